@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
 from brdfdb.errors import ParameterError
-from brdfdb.geometry import HALF_PI, degrees, radians
+from brdfdb.geometry import HALF_PI, degrees, radians, unit_vector
 from brdfdb.measurements.coordinates import beyond, places
 from brdfdb.measurements.samples import Samples
 from brdfdb.parameters import Floats
@@ -21,6 +21,7 @@ _CELL_DEG, _TURNED_CELL_DEG = 2.5, 7.5  # cells of three coordinates, and of fou
 _REGULAR = 8  # samples of a light, and more, make a scan
 _LIGHTS, _VIEWERS, _SCATTERED = 2.0, 4.0, 4.0  # volume of a ball, in those that typically fit between samples
 _THINNED = 400  # samples that the typical ball is measured with
+_LOWEST = radians(89.9)  # polar angle of directions that are drawn, at most
 _LEAST = 1.5  # radius of a ball in cells, at least: smaller ones slip through the cells
 _FLAT = 1e-6  # spread along an axis, relative to the largest, that counts as none
 _ROUNDING = 1e-6  # of distances, in radii
@@ -77,9 +78,9 @@ class Extent(BaseModel):
         scans = np.median(np.bincount(incidence)) >= _REGULAR
         if scans:
             of_light = _typical(light)
-            each = [_typical(sheared[incidence == one, lights:]) for one in np.unique(incidence)]
+            of_viewers = [_typical(sheared[incidence == one, lights:]) for one in np.unique(incidence)]
             radii = np.array(
-                [_LIGHTS ** (1.0 / lights) * of_light] * lights + [_VIEWERS**0.5 * float(np.median(each))] * 2
+                [_LIGHTS ** (1.0 / lights) * of_light] * lights + [_VIEWERS**0.5 * float(np.median(of_viewers))] * 2
             )
         else:
             radii = np.full(lights + 2, _SCATTERED ** (1.0 / (lights + 2)) * _typical(sheared))
@@ -123,6 +124,17 @@ class Extent(BaseModel):
         at = at if self.turned else np.stack([at[:, 0], at[:, 1], np.abs(at[:, 2])], axis=1)
         at = np.clip(at + _origin(count, turned=self.turned), 0, np.array(self.measured.shape) - 1)
         return np.asarray(~self.measured[tuple(at.T)])
+
+    def drawn(self, count: int, rng: np.random.Generator) -> tuple[Floats, Floats]:
+        """Draw pairs of unit vectors (count, 3) above the horizon, evenly over the cells that were measured."""
+        cells = np.argwhere(self.measured) - _origin(round(90.0 / self.cell_deg), turned=self.turned)
+        x = cells[rng.integers(len(cells), size=count)] + rng.uniform(-0.5, 0.5, (count, cells.shape[1]))
+        x = x * radians(self.cell_deg)
+        theta_i = np.hypot(x[:, 0], x[:, 1]) if self.turned else np.abs(x[:, 0])
+        phi_i = np.arctan2(x[:, 1], x[:, 0]) if self.turned else rng.uniform(0.0, 2.0 * np.pi, count)
+        theta_r, phi_r = np.hypot(x[:, -2], x[:, -1]), np.arctan2(x[:, -1], x[:, -2]) + phi_i * (not self.turned)
+        theta_i, theta_r = (np.minimum(theta, _LOWEST) for theta in (theta_i, theta_r))
+        return unit_vector(theta_i, phi_i), unit_vector(theta_r, phi_r)
 
 
 def _shape(count: int, *, turned: bool) -> tuple[int, ...]:

@@ -8,6 +8,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from brdfdb.measurements.extent import Extent
 
+_FEW = 1e-3  # share of directions that is not told from 0: a few of those that it is counted with
 _SHOWN = 12  # digits of a digest
 
 _STRICT = ConfigDict(frozen=True, extra="forbid")
@@ -135,8 +136,10 @@ class Measured(BaseModel):
                 )
                 lines.append(f"{name} {'assumed' if symmetry.assumed else 'not assumed'}: {how}")
         if self.extrapolated is not None:
+            share = 1.0 - self.extrapolated
+            words = f"{100.0 * share:.3g} %" if share >= _FEW else f"less than {100.0 * _FEW:g} %"
             lines.append(
-                f"{100.0 * (1.0 - self.extrapolated):.3g} % of all pairs of directions were measured; beyond, and in "
+                f"{words} of all pairs of directions were measured; beyond, and in "
                 "holes, f_r is extrapolated, and its error not known"
             )
         if self.negative > 0.0:

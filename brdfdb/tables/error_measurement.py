@@ -15,6 +15,7 @@ from brdfdb.geometry import radians, unit_vector
 from brdfdb.integrals.sampling import mirrored_in_lobe, mixture_density
 from brdfdb.materials import FunctionRecord, Source
 from brdfdb.measurements import MeasuredSource
+from brdfdb.measurements.extent import Extent
 from brdfdb.parameters import Floats
 from brdfdb.tables import places
 from brdfdb.tables._interpolation import weights_of_nodes
@@ -36,6 +37,7 @@ SEED = 1991
 _IN_PLACES, _BETWEEN, _BETWEEN_IN_PLACES = 1 / 10, 1 / 6, 1 / 15
 _WITHIN, _CONFIDENCE = 0.98, 0.98  # share of the values within a limit, and how sure that is
 _SEARCHED, _SEARCHED_AT = (9, 400), 40  # wavelengths of an interval, of all; directions of a band: for the worst
+_THIN = 0.05  # share of the pairs that count below which they are drawn among those that were measured
 _WINDOW = 1 << 21  # values of a table that are held at a time
 _EVALUATED = 1 << 16  # directions at which the source is evaluated at a time
 
@@ -68,8 +70,26 @@ def draw(
     theta_i is uniform in its band, phi_i in the circle. Over the hemisphere the solid angle is uniform; in the lobe the
     light is mirrored in half vectors that follow `Source.lobe`, of the wavelengths in turn, or a lobe twice as wide:
     its own distribution hardly ever reaches the shoulder where the lobe ends. All facets count alike, seen or not.
-    Viewers of a source without a lobe, or of an unknown one, are all drawn over the hemisphere.
+    Viewers of a source without a lobe, or of an unknown one, are all drawn over the hemisphere. Where hardly any of
+    these pairs was measured, such as in a single plane, pairs are drawn evenly over those that were.
     """
+    drawn = _over_all(source, wavelength_nm, count, seed)
+    extent = _extent_of(source)
+    if extent is None or np.count_nonzero(drawn.above) >= _THIN * len(drawn.wi):
+        return drawn
+    wi, wr = extent.drawn(len(drawn.wi), np.random.default_rng(seed))
+    band = np.clip(np.searchsorted(radians(BANDS_DEG), np.arccos(wi[:, 2]), side="right") - 1, 0, BANDS_DEG.size - 2)
+    order = np.argsort(band, kind="stable")
+    wi, wr, band = wi[order], wr[order], band[order]
+    weight = wr[:, 2] * np.sinc(np.arccos(wr[:, 2]) / np.pi)  # drawn evenly in theta (cos phi, sin phi)
+    none = np.zeros(band.size, dtype=bool)
+    return Draw(wi, wr, band, weight * (np.pi / weight.mean()), none, ~none)
+
+
+def _over_all(
+    source: Source | FunctionRecord | None, wavelength_nm: NDArray[np.float64] | None, count: int, seed: int
+) -> Draw:
+    """Draw pairs of directions as `draw` does, everywhere."""
     rng = np.random.default_rng(seed)
     band = np.repeat(np.arange(BANDS_DEG.size - 1), count)
     theta_i = radians(BANDS_DEG[band] + rng.random(band.size) * np.diff(BANDS_DEG)[band])
@@ -96,15 +116,15 @@ def draw(
 
 
 def _measured(source: Source | FunctionRecord | None, wi: Floats, wr: Floats) -> NDArray[np.bool_]:
-    """Return which pairs of unit vectors (N, 3) count: all, or of measured data those that are not extrapolated.
+    """Return which pairs of unit vectors (N, 3) count: all, or of measured data those that are not extrapolated."""
+    extent = _extent_of(source)
+    return np.ones(len(wi), dtype=bool) if extent is None else ~extent.outside(wi, wr)
 
-    If none of so many pairs was measured, such as of anisotropic data in a single plane, all count.
-    """
-    known = source.measured if isinstance(source, MeasuredSource | TableSource) else None
-    if known is None or known.extent is None:
-        return np.ones(len(wi), dtype=bool)
-    inside = ~known.extent.outside(wi, wr)
-    return inside if np.any(inside & (wr[:, 2] > 0.0)) else np.ones(len(wi), dtype=bool)
+
+def _extent_of(source: Source | FunctionRecord | None) -> Extent | None:
+    """Return the directions that were measured; None if all are known."""
+    measured = source.measured if isinstance(source, MeasuredSource | TableSource) else None
+    return None if measured is None else measured.extent
 
 
 def model_values(source: Source, wavelength_nm: NDArray[np.float64] | None, wi: Floats, wr: Floats) -> Floats:

@@ -70,7 +70,7 @@ def test_lookup_with_its_error_marks_what_is_extrapolated(client: Client) -> Non
     assert client.post("/v1/materials/clay-vase/lookup?error=true", json=body).json()["extrapolated"] == [False, False]
 
 
-def test_cut_tells_where_it_is_extrapolated(client: Client, measured: Path) -> None:
+def test_cut_tells_where_it_is_extrapolated(client: Client) -> None:
     lobe = client.get("/v1/materials/my-clay/lobe?theta_i=30").json()
     theta_r = np.abs(lobe["axes_deg"]["theta_r"])
     assert np.all(np.array(lobe["extrapolated"])[theta_r > 77.0])
