@@ -109,6 +109,11 @@ def of_lines(texts: list[str]) -> dict[str, Any]:
     return document
 
 
+def note(document: dict[str, Any], sentence: str) -> None:
+    """Add a sentence to the notes of a record, which statements on samples repeat."""
+    document["notes"] = [*document.get("notes", ()), sentence]
+
+
 _NM, _SPOT = re.compile(r"\b(\d+(?:\.\d+)?) ?nm\b"), re.compile(r"(\d+(?:\.\d+)?) ?mm spot")
 _INSTRUMENTS = ("Instrument", "Scatterometer", "Gonioreflectometer", "Goniophotometer")
 

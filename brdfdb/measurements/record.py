@@ -125,7 +125,7 @@ class Measured(BaseModel):
                 f"{held.p95:.2g}, 99 within {held.p99:.2g}, of f_r"
             )
         noise = "not stated" if self.noise is None else f"median {self.noise.median:.2g}, p95 {self.noise.p95:.2g}"
-        lines.append(f"noise of the samples: {noise}")
+        lines.append(f"noise of the {'samples' if self.samples else 'file'}: {noise}")
         for name, symmetry in (("reciprocity", self.reciprocity), ("mirror symmetry", self.mirror)):
             if symmetry is not None:
                 seen = symmetry.asymmetry
@@ -139,8 +139,8 @@ class Measured(BaseModel):
             share = 1.0 - self.extrapolated
             words = f"{100.0 * share:.3g} %" if share >= _FEW else f"less than {100.0 * _FEW:g} %"
             lines.append(
-                f"{words} of all pairs of directions were measured; beyond, and in "
-                "holes, f_r is extrapolated, and its error not known"
+                f"{words} of all pairs of directions were measured; beyond, and in holes, f_r is extrapolated, and its "
+                "error not known"
             )
         if self.negative > 0.0:
             lines.append(f"{100.0 * self.negative:.3g} % of the values are below 0: f_r is 0 there")

@@ -34,6 +34,7 @@ def run(
     residual: Kind = "log",
     channel: str | None = None,
     wavelength_nm: float | None = None,
+    azimuth: str = "light",
     refractive_index: str | None = None,
     receiver_deg: float | None = None,
     source_deg: float | None = None,
@@ -55,6 +56,8 @@ def run(
         The one channel that is fitted.
     wavelength_nm : float [nm], optional
         Wavelength of samples of one channel that state none.
+    azimuth : str
+        As of `brdfdb.formats.read`.
     receiver_deg, source_deg : float [degree], optional
         Full angles of the cones of receiver and light, as the sample sees them, in place of what the file states.
     json, page, recipe : Path, optional
@@ -72,7 +75,7 @@ def run(
     BrdfdbError
         If a recipe is asked for and no fit is one model of the registry.
     """
-    samples = _selected(formats.samples(data), channel, wavelength_nm)
+    samples = _selected(formats.samples(data, azimuth=azimuth), channel, wavelength_nm)
     cones = {
         "receiver_solid_angle_sr": ("receiver-deg", receiver_deg),
         "source_solid_angle_sr": ("source-deg", source_deg),

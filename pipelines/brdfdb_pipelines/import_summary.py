@@ -169,4 +169,4 @@ def _percent(value: float | np.floating[Any] | None) -> str:
     """Return a share as text in percent with two digits, a hyphen if it is not known."""
     if value is None:
         return "-"
-    return f"{100.0 * value:.2g} %" if value < 0.995 else "100 %"
+    return f"{100.0 * value:.2g} %" if value < 0.0995 else f"{100.0 * value:.0f} %"

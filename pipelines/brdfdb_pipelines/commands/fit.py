@@ -34,6 +34,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--wavelength-nm", type=float, metavar="NM", help="wavelength of samples of one channel that state none"
     )
     parser.add_argument(
+        "--azimuth",
+        choices=("light", "forward"),
+        help="direction from which DATA counts azimuths: the light, or the one into which it travels (default: light)",
+    )
+    parser.add_argument(
         "--refractive-index",
         metavar="ENTRY",
         help="shelf/book/page of models with n and k (default: n and k are searched)",
@@ -68,6 +73,7 @@ def run(options: argparse.Namespace) -> int:
         residual=options.residual,
         channel=options.channel,
         wavelength_nm=options.wavelength_nm,
+        azimuth=options.azimuth or "light",
         refractive_index=options.refractive_index,
         receiver_deg=options.receiver_deg,
         source_deg=options.source_deg,
@@ -83,7 +89,7 @@ def _published(options: argparse.Namespace) -> int:
     from brdfdb.errors import ParameterError
     from brdfdb_pipelines import published_fits
 
-    for name in ("model", "wavelength_nm", "refractive_index", "receiver_deg", "source_deg", "page"):
+    for name in ("model", "wavelength_nm", "azimuth", "refractive_index", "receiver_deg", "source_deg", "page"):
         if getattr(options, name):
             option = f"--{name.replace('_', '-')}"
             raise ParameterError(option, f"{options.data} holds the fits of others and no samples; leave it out")
