@@ -53,7 +53,7 @@ def record(
         "title": known.title or "",
         **document,
         "source": known.source or "",
-        "measured": None if known.measured is None else known.measured.model_dump(mode="json", exclude={"hull"}),
+        "measured": None if known.measured is None else known.measured.model_dump(mode="json", exclude={"extent"}),
         "note": known.note,
         "revision": table.revision,
         "digest": table.digest,

@@ -302,7 +302,7 @@ def _on_pairs(known: Statement) -> list[str]:
         return ["Reciprocity: no sample is the swap of another."]
     pairs = known.reciprocity
     return [
-        f"Reciprocity: {counted(pairs.pairs, 'pair')} of samples with light and viewer exchanged; median difference "
+        f"Reciprocity: {counted(pairs.pairs, 'pair')} of samples with light and viewer exchanged; median asymmetry "
         f"{100.0 * pairs.median:.3g} %, largest {100.0 * pairs.largest:.3g} %."
     ]
 

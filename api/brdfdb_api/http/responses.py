@@ -70,7 +70,7 @@ class Summary(BaseModel):
 
     name: str
     title: str = ""
-    model: str = ""
+    model: str | None = Field(default=None, description="null: measured, or a function")
     model_title: str = ""
     paper: str = Field(default="", description="key of the paper of the model, such as he1991")
     source: str = Field(default="", description="paper and table, figure or section of the parameters")
@@ -136,7 +136,7 @@ class Material(BaseModel):
     name: str
     revision: str
     title: str
-    model: str
+    model: str | None = Field(description="name of the model; null: measured, or a function")
     parameters: list[ParameterDocument]
     anisotropic: bool
     wavelength_nm: list[float] | None = Field(description="wavelengths [nm]; null: grey")
@@ -226,6 +226,9 @@ class Lobe(BaseModel):
         "hemisphere delta_phi is phi_r - phi_i"
     )
     brdf: list[Any]
+    extrapolated: list[Any] | None = Field(
+        description="over the same axes, true where measured data lack the direction; null: not measured"
+    )
     specular_reflectance: float | list[float] | None
 
 

@@ -136,7 +136,7 @@ def catalogue(
 
 def _let_through(line: dict[str, Any], model: str, paper: str, words: list[str]) -> bool:
     """Return True if the filters let a line of the catalogue through."""
-    text = " ".join(str(line.get(key, "")) for key in SEARCHED).casefold()
+    text = " ".join(str(line.get(key) or "") for key in SEARCHED).casefold()
     papers = f"{line.get('paper', '')} {line.get('source', '')}".casefold()
     models = ("", line.get("model", ""), "measured" if line.get("measured") else "")
     return model in models and paper in papers and all(word in text for word in words)
@@ -179,7 +179,7 @@ def material(request: Request, name: str, revision: str | None = None) -> Respon
         "name": table.name,
         "revision": table.revision,
         "title": metadata.title or "",
-        "model": metadata.model or "",
+        "model": metadata.model,
         "parameters": _parameters(metadata),
         "anisotropic": table.anisotropic,
         "wavelength_nm": table.wavelength_nm,
@@ -187,7 +187,7 @@ def material(request: Request, name: str, revision: str | None = None) -> Respon
         "axes_deg": {axis: np.ascontiguousarray(values) for axis, values in table.axes_deg.items()},
         "specular": table.specular is not None,
         "error": None if table.error is None else table.attrs["error"],
-        "measured": None if metadata.measured is None else metadata.measured.model_dump(exclude={"hull"}),
+        "measured": None if metadata.measured is None else metadata.measured.model_dump(exclude={"extent"}),
         "formula_error": table.attrs.get("formula_error"),
         "largest_albedo": table.attrs.get("largest_albedo"),
         "incomplete": metadata.gaps or None,

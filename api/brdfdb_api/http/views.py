@@ -163,6 +163,7 @@ def lobe(
         "wavelength_nm": points.wavelengths(table),
         "axes_deg": axes,
         "brdf": plain(values.brdf),
+        "extrapolated": None if table.metadata.measured is None else plain(table.extrapolated(*angles)),
         "specular_reflectance": None if view == "half-difference" else plain(values.specular_reflectance),
     }
     return json_response(document, headers)

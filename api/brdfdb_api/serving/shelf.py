@@ -220,7 +220,7 @@ def _described(name: str, group: Path, digest: str, head: Mapping[str, Any]) -> 
     return {
         "name": name,
         "title": metadata.title or "",
-        "model": metadata.model or "",
+        "model": metadata.model,
         "model_title": metadata.model_title or metadata.model or "",
         "paper": metadata.model_reference or "",
         "source": metadata.source or "",
