@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import math
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -51,6 +52,12 @@ _UNCERTAINTY = (
 _WAVELENGTH = ("wavelength", "lambda", "wl", "wvl", "wave")
 _LENGTHS = {"nm": 1.0, "nanomet": 1.0, "um": 1e3, "µm": 1e3, "μm": 1e3, "micro": 1e3, "m": 1e9}  # in nm
 _LENGTH = re.compile(r"(?:^|[\W_\d])(nm|um|µm|μm|m|(?:nano|micro)met(?:er|re)s?|microns?)(?=$|[\W_])", re.IGNORECASE)
+ANGLE_UNITS = {"deg": math.pi / 180.0, "rad": 1.0, "mrad": 1e-3}  # in rad
+_ANGLE_WORDS = {
+    "deg": ("deg", "degs", "degree", "degrees", "°", "º"),
+    "rad": ("rad", "rads", "radian", "radians"),
+    "mrad": ("mrad", "mrads", "milliradian", "milliradians"),
+}
 AZIMUTHS = ("phi", "azimuth", "azi", "az", "azimuth_angle")  # of a viewer relative to the light, if there is no other
 _COLOURS = (("R", "G", "B"), ("r", "g", "b"), ("X", "Y", "Z"))  # x, y, z are positions
 _OF_FACTORS = re.compile(r"\b(?:BRF|HCRF|reflectance factors?)\b", re.IGNORECASE)
@@ -275,13 +282,16 @@ def plain_name(name: str) -> str:
     text = name.strip().lower().replace("θ", "theta").replace("φ", "phi").replace("ϕ", "phi").replace("δ", "delta_")
     text = re.sub(r"[\[(].*?[\])]", "", text)
     text = re.sub(r"[^a-z0-9.µμ]+", "_", text).strip("_")
-    return re.sub(r"_(?:deg|degrees?|rad|radians?|percent|pct)$", "", text)
+    return re.sub(r"_(?:deg|degrees?|m?rad|radians?|percent|pct)$", "", text)
 
 
 def angle_unit(name: str) -> str:
-    """Return the unit of angles that a name gives: "deg", "rad", or "" if it gives none."""
-    if re.search(r"[\W_]rad", name.lower()):
-        return "rad"
+    """Return the unit of angles that a name gives: one of `ANGLE_UNITS`, the text in its brackets, or "" if none."""
+    for unit in (text.strip() for text in _BRACKETS.findall(name)):
+        if unit:
+            return next((key for key, words in _ANGLE_WORDS.items() if unit.lower().rstrip(".") in words), unit)
+    if match := re.search(r"[\W_](m?rad)", name.lower()):
+        return match[1]
     return "deg" if "deg" in name.lower() or "°" in name else ""
 
 

@@ -20,10 +20,8 @@ from numpy.typing import NDArray
 from brdfdb.errors import FileFormatError, ParameterError
 from brdfdb.formats._columns import (
     ANGLES,
-    AZIMUTHS,
     QUANTITIES,
     Layout,
-    angle_unit,
     fields_of,
     in_percent,
     layout_of,
@@ -37,6 +35,7 @@ from brdfdb.formats._columns import (
 )
 from brdfdb.formats._nodes import samples_at_angles
 from brdfdb.formats._record import note, of_comments
+from brdfdb.formats._text_angles import angles_of_rows
 from brdfdb.formats._text_file import check_text, lines_of
 
 if TYPE_CHECKING:
@@ -53,8 +52,6 @@ _UNITS = ("auto", "deg", "rad")
 _LEAST_NM, _LEAST_UM = 10.0, 100.0  # numbers without a unit below the first are not nm, from the second on not um
 HOW = "theta_i=NAME and so on, at the command line --column theta_i=NAME"  # columns are named
 _SHOWN = 200  # characters of names that a sentence repeats
-_IN_PLANE = 1e-6  # sine of an angle to the plane of incidence that is rounding
-_UPRIGHT = np.radians(90.0 + 1e-6)
 
 
 def recognises(head: bytes) -> bool:
@@ -119,7 +116,7 @@ def read(
     roles = _roles(path, layout, columns)
     rows = _rows(path, layout)
     record: dict[str, Any] = {"titles": list(layout.titles)} if layout.titles else {}
-    turned = _angles(path, rows, roles, layout, angles, record)
+    turned = angles_of_rows(path, rows, roles, layout, angles, record)
     names = [layout.names[column] for column in roles["values"]]
     scale = _scale(path, names, layout, quantity, turned[:, 2], record)
     values, uncertainty = _values(path, rows, roles, layout, scale, record)
@@ -224,72 +221,6 @@ def _rows(path: Path, layout: Layout) -> Array:
             decimals = sign
             numbers.append(number)
     return np.frombuffer(numbers, dtype=np.float64).reshape(-1, count)
-
-
-def _angles(
-    path: Path, rows: Array, roles: Mapping[str, list[int]], layout: Layout, unit: str, record: dict[str, Any]
-) -> Array:
-    """Return theta_i, phi_i, theta_r, phi_r [rad] of rows, shape (N, 4)."""
-    from brdfdb.measurements.samples import RELATIVE
-
-    given = {name: rows[:, roles[name][0]] for name in ANGLES if name in roles}
-    for name, column in given.items():
-        if np.any(np.isnan(column)):
-            line = f"line {layout.line}, field {layout.names[roles[name][0]]}"
-            raise FileFormatError(f"{path}: {line}: an angle is missing")
-    units = {name: unit if unit != "auto" else angle_unit(layout.names[roles[name][0]]) for name in given}
-    named = sorted(set(units.values()) - {""})
-    other = named[0] if len(named) == 1 else "deg"  # of columns whose names give none
-    if not named and _may_be_radians(given):
-        text = "no polar angle exceeds pi/2 and no azimuth 2 pi, so they may be radians: --angles rad reads them so"
-        note(record, f"Angles were taken as degrees, but no name gives a unit, {text}.")
-    if "delta_phi" in given and plain_name(layout.names[roles["delta_phi"][0]]) in AZIMUTHS:
-        note(
-            record,
-            f"The column {layout.names[roles['delta_phi'][0]]} was taken as the azimuth from the light to the viewer.",
-        )
-    units = {name: unit or other for name, unit in units.items()}
-    record["angles"] = " and ".join({"deg": "degrees", "rad": "radians"}[unit] for unit in sorted(set(units.values())))
-    given = {name: np.deg2rad(column) if units[name] == "deg" else column for name, column in given.items()}
-    relative = "phi_i" not in given
-    if relative:
-        given["phi_i"] = np.zeros(len(rows))
-    _exchange(given, record)
-    swept = bool(np.any(given["theta_i"] < 0.0)) and np.ptp(given["phi_i"]) == 0.0
-    for side in ("i", "r"):
-        theta, phi = given[f"theta_{side}"], f"phi_{side}" if f"phi_{side}" in given else "delta_phi"
-        given[phi] = np.where(theta < 0.0, given[phi] + np.pi, given[phi])
-        if side == "i" and "delta_phi" in given:  # the viewer turns with the light
-            given["delta_phi"] = np.where(theta < 0.0, given["delta_phi"] - np.pi, given["delta_phi"])
-        given[f"theta_{side}"] = np.abs(theta)
-        if np.any(np.abs(theta) > np.pi * (1.0 + 1e-9)):
-            shown = np.rad2deg(np.abs(theta).max())
-            raise FileFormatError(f"{path}: line {layout.line}: theta_{side} of {shown:g} degrees is no polar angle")
-    phi_i = given["phi_i"]
-    phi_r = given["phi_r"] if "phi_r" in given else phi_i + given["delta_phi"]
-    in_plane = np.abs(np.sin(phi_r - phi_i)) * np.sin(given["theta_r"]) < _IN_PLANE
-    if relative or (swept and in_plane.all()):  # signed angles in one plane: the surface has not turned
-        record["azimuths"] = RELATIVE
-        phi_i, phi_r = np.zeros(len(rows)), phi_r - phi_i
-    return np.stack([given["theta_i"], phi_i, given["theta_r"], phi_r], axis=1)
-
-
-def _may_be_radians(given: Mapping[str, Array]) -> bool:
-    """Return True if angles without a unit are as small as radians are, and not 0 alone."""
-    largest = {name: float(np.abs(column).max(initial=0.0)) for name, column in given.items()}
-    within = all(size <= (0.5 if name.startswith("theta") else 2.0) * np.pi + 1e-3 for name, size in largest.items())
-    return within and any(largest.values())
-
-
-def _exchange(given: dict[str, Array], record: dict[str, Any]) -> None:
-    """Exchange theta and phi where theta cannot be the polar angle, and phi can."""
-    if not {"phi_i", "phi_r"} <= set(given) or np.all(np.abs(given["theta_i"]) <= _UPRIGHT):
-        return
-    if max(np.abs(given["phi_i"]).max(), np.abs(given["phi_r"]).max()) <= _UPRIGHT:
-        for side in ("i", "r"):
-            theta, phi = f"theta_{side}", f"phi_{side}"
-            given[theta], given[phi] = given[phi], given[theta]
-        record["exchanged"] = "theta exceeds 90 degrees and phi does not: phi was read as the polar angle"
 
 
 def _scale(

@@ -92,6 +92,35 @@ def test_the_unit_of_angles_is_that_of_the_names(header: str, row: str, tmp_path
     assert "notes" not in sheet.record
 
 
+@pytest.mark.parametrize(
+    ("header", "row", "unit"),
+    [
+        ("theta_i (mrad),theta_r (mrad),raa (mrad),brdf", "500,1250,3141.5927,0.3", "milliradians"),
+        ("theta_i_mrad,theta_r_mrad,raa_mrad,brdf", "500,1250,3141.5927,0.3", "milliradians"),
+        ("theta_i [°],theta_r (Degree),raa [deg.],brdf", "28.647890,71.619724,180,0.3", "degrees"),
+        ("theta_i [radian],theta_r [rad],raa [RAD],brdf", "0.5,1.25,3.1415927,0.3", "radians"),
+    ],
+)
+def test_units_of_angles_in_brackets_are_read(header: str, row: str, unit: str, tmp_path: Path) -> None:
+    sheet = samples(tmp_path, f"{header}\n{row}\n")
+    assert [sheet.theta_i[0], sheet.theta_r[0], sheet.phi_r[0]] == pytest.approx([0.5, 1.25, np.pi])
+    assert sheet.record["angles"] == unit
+
+
+def test_a_unit_of_angles_that_is_none_is_refused_unless_the_user_states_one(tmp_path: Path) -> None:
+    text = "theta_i [gon],theta_r [gon],raa [gon],brdf\n10,20,180,0.3\n"
+    with pytest.raises(FileFormatError, match=r"line 1, field theta_i \[gon\]: the unit 'gon' is none of angles"):
+        samples(tmp_path, text)
+    assert np.degrees(samples(tmp_path, text, angles="deg").theta_i) == pytest.approx([10.0])
+
+
+@pytest.mark.parametrize(("turn", "stated"), [("3.14159", True), ("180", False)])
+def test_an_azimuth_without_a_unit_beside_degrees_may_be_radians(turn: str, stated: bool, tmp_path: Path) -> None:
+    sheet = samples(tmp_path, f"theta_i [deg],theta_r [deg],delta_phi,brdf\n40,20,0,0.3\n40,20,{turn},0.5\n")
+    notes = [text for text in statement(sheet).notes if "may be radians" in text]
+    assert [text.startswith("The column delta_phi was taken as degrees") for text in notes] == [True] * stated
+
+
 @pytest.mark.parametrize("header", ["theta_i,theta_r,delta_phi,brdf", "sza,vza,raa,brdf"])
 def test_angles_without_a_unit_are_degrees_and_small_ones_are_stated(header: str, tmp_path: Path) -> None:
     path = tmp_path / "sheet.csv"

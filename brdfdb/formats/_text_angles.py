@@ -1,0 +1,115 @@
+"""Angles of texts: their units, the relative azimuth, and letters that a file has exchanged."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brdfdb.errors import FileFormatError
+from brdfdb.formats._columns import ANGLE_UNITS, ANGLES, AZIMUTHS, Layout, angle_unit, plain_name
+from brdfdb.formats._record import note
+
+Array = NDArray[np.float64]
+
+_WORDS = {"deg": "degrees", "rad": "radians", "mrad": "milliradians"}
+_IN_PLANE = 1e-6  # sine of an angle to the plane of incidence that is rounding
+_UPRIGHT = np.radians(90.0 + 1e-6)
+
+
+def angles_of_rows(
+    path: Path, rows: Array, roles: Mapping[str, list[int]], layout: Layout, unit: str, record: dict[str, Any]
+) -> Array:
+    """Return theta_i, phi_i, theta_r, phi_r [rad] of rows, shape (N, 4)."""
+    from brdfdb.measurements.samples import RELATIVE
+
+    given = {name: rows[:, roles[name][0]] for name in ANGLES if name in roles}
+    for name, column in given.items():
+        if np.any(np.isnan(column)):
+            line = f"line {layout.line}, field {layout.names[roles[name][0]]}"
+            raise FileFormatError(f"{path}: {line}: an angle is missing")
+    units = _units(path, given, roles, layout, unit, record)
+    if "delta_phi" in given and plain_name(layout.names[roles["delta_phi"][0]]) in AZIMUTHS:
+        note(
+            record,
+            f"The column {layout.names[roles['delta_phi'][0]]} was taken as the azimuth from the light to the viewer.",
+        )
+    record["angles"] = " and ".join(_WORDS[unit] for unit in sorted(set(units.values())))
+    given = {name: column * ANGLE_UNITS[units[name]] for name, column in given.items()}
+    relative = "phi_i" not in given
+    if relative:
+        given["phi_i"] = np.zeros(len(rows))
+    _exchange(given, record)
+    swept = bool(np.any(given["theta_i"] < 0.0)) and np.ptp(given["phi_i"]) == 0.0
+    for side in ("i", "r"):
+        theta, phi = given[f"theta_{side}"], f"phi_{side}" if f"phi_{side}" in given else "delta_phi"
+        given[phi] = np.where(theta < 0.0, given[phi] + np.pi, given[phi])
+        if side == "i" and "delta_phi" in given:  # the viewer turns with the light
+            given["delta_phi"] = np.where(theta < 0.0, given["delta_phi"] - np.pi, given["delta_phi"])
+        given[f"theta_{side}"] = np.abs(theta)
+        if np.any(np.abs(theta) > np.pi * (1.0 + 1e-9)):
+            shown = np.rad2deg(np.abs(theta).max())
+            raise FileFormatError(f"{path}: line {layout.line}: theta_{side} of {shown:g} degrees is no polar angle")
+    phi_i = given["phi_i"]
+    phi_r = given["phi_r"] if "phi_r" in given else phi_i + given["delta_phi"]
+    in_plane = np.abs(np.sin(phi_r - phi_i)) * np.sin(given["theta_r"]) < _IN_PLANE
+    if relative or (swept and in_plane.all()):  # signed angles in one plane: the surface has not turned
+        record["azimuths"] = RELATIVE
+        phi_i, phi_r = np.zeros(len(rows)), phi_r - phi_i
+    return np.stack([given["theta_i"], phi_i, given["theta_r"], phi_r], axis=1)
+
+
+def _units(
+    path: Path,
+    given: Mapping[str, Array],
+    roles: Mapping[str, list[int]],
+    layout: Layout,
+    unit: str,
+    record: dict[str, Any],
+) -> dict[str, str]:
+    """Return the unit of each angle: the one that the user states, or that of its name, or that of other names."""
+    if unit != "auto":
+        return dict.fromkeys(given, unit)
+    units = {}
+    for name in given:
+        column = layout.names[roles[name][0]]
+        units[name] = angle_unit(column)
+        if units[name] not in ("", *ANGLE_UNITS):
+            where = f"{path}: line {layout.line}, field {column}"
+            raise FileFormatError(f"{where}: the unit {units[name]!r} is none of angles; allowed are deg, rad and mrad")
+    named = sorted(set(units.values()) - {""})
+    other = named[0] if len(named) == 1 else "deg"  # of columns whose names give none
+    unnamed = {name: column for name, column in given.items() if not units[name]}
+    if other == "deg" and unnamed and _may_be_radians(unnamed):
+        if named:
+            columns = [layout.names[roles[name][0]] for name in unnamed]
+            subject, verb = f"The column {columns[0]} was", "it gives"
+            if len(columns) > 1:
+                subject, verb = f"The columns {' and '.join(columns)} were", "they give"
+            text = f"{subject} taken as degrees, as other columns are, but {verb} no unit and may be radians"
+            note(record, f"{text}: names such as {plain_name(columns[0])}_rad say so.")
+        else:
+            text = "no polar angle exceeds pi/2 and no azimuth 2 pi, so they may be radians: --angles rad reads them so"
+            note(record, f"Angles were taken as degrees, but no name gives a unit, {text}.")
+    return {name: own or other for name, own in units.items()}
+
+
+def _may_be_radians(given: Mapping[str, Array]) -> bool:
+    """Return True if angles without a unit are as small as radians are, and not 0 alone."""
+    largest = {name: float(np.abs(column).max(initial=0.0)) for name, column in given.items()}
+    within = all(size <= (0.5 if name.startswith("theta") else 2.0) * np.pi + 1e-3 for name, size in largest.items())
+    return within and any(largest.values())
+
+
+def _exchange(given: dict[str, Array], record: dict[str, Any]) -> None:
+    """Exchange theta and phi where theta cannot be the polar angle, and phi can."""
+    if not {"phi_i", "phi_r"} <= set(given) or np.all(np.abs(given["theta_i"]) <= _UPRIGHT):
+        return
+    if max(np.abs(given["phi_i"]).max(), np.abs(given["phi_r"]).max()) <= _UPRIGHT:
+        for side in ("i", "r"):
+            theta, phi = f"theta_{side}", f"phi_{side}"
+            given[theta], given[phi] = given[phi], given[theta]
+        record["exchanged"] = "theta exceeds 90 degrees and phi does not: phi was read as the polar angle"
