@@ -54,7 +54,7 @@ _LENGTHS = {"nm": 1.0, "nanomet": 1.0, "um": 1e3, "µm": 1e3, "μm": 1e3, "micro
 _LENGTH = re.compile(r"(?:^|[\W_\d])(nm|um|µm|μm|m|(?:nano|micro)met(?:er|re)s?|microns?)(?=$|[\W_])", re.IGNORECASE)
 ANGLE_UNITS = {"deg": math.pi / 180.0, "rad": 1.0, "mrad": 1e-3}  # in rad
 _ANGLE_WORDS = {
-    "deg": ("deg", "degs", "degree", "degrees", "°", "º"),
+    "deg": ("deg", "degs", "degree", "degrees", "°", "º", "\ufffd"),  # the last is ° of other encodings
     "rad": ("rad", "rads", "radian", "radians"),
     "mrad": ("mrad", "mrads", "milliradian", "milliradians"),
 }
@@ -156,7 +156,7 @@ def layout_of(lines: Iterable[tuple[int, str]]) -> Layout | None:
     for number, line in lines:
         delimiter = next((sign for sign in _delimiters(line) if _is_row(fields_of(line, sign))), "")
         if delimiter == "":
-            text = _COMMENT.sub("", line.rstrip("\r\n"))
+            text = comment_of(line)
             before.append(_Line(number, text, comment=text != line.rstrip("\r\n")))
             continue
         count = len(fields_of(line, delimiter))
@@ -167,6 +167,18 @@ def layout_of(lines: Iterable[tuple[int, str]]) -> Layout | None:
         damaged = next((fault for some in between if (fault := _fault(some, delimiter, names))), "")
         return Layout(delimiter, at or number, names, titles, number, damaged)
     return None
+
+
+def comment_of(line: str) -> str:
+    """Return a line without the sign of a comment and its end."""
+    return _COMMENT.sub("", line.rstrip("\r\n"))
+
+
+def header_of(text: str, layout: Layout) -> tuple[str, ...]:
+    """Return the names of columns in a line with as many as a layout has, three of them known; else none."""
+    names = _split(text, layout.delimiter, len(layout.names))
+    known = sum(name in layout.names or bool(role_of(name)) for name in names if number_of(name) is None)
+    return names if known >= _FEWEST_NAMES else ()
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import itertools
 import os
-from array import array
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,11 +22,9 @@ from brdfdb.formats._columns import (
     ANGLES,
     QUANTITIES,
     Layout,
-    fields_of,
     in_percent,
     layout_of,
     length_unit,
-    number_of,
     plain_name,
     quantity_of,
     roles_of,
@@ -37,6 +35,7 @@ from brdfdb.formats._nodes import samples_at_angles
 from brdfdb.formats._record import note, of_comments
 from brdfdb.formats._text_angles import angles_of_rows
 from brdfdb.formats._text_file import check_text, lines_of
+from brdfdb.formats._text_rows import rows_of
 
 if TYPE_CHECKING:
     from brdfdb.measurements.samples import Samples
@@ -107,6 +106,8 @@ def read(
     FileFormatError
         If the file is no text of numbers, or a column is missing; with the line and the field.
     """
+    from brdfdb.measurements.joining import contradiction_within
+
     path = Path(path)
     check_text(path, _MOST_BYTES)
     for name, value, allowed in (("quantity", quantity, ("auto", *QUANTITIES)), ("angles", angles, _UNITS)):
@@ -114,7 +115,7 @@ def read(
             raise ParameterError(name, f"{value!r} is not one of {', '.join(allowed)}", value, allowed)
     layout = _layout(path)
     roles = _roles(path, layout, columns)
-    rows = _rows(path, layout)
+    rows = rows_of(path, layout, one_wavelength="wavelength" not in roles and len(roles["values"]) == 1)
     record: dict[str, Any] = {"titles": list(layout.titles)} if layout.titles else {}
     turned = angles_of_rows(path, rows, roles, layout, angles, record)
     names = [layout.names[column] for column in roles["values"]]
@@ -141,9 +142,11 @@ def read(
     left = set(range(len(layout.names))) - {column for columns_ in roles.values() for column in columns_}
     if left:
         record["columns_left_out"] = [layout.names[column] for column in sorted(left)]
-    return samples_at_angles(
+    listed = samples_at_angles(
         turned, values, path.stem, channels, at, record, uncertainty=uncertainty, instrument=instrument
     )
+    contradiction = contradiction_within(listed)
+    return replace(listed, record={**listed.record, "contradiction": contradiction}) if contradiction else listed
 
 
 def _layout(path: Path) -> Layout:
@@ -177,6 +180,8 @@ def _roles(path: Path, layout: Layout, columns: Mapping[str, str | Sequence[str]
     known = {role: [n for n in numbers if n not in used] for role, numbers in roles_of(layout.names).items()}
     if "delta_phi" in given or "phi_r" in given:
         known.pop("phi_r" if "delta_phi" in given else "delta_phi", None)
+    elif {"phi_r", "delta_phi"} <= set(known):  # without phi_i, phi_r may count from any direction
+        known.pop("delta_phi" if "phi_i" in known or "phi_i" in given else "phi_r")
     roles = {role: numbers for role, numbers in (known | given).items() if numbers}
     if missing := _missing(roles):
         raise FileFormatError(
@@ -195,32 +200,6 @@ def _missing(roles: Mapping[str, list[int]]) -> str:
     if not {"phi_r", "delta_phi"} & set(roles):
         missing.append("phi_r or delta_phi")
     return ", ".join(missing)
-
-
-def _rows(path: Path, layout: Layout) -> Array:
-    """Return the numbers of a text from its first row on, shape (N, columns)."""
-    numbers, count = array("d"), len(layout.names)
-    decimals = ""  # the sign before decimals: a comma beside points may be that of thousands
-    for line_number, line in lines_of(path):
-        if line_number < layout.first or not line.strip() or line.lstrip().startswith(("#", "%")):
-            continue
-        fields = fields_of(line, layout.delimiter)
-        fields = fields[:count] if len(fields) == count + 1 and not fields[-1] else fields
-        if len(fields) != count:
-            raise FileFormatError(f"{path}: line {line_number} has {len(fields)} fields, and the first row {count}")
-        for field, name in zip(fields, layout.names, strict=True):
-            number = number_of(field)
-            if number is None or number in (np.inf, -np.inf):
-                raise FileFormatError(f"{path}: line {line_number}, field {name}: {field[:40]!r} is not a number")
-            sign = "," if "," in field else "." if "." in field else decimals
-            if decimals not in ("", sign):
-                where = f"line {line_number}, field {name}"
-                raise FileFormatError(
-                    f"{path}: {where}: {field[:40]!r} has {sign!r}, and numbers before it {decimals!r}"
-                )
-            decimals = sign
-            numbers.append(number)
-    return np.frombuffer(numbers, dtype=np.float64).reshape(-1, count)
 
 
 def _scale(

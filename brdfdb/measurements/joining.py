@@ -128,21 +128,51 @@ def _contradiction(parts: Sequence[Samples]) -> str:
     for number in range(1, len(parts)):
         before = np.concatenate(codes[:number])
         _, one, two = np.intersect1d(before, codes[number], return_indices=True)
-        two = two + len(before)
-        positive = np.minimum(values[one], values[two]) > 0.0
-        if not positive.any():
-            continue
-        a, b, u = values[one][positive], values[two][positive], np.hypot(noises[one], noises[two])[positive]
-        ratio = float(np.median(np.maximum(a, b) / np.minimum(a, b)))
-        stated = (u > 0.0) & np.isfinite(u)
-        beyond = stated.any() and float(np.median(np.abs(a - b)[stated] / u[stated])) > _UNLIKELY
-        if ratio > worst and (ratio > _RATIO or beyond):
-            files = "both files have" if len(parts) == 2 else f"{parts[number].name} and files before it have"
-            what = f"f_r differs by {percent(ratio - 1.0)} in the median"
-            end = ", which is beyond the stated uncertainties" if beyond else ""
-            directions = counted(int(np.sum(positive.any(axis=1))), "direction")
-            worst, sentence = ratio, f"At {directions} that {files}, {what}{end}."
-    return sentence
+        files = "both files have" if len(parts) == 2 else f"{parts[number].name} and files before it have"
+        ratio, text = _difference(values, noises, one, two + len(before), files)
+        if ratio > worst:
+            worst, sentence = ratio, text
+    own = [str(part.record["contradiction"]) for part in parts if "contradiction" in part.record]
+    return sentence or next(iter(own), "")
+
+
+def contradiction_within(samples: Samples) -> str:
+    """Return a sentence if samples hold different values at the same directions, else an empty text.
+
+    Each sample is compared with the first one of its directions. They contradict as those of joined files do.
+    """
+    _, first, directions = np.unique(_codes(samples), return_index=True, return_inverse=True)
+    one = first[directions]
+    again = np.flatnonzero(one != np.arange(one.size))
+    return _difference(samples.values, _noise(samples), one[again], again, "more than one row has")[1]
+
+
+def _difference(
+    values: Floats, noises: Floats, one: NDArray[np.intp], two: NDArray[np.intp], holders: str
+) -> tuple[float, str]:
+    """Return the median ratio of rows `one` and `two`, and a sentence; 0 and an empty text if they do not contradict.
+
+    Parameters
+    ----------
+    values, noises : array (N, C) [1/sr]
+        f_r and its standard uncertainties, 0 where none is stated.
+    one, two : array (n,)
+        Rows with the same directions.
+    holders : str
+        What has the directions, with its verb.
+    """
+    positive = np.minimum(values[one], values[two]) > 0.0
+    if not positive.any():
+        return 0.0, ""
+    a, b, u = values[one][positive], values[two][positive], np.hypot(noises[one], noises[two])[positive]
+    ratio = float(np.median(np.maximum(a, b) / np.minimum(a, b)))
+    stated = (u > 0.0) & np.isfinite(u)
+    beyond = stated.any() and float(np.median(np.abs(a - b)[stated] / u[stated])) > _UNLIKELY
+    if not (ratio > _RATIO or beyond):
+        return 0.0, ""
+    end = ", which is beyond the stated uncertainties" if beyond else ""
+    directions = counted(np.unique(one[np.any(positive, axis=1)]).size, "direction")
+    return ratio, f"At {directions} that {holders}, f_r differs by {percent(ratio - 1.0)} in the median{end}."
 
 
 def _noise(part: Samples) -> Floats:

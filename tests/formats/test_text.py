@@ -135,6 +135,22 @@ def test_angles_without_a_unit_are_degrees_and_small_ones_are_stated(header: str
     assert statement(formats.samples(path)).notes == ()
 
 
+@pytest.mark.parametrize(
+    ("header", "row", "left"),
+    [
+        ("sza,vza,vaa,raa,brdf", "10,20,240,150,0.5", "vaa"),
+        ("theta_i,theta_r,phi_r,delta_phi,brdf", "10,20,240,150,0.5", "phi_r"),
+        ("theta_i,theta_r,phi_i,phi_r,delta_phi,brdf", "10,20,90,240,150,0.5", "delta_phi"),
+    ],
+)
+def test_one_of_two_azimuths_of_the_viewer_is_used_and_the_other_named(
+    header: str, row: str, left: str, tmp_path: Path
+) -> None:
+    sheet = samples(tmp_path, f"{header}\n{row}\n")
+    assert np.degrees(sheet.phi_r - sheet.phi_i) % 360.0 == pytest.approx([150.0])
+    assert f"Columns left out: {left}." in statement(sheet).notes
+
+
 def test_a_negative_polar_angle_is_at_the_opposite_azimuth(tmp_path: Path) -> None:
     sheet = samples(tmp_path, "theta_i theta_r raa brdf\n30 -40 0 0.3\n-30 40 0 0.4\n")
     assert np.degrees(sheet.theta_r) == pytest.approx([40.0, 40.0])

@@ -1,0 +1,59 @@
+"""Texts whose rows are not all alike: comments between them, rows of units, and directions that stand twice."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from brdfdb import formats
+from brdfdb.errors import FileFormatError
+from brdfdb.measurements import Samples
+from brdfdb.measurements.statement import statement
+
+NAMES = "theta_i,theta_r,delta_phi,brdf"
+ROWS = "10,20,180,0.5\n40,20,180,0.25\n"
+
+
+def samples(tmp_path: Path, text: str, **keywords: Any) -> Samples:
+    path = tmp_path / "sheet.csv"
+    path.write_text(text, encoding="utf-8")
+    return formats.samples(path, **keywords)
+
+
+@pytest.mark.parametrize(
+    ("title", "comment", "sentence"),
+    [
+        ("wavelength 450 nm", "wavelength 650 nm", "gives a wavelength of 650 nm, and rows before it have 450 nm"),
+        ("of paint", "wavelength 650 nm", "gives a wavelength of 650 nm, and rows before it have none"),
+        ("of paint", "theta_r,theta_i,delta_phi,brdf", "names other columns than line 2: theta_r, theta_i, delta_phi"),
+        ("of paint", "theta_i,theta_r,delta_phi,BRF", "names other columns than line 2: theta_i, theta_r, delta_phi"),
+        ("of paint", "theta in radians", "gives angles another unit: 'theta in radians'"),
+        ("theta in rad", "theta in degrees", "gives angles another unit: 'theta in degrees'"),
+    ],
+)
+def test_rows_below_a_comment_that_changes_them_are_refused(
+    title: str, comment: str, sentence: str, tmp_path: Path
+) -> None:
+    with pytest.raises(FileFormatError, match=rf"line 5 {sentence}.*; write a file for each"):
+        samples(tmp_path, f"# {title}\n{NAMES}\n{ROWS}# {comment}\n{ROWS}")
+    assert len(samples(tmp_path, f"# {title}\n{NAMES}\n{ROWS}# {comment}\n")) == 2  # no row is below it
+
+
+def test_comments_that_change_nothing_are_left_out(tmp_path: Path) -> None:
+    comments = (NAMES, "wavelength 450 nm", "the light is at 40 degrees now", "in degrees", "20,20,180,0.5", "values")
+    text = "".join(f"# {comment}\n{angle},20,180,0.5\n" for angle, comment in enumerate(comments))
+    assert len(samples(tmp_path, f"# wavelength 450 nm\n{NAMES}\n{ROWS}{text}")) == 2 + len(comments)
+
+
+@pytest.mark.parametrize(("factor", "stated"), [(2.0, True), (1.1, False)])
+def test_values_that_contradict_at_the_same_directions_of_a_file_are_stated(
+    factor: float, stated: bool, tmp_path: Path
+) -> None:
+    again = f"10,20,180,{0.5 * factor}\n40,20,180,{0.25 * factor}\n"
+    sheet = samples(tmp_path, f"{NAMES}\n{ROWS}{again}")
+    sentence = "At 2 directions that more than one row has, f_r differs by 100 % in the median."
+    assert (sentence in statement(sheet).notes) == stated
+    assert np.unique(sheet.theta_i).size == 2
