@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import itertools
 import math
 import re
 from collections.abc import Iterable, Sequence
@@ -58,9 +59,16 @@ _ANGLE_WORDS = {
     "rad": ("rad", "rads", "radian", "radians"),
     "mrad": ("mrad", "mrads", "milliradian", "milliradians"),
 }
+_OTHER_ANGLES = ("gon", "grad", "arcmin", "arcsec", "turn")  # units of angles that are refused
 AZIMUTHS = ("phi", "azimuth", "azi", "az", "azimuth_angle")  # of a viewer relative to the light, if there is no other
 _COLOURS = (("R", "G", "B"), ("r", "g", "b"), ("X", "Y", "Z"))  # x, y, z are positions
 _OF_FACTORS = re.compile(r"\b(?:BRF|HCRF|reflectance factors?)\b", re.IGNORECASE)
+_OF_PERCENT = re.compile(
+    r"\b(?:BRDF|BRF|HCRF|BCRF|DSF|f_r|reflectance factors?|values)\b[\s,:;=(\[]*(?:(?:is|are|given|in) )*"
+    r"(?:%|(?:percent|pct)\b)",
+    re.IGNORECASE,
+)
+_OF_UNCERTAINTY = re.compile(r"uncertaint|error|deviation|\bstd\b", re.IGNORECASE)
 _NUMBER_NM = re.compile(r"(?P<word>[a-z_]*?)[_@]?(?P<number>\d+(?:\.\d+)?)_?(?P<unit>nm|um|µm|μm)?$")
 _PERCENT = re.compile(r"%|(?:^|[\W_])(?:percent|pct)(?:$|[\W_])", re.IGNORECASE)
 _BRACKETS = re.compile(r"[\[(](.*?)[\])]")
@@ -101,6 +109,8 @@ class Layout:
         Lines before the numbers that are not the names.
     first : int
         Line of the first row.
+    units : tuple of str
+        Units in a line of their own below the names, one a column; () if there is none.
     damaged : str
         A sentence on a line before it that is a row with fields that are no numbers; empty if there is none.
     """
@@ -110,7 +120,19 @@ class Layout:
     names: tuple[str, ...]
     titles: tuple[str, ...]
     first: int
+    units: tuple[str, ...] = ()
     damaged: str = ""
+
+    @property
+    def described(self) -> tuple[str, ...]:
+        """Names of the columns with the units of the line below them in brackets."""
+        pairs = itertools.zip_longest(self.names, self.units, fillvalue="")
+        return tuple(f"{name} [{unit.strip('[]()')}]" if unit else name for name, unit in pairs)
+
+    @property
+    def names_percent(self) -> bool:
+        """True if a line before the numbers says that values are percent."""
+        return any(_OF_PERCENT.search(line) and not _OF_UNCERTAINTY.search(line) for line in self.titles)
 
     @property
     def names_factors(self) -> bool:
@@ -161,11 +183,14 @@ def layout_of(lines: Iterable[tuple[int, str]]) -> Layout | None:
             continue
         count = len(fields_of(line, delimiter))
         at, names = _names(before, delimiter, count)
+        rows_of_units = [some for some in before if some.number > at and _are_units(some.text, delimiter, count)]
+        units = _split(rows_of_units[-1].text, delimiter, count) if rows_of_units else ()
+        before = [some for some in before if some not in rows_of_units]
         titles = tuple(some.text for some in before if some.number != at and some.text.strip())
         between = [some for some in before if some.number > at and not some.comment]
         between = between if at else [some for some in between[-1:] if len(fields_of(some.text, delimiter)) == count]
         damaged = next((fault for some in between if (fault := _fault(some, delimiter, names))), "")
-        return Layout(delimiter, at or number, names, titles, number, damaged)
+        return Layout(delimiter, at or number, names, titles, number, units, damaged)
     return None
 
 
@@ -214,12 +239,18 @@ def _names(before: Sequence[_Line], delimiter: str | None, count: int) -> tuple[
         if len(words) >= _FEWEST_NAMES and any(role_of(name) for name in words):
             return line.number, names
     for line in reversed(before):
-        names = _split(line.text, delimiter, count)
+        names = () if _are_units(line.text, delimiter, count) else _split(line.text, delimiter, count)
         if sum(number_of(name) is None for name in names) >= _FEWEST_NAMES:
             return line.number, names
         if line.text.strip() and (line.comment or not _fault(line, delimiter, numbered)):
             break
     return 0, numbered
+
+
+def _are_units(text: str, delimiter: str | None, count: int) -> bool:
+    """Return True if a line has as many fields as there are columns, and two of them or more are units of angles."""
+    units = [unit.strip("[]()").lower() for unit in _split(text, delimiter, count)]
+    return sum(any(unit in words for words in _ANGLE_WORDS.values()) or unit in _OTHER_ANGLES for unit in units) >= 2
 
 
 def _split(text: str, delimiter: str | None, count: int) -> tuple[str, ...]:

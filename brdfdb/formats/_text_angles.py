@@ -75,7 +75,7 @@ def _units(
         return dict.fromkeys(given, unit)
     units = {}
     for name in given:
-        column = layout.names[roles[name][0]]
+        column = layout.described[roles[name][0]]
         units[name] = angle_unit(column)
         if units[name] not in ("", *ANGLE_UNITS):
             where = f"{path}: line {layout.line}, field {column}"

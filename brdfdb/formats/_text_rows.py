@@ -72,7 +72,7 @@ def _other_rows(text: str, number: int, layout: Layout, *, one_wavelength: bool)
     names = header_of(text, layout)
     if names and names != layout.names:
         return f"line {number} names other columns than line {layout.line}: {', '.join(names)[:_SHOWN]}; {_SPLIT}"
-    units = {unit for name in layout.names if (unit := angle_unit(name))}
+    units = {unit for name in layout.described if (unit := angle_unit(name))}
     units |= {_unit_of(match) for title in layout.titles for match in _ANGLE_UNIT.finditer(title)}
     new = {_unit_of(match) for match in _ANGLE_UNIT.finditer(text)}
     if new and new != (units or {"deg"}):

@@ -125,7 +125,7 @@ def read(
     if "wavelength" in roles:
         if values.shape[1] != 1:
             raise FileFormatError(f"{path}: line {layout.line}: beside a wavelength there may be one column of values")
-        lengths = _nm(path, rows[:, roles["wavelength"][0]], layout.names[roles["wavelength"][0]], layout, record)
+        lengths = _nm(path, rows[:, roles["wavelength"][0]], layout.described[roles["wavelength"][0]], layout, record)
         turned, values, uncertainty, at = _pivoted(turned, values, uncertainty, lengths)
     elif at is not None:
         note(record, "Wavelengths are those in the names of the columns.")
@@ -231,11 +231,13 @@ def _values(
     path: Path, rows: Array, roles: Mapping[str, list[int]], layout: Layout, scale: Array, record: dict[str, Any]
 ) -> tuple[Array, Array | None]:
     """Return f_r [1/sr] of rows, shape (N, C), and their uncertainties if there are any."""
-    names = {role: [layout.names[column] for column in roles.get(role, ())] for role in ("values", "uncertainty")}
+    names = {role: [layout.described[column] for column in roles.get(role, ())] for role in ("values", "uncertainty")}
     for name in (*names["values"], *names["uncertainty"]):
         if unit := unknown_unit(name):
             note(record, f"The unit {unit!r} of the column {name} is not known: its numbers were taken as they stand.")
     percent = np.array([in_percent(name) for name in names["values"]])
+    if layout.names_percent and not any("[" in name or "(" in name for name in names["values"]):
+        percent[:] = True
     if percent.any():
         note(record, "Values in percent were divided by 100.")
     values: Array = rows[:, roles["values"]] * np.where(percent, 0.01, 1.0) * scale

@@ -57,3 +57,33 @@ def test_values_that_contradict_at_the_same_directions_of_a_file_are_stated(
     sentence = "At 2 directions that more than one row has, f_r differs by 100 % in the median."
     assert (sentence in statement(sheet).notes) == stated
     assert np.unique(sheet.theta_i).size == 2
+
+
+def test_a_row_of_units_below_the_names_is_read(tmp_path: Path) -> None:
+    sheet = samples(tmp_path, "theta_i,theta_r,delta_phi,BRF,u\nrad,mrad,deg,%,%\n0.5,250,180,40,2\n")
+    assert [sheet.theta_i[0], sheet.theta_r[0], sheet.phi_r[0]] == pytest.approx([0.5, 0.25, np.pi])
+    assert sheet.values[0] == pytest.approx([0.4 / np.pi])
+    assert sheet.uncertainty is not None
+    assert sheet.uncertainty[0] == pytest.approx([0.02 * 0.4 / np.pi])
+    assert "titles" not in sheet.record
+    with pytest.raises(FileFormatError, match="the unit 'gon' is none of angles"):
+        samples(tmp_path, f"{NAMES}\ngon,gon,gon,1/sr\n{ROWS}")
+    waves = samples(tmp_path, f"wavelength,{NAMES}\num,deg,deg,deg,1/sr\n0.55,10,20,180,0.5\n")
+    assert waves.channels == ("550nm",)
+
+
+@pytest.mark.parametrize(
+    ("title", "name", "factor"),
+    [
+        ("BRF in percent", "BRF", 0.01),
+        ("reflectance factors [%]", "BRF", 0.01),
+        ("values are given in %", "BRF", 0.01),
+        ("uncertainty of the BRF in percent: 2", "BRF", 1.0),
+        ("BRF at a humidity of 40 percent", "BRF", 1.0),
+        ("BRF in percent", "BRF [1]", 1.0),
+    ],
+)
+def test_percent_beside_the_quantity_in_a_title_counts(title: str, name: str, factor: float, tmp_path: Path) -> None:
+    sheet = samples(tmp_path, f"# {title}\ntheta_i,theta_r,delta_phi,{name}\n10,20,180,0.5\n")
+    assert sheet.values[0] == pytest.approx([factor * 0.5 / np.pi])
+    assert ("Values in percent were divided by 100." in statement(sheet).notes) == (factor < 1.0)
