@@ -19,6 +19,7 @@ from brdfdb.formats._interface import TOLERANCE, Option
 from brdfdb.formats._json_tables import degrees_of
 from brdfdb.formats._nodes import samples_at_angles
 from brdfdb.formats._record import CONVENTION, record, specular_remark
+from brdfdb.measurements.samples import NM_PER, PER_SR
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -55,9 +56,7 @@ _TURNED = {
 }
 _MOST_VALUES = 1 << 27  # of a file that is read
 _MOST_NODES = 1 << 22  # of an axis that is read
-_NM_PER = {"": 1.0, "nm": 1.0, "um": 1e3, "µm": 1e3, "μm": 1e3, "micrometer": 1e3, "m": 1e9}  # by the unit of a file
 _DEGREES, _RADIANS = ("", "degree", "degrees", "deg", "°"), ("rad", "radian", "radians")
-_PER_SR = ("", "sr-1", "1/sr", "sr^-1", "sr**-1")
 
 
 def dense_record(table: Table, dense: DenseTable, verdict: str | None, *, specular: bool) -> dict[str, Any]:
@@ -130,7 +129,7 @@ def read_dataset(path: Path, opened: xr.Dataset) -> FileTable | Samples:
     if set(brdf.dims) != {*names, *spectral} or not set(brdf.dims) <= set(opened.coords):
         raise FileFormatError(f"{path}: brdf over {', '.join(map(str, brdf.dims))} lacks axes or has too many")
     check_sizes(path, {name: opened[name].shape for name in ("brdf", *brdf.dims)})
-    if _unit(brdf) not in _PER_SR:
+    if _unit(brdf) not in PER_SR:
         raise FileFormatError(f"{path}: brdf has the units {_unit(brdf)!r}; allowed is sr-1")
     values = brdf.transpose(*names, *spectral).values
     at = _in_nm(path, opened["wavelength"]) if spectral else None
@@ -152,9 +151,9 @@ def _unit(variable: xr.DataArray) -> str:
 
 def _in_nm(path: Path, variable: xr.DataArray) -> NDArray[Any]:
     """Return wavelengths [nm], in the unit that a file names."""
-    if _unit(variable) not in _NM_PER:
+    if _unit(variable) not in NM_PER:
         raise FileFormatError(f"{path}: {variable.name} has the units {_unit(variable)!r}; allowed are nm, um and m")
-    scale = _NM_PER[_unit(variable)]
+    scale = NM_PER[_unit(variable)]
     return np.asarray(variable.values if scale == 1.0 else np.round(variable.values * scale, 9))
 
 

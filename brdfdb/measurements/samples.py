@@ -22,6 +22,13 @@ RELATIVE = "relative to the light"  # entry "azimuths" of a record: the azimuth 
 NODES = "nodes"  # entry of a record that is true if the samples are all nodes of a grid
 ANGLES = ("theta_i", "phi_i", "theta_r", "phi_r")
 _OPTIONAL = ("uncertainty", "wavelength_nm", "bandwidth_nm")
+PER_SR = ("", "sr-1", "1/sr", "sr^-1", "sr**-1")
+NM_PER = {  # by the unit that a file states
+    **dict.fromkeys(("", "nm", "nanometer", "nanometre", "nanometers", "nanometres"), 1.0),
+    **dict.fromkeys(("um", "\u00b5m", "\u03bcm", "micron", "microns", "micrometer", "micrometre"), 1e3),
+    **dict.fromkeys(("micrometers", "micrometres"), 1e3),
+    **dict.fromkeys(("m", "meter", "metre", "meters", "metres"), 1e9),
+}
 _HORIZON = 0.5 * np.pi * (1.0 + 1e-9)  # largest polar angle [rad], with rounding
 _SAME_LIGHT_DEG = 1e-4  # lights closer than this are one incidence
 
@@ -200,6 +207,7 @@ class Samples:
         """Return the samples of a Dataset as `to_xarray` gives it.
 
         Only the angles theta_i, theta_r and phi_r in degrees or radians (attribute ``units``) and brdf are required.
+        Wavelengths and bandwidths are in nm, um or m, by default nm; brdf and uncertainty are in 1/sr.
 
         Raises
         ------
@@ -212,7 +220,10 @@ class Samples:
             raise ParameterError("dataset", f"it has no {', '.join(missing)}", missing)
         count = dataset["theta_i"].size
         values = np.asarray(brdf.transpose("sample", ...), dtype=np.float64).reshape(count, -1)
-        wavelength = np.asarray(dataset["wavelength"]).reshape(-1) if "wavelength" in dataset.variables else None
+        for name in ("brdf", "uncertainty"):
+            if name in dataset.variables and (units := _units(dataset, name)) not in PER_SR:
+                raise ParameterError(name, f"its units are {units!r}; allowed is sr-1", units, PER_SR)
+        wavelength = _length_nm(dataset, "wavelength")
         if "channel" in dataset.variables:
             channels = tuple(str(name) for name in np.atleast_1d(dataset["channel"].values))
         else:
@@ -233,7 +244,7 @@ class Samples:
             wavelength_nm=wavelength,
             values=values,
             uncertainty=uncertainty,
-            bandwidth_nm=np.asarray(dataset["bandwidth"]).reshape(-1) if "bandwidth" in dataset.variables else None,
+            bandwidth_nm=_length_nm(dataset, "bandwidth"),
             instrument=Instrument(**instrument),
             provenance=str(attributes.get("provenance", "")),
             record=json.loads(attributes.get("record", "{}")),
@@ -250,6 +261,28 @@ def _floats(name: str, array: Any, *, optional: bool) -> Floats | None:
         return np.asarray(array, dtype=np.float64)
     except (TypeError, ValueError):
         raise ParameterError(name, f"{type(array).__name__} is no array of numbers", type(array).__name__) from None
+
+
+def _units(dataset: xr.Dataset, name: str) -> str:
+    """Return the units that a variable of a Dataset states, without blanks at the ends; "" if it states none."""
+    return str(dataset[name].attrs.get("units", "")).strip()
+
+
+def _length_nm(dataset: xr.Dataset, name: str) -> NDArray[np.float64] | None:
+    """Return wavelengths or bandwidths [nm] of a Dataset, shape (C,), in the unit that it states; None if it has none.
+
+    Raises
+    ------
+    ParameterError
+        If the unit is not nm, um or m.
+    """
+    if name not in dataset.variables:
+        return None
+    units = _units(dataset, name)
+    if units not in NM_PER:
+        raise ParameterError(name, f"its units are {units!r}; allowed are nm, um and m", units, tuple(NM_PER))
+    lengths, scale = np.asarray(dataset[name], dtype=np.float64).reshape(-1), NM_PER[units]
+    return lengths if scale == 1.0 else np.round(lengths * scale, 9)
 
 
 def _angle(dataset: xr.Dataset, name: str, count: int) -> Floats:

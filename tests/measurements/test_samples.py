@@ -114,6 +114,33 @@ def test_a_dataset_without_units_is_refused() -> None:
         Samples.from_xarray(xr.Dataset(bare))
 
 
+@pytest.mark.parametrize(("units", "scale"), [("um", 1e3), ("\u00b5m", 1e3), ("m", 1e9), ("nm", 1.0)])
+def test_wavelengths_and_bandwidths_of_a_dataset_have_the_units_that_it_states(units: str, scale: float) -> None:
+    dataset = samples(bandwidth_nm=np.array([5.0, 10.0])).to_xarray()
+    for name in ("wavelength", "bandwidth"):
+        dataset[name] = ("channel", dataset[name].values / scale, {"units": units})
+    read = Samples.from_xarray(dataset)
+    assert read.wavelength_nm == pytest.approx([450.0, 650.0])
+    assert read.bandwidth_nm == pytest.approx([5.0, 10.0])
+
+
+@pytest.mark.parametrize(
+    ("name", "units", "allowed"),
+    [
+        ("brdf", "percent", "allowed is sr-1"),
+        ("uncertainty", "%", "allowed is sr-1"),
+        ("wavelength", "cm-1", "allowed are nm, um and m"),
+        ("bandwidth", "eV", "allowed are nm, um and m"),
+    ],
+)
+def test_other_units_of_a_dataset_are_refused(name: str, units: str, allowed: str) -> None:
+    whole = samples(bandwidth_nm=np.array([5.0, 10.0]))
+    dataset = replace(whole, uncertainty=0.1 * np.abs(whole.values)).to_xarray()
+    dataset[name].attrs["units"] = units
+    with pytest.raises(ParameterError, match=f"{name}: its units are '{units}'; {allowed}"):
+        Samples.from_xarray(dataset)
+
+
 def test_joined_files_that_contradict_say_so() -> None:
     first = samples(uncertainty=None)
     turned_round = first.phi_r + 2.0 * np.pi
