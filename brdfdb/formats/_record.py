@@ -114,7 +114,16 @@ def note(document: dict[str, Any], sentence: str) -> None:
     document["notes"] = [*document.get("notes", ()), sentence]
 
 
-_NM, _SPOT = re.compile(r"\b(\d+(?:\.\d+)?) ?nm\b"), re.compile(r"(\d+(?:\.\d+)?) ?mm spot")
+_LENGTH = r"(?P<number>\d+(?:\.\d+)?) ?(?P<unit>nm|um|\u00b5m|\u03bcm|microns?)\b"
+_WAVELENGTHS = tuple(  # of light, not of a layer or a band; the first that a text has are taken
+    re.compile(pattern, re.IGNORECASE)
+    for pattern in (
+        rf"(?:wavelengths?|laser|lambda|\u03bb)(?:[\s:=,(]|\b(?:is|was|are|of|at|lambda|light|source)\b)*{_LENGTH}",
+        rf"{_LENGTH} (?:wavelength|laser|light)",
+        rf"(?:\bat|@)\s*{_LENGTH}",
+    )
+)
+_SPOT = re.compile(r"(\d+(?:\.\d+)?) ?mm spot")
 _INSTRUMENTS = ("Instrument", "Scatterometer", "Gonioreflectometer", "Goniophotometer")
 
 
@@ -126,10 +135,12 @@ def of_comments(document: Mapping[str, Any]) -> tuple[Instrument, float | None]:
     document : mapping
         Comments by the words before their colons, as `of_lines` gives them.
     """
-    text = "\n".join(value for value in document.values() if isinstance(value, str))
-    lengths, spots = set(_NM.findall(text)), set(_SPOT.findall(text))
+    text = "\n".join(f"{key}: {value}" for key, value in document.items() if isinstance(value, str))
+    matches = next((matches for one in _WAVELENGTHS if (matches := list(one.finditer(text)))), [])
+    lengths = {round(float(at["number"]) * (1.0 if at["unit"].lower() == "nm" else 1e3), 6) for at in matches}
+    spots = set(_SPOT.findall(text))
     name = next((str(document[key]) for key in _INSTRUMENTS if key in document), "")
     spot = float(spots.pop()) if len(spots) == 1 else None
     from brdfdb.measurements.samples import Instrument
 
-    return Instrument(name, spot_mm=spot or None), float(lengths.pop()) if len(lengths) == 1 else None
+    return Instrument(name, spot_mm=spot or None), lengths.pop() if len(lengths) == 1 else None

@@ -87,3 +87,25 @@ def test_percent_beside_the_quantity_in_a_title_counts(title: str, name: str, fa
     sheet = samples(tmp_path, f"# {title}\ntheta_i,theta_r,delta_phi,{name}\n10,20,180,0.5\n")
     assert sheet.values[0] == pytest.approx([factor * 0.5 / np.pi])
     assert ("Values in percent were divided by 100." in statement(sheet).notes) == (factor < 1.0)
+
+
+@pytest.mark.parametrize(
+    ("title", "wavelength_nm"),
+    [
+        ("measured at 532 nm", 532.0),
+        ("bandwidth 10 nm\n# wavelength 0.65 um", 650.0),
+        ("wavelength = 0.65 \u00b5m, polished to Rq = 35 nm", 650.0),
+        ("laser: 632.8 nm, calibrated at 550 nm", 632.8),
+        ("632.8 nm laser", 632.8),
+        ("Wavelength: 450 nm and wavelength 650 nm", None),
+        ("bandwidth 10 nm", None),
+        ("roughness Rq = 35 nm", None),
+        ("thickness of the coating 200 nm", None),
+        ("laser bandwidth 10 nm", None),
+    ],
+)
+def test_a_length_of_a_title_is_a_wavelength_only_by_its_words(
+    title: str, wavelength_nm: float | None, tmp_path: Path
+) -> None:
+    sheet = samples(tmp_path, f"# {title}\n{NAMES}\n{ROWS}")
+    assert sheet.channels == ("grey" if wavelength_nm is None else f"{wavelength_nm:g}nm",)
