@@ -105,8 +105,11 @@ def _may_be_radians(given: Mapping[str, Array]) -> bool:
 
 
 def _exchange(given: dict[str, Array], record: dict[str, Any]) -> None:
-    """Exchange theta and phi where theta cannot be the polar angle, and phi can."""
+    """Exchange theta and phi where theta of most rows cannot be the polar angle, and phi of all can."""
     if not {"phi_i", "phi_r"} <= set(given) or np.all(np.abs(given["theta_i"]) <= _UPRIGHT):
+        return
+    beyond = np.maximum(np.abs(given["theta_i"]), np.abs(given["theta_r"])) > _UPRIGHT
+    if 2 * np.count_nonzero(beyond) <= beyond.size:  # some rows of transmitted light
         return
     if max(np.abs(given["phi_i"]).max(), np.abs(given["phi_r"]).max()) <= _UPRIGHT:
         for side in ("i", "r"):

@@ -167,6 +167,14 @@ def test_theta_and_phi_that_are_exchanged_are_noticed(tmp_path: Path) -> None:
     assert chassis.channels == ("532nm",)
 
 
+def test_a_few_rows_below_the_horizon_exchange_no_letters(tmp_path: Path) -> None:
+    rows = "".join(f"{light},0,20,{turn},0.5\n" for light in (10, 30) for turn in (0, 45, 90))
+    sheet = samples(tmp_path, f"theta_i,phi_i,theta_r,phi_r,brdf\n{rows}150,0,30,45,0.01\n")
+    assert "exchanged" not in sheet.record
+    assert sheet.record["below_the_horizon"] == 1
+    assert np.degrees(sheet.theta_i) == pytest.approx([10.0] * 3 + [30.0] * 3)
+
+
 def test_a_column_of_wavelengths_becomes_channels(tmp_path: Path) -> None:
     rows = ("10,20,0,0.65,2,0.2", "10,20,0,0.45,1,0.1", "30,20,0,0.45,3,0.3", "10,20,0,0.65,4,0.4")
     text = "\n".join(("theta_i,theta_r,raa,lambda,brdf,u", *rows, ""))
