@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import itertools
 import os
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -36,6 +37,7 @@ from brdfdb.formats._record import note, of_comments
 from brdfdb.formats._text_angles import angles_of_rows
 from brdfdb.formats._text_file import check_text, lines_of
 from brdfdb.formats._text_rows import rows_of
+from brdfdb.formats._text_uncertainties import uncertainty_of
 
 if TYPE_CHECKING:
     from brdfdb.measurements.samples import Samples
@@ -50,6 +52,9 @@ keywords = (*_ROLES, "quantity", "angles")
 _UNITS = ("auto", "deg", "rad")
 _LEAST_NM, _LEAST_UM = 10.0, 100.0  # numbers without a unit below the first are not nm, from the second on not um
 HOW = "theta_i=NAME and so on, at the command line --column theta_i=NAME"  # columns are named
+_OF_COSINE = re.compile(r"\b(?:times|multiplied|including|with)\b.{0,20}\bcos(?:ine)?\b|\* ?cos\b", re.IGNORECASE)
+_OF_FORWARD = re.compile(r"\b(?:azimuths?|phi)\b.*\b0\b[^\d,;]*\b(?:forward|specular|mirror)\b", re.IGNORECASE)
+_NO = re.compile(r"\b(?:no|not|without|divided|excluding)\b", re.IGNORECASE)
 _SHOWN = 200  # characters of names that a sentence repeats
 
 
@@ -132,6 +137,7 @@ def read(
         order = np.argsort(at)
         at, values = at[order], values[:, order]
         uncertainty = None if uncertainty is None else uncertainty[:, order]
+    _doubt_titles(layout, quantity, record)
     instrument, length = of_comments({"titles": "\n".join(layout.titles)})
     if at is None and len(names) == 1 and length is not None:
         at = np.array([length])
@@ -232,7 +238,7 @@ def _values(
 ) -> tuple[Array, Array | None]:
     """Return f_r [1/sr] of rows, shape (N, C), and their uncertainties if there are any."""
     names = {role: [layout.described[column] for column in roles.get(role, ())] for role in ("values", "uncertainty")}
-    for name in (*names["values"], *names["uncertainty"]):
+    for name in names["values"]:
         if unit := unknown_unit(name):
             note(record, f"The unit {unit!r} of the column {name} is not known: its numbers were taken as they stand.")
     percent = np.array([in_percent(name) for name in names["values"]])
@@ -246,15 +252,19 @@ def _values(
     given = rows[:, roles["uncertainty"]]
     if given.shape != values.shape:
         raise FileFormatError(f"{path}: line {layout.line}: there are not as many uncertainties as values")
-    columns = (
-        f"column {names['uncertainty'][0]}" if given.shape[1] == 1 else f"columns {', '.join(names['uncertainty'])}"
-    )
-    note(record, f"Standard uncertainties were read from the {columns[:_SHOWN]}.")
-    relative = np.array([in_percent(name) for name in names["uncertainty"]])
-    if relative.any():
-        note(record, "Uncertainties in percent were taken as percent of the values of their rows.")
-    uncertainty = np.where(relative, 0.01 * given * np.abs(values), given * np.where(percent, 0.01, 1.0) * scale)
-    return values, uncertainty
+    of_values = np.where(percent, 0.01, 1.0) * scale
+    return values, uncertainty_of(path, layout.line, names["uncertainty"], given, values, of_values, record)
+
+
+def _doubt_titles(layout: Layout, quantity: str, record: dict[str, Any]) -> None:
+    """Note titles that speak of a cosine or of the forward direction, where the values were read without."""
+    for line in layout.titles:
+        shown = line.strip()[:_SHOWN]
+        if quantity == "auto" and record["quantity"] == "f_r" and _OF_COSINE.search(line) and not _NO.search(line):
+            text = "were read as f_r; --quantity f_r_cos divides them by the cosine of the viewer"
+            note(record, f"Cosine? A title says {shown!r}, and values {text}.")
+        if _OF_FORWARD.search(line) and not _NO.search(line):
+            record["forward_title"] = shown
 
 
 def _wavelengths(path: Path, names: Iterable[str], layout: Layout) -> Array | None:

@@ -22,6 +22,11 @@ def notes_of(record: Mapping[str, Any]) -> tuple[str, ...]:
         notes.append(f"The file holds {text}: f_r was made of them.")
     if record.get("azimuth") == "forward":
         notes.append("Azimuths count from the forward direction, as was stated: 180 degrees were added.")
+    elif title := record.get("forward_title"):
+        notes.append(
+            f"Azimuths? A title says {title!r}. If 0 is the direction into which the light travels, import the file "
+            "with --azimuth forward."
+        )
     if "exchanged" in record:
         notes.append(f"Letters exchanged: {record['exchanged']}.")
     if count := record.get("below_the_horizon"):

@@ -109,3 +109,42 @@ def test_a_length_of_a_title_is_a_wavelength_only_by_its_words(
 ) -> None:
     sheet = samples(tmp_path, f"# {title}\n{NAMES}\n{ROWS}")
     assert sheet.channels == ("grey" if wavelength_nm is None else f"{wavelength_nm:g}nm",)
+
+
+@pytest.mark.parametrize(
+    ("name", "number", "shown"),
+    [
+        ("U (k=2)", 0.02, "divided by their coverage factor k, 2."),
+        ("U (k = 2, 95 %)", 0.02, "divided by their coverage factor k, 2."),
+        ("U [%] (k=2)", 4.0, "taken as percent of the values"),
+        ("u [rel]", 0.02, "Relative uncertainties were multiplied by the values"),
+        ("u [%]", 2.0, "taken as percent of the values"),
+        ("u [1/sr]", 0.01, "read from the column u [1/sr]"),
+    ],
+)
+def test_uncertainties_are_made_standard_ones_in_1_sr(name: str, number: float, shown: str, tmp_path: Path) -> None:
+    text = f'{NAMES},"{name}"\n10,20,180,0.5,{number}\n'
+    sheet = samples(tmp_path, text)
+    assert sheet.uncertainty is not None
+    assert sheet.uncertainty[0] == pytest.approx([0.01])
+    assert any(shown in text for text in statement(sheet).notes)
+    assert not any("not known" in text for text in statement(sheet).notes)
+
+
+def test_a_probability_of_uncertainties_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(
+        FileFormatError, match=r"line 1, field U \(95 %\): a probability is no unit; write the coverage"
+    ):
+        samples(tmp_path, f"{NAMES},U (95 %)\n10,20,180,0.5,0.02\n")
+
+
+def test_titles_of_cosines_and_forward_azimuths_are_doubted(tmp_path: Path) -> None:
+    cosine, forward = "values are BRDF times cos(theta_r)", "azimuth 0 is the forward (specular) direction"
+    text = f"# {cosine}\n# {forward}\n{NAMES}\n{ROWS}"
+    notes = statement(samples(tmp_path, text)).notes
+    assert any(cosine in sentence and "--quantity f_r_cos" in sentence for sentence in notes)
+    assert any(forward in sentence and "--azimuth forward" in sentence for sentence in notes)
+    stated = statement(samples(tmp_path, text, quantity="f_r_cos", azimuth="forward")).notes
+    assert not any("A title says" in sentence for sentence in stated)
+    plain = "# values are f_r without the cosine\n# azimuth 0 is at the light, 180 is specular\n"
+    assert statement(samples(tmp_path, f"{plain}{NAMES}\n{ROWS}")).notes == ()
