@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import functools
+import struct
+import zlib
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -100,6 +102,29 @@ def lit_sphere(surface: Source | BaseTable, size: int = SIZE, light: Light = stu
     linear = linear_sphere(surface, size, light, detail)
     encoded = colour_science().cctf_encoding(np.clip(linear[..., :3], 0.0, 1.0), function="sRGB")
     return np.concatenate([encoded, linear[..., 3:]], axis=-1)
+
+
+def sphere_png(surface: Source | BaseTable, size: int = SIZE, detail: Detail = FINE) -> bytes:
+    """Return the picture of `lit_sphere` as a PNG file of 8 bits with transparent corners.
+
+    Parameters
+    ----------
+    surface, size, detail
+        As of `lit_sphere`.
+
+    Raises
+    ------
+    ParameterError
+        If `size` is out of range.
+    """
+    pixels = np.rint(255.0 * lit_sphere(surface, size, detail=detail)).astype(np.uint8)
+    rows = np.pad(pixels.reshape(size, -1), ((0, 0), (1, 0)))  # each row begins with its filter: none
+    header, data = struct.pack(">2I5B", size, size, 8, 6, 0, 0, 0), zlib.compress(rows.tobytes(), 1)
+    chunks = (
+        struct.pack(">I", len(content)) + kind + content + struct.pack(">I", zlib.crc32(kind + content))
+        for kind, content in ((b"IHDR", header), (b"IDAT", data), (b"IEND", b""))
+    )
+    return b"\x89PNG\r\n\x1a\n" + b"".join(chunks)
 
 
 def linear_sphere(surface: Source | BaseTable, size: int = SIZE, light: Light = studio, detail: Detail = FINE) -> Array:
