@@ -36,7 +36,7 @@ class Axes(NamedTuple):
     width : int64 (axes,)
         Nodes that count in a cell: 2, or 4 of a cubic.
     stencil : int64 (nodes, 4)
-        The numbers of those nodes.
+        The numbers of those nodes; if two count, they are in the middle. Of a periodic axis the last is the first.
     slopes : float64 (nodes, 8)
         The slopes at both ends of a cell, times its length, as weights of those nodes.
     """
@@ -148,16 +148,18 @@ def _cubic_cells(nodes: Array, ends: tuple[str, str]) -> tuple[NDArray[np.int64]
     neighbours. The cell after the last node is never looked up.
     """
     count = nodes.size
-    if count < 3:
-        return np.zeros((count, 4), np.int64), np.zeros((count, 8))
     (before, x_before), (after, x_after) = (
         _beyond(nodes, end, low) for end, low in zip(ends, (True, False), strict=True)
     )
     x = np.concatenate([[x_before], nodes, [x_after]])
     index = np.concatenate([[before], np.arange(count), [after]])
+    if ends[1] == "periodic":  # their numbers are rounded each by itself, which would leave a step
+        index[-2] = 0
     stencil, slopes = np.zeros((count, 4), np.int64), np.zeros((count, 2, 4))
     for k in range(4):
         stencil[:-1, k] = index[k : k + count - 1]
+    if count < 3:
+        return stencil, slopes.reshape(count, 8)
     at_nodes = _slopes(x[:-2], x[1:-1], x[2:], x[1:-1])
     slopes[:-1, 0, 0:3], slopes[:-1, 1, 1:4] = at_nodes[:-1], at_nodes[1:]
     if np.isnan(x_before):  # the parabola through the nodes inside; the one outside gets no weight
@@ -235,11 +237,11 @@ def locate(axes: Axes, axis: int, x: Array, count: int, cell: NDArray[np.int64],
 @kernel
 def _weigh(axes: Axes, axis: int, c: int, t: float, stride: int, at: NDArray[np.uint64], w: Array) -> None:
     """Write offsets and weights of the nodes that count for a point into row `axis` of `at` and `w`."""
+    k = np.uint64(axes.first[axis] + c)
     if axes.width[axis] == 2:
-        at[axis, 0], at[axis, 1] = np.uint64(c * stride), np.uint64((c + 1) * stride)
+        at[axis, 0], at[axis, 1] = np.uint64(axes.stencil[k, 1] * stride), np.uint64(axes.stencil[k, 2] * stride)
         w[axis, 0], w[axis, 1] = 1.0 - t, t
         return
-    k = np.uint64(axes.first[axis] + c)
     t2 = t * t
     h_1 = t2 * (3.0 - 2.0 * t)
     m_0, m_1 = t * (1.0 - t) * (1.0 - t), t2 * (t - 1.0)

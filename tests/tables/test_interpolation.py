@@ -169,3 +169,14 @@ def test_on_a_node_its_weight_is_exactly_1(count: int, cubic: bool) -> None:
     if count > 1 and (count < 3 or not cubic):
         index, weight = weights_of_nodes(nodes, nodes[:-1] + 0.25 * np.diff(nodes), cubic=cubic)
         np.testing.assert_allclose(weight, np.tile([0.75, 0.25, 0.0, 0.0], (count - 1, 1)), rtol=0.0, atol=EXACT)
+
+
+@pytest.mark.parametrize("cubic", [False, True], ids=["linear", "cubic"])
+@pytest.mark.parametrize("nodes", [UNEQUAL, EQUAL, UNEQUAL[[0, -1]]], ids=["unequal", "equal", "two"])
+def test_the_last_node_of_a_periodic_axis_is_the_first(nodes: NDArray[np.float64], cubic: bool) -> None:
+    """The numbers of both are rounded each by itself; without this there would be a step."""
+    values = np.sin(2.0 * np.pi * nodes / 3.0) + 2.0
+    values[-1] += 1e-3
+    first, below, last = along(nodes, ("periodic", "periodic"), values, [0.0, 3.0 - 1e-12, 3.0], cubic=cubic)
+    assert first == last == 2.0
+    assert below == pytest.approx(2.0, abs=1e-10)

@@ -131,3 +131,17 @@ def test_the_stated_error_has_the_shape_of_the_values(kind: str) -> None:
     assert found.error.shape == found.brdf.shape
     assert (found.error > 0.0).all()
     np.testing.assert_array_equal(found.brdf, table.lookup(*ANGLES))
+
+
+@KINDS
+@pytest.mark.parametrize("turn", [0.0, np.pi])
+def test_the_last_bit_of_an_azimuth_moves_nothing_in_the_plane_of_incidence(kind: str, turn: float) -> None:
+    table = table_of(kind)
+    number = np.random.default_rng(9)
+    theta_i, theta_r = np.arccos(number.uniform(0.05, 1.0, (2, 2000)))
+    phi_i = number.uniform(0.0, 2.0 * np.pi, 2000)
+    phi_r = phi_i + turn
+    at = table.lookup(theta_i, phi_i, theta_r, phi_r)
+    for beside in (np.nextafter(phi_r, 100.0), np.nextafter(phi_r, -100.0)):
+        moved = table.lookup(theta_i, phi_i, theta_r, beside)
+        np.testing.assert_allclose(moved, at, rtol=1e-12, atol=1e-13 * at.max())  # an offset is taken away again

@@ -38,14 +38,14 @@ export function show(info) {
 }
 
 /** What measured data are of. */
-const origin = ({ by, file, samples, incidences }) => [
-  samples ? `${samples} samples of ${incidences} lights` : "known everywhere", by, file && `file ${file}`].filter(Boolean).join("; ");
+const origin = ({ by, file, samples, incidences, extrapolated }) => [
+  samples ? `${samples} samples of ${incidences} lights` : `known ${extrapolated === null ? "everywhere" : "between its values"}`, by, file && `file ${file}`].filter(Boolean).join("; ");
 
 /** How far measured data are to be trusted, and where nothing was measured. */
 const data = ({ held_out: left, noise, extrapolated, negative, changes }) => [
   ["held out", left ? `95 of 100 samples within ${percent(left.p95)}` : "no samples", left ? `99 within ${percent(left.p99)}` : ""],
   ["noise", noise ? `95 of 100 below ${percent(noise.p95)}` : "not stated"],
-  ...(extrapolated === null ? [] : [["extrapolated", `${percent(extrapolated)} of the nodes`]]),
+  ...(extrapolated === null ? [] : [["measured", `${percent(1 - extrapolated)} of all directions`]]),
   ...(negative ? [["below 0", `${percent(negative)} of the values, which are 0 here`]] : []),
   ...changes.map(({ law, changed }) => [`made ${law}`, `by up to ${percent(changed.max)}`]),
 ];

@@ -21,15 +21,21 @@ function cut(into, series, answers, state) {
   const out = (value) => ((height(value) - range[0]) / (range[1] - range[0])) * radius;
   const at = (theta, r) => [width / 2 + r * Math.sin(theta * RADIAN), TOP + radius - r * Math.cos(theta * RADIAN)];
   const thetas = answers.map((answer, i) => kept[i].map((k) => answer.axes_deg.theta_r[k]));
+  const guessed = answers.map(({ extrapolated }, i) => kept[i].map((k) => Boolean(extrapolated?.[k])));
+  const faint = (i, k) => guessed[i][k] || guessed[i][k - 1];
 
   const parts = [...frame(at, radius, range, state)];
   for (const [theta, kind] of [[-state.theta_i, "light"], [state.theta_i, "mirror"]]) {
     parts.push(path([at(theta, 0), at(theta, radius)], kind));
   }
   curves.forEach((curve, i) => {
-    parts.push(path(curve.map((value, k) => at(thetas[i][k], out(value))), i ? "second" : "first"));
+    const points = curve.map((value, k) => at(thetas[i][k], out(value))), kind = i ? "second" : "first";
+    parts.push(pieces(points, (k) => !faint(i, k), kind));
+    if (guessed[i].includes(true)) parts.push(pieces(points, (k) => faint(i, k), `${kind} guess`));
   });
   const rows = series.map(({ label }, i) => [i ? "second" : "first", label]);
+  const some = guessed.findIndex((each) => each.includes(true));
+  if (some >= 0) rows.push([`${rows[some][0]} guess`, "extrapolated: not measured"]);
   let words = `${quantityWords(series[0], state)} in 1/sr over θᵣ in the plane of incidence, negative back towards the light.`;
   let bottom = TOP + radius + 24;
   if (against) {
@@ -89,6 +95,10 @@ function* strip(theta, off, worst, top, at, radius) {
 const degrees = (theta) => `${String(theta).replace("-", "−")}°`;
 
 const closest = (values, to) => values.reduce((best, value, i) => (Math.abs(value - to) < Math.abs(values[best] - to) ? i : best), 0);
+
+/** The pieces of a line that end at points that are chosen. */
+const pieces = (points, chosen, kind) => svg("path", { class: kind, d: points.map(([x, y], k) =>
+  `${k && chosen(k) ? "L" : "M"}${x.toFixed(1)} ${y.toFixed(1)}`).join("") });
 
 const path = (points, kind) => svg("path", { d: `M${points.map(([x, y]) => `${x.toFixed(1)} ${y.toFixed(1)}`).join("L")}`, class: kind });
 
