@@ -75,4 +75,5 @@ def uncertainty_of(
         shown = " and ".join(f"{k:g}" for k in expanded)
         note(record, f"Expanded uncertainties were divided by their coverage factor k, {shown}.")
     relative = np.array(shares)
-    return np.where(relative > 0.0, relative * given * np.abs(values), given * scale) / np.array(factors)
+    in_1_sr = np.where(relative > 0.0, relative * given * np.abs(values), given * scale)
+    return np.asarray(in_1_sr / np.array(factors))
