@@ -91,8 +91,8 @@ def read(
     quantity : {"auto", "f_r", "reflectance_factor", "f_r_cos"}
         Quantity of the values. By default the one that names or titles give, such as BRF, and else f_r.
     angles : {"auto", "deg", "rad"}
-        Unit of the angles. By default the one that names give, and else degrees; the record has a note where the
-        numbers may be radians as well.
+        Unit of the angles. By default the one that names, or a row of units below them, give (mrad, too), and else
+        degrees; the record has a note where the numbers may be radians as well.
     **columns : str or sequence of str
         Names of columns for theta_i, phi_i, theta_r, phi_r, delta_phi, values, uncertainty and wavelength; numbers from
         1 in a text without names. A role that is not given is recognised by names.
@@ -101,15 +101,17 @@ def read(
     -------
     Samples
         Reflectance factors are divided by pi, and f_r cos by the cosine of theta_r. A negative polar angle is one at
-        the opposite azimuth. Where theta exceeds 90 degrees for the light and phi does not, the file has exchanged the
-        two letters, and the record says so.
+        the opposite azimuth. Where theta of most rows exceeds 90 degrees and phi of none does, the file has exchanged
+        the two letters, and the record says so. Uncertainties that are relative, or expanded by a factor k, are made
+        standard ones in 1/sr. Values that contradict at the same directions are an entry "contradiction" of the record.
 
     Raises
     ------
     ParameterError
         If there is no such role, column, quantity or unit.
     FileFormatError
-        If the file is no text of numbers, or a column is missing; with the line and the field.
+        If the file is no text of numbers, a column is missing, a unit of angles is not known, or rows stand below a
+        comment that changes their wavelength, columns or units; with the line and the field.
     """
     from brdfdb.measurements.joining import contradiction_within
 
