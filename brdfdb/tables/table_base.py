@@ -145,8 +145,8 @@ class BaseTable(Lookups):
         """Return which pairs of directions, above the horizon, lie outside of those that were measured.
 
         f_r is made up there, and its error not known. Tables of models have no such directions. The angles [rad] are
-        those of `lookup`; the result has the shape that they broadcast to. ParameterError if the record of measured data
-        is one that this program does not know.
+        those of `lookup`; the result has the shape that they broadcast to. ParameterError, too, if the record of
+        measured data is one that this program does not know.
         """
         return self._extrapolated(checked_angles(theta_i, phi_i, theta_r, phi_r))
 
