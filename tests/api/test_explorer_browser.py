@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 
 import brdfdb
-from brdfdb_api.serving.shelf import COLOURED_BYTES
 from tests.api.a_store import serving
 from tests.api.chromium import Chromium, chosen, copied, curve, milliseconds, shown
 
@@ -255,36 +254,6 @@ def test_the_error_between_two_wavelengths_is_the_larger_of_theirs(
         chromium.open(f"{address}#material=scene-copper-sphere&theta_i={table.error.theta_i_deg[band]:g}&nm={nm:g}")
         shown(chromium, f"nm={nm:g}")
         assert chromium.evaluate("band.textContent") == f"within {100.0 * expected:.3g} %"
-
-
-PAGES = {
-    "v1/materials?limit=1000": [
-        {"name": "a", "colour": "#010101"},
-        {"name": "large", "colour": None, "bytes": COLOURED_BYTES + 1},
-    ],
-    "v1/materials?limit=1000&cursor=a": [{"name": "b", "colour": None, "bytes": COLOURED_BYTES}],
-}
-# a service of two pages: a colour of the second is not there when that is first asked for, that of a large table never
-TWO_PAGES = """\
-const pages = %s, ask = fetch, asked = globalThis.asked = [];
-globalThis.fetch = (path, options) => {
-  if (!(path in pages)) return ask(path, options);
-  asked.push(path);
-  const materials = pages[path].map(each => ({ title: "", model_title: "", source: "", ...each,
-    colour: asked.filter(each => each === path).length > 1 ? "#020202" : each.colour }));
-  return Promise.resolve(Response.json({ materials, next: path.includes("cursor") ? null : `/${path}&cursor=a` }));
-};
-"""
-
-
-def test_the_list_asks_again_only_for_pages_with_colours_that_will_come(chromium: Chromium, plain: str) -> None:
-    script = chromium.send("Page.addScriptToEvaluateOnNewDocument", source=TWO_PAGES % json.dumps(PAGES))
-    chromium.open(f"{plain}/#material=white-tile")
-    second = "document.querySelector('#m-b .swatch').style.background"
-    assert chromium.until(f"document.querySelector('#m-b') && {second}") == "rgb(2, 2, 2)"
-    assert chromium.evaluate("document.querySelector('#m-a .swatch').style.background") == "rgb(1, 1, 1)"
-    assert chromium.evaluate("asked") == [*PAGES, "v1/materials?limit=1000&cursor=a"]
-    chromium.send("Page.removeScriptToEvaluateOnNewDocument", identifier=script["identifier"])
 
 
 def test_a_wrong_comparison_leaves_the_material(chromium: Chromium, address: str) -> None:

@@ -7,7 +7,6 @@ const [search, model, paper, verdict, count, list] = ["search", "model", "paper"
   document.getElementById(id));
 
 const materials = [];
-const pages = []; // the same as they came, and from where
 let active = null; // the option that arrow keys have reached
 let chosen = "";
 let choose = () => {};
@@ -18,7 +17,6 @@ export async function load(onChoose, onPage, onFail) {
   choose = onChoose;
   for (let path = "v1/materials?limit=1000"; path;) {
     const page = await arrived(path, onFail);
-    pages.push({ path, materials: page.materials });
     materials.push(...page.materials);
     list.append(...page.materials.map(option));
     offer(model, page.materials.map((each) => [modelOf(each), each.measured ? "measured" : each.model_title]));
@@ -28,7 +26,6 @@ export async function load(onChoose, onPage, onFail) {
     onPage(materials);
     path = page.next?.replace(/^\//, "");
   }
-  await paint(REPAINTS);
 }
 
 /** A page, once it is there; until then the list says why it is not. */
@@ -47,27 +44,10 @@ async function arrived(path, onFail) {
 
 const pause = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
 
-const [REPAINTS, PAUSE_MS] = [8, 1000];
-const COLOURED_BYTES = 16 * 2 ** 20; // the service finds the colour of a larger table only where that is looked at
-
-/** Ask again for the pages with colours that the service has not found yet; some tables get none. */
-async function paint(tries) {
-  const waits = (each) => !each.damaged && !each.colour && (each.bytes ?? 0) <= COLOURED_BYTES;
-  const pale = pages.filter((page) => page.materials.some(waits));
-  if (!tries || !pale.length) return;
-  await pause(PAUSE_MS);
-  for (const page of pale) {
-    page.materials = (await json(page.path).catch(() => page)).materials;
-    page.materials.forEach(update);
-  }
-  await paint(tries - 1);
-}
-
-/** Show what was learnt of a material since its line was made: its verdict, and its colour, where it has one. */
+/** Show what was learnt of a material since its line was made: its verdict. */
 export function update(each) {
   const made = document.getElementById(`m-${each.name}`);
   if (!made) return;
-  if (each.colour) made.querySelector(".swatch").style.background = each.colour;
   made.dataset.verdict = words(each);
   made.querySelector(".answers").replaceWith(answers(each));
   offer(verdict, [[words(each), words(each)]]);
@@ -101,8 +81,8 @@ const SHORT = { as_published: "as published", conserves_energy: "energy" };
 const modelOf = (each) => (each.measured ? "measured" : each.model ?? "");
 
 function option(each) {
-  const swatch = element("span", { className: "swatch" });
-  swatch.style.background = each.colour ?? "";
+  const swatch = element(each.thumbnail ? "img" : "span", { className: "swatch", alt: "", loading: "lazy" });
+  if (each.thumbnail) swatch.src = `${each.thumbnail.slice(1)}?size=48`;
   const name = element("span", { className: "name" }, each.title || each.name, ...grey(each));
   const made = element("li", { id: `m-${each.name}`, title: each.damaged ?? each.source }, swatch, name, answers(each),
     element("span", { className: "quiet" }, errors(each)));

@@ -16,10 +16,12 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 
 from brdfdb_api.http.errors import HANDLED, PROBLEM_JSON, handler, problem_of
 from brdfdb_api.http.files import files
+from brdfdb_api.http.lookups import LARGE_AT_ONCE
 from brdfdb_api.http.middleware import Edge
+from brdfdb_api.http.models import models
 from brdfdb_api.http.pages import pages
 from brdfdb_api.http.responses import REVISION
-from brdfdb_api.http.routes import EXPORTS_AT_ONCE, LARGE_AT_ONCE, answer_point, router
+from brdfdb_api.http.routes import EXPORTS_AT_ONCE, answer_point, router
 from brdfdb_api.http.views import views
 from brdfdb_api.serving.settings import Settings
 from brdfdb_api.serving.shelf import Shelf
@@ -54,12 +56,33 @@ class Application(FastAPI):
 
     def openapi(self) -> dict[str, Any]:
         document = super().openapi()
+        schemas = document["components"]["schemas"]
         for path in document["paths"].values():
             for operation in path.values():
                 for status, response in operation["responses"].items():
-                    if status >= "400" and "application/json" in response.get("content", {}):
-                        response["content"][PROBLEM_JSON] = response["content"].pop("application/json")
+                    content = response.get("content", {})
+                    if "$ref" in content.get("application/json", {}).get(
+                        "schema", {}
+                    ):  # first: generated clients take the first that they can read
+                        kind = PROBLEM_JSON if status >= "400" else "application/json"
+                        response["content"] = {kind: content.pop("application/json"), **content}
+        for part in (*document["paths"].values(), *list(schemas.values())):
+            for key, value in part.items():
+                part[key] = _named(value, schemas)
         return document
+
+
+def _named(part: Any, schemas: dict[str, Any]) -> Any:
+    """Return a part of the document with references to the objects that have titles, which join the schemas."""
+    if isinstance(part, list):
+        return [_named(item, schemas) for item in part]
+    if not isinstance(part, dict):
+        return part
+    part = {key: _named(value, schemas) for key, value in part.items()}
+    if part.get("type") != "object" or "properties" not in part or not isinstance(part.get("title"), str):
+        return part
+    schemas.setdefault(part["title"], part)
+    return {"$ref": f"#/components/schemas/{part['title']}"}
 
 
 def create_app(settings: Settings | None = None, store: Store | None = None) -> FastAPI:
@@ -93,6 +116,7 @@ def create_app(settings: Settings | None = None, store: Store | None = None) -> 
     app.state.exports = asyncio.Semaphore(EXPORTS_AT_ONCE)
     app.include_router(router)
     app.include_router(views)
+    app.include_router(models)
     app.include_router(files)
     app.include_router(pages)
     for kind in HANDLED:
@@ -116,7 +140,6 @@ async def _warmed(app: FastAPI) -> AsyncIterator[None]:
     """Run a thread that finds the colours of the first page of a list, until the application ends."""
     threading.Thread(target=app.state.shelf.warm, daemon=True).start()
     yield
-    app.state.shelf.close()
 
 
 def openapi_json() -> bytes:

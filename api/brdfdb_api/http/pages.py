@@ -14,7 +14,7 @@ from starlette.requests import Request
 from starlette.responses import Response
 
 from brdfdb_api.http.errors import RequestError
-from brdfdb_api.http.responses import not_modified
+from brdfdb_api.http.responses import unchanged
 
 SCRIPT = "text/javascript; charset=utf-8"
 _TYPES = {".html": "text/html; charset=utf-8", ".css": "text/css; charset=utf-8", ".js": SCRIPT}
@@ -54,9 +54,7 @@ def plotly(request: Request) -> Response:
         "Vary": "Accept-Encoding",
         **({"Content-Encoding": "gzip"} if packed else {}),
     }
-    return not_modified(request.headers.get("if-none-match"), headers) or Response(
-        content, media_type=SCRIPT, headers=headers
-    )
+    return unchanged(Response(content, media_type=SCRIPT, headers=headers), request.headers.get("if-none-match"))
 
 
 @pages.get("/explorer/{file}")
@@ -66,9 +64,7 @@ def explorer_file(request: Request, file: str) -> Response:
         raise RequestError(404, "the explorer has no such file")
     content, tag = _file(file)
     headers = {**_SAFE, "ETag": f'"{tag}"', "Cache-Control": "no-cache"}
-    return not_modified(request.headers.get("if-none-match"), headers) or Response(
-        content, media_type=MEDIA[file], headers=headers
-    )
+    return unchanged(Response(content, media_type=MEDIA[file], headers=headers), request.headers.get("if-none-match"))
 
 
 @functools.cache
