@@ -23,7 +23,7 @@ FLAGS = [
     *("--enable-unsafe-swiftshader", "--force-color-profile=srgb"),  # WebGL without a graphics card
     *(f"--disable-{each}" for each in ("quic", "background-networking", "component-update", "sync", "dev-shm-usage")),
 ]
-KEYS = {"Enter": 13, "ArrowLeft": 37, "ArrowUp": 38, "ArrowRight": 39, "ArrowDown": 40, "Home": 36, "End": 35, "Tab": 9}
+KEYS = {"Enter": 13, "ArrowLeft": 37, "ArrowUp": 38, "ArrowRight": 39, "ArrowDown": 40, "Home": 36, "End": 35, "Tab": 9, " ": 32}
 
 
 class Chromium:
@@ -162,10 +162,21 @@ def milliseconds(browser: Chromium) -> float:
     return float(browser.evaluate("performance.getEntriesByName('picture')[0].duration"))
 
 
-def curve(browser: Chromium, kind: str) -> np.ndarray:
-    """The points of a curve [pixel]."""
-    path = browser.evaluate(f"document.querySelector('#cut path.{kind}').getAttribute('d')")
+def curve(browser: Chromium, kind: str | int, view: str = "cut") -> np.ndarray:
+    """The points of a curve [pixel], by its number, or of a line of another kind."""
+    of = f"path.{kind}" if isinstance(kind, str) else "path.curve"
+    number = 0 if isinstance(kind, str) else kind
+    path = browser.evaluate(f"document.querySelectorAll('#{view} > svg {of}')[{number}].getAttribute('d')")
     return np.array([point.split() for point in path[1:].split("L")], dtype=float)
+
+
+def image(browser: Chromium, of: str) -> np.ndarray:
+    """The bytes of a canvas (rows, columns, 4), rows from the top."""
+    width, height, data = browser.evaluate(
+        "(({ width, height }, context) => [width, height, [...context.getImageData(0, 0, width, height).data]])"
+        f"(...[document.querySelector('{of}')].flatMap(each => [each, each.getContext('2d')]))"
+    )
+    return np.reshape(np.array(data, np.uint8), (height, width, 4))
 
 
 def copied(browser: Chromium, kind: str) -> str:
