@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import warnings
 from functools import cache, lru_cache
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,6 +19,7 @@ from brdfdb.parameters import closest
 
 ILLUMINANT, OBSERVER = "D65", "CIE 1931 2 Degree Standard Observer"
 VISIBLE_FROM_NM, VISIBLE_TO_NM, VISIBLE_STEP_NM = 420.0, 680.0, 20.0
+MOST_OF_A_COLOUR = 1000  # wavelengths of a colour: the cost of its weights grows with the square
 PICTURE_NM = np.arange(VISIBLE_FROM_NM, VISIBLE_TO_NM + 1.0, VISIBLE_STEP_NM)  # wavelengths of a picture
 
 # Unit conversion moves the end of a tabulated range by a few ulp; the package forgives the same amount.
@@ -259,6 +260,40 @@ def linear_srgb(wavelength_nm: ArrayLike, reflectance: ArrayLike) -> NDArray[np.
     dtype = np.float32 if values.dtype == np.float32 else np.float64
     weights = srgb_weights(tuple(wavelength.tolist())).astype(dtype)
     return np.asarray(np.matmul(values.astype(dtype, copy=False), weights), dtype=dtype)
+
+
+def colour_weights(
+    colour: Literal["xyz", "linear-srgb"], wavelength_nm: NDArray[np.float64] | None, illuminant: str = ILLUMINANT
+) -> NDArray[np.float64]:
+    """Return weights (L, 3) from a spectrum to a colour, (1, 3) of a grey material; white is Y = 1, or (1, 1, 1).
+
+    Parameters
+    ----------
+    colour : str
+        "xyz" or "linear-srgb".
+    wavelength_nm : array (L,) [nm], or None
+        Increasing, over the visible in steps of at most 20 nm; at most 1000. None of a grey material.
+    illuminant : str
+        A name of colour-science.
+
+    Raises
+    ------
+    ParameterError
+        For an unknown illuminant, with the closest names; for too many wavelengths, or such that make no colour.
+    """
+    check_illuminant(illuminant)
+    if wavelength_nm is not None and wavelength_nm.size > MOST_OF_A_COLOUR:
+        sentence = f"{wavelength_nm.size} wavelengths are more than the {MOST_OF_A_COLOUR} that a colour is of"
+        raise ParameterError("wavelength_nm", sentence, wavelength_nm.size, (1, MOST_OF_A_COLOUR))
+    if wavelength_nm is not None and not covers_visible(wavelength_nm):
+        raise ParameterError(
+            "wavelength_nm",
+            "a colour needs increasing wavelengths from 420 nm or less to 680 nm or more in steps of at most 20 nm",
+        )
+    # a grey material is a flat spectrum: any wavelengths sum to the same
+    at = (380.0, 780.0) if wavelength_nm is None else tuple(wavelength_nm.tolist())
+    weights = (xyz_weights if colour == "xyz" else srgb_weights)(at, illuminant)
+    return weights.sum(axis=0, keepdims=True) if wavelength_nm is None else weights
 
 
 def _summary(wavelength: NDArray[np.float64]) -> str:

@@ -20,7 +20,7 @@ def written_name(parameter: Parameter) -> str:
     return f"{parameter.name}_deg" if parameter.unit == "rad" else parameter.name
 
 
-def _as_written(parameter: Parameter) -> Parameter:
+def as_written(parameter: Parameter) -> Parameter:
     """Return a parameter as files write it: an angle is in degrees, under a name that ends in ``_deg``."""
     if parameter.unit != "rad":
         return parameter
@@ -41,7 +41,7 @@ def from_file(
 
     `wavelengths_nm` and `folder` are those of `spectrum_of`.
     """
-    file_spec = replace(spec, parameters=tuple(_as_written(parameter) for parameter in spec.parameters))
+    file_spec = replace(spec, parameters=tuple(as_written(parameter) for parameter in spec.parameters))
     reflectances = {parameter.name for parameter in spec.parameters if parameter.reflectance}
     read = {
         name: spectrum_of(name, value, wavelengths_nm, folder)

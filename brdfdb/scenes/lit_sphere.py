@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import functools
+import struct
+import zlib
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -26,21 +28,41 @@ Light = Callable[[Array], Array]
 
 SIZE, MOST_SIZE = 160, 2048  # pixels across a picture
 WHITE = 0.8  # linear value of a white Lambertian sphere where it is brightest
-# Normals at which reflected light is computed: angles to the viewer up to the last, and azimuths, a multiple of 4
-_THETAS, _LAST_DEG, _PHIS = 72, 89.0, 96
-# Directions of light for each normal. Anisotropic surfaces have many more normals
-_SAMPLES, _SAMPLES_ANISOTROPIC = 768, 256
+_LAST_DEG = 89.0  # largest angle to the viewer of normals at which reflected light is computed
 _GOLDEN = (np.sqrt(5.0) - 1.0) / 2.0
-# Table of the light: half a degree apart, columns a multiple of _PHIS; every eighth of its rows and columns is blurred
+# Table of the light: half a degree apart, columns a multiple of azimuths; every eighth row and column is blurred
 _ROWS, _COLUMNS, _COARSE = 385, 768, 8
 # Standard deviations of the blurred light, and the radius of a sample from which each is used
 _BLURS_DEG = np.array([3.5, 7.0])
 _BLURS_FROM = radians(np.array([1.2, 2.4]))
-_BLOCKS = 12  # of normals of anisotropic surfaces, so that arrays stay in the cache
-_ACROSS = 3  # points across each pixel, and down
+_BLOCK_SIZE = 2**17  # directions of light of a block of normals of anisotropic surfaces: arrays stay in the cache
 
 
-def lit_sphere(surface: Source | BaseTable, size: int = SIZE, light: Light = studio) -> Array:
+class Detail(NamedTuple):
+    """The numbers that decide between the quality of a picture and the time that it takes.
+
+    Attributes
+    ----------
+    thetas, phis : int
+        Normals at which reflected light is computed: angles to the viewer, and azimuths, a multiple of 4.
+    samples, samples_anisotropic : int
+        Directions of light for each normal, multiples of 4. Anisotropic surfaces have many more normals.
+    across : int
+        Points across each pixel, and down. With one, the edge is smoothed by the distance to it.
+    """
+
+    thetas: int
+    phis: int
+    samples: int
+    samples_anisotropic: int
+    across: int
+
+
+FINE = Detail(72, 96, 768, 256, 3)
+DRAFT = Detail(24, 32, 128, 64, 1)  # for pictures that follow a slider: a tenth of the time
+
+
+def lit_sphere(surface: Source | BaseTable, size: int = SIZE, light: Light = studio, detail: Detail = FINE) -> Array:
     """Return a picture of a sphere in sRGB (size, size, 4) in [0, 1], with its coverage as the last channel.
 
     Parameters
@@ -51,6 +73,8 @@ def lit_sphere(surface: Source | BaseTable, size: int = SIZE, light: Light = stu
         Pixels across and down, up to 2048. The sphere fills the picture.
     light : callable
         ``light(towards)`` gives the radiance [1] from directions (..., 3). The default is `studio`.
+    detail : Detail
+        `FINE`, or `DRAFT` for a picture in a hurry.
 
     Returns
     -------
@@ -75,17 +99,40 @@ def lit_sphere(surface: Source | BaseTable, size: int = SIZE, light: Light = stu
     between its wavelengths, as by any lookup. A table whose wavelengths do not reach from 420 to 680 nm is grey, at the
     first of them.
     """
-    linear = linear_sphere(surface, size, light)
+    linear = linear_sphere(surface, size, light, detail)
     encoded = colour_science().cctf_encoding(np.clip(linear[..., :3], 0.0, 1.0), function="sRGB")
     return np.concatenate([encoded, linear[..., 3:]], axis=-1)
 
 
-def linear_sphere(surface: Source | BaseTable, size: int = SIZE, light: Light = studio) -> Array:
+def sphere_png(surface: Source | BaseTable, size: int = SIZE, detail: Detail = FINE) -> bytes:
+    """Return the picture of `lit_sphere` as a PNG file of 8 bits with transparent corners.
+
+    Parameters
+    ----------
+    surface, size, detail
+        As of `lit_sphere`.
+
+    Raises
+    ------
+    ParameterError
+        If `size` is out of range.
+    """
+    pixels = np.rint(255.0 * lit_sphere(surface, size, detail=detail)).astype(np.uint8)
+    rows = np.pad(pixels.reshape(size, -1), ((0, 0), (1, 0)))  # each row begins with its filter: none
+    header, data = struct.pack(">2I5B", size, size, 8, 6, 0, 0, 0), zlib.compress(rows.tobytes(), 1)
+    chunks = (
+        struct.pack(">I", len(content)) + kind + content + struct.pack(">I", zlib.crc32(kind + content))
+        for kind, content in ((b"IHDR", header), (b"IDAT", data), (b"IEND", b""))
+    )
+    return b"\x89PNG\r\n\x1a\n" + b"".join(chunks)
+
+
+def linear_sphere(surface: Source | BaseTable, size: int = SIZE, light: Light = studio, detail: Detail = FINE) -> Array:
     """Return the picture of `lit_sphere` in linear sRGB (size, size, 4), not clipped, with its coverage at the end.
 
     Parameters
     ----------
-    surface, size, light
+    surface, size, light, detail
         As of `lit_sphere`.
 
     Raises
@@ -95,19 +142,22 @@ def linear_sphere(surface: Source | BaseTable, size: int = SIZE, light: Light = 
     """
     if not 1 <= size <= MOST_SIZE:
         raise ParameterError("size", f"{size} is not a number of pixels from 1 to {MOST_SIZE}", size, (1, MOST_SIZE))
-    fine = (np.arange(size * _ACROSS) + 0.5) / _ACROSS - size / 2.0
+    across = detail.across
+    fine = (np.arange(size * across) + 0.5) / across - size / 2.0
     radius = np.hypot(fine, fine[:, np.newaxis]) / (size / 2.0)
-    theta = np.arcsin(np.minimum(radius, 1.0))
-    phi = np.arctan2(-fine[:, np.newaxis], fine)
-    radiance = sphere_radiance(surface, theta, phi, light)
-    covered = (radius <= 1.0).astype(np.float64)
-    total = _averaged(covered[..., np.newaxis] * radiance)
-    coverage = _averaged(covered)
+    covered = np.clip((1.0 - radius) * size / 2.0 + 0.5, 0.0, 1.0) if across == 1 else (radius <= 1.0).astype(float)
+    theta, phi = np.arcsin(np.minimum(radius, 1.0)), np.arctan2(-fine[:, np.newaxis], fine)
+    seen = covered > 0.0
+    radiance = np.zeros((*covered.shape, 3))
+    radiance[seen] = covered[seen, np.newaxis] * sphere_radiance(surface, theta[seen], phi[seen], light, detail)
+    total, coverage = _averaged(radiance, across), _averaged(covered, across)
     linear = WHITE / _tabulated(light).brightest * total / np.maximum(coverage, 1e-9)[..., np.newaxis]
     return np.concatenate([linear, coverage[..., np.newaxis]], axis=-1)
 
 
-def sphere_radiance(surface: Source | BaseTable, theta: Array, phi: Array, light: Light) -> Array:
+def sphere_radiance(
+    surface: Source | BaseTable, theta: Array, phi: Array, light: Light, detail: Detail = FINE
+) -> Array:
     """Return the radiance (..., 3) in linear sRGB of points of a sphere, in the unit of the light.
 
     Parameters
@@ -118,16 +168,17 @@ def sphere_radiance(surface: Source | BaseTable, theta: Array, phi: Array, light
         Angle between the normal and the viewer, 0 to pi/2.
     phi : array [rad]
         Azimuth of the normal in the picture, counter-clockwise from the right.
-    light : callable
+    light, detail
         As of `lit_sphere`.
     """
     shown = _shown(surface)
-    nodes = radians(np.linspace(0.0, _LAST_DEG, _THETAS))
+    nodes = radians(np.linspace(0.0, _LAST_DEG, detail.thetas))
     sky = _tabulated(light)
-    blocks = np.array_split(nodes, _BLOCKS if shown.surface.anisotropic else 1)
-    grid, turn = np.concatenate([_reflected(shown, block, sky) for block in blocks]), phi / (2.0 * np.pi)
-    places = np.stack([np.minimum(theta / nodes[-1], 1.0) * (_THETAS - 1), turn * _PHIS])
-    values = np.stack([_interpolated(channel, places) for channel in np.moveaxis(grid, -1, 0)], axis=-1)
+    lights = len(nodes) * detail.phis * detail.samples_anisotropic
+    blocks = np.array_split(nodes, max(lights // _BLOCK_SIZE, 1) if shown.surface.anisotropic else 1)
+    grid, turn = np.concatenate([_reflected(shown, block, sky, detail) for block in blocks]), phi / (2.0 * np.pi)
+    places = np.stack([np.minimum(theta / nodes[-1], 1.0) * (detail.thetas - 1), turn * detail.phis])
+    values = _interpolated(grid, places)
     mirror = shown.specular(nodes)
     if np.any(mirror):
         seen = _interpolated(sky.sharp, np.stack([2.0 * theta / np.pi * (_ROWS - 1), turn * _COLUMNS]))
@@ -177,14 +228,14 @@ def _at(surface: Source | BaseTable, source: Source | FunctionRecord | None, at:
     return _Shown(surface, source, at, weights)
 
 
-def _reflected(shown: _Shown, nodes: Array, sky: _Sky) -> Array:
+def _reflected(shown: _Shown, nodes: Array, sky: _Sky, detail: Detail) -> Array:
     """Return the radiance (thetas, azimuths, 3) that a sphere reflects, without the specular part."""
-    theta, phi = np.meshgrid(nodes, _azimuths(shown), indexing="ij")
+    theta, phi = np.meshgrid(nodes, _azimuths(shown, detail.phis), indexing="ij")
     frame = _frames(theta, phi).reshape(-1, 3, 3)
     wr = frame[..., 2]
     lobe = None if shown.source is None else shown.source.lobe(wr[:, np.newaxis, 2], shown.wavelength_nm)
     widest = widest_lobe(lobe, len(wr))
-    samples = _SAMPLES_ANISOTROPIC if shown.surface.anisotropic else _SAMPLES
+    samples = detail.samples_anisotropic if shown.surface.anisotropic else detail.samples
     wi = directions(widest, *_numbers(samples), wr)
     density = samples * mixture_density(widest, wr, wi)
     share = np.divide(wi[..., 2], density, where=wi[..., 2] > 0.0, out=np.zeros(density.shape))
@@ -198,10 +249,10 @@ def _reflected(shown: _Shown, nodes: Array, sky: _Sky) -> Array:
     rows += _ROWS * np.searchsorted(_BLURS_FROM, radius).T.reshape(across)
     start = rows * _COLUMNS
     columns = np.rint(around / (2.0 * np.pi) * _COLUMNS).astype(np.int64)
-    radiance = np.empty((len(nodes), _PHIS, weight.shape[2]))
+    radiance = np.empty((len(nodes), detail.phis, weight.shape[2]))
     flat = np.concatenate([sky.sharp, *sky.blurred]).reshape(-1)
-    for number_of_phi in range(_PHIS):
-        same, sign, turn = _same_as(number_of_phi, theta.shape[1])
+    for number_of_phi in range(detail.phis):
+        same, sign, turn = _same_as(number_of_phi, theta.shape[1], detail.phis)
         incoming = flat[start[:, same] + (sign * columns[:, same] + turn) % _COLUMNS]
         radiance[:, number_of_phi] = (weight[:, same] @ incoming[..., np.newaxis])[..., 0]
     return radiance
@@ -214,20 +265,20 @@ def _numbers(samples: int) -> tuple[Array, Array]:
     return np.tile(u1, (4, 1)), np.concatenate([u2, 1.0 - u2, (0.5 + u2) % 1.0, (1.5 - u2) % 1.0])
 
 
-def _azimuths(shown: _Shown) -> Array:
+def _azimuths(shown: _Shown, phis: int) -> Array:
     """Return the azimuths [rad] whose reflection gives that of all others: one, a quarter turn, or all of them."""
-    full = 2.0 * np.pi * np.arange(_PHIS) / _PHIS
+    full = 2.0 * np.pi * np.arange(phis) / phis
     if not shown.surface.anisotropic:
         return full[:1]
-    return full[: _PHIS // 4 + 1] if shown.elliptical else full
+    return full[: phis // 4 + 1] if shown.elliptical else full
 
 
-def _same_as(phi: int, known: int) -> tuple[int, int, int]:
+def _same_as(phi: int, known: int, phis: int) -> tuple[int, int, int]:
     """Return the known azimuth with the same reflection, and the sign and turn of the columns of its light there."""
-    half = _PHIS // 2
+    half = phis // 2
     if known == 1:
-        return 0, 1, phi * _COLUMNS // _PHIS
-    if known == _PHIS:
+        return 0, 1, phi * _COLUMNS // phis
+    if known == phis:
         return phi, 1, 0
     quadrant, rest = divmod(phi, half // 2)
     return (
@@ -286,13 +337,20 @@ def _tabulated(light: Light) -> _Sky:
 
 
 def _interpolated(values: Array, at: Array) -> Array:
-    """Return values (rows, columns) at places (2, ...), linear between them; columns are periodic."""
-    from scipy.ndimage import map_coordinates
+    """Return values (rows, columns, ...) at places (2, ...), linear between them; columns are periodic."""
+    rows, columns = values.shape[:2]
+    row, column = np.minimum(at[0].astype(np.int64), rows - 2), np.floor(at[1]).astype(np.int64)
+    shape = (*row.shape, *[1] * (values.ndim - 2))
+    down, along = (at[0] - row).reshape(shape), (at[1] - column).reshape(shape)
+    flat, left, right = values.reshape(-1, *values.shape[2:]), column % columns, (column + 1) % columns
+    above, below = (
+        (1.0 - along) * flat[start + left] + along * flat[start + right]
+        for start in (row * columns, (row + 1) * columns)
+    )
+    return np.asarray((1.0 - down) * above + down * below)
 
-    return np.asarray(map_coordinates(values, at, order=1, mode="grid-wrap"))
 
-
-def _averaged(fine: Array) -> Array:
+def _averaged(fine: Array, across: int) -> Array:
     """Return means over the points of each pixel."""
-    size = len(fine) // _ACROSS
-    return np.asarray(fine.reshape(size, _ACROSS, size, _ACROSS, *fine.shape[2:]).mean(axis=(1, 3)))
+    size = len(fine) // across
+    return np.asarray(fine.reshape(size, across, size, across, *fine.shape[2:]).mean(axis=(1, 3)))

@@ -143,6 +143,58 @@ def hemispherical_albedo(theta_i_deg: Axis, albedo: Floats) -> Floats:
     return np.asarray(2.0 * _theta_weights(radians(theta_i_deg)) @ albedo)
 
 
+class Reflected(NamedTuple):
+    """What a surface reflects, averaged over phi_i: arrays (theta_i, wavelengths) [1], one wavelength if grey.
+
+    `albedo` is without the `specular` part, `hemispherical` (wavelengths,) of light from everywhere with it. `error` is
+    the largest estimate of the error of the integration.
+    """
+
+    theta_i_deg: Axis
+    albedo: Floats
+    specular: Floats
+    hemispherical: Floats
+    error: float
+
+
+def reflected(table: Table) -> Reflected:
+    """Return what a table reflects; the integration takes a third of a second if it is not exact."""
+    return _reflected(directional_albedo(table), table, table.wavelength_nm)
+
+
+def reflected_by(source: Source, wavelength_nm: Axis | None) -> Reflected:
+    """Return what a source reflects at wavelengths (L,) [nm], or at none if it is grey.
+
+    Raises
+    ------
+    ParameterError
+        If the source does not hold at one of the wavelengths.
+    """
+    phi_i_deg = np.arange(0.0, 91.0 if source.elliptical else 361.0, _PHI_I_STEP_DEG)
+    phi_i_deg = phi_i_deg if source.anisotropic else phi_i_deg[:1]
+    integrals = [
+        [
+            source_albedo(
+                source, float(radians(theta)), float(radians(phi)), wavelength_nm, tolerance=LARGEST_TOLERANCE
+            )
+            for phi in phi_i_deg
+        ]
+        for theta in THETA_I_DEG
+    ]
+    albedo = np.array([[one.albedo for one in row] for row in integrals])
+    error = np.array([max(one.error for one in row) for row in integrals])
+    return _reflected(TableAlbedo(THETA_I_DEG, phi_i_deg, albedo, error), source, wavelength_nm)
+
+
+def _reflected(albedo: TableAlbedo, surface: Table | Source, wavelength_nm: Axis | None) -> Reflected:
+    diffuse, angles = albedo.mean, albedo.theta_i_deg
+    specular = np.asarray(surface.specular_reflectance(radians(angles), wavelength_nm)).reshape(diffuse.shape[0], -1)
+    specular = np.broadcast_to(specular, diffuse.shape)
+    return Reflected(
+        angles, diffuse, specular, hemispherical_albedo(angles, diffuse + specular), float(albedo.error.max())
+    )
+
+
 def source_albedo(
     source: Source,
     theta_i: float,

@@ -20,7 +20,7 @@ from brdfdb.store.publication import publish_dataset
 from brdfdb.tables.grids import Grid
 from brdfdb.tables.layout import Layout
 from brdfdb.tables.tabulation import tabulate
-from brdfdb_api.http.openapi_notes import EXPORT_OPTIONS, served_options
+from brdfdb_api.http.addresses import EXPORT_OPTIONS, served_options
 from tests.api.a_store import client_of
 from tests.pipelines.command import Captured, run
 

@@ -10,7 +10,7 @@ from brdfdb.errors import ParameterError
 from brdfdb.geometry import unit_vector
 from brdfdb.integrals.quadrature import directional_albedo
 from brdfdb.materials import FunctionSource, Material
-from brdfdb.scenes.lit_sphere import WHITE, lit_sphere, sphere_radiance
+from brdfdb.scenes.lit_sphere import DRAFT, WHITE, lit_sphere, sphere_radiance
 from brdfdb.tables.grids import Grid
 from brdfdb.tables.table import Table
 
@@ -132,3 +132,12 @@ def test_copper_is_red() -> None:
 def test_size_out_of_range_is_refused(size: int) -> None:
     with pytest.raises(ParameterError, match=f"size: {size} is not a number of pixels from 1 to 2048"):
         lit_sphere(MATTE, size)
+
+
+@pytest.mark.parametrize("source", [MATTE, BRUSHED], ids=["matte", "brushed"])
+def test_a_draft_is_the_same_picture_with_less_detail(source: Material) -> None:
+    fine, draft = lit_sphere(source, 64), lit_sphere(source, 64, detail=DRAFT)
+    inside = fine[..., 3] == 1.0
+    assert np.abs(draft - fine)[inside].mean() < 0.03
+    assert 0.0 < np.abs(draft - fine)[inside].max() < 0.2
+    assert draft[..., 3].mean() == pytest.approx(np.pi / 4.0, abs=2e-3)  # a disc in a square

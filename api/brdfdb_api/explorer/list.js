@@ -1,6 +1,6 @@
 // The list of materials: fetched page by page, searched, filtered, and walked with arrow keys.
 
-import { AGAIN_MS, Problem, address, json } from "./api.js";
+import { AGAIN_MS, Problem, json } from "./api.js";
 import { byId, chip, element, isGood, isWrong } from "./dom.js";
 
 const search = byId("search", HTMLInputElement), count = byId("count", HTMLElement), list = byId("list", HTMLElement);
@@ -62,12 +62,11 @@ async function arrived(path, onFail) {
 
 const pause = (/** @type {number} */ ms) => new Promise((resolve) => setTimeout(resolve, ms));
 
-/** Show what was learnt of a material since its line was made: its verdict, and its colour, where it has one.
+/** Show what was learnt of a material since its line was made: its verdict.
  * @param {any} each */
 export function update(each) {
-  const made = document.getElementById(`m-${each.name}`), image = made?.querySelector("img");
+  const made = document.getElementById(`m-${each.name}`);
   if (!made) return;
-  if (each.colour && image) image.style.background = each.colour;
   made.dataset.verdict = words(each);
   made.querySelector(".marks")?.replaceWith(marks(each));
   offer(verdict, words(each));
@@ -112,9 +111,7 @@ const modelOf = (/** @type {any} */ each) => (each.measured ? "measured" : each.
 /** @param {any} each */
 function option(each) {
   const image = element("img", { alt: "", width: 44, height: 44, loading: "lazy", decoding: "async" });
-  image.style.background = each.colour ?? "";
-  image.addEventListener("error", () => { image.removeAttribute("src"); });
-  if (!each.damaged && each.links?.thumbnail !== null) image.src = address(each.name, "thumbnail.png", { size: 88, revision: each.revision });
+  if (each.thumbnail) image.src = `${each.thumbnail.slice(1)}?size=88`;
   const name = element("span", { className: "name" }, each.title || each.name);
   const made = element("li", { id: `m-${each.name}`, title: each.damaged ?? each.source }, image, name,
     element("span", { className: "quiet" }, about(each)), marks(each));

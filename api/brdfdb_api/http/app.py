@@ -16,10 +16,12 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 
 from brdfdb_api.http.errors import HANDLED, PROBLEM_JSON, handler, problem_of
 from brdfdb_api.http.files import files
+from brdfdb_api.http.lookups import LARGE_AT_ONCE
 from brdfdb_api.http.middleware import Edge
+from brdfdb_api.http.models import models
 from brdfdb_api.http.pages import pages
 from brdfdb_api.http.responses import REVISION
-from brdfdb_api.http.routes import EXPORTS_AT_ONCE, LARGE_AT_ONCE, answer_point, router
+from brdfdb_api.http.routes import EXPORTS_AT_ONCE, answer_point, router
 from brdfdb_api.http.views import views
 from brdfdb_api.serving.settings import Settings
 from brdfdb_api.serving.shelf import Shelf
@@ -93,6 +95,7 @@ def create_app(settings: Settings | None = None, store: Store | None = None) -> 
     app.state.exports = asyncio.Semaphore(EXPORTS_AT_ONCE)
     app.include_router(router)
     app.include_router(views)
+    app.include_router(models)
     app.include_router(files)
     app.include_router(pages)
     for kind in HANDLED:
@@ -116,7 +119,6 @@ async def _warmed(app: FastAPI) -> AsyncIterator[None]:
     """Run a thread that finds the colours of the first page of a list, until the application ends."""
     threading.Thread(target=app.state.shelf.warm, daemon=True).start()
     yield
-    app.state.shelf.close()
 
 
 def openapi_json() -> bytes:

@@ -2,54 +2,67 @@
 
 from __future__ import annotations
 
+import contextlib
+import hashlib
+import tempfile
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
+from typing import Any
 
-from fastapi import APIRouter
+from pydantic import BaseModel
 from starlette.requests import Request
 from starlette.responses import FileResponse, Response, StreamingResponse
 
-from brdfdb.errors import StoreError
+from brdfdb.errors import StoreError, UnknownMaterialError
 from brdfdb.store.files import sha256_of
 from brdfdb.store.manifest import check_manifest
-from brdfdb.store.paths import manifest_path
+from brdfdb.store.paths import METADATA, manifest_path
+from brdfdb.store.sealed_json import read_json
+from brdfdb_api.http.addresses import Revision, addresses, answers, both, shelf_of
 from brdfdb_api.http.errors import RequestError
-from brdfdb_api.http.openapi_notes import answers
-from brdfdb_api.http.responses import cache_headers, not_modified
-from brdfdb_api.http.routes import both, query_names, shelf_of
+from brdfdb_api.http.responses import cache_headers, json_response
 
 ZIP = "application/zip"
 BYTES = "application/octet-stream"
 
 _PIECE = 1 << 20
 
-files = APIRouter()
+files = addresses()
+
+
+class Group(BaseModel):
+    """A zarr group (version 3) with the metadata of all below it."""
+
+    zarr_format: int
+    node_type: str
+    attributes: dict[str, Any]
+    consolidated_metadata: dict[str, Any]
 
 
 @both(
+    files,
     "/download.zarr",
-    router=files,
     tags=["files"],
-    dependencies=[query_names()],
-    responses=answers(None, 304, 404, 422, 503, media={ZIP: "a zarr v3 group, for zarr.storage.ZipStore"}),
+    responses=answers(
+        *(None, 304, 404, 503),
+        media={ZIP: "a zarr v3 group, for zarr.storage.ZipStore"},
+        headers=("Content-Disposition",),
+    ),
 )
-def download(request: Request, name: str, revision: str | None = None) -> Response:
+def download(request: Request, name: str, revision: Revision = None) -> Response:
     """Return a revision as one uncompressed zip file: xarray.open_zarr(zarr.storage.ZipStore(path, mode="r"))."""
     group, digest = _located(request, name, revision)
     headers = cache_headers(f"{name}-{group.name}-{digest[:16]}", "zip", immutable=revision is not None)
     headers["Content-Disposition"] = f'attachment; filename="{name}-{group.name}.zarr.zip"'
-    if held := not_modified(request.headers.get("if-none-match"), headers):
-        return held
-    listed = sorted(check_manifest(group, digest, contents=True)["files"])
-    return StreamingResponse(_zipped(group, listed), media_type=ZIP, headers=headers)
+    listed = check_manifest(group, digest, contents=True)["files"]
+    return StreamingResponse(zipped(group, listed, zipfile.ZIP_STORED), media_type=ZIP, headers=headers)
 
 
 @files.get(
     "/v1/store/materials/{name}/{revision}/{file:path}",
     tags=["files"],
-    dependencies=[query_names()],
-    responses=answers(None, 304, 404, 422, 503, media={BYTES: "a file of the zarr group"}),
+    responses=answers(None, 304, 404, 503, media={BYTES: "a file of the zarr group"}),
 )
 def stored_file(request: Request, name: str, revision: str, file: str) -> Response:
     """Return a file of a revision: ``xarray.open_zarr(".../v1/store/materials/NAME/REVISION")`` reads these."""
@@ -59,12 +72,37 @@ def stored_file(request: Request, name: str, revision: str, file: str) -> Respon
         raise RequestError(404, f"{name} {revision} has no such file")
     kind = "json" if file.endswith(".json") else "file"  # JSON may be compressed on its way
     headers = cache_headers(f"{name}-{revision}-{listed[file]['sha256'][:16]}", kind, immutable=True)
-    if held := not_modified(request.headers.get("if-none-match"), headers):
-        return held
     if sha256_of(group / file) != listed[file]["sha256"]:  # a cache would keep it forever
         raise StoreError(f"{name} {revision} is damaged: the content of {file} changed")
     media = "application/json" if file.endswith(".json") else BYTES
     return FileResponse(group / file, media_type=media, headers=headers)
+
+
+@files.get("/v1/store/zarr.json", tags=["files"], responses=answers(Group, 304, 503))
+def root(request: Request) -> Response:
+    """Return the metadata of all current revisions: ``zarr.open_group(".../v1/store")`` lists materials/NAME/REVISION.
+
+    A material that is damaged is left out.
+    """
+    shelf = shelf_of(request)
+    metadata: dict[str, Any] = {"materials": _group()}
+    for name in shelf.names():
+        with contextlib.suppress(StoreError, UnknownMaterialError):
+            group, digest = shelf.store.location(name)
+            check_manifest(group, digest, contents=False)
+            whole = read_json(group / METADATA)
+            arrays = whole.pop("consolidated_metadata", {}).get("metadata", {})
+            place = f"materials/{name}/{group.name}"
+            metadata |= {f"materials/{name}": _group(revision=group.name), place: whole}
+            metadata |= {f"{place}/{key}": array for key, array in arrays.items()}
+    consolidated = {"kind": "inline", "must_understand": False, "metadata": metadata}
+    answer = json_response({**_group(), "consolidated_metadata": consolidated})
+    answer.headers.update(cache_headers(f"store-{hashlib.sha256(answer.body).hexdigest()[:16]}"))
+    return answer
+
+
+def _group(**attributes: Any) -> dict[str, Any]:
+    return {"zarr_format": 3, "node_type": "group", "attributes": attributes}
 
 
 def _located(request: Request, name: str, revision: str | None) -> tuple[Path, str]:
@@ -79,33 +117,12 @@ def _located(request: Request, name: str, revision: str | None) -> tuple[Path, s
     return group, digest
 
 
-class _Pieces:
-    """A write-only stream without seek that hands out the bytes written to it."""
-
-    def __init__(self) -> None:
-        self.waiting: list[bytes] = []
-
-    def write(self, data: bytes) -> int:
-        self.waiting.append(bytes(data))
-        return len(data)
-
-    def flush(self) -> None:
-        """Nothing lies anywhere else."""
-
-    def taken(self) -> bytes:
-        whole = b"".join(self.waiting)
-        self.waiting.clear()
-        return whole
-
-
-def _zipped(group: Path, listed: list[str]) -> Iterator[bytes]:
-    """Yield a zip of some files of a directory in pieces, so that memory does not grow with the table."""
-    pieces = _Pieces()
-    with zipfile.ZipFile(pieces, "w", zipfile.ZIP_STORED) as archive:  # type: ignore[call-overload]
-        for name in listed:
-            with (group / name).open("rb") as source, archive.open(name, "w", force_zip64=True) as target:
-                while piece := source.read(_PIECE):
-                    target.write(piece)
-                    yield pieces.taken()
-            yield pieces.taken()
-    yield pieces.taken()
+def zipped(folder: Path, names: Iterable[str], compression: int = zipfile.ZIP_DEFLATED) -> Iterator[bytes]:
+    """Yield files of a folder as a zip archive in pieces, from a temporary file: memory does not grow with a table."""
+    with tempfile.TemporaryFile() as file:
+        with zipfile.ZipFile(file, "w", compression) as archive:
+            for name in sorted(names):
+                archive.write(folder / name, name)
+        file.seek(0)
+        while piece := file.read(_PIECE):
+            yield piece

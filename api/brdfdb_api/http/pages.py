@@ -15,7 +15,7 @@ from starlette.requests import Request
 from starlette.responses import Response
 
 from brdfdb_api.http.errors import RequestError
-from brdfdb_api.http.responses import not_modified
+from brdfdb_api.http.responses import unchanged
 
 SCRIPT = "text/javascript; charset=utf-8"
 _COMMENT = re.compile(r"^[ \t]*(?:/\*\*(?:[^*]|\*(?!/))*\*/|//.*)\n", re.MULTILINE)
@@ -58,9 +58,7 @@ def explorer_file(request: Request, file: str) -> Response:
         "Vary": "Accept-Encoding",
         **({"Content-Encoding": "gzip"} if packed else {}),
     }
-    return not_modified(request.headers.get("if-none-match"), headers) or Response(
-        content, media_type=MEDIA[file], headers=headers
-    )
+    return unchanged(Response(content, media_type=MEDIA[file], headers=headers), request.headers.get("if-none-match"))
 
 
 @functools.cache

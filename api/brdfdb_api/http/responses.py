@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import io
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -9,19 +10,29 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import numpy as np
 import orjson
 from numpy.typing import NDArray
-from pydantic import BaseModel, Field, WithJsonSchema
+from pydantic import BaseModel, ConfigDict, Field, GetJsonSchemaHandler
+from pydantic_core import CoreSchema
 from starlette.responses import Response
 
 from brdfdb.materials.spectrum import Spectrum
 from brdfdb.measurements.record import Measured
+from brdfdb.store.last_audit import Answer, Sentence
 from brdfdb.tables.first_numbers import FormulaError, LargestAlbedo
+from brdfdb.tables.metadata import TableMetadata
+from brdfdb.tables.stated_error import Error
 
 if TYPE_CHECKING:
     from brdfdb.tables.table import Table
 
-NPY = "application/x-npy"
 JSON = "application/json"
+NPY = "application/x-npy"
 REVISION = "Brdfdb-Revision"  # header that names the revision of the values of a lookup
+
+
+class Attributes(TableMetadata):
+    """The attributes of a table; tables of other programs may lack any."""
+
+    model_config = ConfigDict(json_schema_extra={"required": []})
 
 
 class Problem(BaseModel):
@@ -32,27 +43,14 @@ class Problem(BaseModel):
     status: int
     detail: str = Field(description="one sentence; an error of a parameter starts with its name")
     parameter: str = Field(default="", description="the parameter at fault, where there is one")
-    closest: list[str] = Field(default=[], description="for an unknown material: the names most like it")
+    closest: list[str] = Field(default=[], description="for an unknown name: the names most like it")
 
 
-class Alive(BaseModel):
-    """State of the process."""
+class Health(BaseModel):
+    """State of the process, and of the store where that was asked for."""
 
     status: str
-
-
-class Health(Alive):
-    """State of the store."""
-
-    materials: int = Field(description="number of materials in the store")
-
-
-class Answer(BaseModel):
-    """The answer of an audit to one of its two questions."""
-
-    word: str = Field(description="verdict behind the answer")
-    text: str = Field(description="the answer in a few words")
-    reason: str = Field(description="the answer in a sentence, with its angle and its wavelength")
+    materials: int | None = Field(default=None, description="number of materials in the store")
 
 
 class FormulaRung(BaseModel):
@@ -63,6 +61,12 @@ class FormulaRung(BaseModel):
     )
     rung: str = Field(description="name of the highest rung; empty: none is known")
     p99: float | None = Field(description="relative error that 99 of 100 values keep to; null: no rung is known")
+
+
+SpectrumKind = Annotated[
+    Literal["grey", "one wavelength", "spectral"],
+    Field(description="grey: no colour is known, all wavelengths are alike; one wavelength: shown as grey"),
+]
 
 
 class Summary(BaseModel):
@@ -76,43 +80,27 @@ class Summary(BaseModel):
     source: str = Field(default="", description="paper and table, figure or section of the parameters")
     measured: bool = Field(default=False, description="true: the table is of measured data")
     anisotropic: bool | None = None
-    wavelength_range_nm: list[float] | None = Field(
-        default=None, description="first and last wavelength [nm]; null: grey"
-    )
+    wavelength_range_nm: list[float] | None = Field(default=None, description="first and last [nm]; null: grey")
     error_p99: float | None = Field(
-        default=None,
-        description="of the table against its formula: relative error that 99 of 100 values keep to; "
-        "null: not measured",
+        default=None, description="of the table: relative error that 99 of 100 values keep to; null: not measured"
     )
-    formula_error: FormulaRung | None = Field(
-        default=None, description="error of that formula against the highest rung of its surface; null: not measured"
-    )
-    largest_albedo: LargestAlbedo | None = Field(
-        default=None, description="of the table, specular part included; null: not measured"
-    )
-    spectrum: Literal["grey", "one wavelength", "spectral"] | None = Field(
-        default=None, description="grey: no colour is known, all wavelengths are alike; one wavelength: shown as grey"
-    )
+    formula_error: FormulaRung | None = Field(default=None, description="of its formula; null: not measured")
+    largest_albedo: LargestAlbedo | None = Field(default=None, description="with the specular part; null: not measured")
+    spectrum: SpectrumKind | None = None
     verdict: str | None = Field(default=None, description="of the audit of this revision; null: it has none")
-    as_published: Answer | None = Field(
-        default=None, description="of that audit, about the table: is it what the paper says?"
-    )
-    conserves_energy: Answer | None = Field(
-        default=None, description="of that audit, about the model: does the published model conserve energy?"
-    )
-    colour: str | None = Field(
-        default=None, description="#rrggbb of its albedo under D65, at 45 degrees, to look at; see spectrum"
-    )
+    as_published: Answer | None = Field(default=None, description="is the table what the paper says?")
+    conserves_energy: Answer | None = Field(default=None, description="does the published model conserve energy?")
     revision: str = ""
     created: str | None = None
     bytes: int | None = None
     incomplete: str | None = Field(default=None, description="what the table does not state of itself; null: nothing")
     damaged: str | None = Field(default=None, description="what is wrong with its files")
     href: str
+    thumbnail: str | None = Field(default=None, description="address of its picture")
 
 
 class Catalogue(BaseModel):
-    """Materials of the store, sorted by name."""
+    """Materials of the store, a page of them."""
 
     materials: list[Summary]
     total: int = Field(description="materials that the filters let through, on all pages")
@@ -120,7 +108,7 @@ class Catalogue(BaseModel):
 
 
 class ParameterDocument(BaseModel):
-    """A parameter of a model."""
+    """A parameter of a material."""
 
     name: str
     value: float | bool | Spectrum
@@ -128,6 +116,19 @@ class ParameterDocument(BaseModel):
     meaning: str
     source: str
     assumed: bool = Field(description="the paper does not print it: our choice, explained in attributes.assumed")
+
+
+class AuditSummary(BaseModel):
+    """The verdict of an audit, its answers to two questions, and its findings in sentences."""
+
+    verdict: str
+    as_published: Answer
+    conserves_energy: Answer
+    model: str
+    sentences: list[Sentence]
+    revision: str = Field(description="that was audited")
+    current: bool = Field(description="whether that is this one")
+    when: str
 
 
 class Material(BaseModel):
@@ -140,47 +141,33 @@ class Material(BaseModel):
     parameters: list[ParameterDocument]
     anisotropic: bool
     wavelength_nm: list[float] | None = Field(description="wavelengths [nm]; null: grey")
-    spectrum: Literal["grey", "one wavelength", "spectral"] = Field(description="as in the catalogue")
+    spectrum: SpectrumKind
     axes_deg: dict[str, list[float]] = Field(description="the grid of the table [degrees]")
     specular: bool = Field(description="whether there is a specular part: specular_reflectance is not 0 everywhere")
-    error: Annotated[dict[str, Any] | None, WithJsonSchema({"type": ["object", "null"]})] = Field(
-        description="the measured error of the table against its model, or the data, by bands of theta_i; null: not "
-        "measured"
-    )
+    error: Error | None = Field(description="of the table against its model, or the data; null: not measured")
     measured: Measured | None = Field(
-        description="origin, symmetries and errors of measured data, the error at samples that were held out among "
-        "them; null: the values are a model's or a function's"
+        description="origin, symmetries and errors of measured data; null: the values are a model's or a function's"
     )
-    formula_error: FormulaError | None = Field(
-        description="error of the model against the highest rung of its surface; null: not measured"
-    )
+    formula_error: FormulaError | None = Field(description="of the model against the highest rung; null: not measured")
     largest_albedo: LargestAlbedo | None = Field(description="of the table, specular part included; null: not measured")
     incomplete: str | None = Field(description="what the table does not state of itself; null: nothing")
-    audit: Annotated[dict[str, Any] | None, WithJsonSchema({"type": ["object", "null"]})] = Field(
-        description="verdict of the audit, its answers to the two questions, its findings in sentences, and whether it "
-        "is of this revision; null: none"
-    )
-    colour: str | None
-    attributes: Annotated[dict[str, Any], WithJsonSchema({"type": "object"})] = Field(
-        description="all that the table records of itself"
-    )
+    audit: AuditSummary | None = Field(description="null: none")
+    attributes: Attributes = Field(description="all that the table records of itself")
     revisions: list[str] = Field(description="that are kept, oldest first")
     links: dict[str, str]
 
 
-class Lookup(BaseModel):
+class Evaluated(BaseModel):
     """Values of a BRDF."""
 
-    material: str
-    revision: str
-    source: Literal["table", "model"]
+    source: Literal["table", "model", "family"]
     unit: str = Field(description="unit of brdf and error: 1/sr")
     output: Literal["spectrum", "xyz", "linear-srgb"]
     illuminant: str | None = Field(description="of a colour; null of a spectrum")
-    wavelength_nm: float | list[float] | None = Field(description="wavelengths that were looked up [nm]; null: grey")
+    wavelength_nm: float | list[float] | None = Field(description="of the values [nm]; null: grey")
     brdf: float | list[Any] = Field(
-        description="shape of the broadcast angles, then the wavelengths unless they are one number or null; of a "
-        "colour, then three numbers"
+        description="shape of the broadcast angles, or of axes_deg, then the wavelengths unless they are one number or "
+        "null; of a colour, then three numbers"
     )
     error: float | list[Any] | None = Field(
         description="in the shape of brdf, 99 of 100 values are within that of the model, or of what was measured; "
@@ -190,16 +177,43 @@ class Lookup(BaseModel):
         description="shape of the broadcast angles; true: outside of the directions that were measured; null: error "
         "was not asked for"
     )
-    specular_reflectance: float | list[Any] = Field(
+    specular_reflectance: float | list[Any] | None = Field(
         description="specular part, a reflectance without unit that is not in brdf: shape of theta_i, then as brdf"
     )
 
 
-class Albedo(BaseModel):
-    """Directional albedo of a table: the share of light from theta_i that it reflects, averaged over phi_i."""
+class Lookup(Evaluated):
+    """Values of a material."""
 
     material: str
     revision: str
+
+
+class Lookups(BaseModel):
+    """Values of several materials."""
+
+    materials: list[Lookup]
+
+
+class View(BaseModel):
+    """One light, and the axes of the values."""
+
+    view: Literal["cut", "hemisphere", "half-difference"]
+    theta_i: float | None = Field(description="degrees; null of half-difference")
+    phi_i: float
+    axes_deg: dict[str, list[float]] = Field(
+        description="of the axes of brdf, in order; in a cut theta_r is negative back towards the light; in a "
+        "hemisphere delta_phi is phi_r - phi_i"
+    )
+
+
+class Lobe(Lookup, View):
+    """f_r of a material for one light over viewers, or over half and difference angles."""
+
+
+class AlbedoValues(BaseModel):
+    """Directional albedo: the share of light from theta_i that is reflected, averaged over phi_i."""
+
     wavelength_nm: list[float] | None = Field(description="null: grey")
     theta_i: list[float] = Field(description="degrees")
     albedo: list[list[float]] = Field(description="[theta_i][wavelength], without the specular part")
@@ -208,25 +222,23 @@ class Albedo(BaseModel):
     error: float = Field(description="of albedo, the largest estimate of the integration")
 
 
-class Lobe(BaseModel):
-    """f_r for one light over viewers, or over half and difference angles: axes in degrees, and values over them."""
+class Albedo(AlbedoValues):
+    """Directional albedo of a table."""
 
     material: str
     revision: str
-    source: Literal["table", "model"]
-    view: Literal["cut", "hemisphere", "half-difference"]
-    theta_i: float | None = Field(description="degrees; null of half-difference")
-    phi_i: float
-    output: Literal["spectrum", "xyz", "linear-srgb"]
-    illuminant: str | None
-    unit: str
-    wavelength_nm: float | list[float] | None
-    axes_deg: dict[str, list[float]] = Field(
-        description="of the axes of brdf, in order; in a cut theta_r is negative back towards the light; in a "
-        "hemisphere delta_phi is phi_r - phi_i"
-    )
-    brdf: list[Any]
-    specular_reflectance: float | list[float] | None
+
+
+class _Audited:
+    """The JSON schema of the audit of a material. Its modules are loaded for the document only."""
+
+    @classmethod
+    def __get_pydantic_json_schema__(cls, _: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        with contextlib.suppress(ImportError):  # without the extra `report` findings are objects
+            from brdfdb.audit import MaterialAudit
+
+            return handler(MaterialAudit.__pydantic_core_schema__)
+        return {"type": "object"}
 
 
 class Audit(BaseModel):
@@ -236,12 +248,10 @@ class Audit(BaseModel):
     revision: str = Field(description="that was audited")
     current: bool = Field(description="whether that is the current one")
     when: str
-    finding: Annotated[dict[str, Any], WithJsonSchema({"type": "object"})] = Field(
-        description="MaterialAudit of schemas/audit.schema.json"
-    )
+    finding: Annotated[dict[str, Any], _Audited]
 
 
-def json_bytes(document: dict[str, Any]) -> bytes:
+def json_bytes(document: Any) -> bytes:
     """Return a document as JSON; it may contain numpy arrays, except 0-d ones."""
     return orjson.dumps(document, option=orjson.OPT_SERIALIZE_NUMPY)
 
@@ -249,6 +259,11 @@ def json_bytes(document: dict[str, Any]) -> bytes:
 def json_response(document: dict[str, Any], headers: dict[str, str] | None = None) -> Response:
     """Return a JSON answer with a document that `json_bytes` takes."""
     return Response(json_bytes(document), media_type=JSON, headers=headers)
+
+
+def media_type(kind: str) -> str:
+    """Return the media type of a format."""
+    return NPY if kind == "npy" else JSON
 
 
 def npy_bytes(array: NDArray[Any]) -> bytes:
@@ -279,7 +294,7 @@ class EncodedResponse(Response):
 def lookup_headers(tag: str | None, revision: str, kind: str, *, immutable: bool = False) -> Encoded:
     """Return the headers of the answer to a lookup: its tag (None: not to be cached) and the revision of its values."""
     cached = {"Cache-Control": "no-store"} if tag is None else cache_headers(tag, kind, immutable=immutable)
-    return Encoded({**cached, REVISION: revision, "Content-Type": NPY if kind == "npy" else JSON})
+    return Encoded({**cached, REVISION: revision, "Content-Type": media_type(kind)})
 
 
 def plain(array: Any) -> Any:
@@ -301,13 +316,13 @@ def cache_headers(tag: str, kind: str = "json", *, immutable: bool = False) -> d
     return {"ETag": etag, "Cache-Control": kept, "Vary": "Accept"}
 
 
-def not_modified(held: str | None, headers: dict[str, str], *, certain: bool = True) -> Response | None:
-    """Return the 304 for a client that already holds the answer with these headers, None for any other.
-
-    ``*`` stands for any answer, and so for none as long as it is not `certain` that the request is not refused.
-    """
-    if held is None:
-        return None
-    tags = {tag.strip().removeprefix("W/") for tag in held.split(",")}
-    known = {headers["ETag"].removeprefix("W/"), *(["*"] if certain else [])}
-    return Response(status_code=304, headers=headers) if tags & known else None
+def unchanged(answer: Response, held: str | None) -> Response:
+    """Return 304 in place of an answer that a client already holds, by its If-None-Match; ``*`` stands for any."""
+    tag = answer.headers.get("etag")
+    if held is None or tag is None or answer.status_code != 200:
+        return answer
+    tags = {each.strip().removeprefix("W/") for each in held.split(",")}
+    if not tags & {"*", tag.removeprefix("W/")}:
+        return answer
+    kept = {key: answer.headers[key] for key in ("ETag", "Cache-Control", "Vary") if key in answer.headers}
+    return Response(status_code=304, headers=kept)

@@ -2,88 +2,87 @@
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+import io
+from datetime import datetime
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 from urllib.parse import urlencode
 
 import numpy as np
-from fastapi import APIRouter, Depends, Query
+from fastapi import Query as InQuery
+from pydantic import Field, TypeAdapter, ValidationError
 from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request
 from starlette.responses import Response
 from starlette.types import Scope
 
 from brdfdb.formats import EXPORTERS
-from brdfdb_api.http import middleware, openapi_notes
+from brdfdb_api.http import middleware
+from brdfdb_api.http.addresses import NPY_ANSWER, Content, Revision, addresses, answers, body, both, shelf_of
 from brdfdb_api.http.errors import RequestError
-from brdfdb_api.http.lookups import FIELDS, OPTIONS, Options, Points, evaluate, parsed
-from brdfdb_api.http.openapi_notes import BODY, ERROR, NPY_ANSWER, POINT, WAVELENGTHS, answers
+from brdfdb_api.http.lookups import (
+    INLINE_VALUES,
+    LIMITS,
+    answered,
+    checked_size,
+    document_of,
+    evaluate,
+    surface_of,
+    write_answer,
+)
+from brdfdb_api.http.queries import (
+    BodyQuery,
+    Flag,
+    Format,
+    ManyBody,
+    ManyQuery,
+    PointQuery,
+    PointsBody,
+    Query,
+    Wavelengths,
+    checked,
+    from_json,
+    from_npy,
+    names_of,
+    parsed,
+)
 from brdfdb_api.http.responses import (
-    JSON,
     NPY,
-    Alive,
+    REVISION,
+    AuditSummary,
     Catalogue,
-    Encoded,
-    EncodedResponse,
     Health,
     Lookup,
+    Lookups,
     Material,
     cache_headers,
     json_bytes,
     json_response,
     lookup_headers,
-    not_modified,
-    npy_bytes,
-    plain,
     tag_of,
+    unchanged,
 )
-from brdfdb_api.serving.shelf import Shelf, answers_of, spectrum_of
+from brdfdb_api.serving.shelf import Shelf, Verdict, spectrum_of
 
 if TYPE_CHECKING:
     from brdfdb.tables.metadata import TableMetadata
     from brdfdb.tables.table import Table
 
-T = TypeVar("T")
-
-INLINE_VALUES = 1000  # larger lookups run in a thread, so that the event loop can serve others
-INLINE_BYTES = 96 * 2**10  # larger bodies are read in a thread; 1000 points take about this many bytes
-# Number of larger bodies, or larger answers, that are processed at a time
-LARGE_BYTES, LARGE_VALUES, LARGE_AT_ONCE = 2**20, 100_000, 8
 EXPORTS_AT_ONCE, EXPORT_WAIT_S = 2, 10  # files of other formats that are made at a time, and the wait for a turn [s]
-JSON_BYTES = 8 * 2**20  # limit on a JSON body [byte]: numbers in lists take twenty times the memory of the text
-LIMITS = {"json": (1, 100), "npy": (100, 1000)}  # points and values of one answer, as multiples of max_points
-SPECTRA_OF_COLOURS = 10  # factor on the number of values where only colours are returned
 PAGE, MOST = 100, 1000  # materials on a page: default and largest number
-_ALLOWED = (*FIELDS, *OPTIONS)  # parameters in the query of a lookup
+NPZ = "application/x-npz"
 SEARCHED = ("name", "title", "model", "model_title", "paper", "source")
 
-router = APIRouter()
+router = addresses()
 
 
-def query_names(*allowed: str) -> Any:
-    """Return a dependency that refuses parameters that are not `allowed`, and all but wavelength_nm given twice."""
-
-    async def check(request: Request) -> None:
-        parsed(request.scope["query_string"], allowed)
-
-    return Depends(check)
-
-
-def shelf_of(request: Request) -> Shelf:
-    """Return the shelf of the application."""
-    shelf: Shelf = request.app.state.shelf
-    return shelf
-
-
-@router.get("/healthz", tags=["service"], dependencies=[query_names()], responses=answers(Alive, 422))
+@router.get("/healthz", tags=["service"], responses=answers(Health))
 async def healthz() -> Response:
     """Report that the process answers."""
     return json_response({"status": "ok"})
 
 
-@router.get("/readyz", tags=["service"], dependencies=[query_names()], responses=answers(Health, 422, 503))
+@router.get("/readyz", tags=["service"], responses=answers(Health, 503))
 def readyz(request: Request) -> Response:
     """Report that kernels are loaded and the store can be read, and the number of its materials."""
     if shelf_of(request).warming:
@@ -91,79 +90,103 @@ def readyz(request: Request) -> Response:
     return json_response({"status": "ok", "materials": len(shelf_of(request).names())})
 
 
-@router.get(
-    "/metrics", tags=["service"], dependencies=[query_names()], responses=answers(None, 422, media={"text/plain": ""})
-)
+@router.get("/metrics", tags=["service"], responses=answers(None, media={"text/plain": "counts as text"}))
 def metrics() -> Response:
     """Requests, seconds and points counted, as Prometheus reads them."""
     return Response(middleware.metrics(), media_type="text/plain; version=1.0.0; charset=utf-8")
 
 
-@router.get(
-    "/v1/materials",
-    tags=["materials"],
-    dependencies=[query_names("cursor", "limit", "model", "paper", "q")],
-    responses=answers(Catalogue, 304, 422, 503),
-)
-def catalogue(
-    request: Request,
-    cursor: Annotated[str, Query(description="of the page before, its last name")] = "",
-    limit: Annotated[int, Query(ge=1, le=MOST, description="materials on a page")] = PAGE,
-    model: Annotated[str, Query(description="only of this model; measured: only of measured data")] = "",
-    paper: Annotated[str, Query(description="only with this in the key of the paper or in the source")] = "",
-    q: Annotated[str, Query(description="only with all of these words in name, title, model or source")] = "",
-) -> Response:
-    """Materials of the store, sorted by name, a page at a time."""
+_PLACE = TypeAdapter(tuple[bool, float, str])
+
+
+class CatalogueQuery(Query):
+    """The materials of a page, and their order."""
+
+    cursor: str = Field(default="", description="as `next` of the page before has it")
+    limit: int = Field(default=PAGE, ge=1, le=MOST, description="materials on a page")
+    sort: Literal["name", "error_p99", "-error_p99", "created", "-created", "bytes", "-bytes"] = Field(
+        default="name",
+        description="order; with a minus the largest, or the newest, first; unknown ones last, then by name",
+    )
+    model: str = Field(default="", description="only of this model; measured: only of measured data")
+    paper: str = Field(default="", description="only with this in the key of the paper or in the source")
+    q: str = Field(default="", description="only with all of these words in name, title, model or source")
+    family: str = Field(default="", description="only the members of this family of the store")
+    verdict: Literal["passes", "known published excess", "accepted excess", "violates", "not audited"] | None = Field(
+        default=None, description="only with this verdict of the audit of the current revision"
+    )
+    anisotropic: Flag | None = Field(default=None, description="only anisotropic, or only isotropic ones")
+    wavelength_nm: Wavelengths = Field(
+        default=[], description="only with tables at this wavelength [nm], repeatable; grey ones hold at all"
+    )
+
+    @property
+    def after(self) -> tuple[bool, float, str]:
+        """The place after which the page begins; RequestError (422) if the cursor is none."""
+        try:
+            return _PLACE.validate_json(self.cursor) if self.cursor else (False, -np.inf, "")
+        except ValidationError:
+            raise RequestError(422, "cursor: it is not that of `next` of a page", "cursor") from None
+
+    @property
+    def chosen(self) -> dict[str, Any]:
+        """The parameters that were given, as a query has them."""
+        given = self.model_dump(exclude={"cursor"}, exclude_defaults=True)
+        return {key: str(value).lower() if isinstance(value, bool) else value for key, value in given.items()}
+
+    @property
+    def filters(self) -> bool:
+        """True if some materials may be left out."""
+        return bool(self.chosen.keys() - {"limit", "sort"})
+
+    def rank(self, name: str, line: dict[str, Any]) -> tuple[bool, float, str]:
+        """Return the place of a material in the order."""
+        value = line.get(self.sort.removeprefix("-"))
+        if self.sort == "name" or value is None:
+            return self.sort != "name", 0.0, name
+        number = datetime.fromisoformat(value).timestamp() if isinstance(value, str) else float(value)
+        return False, -number if self.sort.startswith("-") else number, name
+
+    def lets_through(self, line: dict[str, Any]) -> bool:
+        """Return True if the filters let a line of the catalogue through."""
+        text = " ".join(str(line.get(key, "")) for key in SEARCHED).casefold()
+        papers = f"{line.get('paper', '')} {line.get('source', '')}".casefold()
+        low, high = line.get("wavelength_range_nm") or (0.0, np.inf)
+        return (
+            self.model in ("", line.get("model", ""), "measured" if line.get("measured") else "")
+            and self.paper.casefold() in papers
+            and all(word in text for word in self.q.casefold().split())
+            and self.verdict in (None, line.get("verdict") or "not audited")
+            and self.anisotropic in (None, line.get("anisotropic"))
+            and all(low <= wavelength <= high for wavelength in self.wavelength_nm)
+        )
+
+
+@router.get("/v1/materials", tags=["materials"], responses=answers(Catalogue, 304, 404, 503))
+def catalogue(request: Request, query: Annotated[CatalogueQuery, InQuery()]) -> Response:
+    """Materials of the store, a page at a time."""
     shelf = shelf_of(request)
     names = shelf.names()
-    if model or paper or q:
-        words = q.casefold().split()
-        names = [name for name in names if _let_through(shelf.summary(name), model, paper.casefold(), words)]
-    page = [name for name in names if name > cursor][:limit]
-    lines = [shelf.summary(name) for name in page]
-    shelf.colour(line["name"] for line in lines if line.get("colour") is None and "damaged" not in line)
+    if query.family:
+        members = shelf.store.family_content(query.family)["members"]
+        names = [name for name in names if name in members]
+    known = {name: shelf.summary(name) for name in names} if query.filters or query.sort != "name" else {}
+    ranks = [query.rank(name, known.get(name, {})) for name in names if not known or query.lets_through(known[name])]
+    ranks.sort()
+    after = query.after
+    page = [rank for rank in ranks if rank > after][: query.limit]
+    lines = [known.get(name) or shelf.summary(name) for _, _, name in page]
     following = None
-    if page and names[-1] > page[-1]:
-        query = {"model": model, "paper": paper, "q": q, "limit": limit, "cursor": page[-1]}
-        following = f"/v1/materials?{urlencode({key: value for key, value in query.items() if value})}"
-    answer = json_response({"materials": lines, "total": len(names), "next": following})
-    headers = cache_headers(f"materials-{hashlib.sha256(answer.body).hexdigest()[:16]}")
-    if held := not_modified(request.headers.get("if-none-match"), headers):
-        return held
-    answer.headers.update(headers)
+    if page and ranks[-1] > page[-1]:
+        cursor = json_bytes(page[-1]).decode()
+        following = f"/v1/materials?{urlencode({**query.chosen, 'cursor': cursor}, doseq=True)}"
+    answer = json_response({"materials": lines, "total": len(ranks), "next": following})
+    answer.headers.update(cache_headers(f"materials-{hashlib.sha256(answer.body).hexdigest()[:16]}"))
     return answer
 
 
-def _let_through(line: dict[str, Any], model: str, paper: str, words: list[str]) -> bool:
-    """Return True if the filters let a line of the catalogue through."""
-    text = " ".join(str(line.get(key, "")) for key in SEARCHED).casefold()
-    papers = f"{line.get('paper', '')} {line.get('source', '')}".casefold()
-    models = ("", line.get("model", ""), "measured" if line.get("measured") else "")
-    return model in models and paper in papers and all(word in text for word in words)
-
-
-def both(
-    path: str, *, router: APIRouter = router, method: str = "GET", **keywords: Any
-) -> Callable[[Callable[..., T]], Callable[..., T]]:
-    """Serve an address of the current revision, and the same of any revision, which never changes."""
-
-    def add(function: Callable[..., T]) -> Callable[..., T]:
-        name = getattr(function, "__name__", "")
-        for prefix, suffix in (("", ""), ("/revisions/{revision}", "_of_revision")):
-            router.add_api_route(
-                f"/v1/materials/{{name}}{prefix}{path}",
-                function,
-                methods=[method],
-                name=f"{name}{suffix}",
-                **keywords,
-            )
-        return function
-
-    return add
-
-
-@both("", tags=["materials"], dependencies=[query_names()], responses=answers(Material, 304, 404, 422, 503))
-def material(request: Request, name: str, revision: str | None = None) -> Response:
+@both(router, "", tags=["materials"], responses=answers(Material, 304, 404, 503))
+def material(request: Request, name: str, revision: Revision = None) -> Response:
     """Return the origin of the table of a material, its grid (axes in degrees), and its error."""
     shelf = shelf_of(request)
     table = shelf.table(name, revision)
@@ -171,8 +194,6 @@ def material(request: Request, name: str, revision: str | None = None) -> Respon
     # facts that change while the table does not
     beside = f"{'' if verdict is None else verdict.when} {revisions}"
     headers = cache_headers(f"{tag_of(table)}-{hashlib.sha256(beside.encode()).hexdigest()[:8]}")
-    if held := not_modified(request.headers.get("if-none-match"), headers):
-        return held
     address = f"/v1/materials/{name}" + ("" if revision is None else f"/revisions/{revision}")
     metadata = table.metadata
     document = {
@@ -191,13 +212,17 @@ def material(request: Request, name: str, revision: str | None = None) -> Respon
         "formula_error": table.attrs.get("formula_error"),
         "largest_albedo": table.attrs.get("largest_albedo"),
         "incomplete": metadata.gaps or None,
-        "audit": None if verdict is None else _verdicts(verdict.finding, verdict.when, table.revision),
-        "colour": shelf.swatch(table),
-        "attributes": {key: value for key, value in table.attrs.items() if key not in ("error", "request")},
+        "audit": None if verdict is None else _audited(verdict, table.revision),
+        "attributes": {
+            key: value for key, value in table.attrs.items() if key not in ("error", "request", *metadata.strange)
+        },
         "revisions": revisions,
         "links": {
             "self": address,
-            **{key: f"{address}/{key}" for key in ("lookup", "albedo", "lobe", "audit", "download.zarr")},
+            **{
+                key: f"{address}/{key}"
+                for key in ("lookup", "albedo", "lobe", "sphere", "thumbnail.png", "audit", "download.zarr")
+            },
             **{f"export/{file_format}": f"{address}/export/{file_format}" for file_format in EXPORTERS},
             "store": f"/v1/store/materials/{name}/{table.revision}",
             "revision": f"/v1/materials/{name}/revisions/{table.revision}",
@@ -228,26 +253,24 @@ def _parameters(metadata: TableMetadata) -> list[dict[str, Any]]:
     ]
 
 
-def _verdicts(finding: dict[str, Any], when: str, revision: str) -> dict[str, Any]:
+def _audited(verdict: Verdict, revision: str) -> dict[str, Any]:
     """Return the verdict of an audit, its two answers, and its findings in sentences."""
-    return {
-        "verdict": finding["verdict"],
-        **answers_of(finding),
-        "model": finding["model"],
-        "sentences": finding["sentences"],
-        "revision": finding["revision"],
-        "current": finding["revision"] == revision,
-        "when": when,
-    }
+    finding = verdict.finding.model_dump(include={*AuditSummary.model_fields}, exclude_unset=True)
+    return {**finding, "current": verdict.finding.revision == revision, "when": verdict.when}
 
 
 @both(
+    router,
     "/lookup",
     tags=["lookup"],
-    responses=answers(Lookup, 304, 404, 413, 422, 503, media=NPY_ANSWER),
-    openapi_extra={"parameters": [*POINT, WAVELENGTHS, *openapi_notes.OPTIONS, ERROR]},
+    responses=answers(Lookup, 304, 404, 413, 503, media=NPY_ANSWER, headers=(REVISION,)),
 )
-async def lookup_point(request: Request, name: str, revision: str | None = None) -> Response:
+async def lookup_point(
+    request: Request,
+    name: str,
+    query: Annotated[PointQuery, InQuery()],  # noqa: ARG001 of the document
+    revision: Revision = None,
+) -> Response:
     """Return the BRDF at one pair of directions (angles in degrees).
 
     The wavelengths are an axis, unless wavelength_nm is one number or the material is grey. Below the horizon (theta
@@ -256,32 +279,27 @@ async def lookup_point(request: Request, name: str, revision: str | None = None)
     return await answer_point(request.scope, name, revision)
 
 
+_OF_POINTS = names_of(PointQuery)
+
+
 async def answer_point(scope: Scope, name: str, revision: str | None) -> Response:
-    """Answer GET of a lookup, from the query as it came."""
-    query, wavelengths = parsed(scope["query_string"], _ALLOWED)
-    options, points = Options.from_query(query), Points.from_query(query, wavelengths)
-    accept, held = _headers(scope)
-    state = scope["app"].state
-    table = await _table(state.shelf, name, revision)
-    kind = options.format or ("npy" if NPY in accept else "json")
-    headers = lookup_headers(tag_of(table), table.revision, kind, immutable=revision is not None)
-    if held and (unchanged := not_modified(held, headers, certain=False)):
-        return unchanged
-    values = checked_size(state.settings.max_points, points, options, table, kind)
-    in_thread = slow(values, options)
-    answer = await run(write_answer, points, options, table, kind, headers, in_thread=in_thread)
-    return (held and not_modified(held, headers)) or answer
-
-
-def _headers(scope: Scope) -> tuple[str, str]:
-    """Accept and If-None-Match."""
-    accept = held = b""
+    """Answer GET of a lookup, from the query as it came: what lies behind the edge takes three times as long."""
+    query = checked(PointQuery, parsed(scope["query_string"], _OF_POINTS), "query")
+    accept = held = ""
     for key, value in scope["headers"]:
         if key == b"accept":
-            accept += value  # the header may come in several lines
+            accept += value.decode("latin-1")  # the header may come in several lines
         elif key == b"if-none-match":
-            held = value
-    return accept.decode("latin-1"), held.decode("latin-1")
+            held = value.decode("latin-1")
+    state, kind, points = scope["app"].state, query.kind(accept), query.points
+    table = await _table(state.shelf, name, revision)
+    headers = lookup_headers(tag_of(table), table.revision, kind, immutable=revision is not None)
+    surface = surface_of(table, query.source)
+    values = checked_size(state.settings.max_points, points, query, surface, kind)
+    slow = values > INLINE_VALUES or query.source == "model" or query.output != "spectrum"
+    given = (points, query, surface, kind, headers, {"material": table.name, "revision": table.revision})
+    answer = await run_in_threadpool(write_answer, *given) if slow else write_answer(*given)
+    return unchanged(answer, held) if held else answer
 
 
 async def _table(shelf: Shelf, name: str, revision: str | None) -> Table:
@@ -293,94 +311,61 @@ async def _table(shelf: Shelf, name: str, revision: str | None) -> Table:
 
 
 @both(
+    router,
     "/lookup",
     method="POST",
     tags=["lookup"],
-    responses=answers(Lookup, 404, 413, 422, 503, media=NPY_ANSWER),
-    openapi_extra={"requestBody": BODY, "parameters": [WAVELENGTHS, *openapi_notes.OPTIONS, ERROR]},
+    responses=answers(Lookup, 404, 413, 503, media=NPY_ANSWER, headers=(REVISION,)),
+    openapi_extra=body(PointsBody, npy=True),
 )
-async def lookup_points(request: Request, name: str, revision: str | None = None) -> Response:
+async def lookup_points(
+    request: Request, name: str, query: Annotated[BodyQuery, InQuery()], revision: Revision = None
+) -> Response:
     """Return the BRDF at many pairs of directions (angles in degrees), in the shape that the angles broadcast to.
 
     The wavelengths are a last axis, unless wavelength_nm is one number or the material is grey. Below the horizon
-    (theta above 90 degrees) the BRDF is 0. wavelength_nm in the query is for .npy bodies; JSON holds its own.
+    (theta above 90 degrees) the BRDF is 0. A body of any media type but .npy is read as JSON.
     """
-    query, wavelengths = parsed(request.scope["query_string"], ("wavelength_nm", *OPTIONS))
-    options = Options.from_query(query)
     binary = request.headers.get("content-type", "").partition(";")[0].strip().lower() == NPY
-    if wavelengths and not binary:
+    if query.wavelength_nm and not binary:
         raise RequestError(422, "wavelength_nm: a JSON body holds it, not the query", "wavelength_nm")
-    accept = request.headers.get("accept", "")
-    kind = options.format or ("npy" if NPY in accept or (binary and JSON not in accept) else "json")
+    kind = query.kind(request.headers.get("accept", ""), binary=binary)
     table = await _table(shelf_of(request), name, revision)
-    headers = lookup_headers(None, table.revision, kind)
-    max_points = request.app.state.settings.max_points
-
-    def points_of(body: bytes) -> tuple[Points, int]:
-        points = Points.from_npy(body, wavelengths) if binary else Points.from_json(body)
-        return points, checked_size(max_points, points, options, table, kind)
-
-    def answer(body: bytes) -> Response:
-        return write_answer(points_of(body)[0], options, table, kind, headers)
-
-    body = await request.body()
-    if not binary and len(body) > JSON_BYTES:
-        raise RequestError(413, f"a JSON body may have {JSON_BYTES} bytes; send as many points as {NPY}")
-    large = request.app.state.large
-    if len(body) > INLINE_BYTES:
-        async with large if len(body) > LARGE_BYTES else contextlib.nullcontext():
-            return await run_in_threadpool(answer, body)
-    points, values = points_of(body)
-    # a row and a column of angles take few bytes and make many points
-    async with large if values > LARGE_VALUES else contextlib.nullcontext():
-        return await run(write_answer, points, options, table, kind, headers, in_thread=slow(values, options))
+    surface, content = surface_of(table, query.source), await request.body()
+    about, headers = {"material": table.name, "revision": table.revision}, lookup_headers(None, table.revision, kind)
+    return await answered(
+        *(request.app.state, surface, query, kind, len(content)),
+        lambda: from_npy(content, query.wavelength_nm) if binary else from_json(PointsBody, content).points,
+        lambda points: write_answer(points, query, surface, kind, headers, about),
+    )
 
 
-async def run(function: Callable[..., T], *args: Any, in_thread: bool) -> T:
-    """Call `function`, in a thread where that pays: it costs about as long as 1000 values do."""
-    return await run_in_threadpool(function, *args) if in_thread else function(*args)
-
-
-def slow(values: int, options: Options) -> bool:
-    """Return True if a lookup of this many values would keep other requests waiting."""
-    return values > INLINE_VALUES or options.source == "model" or options.output != "spectrum"
-
-
-def checked_size(max_points: int, points: Points, options: Options, table: Table, kind: str) -> int:
-    """Return the number of values to look up; RequestError (413) if they are too many for one answer."""
-    most_points, most_values = LIMITS[kind]
-    most_points, most_values = most_points * max_points, most_values * max_points
-    if points.count > most_points:
-        hint = "; format=npy may hold more" if kind == "json" else ""
-        raise RequestError(
-            413, f"{points.count} points are more than the {most_points} that one {kind} answer may hold{hint}"
-        )
-    values = points.values(table)
-    if options.output != "spectrum" and options.source == "table":
-        most_values *= SPECTRA_OF_COLOURS
-    if values > most_values:
-        raise RequestError(413, f"{values} values are more than the {most_values} that one {kind} answer may be of")
-    return values
-
-
-def write_answer(points: Points, options: Options, table: Table, kind: str, headers: Encoded) -> Response:
-    """Look the points up and write them as `kind`."""
-    middleware.points_counted(options.source, points.count)
-    values = evaluate(points, options, table, specular=kind == "json")
+@router.post(
+    "/v1/lookup",
+    tags=["lookup"],
+    responses=answers(Lookups, 404, 413, 503, media={NPZ: "an array a material, by its name"}),
+    openapi_extra=body(ManyBody),
+)
+def lookup_many(request: Request, query: Annotated[ManyQuery, InQuery()], content: Content) -> Response:
+    """Return the BRDF of several materials at the same pairs of directions (angles in degrees)."""
+    given, shelf = from_json(ManyBody, content), shelf_of(request)
+    points = given.points
+    kind: Format = "npy" if query.format == "npz" else "json"
+    max_points, total, found = request.app.state.settings.max_points, 0, {}
+    for name in dict.fromkeys(given.materials):
+        surface = surface_of(shelf.table(name), query.source)
+        total += checked_size(max_points, points, query, surface, kind)
+        if total > (most := LIMITS[kind][1] * max_points):
+            raise RequestError(413, f"the values of all materials are more than the {most} that one answer may hold")
+        found[name] = surface, evaluate(points, query, surface, error=query.error)
     if kind == "npy":
-        content = npy_bytes(values.brdf if values.error is None else np.stack([values.brdf, values.error]))
-        return EncodedResponse(content, headers)
-    document = {
-        "material": table.name,
-        "revision": table.revision,
-        "source": options.source,
-        "unit": "1/sr",
-        "output": options.output,
-        "illuminant": None if options.output == "spectrum" else options.illuminant,
-        "wavelength_nm": points.wavelengths(table),
-        "brdf": plain(values.brdf),
-        "error": None if values.error is None else plain(values.error),
-        "extrapolated": None if values.error is None else plain(table.extrapolated(*points.angles)),
-        "specular_reflectance": plain(values.specular_reflectance),
-    }
-    return EncodedResponse(json_bytes(document), headers)
+        arrays = {name: values.brdf for name, (_, values) in found.items()}
+        arrays |= {f"{name}.error": values.error for name, (_, values) in found.items() if values.error is not None}
+        data = io.BytesIO()
+        np.savez(data, **arrays)
+        return Response(data.getvalue(), media_type=NPZ, headers={"Cache-Control": "no-store"})
+    documents = [
+        document_of(points, query, surface, values, {"material": name, "revision": shelf.head(name)})
+        for name, (surface, values) in found.items()
+    ]
+    return json_response({"materials": documents}, {"Cache-Control": "no-store"})

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import asyncio
-import io
 import tempfile
-import zipfile
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 from weakref import WeakKeyDictionary
 
 import numpy as np
-from fastapi import APIRouter, Path, Query
-from numpy.typing import NDArray
+from fastapi import Path
+from fastapi import Query as InQuery
+from pydantic import Field
 from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request
 from starlette.responses import Response
@@ -20,18 +19,13 @@ from starlette.responses import Response
 from brdfdb import __version__
 from brdfdb.errors import CannotHoldError, ParameterError
 from brdfdb.formats import EXPORTERS
-from brdfdb.geometry import radians
 from brdfdb.store.summary_words import NOT_AUDITED
+from brdfdb.tables.lobe_views import MOST_POINTS, view_directions
+from brdfdb_api.http.addresses import EXPORT_OPTIONS, Revision, addresses, answers, both, served_options, shelf_of
 from brdfdb_api.http.errors import RequestError
-from brdfdb_api.http.lookups import Options, Points, evaluate, parsed
-from brdfdb_api.http.openapi_notes import (
-    EXPORT_OPTIONS,
-    LOBE_NPY_ANSWER,
-    LOBE_OPTIONS,
-    WAVELENGTHS,
-    answers,
-    served_options,
-)
+from brdfdb_api.http.files import zipped
+from brdfdb_api.http.lookups import Surface, checked_size, document_of, evaluate, surface_of
+from brdfdb_api.http.queries import Light, LobeQuery, Points, Query, Values, listed, parsed
 from brdfdb_api.http.responses import (
     JSON,
     NPY,
@@ -41,50 +35,42 @@ from brdfdb_api.http.responses import (
     cache_headers,
     json_bytes,
     json_response,
-    not_modified,
     npy_bytes,
-    plain,
     tag_of,
 )
-from brdfdb_api.http.routes import EXPORT_WAIT_S, both, checked_size, query_names, shelf_of
+from brdfdb_api.http.routes import EXPORT_WAIT_S
 
 if TYPE_CHECKING:
+    from brdfdb.tables.albedo import Reflected
     from brdfdb.tables.table import Table
     from brdfdb_api.serving.shelf import Shelf
 
-View = Literal["cut", "hemisphere", "half-difference"]
-
-_CUT = np.arange(-90.0, 91.0)  # theta_r [degree], negative back towards the light
-_OVER = np.linspace(0.0, 90.0, 31)  # theta_r of a hemisphere [degree]
-_AROUND = np.linspace(0.0, 360.0, 61)  # delta_phi
-# Angles from the mirror direction [degree]
-_NEAR = np.array([-12.0, -8.0, -5.0, -3.0, -2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0, 3.0, 5.0, 8.0, 12.0])
-_HALF = np.arange(90) + 0.5  # theta_h and theta_d [degree]
-_POINTS = _HALF.size**2  # points of the largest view
-
-_LOBE = ("view", "theta_i", "phi_i", "wavelength_nm", "from", "output", "illuminant", "format")
-
 _ALBEDOS: WeakKeyDictionary[Table, bytes] = WeakKeyDictionary()  # kept as long as the table
 
-views = APIRouter()
+SPHERE = {"image/png": "sRGB with transparent corners", NPY: "linear sRGB and coverage (size, size, 4), not clipped"}
+THUMBNAIL, MOST = 96, 256  # pixels across a thumbnail: default and largest number
 
-Incidence = Annotated[float, Query(ge=0.0, le=90.0, description="polar angle of the light [degrees]")]
-Azimuth = Annotated[float, Query(ge=-720.0, le=720.0, description="azimuth of the light [degrees]")]
+views = addresses()
 
 
-@both(
-    "/albedo",
-    router=views,
-    tags=["views"],
-    dependencies=[query_names()],
-    responses=answers(Albedo, 304, 404, 422, 503),
-)
-def albedo(request: Request, name: str, revision: str | None = None) -> Response:
+class SphereQuery(Query):
+    """The query of a picture."""
+
+    size: int = Field(default=256, ge=16, le=512, description="pixels across")
+    format: Literal["png", "npy"] = Field(default="png", description="a picture, or its linear values")
+
+
+class ThumbnailQuery(Query):
+    """The query of a thumbnail."""
+
+    size: int = Field(default=THUMBNAIL, ge=16, le=MOST, description="pixels across")
+
+
+@both(views, "/albedo", tags=["views"], responses=answers(Albedo, 304, 404, 503))
+def albedo(request: Request, name: str, revision: Revision = None) -> Response:
     """Return the directional and the hemispherical albedo [1] of the table."""
     table = shelf_of(request).table(name, revision)
     headers = cache_headers(tag_of(table), immutable=revision is not None)
-    if held := not_modified(request.headers.get("if-none-match"), headers):
-        return held
     document = _ALBEDOS.get(table)
     if document is None:
         document = _ALBEDOS[table] = _albedo(table)
@@ -92,112 +78,77 @@ def albedo(request: Request, name: str, revision: str | None = None) -> Response
 
 
 def _albedo(table: Table) -> bytes:
-    """Return the document; the integration takes a third of a second."""
-    from brdfdb.tables.albedo import directional_albedo, hemispherical_albedo
+    """Return the document."""
+    from brdfdb.tables.albedo import reflected
 
-    albedo = directional_albedo(table)
-    diffuse = albedo.mean
-    specular = np.asarray(table.specular_reflectance(radians(albedo.theta_i_deg))).reshape(diffuse.shape[0], -1)
-    specular = np.broadcast_to(specular, diffuse.shape)
-    return json_bytes(
-        {
-            "material": table.name,
-            "revision": table.revision,
-            "wavelength_nm": table.wavelength_nm,
-            "theta_i": np.ascontiguousarray(albedo.theta_i_deg),
-            "albedo": np.ascontiguousarray(diffuse),
-            "specular_reflectance": np.ascontiguousarray(specular),
-            "hemispherical": hemispherical_albedo(albedo.theta_i_deg, diffuse + specular),
-            "error": float(albedo.error.max()),
-        }
-    )
+    about = {"material": table.name, "revision": table.revision}
+    return json_bytes(albedo_document(reflected(table), table.wavelength_nm, about))
+
+
+def albedo_document(albedo: Reflected, wavelength_nm: Any, about: dict[str, Any]) -> dict[str, Any]:
+    """Return the document of what a surface reflects; `about` begins it."""
+    return {
+        **about,
+        "wavelength_nm": wavelength_nm,
+        "theta_i": np.ascontiguousarray(albedo.theta_i_deg),
+        "albedo": np.ascontiguousarray(albedo.albedo),
+        "specular_reflectance": np.ascontiguousarray(albedo.specular),
+        "hemispherical": albedo.hemispherical,
+        "error": albedo.error,
+    }
 
 
 @both(
+    views,
     "/lobe",
-    router=views,
     tags=["views"],
-    responses=answers(Lobe, 304, 404, 413, 422, 503, media=LOBE_NPY_ANSWER),
-    openapi_extra={"parameters": [WAVELENGTHS, *LOBE_OPTIONS]},
+    responses=answers(Lobe, 304, 404, 413, 503, media={NPY: "brdf as a .npy file"}),
 )
-def lobe(
-    request: Request,
-    name: str,
-    view: Annotated[View, Query(description="the plane of incidence, all viewers, or theta_h and theta_d")] = "cut",
-    theta_i: Incidence = 45.0,
-    phi_i: Azimuth = 0.0,
-    revision: str | None = None,
-) -> Response:
+def lobe(request: Request, name: str, query: Annotated[LobeQuery, InQuery()], revision: Revision = None) -> Response:
     """Return f_r [1/sr] for one light, in the plane of incidence or over all viewers; or over theta_h and theta_d.
 
     Viewers are closer together around the mirror direction. In half-difference, phi_h is phi_i and phi_d is 90 degrees.
     """
-    query, wavelengths = parsed(request.scope["query_string"], _LOBE)
-    options = Options.from_query(query)
     table = shelf_of(request).table(name, revision)
-    kind = options.format or ("npy" if NPY in request.headers.get("accept", "") else "json")
-    headers = cache_headers(tag_of(table), kind, immutable=revision is not None)
-    held = request.headers.get("if-none-match")
-    if unchanged := not_modified(held, headers, certain=False):
-        return unchanged
-    axes, angles = _directions(view, theta_i, phi_i)
-    at = Points.from_query({"theta_i": "0", "theta_r": "0"}, wavelengths).wavelength_nm
-    points = Points(angles, np.broadcast_shapes(*(np.shape(angle) for angle in angles)), at)
+    headers = cache_headers(
+        tag_of(table), query.kind(request.headers.get("accept", "")), immutable=revision is not None
+    )
+    about = {"material": table.name, "revision": table.revision}
+    return lobe_answer(request, surface_of(table, query.source), query, query, about, headers)
+
+
+def lobe_answer(
+    request: Request, surface: Surface, light: Light, options: Values, about: dict[str, Any], headers: dict[str, str]
+) -> Response:
+    """Return the answer with the lobe of a surface; `about` begins the document."""
+    kind = options.kind(request.headers.get("accept", ""))
+    axes, angles = view_directions(light.view, light.theta_i, light.phi_i)
+    shape = np.broadcast_shapes(*(np.shape(angle) for angle in angles))
+    points = Points(angles, shape, listed(light.wavelength_nm))
     # The view fixes the points; the client chooses only the wavelengths.
-    checked_size(max(request.app.state.settings.max_points, _POINTS), points, options, table, kind)
-    values = evaluate(points, options, table)
-    if unchanged := not_modified(held, headers):
-        return unchanged
+    checked_size(max(request.app.state.settings.max_points, MOST_POINTS), points, options, surface, kind)
+    values = evaluate(points, options, surface)
     if kind == "npy":
         return Response(npy_bytes(values.brdf), media_type=NPY, headers=headers)
-    document = {
-        "material": table.name,
-        "revision": table.revision,
-        "source": options.source,
-        "view": view,
-        "theta_i": None if view == "half-difference" else theta_i,
-        "phi_i": phi_i,
-        "output": options.output,
-        "illuminant": None if options.output == "spectrum" else options.illuminant,
-        "unit": "1/sr",
-        "wavelength_nm": points.wavelengths(table),
+    no_light = light.view == "half-difference"
+    about |= {
+        "view": light.view,
+        "theta_i": None if no_light else light.theta_i,
+        "phi_i": light.phi_i,
         "axes_deg": axes,
-        "brdf": plain(values.brdf),
-        "specular_reflectance": None if view == "half-difference" else plain(values.specular_reflectance),
     }
-    return json_response(document, headers)
-
-
-def _directions(view: View, theta_i: float, phi_i: float) -> tuple[dict[str, NDArray[Any]], Any]:
-    """Return the axes of a view [degree] and the angles of its points [rad]."""
-    if view == "half-difference":
-        from brdfdb.geometry import directions_from_half_difference
-
-        theta_h, theta_d = radians(_HALF)[:, np.newaxis], radians(_HALF)
-        points = directions_from_half_difference(theta_h, radians(phi_i), theta_d, radians(90.0))
-        return {"theta_h": _HALF, "theta_d": _HALF}, points
-    light, turned = radians(theta_i), radians(phi_i)
-    if view == "cut":
-        signed = np.unique(np.clip(np.concatenate([_CUT, theta_i + _NEAR]), -90.0, 90.0))
-        return {"theta_r": signed}, (
-            light,
-            turned,
-            radians(np.abs(signed)),
-            turned + np.where(signed > 0.0, np.pi, 0.0),
-        )
-    theta_r = np.unique(np.clip(np.concatenate([_OVER, theta_i + _NEAR]), 0.0, 90.0))
-    spread = _NEAR / max(np.sin(light), 0.1)
-    delta_phi = np.unique(np.clip(np.concatenate([_AROUND, 180.0 + spread]), 0.0, 360.0))
-    axes = {"theta_r": theta_r, "delta_phi": delta_phi}
-    return axes, (light, turned, radians(theta_r)[:, np.newaxis], turned + radians(delta_phi))
+    document = document_of(points, options, surface, values, about)
+    return json_response(document | ({"specular_reflectance": None} if no_light else {}), headers)
 
 
 @both(
+    views,
     "/export/{file_format}",
-    router=views,
     tags=["views"],
     responses=answers(
-        None, 304, 404, 422, 503, media={exporter.media_type: exporter.summary for exporter in EXPORTERS.values()}
+        *(None, 304, 404, 503),
+        media={exporter.media_type: exporter.summary for exporter in EXPORTERS.values()},
+        headers=("Content-Disposition",),
     ),
     openapi_extra={"parameters": EXPORT_OPTIONS},
 )
@@ -205,13 +156,13 @@ async def export(
     request: Request,
     name: str,
     file_format: Annotated[str, Path(json_schema_extra={"enum": [*EXPORTERS]})],
-    revision: str | None = None,
+    revision: Revision = None,
 ) -> Response:
     """Return the table, or a slice of it, as a file of another format, as `brdfdb export` writes it."""
     if file_format not in EXPORTERS:
         raise RequestError(404, f"{file_format!r} is no format; there are {', '.join(EXPORTERS)}")
     allowed = served_options(file_format)
-    query, _ = parsed(request.scope["query_string"], tuple(allowed))
+    query = parsed(request.scope["query_string"], allowed)
     try:
         options = {option: allowed[option].parse(text) for option, text in query.items()}
     except ParameterError as error:
@@ -220,9 +171,8 @@ async def export(
     # The file states the verdict, which a later audit may change, and the program. A weak tag: some state the time
     headers = cache_headers(f"{tag_of(table)}-{verdict}-{__version__}", file_format)
     headers["ETag"] = f"W/{headers['ETag']}"
-    held = request.headers.get("if-none-match")
-    if unchanged := not_modified(held, headers, certain=False):
-        return unchanged
+    if request.headers.get("if-none-match") == headers["ETag"]:  # a file takes seconds
+        return Response(status_code=304, headers=headers)
     exports = request.app.state.exports
     try:
         async with asyncio.timeout(EXPORT_WAIT_S):
@@ -232,16 +182,15 @@ async def export(
             503, "the server makes as many files as it can; ask again later", retry_after_s=EXPORT_WAIT_S
         ) from None
     try:
-        answer = await run_in_threadpool(_exported, file_format, table, verdict, options, headers)
+        return await run_in_threadpool(_exported, file_format, table, verdict, options, headers)
     finally:
         exports.release()
-    return not_modified(held, headers) or answer
 
 
 def _with_verdict(shelf: Shelf, name: str, revision: str | None) -> tuple[Table, str | None]:
     """Return a table, and the verdict of the audit of its revision."""
     table, known = shelf.table(name, revision), shelf.verdict(name)
-    return table, known.finding["verdict"] if known and known.finding["revision"] == table.revision else None
+    return table, known.finding.verdict if known and known.finding.revision == table.revision else None
 
 
 def _exported(
@@ -257,40 +206,58 @@ def _exported(
         except (CannotHoldError, ParameterError) as error:
             raise RequestError(422, str(error), getattr(error, "parameter", None)) from None
         single = len(written.paths) == 1 and path.is_file()
-        content = path.read_bytes() if single else _zipped(FilePath(folder))
+        names = [str(each.relative_to(folder)) for each in FilePath(folder).rglob("*") if each.is_file()]
+        content = path.read_bytes() if single else b"".join(zipped(FilePath(folder), names))
     media_type = exporter.media_type if single else "application/zip"
     named = {"Content-Disposition": f'attachment; filename="{path.name}{"" if single else ".zip"}"'}
     return Response(content, media_type=media_type, headers=headers | named)
 
 
-def _zipped(folder: FilePath) -> bytes:
-    """Return all files of a folder as a zip archive."""
-    data = io.BytesIO()
-    with zipfile.ZipFile(data, "w", zipfile.ZIP_DEFLATED) as archive:
-        for path in sorted(path for path in folder.rglob("*") if path.is_file()):
-            archive.write(path, path.relative_to(folder))
-    return data.getvalue()
-
-
-@both(
-    "/audit", router=views, tags=["views"], dependencies=[query_names()], responses=answers(Audit, 304, 404, 422, 503)
-)
-def audit(request: Request, name: str, revision: str | None = None) -> Response:
+@both(views, "/audit", tags=["views"], responses=answers(Audit, 304, 404, 503))
+def audit(request: Request, name: str, revision: Revision = None) -> Response:
     """Return the findings of the last `brdfdb audit` on a material: energy, reciprocity, error and more."""
     shelf = shelf_of(request)
     verdict, current = shelf.verdict(name), shelf.head(name)
-    if verdict is None or revision not in (None, verdict.finding["revision"]):
+    if verdict is None or revision not in (None, verdict.finding.revision):
         if revision not in (None, current):
             shelf.table(name, revision)  # raises if there is no such revision
         raise RequestError(404, f"{name}: no audit of it is here; `brdfdb audit` makes one")
+    audited = verdict.finding.revision
+    document = {"material": name, "revision": audited, "current": audited == current, "when": verdict.when}
     headers = cache_headers(f"{name}-{current}-{verdict.when}")
-    if held := not_modified(request.headers.get("if-none-match"), headers):
-        return held
-    document = {
-        "material": name,
-        "revision": verdict.finding["revision"],
-        "current": verdict.finding["revision"] == current,
-        "when": verdict.when,
-        "finding": verdict.finding,
-    }
-    return json_response(document, headers)
+    return json_response({**document, "finding": verdict.finding.model_dump(exclude_unset=True)}, headers)
+
+
+@both(views, "/sphere", tags=["views"], responses=answers(None, 304, 404, 503, media=SPHERE))
+def sphere(
+    request: Request, name: str, query: Annotated[SphereQuery, InQuery()], revision: Revision = None
+) -> Response:
+    """Return the picture of a sphere of the table in the light of a studio, drawn as a draft."""
+    table = shelf_of(request).table(name, revision)
+    return sphere_answer(table, query, _of_picture(table, query.size, query.format))
+
+
+def sphere_answer(surface: Any, query: SphereQuery, headers: dict[str, str]) -> Response:
+    """Return the picture of a material or a table."""
+    from brdfdb.scenes.lit_sphere import DRAFT, linear_sphere, sphere_png
+
+    if query.format == "png":
+        return Response(sphere_png(surface, query.size, DRAFT), media_type="image/png", headers=headers)
+    linear = linear_sphere(surface, query.size, detail=DRAFT).astype(np.float32)
+    return Response(npy_bytes(linear), media_type=NPY, headers=headers)
+
+
+@both(views, "/thumbnail.png", tags=["views"], responses=answers(None, 304, 404, 503, media={"image/png": "a sphere"}))
+def thumbnail(
+    request: Request, name: str, query: Annotated[ThumbnailQuery, InQuery()], revision: Revision = None
+) -> Response:
+    """Return a small picture of the table for lists; those asked for last are kept in memory."""
+    shelf = shelf_of(request)
+    table = shelf.table(name, revision)
+    headers = _of_picture(table, query.size, "png")
+    return Response(shelf.picture(table, query.size), media_type="image/png", headers=headers)
+
+
+def _of_picture(table: Table, size: int, kind: str) -> dict[str, str]:
+    """Return the headers of a picture, which changes with the program, too."""
+    return cache_headers(f"{tag_of(table)}-{__version__}-{size}", kind)

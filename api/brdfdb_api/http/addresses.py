@@ -1,0 +1,178 @@
+"""Addresses: how they are added, the parameters that they know, and their answers as OpenAPI describes them."""
+
+from __future__ import annotations
+
+import functools
+import inspect
+import math
+from collections.abc import Callable, Coroutine
+from dataclasses import replace
+from typing import Annotated, Any, TypeVar
+
+from fastapi import APIRouter, Depends
+from fastapi.routing import APIRoute
+from pydantic import BaseModel, WithJsonSchema
+from starlette.requests import Request
+from starlette.responses import Response
+
+from brdfdb.formats import EXPORTERS, Option, options_of
+from brdfdb_api.http.queries import names_of, parsed
+from brdfdb_api.http.responses import NPY, REVISION, Problem, unchanged
+from brdfdb_api.serving.shelf import Shelf
+
+T = TypeVar("T")
+
+Revision = Annotated[str | None, WithJsonSchema({"type": "string", "description": "such as r000001"})]
+NPY_ANSWER = {NPY: "brdf alone, or brdf and error on a first axis, as a .npy file"}
+NPY_BODY = "theta_i, phi_i, theta_r, phi_r on the last of the axes (..., 4); float32 or float64, degrees"
+
+_OTHERS: dict[int, dict[str, Any]] = {
+    304: {"description": "The ETag in If-None-Match still holds"},
+    404: {"description": "No such name or revision; the closest names are listed", "model": Problem},
+    413: {"description": "Too large a body, or too many points for one answer", "model": Problem},
+    422: {"description": "A parameter is missing, unknown or out of range; it is named", "model": Problem},
+    503: {
+        "description": "The store, or the files of this material, cannot be read; or too much is asked for at once",
+        "model": Problem,
+    },
+}
+_HEADERS = {
+    "X-Request-ID": "that of the request, or a new one; the log has it, too",
+    "ETag": "changes with the answer",
+    "Cache-Control": "how long the answer holds: that of a revision for good",
+    REVISION: "revision of the values",
+    "Content-Disposition": "name of the file",
+    "Retry-After": "seconds after which the same request may succeed, where that is known",
+}
+# Sizes that the service makes a file of: larger ones take gigabytes or minutes, and are for `brdfdb export`
+_SERVED = {
+    "eradiate": {"nodes": 129.0},
+    "png": {"size": 512.0},
+    "radiance": {"cells": 600_000.0},
+    "rgl": {"megabytes": 64.0},
+    **{file_format: {"size": 16.0} for file_format in ("astm", "fred", "ssdd", "zemax")},
+}
+_KINDS = ((bool, "boolean"), (str, "string"), (object, "number"))
+
+
+def shelf_of(request: Request) -> Shelf:
+    """Return the shelf of the application."""
+    shelf: Shelf = request.app.state.shelf
+    return shelf
+
+
+async def _content(request: Request) -> bytes:
+    return await request.body()
+
+
+Content = Annotated[bytes, Depends(_content)]  # of addresses that run in a thread
+
+
+class Address(APIRoute):
+    """An address that refuses parameters of the query that it does not name, and sends nothing that a client holds."""
+
+    def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
+        handle = super().get_route_handler()
+        kinds: list[Any] = [parameter.field_info.annotation for parameter in self.dependant.query_params]
+        names = [name for kind in kinds for name in names_of(kind)]
+        reads_itself = "parameters" in (self.openapi_extra or {})
+
+        async def answer(request: Request) -> Response:
+            if not reads_itself:
+                parsed(request.scope["query_string"], names)
+            return unchanged(await handle(request), request.headers.get("if-none-match"))
+
+        return answer
+
+
+def addresses() -> APIRouter:
+    """Return a router of addresses."""
+    return APIRouter(route_class=Address, default_response_class=Response)
+
+
+def both(
+    router: APIRouter, path: str, *, method: str = "GET", **keywords: Any
+) -> Callable[[Callable[..., T]], Callable[..., T]]:
+    """Serve an address of the current revision, and the same of any revision, which never changes."""
+
+    def add(function: Callable[..., T]) -> Callable[..., T]:
+        signature = inspect.signature(function, eval_str=True)
+        others = [each for each in signature.parameters.values() if each.name != "revision"]
+        current = functools.update_wrapper(functools.partial(function, revision=None), function)
+        current.__signature__ = signature.replace(parameters=others)  # type: ignore[attr-defined]
+        name = getattr(function, "__name__", "")
+        for endpoint, prefix, suffix in ((current, "", ""), (function, "/revisions/{revision}", "_of_revision")):
+            address = f"/v1/materials/{{name}}{prefix}{path}"
+            router.add_api_route(address, endpoint, methods=[method], name=f"{name}{suffix}", **keywords)
+        return function
+
+    return add
+
+
+def answers(
+    model: Any, *statuses: int, media: dict[str, str] | None = None, headers: tuple[str, ...] = ()
+) -> dict[int | str, dict[str, Any]]:
+    """Return the OpenAPI description of the answers of an address: `model` at 200 or other media, and `statuses`."""
+    success: dict[str, Any] = {"description": "Success"} | ({} if model is None else {"model": model})
+    if media is not None:
+        success["content"] = {
+            kind: {"schema": {"type": "string", "format": "binary", "description": text}}
+            for kind, text in media.items()
+        }
+    cached = ("ETag", "Cache-Control") if 304 in statuses else ()
+    described: dict[int | str, dict[str, Any]] = {200: _with_headers(success, *cached, *headers)}
+    for status in (*statuses, 422):
+        more = {304: cached, 503: ("Retry-After",)}.get(status, ())
+        described[status] = _with_headers(_OTHERS[status], *more)
+    return described
+
+
+def _with_headers(answer: dict[str, Any], *names: str) -> dict[str, Any]:
+    headers = {
+        name: {"description": _HEADERS[name], "schema": {"type": "integer" if name == "Retry-After" else "string"}}
+        for name in ("X-Request-ID", *names)
+    }
+    return {**answer, "headers": headers}
+
+
+def body(model: type[BaseModel], *, npy: bool = False) -> dict[str, Any]:
+    """Return the OpenAPI description of a body that is JSON, or .npy, too."""
+    schema = model.model_json_schema()
+    example = schema.pop("example", None)
+    content = {"application/json": {"schema": schema} | ({} if example is None else {"example": example})}
+    if npy:
+        content[NPY] = {"schema": {"type": "string", "format": "binary", "description": NPY_BODY}}
+    return {"requestBody": {"required": True, "content": content}}
+
+
+def served_options(file_format: str) -> dict[str, Option]:
+    """Return the options of a format by name, with the ranges that the service allows."""
+    highest = _SERVED.get(file_format, {})
+    return {
+        name: replace(option, high=min(option.high, highest.get(name, math.inf)))
+        for name, option in options_of(EXPORTERS[file_format]).items()
+    }
+
+
+def _option(name: str) -> dict[str, Any]:
+    """Return the parameter of an option of one or more formats, with the values that any of them allows.
+
+    It has no default: generated clients send defaults, and a format refuses options of others.
+    """
+    of = {key: options[name] for key in EXPORTERS if name in (options := served_options(key))}
+    kinds = {next(word for kind, word in _KINDS if isinstance(option.default, kind)) for option in of.values()}
+    schema: dict[str, Any] = {"type": kinds.pop() if len(kinds) == 1 else "string"}
+    if schema["type"] == "number":
+        ends = [end for option in of.values() for end in (option.low, option.high, float(option.default))]
+        schema |= {"minimum": min(ends), "maximum": max(ends)}
+    elif all(option.choices for option in of.values()):
+        schema["enum"] = list(dict.fromkeys(choice for option in of.values() for choice in option.choices))
+    words: dict[str, list[str]] = {}
+    for key, option in of.items():
+        words.setdefault(f"{option.help}; {option.allowed}; default {option.default}", []).append(key)
+    text = ". ".join(f"{', '.join(keys)}: {sentence}" for sentence, keys in words.items())
+    return {"name": name, "in": "query", "required": False, "description": text, "schema": schema}
+
+
+# Of all formats: an option that a format does not have is refused
+EXPORT_OPTIONS = [_option(name) for name in dict.fromkeys(name for key in EXPORTERS for name in served_options(key))]
