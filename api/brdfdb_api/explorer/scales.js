@@ -6,6 +6,7 @@ import { makesColour, nearest } from "./series.js";
 /** @typedef {import("./state.js").State} State */
 /** @typedef {import("./series.js").Series} Series */
 
+const APART = 0.13; // of the length of a colour bar, between its marks
 const DECADES = 5; // of a logarithmic scale, below its largest value
 
 /** Ends of an axis over some values: of a logarithmic one in decades, which moves less while one turns.
@@ -87,11 +88,15 @@ export function mapped(share, shaded = 1, colours = VIRIDIS) {
 export function colourBar(marks) {
   const stripe = element("div", { className: "stripe" });
   stripe.style.background = `linear-gradient(to right, ${VIRIDIS.map((each) => `rgb(${each})`)})`;
-  const texts = marks.map(([share, text]) => {
+  const texts = [];
+  let last = -1;
+  for (const [share, text] of marks) {
+    if (share - last < APART) continue;
+    last = share;
     const mark = element("span", {}, text);
     mark.style.left = `${100 * share}%`;
-    return mark;
-  });
+    texts.push(mark);
+  }
   return element("div", { className: "bar quiet" }, stripe, ...texts);
 }
 

@@ -2,14 +2,13 @@
 
 import { address, json, withQuery } from "./api.js";
 import { changed, described } from "./parameters.js";
-import { subjectOf } from "./state.js";
+import { PICTURE_NM, subjectOf } from "./state.js";
 
 /** @typedef {import("./state.js").State} State */
 /** @typedef {import("./api.js").Question} Question */
 /** @typedef {{ text: string, label: string, name: string, source: "table" | "model" | "parameters", info: any,
  *   recipe?: Record<string, any>, colour: string, dash: string }} Series recipe: the material of a model with parameters */
 
-export const PICTURE_NM = Array.from({ length: 14 }, (_, i) => 420 + 20 * i); // at which pictures look up spectra, as `brdfdb render`
 const DASHES = ["none", "6 5", "2 4", "9 4 2 4", "none", "6 5", "2 4", "9 4 2 4"];
 const FEW_NM = [450, 500, 550, 600, 650]; // of curves at wavelengths
 
@@ -58,11 +57,12 @@ function labelOf(each, all) {
  * @param {Angles} [angles]
  * @returns {Question} */
 export function question(each, kind, query = {}, angles = undefined) {
-  const { wavelength_nm, ...rest } = query, split = angles ? rest : query; // a body holds its own wavelengths
-  const body = angles && { ...angles, wavelength_nm };
-  if (each.source === "parameters") return { path: withQuery(`v1/models/${each.info.model}/${kind}`, split), body: { ...each.recipe, ...body } };
+  const own = each.source === "parameters", { theta_i, phi_i, theta_r, phi_r, wavelength_nm, ...rest } = query;
+  const held = angles ?? { theta_i, phi_i, theta_r, phi_r };
+  const body = angles || (own && kind === "lookup") ? { ...held, wavelength_nm: wavelength_nm ?? (own ? each.info.wavelength_nm ?? undefined : undefined) } : undefined;
+  if (own) return { path: withQuery(`v1/models/${each.info.model}/${kind}`, body ? rest : query), body: { ...each.recipe, ...body } };
   const from = each.source === "model" ? { from: "model" } : {};
-  return { path: address(each.name, kind, { ...from, ...split }), body };
+  return { path: address(each.name, kind, { ...from, ...(body ? rest : query) }), body };
 }
 
 /** Whether any of them turns with phi_i.

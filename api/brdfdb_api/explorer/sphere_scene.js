@@ -5,11 +5,14 @@
 const DEGREE = 180 / Math.PI;
 const RHO = 2.5 / DEGREE; // angular radius of the light, which only a specular part shows
 const RADIANCE = 1 / (2 * (1 - Math.cos(RHO))); // over that of a white matt surface that faces the light
-const [RINGS, RAYS] = [40, 25]; // directions around the half vector: along half a turn, where the other half is the same
+/** @typedef {{ rings: number, rays: number, viewers: number[], far: number, around: number }} Detail rings and rays: directions
+ *   around the half vector, along half a turn; viewers [degrees] of which the surroundings are summed, over lights far and around */
+/** @type {Detail} */
+const FINE = { rings: 40, rays: 25, viewers: [0, 15, 30, 42, 52, 60, 67, 73, 78, 82, 85, 87.5], far: 20, around: 10 };
+/** @type {Detail} */
+const QUICK = { rings: 22, rays: 13, viewers: [0, 30, 52, 67, 78, 87.5], far: 12, around: 8 };
 const EDGE = 0.99; // of the way to the horizon of light or viewer, next to which models have poles
-const VIEWERS = [0, 15, 30, 42, 52, 60, 67, 73, 78, 82, 85, 87.5]; // degrees, of which the surroundings are summed
 const SKY = 0.35; // what is seen of the surroundings at the height of the eye, over a white matt surface in the light
-const [FAR, AROUND] = [20, 10]; // lights of that sum: away from the mirror direction, and around it
 
 const dot = (/** @type {Vector} */ a, /** @type {Vector} */ b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 const cross = (/** @type {Vector} */ a, /** @type {Vector} */ b) => /** @type {Vector} */ (
@@ -56,15 +59,17 @@ function anglesAt([x, y, z], light) {
 
 /** Directions that all pixels of one light lie between: rings and rays around the half vector.
  * @param {Vector} light
- * @param {boolean} whole the other half of a turn is not the same */
-export function lune(light, whole) {
-  const { half, towards, across, tangent } = frameOf(light), rays = whole ? 2 * RAYS - 1 : RAYS, turn = whole ? 2 * Math.PI : Math.PI;
+ * @param {boolean} whole the other half of a turn is not the same
+ * @param {boolean} quick */
+export function lune(light, whole, quick) {
+  const { half, towards, across, tangent } = frameOf(light), { rings, rays: some } = quick ? QUICK : FINE;
+  const rays = whole ? 2 * some - 1 : some, turn = whole ? 2 * Math.PI : Math.PI;
   const found = { theta_i: /** @type {number[]} */ ([]), phi_i: /** @type {number[]} */ ([]), theta_r: /** @type {number[]} */ ([]),
     phi_r: /** @type {number[]} */ ([]) };
   for (let j = 0; j < rays; j += 1) {
     const psi = (turn * j) / (rays - 1), end = EDGE * reach(tangent, psi);
-    for (let i = 0; i < RINGS; i += 1) {
-      const theta = end * (i / (RINGS - 1)) ** 2, [c, s, u, v] = [Math.cos(theta), Math.sin(theta), Math.cos(psi), Math.sin(psi)];
+    for (let i = 0; i < rings; i += 1) {
+      const theta = end * (i / (rings - 1)) ** 2, [c, s, u, v] = [Math.cos(theta), Math.sin(theta), Math.cos(psi), Math.sin(psi)];
       const n = /** @type {Vector} */ ([0, 1, 2].map((k) => c * half[k] + s * (u * towards[k] + v * across[k])));
       const [theta_i, theta_r, phi_i, phi_r] = anglesAt(n, light);
       found.theta_i.push(round(theta_i));
@@ -73,24 +78,23 @@ export function lune(light, whole) {
       found.phi_r.push(round(phi_r));
     }
   }
-  return { angles: found, rays };
+  return { angles: found, rays, rings, turn };
 }
 
 /** A function that gives f_r, three colours, at a normal, between the values at the directions of a lune.
  * @param {Vector} light
  * @param {ArrayLike<number>} values
- * @param {number} rays
+ * @param {{ rays: number, rings: number, turn: number }} of
  * @returns {(x: number, y: number, z: number, into: Float64Array) => void} */
-export function between(light, values, rays) {
-  const { half, towards, across, tangent } = frameOf(light), channels = values.length / (rays * RINGS);
-  const turn = rays === RAYS ? Math.PI : 2 * Math.PI;
+export function between(light, values, { rays, rings, turn }) {
+  const { half, towards, across, tangent } = frameOf(light), channels = values.length / (rays * rings);
   return (x, y, z, into) => {
     const cosine = half[0] * x + half[1] * y + half[2] * z;
     let psi = Math.atan2(across[0] * x + across[1] * y + across[2] * z, towards[0] * x + towards[1] * y + towards[2] * z);
     psi = turn === Math.PI ? Math.abs(psi) : (psi + turn) % turn;
-    const along = Math.sqrt(Math.min(Math.acos(Math.min(cosine, 1)) / (EDGE * reach(tangent, psi)), 1)) * (RINGS - 1);
-    const around = (psi / turn) * (rays - 1), i = Math.min(Math.floor(along), RINGS - 2), j = Math.min(Math.floor(around), rays - 2);
-    const a = along - i, b = around - j, first = channels * (j * RINGS + i), next = first + channels * RINGS;
+    const along = Math.sqrt(Math.min(Math.acos(Math.min(cosine, 1)) / (EDGE * reach(tangent, psi)), 1)) * (rings - 1);
+    const around = (psi / turn) * (rays - 1), i = Math.min(Math.floor(along), rings - 2), j = Math.min(Math.floor(around), rays - 2);
+    const a = along - i, b = around - j, first = channels * (j * rings + i), next = first + channels * rings;
     for (let k = 0; k < 3; k += 1) {
       const of = first + (channels === 3 ? k : 0), on = next + (channels === 3 ? k : 0);
       into[k] = (1 - b) * ((1 - a) * values[of] + a * values[of + channels]) + b * ((1 - a) * values[on] + a * values[on + channels]);
@@ -104,14 +108,15 @@ const sky = (y) => SKY * (1 + y);
 
 /** Lights that sum up the surroundings of some viewers, with the weights of the sum, and the lights as vectors: z is the
  * normal, x points away from the viewer.
- * @param {number[]} azimuths of the viewers [degrees] */
-export function surroundings(azimuths) {
-  const rows = VIEWERS.flatMap((theta) => azimuths.map((phi) => ({ theta, phi })));
+ * @param {number[]} azimuths of the viewers [degrees]
+ * @param {boolean} quick */
+export function surroundings(azimuths, quick) {
+  const { viewers, far, around } = quick ? QUICK : FINE, rows = viewers.flatMap((theta) => azimuths.map((phi) => ({ theta, phi })));
   const lights = rows.map(({ theta }) => {
     const mirror = [Math.sin(theta / DEGREE), 0, Math.cos(theta / DEGREE)];
-    const found = Array.from({ length: FAR * AROUND }, (_, k) => {
-      const t = (Math.floor(k / AROUND) + 0.5) / FAR, alpha = Math.PI * t * t, psi = (2 * Math.PI * ((k % AROUND) + 0.5)) / AROUND;
-      const weight = Math.sin(alpha) * ((2 * Math.PI * t) / FAR) * ((2 * Math.PI) / AROUND);
+    const found = Array.from({ length: far * around }, (_, k) => {
+      const t = (Math.floor(k / around) + 0.5) / far, alpha = Math.PI * t * t, psi = (2 * Math.PI * ((k % around) + 0.5)) / around;
+      const weight = Math.sin(alpha) * ((2 * Math.PI * t) / far) * ((2 * Math.PI) / around);
       const [c, s] = [Math.cos(alpha), Math.sin(alpha)], [u, v] = [Math.cos(psi), Math.sin(psi)];
       const l = /** @type {Vector} */ ([c * mirror[0] + s * u * mirror[2], s * v, c * mirror[2] - s * u * mirror[0]]);
       return { l, weight: l[2] > 0.01 ? weight * l[2] : 0 };
@@ -123,15 +128,15 @@ export function surroundings(azimuths) {
   const turned = lights.map((row, i) => row.map(({ l }) => round(rows[i].phi + 180 + Math.atan2(l[1], l[0]) * DEGREE)));
   // of a viewer at theta the lights by reciprocity: the one direction is asked for as the light, all others as viewers
   const angles = { theta_i: rows.map(({ theta }) => [theta]), phi_i: rows.map(({ phi }) => [phi]), theta_r: polar, phi_r: turned };
-  return { angles, lights, count: azimuths.length };
+  return { angles, lights, viewers, count: azimuths.length };
 }
 
 /** Moments of the surroundings over the viewers of `surroundings`: nine numbers each, albedo and its mean light along x and z of
  * three colours.
  * @param {ReturnType<typeof surroundings>} scene
  * @param {ArrayLike<number>} values */
-export function moments({ lights, count }, values) {
-  const each = lights[0].length, channels = values.length / (lights.length * each), found = new Float64Array(9 * VIEWERS.length);
+export function moments({ lights, viewers, count }, values) {
+  const each = lights[0].length, channels = values.length / (lights.length * each), found = new Float64Array(9 * viewers.length);
   lights.forEach((row, j) => row.forEach(({ l, weight }, i) => {
     for (let k = 0; k < 3 && weight; k += 1) {
       const share = (values[(j * each + i) * channels + (channels === 3 ? k : 0)] * weight) / count, at = 9 * Math.floor(j / count) + 3 * k;
@@ -144,10 +149,11 @@ export function moments({ lights, count }, values) {
 }
 
 /** Between which of the viewers an angle [degrees] is, and how far.
+ * @param {number[]} viewers
  * @param {number} theta */
-function viewer(theta) {
-  const next = VIEWERS.findIndex((each) => each > theta), i = next < 0 ? VIEWERS.length - 2 : Math.max(next - 1, 0);
-  return [i, Math.min((theta - VIEWERS[i]) / (VIEWERS[i + 1] - VIEWERS[i]), 1)];
+function viewer(viewers, theta) {
+  const next = viewers.findIndex((each) => each > theta), i = next < 0 ? viewers.length - 2 : Math.max(next - 1, 0);
+  return [i, Math.min((theta - viewers[i]) / (viewers[i + 1] - viewers[i]), 1)];
 }
 
 /** Add what a normal reflects of the surroundings and, where it has a specular part, of the light that stands in them.
@@ -155,10 +161,10 @@ function viewer(theta) {
  * @param {number} y
  * @param {number} z
  * @param {Vector} light
- * @param {{ moments: ArrayLike<number> | null, specular: number[][] | null }} of specular: three colours over the viewers
+ * @param {{ viewers: number[], moments: ArrayLike<number> | null, specular: number[][] | null }} of specular: three colours over the viewers
  * @param {Float64Array} into */
 export function add(x, y, z, light, of, into) {
-  const [i, a] = viewer(Math.acos(Math.min(z, 1)) * DEGREE);
+  const [i, a] = viewer(of.viewers, Math.acos(Math.min(z, 1)) * DEGREE);
   const away = z < 1 ? (y * z) / Math.sqrt(1 - z * z) : 0; // how far up the side of the mirror direction leans
   if (of.moments) {
     for (let k = 0; k < 3; k += 1) {

@@ -3,8 +3,8 @@
 /** @typedef {{ base: string, model: boolean, changes: Record<string, number> | null }} Subject a material's table; with `model`
  *   the model that it was made of; with `changes` that model, or a model by its name, with other parameters */
 /** @typedef {{ material: string, view: string, theta_i: number, phi_i: number, theta_r: number, turn: number, nm: number | null,
- *   scale: string, axes: string, curves: string, compare: string[], illuminant: string, exposure: number, surround: string }} State
- *   turn is phi_r - phi_i; nm null is luminance and colours under an illuminant; material and compare are subjects as text */
+ *   scale: string, axes: string, curves: string, compare: string[], illuminant: string, exposure: number, surround: string, quick?: boolean }} State
+ *   quick: drawn in a hurry, while a slider moves; turn is phi_r - phi_i; nm null is luminance and colours under an illuminant; material and compare are subjects as text */
 
 // compare: the model of the material itself
 export const MODEL = ":model";
@@ -20,12 +20,13 @@ const DEFAULTS = {
 /** @type {Record<string, string[]>} */
 export const CHOICES = {
   scale: ["log", "linear"], axes: ["polar", "cartesian"], curves: ["one", "rgb", "wavelengths"], illuminant: ILLUMINANTS,
-  surround: ["sky", "dark"],
+  surround: ["sky", "dark", "studio"],
 };
 /** @type {Record<string, [number, number]>} */
 const RANGES = {
   theta_i: [0, 89.5], phi_i: [0, 360], theta_r: [0, 89.5], turn: [0, 360], nm: [1, 1e6], exposure: [-8, 8],
 };
+export const PICTURE_NM = Array.from({ length: 14 }, (_, i) => 420 + 20 * i); // at which pictures look up spectra, as `brdfdb render`
 const MOST = 7; // subjects that are compared with: there are as many more colours
 
 /** The state that a link holds, of some views; what it does not hold, or holds wrongly, is as at the start.
@@ -53,7 +54,8 @@ export function fromHash(hash, views) {
 /** The end of a link: what differs from the start.
  * @param {State} state */
 export function toHash(state) {
-  const held = Object.entries(state).flatMap(([key, value]) => (Array.isArray(value) ? value.map((each) => [key, each])
+  const { quick: _, ...all } = state;
+  const held = Object.entries(all).flatMap(([key, value]) => (Array.isArray(value) ? value.map((each) => [key, each])
     : value === null || value === DEFAULTS[/** @type {keyof State} */ (key)] ? [] : [[key, value]]));
   return `#${held.map(([key, value]) => `${key}=${plain(String(value))}`).join("&")}`;
 }

@@ -28,19 +28,20 @@ let light = { theta: 0, phi: 0 }; // of what is shown [degrees]
 export default {
   name: "hemisphere", title: "Lobe", order: 2, turned: true, draw: hemisphere, begin: turns,
   request: (each, state, series) => lobe("hemisphere", each, state, series),
-  answer: (each, state, series, signal) => json(asked(each, state, series), signal),
+  answer: async (each, state, series, signal) =>
+    ({ ...(await json(asked(each, state, series), signal)), grid: grid(state, series) }),
 };
 
 /** The angles of all viewers [degrees], closer together around the mirror direction; of what is isotropic one half.
  * @param {State} state
  * @param {Series[]} series */
-function grid({ theta_i }, series) {
-  const around = [-1, 1].flatMap((sign) => OFF.map((each) => sign * each)), wide = Math.max(Math.sin(theta_i * RADIAN), 0.15);
+function grid({ theta_i, quick }, series) {
+  const every = quick ? 2 : 1, around = [-1, 1].flatMap((sign) => OFF.filter((_, i) => i % every === 0).map((each) => sign * each)), wide = Math.max(Math.sin(theta_i * RADIAN), 0.15);
   const within = (/** @type {number[]} */ values, /** @type {number} */ end) =>
     [...new Set(values.filter((value) => value >= 0 && value <= end))].sort((a, b) => a - b);
-  const theta_r = within([...Array.from({ length: 23 }, (_, i) => 4 * i), theta_i, ...around.map((each) => theta_i + each), LAST], LAST);
+  const theta_r = within([...Array.from({ length: 23 }, (_, i) => 4 * every * i), theta_i, ...around.map((each) => theta_i + each), LAST], LAST);
   const end = anisotropic(series) ? 360 : 180;
-  const turn = within([...Array.from({ length: 37 }, (_, i) => 10 * i), ...around.map((each) => 180 + each / wide)], end);
+  const turn = within([...Array.from({ length: 37 }, (_, i) => 10 * every * i), ...around.map((each) => 180 + each / wide)], end);
   return { theta_r, turn };
 }
 
@@ -59,7 +60,7 @@ function asked(each, state, series) {
  * @param {any[]} answers
  * @param {State} state */
 function hemisphere(into, series, answers, state) {
-  const { theta_r, turn } = grid(state, series), half = turn[turn.length - 1] === 180;
+  const { theta_r, turn } = answers[0].grid, half = turn[turn.length - 1] === 180;
   /** @type {number[][][]} */
   const values = answers.map((answer) => answer.brdf.map((/** @type {any[]} */ row) => row.map(number(answer))));
   const range = span(values.flat(2), state), height = scaled(state, range[0]);
@@ -67,12 +68,12 @@ function hemisphere(into, series, answers, state) {
   /** @type {[number, string][]} */
   const marks = ticks(range, state).map(([at, text]) => [(at - range[0]) / (range[1] - range[0]), text]);
   const specular = answers.map((answer) => (answer.specular_reflectance ? number(answer)(answer.specular_reflectance) : 0));
-  const across = half ? [...turn, ...turn.slice(0, -1).reverse().map((each) => 360 - each)] : turn;
+  const across = half ? [...turn, ...turn.slice(0, -1).reverse().map((/** @type {number} */ each) => 360 - each)] : turn;
   const scenes = values.map((rows, i) => {
     /** @type {Scene} */
     const scene = { points: [], pieces: [] };
     const whole = rows.map((row) => (half ? [...row, ...row.slice(0, -1).reverse()] : row));
-    surface(scene, theta_r, across.map((each) => state.phi_i + each), whole.map((row) => row.map(share)));
+    surface(scene, theta_r, across.map((/** @type {number} */ each) => state.phi_i + each), whole.map((row) => row.map(share)));
     line(scene, towards(0, 0, 1), "grid", 1);
     line(scene, towards(state.theta_i, state.phi_i, 1), "third", 3);
     line(scene, towards(state.theta_i, state.phi_i + 180, 1), specular[i] ? "spike" : "muted", specular[i] ? 4 : 1.5);

@@ -8,9 +8,9 @@ import { add, between, lightOf, lune, moments, surroundings } from "./sphere_sce
 
 /** @typedef {import("./state.js").State} State */
 /** @typedef {import("./series.js").Series} Series */
-/** @typedef {{ moments: Float64Array, specular: number[][] | null }} Around */
+/** @typedef {{ viewers: number[], moments: Float64Array, specular: number[][] | null }} Around */
 
-const SIZE = 320; // pixels across
+const SIZE = 320, QUICK = 160; // pixels across, and while a slider moves
 const KEPT = 16; // surroundings, which stay the same while the light moves
 const ENCODED = Uint8Array.from({ length: 4097 }, (_, i) => { // bytes of sRGB (IEC 61966-2-1)
   const value = i / 4096;
@@ -37,26 +37,32 @@ export default {
   answer, draw: spheres, begin: moves,
 };
 
-/** What the service says of a light, and of the surroundings.
+/** What the service says of a light, and of the surroundings; or its picture in a studio.
  * @param {Series} each
  * @param {State} state
  * @param {Series[]} _
  * @param {AbortSignal} signal */
 async function answer(each, state, _, signal) {
-  const { angles, rays } = lune(lightOf(state), anisotropic([each])), query = quantity(each, state, "linear-srgb");
+  if (state.surround === "studio") return values(question(each, "sphere", { size: SIZE, format: "npy" }), SIZE * SIZE, signal);
+  const { angles, ...of } = lune(lightOf(state), anisotropic([each]), Boolean(state.quick)), query = quantity(each, state, "linear-srgb");
   const [lit, around] = await Promise.all([
-    values(question(each, "lookup", query, angles), angles.theta_i.length, signal), aroundOf(each, query, signal)]);
-  return { ...lit, rays, around };
+    values(question(each, "lookup", query, angles), angles.theta_i.length, signal), aroundOf(each, query, Boolean(state.quick), signal)]);
+  return { ...lit, of, around };
 }
 
 /** @param {Series} each
  * @param {Record<string, unknown>} query
+ * @param {boolean} quick
  * @param {AbortSignal} signal
  * @returns {Promise<Around>} */
-function aroundOf(each, query, signal) {
-  const key = JSON.stringify([each.text, each.info.revision, query]);
-  const found = known.get(key) ?? summed(each, query, signal);
-  known.delete(key); // the last one is kept longest
+function aroundOf(each, query, quick, signal) {
+  const key = (/** @type {boolean} */ hurried) => JSON.stringify([each.text, each.info.revision, query, hurried]);
+  return known.get(key(false)) ?? known.get(key(quick)) ?? kept(key(quick), summed(each, query, quick, signal));
+}
+
+/** @param {string} key
+ * @param {Promise<Around>} found */
+function kept(key, found) {
   known.set(key, found);
   found.catch(() => known.delete(key));
   for (const old of [...known.keys()].slice(0, -KEPT)) known.delete(old);
@@ -65,14 +71,15 @@ function aroundOf(each, query, signal) {
 
 /** @param {Series} each
  * @param {Record<string, unknown>} query
+ * @param {boolean} quick
  * @param {AbortSignal} signal
  * @returns {Promise<Around>} */
-async function summed(each, query, signal) {
-  const scene = surroundings(anisotropic([each]) ? [0, 45, 90, 135] : [0]);
+async function summed(each, query, quick, signal) {
+  const scene = surroundings(anisotropic([each]) ? [0, 45, 90, 135] : [0], quick);
   const found = await json(question(each, "lookup", query, scene.angles), signal), part = found.specular_reflectance;
   const specular = part && part.filter((/** @type {unknown} */ _, /** @type {number} */ i) => i % scene.count === 0)
     .map((/** @type {any[]} */ row) => (Array.isArray(row[0]) ? row[0] : [row[0], row[0], row[0]]));
-  return { moments: moments(scene, found.brdf.flat(2)), specular };
+  return { viewers: scene.viewers, moments: moments(scene, found.brdf.flat(2)), specular };
 }
 
 /** Draw the sphere of each series into an element; the caption.
@@ -87,26 +94,28 @@ function spheres(into, series, answers, state) {
   while (into.children.length > answers.length) into.lastChild?.remove();
   answers.forEach((found, i) => {
     const [canvas, label] = into.children[i].children;
-    if (canvas instanceof HTMLCanvasElement) paint(canvas, found, state);
+    if (canvas instanceof HTMLCanvasElement) (found.around ? paint : develop)(canvas, found, state);
     label.textContent = series.length > 1 ? series[i].label : "";
   });
-  const specular = answers.some(({ around }) => around.specular?.flat().some((/** @type {number} */ part) => part > 0));
+  const specular = answers.some(({ around }) => around?.specular?.flat().some((/** @type {number} */ part) => part > 0));
+  if (state.surround === "studio") return "The viewer is far above the page, and the light is that of a studio, which the specular part reflects, too.";
   return WORDS + (state.surround === "sky" ? SKY : "") + (specular ? SPECULAR : "") + unseenWords(series[0], state);
 }
 
 /** @param {HTMLCanvasElement} canvas
- * @param {{ values: ArrayLike<number>, rays: number, around: Around }} found
+ * @param {{ values: ArrayLike<number>, of: { rays: number, rings: number, turn: number }, around: Around }} found
  * @param {State} state */
-function paint(canvas, { values: f_r, rays, around }, state) {
-  const context = canvas.getContext("2d"), image = context?.createImageData(SIZE, SIZE);
+function paint(canvas, { values: f_r, of: nodes, around }, state) {
+  const size = state.quick ? QUICK : SIZE, context = canvas.getContext("2d"), image = context?.createImageData(size, size);
   if (!context || !image) return;
+  Object.assign(canvas, { width: size, height: size });
   const light = lightOf(state), of = { ...around, moments: state.surround === "sky" ? around.moments : null };
-  const at = between(light, f_r, rays), seen = new Float64Array(3), bright = 4096 * 2 ** state.exposure;
-  for (let row = 0; row < SIZE; row += 1) {
-    for (let column = 0; column < SIZE; column += 1) {
-      const x = (2 * column + 1) / SIZE - 1, y = 1 - (2 * row + 1) / SIZE, inside = 1 - x * x - y * y;
+  const at = between(light, f_r, nodes), seen = new Float64Array(3), bright = 4096 * 2 ** state.exposure;
+  for (let row = 0; row < size; row += 1) {
+    for (let column = 0; column < size; column += 1) {
+      const x = (2 * column + 1) / size - 1, y = 1 - (2 * row + 1) / size, inside = 1 - x * x - y * y;
       if (inside <= 0) continue;
-      const z = Math.sqrt(inside), cosine = x * light[0] + y * light[1] + z * light[2], pixel = 4 * (row * SIZE + column);
+      const z = Math.sqrt(inside), cosine = x * light[0] + y * light[1] + z * light[2], pixel = 4 * (row * size + column);
       if (cosine > 0) {
         at(x, y, z, seen);
         for (let k = 0; k < 3; k += 1) seen[k] *= Math.PI * cosine;
@@ -117,6 +126,20 @@ function paint(canvas, { values: f_r, rays, around }, state) {
       for (let k = 0; k < 3; k += 1) image.data[pixel + k] = ENCODED[Math.round(Math.min(Math.max(bright * seen[k], 0), 4096))];
       image.data[pixel + 3] = 255;
     }
+  }
+  context.putImageData(image, 0, 0);
+}
+
+/** Show a picture of linear colours and their coverage.
+ * @param {HTMLCanvasElement} canvas
+ * @param {{ values: ArrayLike<number> }} found
+ * @param {State} state */
+function develop(canvas, { values: linear }, { exposure }) {
+  const context = canvas.getContext("2d"), image = context?.createImageData(SIZE, SIZE), bright = 4096 * 2 ** exposure;
+  if (!context || !image) return;
+  Object.assign(canvas, { width: SIZE, height: SIZE });
+  for (let i = 0; i < linear.length; i += 1) {
+    image.data[i] = i % 4 === 3 ? 255 * linear[i] : ENCODED[Math.round(Math.min(Math.max(bright * linear[i], 0), 4096))];
   }
   context.putImageData(image, 0, 0);
 }
