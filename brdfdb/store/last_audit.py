@@ -12,7 +12,7 @@ from typing import NamedTuple
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 
-class Answer(BaseModel):
+class ShownAnswer(BaseModel):
     """The answer of an audit to one of its two questions."""
 
     word: str = Field(description="verdict behind the answer")
@@ -20,7 +20,7 @@ class Answer(BaseModel):
     reason: str = Field(description="the answer in a sentence, with its angle and its wavelength")
 
 
-class Sentence(BaseModel):
+class ShownSentence(BaseModel):
     """One sentence of an audit, with the title of its subject."""
 
     finding: str
@@ -40,9 +40,9 @@ class Audited(BaseModel):
     revision: str = Field(description="that was audited")
     model: str
     verdict: str
-    sentences: list[Sentence]
-    as_published: Answer = Field(description="of the table: is it what the paper says?")
-    conserves_energy: Answer = Field(description="of the model: does the published model conserve energy?")
+    sentences: list[ShownSentence]
+    as_published: ShownAnswer = Field(description="of the table: is it what the paper says?")
+    conserves_energy: ShownAnswer = Field(description="of the model: does the published model conserve energy?")
 
 
 class Report(NamedTuple):

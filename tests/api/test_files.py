@@ -8,13 +8,15 @@ from pathlib import Path
 
 import fsspec
 import httpx
+import numpy as np
 import pytest
 import xarray as xr
+import zarr
 from zarr.storage import ZipStore
 
 from brdfdb.store import snapshots
 from brdfdb.store.reader import Store
-from brdfdb.store.revisions import collect
+from brdfdb.store.revisions import collect, rollback
 from tests.api.a_store import Client, client_of, publish, serving
 
 FOIL = "/v1/materials/copper-foil"
@@ -159,3 +161,44 @@ def test_a_service_that_is_pinned_to_a_snapshot_goes_on_serving_it(tmp_path: Pat
     assert pinned.get("/v1/store/materials/white/r000001/zarr.json").status_code == 200
     pinned.problem("GET", "/v1/store/materials/white/r000002/zarr.json", 404)
     client_of(tmp_path, snapshot="poster").problem("GET", at, 503)
+
+
+def test_zarr_walks_the_store(own: Path, store: Store) -> None:
+    pytest.importorskip("aiohttp")
+    publish(own, "white-tile", "lambert", rho=0.5)
+    (own / "materials" / "grey-felt" / "r000001" / "zarr.json").unlink()  # a damaged material is left out
+    with serving(own) as url:
+        group = zarr.open_group(f"{url}/v1/store", mode="r")
+        assert sorted(group["materials"].group_keys()) == ["brushed-metal", "copper-foil", "white-tile"]
+        revisions = {name: list(group[f"materials/{name}"].group_keys()) for name in ("copper-foil", "white-tile")}
+        assert revisions == {"copper-foil": ["r000001"], "white-tile": ["r000002"]}
+        table = group["materials/copper-foil/r000001"]
+        assert table.attrs["title"] == "Test copper-foil"
+        local = zarr.open_group(store.path("copper-foil"), mode="r")
+        np.testing.assert_array_equal(table["brdf"][:2], local["brdf"][:2])
+        place = "materials/copper-foil/r000001"
+        with xr.open_zarr(f"{url}/v1/store", group=place) as found, xr.open_zarr(store.path("copper-foil")) as expected:
+            assert found.load().identical(expected.load())
+
+
+def test_the_metadata_of_the_store_change_with_a_revision(own: Path) -> None:
+    client = client_of(own)
+    first = client.get("/v1/store/zarr.json")
+    assert client.get("/v1/store/zarr.json", headers={"If-None-Match": first.headers["etag"]}).status_code == 304
+    publish(own, "white-tile", "lambert", rho=0.5)
+    assert client.get("/v1/store/zarr.json", headers={"If-None-Match": first.headers["etag"]}).status_code == 200
+
+
+def test_an_older_revision_may_become_current_again(tmp_path: Path) -> None:
+    for rho in (0.25, 0.5):
+        publish(tmp_path, "white", "lambert", rho=rho)
+    client = client_of(tmp_path)
+    at = "/v1/materials/white/lookup?theta_i=30&theta_r=30"
+    newer = client.get(at)
+    rollback(tmp_path, "white", "r000001")
+    older = client.get(at, headers={"If-None-Match": newer.headers["etag"]})
+    assert (older.status_code, older.json()["revision"]) == (200, "r000001")
+    assert older.json()["brdf"] == newer.json()["brdf"] / 2.0
+    assert client.get(f"/v1/materials/white/revisions/r000002{at[19:]}").json() == newer.json()
+    with zipfile.ZipFile(io.BytesIO(client.get("/v1/materials/white/download.zarr").content)) as archive:
+        assert archive.read("zarr.json") == (tmp_path / "materials" / "white" / "r000001" / "zarr.json").read_bytes()

@@ -96,7 +96,48 @@ def test_filters_of_the_catalogue(client: Client, query: str, names: list[str]) 
     assert (page["total"], page["next"]) == (len(names), None)
 
 
-@pytest.mark.parametrize("query", ["", "&q=no+paper", "&model=ward"])
+@pytest.mark.parametrize(
+    ("query", "names"),
+    [
+        ("anisotropic=true", ["brushed-metal"]),
+        ("anisotropic=false&q=tile", ["white-tile"]),
+        ("wavelength_nm=399", ["brushed-metal", "grey-felt", "white-tile"]),
+        ("wavelength_nm=400&wavelength_nm=700&model=he_torrance", ["copper-foil"]),
+        ("verdict=not+audited&model=lambert", ["white-tile"]),
+        ("verdict=passes", []),
+    ],
+)
+def test_more_filters_of_the_catalogue(client: Client, query: str, names: list[str]) -> None:
+    assert [line["name"] for line in client.get(f"/v1/materials?{query}").json()["materials"]] == names
+
+
+@pytest.mark.parametrize("sort", ["error_p99", "-error_p99", "created", "-created", "bytes", "-bytes"])
+def test_the_catalogue_is_sorted_and_what_is_unknown_comes_last(own: Path, sort: str) -> None:
+    publish(own, "half-tile", "lambert", rho=0.5, error=True)
+    client = client_of(own)
+    (own / "materials" / "grey-felt" / "r000001" / "zarr.json").write_bytes(b"{}")
+    lines = client.get(f"/v1/materials?sort={sort}").json()["materials"]
+    assert len(lines) == 5
+    values = [line.get(sort.removeprefix("-")) for line in lines]
+    known = [value for value in values if value is not None]
+    assert values == sorted(known, reverse=sort.startswith("-")) + [None] * (5 - len(known))
+    names, address = [], f"/v1/materials?limit=2&sort={sort}"
+    while address is not None:
+        page = client.get(address).json()
+        names += [line["name"] for line in page["materials"]]
+        address = page["next"]
+    assert names == [line["name"] for line in lines]
+
+
+def test_a_page_begins_after_the_one_before_also_where_that_is_gone(own: Path) -> None:
+    client = client_of(own)
+    following = client.get("/v1/materials?limit=2&sort=bytes").json()["next"]
+    whole = [line["name"] for line in client.get("/v1/materials?sort=bytes").json()["materials"]]
+    shutil.rmtree(own / "materials" / whole[1])
+    assert [line["name"] for line in client.get(following).json()["materials"]] == whole[2:]
+
+
+@pytest.mark.parametrize("query", ["", "&q=no+paper", "&model=ward", "&sort=-bytes", "&anisotropic=false"])
 def test_pages_of_the_catalogue(client: Client, query: str) -> None:
     whole = client.get(f"/v1/materials?{query[1:]}").json()
     names, address = [], f"/v1/materials?limit=1{query}"
@@ -108,7 +149,20 @@ def test_pages_of_the_catalogue(client: Client, query: str) -> None:
     assert names == [line["name"] for line in whole["materials"]]
 
 
-@pytest.mark.parametrize("query", ["limit=0", "limit=1001", "limit=many", "limits=3", "model=a&model=b"])
+@pytest.mark.parametrize(
+    "query",
+    [
+        "limit=0",
+        "limit=1001",
+        "limit=many",
+        "limits=3",
+        "model=a&model=b",
+        "sort=colour",
+        "cursor=a",
+        "anisotropic=1",
+        "verdict=bad",
+    ],
+)
 def test_a_bad_page_names_the_parameter(client: Client, query: str) -> None:
     problem = client.problem("GET", f"/v1/materials?{query}", 422)
     assert problem["parameter"] == query.partition("=")[0]

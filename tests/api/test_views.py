@@ -16,10 +16,12 @@ import pytest
 from brdfdb import formats
 from brdfdb.formats._exr_file import write_slice
 from brdfdb.geometry import directions_from_half_difference
+from brdfdb.scenes import lit_sphere
 from brdfdb.spectra import srgb_weights
 from brdfdb.store.reader import Store
 from brdfdb.tables import slices
 from brdfdb.tables.albedo import directional_albedo
+from brdfdb_api.serving import shelf
 from tests.api.a_store import NPY, VISIBLE_NM, Client, client_of, degrees, publish, read_npy
 
 FOIL, FELT, TILE, METAL = (
@@ -311,3 +313,49 @@ def test_a_report_that_is_none_is_no_verdict(own: Path, content: str) -> None:
     client = client_of(own)
     assert client.get(TILE).json()["audit"] is None
     client.problem("GET", f"{TILE}/audit", 404)
+
+
+# Pictures
+
+
+@pytest.mark.parametrize("address", [FOIL, METAL])
+def test_thumbnails_are_kept_and_change_with_the_table(
+    own: Path, monkeypatch: pytest.MonkeyPatch, address: str
+) -> None:
+    drawn = []
+    draw = lit_sphere.sphere_png
+    monkeypatch.setattr(lit_sphere, "sphere_png", lambda *given: drawn.append(given) or draw(*given))
+    client = client_of(own)
+    first = client.get(f"{address}/thumbnail.png?size=32")
+    assert first.content == draw(Store(own)[address.rpartition("/")[2]], 32, lit_sphere.DRAFT)
+    assert (first.headers["content-type"], first.headers["cache-control"]) == ("image/png", "no-cache")
+    held = {"If-None-Match": first.headers["etag"]}
+    assert client.get(f"{address}/thumbnail.png?size=32", headers=held).status_code == 304
+    assert client.get(f"{address}/revisions/r000001/thumbnail.png?size=32").content == first.content
+    assert len(drawn) == 1
+    publish(own, address.rpartition("/")[2], "lambert", rho=0.5)
+    again = client.get(f"{address}/thumbnail.png?size=32", headers=held)
+    assert (again.status_code, len(drawn)) == (200, 2)
+    assert again.content != first.content
+
+
+def test_few_thumbnails_are_kept(own: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(shelf, "PICTURES", 2)
+    client = client_of(own)
+    for size in (16, 17, 18):
+        assert client.get(f"{TILE}/thumbnail.png?size={size}").status_code == 200
+    assert [size for _, size in client.app.state.shelf._pictures] == [17, 18]
+
+
+def test_a_sphere_is_that_of_the_table(client: Client, store: Store) -> None:
+    answer = client.get(f"{FOIL}/sphere?size=24&format=npy")
+    expected = lit_sphere.linear_sphere(store["copper-foil"], 24, detail=lit_sphere.DRAFT)
+    np.testing.assert_array_equal(read_npy(answer.content), expected.astype(np.float32))
+    assert client.get(f"{FOIL}/sphere").content.startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize(
+    "query", ["sphere?size=15", "sphere?format=jpg", "thumbnail.png?size=257", "thumbnail.png?light=1"]
+)
+def test_a_bad_picture_names_the_parameter(client: Client, query: str) -> None:
+    assert client.problem("GET", f"{FOIL}/{query}", 422)["parameter"] == query.partition("?")[2].partition("=")[0]

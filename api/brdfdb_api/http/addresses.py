@@ -116,7 +116,7 @@ def answers(
     success: dict[str, Any] = {"description": "Success"} | ({} if model is None else {"model": model})
     if media is not None:
         success["content"] = {
-            kind: {"schema": {"type": "string", "format": "binary", "description": text}}
+            kind: {"schema": {"type": "string", "description": text} | ({} if "text" in kind else {"format": "binary"})}
             for kind, text in media.items()
         }
     cached = ("ETag", "Cache-Control") if 304 in statuses else ()

@@ -56,12 +56,33 @@ class Application(FastAPI):
 
     def openapi(self) -> dict[str, Any]:
         document = super().openapi()
+        schemas = document["components"]["schemas"]
         for path in document["paths"].values():
             for operation in path.values():
                 for status, response in operation["responses"].items():
-                    if status >= "400" and "application/json" in response.get("content", {}):
-                        response["content"][PROBLEM_JSON] = response["content"].pop("application/json")
+                    content = response.get("content", {})
+                    if "$ref" in content.get("application/json", {}).get(
+                        "schema", {}
+                    ):  # first: generated clients take the first that they can read
+                        kind = PROBLEM_JSON if status >= "400" else "application/json"
+                        response["content"] = {kind: content.pop("application/json"), **content}
+        for part in (*document["paths"].values(), *list(schemas.values())):
+            for key, value in part.items():
+                part[key] = _named(value, schemas)
         return document
+
+
+def _named(part: Any, schemas: dict[str, Any]) -> Any:
+    """Return a part of the document with references to the objects that have titles, which join the schemas."""
+    if isinstance(part, list):
+        return [_named(each, schemas) for each in part]
+    if not isinstance(part, dict):
+        return part
+    part = {key: _named(value, schemas) for key, value in part.items()}
+    if part.get("type") != "object" or "properties" not in part or not isinstance(part.get("title"), str):
+        return part
+    schemas.setdefault(part["title"], part)
+    return {"$ref": f"#/components/schemas/{part['title']}"}
 
 
 def create_app(settings: Settings | None = None, store: Store | None = None) -> FastAPI:

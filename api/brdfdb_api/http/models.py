@@ -8,6 +8,7 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import numpy as np
+from fastapi import Depends
 from fastapi import Query as InQuery
 from pydantic import BaseModel, ConfigDict, Field, WithJsonSchema
 from starlette.requests import Request
@@ -15,10 +16,11 @@ from starlette.responses import Response
 
 from brdfdb.errors import MaterialError, UnknownMaterialError
 from brdfdb.geometry import radians
+from brdfdb.parameters import ModelSpec
 from brdfdb_api.http.addresses import NPY_ANSWER, Content, addresses, answers, body, shelf_of
 from brdfdb_api.http.errors import RequestError
 from brdfdb_api.http.lookups import Surface, checked_size, refused, write_answer
-from brdfdb_api.http.queries import Flag, Light, PointsBody, Query, Values, from_json, unknown
+from brdfdb_api.http.queries import Flag, Light, PointsBody, Query, Values, Wavelengths, from_json, unknown
 from brdfdb_api.http.responses import (
     NPY,
     AlbedoValues,
@@ -32,7 +34,6 @@ from brdfdb_api.http.views import SPHERE, SphereQuery, albedo_document, lobe_ans
 
 if TYPE_CHECKING:
     from brdfdb.materials import Material
-    from brdfdb.parameters import ModelSpec
 
 models = addresses()
 NO_STORE = {"Cache-Control": "no-store"}
@@ -196,12 +197,15 @@ def _described(spec: ModelSpec) -> dict[str, Any]:
     }
 
 
-def _spec(name: str) -> ModelSpec:
+def _spec(model: str) -> ModelSpec:
     from brdfdb.models import MODELS
 
-    if name not in MODELS:
-        raise UnknownModelError(name, MODELS)
-    return MODELS[name]
+    if model not in MODELS:
+        raise UnknownModelError(model, MODELS)
+    return MODELS[model]
+
+
+Spec = Annotated[ModelSpec, Depends(_spec)]
 
 
 @models.get("/v1/models", tags=["models"], responses=answers(Models))
@@ -213,38 +217,43 @@ def model_list() -> Response:
 
 
 @models.get("/v1/models/{model}", tags=["models"], responses=answers(Model, 404))
-def model_document(model: str) -> Response:
+def model_document(spec: Spec) -> Response:
     """Return one model."""
-    return json_response(_described(_spec(model)))
+    return json_response(_described(spec))
 
 
-def _material(model: str, given: Parameters) -> Material:
+def _material(spec: ModelSpec, given: Parameters) -> Material:
     """Return the material of a request, checked as those of recipes are; RequestError (422) if it is none."""
     from brdfdb.materials import Material
 
-    _spec(model)
     for name, value in given.parameters.items():
         if isinstance(value, Mapping) and "csv" in value:
             raise RequestError(422, f"{name}: files are not read over HTTP; give wavelengths_nm and values", name)
     index = {} if given.refractive_index is None else {"refractive_index": given.refractive_index}
-    fields = {"title": "of a request", "model": model, "source": "a request", "parameters": given.parameters, **index}
+    fields = {
+        "title": "of a request",
+        "model": spec.name,
+        "source": "a request",
+        "parameters": given.parameters,
+        **index,
+    }
     try:
         return Material.from_table("request", fields)
     except MaterialError as error:
         raise RequestError(422, f"{error.parameter}: {error.sentence}", error.parameter) from None
 
 
-def _surface(model: str, given: Parameters) -> tuple[Surface, dict[str, Any]]:
+def _surface(spec: ModelSpec, given: Parameters) -> tuple[Surface, dict[str, Any]]:
     """Return the material of a request, by default at the wavelengths of pictures, and what answers say of it."""
     from brdfdb.materials.spectrum import Spectrum
     from brdfdb.spectra import PICTURE_NM
 
-    material = _material(model, given)
+    material = _material(spec, given)
     written = {
         name: value.model_dump(mode="json") if isinstance(value, Spectrum) else value
         for name, value in material.file_parameters().items()
     }
-    about = {"model": model, "model_version": material.spec.version, "parameters": written}
+    about = {"model": spec.name, "model_version": spec.version, "parameters": written}
     return Surface(material, "model", PICTURE_NM if material.spectral else None), about
 
 
@@ -262,13 +271,13 @@ def _looked_up(request: Request, surface: Surface, query: Values, given: PointsB
     responses=answers(ModelLookup, 404, 413, 503, media=NPY_ANSWER),
     openapi_extra=body(PointsAt),
 )
-def model_lookup(request: Request, model: str, query: Annotated[Values, InQuery()], content: Content) -> Response:
+def model_lookup(request: Request, spec: Spec, query: Annotated[Values, InQuery()], content: Content) -> Response:
     """Return the BRDF of a model at its parameters and many pairs of directions (angles in degrees).
 
     A spectral model is evaluated from 420 to 680 nm in steps of 20 nm, unless wavelength_nm says otherwise.
     """
     given = from_json(PointsAt, content)
-    surface, about = _surface(model, given)
+    surface, about = _surface(spec, given)
     return _looked_up(request, surface, query, given, about)
 
 
@@ -278,9 +287,9 @@ def model_lookup(request: Request, model: str, query: Annotated[Values, InQuery(
     responses=answers(ModelLobe, 404, 413, 503, media={NPY: "brdf as a .npy file"}),
     openapi_extra=body(Parameters),
 )
-def model_lobe(request: Request, model: str, query: Annotated[LobeValues, InQuery()], content: Content) -> Response:
+def model_lobe(request: Request, spec: Spec, query: Annotated[LobeValues, InQuery()], content: Content) -> Response:
     """Return f_r [1/sr] of a model for one light, in a view as of a material."""
-    surface, about = _surface(model, from_json(Parameters, content))
+    surface, about = _surface(spec, from_json(Parameters, content))
     with refused():
         return lobe_answer(request, surface, query, query, about, NO_STORE)
 
@@ -288,7 +297,7 @@ def model_lobe(request: Request, model: str, query: Annotated[LobeValues, InQuer
 class WavelengthQuery(Query):
     """The query of an albedo."""
 
-    wavelength_nm: list[float] = Field(default=[], description="wavelength [nm] of a spectral model, repeatable")
+    wavelength_nm: Wavelengths = Field(default=[])
 
 
 @models.post(
@@ -297,11 +306,11 @@ class WavelengthQuery(Query):
     responses=answers(ModelAlbedo, 404, 413, 503),
     openapi_extra=body(Parameters),
 )
-def model_albedo(model: str, query: Annotated[WavelengthQuery, InQuery()], content: Content) -> Response:
+def model_albedo(spec: Spec, query: Annotated[WavelengthQuery, InQuery()], content: Content) -> Response:
     """Return the directional and the hemispherical albedo [1] of a model, to a thousandth."""
     from brdfdb.tables.albedo import reflected_by
 
-    surface, about = _surface(model, from_json(Parameters, content))
+    surface, about = _surface(spec, from_json(Parameters, content))
     at = (
         surface.wavelength_nm
         if surface.wavelength_nm is None or not query.wavelength_nm
@@ -317,10 +326,10 @@ def model_albedo(model: str, query: Annotated[WavelengthQuery, InQuery()], conte
     responses=answers(None, 404, 413, 503, media=SPHERE),
     openapi_extra=body(Parameters),
 )
-def model_sphere(model: str, query: Annotated[SphereQuery, InQuery()], content: Content) -> Response:
+def model_sphere(spec: Spec, query: Annotated[SphereQuery, InQuery()], content: Content) -> Response:
     """Return the picture of a sphere of a model in the light of a studio, drawn as a draft."""
     with refused():
-        return sphere_answer(_material(model, from_json(Parameters, content)), query, NO_STORE)
+        return sphere_answer(_material(spec, from_json(Parameters, content)), query, NO_STORE)
 
 
 class _Blended(NamedTuple):

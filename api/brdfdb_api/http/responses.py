@@ -14,9 +14,10 @@ from pydantic import BaseModel, ConfigDict, Field, GetJsonSchemaHandler
 from pydantic_core import CoreSchema
 from starlette.responses import Response
 
+from brdfdb.materials.provenance import KnownExcess
 from brdfdb.materials.spectrum import Spectrum
 from brdfdb.measurements.record import Measured
-from brdfdb.store.last_audit import Answer, Sentence
+from brdfdb.store.last_audit import ShownAnswer, ShownSentence
 from brdfdb.tables.first_numbers import FormulaError, LargestAlbedo
 from brdfdb.tables.metadata import TableMetadata
 from brdfdb.tables.stated_error import Error
@@ -33,6 +34,8 @@ class Attributes(TableMetadata):
     """The attributes of a table; tables of other programs may lack any."""
 
     model_config = ConfigDict(json_schema_extra={"required": []})
+
+    known_excess: KnownExcess | dict[str, Any] | None = None  # type: ignore[assignment]
 
 
 class Problem(BaseModel):
@@ -88,8 +91,8 @@ class Summary(BaseModel):
     largest_albedo: LargestAlbedo | None = Field(default=None, description="with the specular part; null: not measured")
     spectrum: SpectrumKind | None = None
     verdict: str | None = Field(default=None, description="of the audit of this revision; null: it has none")
-    as_published: Answer | None = Field(default=None, description="is the table what the paper says?")
-    conserves_energy: Answer | None = Field(default=None, description="does the published model conserve energy?")
+    as_published: ShownAnswer | None = Field(default=None, description="is the table what the paper says?")
+    conserves_energy: ShownAnswer | None = Field(default=None, description="does the published model conserve energy?")
     revision: str = ""
     created: str | None = None
     bytes: int | None = None
@@ -122,10 +125,10 @@ class AuditSummary(BaseModel):
     """The verdict of an audit, its answers to two questions, and its findings in sentences."""
 
     verdict: str
-    as_published: Answer
-    conserves_energy: Answer
+    as_published: ShownAnswer
+    conserves_energy: ShownAnswer
     model: str
-    sentences: list[Sentence]
+    sentences: list[ShownSentence]
     revision: str = Field(description="that was audited")
     current: bool = Field(description="whether that is this one")
     when: str

@@ -23,7 +23,7 @@ from brdfdb.store.summary_words import NOT_AUDITED
 from brdfdb.tables.lobe_views import MOST_POINTS, view_directions
 from brdfdb_api.http.addresses import EXPORT_OPTIONS, Revision, addresses, answers, both, served_options, shelf_of
 from brdfdb_api.http.errors import RequestError
-from brdfdb_api.http.files import zipped
+from brdfdb_api.http.files import ZIP, zipped
 from brdfdb_api.http.lookups import Surface, checked_size, document_of, evaluate, surface_of
 from brdfdb_api.http.queries import Light, LobeQuery, Points, Query, Values, listed, parsed
 from brdfdb_api.http.responses import (
@@ -147,7 +147,7 @@ def lobe_answer(
     tags=["views"],
     responses=answers(
         *(None, 304, 404, 503),
-        media={exporter.media_type: exporter.summary for exporter in EXPORTERS.values()},
+        media={ZIP: "several files"} | {exporter.media_type: exporter.summary for exporter in EXPORTERS.values()},
         headers=("Content-Disposition",),
     ),
     openapi_extra={"parameters": EXPORT_OPTIONS},
@@ -208,7 +208,7 @@ def _exported(
         single = len(written.paths) == 1 and path.is_file()
         names = [str(each.relative_to(folder)) for each in FilePath(folder).rglob("*") if each.is_file()]
         content = path.read_bytes() if single else b"".join(zipped(FilePath(folder), names))
-    media_type = exporter.media_type if single else "application/zip"
+    media_type = exporter.media_type if single else ZIP
     named = {"Content-Disposition": f'attachment; filename="{path.name}{"" if single else ".zip"}"'}
     return Response(content, media_type=media_type, headers=headers | named)
 
