@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.api.chromium import Chromium, shown
+from tests.api.chromium import Chromium, box, shown
 
 AXE = Path(os.environ.get("BRDFDB_NODE", "node_modules/.bin")).parent / "axe-core" / "axe.min.js"
 VIEWS = ("together", "cut&axes=cartesian&curves=rgb", "slice", "spectrum", "albedo", "sphere")
@@ -21,7 +21,8 @@ def test_axe_finds_no_violation(chromium: Chromium, address: str, scheme: str, w
         pytest.skip("axe-core is not installed; BRDFDB_NODE names the folder of the programs of npm")
     rules = AXE.read_text(encoding="utf-8")
     for view in VIEWS:
-        chromium.open(f"{address}#material=rolled-brass(rho_d=0.2)&compare=rolled-brass&view={view}", width, 900, scheme)
+        link = f"{address}#material=rolled-brass(rho_d=0.2)&compare=rolled-brass&view={view}"
+        chromium.open(link, width, 900, scheme)
         shown(chromium)
         chromium.until("picture.ariaBusy === 'false' && parameters.children.length > 0")
         chromium.evaluate("document.querySelectorAll('details').forEach(each => { each.open = true; })")
@@ -37,22 +38,18 @@ def test_every_control_has_a_name_and_can_be_reached_by_keys(chromium: Chromium,
     chromium.until("picture.ariaBusy === 'false' && parameters.children.length > 0")
     unnamed = chromium.evaluate(
         "[...document.querySelectorAll('input, select, textarea, button:not([aria-hidden])')]"
-        ".filter(each => !(each.labels?.[0] ?? each).innerText.trim() && !each.closest('[hidden]')).map(each => each.outerHTML)"
+        ".filter(each => !each.closest('[hidden]') && !(each.labels?.[0] ?? each).innerText.trim())"
+        ".map(each => each.outerHTML)"
     )
     assert unnamed == []
-    reached = set()
+    reached, now = set(), "document.activeElement"
+    seen = [f"getComputedStyle({each}).outlineStyle !== 'none'" for each in (now, f"({now}.closest('label') ?? {now})")]
     chromium.evaluate("document.body.focus()")
     for _ in range(60):
         chromium.press("Tab")
-        reached.add(
-            chromium.evaluate(
-                "(of => of.id || of.name || of.dataset.action || of.dataset.copy || of.innerText)(document.activeElement)"
-            )
-        )
-        assert chromium.evaluate(
-            "document.activeElement === document.body || getComputedStyle(document.activeElement.closest('label') ?? "
-            "document.activeElement).outlineStyle !== 'none' || getComputedStyle(document.activeElement).outlineStyle !== 'none'"
-        )
+        name = f"(of => of.id || of.name || of.dataset.action || of.dataset.copy || of.innerText)({now})"
+        reached.add(chromium.evaluate(name))
+        assert chromium.evaluate(f"{now} === document.body || {' || '.join(seen)}")
     pictures = {"cut", "hemisphere", "sphere"}
     assert {"search", "model", "verdict", "paper", "models", "list", "view", *pictures} <= reached
     assert {"theta_i", "phi_i", "log", "compare", "axes", "curves", "exposure", "surround"} <= reached
@@ -73,8 +70,6 @@ def test_a_phone_shows_the_picture_first(chromium: Chromium, address: str) -> No
     for width, height in ((390, 844), (320, 640)):
         chromium.open(f"{address}#material=foam", width, height, touch=True)
         shown(chromium)
-        top, bottom = chromium.evaluate(
-            "(({ top, bottom }) => [top, bottom])(document.querySelector('#sphere canvas').getBoundingClientRect())"
-        )
-        assert 0 < top < bottom < height
+        _, top, _, tall = box(chromium, "#sphere canvas")
+        assert 0 < top < top + tall < height
         assert chromium.evaluate("search.getBoundingClientRect().top") > height

@@ -16,6 +16,7 @@ import brdfdb
 from tests.api.a_store import serving
 from tests.api.chromium import Chromium, chosen, copied, curve, milliseconds, shown
 
+
 def test_the_first_view_is_a_list_three_pictures_and_what_is_known(chromium: Chromium, address: str) -> None:
     for server in ("just started", "at work"):
         chromium.open(address)
@@ -82,7 +83,10 @@ def test_a_slider_has_one_request_on_its_way_and_ends_where_it_rests(chromium: C
     chromium.open(f"{address}#material=scene-copper-sphere&view=hemisphere")
     shown(chromium, "view=hemisphere")
     chromium.evaluate(
-        "asked = [], (was => { fetch = (...all) => { asked.push(JSON.parse(all[1].body).theta_i); return was(...all); }; })(fetch);"
+        "asked = [], (was => { fetch = (...all) => {"
+        "  asked.push(JSON.parse(all[1].body).theta_i);"
+        "  return was(...all);"
+        "}; })(fetch);"
         "for (let theta = 20; theta <= 40; theta += 1) {"
         "  controls.elements.theta_i.value = theta;"
         "  controls.elements.theta_i.dispatchEvent(new Event('input', { bubbles: true }));"
@@ -218,8 +222,7 @@ def test_what_fails_is_said_in_the_page(chromium: Chromium, address: str) -> Non
     assert chromium.evaluate(resting) == [True, True, True]
     assert chromium.evaluate("message.getAttribute('role')") == "status"
     assert chromium.evaluate("[title.textContent, facts.textContent, picture.innerText.trim()]") == ["fome", "", ""]
-    chromium.until("document.querySelectorAll('#list li').length === 3")
-    chromium.evaluate("document.querySelector('#list li').click()")
+    chromium.evaluate("document.querySelector('#message a').click()")
     shown(chromium, "material=foam")
     assert chromium.evaluate("message.textContent") == ""
     assert chromium.evaluate(resting) == [False, False, False]
@@ -264,7 +267,9 @@ def test_a_wrong_comparison_leaves_the_material(chromium: Chromium, address: str
     chromium.evaluate("controls.elements.theta_i.dispatchEvent(new Event('input', { bubbles: true }))")
     shown(chromium, "theta_i=20")
     assert "brsas" in chromium.evaluate("message.textContent")
-    assert chromium.until("location.hash.includes('theta_i=20') && location.hash") == "#material=foam&view=cut&theta_i=20"
+    assert (
+        chromium.until("location.hash.includes('theta_i=20') && location.hash") == "#material=foam&view=cut&theta_i=20"
+    )
 
 
 def test_what_was_away_is_shown_when_it_is_back(chromium: Chromium, address: str, explored: Path) -> None:

@@ -12,7 +12,12 @@ import pytest
 
 import brdfdb
 from brdfdb.geometry import unit_vector
-from tests.api.chromium import SECONDS, Chromium, curve, image, shown
+from brdfdb.materials import presets
+from brdfdb.measurements import MeasuredSource
+from brdfdb.store.publication import publish
+from tests.api.a_store import serving
+from tests.api.chromium import SECONDS, Chromium, box, curve, frame, image, labels, shown
+from tests.measurements.made_up import scans
 
 # What a view has drawn once it is there
 DRAWN = {
@@ -76,7 +81,8 @@ def test_any_number_of_series_lie_over_one_another(chromium: Chromium, address: 
         chromium.evaluate(f"controls.elements.compare.value = '{name}'" + change)
         shown(chromium, f"compare={name}")
     assert chromium.evaluate("document.querySelectorAll('#cut > svg path.curve').length") == 4
-    strokes = "[...document.querySelectorAll('#cut > svg path.curve')].map(each => each.style.stroke + each.style.strokeDasharray)"
+    paths = "[...document.querySelectorAll('#cut > svg path.curve')]"
+    strokes = f"{paths}.map(({{ style }}) => style.stroke + style.strokeDasharray)"
     assert len(set(chromium.evaluate(strokes))) == 4
     assert "Foam" in chromium.evaluate("document.querySelector('#cut .legend').textContent")
     assert chromium.evaluate("document.querySelector('#cut path.off')") is None
@@ -92,13 +98,10 @@ def test_a_chart_of_the_cut_shows_the_numbers_of_the_table(
 ) -> None:
     chromium.open(f"{address}#material=scene-copper-sphere&view=cut&axes=cartesian&curves=wavelengths&scale={scale}")
     shown(chromium, "view=cut")
-    left, top, width, height = chromium.evaluate(
-        "['x', 'y', 'width', 'height'].map(each => Number(document.querySelector('#cut .frame').getAttribute(each)))"
-    )
-    table, labels = brdfdb.open(explored)["scene-copper-sphere"], ["450 nm", "500 nm", "550 nm", "600 nm", "650 nm"]
-    assert chromium.evaluate("[...document.querySelectorAll('#cut > svg path.curve')].map(each => each.dataset.label)") == labels
-    (_, low, high) = chromium.evaluate("[0, ...document.querySelector('#cut > svg').dataset.range.split(' ').map(Number)]")
-    for number, label in enumerate(labels):
+    left, top, width, height, low, high = frame(chromium)
+    table = brdfdb.open(explored)["scene-copper-sphere"]
+    assert labels(chromium) == ["450 nm", "500 nm", "550 nm", "600 nm", "650 nm"]
+    for number, label in enumerate(labels(chromium)):
         x, y = curve(chromium, number).T
         theta = np.deg2rad(-90.0 + 180.0 * (x - left) / width)
         f_r = table.lookup(np.deg2rad(45.0), 0.0, np.abs(theta), np.where(theta > 0.0, np.pi, 0.0), float(label[:3]))
@@ -139,17 +142,13 @@ def test_a_table_is_off_by_what_its_stated_error_means(chromium: Chromium, addre
     assert (reds[off < -0.3 * most] < 0).all()
 
 
-def test_a_slice_has_half_angles_across_and_a_click_picks_directions(
-    chromium: Chromium, address: str, explored: Path
-) -> None:
+def test_a_slice_has_half_angles_across_and_a_click_picks_directions(chromium: Chromium, address: str) -> None:
     chromium.open(f"{address}#material=scene-copper-sphere&view=slice&nm=500")
     shown(chromium, "view=slice")
     brightness = image(chromium, "#slice canvas")[..., 1].astype(int)  # green grows along the scale
     assert brightness[45, 0] > brightness[45, 30] > brightness[45, 80]  # away from the half vector
-    x, y = chromium.evaluate(
-        "(({ left, bottom, width, height }) => [left + width * 20.5 / 90, bottom - height * 60.5 / 90])"
-        "(document.querySelector('#slice canvas').getBoundingClientRect())"
-    )
+    left, top, width, height = box(chromium, "#slice canvas")
+    x, y = left + width * 20.5 / 90.0, top + height * (1.0 - 60.5 / 90.0)
     for kind in ("mouseMoved", "mousePressed", "mouseReleased"):
         chromium.send("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", clickCount=1)
     assert chromium.evaluate(READ).startswith("θh 20.5°, θd 60.5°: ")
@@ -195,21 +194,16 @@ def test_a_finger_on_a_picture_scrolls_the_page(chromium: Chromium, address: str
 def test_the_axis_of_a_spectrum_is_wider_than_rounding(chromium: Chromium, address: str, name: str) -> None:
     chromium.open(f"{address}#material={name}&view=spectrum&compare=%3Amodel")
     shown(chromium, "view=spectrum")
-    low, high = np.array(chromium.evaluate("document.querySelector('#spectrum > svg').dataset.range.split(' ').map(Number)"))
+    _, top, _, height, low, high = frame(chromium, "spectrum")
     assert high - low > np.log10(1.5)
     ys = np.concatenate([curve(chromium, number, "spectrum")[:, 1] for number in range(2)])
-    top, height = chromium.evaluate(
-        "['y', 'height'].map(each => Number(document.querySelector('#spectrum .frame').getAttribute(each)))"
-    )
     assert top < ys.min() <= ys.max() < top + height
 
 
 def test_a_spectrum_over_decades_has_numbers_at_1_2_and_5(chromium: Chromium, address: str) -> None:
     chromium.open(f"{address}#material=foam&view=spectrum&compare=rolled-brass")
     shown(chromium, "view=spectrum")
-    low, high = 10.0 ** np.array(
-        chromium.evaluate("document.querySelector('#spectrum > svg').dataset.range.split(' ').map(Number)")
-    )
+    low, high = 10.0 ** np.array(frame(chromium, "spectrum")[4:])
     assert high / low > 10.0
     texts = chromium.evaluate("[...document.querySelectorAll('#spectrum text.end')].map(each => each.textContent)")
     expected = [mantissa * 10.0**power for power in range(-3, 3) for mantissa in (1, 2, 5)]
@@ -278,3 +272,22 @@ def test_the_spectrum_of_a_table_that_states_no_error_is_drawn_without_one(
     assert f"is grey: {1.0 / np.pi:.3g} /sr" in chromium.evaluate("caption.textContent")
     assert ("with the band" in chromium.evaluate("caption.textContent")) == (compare == "grey-felt")
     assert chromium.errors == []
+
+
+def test_what_a_measured_table_extrapolates_is_dashed(chromium: Chromium, tmp_path: Path) -> None:
+    clay, store = presets()["clay-vase"], tmp_path / "store"
+    samples = scans(clay.brdf_at(None), np.array([10.0, 35.0, 60.0]), 0.03, step_deg=15.0)
+    source = MeasuredSource.of_samples(samples, name="my-clay", title="Clay", provenance="run 12")
+    publish(store, source.recorded(file="clay.csv", file_sha256="0" * 64), tolerance=0.1)
+    with serving(store) as address:
+        for theta_i, dashed in ((35, False), (80, True)):
+            chromium.open(f"{address}/#material=my-clay&view=cut&axes=cartesian&theta_i={theta_i}")
+            shown(chromium, f"theta_i={theta_i}")
+            dashes = "[...document.querySelectorAll('#cut > svg path.curve')].map(each => each.style.strokeDasharray)"
+            pieces = chromium.evaluate(dashes)
+            assert "3, 4" in pieces
+            points = len(curve(chromium, len(pieces) - 1))
+            assert (points > 100) is dashed  # at 80 degrees nothing was measured
+            assert "Dashed is what was not measured" in chromium.evaluate("caption.textContent")
+            assert chromium.evaluate("parameters.hidden")
+        assert chromium.errors == []

@@ -1,4 +1,4 @@
-"""The sphere of the explorer: radiance under its light and its surroundings, what a specular part reflects, and hands."""
+"""The sphere of the explorer: radiance under light and surroundings, what a specular part reflects, and hands."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import brdfdb
 from brdfdb.geometry import unit_vector
 from brdfdb.spectra import srgb_weights
 from tests.api.a_store import publish, serving
-from tests.api.chromium import Chromium, image, shown
+from tests.api.chromium import Chromium, box, image, shown
 
 SIZE = 320  # pixels across
 SKY = 0.35  # what is seen of the surroundings at the height of the eye
@@ -70,7 +70,8 @@ def test_the_sphere_has_the_radiance_of_the_table(
     drawn, (normal, _) = levels(chromium, link), normals()
     # the same scene with vectors: x to the right, y up, z to the viewer; the tangent is up x normal
     light = unit_vector(np.deg2rad(theta), np.deg2rad(phi))
-    half = (light + [0.0, 0.0, 1.0]) / np.linalg.norm(light + [0.0, 0.0, 1.0])
+    half = light + np.array([0.0, 0.0, 1.0])
+    half /= np.linalg.norm(half)
     table = brdfdb.open(explored)[name]
     disk = np.any(table.specular_reflectance(0.0) > 0.0) & (normal @ half > np.cos(DISK))
     lit = (normal @ light > 0.0) & ~disk
@@ -127,9 +128,7 @@ def test_a_mirror_shows_its_surroundings_and_the_light(chromium: Chromium, tmp_p
 def test_a_hand_and_keys_move_the_light_to_where_they_point(chromium: Chromium, address: str) -> None:
     chromium.open(f"{address}#material=foam&view=together")
     shown(chromium, "material=foam")
-    left, top, width = chromium.evaluate(
-        "(({ left, top, width }) => [left, top, width])(document.querySelector('#sphere canvas').getBoundingClientRect())"
-    )
+    left, top, width, _ = box(chromium, "#sphere canvas")
     x, y = left + width * (0.5 + 0.25), top + width * 0.5  # of a normal at 30 degrees: the light is at 60
     for kind in ("mousePressed", "mouseReleased"):
         chromium.send("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", buttons=1, clickCount=1)
@@ -137,10 +136,8 @@ def test_a_hand_and_keys_move_the_light_to_where_they_point(chromium: Chromium, 
     chromium.evaluate("document.querySelector('#sphere').focus()")
     chromium.press("ArrowDown", "ArrowLeft")
     shown(chromium, "theta_i=55", "phi_i=5")
-    x, y = chromium.evaluate(
-        "(({ left, top, width, height }) => [left + width / 2, top + height / 2])"
-        "(document.querySelector('#cut .lamp').getBoundingClientRect())"
-    )
+    left, top, width, height = box(chromium, "#cut .lamp")
+    x, y = left + width / 2.0, top + height / 2.0
     for kind, by in (("mousePressed", 0), ("mouseMoved", 10), ("mouseReleased", 10)):
         chromium.send("Input.dispatchMouseEvent", type=kind, x=x + by, y=y, button="left", buttons=1, clickCount=1)
     chromium.until("controls.elements.theta_i.value < 55")

@@ -226,11 +226,13 @@ async function answersTo(view, now, signal, lastTry = false) {
 const outdates = ({ revision, current, finding }, { info, source }) => source !== "parameters" && (finding ?
   revision !== info.audit.revision || current !== info.audit.current : revision !== info.revision);
 
-/** Tell people: what failed, or in another colour what worked.
+/** Tell people: what failed, or in another colour what worked; the names of materials that come closest are links.
  * @param {string} sentence */
 function say(sentence, tone = "bad") {
+  const [, before, names] = /^(.*closest: )(.+)$/.exec(sentence) ?? [];
   message.className = tone;
-  message.textContent = sentence;
+  if (!names) message.textContent = sentence;
+  else message.replaceChildren(before, ...names.split(", ").flatMap((name, i) => [i ? ", " : "", element("a", { href: `#material=${name}` }, name)]));
 }
 
 for (const view of Object.values(VIEWS)) {

@@ -19,7 +19,7 @@ from brdfdb_api.http.responses import unchanged
 
 SCRIPT = "text/javascript; charset=utf-8"
 _COMMENT = re.compile(r"^[ \t]*(?:/\*\*(?:[^*]|\*(?!/))*\*/|//.*)\n", re.MULTILINE)
-_IMPORT = re.compile(r"""^import (.+) from "\./(.+)";$""", re.MULTILINE)
+_IMPORT = re.compile(r"""^import ([^;]+) from "\./(.+)";$""", re.MULTILINE)
 _TYPES = {".html": "text/html; charset=utf-8", ".css": "text/css; charset=utf-8", ".js": SCRIPT}
 _VIEWS = "views.js"
 FOLDER = files("brdfdb_api").joinpath("explorer")
