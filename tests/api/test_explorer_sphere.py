@@ -43,7 +43,7 @@ def levels(browser: Chromium, link: str) -> np.ndarray:
 def test_the_light_of_a_sphere_is_where_its_caption_says(
     chromium: Chromium, address: str, phi_i: int, axis: int, side: int, words: str
 ) -> None:
-    chromium.open(f"{address}#material=foam&view=sphere&theta_i=60&phi_i={phi_i}")
+    chromium.open(f"{address}#material=foam&view=sphere&theta_i=60&phi_i={phi_i}&surround=dark")
     shown(chromium, "view=sphere")
     bright = image(chromium, "#sphere canvas")[..., 0].astype(float)  # rows from the top
     middle = np.sum(np.nonzero(bright)[axis] * bright[bright > 0]) / np.sum(bright)

@@ -20,7 +20,8 @@ export class Problem extends Error {
  * @param {Record<string, unknown>} query */
 export function withQuery(path, query) {
   const pairs = Object.entries(query).flatMap(([key, value]) =>
-    (value === undefined ? [] : [value].flat().map((each) => [key, String(each)])));
+    value === undefined ? [] : [value].flat().map((each) => [key, String(each)]),
+  );
   return pairs.length ? `${path}?${new URLSearchParams(pairs)}` : path;
 }
 
@@ -57,7 +58,11 @@ async function answer({ path, body }, headers, signal) {
   /** @type {RequestInit} */
   const options = { signal, headers };
   if (body) {
-    Object.assign(options, { method: "POST", body: JSON.stringify(body), headers: { ...headers, "Content-Type": "application/json" } });
+    Object.assign(options, {
+      method: "POST",
+      body: JSON.stringify(body),
+      headers: { ...headers, "Content-Type": "application/json" },
+    });
   }
   let response;
   try {

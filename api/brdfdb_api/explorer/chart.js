@@ -19,9 +19,11 @@ const TALL = 330; // pixels of the frame
  * @param {(x: number) => string} reads
  * @param {(place: (x: number, y: number) => [number, number]) => SVGElement[]} more what is drawn below the curves */
 export function chart(into, curves, across, up, reads, more = () => []) {
-  const width = Math.max(into.clientWidth, 240), tall = Math.min(TALL, Math.max(200, 0.75 * width));
+  const width = Math.max(into.clientWidth, 240),
+    tall = Math.min(TALL, Math.max(200, 0.75 * width));
   const [right, bottom] = [width - RIGHT, TOP + tall];
-  const atX = (/** @type {number} */ x) => LEFT + ((x - across.range[0]) / (across.range[1] - across.range[0])) * (right - LEFT);
+  const atX = (/** @type {number} */ x) =>
+    LEFT + ((x - across.range[0]) / (across.range[1] - across.range[0])) * (right - LEFT);
   const atY = (/** @type {number} */ y) => bottom - ((up.height(y) - up.range[0]) / (up.range[1] - up.range[0])) * tall;
   /** @type {(x: number, y: number) => [number, number]} */
   const place = (x, y) => [atX(x), Math.min(Math.max(atY(y), TOP - 1e4), bottom + 1e4)];
@@ -29,38 +31,83 @@ export function chart(into, curves, across, up, reads, more = () => []) {
   /** @type {SVGElement[]} */
   const parts = [svg("rect", { x: LEFT, y: TOP, width: right - LEFT, height: tall, class: "frame" })];
   const inside = svg("g", { "clip-path": "url(#frame)" });
-  const clip = svg("clipPath", { id: "frame" }, svg("rect", { x: LEFT, y: TOP - 1, width: right - LEFT, height: tall + 2 }));
+  const clip = svg(
+    "clipPath",
+    { id: "frame" },
+    svg("rect", { x: LEFT, y: TOP - 1, width: right - LEFT, height: tall + 2 }),
+  );
   for (const x of steps(across.range, (right - LEFT) / 70, across.every)) {
-    parts.push(path([[atX(x), TOP], [atX(x), bottom]], "grid"),
-      svg("text", { x: atX(x), y: bottom + 17, class: "middle" }, String(x).replace("-", "−")));
+    parts.push(
+      path(
+        [
+          [atX(x), TOP],
+          [atX(x), bottom],
+        ],
+        "grid",
+      ),
+      svg("text", { x: atX(x), y: bottom + 17, class: "middle" }, String(x).replace("-", "−")),
+    );
   }
   for (const [at, text] of up.ticks) {
     const y = bottom - ((at - up.range[0]) / (up.range[1] - up.range[0])) * tall;
-    parts.push(path([[LEFT, y], [right, y]], "grid"), svg("text", { x: LEFT - 6, y: y + 4, class: "end" }, text));
+    parts.push(
+      path(
+        [
+          [LEFT, y],
+          [right, y],
+        ],
+        "grid",
+      ),
+      svg("text", { x: LEFT - 6, y: y + 4, class: "end" }, text),
+    );
   }
-  parts.push(svg("text", { x: (LEFT + right) / 2, y: bottom + 38, class: "middle" }, across.title),
-    svg("text", { x: 0, y: 0, class: "middle", transform: `translate(13 ${(TOP + bottom) / 2}) rotate(-90)` }, up.title));
+  parts.push(
+    svg("text", { x: (LEFT + right) / 2, y: bottom + 38, class: "middle" }, across.title),
+    svg(
+      "text",
+      { x: 0, y: 0, class: "middle", transform: `translate(13 ${(TOP + bottom) / 2}) rotate(-90)` },
+      up.title,
+    ),
+  );
   for (const { x, low, high, colour } of curves) {
     if (!low || !high) continue;
-    const edge = x.map((each, i) => place(each, high[i])), back = x.map((each, i) => place(each, low[i])).reverse();
+    const edge = x.map((each, i) => place(each, high[i])),
+      back = x.map((each, i) => place(each, low[i])).reverse();
     inside.append(path([...edge, ...back], "band", { style: `fill: ${colour}` }));
   }
   inside.append(...more(place));
   for (const curve of curves) inside.append(...strokes(curve, place));
-  const cursor = path([[0, TOP], [0, bottom]], "cursor");
+  const cursor = path(
+    [
+      [0, TOP],
+      [0, bottom],
+    ],
+    "cursor",
+  );
   cursor.style.visibility = "hidden";
   const picture = svg("svg", { width, height: bottom + BOTTOM, class: "chart" }, clip, ...parts, inside, cursor);
   const read = element("span", { className: "read" }, "point at the picture to read it");
   picture.dataset.range = up.range.join(" ");
-  into.replaceChildren(picture, element("p", { className: "legend quiet" }, ...(curves.length > 1 ? curves.map(legend) : []), read));
-  reader(into, picture, read, (clientX) => {
-    const share = (clientX - LEFT) / (right - LEFT), [low, high] = across.range;
-    return Math.min(Math.max(low + share * (high - low), low), high);
-  }, across.range, (x) => {
-    cursor.setAttribute("transform", `translate(${atX(x)} 0)`);
-    cursor.style.visibility = "visible";
-    return reads(x);
-  });
+  into.replaceChildren(
+    picture,
+    element("p", { className: "legend quiet" }, ...(curves.length > 1 ? curves.map(legend) : []), read),
+  );
+  reader(
+    into,
+    picture,
+    read,
+    (clientX) => {
+      const share = (clientX - LEFT) / (right - LEFT),
+        [low, high] = across.range;
+      return Math.min(Math.max(low + share * (high - low), low), high);
+    },
+    across.range,
+    (x) => {
+      cursor.setAttribute("transform", `translate(${atX(x)} 0)`);
+      cursor.style.visibility = "visible";
+      return reads(x);
+    },
+  );
 }
 
 /** Let a pointer and arrow keys read a picture.
@@ -100,26 +147,49 @@ export function strokes({ x, y, colour, dash, dashed, label }, place) {
     return [svg("circle", { cx: points[0][0], cy: points[0][1], r: 4, style: `fill: ${colour}`, "data-label": label })];
   }
   if (!dashed?.some(Boolean)) return [stroke(points)];
-  return [stroke(points.map((point, i) => (dashed[i] ? null : point))),
-    stroke(points.map((point, i) => (dashed[i] || dashed[i - 1] || dashed[i + 1] ? point : null)), "3 4")];
+  return [
+    stroke(points.map((point, i) => (dashed[i] ? null : point))),
+    stroke(
+      points.map((point, i) => (dashed[i] || dashed[i - 1] || dashed[i + 1] ? point : null)),
+      "3 4",
+    ),
+  ];
 }
 
 /** A line and what it stands for.
  * @param {{ label: string, colour: string, dash?: string }} curve */
-export const legend = ({ label, colour, dash = "none" }) => element("span", {},
-  svg("svg", { width: 28, height: 10, "aria-hidden": "true" },
-    path([[0, 5], [28, 5]], "curve", { style: `stroke: ${colour}; stroke-dasharray: ${dash}` })), ` ${label}`);
+export const legend = ({ label, colour, dash = "none" }) =>
+  element(
+    "span",
+    {},
+    svg(
+      "svg",
+      { width: 28, height: 10, "aria-hidden": "true" },
+      path(
+        [
+          [0, 5],
+          [28, 5],
+        ],
+        "curve",
+        { style: `stroke: ${colour}; stroke-dasharray: ${dash}` },
+      ),
+    ),
+    ` ${label}`,
+  );
 
 /** Round places between the ends of an axis.
  * @param {[number, number]} range
  * @param {number} most how many fit
  * @param {number} [every] their distance */
 export function steps([low, high], most, every) {
-  const rough = (high - low) / Math.max(most, 2), power = 10 ** Math.floor(Math.log10(rough));
+  const rough = (high - low) / Math.max(most, 2),
+    power = 10 ** Math.floor(Math.log10(rough));
   let step = every ?? [1, 2, 5, 10].map((each) => each * power).find((each) => each >= rough) ?? 10 * power;
   while (every && (high - low) / step > most) step *= 2;
   const first = Math.ceil(low / step - 1e-9);
-  return Array.from({ length: Math.floor(high / step + 1e-9) - first + 1 }, (_, i) => Number(((first + i) * step).toPrecision(12)));
+  return Array.from({ length: Math.floor(high / step + 1e-9) - first + 1 }, (_, i) =>
+    Number(((first + i) * step).toPrecision(12)),
+  );
 }
 
 /** The value of a curve at a place across, in words.

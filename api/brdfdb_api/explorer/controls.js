@@ -8,7 +8,9 @@ import { VIEWS } from "./views.js";
 /** @typedef {import("./state.js").State} State */
 /** @typedef {import("./series.js").Series} Series */
 
-const form = byId("controls", HTMLFormElement), views = byId("views", HTMLElement), beside = byId("beside", HTMLElement);
+const form = byId("controls", HTMLFormElement),
+  views = byId("views", HTMLElement),
+  beside = byId("beside", HTMLElement);
 const CHOSEN = ["axes", "curves", "illuminant", "surround"];
 
 /** A control of the form.
@@ -26,7 +28,10 @@ field("illuminant").append(...ILLUMINANTS.map((name) => new Option(name)));
  * @param {(part: Partial<State>) => void} choose
  * @param {() => State} now */
 export function listen(choose, now) {
-  views.addEventListener("change", ({ target }) => target instanceof HTMLInputElement && choose({ view: target.value }));
+  views.addEventListener(
+    "change",
+    ({ target }) => target instanceof HTMLInputElement && choose({ view: target.value }),
+  );
   form.addEventListener("submit", (event) => event.preventDefault());
   form.addEventListener("input", ({ target }) => {
     const { name, checked, value } = /** @type {HTMLInputElement} */ (target);
@@ -45,8 +50,11 @@ export function listen(choose, now) {
 /** Offer materials to compare with.
  * @param {any[]} materials */
 export function offer(materials) {
-  field("compare").replaceChildren(new Option("add …", ""), new Option("its own model or table", MODEL),
-    ...materials.filter((each) => !each.damaged).map((each) => new Option(each.title, each.name)));
+  field("compare").replaceChildren(
+    new Option("add …", ""),
+    new Option("its own model or table", MODEL),
+    ...materials.filter((each) => !each.damaged).map((each) => new Option(each.title, each.name)),
+  );
 }
 
 const all = [views, form, byId("copies", HTMLElement), beside];
@@ -68,7 +76,9 @@ export function show(state, series) {
     said(name, `${state[name]}°`);
   }
   const { idle = [], also = [], turned = false, shapes = false, lit = false } = VIEWS[state.view];
-  const drop = (/** @type {string} */ name, /** @type {boolean} */ hidden) => { field(name).closest("label").hidden = hidden; };
+  const drop = (/** @type {string} */ name, /** @type {boolean} */ hidden) => {
+    field(name).closest("label").hidden = hidden;
+  };
   for (const name of ["theta_r", "turn"]) drop(name, !also.includes(name));
   for (const name of ["axes", "curves"]) drop(name, !shapes);
   for (const name of ["exposure", "surround"]) drop(name, !lit);
@@ -80,16 +90,31 @@ export function show(state, series) {
   field("log").checked = state.scale === "log";
   drop("log", idle.includes("log"));
   field("compare").value = "";
-  beside.replaceChildren(...series.slice(1).map(({ label }, i) => element("button", { type: "button", title: "take it away" }, `${label} ×`)));
-  series.slice(1).forEach((_, i) => { /** @type {HTMLElement} */ (beside.children[i]).dataset.text = state.compare[i]; });
+  beside.replaceChildren(
+    ...series
+      .slice(1)
+      .map(({ label }, i) => element("button", { type: "button", title: "take it away" }, `${label} ×`)),
+  );
+  series.slice(1).forEach((_, i) => {
+    /** @type {HTMLElement} */ (beside.children[i]).dataset.text = state.compare[i];
+  });
 
-  const spectral = series.find(({ info }) => info.wavelength_nm)?.info, range = spectral?.wavelength_nm ?? [550];
+  const spectral = series.find(({ info }) => info.wavelength_nm)?.info,
+    range = spectral?.wavelength_nm ?? [550];
   field("nm").min = range[0];
   field("nm").max = range.at(-1);
-  const one = range.length === 1 || idle.includes("nm"), coloured = spectral !== undefined && makesColour(spectral);
+  const one = range.length === 1 || idle.includes("nm"),
+    coloured = spectral !== undefined && makesColour(spectral);
   field("nm").disabled = one || (coloured && state.nm === null);
   if (spectral && state.nm !== null) field("nm").value = nearest(spectral, state.nm);
-  said("nm", !spectral ? "grey: the same at all" : idle.includes("nm") || (field("nm").disabled && !one) ? "all" : `${nearest(spectral, state.nm)} nm`);
+  said(
+    "nm",
+    !spectral
+      ? "grey: the same at all"
+      : idle.includes("nm") || (field("nm").disabled && !one)
+        ? "all"
+        : `${nearest(spectral, state.nm)} nm`,
+  );
   drop("nm", !spectral || idle.includes("nm"));
   field("colour").checked = coloured && state.nm === null;
   drop("colour", !coloured || idle.includes("colour"));

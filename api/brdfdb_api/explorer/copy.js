@@ -4,7 +4,8 @@ import { byId } from "./dom.js";
 
 /** @typedef {import("./api.js").Question} Question */
 
-const box = byId("copied", HTMLElement), text = /** @type {HTMLTextAreaElement} */ (box.querySelector("textarea"));
+const box = byId("copied", HTMLElement),
+  text = /** @type {HTMLTextAreaElement} */ (box.querySelector("textarea"));
 
 /** @type {Record<string, (href: string, question: Question) => string>} */
 const WRITTEN = { curl, python };
@@ -13,7 +14,9 @@ const WRITTEN = { curl, python };
  * @param {string} href
  * @param {Question} question */
 function curl(href, { body }) {
-  return body ? `curl -H 'Content-Type: application/json' -d '${JSON.stringify(body).replaceAll("'", "'\\''")}' '${href}'` : `curl '${href}'`;
+  return body
+    ? `curl -H 'Content-Type: application/json' -d '${JSON.stringify(body).replaceAll("'", "'\\''")}' '${href}'`
+    : `curl '${href}'`;
 }
 
 /** Directions of a question as lines of Python, the last of which is the arguments of a lookup [rad].
@@ -22,14 +25,17 @@ const DIRECTIONS = {
   lookup: ({ theta_i, phi_i = 0, theta_r, phi_r }) => ["", `*np.deg2rad([${theta_i}, ${phi_i}, ${theta_r}, ${phi_r}])`],
   cut: ({ theta_i, phi_i = 0 }) => [
     "theta_r = np.linspace(-90, 90, 181)  # degrees, negative back towards the light\n",
-    `*np.deg2rad([${theta_i}, ${phi_i}]), np.deg2rad(abs(theta_r)), np.deg2rad(${phi_i} + 180 * (theta_r > 0))`],
+    `*np.deg2rad([${theta_i}, ${phi_i}]), np.deg2rad(abs(theta_r)), np.deg2rad(${phi_i} + 180 * (theta_r > 0))`,
+  ],
   hemisphere: ({ theta_i, phi_i = 0 }) => [
     "theta_r, phi_r = np.linspace(0, 90, 91)[:, None], np.linspace(0, 360, 181)  # degrees\n",
-    `*np.deg2rad([${theta_i}, ${phi_i}]), np.deg2rad(theta_r), np.deg2rad(phi_r)`],
+    `*np.deg2rad([${theta_i}, ${phi_i}]), np.deg2rad(theta_r), np.deg2rad(phi_r)`,
+  ],
   "half-difference": ({ phi_i = 0 }) => [
     "from brdfdb.geometry import directions_from_half_difference\n\n" +
-    "theta_h, theta_d = np.deg2rad(np.arange(0.5, 90))[:, None], np.deg2rad(np.arange(0.5, 90))\n",
-    `*directions_from_half_difference(theta_h, np.deg2rad(${phi_i}), theta_d, np.deg2rad(90))`],
+      "theta_h, theta_d = np.deg2rad(np.arange(0.5, 90))[:, None], np.deg2rad(np.arange(0.5, 90))\n",
+    `*directions_from_half_difference(theta_h, np.deg2rad(${phi_i}), theta_d, np.deg2rad(90))`,
+  ],
 };
 
 /** A question as Python: of the client, which has f_r; albedos and findings are documents.
@@ -40,15 +46,22 @@ function python(href, { body }) {
   const [, base, name, kind] = /^(.*\/)v1\/materials\/([^/]+)\/(lookup|lobe)$/.exec(origin + pathname) ?? [];
   const json = "import json\nfrom urllib.request import Request, urlopen\n\n";
   if (body) {
-    return `${json}body = json.loads(r"""${JSON.stringify(body)}""")\nrequest = Request("${href}", json.dumps(body).encode(), ` +
-      "{\"Content-Type\": \"application/json\"})\nanswer = json.load(urlopen(request))";
+    return (
+      `${json}body = json.loads(r"""${JSON.stringify(body)}""")\nrequest = Request("${href}", json.dumps(body).encode(), ` +
+      '{"Content-Type": "application/json"})\nanswer = json.load(urlopen(request))'
+    );
   }
   if (!kind) return `${json}answer = json.load(urlopen("${href}"))`;
-  const query = Object.fromEntries(searchParams), [before, directions] = DIRECTIONS[query.view ?? kind](query);
-  const at = searchParams.getAll("wavelength_nm"), method = query.error ? "lookup_with_error" : "lookup";
-  const wavelength = at.length && !query.output ? `, wavelength_nm=${at.length > 1 ? `[${at.join(", ")}]` : at[0]}` : "";
-  return `import numpy as np\nimport brdfdb\n${before}table = brdfdb.open("${base}")["${decodeURIComponent(name)}"]\n` +
-    `answer = table.${method}(${directions}${wavelength})  # 1/sr${query.output ? ", at all wavelengths" : ""}`;
+  const query = Object.fromEntries(searchParams),
+    [before, directions] = DIRECTIONS[query.view ?? kind](query);
+  const at = searchParams.getAll("wavelength_nm"),
+    method = query.error ? "lookup_with_error" : "lookup";
+  const wavelength =
+    at.length && !query.output ? `, wavelength_nm=${at.length > 1 ? `[${at.join(", ")}]` : at[0]}` : "";
+  return (
+    `import numpy as np\nimport brdfdb\n${before}table = brdfdb.open("${base}")["${decodeURIComponent(name)}"]\n` +
+    `answer = table.${method}(${directions}${wavelength})  # 1/sr${query.output ? ", at all wavelengths" : ""}`
+  );
 }
 
 /** Make the buttons work; `link` gives that of the view, `request` what it asks for, `say` tells people.

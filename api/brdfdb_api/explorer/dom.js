@@ -4,9 +4,19 @@ const SVG = "http://www.w3.org/2000/svg";
 
 /** @type {Record<string, string>} */
 const LEVELS = {
-  passes: "good", conserves: "good", inside: "good", loses: "calm", "at the edge": "calm", unknown: "calm", "not judged": "calm",
-  outside: "note", gains: "note", "known published excess": "note", "accepted excess": "note",
-  violates: "bad", damaged: "bad",
+  passes: "good",
+  conserves: "good",
+  inside: "good",
+  loses: "calm",
+  "at the edge": "calm",
+  unknown: "calm",
+  "not judged": "calm",
+  outside: "note",
+  gains: "note",
+  "known published excess": "note",
+  "accepted excess": "note",
+  violates: "bad",
+  damaged: "bad",
 };
 
 /** The element of the page with an id, of a kind.
@@ -53,7 +63,8 @@ export function svg(tag, attributes, ...children) {
  * @param {Record<string, string>} more */
 export function path(points, kind, more = {}) {
   const pieces = points.map((point, i) =>
-    (point ? `${i && points[i - 1] ? "L" : "M"}${point[0].toFixed(1)} ${point[1].toFixed(1)}` : ""));
+    point ? `${i && points[i - 1] ? "L" : "M"}${point[0].toFixed(1)} ${point[1].toFixed(1)}` : "",
+  );
   return svg("path", { d: pieces.join(""), class: kind, ...more });
 }
 

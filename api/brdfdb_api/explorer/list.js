@@ -3,7 +3,9 @@
 import { AGAIN_MS, Problem, json } from "./api.js";
 import { byId, chip, element, isGood, isWrong } from "./dom.js";
 
-const search = byId("search", HTMLInputElement), count = byId("count", HTMLElement), list = byId("list", HTMLElement);
+const search = byId("search", HTMLInputElement),
+  count = byId("count", HTMLElement),
+  list = byId("list", HTMLElement);
 const [model, paper, verdict] = ["model", "paper", "verdict"].map((id) => byId(id, HTMLSelectElement));
 const FIRST = "scene-copper-sphere"; // to look at: colour, a lobe and a specular part
 
@@ -16,8 +18,10 @@ let choose = (/** @type {string} */ _) => {};
 
 /** The one to look at first.
  * @param {any[]} all */
-export const first = (all) => all.find(({ name, damaged }) => name === FIRST && !damaged) ??
-  all.find(({ damaged, spectrum }) => !damaged && spectrum === "spectral") ?? all.find(({ damaged }) => !damaged);
+export const first = (all) =>
+  all.find(({ name, damaged }) => name === FIRST && !damaged) ??
+  all.find(({ damaged, spectrum }) => !damaged && spectrum === "spectral") ??
+  all.find(({ damaged }) => !damaged);
 
 /** All options. */
 const options = () => /** @type {HTMLElement[]} */ ([...list.children]);
@@ -90,35 +94,51 @@ const paperOf = (each) => each.source?.split(",")[0];
  * @param {any} each
  * @returns {string} */
 const words = ({ damaged, verdict, audit }) =>
-  damaged ? "damaged" : verdict ?? (audit?.current ? audit.verdict : "not audited");
+  damaged ? "damaged" : (verdict ?? (audit?.current ? audit.verdict : "not audited"));
 
 /** A mark where something is wrong with a material: with its table, its formula, its error or its energy.
  * @param {any} each */
 function marks(each) {
-  const from = each.audit?.current ? each.audit : each, { as_published: published, conserves_energy: energy } = from;
+  const from = each.audit?.current ? each.audit : each,
+    { as_published: published, conserves_energy: energy } = from;
   /** @type {[string, string, string][]} */
   const wrong = [];
   if (each.damaged) wrong.push(["damaged", "damaged", each.damaged]);
-  if (published && !isGood(published.word)) wrong.push([published.word, `not as published: ${published.text}`, published.reason]);
-  if (energy && isWrong(energy.word) && energy.word !== "gains") wrong.push([energy.word, `energy: ${energy.text}`, energy.reason]);
+  if (published && !isGood(published.word))
+    wrong.push([published.word, `not as published: ${published.text}`, published.reason]);
+  if (energy && isWrong(energy.word) && energy.word !== "gains")
+    wrong.push([energy.word, `energy: ${energy.text}`, energy.reason]);
   if (!wrong.length && isWrong(words(each))) wrong.push([words(each), words(each), ""]);
   if (each.incomplete) wrong.push(["outside", "incomplete", each.incomplete]);
-  return element("span", { className: "marks" }, ...wrong.map(([word, text, why]) => Object.assign(chip(word, text), { title: why })));
+  return element(
+    "span",
+    { className: "marks" },
+    ...wrong.map(([word, text, why]) => Object.assign(chip(word, text), { title: why })),
+  );
 }
 
-const modelOf = (/** @type {any} */ each) => (each.measured ? "measured" : each.model ?? "");
+const modelOf = (/** @type {any} */ each) => (each.measured ? "measured" : (each.model ?? ""));
 
 /** @param {any} each */
 function option(each) {
   const image = element("img", { alt: "", width: 44, height: 44, loading: "lazy", decoding: "async" });
   if (each.thumbnail) image.src = `${each.thumbnail.slice(1)}?size=88`;
   const name = element("span", { className: "name" }, each.title || each.name);
-  const made = element("li", { id: `m-${each.name}`, title: each.damaged ?? each.source }, image, name,
-    element("span", { className: "quiet" }, about(each)), marks(each));
+  const made = element(
+    "li",
+    { id: `m-${each.name}`, title: each.damaged ?? each.source },
+    image,
+    name,
+    element("span", { className: "quiet" }, about(each)),
+    marks(each),
+  );
   made.setAttribute("role", "option");
   made.setAttribute("aria-selected", String(each.name === chosen));
   Object.assign(made.dataset, {
-    name: each.name, model: modelOf(each), paper: paperOf(each) ?? "", verdict: words(each),
+    name: each.name,
+    model: modelOf(each),
+    paper: paperOf(each) ?? "",
+    verdict: words(each),
     text: `${each.name} ${each.title} ${each.model_title} ${each.source}`.toLowerCase(),
   });
   return made;
@@ -126,8 +146,12 @@ function option(each) {
 
 /** What a material is, in a line.
  * @param {any} each */
-const about = ({ damaged, measured, model_title: title, spectrum, anisotropic }) => (damaged ? "" : [
-  measured ? "measured" : title, spectrum === "spectral" ? "" : spectrum, anisotropic ? "anisotropic" : ""].filter(Boolean).join(", "));
+const about = ({ damaged, measured, model_title: title, spectrum, anisotropic }) =>
+  damaged
+    ? ""
+    : [measured ? "measured" : title, spectrum === "spectral" ? "" : spectrum, anisotropic ? "anisotropic" : ""]
+        .filter(Boolean)
+        .join(", ");
 
 /** @param {HTMLSelectElement} select
  * @param {string} value
@@ -139,13 +163,22 @@ function offer(select, value, text = value) {
 function filter() {
   const asked = search.value.toLowerCase().split(/\s+/);
   for (const each of options()) {
-    const { dataset: { text, model: by, paper: source, verdict: word } } = each;
-    each.hidden = !asked.every((part) => text?.includes(part)) ||
-      [[model.value, by], [paper.value, source], [verdict.value, word]].some(([value, own]) => value !== "" && value !== own);
+    const {
+      dataset: { text, model: by, paper: source, verdict: word },
+    } = each;
+    each.hidden =
+      !asked.every((part) => text?.includes(part)) ||
+      [
+        [model.value, by],
+        [paper.value, source],
+        [verdict.value, word],
+      ].some(([value, own]) => value !== "" && value !== own);
   }
   const shown = visible();
-  count.textContent = shown.length === materials.length ? `${materials.length} materials` :
-    `${shown.length} of ${materials.length} materials`;
+  count.textContent =
+    shown.length === materials.length
+      ? `${materials.length} materials`
+      : `${shown.length} of ${materials.length} materials`;
   reach(shown.find((each) => each.dataset.name === chosen) ?? shown[0]);
 }
 
@@ -156,7 +189,8 @@ function reach(to) {
   active?.classList.remove("active");
   active = to ?? null;
   active?.classList.add("active");
-  if (active) { // within the list alone: the page stays where it is
+  if (active) {
+    // within the list alone: the page stays where it is
     const { offsetTop: top, offsetHeight: height } = active;
     list.scrollTop = Math.min(top, Math.max(list.scrollTop, top + height - list.clientHeight));
   }
@@ -165,9 +199,14 @@ function reach(to) {
 
 /** @param {KeyboardEvent} event */
 function walk(event) {
-  const shown = visible(), at = active ? shown.indexOf(active) : -1;
+  const shown = visible(),
+    at = active ? shown.indexOf(active) : -1;
   /** @type {Record<string, number>} */
-  const steps = { ArrowDown: at + 1, ArrowUp: at - 1, ...(event.target === list && { Home: 0, End: shown.length - 1 }) };
+  const steps = {
+    ArrowDown: at + 1,
+    ArrowUp: at - 1,
+    ...(event.target === list && { Home: 0, End: shown.length - 1 }),
+  };
   if (event.key in steps) reach(shown[Math.max(0, Math.min(steps[event.key], shown.length - 1))]);
   else if (event.key === "Enter" && active?.dataset.name) choose(active.dataset.name);
   else return;

@@ -28,7 +28,12 @@ import { VIEWS } from "./views.js";
  *   views have; request: what a copy asks for; answer: what the picture asks for, if that is more; known: the series that the
  *   service knows there; draw: the picture, and its caption; begin: what hands and keys do in it */
 
-const [title, message, caption, picture] = [byId("title", HTMLElement), byId("message", HTMLElement), byId("caption", HTMLElement), byId("picture", HTMLElement)];
+const [title, message, caption, picture] = [
+  byId("title", HTMLElement),
+  byId("message", HTMLElement),
+  byId("caption", HTMLElement),
+  byId("picture", HTMLElement),
+];
 const SLOW_MS = 200; // after which people are told that a picture is on its way
 const REST_MS = 250; // after which a slider rests
 const LINK_MS = 200; // browsers slow pages down that write their address at every move of a slider
@@ -39,10 +44,14 @@ let state = fromHash(location.hash, VIEWS);
 let series = []; // what is shown; emptied when it has to be found anew
 let stop = new AbortController();
 let asked = 0; // when the picture was asked for; the first one when the page was
-let wanted = false, working = false;
-let linked = 0, again = 0;
-let stale = false, fresh = true; // whether parameters have moved; whether the facts are to be shown anew
-let quick = false, resting = 0; // whether a slider moves; the picture is drawn again, finely, once it rests
+let wanted = false,
+  working = false;
+let linked = 0,
+  again = 0;
+let stale = false,
+  fresh = true; // whether parameters have moved; whether the facts are to be shown anew
+let quick = false,
+  resting = 0; // whether a slider moves; the picture is drawn again, finely, once it rests
 /** @type {Map<string, { key: string, hurried: boolean, answers: any[] }>} */
 const before = new Map(); // the last answers to each view
 let missing = ""; // why what is compared with is not shown
@@ -54,7 +63,8 @@ const partsOf = (name) => (VIEWS[name].parts ?? [name]).map((part) => VIEWS[part
 /** Change the state by hand: another material or view can be gone back from, anything else is written over its link.
  * @type {Choose} */
 function choose(part) {
-  const before = toHash(state), from = subjectOf(state.material).base;
+  const before = toHash(state),
+    from = subjectOf(state.material).base;
   change(part);
   clearTimeout(linked);
   const go = ("view" in part || subjectOf(state.material).base !== from) && toHash(state) !== before;
@@ -69,7 +79,10 @@ function choose(part) {
 /** Change the state: a slider's next picture waits for the one that is being drawn, anything else stops it.
  * @type {Choose} */
 function change(part) {
-  const slid = "material" in part && series[0]?.source === "parameters" && subjectOf(part.material ?? "").base === subjectOf(state.material).base;
+  const slid =
+    "material" in part &&
+    series[0]?.source === "parameters" &&
+    subjectOf(part.material ?? "").base === subjectOf(state.material).base;
   const moved = slid || Object.keys(part).every((key) => MOVED.includes(key));
   state = { ...state, ...part };
   if ("material" in part || "compare" in part) {
@@ -85,7 +98,11 @@ function change(part) {
   if (series.length) controls.show(state, series);
   quick = moved;
   clearTimeout(resting);
-  if (moved) resting = setTimeout(() => { quick = false; redraw(); }, REST_MS);
+  if (moved)
+    resting = setTimeout(() => {
+      quick = false;
+      redraw();
+    }, REST_MS);
   redraw();
 }
 
@@ -101,8 +118,12 @@ async function work() {
   picture.ariaBusy = "true";
   while (wanted) {
     wanted = false;
-    const now = { ...state, quick }, start = asked, { signal } = stop;
-    const slow = setTimeout(() => { caption.textContent = "Loading …"; }, SLOW_MS);
+    const now = { ...state, quick },
+      start = asked,
+      { signal } = stop;
+    const slow = setTimeout(() => {
+      caption.textContent = "Loading …";
+    }, SLOW_MS);
     try {
       await draw(now, start, signal);
       say(missing);
@@ -128,16 +149,20 @@ async function work() {
 async function draw(now, start, signal) {
   if (series.length && !stale) facts.band(series[0].info, now);
   else await know(now, signal);
-  const places = shown(now.view), views = partsOf(now.view);
+  const places = shown(now.view),
+    views = partsOf(now.view);
   performance.clearMeasures("first");
   performance.clearMeasures("picture");
-  const words = await Promise.all(views.map(async (view, i) => {
-    const { known, answers } = await answersTo(view, now, signal);
-    signal.throwIfAborted();
-    const said = view.draw?.(places[i], known, answers, now, series) ?? "";
-    if (!performance.getEntriesByName("first").length) performance.measure("first", { start, end: performance.now() });
-    return said;
-  }));
+  const words = await Promise.all(
+    views.map(async (view, i) => {
+      const { known, answers } = await answersTo(view, now, signal);
+      signal.throwIfAborted();
+      const said = view.draw?.(places[i], known, answers, now, series) ?? "";
+      if (!performance.getEntriesByName("first").length)
+        performance.measure("first", { start, end: performance.now() });
+      return said;
+    }),
+  );
   signal.throwIfAborted();
   performance.measure("picture", { start, end: performance.now() });
   caption.replaceChildren(...words.map((text) => element("p", {}, text)));
@@ -206,12 +231,21 @@ async function alone(now, signal, sentence) {
  * @param {AbortSignal} signal
  * @returns {Promise<{ known: Series[], answers: any[] }>} */
 async function answersTo(view, now, signal, lastTry = false) {
-  const all = series, knows = view.known ?? (() => true), known = all.filter((each) => knows(each, now, all));
+  const all = series,
+    knows = view.known ?? (() => true),
+    known = all.filter((each) => knows(each, now, all));
   const answer = view.answer ?? ((each) => json(view.request?.(each, now, all) ?? "", signal));
   const { quick: hurried = false, exposure: _, scale: __, axes: ___, view: ____, compare: _____, ...rest } = now; // of which these do not change answers
-  const key = JSON.stringify([known.map(({ text, source, info }) => [text, source, info.revision]), all.some(({ info }) => info.anisotropic), rest]);
+  const key = JSON.stringify([
+    known.map(({ text, source, info }) => [text, source, info.revision]),
+    all.some(({ info }) => info.anisotropic),
+    rest,
+  ]);
   const kept = before.get(view.name);
-  const answers = kept?.key === key && (hurried || !kept.hurried) ? kept.answers : await Promise.all(known.map((each) => answer(each, now, all, signal)));
+  const answers =
+    kept?.key === key && (hurried || !kept.hurried)
+      ? kept.answers
+      : await Promise.all(known.map((each) => answer(each, now, all, signal)));
   signal.throwIfAborted();
   if (answers !== kept?.answers) before.set(view.name, { key, hurried, answers });
   if (lastTry || !answers.some((found, i) => outdates(found, known[i]))) return { known, answers };
@@ -223,8 +257,9 @@ async function answersTo(view, now, signal, lastTry = false) {
 /** Whether an answer is of another revision than what is known; what an audit found may be of an old one.
  * @param {any} answer
  * @param {Series} each */
-const outdates = ({ revision, current, finding }, { info, source }) => source !== "parameters" && (finding ?
-  revision !== info.audit.revision || current !== info.audit.current : revision !== info.revision);
+const outdates = ({ revision, current, finding }, { info, source }) =>
+  source !== "parameters" &&
+  (finding ? revision !== info.audit.revision || current !== info.audit.current : revision !== info.revision);
 
 /** Tell people: what failed, or in another colour what worked; the names of materials that come closest are links.
  * @param {string} sentence */
@@ -232,7 +267,11 @@ function say(sentence, tone = "bad") {
   const [, before, names] = /^(.*closest: )(.+)$/.exec(sentence) ?? [];
   message.className = tone;
   if (!names) message.textContent = sentence;
-  else message.replaceChildren(before, ...names.split(", ").flatMap((name, i) => [i ? ", " : "", element("a", { href: `#material=${name}` }, name)]));
+  else
+    message.replaceChildren(
+      before,
+      ...names.split(", ").flatMap((name, i) => [i ? ", " : "", element("a", { href: `#material=${name}` }, name)]),
+    );
 }
 
 for (const view of Object.values(VIEWS)) {
@@ -247,8 +286,14 @@ controls.listen(choose, () => state);
 parameters.listen(choose, () => state, say);
 copy.listen(
   () => new URL(toHash(state), location.href),
-  () => (series.length ? partsOf(state.view).at(-1)?.request?.(series[0], state, series) : null) ?? { path: "v1/materials" }, say);
-addEventListener("hashchange", () => { // a link, or the way back
+  () =>
+    (series.length ? partsOf(state.view).at(-1)?.request?.(series[0], state, series) : null) ?? {
+      path: "v1/materials",
+    },
+  say,
+);
+addEventListener("hashchange", () => {
+  // a link, or the way back
   clearTimeout(linked);
   const held = fromHash(location.hash, VIEWS);
   change({ ...held, material: held.material || state.material });
@@ -262,17 +307,23 @@ new ResizeObserver(() => {
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => series.length && redraw());
 shown(state.view); // an empty frame
 if (state.material) redraw(0);
-list.load((material) => choose({ material }), (materials) => {
-  controls.offer(materials);
-  if (series.length) controls.show(state, series);
-  for (const each of series) if (each.source !== "parameters") list.update(each.info);
-  list.mark(subjectOf(state.material).base);
-  const first = list.first(materials);
-  if (!state.material && first) {
-    state = { ...state, material: first.name };
-    redraw(0);
-  } else if (!state.material) {
-    forget(state);
-    say("There is nothing to look at in the store.");
-  }
-}, () => state.material || forget(state)).catch((error) => say(error.message));
+list
+  .load(
+    (material) => choose({ material }),
+    (materials) => {
+      controls.offer(materials);
+      if (series.length) controls.show(state, series);
+      for (const each of series) if (each.source !== "parameters") list.update(each.info);
+      list.mark(subjectOf(state.material).base);
+      const first = list.first(materials);
+      if (!state.material && first) {
+        state = { ...state, material: first.name };
+        redraw(0);
+      } else if (!state.material) {
+        forget(state);
+        say("There is nothing to look at in the store.");
+      }
+    },
+    () => state.material || forget(state),
+  )
+  .catch((error) => say(error.message));

@@ -47,10 +47,19 @@ async function begun(base) {
     return { material, model: await modelOf(material.model) };
   }
   const model = await modelOf(base.slice(1));
-  const parameters = model.parameters.map((/** @type {Parameter} */ each) => ({ name: each.name, value: typical(each) }));
+  const parameters = model.parameters.map((/** @type {Parameter} */ each) => ({
+    name: each.name,
+    value: typical(each),
+  }));
   const material = {
-    name: base, title: model.title, model: model.name, parameters, anisotropic: turned(model), wavelength_nm: model.spectral ? PICTURE_NM : null,
-    specular: model.specular, attributes: { source: model.paper, refractive_index: model.spectral ? "constant/1.5/0" : "" },
+    name: base,
+    title: model.title,
+    model: model.name,
+    parameters,
+    anisotropic: turned(model),
+    wavelength_nm: model.spectral ? PICTURE_NM : null,
+    specular: model.specular,
+    attributes: { source: model.paper, refractive_index: model.spectral ? "constant/1.5/0" : "" },
   };
   return { material, model };
 }
@@ -71,11 +80,23 @@ function typical({ default: given, typical: ends, low, high }) {
  * @param {Record<string, number>} changes
  * @returns {Promise<{ info: any, recipe: Record<string, any> }>} */
 export async function described(base, changes) {
-  const { material, model } = await begun(base), { [N]: n, [K]: k, ...moved } = changes;
-  const parameters = { ...Object.fromEntries(material.parameters.map((/** @type {any} */ { name, value }) => [name, value])), ...moved };
-  const index = n === undefined && k === undefined ? material.attributes.refractive_index : `constant/${n ?? 1.5}/${k ?? 0}`;
+  const { material, model } = await begun(base),
+    { [N]: n, [K]: k, ...moved } = changes;
+  const parameters = {
+    ...Object.fromEntries(material.parameters.map((/** @type {any} */ { name, value }) => [name, value])),
+    ...moved,
+  };
+  const index =
+    n === undefined && k === undefined ? material.attributes.refractive_index : `constant/${n ?? 1.5}/${k ?? 0}`;
   const info = {
-    ...material, error: null, audit: null, measured: null, parameters: [], changes, base: material, model_title: model.title,
+    ...material,
+    error: null,
+    audit: null,
+    measured: null,
+    parameters: [],
+    changes,
+    base: material,
+    model_title: model.title,
     title: base.startsWith(OF_MODEL) ? material.title : `${material.title}, changed`,
   };
   return { info, recipe: { parameters, ...(model.spectral && { refractive_index: index }) } };
@@ -96,15 +117,19 @@ export function forget() {
  * @param {Series} series */
 export async function show({ info, name, source }) {
   if (source === "table") documents.set(address(name), Promise.resolve(info));
-  const changes = source === "parameters" ? info.changes : {}, found = info.model && !info.measured ? await begun(name).catch(() => null) : null;
+  const changes = source === "parameters" ? info.changes : {},
+    found = info.model && !info.measured ? await begun(name).catch(() => null) : null;
   if (!found) return forget();
-  const { recipe } = await described(name, changes), [n, k] = indexOf(recipe.refractive_index);
+  const { recipe } = await described(name, changes),
+    [n, k] = indexOf(recipe.refractive_index);
   /** @type {Record<string, any>} */
   const values = { ...recipe.parameters, [N]: n, [K]: k };
   if (shown !== name) build(found.model, values, name);
   panel.hidden = false;
   for (const input of panel.querySelectorAll("input")) {
-    const { at, share } = tracks[input.name], value = values[input.name], unit = input.dataset.unit ?? "";
+    const { at, share } = tracks[input.name],
+      value = values[input.name],
+      unit = input.dataset.unit ?? "";
     if (value === undefined || at(Number(input.value)) !== value) input.value = String(share(value ?? 1));
     const text = value === undefined ? recipe.refractive_index : `${short(value)}${unit}`;
     input.setAttribute("aria-valuetext", text);
@@ -117,7 +142,8 @@ export async function show({ info, name, source }) {
 /** n and k of a constant refractive index; of another none.
  * @param {string | undefined} index
  * @returns {(number | undefined)[]} */
-const indexOf = (index) => (index?.startsWith("constant/") ? index.split("/").slice(1).map(Number) : [undefined, undefined]);
+const indexOf = (index) =>
+  index?.startsWith("constant/") ? index.split("/").slice(1).map(Number) : [undefined, undefined];
 
 /** @type {Record<string, Track>} */
 let tracks = {};
@@ -130,27 +156,51 @@ function build(model, values, name) {
   shown = name;
   tracks = {};
   const all = [...model.parameters, ...(model.spectral ? INDEX : [])];
-  const numbers = all.filter((/** @type {Parameter} */ each) => ["number", "undefined"].includes(typeof values[each.name]));
+  const numbers = all.filter((/** @type {Parameter} */ each) =>
+    ["number", "undefined"].includes(typeof values[each.name]),
+  );
   const sliders = numbers.map((/** @type {Parameter} */ parameter) => {
-    const { name: key, unit, meaning } = parameter, others = published(parameter), track = trackOf(parameter, others.map(({ value }) => value));
+    const { name: key, unit, meaning } = parameter,
+      others = published(parameter),
+      track = trackOf(
+        parameter,
+        others.map(({ value }) => value),
+      );
     tracks[key] = track;
     const input = element("input", { type: "range", name: key, min: "0", max: "1", step: "0.0025" });
     input.dataset.unit = ["1", ""].includes(unit) ? "" : ` ${unit === "degree" ? "°" : unit}`;
-    const marks = element("span", { className: "track" }, ...others.map(({ value, names }) => {
-      const made = element("button", { type: "button", tabIndex: -1, title: `${short(value)}: ${names.join(", ")}` });
-      made.style.left = `${100 * track.share(value)}%`;
-      Object.assign(made.dataset, { key, value });
-      made.setAttribute("aria-hidden", "true"); // the list of materials has the same for keys
-      return made;
-    }));
-    return element("div", {}, element("label", { title: meaning }, key, " ", element("span", { className: "said" }), input), marks);
+    const marks = element(
+      "span",
+      { className: "track" },
+      ...others.map(({ value, names }) => {
+        const made = element("button", { type: "button", tabIndex: -1, title: `${short(value)}: ${names.join(", ")}` });
+        made.style.left = `${100 * track.share(value)}%`;
+        Object.assign(made.dataset, { key, value });
+        made.setAttribute("aria-hidden", "true"); // the list of materials has the same for keys
+        return made;
+      }),
+    );
+    return element(
+      "div",
+      {},
+      element("label", { title: meaning }, key, " ", element("span", { className: "said" }), input),
+      marks,
+    );
   });
-  const buttons = [["reset", "As published"], ["keep", "Keep beside"], ["recipe", "Copy as recipe"]].map(([action, text]) => {
+  const buttons = [
+    ["reset", "As published"],
+    ["keep", "Keep beside"],
+    ["recipe", "Copy as recipe"],
+  ].map(([action, text]) => {
     const made = element("button", { type: "button" }, text);
     made.dataset.action = action;
     return made;
   });
-  panel.replaceChildren(element("h3", {}, `Parameters of ${model.title}`), ...sliders, element("div", { className: "buttons" }, ...buttons));
+  panel.replaceChildren(
+    element("h3", {}, `Parameters of ${model.title}`),
+    ...sliders,
+    element("div", { className: "buttons" }, ...buttons),
+  );
 }
 
 /** The published values of a parameter, and the materials of each.
@@ -168,25 +218,37 @@ function published(parameter) {
  * @param {number[]} values
  * @returns {Track} */
 function trackOf(parameter, values) {
-  const { low, high } = parameter, some = values.length ? values : [Number(typical(parameter)), Math.min(high, 10)], most = Math.max(...some, 1e-6);
-  const least = Math.min(...some.filter((value) => value > 0), most), near = high <= DECADES * most;
-  const end = near ? high : Math.min(BEYOND * most, high), from = low < -end ? -end : low;
-  const share = (/** @type {number} */ value, /** @type {(value: number) => number} */ scale, /** @type {number} */ first) =>
-    Math.min(Math.max((scale(value) - scale(first)) / (scale(end) - scale(first)), 0), 1);
+  const { low, high } = parameter,
+    some = values.length ? values : [Number(typical(parameter)), Math.min(high, 10)],
+    most = Math.max(...some, 1e-6);
+  const least = Math.min(...some.filter((value) => value > 0), most),
+    near = high <= DECADES * most;
+  const end = near ? high : Math.min(BEYOND * most, high),
+    from = low < -end ? -end : low;
+  const share = (
+    /** @type {number} */ value,
+    /** @type {(value: number) => number} */ scale,
+    /** @type {number} */ first,
+  ) => Math.min(Math.max((scale(value) - scale(first)) / (scale(end) - scale(first)), 0), 1);
   if (from >= 0 && end / least > DECADES) {
-    const first = Math.max(least / BEYOND, low), decades = Math.log10(end / first);
+    const first = Math.max(least / BEYOND, low),
+      decades = Math.log10(end / first);
     return {
       at: (to) => Number((to <= 0 && low === 0 ? 0 : first * 10 ** (to * decades)).toPrecision(4)),
       share: (value) => (value > 0 ? share(value, Math.log10, first) : 0),
     };
   }
-  return { at: (to) => Number((from + to * (end - from)).toPrecision(4)), share: (value) => share(value, Number, from) };
+  return {
+    at: (to) => Number((from + to * (end - from)).toPrecision(4)),
+    share: (value) => share(value, Number, from),
+  };
 }
 
 /** Fill the list of models, which begin with typical parameters.
  * @param {(part: Partial<State>) => void} choose */
 async function offer(choose) {
-  const { models } = await json("v1/models"), select = byId("models", HTMLSelectElement);
+  const { models } = await json("v1/models"),
+    select = byId("models", HTMLSelectElement);
   select.append(...models.map((/** @type {any} */ { name, title }) => new Option(title, `${OF_MODEL}${name}()`)));
   select.addEventListener("change", () => {
     if (select.value) choose({ material: select.value });
@@ -205,15 +267,17 @@ export function listen(choose, now, say) {
   };
   panel.addEventListener("input", ({ target }) => {
     if (target instanceof HTMLInputElement) move(target.name, tracks[target.name].at(Number(target.value)));
-      });
+  });
   offer(choose).catch((error) => say(error.message, "bad"));
   panel.addEventListener("click", ({ target }) => {
-    const { key, value, action } = target instanceof HTMLElement ? target.dataset : {}, { material, compare } = now();
+    const { key, value, action } = target instanceof HTMLElement ? target.dataset : {},
+      { material, compare } = now();
     if (key) move(key, Number(value));
     const { base, changes } = subjectOf(material);
     if (action === "reset") choose({ material: base.startsWith(OF_MODEL) ? `${base}()` : base });
     if (action === "keep" && !compare.includes(material)) choose({ compare: [...compare, material] });
-    if (action === "recipe") described(base, changes ?? {}).then(({ info, recipe }) => copyText(written(recipe, info), say));
+    if (action === "recipe")
+      described(base, changes ?? {}).then(({ info, recipe }) => copyText(written(recipe, info), say));
   });
 }
 
@@ -222,12 +286,26 @@ export function listen(choose, now, say) {
  * @param {any} info */
 function written({ parameters, refractive_index }, { base, model, title, wavelength_nm }) {
   const slug = `my-${base.name.replace(/[^a-z0-9]+/g, "-").replace(/^-/, "")}`;
-  const toml = (/** @type {any} */ value) => (typeof value === "object"
-    ? `{ ${Object.entries(value).map(([key, each]) => `${key} = ${JSON.stringify(each)}`).join(", ")} }` : JSON.stringify(value));
+  const toml = (/** @type {any} */ value) =>
+    typeof value === "object"
+      ? `{ ${Object.entries(value)
+          .map(([key, each]) => `${key} = ${JSON.stringify(each)}`)
+          .join(", ")} }`
+      : JSON.stringify(value);
   return [
-    `title = ${JSON.stringify(title)}`, `materials = ["${slug}"]`, ...(wavelength_nm ? [`wavelengths_nm = ${JSON.stringify(wavelength_nm)}`] : []),
-    "tolerance = 0.01", "", `[define.${slug}]`, `title = ${JSON.stringify(title)}`, `model = "${model}"`,
-    `source = ${JSON.stringify(`changed by hand from ${base.title}`)}`, ...(refractive_index ? [`refractive_index = "${refractive_index}"`] : []),
-    "", `[define.${slug}.parameters]`, ...Object.entries(parameters).map(([key, value]) => `${key} = ${toml(value)}`), "",
+    `title = ${JSON.stringify(title)}`,
+    `materials = ["${slug}"]`,
+    ...(wavelength_nm ? [`wavelengths_nm = ${JSON.stringify(wavelength_nm)}`] : []),
+    "tolerance = 0.01",
+    "",
+    `[define.${slug}]`,
+    `title = ${JSON.stringify(title)}`,
+    `model = "${model}"`,
+    `source = ${JSON.stringify(`changed by hand from ${base.title}`)}`,
+    ...(refractive_index ? [`refractive_index = "${refractive_index}"`] : []),
+    "",
+    `[define.${slug}.parameters]`,
+    ...Object.entries(parameters).map(([key, value]) => `${key} = ${toml(value)}`),
+    "",
   ].join("\n");
 }

@@ -25,8 +25,10 @@ export function span(values, { scale }) {
  * @param {Pick<State, "scale">} state
  * @param {number} bottom
  * @returns {(value: number) => number} */
-export const scaled = ({ scale }, bottom) => (value) =>
-  (scale === "linear" ? value : Math.max(Math.log10(Math.max(value, 1e-300)), bottom));
+export const scaled =
+  ({ scale }, bottom) =>
+  (value) =>
+    scale === "linear" ? value : Math.max(Math.log10(Math.max(value, 1e-300)), bottom);
 
 /** Places on a scale and what to write there; of a logarithmic one less than a decade and a half long at 1, 2 and 5, too.
  * @param {[number, number]} range
@@ -37,10 +39,12 @@ export function ticks([low, high], { scale }) {
     const powers = Array.from({ length: Math.ceil(high) - Math.floor(low) + 1 }, (_, i) => Math.floor(low) + i);
     const between = high - low > 3 ? [1] : [1, 2, 5];
     const all = powers.flatMap((power) => between.map((digit) => digit * 10 ** power));
-    return all.filter((value) => Math.log10(value) >= low - 1e-9 && Math.log10(value) <= high + 1e-9)
+    return all
+      .filter((value) => Math.log10(value) >= low - 1e-9 && Math.log10(value) <= high + 1e-9)
       .map((value) => [Math.log10(value), short(Number(value.toPrecision(3))).replace("1 × ", "")]);
   }
-  const rough = high / 4, power = 10 ** Math.floor(Math.log10(rough));
+  const rough = high / 4,
+    power = 10 ** Math.floor(Math.log10(rough));
   const step = ([1, 2, 5, 10].find((each) => each * power >= rough) ?? 10) * power;
   return Array.from({ length: Math.floor(high / step) + 1 }, (_, i) => [i * step, short(i * step)]);
 }
@@ -62,25 +66,39 @@ export function floorOf(info, nm) {
  * @param {number[]} table
  * @param {number[]} model
  * @param {number} floor */
-export const relative = (table, model, floor) => table.map((value, i) => {
-  const by = Math.max(model[i], floor);
-  return by > 0 ? (value - model[i]) / by : null;
-});
+export const relative = (table, model, floor) =>
+  table.map((value, i) => {
+    const by = Math.max(model[i], floor);
+    return by > 0 ? (value - model[i]) / by : null;
+  });
 
 /** What that is relative to, in words. */
 export const RELATIVE = "relative to the model, or to the floor of the error where that is larger";
 
 // Colours of maps, from the least to the most
-export const VIRIDIS = [[68, 1, 84], [72, 40, 120], [62, 74, 137], [49, 104, 142], [38, 130, 142], [31, 158, 137], [53, 183, 121],
-  [110, 206, 88], [181, 222, 43], [253, 231, 37]];
+export const VIRIDIS = [
+  [68, 1, 84],
+  [72, 40, 120],
+  [62, 74, 137],
+  [49, 104, 142],
+  [38, 130, 142],
+  [31, 158, 137],
+  [53, 183, 121],
+  [110, 206, 88],
+  [181, 222, 43],
+  [253, 231, 37],
+];
 
 /** Red, green and blue of a share of a scale of colours, shaded.
  * @param {number} share
  * @param {number} shaded
  * @param {number[][]} colours */
 export function mapped(share, shaded = 1, colours = VIRIDIS) {
-  const at = Math.min(Math.max(share, 0), 1) * (colours.length - 1), low = Math.min(Math.floor(at), colours.length - 2);
-  return [0, 1, 2].map((i) => Math.round(shaded * (colours[low][i] + (at - low) * (colours[low + 1][i] - colours[low][i]))));
+  const at = Math.min(Math.max(share, 0), 1) * (colours.length - 1),
+    low = Math.min(Math.floor(at), colours.length - 2);
+  return [0, 1, 2].map((i) =>
+    Math.round(shaded * (colours[low][i] + (at - low) * (colours[low + 1][i] - colours[low][i]))),
+  );
 }
 
 /** What colours mean: a bar with marks at shares of it.
@@ -115,6 +133,7 @@ export function unseenWords({ info }, { nm }) {
  * @param {number[]} parts the specular reflectance of each, 0 for none */
 export function specularWords(series, parts) {
   const words = series.flatMap(({ label }, i) =>
-    (parts[i] ? [series.length > 1 ? `${short(parts[i])} (${label})` : short(parts[i])] : []));
+    parts[i] ? [series.length > 1 ? `${short(parts[i])} (${label})` : short(parts[i])] : [],
+  );
   return words.length ? ` The spike is the specular part, which has no f_r: ${words.join(", ")} of the light.` : "";
 }

@@ -17,7 +17,10 @@ const FEW_NM = [450, 500, 550, 600, 650]; // of curves at wavelengths
  * @param {AbortSignal} signal
  * @returns {Promise<Series[]>} */
 export async function seriesOf(state, signal) {
-  const texts = [state.material, ...state.compare.map((text) => (text.startsWith(":") ? ownModel(state.material, text) : text))];
+  const texts = [
+    state.material,
+    ...state.compare.map((text) => (text.startsWith(":") ? ownModel(state.material, text) : text)),
+  ];
   const found = await Promise.all(texts.map((text) => oneOf(text, signal)));
   return found.map((each, i) => ({ ...each, label: labelOf(each, found), colour: `series-${i + 1}`, dash: DASHES[i] }));
 }
@@ -40,7 +43,10 @@ async function oneOf(text, signal) {
 /** Whether a picture is of a table and of its own model, whose difference is what the stated error is about.
  * @param {Series[]} series */
 export const against = (series) =>
-  series.length === 2 && series[0].name === series[1].name && series[0].source === "table" && series[1].source === "model";
+  series.length === 2 &&
+  series[0].name === series[1].name &&
+  series[0].source === "table" &&
+  series[1].source === "model";
 
 /** @param {Series} each
  * @param {Series[]} all */
@@ -57,10 +63,18 @@ function labelOf(each, all) {
  * @param {Angles} [angles]
  * @returns {Question} */
 export function question(each, kind, query = {}, angles = undefined) {
-  const own = each.source === "parameters", { theta_i, phi_i, theta_r, phi_r, wavelength_nm, ...rest } = query;
+  const own = each.source === "parameters",
+    { theta_i, phi_i, theta_r, phi_r, wavelength_nm, ...rest } = query;
   const held = angles ?? { theta_i, phi_i, theta_r, phi_r };
-  const body = angles || (own && kind === "lookup") ? { ...held, wavelength_nm: wavelength_nm ?? (own ? each.info.wavelength_nm ?? undefined : undefined) } : undefined;
-  if (own) return { path: withQuery(`v1/models/${each.info.model}/${kind}`, body ? rest : query), body: { ...each.recipe, ...body } };
+  const body =
+    angles || (own && kind === "lookup")
+      ? { ...held, wavelength_nm: wavelength_nm ?? (own ? (each.info.wavelength_nm ?? undefined) : undefined) }
+      : undefined;
+  if (own)
+    return {
+      path: withQuery(`v1/models/${each.info.model}/${kind}`, body ? rest : query),
+      body: { ...each.recipe, ...body },
+    };
   const from = each.source === "model" ? { from: "model" } : {};
   return { path: address(each.name, kind, { ...from, ...(body ? rest : query) }), body };
 }
@@ -72,7 +86,9 @@ export const anisotropic = (series) => series.some(({ info }) => info.anisotropi
 /** Whether the wavelengths of a material make a colour, by the rule of the service.
  * @param {{ wavelength_nm: number[] | null }} info */
 export function makesColour({ wavelength_nm: at }) {
-  return at !== null && at[0] <= 420 && at[at.length - 1] >= 680 && at.every((nm, i) => i === 0 || nm - at[i - 1] <= 20);
+  return (
+    at !== null && at[0] <= 420 && at[at.length - 1] >= 680 && at.every((nm, i) => i === 0 || nm - at[i - 1] <= 20)
+  );
 }
 
 /** The wavelength [nm] closest to one that is asked for, within those of a material; else its middle one.
@@ -112,9 +128,13 @@ export const azimuth = ({ phi_i }, series) => (anisotropic(series) ? phi_i : und
  * @param {State} state
  * @param {Series[]} series
  * @param {Record<string, unknown>} of */
-export const lobe = (view, each, state, series, of = quantity(each, state)) => question(each, "lobe", {
-  view, theta_i: view === "half-difference" ? undefined : state.theta_i, phi_i: azimuth(state, series), ...of,
-});
+export const lobe = (view, each, state, series, of = quantity(each, state)) =>
+  question(each, "lobe", {
+    view,
+    theta_i: view === "half-difference" ? undefined : state.theta_i,
+    phi_i: azimuth(state, series),
+    ...of,
+  });
 
 /** A function that makes a number of what an answer holds at a point.
  * @param {{ output: string }} document
@@ -129,19 +149,32 @@ export const number = (document) => (document.output === "xyz" ? (value) => valu
  * @param {State} state
  * @returns {{ query: Record<string, unknown>, channels: Channel[] }} */
 export function channelsOf(each, state) {
-  const { info } = each, colourful = makesColour(info);
+  const { info } = each,
+    colourful = makesColour(info);
   if (state.curves === "rgb" && colourful) {
-    const parts = ["red", "green", "blue"].map((part, i) => ({ part, colour: `channel-${part}`, pick: (/** @type {any} */ value) => value[i] }));
+    const parts = ["red", "green", "blue"].map((part, i) => ({
+      part,
+      colour: `channel-${part}`,
+      pick: (/** @type {any} */ value) => value[i],
+    }));
     return { query: quantity(each, { ...state, nm: null }, "linear-srgb"), channels: parts };
   }
   if (state.curves === "wavelengths" && info.wavelength_nm?.length > 1) {
-    const range = info.wavelength_nm, low = range[0], high = range[range.length - 1];
+    const range = info.wavelength_nm,
+      low = range[0],
+      high = range[range.length - 1];
     const some = FEW_NM.filter((nm) => nm >= low && nm <= high);
     const at = some.length > 1 ? some : [low, high];
-    return { query: { wavelength_nm: at }, channels: at.map((nm, i) => ({ part: `${nm} nm`, colour: hue(nm), pick: (value) => value[i] })) };
+    return {
+      query: { wavelength_nm: at },
+      channels: at.map((nm, i) => ({ part: `${nm} nm`, colour: hue(nm), pick: (value) => value[i] })),
+    };
   }
   const one = quantity(each, state);
-  return { query: one, channels: [{ part: "", colour: null, pick: one.output === "xyz" ? (value) => value[1] : (value) => value }] };
+  return {
+    query: one,
+    channels: [{ part: "", colour: null, pick: one.output === "xyz" ? (value) => value[1] : (value) => value }],
+  };
 }
 
 /** The name of a colour for a wavelength.

@@ -14,17 +14,37 @@ export const ILLUMINANTS = ["D65", "D50", "A", "FL2"];
 
 /** @type {State} */
 const DEFAULTS = {
-  material: "", view: "together", theta_i: 45, phi_i: 0, theta_r: 45, turn: 180, nm: null, scale: "log", axes: "polar", curves: "one",
-  compare: [], illuminant: "D65", exposure: 0, surround: "sky",
+  material: "",
+  view: "together",
+  theta_i: 45,
+  phi_i: 0,
+  theta_r: 45,
+  turn: 180,
+  nm: null,
+  scale: "log",
+  axes: "polar",
+  curves: "one",
+  compare: [],
+  illuminant: "D65",
+  exposure: 0,
+  surround: "sky",
 };
 /** @type {Record<string, string[]>} */
 export const CHOICES = {
-  scale: ["log", "linear"], axes: ["polar", "cartesian"], curves: ["one", "rgb", "wavelengths"], illuminant: ILLUMINANTS,
+  scale: ["log", "linear"],
+  axes: ["polar", "cartesian"],
+  curves: ["one", "rgb", "wavelengths"],
+  illuminant: ILLUMINANTS,
   surround: ["sky", "dark", "studio"],
 };
 /** @type {Record<string, [number, number]>} */
 const RANGES = {
-  theta_i: [0, 89.5], phi_i: [0, 360], theta_r: [0, 89.5], turn: [0, 360], nm: [1, 1e6], exposure: [-8, 8],
+  theta_i: [0, 89.5],
+  phi_i: [0, 360],
+  theta_r: [0, 89.5],
+  turn: [0, 360],
+  nm: [1, 1e6],
+  exposure: [-8, 8],
 };
 export const PICTURE_NM = Array.from({ length: 14 }, (_, i) => 420 + 20 * i); // at which pictures look up spectra, as `brdfdb render`
 const MOST = 7; // subjects that are compared with: there are as many more colours
@@ -40,7 +60,8 @@ export function fromHash(hash, views) {
   const choices = { ...CHOICES, view: Object.keys(views) };
   for (const [key, text] of new URLSearchParams(hash.replace(/^#/, ""))) {
     if (key in RANGES) {
-      const value = Number(text), [low, high] = RANGES[key];
+      const value = Number(text),
+        [low, high] = RANGES[key];
       if (text !== "" && value >= low && value <= high) state[key] = value;
     } else if (key === "compare") {
       if (text && !state.compare.includes(text)) state.compare = [...state.compare, text].slice(0, MOST);
@@ -55,8 +76,13 @@ export function fromHash(hash, views) {
  * @param {State} state */
 export function toHash(state) {
   const { quick: _, ...all } = state;
-  const held = Object.entries(all).flatMap(([key, value]) => (Array.isArray(value) ? value.map((each) => [key, each])
-    : value === null || value === DEFAULTS[/** @type {keyof State} */ (key)] ? [] : [[key, value]]));
+  const held = Object.entries(all).flatMap(([key, value]) =>
+    Array.isArray(value)
+      ? value.map((each) => [key, each])
+      : value === null || value === DEFAULTS[/** @type {keyof State} */ (key)]
+        ? []
+        : [[key, value]],
+  );
   return `#${held.map(([key, value]) => `${key}=${plain(String(value))}`).join("&")}`;
 }
 
@@ -70,10 +96,14 @@ const plain = (text) => encodeURIComponent(text).replace(/%3A|%3D|%2C/g, (code) 
 export function subjectOf(text) {
   const [, base, changed] = /^(.*?)\((.*)\)$/.exec(text) ?? [];
   if (base !== undefined) {
-    const pairs = changed.split(",").map((each) => each.split("=")).filter(([name, value]) => name && value && Number.isFinite(Number(value)));
+    const pairs = changed
+      .split(",")
+      .map((each) => each.split("="))
+      .filter(([name, value]) => name && value && Number.isFinite(Number(value)));
     return { base, model: true, changes: Object.fromEntries(pairs.map(([name, value]) => [name, Number(value)])) };
   }
-  return text.endsWith(MODEL) ? { base: text.slice(0, -MODEL.length), model: true, changes: null }
+  return text.endsWith(MODEL)
+    ? { base: text.slice(0, -MODEL.length), model: true, changes: null }
     : { base: text, model: false, changes: null };
 }
 
@@ -81,4 +111,6 @@ export function subjectOf(text) {
  * @param {string} base
  * @param {Record<string, number>} changes */
 export const changedText = (base, changes) =>
-  `${base}(${Object.entries(changes).map(([name, value]) => `${name}=${Number(value.toPrecision(6))}`).join(",")})`;
+  `${base}(${Object.entries(changes)
+    .map(([name, value]) => `${name}=${Number(value.toPrecision(6))}`)
+    .join(",")})`;

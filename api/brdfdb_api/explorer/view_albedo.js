@@ -20,7 +20,8 @@ export default {
   title: "Albedo",
   order: 5,
   idle: ["theta_i", "phi_i", "log", "illuminant"],
-  request: (each, _, series) => (audited(each, series) ? question({ ...each, source: "table" }, "audit") : question(each, "albedo")),
+  request: (each, _, series) =>
+    audited(each, series) ? question({ ...each, source: "table" }, "audit") : question(each, "albedo"),
   known: (each, _, series) => each.source !== "model" || audited(each, series), // the service does not know that of a model
   draw: albedo,
 };
@@ -32,7 +33,8 @@ function albedosOf(answer, { source }) {
   const found = answer.finding?.findings.energy[source];
   if (found) return { theta_i: found.theta_i_deg, at: found.wavelength_nm, total: found.albedo };
   const total = answer.albedo.map((/** @type {number[]} */ row, /** @type {number} */ k) =>
-    row.map((value, i) => value + (answer.specular_reflectance?.[k][i] ?? 0)));
+    row.map((value, i) => value + (answer.specular_reflectance?.[k][i] ?? 0)),
+  );
   return { theta_i: answer.theta_i, at: answer.wavelength_nm, total };
 }
 
@@ -44,12 +46,19 @@ function albedosOf(answer, { source }) {
 function albedo(into, series, answers, state, all) {
   const curves = answers.flatMap((answer, i) => {
     const { theta_i, at, total } = albedosOf(answer, series[i]);
-    const asked = at === null ? [null] : state.nm === null && at.length > 1 ? NM : [nearest({ wavelength_nm: at }, state.nm)];
+    const asked =
+      at === null ? [null] : state.nm === null && at.length > 1 ? NM : [nearest({ wavelength_nm: at }, state.nm)];
     return asked.map((nm) => {
       const column = nm === null ? 0 : closest(at, nm);
-      const words = [...(answers.length > 1 || nm === null ? [series[i].label] : []), ...(nm === null ? [] : [`${at[column]} nm`])];
+      const words = [
+        ...(answers.length > 1 || nm === null ? [series[i].label] : []),
+        ...(nm === null ? [] : [`${at[column]} nm`]),
+      ];
       return {
-        x: theta_i, y: total.map((/** @type {number[]} */ row) => row[column]), label: words.join(", "), dash: series[i].dash,
+        x: theta_i,
+        y: total.map((/** @type {number[]} */ row) => row[column]),
+        label: words.join(", "),
+        dash: series[i].dash,
         colour: ink(asked.length > 1 ? `hue-${nm}` : series[i].colour),
       };
     });
@@ -58,10 +67,22 @@ function albedo(into, series, answers, state, all) {
   const most = 1.05 * Math.max(1, ...curves.flatMap(({ y }) => y));
   /** @type {[number, number]} */
   const range = [0, most];
-  const up = { title: "albedo", range, ticks: steps(range, 6).map((at) => /** @type {[number, string]} */ ([at, short(at)])), height: Number };
-  chart(into, [...curves, limit], { title: "θᵢ [degrees]", range: [0, 90], every: 30 }, up,
-    (theta) => `θᵢ ${Math.round(theta)}°: ${curves.map((curve) => valueAt(curve, theta)).join(", ")}`);
+  const up = {
+    title: "albedo",
+    range,
+    ticks: steps(range, 6).map((at) => /** @type {[number, string]} */ ([at, short(at)])),
+    height: Number,
+  };
+  chart(
+    into,
+    [...curves, limit],
+    { title: "θᵢ [degrees]", range: [0, 90], every: 30 },
+    up,
+    (theta) => `θᵢ ${Math.round(theta)}°: ${curves.map((curve) => valueAt(curve, theta)).join(", ")}`,
+  );
   const of = answers.some(({ finding }) => finding);
-  return `The share of light from θᵢ that is reflected, specular part included; over φᵢ the ${of ? "most, as the audit found it" : "mean"}.` +
-    (series.length < all.length ? " That of a model behind a table is known where an audit found it." : "");
+  return (
+    `The share of light from θᵢ that is reflected, specular part included; over φᵢ the ${of ? "most, as the audit found it" : "mean"}.` +
+    (series.length < all.length ? " That of a model behind a table is known where an audit found it." : "")
+  );
 }

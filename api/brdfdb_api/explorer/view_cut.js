@@ -11,7 +11,9 @@ import { against, channelsOf, lobe, quantityWords } from "./series.js";
 /** @typedef {import("./chart.js").Curve} Curve */
 
 const RADIAN = Math.PI / 180;
-const TOP = 26, STRIP = 110, LABEL = 40; // pixels: room above, height of what tells the difference, width of a number
+const TOP = 26,
+  STRIP = 110,
+  LABEL = 40; // pixels: room above, height of what tells the difference, width of a number
 const NEAR = 24; // pixels from the light in which a hand takes it
 
 let centre = [0, 0]; // of the polar picture [pixel]
@@ -34,7 +36,9 @@ function request(each, state, series) {
 async function answer(each, state, series, signal) {
   const found = await json(request(each, state, series), signal);
   if (!each.info.measured || each.source !== "table") return found;
-  const { theta_r } = found.axes_deg, { theta_i, phi_i } = found, at = each.info.wavelength_nm?.[0];
+  const { theta_r } = found.axes_deg,
+    { theta_i, phi_i } = found,
+    at = each.info.wavelength_nm?.[0];
   const phi_r = theta_r.map((/** @type {number} */ theta) => phi_i + (theta > 0 ? 180 : 0));
   const body = { theta_i, phi_i, theta_r: theta_r.map(Math.abs), phi_r, wavelength_nm: at };
   const { extrapolated } = await json({ path: address(each.name, "lookup", { error: true }), body }, signal);
@@ -48,10 +52,18 @@ async function answer(each, state, series, signal) {
  * @returns {Curve[]} */
 function curvesOf(series, answers, state) {
   return series.flatMap((each, i) => {
-    const { axes_deg: { theta_r }, brdf, extrapolated } = answers[i], kept = shortOfHorizon(theta_r);
+    const {
+        axes_deg: { theta_r },
+        brdf,
+        extrapolated,
+      } = answers[i],
+      kept = shortOfHorizon(theta_r);
     return channelsOf(each, state).channels.map(({ part, colour, pick }) => ({
-      x: kept.map((k) => theta_r[k]), y: kept.map((k) => pick(brdf[k])), colour: ink(colour ?? each.colour),
-      dash: each.dash, label: [series.length > 1 || !part ? each.label : "", part].filter(Boolean).join(", "),
+      x: kept.map((k) => theta_r[k]),
+      y: kept.map((k) => pick(brdf[k])),
+      colour: ink(colour ?? each.colour),
+      dash: each.dash,
+      label: [series.length > 1 || !part ? each.label : "", part].filter(Boolean).join(", "),
       ...(extrapolated && { dashed: kept.map((k) => extrapolated[k]) }),
     }));
   });
@@ -61,10 +73,11 @@ function curvesOf(series, answers, state) {
  * @param {Series[]} series
  * @param {any[]} answers
  * @param {State} state */
-const specularOf = (series, answers, state) => series.map((each, i) => {
-  const part = answers[i].specular_reflectance ?? 0;
-  return Math.max(...channelsOf(each, state).channels.map(({ pick }) => (Array.isArray(part) ? pick(part) : part)));
-});
+const specularOf = (series, answers, state) =>
+  series.map((each, i) => {
+    const part = answers[i].specular_reflectance ?? 0;
+    return Math.max(...channelsOf(each, state).channels.map(({ pick }) => (Array.isArray(part) ? pick(part) : part)));
+  });
 
 /** Draw the cut into an element; its caption.
  * @param {HTMLElement} into
@@ -72,15 +85,26 @@ const specularOf = (series, answers, state) => series.map((each, i) => {
  * @param {any[]} answers
  * @param {State} state */
 function cut(into, series, answers, state) {
-  const curves = curvesOf(series, answers, state), range = span(curves.flatMap(({ y }) => y.map(Number)), state);
-  const specular = specularOf(series, answers, state), differ = against(series) && curves.length === 2;
-  const off = differ ? relative(curves[0].y.map(Number), curves[1].y.map(Number), floorOf(series[0].info, state.nm)) : null;
+  const curves = curvesOf(series, answers, state),
+    range = span(
+      curves.flatMap(({ y }) => y.map(Number)),
+      state,
+    );
+  const specular = specularOf(series, answers, state),
+    differ = against(series) && curves.length === 2;
+  const off = differ
+    ? relative(curves[0].y.map(Number), curves[1].y.map(Number), floorOf(series[0].info, state.nm))
+    : null;
   const words = state.curves === "one" ? quantityWords(series[0], state) : "fᵣ";
   (state.axes === "cartesian" ? flat : round)(into, curves, range, state, specular, off);
-  return `${words} in 1/sr over θᵣ in the plane of incidence, negative back towards the light.` +
-    (off ? ` ${state.axes === "polar" ? "Below, to 89°, t" : "T"}able − model, ${RELATIVE}: ${percent(worstOf(off))} at most.` : "") +
+  return (
+    `${words} in 1/sr over θᵣ in the plane of incidence, negative back towards the light.` +
+    (off
+      ? ` ${state.axes === "polar" ? "Below, to 89°, t" : "T"}able − model, ${RELATIVE}: ${percent(worstOf(off))} at most.`
+      : "") +
     (answers.some(({ extrapolated }) => extrapolated) ? " Dashed is what was not measured but extrapolated." : "") +
-    specularWords(series, specular);
+    specularWords(series, specular)
+  );
 }
 
 /** @param {(number | null)[]} off */
@@ -89,7 +113,8 @@ const worstOf = (off) => Math.max(...off.map((value) => Math.abs(value ?? 0)));
 /** What the curves say at an angle.
  * @param {Curve[]} curves
  * @param {number} theta */
-const reading = (curves, theta) => `θᵣ ${degrees(curves[0].x[closest(curves[0].x, theta)])}: ` +
+const reading = (curves, theta) =>
+  `θᵣ ${degrees(curves[0].x[closest(curves[0].x, theta)])}: ` +
   `${curves.map(({ x, y }) => `${short(Number(y[closest(x, theta)]))} /sr`).join(", ")}`;
 
 /** The cut as a chart.
@@ -100,12 +125,20 @@ const reading = (curves, theta) => `θᵣ ${degrees(curves[0].x[closest(curves[0
  * @param {number[]} specular */
 function flat(into, curves, range, state, specular) {
   const up = { title: "fᵣ [1/sr]", range, ticks: ticks(range, state), height: scaled(state, range[0]) };
-  const top = state.scale === "log" ? 10 ** range[1] : range[1], bottom = state.scale === "log" ? 10 ** range[0] : 0;
+  const top = state.scale === "log" ? 10 ** range[1] : range[1],
+    bottom = state.scale === "log" ? 10 ** range[0] : 0;
   const marks = (/** @type {(x: number, y: number) => [number, number]} */ place) => [
     path([place(-state.theta_i, bottom), place(-state.theta_i, top)], "light"),
     path([place(state.theta_i, bottom), place(state.theta_i, top)], Math.max(...specular) > 0 ? "spike" : "mirror"),
   ];
-  chart(into, curves, { title: "θᵣ [degrees]", range: [-90, 90], every: 30 }, up, (theta) => reading(curves, theta), marks);
+  chart(
+    into,
+    curves,
+    { title: "θᵣ [degrees]", range: [-90, 90], every: 30 },
+    up,
+    (theta) => reading(curves, theta),
+    marks,
+  );
 }
 
 /** The cut as a polar picture.
@@ -116,19 +149,27 @@ function flat(into, curves, range, state, specular) {
  * @param {number[]} specular
  * @param {(number | null)[] | null} off */
 function round(into, curves, range, state, specular, off) {
-  const width = into.clientWidth, radius = Math.max(Math.min((width - 80) / 2, 300), 60), height = scaled(state, range[0]);
+  const width = into.clientWidth,
+    radius = Math.max(Math.min((width - 80) / 2, 300), 60),
+    height = scaled(state, range[0]);
   const out = (/** @type {number} */ value) => ((height(value) - range[0]) / (range[1] - range[0])) * radius;
   /** @type {(theta: number, r: number) => [number, number]} */
   const at = (theta, r) => [width / 2 + r * Math.sin(theta * RADIAN), TOP + radius - r * Math.cos(theta * RADIAN)];
   const part = Math.max(...specular);
   centre = at(0, 0);
-  const [x, y] = at(-state.theta_i, radius), [u, v] = at(state.theta_i, radius * 0.62);
+  const [x, y] = at(-state.theta_i, radius),
+    [u, v] = at(state.theta_i, radius * 0.62);
   const parts = [
-    ...frame(at, radius, range, state), path([at(-state.theta_i, 0), at(-state.theta_i, radius)], "light"),
+    ...frame(at, radius, range, state),
+    path([at(-state.theta_i, 0), at(-state.theta_i, radius)], "light"),
     path([at(state.theta_i, 0), at(state.theta_i, radius)], "mirror"),
     ...curves.flatMap((curve) => strokes(curve, (theta, value) => at(theta, out(value)))),
-    ...(part > 0 ? [path([at(state.theta_i, 0), at(state.theta_i, radius)], "spike"),
-      svg("text", { x: u + 8, y: v + 4, class: "strong" }, short(part))] : []),
+    ...(part > 0
+      ? [
+          path([at(state.theta_i, 0), at(state.theta_i, radius)], "spike"),
+          svg("text", { x: u + 8, y: v + 4, class: "strong" }, short(part)),
+        ]
+      : []),
     svg("circle", { cx: x, cy: y, r: 7, class: "lamp" }),
   ];
   let bottom = TOP + radius + 24;
@@ -138,10 +179,22 @@ function round(into, curves, range, state, specular, off) {
   }
   const picture = svg("svg", { width, height: bottom, class: "polar" }, ...parts);
   const read = element("span", { className: "read" }, "point at the picture to read it");
-  reader(into, picture, read, (left, top) => Math.atan2(left - width / 2, TOP + radius - top) / RADIAN, [-89, 89],
-    (theta) => reading(curves, theta));
-  const rays = [{ label: "light", colour: ink("third"), dash: "2 3" }, { label: "mirror direction", colour: ink("muted"), dash: "2 3" }];
-  into.replaceChildren(picture, element("p", { className: "legend quiet" }, ...[...(curves.length > 1 ? curves : []), ...rays].map(legend), read));
+  reader(
+    into,
+    picture,
+    read,
+    (left, top) => Math.atan2(left - width / 2, TOP + radius - top) / RADIAN,
+    [-89, 89],
+    (theta) => reading(curves, theta),
+  );
+  const rays = [
+    { label: "light", colour: ink("third"), dash: "2 3" },
+    { label: "mirror direction", colour: ink("muted"), dash: "2 3" },
+  ];
+  into.replaceChildren(
+    picture,
+    element("p", { className: "legend quiet" }, ...[...(curves.length > 1 ? curves : []), ...rays].map(legend), read),
+  );
 }
 
 /** Rings of the scale and spokes of the angle.
@@ -151,10 +204,12 @@ function round(into, curves, range, state, specular, off) {
  * @param {State} state
  * @returns {Generator<SVGElement>} */
 function* frame(at, radius, range, state) {
-  const all = ticks(range, state), rings = all.length > 8 ? all.filter(([value]) => Number.isInteger(value)) : all;
+  const all = ticks(range, state),
+    rings = all.length > 8 ? all.filter(([value]) => Number.isInteger(value)) : all;
   const every = Math.ceil((LABEL * (rings.length - 1)) / radius);
   for (const [i, [value, label]] of rings.entries()) {
-    const r = ((value - range[0]) / (range[1] - range[0])) * radius, [x, y] = at(90, r);
+    const r = ((value - range[0]) / (range[1] - range[0])) * radius,
+      [x, y] = at(90, r);
     yield svg("path", { d: `M${at(-90, r)}A${r} ${r} 0 0 1 ${x} ${y}`, class: "grid" });
     if ((rings.length - 1 - i) % every === 0) yield svg("text", { x, y: y + 17, class: "middle" }, label);
   }
@@ -175,19 +230,24 @@ function* frame(at, radius, range, state) {
  * @param {number} radius
  * @returns {Generator<SVGElement>} */
 function* strip(theta, off, worst, top, at, radius) {
-  const middle = top + STRIP / 2, left = at(-90, radius)[0];
+  const middle = top + STRIP / 2,
+    left = at(-90, radius)[0];
   /** @type {(each: number, value: number) => [number, number]} */
   const place = (each, value) => [left + ((each + 90) / 180) * 2 * radius, middle - (value / worst) * (STRIP / 2)];
   for (const share of [-worst, 0, worst]) {
     const [x, y] = place(-90, share);
     yield path([[x, y], place(90, share)], "grid");
-    if (share !== 0) yield svg("text", { x: x + 2, y: y - 4 }, `${share > 0 ? "+" : ""}${percent(share).replace("-", "−")}`);
+    if (share !== 0)
+      yield svg("text", { x: x + 2, y: y - 4 }, `${share > 0 ? "+" : ""}${percent(share).replace("-", "−")}`);
   }
   for (let each = -90; each <= 90; each += 30) {
     const [x, y] = place(each, -worst);
     yield svg("text", { x, y: y + 17, class: "middle" }, degrees(each));
   }
-  yield path(theta.map((each, i) => place(each, off[i] ?? 0)), "off");
+  yield path(
+    theta.map((each, i) => place(each, off[i] ?? 0)),
+    "off",
+  );
 }
 
 /** Let a hand move the light around the polar picture.
@@ -209,5 +269,8 @@ function moves(into, choose) {
   into.addEventListener("pointermove", (event) => {
     if (moving) choose({ theta_i: Math.round(2 * Math.min(Math.max(theta(event), 0), 89.5)) / 2 });
   });
-  for (const end of /** @type {const} */ (["pointerup", "pointercancel"])) into.addEventListener(end, () => { moving = false; });
+  for (const end of /** @type {const} */ (["pointerup", "pointercancel"]))
+    into.addEventListener(end, () => {
+      moving = false;
+    });
 }

@@ -10,14 +10,17 @@ import { add, between, lightOf, lune, moments, surroundings } from "./sphere_sce
 /** @typedef {import("./series.js").Series} Series */
 /** @typedef {{ viewers: number[], moments: Float64Array, specular: number[][] | null }} Around */
 
-const SIZE = 320, QUICK = 160; // pixels across, and while a slider moves
+const SIZE = 320,
+  QUICK = 160; // pixels across, and while a slider moves
 const KEPT = 16; // surroundings, which stay the same while the light moves
-const ENCODED = Uint8Array.from({ length: 4097 }, (_, i) => { // bytes of sRGB (IEC 61966-2-1)
+const ENCODED = Uint8Array.from({ length: 4097 }, (_, i) => {
+  // bytes of sRGB (IEC 61966-2-1)
   const value = i / 4096;
   return Math.round(255 * (value <= 0.0031308 ? 12.92 * value : 1.055 * value ** (1 / 2.4) - 0.055));
 });
 
-const WORDS = "The viewer is far above the page; the light is θᵢ away from the viewer, to the right (+x) at φᵢ = 0 and to the " +
+const WORDS =
+  "The viewer is far above the page; the light is θᵢ away from the viewer, to the right (+x) at φᵢ = 0 and to the " +
   "top (+y) at 90°, and as bright as makes a white matt surface white. Drag it. The x axis of the surface runs around the vertical " +
   "axis of the sphere.";
 const SKY = " The surroundings are bright above and black below.";
@@ -28,13 +31,22 @@ const known = new Map();
 
 /** @type {import("./main.js").View} */
 export default {
-  name: "sphere", title: "Sphere", order: 6, idle: ["log"], lit: true, turned: true,
+  name: "sphere",
+  title: "Sphere",
+  order: 6,
+  idle: ["log"],
+  lit: true,
+  turned: true,
   /** Of the middle of the sphere, to be copied: the picture takes hundreds of directions. */
   request(each, state, series) {
-    const { theta_i } = state, phi_i = azimuth(state, series), phi_r = ((phi_i ?? 0) + state.turn) % 360;
+    const { theta_i } = state,
+      phi_i = azimuth(state, series),
+      phi_r = ((phi_i ?? 0) + state.turn) % 360;
     return question(each, "lookup", { theta_i, phi_i, theta_r: 0, phi_r, ...quantity(each, state, "linear-srgb") });
   },
-  answer, draw: spheres, begin: moves,
+  answer,
+  draw: spheres,
+  begin: moves,
 };
 
 /** What the service says of a light, and of the surroundings; or its picture in a studio.
@@ -43,10 +55,14 @@ export default {
  * @param {Series[]} _
  * @param {AbortSignal} signal */
 async function answer(each, state, _, signal) {
-  if (state.surround === "studio") return values(question(each, "sphere", { size: SIZE, format: "npy" }), SIZE * SIZE, signal);
-  const { angles, ...of } = lune(lightOf(state), anisotropic([each]), Boolean(state.quick)), query = quantity(each, state, "linear-srgb");
+  if (state.surround === "studio")
+    return values(question(each, "sphere", { size: SIZE, format: "npy" }), SIZE * SIZE, signal);
+  const { angles, ...of } = lune(lightOf(state), anisotropic([each]), Boolean(state.quick)),
+    query = quantity(each, state, "linear-srgb");
   const [lit, around] = await Promise.all([
-    values(question(each, "lookup", query, angles), angles.theta_i.length, signal), aroundOf(each, query, Boolean(state.quick), signal)]);
+    values(question(each, "lookup", query, angles), angles.theta_i.length, signal),
+    aroundOf(each, query, Boolean(state.quick), signal),
+  ]);
   return { ...lit, of, around };
 }
 
@@ -76,9 +92,13 @@ function kept(key, found) {
  * @returns {Promise<Around>} */
 async function summed(each, query, quick, signal) {
   const scene = surroundings(anisotropic([each]) ? [0, 45, 90, 135] : [0], quick);
-  const found = await json(question(each, "lookup", query, scene.angles), signal), part = found.specular_reflectance;
-  const specular = part && part.filter((/** @type {unknown} */ _, /** @type {number} */ i) => i % scene.count === 0)
-    .map((/** @type {any[]} */ row) => (Array.isArray(row[0]) ? row[0] : [row[0], row[0], row[0]]));
+  const found = await json(question(each, "lookup", query, scene.angles), signal),
+    part = found.specular_reflectance;
+  const specular =
+    part &&
+    part
+      .filter((/** @type {unknown} */ _, /** @type {number} */ i) => i % scene.count === 0)
+      .map((/** @type {any[]} */ row) => (Array.isArray(row[0]) ? row[0] : [row[0], row[0], row[0]]));
   return { viewers: scene.viewers, moments: moments(scene, found.brdf.flat(2)), specular };
 }
 
@@ -89,7 +109,14 @@ async function summed(each, query, quick, signal) {
  * @param {State} state */
 function spheres(into, series, answers, state) {
   while (into.children.length < answers.length) {
-    into.append(element("figure", {}, element("canvas", { width: SIZE, height: SIZE }), element("figcaption", { className: "quiet" })));
+    into.append(
+      element(
+        "figure",
+        {},
+        element("canvas", { width: SIZE, height: SIZE }),
+        element("figcaption", { className: "quiet" }),
+      ),
+    );
   }
   while (into.children.length > answers.length) into.lastChild?.remove();
   answers.forEach((found, i) => {
@@ -97,8 +124,11 @@ function spheres(into, series, answers, state) {
     if (canvas instanceof HTMLCanvasElement) (found.around ? paint : develop)(canvas, found, state);
     label.textContent = series.length > 1 ? series[i].label : "";
   });
-  const specular = answers.some(({ around }) => around?.specular?.flat().some((/** @type {number} */ part) => part > 0));
-  if (state.surround === "studio") return "The viewer is far above the page, and the light is that of a studio, which the specular part reflects, too.";
+  const specular = answers.some(({ around }) =>
+    around?.specular?.flat().some((/** @type {number} */ part) => part > 0),
+  );
+  if (state.surround === "studio")
+    return "The viewer is far above the page, and the light is that of a studio, which the specular part reflects, too.";
   return WORDS + (state.surround === "sky" ? SKY : "") + (specular ? SPECULAR : "") + unseenWords(series[0], state);
 }
 
@@ -106,16 +136,25 @@ function spheres(into, series, answers, state) {
  * @param {{ values: ArrayLike<number>, of: { rays: number, rings: number, turn: number }, around: Around }} found
  * @param {State} state */
 function paint(canvas, { values: f_r, of: nodes, around }, state) {
-  const size = state.quick ? QUICK : SIZE, context = canvas.getContext("2d"), image = context?.createImageData(size, size);
+  const size = state.quick ? QUICK : SIZE,
+    context = canvas.getContext("2d"),
+    image = context?.createImageData(size, size);
   if (!context || !image) return;
   Object.assign(canvas, { width: size, height: size });
-  const light = lightOf(state), of = { ...around, moments: state.surround === "sky" ? around.moments : null };
-  const at = between(light, f_r, nodes), seen = new Float64Array(3), bright = 4096 * 2 ** state.exposure;
+  const light = lightOf(state),
+    of = { ...around, moments: state.surround === "sky" ? around.moments : null };
+  const at = between(light, f_r, nodes),
+    seen = new Float64Array(3),
+    bright = 4096 * 2 ** state.exposure;
   for (let row = 0; row < size; row += 1) {
     for (let column = 0; column < size; column += 1) {
-      const x = (2 * column + 1) / size - 1, y = 1 - (2 * row + 1) / size, inside = 1 - x * x - y * y;
+      const x = (2 * column + 1) / size - 1,
+        y = 1 - (2 * row + 1) / size,
+        inside = 1 - x * x - y * y;
       if (inside <= 0) continue;
-      const z = Math.sqrt(inside), cosine = x * light[0] + y * light[1] + z * light[2], pixel = 4 * (row * size + column);
+      const z = Math.sqrt(inside),
+        cosine = x * light[0] + y * light[1] + z * light[2],
+        pixel = 4 * (row * size + column);
       if (cosine > 0) {
         at(x, y, z, seen);
         for (let k = 0; k < 3; k += 1) seen[k] *= Math.PI * cosine;
@@ -123,7 +162,8 @@ function paint(canvas, { values: f_r, of: nodes, around }, state) {
         seen.fill(0);
       }
       add(x, y, z, light, of, seen);
-      for (let k = 0; k < 3; k += 1) image.data[pixel + k] = ENCODED[Math.round(Math.min(Math.max(bright * seen[k], 0), 4096))];
+      for (let k = 0; k < 3; k += 1)
+        image.data[pixel + k] = ENCODED[Math.round(Math.min(Math.max(bright * seen[k], 0), 4096))];
       image.data[pixel + 3] = 255;
     }
   }
@@ -135,11 +175,14 @@ function paint(canvas, { values: f_r, of: nodes, around }, state) {
  * @param {{ values: ArrayLike<number> }} found
  * @param {State} state */
 function develop(canvas, { values: linear }, { exposure }) {
-  const context = canvas.getContext("2d"), image = context?.createImageData(SIZE, SIZE), bright = 4096 * 2 ** exposure;
+  const context = canvas.getContext("2d"),
+    image = context?.createImageData(SIZE, SIZE),
+    bright = 4096 * 2 ** exposure;
   if (!context || !image) return;
   Object.assign(canvas, { width: SIZE, height: SIZE });
   for (let i = 0; i < linear.length; i += 1) {
-    image.data[i] = i % 4 === 3 ? 255 * linear[i] : ENCODED[Math.round(Math.min(Math.max(bright * linear[i], 0), 4096))];
+    image.data[i] =
+      i % 4 === 3 ? 255 * linear[i] : ENCODED[Math.round(Math.min(Math.max(bright * linear[i], 0), 4096))];
   }
   context.putImageData(image, 0, 0);
 }
@@ -154,10 +197,15 @@ function moves(into, choose, now) {
     const canvas = event.target instanceof HTMLCanvasElement ? event.target : into.querySelector("canvas");
     if (!canvas || !event.buttons) return;
     const { left, top, width, height } = canvas.getBoundingClientRect();
-    const x = (2 * (event.clientX - left)) / width - 1, y = 1 - (2 * (event.clientY - top)) / height, size = Math.min(Math.hypot(x, y), 1);
+    const x = (2 * (event.clientX - left)) / width - 1,
+      y = 1 - (2 * (event.clientY - top)) / height,
+      size = Math.min(Math.hypot(x, y), 1);
     const phi = Math.round((Math.atan2(y, x) * 180) / Math.PI);
     // the light is where the hand sees its mirror image: the normal there lies half way
-    choose({ theta_i: Math.min(Math.round(4 * Math.asin(size) * (180 / Math.PI)) / 2, 89.5), phi_i: (phi + 360) % 360 });
+    choose({
+      theta_i: Math.min(Math.round(4 * Math.asin(size) * (180 / Math.PI)) / 2, 89.5),
+      phi_i: (phi + 360) % 360,
+    });
   };
   into.addEventListener("pointerdown", (event) => {
     if (event.target instanceof HTMLCanvasElement) into.setPointerCapture(event.pointerId);
