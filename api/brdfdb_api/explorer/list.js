@@ -14,6 +14,7 @@ const materials = [];
 /** @type {HTMLElement | null} */
 let active = null; // the option that arrow keys have reached
 let chosen = "";
+let painted = false;
 let choose = (/** @type {string} */ _) => {};
 
 /** The one to look at first.
@@ -43,6 +44,7 @@ export async function load(onChoose, onPage, onFail) {
       offer(verdict, words(each));
     }
     filter();
+    if (painted) paint();
     onPage(materials);
     path = page.next?.replace(/^\//, "");
   }
@@ -65,6 +67,12 @@ async function arrived(path, onFail) {
 }
 
 const pause = (/** @type {number} */ ms) => new Promise((resolve) => setTimeout(resolve, ms));
+
+/** Show the pictures of the list, which wait for the first picture of the page. */
+export function paint() {
+  painted = true;
+  for (const each of list.querySelectorAll("img")) if (each.dataset.src && !each.src) each.src = each.dataset.src;
+}
 
 /** Show what was learnt of a material since its line was made: its verdict.
  * @param {any} each */
@@ -122,7 +130,7 @@ const modelOf = (/** @type {any} */ each) => (each.measured ? "measured" : (each
 /** @param {any} each */
 function option(each) {
   const image = element("img", { alt: "", width: 44, height: 44, loading: "lazy", decoding: "async" });
-  if (each.thumbnail) image.src = `${each.thumbnail.slice(1)}?size=88`;
+  if (each.thumbnail) image.dataset.src = `${each.thumbnail.slice(1)}?size=88`;
   const name = element("span", { className: "name" }, each.title || each.name);
   const made = element(
     "li",

@@ -50,6 +50,7 @@ let linked = 0,
   again = 0;
 let stale = false,
   fresh = true; // whether parameters have moved; whether the facts are to be shown anew
+let drawn = false; // whether there has been a picture; what is not needed for it waits
 let quick = false,
   resting = 0; // whether a slider moves; the picture is drawn again, finely, once it rests
 /** @type {Map<string, { key: string, hurried: boolean, answers: any[] }>} */
@@ -153,16 +154,21 @@ async function draw(now, start, signal) {
     views = partsOf(now.view);
   performance.clearMeasures("first");
   performance.clearMeasures("picture");
-  const words = await Promise.all(
-    views.map(async (view, i) => {
-      const { known, answers } = await answersTo(view, now, signal);
-      signal.throwIfAborted();
-      const said = view.draw?.(places[i], known, answers, now, series) ?? "";
-      if (!performance.getEntriesByName("first").length)
-        performance.measure("first", { start, end: performance.now() });
-      return said;
-    }),
-  );
+  const one = async (/** @type {View} */ view, /** @type {number} */ i) => {
+    const { known, answers } = await answersTo(view, now, signal);
+    signal.throwIfAborted();
+    const said = view.draw?.(places[i], known, answers, now, series) ?? "";
+    if (!performance.getEntriesByName("first").length) performance.measure("first", { start, end: performance.now() });
+    return said;
+  };
+  const words = drawn ? [] : [await one(views[0], 0)]; // on a slow connection the first picture has no rivals
+  if (!drawn) {
+    drawn = true;
+    list.paint();
+    parameters.offer(choose).catch((error) => say(error.message));
+  }
+  parameters.show(series[0]);
+  words.push(...(await Promise.all(views.slice(words.length).map((view, i) => one(view, i + words.length)))));
   signal.throwIfAborted();
   performance.measure("picture", { start, end: performance.now() });
   caption.replaceChildren(...words.map((text) => element("p", {}, text)));
@@ -208,7 +214,6 @@ async function know(now, signal) {
   if (fresh) facts.show(series[0]);
   fresh = false;
   facts.band(info, now);
-  parameters.show(series[0]);
   for (const each of series) if (each.source !== "parameters") list.update(each.info);
   controls.show(state, series);
 }

@@ -246,7 +246,7 @@ function trackOf(parameter, values) {
 
 /** Fill the list of models, which begin with typical parameters.
  * @param {(part: Partial<State>) => void} choose */
-async function offer(choose) {
+export async function offer(choose) {
   const { models } = await json("v1/models"),
     select = byId("models", HTMLSelectElement);
   select.append(...models.map((/** @type {any} */ { name, title }) => new Option(title, `${OF_MODEL}${name}()`)));
@@ -268,7 +268,6 @@ export function listen(choose, now, say) {
   panel.addEventListener("input", ({ target }) => {
     if (target instanceof HTMLInputElement) move(target.name, tracks[target.name].at(Number(target.value)));
   });
-  offer(choose).catch((error) => say(error.message, "bad"));
   panel.addEventListener("click", ({ target }) => {
     const { key, value, action } = target instanceof HTMLElement ? target.dataset : {},
       { material, compare } = now();

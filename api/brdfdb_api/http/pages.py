@@ -81,7 +81,7 @@ def _modules(name: str, before: set[str]) -> Iterator[str]:
     Imports are lines of their own, and exports declare a constant, a function or a class, or are a default.
     """
     before.add(name)
-    text = _COMMENT.sub("", _text(name))
+    text = re.sub(r"^ +", "", _COMMENT.sub("", _text(name)), flags=re.MULTILINE)
     for _, other in _IMPORT.findall(text):
         if other not in before:
             yield from _modules(other, before)
