@@ -345,7 +345,7 @@ class Store(Mapping[str, "Table"]):
                 "manifests": {group.name: digest},
                 "last": number_of(group.name),
             }
-            known = self._pointers[name] = _Pointer((0, 0, 0), group.parent, head)
+            known = self._pointers[name] = _pointer((0, 0, 0), pointer_path(group.parent), head)
         return known
 
     def _read_pointer(self, name: str) -> _Pointer | None:
@@ -355,14 +355,13 @@ class Store(Mapping[str, "Table"]):
         known = self._pointers.get(name)
         if known is None and not NAME.fullmatch(name):
             return None
-        material = material_path(self.root, name) if known is None else known.material
-        path = pointer_path(material)
+        path = pointer_path(material_path(self.root, name)) if known is None else known.path
         try:
             at = os.stat(path)
             seen = at.st_ino, at.st_mtime_ns, at.st_size  # a swap gives the file a new inode
             if known is None or known.seen != seen:
                 head = head_from(path, regular_bytes(path))
-                known = self._pointers[name] = _Pointer(seen, material, head)
+                known = self._pointers[name] = _pointer(seen, path, head)
         except (FileNotFoundError, NotADirectoryError):
             return None
         except OSError as error:
@@ -380,17 +379,20 @@ class Store(Mapping[str, "Table"]):
 
 
 class _Pointer(NamedTuple):
-    """The pointer of a material as it was read, and how to tell that it is another now."""
+    """The pointer of a material as it was read, and how to tell that it is another now.
+
+    `location` is the directory of the revision, and the digest of its manifest: made once, since lookups ask for it.
+    """
 
     seen: tuple[int, int, int]
-    material: Path
+    path: Path
     head: Head
+    location: tuple[Path, str]
 
-    @property
-    def location(self) -> tuple[Path, str]:
-        """The directory of the revision, and the digest of its manifest."""
-        revision = self.head["revision"]
-        return self.material / revision, self.head["manifests"][revision]
+
+def _pointer(seen: tuple[int, int, int], path: Path, head: Head) -> _Pointer:
+    revision = head["revision"]
+    return _Pointer(seen, path, head, (path.parent / revision, head["manifests"][revision]))
 
 
 _OPEN: weakref.WeakValueDictionary[int, Store] = weakref.WeakValueDictionary()

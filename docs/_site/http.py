@@ -22,6 +22,9 @@ _EXAMPLES = {
     "/v1/materials/{name}/lobe": "curl 'http://127.0.0.1:8000/v1/materials/rolled-brass/lobe?theta_i=45'",
     "/v1/materials/{name}/export/{file_format}": "curl -OJ http://127.0.0.1:8000/v1/materials/rolled-brass/export/exr",
     "/v1/materials/{name}/audit": "curl http://127.0.0.1:8000/v1/materials/rolled-brass/audit",
+    "/v1/materials/{name}/sphere": "curl -o brass.png http://127.0.0.1:8000/v1/materials/rolled-brass/sphere",
+    "/v1/materials/{name}/thumbnail.png": "curl -O http://127.0.0.1:8000/v1/materials/rolled-brass/thumbnail.png",
+    "/v1/models/{model}": "curl http://127.0.0.1:8000/v1/models/ward",
     "/v1/materials/{name}/download.zarr": "curl -OJ http://127.0.0.1:8000/v1/materials/rolled-brass/download.zarr",
 }
 
@@ -49,7 +52,7 @@ def _operation(method: str, path: str, operation: Schema) -> str:
         parts.append(code(_EXAMPLES[path], "sh"))
     content = body.get("content", {}).get("application/json", {})
     if "example" in content:
-        address = path.replace("{name}", "rolled-brass")
+        address = path.replace("{name}", "rolled-brass").replace("{model}", "lambert").replace("{family}", "plaster")
         data = json.dumps(content["example"])
         parts.append(code(f"curl -d '{data}' \\\n  'http://127.0.0.1:8000{address}'", "sh"))
     if operation.get("parameters"):

@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray as xr
+from zarr.storage import ZipStore
 
-from brdfdb.geometry import radians
+from brdfdb import formats
+from brdfdb.formats._readings import FileTable
+from brdfdb.geometry import radians, unit_vector
 from brdfdb.materials import presets
 from brdfdb.measurements import MeasuredSource
 from brdfdb.store import http_client
 from brdfdb.store.publication import publish
 from brdfdb.store.reader import Store
+from brdfdb.store.revisions import rollback
 from tests.api.a_store import Client, client_of, serving
 from tests.measurements.made_up import scans
 
@@ -82,3 +88,51 @@ def test_remote_table_knows_where_it_is_extrapolated(measured: Path) -> None:
         angles = radians(np.array([30.0, 80.0])), 0.0, radians(20.0), radians(120.0)
         assert table.extrapolated(*angles).tolist() == [False, True]
         assert np.isnan(table.lookup_with_error(*angles).error).tolist() == [False, True]
+
+
+def test_a_measured_table_is_downloaded_whole(client: Client, measured: Path, tmp_path: Path) -> None:
+    (tmp_path / "clay.zip").write_bytes(client.get("/v1/materials/my-clay/download.zarr").content)
+    zipped = ZipStore(tmp_path / "clay.zip", mode="r")
+    with xr.open_zarr(zipped) as found, xr.open_zarr(Store(measured).path("my-clay")) as expected:
+        assert found.load().identical(expected.load())
+        assert found.attrs["measured"]["by"] == "a made-up goniophotometer"
+    zipped.close()
+
+
+@pytest.mark.parametrize(("file_format", "suffix"), [("numpy", ".npz"), ("netcdf", ".nc"), ("csv", ".csv")])
+def test_files_of_a_measured_table_are_read_again(
+    client: Client, measured: Path, tmp_path: Path, file_format: str, suffix: str
+) -> None:
+    answer = client.get(f"/v1/materials/my-clay/export/{file_format}")
+    assert answer.status_code == 200, answer.text
+    path = tmp_path / f"my-clay{suffix}"
+    path.write_bytes(answer.content)
+    reading = formats.read(path)
+    assert isinstance(reading, FileTable)
+    at = [radians(np.array(angle)) for angle in ([30.0], [0.0], [20.0], [120.0])]
+    expected = Store(measured)["my-clay"].lookup(*at)
+    np.testing.assert_allclose(np.ravel(reading.evaluate(*directions(at))), expected, rtol=0.05)
+
+
+def test_a_measured_table_goes_back_to_an_older_revision(measured: Path, tmp_path: Path) -> None:
+    root = Path(shutil.copytree(measured, tmp_path / "store"))
+    client = client_of(root)
+    older = client.get("/v1/materials/my-clay").json()
+    picture = client.get("/v1/materials/my-clay/thumbnail.png?size=16")
+    publish(root, presets()["clay-vase"].model_copy(update={"name": "my-clay"}), tolerance=0.3)
+    newer = client.get("/v1/materials/my-clay").json()
+    assert (newer["revision"], newer["measured"], newer["model"]) == ("r000002", None, "oren_nayar")
+    rollback(root, "my-clay", "r000001")
+    again = client.get("/v1/materials/my-clay").json()
+    assert again == older | {"revisions": ["r000001", "r000002"]}
+    answer = client.get("/v1/materials/my-clay/lookup", params={**OUTSIDE, "error": "true"}).json()
+    assert (answer["revision"], answer["extrapolated"], answer["error"]) == ("r000001", True, None)
+    held = {"If-None-Match": picture.headers["etag"]}
+    assert client.get("/v1/materials/my-clay/thumbnail.png?size=16", headers=held).status_code == 304
+    problem = client.problem("POST", "/v1/materials/my-clay/lookup?from=model", 422, json=OUTSIDE)
+    assert problem["parameter"] == "from"
+
+
+def directions(angles: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """Unit vectors of light and viewer."""
+    return unit_vector(angles[0], angles[1]), unit_vector(angles[2], angles[3])

@@ -101,20 +101,22 @@ def evaluate(points: Points, options: Values, surface: Surface, *, error: bool =
     def spectra(angles: Angles) -> tuple[Any, Any]:
         return source.lookup_with_error(*angles, at) if error else (source.lookup(*angles, at), None)
 
-    with refused(_PARAMETERS):
+    try:
         if options.output != "spectrum":
             return _coloured(points, options, surface, spectra, error=error, specular=specular)
         return Found(*spectra(points.angles), source.specular_reflectance(points.angles[0], at) if specular else None)
+    except ParameterError as error:
+        if error.parameter not in _PARAMETERS:
+            raise
+        raise RequestError(422, str(error), error.parameter) from error
 
 
 @contextlib.contextmanager
-def refused(parameters: tuple[str, ...] | None = None) -> Iterator[None]:
-    """Turn errors about parameters of the request, by default about any, into refusals (422)."""
+def refused() -> Iterator[None]:
+    """Turn errors about the parameters of a request into refusals (422)."""
     try:
         yield
     except ParameterError as error:
-        if parameters is not None and error.parameter not in parameters:
-            raise
         raise RequestError(422, str(error), error.parameter) from error
 
 

@@ -297,7 +297,7 @@ def model_lobe(request: Request, spec: Spec, query: Annotated[LobeValues, InQuer
 class WavelengthQuery(Query):
     """The query of an albedo."""
 
-    wavelength_nm: Wavelengths = Field(default=[])
+    wavelength_nm: Wavelengths = ()
 
 
 @models.post(

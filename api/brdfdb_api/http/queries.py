@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import json
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from typing import Annotated, Any, Literal, NamedTuple, TypeVar
 from urllib.parse import parse_qsl
 
@@ -46,7 +46,7 @@ _HEADER_BYTES = 4096  # limit on the header of a .npy file, which usually takes 
 Polar = Annotated[float, Field(ge=0.0, le=180.0)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Flag = Annotated[bool, BeforeValidator(lambda text: {"true": True, "false": False}.get(text, text)), Strict()]
-Wavelengths = Annotated[list[Finite], Field(description="wavelength [nm], repeatable; missing: all of the table")]
+Wavelengths = Annotated[tuple[Finite, ...], Field(description="wavelength [nm], repeatable; missing: all of the table")]
 
 
 class Query(BaseModel):
@@ -111,7 +111,7 @@ class Stated(OfTable):
 class BodyQuery(Stated):
     """The query of a lookup whose points are in the body."""
 
-    wavelength_nm: Wavelengths = Field(default=[], description="wavelength [nm] of a .npy body; JSON holds its own")
+    wavelength_nm: Wavelengths = Field(default=(), description="wavelength [nm] of a .npy body; JSON holds its own")
 
 
 class ManyQuery(Stated):
@@ -125,7 +125,7 @@ class ManyQuery(Stated):
 class PointQuery(Stated):
     """The query of a lookup of one point."""
 
-    wavelength_nm: Wavelengths = []
+    wavelength_nm: Wavelengths = ()
     theta_i: Polar = Field(description="polar angle of the light [degrees]")
     phi_i: Finite = Field(default=0.0, description="azimuth of the light [degrees], any finite number")
     theta_r: Polar = Field(description="polar angle of the viewer [degrees]")
@@ -146,7 +146,7 @@ class Light(Query):
     view: View = Field(default="cut", description="the plane of incidence, all viewers, or theta_h and theta_d")
     theta_i: float = Field(default=45.0, ge=0.0, le=90.0, description="polar angle of the light [degrees]")
     phi_i: float = Field(default=0.0, ge=-720.0, le=720.0, description="azimuth of the light [degrees]")
-    wavelength_nm: Wavelengths = []
+    wavelength_nm: Wavelengths = ()
 
 
 class LobeQuery(Light, OfTable):
@@ -176,7 +176,7 @@ class Points(NamedTuple):
         return math.prod(self.shape)
 
 
-def listed(wavelengths: list[float]) -> float | NDArray[np.float64] | None:
+def listed(wavelengths: Sequence[float]) -> float | NDArray[np.float64] | None:
     """Return the wavelengths [nm] of a query: one as a number, none as None."""
     return (wavelengths[0] if len(wavelengths) == 1 else np.array(wavelengths)) if wavelengths else None
 
@@ -299,18 +299,17 @@ def from_json(model: type[M], body: bytes) -> M:
 
 def checked(model: type[M], fields: dict[str, Any], where: str) -> M:
     """Return fields as a model; a refusal (422) names the first that is unknown, missing or not allowed."""
-    names = names_of(model)
-    for name in fields:
-        if name not in names:
-            raise unknown(name, names)
     try:
         return model.model_validate(fields)
     except ValidationError as error:
+        for name in fields:
+            if name not in (names := names_of(model)):
+                raise unknown(name, names) from None
         first = error.errors(include_url=False)[0]
         raise RequestValidationError([{**first, "loc": (where, *first["loc"])}]) from None
 
 
-def from_npy(body: bytes, wavelengths: list[float]) -> Points:
+def from_npy(body: bytes, wavelengths: Sequence[float]) -> Points:
     """Read a .npy body: float32 or float64 of shape (..., 4), the angles theta_i, phi_i, theta_r, phi_r [degrees].
 
     Raises

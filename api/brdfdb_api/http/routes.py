@@ -117,7 +117,7 @@ class CatalogueQuery(Query):
     )
     anisotropic: Flag | None = Field(default=None, description="only anisotropic, or only isotropic ones")
     wavelength_nm: Wavelengths = Field(
-        default=[], description="only with tables at this wavelength [nm], repeatable; grey ones hold at all"
+        default=(), description="only with tables at this wavelength [nm], repeatable; grey ones hold at all"
     )
 
     @property
