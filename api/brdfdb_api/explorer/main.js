@@ -188,6 +188,7 @@ function shown(name) {
  * @param {State} now */
 function forget(now) {
   shown(null);
+  list.paint();
   caption.textContent = "";
   if (series.length) return;
   title.textContent = now.material;

@@ -16,7 +16,7 @@ const DIFFERENCE = [
   [247, 247, 247],
   [178, 24, 43],
 ];
-const [LEFT, BOTTOM, TOP] = [44, 42, 6]; // pixels around a map
+const [LEFT, RIGHT, BOTTOM, TOP, SIDE] = [44, 18, 42, 10, 300]; // pixels around a map and along its sides
 
 /** @type {import("./main.js").View} */
 export default {
@@ -141,27 +141,36 @@ function figure({ label, text, colour }, read, here) {
     const [j, i] = nodeAt(canvas, offsetX, offsetY);
     read.textContent = `θh ${j + 0.5}°, θd ${i + 0.5}°: ${text(j, i)}`;
   });
-  const side = 300,
-    place = (/** @type {number} */ at) => (at / 90) * side;
+  const wide = LEFT + SIDE + RIGHT,
+    tall = TOP + SIDE + BOTTOM;
+  const place = (/** @type {number} */ at) => (at / 90) * SIDE;
+  const share = (/** @type {number} */ part, /** @type {number} */ all) => `${(100 * part) / all}%`;
   const axes = svg(
     "svg",
-    { viewBox: `0 0 ${LEFT + side + 8} ${TOP + side + BOTTOM}`, "aria-hidden": "true" },
+    { viewBox: `0 0 ${wide} ${tall}`, "aria-hidden": "true" },
     ...steps([0, 90], 4, 30).flatMap((at) => [
-      svg("text", { x: LEFT + place(at), y: TOP + side + 16, class: "middle" }, `${at}°`),
-      svg("text", { x: LEFT - 6, y: TOP + side - place(at) + 4, class: "end" }, `${at}°`),
+      svg("text", { x: LEFT + place(at), y: TOP + SIDE + 16, class: "middle" }, `${at}°`),
+      svg("text", { x: LEFT - 6, y: TOP + SIDE - place(at) + 4, class: "end" }, `${at}°`),
     ]),
-    svg("text", { x: LEFT + side / 2, y: TOP + side + 36, class: "middle" }, "half angle θh"),
+    svg("text", { x: LEFT + SIDE / 2, y: TOP + SIDE + 36, class: "middle" }, "half angle θh"),
     svg(
       "text",
-      { x: 0, y: 0, class: "middle", transform: `translate(11 ${TOP + side / 2}) rotate(-90)` },
+      { x: 0, y: 0, class: "middle", transform: `translate(11 ${TOP + SIDE / 2}) rotate(-90)` },
       "difference angle θd",
     ),
   );
   const ring = element("span", { className: "ring" });
   Object.assign(ring.style, {
-    left: `${(LEFT + place(here[0])) / 3.52}%`,
-    top: `${(TOP + side - place(here[1])) / 3.48}%`,
+    left: share(LEFT + place(here[0]), wide),
+    top: share(TOP + SIDE - place(here[1]), tall),
   });
+  const around = {
+    left: share(LEFT, wide),
+    top: share(TOP, tall),
+    width: share(SIDE, wide),
+    height: share(SIDE, tall),
+  };
+  Object.assign(canvas.style, around);
   return element(
     "figure",
     {},
