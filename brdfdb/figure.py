@@ -30,6 +30,7 @@ class Curve(BaseModel):
     role: Role = Field(
         default="other", description="kind of the form that is drawn; curves of the same role look the same"
     )
+    dots: bool = Field(default=False, description="true: points, such as samples, that no line joins")
 
 
 class Panel(BaseModel):
@@ -103,9 +104,9 @@ class Figure(BaseModel):
     statements: list[Statement]
 
 
-def curve_of(label: str, x: ArrayLike, y: ArrayLike, role: Role = "other") -> Curve:
+def curve_of(label: str, x: ArrayLike, y: ArrayLike, role: Role = "other", *, dots: bool = False) -> Curve:
     """Return the curve of a panel through arrays; y has five digits, and gaps where it is not finite."""
-    return Curve(label=label, x=np.asarray(x, dtype=np.float64).tolist(), y=numbers(y), role=role)
+    return Curve(label=label, x=np.asarray(x, dtype=np.float64).tolist(), y=numbers(y), role=role, dots=dots)
 
 
 def numbers(values: ArrayLike, digits: int = 5) -> Numbers:

@@ -10,7 +10,6 @@ from brdfdb._elementary import COS_HORIZON
 from brdfdb.audit.finding import STRICT, Cell, Finding, NumberTable, Sentence, Subject, Verdict
 from brdfdb.audit.pairs import Pairs
 from brdfdb.figure import number
-from brdfdb.measurements.coordinates import Hull
 from brdfdb.parameters import Floats
 from brdfdb.tables.albedo import wavelengths_of
 from brdfdb.tables.grids import Grid
@@ -179,10 +178,10 @@ def reciprocity_of(table: Table, pairs: Pairs) -> Reciprocity:
 def _measured_both_ways(table: Table, pairs: Pairs) -> NDArray[np.bool_] | bool:
     """Return which pairs lie within the directions that were measured, and do so exchanged; True without samples."""
     measured = table.metadata.measured
-    if measured is None or measured.hull is None:
+    if measured is None or measured.extent is None:
         return True
-    hull, (wi, wr) = Hull(measured.hull), (pairs.drawn.wi, pairs.drawn.wr)
-    return ~(hull.outside(wi, wr) | hull.outside(wr, wi))
+    outside, (wi, wr) = measured.extent.outside, (pairs.drawn.wi, pairs.drawn.wr)
+    return ~(outside(wi, wr) | outside(wr, wi))
 
 
 def _interpolant_tolerance(grid: Grid) -> float | None:

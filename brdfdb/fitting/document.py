@@ -139,4 +139,7 @@ class Fits(_Record):
         description="samples farther than that from every fit, which the errors and the ranking leave out; 0 where "
         "they are more than 2 % of all: then they are no accident"
     )
-    skipped: dict[str, str] = Field(description="models that cannot describe the samples, with the reason")
+    skipped: dict[str, str] = Field(description="models that were not fitted, with the reason")
+    interrupted: bool = Field(
+        description="true: the search was ended before all models, or the intervals of the best, were done"
+    )

@@ -31,28 +31,31 @@ def figure_of(document: Fits, fitted: Fitted) -> Figure:
     Returns
     -------
     Figure
-        For up to six incidences, f_r of samples and fit in the plane of incidence, where there are samples in it, and a
-        map of the mean of ln(model / sample) over the direction of the viewer. Of several channels, the middle one.
+        For up to six incidences, f_r of samples and fit in the plane of incidence, where there are samples in it. After
+        all of these, for each incidence a map of the mean of ln(model / sample) over the direction of the viewer. Of
+        several channels, the middle one.
     """
     samples = fitted.samples
     _, first = np.unique(samples.incidence, return_index=True)
     order = first[np.lexsort((samples.phi_i[first], samples.theta_i[first]))]
     shown = order[np.linspace(0, order.size - 1, min(_MOST, order.size)).round().astype(np.int64)]
     channel = len(samples.channels) // 2
-    panels: list[Panel | Map] = []
+    cuts: list[Panel] = []
+    maps: list[Map] = []
     for row in shown.tolist():
         chosen = samples.incidence == samples.incidence[row]
         title = f"theta_i = {float(degrees(samples.theta_i[row])):.4g} degrees"
         cut = _cut(fitted, np.flatnonzero(chosen), channel, title)
-        panels += [] if cut is None else [cut]
-        panels.append(_map(fitted, np.flatnonzero(chosen), channel, title))
+        cuts += [] if cut is None else [cut]
+        maps.append(_map(fitted, np.flatnonzero(chosen), channel, title))
     of = f" of {samples.channels[channel]}" if len(samples.channels) > 1 else ""
     return Figure(
         key="fit",
         paper="",
         title=f"{fitted.surface.name}, fitted to {document.name}",
-        caption=f"f_r{of} in the plane of incidence, mirror side positive, and ln(model / sample) of each viewer.",
-        panels=list(panels),
+        caption=f"f_r{of} in the plane of incidence, mirror side positive: the fit as a line, samples as dots. Mean of "
+        f"ln(model / sample){of} at the viewers of each light; 0 where the fit has what was measured.",
+        panels=[*cuts, *maps],
         statements=[],
     )
 
@@ -83,7 +86,7 @@ def _cut(fitted: Fitted, chosen: NDArray[np.int64], channel: int, title: str) ->
         y_label="f_r [1/sr]",
         curves=[
             curve_of(fitted.surface.name, fine, np.where(model > 0.0, model, np.nan), "ours"),
-            curve_of("samples", signed[order], np.where(values > 0.0, values, np.nan)[order], "truth"),
+            curve_of("samples", signed[order], np.where(values > 0.0, values, np.nan)[order], "truth", dots=True),
         ],
         log_y=bool(np.any(values > 0.0)),
     )

@@ -15,7 +15,7 @@ from brdfdb.fitting.fitted import Fitted
 from brdfdb.fitting.held_out import held_out, predicted
 from brdfdb.fitting.material import material_of
 from brdfdb.fitting.problem import Point, Problem
-from brdfdb.fitting.remarks import remarks_of, remarks_on_samples
+from brdfdb.fitting.remarks import remarks_of, remarks_on_samples, sees_anisotropy
 from brdfdb.fitting.residuals import Kind, Residual
 from brdfdb.fitting.surface import ASSUMED_NM, NotDescribedError, Surface, fitted_by_default
 from brdfdb.geometry import degrees, radians, versine
@@ -36,6 +36,7 @@ _LISTED = 20  # outliers that are listed
 _SETTLED = 0.05  # relative change of the scale that ends the iterations
 _SCALES, _EVALUATIONS = 4, 60
 _LEAST_SCALE = 1e-9  # of noise-free samples
+INTERRUPTED = "the search was interrupted"  # why a model was not fitted
 _NEAR_MIRROR = float(radians(3.0))  # angle from the mirror direction within which apertures may catch a specular part
 _COUNTS = 0.01  # share of f_r that a specular part adds in an aperture of that half angle, so that it counts
 
@@ -95,9 +96,8 @@ def fit(samples: Samples, model: str, *, residual: Kind = "log", refractive_inde
     >>> print(np.round(fitted.point.values, 3))
     [[0.7]]
     """
-    surface = Surface(
-        model, samples.wavelength_nm, len(samples.channels), turned=samples.turned, entry=refractive_index
-    )
+    turned = sees_anisotropy(samples)
+    surface = Surface(model, samples.wavelength_nm, len(samples.channels), turned=turned, entry=refractive_index)
     fitted = _searched(samples, surface, residual, np.zeros(len(samples), dtype=np.bool_))
     hidden = _hidden(fitted)
     if hidden.any() and np.any(fitted.problem.residual.used[~hidden[fitted.rows]]):
@@ -148,6 +148,7 @@ def fits(
     refractive_index: str | None = None,
     profiles: bool = True,
     tick: Callable[[str], None] = lambda _: None,
+    keep_finished: bool = False,
 ) -> tuple[Fits, list[Fitted]]:
     """Fit several models to samples and rank them.
 
@@ -163,6 +164,8 @@ def fits(
         True to correct the intervals of the best fit by profiles where the covariance misleads.
     tick : callable
         A function that is called with the name of each model before it is fitted.
+    keep_finished : bool
+        True to end at Ctrl-C with the models that are finished, if there are any.
 
     Returns
     -------
@@ -178,13 +181,20 @@ def fits(
         that all fits are below a tenth of it at 95 % of the samples.
     """
     counting = Residual(samples, residual)
-    made, skipped, shared = _made(samples, models, residual, refractive_index, tick)
+    searches, skipped = _searches(samples, models, residual, refractive_index, tick, keep_finished)
+    interrupted = INTERRUPTED in skipped.values()
+    shared = _shared_outliers([fitted for fitted, _ in searches])
+    made = [(_document(fitted, errors, shared), fitted) for fitted, errors in searches]
     by_held_out = made[0][0].held_out is not None
     made.sort(key=lambda one: _rank(one[0]))
-    if profiles:
-        tick("intervals")
-        first, fitted = made[0]
-        made[0] = first.model_copy(update={"estimates": estimates_of(fitted, profiles=True)}), fitted
+    if profiles and not interrupted:
+        try:
+            tick("intervals")
+            made[0] = _profiled(*made[0])
+        except KeyboardInterrupt:
+            if not keep_finished:
+                raise
+            interrupted = True
     far, count = _outliers(made[0][1])
     indexed = any(fitted.surface.indexed for _, fitted in made)
     document = Fits(
@@ -199,12 +209,7 @@ def fits(
         refractive_index=refractive_index,
         source_solid_angle_sr=samples.instrument.source_solid_angle_sr,
         receiver_solid_angle_sr=samples.instrument.receiver_solid_angle_sr,
-        left_out=Left(
-            below_horizon=int(samples.record.get("below_the_horizon", 0)),
-            holes=counting.holes,
-            at_horizon=counting.at_horizon,
-            unusable=counting.left_out,
-        ),
+        left_out=_left_out(samples, counting),
         remarks=remarks_on_samples(samples, counting),
         ranked_by="held-out rms of ln" if by_held_out else "BIC",
         fits=[one for one, _ in made],
@@ -212,39 +217,59 @@ def fits(
         outlier_count=count,
         shared_outlier_count=int(shared.sum()),
         skipped=skipped,
+        interrupted=interrupted,
     )
     return document, [fitted for _, fitted in made]
 
 
-def _made(
+def _left_out(samples: Samples, counting: Residual) -> Left:
+    """Return the numbers of values that no fit uses, by reason."""
+    return Left(
+        below_horizon=int(samples.record.get("below_the_horizon", 0)),
+        holes=counting.holes,
+        at_horizon=counting.at_horizon,
+        unusable=counting.left_out,
+    )
+
+
+def _profiled(record: Fit, fitted: Fitted) -> tuple[Fit, Fitted]:
+    """Return a fit with the intervals of profiles where the covariance misleads."""
+    return record.model_copy(update={"estimates": estimates_of(fitted, profiles=True)}), fitted
+
+
+def _searches(
     samples: Samples,
     models: Sequence[str] | None,
     residual: Kind,
     refractive_index: str | None,
     tick: Callable[[str], None],
-) -> tuple[list[tuple[Fit, Fitted]], dict[str, str], Mask]:
-    """Return the fits of all models that can describe the samples, why others are left out, and shared outliers."""
+    keep_finished: bool,
+) -> tuple[list[tuple[Fitted, Floats | None]], dict[str, str]]:
+    """Return the fits of all models that can describe the samples with their errors held out, and why others lack."""
     searches: list[tuple[Fitted, Floats | None]] = []
     skipped: dict[str, str] = {}
     tried = fitted_by_default() if models is None else models
-    for model in tried:
-        tick(model)
+    for number, model in enumerate(tried):
         try:
+            tick(model)
             fitted = fit(samples, model, residual=residual, refractive_index=refractive_index)
+            searches.append((fitted, predicted(fitted)))
         except NotDescribedError as error:
             if models is not None and len(models) == 1:
                 raise
             skipped[model] = error.sentence
-            continue
-        searches.append((fitted, predicted(fitted)))
+        except KeyboardInterrupt:
+            if not (keep_finished and searches):
+                raise
+            skipped |= dict.fromkeys(tried[number:], INTERRUPTED)
+            break
     if not searches:
         raise ParameterError("model", f"none can describe {samples.name}: {next(iter(skipped.values()))}")
     if models is None:
         slow = "its values are integrals, which take minutes; name it to fit it"
         skipped |= {name: slow for name in MODELS if name not in tried}
     _check_reach([fitted for fitted, _ in searches])
-    shared = _shared_outliers([fitted for fitted, _ in searches])
-    return [(_document(fitted, errors, shared), fitted) for fitted, errors in searches], skipped, shared
+    return searches, skipped
 
 
 def _check_reach(searches: Sequence[Fitted]) -> None:

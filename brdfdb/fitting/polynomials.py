@@ -100,6 +100,6 @@ class Polynomial:
         powers = self.lowered.reshape(*self.lowered.shape, *further)
         return np.asarray(factors * np.prod(values[np.newaxis, np.newaxis] ** powers, axis=2))
 
-    def parts(self, values: list[Floats]) -> Floats:
-        """Return the factors (M, N) of the monomials from the values (N,) of a model at the nodes."""
-        return np.asarray(np.einsum("mj,jn->mn", self.inverse, np.stack(values)))
+    def parts(self, values: Floats) -> Floats:
+        """Return the factors (..., M, N) of the monomials from the values (..., M, N) of a model at the nodes."""
+        return np.asarray(self.inverse @ values)

@@ -73,9 +73,8 @@ class Problem:
         self.high = np.array([np.full(surface.channels, one.high) for one in surface.coefficients]).reshape(shape)
         for index, value in (held or {}).items():
             self.low[index] = self.high[index] = value
-        units = np.array([one.unit for one in surface.coefficients]).reshape(-1, 1)
         level = np.pi * float(np.median(np.maximum(residual.truth[residual.used], 0.0)))
-        self.begin = np.broadcast_to(np.clip(level, 0.01, 0.5) * units, shape)
+        self.begin = np.broadcast_to(np.clip(level, 0.01, 0.5) * surface.units, shape)
         self.scale = 1.0
 
     def selected(self, rows: NDArray[np.int64]) -> Problem:
@@ -85,13 +84,21 @@ class Problem:
         part.view, part.residual = self.view.selected(rows), self.residual.selected(rows)
         return part
 
-    def at(self, free: Array, start: Array | None = None, tolerance: float = FINE) -> Point:
-        """Return a point whose free shape variables are given, with its best coefficients."""
-        x = np.zeros(len(self.surface.shape))
-        x[self.free] = free
+    def placed(self, free: Array) -> Array:
+        """Return points (..., S) of the unit cube whose free variables are given."""
+        x = np.zeros((*free.shape[:-1], len(self.surface.shape)))
+        x[..., self.free] = free
         for index, u in self.fixed.items():
-            x[index] = u
-        basis = self.surface.basis(x, self.view)
+            x[..., index] = u
+        return x
+
+    def at(
+        self, free: Array, start: Array | None = None, tolerance: float = FINE, basis: Floats | None = None
+    ) -> Point:
+        """Return a point whose free shape variables are given, with its best coefficients; `basis` if it is known."""
+        x = self.placed(free)
+        if basis is None:
+            basis = self.surface.basis(x, self.view)
         begin = self.begin if start is None else start
         values = project(self.surface, basis, self.residual, self.scale, (self.low, self.high), begin, tolerance)
         f_r = total(basis, self.surface.monomials(values))
@@ -102,19 +109,19 @@ class Problem:
         """Return the derivatives (S, N, C) of residuals by the free shape variables, at fixed coefficients."""
         monomials = self.surface.monomials(point.values)
         slope = self.residual.slope(point.f_r)
+        steps = np.where(point.x[self.free] > 0.5, -_STEP, _STEP)
+        moved = np.tile(point.x, (len(self.free), 1))
+        moved[np.arange(len(self.free)), self.free] += steps
         columns = np.zeros((len(self.free), *point.f_r.shape))
-        for number, index in enumerate(self.free):
-            moved = point.x.copy()
-            step = -_STEP if moved[index] > 0.5 else _STEP
-            moved[index] += step
-            f_r = total(self.surface.basis(moved, self.view), monomials)
-            columns[number] = slope * (f_r - point.f_r) / step
+        if self.free:
+            for number, basis in enumerate(self.surface.bases(moved, self.view)):
+                columns[number] = slope * (total(basis, monomials) - point.f_r) / steps[number]
         return columns
 
     def coefficient_jacobian(self, point: Point) -> tuple[Floats, NDArray[np.bool_]]:
         """Return the derivatives (K, N, C) of residuals by coefficients, 0 for those at a bound, and which are free."""
         span = self.high - self.low
-        units = np.array([[one.unit] for one in self.surface.coefficients]).reshape(-1, 1)
+        units = self.surface.units
         free = (point.values > self.low + _AT_END * units) & (point.values < self.high - _AT_END * units) & (span > 0.0)
         jacobian = slopes_of(self.surface, point.basis, point.values) * self.residual.slope(point.f_r)
         return jacobian * free[:, np.newaxis, :], free
@@ -165,23 +172,18 @@ class Problem:
 
     def begin_points(self) -> Array:
         """Return points (P, S) of the free variables, spread evenly, whose lobes are as wide as samples can show."""
-        points = spread(_SPREAD, max(len(self.free), 1))
+        points = spread(_SPREAD, max(len(self.free), 1))[:, : len(self.free)]
         chosen: list[Array] = []
-        for point in points:
-            if len(chosen) == POINTS:
+        for some in np.split(points, _SPREAD // POINTS):
+            chosen += list(some[self._shows(self.placed(some))])
+            if len(chosen) >= POINTS:
                 break
-            x = np.full(len(self.surface.shape), 0.5)
-            x[self.free] = point[: len(self.free)]
-            for index, u in self.fixed.items():
-                x[index] = u
-            if self._shows(x):
-                chosen.append(point[: len(self.free)])
-        return np.array(chosen if chosen else points[:POINTS, : len(self.free)])
+        return np.array(chosen[:POINTS] if chosen else points[:POINTS])
 
-    def _shows(self, x: Array) -> bool:
-        """Return False if a lobe of the surface is too narrow or too wide to begin with."""
-        narrowest = max(_NARROWEST, RESOLVED * self.view.half_angle)
-        return all(narrowest <= width <= _WIDEST for width in self.surface.widths(x))
+    def _shows(self, points: Array) -> NDArray[np.bool_]:
+        """Return False for points (P, S) where a lobe is too narrow or too wide to begin with."""
+        narrowest, widths = max(_NARROWEST, RESOLVED * self.view.half_angle), self.surface.widths(points)
+        return np.asarray(np.all((narrowest <= widths) & (widths <= _WIDEST), axis=1))
 
     def best(self) -> Point:
         """Return the best end of descents from several beginnings, from which a descent at all samples goes on.
@@ -193,7 +195,10 @@ class Problem:
             return self.at(np.zeros(0))
         coarse = self.selected(self._brightest_and_others(_SOME))
         points = self.begin_points()
-        values = np.array([coarse.at(point, tolerance=COARSE).cost for point in points])
+        bases = self.surface.bases(self.placed(points), coarse.view)
+        values = np.array(
+            [coarse.at(point, tolerance=COARSE, basis=basis).cost for point, basis in zip(points, bases, strict=True)]
+        )
         ends = [coarse.descend(point, _COARSE) for point in best_apart(points, values, STARTS)]
         least = min(end.cost for end in ends)
         good = [end for end in ends if end.cost <= _PROMISING * least]

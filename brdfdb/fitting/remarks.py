@@ -17,6 +17,17 @@ NARROW = 0.05  # width of a lobe, in slopes, below which usual apertures change 
 PATTERN = 0.5  # correlation of neighbouring residuals from which on the rest is a pattern
 UNEVEN = 3.0  # ratio of relative uncertainties, at the ends of the middle 90 %, from which on weights matter
 LEFT_OUT = 0.01  # share of values that are not positive, from which on it matters that they are left out
+_SAME_AZIMUTH = 0.01  # degrees
+
+
+def sees_anisotropy(samples: Samples) -> bool:
+    """Return True if the light comes from azimuths that are neither the same nor half a turn apart.
+
+    Half a turn of the surface changes no lobe of two widths.
+    """
+    phi = degrees(samples.phi_i[samples.theta_i > 0.0])
+    apart = np.abs((phi - phi[:1] + 90.0) % 180.0 - 90.0)
+    return bool(np.any(apart > _SAME_AZIMUTH))
 
 
 def remarks_of(fit: Fit, fitted: Fitted) -> list[str]:
@@ -50,6 +61,20 @@ def remarks_of(fit: Fit, fitted: Fitted) -> list[str]:
 
 
 def remarks_on_samples(samples: Samples, residual: Residual) -> list[str]:
+    """Return sentences on lights that cannot tell anisotropy, uncertainties not followed, files that contradict."""
+    sentences = _on_uncertainties(samples, residual)
+    if "contradiction" in samples.record:
+        sentences.append(str(samples.record["contradiction"]))
+    if sees_anisotropy(samples):
+        return sentences
+    return [
+        "The light comes from one azimuth of the surface: whether the surface is anisotropic cannot be told, and "
+        "models with two widths are fitted with one.",
+        *sentences,
+    ]
+
+
+def _on_uncertainties(samples: Samples, residual: Residual) -> list[str]:
     """Return a sentence on uncertainties that are no credible ones, or that the residual does not follow."""
     used = residual.used
     if residual.raised:
@@ -81,7 +106,8 @@ def remarks_on_samples(samples: Samples, residual: Residual) -> list[str]:
 
 def _of_aperture(fit: Fit, fitted: Fitted) -> list[str]:
     """Return sentences on what an aperture hides, or one that is not known."""
-    width, half_angle = min(fitted.surface.widths(fitted.point.x), default=math.inf), fitted.view.half_angle
+    width = float(np.min(fitted.surface.widths(fitted.point.x[np.newaxis]), initial=math.inf))
+    half_angle = fitted.view.half_angle
     sentences = []
     if fit.at_mirror:
         sentences.append(

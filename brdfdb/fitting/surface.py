@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,12 +20,13 @@ from brdfdb.parameters import Floats, ModelSpec, closest
 from brdfdb.spectra import refractive_index
 
 Array = NDArray[np.float64]
+Numbers = Mapping[str, Any]
 
 ASSUMED_NM = 550.0  # wavelength of samples that state none, for models with n and k
 SCALE = "scale"
 _MOST_LOBES = 4  # terms of a sum
 _MOST_SHAPE = 2  # numbers of the shape of a lobe in the sums that are tried unasked
-_REMEMBERED = 2  # values of a term: those of a point and of its last neighbour
+_VALUES = 1 << 18  # values that are computed together, so that they stay in the caches
 _LEAST_K = 1e-6  # below it, k is 0
 
 
@@ -80,7 +81,7 @@ class Term:
         self.polynomial = (
             Polynomial(1, 1, constant=False) if self.scaled else Polynomial(len(names), degree, constant=bright)
         )
-        self.memory: list[tuple[View, dict[str, Any], Floats]] = []
+        self.memory: tuple[View, dict[Any, Floats]] | None = None
         self.tied = None if turned else spec.lobe_axes
         out = {*self.fixed, *self.linear, *(self.tied or ())[1:]}
         self.free = [p for p in spec.parameters if p.name not in out]
@@ -92,40 +93,56 @@ class Term:
         parameters = [self.spec.parameter(name) for name in self.linear]
         return [Coefficient(number, p.name, f"{self.label}{p.name}", p.low, p.high, unit_of(p)) for p in parameters]
 
-    def basis(self, view: View, numbers: Mapping[str, Any]) -> Floats:
-        """Return the factors (M, N) [1/sr] of the monomials of this term. The last ones are remembered."""
-        for before, given, part in self.memory:
-            if before is view and given == numbers:
-                return part
-        part = self._computed(view, numbers)
-        self.memory = [(view, dict(numbers), part), *self.memory[: _REMEMBERED - 1]]
-        return part
+    def basis(self, view: View, points: Sequence[Numbers], *, remember: bool) -> Floats:
+        """Return the factors (B, M, N) [1/sr] of the monomials of this term at B points.
 
-    def width(self, numbers: Mapping[str, Any]) -> float | None:
-        """Return the width of the lobe of this term, the smaller of two, in slopes; None for a diffuse model."""
+        Points are evaluated together, equal ones once. Those of the last call with `remember` are known.
+        """
+        keys = [tuple(one.items()) for one in points]
+        known = self.memory[1] if self.memory is not None and self.memory[0] is view else {}
+        new = {key: one for key, one in zip(keys, points, strict=True) if key not in known}
+        if new:
+            known = known | dict(zip(new, self._computed(view, list(new.values())), strict=True))
+        if remember:
+            self.memory = view, {key: known[key] for key in keys}
+        return np.stack([known[key] for key in keys])
+
+    def widths(self, points: Sequence[Numbers]) -> Floats | None:
+        """Return the widths (B,) of the lobe of this term, the smaller of two, in slopes; None for a diffuse model."""
         if self.spec.lobe is None:
             return None
         middle = {name: 0.5 * unit_of(self.spec.parameter(name)) for name in self.linear}
         with np.errstate(all="ignore"):
-            lobe = self.spec.lobe(np.asarray(1.0), **numbers, **middle)
-            return float(np.min(np.minimum(lobe.alpha_x, lobe.alpha_y)))
+            lobe = self.spec.lobe(np.asarray(1.0), **_columns(points), **middle)
+        return np.broadcast_to(np.minimum(lobe.alpha_x, lobe.alpha_y).reshape(-1), len(points))
 
-    def _computed(self, view: View, numbers: Mapping[str, Any]) -> Floats:
-        width = self.width(numbers) if view.half_angle else None
-        if self.scaled:
-            return self._seen(view, width, numbers)[np.newaxis]
-        units = [unit_of(self.spec.parameter(name)) for name in self.linear]
-        values = []
-        for node in self.polynomial.nodes.tolist():
-            given = {name: u * unit for name, u, unit in zip(self.linear, node, units, strict=True)}
-            values.append(self._seen(view, width, {**numbers, **given}))
-        return self.polynomial.parts(values)
+    def _computed(self, view: View, points: Sequence[Numbers]) -> Floats:
+        """Return the factors (B, M, N) [1/sr] of the monomials at points that are not known yet."""
+        nodes: list[dict[str, Any]] = [{}]
+        if not self.scaled:
+            units = [unit_of(self.spec.parameter(name)) for name in self.linear]
+            nodes = [
+                {name: u * unit for name, u, unit in zip(self.linear, node, units, strict=True)}
+                for node in self.polynomial.nodes.tolist()
+            ]
+        rows = [{**one, **node} for one in points for node in nodes]
+        widths = self.widths(points) if view.half_angle else None
+        of_rows = np.full(len(rows), np.inf) if widths is None else np.repeat(widths, len(nodes))
+        spread = np.array([view.points(width) for width in of_rows.tolist()])  # directions of the aperture
+        seen = np.empty((len(rows), len(view)))
+        for count in np.unique(spread).tolist():
+            same = np.flatnonzero(spread == count)
+            for some in np.array_split(same, -(-same.size * count * len(view) // _VALUES)):
+                seen[some] = self._seen(view, float(of_rows[some[0]]), [rows[row] for row in some.tolist()])
+        values = seen.reshape(len(points), len(nodes), -1)
+        return values if self.scaled else self.polynomial.parts(values)
 
-    def _seen(self, view: View, width: float | None, given: Mapping[str, Any]) -> Floats:
-        """Return f_r (N,) [1/sr] as an instrument sees it, with the specular part that falls into its aperture."""
+    def _seen(self, view: View, width: float, points: Sequence[Numbers]) -> Floats:
+        """Return f_r (B, N) [1/sr] as an instrument sees it, with the specular part that falls into its aperture."""
+        given, shape = _columns(points), (len(points), len(view))
         if not view.half_angle:
-            return np.asarray(self.spec.vectors(view.w_i, view.w_r, **given))
-        f_r = view.mean(lambda wi, wr: self.spec.vectors(wi, wr, **given), np.inf if width is None else width)
+            return np.asarray(self.spec.vectors(view.w_i, view.w_r, **given)).reshape(shape)
+        f_r = view.mean(lambda wi, wr: self.spec.vectors(wi, wr, **given).T, width).T.reshape(shape)
         if self.spec.specular is None:
             return f_r
         return f_r + view.mirror * self.reflected(view, given)
@@ -170,7 +187,7 @@ class Surface:
     shape : list of Variable
         Numbers that all channels share; `owners` are the terms that they belong to, None for n and k.
     coefficients : list of Coefficient
-        Numbers with a value for each channel.
+        Numbers with a value for each channel. `units`, shape (K, 1), are theirs.
 
     Raises
     ------
@@ -204,6 +221,7 @@ class Surface:
             self.shape += index_variables()
             self.owners += [None, None]
         self.coefficients = [one for number, term in enumerate(self.terms) for one in term.coefficients(number)]
+        self.units = np.array([one.unit for one in self.coefficients]).reshape(-1, 1)
         self.wavelength_nm = np.full(channels, ASSUMED_NM) if wavelength_nm is None else wavelength_nm
         self.indices = refractive_index(entry, self.wavelength_nm) if self.indexed and entry else None
 
@@ -269,16 +287,24 @@ class Surface:
 
     def basis(self, x: Array, view: View) -> Floats:
         """Return the factors (M, N, C) [1/sr] of all monomials; (M, N, 1) if they are the same in each channel."""
-        parts = []
+        return np.asarray(self.bases(x[np.newaxis], view)[0])
+
+    def bases(self, points: Array, view: View) -> Floats:
+        """Return the factors (B, M, N, C) or (B, M, N, 1) [1/sr] at points (B, S), which models take together.
+
+        The terms of a point that was evaluated alone are remembered until the next: its neighbours share some of them.
+        """
+        parts, numbers = [], [self.numbers(x) for x in points]
         several = self.channels if self.indexed else 1
-        for number, (term, given) in enumerate(zip(self.terms, self.numbers(x), strict=True)):
+        for number, term in enumerate(self.terms):
             own = several if term.spec.spectral else 1
+            wanted = [self.arguments(number, of_point[number], c) for of_point in numbers for c in range(own)]
             with np.errstate(all="ignore"):  # extreme parameters may raise flags
-                columns = [term.basis(view, self.arguments(number, given, c)) for c in range(own)]
-            part = np.stack(columns, axis=-1)
-            parts.append(np.broadcast_to(part, (*part.shape[:2], several)))
-        basis = np.concatenate(parts)
-        return basis if np.all(np.isfinite(basis)) else np.nan_to_num(basis, nan=0.0, posinf=0.0, neginf=0.0)
+                part = term.basis(view, wanted, remember=len(points) == 1)
+            part = part.reshape(len(points), own, *part.shape[1:]).transpose(0, 2, 3, 1)
+            parts.append(np.broadcast_to(part, (*part.shape[:3], several)))
+        bases = np.concatenate(parts, axis=1)
+        return bases if np.all(np.isfinite(bases)) else np.nan_to_num(bases, nan=0.0, posinf=0.0, neginf=0.0)
 
     def monomials(self, values: Floats) -> Floats:
         """Return the monomials (M, C) of coefficients (K, C)."""
@@ -295,15 +321,13 @@ class Surface:
         slopes = np.zeros((sum(k for _, k in sizes), sum(m for m, _ in sizes), values.shape[1]))
         row = column = 0
         for term, (m, k) in zip(self.terms, sizes, strict=True):
-            units = np.array([one.unit for one in self.coefficients[row : row + k]])
             of_term = term.polynomial.slopes(self._in_units(values, row, k))
-            slopes[row : row + k, column : column + m] = of_term / units[:, np.newaxis, np.newaxis]
+            slopes[row : row + k, column : column + m] = of_term / self.units[row : row + k, :, np.newaxis]
             row, column = row + k, column + m
         return slopes
 
     def _in_units(self, values: Floats, at: int, count: int) -> Floats:
-        units = np.array([one.unit for one in self.coefficients[at : at + count]])
-        return np.asarray(values[at : at + count] / units[:, np.newaxis])
+        return np.asarray(values[at : at + count] / self.units[at : at + count])
 
     def f_r(self, x: Array, values: Floats, view: View) -> Floats:
         """Return f_r (N, C) [1/sr] as an instrument sees it, with coefficients (K, C)."""
@@ -318,13 +342,24 @@ class Surface:
                 sums[:, channel] += scale * term.reflected(view, given)
         return sums
 
-    def widths(self, x: Array) -> list[float]:
-        """Return the widths of the lobes at a point of the unit cube, in slopes."""
+    def widths(self, points: Array) -> Floats:
+        """Return the widths (B, L) of the L lobes at points (B, S) of the unit cube, in slopes."""
+        numbers = [self.numbers(x) for x in points]
         widths = [
-            term.width(self.arguments(number, given, 0))
-            for number, (term, given) in enumerate(zip(self.terms, self.numbers(x), strict=True))
+            term.widths([self.arguments(number, of_point[number], 0) for of_point in numbers])
+            for number, term in enumerate(self.terms)
         ]
-        return [width for width in widths if width is not None]
+        return np.array([of_term for of_term in widths if of_term is not None]).reshape(-1, len(points)).T
+
+
+def _columns(points: Sequence[Numbers]) -> dict[str, Any]:
+    """Return the arguments of points as columns (B, 1), or as one number where all have the same."""
+    columns: dict[str, Any] = {}
+    for name, first in points[0].items():
+        values = [one[name] for one in points]
+        same = all(value == first for value in values)
+        columns[name] = first if same else np.array(values)[:, np.newaxis]
+    return columns
 
 
 def total(basis: Floats, monomials: Floats) -> Floats:
@@ -354,7 +389,8 @@ def _parsed(name: str) -> list[str]:
             )
         model = match[2]
         if model not in MODELS:
-            raise ParameterError("model", f"{model!r} is unknown{closest(model, MODELS)}", model, tuple(MODELS))
+            hint = closest(model, MODELS) or f"; the models are {', '.join(MODELS)}"
+            raise ParameterError("model", f"{model!r} is unknown{hint}", model, tuple(MODELS))
         names += [model] * int(match[1] or 1)
     if not 1 <= len(names) <= _MOST_LOBES:
         raise ParameterError("model", f"{name!r} has {len(names)} terms; 1 to {_MOST_LOBES} are allowed", name)

@@ -34,7 +34,7 @@ class Variable:
     def value(self, u: float) -> float:
         """Return the value at u in [0, 1]."""
         if self.logarithmic:
-            return float(np.clip(self.low * (self.high / self.low) ** u, self.low, self.high))
+            return min(max(self.low * float((self.high / self.low) ** u), self.low), self.high)
         return self.low + (self.high - self.low) * u
 
     @property

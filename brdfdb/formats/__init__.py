@@ -10,6 +10,7 @@ import importlib
 import os
 import pkgutil
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +19,7 @@ import numpy as np
 from brdfdb.errors import FileFormatError, ParameterError
 from brdfdb.formats._input import check_file
 from brdfdb.formats._interface import Exporter, Importer, Option, options_of, parsed_options
+from brdfdb.formats._stated import AZIMUTHS, at_wavelength, from_forward
 
 if TYPE_CHECKING:
     from brdfdb.formats._readings import FileTable
@@ -40,6 +42,7 @@ __all__ = [
 ]
 
 _TEXT = "text"
+_SHOWN = 200  # characters of names of columns that a refusal repeats
 _HEAD = 4096  # bytes of a file that tell its format
 
 
@@ -108,7 +111,14 @@ def _text(value: Any) -> str:
     return str(value).lower() if isinstance(value, bool) else str(value)
 
 
-def read(path: str | os.PathLike[str], file_format: str = "", **keywords: Any) -> FileTable | Samples:
+def read(
+    path: str | os.PathLike[str],
+    file_format: str = "",
+    *,
+    azimuth: str = "light",
+    wavelength_nm: float | None = None,
+    **keywords: Any,
+) -> FileTable | Samples:
     """Return f_r of a file of another format as the tools of the format see it, or the samples that the file lists.
 
     Parameters
@@ -117,6 +127,10 @@ def read(path: str | os.PathLike[str], file_format: str = "", **keywords: Any) -
         The file.
     file_format : str
         One of `IMPORTERS`; by default the one that recognises the first bytes of the file, those with its suffix first.
+    azimuth : {"light", "forward"}
+        Direction from which the file counts azimuths: that of the light, as here, or the one into which it travels.
+    wavelength_nm : float, optional
+        Wavelength [nm], in [10, 1e6], of a file of one channel that states none.
     **keywords
         Of a text its columns, quantity and angles, as of `brdfdb.formats.text.read`: with one of them any file is read
         as text. Of an archive the `member`, as of `brdfdb.formats.neural.read`. Of a Klems matrix its `side`.
@@ -124,7 +138,8 @@ def read(path: str | os.PathLike[str], file_format: str = "", **keywords: Any) -
     Raises
     ------
     ParameterError
-        If there is no such format, keyword, column or member, or files of the format are only written.
+        If there is no such format, keyword, column or member, files of the format are only written, or the file states
+        the wavelength itself.
     FileFormatError
         If no format recognises the file, its format is only written, it is damaged, or it is no regular file of at most
         2 GiB.
@@ -138,6 +153,8 @@ def read(path: str | os.PathLike[str], file_format: str = "", **keywords: Any) -
     Traceback (most recent call last):
     FileNotFoundError: [Errno 2] No such file or directory: 'brass.exr'
     """
+    if azimuth not in AZIMUTHS:
+        raise ParameterError("azimuth", f"{azimuth!r} is not one of {', '.join(AZIMUTHS)}", azimuth, AZIMUTHS)
     path = Path(path)
     importer = _importer(path, file_format, keywords)
     try:
@@ -152,7 +169,8 @@ def read(path: str | os.PathLike[str], file_format: str = "", **keywords: Any) -
     if at is not None and not np.all((at > 0.0) & (at < np.inf)):
         wrong = at[~((at > 0.0) & (at < np.inf))][0]
         raise FileFormatError(f"{path}: a wavelength is {wrong:g} nm; allowed are positive numbers")
-    return reading
+    reading = reading if wavelength_nm is None else at_wavelength(reading, wavelength_nm)
+    return from_forward(reading) if azimuth == "forward" else reading
 
 
 def samples(path: str | os.PathLike[str], file_format: str = "", **keywords: Any) -> Samples:
@@ -189,14 +207,15 @@ def samples(path: str | os.PathLike[str], file_format: str = "", **keywords: Any
     >>> from brdfdb import formats
     >>> tile = formats.samples("tile.csv", quantity="reflectance_factor")  # doctest: +SKIP
     """
-    from brdfdb.measurements.samples import Samples
+    from brdfdb.measurements.samples import NODES, Samples
 
     reading = read(path, file_format, **keywords)
     if isinstance(reading, Samples):
         return reading
     if reading.nodes is None:
         raise FileFormatError(f"{path}: it holds a formula, and no values at directions")
-    return reading.nodes()
+    nodes = reading.nodes()
+    return replace(nodes, record={**nodes.record, NODES: True})
 
 
 def members(path: str | os.PathLike[str], file_format: str = "", **keywords: Any) -> list[str]:
@@ -205,6 +224,7 @@ def members(path: str | os.PathLike[str], file_format: str = "", **keywords: Any
     Parameters and errors are those of `read`.
     """
     path = Path(path)
+    keywords = {name: value for name, value in keywords.items() if name not in ("azimuth", "wavelength_nm")}
     importer = _importer(path, file_format, keywords)
     return importer.members(path) if hasattr(importer, "members") else []
 
@@ -245,5 +265,13 @@ def _chosen(path: Path, file_format: str) -> Importer:
     for name, exporter in only_written.items():
         if path.name.endswith(exporter.suffix):
             raise FileFormatError(f"{path}: files of {name} are only written, not read")
-    hint = "" if b"\0" in head else "; a text is read with the names of its columns, such as theta_i=NAME"
-    raise FileFormatError(f"{path}: no format recognises it; there are {', '.join(IMPORTERS)}{hint}")
+    from brdfdb.fitting.published import SUFFIX
+
+    known = f"{path}: no format recognises it; there are {', '.join(IMPORTERS)}"
+    columns = _MODULES[_TEXT].columns_of(head)
+    if columns:
+        shown = ", ".join(columns)[:_SHOWN]
+        known += f"; as a text it has the columns {shown}: name them, {_MODULES[_TEXT].HOW}"
+    if path.name.lower().endswith(SUFFIX):
+        raise FileFormatError(f"{path}: a file of published fits holds no samples; `brdfdb fit` lists them")
+    raise FileFormatError(known)

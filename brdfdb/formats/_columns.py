@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -47,7 +48,10 @@ _UNCERTAINTY = (
     "brdf_std",
     "standard_deviation",
 )
-_WAVELENGTH = ("wavelength", "wavelength_nm", "lambda", "wl", "wvl", "wave")
+_WAVELENGTH = ("wavelength", "lambda", "wl", "wvl", "wave")
+_LENGTHS = {"nm": 1.0, "nanomet": 1.0, "um": 1e3, "µm": 1e3, "μm": 1e3, "micro": 1e3, "m": 1e9}  # in nm
+_LENGTH = re.compile(r"(?:^|[\W_\d])(nm|um|µm|μm|m|(?:nano|micro)met(?:er|re)s?|microns?)(?=$|[\W_])", re.IGNORECASE)
+AZIMUTHS = ("phi", "azimuth", "azi", "az", "azimuth_angle")  # of a viewer relative to the light, if there is no other
 _COLOURS = (("R", "G", "B"), ("r", "g", "b"), ("X", "Y", "Z"))  # x, y, z are positions
 _OF_FACTORS = re.compile(r"\b(?:BRF|HCRF|reflectance factors?)\b", re.IGNORECASE)
 _NUMBER_NM = re.compile(r"(?P<word>[a-z_]*?)[_@]?(?P<number>\d+(?:\.\d+)?)_?(?P<unit>nm|um|µm|μm)?$")
@@ -70,6 +74,7 @@ _KNOWN_UNITS = (
     "µm",
     "μm",
 )
+_FEWEST_NAMES = 3  # fields of a line of names that are no numbers: those of the angles
 _COMMENT = re.compile(r"^\s*(?:#|%|//|!)+\s?")
 
 
@@ -82,17 +87,23 @@ class Layout:
     delimiter : str or None
         The character between fields; None: any white space.
     line : int
-        Line of the names of the columns; 0 if it has none.
+        Line of the names of the columns; that of the first row if it has none.
     names : tuple of str
-        Names of the columns.
+        Names of the columns; their numbers, from 1, if it has none.
     titles : tuple of str
         Lines before the numbers that are not the names.
+    first : int
+        Line of the first row.
+    damaged : str
+        A sentence on a line before it that is a row with fields that are no numbers; empty if there is none.
     """
 
     delimiter: str | None
     line: int
     names: tuple[str, ...]
     titles: tuple[str, ...]
+    first: int
+    damaged: str = ""
 
     @property
     def names_factors(self) -> bool:
@@ -101,22 +112,28 @@ class Layout:
 
 
 def fields_of(line: str, delimiter: str | None) -> list[str]:
-    """Return the fields of a line."""
-    return [field.strip().strip('"') for field in line.strip("\r\n").split(delimiter)]
+    """Return the fields of a line; those in quotation marks may hold the delimiter."""
+    line = line.strip("\r\n")
+    if delimiter is not None and '"' in line:
+        try:
+            return [field.strip() for field in next(csv.reader([line], delimiter=delimiter, skipinitialspace=True))]
+        except csv.Error:  # a field is too long
+            pass
+    return [field.strip().strip('"') for field in line.split(delimiter)]
 
 
-def number_of(text: str, delimiter: str | None) -> float | None:
-    """Return the number in a field, nan of an empty one; None if it is neither."""
+def number_of(text: str) -> float | None:
+    """Return the number in a field, with a decimal point or comma, nan of an empty one; None if it is neither."""
     if not text or text.lower() in ("na", "n/a", "null", "none", "-", "--"):
         return float("nan")
     try:
-        return float(text.replace(",", ".") if delimiter == ";" else text)
+        return float(text.replace(",", "."))
     except ValueError:
         return None
 
 
-def layout_of(lines: Iterable[tuple[int, str]]) -> tuple[Layout, int] | None:
-    """Return the layout of a text, and the number of the line with the first row; None if there is no row.
+def layout_of(lines: Iterable[tuple[int, str]]) -> Layout | None:
+    """Return the layout of a text; None if there is no row.
 
     Parameters
     ----------
@@ -125,48 +142,102 @@ def layout_of(lines: Iterable[tuple[int, str]]) -> tuple[Layout, int] | None:
 
     Notes
     -----
-    The first line of numbers alone, four at least, is the first row. The last line before it with as many fields has
-    the names, also behind a sign of a comment.
+    The first line of numbers alone, four at least, is the first row. The last line before it with as many fields, three
+    of them no numbers, has the names, also behind a sign of a comment.
     """
-    before: list[tuple[int, str]] = []
+    before: list[_Line] = []
     for number, line in lines:
-        delimiter = next((sign for sign in "\t;," if sign in line), None)
-        fields = fields_of(line, delimiter)
-        numbers = [number_of(field, delimiter) for field in fields]
-        if len(fields) < 4 or None in numbers or all(value != value for value in numbers):
-            before.append((number, _COMMENT.sub("", line.rstrip("\r\n"))))
+        delimiter = next((sign for sign in _delimiters(line) if _is_row(fields_of(line, sign))), "")
+        if delimiter == "":
+            text = _COMMENT.sub("", line.rstrip("\r\n"))
+            before.append(_Line(number, text, comment=text != line.rstrip("\r\n")))
             continue
-        count = len(fields)
-        for known in (True, False):  # without a known name, the line before the first row may have names
-            for at, text in list(reversed(before))[: None if known else 1]:
-                names = _names(text, delimiter, count)
-                if names and (not known or any(role_of(name) for name in names)):
-                    titles = tuple(line for other, line in before if other != at and line.strip())
-                    return Layout(delimiter, at, names, titles), number
-        titles = tuple(line for _, line in before if line.strip())
-        return Layout(delimiter, 0, tuple(str(1 + column) for column in range(len(fields))), titles), number
+        count = len(fields_of(line, delimiter))
+        at, names = _names(before, delimiter, count)
+        titles = tuple(some.text for some in before if some.number != at and some.text.strip())
+        between = [some for some in before if some.number > at and not some.comment]
+        between = between if at else [some for some in between[-1:] if len(fields_of(some.text, delimiter)) == count]
+        damaged = next((fault for some in between if (fault := _fault(some, delimiter, names))), "")
+        return Layout(delimiter, at or number, names, titles, number, damaged)
     return None
 
 
-def _names(text: str, delimiter: str | None, count: int) -> tuple[str, ...]:
+@dataclass(frozen=True)
+class _Line:
+    """A line before the first row, without the sign of a comment."""
+
+    number: int
+    text: str
+    comment: bool
+
+
+def _delimiters(line: str) -> list[str | None]:
+    """Return the delimiters that a line may have, the likely ones first: a comma may be that of decimals."""
+    signs: list[str | None] = [sign for sign in "\t;," if sign in line]
+    return signs if signs and "," not in signs else [*signs, None]
+
+
+def _is_row(fields: Sequence[str]) -> bool:
+    """Return True if fields are numbers, four at least, and not all empty."""
+    numbers = [number_of(field) for field in fields]
+    return len(numbers) >= 4 and None not in numbers and any(value == value for value in numbers)
+
+
+def _names(before: Sequence[_Line], delimiter: str | None, count: int) -> tuple[int, tuple[str, ...]]:
+    """Return the line of the names and the names of columns, numbers from 1 and line 0 if there are none.
+
+    They are in the last line with as many names, one of which is known, or else in the last line that is no row.
+    """
+    numbered = tuple(str(1 + column) for column in range(count))
+    for line in reversed(before):
+        names = _split(line.text, delimiter, count)
+        words = [name for name in names if number_of(name) is None]
+        if len(words) >= _FEWEST_NAMES and any(role_of(name) for name in words):
+            return line.number, names
+    for line in reversed(before):
+        names = _split(line.text, delimiter, count)
+        if sum(number_of(name) is None for name in names) >= _FEWEST_NAMES:
+            return line.number, names
+        if line.text.strip() and (line.comment or not _fault(line, delimiter, numbered)):
+            break
+    return 0, numbered
+
+
+def _split(text: str, delimiter: str | None, count: int) -> tuple[str, ...]:
     """Return the names in a line if it has as many as there are columns, with the delimiter of rows or another one."""
-    for sign in dict.fromkeys((delimiter, None, ",", "\t")):
+    for sign in dict.fromkeys((delimiter, None, ",", ";", "\t")):
         names = fields_of(text, sign)
         if len(names) == count and all(names):
             return tuple(names)
     return ()
 
 
+def _fault(line: _Line, delimiter: str | None, names: Sequence[str]) -> str:
+    """Return a sentence on a line that is a row of numbers, but for some field; empty if it is none."""
+    fields = fields_of(line.text, delimiter)
+    numbers = [number_of(field) for field in fields]
+    known = sum(value is not None and value == value for value in numbers)
+    if len(fields) == len(names) and known >= 2:
+        for field, name, value in zip(fields, names, numbers, strict=True):
+            if value is None:
+                return f"line {line.number}, field {name}: {field[:40]!r} is not a number"
+    if len(fields) != len(names) and len(fields) >= 3 and None not in numbers and known:
+        return f"line {line.number} has {len(fields)} fields, and the first whole row {len(names)}"
+    return ""
+
+
 def role_of(name: str) -> str:
     """Return what a column is by its name: one of `ANGLES`, "values", "uncertainty", "wavelength"; "" if unknown."""
     plain = plain_name(name)
+    if plain in AZIMUTHS:  # "phi" is not "ph" and "i"
+        return ""
     if plain in _RELATIVE:
         return "delta_phi"
     if plain in _OTHERS:
         return _OTHERS[plain]
     if plain in _UNCERTAINTY:
         return "uncertainty"
-    if plain in _WAVELENGTH:
+    if plain in _WAVELENGTH or (plain.rpartition("_")[0] in _WAVELENGTH and length_unit(name) is not None):
         return "wavelength"
     if wavelength_of(name) is not None or any(plain in names for names in _QUANTITIES.values()):
         return "values"
@@ -193,6 +264,9 @@ def roles_of(names: Sequence[str]) -> dict[str, list[int]]:
     for colour in _COLOURS:
         if "values" not in roles and set(colour) <= set(bare):
             roles["values"] = [bare.index(channel) for channel in colour]
+    azimuths = [column for column, text in enumerate(plain) if text in AZIMUTHS]
+    if len(azimuths) == 1 and not {"phi_i", "phi_r", "delta_phi"} & set(roles):
+        roles["delta_phi"] = azimuths
     return {role: columns for role, columns in roles.items() if role and columns}
 
 
@@ -209,6 +283,12 @@ def angle_unit(name: str) -> str:
     if re.search(r"[\W_]rad", name.lower()):
         return "rad"
     return "deg" if "deg" in name.lower() or "°" in name else ""
+
+
+def length_unit(name: str) -> float | None:
+    """Return the unit [nm] of wavelengths that a name gives, such as 1000 of lambda_um; None if it gives none."""
+    match = _LENGTH.search(name)
+    return None if match is None else next(nm for unit, nm in _LENGTHS.items() if match[1].lower().startswith(unit))
 
 
 def in_percent(name: str) -> bool:

@@ -53,7 +53,7 @@ def record(
         "title": known.title or "",
         **document,
         "source": known.source or "",
-        "measured": None if known.measured is None else known.measured.model_dump(mode="json", exclude={"hull"}),
+        "measured": None if known.measured is None else known.measured.model_dump(mode="json", exclude={"extent"}),
         "note": known.note,
         "revision": table.revision,
         "digest": table.digest,
@@ -107,6 +107,11 @@ def of_lines(texts: list[str]) -> dict[str, Any]:
             except (ValueError, RecursionError):
                 document[key] = value
     return document
+
+
+def note(document: dict[str, Any], sentence: str) -> None:
+    """Add a sentence to the notes of a record, which statements on samples repeat."""
+    document["notes"] = [*document.get("notes", ()), sentence]
 
 
 _NM, _SPOT = re.compile(r"\b(\d+(?:\.\d+)?) ?nm\b"), re.compile(r"(\d+(?:\.\d+)?) ?mm spot")

@@ -39,6 +39,7 @@ tools = "every spreadsheet, pandas, R, MATLAB"
 kinds = ()
 options = OPTIONS
 _DIGITS = 5
+_LEAST_NM = 10.0  # of wavelengths in names without a unit
 _ANGLE_BYTES, _VALUE_BYTES, _MOST_BYTES = 8, 10, 40_000_000  # of a number in a row, and of a file, about
 _ANGLES = ("theta_i", "phi_i", "theta_r", "phi_r", "delta_phi", "theta_h", "phi_h", "theta_d", "phi_d")
 _ENOUGH = {"theta_i", "theta_r"}  # of a text of others, beside an azimuth
@@ -148,6 +149,9 @@ def read(path: str | os.PathLike[str]) -> FileTable | Samples:
         raise FileFormatError(f"{path}: the columns {', '.join(names)[:200]} are not angles, then values of f_r")
     known = of_lines(comments)
     at = _wavelengths(names[len(angles) :])
+    short = [name for name, nm in zip(names[len(angles) :], () if at is None else at, strict=False) if nm < _LEAST_NM]
+    if bare := [name for name in short if not name.endswith("m")]:
+        raise FileFormatError(f"{path}: line {first}: {bare[0]} is no wavelength in nm; write it as 550nm or 0.55um")
     if at is not None and np.unique(at).size != at.size:
         raise FileFormatError(f"{path}: line {first}: a wavelength stands twice")
     columns = {name: numbers[:, index] for index, name in enumerate(angles)}
@@ -186,13 +190,16 @@ def _wrong_row(names: tuple[str, ...], rows: Iterator[tuple[int, str]]) -> str:
         if len(fields) != len(names) and any(fields):
             return f"line {number} has {len(fields)} fields, and there are {len(names)} names"
         for field, name in zip(fields, names, strict=False):
-            if number_of(field or "empty", ",") is None and any(fields):
+            if number_of(field or "empty") is None and any(fields):
                 return f"line {number}, field {name}: {field[:40]!r} is not a number"
     return "it is no table of numbers"
 
 
 def _wavelengths(names: tuple[str, ...]) -> NDArray[np.float64] | None:
+    """Return the wavelengths [nm] that names give, 550nm or 0.55um; None if one gives none."""
     try:
-        return np.array([float(name.removesuffix("nm")) for name in names])
+        return np.array(
+            [1e3 * float(name[:-2]) if name.endswith("um") else float(name.removesuffix("nm")) for name in names]
+        )
     except ValueError:
         return None

@@ -20,20 +20,23 @@ from numpy.typing import NDArray
 from brdfdb.errors import FileFormatError, ParameterError
 from brdfdb.formats._columns import (
     ANGLES,
+    AZIMUTHS,
     QUANTITIES,
     Layout,
     angle_unit,
     fields_of,
     in_percent,
     layout_of,
+    length_unit,
     number_of,
+    plain_name,
     quantity_of,
     roles_of,
     unknown_unit,
     wavelength_of,
 )
 from brdfdb.formats._nodes import samples_at_angles
-from brdfdb.formats._record import of_comments
+from brdfdb.formats._record import note, of_comments
 from brdfdb.formats._text_file import check_text, lines_of
 
 if TYPE_CHECKING:
@@ -47,6 +50,8 @@ _LONGEST_TITLE = 1000  # lines before the first row
 _ROLES = (*ANGLES, "values", "uncertainty", "wavelength")
 keywords = (*_ROLES, "quantity", "angles")
 _UNITS = ("auto", "deg", "rad")
+_LEAST_NM, _LEAST_UM = 10.0, 100.0  # numbers without a unit below the first are not nm, from the second on not um
+HOW = "theta_i=NAME and so on, at the command line --column theta_i=NAME"  # columns are named
 _SHOWN = 200  # characters of names that a sentence repeats
 _IN_PLANE = 1e-6  # sine of an angle to the plane of incidence that is rounding
 _UPRIGHT = np.radians(90.0 + 1e-6)
@@ -54,13 +59,23 @@ _UPRIGHT = np.radians(90.0 + 1e-6)
 
 def recognises(head: bytes) -> bool:
     """Return True for the first bytes of a text whose columns have names of angles and values."""
+    layout = _layout_of_head(head)
+    return layout is not None and not _missing(roles_of(layout.names))
+
+
+def columns_of(head: bytes) -> tuple[str, ...]:
+    """Return the names of the columns in the first bytes of a text, their numbers if they have none."""
+    layout = _layout_of_head(head)
+    return () if layout is None else layout.names
+
+
+def _layout_of_head(head: bytes) -> Layout | None:
+    """Return the layout of a text by its first bytes, without a line that they may cut; None of any other file."""
     if b"\0" in head and not head.startswith((b"\xff\xfe", b"\xfe\xff")):
-        return False
+        return None
     encoding = "utf-16" if head.startswith((b"\xff\xfe", b"\xfe\xff")) else "utf-8-sig"
     lines = head[: len(head) // 2 * 2].decode(encoding, "replace").splitlines(keepends=True)
-    whole = lines if len(head) < 4096 else lines[:-1]
-    layout = layout_of(enumerate(whole, 1))
-    return layout is not None and not _missing(roles_of(layout[0].names))
+    return layout_of(enumerate(lines if len(head) < 4096 else lines[:-1], 1))
 
 
 def read(
@@ -100,9 +115,9 @@ def read(
     for name, value, allowed in (("quantity", quantity, ("auto", *QUANTITIES)), ("angles", angles, _UNITS)):
         if value not in allowed:
             raise ParameterError(name, f"{value!r} is not one of {', '.join(allowed)}", value, allowed)
-    layout, first = _layout(path)
+    layout = _layout(path)
     roles = _roles(path, layout, columns)
-    rows = _rows(path, layout, first)
+    rows = _rows(path, layout)
     record: dict[str, Any] = {"titles": list(layout.titles)} if layout.titles else {}
     turned = _angles(path, rows, roles, layout, angles, record)
     names = [layout.names[column] for column in roles["values"]]
@@ -112,17 +127,17 @@ def read(
     if "wavelength" in roles:
         if values.shape[1] != 1:
             raise FileFormatError(f"{path}: line {layout.line}: beside a wavelength there may be one column of values")
-        unit = layout.names[roles["wavelength"][0]]
-        turned, values, uncertainty, at = _pivoted(
-            turned, values, uncertainty, _nm(rows[:, roles["wavelength"][0]], unit)
-        )
+        lengths = _nm(path, rows[:, roles["wavelength"][0]], layout.names[roles["wavelength"][0]], layout, record)
+        turned, values, uncertainty, at = _pivoted(turned, values, uncertainty, lengths)
     elif at is not None:
+        note(record, "Wavelengths are those in the names of the columns.")
         order = np.argsort(at)
         at, values = at[order], values[:, order]
         uncertainty = None if uncertainty is None else uncertainty[:, order]
     instrument, length = of_comments({"titles": "\n".join(layout.titles)})
     if at is None and len(names) == 1 and length is not None:
         at = np.array([length])
+        note(record, f"The wavelength {length:g} nm was read from the titles of the file.")
     channels = [f"{nm:g}nm" for nm in at] if at is not None else ["grey"] if len(names) == 1 else names
     if channels == ["r", "g", "b"]:
         channels = ["R", "G", "B"]
@@ -134,8 +149,8 @@ def read(
     )
 
 
-def _layout(path: Path) -> tuple[Layout, int]:
-    """Return the layout of a text, and the line of its first row."""
+def _layout(path: Path) -> Layout:
+    """Return the layout of a text; FileFormatError if it has no row, or its first row is damaged."""
     layout = layout_of(itertools.islice(lines_of(path), _LONGEST_TITLE))
     if layout is None:
         for number, line in itertools.islice(lines_of(path), _LONGEST_TITLE):
@@ -144,6 +159,8 @@ def _layout(path: Path) -> tuple[Layout, int]:
         raise FileFormatError(
             f"{path}: line 1: none of the first {_LONGEST_TITLE} lines is a row of four numbers or more"
         )
+    if layout.damaged:
+        raise FileFormatError(f"{path}: {layout.damaged}")
     return layout
 
 
@@ -165,7 +182,9 @@ def _roles(path: Path, layout: Layout, columns: Mapping[str, str | Sequence[str]
         known.pop("phi_r" if "delta_phi" in given else "delta_phi", None)
     roles = {role: numbers for role, numbers in (known | given).items() if numbers}
     if missing := _missing(roles):
-        raise FileFormatError(f"{path}: line {layout.line}: among the columns {shown} is none of {missing}; name it")
+        raise FileFormatError(
+            f"{path}: line {layout.line}: among the columns {shown} is none of {missing}; name it: {HOW}"
+        )
     for role in (*ANGLES, "wavelength"):
         if len(roles.get(role, ())) > 1:
             names = [layout.names[column] for column in roles[role]]
@@ -181,20 +200,28 @@ def _missing(roles: Mapping[str, list[int]]) -> str:
     return ", ".join(missing)
 
 
-def _rows(path: Path, layout: Layout, first: int) -> Array:
+def _rows(path: Path, layout: Layout) -> Array:
     """Return the numbers of a text from its first row on, shape (N, columns)."""
     numbers, count = array("d"), len(layout.names)
+    decimals = ""  # the sign before decimals: a comma beside points may be that of thousands
     for line_number, line in lines_of(path):
-        if line_number < first or not line.strip() or line.lstrip().startswith(("#", "%")):
+        if line_number < layout.first or not line.strip() or line.lstrip().startswith(("#", "%")):
             continue
         fields = fields_of(line, layout.delimiter)
         fields = fields[:count] if len(fields) == count + 1 and not fields[-1] else fields
         if len(fields) != count:
             raise FileFormatError(f"{path}: line {line_number} has {len(fields)} fields, and the first row {count}")
         for field, name in zip(fields, layout.names, strict=True):
-            number = number_of(field, layout.delimiter)
+            number = number_of(field)
             if number is None or number in (np.inf, -np.inf):
                 raise FileFormatError(f"{path}: line {line_number}, field {name}: {field[:40]!r} is not a number")
+            sign = "," if "," in field else "." if "." in field else decimals
+            if decimals not in ("", sign):
+                where = f"line {line_number}, field {name}"
+                raise FileFormatError(
+                    f"{path}: {where}: {field[:40]!r} has {sign!r}, and numbers before it {decimals!r}"
+                )
+            decimals = sign
             numbers.append(number)
     return np.frombuffer(numbers, dtype=np.float64).reshape(-1, count)
 
@@ -215,7 +242,12 @@ def _angles(
     other = named[0] if len(named) == 1 else "deg"  # of columns whose names give none
     if not named and _may_be_radians(given):
         text = "no polar angle exceeds pi/2 and no azimuth 2 pi, so they may be radians: --angles rad reads them so"
-        record["notes"] = [f"Angles were taken as degrees, but no name gives a unit, {text}."]
+        note(record, f"Angles were taken as degrees, but no name gives a unit, {text}.")
+    if "delta_phi" in given and plain_name(layout.names[roles["delta_phi"][0]]) in AZIMUTHS:
+        note(
+            record,
+            f"The column {layout.names[roles['delta_phi'][0]]} was taken as the azimuth from the light to the viewer.",
+        )
     units = {name: unit or other for name, unit in units.items()}
     record["angles"] = " and ".join({"deg": "degrees", "rad": "radians"}[unit] for unit in sorted(set(units.values())))
     given = {name: np.deg2rad(column) if units[name] == "deg" else column for name, column in given.items()}
@@ -290,26 +322,26 @@ def _values(
 ) -> tuple[Array, Array | None]:
     """Return f_r [1/sr] of rows, shape (N, C), and their uncertainties if there are any."""
     names = {role: [layout.names[column] for column in roles.get(role, ())] for role in ("values", "uncertainty")}
-    notes = [
-        f"The unit {unit!r} of the column {name} is not known: its numbers were taken as they stand."
-        for name in (*names["values"], *names["uncertainty"])
-        if (unit := unknown_unit(name))
-    ]
+    for name in (*names["values"], *names["uncertainty"]):
+        if unit := unknown_unit(name):
+            note(record, f"The unit {unit!r} of the column {name} is not known: its numbers were taken as they stand.")
     percent = np.array([in_percent(name) for name in names["values"]])
     if percent.any():
-        notes.append("Values in percent were divided by 100.")
+        note(record, "Values in percent were divided by 100.")
     values: Array = rows[:, roles["values"]] * np.where(percent, 0.01, 1.0) * scale
-    uncertainty: Array | None = None
-    if "uncertainty" in roles:
-        given = rows[:, roles["uncertainty"]]
-        if given.shape != values.shape:
-            raise FileFormatError(f"{path}: line {layout.line}: there are not as many uncertainties as values")
-        relative = np.array([in_percent(name) for name in names["uncertainty"]])
-        if relative.any():
-            notes.append("Uncertainties in percent were taken as percent of the values of their rows.")
-        uncertainty = np.where(relative, 0.01 * given * np.abs(values), given * np.where(percent, 0.01, 1.0) * scale)
-    if notes:
-        record["notes"] = [*record.get("notes", ()), *notes]
+    if "uncertainty" not in roles:
+        return values, None
+    given = rows[:, roles["uncertainty"]]
+    if given.shape != values.shape:
+        raise FileFormatError(f"{path}: line {layout.line}: there are not as many uncertainties as values")
+    columns = (
+        f"column {names['uncertainty'][0]}" if given.shape[1] == 1 else f"columns {', '.join(names['uncertainty'])}"
+    )
+    note(record, f"Standard uncertainties were read from the {columns[:_SHOWN]}.")
+    relative = np.array([in_percent(name) for name in names["uncertainty"]])
+    if relative.any():
+        note(record, "Uncertainties in percent were taken as percent of the values of their rows.")
+    uncertainty = np.where(relative, 0.01 * given * np.abs(values), given * np.where(percent, 0.01, 1.0) * scale)
     return values, uncertainty
 
 
@@ -324,12 +356,26 @@ def _wavelengths(path: Path, names: Iterable[str], layout: Layout) -> Array | No
     return at
 
 
-def _nm(lengths: Array, name: str) -> Array:
+def _nm(path: Path, lengths: Array, name: str, layout: Layout, record: dict[str, Any]) -> Array:
     """Return wavelengths in nm, by the unit that a name gives, or by their size."""
-    if "nm" in name.lower():
-        return lengths
-    largest = float(np.nanmax(lengths))
-    return np.asarray(lengths * (1e9 if largest < 1e-3 else 1e3 if largest < 100.0 else 1.0))
+    where = f"{path}: line {layout.line}, field {name}"
+    if np.any(np.isnan(lengths)):
+        raise FileFormatError(f"{where}: a wavelength is missing")
+    unit_nm, word = length_unit(name), ""
+    if unit_nm is None:
+        if unit := unknown_unit(name):
+            raise FileFormatError(f"{where}: the unit {unit!r} is none of wavelengths; allowed are nm, um and m")
+        low, high = float(lengths.min()), float(lengths.max())
+        if low < _LEAST_NM <= _LEAST_UM <= high:
+            raise FileFormatError(f"{where}: {low:g} and {high:g} have no unit in common; write it into the name")
+        unit_nm, word = (1e9, "metres") if high < 1e-3 else (1e3, "micrometres") if high < _LEAST_UM else (1.0, "")
+    if word:
+        of_numbers = f"{low:g}" if low == high else f"{low:g} to {high:g}"
+        end = f"a name such as {plain_name(name)}_nm would say otherwise"
+        note(record, f"The column {name} gives no unit: its numbers, {of_numbers}, were taken as {word}; {end}.")
+    else:
+        note(record, f"Wavelengths are those of the column {name}.")
+    return np.asarray(lengths * unit_nm)
 
 
 def _pivoted(

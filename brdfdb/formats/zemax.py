@@ -25,7 +25,7 @@ from brdfdb.formats._angular_grid import SIZE, AngularGrid, Sink, chosen, rounde
 from brdfdb.formats._channels import LUMINOUS, XYZ, channels_of
 from brdfdb.formats._interface import TOLERANCE, Option
 from brdfdb.formats._nodes import samples_of_grid
-from brdfdb.formats._record import CONVENTION, lines, of_comments, of_lines, record, specular_remark
+from brdfdb.formats._record import CONVENTION, lines, note, of_comments, of_lines, record, specular_remark
 from brdfdb.formats._written import Written, whole
 
 if TYPE_CHECKING:
@@ -189,6 +189,9 @@ def _samples(name: str, names: tuple[str, ...], text: _zemax_file.Text, document
     nodes = [np.deg2rad(text.angles[axis]) for axis in (1, 0, 3, 2)]
     instrument, wavelength_nm = of_comments(document)
     known = wavelength_nm is not None and names == ("grey",)
+    if known:
+        document = dict(document)
+        note(document, f"The wavelength {wavelength_nm:g} nm was read from the comments of the file.")
     return samples_of_grid(
         Specular(anisotropic=True, mirrored=False),
         nodes,

@@ -10,11 +10,18 @@ from brdfdb.errors import counted
 _QUANTITIES = {"reflectance_factor": "reflectance factors", "f_r_cos": "values with the cosine of the viewer"}
 
 
+def percent(share: float) -> str:
+    """Return a share as text in percent: a plain number, with two digits below 10 %."""
+    return f"{100.0 * share:.0f} %" if not abs(share) < 0.0995 else f"{100.0 * share:.2g} %"
+
+
 def notes_of(record: Mapping[str, Any]) -> tuple[str, ...]:
     """Return what a reader noted in a record, in sentences."""
     notes = [str(note) for note in record.get("notes", ())]
     if text := _QUANTITIES.get(record.get("quantity", "")):
         notes.append(f"The file holds {text}: f_r was made of them.")
+    if record.get("azimuth") == "forward":
+        notes.append("Azimuths count from the forward direction, as was stated: 180 degrees were added.")
     if "exchanged" in record:
         notes.append(f"Letters exchanged: {record['exchanged']}.")
     if count := record.get("below_the_horizon"):

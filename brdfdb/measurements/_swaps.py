@@ -1,4 +1,4 @@
-"""Reciprocity of samples: the difference between those that are each other's swap of light and viewer."""
+"""Reciprocity of samples: the asymmetry of those that are each other's swap of light and viewer."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ _FAINT = 1e-3  # share of the median of abs(f_r) below which pairs do not count
 
 @dataclass(frozen=True)
 class Reciprocity:
-    """Difference between samples that are each other's swap of light and viewer, abs(a - b) / mean [1].
+    """Asymmetry abs(a - b) / (abs(a) + abs(b)) [1] of samples that are each other's swap of light and viewer.
 
     Attributes
     ----------
     pairs : int
         Number of pairs.
     median, largest : float [1]
-        Median and largest difference over pairs and channels.
+        Median and largest asymmetry over pairs and channels.
     """
 
     pairs: int
@@ -33,7 +33,7 @@ class Reciprocity:
 
 
 def reciprocity_of(samples: Samples, one_side: bool) -> Reciprocity | None:
-    """Return the differences between samples that are each other's swap."""
+    """Return the asymmetry of samples that are each other's swap; None without any."""
     angles = [degrees(angle) for angle in (samples.theta_i, samples.phi_i, samples.theta_r, samples.phi_r)]
     theta_i, phi_i, theta_r, phi_r = (np.rint(angle / _SAME_DEG).astype(np.int64) for angle in angles)
     turn = round(360.0 / _SAME_DEG)
@@ -51,14 +51,14 @@ def reciprocity_of(samples: Samples, one_side: bool) -> Reciprocity | None:
     partner = order[place]
     first = np.flatnonzero((code[partner] == code_swapped) & (code < code_swapped))
     a, b = samples.values[first], samples.values[partner[first]]
-    mean = 0.5 * (np.abs(a) + np.abs(b))
+    total = np.abs(a) + np.abs(b)
     faint = _FAINT * np.nanmedian(np.abs(samples.values)) if samples.known.any() else 0.0
-    counts = np.isfinite(mean) & (mean > faint)
+    counts = np.isfinite(total) & (0.5 * total > faint)
     pairs = int(np.sum(counts.any(axis=1)))
     if not pairs:
         return None
-    differences = np.abs(a - b)[counts] / mean[counts]
-    return Reciprocity(pairs, float(np.median(differences)), float(differences.max()))
+    asymmetry = np.abs(a - b)[counts] / total[counts]
+    return Reciprocity(pairs, float(np.median(asymmetry)), float(asymmetry.max()))
 
 
 def _wide(parts: Sequence[NDArray[np.int64]]) -> list[NDArray[np.uint64]]:

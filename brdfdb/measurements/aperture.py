@@ -118,6 +118,11 @@ class View:
             return np.asarray(shared / (_solid_angle(first) ** 2 * self.w_r[:, 2]))
         return np.asarray(shared / (_solid_angle(first) * _solid_angle(last) * self.w_r[:, 2]))
 
+    def points(self, width: float | None = None) -> int:
+        """Return the number of directions that the mean of a lobe takes at each pair; `width` as of `mean`."""
+        rings = _rings(self.half_angle, width)
+        return len(disk(rings)[1]) if rings else 1
+
     def mean(self, brdf: Callable[[Floats, Floats], Floats], width: float | None = None) -> Floats:
         """Return f_r [1/sr] averaged over the aperture.
 

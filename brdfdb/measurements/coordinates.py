@@ -1,16 +1,14 @@
-"""Coordinates of pairs of directions for scattered samples, and the hull of the directions that were measured."""
+"""Coordinates of pairs of directions for scattered samples, and the hull of some of them."""
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from brdfdb.parameters import Floats
 
 _FLAT = 1e-6  # spread of the samples along an axis of their hull, relative to the largest, that counts as none
 _WITHIN = 1e-6  # distance [rad] outside of the hull that rounding makes
-_DECIMALS = 9  # digits of half-spaces that are kept
-_TURNED = 5  # numbers of a half-space where the azimuth of the light counts
 
 
 def half_angles(wi: Floats, wr: Floats) -> tuple[Floats, Floats]:
@@ -39,56 +37,35 @@ def features(wi: Floats, wr: Floats, alpha: float, scales: tuple[float, float, f
     return np.stack(columns, axis=1)
 
 
-class Hull:
-    """The convex hull of the directions that were measured.
+def beyond(at: Floats, x: Floats) -> NDArray[np.bool_]:
+    """Return which points (N, D) lie outside of the convex hull of others (M, D), which is flat if they are."""
+    from scipy.spatial import ConvexHull
 
-    Isotropic pairs are points (theta_i, theta_r cos delta_phi, theta_r sin delta_phi), with their mirror images.
-    Others are points theta (cos phi, sin phi) of light and viewer. Directions in one plane make a flat hull.
+    centre = x.mean(axis=0)
+    _, spread, axes = np.linalg.svd(np.linalg.qr(x - centre, mode="r"), full_matrices=True)
+    spread = np.pad(spread, (0, x.shape[1] - spread.size))
+    wide = spread > _FLAT * max(spread[0], 1e-12)
+    along, across = axes[wide], axes[~wide]
+    inside = (x - centre) @ along.T
+    if inside.shape[1] > 1:
+        planes = ConvexHull(inside).equations
+    else:
+        low, high = inside.min(initial=0.0), inside.max(initial=0.0)
+        planes = np.array([[1.0, -high], [-1.0, low]])[:, 1 - inside.shape[1] :]
+    at = at - centre
+    outside: NDArray[np.bool_] = np.any(np.abs(at @ across.T) > _WITHIN, axis=1)
+    at = at @ along.T
+    for plane in planes:  # one at a time: there may be many
+        outside |= at @ plane[:-1] + plane[-1] > _WITHIN
+    return outside
 
-    Attributes
-    ----------
-    planes : array (P, 4 or 5)
-        Normals of the half-spaces and their offsets [rad]: a point x of 3 or 4 coordinates [rad] lies in the hull if
-        normal . x + offset is at most 0 for each of them.
+
+def places(wi: Floats, wr: Floats, *, turned: bool) -> Floats:
+    """Return coordinates [rad] of pairs of unit vectors (N, 3), shape (N, 3), or (N, 4) if the azimuth counts.
+
+    Isotropic pairs are points (theta_i, theta_r cos delta_phi, theta_r sin delta_phi). Others are points
+    theta (cos phi, sin phi) of light and viewer.
     """
-
-    def __init__(self, planes: ArrayLike) -> None:
-        self.planes = np.asarray(planes, dtype=np.float64)
-
-    @classmethod
-    def of(cls, wi: Floats, wr: Floats, *, turned: bool) -> Hull:
-        """Return the hull of pairs of unit vectors (N, 3) of light and viewer; `turned` if the azimuth counts."""
-        from scipy.spatial import ConvexHull
-
-        x = _places(wi, wr, turned=turned)
-        if not turned:
-            x = np.concatenate([x, x * [1.0, 1.0, -1.0]])
-        centre = x.mean(axis=0)
-        _, spread, axes = np.linalg.svd(np.linalg.qr(x - centre, mode="r"), full_matrices=True)
-        spread = np.pad(spread, (0, x.shape[1] - spread.size))
-        wide = spread > _FLAT * max(spread[0], 1e-12)
-        along, across = axes[wide], axes[~wide]
-        inside = (x - centre) @ along.T
-        if inside.shape[1] > 1:
-            planes = ConvexHull(inside).equations
-        else:
-            low, high = inside.min(initial=0.0), inside.max(initial=0.0)
-            planes = np.array([[1.0, -high], [-1.0, low]])[:, 1 - inside.shape[1] :]
-        flat = np.zeros((len(across), 1))
-        normals = np.concatenate([planes[:, :-1] @ along, across, -across])
-        offsets = np.concatenate([planes[:, -1:], flat, flat]) - (normals @ centre)[:, np.newaxis]
-        return cls(np.unique(np.round(np.concatenate([normals, offsets], axis=1), _DECIMALS), axis=0))
-
-    def outside(self, wi: Floats, wr: Floats) -> NDArray[np.bool_]:
-        """Return which pairs of unit vectors (N, 3) lie outside of the hull."""
-        x = _places(wi, wr, turned=self.planes.shape[1] == _TURNED)
-        beyond = np.zeros(len(x), dtype=bool)
-        for plane in self.planes:  # one at a time: tables have many nodes
-            beyond |= x @ plane[:-1] + plane[-1] > _WITHIN
-        return beyond
-
-
-def _places(wi: Floats, wr: Floats, *, turned: bool) -> Floats:
     theta_i, theta_r = (np.arctan2(np.hypot(w[:, 0], w[:, 1]), w[:, 2]) for w in (wi, wr))
     phi_i, phi_r = (np.arctan2(w[:, 1], w[:, 0]) for w in (wi, wr))
     if turned:

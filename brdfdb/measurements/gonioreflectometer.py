@@ -40,6 +40,7 @@ _RANGES = {
     "stray": (0.0, 1.0),
 }
 _WHITE = 0.7  # share of the full well that the standard fills at the longest exposure under perpendicular light
+_PIXEL = 1.0 / 12.0  # variance of a pixel along an axis [pixel^2]
 _SMOOTH = 2.0  # standard deviation [pixel] of the smoothing of counts by which noise is judged
 _SATURATED = 0.9  # share of the largest count above which a count is not used
 # Points of a pixel along each axis at which f_r is evaluated: Gauss and Legendre's two, with the variance of a pixel
@@ -171,7 +172,7 @@ class Gonioreflectometer:
     @property
     def instrument(self) -> Instrument:
         """The instrument as samples record it: solid angles are those of disks that blur as much."""
-        variance = (self.blur_px**2 + 1.0 / 12.0) * self.pitch**2  # along an axis; a disk of radius a has a^2 / 4
+        variance = (self.blur_px**2 + _PIXEL) * self.pitch**2  # along an axis; a disk of radius a has a^2 / 4
         light = radians(self.light_half_angle_deg)
         return Instrument(
             name="imaging gonioreflectometer",
@@ -307,7 +308,8 @@ def reduced(picture: Picture, thin: bool = True) -> Samples:
     -----
     Of the exposures in which a pixel does not saturate the longest counts. The paper fits to directions by eq. 3; here
     they are those of traced rays, which eq. 3 approximates. Pixels are not averaged: what a pixel blurs is stated by
-    the solid angle of the receiver.
+    the solid angle of the receiver. The blur is round in the picture, and the lens makes it an ellipse in directions:
+    at 60 degrees it is 4 / 3 as wide along theta as across. f_r is taken back to a round one by its second derivatives.
     """
     settings = picture.settings
     surface, noise = _unsaturated(picture.sample, picture.background, settings, 1)
@@ -316,10 +318,11 @@ def reduced(picture: Picture, thin: bool = True) -> Samples:
     with np.errstate(divide="ignore", invalid="ignore"):
         f_r = surface / white * scale
         uncertainty = np.hypot(noise, surface / white * white_noise) / white * scale
+    f_r = _rounded(f_r, settings)
     known = np.isfinite(settings.directions[..., 0]) & np.isfinite(f_r) & (white > 5.0 * white_noise)
     if not np.any(known):
         raise ParameterError("picture", "every pixel is dark, saturated or outside of the hemisphere")
-    kept = known & _chosen(np.where(known, f_r, np.nan), uncertainty) if thin else known
+    kept = known & _chosen(_smoothed(np.where(known, f_r, np.nan)), uncertainty) if thin else known
     theta_r, phi_r = spherical_angles(_turned(settings.directions[kept], picture.phi_i))
     return Samples(
         name=picture.name,
@@ -358,6 +361,39 @@ def _unsaturated(counts: Frames, background: Frames, settings: Gonioreflectomete
         value[used] = (some.astype(np.float64) - dark)[used] / time
         noise[used] = np.sqrt(variance[used]) / time
     return value, noise
+
+
+def _smoothed(f_r: Array) -> Array:
+    """Return f_r [1/sr] of pixels averaged over some of their neighbours; nan where it is.
+
+    Thinning by single pixels would keep those whose noise adds to the slope of f_r, and lobes come out too narrow.
+    """
+    from scipy.ndimage import gaussian_filter
+
+    known = np.isfinite(f_r)
+    weight = gaussian_filter(known.astype(np.float64), _SMOOTH)
+    sums = gaussian_filter(np.where(known, f_r, 0.0), _SMOOTH)
+    return np.asarray(np.divide(sums, weight, where=known, out=np.full(f_r.shape, np.nan)))
+
+
+def _rounded(f_r: Array, settings: Gonioreflectometer) -> Array:
+    """Return f_r [1/sr] of pixels as a blur leaves it that is round in directions, and of the same variance.
+
+    A blur adds half of its variance times the second derivative of f_r. The derivatives are those of a smoothed
+    picture; pixels near its edge, or near pixels without a value, stay as they are.
+    """
+    from scipy.ndimage import gaussian_filter, minimum_filter
+
+    down, right = np.gradient(settings.directions, axis=(0, 1))
+    xx, yy, xy = (np.sum(a * b, axis=-1) / settings.pitch**2 for a, b in ((right, right), (down, down), (right, down)))
+    area = xx * yy - xy**2
+    known = np.isfinite(f_r)
+    filled = np.where(known, f_r, 0.0)
+    f_xx, f_yy, f_xy = (gaussian_filter(filled, _SMOOTH, order) for order in ((0, 2), (2, 0), (1, 1)))
+    difference = (1.0 - yy / area) * f_xx + (1.0 - xx / area) * f_yy + 2.0 * xy / area * f_xy
+    change = 0.5 * (settings.blur_px**2 + _PIXEL) * difference
+    inside = minimum_filter(known, int(8.0 * _SMOOTH) + 1) & np.isfinite(change)
+    return f_r - np.where(inside, change, 0.0)
 
 
 def _chosen(f_r: Array, uncertainty: Array) -> NDArray[np.bool_]:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.errors import ParameterError
-from brdfdb.measurements.coordinates import Hull, features, half_angles
+from brdfdb.measurements.coordinates import beyond, features, half_angles, places
 from brdfdb.measurements.record import HeldOut
 from brdfdb.measurements.samples import Samples
 from brdfdb.parameters import Floats
@@ -277,9 +277,8 @@ def fit(samples: Samples, base: Base | None = None) -> Fitted:
     most likely one. Their scales are those with the smallest error at samples that are held out. Of scans, which have
     many viewers for one light, all samples of a light are held out together: neighbours in a scan would tell too much.
     The gap is then twice that of the samples, and the stated error is rather too large between incidences than too
-    small: of two lights it is that of extrapolation. Where some gaps are wider than most, such as one without lights,
-    or a hole among the viewers, it is too small within them. Samples without such a pattern are held out in ten parts,
-    by chance.
+    small: of two lights it is that of extrapolation. Nothing is tested in wider gaps and in holes, which
+    `brdfdb.measurements.extent.Extent` marks. Samples without such a pattern are held out in ten parts, by chance.
     """
     _check_values(samples)
     own, alpha, words = lambert_and_lobe(samples)
@@ -365,10 +364,11 @@ def _held_out(how: Interpolation, problem: _Problem, centres: _Problem) -> Float
 def _stated(samples: Samples, problem: _Problem, predicted: Floats, how: Interpolation, scheme: str) -> HeldOut:
     """Return the error at samples that were held out and lie within the directions of the others."""
     inside = np.ones(len(problem.wi), dtype=bool)
+    x = places(problem.wi, problem.wr, turned=samples.turned)
     for group in np.unique(problem.group):
         own = problem.group == group
-        hull = Hull.of(problem.wi[~own], problem.wr[~own], turned=samples.turned)
-        inside[own] = ~hull.outside(problem.wi[own], problem.wr[own])
+        others = x[~own] if samples.turned else np.concatenate([x[~own], x[~own] * [1.0, 1.0, -1.0]])
+        inside[own] = ~beyond(x[own], others)
     counted = inside if inside.any() else ~inside
     f_r = np.maximum(2.0 * how.level * np.sinh(problem.of_base + predicted), 0.0)[counted]
     values, floor = problem.values[counted], floor_of(samples)

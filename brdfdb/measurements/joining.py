@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
@@ -11,9 +13,12 @@ from numpy.typing import NDArray
 
 from brdfdb.errors import ParameterError, counted
 from brdfdb.geometry import degrees
-from brdfdb.measurements.samples import ANGLES, RELATIVE, Instrument, Samples
+from brdfdb.measurements._notes import percent
+from brdfdb.measurements.samples import ANGLES, NODES, RELATIVE, Instrument, Samples
 from brdfdb.parameters import Floats
 
+_BETWEEN = " _-.,+"  # signs between the words of a name
+_WORD = re.compile(r"\d+|[^\W\d_]+|[\W_]+")
 _SHOWN = 100  # characters of the channels of a part that a refusal repeats
 _SAME_DEG = 0.01  # directions closer than this are one
 _RATIO = 1.3  # of the larger to the smaller value, in the median, above which files contradict
@@ -23,8 +28,10 @@ _UNLIKELY = 3.0  # standard uncertainties of the difference, in the median, from
 def joined(parts: Sequence[Samples]) -> Samples:
     """Return the samples of several pictures or files of one surface as one.
 
-    Name and record are those of the first part, instruments and origins those of all. Where parts hold different values
-    at the same directions, a sentence says so in the entry "contradiction" of the record.
+    The name is the words that all names begin with, or all names. The record is that of the first part, with the notes
+    and counts of all; instruments and origins are those of all. Where parts hold different values at the same
+    directions, a sentence says so in the entry "contradiction" of the record. Uncertainties are left out, with a note,
+    unless all parts state them.
 
     Raises
     ------
@@ -56,11 +63,41 @@ def joined(parts: Sequence[Samples]) -> Samples:
             "; ".join(dict.fromkeys(part.instrument.name for part in parts if part.instrument.name))
         )
     provenance = "; ".join(dict.fromkeys(part.provenance for part in parts if part.provenance))
-    sentence = _contradiction(parts)
-    record = {**first.record, "contradiction": sentence} if sentence else first.record
+    names = list(dict.fromkeys(part.name for part in parts))
     return replace(
-        first, **arrays, uncertainty=uncertainty, instrument=instrument, provenance=provenance, record=record
+        first,
+        **arrays,
+        name=common_name(names) or " and ".join(names),
+        uncertainty=uncertainty,
+        instrument=instrument,
+        provenance=provenance,
+        record=_record(parts),
     )
+
+
+def common_name(names: Sequence[str]) -> str:
+    """Return the words and numbers that all names begin with, such as tile of tile_10 and tile_30; "" if none."""
+    columns = zip(*(_WORD.findall(name) for name in names), strict=False)
+    same = itertools.takewhile(lambda words: len(set(words)) == 1, columns)
+    return "".join(words[0] for words in same).strip(_BETWEEN)
+
+
+def _record(parts: Sequence[Samples]) -> dict[str, Any]:
+    """Return the record of the first part with the notes and counts of all, and what contradicts."""
+    records = [part.record for part in parts]
+    record = dict(records[0])
+    notes = list(dict.fromkeys(str(text) for some in records for text in some.get("notes", ())))
+    without = [part.name for part in parts if part.uncertainty is None]
+    if 0 < len(without) < len(parts):
+        verb = "states" if len(without) == 1 else "state"
+        notes.append(f"Standard uncertainties were left out: {' and '.join(without)} {verb} none.")
+    left = list(dict.fromkeys(name for some in records for name in some.get("columns_left_out", ())))
+    counts = {key: sum(some.get(key, 0) for some in records) for key in ("below_the_horizon", "repeated")}
+    entries = {"notes": notes, "columns_left_out": left, **counts, "contradiction": _contradiction(parts)}
+    record |= {key: value for key, value in entries.items() if value}
+    if not all(some.get(NODES) for some in records):
+        record.pop(NODES, None)
+    return record
 
 
 def _check_channels(first: Samples, other: Samples) -> None:
@@ -101,7 +138,7 @@ def _contradiction(parts: Sequence[Samples]) -> str:
         beyond = stated.any() and float(np.median(np.abs(a - b)[stated] / u[stated])) > _UNLIKELY
         if ratio > worst and (ratio > _RATIO or beyond):
             files = "both files have" if len(parts) == 2 else f"{parts[number].name} and files before it have"
-            what = f"f_r differs by {100.0 * (ratio - 1.0):.3g} % in the median"
+            what = f"f_r differs by {percent(ratio - 1.0)} in the median"
             end = ", which is beyond the stated uncertainties" if beyond else ""
             directions = counted(int(np.sum(positive.any(axis=1))), "direction")
             worst, sentence = ratio, f"At {directions} that {files}, {what}{end}."

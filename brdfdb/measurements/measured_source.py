@@ -17,7 +17,7 @@ from brdfdb.materials import FunctionSource
 from brdfdb.materials.source import Evaluate
 from brdfdb.measurements import laws, symmetry
 from brdfdb.measurements.colours import rgb_of, spectra_of_colours
-from brdfdb.measurements.coordinates import Hull
+from brdfdb.measurements.extent import Extent
 from brdfdb.measurements.interpolation import Base, fit, floor_of
 from brdfdb.measurements.record import Change, Measured, Noise
 from brdfdb.measurements.samples import Samples
@@ -28,7 +28,7 @@ _COLOURS = (("R", "G", "B"), ("X", "Y", "Z"))
 _LIGHTS_DEG, _HALF_DEG = (10.0, 20.0, 30.0), np.linspace(0.0, 60.0, 121)  # where the width of a lobe is looked for
 MARGIN = 0.003  # of the albedo of data that are made to conserve energy: measured tables exceed them by 0.0012
 _CLEAR = 3.0  # a peak so many times as bright as the surface far from it is a lobe
-_BETWEEN = 0.05  # share of the pairs of directions outside of the hull of a file that lists all: its hull has corners
+_BETWEEN = 0.05  # share of the pairs of directions outside of the extent of a file that lists all: it has corners
 _PROBED = 2000  # pairs at which the share of negative values of a function is counted
 
 
@@ -93,7 +93,7 @@ class MeasuredSource(FunctionSource):
             relative = (uncertainty / np.maximum(np.abs(samples.values), floor_of(samples)))[samples.known]
             noise = Noise(**_named(("median", "p95"), np.nanpercentile(relative, [50.0, 95.0])))
         some = samples.known.any(axis=1)
-        hull = _hull(samples, turned=samples.turned)
+        extent = Extent.of(samples, turned=samples.turned)
         known = samples.values[samples.known]
         measured = Measured(
             by=samples.instrument.name,
@@ -103,9 +103,10 @@ class MeasuredSource(FunctionSource):
             holes=int(np.count_nonzero(~samples.known)),
             negative=float(f"{np.mean(known < 0.0):.3g}"),
             interpolation=f"asinh of f_r over noise, less that of {fitted.base}, by radial functions of directions",
-            reciprocity=symmetry.reciprocity(fitted.f_r, hull, fitted.held_out.p99),
+            reciprocity=symmetry.reciprocity(fitted.f_r, extent, fitted.held_out.p99),
             mirror=None if samples.turned else _mirror_of(samples, fitted.held_out.p99),
-            hull=hull.planes.tolist(),
+            extrapolated=_extrapolated(extent),
+            extent=extent,
             held_out=fitted.held_out,
             noise=noise,
         )
@@ -142,8 +143,8 @@ class MeasuredSource(FunctionSource):
         noise : Noise, optional
             Uncertainty of the values.
         nodes : Samples, optional
-            Values at the directions that were measured: f_r outside of their hull is marked as extrapolated. By default
-            f_r is known everywhere, as it is where nearly all directions lie within the hull.
+            Values at the directions that were measured: f_r outside of their `Extent` is marked as extrapolated. By
+            default f_r is known everywhere, as it is where nearly all directions lie within.
 
         Raises
         ------
@@ -160,18 +161,21 @@ class MeasuredSource(FunctionSource):
 
         known = None if noise is None else 2.6 * noise.p95
         turned = symmetry.is_turned(f_r, known)
-        hull = None if nodes is None else _hull_of(nodes, turned=turned)
         seen = None if turned else symmetry.mirror(f_r, known)
         if seen is not None and not seen.assumed:
             turned = True
+        extent = None if nodes is None else Extent.of(nodes, turned=turned)
+        if extent is not None and _extrapolated(extent) <= _BETWEEN:
+            extent = None
         measured = Measured(
             channels=list(channels),
             samples=0,
             negative=float(f"{np.mean(values < 0.0):.3g}"),
             interpolation="as the tools of the file evaluate it",
-            reciprocity=symmetry.reciprocity(f_r, hull, known),
+            reciprocity=symmetry.reciprocity(f_r, extent, known),
             mirror=seen,
-            hull=None if hull is None else hull.planes.tolist(),
+            extrapolated=None if extent is None else _extrapolated(extent),
+            extent=extent,
             noise=noise,
         )
         mirrored = _mirrored(f_r) if seen is not None and seen.assumed and _differs(seen) else f_r
@@ -211,7 +215,8 @@ class MeasuredSource(FunctionSource):
 
     def extrapolated(self, wi: Floats, wr: Floats) -> NDArray[np.bool_]:
         """Return which pairs of unit vectors (N, 3) lie outside of the directions that were measured."""
-        return Hull(self._measured.hull or np.empty((0, 4))).outside(wi, wr)
+        extent = self._measured.extent
+        return np.zeros(len(wi), dtype=bool) if extent is None else extent.outside(wi, wr)
 
     def recorded(self, **changes: Any) -> Self:
         """Return the source with some entries of its record changed."""
@@ -279,16 +284,9 @@ def slug(name: str) -> str:
     return words
 
 
-def _hull(samples: Samples, *, turned: bool) -> Hull:
-    """Return the hull of the directions at which a value is known."""
-    some = samples.known.any(axis=1)
-    return Hull.of(samples.w_i[some], samples.w_r[some], turned=turned)
-
-
-def _hull_of(nodes: Samples, *, turned: bool) -> Hull | None:
-    """Return the hull of the nodes of a file, or None if nearly all pairs of directions lie within it."""
-    hull = _hull(nodes, turned=turned)
-    return None if np.mean(hull.outside(*symmetry.drawn_pairs(up_to_deg=90.0))) <= _BETWEEN else hull
+def _extrapolated(extent: Extent) -> float:
+    """Return the share of the pairs of directions, evenly over both hemispheres, that lie outside of an extent."""
+    return float(f"{np.mean(extent.outside(*symmetry.drawn_pairs(up_to_deg=90.0))):.3g}")
 
 
 def _named(names: tuple[str, ...], values: Floats) -> dict[str, float]:

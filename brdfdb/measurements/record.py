@@ -6,6 +6,9 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from brdfdb.measurements.extent import Extent
+
+_FEW = 1e-3  # share of directions that is not told from 0: a few of those that it is counted with
 _SHOWN = 12  # digits of a digest
 
 _STRICT = ConfigDict(frozen=True, extra="forbid")
@@ -87,13 +90,11 @@ class Measured(BaseModel):
         description="f_r of an isotropic surface and of its mirror image; null: anisotropic"
     )
     extrapolated: float | None = Field(
-        default=None, description="share of the nodes above the horizon that lie outside of the samples"
-    )
-    hull: list[list[float]] | None = Field(
         default=None,
-        description="half-spaces around the directions that were measured, each a normal and an offset [rad], as of "
-        "`brdfdb.measurements.coordinates.Hull`; holes within are not marked; null: f_r is "
-        "known everywhere",
+        description="share of all pairs of directions that were not measured; null: f_r is known everywhere",
+    )
+    extent: Extent | None = Field(
+        default=None, description="directions that were measured, without holes; null: f_r is known everywhere"
     )
     held_out: HeldOut | None = Field(default=None, description="null: f_r is known everywhere")
     noise: Noise | None = Field(default=None, description="null: not known")
@@ -111,7 +112,7 @@ class Measured(BaseModel):
 
     def in_words(self) -> list[str]:
         """Return sentences on origin, errors, symmetries and changes."""
-        known = "f_r of a file, between its values" if self.hull else "f_r of a file, everywhere"
+        known = "f_r of a file, between its values" if self.extent else "f_r of a file, everywhere"
         of = f"{self.samples} samples of {self.incidences} incidences" if self.samples else known
         lines = [f"{of}, channels {', '.join(self.channels)}{f'; {self.by}' if self.by else ''}"]
         if self.file:
@@ -124,7 +125,7 @@ class Measured(BaseModel):
                 f"{held.p95:.2g}, 99 within {held.p99:.2g}, of f_r"
             )
         noise = "not stated" if self.noise is None else f"median {self.noise.median:.2g}, p95 {self.noise.p95:.2g}"
-        lines.append(f"noise of the samples: {noise}")
+        lines.append(f"noise of the {'samples' if self.samples else 'file'}: {noise}")
         for name, symmetry in (("reciprocity", self.reciprocity), ("mirror symmetry", self.mirror)):
             if symmetry is not None:
                 seen = symmetry.asymmetry
@@ -135,8 +136,11 @@ class Measured(BaseModel):
                 )
                 lines.append(f"{name} {'assumed' if symmetry.assumed else 'not assumed'}: {how}")
         if self.extrapolated is not None:
+            share = 1.0 - self.extrapolated
+            words = f"{100.0 * share:.3g} %" if share >= _FEW else f"less than {100.0 * _FEW:g} %"
             lines.append(
-                f"{100.0 * self.extrapolated:.3g} % of the nodes lie outside of the samples: f_r there is extrapolated"
+                f"{words} of all pairs of directions were measured; beyond, and in holes, f_r is extrapolated, and its "
+                "error not known"
             )
         if self.negative > 0.0:
             lines.append(f"{100.0 * self.negative:.3g} % of the values are below 0: f_r is 0 there")

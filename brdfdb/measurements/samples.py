@@ -12,14 +12,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.errors import ParameterError
-from brdfdb.geometry import check_phi, check_theta, degrees, radians, unit_vector
+from brdfdb.geometry import check_phi, degrees, radians, unit_vector
 from brdfdb.parameters import Floats
 
 if TYPE_CHECKING:
     import xarray as xr
 
 RELATIVE = "relative to the light"  # entry "azimuths" of a record: the azimuth on the surface is not known
+NODES = "nodes"  # entry of a record that is true if the samples are all nodes of a grid
 ANGLES = ("theta_i", "phi_i", "theta_r", "phi_r")
+_OPTIONAL = ("uncertainty", "wavelength_nm", "bandwidth_nm")
 _HORIZON = 0.5 * np.pi * (1.0 + 1e-9)  # largest polar angle [rad], with rounding
 _SAME_LIGHT_DEG = 1e-4  # lights closer than this are one incidence
 
@@ -103,10 +105,8 @@ class Samples:
 
     def __post_init__(self) -> None:
         for name in (*ANGLES, "values", "uncertainty", "wavelength_nm", "bandwidth_nm"):
-            array = getattr(self, name)
-            if array is not None:
-                object.__setattr__(self, name, np.asarray(array, dtype=np.float64))
-        count = len(self.theta_i)
+            object.__setattr__(self, name, _floats(name, getattr(self, name), optional=name in _OPTIONAL))
+        count = self.theta_i.size
         expected = {**dict.fromkeys(ANGLES, (count,)), "values": (count, len(self.channels))}
         expected |= {"uncertainty": expected["values"], "wavelength_nm": (len(self.channels),)}
         expected |= {"bandwidth_nm": expected["wavelength_nm"]}
@@ -116,16 +116,13 @@ class Samples:
                 raise ParameterError(name, f"shape {array.shape} is not {shape}", array.shape, shape)
         for name in ANGLES:
             angle = getattr(self, name)
-            (check_theta if name.startswith("theta") else check_phi)(name, angle)
-            if not np.all(np.isfinite(angle)):
+            if not np.all(np.isfinite(check_phi(name, angle))):
                 raise ParameterError(name, "nan is not an angle", np.nan)
-            if name.startswith("theta") and np.any(angle > _HORIZON):
-                raise ParameterError(
-                    name,
-                    f"{degrees(angle.max()):.6g} degrees is below the horizon",
-                    float(angle.max()),
-                    (0.0, _HORIZON),
-                )
+            beyond = angle[(angle < 0.0) | (angle > _HORIZON)] if name.startswith("theta") else angle[:0]
+            if beyond.size:
+                where = "is below the horizon" if beyond[0] > 0.0 else "is no polar angle"
+                text = f"{degrees(beyond[0]):.6g} degrees {where}; allowed are 0 to 90 degrees"
+                raise ParameterError(name, text, float(beyond[0]), (0.0, _HORIZON))
         if np.any(np.isinf(self.values)):
             raise ParameterError("values", "a value is infinite; a hole is nan", np.inf)
         if self.uncertainty is not None and np.any(self.uncertainty < 0.0):
@@ -241,6 +238,18 @@ class Samples:
             provenance=str(attributes.get("provenance", "")),
             record=json.loads(attributes.get("record", "{}")),
         )
+
+
+def _floats(name: str, array: Any, *, optional: bool) -> Floats | None:
+    """Return numbers as an array of floats; ParameterError if they are missing, or none."""
+    if array is None:
+        if optional:
+            return None
+        raise ParameterError(name, "it is missing; an array of numbers is needed", None)
+    try:
+        return np.asarray(array, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise ParameterError(name, f"{type(array).__name__} is no array of numbers", type(array).__name__) from None
 
 
 def _angle(dataset: xr.Dataset, name: str, count: int) -> Floats:

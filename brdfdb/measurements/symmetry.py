@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from brdfdb.geometry import radians, unit_vector
 from brdfdb.materials.source import Evaluate
-from brdfdb.measurements.coordinates import Hull
+from brdfdb.measurements.extent import Extent
 from brdfdb.measurements.record import Spread, Symmetry
 from brdfdb.parameters import Floats
 
@@ -23,19 +23,19 @@ _IN_OCTAVE = 400
 _WITHIN = 1.2  # times the noise is how large the asymmetry may be, because both are estimates
 
 
-def drawn_pairs(hull: Hull | None = None, up_to_deg: float = _UP_TO_DEG) -> tuple[Floats, Floats]:
-    """Return pairs of unit vectors (N, 3) up to an angle [degree]; with a hull, those within it, also exchanged."""
+def drawn_pairs(extent: Extent | None = None, up_to_deg: float = _UP_TO_DEG) -> tuple[Floats, Floats]:
+    """Return pairs of unit vectors (N, 3) up to an angle [degree]; with an extent, those within it, also exchanged."""
     rng = np.random.default_rng(_SEED)
     theta = np.arccos(rng.uniform(np.cos(radians(up_to_deg)), 1.0, (2, _DRAWN)))
     phi = rng.uniform(0.0, 2.0 * np.pi, (2, _DRAWN))
     wi, wr = (unit_vector(theta[k], phi[k]) for k in (0, 1))
-    if hull is None:
+    if extent is None:
         return wi, wr
-    inside = _inside(hull, wi, wr)
+    inside = _inside(extent, wi, wr)
     return wi[inside], wr[inside]
 
 
-def lobe_pairs(hull: Hull | None = None) -> tuple[Floats, Floats, NDArray[np.int64]]:
+def lobe_pairs(extent: Extent | None = None) -> tuple[Floats, Floats, NDArray[np.int64]]:
     """Return pairs of unit vectors (N, 3) around the mirror direction and the light, and their octaves (N,).
 
     As many pairs have half vectors with slopes of 0.002 to 0.004, as of 0.004 to 0.008, and so on up to 2: a lobe of
@@ -52,13 +52,13 @@ def lobe_pairs(hull: Hull | None = None) -> tuple[Floats, Floats, NDArray[np.int
     wi, wr = np.concatenate([wi, wi]), np.concatenate([wr, wr * _HALF_TURN])
     octave = np.concatenate([octave, octave + _SLOPES.size])
     inside = wr[:, 2] > np.cos(radians(_UP_TO_DEG))
-    if hull is not None:
-        inside &= _inside(hull, wi, wr)
+    if extent is not None:
+        inside &= _inside(extent, wi, wr)
     return wi[inside], wr[inside], octave[inside]
 
 
-def _inside(hull: Hull, wi: Floats, wr: Floats) -> NDArray[np.bool_]:
-    return ~(hull.outside(wi, wr) | hull.outside(wr, wi))
+def _inside(extent: Extent, wi: Floats, wr: Floats) -> NDArray[np.bool_]:
+    return ~(extent.outside(wi, wr) | extent.outside(wr, wi))
 
 
 def spread_of(changes: Floats) -> Spread:
@@ -76,13 +76,13 @@ def asymmetry_of(f: Floats, other: Floats) -> Spread | None:
     return spread_of(np.abs(f - other) / np.maximum(total, floor))
 
 
-def reciprocity(f_r: Evaluate, hull: Hull | None, noise: float | None) -> Symmetry:
+def reciprocity(f_r: Evaluate, extent: Extent | None, noise: float | None) -> Symmetry:
     """Return whether data keep to reciprocity within their noise [1]; it is not assumed where they cannot tell.
 
     The asymmetry is the larger one of pairs everywhere and of `lobe_pairs`.
     """
     spreads = [
-        asymmetry_of(f_r(wi, wr), f_r(wr, wi)) for wi, wr in (drawn_pairs(hull), lobe_pairs(hull)[:2]) if len(wi)
+        asymmetry_of(f_r(wi, wr), f_r(wr, wi)) for wi, wr in (drawn_pairs(extent), lobe_pairs(extent)[:2]) if len(wi)
     ]
     seen = max((one for one in spreads if one is not None), key=lambda one: one.p99, default=None)
     allowed = _ROUNDING if noise is None else max(_WITHIN * noise, _ROUNDING)

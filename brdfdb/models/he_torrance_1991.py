@@ -198,7 +198,8 @@ def evaluated(directions: Directions, surface: Sequence[Floats], series: int = W
     directions.
     """
     uniform = all(np.size(feature) == 1 for feature in surface)
-    if isinstance(directions, Vectors) and uniform:
+    rows_of_one = all(np.ndim(feature) == 0 or np.shape(feature)[-1] == 1 for feature in surface)
+    if isinstance(directions, Vectors) and (uniform or (rows_of_one and directions.w_i.shape[-2:-1] > (1,))):
 
         def rows(w_i: Floats, w_r: Floats, scalars: NDArray[np.float64], values: Floats) -> None:
             vector_rows(w_i, w_r, series, reach, scalars, values)

@@ -14,6 +14,8 @@ from brdfdb._elementary import COS_HORIZON
 from brdfdb.geometry import radians, unit_vector
 from brdfdb.integrals.sampling import mirrored_in_lobe, mixture_density
 from brdfdb.materials import FunctionRecord, Source
+from brdfdb.measurements import MeasuredSource
+from brdfdb.measurements.extent import Extent
 from brdfdb.parameters import Floats
 from brdfdb.tables import places
 from brdfdb.tables._interpolation import weights_of_nodes
@@ -22,6 +24,7 @@ from brdfdb.tables.layout import PLAIN, Interpolation, Layout
 from brdfdb.tables.places import BANDS_DEG
 from brdfdb.tables.stated_error import Between, Error, Overall, Places
 from brdfdb.tables.table import Table, points
+from brdfdb.tables.table_source import TableSource
 from brdfdb.tables.worst_pair import worst_pair
 
 FLOOR = 1e-3  # share of the Lambertian BRDF with the albedo of the source
@@ -34,6 +37,7 @@ SEED = 1991
 _IN_PLACES, _BETWEEN, _BETWEEN_IN_PLACES = 1 / 10, 1 / 6, 1 / 15
 _WITHIN, _CONFIDENCE = 0.98, 0.98  # share of the values within a limit, and how sure that is
 _SEARCHED, _SEARCHED_AT = (9, 400), 40  # wavelengths of an interval, of all; directions of a band: for the worst
+_THIN = 0.05  # share of the pairs that count below which they are drawn among those that were measured
 _WINDOW = 1 << 21  # values of a table that are held at a time
 _EVALUATED = 1 << 16  # directions at which the source is evaluated at a time
 
@@ -42,7 +46,7 @@ class Draw(NamedTuple):
     """Pairs of directions: unit vectors (N, 3), the band of theta_i of each, and what an integral weighs it with.
 
     `weight` is cos theta_r over the density with which the viewer was drawn; 0 below the horizon. `in_lobe` says which
-    viewers were drawn in the lobe.
+    viewers were drawn in the lobe, `measured` which pairs count: of measured data those that are not extrapolated.
     """
 
     wi: Floats
@@ -50,11 +54,12 @@ class Draw(NamedTuple):
     band: NDArray[np.int64]
     weight: Floats
     in_lobe: NDArray[np.bool_]
+    measured: NDArray[np.bool_]
 
     @property
     def above(self) -> NDArray[np.bool_]:
-        """Mask of the viewers above the horizon."""
-        return np.asarray(self.weight > 0.0)
+        """Mask of the pairs that count: the viewer is above the horizon, and f_r is not extrapolated."""
+        return np.asarray((self.weight > 0.0) & self.measured)
 
 
 def draw(
@@ -65,8 +70,26 @@ def draw(
     theta_i is uniform in its band, phi_i in the circle. Over the hemisphere the solid angle is uniform; in the lobe the
     light is mirrored in half vectors that follow `Source.lobe`, of the wavelengths in turn, or a lobe twice as wide:
     its own distribution hardly ever reaches the shoulder where the lobe ends. All facets count alike, seen or not.
-    Viewers of a source without a lobe, or of an unknown one, are all drawn over the hemisphere.
+    Viewers of a source without a lobe, or of an unknown one, are all drawn over the hemisphere. Where hardly any of
+    these pairs was measured, such as in a single plane, pairs are drawn evenly over those that were.
     """
+    drawn = _over_all(source, wavelength_nm, count, seed)
+    extent = _extent_of(source)
+    if extent is None or np.count_nonzero(drawn.above) >= _THIN * len(drawn.wi):
+        return drawn
+    wi, wr = extent.drawn(len(drawn.wi), np.random.default_rng(seed))
+    band = np.clip(np.searchsorted(radians(BANDS_DEG), np.arccos(wi[:, 2]), side="right") - 1, 0, BANDS_DEG.size - 2)
+    order = np.argsort(band, kind="stable")
+    wi, wr, band = wi[order], wr[order], band[order]
+    weight = wr[:, 2] * np.sinc(np.arccos(wr[:, 2]) / np.pi)  # drawn evenly in theta (cos phi, sin phi)
+    none = np.zeros(band.size, dtype=bool)
+    return Draw(wi, wr, band, weight * (np.pi / weight.mean()), none, ~none)
+
+
+def _over_all(
+    source: Source | FunctionRecord | None, wavelength_nm: NDArray[np.float64] | None, count: int, seed: int
+) -> Draw:
+    """Draw pairs of directions as `draw` does, everywhere."""
     rng = np.random.default_rng(seed)
     band = np.repeat(np.arange(BANDS_DEG.size - 1), count)
     theta_i = radians(BANDS_DEG[band] + rng.random(band.size) * np.diff(BANDS_DEG)[band])
@@ -76,7 +99,8 @@ def draw(
     in_turn = None if wavelength_nm is None else wavelength_nm[np.arange(band.size) % wavelength_nm.size]
     lobe = None if source is None else source.lobe(wi[:, 2], in_turn)
     if lobe is None:
-        return Draw(wi, over, band, over[:, 2] * (2.0 * np.pi), np.zeros(band.size, dtype=bool))
+        none = np.zeros(band.size, dtype=bool)
+        return Draw(wi, over, band, over[:, 2] * (2.0 * np.pi), none, _measured(source, wi, over))
     lobes = [
         lobe._replace(share=np.ones(1), alpha_x=width * lobe.alpha_x, alpha_y=width * lobe.alpha_y, visible=False)
         for width in WIDTHS
@@ -87,7 +111,20 @@ def draw(
         chosen = (which >= number) & (which < number + 1)
         wr = np.where(chosen[:, np.newaxis], mirrored_in_lobe(u, angle, wi, drawn), wr)
     density = 0.5 / (2.0 * np.pi) + 0.5 * np.mean([mixture_density(drawn, wi, wr) for drawn in lobes], axis=0)
-    return Draw(wi, wr, band, np.where(wr[:, 2] > 0.0, wr[:, 2], 0.0) / density, which < len(lobes))
+    weight = np.where(wr[:, 2] > 0.0, wr[:, 2], 0.0) / density
+    return Draw(wi, wr, band, weight, which < len(lobes), _measured(source, wi, wr))
+
+
+def _measured(source: Source | FunctionRecord | None, wi: Floats, wr: Floats) -> NDArray[np.bool_]:
+    """Return which pairs of unit vectors (N, 3) count: all, or of measured data those that are not extrapolated."""
+    extent = _extent_of(source)
+    return np.ones(len(wi), dtype=bool) if extent is None else ~extent.outside(wi, wr)
+
+
+def _extent_of(source: Source | FunctionRecord | None) -> Extent | None:
+    """Return the directions that were measured; None if all are known."""
+    measured = source.measured if isinstance(source, MeasuredSource | TableSource) else None
+    return None if measured is None else measured.extent
 
 
 def model_values(source: Source, wavelength_nm: NDArray[np.float64] | None, wi: Floats, wr: Floats) -> Floats:
@@ -161,6 +198,7 @@ def measure(
     truth = model_values(layout.source, layout.wavelength_nm, wi, wr)
     values = _looked_up(layout, read, wi, wr, layout.wavelength_nm)
     own = len(drawn.wi)
+    inside = _measured(layout.source, pairs.wi, pairs.wr)
     error = compare(values[:own], truth[:own], drawn, seed)
     floor = np.array(error.floor)  # as it is stated, to three digits
     above = drawn.above
@@ -177,7 +215,7 @@ def measure(
     measured = error.model_copy(
         update={
             "worst": worst,
-            "places": _in_places(relative(truth[own:], values[own:], floor), pairs),
+            "places": _in_places(relative(truth[own:], values[own:], floor), pairs, inside),
             "between": None if floor.size < 2 else _between(layout, read, drawn, pairs, floor, count),
         }
     )
@@ -194,10 +232,10 @@ def _between(
 ) -> Between:
     """Measure the error between wavelengths, at some of the directions that it was measured at on them."""
     assert layout.wavelength_nm is not None
-    few = _first(drawn.band, min(count, _SEARCHED_AT)) & drawn.above
+    few = _some(drawn, min(count, _SEARCHED_AT))
     how = layout.interpolation if layout.part_nm is None else PLAIN  # a mixture interpolates f_r itself
     at = worst_wavelengths(layout.source, layout.wavelength_nm, how, drawn.wi[few], drawn.wr[few], floor)
-    some = _first(drawn.band, math.ceil(count * _BETWEEN)) & drawn.above
+    some = _some(drawn, math.ceil(count * _BETWEEN))
     fewer = pairs.some(_first(pairs.sample, math.ceil(count * _BETWEEN_IN_PLACES)))
     wi, wr = np.concatenate([drawn.wi[some], fewer.wi]), np.concatenate([drawn.wr[some], fewer.wr])
     values, truth = _looked_up(layout, read, wi, wr, at), model_values(layout.source, at, wi, wr)
@@ -206,7 +244,7 @@ def _between(
     return Between(
         wavelength_nm=at.tolist(),
         bands=limits_of_bands(error[:own], drawn.band[some]),
-        places=_in_places(error[own:], fewer),
+        places=_in_places(error[own:], fewer, _measured(layout.source, fewer.wi, fewer.wr)),
     )
 
 
@@ -239,18 +277,27 @@ def limits_of_bands(error: Floats, band: NDArray[np.int64]) -> list[list[float]]
     return [_not_less(_limit(error[band == row])) for row in range(places.BANDS)]
 
 
+def _some(drawn: Draw, count: int) -> NDArray[np.bool_]:
+    """Return which pairs count, of the first `count` of each band; all that do where none of these does."""
+    first = _first(drawn.band, count) & drawn.above
+    return first if first.any() else drawn.above
+
+
 def _first(sample: NDArray[np.int64], count: int) -> NDArray[np.bool_]:
     """Return which members of samples are among the first `count` of theirs; those of a sample stand together."""
     return np.asarray(np.arange(sample.size) - np.searchsorted(sample, sample) < count)
 
 
-def _in_places(error: Floats, pairs: places.Pairs) -> Places:
-    """Return limits of errors (N, columns) at pairs drawn in places: the largest of the samples of each place."""
+def _in_places(error: Floats, pairs: places.Pairs, inside: NDArray[np.bool_]) -> Places:
+    """Return limits of errors (N, columns) at pairs drawn in places: the largest of the samples of each place.
+
+    `inside` says which pairs count. The limit of a place without any is 0.
+    """
     rows: dict[int, Floats] = {}
     for sample in range(pairs.sample[-1] + 1):
         members = pairs.sample == sample
         row = int(pairs.row[members][0])
-        rows[row] = np.maximum(rows.get(row, 0.0), _limit(error[members]))
+        rows[row] = np.maximum(rows.get(row, 0.0), _limit(error[members & inside]))
 
     limits = {row: _not_less(limit) for row, limit in rows.items()}
     return Places(
@@ -284,16 +331,17 @@ def rank_of_limit(count: int, within: float, confidence: float) -> int:
 
 
 def compare(values: Floats, truth: Floats, drawn: Draw, seed: int = SEED) -> Error:
-    """Return the error of values of f_r, shape (N, L), against the truth at the directions of a draw."""
+    """Return the error of values of f_r, shape (N, L), against the truth at the directions of a draw that count.
+
+    A band of theta_i without any, in which nothing was measured, repeats the error of all bands.
+    """
     floor = floor_of(truth, drawn)
     count = BANDS_DEG.size - 1
-    # rows of weights: each band of theta_i, then all of them
-    weights = np.concatenate(
-        [np.where(drawn.band == np.arange(count)[:, np.newaxis], drawn.weight, 0.0), [drawn.weight]]
-    )
-    l1 = mean_error(values, truth, weights)
+    above = drawn.above
+    bands_of = [above & (drawn.band == band) for band in range(count)]
+    chosen = [rows if rows.any() else above for rows in bands_of] + [above]  # each band of theta_i, then all of them
+    l1 = mean_error(values, truth, np.where(chosen, drawn.weight, 0.0))
     error = np.ascontiguousarray(relative(values, truth, floor).T)
-    chosen = [drawn.above & (drawn.band == band) for band in range(count)] + [drawn.above]
     percentiles = [np.percentile(error[:, rows], [50.0, 95.0, 99.0, 100.0], axis=1) for rows in chosen]
     # [statistic][band][wavelength]
     bands = np.stack([l1[:-1], *np.moveaxis(np.stack(percentiles[:-1]), 1, 0)])
@@ -302,7 +350,7 @@ def compare(values: Floats, truth: Floats, drawn: Draw, seed: int = SEED) -> Err
     return Error.model_validate(
         {
             "theta_i_deg": BANDS_DEG.tolist(),
-            "directions": int(np.count_nonzero(drawn.above)),
+            "directions": int(np.count_nonzero(above)),
             "seed": seed,
             "floor": _short(floor),
             "overall": dict(zip(names, _short(worst), strict=True)),

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from brdfdb.geometry import HALF_PI, degrees
+from brdfdb.geometry import degrees
 from brdfdb.materials import Source
 from brdfdb.measurements import MeasuredSource
 from brdfdb.parameters import Floats
@@ -61,6 +61,7 @@ def tabulated(
     Notes
     -----
     The planner of models looks along each axis for the smallest table. Data have noise, and it would spend nodes on it.
+    Directions that are extrapolated do not count: no node makes them better.
     The axes of these grids crowd where lobes are: theta_h at 0, theta_d and the azimuths at the mirror direction.
     """
     check_tolerance(tolerance)
@@ -69,6 +70,7 @@ def tabulated(
     drawn = error_measurement.draw(source, wavelength_nm, _DRAWS, _SEED)
     truth = error_measurement.model_values(source, wavelength_nm, drawn.wi, drawn.wr)
     floor = error_measurement.floor_of(truth, drawn)
+    weight = np.where(drawn.above, drawn.weight, 0.0)
     layout, values, reached = None, np.empty(0, np.float32), math.inf
     for count in _ANISOTROPIC_LADDER if source.anisotropic else _LADDER:
         layout = Layout(
@@ -84,25 +86,14 @@ def tabulated(
         values = np.concatenate([tabulation.block(layout, rows) for rows in layout.blocks])
         looked_up = Table.of(layout, values).lookup_vectors(drawn.wi, drawn.wr).reshape(truth.shape)
         error = error_measurement.relative(looked_up, truth, floor)[drawn.above]
-        wrong = drawn.weight @ np.abs(looked_up - truth) / np.maximum(drawn.weight @ truth, 1e-300)
+        wrong = weight @ np.abs(looked_up - truth) / np.maximum(weight @ truth, 1e-300)
         reached = max(float(np.percentile(error, 95, axis=0).max()), float(wrong.max()))
         if reached <= tolerance:
             break
     assert layout is not None
     kept = "keeps" if reached <= tolerance else "is the finest grid of measured data, and does not keep"
     reason = f"{math.prod(layout.grid.shape)} nodes; {kept} to a tolerance of {tolerance:g} against the data"
-    if isinstance(source, MeasuredSource):
-        layout = replace(layout, source=source.recorded(extrapolated=_extrapolated(source, layout.grid)))
     return replace(layout, reason=reason), values
-
-
-def _extrapolated(source: MeasuredSource, grid: Grid) -> float | None:
-    """Return the share of the nodes above the horizon that lie outside of the samples; None without samples."""
-    if source.measured.hull is None:
-        return None
-    theta_i, _, theta_r, _ = grid.directions()
-    above = np.broadcast_to(np.maximum(theta_i, theta_r) <= HALF_PI, grid.shape)
-    return float(f"{np.mean(tabulation.extrapolated(source, grid)[above]):.3g}")
 
 
 def _grid(source: Source, count: int) -> Grid:

@@ -98,12 +98,17 @@ class Error(BaseModel):
 
     The table of a mixture states one column, for the wavelength where it is largest: all of its wavelengths are made of
     the same few parts. Only the floor is then for each wavelength. In the intervals between, it states one row.
+
+    Of measured data, directions that were not measured do not count. Bands in which none was repeat the error of all.
     """
 
     model_config = _STRICT
 
     theta_i_deg: list[float] = Field(description="edges of the bands")
-    directions: int = Field(description="drawn above the horizon, half over the hemisphere and half in the lobe")
+    directions: int = Field(
+        description="drawn above the horizon, half over the hemisphere and half in the lobe; of measured data those "
+        "that were measured"
+    )
     seed: int
     floor: list[float] = Field(
         description="1/sr, for each wavelength: a thousandth of the Lambertian BRDF of the same albedo"

@@ -14,7 +14,6 @@ from brdfdb.errors import BrdfdbError, ParameterError
 from brdfdb.geometry import Directions, checked_angles, checked_vectors
 from brdfdb.materials import FunctionRecord, Material, source_of
 from brdfdb.materials.source import Lookups
-from brdfdb.measurements.coordinates import Hull
 from brdfdb.notebook import card, listed, percent, spectrum
 from brdfdb.parameters import Floats
 from brdfdb.tables._interpolation import weights_of_nodes
@@ -153,13 +152,13 @@ class BaseTable(Lookups):
     def _extrapolated(self, directions: Directions) -> NDArray[np.bool_]:
         shape = np.broadcast_shapes(*(given.shape for given in directions.given))
         measured = self.metadata.measured
-        if measured is None or measured.hull is None:
+        if measured is None or measured.extent is None:
             return np.zeros(shape, dtype=bool)
         x_i, y_i, z_i, x_r, y_r, z_r = (
             np.broadcast_to(getattr(directions, name), shape).ravel()
             for name in ("x_i", "y_i", "cos_i", "x_r", "y_r", "cos_r")
         )
-        outside = Hull(measured.hull).outside(np.stack([x_i, y_i, z_i], axis=1), np.stack([x_r, y_r, z_r], axis=1))
+        outside = measured.extent.outside(np.stack([x_i, y_i, z_i], axis=1), np.stack([x_r, y_r, z_r], axis=1))
         return outside.reshape(shape) & ~directions.below
 
     @functools.cached_property
@@ -235,7 +234,7 @@ class BaseTable(Lookups):
         measured = self.metadata.measured
         if measured is not None and measured.uncertainty is not None:
             errors = errors + measured.uncertainty * np.maximum(values, error.floors[at.column])
-        if measured is not None and measured.hull is not None:
+        if measured is not None and measured.extent is not None:
             errors = np.where(self._extrapolated(directions)[..., np.newaxis], np.nan, errors)
         return np.asarray(errors if at.tail else errors[..., 0])[()]
 

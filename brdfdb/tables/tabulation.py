@@ -228,7 +228,7 @@ def frame(layout: Layout) -> Frame:
             np.asarray(source.specular_reflectance(radians(theta_i_deg), wavelength_nm)),
             {"units": "1", "long_name": "reflectance of the specular part, in the exact mirror direction"},
         )
-    if isinstance(source, MeasuredSource) and source.measured.hull is not None:
+    if isinstance(source, MeasuredSource) and source.measured.extent is not None:
         variables["extrapolated"] = Variable(grid.names, extrapolated(source, grid), VARIABLES["extrapolated"])
     return Frame(variables, coordinates, metadata_of(layout).attributes())
 

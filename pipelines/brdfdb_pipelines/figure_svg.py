@@ -58,6 +58,7 @@ _LOOKS = {
     "textbook": _Look(TEXTBOOK, 1.6, (1, 1.4), 4),
     "truth": _Look(TRUTH, 0.9, (), 5),
 }
+_DOT = 3.4  # diameter [point] of a sample
 _OTHER_DASHES = ((), (6, 1.5), (5, 1.5, 1, 1.5), (2, 1), (8, 1.5, 1, 1.5, 1, 1.5), (1, 2.5))
 
 # In points, of which a figure is as wide whatever it shows: rows of figures keep in line
@@ -323,7 +324,10 @@ def _lines(curves: list[Curve]) -> list[Line2D]:
             [],
             color=look.colour,
             linewidth=look.width,
-            linestyle=(0, look.dashes) if look.dashes else "-",
+            linestyle="none" if curve.dots else (0, look.dashes) if look.dashes else "-",
+            marker="o" if curve.dots else "none",
+            markersize=_DOT,
+            markeredgewidth=0.0,
             zorder=look.order,
         )
         line.set_label(curve.label)

@@ -1,4 +1,4 @@
-"""The fit job: fits models to the samples of a file, prints their ranking, and writes JSON, a page and a recipe."""
+"""The fit job: fits models to the samples of files, prints their ranking, and writes JSON, a page and a recipe."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from brdfdb import formats
 from brdfdb.errors import BrdfdbError, ParameterError, counted
 from brdfdb.fitting.document import Estimate, Fit, Fits
 from brdfdb.fitting.figure import figure_of
-from brdfdb.fitting.fit import fits
+from brdfdb.fitting.fit import INTERRUPTED, fits
 from brdfdb.fitting.residuals import Kind
 from brdfdb.fitting.surface import fitted_by_default
 from brdfdb.geometry import degrees, radians, versine
-from brdfdb.measurements import Samples
+from brdfdb.measurements import Samples, joined
 from brdfdb.parameters import closest
 from brdfdb.store.files import write_file
 from brdfdb_pipelines import terminal
@@ -28,12 +28,13 @@ _WIDEST_DEG = 30.0  # full angle of a cone: wider ones are no directions
 
 
 def run(
-    data: Path,
+    data: Sequence[Path],
     models: Sequence[str] | None = None,
     *,
     residual: Kind = "log",
     channel: str | None = None,
     wavelength_nm: float | None = None,
+    azimuth: str = "light",
     refractive_index: str | None = None,
     receiver_deg: float | None = None,
     source_deg: float | None = None,
@@ -41,12 +42,14 @@ def run(
     page: Path | None = None,
     recipe: Path | None = None,
 ) -> Fits:
-    """Fit models to the samples of a file and print the result.
+    """Fit models to the samples of a file, or of several of one surface, and print the result.
+
+    Ctrl-C ends the search. The models that were finished are ranked and written; `Fits.interrupted` is then true.
 
     Parameters
     ----------
-    data : Path
-        A file that `brdfdb.formats.samples` reads.
+    data : sequence of Path
+        Files that `brdfdb.formats.samples` reads. Several are joined, as by `brdfdb.measurements.joined`.
     models : sequence of str, optional
         Models and sums, by default all.
     residual, refractive_index
@@ -55,6 +58,8 @@ def run(
         The one channel that is fitted.
     wavelength_nm : float [nm], optional
         Wavelength of samples of one channel that state none.
+    azimuth : str
+        As of `brdfdb.formats.read`.
     receiver_deg, source_deg : float [degree], optional
         Full angles of the cones of receiver and light, as the sample sees them, in place of what the file states.
     json, page, recipe : Path, optional
@@ -68,19 +73,14 @@ def run(
     Raises
     ------
     ParameterError
-        If a name is unknown, or no model can describe the samples.
+        If a name is unknown, files cannot be joined, or no model can describe the samples.
+    KeyboardInterrupt
+        If no model was finished.
     BrdfdbError
         If a recipe is asked for and no fit is one model of the registry.
     """
-    samples = _selected(formats.samples(data), channel, wavelength_nm)
-    cones = {
-        "receiver_solid_angle_sr": ("receiver-deg", receiver_deg),
-        "source_solid_angle_sr": ("source-deg", source_deg),
-    }
-    known: dict[str, Any] = {
-        name: _solid_angle(option, angle) for name, (option, angle) in cones.items() if angle is not None
-    }
-    samples = replace(samples, instrument=replace(samples.instrument, **known))
+    samples = joined([_selected(formats.samples(file, azimuth=azimuth), channel, wavelength_nm) for file in data])
+    samples = _seen(samples, receiver_deg, source_deg)
     count = len(models or fitted_by_default()) + 1
     with terminal.progress(transient=True) as bar:
         task = bar.add_task("fit", total=count)
@@ -88,7 +88,14 @@ def run(
         def tick(name: str) -> None:
             bar.update(task, advance=1, description=name)
 
-        document, fitted = fits(samples, models, residual=residual, refractive_index=refractive_index, tick=tick)
+        document, fitted = fits(
+            samples,
+            models,
+            residual=residual,
+            refractive_index=refractive_index,
+            tick=tick,
+            keep_finished=True,
+        )
     if json is not None:
         write(json, document.model_dump_json(indent=1) + "\n")
     if page is not None:
@@ -125,6 +132,18 @@ def _selected(samples: Samples, channel: str | None, wavelength_nm: float | None
     if not 0.0 < wavelength_nm < np.inf:
         raise ParameterError("wavelength_nm", f"{wavelength_nm:g} is not a positive number", wavelength_nm)
     return replace(samples, channels=(f"{wavelength_nm:g}nm",), wavelength_nm=np.array([wavelength_nm]))
+
+
+def _seen(samples: Samples, receiver_deg: float | None, source_deg: float | None) -> Samples:
+    """Return samples with the solid angles of the cones that are given."""
+    cones = {
+        "receiver_solid_angle_sr": ("receiver-deg", receiver_deg),
+        "source_solid_angle_sr": ("source-deg", source_deg),
+    }
+    known: dict[str, Any] = {
+        name: _solid_angle(option, angle) for name, (option, angle) in cones.items() if angle is not None
+    }
+    return replace(samples, instrument=replace(samples.instrument, **known))
 
 
 def _solid_angle(option: str, angle_deg: float) -> float:
@@ -185,7 +204,11 @@ def lines(document: Fits) -> list[str]:
     text += [
         f"  not fitted: {reason if reason.startswith(name) else f'{name}, {reason}'}"
         for name, reason in document.skipped.items()
+        if reason != INTERRUPTED
     ]
+    if document.interrupted:
+        missing = list(document.skipped.values()).count(INTERRUPTED)
+        text.append(f"  interrupted: {counted(missing, 'model')} not fitted, and intervals are those of the covariance")
     best = document.fits[0]
     text += ["", f"best: {best.model}", *_numbers(best.estimates)]
     text += [f"  note  {sentence}" for sentence in best.remarks]

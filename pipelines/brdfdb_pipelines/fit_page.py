@@ -22,9 +22,17 @@ def render(document: Fits, figure: Figure) -> str:
     str
         An HTML document.
     """
-    plots = [(one.kind, figure_svg.svg(one, f"fit-{number}")) for number, one in enumerate(figure.panels, 1)]
+    keys = [f"fit-{number}" for number, _ in enumerate(figure.panels, 1)]
+    plots = [(key, one.kind, figure_svg.svg(one, key)) for key, one in zip(keys, figure.panels, strict=True)]
+    cuts, _, maps = figure.caption.partition(". ")
     return (
         html_page.environment()
         .get_template("fit.html")
-        .render(document=document, best=document.fits[0], figure=figure, plots=plots, colours=figure_svg.VARIABLES)
+        .render(
+            document=document,
+            best=document.fits[0],
+            plots=plots,
+            captions={"curves": f"{cuts}.", "map": maps},
+            colours=figure_svg.VARIABLES,
+        )
     )

@@ -30,6 +30,8 @@ class Line:
         Name and revision.
     error_p95 : float [1]
         Relative error of the table that 95 of 100 values keep to, against the data: the one that a tolerance bounds.
+    measured : float [1]
+        Share of all pairs of directions that were measured; 1 if f_r is known everywhere.
     asymmetry_median, asymmetry_p99 : float [1] or None
         abs(f - f') / (abs(f) + abs(f')) of the data, f' with light and viewer exchanged; None: the data cannot tell.
     uncertainty : float [1] or None
@@ -49,6 +51,7 @@ class Line:
     material: str
     revision: str
     error_p95: float
+    measured: float
     asymmetry_median: float | None
     asymmetry_p99: float | None
     uncertainty: float | None
@@ -73,6 +76,7 @@ def lines_of(root: Path, report: AuditReport) -> list[Line]:
                 audited.material,
                 audited.revision,
                 math.nan if error is None else error.overall.p95,
+                1.0 if measured.extrapolated is None else 1.0 - measured.extrapolated,
                 None if seen is None else seen.median,
                 None if seen is None else seen.p99,
                 uncertainty,
@@ -106,14 +110,17 @@ def document(lines: Sequence[Line], report: AuditReport) -> dict[str, Any]:
 def show(lines: Sequence[Line], report: AuditReport, tolerance: float) -> None:
     """Print a line for each table, the problems of tables, and the summary."""
     print()
-    numbers = ("table error", "asymmetry, median", "99 of 100", "uncertainty", "albedo up to")
+    numbers = ("table error", "measured", "asymmetry, median", "99 of 100", "uncertainty", "albedo up to")
     terminal.print_table(
         f"Measured tables in {report.store}",
         ("material", *numbers, "audit"),
         [
             (
                 line.material,
-                *map(_percent, (line.error_p95, line.asymmetry_median, line.asymmetry_p99, line.uncertainty)),
+                *map(
+                    _percent,
+                    (line.error_p95, line.measured, line.asymmetry_median, line.asymmetry_p99, line.uncertainty),
+                ),
                 "not finite" if line.albedo is None else f"{line.albedo:.4f} at {line.at_theta_i_deg:g}°",
                 line.verdict,
             )
@@ -121,7 +128,8 @@ def show(lines: Sequence[Line], report: AuditReport, tolerance: float) -> None:
         ],
         numbers=numbers,
     )
-    print("table error: 95 of 100 values of a table are so near to the data, interpolated")
+    print("table error: 95 of 100 values of a table are so near to the data, interpolated, where these were measured")
+    print("measured: share of all pairs of directions; in others f_r is extrapolated, and its error not known")
     print("asymmetry: |f - f'| / (|f| + |f'|) of the data up to 80 degrees, f' with light and viewer exchanged")
     for audited in report.materials:
         for problem in audited.problems():
@@ -161,4 +169,4 @@ def _percent(value: float | np.floating[Any] | None) -> str:
     """Return a share as text in percent with two digits, a hyphen if it is not known."""
     if value is None:
         return "-"
-    return f"{100.0 * value:.2g} %" if value < 0.995 else "100 %"
+    return f"{100.0 * value:.2g} %" if value < 0.0995 else f"{100.0 * value:.0f} %"

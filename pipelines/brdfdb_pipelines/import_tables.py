@@ -14,6 +14,7 @@ from brdfdb.audit import AuditReport
 from brdfdb.errors import BrdfdbError, ParameterError, StoreError
 from brdfdb.materials import presets
 from brdfdb.materials.recipe_text import toml_of
+from brdfdb.measurements.joining import common_name
 from brdfdb.measurements.measured_source import slug
 from brdfdb.store.files import write_file
 from brdfdb.store.paths import NAME
@@ -101,20 +102,25 @@ class Made:
 def named(targets: Sequence[Target], tables: Tables, count: int) -> tuple[list[Target], list[str]]:
     """Return materials with their names, and a sentence on each name that several would have: none of these is made.
 
-    A name is that of the command line, or that of the file or the member, as words.
+    A name is that of the command line, that of the file or the member, as words, or the words that the names of joined
+    files begin with.
 
     Raises
     ------
     ParameterError
-        If a name is given to several materials, is that of a preset, or is not made of words.
+        If a name is given to several materials, is that of a preset, is not made of words, or joined files have no word
+        in common.
     """
     for option, text in (("--name", tables.name), ("--title", tables.title)):
         if text is not None and count != 1:
             raise ParameterError(option, f"it is for one material, and there are {count}", text)
     materials: dict[str, list[Target]] = {}
     for target in targets:
-        first = target.files[0]
-        name = tables.name or slug(target.keys.get("member", "").removesuffix(".h5") or first.stem)
+        first, stems = target.files[0], [file.stem for file in target.files]
+        of_files = common_name(stems) or ("" if len(stems) > 1 else first.stem)
+        if not (tables.name or of_files):
+            raise ParameterError("--name", f"{target.label} have no word in common that names them; give one", None)
+        name = tables.name or slug(target.keys.get("member", "").removesuffix(".h5") or of_files)
         if not NAME.fullmatch(name):
             raise ParameterError(
                 "--name", f"{name!r} is not made of lower-case letters, digits and single hyphens, 128 at most", name

@@ -33,8 +33,9 @@ from brdfdb_pipelines.recipe_grids import STRICT, RecipeError
 if TYPE_CHECKING:
     from brdfdb.formats._readings import FileTable
 
-MEASURED_VERSION = 4  # of the way from a file to the values of its table
-_ADDED = {"columns", "quantity", "angles", "side"}  # keys of a request that are left out where they are empty
+MEASURED_VERSION = 6  # of the way from a file to the values of its table
+# Keys of a request that are left out where they are empty.
+_ADDED = {"columns", "quantity", "angles", "azimuth", "wavelength_nm", "side"}
 _MARGINS = 3  # tables of data that are made to conserve, each a little darker, until none is above 1
 
 
@@ -65,6 +66,13 @@ class MeasuredTable(BaseModel):
     angles: Literal["", "deg", "rad"] = Field(
         default="", description="unit of the angles of a text; by default by names"
     )
+    azimuth: Literal["", "light", "forward"] = Field(
+        default="",
+        description="direction from which azimuths count: light, the default, or forward, into which it travels",
+    )
+    wavelength_nm: float | None = Field(
+        default=None, ge=10.0, le=1e6, description="wavelength [nm] of a file of one channel that states none"
+    )
     side: Literal["", "back", "front"] = Field(default="", description="side of a Klems matrix; by default back")
     title: Text | None = Field(default=None, description="a line for people; by default the name in the file")
     source: Text | None = Field(default=None, description="who measured, where it is published; by default the file's")
@@ -74,7 +82,8 @@ class MeasuredTable(BaseModel):
     @property
     def keywords(self) -> dict[str, Any]:
         """Return the keywords of `brdfdb.formats.read`."""
-        others = {name: getattr(self, name) for name in ("member", "quantity", "angles", "side")}
+        names = ("member", "quantity", "angles", "azimuth", "wavelength_nm", "side")
+        others = {name: getattr(self, name) for name in names}
         return {**self.columns, **{name: value for name, value in others.items() if value}}
 
     def read(self, paths: Sequence[Path]) -> FileTable | Samples:

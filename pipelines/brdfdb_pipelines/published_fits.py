@@ -34,7 +34,10 @@ def run(
         bar.add_task(data.name, total=None)
         published = read_published(data)
     text = None if recipe is None else recipe_of(published, "G" if channel is None else channel)
-    print(terminal.plain("\n".join(lines(published))))
+    shown = lines(published)
+    if recipe is not None and channel is None:
+        shown.append("  note  the recipe has channel G alone, as the file states no wavelengths; --channel chooses")
+    print(terminal.plain("\n".join(shown)))
     if json is not None:
         write(json, published.model_dump_json(indent=1) + "\n")
     if recipe is not None and text is not None:

@@ -54,6 +54,9 @@ def test_material_says_by_whom_and_how_well_it_was_measured(client: Client, meas
 def test_catalogue_tells_measured_tables_apart(client: Client) -> None:
     lines = client.get("/v1/materials").json()["materials"]
     assert {line["name"]: line["measured"] for line in lines} == {"clay-vase": False, "my-clay": True}
+    assert [line["model"] for line in lines] == ["oren_nayar", None]
+    assert client.get("/v1/materials?q=none").json()["materials"] == []
+    assert client.get("/v1/materials/my-clay").json()["model"] is None
     only = client.get("/v1/materials?model=measured").json()["materials"]
     assert [line["name"] for line in only] == ["my-clay"]
 
@@ -71,6 +74,14 @@ def test_lookup_with_its_error_marks_what_is_extrapolated(client: Client) -> Non
     body = {"theta_i": [30, 80], "theta_r": 20, "phi_r": 120}
     assert client.post("/v1/materials/my-clay/lookup?error=true", json=body).json()["extrapolated"] == [False, True]
     assert client.post("/v1/materials/clay-vase/lookup?error=true", json=body).json()["extrapolated"] == [False, False]
+
+
+def test_cut_tells_where_it_is_extrapolated(client: Client) -> None:
+    lobe = client.get("/v1/materials/my-clay/lobe?theta_i=30").json()
+    theta_r = np.abs(lobe["axes_deg"]["theta_r"])
+    assert np.all(np.array(lobe["extrapolated"])[theta_r > 77.0])
+    assert not np.any(np.array(lobe["extrapolated"])[theta_r < 75.0])
+    assert client.get("/v1/materials/clay-vase/lobe?theta_i=30").json()["extrapolated"] is None
 
 
 def test_a_model_and_its_source_code_are_refused_in_a_sentence(client: Client) -> None:

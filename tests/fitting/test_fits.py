@@ -16,12 +16,16 @@ from brdfdb.fitting.residuals import Residual
 from brdfdb.fitting.surface import NotDescribedError, Surface, fitted_by_default
 from brdfdb.fitting.uncertainty import NORMAL_95, _root
 from brdfdb.geometry import unit_vector
-from brdfdb.measurements import Samples
+from brdfdb.measurements import Instrument, Samples
 from brdfdb.measurements.aperture import View
 from brdfdb.models import MODELS
 
 NOISE = 0.03
 ROUNDING = 1e-9  # measured: 4e-13, of the polynomials of all models
+ONE_AZIMUTH = (
+    "The light comes from one azimuth of the surface: whether the surface is anisotropic cannot be told, and models "
+    "with two widths are fitted with one."
+)
 GRADIENT = 1e-4  # measured: 8e-6, of differences of the cost with a step of 1e-5
 
 Array = NDArray[np.float64]
@@ -74,6 +78,36 @@ def test_polynomial_of_a_surface_is_the_model(name: str) -> None:
     assert np.max(np.abs(found - expected)) <= ROUNDING * np.max(expected)
 
 
+@pytest.mark.parametrize("aperture_sr", [None, 0.01])
+@pytest.mark.parametrize("name", ["hapke", "lambert + 2 he_torrance", "ward", "ggx_compensated"])
+def test_points_that_are_evaluated_together_have_the_values_of_each(name: str, aperture_sr: float | None) -> None:
+    made = samples(noisy(truth("ward", **WARD)))
+    view = View(made.w_i, made.w_r, Instrument(receiver_solid_angle_sr=aperture_sr))
+    at = np.array([450.0] if name in ("hapke", "ggx_compensated") else [450.0, 650.0])
+    together, alone = (Surface(name, at, len(at), turned=True, entry="constant/1.5/0.1") for _ in range(2))
+    points = np.random.default_rng(5).uniform(0.1, 0.9, (6, len(alone.shape)))
+    expected = np.array([alone.basis(x, view) for x in points])
+    assert np.max(np.abs(together.bases(points, view) - expected)) <= ROUNDING * np.max(expected)
+    several = [alone.widths(x[np.newaxis])[0] for x in points]
+    assert together.widths(points) == pytest.approx(np.array(several))
+
+
+def test_the_neighbours_of_a_point_are_one_call_of_the_model(monkeypatch: pytest.MonkeyPatch) -> None:
+    made = samples(noisy(truth("ward", **WARD)))
+    surface = Surface("hapke", None, 1, turned=False)
+    problem = Problem(surface, View(made.w_i, made.w_r), Residual(made, "log"))
+    point = problem.at(np.full(len(problem.free), 0.4))
+    spec, calls = surface.terms[0].spec, []
+
+    def counted(*directions: Array, **given: Array) -> Array:
+        calls.append(given)
+        return spec.vectors(*directions, **given)
+
+    monkeypatch.setattr(surface.terms[0], "spec", replace(spec, vectors=counted))
+    assert problem.shape_jacobian(point).shape == (6, len(made), 1)
+    assert len(calls) == 1
+
+
 def test_errors_are_as_large_as_the_standard_errors_say() -> None:
     scores = []
     for seed in range(12):
@@ -107,6 +141,21 @@ def test_two_widths_need_azimuths_of_the_light() -> None:
     assert widths["alpha_y"] == pytest.approx(0.3, rel=0.02)
     tied = fit(samples(noisy(truth("ward", **WARD))), "ward").surface.numbers(found.point.x[:1])[0]
     assert tied["alpha_x"] == tied["alpha_y"]
+
+
+@pytest.mark.parametrize("phi_i_deg", [(0.0, 0.0), (20.0, 20.0), (0.0, 180.0), (-90.0, 90.0)])
+def test_lights_of_one_plane_cannot_tell_an_anisotropic_surface(phi_i_deg: tuple[float, float]) -> None:
+    """Half a turn changes no lobe of two widths, so that light from both sides of a plane is one azimuth."""
+    theta_i, _, theta_r, turn = directions()
+    phi_i = np.deg2rad(np.resize(phi_i_deg, theta_i.size))
+    wi, wr = unit_vector(theta_i, phi_i), unit_vector(theta_r, phi_i + turn)
+    values = noisy(MODELS["ward"].vectors(wi, wr, **(WARD | {"alpha_y": 0.3}))[:, np.newaxis])
+    made = Samples("brushed", theta_i, phi_i, theta_r, phi_i + turn, ("grey",), None, values)
+    document, _ = fits(made, ["ward"], profiles=False)
+    assert document.remarks == [ONE_AZIMUTH]
+    assert "alpha_y" not in {one.name for one in document.fits[0].estimates}
+    turned, _ = fits(samples(noisy(truth("ward", turned=True, **WARD)), turned=True), ["ward"], profiles=False)
+    assert turned.remarks == []
 
 
 def test_a_spike_is_an_outlier() -> None:
@@ -158,17 +207,17 @@ def test_a_stated_uncertainty_that_the_residual_does_not_follow_is_remarked() ->
     values = clean + 0.003 * np.random.default_rng(0).standard_normal(clean.shape)
     stated = np.full_like(values, 0.003)
     document, _ = fits(with_uncertainty(values, stated), ["ward"], profiles=False)
-    (sentence,) = document.remarks
+    _, sentence = document.remarks
     assert "--residual uncertainty" in sentence
     weighted, _ = fits(with_uncertainty(values, stated), ["ward"], residual="uncertainty", profiles=False)
-    assert weighted.remarks == []
+    assert weighted.remarks == [ONE_AZIMUTH]
     diffuse = next(one for one in weighted.fits[0].estimates if one.name == "rho_d")
     assert diffuse.low < 0.02 < diffuse.high
     even, _ = fits(with_uncertainty(noisy(clean), NOISE * clean), ["ward"], profiles=False)
-    assert even.remarks == []
+    assert even.remarks == [ONE_AZIMUTH]
     stated[0] = np.nan
     partly, _ = fits(with_uncertainty(values, stated), ["ward"], profiles=False)
-    assert partly.remarks == []
+    assert partly.remarks == [ONE_AZIMUTH]
 
 
 @pytest.mark.parametrize("value", [0.03, 0.0])
@@ -178,7 +227,7 @@ def test_one_tiny_uncertainty_does_not_capture_a_fit(value: float) -> None:
     values[7], stated[7] = value, 1e-12
     document, fitted = fits(with_uncertainty(values, stated), ["ward"], residual="uncertainty", profiles=False)
     assert fitted[0].point.values[:, 0] == pytest.approx([0.2, 0.1], rel=0.02)
-    (sentence,) = document.remarks
+    _, sentence = document.remarks
     assert sentence.startswith("1 uncertainty is below 1 % of the median")
 
 
@@ -206,7 +255,7 @@ def test_many_values_left_out_are_remarked_where_an_uncertainty_is_stated() -> N
     values = noisy(truth("oren_nayar", rho=0.5, sigma=0.6))
     values[::40] = -0.01
     document, _ = fits(with_uncertainty(values, NOISE * np.abs(values)), ["lambert"], profiles=False)
-    (sentence,) = document.remarks
+    _, sentence = document.remarks
     assert sentence.startswith("11 values that are not positive are left out")
 
 

@@ -76,6 +76,7 @@ def test_a_grid_about_the_specular_direction_is_turned_and_loses_what_is_below_t
     assert samples.values[:, 0].tolist() == [1.0, 2.0, -3.0]
     assert np.degrees(samples.phi_r[:2]) == pytest.approx([180.0, 180.0])
     assert samples.channels == ("650nm",)
+    assert samples.record["notes"] == ["The wavelength 650 nm was read from the comments of the file."]
     assert samples.instrument == Instrument("bench", spot_mm=3.5)
     assert samples.record["tis"] == [[[0.1]]]
 

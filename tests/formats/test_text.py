@@ -247,3 +247,142 @@ def test_a_damaged_csv_is_refused_with_line_and_name(text: str, sentence: str, t
     path.write_text(text)
     with pytest.raises(FileFormatError, match=rf"sheet\.csv: {sentence}$"):
         formats.read(path, "csv")
+
+
+@pytest.mark.parametrize(
+    ("name", "shown"),
+    [
+        ("wavelength_um", "those of the column wavelength_um"),
+        ("wavelength [um]", "those of the column wavelength [um]"),
+        ("Wavelength [\u00b5m]", "those of the column Wavelength [\u00b5m]"),
+        ("wl micron", "those of the column wl micron"),
+        ("lambda", "gives no unit: its numbers, 0.45 to 0.55, were taken as micrometres"),
+    ],
+)
+def test_wavelengths_in_micrometres_are_channels_in_nm(name: str, shown: str, tmp_path: Path) -> None:
+    sheet = samples(tmp_path, f"sza,vza,raa,{name},brdf\n10,20,180,0.45,0.1\n10,20,180,0.55,0.2\n")
+    assert sheet.channels == ("450nm", "550nm")
+    assert sheet.values.tolist() == [[0.1, 0.2]]
+    assert any(shown in note for note in statement(sheet).notes)
+    assert "Wavelengths: 450 to 550 nm." in statement(sheet).sentences
+
+
+@pytest.mark.parametrize(
+    ("name", "first", "sentence"),
+    [
+        ("lambda", "0.45", "line 1, field lambda: 0.45 and 550 have no unit in common; write it into the name"),
+        ("lambda [cm-1]", "450", r"line 1, field lambda \[cm-1\]: the unit 'cm-1' is none of wavelengths"),
+        ("lambda", "", "line 1, field lambda: a wavelength is missing"),
+    ],
+)
+def test_wavelengths_without_a_common_unit_are_refused(name: str, first: str, sentence: str, tmp_path: Path) -> None:
+    with pytest.raises(FileFormatError, match=sentence):
+        samples(tmp_path, f"sza,vza,raa,{name},brdf\n10,20,180,{first},0.1\n10,20,180,550,0.2\n")
+
+
+def test_names_of_a_csv_below_10_are_no_nm(tmp_path: Path) -> None:
+    path = tmp_path / "grid.csv"
+    rows = [f"{h},{d},{p},1,2" for h in (0, 45, 90) for d in (0, 45, 90) for p in (0, 45, 90)]
+    path.write_text("\n".join(["theta_h,theta_d,phi_d,0.45,0.55", *rows, ""]))
+    with pytest.raises(FileFormatError, match=r"line 1: 0\.45 is no wavelength in nm; write it as 550nm or 0\.55um"):
+        formats.read(path)
+    path.write_text(path.read_text().replace("0.45,0.55", "0.45um,0.55um"))
+    assert formats.read(path).channels == ("450nm", "550nm")
+
+
+@pytest.mark.parametrize("delimiter", ["\t", ";", " ", ","])
+def test_decimal_commas_are_read_with_each_delimiter(delimiter: str, tmp_path: Path) -> None:
+    fields = ["10,5", "20", "180", "0,25"]
+    row = delimiter.join(f'"{field}"' if delimiter == "," else field for field in fields)
+    sheet = samples(tmp_path, f"{delimiter.join(('sza', 'vza', 'raa', 'brdf'))}\n{row}\n")
+    assert np.degrees(sheet.theta_i) == pytest.approx([10.5])
+    assert sheet.values.tolist() == [[0.25]]
+
+
+def test_commas_of_thousands_are_not_taken_for_decimals(tmp_path: Path) -> None:
+    with pytest.raises(FileFormatError, match=r"line 2, field brdf: '1,000' has ',', and numbers before it '\.'"):
+        samples(tmp_path, "sza\tvza\traa\tbrdf\n10.5\t20\t180\t1,000\n")
+
+
+def test_phi_alone_is_the_azimuth_between_light_and_viewer(tmp_path: Path) -> None:
+    sheet = samples(tmp_path, "theta_i [deg],theta_r [deg],Phi [deg],brdf\n10,20,150,0.5\n")
+    assert np.degrees(sheet.phi_r - sheet.phi_i) == pytest.approx([150.0])
+    assert "The column Phi [deg] was taken as the azimuth from the light to the viewer." in statement(sheet).notes
+    with pytest.raises(FileFormatError, match="no format recognises it"):
+        samples(tmp_path, "theta_i,theta_r,phi_i,Phi,brdf\n10,20,0,150,0.5\n")
+
+
+ROLES = {"theta_i": "sun", "theta_r": "view", "delta_phi": "turn", "values": "number"}
+
+
+@pytest.mark.parametrize(
+    ("text", "keywords", "sentence"),
+    [
+        ("sza,vza,raa,brdf\n1O,20,180,0.5\n10,20,180,0.5\n", {}, "line 2, field sza: '1O' is not a number"),
+        ("sun view turn number\n2O 20 180 0.5\n10 20 180 0.5\n", ROLES, "line 2, field sun: '2O' is not a number"),
+        ("sza,vza,raa,brdf\n10,20,180\n10,20,180,0.5\n", {}, "line 2 has 3 fields, and the first whole row 4"),
+        ("2O 20 180 0.5\n10 20 180 0.5\n", {"angles": "deg"}, "line 1, field 1: '2O' is not a number"),
+    ],
+)
+def test_a_damaged_first_row_is_no_title(text: str, keywords: dict[str, str], sentence: str, tmp_path: Path) -> None:
+    with pytest.raises(FileFormatError, match=sentence):
+        samples(tmp_path, text, **keywords)
+
+
+def test_units_below_the_names_are_no_damaged_row(tmp_path: Path) -> None:
+    assert len(samples(tmp_path, "sza,vza,raa,brdf\ndeg,deg,deg,1/sr\n10,20,180,0.5\n")) == 1
+
+
+def test_a_text_that_no_format_recognises_shows_its_columns_and_how_to_name_them(tmp_path: Path) -> None:
+    with pytest.raises(
+        FileFormatError, match=r"it has the columns sun, view, turn, number: name them, .*--column theta_i="
+    ):
+        samples(tmp_path, "sun view turn number\n10 20 180 0.5\n")
+
+
+def test_a_column_of_uncertainties_is_stated(tmp_path: Path) -> None:
+    known = statement(samples(tmp_path, "sza,vza,raa,brdf,unc\n10,20,180,0.5,0.01\n10,30,180,0.5,0.02\n"))
+    assert "Standard uncertainties were read from the column unc." in known.notes
+    assert "Standard uncertainties are stated: 3 % of f_r in the median." in known.sentences
+
+
+def test_a_wavelength_of_titles_is_stated(tmp_path: Path) -> None:
+    known = statement(samples(tmp_path, f"# at 532 nm\n{SR}"))
+    assert "The wavelength 532 nm was read from the titles of the file." in known.notes
+    assert "No wavelength is stated; --wavelength-nm states one." in statement(samples(tmp_path, SR)).sentences
+
+
+def test_the_user_states_a_wavelength_of_a_file_that_has_none(tmp_path: Path) -> None:
+    sheet = samples(tmp_path, SR, wavelength_nm=550.0)
+    assert (sheet.channels, sheet.wavelength_nm) == (("550nm",), [550.0])
+    assert "The wavelength 550 nm was stated; the file has none." in statement(sheet).notes
+    with pytest.raises(ParameterError, match=r"wavelength_nm: 0\.55 is outside \[10, 1e\+06\] nm"):
+        samples(tmp_path, SR, wavelength_nm=0.55)
+    with pytest.raises(ParameterError, match="wavelength_nm: sheet states its own: 532nm; leave it out"):
+        samples(tmp_path, f"# at 532 nm\n{SR}", wavelength_nm=550.0)
+
+
+@pytest.mark.parametrize("text", ["sza,vza,raa,brdf\n40,30,50,0.5\n", "sza,saa,vza,vaa,brdf\n40,10,30,60,0.5\n"])
+def test_azimuths_may_count_from_the_forward_direction(text: str, tmp_path: Path) -> None:
+    sheet = samples(tmp_path, text, azimuth="forward")
+    assert np.degrees(sheet.phi_r - sheet.phi_i) % 360.0 == pytest.approx([230.0])
+    assert np.degrees(sheet.phi_i) == pytest.approx([190.0 if "saa" in text else 0.0])
+    assert any(note.startswith("Azimuths count from the forward direction") for note in statement(sheet).notes)
+    with pytest.raises(ParameterError, match="azimuth: 'back' is not one of light, forward"):
+        samples(tmp_path, text, azimuth="back")
+
+
+def test_a_grid_may_count_azimuths_from_the_forward_direction(tmp_path: Path) -> None:
+    path = tmp_path / "grid.csv"
+    nodes = (0, 30, 60, 90)
+    rows = [f"{i},{r},{turn},{1 + turn}" for i in nodes for r in nodes for turn in (0, 60, 120, 180)]
+    header = "# columns: angles [degree], then f_r [1/sr], one column a wavelength; the last angle changes fastest"
+    path.write_text("\n".join([header, "theta_i,theta_r,delta_phi,brdf", *rows, ""]))
+    here, there = (formats.read(path, azimuth=azimuth) for azimuth in ("light", "forward"))
+    angles = np.radians([30.0, 0.0, 60.0, 130.0])
+    assert there.lookup(*angles) == pytest.approx(here.lookup(*angles[:3], angles[3] - np.pi))
+    listed = formats.samples(path, azimuth="forward")
+    assert statement(listed).sentences[0].startswith("64 nodes of 1 channel")
+    tilted = listed.selected((listed.theta_i > 0.0) & (listed.theta_r > 0.0) & (listed.theta_r < 1.5))
+    at = (tilted.theta_i, tilted.phi_i, tilted.theta_r, tilted.phi_r)
+    assert there.lookup(*at) == pytest.approx(tilted.values[:, 0])

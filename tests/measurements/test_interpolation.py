@@ -12,7 +12,6 @@ from brdfdb.errors import ParameterError
 from brdfdb.geometry import radians, unit_vector
 from brdfdb.materials import presets
 from brdfdb.measurements import Samples
-from brdfdb.measurements.coordinates import Hull
 from brdfdb.measurements.interpolation import fit, floor_of
 from brdfdb.measurements.record import HeldOut
 from brdfdb.parameters import Floats
@@ -121,20 +120,3 @@ def _with(numbers: Floats, top: float) -> Samples:
     samples = scattered(lambda wi, _: 0.005 + (top - 0.005) * wi[:, :1] ** 8, 200, 0.0)
     values = np.concatenate([numbers[:, np.newaxis], samples.values[len(numbers) :]])
     return replace(samples, values=values, uncertainty=None)
-
-
-def test_hull_has_what_lies_between_samples_and_nothing_else() -> None:
-    samples = scans(lambda wi, _: np.ones((len(wi), 1)), np.array([10.0, 30.0, 50.0]), 0.0)
-    hull = Hull.of(samples.w_i, samples.w_r, turned=False)
-    light = unit_vector(radians(np.array([20.0, 5.0, 60.0, 20.0])), np.full(4, 1.0))
-    viewer = unit_vector(radians(np.array([40.0, 40.0, 40.0, 80.0])), np.full(4, 2.0))
-    assert hull.outside(light, viewer).tolist() == [False, True, True, True]
-
-
-def test_hull_of_one_plane_has_that_plane_alone() -> None:
-    theta = radians(np.array([0.0, 30.0, 60.0, 0.0, 30.0, 60.0]))
-    lights = unit_vector(np.repeat(radians(np.array([10.0, 50.0])), 3), np.zeros(6))
-    hull = Hull.of(lights, unit_vector(theta, np.full(6, np.pi)), turned=False)
-    light, theta_r = unit_vector(radians(30.0), 0.0)[np.newaxis], radians(20.0)
-    assert not hull.outside(light, unit_vector(theta_r, np.pi)[np.newaxis])[0]
-    assert hull.outside(light, unit_vector(theta_r, 3.0)[np.newaxis])[0]

@@ -12,7 +12,6 @@ from brdfdb.materials import presets
 from brdfdb.materials.source import Evaluate
 from brdfdb.measurements import MeasuredSource, Samples
 from brdfdb.measurements.colours import spectra_of_colours
-from brdfdb.measurements.coordinates import Hull
 from brdfdb.measurements.measured_source import MARGIN
 from brdfdb.measurements.record import Noise
 from brdfdb.models import MODELS
@@ -205,11 +204,6 @@ def test_file_is_extrapolated_beyond_the_nodes_that_it_lists(lights_deg: tuple[f
     )
     viewer = unit_vector(radians(np.full(3, 30.0)), radians(np.full(3, 100.0)))
     outside = source.extrapolated(unit_vector(radians(np.array([5.0, 40.0, 80.0])), np.zeros(3)), viewer)
-    assert outside.tolist() == [marked, False, marked]
-    assert (source.measured.hull is not None) == marked
-
-
-def test_hull_of_many_samples_takes_little_memory() -> None:
-    rng = np.random.default_rng(1)
-    wi, wr = (unit_vector(rng.uniform(0.0, 1.2, 200_000), rng.uniform(0.0, 6.0, 200_000)) for _ in range(2))
-    assert Hull.of(wi, wr, turned=False).outside(wi[:100], wr[:100]).sum() == 0
+    assert outside.tolist() == [False, False, marked]  # 5 degrees lie between lights of 10 degrees from either side
+    assert (source.measured.extent is not None) == marked
+    assert (source.measured.extrapolated is not None) == marked

@@ -88,6 +88,12 @@ def test_a_plain_dataset_of_radians_is_enough() -> None:
         ({"values": np.full((4, 2), np.inf)}, "values: a value is infinite"),
         ({"uncertainty": -np.ones((4, 2))}, "uncertainty: -1 is below 0"),
         ({"theta_i": np.zeros(5)}, "phi_i: shape"),
+        ({"theta_i": np.full(4, -0.1)}, "theta_i: -5.72958 degrees is no polar angle; allowed are 0 to 90 degrees"),
+        ({"theta_i": np.full(4, 4.0)}, "theta_i: 229.183 degrees is below the horizon; allowed are 0 to 90 degrees"),
+        ({"values": None}, "values: it is missing; an array of numbers is needed"),
+        ({"phi_i": None}, "phi_i: it is missing; an array of numbers is needed"),
+        ({"values": "high"}, "values: str is no array of numbers"),
+        ({"theta_i": 0.1}, r"theta_i: shape \(\) is not \(1,\)"),
     ],
 )
 def test_samples_that_cannot_be_are_refused(changes: dict[str, Any], sentence: str) -> None:
@@ -134,3 +140,19 @@ def test_uncertainty_of_nan_alone_is_not_known_and_an_infinite_one_is_refused() 
     assert samples(uncertainty=np.where(np.eye(4, 2) > 0.0, 0.1, np.nan)).uncertainty is not None
     with pytest.raises(ParameterError, match="uncertainty: a value is infinite"):
         samples(uncertainty=np.full((4, 2), np.inf))
+
+
+def test_joined_files_have_the_name_notes_and_counts_of_all() -> None:
+    parts = [
+        samples(name="tile_10deg", record={"notes": ["a", "b"], "repeated": 1, "columns_left_out": ["t"]}),
+        samples(name="tile_30deg", record={"notes": ["b", "c"], "repeated": 2}, uncertainty=None),
+    ]
+    both = joined(parts)
+    assert both.name == "tile"
+    assert both.uncertainty is None
+    left_out = "Standard uncertainties were left out: tile_30deg states none."
+    assert both.record["notes"] == ["a", "b", "c", left_out]
+    assert (both.record["repeated"], both.record["columns_left_out"]) == (3, ["t"])
+    assert left_out in statement(both).sentences
+    assert joined([samples(name="oak"), samples(name="elm")]).name == "oak and elm"
+    assert joined([samples(name="sheet1"), samples(name="sheet2")]).name == "sheet"

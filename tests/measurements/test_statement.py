@@ -49,11 +49,12 @@ def test_a_lambertian_surface_integrates_to_its_reflectance() -> None:
     assert not known.one_side
 
 
-def test_one_side_of_the_plane_of_incidence_is_mirrored() -> None:
+@pytest.mark.parametrize("first", [0.0, 180.0])
+def test_one_side_of_the_plane_of_incidence_is_mirrored(first: float) -> None:
     def ward(theta_i: Any, theta_r: Any, delta: Any) -> Any:
         return models.ward(theta_i, 0.0, theta_r, delta, rho_d=0.3, rho_s=0.2, alpha_x=0.4, alpha_y=0.4)
 
-    half = statement(samples(ward, turns=np.arange(0.0, 181.0, 15.0)))
+    half = statement(samples(ward, turns=first + np.arange(0.0, 181.0, 15.0)))
     full = statement(samples(ward))
     assert half.one_side
     for one, other in zip(half.incidences, full.incidences, strict=True):
@@ -78,8 +79,8 @@ def test_reciprocity_is_that_of_samples_with_light_and_viewer_exchanged() -> Non
     assert fair.reciprocity.largest < 1e-12
     unfair = statement(samples(skewed)).reciprocity
     assert unfair is not None
-    assert unfair.largest == pytest.approx(0.1 / 0.15)
-    assert unfair.median == pytest.approx(0.1 / 0.15)  # 24 of 46 pairs are of both incidences
+    assert unfair.largest == pytest.approx(0.1 / 0.3)
+    assert unfair.median == pytest.approx(0.1 / 0.3)  # 24 of 46 pairs are of both incidences
 
 
 def test_a_claim_of_the_header_is_compared_with_its_values() -> None:
@@ -181,3 +182,48 @@ def test_numbers_in_sentences_have_four_digits_at_most() -> None:
         for sentence in statement(samples(value)).sentences:
             for number in re.findall(r"\d+(?:\.\d+)?", sentence.replace("e+", "e").replace("e-", "e")):
                 assert len(number.replace(".", "").lstrip("0")) <= 4, sentence
+
+
+@pytest.mark.parametrize(("claimed", "words"), [(0.8, "1 claim of the header cannot be judged"), (0.1, "at least 0.")])
+def test_a_claim_is_judged_only_where_viewers_surround_enough(claimed: float, words: str) -> None:
+    polar = np.arange(0.0, 51.0, 5.0)  # they surround 58 % of the hemisphere
+    known = statement(samples(polar=polar, lights=[10.0], record={"tis": [[[claimed]]], "theta_i_deg": [10.0]}))
+    (claim,) = known.claims
+    assert claim.at_least
+    assert claim.integrated == known.incidences[0].measured[0] < 0.3
+    assert claim.known == (claimed < 0.2)
+    assert any(words in sentence for sentence in known.sentences)
+
+
+def _lobe(at_deg: float, back: float = 0.0) -> Any:
+    """Return f_r with a lobe at an azimuth, and one at the light with a part of its height."""
+
+    def f_r(theta_i: Any, theta_r: Any, delta: Any) -> Any:
+        def peak(turn: float) -> Any:
+            cos = np.cos(theta_i) * np.cos(theta_r) + np.sin(theta_i) * np.sin(theta_r) * np.cos(delta - turn)
+            return np.exp(40.0 * (cos - 1.0))
+
+        return 0.1 + peak(np.radians(at_deg)) + back * peak(0.0)
+
+    return f_r
+
+
+@pytest.mark.parametrize(
+    ("values", "doubted"),
+    [(_lobe(0.0), True), (_lobe(180.0), False), (_lobe(180.0, 1.0), False), (_lobe(90.0), False), (0.1, False)],
+)
+def test_a_lobe_at_the_light_is_doubted(values: Any, doubted: bool) -> None:
+    sheet = samples(values, lights=(0.0, 30.0, 60.0))
+    hints = [hint for hint in statement(sheet).hints if hint.startswith("Azimuths?")]
+    assert bool(hints) == doubted
+    assert all(hint.endswith("import it with --azimuth forward.") for hint in hints)
+    plane = statement(samples(values, lights=(30.0, 60.0), turns=[0.0, 180.0])).hints
+    assert any(hint.startswith("Azimuths?") for hint in plane) == doubted
+    if doubted:
+        (hint,) = statement(replace(sheet, record={"azimuth": "forward"})).hints
+        assert hint.endswith("--azimuth light.")
+
+
+def test_shares_are_plain_numbers() -> None:
+    sheet = samples(lambda i, r, delta: 1e4 * (np.abs(r - i) < 0.01) * (np.abs(delta - np.pi) < 0.01) + 1e-9)
+    assert any("unknown: one viewer makes 100 % of it" in sentence for sentence in statement(sheet).sentences)

@@ -8,13 +8,15 @@ import json
 import re
 from html.parser import HTMLParser
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jsonschema
 import numpy as np
 import pytest
 
+from brdfdb.fitting import fit as fitting
 from brdfdb.geometry import unit_vector
+from brdfdb.measurements import Samples
 from brdfdb.models import MODELS
 from brdfdb.store.reader import Store
 from brdfdb_pipelines import recipe_file
@@ -65,8 +67,9 @@ KINDS = {"fit.json": "json", "new/fit.html": "page", "fit.toml": "recipe"}
 
 
 def test_the_ranking_is_printed(answer: Answer) -> None:
-    first, heading, *others = answer.printed.splitlines()
+    first, note, heading, *others = answer.printed.splitlines()
     assert first.startswith("tile: 108 values at 3 incidences, log")
+    assert note.startswith("  note  The light comes from one azimuth of the surface")
     assert heading.split() == ["model", "held", "out", "all", "numbers", "BIC", "albedo"]
     ranked = [
         re.match(r"  (lambert \+ beckmann_schlick|ward|lambert) +([\d.]+) +([\d.]+) +(\d+)", line)
@@ -130,6 +133,14 @@ def test_the_page_is_html_with_figures_and_no_script(answer: Answer) -> None:
     assert not re.search(r"(src|href)=.?https?:", text)
     for words in ("The best of 3 fits is", "held out", "residuals", "theta_i = 55 degrees", "[define.tile-as-ward]"):
         assert words in text
+    headings = re.findall("<h2>(.*)</h2>", text)
+    assert headings == ["Ranking", "Cuts of ward", "Residuals of ward", "Numbers of ward"]
+    figures = re.findall(r'<figure class="(\w+)".*?</figure>', text, re.DOTALL)
+    assert figures == ["curves"] * 3 + ["map"] * 3
+    first = text[text.index('<figure class="curves"') : text.index("</figure>")]
+    line, dots = first[first.index('data-curve="0"') :].split('data-curve="1"')
+    assert "<use" not in line
+    assert dots.count("<use") == 21  # 18 samples in the plane and 2 at the normal; the last is that of the legend
 
 
 def test_the_recipe_is_that_of_the_best_model(answer: Answer) -> None:
@@ -159,6 +170,51 @@ def test_an_aperture_can_be_said(tile: Path, tmp_path: Path, capsys: Captured) -
     assert alpha == pytest.approx(TRUTH["alpha_x"], rel=0.03)
 
 
+def test_files_of_one_surface_are_joined(tile: Path, tmp_path: Path, capsys: Captured) -> None:
+    lines = rows()
+    parts = [written(tmp_path / f"tile-{number}.csv", lines[number::2]) for number in range(2)]
+    assert run("fit", *parts, "--model", "ward", "--json", tmp_path / "parts.json") == 0
+    assert run("fit", tile, "--model", "ward", "--json", tmp_path / "whole.json") == 0
+    capsys.readouterr()
+    several, whole = (json.loads((tmp_path / f"{name}.json").read_text("utf-8")) for name in ("parts", "whole"))
+    assert several["samples"] == whole["samples"] == 108
+    values = [[one["value"] for one in document["fits"][0]["estimates"]] for document in (several, whole)]
+    assert values[0] == pytest.approx(values[1], rel=1e-4)
+    brighter = written(tmp_path / "brighter.csv", [[*line[:3], 2.0 * line[3]] for line in lines])
+    assert run("fit", tile, brighter, "--model", "lambert") == 0
+    assert "  note  At 99 directions that both files have, f_r differs by 100 %" in capsys.readouterr().out
+    assert run("fit", tile, tmp_path / "other.fit", "--model", "lambert") == 2
+    assert "published fits are listed one file at a time" in capsys.readouterr().err
+
+
+def test_ctrl_c_keeps_the_models_that_are_finished(
+    tile: Path, tmp_path: Path, capsys: Captured, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    finished = fitting.fit
+
+    def stopped(samples: Samples, model: str, **options: Any) -> Any:
+        if model == "ggx_schlick":
+            raise KeyboardInterrupt
+        return finished(samples, model, **options)
+
+    monkeypatch.setattr(fitting, "fit", stopped)
+    out = tmp_path / "fit.json"
+    models = [part for name in ("lambert", "ward", "ggx_schlick", "beckmann") for part in ("--model", name)]
+    assert run("fit", tile, *models, "--json", out) == 130
+    printed = capsys.readouterr()
+    assert "  interrupted: 2 models not fitted" in printed.out
+    assert "best: ward" in printed.out
+    assert printed.err == "brdfdb: interrupted; 2 models of the search are above\n"
+    document = json.loads(out.read_text(encoding="utf-8"))
+    assert document["interrupted"]
+    assert [one["model"] for one in document["fits"]] == ["ward", "lambert"]
+    assert document["skipped"] == dict.fromkeys(["ggx_schlick", "beckmann"], fitting.INTERRUPTED)
+    out.unlink()
+    assert run("fit", tile, "--model", "ggx_schlick", "--json", out) == 130
+    assert capsys.readouterr().err == "brdfdb: interrupted\n"
+    assert not out.exists()
+
+
 def test_two_lengths_that_are_not_told_apart_are_named(tmp_path: Path, capsys: Captured) -> None:
     lines = np.array(rows())
     wi = unit_vector(np.deg2rad(lines[:, 0]), np.zeros(len(lines)))
@@ -178,6 +234,7 @@ def test_two_lengths_that_are_not_told_apart_are_named(tmp_path: Path, capsys: C
     ("options", "sentence"),
     [
         (["--model", "wrad"], "model: 'wrad' is unknown; closest: ward"),
+        (["--model", "nosuch"], "model: 'nosuch' is unknown; the models are lambert, "),
         (["--model", "ward +"], "model: 'ward +' is no model and no sum of models"),
         (["--model", "lambert", "--residual", "uncertainty"], "has no uncertainties; choose log, relative or cosine"),
         (["--channel", "green"], "channel: 'green' is not one of grey"),
@@ -266,6 +323,9 @@ def test_published_fits_are_listed_and_become_a_recipe(tmp_path: Path, capsys: C
     assert "  1 of 2 are no physics; 1 are models of the registry (ward)" in printed
     assert "  note  NganHe: no model of the registry is taken for it" in printed
     assert [len(one["flags"]) for one in json.loads(out.read_text(encoding="utf-8"))["fits"]] == [0, 2]
+    assert "the recipe has channel" not in printed
     assert [job.material.name for job in recipe_file.load(recipe).jobs()] == ["tile-1-tiles-r"]
+    assert run("fit", data, "--recipe", recipe) == 0
+    assert "  note  the recipe has channel G alone" in capsys.readouterr().out
     assert run("fit", data, "--model", "ward") == 2
     assert "--model: " in capsys.readouterr().err

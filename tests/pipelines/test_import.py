@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from brdfdb import formats
+from brdfdb import formats, models
+from brdfdb_pipelines.import_summary import _percent
 from tests.pipelines.command import Captured, run
 
 
@@ -64,6 +65,7 @@ def test_samples_are_written_as_netcdf_that_is_imported_again(tile: Path, tmp_pa
         (["--column", "theta_q=sun"], "theta_q: no format takes it; there are angles, delta_phi"),
         ([*OPTIONS, "--out", "tile.txt"], "--out: 'tile.txt' does not end in .nc"),
         (["--format", "paper"], "file_format: 'paper' is not one of astm,"),
+        (["--wavelength-nm", "0.5", *OPTIONS], "wavelength_nm: 0.5 is outside [10, 1e+06] nm"),
         (["--member", "white"], "no format recognises it"),
         ([], "no format recognises it"),
     ],
@@ -81,5 +83,33 @@ def test_one_file_is_written_at_a_time(tile: Path, tmp_path: Path, capsys: Captu
     assert run("import", tile, tile, *OPTIONS, "--out", out) == 2
     assert "--out: it takes the samples of one file, and there are 2" in capsys.readouterr().err
     assert not out.exists()
+    fits = tmp_path / "ward.fit"
+    fits.write_text("# published fits\nbrass = Ward(a = 0.1)\n")
+    assert run("import", fits) == 2
+    assert "ward.fit: a file of published fits holds no samples; `brdfdb fit` lists them" in capsys.readouterr().err
     assert run("import", tmp_path / "missing.csv") == 2
     assert "missing.csv: No such file or directory" in capsys.readouterr().err
+
+
+def test_fits_take_azimuths_from_the_forward_direction(tmp_path: Path, capsys: Captured) -> None:
+    rows = ["sza,vza,raa,brdf"]
+    for light, viewer, turn in ((i, r, t) for i in (30, 60) for r in range(0, 81, 10) for t in range(0, 181, 30)):
+        angles = np.radians([light, 0.0, viewer, 180.0 - turn])
+        rows.append(f"{light},{viewer},{turn},{models.ward(*angles, rho_d=0.2, rho_s=0.1, alpha_x=0.2, alpha_y=0.2)}")
+    path = tmp_path / "forward.csv"
+    path.write_text("\n".join([*rows, ""]))
+    for options, found in ((["--azimuth", "forward"], True), ([], False)):
+        assert run("fit", path, "--model", "ward", *options, "--json", tmp_path / "fits.json") == 0
+        (fit,) = json.loads((tmp_path / "fits.json").read_text())["fits"]
+        assert (fit["rms_ln"] < 1e-3) == found
+    capsys.readouterr()
+    fits = tmp_path / "ward.fit"
+    fits.write_text("# published fits\nbrass = Ward(a = 0.1)\n")
+    assert run("fit", fits, "--azimuth", "forward") == 2
+    assert "--azimuth: " in capsys.readouterr().err
+
+
+def test_percentages_of_summaries_are_plain_numbers() -> None:
+    assert [_percent(value) for value in (None, 0.00123, 0.0999, 0.995, 2.5, 123.0)] == [
+        *("-", "0.12 %", "10 %", "100 %", "250 %", "12300 %")
+    ]

@@ -142,7 +142,7 @@ def test_joined_files_are_one_table(tmp_path: Path, clay: Samples, capsys: Captu
     first = _csv(tmp_path / "first.csv", clay.selected(rows[:100]))
     second = _csv(tmp_path / "second.csv", clay.selected(rows[100:]))
     assert run("import", first, second, "--join", "--name", "clay", "--store", tmp_path / "store", *ONE_JOB) in (0, 1)
-    assert f"{first}, {second}: first\n  240 samples" in capsys.readouterr().out
+    assert f"{first}, {second}: first and second\n  240 samples" in capsys.readouterr().out
     measured = brdfdb.open(tmp_path / "store").metadata("clay").measured
     assert measured is not None
     assert (measured.samples, measured.file) == (240, "first.csv, second.csv")
@@ -150,6 +150,33 @@ def test_joined_files_are_one_table(tmp_path: Path, clay: Samples, capsys: Captu
     whole = _csv(tmp_path / "whole.csv", clay)
     joined, alone = (formats.samples(path) for path in (whole, first))
     assert np.array_equal(joined.values[:100], alone.values)
+
+
+def test_joined_files_are_named_by_what_their_names_share(tmp_path: Path, clay: Samples, capsys: Captured) -> None:
+    files = [_csv(tmp_path / name, clay) for name in ("clay_run1.csv", "clay_run2.csv", "loam.csv")]
+    recipe = tmp_path / "clay.toml"
+    assert run("import", *files[:2], "--join", "--recipe", recipe) == 0
+    assert tomllib.loads(recipe.read_text())["materials"] == ["clay-run"]
+    assert run("import", *files[1:], "--join", "--recipe", tmp_path / "two.toml") == 2
+    assert "--name: " in (error := capsys.readouterr().err)
+    assert "loam.csv have no word in common that names them; give one" in error
+    assert not (tmp_path / "two.toml").exists()
+
+
+def test_azimuth_and_wavelength_are_keys_of_the_recipe(tmp_path: Path, clay: Samples, capsys: Captured) -> None:
+    path, recipe = _csv(tmp_path / "clay.csv", clay), tmp_path / "clay.toml"
+    assert run("import", path, "--azimuth", "forward", "--wavelength-nm", "650", "--recipe", recipe) == 0
+    printed = capsys.readouterr().out
+    assert "Wavelength: 650 nm." in printed
+    assert "Azimuths count from the forward direction" in printed
+    keys = tomllib.loads(recipe.read_text())["define"]["clay"]
+    assert (keys["azimuth"], keys["wavelength_nm"]) == ("forward", 650.0)
+    (job,) = recipe_file.load(recipe).measured_jobs()
+    assert job.request["wavelength_nm"] == 650.0
+    read = job.table.read(job.paths)
+    assert read.wavelength_nm == [650.0]
+    assert isinstance(read, Samples)
+    assert np.cos(read.phi_r - read.phi_i) == pytest.approx(-np.cos(clay.phi_r))
 
 
 @pytest.mark.parametrize(
@@ -168,7 +195,8 @@ def test_files_that_do_not_fit_are_not_joined(
 ) -> None:
     other = tmp_path / "other.csv"
     other.write_text(f"{header}\n{row}\n")
-    assert run("import", _csv(tmp_path / "clay.csv", clay), other, "--join", "--store", tmp_path / "store") == 2
+    clay_file = _csv(tmp_path / "clay.csv", clay)
+    assert run("import", clay_file, other, "--join", "--name", "clay", "--store", tmp_path / "store") == 2
     error = capsys.readouterr().err
     assert sentence in error
     assert error.count("\n") == 1

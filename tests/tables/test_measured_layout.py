@@ -9,17 +9,18 @@ import pytest
 
 import brdfdb
 from brdfdb.errors import ParameterError
-from brdfdb.geometry import unit_vector
+from brdfdb.geometry import radians, unit_vector
 from brdfdb.materials import FunctionSource, presets
-from brdfdb.measurements import MeasuredSource
+from brdfdb.measurements import MeasuredSource, Samples
 from brdfdb.parameters import Floats
 from brdfdb.store.publication import publish
+from brdfdb.tables.error_measurement import measure
 from brdfdb.tables.grids import Grid
 from brdfdb.tables.layout import Interpolation, Layout
 from brdfdb.tables.measured_layout import tabulated
 from brdfdb.tables.table import Table
 from brdfdb.tables.tabulation import block, metadata_of
-from tests.measurements.made_up import scattered
+from tests.measurements.made_up import scans, scattered
 
 RNG = np.random.default_rng(8)
 WI, WR = (unit_vector(RNG.uniform(0.0, 1.2, 500), RNG.uniform(0.0, 6.0, 500)) for _ in range(2))
@@ -109,3 +110,37 @@ def test_colours_take_three_parts(tmp_path: Path) -> None:
     assert table.values.shape[-1] == 3
     spectrum = table.lookup_vectors(WI[:5], WR[:5])
     assert brdfdb.spectra.linear_srgb(table.wavelength_nm, spectrum) == pytest.approx(red(WI[:5], WR[:5]), rel=0.02)
+
+
+def test_directions_that_were_not_measured_count_neither_for_the_grid_nor_for_the_error() -> None:
+    def torn(wi: Floats, wr: Floats) -> Floats:
+        steps = np.floor(40.0 * (wi[:, 2:] + wr[:, 2:])) % 2.0
+        return np.where(wi[:, 2:] < np.cos(radians(65.0)), 0.1 + steps, 0.2)
+
+    stated = {}
+    for nodes in (None, scans(lambda wi, _: wi[:, 2:], np.arange(10.0, 61.0, 10.0), 0.0)):
+        source = MeasuredSource.of_function(torn, ("grey",), None, name="x", title="x", provenance="x", nodes=nodes)
+        layout, values = tabulated(source, None, 0.05)
+        stated[nodes is None] = measure(layout, lambda rows, values=values: values[rows])
+        assert ("does not keep" in layout.reason) == (nodes is None)
+    assert stated[True].overall.p95 > 0.5
+    assert stated[False].overall.p95 < 0.05
+    assert stated[False].directions < stated[True].directions
+    assert stated[False].p95[-1] == [stated[False].overall.p95]  # nothing was measured in the last band
+
+
+def test_table_of_samples_in_one_plane_is_measured_there(tmp_path: Path) -> None:
+    light, viewer = (radians(a.ravel()) for a in np.meshgrid([10.0, 30.0, 50.0], np.arange(-70.0, 71.0, 5.0)))
+    turn = np.where(viewer < 0.0, np.pi, 0.0)
+    samples = Samples(
+        "plane", light, 0.0 * light, np.abs(viewer), turn, ("400nm", "700nm"), np.array([400.0, 700.0]),
+        np.stack([0.1 + 0.1 * np.cos(light), 0.2 + 0.1 * np.cos(viewer)], axis=1),
+    )  # fmt: skip
+    source = MeasuredSource.of_samples(samples, name="plane")
+    publish(tmp_path, source, tolerance=0.05)
+    table = brdfdb.open(tmp_path)["plane"]
+    at = radians(np.array([[20.0, 0.0, 33.0, 0.0], [20.0, 0.0, 33.0, 180.0], [20.0, 0.0, 33.0, 90.0]])).T
+    assert table.extrapolated(*at).tolist() == [False, False, True]
+    stated = table.lookup_with_error(*at)
+    assert np.isnan(stated.error).all(axis=1).tolist() == [False, False, True]
+    assert stated.brdf[0] == pytest.approx([0.1 + 0.1 * np.cos(at[0, 0]), 0.2 + 0.1 * np.cos(at[2, 0])], rel=0.03)

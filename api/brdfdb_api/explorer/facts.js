@@ -124,8 +124,14 @@ const optional = (term, text) => (text ? [[term, text]] : []);
 
 /** What measured data are of.
  * @param {any} measured */
-const origin = ({ by, file, samples, incidences }) =>
-  [samples ? `${samples} samples of ${incidences} lights` : "known everywhere", by, file && `file ${file}`]
+const origin = ({ by, file, samples, incidences, extrapolated }) =>
+  [
+    samples
+      ? `${samples} samples of ${incidences} lights`
+      : `known ${extrapolated === null ? "everywhere" : "between its values"}`,
+    by,
+    file && `file ${file}`,
+  ]
     .filter(Boolean)
     .join("; ");
 
@@ -139,7 +145,7 @@ const data = ({ held_out: left, noise, extrapolated, negative, changes }) => [
     left ? `99 within ${percent(left.p99)}` : "",
   ],
   ["noise", noise ? `95 of 100 below ${percent(noise.p95)}` : "not stated"],
-  ...optional("extrapolated", extrapolated === null ? "" : `${percent(extrapolated)} of the nodes`),
+  ...optional("measured", extrapolated === null ? "" : `${percent(1 - extrapolated)} of all directions`),
   ...optional("below 0", negative && `${percent(negative)} of the values, which are 0 here`),
   ...changes.map(
     (/** @type {any} */ { law, changed }) => /** @type {Row} */ ([`made ${law}`, `by up to ${percent(changed.max)}`]),

@@ -1,6 +1,5 @@
 // The cut through the plane of incidence: f_r over the viewer, as a polar picture or a chart.
 
-import { address, json } from "./api.js";
 import { chart, legend, reader, strokes } from "./chart.js";
 import { closest, degrees, element, ink, path, percent, short, svg } from "./dom.js";
 import { RELATIVE, floorOf, relative, scaled, shortOfHorizon, span, specularWords, ticks } from "./scales.js";
@@ -19,30 +18,13 @@ const NEAR = 24; // pixels from the light in which a hand takes it
 let centre = [0, 0]; // of the polar picture [pixel]
 
 /** @type {import("./main.js").View} */
-export default { name: "cut", title: "Cut", order: 1, shapes: true, request, answer, draw: cut, begin: moves };
+export default { name: "cut", title: "Cut", order: 1, shapes: true, request, draw: cut, begin: moves };
 
 /** @param {Series} each
  * @param {State} state
  * @param {Series[]} series */
 function request(each, state, series) {
   return lobe("cut", each, state, series, channelsOf(each, state).query);
-}
-
-/** The lobe, and of measured data where nothing was measured.
- * @param {Series} each
- * @param {State} state
- * @param {Series[]} series
- * @param {AbortSignal} signal */
-async function answer(each, state, series, signal) {
-  const found = await json(request(each, state, series), signal);
-  if (!each.info.measured || each.source !== "table") return found;
-  const { theta_r } = found.axes_deg,
-    { theta_i, phi_i } = found,
-    at = each.info.wavelength_nm?.[0];
-  const phi_r = theta_r.map((/** @type {number} */ theta) => phi_i + (theta > 0 ? 180 : 0));
-  const body = { theta_i, phi_i, theta_r: theta_r.map(Math.abs), phi_r, wavelength_nm: at };
-  const { extrapolated } = await json({ path: address(each.name, "lookup", { error: true }), body }, signal);
-  return { ...found, extrapolated };
 }
 
 /** The curves of all series, short of the horizon.
@@ -102,7 +84,7 @@ function cut(into, series, answers, state) {
     (off
       ? ` ${state.axes === "polar" ? "Below, to 89°, t" : "T"}able − model, ${RELATIVE}: ${percent(worstOf(off))} at most.`
       : "") +
-    (answers.some(({ extrapolated }) => extrapolated) ? " Dashed is what was not measured but extrapolated." : "") +
+    (answers.some(({ extrapolated }) => extrapolated?.includes(true)) ? " Dashed is what was not measured but extrapolated." : "") +
     specularWords(series, specular)
   );
 }

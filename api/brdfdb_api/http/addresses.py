@@ -24,7 +24,9 @@ T = TypeVar("T")
 
 Revision = Annotated[str | None, WithJsonSchema({"type": "string", "description": "such as r000001"})]
 NPY_ANSWER = {NPY: "brdf alone, or brdf and error on a first axis, as a .npy file"}
-NPY_BODY = "theta_i, phi_i, theta_r, phi_r on the last of the axes (..., 4); float32 or float64, degrees"
+NPY_BODY = (
+    "Or .npy of shape (..., 4), float32 or float64: theta_i, phi_i, theta_r, phi_r. Other media are read as JSON."
+)
 
 _OTHERS: dict[int, dict[str, Any]] = {
     304: {"description": "The ETag in If-None-Match still holds"},
@@ -142,7 +144,8 @@ def body(model: type[BaseModel], *, npy: bool = False) -> dict[str, Any]:
     content = {"application/json": {"schema": schema} | ({} if example is None else {"example": example})}
     if npy:
         content[NPY] = {"schema": {"type": "string", "format": "binary", "description": NPY_BODY}}
-    return {"requestBody": {"required": True, "content": content}}
+    words = f"{model.__doc__} {NPY_BODY if npy else ''}".strip()
+    return {"requestBody": {"required": True, "description": words, "content": content}}
 
 
 def served_options(file_format: str) -> dict[str, Option]:

@@ -77,7 +77,7 @@ class Summary(BaseModel):
 
     name: str
     title: str = ""
-    model: str = ""
+    model: str | None = Field(default=None, description="null: measured, or a function")
     model_title: str = ""
     paper: str = Field(default="", description="key of the paper of the model, such as he1991")
     source: str = Field(default="", description="paper and table, figure or section of the parameters")
@@ -140,7 +140,7 @@ class Material(BaseModel):
     name: str
     revision: str
     title: str
-    model: str
+    model: str | None = Field(description="name of the model; null: measured, or a function")
     parameters: list[ParameterDocument]
     anisotropic: bool
     wavelength_nm: list[float] | None = Field(description="wavelengths [nm]; null: grey")

@@ -149,7 +149,7 @@ class CatalogueQuery(Query):
 
     def lets_through(self, line: dict[str, Any]) -> bool:
         """Return True if the filters let a line of the catalogue through."""
-        text = " ".join(str(line.get(key, "")) for key in SEARCHED).casefold()
+        text = " ".join(str(line.get(key) or "") for key in SEARCHED).casefold()
         papers = f"{line.get('paper', '')} {line.get('source', '')}".casefold()
         low, high = line.get("wavelength_range_nm") or (0.0, np.inf)
         return (
@@ -200,7 +200,7 @@ def material(request: Request, name: str, revision: Revision = None) -> Response
         "name": table.name,
         "revision": table.revision,
         "title": metadata.title or "",
-        "model": metadata.model or "",
+        "model": metadata.model,
         "parameters": _parameters(metadata),
         "anisotropic": table.anisotropic,
         "wavelength_nm": table.wavelength_nm,
@@ -208,7 +208,7 @@ def material(request: Request, name: str, revision: Revision = None) -> Response
         "axes_deg": {axis: np.ascontiguousarray(values) for axis, values in table.axes_deg.items()},
         "specular": table.specular is not None,
         "error": None if table.error is None else table.attrs["error"],
-        "measured": None if metadata.measured is None else metadata.measured.model_dump(exclude={"hull"}),
+        "measured": None if metadata.measured is None else metadata.measured.model_dump(exclude={"extent"}),
         "formula_error": table.attrs.get("formula_error"),
         "largest_albedo": table.attrs.get("largest_albedo"),
         "incomplete": metadata.gaps or None,

@@ -36,6 +36,7 @@ from brdfdb_api.http.responses import (
     json_bytes,
     json_response,
     npy_bytes,
+    plain,
     tag_of,
 )
 from brdfdb_api.http.routes import EXPORT_WAIT_S
@@ -138,6 +139,8 @@ def lobe_answer(
         "axes_deg": axes,
     }
     document = document_of(points, options, surface, values, about)
+    if surface.kind == "table" and surface.source.metadata.measured is not None:
+        document["extrapolated"] = plain(surface.source.extrapolated(*angles))
     return json_response(document | ({"specular_reflectance": None} if no_light else {}), headers)
 
 

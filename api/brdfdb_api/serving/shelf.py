@@ -154,7 +154,7 @@ def _described(name: str, group: Path, head: dict[str, Any]) -> dict[str, Any]:
     return {
         "name": name,
         "title": metadata.title or "",
-        "model": metadata.model or "",
+        "model": metadata.model,
         "model_title": metadata.model_title or metadata.model or "",
         "paper": metadata.model_reference or "",
         "source": metadata.source or "",

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from pathlib import Path
+
+from brdfdb_pipelines.exit_codes import INTERRUPTED
 
 HELP = "Fit models to measured samples: their parameters with intervals, ranked by the error at incidences left out."
 
@@ -12,9 +15,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the file, the models, the residual, and the forms of the answer."""
     parser.add_argument(
         "data",
+        nargs="+",
         type=Path,
         metavar="DATA",
-        help="a file of samples, a table of another program, or published fits (NAME.fit)",
+        help="a file of samples, or several of one surface; a table of another program; or published fits (NAME.fit)",
     )
     parser.add_argument(
         "--model",
@@ -32,6 +36,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--channel", metavar="NAME", help="the channel that is fitted (default: all together)")
     parser.add_argument(
         "--wavelength-nm", type=float, metavar="NM", help="wavelength of samples of one channel that state none"
+    )
+    parser.add_argument(
+        "--azimuth",
+        choices=("light", "forward"),
+        help="direction from which DATA counts azimuths: the light, or the one into which it travels (default: light)",
     )
     parser.add_argument(
         "--refractive-index",
@@ -52,22 +61,23 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Fit, and print the ranking."""
-    from brdfdb.errors import import_extra
+    from brdfdb.errors import counted, import_extra
     from brdfdb.fitting.published import SUFFIX
     from brdfdb_pipelines import fit
 
     import_extra("scipy")
-    if options.data.suffix.lower() == SUFFIX:
+    if any(file.suffix.lower() == SUFFIX for file in options.data):
         return _published(options)
     if options.page is not None:
         import_extra("matplotlib")  # before the time is spent
         import_extra("jinja2")
-    fit.run(
+    document = fit.run(
         options.data,
         options.model or None,
         residual=options.residual,
         channel=options.channel,
         wavelength_nm=options.wavelength_nm,
+        azimuth=options.azimuth or "light",
         refractive_index=options.refractive_index,
         receiver_deg=options.receiver_deg,
         source_deg=options.source_deg,
@@ -75,6 +85,9 @@ def run(options: argparse.Namespace) -> int:
         page=options.page,
         recipe=options.recipe,
     )
+    if document.interrupted:
+        print(f"brdfdb: interrupted; {counted(len(document.fits), 'model')} of the search are above", file=sys.stderr)
+        return INTERRUPTED
     return 0
 
 
@@ -83,9 +96,12 @@ def _published(options: argparse.Namespace) -> int:
     from brdfdb.errors import ParameterError
     from brdfdb_pipelines import published_fits
 
-    for name in ("model", "wavelength_nm", "refractive_index", "receiver_deg", "source_deg", "page"):
+    first, *others = options.data
+    if others:
+        raise ParameterError("DATA", f"{first} and {len(others)} more: published fits are listed one file at a time")
+    for name in ("model", "wavelength_nm", "azimuth", "refractive_index", "receiver_deg", "source_deg", "page"):
         if getattr(options, name):
             option = f"--{name.replace('_', '-')}"
-            raise ParameterError(option, f"{options.data} holds the fits of others and no samples; leave it out")
-    published_fits.run(options.data, channel=options.channel, json=options.json, recipe=options.recipe)
+            raise ParameterError(option, f"{first} holds the fits of others and no samples; leave it out")
+    published_fits.run(first, channel=options.channel, json=options.json, recipe=options.recipe)
     return 0

@@ -12,6 +12,8 @@ from brdfdb_pipelines.exit_codes import REFUSED, VIOLATED
 
 HELP = "Import measurements: state what files of others cover, integrate to and claim, and make audited tables of them."
 
+_KEYS = ("format", "member", "quantity", "angles", "azimuth", "side")  # options that are keys of a recipe
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the files, what their columns are, and the forms of the answer."""
@@ -34,6 +36,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--angles", choices=("deg", "rad"), help="unit of the angles of a text (default: by its names, else degrees)"
+    )
+    parser.add_argument(
+        "--azimuth",
+        choices=("light", "forward"),
+        help="direction from which the file counts azimuths: the light, or the one into which it travels, so that 0 is "
+        "the mirror side (default: light)",
+    )
+    parser.add_argument(
+        "--wavelength-nm", type=float, metavar="NM", help="wavelength of a file of one channel that states none"
     )
     parser.add_argument("--member", metavar="NAME", help="the file of an archive (.zip) that is read (default: all)")
     parser.add_argument(
@@ -70,10 +81,14 @@ def run(options: argparse.Namespace) -> int:
     """Read the files, print a statement on each, and make tables; return the exit code of the command."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # processes fill the cores: threads beside them wait
     from brdfdb.errors import ParameterError
+    from brdfdb.formats._stated import check_wavelength
     from brdfdb_pipelines import import_samples
     from brdfdb_pipelines.import_tables import TOLERANCE, Tables
 
-    keys = {name: getattr(options, name) or "" for name in ("format", "member", "quantity", "angles", "side")}
+    keys = {name: getattr(options, name) or "" for name in _KEYS}
+    if options.wavelength_nm is not None:
+        check_wavelength(options.wavelength_nm)
+        keys["wavelength_nm"] = options.wavelength_nm
     of_table = ("tolerance", "reciprocal", "conserving", "name", "title", "source")
     tables = None
     if options.store is not None or options.recipe is not None:

@@ -1,0 +1,132 @@
+"""Albedos of the directions of the light of samples: integrals of their values over the viewers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brdfdb.geometry import degrees
+from brdfdb.measurements._disk import averaged, integrals
+from brdfdb.measurements.samples import Samples
+from brdfdb.parameters import Floats
+
+PEAK = 0.1  # share of one viewer in an albedo from which on it is not known
+BAND_DEG = 1.0
+_BANDS_DEG = (10.0, 30.0, 50.0, 70.0)  # incidences of scattered directions, each with those within BAND_DEG
+_MOST_IN_BAND = 20_000
+_FEWEST_VIEWERS = 12  # of an incidence that is integrated
+_MOST_INCIDENCES = 400  # that are integrated, evenly among all
+
+
+@dataclass(frozen=True)
+class Incidence:
+    """Albedo of one direction of the light: the integral of its samples.
+
+    Attributes
+    ----------
+    theta_i_deg, phi_i_deg : float [degree]
+        Direction of the light.
+    viewers : int
+        Directions of the viewer.
+    covered : float [1]
+        Share of the projected solid angle of the hemisphere that the viewers surround, of the channel with most holes.
+    measured : tuple of float [1]
+        Integral of f_r cos(theta_r) over what is covered, of each channel.
+    albedo : tuple of float [1]
+        The same over the hemisphere; beyond the viewers f_r is that of the nearest one.
+    peak : float [1]
+        Largest share of one viewer in the albedo of a channel. Above a tenth the lobe is narrower than the steps
+        between viewers, and the albedo is not known.
+    """
+
+    theta_i_deg: float
+    phi_i_deg: float
+    viewers: int
+    covered: float
+    measured: tuple[float, ...]
+    albedo: tuple[float, ...]
+    peak: float
+
+
+def incidences_of(
+    samples: Samples, delta_deg: Floats, progress: Callable[[float], None] | None, *, one_side: bool
+) -> tuple[tuple[Incidence, ...], bool]:
+    """Return the albedos of directions of the light, and True if these are bands of scattered directions.
+
+    Parameters
+    ----------
+    samples : Samples
+        Samples; their holes are nan.
+    delta_deg : array (N,) [degree]
+        Azimuths from the light to the viewer, in [0, 360).
+    progress : callable or None
+        Called with the share [1] that is done.
+    one_side : bool
+        The viewers are on one side of the plane of incidence: the other one is its mirror image.
+    """
+    for in_bands, groups in ((False, lights(samples)), (True, bands(samples))):
+        incidences = []
+        for number, rows in enumerate(groups):
+            incidences.append(_incidence(samples, rows, delta_deg, one_side, in_bands))
+            if progress is not None:
+                progress((number + 1) / len(groups))
+        if integrated := tuple(some for some in incidences if some is not None):
+            return integrated, in_bands
+    return (), False
+
+
+def lights(samples: Samples, fewest: int = _FEWEST_VIEWERS) -> list[NDArray[np.intp]]:
+    """Return the rows of each direction of the light that has viewers enough, by theta_i."""
+    number, theta_i = samples.incidence, degrees(samples.theta_i)
+    counts = np.bincount(number)
+    enough = np.flatnonzero(counts >= fewest)
+    if not enough.size:
+        return []
+    some = enough[np.unique(np.linspace(0, enough.size - 1, _MOST_INCIDENCES).astype(int))]
+    order = np.argsort(number, kind="stable")
+    ends = np.cumsum(counts)
+    groups = [order[ends[k] - counts[k] : ends[k]] for k in some]
+    return sorted(groups, key=lambda rows: float(theta_i[rows[0]]))
+
+
+def bands(samples: Samples) -> list[NDArray[np.intp]]:
+    """Return the rows of bands of theta_i, for directions of the light that are scattered."""
+    theta_i = degrees(samples.theta_i)
+    near = [np.flatnonzero(np.abs(theta_i - middle) <= BAND_DEG) for middle in _BANDS_DEG]
+    thinned = [rows[:: max(1, -(-rows.size // _MOST_IN_BAND))] for rows in near]
+    return [rows for rows in thinned if rows.size >= _FEWEST_VIEWERS]
+
+
+def _incidence(
+    samples: Samples, rows: NDArray[np.intp], delta: Floats, one_side: bool, in_bands: bool
+) -> Incidence | None:
+    """Return what the samples of one direction of the light integrate to; None if the viewers cover too little."""
+    radius, turn = np.sin(samples.theta_r[rows]), np.deg2rad(delta[rows])
+    points = np.stack([radius * np.cos(turn), radius * np.sin(turn)], axis=1)
+    values = samples.values[rows]
+    if one_side or in_bands:
+        points = np.concatenate([points, points * np.array([1.0, -1.0])])
+        values = np.concatenate([values, values])
+    points, values = averaged(points, values)
+    covered, peak, (measured, albedo) = 1.0, 0.0, np.zeros((2, len(samples.channels)))
+    patterns, of_pattern = np.unique(np.isfinite(values), axis=1, return_inverse=True)
+    for number, known in enumerate(patterns.T):
+        channels = np.flatnonzero(of_pattern.reshape(-1) == number)
+        part = integrals(points[known], values[np.ix_(known, channels)])
+        if part is None:
+            return None
+        covered, peak = min(covered, part.covered), max(peak, part.peak)
+        measured[channels], albedo[channels] = part.inside, part.whole
+    theta_i, phi_i = degrees(samples.theta_i[rows]), degrees(samples.phi_i[rows]) % 360.0
+    return Incidence(
+        round(float(np.mean(theta_i)), 4),
+        0.0 if in_bands else round(float(phi_i[0]), 4) % 360.0,
+        len(rows),
+        covered,
+        tuple(measured.tolist()),
+        tuple(albedo.tolist()),
+        peak,
+    )
