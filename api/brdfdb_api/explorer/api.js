@@ -78,7 +78,7 @@ async function answer({ path, body }, headers, signal) {
 
 /** The numbers of a .npy file of version 1.0, in its order.
  * @param {ArrayBuffer} buffer */
-export function fromNpy(buffer) {
+function fromNpy(buffer) {
   const start = 10 + new DataView(buffer).getUint16(8, true);
   const kind = /'descr': '<(f[48])'/.exec(new TextDecoder().decode(buffer.slice(10, start)))?.[1];
   if (!kind) throw new Problem("the server answers with numbers of another kind");

@@ -2,11 +2,12 @@
 
 import { closest, element, path, short, svg } from "./dom.js";
 
-/** @typedef {{ x: number[], y: (number | null)[], label: string, colour: string, dash?: string, low?: number[], high?: number[],
+/** @typedef {{ x: number[], y: (number | null)[], label: string, colour: string, dash?: string, low?: number[],
+ *   high?: number[],
  *   dashed?: boolean[] }} Curve low and high are the ends of a band; dashed tells which points are */
 /** @typedef {{ title: string, range: [number, number], every?: number }} Across */
-/** @typedef {{ title: string, range: [number, number], ticks: [number, string][], height: (value: number) => number }} Up range,
- *   ticks and height are on the scale, which may be logarithmic */
+/** @typedef {{ title: string, range: [number, number], ticks: [number, string][],
+ *   height: (value: number) => number }} Up range, ticks and height are on the scale, which may be logarithmic */
 
 const [LEFT, RIGHT, TOP, BOTTOM] = [62, 14, 12, 46]; // pixels around the frame
 const TALL = 330; // pixels of the frame

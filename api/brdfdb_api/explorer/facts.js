@@ -3,7 +3,8 @@
 import { byId, chip, element, isGood, percent, short } from "./dom.js";
 import { nearest } from "./series.js";
 
-/** @typedef {[string | Node, string | Node, ...(string | undefined)[]]} Row a term, its value, and small lines below that */
+/** @typedef {[string | Node, string | Node, ...(string | undefined)[]]} Row a term, its value, and small lines below
+ *   that */
 
 /** @type {Record<string, string>} */
 const QUESTIONS = {
@@ -192,7 +193,7 @@ function assumed(parameter, attributes) {
 /** Know nothing. */
 export const forget = () => aside.replaceChildren();
 
-/** Say the error at the light that is looked at: between two wavelengths the larger of theirs, of a mixture the one stated.
+/** Say the error at the light that is looked at: between two wavelengths the larger of theirs, else the one stated.
  * @param {any} info
  * @param {{ theta_i: number, nm: number | null }} state */
 export function band({ error, wavelength_nm: wavelengths }, { theta_i, nm }) {

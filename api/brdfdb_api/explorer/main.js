@@ -24,8 +24,10 @@ import { VIEWS } from "./views.js";
  *   known?: (each: Series, state: State, series: Series[]) => boolean,
  *   draw?: (into: HTMLElement, series: Series[], answers: any[], state: State, all: Series[]) => string,
  *   begin?: (into: HTMLElement, choose: Choose, now: () => State) => void,
- * }} View parts: views that are shown side by side, or the view itself; idle and also: controls without effect, and those that few
- *   views have; request: what a copy asks for; answer: what the picture asks for, if that is more; known: the series that the
+ * }} View parts: views that are shown side by side, or the view itself; idle and also: controls without effect, and
+ *   those that few
+ *   views have; request: what a copy asks for; answer: what the picture asks for, if that is more; known: the series
+ *   that the
  *   service knows there; draw: the picture, and its caption; begin: what hands and keys do in it */
 
 const [title, message, caption, picture] = [
@@ -241,11 +243,13 @@ async function answersTo(view, now, signal, lastTry = false) {
     knows = view.known ?? (() => true),
     known = all.filter((each) => knows(each, now, all));
   const answer = view.answer ?? ((each) => json(view.request?.(each, now, all) ?? "", signal));
-  const { quick: hurried = false, exposure: _, scale: __, axes: ___, view: ____, compare: _____, ...rest } = now; // of which these do not change answers
+  const hurried = Boolean(now.quick);
+  // what does not change answers is 0
+  const asked = { ...now, quick: 0, exposure: 0, scale: 0, axes: 0, view: 0, compare: 0 };
   const key = JSON.stringify([
     known.map(({ text, source, info }) => [text, source, info.revision]),
     all.some(({ info }) => info.anisotropic),
-    rest,
+    asked,
   ]);
   const kept = before.get(view.name);
   const answers =

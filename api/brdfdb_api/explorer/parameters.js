@@ -7,9 +7,11 @@ import { PICTURE_NM, changedText, subjectOf } from "./state.js";
 
 /** @typedef {import("./state.js").State} State */
 /** @typedef {import("./series.js").Series} Series */
-/** @typedef {{ name: string, unit: string, low: number, high: number, meaning: string, default: number | boolean | null,
+/** @typedef {{ name: string, unit: string, low: number, high: number, meaning: string, default: number | boolean |
+ *   null,
  *   typical: [number, number] | null, published: { material: string, value: number }[] }} Parameter */
-/** @typedef {{ at: (share: number) => number, share: (value: number) => number }} Track the values of a slider, and back */
+/** @typedef {{ at: (share: number) => number, share: (value: number) => number }} Track the values of a slider, and
+ *   back */
 
 const panel = byId("parameters", HTMLElement);
 const BEYOND = 3; // factor by which sliders go beyond what is published, where a parameter has no end of its own

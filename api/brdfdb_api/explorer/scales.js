@@ -30,7 +30,8 @@ export const scaled =
   (value) =>
     scale === "linear" ? value : Math.max(Math.log10(Math.max(value, 1e-300)), bottom);
 
-/** Places on a scale and what to write there; of a logarithmic one less than a decade and a half long at 1, 2 and 5, too.
+/** Places on a scale and what to write there; of a logarithmic one less than a decade and a half long at 1, 2 and 5,
+ *   too.
  * @param {[number, number]} range
  * @param {Pick<State, "scale">} state
  * @returns {[number, string][]} */
@@ -76,7 +77,7 @@ export const relative = (table, model, floor) =>
 export const RELATIVE = "relative to the model, or to the floor of the error where that is larger";
 
 // Colours of maps, from the least to the most
-export const VIRIDIS = [
+const VIRIDIS = [
   [68, 1, 84],
   [72, 40, 120],
   [62, 74, 137],

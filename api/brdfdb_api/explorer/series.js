@@ -1,4 +1,4 @@
-// What a picture shows, one or more series of values: of a table, of the model behind it, or of a model with other parameters.
+// What a picture shows, one or more series of values: of a table, of its model, or of a model with other parameters.
 
 import { address, json, withQuery } from "./api.js";
 import { changed, described } from "./parameters.js";
@@ -7,7 +7,8 @@ import { PICTURE_NM, subjectOf } from "./state.js";
 /** @typedef {import("./state.js").State} State */
 /** @typedef {import("./api.js").Question} Question */
 /** @typedef {{ text: string, label: string, name: string, source: "table" | "model" | "parameters", info: any,
- *   recipe?: Record<string, any>, colour: string, dash: string }} Series recipe: the material of a model with parameters */
+ *   recipe?: Record<string, any>, colour: string, dash: string }} Series recipe: the material of a model with
+ *   parameters */
 
 const DASHES = ["none", "6 5", "2 4", "9 4 2 4", "none", "6 5", "2 4", "9 4 2 4"];
 const FEW_NM = [450, 500, 550, 600, 650]; // of curves at wavelengths

@@ -1,12 +1,14 @@
-// The scene of a sphere: which directions its pixels need, and what is seen of the light, of the surroundings and in the mirror.
+// The scene of a sphere: the directions that its pixels need, and what is seen of light, surroundings and mirror.
 
 /** @typedef {[number, number, number]} Vector x to the right, y up, z to the viewer */
 
 const DEGREE = 180 / Math.PI;
 const RHO = 2.5 / DEGREE; // angular radius of the light, which only a specular part shows
 const RADIANCE = 1 / (2 * (1 - Math.cos(RHO))); // over that of a white matt surface that faces the light
-/** @typedef {{ rings: number, rays: number, viewers: number[], far: number, around: number }} Detail rings and rays: directions
- *   around the half vector, along half a turn; viewers [degrees] of which the surroundings are summed, over lights far and around */
+/** @typedef {{ rings: number, rays: number, viewers: number[], far: number, around: number }} Detail rings and rays:
+ *   directions
+ *   around the half vector, along half a turn; viewers [degrees] of which the surroundings are summed, over lights
+ *   far and around */
 /** @type {Detail} */
 const FINE = { rings: 40, rays: 25, viewers: [0, 15, 30, 42, 52, 60, 67, 73, 78, 82, 85, 87.5], far: 20, around: 10 };
 /** @type {Detail} */
@@ -131,7 +133,8 @@ export function between(light, values, { rays, rings, turn }) {
  * @param {number} y how far up it is */
 const sky = (y) => SKY * (1 + y);
 
-/** Lights that sum up the surroundings of some viewers, with the weights of the sum, and the lights as vectors: z is the
+/** Lights that sum up the surroundings of some viewers, with the weights of the sum, and the lights as vectors: z is
+ *   the
  * normal, x points away from the viewer.
  * @param {number[]} azimuths of the viewers [degrees]
  * @param {boolean} quick */
@@ -165,7 +168,8 @@ export function surroundings(azimuths, quick) {
   return { angles, lights, viewers, count: azimuths.length };
 }
 
-/** Moments of the surroundings over the viewers of `surroundings`: nine numbers each, albedo and its mean light along x and z of
+/** Moments of the surroundings over the viewers of `surroundings`: nine numbers each, albedo and its mean light
+ *   along x and z of
  * three colours.
  * @param {ReturnType<typeof surroundings>} scene
  * @param {ArrayLike<number>} values */
@@ -196,12 +200,14 @@ function viewer(viewers, theta) {
   return [i, Math.min((theta - viewers[i]) / (viewers[i + 1] - viewers[i]), 1)];
 }
 
-/** Add what a normal reflects of the surroundings and, where it has a specular part, of the light that stands in them.
+/** Add what a normal reflects of the surroundings and, where it has a specular part, of the light that stands in
+ *   them.
  * @param {number} x
  * @param {number} y
  * @param {number} z
  * @param {Vector} light
- * @param {{ viewers: number[], moments: ArrayLike<number> | null, specular: number[][] | null }} of specular: three colours over the viewers
+ * @param {{ viewers: number[], moments: ArrayLike<number> | null, specular: number[][] | null }} of specular: three
+ *   colours over the viewers
  * @param {Float64Array} into */
 export function add(x, y, z, light, of, into) {
   const [i, a] = viewer(of.viewers, Math.acos(Math.min(z, 1)) * DEGREE);

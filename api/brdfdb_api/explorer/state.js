@@ -1,10 +1,14 @@
 // What is looked at: subjects, directions, a wavelength, a view; as a link, and back from one.
 
-/** @typedef {{ base: string, model: boolean, changes: Record<string, number> | null }} Subject a material's table; with `model`
+/** @typedef {{ base: string, model: boolean, changes: Record<string, number> | null }} Subject a material's table;
+ *   with `model`
  *   the model that it was made of; with `changes` that model, or a model by its name, with other parameters */
-/** @typedef {{ material: string, view: string, theta_i: number, phi_i: number, theta_r: number, turn: number, nm: number | null,
- *   scale: string, axes: string, curves: string, compare: string[], illuminant: string, exposure: number, surround: string, quick?: boolean }} State
- *   quick: drawn in a hurry, while a slider moves; turn is phi_r - phi_i; nm null is luminance and colours under an illuminant; material and compare are subjects as text */
+/** @typedef {{ material: string, view: string, theta_i: number, phi_i: number, theta_r: number, turn: number, nm:
+ *   number | null,
+ *   scale: string, axes: string, curves: string, compare: string[], illuminant: string, exposure: number, surround:
+ *   string, quick?: boolean }} State
+ *   quick: drawn in a hurry, while a slider moves; turn is phi_r - phi_i; nm null is luminance and colours under an
+ *   illuminant; material and compare are subjects as text */
 
 // compare: the model of the material itself
 export const MODEL = ":model";
@@ -46,7 +50,8 @@ const RANGES = {
   nm: [1, 1e6],
   exposure: [-8, 8],
 };
-export const PICTURE_NM = Array.from({ length: 14 }, (_, i) => 420 + 20 * i); // at which pictures look up spectra, as `brdfdb render`
+// Wavelengths at which pictures look up spectra, as `brdfdb render`
+export const PICTURE_NM = Array.from({ length: 14 }, (_, i) => 420 + 20 * i);
 const MOST = 7; // subjects that are compared with: there are as many more colours
 
 /** The state that a link holds, of some views; what it does not hold, or holds wrongly, is as at the start.

@@ -9,7 +9,8 @@ import { against, nearest, question } from "./series.js";
 
 const NM = [450, 550, 650]; // of albedos, where none is chosen
 
-/** Whether albedos are those of the audit: it alone knows that of the model of a table, unless that was audited without one.
+/** Whether albedos are those of the audit: it alone knows that of the model of a table, unless that was audited
+ *   without one.
  * @param {Series} each
  * @param {Series[]} series */
 const audited = ({ info }, series) => against(series) && Boolean(info.audit?.model);
@@ -22,7 +23,8 @@ export default {
   idle: ["theta_i", "phi_i", "log", "illuminant"],
   request: (each, _, series) =>
     audited(each, series) ? question({ ...each, source: "table" }, "audit") : question(each, "albedo"),
-  known: (each, _, series) => each.source !== "model" || audited(each, series), // the service does not know that of a model
+  // the service does not know that of the model of a table
+  known: (each, _, series) => each.source !== "model" || audited(each, series),
   draw: albedo,
 };
 
@@ -82,7 +84,8 @@ function albedo(into, series, answers, state, all) {
   );
   const of = answers.some(({ finding }) => finding);
   return (
-    `The share of light from θᵢ that is reflected, specular part included; over φᵢ the ${of ? "most, as the audit found it" : "mean"}.` +
+    "The share of light from θᵢ that is reflected, specular part included; " +
+    `over φᵢ the ${of ? "most, as the audit found it" : "mean"}.` +
     (series.length < all.length ? " That of a model behind a table is known where an audit found it." : "")
   );
 }

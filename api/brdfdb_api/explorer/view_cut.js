@@ -84,7 +84,9 @@ function cut(into, series, answers, state) {
     (off
       ? ` ${state.axes === "polar" ? "Below, to 89°, t" : "T"}able − model, ${RELATIVE}: ${percent(worstOf(off))} at most.`
       : "") +
-    (answers.some(({ extrapolated }) => extrapolated?.includes(true)) ? " Dashed is what was not measured but extrapolated." : "") +
+    (answers.some(({ extrapolated }) => extrapolated?.includes(true))
+      ? " Dashed is what was not measured but extrapolated."
+      : "") +
     specularWords(series, specular)
   );
 }

@@ -1,4 +1,4 @@
-// The lobe: f_r over the hemisphere of viewers as the distance from the centre; a hand moves the light or turns the picture.
+// The lobe: f_r over all viewers as the distance from the centre; a hand moves the light or turns the picture.
 
 import { json } from "./api.js";
 import { element, ink, short } from "./dom.js";
@@ -8,7 +8,8 @@ import { anisotropic, azimuth, lobe, number, quantity, quantityWords, question }
 /** @typedef {import("./state.js").State} State */
 /** @typedef {import("./series.js").Series} Series */
 /** @typedef {[number, number, number]} Vector */
-/** @typedef {{ corners: number[], colour?: string, ink?: string, width?: number, depth?: number }} Piece corners are numbers of points */
+/** @typedef {{ corners: number[], colour?: string, ink?: string, width?: number, depth?: number }} Piece corners are
+ *   numbers of points */
 /** @typedef {{ points: Vector[], pieces: Piece[] }} Scene */
 
 const RADIAN = Math.PI / 180;
@@ -136,7 +137,8 @@ function hemisphere(into, series, answers, state) {
   repaint();
   const scale = state.scale === "log" ? `its logarithm, from ${short(10 ** range[0])}` : "the value itself, from 0";
   return (
-    `${quantityWords(series[0], state)} in 1/sr over all viewers to θᵣ = ${LAST}°: the distance from the centre is ${scale}. ` +
+    `${quantityWords(series[0], state)} in 1/sr over all viewers to θᵣ = ${LAST}°: ` +
+    `the distance from the centre is ${scale}. ` +
     "Drag the light, or anything else to turn the picture; arrow keys turn it, too." +
     specularWords(series, specular)
   );
@@ -257,7 +259,8 @@ function projection({ clientWidth: width, clientHeight: high }) {
     place: ([x, y, z]) => [width / 2 + scale * (ca * y - sa * x), down - scale * (ce * z - se * (ca * x + sa * y))],
     /** @type {(point: Vector) => number} */
     depth: ([x, y, z]) => ce * (ca * x + sa * y) + se * z,
-    /** The direction above the horizon that is shown at a point, the nearer one of two. @type {(x: number, y: number) => Vector} */
+    /** The direction above the horizon that is shown at a point, the nearer one of two. @type {(x: number, y:
+     *   number) => Vector} */
     back: (x, y) => {
       let right = (x - width / 2) / scale,
         up = (down - y) / scale;

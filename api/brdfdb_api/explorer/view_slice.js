@@ -7,7 +7,8 @@ import { against, anisotropic, lobe, number, quantityWords } from "./series.js";
 
 /** @typedef {import("./state.js").State} State */
 /** @typedef {import("./series.js").Series} Series */
-/** @typedef {{ label: string, text: (j: number, i: number) => string, colour: (j: number, i: number) => number[] }} Map j of theta_h, i of theta_d */
+/** @typedef {{ label: string, text: (j: number, i: number) => string, colour: (j: number, i: number) => number[] }}
+ *   Map j of theta_h, i of theta_d */
 
 const RADIAN = Math.PI / 180;
 const SIZE = 90; // nodes along theta_h and theta_d
@@ -99,7 +100,8 @@ function slice(into, series, answers, state) {
   );
   const turned = anisotropic(series) ? `; φ of the half vector is ${answers[0].phi_i}°` : "";
   return (
-    `${quantityWords(series[0], state)} in 1/sr over the half angle, across, and the difference angle, up, of φ 90°${turned}.` +
+    `${quantityWords(series[0], state)} in 1/sr over the half angle, across, ` +
+    `and the difference angle, up, of φ 90°${turned}.` +
     (differ ? ` On the right, how far the table is off, ${RELATIVE}; the scale ends at the 99th percentile.` : "")
   );
 }

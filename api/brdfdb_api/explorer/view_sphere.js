@@ -21,8 +21,8 @@ const ENCODED = Uint8Array.from({ length: 4097 }, (_, i) => {
 
 const WORDS =
   "The viewer is far above the page; the light is θᵢ away from the viewer, to the right (+x) at φᵢ = 0 and to the " +
-  "top (+y) at 90°, and as bright as makes a white matt surface white. Drag it. The x axis of the surface runs around the vertical " +
-  "axis of the sphere.";
+  "top (+y) at 90°, and as bright as makes a white matt surface white. Drag it. " +
+  "The x axis of the surface runs around the vertical axis of the sphere.";
 const SKY = " The surroundings are bright above and black below.";
 const SPECULAR = " The specular part reflects them and the light, a disk of 5°.";
 
