@@ -34,7 +34,7 @@ DRAWN = {
 }
 COLOURFUL = 60  # of 255: between the largest and the smallest channel
 LAST = 88.0  # degrees: of the viewers of a hemisphere, those next to the horizon
-PIXELS = 0.75  # both ends of a width are whole pixels, and edges are soft: measured 0.51
+PIXELS = 1.1  # the four ends of width and height are whole pixels, and edges are soft: measured 1.02
 PIXEL = 0.1  # paths are written to a tenth of a pixel
 READ = "document.querySelector('#stage > div:not([hidden]) .read').textContent"
 
@@ -236,7 +236,7 @@ def test_a_hand_turns_the_hemisphere(chromium: Chromium, address: str) -> None:
     chromium.open(f"{address}#material=rolled-brass&view=hemisphere&theta_i=60")
     shown(chromium, "view=hemisphere")
     before = painted(chromium)
-    left, top = chromium.evaluate("(({ left, top }) => [left, top])(hemisphere.getBoundingClientRect())")
+    left, top, _, _ = box(chromium, "#hemisphere canvas")
     half_a_turn = 360  # pixels
     for kind, x in (("mousePressed", 50), ("mouseMoved", 50 + half_a_turn), ("mouseReleased", 50 + half_a_turn)):
         chromium.send(

@@ -205,7 +205,7 @@ function forget(now) {
 async function know(now, signal) {
   list.mark(subjectOf(now.material).base);
   const found = await seriesOf(now, signal).catch((error) => {
-    if (!(error instanceof Problem && now.compare.length)) throw error;
+    if (!(error instanceof Problem && !error.passes && now.compare.length)) throw error;
     return alone(now, signal, error.message);
   });
   signal.throwIfAborted();
