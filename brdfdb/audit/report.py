@@ -108,7 +108,7 @@ class AuditReport(BaseModel):
     version: Literal[6] = 6
     store: str = Field(description="directory of the store")
     brdfdb: str = Field(description="version of the library")
-    when: datetime
+    when: datetime = Field(description="of the last run; audits that a report of some materials keeps may be older")
     explanations: list[Explanation] = Field(description="explanations of the findings, in their order")
     materials: list[MaterialAudit]
     atlas: list[Figure] = Field(

@@ -17,8 +17,8 @@ ERRORS_EXPLAINED = (
 )
 COLUMNS = ("what the paper says?", "model conserves energy?")  # headings of the two answers
 
-
-REPORTS = ("audit.json", "audit-part.json")  # of all materials, and of those that were named or imported
+REPORT_OF_ALL = "audit.json"  # in a store: the report on all its materials
+REPORT_OF_SOME = "audit-part.json"  # on those that were named or imported
 
 
 class Audited(NamedTuple):
@@ -39,7 +39,7 @@ def last_audit(root: Path) -> dict[tuple[str, str], Audited]:
 def audited_materials(root: Path) -> list[dict[str, Any]]:
     """Return the entries of the reports that lie in a store: of all materials and of some, the newer report last."""
     entries: list[dict[str, Any]] = []
-    paths = [path for name in REPORTS if (path := root / name).exists()]
+    paths = [path for name in (REPORT_OF_ALL, REPORT_OF_SOME) if (path := root / name).exists()]
     for path in sorted(paths, key=lambda path: path.stat().st_mtime_ns):
         try:
             of_report = json.loads(path.read_bytes())["materials"]

@@ -21,6 +21,7 @@ from brdfdb.gallery import GALLERY
 from brdfdb.materials import presets
 from brdfdb.models import MODELS
 from brdfdb.store.reader import Store
+from brdfdb.store.summary_words import REPORT_OF_SOME
 from brdfdb_pipelines import audit_page, terminal, workers
 
 Task = Callable[[], Any]
@@ -53,7 +54,8 @@ def run(
         Materials; empty for all.
     report_path : Path
         The JSON report, which ends in .json; the page is written beside it, as .html. Both are written when everything
-        has been audited.
+        has been audited. The report of some materials that lies in the store keeps what it said of others before, as
+        long as their revisions are current; its page has those of this run.
     jobs : int
         Number of processes; 1: this one.
     figures : bool
@@ -100,7 +102,8 @@ def run(
         gallery=[done[f"figure {key}"].subject for key in GALLERY if figures],
         damaged=damaged,
     )
-    report_path.write_text(audit_report.model_dump_json() + "\n", encoding="utf-8")
+    whole = audit_report if report_path != root / REPORT_OF_SOME else _with_former(audit_report, report_path, store)
+    report_path.write_text(whole.model_dump_json() + "\n", encoding="utf-8")
     plots = {
         audit_page.key_of(section.subject): section.plots for section in done.values() if isinstance(section, Section)
     }
@@ -111,6 +114,19 @@ def run(
     if damaged:
         raise StoreError("; ".join(damaged))
     return audit_report
+
+
+def _with_former(audit_report: AuditReport, path: Path, store: Store) -> AuditReport:
+    """Return a report with the audits of an earlier one at `path` that are of other tables, and of current ones."""
+    try:
+        former = AuditReport.model_validate_json(path.read_bytes()).materials
+    except (OSError, ValueError):  # none yet, or that of another version
+        return audit_report
+    audits = {audited.material: audited for audited in former if audited.material in store}
+    audits = {name: audited for name, audited in audits.items() if audited.revision == store.head(name)}
+    audits |= {audited.material: audited for audited in audit_report.materials}
+    violations = [name for name, audited in audits.items() if audited.verdict == "violates"]
+    return audit_report.model_copy(update={"materials": [*audits.values()], "violations": violations})
 
 
 def _check_path(report_path: Path) -> None:

@@ -18,6 +18,7 @@ from brdfdb.measurements.joining import common_name
 from brdfdb.measurements.measured_source import slug
 from brdfdb.store.files import write_file
 from brdfdb.store.paths import NAME
+from brdfdb.store.summary_words import REPORT_OF_SOME
 from brdfdb.tables.planner import check_tolerance
 from brdfdb_pipelines import audit, build_resources, workers
 from brdfdb_pipelines.build import build
@@ -167,7 +168,7 @@ def make(targets: Sequence[Target], tables: Tables) -> Made:
         made.report = audit.run(
             tables.store,
             kept,
-            tables.store / "audit-part.json",
+            tables.store / REPORT_OF_SOME,
             jobs=min(tables.jobs, len(kept)),
             figures=False,
             shown=False,

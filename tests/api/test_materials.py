@@ -231,7 +231,8 @@ def test_unknown_material_names_the_closest(client: Client, address: str) -> Non
 
 @pytest.mark.parametrize("name", ["..", "%2e%2e", "..%2F..%2Fetc%2Fpasswd", "%00", "copper-foil%2F..", "COPPER-FOIL"])
 def test_a_name_is_not_a_path(client: Client, name: str) -> None:
-    assert client.request("GET", f"/v1/materials/{name}/lookup?theta_i=1&theta_r=2").status_code == 404
+    status = 405 if name == ".." else 404  # the client asks for /v1/lookup, which takes POST
+    assert client.request("GET", f"/v1/materials/{name}/lookup?theta_i=1&theta_r=2").status_code == status
 
 
 @pytest.mark.parametrize(

@@ -16,6 +16,7 @@ from brdfdb import formats
 from brdfdb.geometry import degrees, unit_vector
 from brdfdb.materials import presets
 from brdfdb.measurements import Samples
+from brdfdb.store.summary_words import audited_materials
 from brdfdb_pipelines import recipe_file
 from tests.formats.test_neural import network
 from tests.measurements.made_up import scattered
@@ -79,6 +80,22 @@ def test_an_archive_is_imported_and_audited_whole(archive: Path, tmp_path: Path,
     looked_up = brdfdb.open(store)["dark-grey"].lookup_vectors(*directions, 550.0)
     assert np.ravel(looked_up) == pytest.approx(expected, rel=0.02)
     assert (store / "audit-part.json").exists()
+
+
+def test_audits_of_earlier_imports_are_kept_as_long_as_their_tables_are_current(
+    archive: Path, tmp_path: Path, clay: Samples, capsys: Captured
+) -> None:
+    store, samples = tmp_path / "store", tmp_path / "clay.nc"
+    clay.to_xarray().to_netcdf(samples)
+    assert run("import", archive, "--store", store, *ONE_JOB) == 1
+    assert run("import", samples, "--store", store, "--name", "clay", *ONE_JOB) == 0
+    verdicts = {one["material"]: one["verdict"] for one in audited_materials(store)}
+    assert verdicts == {"clay": "passes", "dark-grey": "passes", "too-bright": "violates"}
+    assert run("import", archive, "--store", store, "--conserving", *ONE_JOB) == 0
+    report = json.loads((store / "audit-part.json").read_text(encoding="utf-8"))
+    assert {one["material"] for one in report["materials"]} == {"clay", "dark-grey", "too-bright"}
+    assert report["violations"] == []
+    capsys.readouterr()
 
 
 def test_json_has_statements_tables_and_summary(archive: Path, tmp_path: Path, capsys: Captured) -> None:

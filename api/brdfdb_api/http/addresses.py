@@ -99,7 +99,7 @@ def both(
 
     def add(function: Callable[..., T]) -> Callable[..., T]:
         signature = inspect.signature(function, eval_str=True)
-        others = [each for each in signature.parameters.values() if each.name != "revision"]
+        others = [parameter for parameter in signature.parameters.values() if parameter.name != "revision"]
         current = functools.update_wrapper(functools.partial(function, revision=None), function)
         current.__signature__ = signature.replace(parameters=others)  # type: ignore[attr-defined]
         name = getattr(function, "__name__", "")

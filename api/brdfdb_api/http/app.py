@@ -75,7 +75,7 @@ class Application(FastAPI):
 def _named(part: Any, schemas: dict[str, Any]) -> Any:
     """Return a part of the document with references to the objects that have titles, which join the schemas."""
     if isinstance(part, list):
-        return [_named(each, schemas) for each in part]
+        return [_named(item, schemas) for item in part]
     if not isinstance(part, dict):
         return part
     part = {key: _named(value, schemas) for key, value in part.items()}

@@ -369,5 +369,7 @@ def family_lookup(
         for name, value in given.parameters.items()
     }
     functions = (opened.lookup, opened.lookup_with_error, opened.specular_reflectance)
-    surface = Surface(_Blended(*(functools.partial(each, **at) for each in functions)), "family", opened.wavelength_nm)
+    surface = Surface(
+        _Blended(*(functools.partial(function, **at) for function in functions)), "family", opened.wavelength_nm
+    )
     return _looked_up(request, surface, query, given, {"family": family, "parameters": given.parameters})

@@ -43,8 +43,14 @@ _MOST_AXES = 32  # axes that numpy broadcasts
 _HEADER_BYTES = 4096  # limit on the header of a .npy file, which usually takes a hundred
 
 
-Polar = Annotated[float, Field(ge=0.0, le=180.0)]
-Finite = Annotated[float, Field(allow_inf_nan=False)]
+def _digits(value: object) -> object:
+    if isinstance(value, str) and "_" in value:  # which Python reads as a number
+        raise ValueError(f"{shortened(value)!r} is not a finite number")
+    return value
+
+
+Finite = Annotated[float, Field(allow_inf_nan=False), BeforeValidator(_digits)]
+Polar = Annotated[Finite, Field(ge=0.0, le=180.0)]
 Flag = Annotated[bool, BeforeValidator(lambda text: {"true": True, "false": False}.get(text, text)), Strict()]
 Wavelengths = Annotated[tuple[Finite, ...], Field(description="wavelength [nm], repeatable; missing: all of the table")]
 
@@ -144,8 +150,8 @@ class Light(Query):
     """The direction of one light, and the viewers that are looked at."""
 
     view: View = Field(default="cut", description="the plane of incidence, all viewers, or theta_h and theta_d")
-    theta_i: float = Field(default=45.0, ge=0.0, le=90.0, description="polar angle of the light [degrees]")
-    phi_i: float = Field(default=0.0, ge=-720.0, le=720.0, description="azimuth of the light [degrees]")
+    theta_i: Finite = Field(default=45.0, ge=0.0, le=90.0, description="polar angle of the light [degrees]")
+    phi_i: Finite = Field(default=0.0, ge=-720.0, le=720.0, description="azimuth of the light [degrees]")
     wavelength_nm: Wavelengths = ()
 
 

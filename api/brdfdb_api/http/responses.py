@@ -324,7 +324,7 @@ def unchanged(answer: Response, held: str | None) -> Response:
     tag = answer.headers.get("etag")
     if held is None or tag is None or answer.status_code != 200:
         return answer
-    tags = {each.strip().removeprefix("W/") for each in held.split(",")}
+    tags = {one.strip().removeprefix("W/") for one in held.split(",")}
     if not tags & {"*", tag.removeprefix("W/")}:
         return answer
     kept = {key: answer.headers[key] for key in ("ETag", "Cache-Control", "Vary") if key in answer.headers}

@@ -351,21 +351,21 @@ def lookup_many(request: Request, query: Annotated[ManyQuery, InQuery()], conten
     given, shelf = from_json(ManyBody, content), shelf_of(request)
     points = given.points
     kind: Format = "npy" if query.format == "npz" else "json"
-    max_points, total, found = request.app.state.settings.max_points, 0, {}
+    max_points, total, values_of = request.app.state.settings.max_points, 0, {}
     for name in dict.fromkeys(given.materials):
         surface = surface_of(shelf.table(name), query.source)
         total += checked_size(max_points, points, query, surface, kind)
         if total > (most := LIMITS[kind][1] * max_points):
             raise RequestError(413, f"the values of all materials are more than the {most} that one answer may hold")
-        found[name] = surface, evaluate(points, query, surface, error=query.error)
+        values_of[name] = surface, evaluate(points, query, surface, error=query.error)
     if kind == "npy":
-        arrays = {name: values.brdf for name, (_, values) in found.items()}
-        arrays |= {f"{name}.error": values.error for name, (_, values) in found.items() if values.error is not None}
+        arrays = {name: values.brdf for name, (_, values) in values_of.items()}
+        arrays |= {f"{name}.error": values.error for name, (_, values) in values_of.items() if values.error is not None}
         data = io.BytesIO()
         np.savez(data, **arrays)
         return Response(data.getvalue(), media_type=NPZ, headers={"Cache-Control": "no-store"})
     documents = [
         document_of(points, query, surface, values, {"material": name, "revision": shelf.head(name)})
-        for name, (surface, values) in found.items()
+        for name, (surface, values) in values_of.items()
     ]
     return json_response({"materials": documents}, {"Cache-Control": "no-store"})

@@ -209,7 +209,7 @@ def _exported(
         except (CannotHoldError, ParameterError) as error:
             raise RequestError(422, str(error), getattr(error, "parameter", None)) from None
         single = len(written.paths) == 1 and path.is_file()
-        names = [str(each.relative_to(folder)) for each in FilePath(folder).rglob("*") if each.is_file()]
+        names = [str(file.relative_to(folder)) for file in FilePath(folder).rglob("*") if file.is_file()]
         content = path.read_bytes() if single else b"".join(zipped(FilePath(folder), names))
     media_type = exporter.media_type if single else ZIP
     named = {"Content-Disposition": f'attachment; filename="{path.name}{"" if single else ".zip"}"'}

@@ -115,8 +115,8 @@ class Shelf:
         except (UnknownMaterialError, StoreError) as error:
             return {"name": name, "damaged": str(error), "href": f"/v1/materials/{name}"}
         verdict = self.verdict(name)
-        said = verdict.finding.model_dump() if verdict and verdict.current else {}
-        return {**known[1], **{key: said.get(key) for key in ("verdict", "as_published", "conserves_energy")}}
+        audited = verdict.finding.model_dump() if verdict and verdict.current else {}
+        return {**known[1], **{key: audited.get(key) for key in ("verdict", "as_published", "conserves_energy")}}
 
     def picture(self, table: Table, size: int) -> bytes:
         """Return the picture of a table, `size` pixels across, as a PNG file; those used last are kept."""

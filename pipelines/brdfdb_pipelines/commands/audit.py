@@ -36,9 +36,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Audit the materials; return `VIOLATED` if there is a new violation."""
+    from brdfdb.store.summary_words import REPORT_OF_ALL, REPORT_OF_SOME
     from brdfdb_pipelines import audit
 
-    default = options.store / ("audit-part.json" if options.names else "audit.json")
+    default = options.store / (REPORT_OF_SOME if options.names else REPORT_OF_ALL)
     try:
         report = audit.run(
             options.store,
