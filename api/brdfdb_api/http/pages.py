@@ -85,7 +85,7 @@ def _modules(name: str, before: set[str]) -> Iterator[str]:
     for _, other in _IMPORT.findall(text):
         if other not in before:
             yield from _modules(other, before)
-    text = _IMPORT.sub(lambda found: f"const {_bound(found[1])} = modules[{found[2]!r}];", text)
+    text = _IMPORT.sub(lambda line: f"const {_bound(line[1])} = modules[{line[2]!r}];", text)
     names = re.findall(r"^export (?:async )?(?:const|function\*?|class) (\w+)", text, re.MULTILINE)
     text = re.sub("^export default ", "const exported = ", text, flags=re.MULTILINE)
     exports = ", ".join([*names, *(["default: exported"] if "\nconst exported = " in text else [])])
