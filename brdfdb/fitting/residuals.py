@@ -17,6 +17,7 @@ KINDS: tuple[Kind, ...] = ("log", "relative", "cosine", "uncertainty")
 _LEAST = 1e-6  # share of the smallest sample that is added to both sides before logarithms: the model may be 0
 _NOTHING = 1e-12  # the same of the largest, for samples that fall beneath what any instrument resolves
 CREDIBLE = 0.01  # share of the median uncertainty, absolute and relative, below which an uncertainty is a mistake
+_LEAST_F_R = 1e-100  # squares of derivatives of logarithms of less than that are too large for numbers
 _HORIZON_COSINE = 1e-4  # directions closer to the horizon are left out: models are 0 there
 
 
@@ -45,7 +46,7 @@ class Residual:
     Raises
     ------
     ParameterError
-        If the kind is unknown, the samples have no uncertainty, or none is left.
+        If the kind is unknown, the samples have no uncertainty, none is left, or f_r is below 1e-100 /sr.
     """
 
     def __init__(self, samples: Samples, kind: Kind) -> None:
@@ -79,6 +80,12 @@ class Residual:
             )
         y = np.where(self.used, self.truth, 1.0)
         usable_y = y[self.used]
+        size = float(usable_y.min() if kind == "relative" else np.abs(usable_y).max())
+        if 0.0 < size < _LEAST_F_R:
+            text = (
+                f"{samples.name} has f_r of {size:.3g} /sr; {_LEAST_F_R:g} /sr and more are allowed; check their unit"
+            )
+            raise ParameterError("samples", text, size, (_LEAST_F_R, np.inf))
         least = max(_LEAST * float(usable_y.min()), _NOTHING * float(usable_y.max()))
         self.raised = 0
         self.floor = least if kind == "log" else 0.0

@@ -20,6 +20,7 @@ _UNLIKE = 0.3  # relative difference of sqrt(deviance) from 1.96 at the ends of 
 _STEPS = 14  # of the search of an end of an interval
 _FIRST = 0.02  # first step of a profile, of the range, for a number without a standard error
 _EVALUATIONS = 25
+_LEAST_NOISE = 1e-18  # variance of noise-free samples: residuals of 1e-9 are rounding
 
 
 class Covariance(NamedTuple):
@@ -47,10 +48,10 @@ class Covariance(NamedTuple):
 
 
 def noise_of(problem: Problem, residuals: Floats, searched: int) -> tuple[float, float]:
-    """Return two factors: of the covariance of a robust fit, and between cost and deviance."""
+    """Return two factors, above 0: of the covariance of a robust fit, and between cost and deviance."""
     r = residuals[problem.residual.used]
     z = (r / problem.scale) ** 2
-    squares = float(np.sum(r * r / (1.0 + z))) / max(r.size - searched, 1)
+    squares = max(float(np.sum(r * r / (1.0 + z))) / max(r.size - searched, 1), _LEAST_NOISE)
     slope = float(np.mean((1.0 + z) ** -1.5))
     return squares / slope**2, squares / slope
 

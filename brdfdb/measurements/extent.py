@@ -18,7 +18,6 @@ from brdfdb.measurements.samples import Samples
 from brdfdb.parameters import Floats
 
 _CELL_DEG, _TURNED_CELL_DEG = 2.5, 7.5  # cells of three coordinates, and of four, which are many more
-_REGULAR = 8  # samples of a light, and more, make a scan
 _LIGHTS, _VIEWERS, _SCATTERED = 2.0, 4.0, 4.0  # volume of a ball, in those that typically fit between samples
 _THINNED = 400  # samples that the typical ball is measured with
 _LOWEST = radians(89.9)  # polar angle of directions that are drawn, at most
@@ -69,15 +68,15 @@ class Extent(BaseModel):
     @classmethod
     def of(cls, samples: Samples, *, turned: bool) -> Extent:
         """Return the extent of the samples of which a value is known; `turned` if the azimuth of the light counts."""
-        some = samples.known.any(axis=1)
+        samples = samples.selected(np.flatnonzero(samples.known.any(axis=1)))
         cell = float(radians(_TURNED_CELL_DEG if turned else _CELL_DEG))
-        x = np.asarray(places(samples.w_i[some], samples.w_r[some], turned=turned), dtype=np.float64)
+        x = np.asarray(places(samples.w_i, samples.w_r, turned=turned), dtype=np.float64)
         lights = 2 if turned else 1
         light, sheared = x[:, :lights], _sheared(x, lights)
-        incidence = np.unique(samples.incidence[some], return_inverse=True)[1].reshape(-1)
-        scans = np.median(np.bincount(incidence)) >= _REGULAR
-        if scans:
-            of_light = _typical(light)
+        if samples.scanned:
+            incidence = samples.incidence
+            centres = np.stack([np.bincount(incidence, column) for column in light.T], axis=1)
+            of_light = _typical(centres / np.bincount(incidence)[:, np.newaxis])
             of_viewers = [_typical(sheared[incidence == one, lights:]) for one in np.unique(incidence)]
             radii = np.array(
                 [_LIGHTS ** (1.0 / lights) * of_light] * lights + [_VIEWERS**0.5 * float(np.median(of_viewers))] * 2

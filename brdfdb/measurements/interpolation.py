@@ -26,7 +26,6 @@ _SEEN = 5  # samples within the width of a lobe that are needed to see its heigh
 _SCALES = (0.5, 1.0, 2.0, 4.0)  # of the coordinates, tried against each other
 _ROUGHNESS = (0.01, 0.1)  # noise that no uncertainty states, relative to the spread of the logarithm, tried
 _PARTS = 10  # parts of samples without a pattern, held out one at a time
-_REGULAR = 8  # samples of an incidence, and more, make a scan
 _MOST_ROUNDS = 24  # incidences that are held out one by one; more of them are held out in groups
 _SIGMAS = 1.4826  # standard deviations in the median magnitude of normal noise, inverted
 _ABSURD = 3.0  # times the noise, and the largest value, is what no value is below 0 by
@@ -314,14 +313,16 @@ def _problem(samples: Samples, base: Base) -> tuple[_Problem, Floats, str]:
     if uncertainty is not None:
         slope = np.sqrt(values**2 + 4.0 * level**2)
         noise = np.nan_to_num(np.nanmean(uncertainty / slope, axis=1)) / max(float(np.std(y)), 1e-3)
-    incidence = np.unique(samples.incidence[samples.known.any(axis=1)], return_inverse=True)[1].reshape(-1)
-    lights = int(incidence.max()) + 1
-    scans = lights > 1 and np.median(np.bincount(incidence)) >= _REGULAR
+    known = samples.selected(np.flatnonzero(samples.known.any(axis=1)))
+    lights, pairs = int(known.incidence.max()) + 1, int(known.pair.max()) + 1
+    scans = lights > 1 and known.scanned
     rng = np.random.default_rng(_SEED)
     if scans:
-        group = (np.arange(lights) if lights <= _MOST_ROUNDS else rng.permutation(lights) % _MOST_ROUNDS)[incidence]
+        group = np.arange(lights) if lights <= _MOST_ROUNDS else rng.permutation(lights) % _MOST_ROUNDS
+        group = group[known.incidence]
     else:
-        group = rng.permutation(len(wi)) % _PARTS
+        apart = known.pair if pairs > 1 else np.arange(len(wi))
+        group = (rng.permutation(int(apart.max()) + 1) % _PARTS)[apart]
     return _Problem(wi, wr, values, of_base, y, noise, group), level, "incidences" if scans else "folds"
 
 

@@ -23,7 +23,10 @@ NODES = "nodes"  # entry of a record that is true if the samples are all nodes o
 ANGLES = ("theta_i", "phi_i", "theta_r", "phi_r")
 _OPTIONAL = ("uncertainty", "wavelength_nm", "bandwidth_nm")
 _HORIZON = 0.5 * np.pi * (1.0 + 1e-9)  # largest polar angle [rad], with rounding
-_SAME_LIGHT_DEG = 1e-4  # lights closer than this are one incidence
+_SAME_DEG = 1e-4  # directions closer than this are the same
+_READ_DEG = 0.25  # cells of directions that encoders read
+_SPREAD_DEG = 1.0  # width of the readings of one direction of the light, at most
+_REGULAR = 8  # viewers of an incidence, and more, make a scan
 
 
 @dataclass(frozen=True)
@@ -152,19 +155,49 @@ class Samples:
 
     @cached_property
     def incidence(self) -> NDArray[np.int64]:
-        """Number of the incidence of each sample, shape (N,): the same number, the same direction of the light."""
-        theta, phi = degrees(self.theta_i), degrees(self.phi_i) % 360.0
-        rings, turns = np.round(theta / _SAME_LIGHT_DEG), np.round(phi / _SAME_LIGHT_DEG)
-        turns[rings == 0.0] = 0.0  # at the normal every azimuth is the same direction
-        code = rings * (1.0 + np.round(360.0 / _SAME_LIGHT_DEG)) + turns
-        return np.unique(code, return_inverse=True)[1].reshape(-1).astype(np.int64)
+        """Number of the incidence of each sample, shape (N,): the same number, the same direction of the light.
+
+        Encoders read one direction as several that differ by hundredths of a degree. Lights are one incidence if cells
+        of a quarter of a degree that touch join them, and all lie within a degree. Lights that are joined over more
+        than that are scattered, or a fine series: each is an incidence of its own.
+        """
+        from scipy.ndimage import find_objects, label
+
+        at = _flat(self.theta_i, self.phi_i)
+        cells = np.rint(at / _READ_DEG).astype(np.int64)
+        cells -= cells.min(axis=0, initial=0)
+        read = np.zeros(cells.max(axis=0, initial=0) + 1, dtype=bool)
+        read[tuple(cells.T)] = True
+        groups, _ = label(read, structure=np.ones((3, 3)))
+        widest = [max(side.stop - side.start for side in box) * _READ_DEG for box in find_objects(groups)]
+        group = groups[tuple(cells.T)]
+        exact = np.rint(at / _SAME_DEG).astype(np.int64)
+        exact[(np.array([0.0, *widest]) <= _SPREAD_DEG)[group]] = 0
+        return _numbered(np.column_stack([group, exact]))
+
+    @cached_property
+    def pair(self) -> NDArray[np.int64]:
+        """Number of the pair of incidence and viewer of each sample, shape (N,): repeats have the same number."""
+        viewer = np.rint(_flat(self.theta_r, self.phi_r) / (2.0 * _READ_DEG)).astype(np.int64)
+        return _numbered(np.column_stack([self.incidence, viewer]))
+
+    @cached_property
+    def scanned(self) -> bool:
+        """True if the typical incidence has eight viewers or more, repeats not counted."""
+        first = np.unique(self.pair, return_index=True)[1]
+        return bool(np.median(np.bincount(self.incidence[first])) >= _REGULAR)
 
     @cached_property
     def turned(self) -> bool:
-        """True if the light comes from more than one azimuth, so that anisotropy can be seen."""
-        tilted = self.theta_i > 0.0
-        azimuths = np.round(degrees(self.phi_i[tilted]) % 360.0 / _SAME_LIGHT_DEG)
-        return np.unique(azimuths).size > 1
+        """True if the light comes from more than one azimuth, so that anisotropy can be seen.
+
+        Azimuths are one if all lights are within a quarter of a degree of those of the azimuth of the lowest light.
+        """
+        if not len(self):
+            return False
+        turn = 0.5 * (self.phi_i - self.phi_i[np.argmax(self.theta_i)])
+        beside = 2.0 * np.sin(self.theta_i) * np.abs(np.sin(turn))
+        return bool(np.any(degrees(beside) > _READ_DEG))
 
     def selected(self, rows: NDArray[Any]) -> Samples:
         """Return some of the samples: those of a mask (N,), or of indices."""
@@ -250,6 +283,20 @@ def _floats(name: str, array: Any, *, optional: bool) -> Floats | None:
         return np.asarray(array, dtype=np.float64)
     except (TypeError, ValueError):
         raise ParameterError(name, f"{type(array).__name__} is no array of numbers", type(array).__name__) from None
+
+
+def _flat(theta: Floats, phi: Floats) -> Floats:
+    """Return directions as theta (cos phi, sin phi) [degree], shape (N, 2)."""
+    return np.stack([degrees(theta) * np.cos(phi), degrees(theta) * np.sin(phi)], axis=1)
+
+
+def _numbered(keys: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return a number for each row (N, K) of keys: the same number, the same row. Numbers are in the order of rows."""
+    order = np.lexsort(keys.T[::-1])
+    new = np.any(np.diff(keys[order], axis=0, prepend=keys[order[:1]]), axis=1)
+    numbers = np.empty(len(keys), dtype=np.int64)
+    numbers[order] = np.cumsum(new)
+    return numbers
 
 
 def _angle(dataset: xr.Dataset, name: str, count: int) -> Floats:

@@ -155,6 +155,13 @@ class TableMetadata(BaseModel):
             raise ParameterError("interpolation", self.strange["interpolation"])
         return self.interpolation
 
+    def known_measured(self) -> Measured | None:
+        """Return the record of measured data; ParameterError if it is one that this program does not know."""
+        if "measured" in self.strange:
+            why = f"its record is of another version, or damaged ({self.strange['measured']})"
+            raise ParameterError("measured", f"{why}; import or build the table anew")
+        return self.measured
+
     @property
     def gaps(self) -> str:
         """A phrase that names the attributes that are missing or not what they must be; empty for a whole record."""

@@ -266,6 +266,7 @@ def table_from(name: str, revision: str, arrays: Mapping[str, NDArray[Any]], att
     """Return the table that the arrays and attributes of a stored group describe; ValueError if they do not fit."""
     metadata = TableMetadata.read(attrs)
     interpolation = metadata.known_interpolation()
+    metadata.known_measured()
     variable = "brdf" if "brdf" in arrays else "parts"
     if variable not in arrays:
         raise ParameterError("brdf", f"neither it nor parts is among the arrays {', '.join(arrays) or 'none'}")

@@ -145,13 +145,14 @@ class BaseTable(Lookups):
         """Return which pairs of directions, above the horizon, lie outside of those that were measured.
 
         f_r is made up there, and its error not known. Tables of models have no such directions. The angles [rad] are
-        those of `lookup`; the result has the shape that they broadcast to.
+        those of `lookup`; the result has the shape that they broadcast to. ParameterError, too, if the record of
+        measured data is one that this program does not know.
         """
         return self._extrapolated(checked_angles(theta_i, phi_i, theta_r, phi_r))
 
     def _extrapolated(self, directions: Directions) -> NDArray[np.bool_]:
         shape = np.broadcast_shapes(*(given.shape for given in directions.given))
-        measured = self.metadata.measured
+        measured = self.metadata.known_measured()
         if measured is None or measured.extent is None:
             return np.zeros(shape, dtype=bool)
         x_i, y_i, z_i, x_r, y_r, z_r = (
@@ -231,7 +232,7 @@ class BaseTable(Lookups):
             )
         values = brdf if at.tail else np.asarray(brdf)[..., np.newaxis]
         errors = stated(error, directions, values, at.column)
-        measured = self.metadata.measured
+        measured = self.metadata.known_measured()
         if measured is not None and measured.uncertainty is not None:
             errors = errors + measured.uncertainty * np.maximum(values, error.floors[at.column])
         if measured is not None and measured.extent is not None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -18,9 +18,11 @@ from brdfdb.fitting.residuals import Kind
 from brdfdb.fitting.surface import fitted_by_default
 from brdfdb.geometry import degrees, radians, versine
 from brdfdb.measurements import Samples, joined
+from brdfdb.measurements.statement import statement
 from brdfdb.parameters import closest
 from brdfdb.store.files import write_file
 from brdfdb_pipelines import terminal
+from brdfdb_pipelines.measured_job import MeasuredTable
 
 _SHOWN = 12  # channels of a number that are printed
 TOLERANCE = 0.05  # of the recipe that is written
@@ -31,10 +33,9 @@ def run(
     data: Sequence[Path],
     models: Sequence[str] | None = None,
     *,
+    keys: Mapping[str, Any] | None = None,
     residual: Kind = "log",
     channel: str | None = None,
-    wavelength_nm: float | None = None,
-    azimuth: str = "light",
     refractive_index: str | None = None,
     receiver_deg: float | None = None,
     source_deg: float | None = None,
@@ -44,6 +45,7 @@ def run(
 ) -> Fits:
     """Fit models to the samples of a file, or of several of one surface, and print the result.
 
+    Before the search, what the reader noted and what looks wrong with the samples is printed, as by an import.
     Ctrl-C ends the search. The models that were finished are ranked and written; `Fits.interrupted` is then true.
 
     Parameters
@@ -52,14 +54,12 @@ def run(
         Files that `brdfdb.formats.samples` reads. Several are joined, as by `brdfdb.measurements.joined`.
     models : sequence of str, optional
         Models and sums, by default all.
+    keys : mapping, optional
+        How the files are read: keys of `brdfdb_pipelines.measured_job.MeasuredTable`, `samples` apart.
     residual, refractive_index
         As of `brdfdb.fitting.fit.fits`.
     channel : str, optional
         The one channel that is fitted.
-    wavelength_nm : float [nm], optional
-        Wavelength of samples of one channel that state none.
-    azimuth : str
-        As of `brdfdb.formats.read`.
     receiver_deg, source_deg : float [degree], optional
         Full angles of the cones of receiver and light, as the sample sees them, in place of what the file states.
     json, page, recipe : Path, optional
@@ -79,8 +79,13 @@ def run(
     BrdfdbError
         If a recipe is asked for and no fit is one model of the registry.
     """
-    samples = joined([_selected(formats.samples(file, azimuth=azimuth), channel, wavelength_nm) for file in data])
+    table = MeasuredTable(samples=[str(file) for file in data], **(keys or {}))
+    samples = joined([_selected(formats.samples(file, table.format, **table.keywords), channel) for file in data])
     samples = _seen(samples, receiver_deg, source_deg)
+    known = statement(samples)
+    for sentence in (*known.notes, *known.hints):
+        if sentence != samples.record.get("contradiction"):  # which is a remark of the fits
+            print(terminal.plain(f"{samples.name}: {sentence}"), flush=True)
     count = len(models or fitted_by_default()) + 1
     with terminal.progress(transient=True) as bar:
         task = bar.add_task("fit", total=count)
@@ -108,8 +113,8 @@ def run(
     return document
 
 
-def _selected(samples: Samples, channel: str | None, wavelength_nm: float | None) -> Samples:
-    """Return the samples of one channel, with the wavelength that the user states."""
+def _selected(samples: Samples, channel: str | None) -> Samples:
+    """Return the samples of one channel, or of all."""
     if channel is not None:
         if channel not in samples.channels:
             hint = closest(channel, samples.channels)
@@ -125,13 +130,7 @@ def _selected(samples: Samples, channel: str | None, wavelength_nm: float | None
             uncertainty=None if samples.uncertainty is None else samples.uncertainty[:, column],
             bandwidth_nm=None if samples.bandwidth_nm is None else samples.bandwidth_nm[column],
         )
-    if wavelength_nm is None:
-        return samples
-    if samples.wavelength_nm is not None or len(samples.channels) > 1:
-        raise ParameterError("wavelength_nm", f"{samples.name} states its channels; leave it out", wavelength_nm)
-    if not 0.0 < wavelength_nm < np.inf:
-        raise ParameterError("wavelength_nm", f"{wavelength_nm:g} is not a positive number", wavelength_nm)
-    return replace(samples, channels=(f"{wavelength_nm:g}nm",), wavelength_nm=np.array([wavelength_nm]))
+    return samples
 
 
 def _seen(samples: Samples, receiver_deg: float | None, source_deg: float | None) -> Samples:

@@ -324,6 +324,24 @@ def test_values_that_no_model_reaches_are_refused(size: float) -> None:
         fits(samples(values), ["lambert", "ward", "ggx_schlick"], profiles=False)
 
 
+def test_values_that_are_too_small_for_numbers_are_refused() -> None:
+    values = truth("ward", **WARD)
+    with pytest.raises(ParameterError, match=r"allowed; check their unit$"):
+        fit(samples(1e-300 * values), "ward")
+    values[0] = 1e-300
+    with pytest.raises(ParameterError, match=r"f_r of 1e-300 /sr; 1e-100 /sr and more are allowed"):
+        fit(samples(values), "ward", residual="relative")
+
+
+@pytest.mark.parametrize("model", ["lambert", "ward"])
+def test_intervals_of_samples_without_noise_are_narrow_and_hold_the_truth(model: str) -> None:
+    document, _ = fits(samples(np.full((len(directions()[0]), 1), 0.1)), [model])
+    (rho,) = (one for one in document.fits[0].estimates if one.name in ("rho", "rho_d"))
+    assert rho.low <= rho.value <= rho.high
+    assert rho.value == pytest.approx(0.1 * np.pi, rel=1e-6)
+    assert rho.high - rho.low < 1e-6
+
+
 def test_a_bright_mirror_lobe_and_faint_values_are_not_refused() -> None:
     values = truth("ward", **(WARD | {"rho_d": 0.0, "rho_s": 1.0, "alpha_x": 0.02, "alpha_y": 0.02}))
     for some in (values, 1e-30 * values):

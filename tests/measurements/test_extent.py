@@ -16,7 +16,7 @@ from brdfdb.materials.source import Evaluate
 from brdfdb.measurements import MeasuredSource, Samples
 from brdfdb.measurements.coordinates import beyond, places
 from brdfdb.measurements.extent import Extent
-from brdfdb.measurements.interpolation import floor_of
+from brdfdb.measurements.interpolation import fit, floor_of
 from brdfdb.parameters import Floats
 from tests.measurements.made_up import scans, scattered
 
@@ -151,3 +151,19 @@ def test_damaged_cells_are_refused() -> None:
     for cells in ("AAAA", "no base64!", extent.model_copy(update={"turned": True}).cells[:40]):
         with pytest.raises(ParameterError, match="the cells are damaged"):
             extent.model_copy(update={"cells": cells}).outside(np.array([[0.0, 0.0, 1.0]]), np.array([[0.0, 0.0, 1.0]]))
+
+
+def test_repeats_leave_the_extent_of_scattered_samples_as_it_is() -> None:
+    once = scattered(_ones, 150, NOISE)
+    both = [Extent.of(some, turned=False).measured for some in (once, once.selected(np.tile(np.arange(150), 10)))]
+    assert np.array_equal(*both)
+
+
+def test_encoder_noise_leaves_extent_and_scheme_of_scans_as_they_are() -> None:
+    exact = scans(_ones, np.array([20.0, 40.0, 60.0]), NOISE)
+    noise = radians(0.02) * np.random.default_rng(4).standard_normal((2, len(exact)))
+    read = replace(exact, theta_i=exact.theta_i + noise[0], theta_r=np.abs(exact.theta_r + noise[1]))
+    measured = [Extent.of(some, turned=False).measured for some in (exact, read)]
+    assert measured[1].mean() == pytest.approx(measured[0].mean(), rel=0.05)
+    assert np.mean(measured[0] != measured[1]) < 0.03
+    assert (fit(exact).held_out.scheme, fit(read).held_out.scheme) == ("incidences", "incidences")

@@ -49,6 +49,34 @@ def test_all_azimuths_at_the_normal_are_one_incidence() -> None:
     assert not some.turned
 
 
+@pytest.mark.parametrize("noise_deg", [0.0, 0.02, 0.05])
+def test_lights_as_encoders_read_them_are_one_incidence(noise_deg: float) -> None:
+    lights = np.radians([[0.0, 0.0], [10.0, 0.0], [11.0, 0.0], [40.0, 0.0], [40.0, 20.0], [70.0, 359.9]])
+    number = np.repeat(np.arange(6), 50)
+    read = lights[number] + np.radians(noise_deg) * np.random.default_rng(2).standard_normal((300, 2))
+    theta_i, phi_i = np.abs(read[:, 0]), read[:, 1]
+    some = Samples("read", theta_i, phi_i, np.zeros(300), phi_i, ("grey",), None, np.ones((300, 1)))
+    of_first = [set(some.incidence[number == light]) for light in range(6)]
+    assert [len(numbers) for numbers in of_first] == [1] * 6
+    assert len(set.union(*of_first)) == 6
+    assert some.turned
+    assert not some.selected(number < 4).turned
+
+
+def test_scattered_lights_are_incidences_of_their_own() -> None:
+    theta_i, zeros = np.radians(np.random.default_rng(3).uniform(0.0, 80.0, 600)), np.zeros(600)
+    some = Samples("scattered", theta_i, zeros, zeros, zeros, ("grey",), None, np.ones((600, 1)))
+    assert np.unique(some.incidence).size > 400  # a few pairs and triples are apart from the others, by chance
+    assert not some.scanned
+
+
+def test_repeats_are_one_viewer_of_a_scan() -> None:
+    one = samples()
+    repeated = one.selected(np.repeat(np.arange(4), 20))
+    assert np.unique(repeated.pair).size == 4
+    assert not repeated.scanned
+
+
 def test_a_selection_keeps_rows_together() -> None:
     some = samples().selected(np.array([False, True, False, True]))
     assert len(some) == 2

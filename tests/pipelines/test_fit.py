@@ -238,7 +238,7 @@ def test_two_lengths_that_are_not_told_apart_are_named(tmp_path: Path, capsys: C
         (["--model", "ward +"], "model: 'ward +' is no model and no sum of models"),
         (["--model", "lambert", "--residual", "uncertainty"], "has no uncertainties; choose log, relative or cosine"),
         (["--channel", "green"], "channel: 'green' is not one of grey"),
-        (["--wavelength-nm", "-5"], "wavelength_nm: -5 is not a positive number"),
+        (["--wavelength-nm", "-5"], "wavelength_nm: -5 is outside"),
         (["--receiver-deg", "0"], "receiver-deg: 0 is outside (0, 30] degrees"),
         (["--source-deg", "nan"], "source-deg: nan is outside (0, 30] degrees"),
         (["--model", "oren_nayar_unidirectional"], "the light is in one azimuth alone"),
@@ -278,6 +278,21 @@ def test_values_that_are_left_out_are_counted(tmp_path: Path, capsys: Captured) 
     assert run("fit", data, "--model", "lambert") == 0
     printed = capsys.readouterr().out
     assert "  left out: 2 below the horizon, 1 holes, 1 at the horizon, 1 not positive\n" in printed
+
+
+def test_texts_are_read_by_the_options_of_an_import_and_doubts_are_said(tmp_path: Path, capsys: Captured) -> None:
+    """The lobe of the file is at azimuth 0, because the file counts from the direction into which light travels."""
+    lines = [f"{line[0]},{line[1]},{180.0 - line[2]},{100.0 * line[3]}" for line in rows()]
+    data = tmp_path / "scan.csv"
+    data.write_text("\n".join(["ein,aus,dreh,wert", *lines]) + "\n")
+    names = [f"--column={role}={name}" for role, name in (("theta_i", "ein"), ("theta_r", "aus"), ("values", "wert"))]
+    assert run("fit", data, "--model", "ward") == 2
+    assert "--column theta_i=NAME" in capsys.readouterr().err
+    percent = ["--column=delta_phi=dreh", *names]
+    assert run("fit", data, "--model", "ward", *percent) == 0
+    printed = capsys.readouterr().out
+    assert "--azimuth forward" in printed
+    assert "Units? An albedo above 1" in printed
 
 
 def test_files_without_a_usable_sample_are_refused(tmp_path: Path, capsys: Captured) -> None:

@@ -67,6 +67,15 @@ def test_show_names_file_and_digest(folder: Path, capsys: Captured) -> None:
     assert f"file clay.csv, sha256 {measured.file_sha256[:12]}" in capsys.readouterr().out
 
 
+def test_show_has_a_dash_where_nothing_was_measured(folder: Path, capsys: Captured) -> None:
+    """Lights are 10 to 60 degrees, and viewers end at 75 degrees."""
+    assert run("show", NAME, "--store", folder / "store") == 0
+    printed = capsys.readouterr().out
+    rows = {line[4:16].strip(): line[16:].split() for line in printed.splitlines() if line.startswith("    ")}
+    assert rows["one there"] == rows["both beyond"] == ["-"] * len(rows["one there"])
+    assert "-" not in rows["99 of 100"][:3]
+
+
 def test_lookups_outside_of_the_samples_are_marked_and_have_no_error(folder: Path, capsys: Captured) -> None:
     table = brdfdb.open(folder / "store")[NAME]
     angles = radians(np.array([INSIDE_DEG, OUTSIDE_DEG, (95.0, 0.0, 20.0, 120.0)])).T

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import jsonschema
@@ -83,3 +84,19 @@ def test_an_interpolation_that_this_program_does_not_know_is_refused() -> None:
     for how in ({"method": "quintic"}, {"method": "cubic", "knots": 3}):
         with pytest.raises(ValueError, match=r"^interpolation: "):
             table_from("odd", "r000001", arrays, {"interpolation": how})
+
+
+def test_a_record_of_measured_data_that_this_program_does_not_know_is_refused() -> None:
+    """It is no table of a model: where nothing was measured, its error is not known."""
+    dataset = tabulate(layout("clay-vase"))
+    arrays = {str(key): variable.values for key, variable in dataset.variables.items()}
+    measured = {
+        "channels": ["grey"], "samples": 300, "negative": 0.0, "interpolation": "", "reciprocity": {"assumed": True},
+        "mirror": None, "hull": [[0.0, 0.0, 0.0]],
+    }  # fmt: skip
+    attributes = {**dataset.attrs, "measured": measured}
+    with pytest.raises(ValueError, match=r"^measured: its record is of another version, .*build the table anew$"):
+        table_from("odd", "r000001", arrays, attributes)
+    served = replace(table_from("odd", "r000001", arrays, dataset.attrs), attrs=attributes)
+    with pytest.raises(ValueError, match=r"^measured: its record is of another version, .*build the table anew$"):
+        served.extrapolated(0.3, 0.0, 0.2, 1.0)

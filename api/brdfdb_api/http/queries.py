@@ -50,7 +50,7 @@ def _digits(value: object) -> object:
 
 
 Finite = Annotated[float, Field(allow_inf_nan=False), BeforeValidator(_digits)]
-Polar = Annotated[Finite, Field(ge=0.0, le=180.0)]
+Polar = Annotated[float, Field(ge=0.0, le=180.0), BeforeValidator(_digits)]
 Flag = Annotated[bool, BeforeValidator(lambda text: {"true": True, "false": False}.get(text, text)), Strict()]
 Wavelengths = Annotated[tuple[Finite, ...], Field(description="wavelength [nm], repeatable; missing: all of the table")]
 

@@ -6,6 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
+from brdfdb_pipelines.commands._reading import add_reading, reading_keys
 from brdfdb_pipelines.exit_codes import INTERRUPTED
 
 HELP = "Fit models to measured samples: their parameters with intervals, ranked by the error at incidences left out."
@@ -20,6 +21,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="DATA",
         help="a file of samples, or several of one surface; a table of another program; or published fits (NAME.fit)",
     )
+    add_reading(parser)
     parser.add_argument(
         "--model",
         action="append",
@@ -34,14 +36,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="what is made small (default: log, the difference of logarithms)",
     )
     parser.add_argument("--channel", metavar="NAME", help="the channel that is fitted (default: all together)")
-    parser.add_argument(
-        "--wavelength-nm", type=float, metavar="NM", help="wavelength of samples of one channel that state none"
-    )
-    parser.add_argument(
-        "--azimuth",
-        choices=("light", "forward"),
-        help="direction from which DATA counts azimuths: the light, or the one into which it travels (default: light)",
-    )
     parser.add_argument(
         "--refractive-index",
         metavar="ENTRY",
@@ -74,10 +68,9 @@ def run(options: argparse.Namespace) -> int:
     document = fit.run(
         options.data,
         options.model or None,
+        keys=reading_keys(options),
         residual=options.residual,
         channel=options.channel,
-        wavelength_nm=options.wavelength_nm,
-        azimuth=options.azimuth or "light",
         refractive_index=options.refractive_index,
         receiver_deg=options.receiver_deg,
         source_deg=options.source_deg,
@@ -99,7 +92,8 @@ def _published(options: argparse.Namespace) -> int:
     first, *others = options.data
     if others:
         raise ParameterError("DATA", f"{first} and {len(others)} more: published fits are listed one file at a time")
-    for name in ("model", "wavelength_nm", "azimuth", "refractive_index", "receiver_deg", "source_deg", "page"):
+    of_samples = ("format", "column", "quantity", "angles", "azimuth", "wavelength_nm", "member", "side")
+    for name in (*of_samples, "model", "refractive_index", "receiver_deg", "source_deg", "page"):
         if getattr(options, name):
             option = f"--{name.replace('_', '-')}"
             raise ParameterError(option, f"{first} holds the fits of others and no samples; leave it out")

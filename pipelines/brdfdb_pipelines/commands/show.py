@@ -57,7 +57,7 @@ def _print_material(table: Table, path: Path, audited: Audited | None) -> None:
         print(terminal.plain(f"  incomplete  the table {metadata.gaps}"))
     _print_grid(table)
     truth = "its formula" if metadata.model is not None else "its source" if metadata.measured is None else "the data"
-    _print_error(table.error, truth)
+    _print_error(table.error, truth, measured=metadata.measured is not None)
     if metadata.measured is None:
         _print_formula_error(metadata.formula_error)
     _print_answers(audited, table.name, measured=metadata.measured is not None)
@@ -168,7 +168,7 @@ def _interpolation(table: Table) -> str:
     return f"{how.method}, of {what}"
 
 
-def _print_error(error: Error | None, truth: str) -> None:
+def _print_error(error: Error | None, truth: str, *, measured: bool = False) -> None:
     """Print the stated error: overall, and by bands and places at the wavelength where it is largest."""
     from brdfdb.tables.places import RINGS_DEG
     from brdfdb_pipelines import terminal
@@ -188,7 +188,7 @@ def _print_error(error: Error | None, truth: str) -> None:
         rows.append(("between", between if len(between) > 1 else between * (len(edges) - 1)))
     print("    theta_i     " + "".join(f"{f'{a:g}-{b:g}°':>9}" for a, b in itertools.pairwise(edges)))
     for label, bands in rows:
-        print(_errors(label, bands))
+        print(_errors(label, bands, measured=measured))
     notes = [] if error.places is None else ["alongside: theta_r within 10° of theta_i, delta_phi within 90°"]
     notes += [] if error.between is None else ["between: any wavelength between those of the table"]
     if notes:
@@ -199,14 +199,19 @@ def _print_error(error: Error | None, truth: str) -> None:
         return
     print("    horizon     " + "".join(f"{f'{a:g}-{b:g}°':>9}" for a, b in itertools.pairwise(RINGS_DEG)))
     for label, rings in (("one there", error.places.one_grazing), ("both beyond", error.places.both_grazing)):
-        print(_errors(label, rings))
+        print(_errors(label, rings, measured=measured))
 
 
-def _errors(label: str, bands: list[list[float]]) -> str:
-    """Return a row of errors at their worst wavelengths, in percent or as factors."""
+def _errors(label: str, bands: list[list[float]], *, measured: bool) -> str:
+    """Return a row of errors at their worst wavelengths, in percent or as factors.
+
+    A dash stands where nothing was measured, of which the error of a measured table is 0.
+    """
     from brdfdb_pipelines import terminal
 
-    cells = [terminal.error(max(row)).replace("a factor of ", "x ").replace(" %", "%") for row in bands]
+    worst = [max(row) for row in bands]
+    words = ["-" if measured and largest == 0.0 else terminal.error(largest) for largest in worst]
+    cells = [text.replace("a factor of ", "x ").replace(" %", "%") for text in words]
     return f"    {label:<12}" + "".join(f"{cell:>9}" for cell in cells)
 
 

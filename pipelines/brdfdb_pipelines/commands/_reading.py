@@ -1,0 +1,75 @@
+"""Options that say how a file of measurements is read."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from typing import Any
+
+_KEYS = ("format", "member", "quantity", "angles", "azimuth", "side")  # of a recipe, too
+
+
+def add_reading(parser: argparse.ArgumentParser) -> None:
+    """Add the format of a file, the columns of a text, their units, and what a file may leave open."""
+    parser.add_argument(
+        "--format", default="", metavar="FORMAT", help="its format (default: recognised by its content)"
+    )
+    parser.add_argument(
+        "--column",
+        action="append",
+        default=[],
+        metavar="NAME=HEADER",
+        help="the column of a text that is theta_i, phi_i, theta_r, phi_r, delta_phi, values, uncertainty or "
+        "wavelength; may be repeated, for values with several columns, too",
+    )
+    parser.add_argument(
+        "--quantity",
+        choices=("f_r", "reflectance_factor", "f_r_cos"),
+        help="quantity of the values of a text (default: the one that its names or titles give, else f_r)",
+    )
+    parser.add_argument(
+        "--angles", choices=("deg", "rad"), help="unit of the angles of a text (default: by its names, else degrees)"
+    )
+    parser.add_argument(
+        "--azimuth",
+        choices=("light", "forward"),
+        help="direction from which the file counts azimuths: the light, or the one into which it travels, so that 0 is "
+        "the mirror side (default: light)",
+    )
+    parser.add_argument(
+        "--wavelength-nm", type=float, metavar="NM", help="wavelength of a file of one channel that states none"
+    )
+    parser.add_argument("--member", metavar="NAME", help="the file of an archive (.zip) that is read (default: all)")
+    parser.add_argument(
+        "--side", choices=("back", "front"), help="side of a Klems matrix, as the file names it (default: back)"
+    )
+
+
+def reading_keys(options: argparse.Namespace) -> dict[str, Any]:
+    """Return the options as keys of `brdfdb_pipelines.measured_job.MeasuredTable`.
+
+    Raises
+    ------
+    ParameterError
+        If the wavelength is out of range, or a column is not written NAME=HEADER.
+    """
+    from brdfdb.formats._stated import check_wavelength
+
+    keys: dict[str, Any] = {name: getattr(options, name) or "" for name in _KEYS}
+    if options.wavelength_nm is not None:
+        check_wavelength(options.wavelength_nm)
+        keys["wavelength_nm"] = options.wavelength_nm
+    return keys | {"columns": _columns(options.column)}
+
+
+def _columns(texts: Sequence[str]) -> dict[str, list[str]]:
+    """Return the headers of each column from texts NAME=HEADER; ParameterError if one is not written so."""
+    from brdfdb.errors import ParameterError
+
+    columns: dict[str, list[str]] = {}
+    for text in texts:
+        name, sign, header = text.partition("=")
+        if not (name and sign and header):
+            raise ParameterError("--column", f"{text!r} is not NAME=HEADER", text, "NAME=HEADER")
+        columns.setdefault(name, []).append(header)
+    return columns
