@@ -124,7 +124,7 @@ class BusyError(BrdfdbError):
 
 # Modules that an optional extra of the distribution installs. The service needs those of scenes, too
 EXTRAS = {
-    "serve": ("fastapi", "uvicorn", "uvloop", "httptools", "orjson", "prometheus_client", "plotly"),
+    "serve": ("fastapi", "uvicorn", "uvloop", "httptools", "orjson", "prometheus_client"),
     "scenes": ("colour", "matplotlib", "OpenEXR", "scipy"),
     "report": ("jinja2", "matplotlib", "mpmath", "colour"),
     "dask": ("distributed",),

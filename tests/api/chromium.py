@@ -23,7 +23,16 @@ FLAGS = [
     *("--enable-unsafe-swiftshader", "--force-color-profile=srgb"),  # WebGL without a graphics card
     *(f"--disable-{each}" for each in ("quic", "background-networking", "component-update", "sync", "dev-shm-usage")),
 ]
-KEYS = {"Enter": 13, "ArrowLeft": 37, "ArrowUp": 38, "ArrowRight": 39, "ArrowDown": 40, "Home": 36, "End": 35, "Tab": 9}
+KEYS = {
+    "Enter": 13,
+    "ArrowLeft": 37,
+    "ArrowUp": 38,
+    "ArrowRight": 39,
+    "ArrowDown": 40,
+    "Home": 36,
+    "End": 35,
+    "Tab": 9,
+}
 
 
 class Chromium:
@@ -162,10 +171,42 @@ def milliseconds(browser: Chromium) -> float:
     return float(browser.evaluate("performance.getEntriesByName('picture')[0].duration"))
 
 
-def curve(browser: Chromium, kind: str) -> np.ndarray:
-    """The points of a curve [pixel]."""
-    path = browser.evaluate(f"document.querySelector('#cut path.{kind}').getAttribute('d')")
+def curve(browser: Chromium, kind: str | int, view: str = "cut") -> np.ndarray:
+    """The points of a curve [pixel], by its number, or of a line of another kind."""
+    of = f"path.{kind}" if isinstance(kind, str) else "path.curve"
+    number = 0 if isinstance(kind, str) else kind
+    path = browser.evaluate(f"document.querySelectorAll('#{view} > svg {of}')[{number}].getAttribute('d')")
     return np.array([point.split() for point in path[1:].split("L")], dtype=float)
+
+
+def labels(browser: Chromium) -> list[str]:
+    """What the curves of the cut stand for."""
+    found = browser.evaluate("[...document.querySelectorAll('#cut > svg path.curve')].map(each => each.dataset.label)")
+    return [str(each) for each in found]
+
+
+def frame(browser: Chromium, view: str = "cut") -> list[float]:
+    """Left, top, width and height of a chart [pixel], and the ends of its scale, which may be decades."""
+    places = "['x', 'y', 'width', 'height'].map(each => Number(chart.querySelector('.frame').getAttribute(each)))"
+    script = f"(chart => [...{places}, ...chart.dataset.range.split(' ').map(Number)])"
+    return [float(each) for each in browser.evaluate(f"{script}(document.querySelector('#{view} > svg'))")]
+
+
+def box(browser: Chromium, of: str) -> list[float]:
+    """Left, top, width and height of an element in the window [pixel]."""
+    script = "(({ left, top, width, height }) => [left, top, width, height])"
+    return [
+        float(each) for each in browser.evaluate(f"{script}(document.querySelector('{of}').getBoundingClientRect())")
+    ]
+
+
+def image(browser: Chromium, of: str) -> np.ndarray:
+    """The bytes of a canvas (rows, columns, 4), rows from the top."""
+    width, height, data = browser.evaluate(
+        "(({ width, height }, context) => [width, height, [...context.getImageData(0, 0, width, height).data]])"
+        f"(...[document.querySelector('{of}')].flatMap(each => [each, each.getContext('2d')]))"
+    )
+    return np.reshape(np.array(data, np.uint8), (height, width, 4))
 
 
 def copied(browser: Chromium, kind: str) -> str:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import asyncio
 import gzip
-import importlib.metadata
+import os
 import re
-from importlib.resources import files
+import shutil
+import subprocess
 from pathlib import Path
 
 import httpx
@@ -18,8 +19,12 @@ from brdfdb_api.serving.settings import Settings
 
 FOLDER = Path(pages.__file__).parents[1] / "explorer"
 NAMES = sorted(path.name for path in FOLDER.iterdir())
-PLOTLY = f"/explorer/plotly.js?{importlib.metadata.version('plotly')}"
 OUTSIDE = re.compile(r"(?:https?:)?//[a-z0-9-]+\.[a-z0-9.-]+[^\s\"']*")
+FIRST = ("index.html", "explorer.css", "explorer.js")  # before there is a picture
+VIEWS = """\
+/** @type {Record<string, import("./main.js").View>} */
+export const VIEWS = {};
+"""
 SVG = "http://www.w3.org/2000/svg"  # a name, not an address
 
 
@@ -35,7 +40,7 @@ def get(path: str, **headers: str) -> httpx.Response:
 
 
 def test_what_is_served_is_what_there_is() -> None:
-    assert sorted(pages.MEDIA) == sorted([*NAMES, "views.js"])
+    assert sorted(pages.MEDIA) == sorted([*NAMES, "explorer.js", "views.js"])
 
 
 def test_the_page_finds_the_views_by_the_names_of_their_modules() -> None:
@@ -71,34 +76,76 @@ def test_nothing_is_fetched_from_elsewhere(name: str) -> None:
     assert set(re.findall(r'from "\./(.*?)"', text)) <= {*NAMES, "views.js"}
 
 
-def test_the_page_is_at_the_root_and_names_the_version_of_plotly() -> None:
+def test_the_page_is_at_the_root_and_asks_for_one_script() -> None:
     answer = get("/")
     assert answer.text == get("/explorer/index.html").text
-    assert f'href="{PLOTLY[1:]}"' in answer.text
+    assert re.findall(r'<script .*src="(.*?)"', answer.text) == ["explorer/explorer.js"]
     assert 'rel="icon" href="data:,"' in answer.text
-    assert "PLOTLY_VERSION" not in answer.text
+
+
+def test_the_script_has_every_module_after_those_that_it_imports() -> None:
+    script = get("/explorer/explorer.js").text
+    order = re.findall(r"^modules\['(.*?)'\] = ", script, re.MULTILINE)
+    assert sorted(order) == sorted([name for name in NAMES if name.endswith(".js")] + ["views.js"])
+    for name in order:
+        imports = re.findall(r'from "\./(.*?)"', get(f"/explorer/{name}").text)
+        assert {order.index(each) for each in imports} <= set(range(order.index(name)))
+
+
+@pytest.mark.parametrize("name", [name for name in NAMES if name.endswith(".js")])
+def test_modules_import_and_export_as_the_script_joins_them(name: str) -> None:
+    text = get(f"/explorer/{name}").text
+    imports = re.findall(r"^import (?:\{[\w\s,]+\}|\* as \w+) from \"\./[\w.]+\";$", text, re.MULTILINE)
+    exports = re.findall(r"^export (?:(?:async )?(?:const|function\*?|class) \w+|default \{)", text, re.MULTILINE)
+    assert len(imports) + len(exports) == len(re.findall(r"^(?:import|export)\b", text, re.MULTILINE))
+
+
+def test_the_script_runs_where_node_reads_it(tmp_path: Path) -> None:
+    node = shutil.which("node")
+    if node is None:
+        pytest.skip("node is not installed")
+    (tmp_path / "explorer.mjs").write_text(get("/explorer/explorer.js").text, encoding="utf-8")
+    assert subprocess.run([node, "--check", tmp_path / "explorer.mjs"]).returncode == 0
+
+
+def test_types_are_what_their_comments_say(tmp_path: Path) -> None:
+    tsc = shutil.which("tsc", path=os.pathsep.join([os.environ.get("BRDFDB_NODE", ""), os.environ["PATH"]]))
+    if tsc is None:
+        pytest.skip("tsc is not installed; BRDFDB_NODE names the folder of the programs of npm")
+    for name in NAMES:
+        if name.endswith(".js"):
+            shutil.copy(FOLDER / name, tmp_path)
+    (tmp_path / "views.js").write_text(VIEWS, encoding="utf-8")
+    options = "--allowJs --checkJs --noEmit --strict --noUnusedLocals --target es2022 --module es2022"
+    libraries = "--lib es2023,dom,dom.iterable --moduleResolution bundler"
+    command = [tsc, *options.split(), *libraries.split(), *sorted(path.name for path in tmp_path.iterdir())]
+    answer = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+    assert (answer.returncode, answer.stdout) == (0, "")
 
 
 def test_scripts_come_from_here_alone() -> None:
-    for path in ("/", PLOTLY, *(f"/explorer/{name}" for name in NAMES)):
+    for path in ("/", *(f"/explorer/{name}" for name in NAMES)):
         policy = dict(part.split(" ", 1) for part in get(path).headers["content-security-policy"].split("; "))
         assert (policy["default-src"], policy["script-src"], policy["connect-src"]) == ("'none'", "'self'", "'self'")
+        assert policy["style-src"] == "'self'"
         assert not OUTSIDE.search(" ".join(policy.values()))
 
 
-def test_plotly_is_that_of_the_package_and_kept_for_good() -> None:
-    content = files("plotly").joinpath("package_data", "plotly.min.js").read_bytes()
-    plain = get(PLOTLY, accept_encoding="identity")
-    assert plain.content == content
+@pytest.mark.parametrize("name", ["index.html", "explorer.css", "explorer.js", "main.js"])
+def test_files_are_packed_for_those_who_take_it(name: str) -> None:
+    plain, packed = (get(f"/explorer/{name}", accept_encoding=each) for each in ("identity", "gzip"))
     assert "content-encoding" not in plain.headers
-    packed = get(PLOTLY, accept_encoding="gzip")
-    assert (packed.headers["content-encoding"], packed.content) == ("gzip", content)
-    assert int(packed.headers["content-length"]) == len(gzip.compress(content, 6))
-    for answer in (plain, packed):
-        assert "immutable" in answer.headers["cache-control"]
-        assert answer.headers["vary"] == "Accept-Encoding"
+    assert (packed.headers["content-encoding"], packed.content) == ("gzip", plain.content)
+    assert int(packed.headers["content-length"]) == len(gzip.compress(plain.content, 9))
+    assert plain.headers["vary"] == packed.headers["vary"] == "Accept-Encoding"
     assert plain.headers["etag"] != packed.headers["etag"]
-    assert get(PLOTLY, accept_encoding="gzip", if_none_match=packed.headers["etag"]).status_code == 304
+    again = get(f"/explorer/{name}", accept_encoding="gzip", if_none_match=packed.headers["etag"])
+    assert again.status_code == 304
+
+
+def test_the_page_and_its_files_are_small() -> None:
+    sizes = [get(f"/explorer/{name}", accept_encoding="gzip").headers["content-length"] for name in FIRST]
+    assert sum(int(size) for size in sizes) < 45_000  # a second of a slow connection
 
 
 @pytest.mark.parametrize("path", ["nothing.js", "..%2fpages.py", "%2e%2e/pages.py", "explorer%2fmain.js", "main.js%00"])

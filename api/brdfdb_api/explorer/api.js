@@ -1,4 +1,6 @@
-// Requests: addresses of what is shown, their answers, and arrays of numbers as .npy bytes.
+// Requests: questions of what is shown, their answers, and arrays of numbers from .npy bytes.
+
+/** @typedef {{ path: string, body?: Record<string, unknown> }} Question a GET, or a POST of a document */
 
 const NPY = "application/x-npy";
 
@@ -6,37 +8,67 @@ export const AGAIN_MS = 3000; // after which is asked again for what may have co
 
 /** An answer that is an error; its message is the sentence that the service gives; whether it may pass by itself. */
 export class Problem extends Error {
+  /** @param {string} sentence */
   constructor(sentence, passes = false) {
     super(sentence);
     this.passes = passes;
   }
 }
 
-/** The address of a material, or of a view of it. */
-export function address(name, path = "", query = {}) {
-  const pairs = new URLSearchParams(Object.entries(query).filter(([, value]) => value !== undefined)).toString();
-  return `v1/materials/${encodeURIComponent(name)}${path && `/${path}`}${pairs && `?${pairs}`}`;
+/** A path with a query; of a list each value is given.
+ * @param {string} path
+ * @param {Record<string, unknown>} query */
+export function withQuery(path, query) {
+  const pairs = Object.entries(query).flatMap(([key, value]) =>
+    value === undefined ? [] : [value].flat().map((each) => [key, String(each)]),
+  );
+  return pairs.length ? `${path}?${new URLSearchParams(pairs)}` : path;
 }
 
-/** A document. */
-export async function json(path, signal) {
-  return (await answer(path, { signal })).json();
+/** The address of a material, or of a view of it.
+ * @param {string} name
+ * @param {string} path
+ * @param {Record<string, unknown>} query */
+export const address = (name, path = "", query = {}) =>
+  withQuery(`v1/materials/${encodeURIComponent(name)}${path && `/${path}`}`, query);
+
+/** A document.
+ * @param {string | Question} question
+ * @param {AbortSignal} [signal]
+ * @returns {Promise<any>} */
+export async function json(question, signal) {
+  return (await answer(typeof question === "string" ? { path: question } : question, {}, signal)).json();
 }
 
-/** Values at directions [degrees], four numbers each: theta_i, phi_i, theta_r, phi_r; and of which revision they are. */
-export async function lookup(name, query, directions, signal) {
-  const response = await answer(address(name, "lookup", query), {
-    signal, method: "POST", body: toNpy(directions, 4), headers: { "Content-Type": NPY, Accept: NPY },
-  });
-  return { revision: response.headers.get("Brdfdb-Revision"), values: fromNpy(await response.arrayBuffer()) };
+/** Values at the directions of a question, how many each, and of which revision they are.
+ * @param {Question} question
+ * @param {number} count
+ * @param {AbortSignal} [signal]
+ * @returns {Promise<{ revision: string | null, values: Float32Array | Float64Array, channels: number }>} */
+export async function values(question, count, signal) {
+  const response = await answer(question, { Accept: NPY }, signal);
+  const found = fromNpy(await response.arrayBuffer());
+  return { revision: response.headers.get("Brdfdb-Revision"), values: found, channels: found.length / count };
 }
 
-async function answer(path, options) {
+/** @param {Question} question
+ * @param {Record<string, string>} headers
+ * @param {AbortSignal} [signal] */
+async function answer({ path, body }, headers, signal) {
+  /** @type {RequestInit} */
+  const options = { signal, headers };
+  if (body) {
+    Object.assign(options, {
+      method: "POST",
+      body: JSON.stringify(body),
+      headers: { ...headers, "Content-Type": "application/json" },
+    });
+  }
   let response;
   try {
     response = await fetch(path, options);
   } catch (error) {
-    if (error.name === "AbortError") throw error;
+    if (signal?.aborted) throw error;
     throw new Problem("the server does not answer", true);
   }
   if (response.ok) return response;
@@ -44,19 +76,9 @@ async function answer(path, options) {
   throw new Problem(problem.detail ?? `the server answers with status ${response.status}`, response.status === 503);
 }
 
-/** A .npy file (version 1.0) of float32 with rows of `columns` numbers. */
-export function toNpy(values, columns) {
-  const text = `{'descr': '<f4', 'fortran_order': False, 'shape': (${values.length / columns}, ${columns}), }`;
-  const header = text.padEnd(64 * Math.ceil((text.length + 11) / 64) - 11) + "\n"; // numbers start at a multiple of 64
-  const bytes = new Uint8Array(10 + header.length + values.byteLength);
-  bytes.set([0x93, ...new TextEncoder().encode("NUMPY"), 1, 0, header.length & 255, header.length >> 8]);
-  bytes.set(new TextEncoder().encode(header), 10);
-  bytes.set(new Uint8Array(values.buffer, values.byteOffset, values.byteLength), 10 + header.length);
-  return bytes;
-}
-
-/** The numbers of a .npy file of version 1.0, in its order. */
-export function fromNpy(buffer) {
+/** The numbers of a .npy file of version 1.0, in its order.
+ * @param {ArrayBuffer} buffer */
+function fromNpy(buffer) {
   const start = 10 + new DataView(buffer).getUint16(8, true);
   const kind = /'descr': '<(f[48])'/.exec(new TextDecoder().decode(buffer.slice(10, start)))?.[1];
   if (!kind) throw new Problem("the server answers with numbers of another kind");

@@ -1,77 +1,128 @@
-// Sliders, switches and the choice of a view: they show the state, and tell what a hand changes of it.
+// Sliders, switches and the choice of a view: they show the state, and change it by hand.
 
-import { element } from "./dom.js";
-import { ILLUMINANTS, MODEL } from "./state.js";
+import { byId, element } from "./dom.js";
 import { anisotropic, makesColour, nearest } from "./series.js";
+import { CHOICES, ILLUMINANTS, MODEL } from "./state.js";
 import { VIEWS } from "./views.js";
 
-const form = document.getElementById("controls");
-const views = document.getElementById("views");
-const fields = form.elements;
+/** @typedef {import("./state.js").State} State */
+/** @typedef {import("./series.js").Series} Series */
+
+const form = byId("controls", HTMLFormElement),
+  views = byId("views", HTMLElement),
+  beside = byId("beside", HTMLElement);
+const CHOSEN = ["axes", "curves", "illuminant", "surround"];
+
+/** A control of the form.
+ * @param {string} name
+ * @returns {any} an input or a select: both have value and disabled */
+const field = (name) => form.elements.namedItem(name);
 
 for (const { name, title } of Object.values(VIEWS)) {
   views.append(element("label", {}, element("input", { type: "radio", name: "view", value: name }), title));
 }
 
-fields.illuminant.append(...ILLUMINANTS.map((name) => new Option(name)));
+field("illuminant").append(...ILLUMINANTS.map((name) => new Option(name)));
 
-/** Call `change` with what a hand changes of the state. */
-export function listen(change) {
-  views.addEventListener("change", (event) => change({ view: event.target.value }));
+/** Call `choose` with what a hand changes of the state.
+ * @param {(part: Partial<State>) => void} choose
+ * @param {() => State} now */
+export function listen(choose, now) {
+  views.addEventListener(
+    "change",
+    ({ target }) => target instanceof HTMLInputElement && choose({ view: target.value }),
+  );
   form.addEventListener("submit", (event) => event.preventDefault());
-  form.addEventListener("input", ({ target: { name, checked, value } }) => {
-    if (name === "colour") change({ nm: checked ? null : Number(fields.nm.value) });
-    else if (name === "log") change({ scale: checked ? "log" : "linear" });
-    else if (["compare", "illuminant"].includes(name)) change({ [name]: value });
-    else change({ [name]: Number(value) });
+  form.addEventListener("input", ({ target }) => {
+    const { name, checked, value } = /** @type {HTMLInputElement} */ (target);
+    if (name === "colour") choose({ nm: checked ? null : Number(field("nm").value) });
+    else if (name === "log") choose({ scale: checked ? "log" : "linear" });
+    else if (CHOSEN.includes(name)) choose({ [name]: value });
+    else if (name !== "compare") choose({ [name]: Number(value) });
+    else if (value && !now().compare.includes(value)) choose({ compare: [...now().compare, value] });
+  });
+  beside.addEventListener("click", ({ target }) => {
+    const text = target instanceof HTMLElement && target.dataset.text;
+    if (text) choose({ compare: now().compare.filter((each) => each !== text) });
   });
 }
 
-/** Offer materials to compare with. */
+/** Offer materials to compare with.
+ * @param {any[]} materials */
 export function offer(materials) {
-  fields.compare.replaceChildren(new Option("nothing", ""), new Option("its model", MODEL),
-    ...materials.filter((each) => !each.damaged).map((each) => new Option(each.title, each.name)));
+  field("compare").replaceChildren(
+    new Option("add …", ""),
+    new Option("its own model or table", MODEL),
+    ...materials.filter((each) => !each.damaged).map((each) => new Option(each.title, each.name)),
+  );
 }
 
-const all = [views, form, document.getElementById("copies")];
+const all = [views, form, byId("copies", HTMLElement), beside];
 
 /** Nothing can be moved while there is nothing to look at. */
 export function forget() {
   for (const each of all) each.inert = true;
 }
 
-/** Show a state of some series; what has no effect on the picture cannot be moved. */
+/** Show a state of some series; what has no effect on the picture cannot be moved.
+ * @param {State} state
+ * @param {Series[]} series */
 export function show(state, series) {
   for (const each of all) each.inert = false;
-  views.querySelector(`[value="${state.view}"]`).checked = true;
-  for (const name of ["theta_i", "phi_i", "theta_r", "turn"]) {
-    fields[name].value = state[name];
+  const chosen = views.querySelector(`[value="${state.view}"]`);
+  if (chosen instanceof HTMLInputElement) chosen.checked = true;
+  for (const name of /** @type {const} */ (["theta_i", "phi_i", "theta_r", "turn"])) {
+    field(name).value = state[name];
     said(name, `${state[name]}°`);
   }
-  const { idle = [], also = [], turned = false } = VIEWS[state.view];
-  for (const name of ["theta_r", "turn"]) fields[name].closest("label").hidden = !also.includes(name);
-  fields.theta_i.disabled = idle.includes("theta_i");
-  fields.phi_i.disabled = idle.includes("phi_i") || !(turned || anisotropic(series));
-  fields.log.checked = state.scale === "log";
-  fields.log.disabled = idle.includes("log");
-  fields.compare.value = state.compare;
+  const { idle = [], also = [], turned = false, shapes = false, lit = false } = VIEWS[state.view];
+  const drop = (/** @type {string} */ name, /** @type {boolean} */ hidden) => {
+    field(name).closest("label").hidden = hidden;
+  };
+  for (const name of ["theta_r", "turn"]) drop(name, !also.includes(name));
+  for (const name of ["axes", "curves"]) drop(name, !shapes);
+  for (const name of ["exposure", "surround"]) drop(name, !lit);
+  for (const name of CHOSEN) if (name in CHOICES) field(name).value = state[/** @type {keyof State} */ (name)];
+  field("exposure").value = state.exposure;
+  said("exposure", `${state.exposure > 0 ? "+" : ""}${state.exposure} EV`.replace("-", "−"));
+  field("theta_i").disabled = idle.includes("theta_i");
+  field("phi_i").disabled = idle.includes("phi_i") || !(turned || anisotropic(series));
+  field("log").checked = state.scale === "log";
+  drop("log", idle.includes("log"));
+  field("compare").value = "";
+  beside.replaceChildren(
+    ...series
+      .slice(1)
+      .map(({ label }, i) => element("button", { type: "button", title: "take it away" }, `${label} ×`)),
+  );
+  series.slice(1).forEach((_, i) => {
+    /** @type {HTMLElement} */ (beside.children[i]).dataset.text = state.compare[i];
+  });
 
-  const spectral = series.find(({ info }) => info.wavelength_nm)?.info;
-  const range = spectral?.wavelength_nm ?? [550];
-  fields.nm.min = range[0];
-  fields.nm.max = range.at(-1);
-  const one = range.length === 1 || idle.includes("nm");
-  const coloured = spectral !== undefined && makesColour(spectral);
-  fields.nm.disabled = one || (coloured && state.nm === null);
-  if (spectral && state.nm !== null) fields.nm.value = nearest(spectral, state.nm);
-  said("nm", !spectral ? "grey: the same at all" : fields.nm.disabled && !one ? "all" : `${nearest(spectral, state.nm)} nm`);
-  if (idle.includes("nm")) said("nm", "all");
-  fields.colour.checked = coloured && state.nm === null;
-  fields.colour.disabled = !coloured || idle.includes("colour");
-  fields.illuminant.value = state.illuminant;
-  fields.illuminant.closest("label").hidden = !fields.colour.checked || idle.includes("illuminant");
+  const spectral = series.find(({ info }) => info.wavelength_nm)?.info,
+    range = spectral?.wavelength_nm ?? [550];
+  field("nm").min = range[0];
+  field("nm").max = range.at(-1);
+  const one = range.length === 1 || idle.includes("nm"),
+    coloured = spectral !== undefined && makesColour(spectral);
+  field("nm").disabled = one || (coloured && state.nm === null);
+  if (spectral && state.nm !== null) field("nm").value = nearest(spectral, state.nm);
+  said(
+    "nm",
+    !spectral
+      ? "grey: the same at all"
+      : idle.includes("nm") || (field("nm").disabled && !one)
+        ? "all"
+        : `${nearest(spectral, state.nm)} nm`,
+  );
+  drop("nm", !spectral || idle.includes("nm"));
+  field("colour").checked = coloured && state.nm === null;
+  drop("colour", !coloured || idle.includes("colour"));
+  drop("illuminant", !field("colour").checked || idle.includes("illuminant"));
 }
 
+/** @param {string} name
+ * @param {string} text */
 function said(name, text) {
-  fields[name].closest("label").querySelector(".said").textContent = text;
+  field(name).closest("label").querySelector(".said").textContent = text;
 }

@@ -1,72 +1,190 @@
-// What is known of a material, beside the picture: parameters, stated error, what the audit found, links.
+// What is known of a material, beside the picture: one sentence of verdict, and the details folded below it.
 
-import { QUESTIONS, chip, element, isGood, percent, short } from "./dom.js";
+import { byId, chip, element, isGood, percent, short } from "./dom.js";
 import { nearest } from "./series.js";
 
-const aside = document.getElementById("facts");
+/** @typedef {[string | Node, string | Node, ...(string | undefined)[]]} Row a term, its value, and small lines below
+ *   that */
 
-/** Fill the side with what the service says of a material. */
-export function show(info) {
+/** @type {Record<string, string>} */
+const QUESTIONS = {
+  as_published: "is it what the paper says?",
+  conserves_energy: "does the published model conserve energy?",
+};
+const aside = byId("facts", HTMLElement);
+
+/** Fill the side with what the service says of a material, or of a model with other parameters.
+ * @param {import("./series.js").Series} series */
+export function show({ info, source }) {
   const { attributes, error, audit } = info;
+  if (source === "parameters") {
+    aside.replaceChildren(
+      element(
+        "p",
+        { className: "verdict" },
+        "Computed now, with parameters of your own: neither tabulated nor audited.",
+      ),
+      element("h3", {}, "Surface"),
+      pairs([
+        ["model", info.model_title],
+        ["begun with", info.base.title],
+        ["source", info.base.attributes.source],
+      ]),
+    );
+    return;
+  }
   aside.replaceChildren(
+    element("p", { className: "verdict" }, ...verdict(info)),
     element("h3", {}, "Surface"),
     pairs([
-      [info.measured ? "measured" : "model", info.measured ? origin(info.measured)
-        : `${attributes.model_title ?? info.model}, ${attributes.model_equation ?? ""}`],
+      [
+        info.measured ? "measured" : "model",
+        info.measured
+          ? origin(info.measured)
+          : `${attributes.model_title ?? info.model}, ${attributes.model_equation ?? ""}`,
+      ],
       ["source", attributes.source],
-      ...(attributes.refractive_index ? [["n, k", attributes.refractive_index]] : []),
+      ...optional("n, k", attributes.refractive_index),
       ["kind", `${info.anisotropic ? "anisotropic" : "isotropic"}, ${range(info.wavelength_nm)}`],
-      ...(attributes.note ? [["note", attributes.note]] : []),
+      ...optional("note", attributes.note),
     ]),
-    ...(info.measured ? [element("h3", {}, "Error of the data"), pairs(data(info.measured))] : []),
-    ...(info.parameters.length ? [element("h3", {}, "Parameters")] : []),
-    pairs(info.parameters.map((each) => [each.name, value(each), each.meaning,
-      each.source === attributes.source ? "" : each.source, assumed(each, attributes)])),
-    element("h3", {}, `Error of the table against ${info.measured ? "the data" : "its formula"}`),
-    error ? pairs([
-      ["99 of 100", `within ${percent(error.overall.p99)}`], ["median", percent(error.overall.median)],
-      ["largest", percent(error.overall.max), error.worst?.why ?? ""], ["at this θᵢ", element("span", { id: "band" })],
-    ]) : element("p", {}, "not measured"),
-    ...(info.measured ? [] : [element("h3", {}, "Error of the formula against the highest rung"), ...formula(info.formula_error)]),
-    element("h3", {}, "Audit"),
-    pairs(above(info.largest_albedo)),
-    ...(audit ? audited(audit) : [element("p", {}, "no audit of it is here; ", element("code", {}, "brdfdb audit"), " makes one")]),
-    element("h3", {}, "As data"),
-    element("p", { className: "links" }, ...links(info)),
+    ...(info.parameters.length
+      ? [
+          folded(
+            "Parameters",
+            pairs(
+              info.parameters.map((/** @type {any} */ each) => [
+                each.name,
+                value(each),
+                each.meaning,
+                each.source === attributes.source ? "" : each.source,
+                assumed(each, attributes),
+              ]),
+            ),
+          ),
+        ]
+      : []),
+    folded(
+      "Errors",
+      ...(info.measured ? [element("h4", {}, "Of the data"), pairs(data(info.measured))] : []),
+      element("h4", {}, `Of the table against ${info.measured ? "the data" : "its formula"}`),
+      error
+        ? pairs([
+            ["99 of 100", `within ${percent(error.overall.p99)}`],
+            ["median", percent(error.overall.median)],
+            ["largest", percent(error.overall.max), error.worst?.why ?? ""],
+            ["at this θᵢ", element("span", { id: "band" })],
+          ])
+        : element("p", {}, "not measured"),
+      ...(info.measured
+        ? []
+        : [element("h4", {}, "Of the formula against the highest rung"), ...formula(info.formula_error)]),
+    ),
+    folded(
+      "Audit",
+      pairs(above(info.largest_albedo)),
+      ...(audit
+        ? audited(audit)
+        : [element("p", {}, "no audit of it is here; ", element("code", {}, "brdfdb audit"), " makes one")]),
+    ),
+    folded("As data", element("p", { className: "links" }, ...links(info))),
     element("p", { className: "quiet" }, `${info.name}, revision ${info.revision}`),
   );
 }
 
-/** What measured data are of. */
-const origin = ({ by, file, samples, incidences, extrapolated }) => [
-  samples ? `${samples} samples of ${incidences} lights` : `known ${extrapolated === null ? "everywhere" : "between its values"}`, by, file && `file ${file}`].filter(Boolean).join("; ");
-
-/** How far measured data are to be trusted, and where nothing was measured. */
-const data = ({ held_out: left, noise, extrapolated, negative, changes }) => [
-  ["held out", left ? `95 of 100 samples within ${percent(left.p95)}` : "no samples", left ? `99 within ${percent(left.p99)}` : ""],
-  ["noise", noise ? `95 of 100 below ${percent(noise.p95)}` : "not stated"],
-  ...(extrapolated === null ? [] : [["measured", `${percent(1 - extrapolated)} of all directions`]]),
-  ...(negative ? [["below 0", `${percent(negative)} of the values, which are 0 here`]] : []),
-  ...changes.map(({ law, changed }) => [`made ${law}`, `by up to ${percent(changed.max)}`]),
-];
-
-/** How far the formula is from the best that is known of its surface. */
-function formula(of) {
-  if (!of) return [element("p", {}, "not measured")];
-  if (of.against === "none known") return [element("p", {}, "none known: the formula is a fit, or no higher rung is known")];
-  if (of.against === "highest rung") return [element("p", {}, `0: it is the exact form, ${of.rung}`)];
-  return [pairs([
-    ["99 of 100", `within ${percent(of.overall.p99)}`, `against ${of.rung}`],
-    ["largest", percent(of.overall.max), of.worst?.why ?? ""],
-  ])];
+/** A verdict as a sentence for people.
+ * @param {any} info
+ * @returns {(string | Node)[]} */
+function verdict({ audit, error, measured, formula_error: of }) {
+  const table = error
+    ? `the table keeps within ${percent(error.overall.p99)} of ${measured ? "the data" : "its formula"}`
+    : "the error of the table was not measured";
+  if (!audit?.current || !audit.as_published) return [`Not audited at this revision; ${table}.`];
+  const { as_published: published, conserves_energy: energy } = audit;
+  const form = of?.against === "highest rung" ? ", which is the exact form" : "";
+  const first = isGood(published.word)
+    ? `It is what the paper says: ${table}${measured ? "" : form}.`
+    : `It is not what the paper says (${published.text}): ${table}.`;
+  const words = isGood(energy.word)
+    ? "It conserves energy."
+    : energy.text.startsWith("no")
+      ? `It does not conserve energy${energy.text.slice(2)}.`
+      : `On energy: it ${energy.text}.`;
+  return [chip(isGood(published.word) ? audit.verdict : published.word), ` ${first} ${words}`];
 }
 
-/** An albedo above 1, where the table has one. */
-const above = (largest) => (largest && (largest.albedo === null || largest.albedo > 1 + largest.tolerance) ? [[
-  largest.albedo === null ? "albedo" : "albedo above 1", `${largest.albedo === null ? "not finite" : short(largest.albedo)} at ${largest.theta_i_deg}°` +
-    `${largest.wavelength_nm === null ? "" : `, ${largest.wavelength_nm} nm`}`]] : []);
+/** Details behind their title.
+ * @param {string} title
+ * @param {(string | Node)[]} children */
+const folded = (title, ...children) => element("details", {}, element("summary", {}, title), ...children);
 
-/** Why a value that no paper prints was chosen; tables built earlier have the names alone, and reasons in their note. */
+/** @param {string} term
+ * @param {string} text
+ * @returns {Row[]} */
+const optional = (term, text) => (text ? [[term, text]] : []);
+
+/** What measured data are of.
+ * @param {any} measured */
+const origin = ({ by, file, samples, incidences, extrapolated }) =>
+  [
+    samples
+      ? `${samples} samples of ${incidences} lights`
+      : `known ${extrapolated === null ? "everywhere" : "between its values"}`,
+    by,
+    file && `file ${file}`,
+  ]
+    .filter(Boolean)
+    .join("; ");
+
+/** How far measured data are to be trusted, and where nothing was measured.
+ * @param {any} measured
+ * @returns {Row[]} */
+const data = ({ held_out: left, noise, extrapolated, negative, changes }) => [
+  [
+    "held out",
+    left ? `95 of 100 samples within ${percent(left.p95)}` : "no samples",
+    left ? `99 within ${percent(left.p99)}` : "",
+  ],
+  ["noise", noise ? `95 of 100 below ${percent(noise.p95)}` : "not stated"],
+  ...optional("measured", extrapolated === null ? "" : `${percent(1 - extrapolated)} of all directions`),
+  ...optional("below 0", negative && `${percent(negative)} of the values, which are 0 here`),
+  ...changes.map(
+    (/** @type {any} */ { law, changed }) => /** @type {Row} */ ([`made ${law}`, `by up to ${percent(changed.max)}`]),
+  ),
+];
+
+/** How far the formula is from the best that is known of its surface.
+ * @param {any} of */
+function formula(of) {
+  if (!of) return [element("p", {}, "not measured")];
+  if (of.against === "none known")
+    return [element("p", {}, "none known: the formula is a fit, or no higher rung is known")];
+  if (of.against === "highest rung") return [element("p", {}, `0: it is the exact form, ${of.rung}`)];
+  return [
+    pairs([
+      ["99 of 100", `within ${percent(of.overall.p99)}`, `against ${of.rung}`],
+      ["largest", percent(of.overall.max), of.worst?.why ?? ""],
+    ]),
+  ];
+}
+
+/** An albedo above 1, where the table has one.
+ * @param {any} largest
+ * @returns {Row[]} */
+const above = (largest) =>
+  largest && (largest.albedo === null || largest.albedo > 1 + largest.tolerance)
+    ? [
+        [
+          largest.albedo === null ? "albedo" : "albedo above 1",
+          `${largest.albedo === null ? "not finite" : short(largest.albedo)} at ${largest.theta_i_deg}°` +
+            `${largest.wavelength_nm === null ? "" : `, ${largest.wavelength_nm} nm`}`,
+        ],
+      ]
+    : [];
+
+/** Why a value that no paper prints was chosen; tables built earlier have the names alone, and reasons in their note.
+ * @param {any} parameter
+ * @param {any} attributes */
 function assumed(parameter, attributes) {
   const why = attributes.assumed?.[parameter.name]?.why ?? "the paper does not print it";
   return parameter.assumed && why !== parameter.source ? `assumed: ${why}` : ""; // a colour says so in its source
@@ -75,58 +193,109 @@ function assumed(parameter, attributes) {
 /** Know nothing. */
 export const forget = () => aside.replaceChildren();
 
-/** Say the error at the light that is looked at: between two wavelengths the larger of theirs, of a mixture the one stated. */
+/** Say the error at the light that is looked at: between two wavelengths the larger of theirs, else the one stated.
+ * @param {any} info
+ * @param {{ theta_i: number, nm: number | null }} state */
 export function band({ error, wavelength_nm: wavelengths }, { theta_i, nm }) {
   const into = document.getElementById("band");
   if (!into || !error) return;
-  const at = Math.max(0, error.theta_i_deg.findLastIndex((edge) => edge <= theta_i));
+  const at = Math.max(
+    0,
+    error.theta_i_deg.findLastIndex((/** @type {number} */ edge) => edge <= theta_i),
+  );
   const row = error.p99[Math.min(at, error.p99.length - 1)];
   const wanted = wavelengths && nm !== null ? nearest({ wavelength_nm: wavelengths }, nm) : null;
-  const around = wanted === null || row.length === 1 ? row : row.slice(
-    wavelengths.findLastIndex((each) => each <= wanted), wavelengths.findIndex((each) => each >= wanted) + 1);
+  const around =
+    wanted === null || row.length === 1
+      ? row
+      : row.slice(
+          wavelengths.findLastIndex((/** @type {number} */ each) => each <= wanted),
+          wavelengths.findIndex((/** @type {number} */ each) => each >= wanted) + 1,
+        );
   into.textContent = `within ${percent(Math.max(...around))}`;
 }
 
-/** Every finding of the audit, in words where it is no plain pass; the report has the words of the papers. */
+/** Every finding of the audit, in words where it is no plain pass; the report has the words of the papers.
+ * @param {any} audit */
 function audited(audit) {
-  const findings = audit.sentences.filter(({ quote }) => !quote);
+  const findings = audit.sentences.filter((/** @type {any} */ { quote }) => !quote);
   return [
     answers([
-      ...(audit.as_published && audit.conserves_energy ? Object.entries(QUESTIONS).map(([key, question]) =>
-        [question, chip(audit[key].word, audit[key].text)]) : [["verdict", chip(audit.verdict)]]),
-      ...findings.map(({ title, word, text }) => [title.toLowerCase(), chip(word), isGood(word) ? "" : text]),
+      ...(audit.as_published && audit.conserves_energy
+        ? Object.entries(QUESTIONS).map(
+            ([key, question]) => /** @type {Row} */ ([question, chip(audit[key].word, audit[key].text)]),
+          )
+        : [["verdict", chip(audit.verdict)]]),
+      ...findings.map((/** @type {any} */ { title, word, text }) => [
+        title.toLowerCase(),
+        chip(word),
+        isGood(word) ? "" : text,
+      ]),
     ]),
     ...(audit.current ? [] : [element("p", {}, `This is of revision ${audit.revision}, not of the current one.`)]),
   ];
 }
 
+/** @param {any} info */
 function links({ links: to, audit }) {
-  const wanted = [["material", to.self], ["albedo", to.albedo], ...(audit ? [["audit", to.audit]] : []),
-    ["table (zarr)", to["download.zarr"]], ...Object.entries(to).flatMap(([key, href]) => {
+  const wanted = [
+    ["material", to.self],
+    ["albedo", to.albedo],
+    ...(audit ? [["audit", to.audit]] : []),
+    ["table (zarr)", to["download.zarr"]],
+    ...Object.entries(to).flatMap(([key, href]) => {
       const [kind, format] = key.split("/"); // a file of every format that the service exports
       return kind === "export" ? [[format.toUpperCase(), href]] : [];
-    })];
+    }),
+  ];
   return wanted.map(([text, href]) => element("a", { href: href.replace(/^\//, "") }, text));
 }
 
-/** A list of terms; of what stands behind the first value each is a small line. */
+/** A list of terms.
+ * @param {Row[]} rows */
 function pairs(rows) {
-  return element("dl", {}, ...rows.flatMap(([term, first, ...small]) => [
-    element("dt", {}, term),
-    element("dd", {}, first, ...small.filter(Boolean).map((text) => element("span", { className: "quiet" }, text))),
-  ]));
+  return element(
+    "dl",
+    {},
+    ...rows.flatMap(([term, first, ...small]) => [
+      element("dt", {}, term),
+      element(
+        "dd",
+        {},
+        first,
+        ...small.flatMap((text) => (text ? [element("span", { className: "quiet" }, text)] : [])),
+      ),
+    ]),
+  );
 }
 
-/** A list of questions: each with its verdict beside it or below, and a reason over the whole width. */
+/** A list of questions: each with its verdict beside it or below, and a reason over the whole width.
+ * @param {Row[]} rows */
 function answers(rows) {
-  return element("dl", { className: "answered" }, ...rows.map(([question, verdict, reason]) => element("div", {},
-    element("dt", {}, question), element("dd", {}, verdict),
-    ...(reason ? [element("dd", { className: "quiet" }, reason)] : []))));
+  return element(
+    "dl",
+    { className: "answered" },
+    ...rows.map(([question, verdict, reason]) =>
+      element(
+        "div",
+        {},
+        element("dt", {}, question),
+        element("dd", {}, verdict),
+        ...(reason ? [element("dd", { className: "quiet" }, reason)] : []),
+      ),
+    ),
+  );
 }
 
-const shown = (of) => (typeof of === "number" ? short(of)
-  : of.values ? `${short(Math.min(...of.values))} to ${short(Math.max(...of.values))}, a spectrum` : of);
+const shown = (/** @type {any} */ of) =>
+  typeof of === "number"
+    ? short(of)
+    : of.values
+      ? `${short(Math.min(...of.values))} to ${short(Math.max(...of.values))}, a spectrum`
+      : of;
 
-const value = ({ value: of, unit }) => `${shown(of)}${["1", ""].includes(unit) ? "" : ` ${unit === "degree" ? "°" : unit}`}`;
+const value = (/** @type {any} */ { value: of, unit }) =>
+  `${shown(of)}${["1", ""].includes(unit) ? "" : ` ${unit === "degree" ? "°" : unit}`}`;
 
-const range = (at) => (at === null ? "grey" : at.length === 1 ? `at ${at[0]} nm` : `${at[0]} to ${at.at(-1)} nm`);
+const range = (/** @type {number[] | null} */ at) =>
+  at === null ? "grey" : at.length === 1 ? `at ${at[0]} nm` : `${at[0]} to ${at.at(-1)} nm`;

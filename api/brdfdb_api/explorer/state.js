@@ -1,35 +1,121 @@
-// What is looked at: a material, directions, a wavelength, a view; as a link, and back from one.
+// What is looked at: subjects, directions, a wavelength, a view; as a link, and back from one.
 
-// compare: nothing, the model of the material itself, or the name of another one
+/** @typedef {{ base: string, model: boolean, changes: Record<string, number> | null }} Subject a material's table;
+ *   with `model`
+ *   the model that it was made of; with `changes` that model, or a model by its name, with other parameters */
+/** @typedef {{ material: string, view: string, theta_i: number, phi_i: number, theta_r: number, turn: number, nm:
+ *   number | null,
+ *   scale: string, axes: string, curves: string, compare: string[], illuminant: string, exposure: number, surround:
+ *   string, quick?: boolean }} State
+ *   quick: drawn in a hurry, while a slider moves; turn is phi_r - phi_i; nm null is luminance and colours under an
+ *   illuminant; material and compare are subjects as text */
+
+// compare: the model of the material itself
 export const MODEL = ":model";
 
 // Of colours; D65 first, as in the list
 export const ILLUMINANTS = ["D65", "D50", "A", "FL2"];
 
-// nm: a wavelength, or null for luminance and colours under an illuminant; turn is phi_r - phi_i
+/** @type {State} */
 const DEFAULTS = {
-  material: "", view: "cut", theta_i: 45, phi_i: 0, theta_r: 45, turn: 180, nm: null, scale: "log", compare: "",
+  material: "",
+  view: "together",
+  theta_i: 45,
+  phi_i: 0,
+  theta_r: 45,
+  turn: 180,
+  nm: null,
+  scale: "log",
+  axes: "polar",
+  curves: "one",
+  compare: [],
   illuminant: "D65",
+  exposure: 0,
+  surround: "sky",
 };
-const CHOICES = { scale: ["log", "linear"], illuminant: ILLUMINANTS };
-const RANGES = { theta_i: [0, 89.5], phi_i: [0, 360], theta_r: [0, 89.5], turn: [0, 360], nm: [1, 1e6] };
+/** @type {Record<string, string[]>} */
+export const CHOICES = {
+  scale: ["log", "linear"],
+  axes: ["polar", "cartesian"],
+  curves: ["one", "rgb", "wavelengths"],
+  illuminant: ILLUMINANTS,
+  surround: ["sky", "dark", "studio"],
+};
+/** @type {Record<string, [number, number]>} */
+const RANGES = {
+  theta_i: [0, 89.5],
+  phi_i: [0, 360],
+  theta_r: [0, 89.5],
+  turn: [0, 360],
+  nm: [1, 1e6],
+  exposure: [-8, 8],
+};
+// Wavelengths at which pictures look up spectra, as `brdfdb render`
+export const PICTURE_NM = Array.from({ length: 14 }, (_, i) => 420 + 20 * i);
+const MOST = 7; // subjects that are compared with: there are as many more colours
 
-/** The state that a link holds, of some views; what it does not hold, or holds wrongly, is as at the start. */
+/** The state that a link holds, of some views; what it does not hold, or holds wrongly, is as at the start.
+ * @param {string} hash
+ * @param {Record<string, unknown>} views
+ * @returns {State} */
 export function fromHash(hash, views) {
-  const state = { ...DEFAULTS }, choices = { ...CHOICES, view: Object.keys(views) };
+  /** @type {Record<string, any>} */
+  const state = { ...DEFAULTS, compare: [] };
+  /** @type {Record<string, string[]>} */
+  const choices = { ...CHOICES, view: Object.keys(views) };
   for (const [key, text] of new URLSearchParams(hash.replace(/^#/, ""))) {
     if (key in RANGES) {
-      const value = Number(text), [low, high] = RANGES[key];
+      const value = Number(text),
+        [low, high] = RANGES[key];
       if (text !== "" && value >= low && value <= high) state[key] = value;
-    } else if (key in choices ? choices[key].includes(text) : key in DEFAULTS) {
+    } else if (key === "compare") {
+      if (text && !state.compare.includes(text)) state.compare = [...state.compare, text].slice(0, MOST);
+    } else if (key in choices ? choices[key].includes(text) : key === "material") {
       state[key] = text;
     }
   }
-  return state;
+  return /** @type {State} */ (state);
 }
 
-/** The end of a link: what differs from the start. */
+/** The end of a link: what differs from the start.
+ * @param {State} state */
 export function toHash(state) {
-  const held = Object.entries(state).filter(([key, value]) => value !== DEFAULTS[key] && value !== null);
-  return `#${new URLSearchParams(held)}`;
+  const { quick: _, ...all } = state;
+  const held = Object.entries(all).flatMap(([key, value]) =>
+    Array.isArray(value)
+      ? value.map((each) => [key, each])
+      : value === null || value === DEFAULTS[/** @type {keyof State} */ (key)]
+        ? []
+        : [[key, value]],
+  );
+  return `#${held.map(([key, value]) => `${key}=${plain(String(value))}`).join("&")}`;
 }
+
+/** Text as a link holds it: signs that mean nothing after # stay as they are.
+ * @param {string} text */
+const plain = (text) => encodeURIComponent(text).replace(/%3A|%3D|%2C/g, (code) => decodeURIComponent(code));
+
+/** A subject from its text: NAME, NAME:model or NAME(parameter=value,...).
+ * @param {string} text
+ * @returns {Subject} */
+export function subjectOf(text) {
+  const [, base, changed] = /^(.*?)\((.*)\)$/.exec(text) ?? [];
+  if (base !== undefined) {
+    const pairs = changed
+      .split(",")
+      .map((each) => each.split("="))
+      .filter(([name, value]) => name && value && Number.isFinite(Number(value)));
+    return { base, model: true, changes: Object.fromEntries(pairs.map(([name, value]) => [name, Number(value)])) };
+  }
+  return text.endsWith(MODEL)
+    ? { base: text.slice(0, -MODEL.length), model: true, changes: null }
+    : { base: text, model: false, changes: null };
+}
+
+/** The text of a subject with parameters.
+ * @param {string} base
+ * @param {Record<string, number>} changes */
+export const changedText = (base, changes) =>
+  `${base}(${Object.entries(changes)
+    .map(([name, value]) => `${name}=${Number(value.toPrecision(6))}`)
+    .join(",")})`;

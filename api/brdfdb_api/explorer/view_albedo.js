@@ -1,57 +1,91 @@
 // The view of the directional albedo over the angle of the light.
 
-import { address } from "./api.js";
-import { line, plotted } from "./plot.js";
-import { againstAudit, nearest } from "./series.js";
-import { MODEL } from "./state.js";
+import { chart, steps, valueAt } from "./chart.js";
+import { closest, ink, short } from "./dom.js";
+import { against, nearest, question } from "./series.js";
+
+/** @typedef {import("./state.js").State} State */
+/** @typedef {import("./series.js").Series} Series */
 
 const NM = [450, 550, 650]; // of albedos, where none is chosen
-const BANDS = ["#4f7df0", "#2f9e6b", "#d8503f"]; // their colours
 
+/** Whether albedos are those of the audit: it alone knows that of the model of a table, unless that was audited
+ *   without one.
+ * @param {Series} each
+ * @param {Series[]} series */
+const audited = ({ info }, series) => against(series) && Boolean(info.audit?.model);
+
+/** @type {import("./main.js").View} */
 export default {
   name: "albedo",
   title: "Albedo",
   order: 5,
   idle: ["theta_i", "phi_i", "log", "illuminant"],
-  request: (each, state) => address(each.name, againstAudit(each, state) ? "audit" : "albedo"),
-  known: (each, state) => each.source === "table" || againstAudit(each, state), // the service does not know that of a model
-  ...plotted(albedo),
+  request: (each, _, series) =>
+    audited(each, series) ? question({ ...each, source: "table" }, "audit") : question(each, "albedo"),
+  // the service does not know that of the model of a table
+  known: (each, _, series) => each.source !== "model" || audited(each, series),
+  draw: albedo,
 };
 
-/** Albedos of an answer of the service, or of the audit, which tells that of the model, too. */
-
-function albedosOf(answer, source) {
+/** Albedos of an answer of the service, or of the audit, which has that of the model, too.
+ * @param {any} answer
+ * @param {Series} each */
+function albedosOf(answer, { source }) {
   const found = answer.finding?.findings.energy[source];
   if (found) return { theta_i: found.theta_i_deg, at: found.wavelength_nm, total: found.albedo };
-  const total = answer.albedo.map((row, k) => row.map((value, i) => value + answer.specular_reflectance[k][i]));
+  const total = answer.albedo.map((/** @type {number[]} */ row, /** @type {number} */ k) =>
+    row.map((value, i) => value + (answer.specular_reflectance?.[k][i] ?? 0)),
+  );
   return { theta_i: answer.theta_i, at: answer.wavelength_nm, total };
 }
 
-function albedo(series, answers, state, ink) {
-  const data = answers.flatMap((answer, i) => {
-    const { theta_i, at, total } = albedosOf(answer, series[i].source);
-    const asked = at === null ? [null] : state.nm === null && at.length > 1 ? NM : [nearest({ wavelength_nm: at }, state.nm)];
-    return asked.map((nm, j) => {
-      const column = nm === null ? 0 : at.reduce((best, each, k) => (Math.abs(each - nm) < Math.abs(at[best] - nm) ? k : best), 0);
-      const words = [...(answers.length > 1 || nm === null ? [series[i].label] : []), ...(nm === null ? [] : [`${at[column]} nm`])];
+/** @param {HTMLElement} into
+ * @param {Series[]} series those that are known
+ * @param {any[]} answers
+ * @param {State} state
+ * @param {Series[]} all */
+function albedo(into, series, answers, state, all) {
+  const curves = answers.flatMap((answer, i) => {
+    const { theta_i, at, total } = albedosOf(answer, series[i]);
+    const asked =
+      at === null ? [null] : state.nm === null && at.length > 1 ? NM : [nearest({ wavelength_nm: at }, state.nm)];
+    return asked.map((nm) => {
+      const column = nm === null ? 0 : closest(at, nm);
+      const words = [
+        ...(answers.length > 1 || nm === null ? [series[i].label] : []),
+        ...(nm === null ? [] : [`${at[column]} nm`]),
+      ];
       return {
-        type: "scatter", mode: "lines", name: words.join(", "), x: theta_i, y: total.map((row) => row[column]),
-        line: { ...line(ink, i), ...(asked.length > 1 && { color: BANDS[j] }) },
-        hovertemplate: "θ<sub>i</sub> %{x}°: %{y:.4f}<extra></extra>",
+        x: theta_i,
+        y: total.map((/** @type {number[]} */ row) => row[column]),
+        label: words.join(", "),
+        dash: series[i].dash,
+        colour: ink(asked.length > 1 ? `hue-${nm}` : series[i].colour),
       };
     });
   });
-  data.push({
-    type: "scatter", mode: "lines", name: "all that arrives", x: [0, 90], y: [1, 1], hoverinfo: "skip",
-    line: { color: ink("muted"), dash: "dot", width: 1.5 },
-  });
-  const most = Math.max(...data.flatMap(({ y }) => y));
-  const layout = {
-    xaxis: { title: { text: "θ<sub>i</sub> [degrees]" }, range: [0, 90], dtick: 30 },
-    yaxis: { title: { text: "albedo" }, range: [0, 1.05 * most] },
+  const limit = { x: [0, 90], y: [1, 1], label: "all that arrives", colour: ink("muted"), dash: "2 3" };
+  const most = 1.05 * Math.max(1, ...curves.flatMap(({ y }) => y));
+  /** @type {[number, number]} */
+  const range = [0, most];
+  const up = {
+    title: "albedo",
+    range,
+    ticks: steps(range, 6).map((at) => /** @type {[number, string]} */ ([at, short(at)])),
+    height: Number,
   };
-  const audited = answers[0].finding !== undefined;
-  const caption = `The share of light from θᵢ that is reflected, specular part included; over φᵢ the ${audited ? "most, as the audit found it" : "mean"}.` +
-    (state.compare === MODEL && !audited ? " Nobody audited it, so that of the model is not known." : "");
-  return { data, layout, caption };
+  chart(
+    into,
+    [...curves, limit],
+    { title: "θᵢ [degrees]", range: [0, 90], every: 30 },
+    up,
+    (theta) => `θᵢ ${Math.round(theta)}°: ${curves.map((curve) => valueAt(curve, theta)).join(", ")}`,
+  );
+  const of = answers.some(({ finding }) => finding);
+  return (
+    "The share of light from θᵢ that is reflected, specular part included; " +
+    `over φᵢ the ${of ? "most, as the audit found it" : "mean"}.` +
+    (series.length < all.length ? " That of a model behind a table is known where an audit found it." : "")
+  );
 }

@@ -1,70 +1,199 @@
-// The polar cut in the plane of incidence, as SVG: the first picture need not wait for a library of megabytes.
+// The cut through the plane of incidence: f_r over the viewer, as a polar picture or a chart.
 
-import { element, percent, short } from "./dom.js";
-import { RELATIVE, floorOf, mirrorWords, relative, scaled, shortOfHorizon, span, ticks } from "./scales.js";
-import { lobe, number, quantityWords } from "./series.js";
-import { MODEL } from "./state.js";
+import { chart, legend, reader, strokes } from "./chart.js";
+import { closest, degrees, element, ink, path, percent, short, svg } from "./dom.js";
+import { RELATIVE, floorOf, relative, scaled, shortOfHorizon, span, specularWords, ticks } from "./scales.js";
+import { against, channelsOf, lobe, quantityWords } from "./series.js";
 
-const SVG = "http://www.w3.org/2000/svg";
+/** @typedef {import("./state.js").State} State */
+/** @typedef {import("./series.js").Series} Series */
+/** @typedef {import("./chart.js").Curve} Curve */
+
 const RADIAN = Math.PI / 180;
-const TOP = 26, STRIP = 110, LABEL = 40; // pixels: room above, height of what tells the difference, width of a number
+const TOP = 26,
+  STRIP = 110,
+  LABEL = 40; // pixels: room above, height of what tells the difference, width of a number
+const NEAR = 24; // pixels from the light in which a hand takes it
 
-export default { name: "cut", title: "Cut", order: 1, request: lobe, draw: cut };
+let centre = [0, 0]; // of the polar picture [pixel]
 
-/** Draw the cut into an element; its caption. */
-function cut(into, series, answers, state) {
-  const width = into.clientWidth, radius = Math.min((width - 80) / 2, 300);
-  const against = state.compare === MODEL;
-  const kept = answers.map((answer) => shortOfHorizon(answer.axes_deg.theta_r));
-  const curves = answers.map((answer, i) => kept[i].map((k) => number(answer)(answer.brdf[k])));
-  const range = span(curves.flat(), state), height = scaled(state, range[0]);
-  const out = (value) => ((height(value) - range[0]) / (range[1] - range[0])) * radius;
-  const at = (theta, r) => [width / 2 + r * Math.sin(theta * RADIAN), TOP + radius - r * Math.cos(theta * RADIAN)];
-  const thetas = answers.map((answer, i) => kept[i].map((k) => answer.axes_deg.theta_r[k]));
-  const guessed = answers.map(({ extrapolated }, i) => kept[i].map((k) => Boolean(extrapolated?.[k])));
-  const faint = (i, k) => guessed[i][k] || guessed[i][k - 1];
+/** @type {import("./main.js").View} */
+export default { name: "cut", title: "Cut", order: 1, shapes: true, request, draw: cut, begin: moves };
 
-  const parts = [...frame(at, radius, range, state)];
-  for (const [theta, kind] of [[-state.theta_i, "light"], [state.theta_i, "mirror"]]) {
-    parts.push(path([at(theta, 0), at(theta, radius)], kind));
-  }
-  curves.forEach((curve, i) => {
-    const points = curve.map((value, k) => at(thetas[i][k], out(value))), kind = i ? "second" : "first";
-    parts.push(pieces(points, (k) => !faint(i, k), kind));
-    if (guessed[i].includes(true)) parts.push(pieces(points, (k) => faint(i, k), `${kind} guess`));
-  });
-  const rows = series.map(({ label }, i) => [i ? "second" : "first", label]);
-  const some = guessed.findIndex((each) => each.includes(true));
-  if (some >= 0) rows.push([`${rows[some][0]} guess`, "extrapolated: not measured"]);
-  let words = `${quantityWords(series[0], state)} in 1/sr over θᵣ in the plane of incidence, negative back towards the light.`;
-  let bottom = TOP + radius + 24;
-  if (against) {
-    const off = relative(...curves, floorOf(series[0].info, state.nm));
-    const worst = Math.max(...off.map((value) => Math.abs(value ?? 0)));
-    parts.push(...strip(thetas[0], off, worst || 1, bottom + 24, at, radius));
-    words += ` Below, to 89°, table − model, ${RELATIVE}: ${percent(worst)} at most.`;
-    bottom += STRIP + 50;
-  }
-  const picture = svg("svg", { width, height: bottom }, ...parts);
-  const legend = [...rows, ["light", "light"], ["mirror", "mirror direction"]].map(([kind, label]) =>
-    element("span", {}, svg("svg", { width: 28, height: 10 }, path([[0, 5], [28, 5]], kind)), ` ${label}`));
-  const read = element("span", { id: "read" }, "point at the picture to read it");
-  picture.addEventListener("pointermove", ({ clientX, clientY }) => {
-    const { left, top } = picture.getBoundingClientRect();
-    const theta = Math.atan2(clientX - left - width / 2, top + TOP + radius - clientY) / RADIAN;
-    const found = thetas.map((each) => closest(each, theta));
-    read.textContent = `θᵣ ${degrees(thetas[0][found[0]])}: ${curves.map((curve, i) => `${short(curve[found[i]])} /sr`).join(", ")}`;
-  });
-  into.replaceChildren(picture, element("p", { className: "legend quiet" }, ...legend, read));
-  return words + mirrorWords(series, answers);
+/** @param {Series} each
+ * @param {State} state
+ * @param {Series[]} series */
+function request(each, state, series) {
+  return lobe("cut", each, state, series, channelsOf(each, state).query);
 }
 
-/** Rings of the scale and spokes of the angle. */
+/** The curves of all series, short of the horizon.
+ * @param {Series[]} series
+ * @param {any[]} answers
+ * @param {State} state
+ * @returns {Curve[]} */
+function curvesOf(series, answers, state) {
+  return series.flatMap((each, i) => {
+    const {
+        axes_deg: { theta_r },
+        brdf,
+        extrapolated,
+      } = answers[i],
+      kept = shortOfHorizon(theta_r);
+    return channelsOf(each, state).channels.map(({ part, colour, pick }) => ({
+      x: kept.map((k) => theta_r[k]),
+      y: kept.map((k) => pick(brdf[k])),
+      colour: ink(colour ?? each.colour),
+      dash: each.dash,
+      label: [series.length > 1 || !part ? each.label : "", part].filter(Boolean).join(", "),
+      ...(extrapolated && { dashed: kept.map((k) => extrapolated[k]) }),
+    }));
+  });
+}
+
+/** The specular reflectance of each series, as one number.
+ * @param {Series[]} series
+ * @param {any[]} answers
+ * @param {State} state */
+const specularOf = (series, answers, state) =>
+  series.map((each, i) => {
+    const part = answers[i].specular_reflectance ?? 0;
+    return Math.max(...channelsOf(each, state).channels.map(({ pick }) => (Array.isArray(part) ? pick(part) : part)));
+  });
+
+/** Draw the cut into an element; its caption.
+ * @param {HTMLElement} into
+ * @param {Series[]} series
+ * @param {any[]} answers
+ * @param {State} state */
+function cut(into, series, answers, state) {
+  const curves = curvesOf(series, answers, state),
+    range = span(
+      curves.flatMap(({ y }) => y.map(Number)),
+      state,
+    );
+  const specular = specularOf(series, answers, state),
+    differ = against(series) && curves.length === 2;
+  const off = differ
+    ? relative(curves[0].y.map(Number), curves[1].y.map(Number), floorOf(series[0].info, state.nm))
+    : null;
+  const words = state.curves === "one" ? quantityWords(series[0], state) : "fᵣ";
+  (state.axes === "cartesian" ? flat : round)(into, curves, range, state, specular, off);
+  return (
+    `${words} in 1/sr over θᵣ in the plane of incidence, negative back towards the light.` +
+    (off
+      ? ` ${state.axes === "polar" ? "Below, to 89°, t" : "T"}able − model, ${RELATIVE}: ${percent(worstOf(off))} at most.`
+      : "") +
+    (answers.some(({ extrapolated }) => extrapolated?.includes(true))
+      ? " Dashed is what was not measured but extrapolated."
+      : "") +
+    specularWords(series, specular)
+  );
+}
+
+/** @param {(number | null)[]} off */
+const worstOf = (off) => Math.max(...off.map((value) => Math.abs(value ?? 0)));
+
+/** What the curves say at an angle.
+ * @param {Curve[]} curves
+ * @param {number} theta */
+const reading = (curves, theta) =>
+  `θᵣ ${degrees(curves[0].x[closest(curves[0].x, theta)])}: ` +
+  `${curves.map(({ x, y }) => `${short(Number(y[closest(x, theta)]))} /sr`).join(", ")}`;
+
+/** The cut as a chart.
+ * @param {HTMLElement} into
+ * @param {Curve[]} curves
+ * @param {[number, number]} range
+ * @param {State} state
+ * @param {number[]} specular */
+function flat(into, curves, range, state, specular) {
+  const up = { title: "fᵣ [1/sr]", range, ticks: ticks(range, state), height: scaled(state, range[0]) };
+  const top = state.scale === "log" ? 10 ** range[1] : range[1],
+    bottom = state.scale === "log" ? 10 ** range[0] : 0;
+  const marks = (/** @type {(x: number, y: number) => [number, number]} */ place) => [
+    path([place(-state.theta_i, bottom), place(-state.theta_i, top)], "light"),
+    path([place(state.theta_i, bottom), place(state.theta_i, top)], Math.max(...specular) > 0 ? "spike" : "mirror"),
+  ];
+  chart(
+    into,
+    curves,
+    { title: "θᵣ [degrees]", range: [-90, 90], every: 30 },
+    up,
+    (theta) => reading(curves, theta),
+    marks,
+  );
+}
+
+/** The cut as a polar picture.
+ * @param {HTMLElement} into
+ * @param {Curve[]} curves
+ * @param {[number, number]} range
+ * @param {State} state
+ * @param {number[]} specular
+ * @param {(number | null)[] | null} off */
+function round(into, curves, range, state, specular, off) {
+  const width = into.clientWidth,
+    radius = Math.max(Math.min((width - 80) / 2, 300), 60),
+    height = scaled(state, range[0]);
+  const out = (/** @type {number} */ value) => ((height(value) - range[0]) / (range[1] - range[0])) * radius;
+  /** @type {(theta: number, r: number) => [number, number]} */
+  const at = (theta, r) => [width / 2 + r * Math.sin(theta * RADIAN), TOP + radius - r * Math.cos(theta * RADIAN)];
+  const part = Math.max(...specular);
+  centre = at(0, 0);
+  const [x, y] = at(-state.theta_i, radius),
+    [u, v] = at(state.theta_i, radius * 0.62);
+  const parts = [
+    ...frame(at, radius, range, state),
+    path([at(-state.theta_i, 0), at(-state.theta_i, radius)], "light"),
+    path([at(state.theta_i, 0), at(state.theta_i, radius)], "mirror"),
+    ...curves.flatMap((curve) => strokes(curve, (theta, value) => at(theta, out(value)))),
+    ...(part > 0
+      ? [
+          path([at(state.theta_i, 0), at(state.theta_i, radius)], "spike"),
+          svg("text", { x: u + 8, y: v + 4, class: "strong" }, short(part)),
+        ]
+      : []),
+    svg("circle", { cx: x, cy: y, r: 7, class: "lamp" }),
+  ];
+  let bottom = TOP + radius + 24;
+  if (off) {
+    parts.push(...strip(curves[0].x, off, worstOf(off) || 1, bottom + 24, at, radius));
+    bottom += STRIP + 50;
+  }
+  const picture = svg("svg", { width, height: bottom, class: "polar" }, ...parts);
+  const read = element("span", { className: "read" }, "point at the picture to read it");
+  reader(
+    into,
+    picture,
+    read,
+    (left, top) => Math.atan2(left - width / 2, TOP + radius - top) / RADIAN,
+    [-89, 89],
+    (theta) => reading(curves, theta),
+  );
+  const rays = [
+    { label: "light", colour: ink("third"), dash: "2 3" },
+    { label: "mirror direction", colour: ink("muted"), dash: "2 3" },
+  ];
+  into.replaceChildren(
+    picture,
+    element("p", { className: "legend quiet" }, ...[...(curves.length > 1 ? curves : []), ...rays].map(legend), read),
+  );
+}
+
+/** Rings of the scale and spokes of the angle.
+ * @param {(theta: number, r: number) => [number, number]} at
+ * @param {number} radius
+ * @param {[number, number]} range
+ * @param {State} state
+ * @returns {Generator<SVGElement>} */
 function* frame(at, radius, range, state) {
-  const rings = ticks(range, state), every = Math.ceil((LABEL * (rings.length - 1)) / radius);
+  const all = ticks(range, state),
+    rings = all.length > 8 ? all.filter(([value]) => Number.isInteger(value)) : all;
+  const every = Math.ceil((LABEL * (rings.length - 1)) / radius);
   for (const [i, [value, label]] of rings.entries()) {
-    const r = ((value - range[0]) / (range[1] - range[0])) * radius;
-    const [x, y] = at(90, r);
+    const r = ((value - range[0]) / (range[1] - range[0])) * radius,
+      [x, y] = at(90, r);
     yield svg("path", { d: `M${at(-90, r)}A${r} ${r} 0 0 1 ${x} ${y}`, class: "grid" });
     if ((rings.length - 1 - i) % every === 0) yield svg("text", { x, y: y + 17, class: "middle" }, label);
   }
@@ -76,35 +205,56 @@ function* frame(at, radius, range, state) {
   }
 }
 
-/** The difference over theta_r, between its largest sizes. */
+/** The difference over theta_r, between its largest sizes.
+ * @param {number[]} theta
+ * @param {(number | null)[]} off
+ * @param {number} worst
+ * @param {number} top
+ * @param {(theta: number, r: number) => [number, number]} at
+ * @param {number} radius
+ * @returns {Generator<SVGElement>} */
 function* strip(theta, off, worst, top, at, radius) {
-  const middle = top + STRIP / 2, left = at(-90, radius)[0];
+  const middle = top + STRIP / 2,
+    left = at(-90, radius)[0];
+  /** @type {(each: number, value: number) => [number, number]} */
   const place = (each, value) => [left + ((each + 90) / 180) * 2 * radius, middle - (value / worst) * (STRIP / 2)];
   for (const share of [-worst, 0, worst]) {
     const [x, y] = place(-90, share);
     yield path([[x, y], place(90, share)], "grid");
-    if (share !== 0) yield svg("text", { x: x + 2, y: y - 4 }, `${share > 0 ? "+" : ""}${percent(share).replace("-", "−")}`);
+    if (share !== 0)
+      yield svg("text", { x: x + 2, y: y - 4 }, `${share > 0 ? "+" : ""}${percent(share).replace("-", "−")}`);
   }
   for (let each = -90; each <= 90; each += 30) {
     const [x, y] = place(each, -worst);
     yield svg("text", { x, y: y + 17, class: "middle" }, degrees(each));
   }
-  yield path(theta.map((each, i) => place(each, off[i] ?? 0)), "off");
+  yield path(
+    theta.map((each, i) => place(each, off[i] ?? 0)),
+    "off",
+  );
 }
 
-const degrees = (theta) => `${String(theta).replace("-", "−")}°`;
-
-const closest = (values, to) => values.reduce((best, value, i) => (Math.abs(value - to) < Math.abs(values[best] - to) ? i : best), 0);
-
-/** The pieces of a line that end at points that are chosen. */
-const pieces = (points, chosen, kind) => svg("path", { class: kind, d: points.map(([x, y], k) =>
-  `${k && chosen(k) ? "L" : "M"}${x.toFixed(1)} ${y.toFixed(1)}`).join("") });
-
-const path = (points, kind) => svg("path", { d: `M${points.map(([x, y]) => `${x.toFixed(1)} ${y.toFixed(1)}`).join("L")}`, class: kind });
-
-function svg(tag, attributes, ...children) {
-  const made = document.createElementNS(SVG, tag);
-  for (const [name, value] of Object.entries(attributes)) made.setAttribute(name, value);
-  made.append(...children);
-  return made;
+/** Let a hand move the light around the polar picture.
+ * @param {HTMLElement} into
+ * @param {(part: Partial<State>) => void} choose */
+function moves(into, choose) {
+  let moving = false;
+  const theta = (/** @type {PointerEvent} */ { clientX, clientY }) => {
+    const { left = 0, top = 0 } = into.querySelector("svg")?.getBoundingClientRect() ?? {};
+    return Math.atan2(left + centre[0] - clientX, top + centre[1] - clientY) / RADIAN;
+  };
+  into.addEventListener("pointerdown", (event) => {
+    const lamp = into.querySelector(".lamp")?.getBoundingClientRect();
+    if (!lamp || Math.hypot(lamp.x + 7 - event.clientX, lamp.y + 7 - event.clientY) > NEAR) return;
+    moving = true;
+    into.setPointerCapture(event.pointerId);
+    event.preventDefault();
+  });
+  into.addEventListener("pointermove", (event) => {
+    if (moving) choose({ theta_i: Math.round(2 * Math.min(Math.max(theta(event), 0), 89.5)) / 2 });
+  });
+  for (const end of /** @type {const} */ (["pointerup", "pointercancel"]))
+    into.addEventListener(end, () => {
+      moving = false;
+    });
 }

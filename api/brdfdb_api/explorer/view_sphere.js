@@ -1,93 +1,222 @@
-// A sphere of the material, lit from one direction and looked at from far away, drawn pixel by pixel.
+// A sphere of the material in a light and its surroundings, looked at from far away, drawn pixel by pixel.
 
-import { address, lookup } from "./api.js";
+import { json, values } from "./api.js";
 import { element } from "./dom.js";
 import { unseenWords } from "./scales.js";
-import { azimuth, quantity } from "./series.js";
+import { anisotropic, azimuth, quantity, question } from "./series.js";
+import { add, between, lightOf, lune, moments, surroundings } from "./sphere_scene.js";
 
-const SIZE = 96; // pixels across
-const DEGREE = 180 / Math.PI;
+/** @typedef {import("./state.js").State} State */
+/** @typedef {import("./series.js").Series} Series */
+/** @typedef {{ viewers: number[], moments: Float64Array, specular: number[][] | null }} Around */
 
-const WORDS = "The viewer is far above the page; the light is θᵢ away from the viewer, to the right (+x) at φᵢ = 0 and to the " +
-  "top (+y) at 90°, and as bright as makes a white matt surface white. The x axis of the surface runs around the vertical " +
-  "axis of the sphere.";
-const MIRROR = " The mirror image, a specular part, is not drawn.";
+const SIZE = 320,
+  QUICK = 160; // pixels across, and while a slider moves
+const KEPT = 16; // surroundings, which stay the same while the light moves
+const ENCODED = Uint8Array.from({ length: 4097 }, (_, i) => {
+  // bytes of sRGB (IEC 61966-2-1)
+  const value = i / 4096;
+  return Math.round(255 * (value <= 0.0031308 ? 12.92 * value : 1.055 * value ** (1 / 2.4) - 0.055));
+});
 
+const WORDS =
+  "The viewer is far above the page; the light is θᵢ away from the viewer, to the right (+x) at φᵢ = 0 and to the " +
+  "top (+y) at 90°, and as bright as makes a white matt surface white. Drag it. " +
+  "The x axis of the surface runs around the vertical axis of the sphere.";
+const SKY = " The surroundings are bright above and black below.";
+const SPECULAR = " The specular part reflects them and the light, a disk of 5°.";
+
+/** @type {Map<string, Promise<Around>>} */
+const known = new Map();
+
+/** @type {import("./main.js").View} */
 export default {
   name: "sphere",
   title: "Sphere",
   order: 6,
-  place: "spheres",
   idle: ["log"],
-  turned: true, // phi_i moves the light, of isotropic materials, too
-  /** Of the middle of the sphere, to be copied: the picture takes thousands of directions. */
+  lit: true,
+  turned: true,
+  /** Of the middle of the sphere, to be copied: the picture takes hundreds of directions. */
   request(each, state, series) {
-    const { theta_i } = state, phi_i = azimuth(state, series);
-    const phi_r = ((phi_i ?? 0) + state.turn) % 360;
-    return address(each.name, "lookup", { theta_i, phi_i, theta_r: 0, phi_r, ...quantity(each, state, "linear-srgb") });
+    const { theta_i } = state,
+      phi_i = azimuth(state, series),
+      phi_r = ((phi_i ?? 0) + state.turn) % 360;
+    return question(each, "lookup", { theta_i, phi_i, theta_r: 0, phi_r, ...quantity(each, state, "linear-srgb") });
   },
-  /** What the service says of all lit pixels of a series. */
-  answer: (each, state, signal) =>
-    lookup(each.name, quantity(each, state, "linear-srgb"), geometry(state).directions, signal),
+  answer,
   draw: spheres,
+  begin: moves,
 };
 
-/** Draw the sphere of each series into an element; the caption. */
+/** What the service says of a light, and of the surroundings; or its picture in a studio.
+ * @param {Series} each
+ * @param {State} state
+ * @param {Series[]} _
+ * @param {AbortSignal} signal */
+async function answer(each, state, _, signal) {
+  if (state.surround === "studio")
+    return values(question(each, "sphere", { size: SIZE, format: "npy" }), SIZE * SIZE, signal);
+  const { angles, ...of } = lune(lightOf(state), anisotropic([each]), Boolean(state.quick)),
+    query = quantity(each, state, "linear-srgb");
+  const [lit, around] = await Promise.all([
+    values(question(each, "lookup", query, angles), angles.theta_i.length, signal),
+    aroundOf(each, query, Boolean(state.quick), signal),
+  ]);
+  return { ...lit, of, around };
+}
+
+/** @param {Series} each
+ * @param {Record<string, unknown>} query
+ * @param {boolean} quick
+ * @param {AbortSignal} signal
+ * @returns {Promise<Around>} */
+function aroundOf(each, query, quick, signal) {
+  const key = (/** @type {boolean} */ hurried) => JSON.stringify([each.text, each.info.revision, query, hurried]);
+  return known.get(key(false)) ?? known.get(key(quick)) ?? kept(key(quick), summed(each, query, quick, signal));
+}
+
+/** @param {string} key
+ * @param {Promise<Around>} found */
+function kept(key, found) {
+  known.set(key, found);
+  found.catch(() => known.delete(key));
+  for (const old of [...known.keys()].slice(0, -KEPT)) known.delete(old);
+  return found;
+}
+
+/** @param {Series} each
+ * @param {Record<string, unknown>} query
+ * @param {boolean} quick
+ * @param {AbortSignal} signal
+ * @returns {Promise<Around>} */
+async function summed(each, query, quick, signal) {
+  const scene = surroundings(anisotropic([each]) ? [0, 45, 90, 135] : [0], quick);
+  const found = await json(question(each, "lookup", query, scene.angles), signal),
+    part = found.specular_reflectance;
+  const specular =
+    part &&
+    part
+      .filter((/** @type {unknown} */ _, /** @type {number} */ i) => i % scene.count === 0)
+      .map((/** @type {any[]} */ row) => (Array.isArray(row[0]) ? row[0] : [row[0], row[0], row[0]]));
+  return { viewers: scene.viewers, moments: moments(scene, found.brdf.flat(2)), specular };
+}
+
+/** Draw the sphere of each series into an element; the caption.
+ * @param {HTMLElement} into
+ * @param {Series[]} series
+ * @param {any[]} answers
+ * @param {State} state */
 function spheres(into, series, answers, state) {
-  const scene = geometry(state);
-  while (into.children.length < answers.length) into.append(made());
-  while (into.children.length > answers.length) into.lastChild.remove();
-  answers.forEach(({ values }, i) => {
+  while (into.children.length < answers.length) {
+    into.append(
+      element(
+        "figure",
+        {},
+        element("canvas", { width: SIZE, height: SIZE }),
+        element("figcaption", { className: "quiet" }),
+      ),
+    );
+  }
+  while (into.children.length > answers.length) into.lastChild?.remove();
+  answers.forEach((found, i) => {
     const [canvas, label] = into.children[i].children;
-    paint(canvas, values, scene);
+    if (canvas instanceof HTMLCanvasElement) (found.around ? paint : develop)(canvas, found, state);
     label.textContent = series.length > 1 ? series[i].label : "";
   });
-  return WORDS + (series.some(({ info }) => info.specular) ? MIRROR : "") + unseenWords(series[0], state);
+  const specular = answers.some(({ around }) =>
+    around?.specular?.flat().some((/** @type {number} */ part) => part > 0),
+  );
+  if (state.surround === "studio")
+    return "The viewer is far above the page, and the light is that of a studio, which the specular part reflects, too.";
+  return WORDS + (state.surround === "sky" ? SKY : "") + (specular ? SPECULAR : "") + unseenWords(series[0], state);
 }
 
-function made() {
-  const canvas = element("canvas", { width: SIZE, height: SIZE });
-  return element("figure", {}, canvas, element("figcaption", { className: "quiet" }));
-}
-
-/** Lit pixels: directions [degrees], four numbers each, places, and cosines at the light. */
-function geometry({ theta_i: theta, phi_i: phi }) {
-  const sine = Math.sin(theta / DEGREE);
-  const light = [sine * Math.cos(phi / DEGREE), sine * Math.sin(phi / DEGREE), Math.cos(theta / DEGREE)];
-  const directions = [], pixels = [], cosines = [];
-  for (let row = 0; row < SIZE; row += 1) {
-    for (let column = 0; column < SIZE; column += 1) {
-      const x = (2 * column + 1) / SIZE - 1, y = 1 - (2 * row + 1) / SIZE;
-      const z = Math.sqrt(1 - x * x - y * y); // the normal; the viewer is at (0, 0, 1)
-      const cosine = x * light[0] + y * light[1] + z * light[2];
-      if (!(cosine > 0)) continue; // past the limb z is not a number
-      const across = Math.hypot(x, z); // the tangent runs around the vertical axis: (z, 0, -x) / across
-      const tangent = (v) => (z * v[0] - x * v[2]) / across;
-      const upward = (v) => (-x * y * v[0] + across * across * v[1] - y * z * v[2]) / across;
-      const azimuth = (v) => Math.atan2(upward(v), tangent(v)) * DEGREE;
-      directions.push(Math.acos(Math.min(cosine, 1)) * DEGREE, azimuth(light), Math.acos(z) * DEGREE, azimuth([0, 0, 1]));
-      pixels.push(row * SIZE + column);
-      cosines.push(cosine);
+/** @param {HTMLCanvasElement} canvas
+ * @param {{ values: ArrayLike<number>, of: { rays: number, rings: number, turn: number }, around: Around }} found
+ * @param {State} state */
+function paint(canvas, { values: f_r, of: nodes, around }, state) {
+  const size = state.quick ? QUICK : SIZE,
+    context = canvas.getContext("2d"),
+    image = context?.createImageData(size, size);
+  if (!context || !image) return;
+  Object.assign(canvas, { width: size, height: size });
+  const light = lightOf(state),
+    of = { ...around, moments: state.surround === "sky" ? around.moments : null };
+  const at = between(light, f_r, nodes),
+    seen = new Float64Array(3),
+    bright = 4096 * 2 ** state.exposure;
+  for (let row = 0; row < size; row += 1) {
+    for (let column = 0; column < size; column += 1) {
+      const x = (2 * column + 1) / size - 1,
+        y = 1 - (2 * row + 1) / size,
+        inside = 1 - x * x - y * y;
+      if (inside <= 0) continue;
+      const z = Math.sqrt(inside),
+        cosine = x * light[0] + y * light[1] + z * light[2],
+        pixel = 4 * (row * size + column);
+      if (cosine > 0) {
+        at(x, y, z, seen);
+        for (let k = 0; k < 3; k += 1) seen[k] *= Math.PI * cosine;
+      } else {
+        seen.fill(0);
+      }
+      add(x, y, z, light, of, seen);
+      for (let k = 0; k < 3; k += 1)
+        image.data[pixel + k] = ENCODED[Math.round(Math.min(Math.max(bright * seen[k], 0), 4096))];
+      image.data[pixel + 3] = 255;
     }
   }
-  return { directions: new Float32Array(directions), pixels, cosines };
-}
-
-function paint(canvas, values, { pixels, cosines }) {
-  const context = canvas.getContext("2d"), image = context.createImageData(SIZE, SIZE);
-  const channels = values.length / pixels.length; // three, or one that is grey
-  pixels.forEach((pixel, i) => {
-    for (let channel = 0; channel < 3; channel += 1) {
-      const f_r = values[i * channels + (channels === 3 ? channel : 0)];
-      image.data[4 * pixel + channel] = encoded(Math.PI * f_r * cosines[i]);
-    }
-    image.data[4 * pixel + 3] = 255;
-  });
   context.putImageData(image, 0, 0);
 }
 
-/** A byte of sRGB (IEC 61966-2-1). */
-function encoded(linear) {
-  const value = Math.min(Math.max(linear, 0), 1);
-  return Math.round(255 * (value <= 0.0031308 ? 12.92 * value : 1.055 * value ** (1 / 2.4) - 0.055));
+/** Show a picture of linear colours and their coverage.
+ * @param {HTMLCanvasElement} canvas
+ * @param {{ values: ArrayLike<number> }} found
+ * @param {State} state */
+function develop(canvas, { values: linear }, { exposure }) {
+  const context = canvas.getContext("2d"),
+    image = context?.createImageData(SIZE, SIZE),
+    bright = 4096 * 2 ** exposure;
+  if (!context || !image) return;
+  Object.assign(canvas, { width: SIZE, height: SIZE });
+  for (let i = 0; i < linear.length; i += 1) {
+    image.data[i] =
+      i % 4 === 3 ? 255 * linear[i] : ENCODED[Math.round(Math.min(Math.max(bright * linear[i], 0), 4096))];
+  }
+  context.putImageData(image, 0, 0);
+}
+
+/** Let a hand and arrow keys move the light over the sphere.
+ * @param {HTMLElement} into
+ * @param {(part: Partial<State>) => void} choose
+ * @param {() => State} now */
+function moves(into, choose, now) {
+  into.tabIndex = 0;
+  const move = (/** @type {PointerEvent} */ event) => {
+    const canvas = event.target instanceof HTMLCanvasElement ? event.target : into.querySelector("canvas");
+    if (!canvas || !event.buttons) return;
+    const { left, top, width, height } = canvas.getBoundingClientRect();
+    const x = (2 * (event.clientX - left)) / width - 1,
+      y = 1 - (2 * (event.clientY - top)) / height,
+      size = Math.min(Math.hypot(x, y), 1);
+    const phi = Math.round((Math.atan2(y, x) * 180) / Math.PI);
+    // the light is where the hand sees its mirror image: the normal there lies half way
+    choose({
+      theta_i: Math.min(Math.round(4 * Math.asin(size) * (180 / Math.PI)) / 2, 89.5),
+      phi_i: (phi + 360) % 360,
+    });
+  };
+  into.addEventListener("pointerdown", (event) => {
+    if (event.target instanceof HTMLCanvasElement) into.setPointerCapture(event.pointerId);
+    move(event);
+  });
+  into.addEventListener("pointermove", move);
+  into.addEventListener("keydown", (event) => {
+    const by = { ArrowLeft: [0, 5], ArrowRight: [0, -5], ArrowUp: [5, 0], ArrowDown: [-5, 0] }[event.key];
+    if (!by) return;
+    const { theta_i, phi_i } = now();
+    choose({ theta_i: Math.min(Math.max(theta_i + by[0], 0), 89.5), phi_i: (phi_i + by[1] + 360) % 360 });
+    event.preventDefault();
+  });
 }

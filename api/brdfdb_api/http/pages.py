@@ -1,11 +1,12 @@
-"""The explorer, a page at `/`: its files, and plotly.js as the installed package holds it."""
+"""The explorer, a page at `/`: its files, and its modules as one script."""
 
 from __future__ import annotations
 
 import functools
 import gzip
 import hashlib
-import importlib.metadata
+import re
+from collections.abc import Iterator
 from importlib.resources import files
 from pathlib import PurePath
 
@@ -17,17 +18,18 @@ from brdfdb_api.http.errors import RequestError
 from brdfdb_api.http.responses import unchanged
 
 SCRIPT = "text/javascript; charset=utf-8"
+_COMMENT = re.compile(r"^[ \t]*(?:/\*\*(?:[^*]|\*(?!/))*\*/|//.*)\n", re.MULTILINE)
+_IMPORT = re.compile(r"""^import ([^;]+) from "\./(.+)";$""", re.MULTILINE)
 _TYPES = {".html": "text/html; charset=utf-8", ".css": "text/css; charset=utf-8", ".js": SCRIPT}
 _VIEWS = "views.js"
 FOLDER = files("brdfdb_api").joinpath("explorer")
-# Media types of all files of the explorer: those of the folder, and the list of its views
-MEDIA = {file.name: _TYPES[PurePath(file.name).suffix] for file in FOLDER.iterdir()} | {_VIEWS: SCRIPT}
+_BUNDLE = "explorer.js"  # all modules in one answer: a slow connection waits 0.4 s for each six of them
+# Media types of all files of the explorer: those of the folder, the list of its views, and all modules as one
+MEDIA = {file.name: _TYPES[PurePath(file.name).suffix] for file in FOLDER.iterdir()} | {_VIEWS: SCRIPT, _BUNDLE: SCRIPT}
 
-# plotly writes style attributes, and reads its pictures from data: and blob: addresses
 POLICY = "; ".join(
     (
-        *("default-src 'none'", "script-src 'self'", "style-src 'self' 'unsafe-inline'"),
-        *("img-src 'self' data: blob:", "connect-src 'self'"),
+        *("default-src 'none'", "script-src 'self'", "style-src 'self'", "img-src 'self' data:", "connect-src 'self'"),
         *("base-uri 'none'", "form-action 'none'", "frame-ancestors 'none'"),
     )
 )
@@ -42,52 +44,67 @@ def index(request: Request) -> Response:
     return explorer_file(request, "index.html")
 
 
-@pages.get("/explorer/plotly.js")
-def plotly(request: Request) -> Response:
-    """Return plotly.js; its address holds the version, so that a browser fetches it once."""
-    packed = "gzip" in request.headers.get("accept-encoding", "")
-    content, tag = _plotly(packed=packed)
-    headers = {
-        **_SAFE,
-        "ETag": f'"{tag}"',
-        "Cache-Control": "public, max-age=31536000, immutable",
-        "Vary": "Accept-Encoding",
-        **({"Content-Encoding": "gzip"} if packed else {}),
-    }
-    return unchanged(Response(content, media_type=SCRIPT, headers=headers), request.headers.get("if-none-match"))
-
-
 @pages.get("/explorer/{file}")
 def explorer_file(request: Request, file: str) -> Response:
     """Return a file of the explorer."""
     if file not in MEDIA:
         raise RequestError(404, "the explorer has no such file")
-    content, tag = _file(file)
-    headers = {**_SAFE, "ETag": f'"{tag}"', "Cache-Control": "no-cache"}
+    packed = "gzip" in request.headers.get("accept-encoding", "")
+    content, tag = _file(file, packed=packed)
+    headers = {
+        **_SAFE,
+        "ETag": f'"{tag}"',
+        "Cache-Control": "no-cache",
+        "Vary": "Accept-Encoding",
+        **({"Content-Encoding": "gzip"} if packed else {}),
+    }
     return unchanged(Response(content, media_type=MEDIA[file], headers=headers), request.headers.get("if-none-match"))
 
 
 @functools.cache
-def _file(name: str) -> tuple[bytes, str]:
+def _file(name: str, *, packed: bool) -> tuple[bytes, str]:
     """Return a file of the explorer and its digest."""
-    content = _views() if name == _VIEWS else FOLDER.joinpath(name).read_bytes()
-    content = content.replace(b"PLOTLY_VERSION", importlib.metadata.version("plotly").encode())
+    content = _text(name).encode()
+    content = gzip.compress(content, 9, mtime=0) if packed else content
     return content, hashlib.sha256(content).hexdigest()[:16]
 
 
-def _views() -> bytes:
+def _text(name: str) -> str:
+    if name == _BUNDLE:
+        return "const modules = {};\n" + "".join(_modules("main.js", set()))
+    return _views() if name == _VIEWS else FOLDER.joinpath(name).read_text(encoding="utf-8")
+
+
+def _modules(name: str, before: set[str]) -> Iterator[str]:
+    """Yield a module as a function that is called once, after those that it imports and are not `before`.
+
+    Imports are lines of their own, and exports declare a constant, a function or a class, or are a default.
+    """
+    before.add(name)
+    text = re.sub(r"^ +", "", _COMMENT.sub("", _text(name)), flags=re.MULTILINE)
+    for _, other in _IMPORT.findall(text):
+        if other not in before:
+            yield from _modules(other, before)
+    text = _IMPORT.sub(lambda line: f"const {_bound(line[1])} = modules[{line[2]!r}];", text)
+    names = re.findall(r"^export (?:async )?(?:const|function\*?|class) (\w+)", text, re.MULTILINE)
+    text = re.sub("^export default ", "const exported = ", text, flags=re.MULTILINE)
+    exports = ", ".join([*names, *(["default: exported"] if "\nconst exported = " in text else [])])
+    text = re.sub("^export ", "", text, flags=re.MULTILINE)
+    yield f"modules[{name!r}] = (() => {{\n{text}return {{ {exports} }};\n}})();\n"
+
+
+def _bound(names: str) -> str:
+    """Return the pattern that takes the names of an import from the exports of a module."""
+    if names.startswith("*"):
+        return names.removeprefix("* as ")
+    return names.replace(" as ", ": ") if names.startswith("{") else f"{{ default: {names} }}"
+
+
+def _views() -> str:
     """Return a script that exports VIEWS: the views of all modules ``view_*.js`` by name, in their order."""
     modules = sorted(name for name in MEDIA if name.startswith("view_"))
     lines = [f'import view{number} from "./{name}";' for number, name in enumerate(modules)]
     views = ", ".join(f"view{number}" for number in range(len(modules)))
     lines.append("const by = (a, b) => a.order - b.order;")
     lines.append(f"export const VIEWS = Object.fromEntries([{views}].sort(by).map((view) => [view.name, view]));")
-    return ("\n".join(lines) + "\n").encode()
-
-
-@functools.cache
-def _plotly(*, packed: bool) -> tuple[bytes, str]:
-    """plotly.js and its tag: 4.8 MB, or 1.5 MB packed, which takes 0.15 s once."""
-    content = files("plotly").joinpath("package_data", "plotly.min.js").read_bytes()
-    version = importlib.metadata.version("plotly")
-    return (gzip.compress(content, 6, mtime=0), f"{version}-gzip") if packed else (content, version)
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,120 @@
+"""Parameters that move in the explorer: sliders, marks, what is kept beside, and the recipe of what was found."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from urllib.parse import unquote
+
+import httpx
+import numpy as np
+import pytest
+
+from brdfdb.materials import Material
+from tests.api.chromium import SECONDS, Chromium, copied, curve, frame, labels, milliseconds, shown
+
+SLIDER = "document.querySelector('#parameters [name={name}]')"
+
+
+def slide(browser: Chromium, name: str, share: float) -> None:
+    """Move a slider of a parameter to a share of its length, as a hand does."""
+    slider = SLIDER.format(name=name)
+    browser.evaluate(f"{slider}.value = {share}; {slider}.dispatchEvent(new Event('input', {{ bubbles: true }}))")
+
+
+def opened(browser: Chromium, link: str) -> None:
+    browser.open(link)
+    shown(browser)
+    browser.until("!parameters.hidden && parameters.children.length > 0 && picture.ariaBusy === 'false'")
+
+
+def test_a_slider_changes_the_picture_to_that_of_the_model(chromium: Chromium, address: str) -> None:
+    opened(chromium, f"{address}#material=rolled-brass&view=cut&axes=cartesian&scale=linear")
+    before = curve(chromium, 0)
+    slide(chromium, "rho_d", 0.8)
+    shown(chromium, "rolled-brass(rho_d=")
+    print(f"parameter to picture: {milliseconds(chromium):.0f} ms")
+    assert not np.array_equal(before, curve(chromium, 0))
+    link = unquote(chromium.until("location.hash.includes('rho_d') && location.hash"))
+    value = float(link.split("rho_d=")[1].split(")")[0])
+    parameters = {
+        each["name"]: each["value"] for each in httpx.get(f"{address}v1/materials/rolled-brass").json()["parameters"]
+    }
+    body = {"parameters": parameters | {"rho_d": value}}
+    answer = httpx.post(f"{address}v1/models/ward/lobe?view=cut&theta_i=45&phi_i=0", json=body, timeout=SECONDS).json()
+    theta, f_r = np.array(answer["axes_deg"]["theta_r"]), np.array(answer["brdf"])
+    kept = np.abs(theta) <= 89.0
+    _, top, _, height, low, high = frame(chromium)
+    expected = top + height * (high - f_r[kept]) / (high - low)
+    np.testing.assert_allclose(curve(chromium, 0)[:, 1], expected, atol=0.06)  # written to a tenth of a pixel
+    assert "rolled-brass" in chromium.evaluate("document.querySelector('[aria-selected=true]').id")
+    assert "neither tabulated nor audited" in chromium.evaluate("facts.innerText")
+    assert chromium.errors == []
+
+
+def test_a_link_restores_parameters_and_a_button_those_that_were_published(chromium: Chromium, address: str) -> None:
+    opened(chromium, f"{address}#material=rolled-brass(alpha_x=0.3,rho_s=0.2)&view=cut&compare=rolled-brass")
+    said = "[...parameters.querySelectorAll('label')].map(each => each.innerText.replace(/\\s+/g, ' ').trim())"
+    assert chromium.evaluate(said) == ["rho_d 0.1", "rho_s 0.2", "alpha_x 0.3", "alpha_y 0.16"]
+    assert labels(chromium) == ["Rolled brass, alpha_x 0.3, rho_s 0.2", "Rolled brass"]
+    chromium.evaluate("document.querySelector('[data-action=keep]').click()")
+    shown(chromium, "compare=rolled-brass&compare=rolled-brass(alpha_x=0.3,rho_s=0.2)")
+    chromium.evaluate("document.querySelector('[data-action=reset]').click()")
+    shown(chromium, "#material=rolled-brass&")
+    assert chromium.until(f"{said}[1] === 'rho_s 0.33'")
+    assert chromium.errors == []
+
+
+def test_marks_are_published_values_and_set_them(chromium: Chromium, address: str) -> None:
+    opened(chromium, f"{address}#material=rolled-brass&view=cut")
+    model = httpx.get(f"{address}v1/models/ward", timeout=SECONDS).json()
+    published = {each["value"] for each in model["parameters"][0]["published"]}
+    marks = "[...document.querySelectorAll('#parameters [data-key=rho_d]')]"
+    assert {float(value) for value in chromium.evaluate(f"{marks}.map(each => each.dataset.value)")} == published
+    chromium.evaluate(f"{marks}.at(-1).click()")
+    shown(chromium, f"rolled-brass(rho_d={max(published):g})")
+    share = float(chromium.evaluate(f"{SLIDER.format(name='rho_d')}.value"))
+    left = float(chromium.evaluate(f"{marks}.at(-1).style.left.replace('%', '')")) / 100.0
+    assert share == pytest.approx(left, abs=0.003)  # a step of the slider
+
+
+def test_a_recipe_of_moved_parameters_is_one(chromium: Chromium, address: str) -> None:
+    opened(chromium, f"{address}#material=scene-copper-sphere(sigma_0_um=0.05,n=1.5)&view=cut")
+    chromium.evaluate("document.querySelector('[data-action=recipe]').click()")
+    recipe = tomllib.loads(chromium.until("document.querySelector('#copied textarea').value"))
+    (name,) = recipe["materials"]
+    material = Material.from_table(name, recipe["define"][name])
+    assert (material.model, material.refractive_index) == ("he_torrance", "constant/1.5/0")
+    assert material.parameters == {"sigma_0_um": 0.05, "tau_um": 1.2, "a": 0.0}
+    assert recipe["wavelengths_nm"][0] == 400
+    assert copied(chromium, "curl").startswith("curl -H 'Content-Type: application/json' -d '{\"parameters\":{")
+
+
+def test_any_model_can_be_begun_with_and_drawn_in_every_view(chromium: Chromium, address: str) -> None:
+    chromium.open(address)
+    shown(chromium)
+    names = chromium.until("models.options.length > 9 && [...models.options].slice(1).map(each => each.value)")
+    known = [model["name"] for model in httpx.get(f"{address}v1/models", timeout=SECONDS).json()["models"]]
+    assert names == [f"*{name}()" for name in known]
+    chromium.evaluate("models.value = '*ward()'; models.dispatchEvent(new Event('change'))")
+    shown(chromium, "material=*ward()")
+    for view in ("cut", "hemisphere", "slice", "spectrum", "albedo", "sphere", "sphere&surround=studio"):
+        chromium.evaluate(f"location.hash = 'material=*ward(rho_d=0.4)&view={view}'")
+        shown(chromium, f"view={view}")
+        assert chromium.evaluate("message.textContent") == ""
+    assert chromium.errors == []
+
+
+def test_the_way_back_is_over_materials_and_not_over_parameters(chromium: Chromium, address: str) -> None:
+    opened(chromium, f"{address}#material=rolled-brass&view=cut")
+    chromium.send("Page.resetNavigationHistory")
+    start = chromium.evaluate("history.length")
+    for share in (0.3, 0.5, 0.7):
+        slide(chromium, "rho_s", share)
+        chromium.until("picture.ariaBusy === 'false' && picture.dataset.shown.includes('rho_s')")
+    assert chromium.evaluate("history.length") == start
+    chromium.evaluate("document.querySelector('#m-foam').click()")
+    shown(chromium, "material=foam")
+    chromium.evaluate("history.back()")
+    shown(chromium, "rolled-brass(rho_s=")
+    assert math.isfinite(float(chromium.evaluate("document.querySelector('#parameters [name=rho_s]').value")))
