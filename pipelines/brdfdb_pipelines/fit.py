@@ -79,13 +79,8 @@ def run(
     BrdfdbError
         If a recipe is asked for and no fit is one model of the registry.
     """
-    table = MeasuredTable(samples=[str(file) for file in data], **(keys or {}))
-    samples = joined([_selected(formats.samples(file, table.format, **table.keywords), channel) for file in data])
-    samples = _seen(samples, receiver_deg, source_deg)
-    known = statement(samples)
-    for sentence in (*known.notes, *known.hints):
-        if sentence != samples.record.get("contradiction"):  # which is a remark of the fits
-            print(terminal.plain(f"{samples.name}: {sentence}"), flush=True)
+    samples = _seen(_read(data, keys or {}, channel), receiver_deg, source_deg)
+    _doubt(samples)
     count = len(models or fitted_by_default()) + 1
     with terminal.progress(transient=True) as bar:
         task = bar.add_task("fit", total=count)
@@ -111,6 +106,20 @@ def run(
     if recipe is not None:
         write(recipe, recipe_of(document))
     return document
+
+
+def _read(data: Sequence[Path], keys: Mapping[str, Any], channel: str | None) -> Samples:
+    """Return the samples of files as one, of one channel or of all."""
+    table = MeasuredTable(samples=[str(file) for file in data], **keys)
+    return joined([_selected(formats.samples(file, table.format, **table.keywords), channel) for file in data])
+
+
+def _doubt(samples: Samples) -> None:
+    """Print what the reader noted and what looks wrong; a contradiction of files is a remark of the fits."""
+    known = statement(samples)
+    for sentence in (*known.notes, *known.hints):
+        if sentence != samples.record.get("contradiction"):
+            print(terminal.plain(f"{samples.name}: {sentence}"), flush=True)
 
 
 def _selected(samples: Samples, channel: str | None) -> Samples:
