@@ -171,12 +171,12 @@ def layout_of(lines: Iterable[tuple[int, str]]) -> Layout | None:
 
     Notes
     -----
-    The first line of numbers alone, four at least, is the first row. The last line before it with as many fields, three
-    of them no numbers, has the names, also behind a sign of a comment.
+    The first line of numbers alone is the first row: four at least, or three below the names of two polar angles. The
+    last line before it with as many fields, three of them no numbers, has the names, also behind a sign of a comment.
     """
     before: list[_Line] = []
     for number, line in lines:
-        delimiter = next((sign for sign in _delimiters(line) if _is_row(fields_of(line, sign))), "")
+        delimiter = next((sign for sign in _delimiters(line) if _is_row(fields_of(line, sign), sign, before)), "")
         if delimiter == "":
             text = comment_of(line)
             before.append(_Line(number, text, comment=text != line.rstrip("\r\n")))
@@ -221,10 +221,12 @@ def _delimiters(line: str) -> list[str | None]:
     return signs if signs and "," not in signs else [*signs, None]
 
 
-def _is_row(fields: Sequence[str]) -> bool:
-    """Return True if fields are numbers, four at least, and not all empty."""
+def _is_row(fields: Sequence[str], delimiter: str | None, before: Sequence[_Line]) -> bool:
+    """Return True if fields are the numbers of a row, and not all empty."""
     numbers = [number_of(field) for field in fields]
-    return len(numbers) >= 4 and None not in numbers and any(value == value for value in numbers)
+    if len(numbers) < 3 or None in numbers or not any(value == value for value in numbers):
+        return False
+    return len(numbers) > 3 or {"theta_i", "theta_r"} <= set(roles_of(_names(before, delimiter, 3)[1]))
 
 
 def _names(before: Sequence[_Line], delimiter: str | None, count: int) -> tuple[int, tuple[str, ...]]:

@@ -16,7 +16,7 @@ from brdfdb.formats._record import note
 Array = NDArray[np.float64]
 
 _WORDS = {"deg": "degrees", "rad": "radians", "mrad": "milliradians"}
-_IN_PLANE = 1e-6  # sine of an angle to the plane of incidence that is rounding
+_FLAT = 1e-6  # sine of an angle to the plane of incidence that is rounding
 _UPRIGHT = np.radians(90.0 + 1e-6)
 
 
@@ -39,6 +39,8 @@ def angles_of_rows(
         )
     record["angles"] = " and ".join(_WORDS[unit] for unit in sorted(set(units.values())))
     given = {name: column * ANGLE_UNITS[units[name]] for name, column in given.items()}
+    if not {"phi_r", "delta_phi"} & set(given):
+        given["delta_phi"] = _in_plane(path, given, layout, record)
     relative = "phi_i" not in given
     if relative:
         given["phi_i"] = np.zeros(len(rows))
@@ -55,11 +57,29 @@ def angles_of_rows(
             raise FileFormatError(f"{path}: line {layout.line}: theta_{side} of {shown:g} degrees is no polar angle")
     phi_i = given["phi_i"]
     phi_r = given["phi_r"] if "phi_r" in given else phi_i + given["delta_phi"]
-    in_plane = np.abs(np.sin(phi_r - phi_i)) * np.sin(given["theta_r"]) < _IN_PLANE
-    if relative or (swept and in_plane.all()):  # signed angles in one plane: the surface has not turned
+    flat = np.abs(np.sin(phi_r - phi_i)) * np.sin(given["theta_r"]) < _FLAT
+    if relative or (swept and flat.all()):  # signed angles in one plane: the surface has not turned
         record["azimuths"] = RELATIVE
         phi_i, phi_r = np.zeros(len(rows)), phi_r - phi_i
     return np.stack([given["theta_i"], phi_i, given["theta_r"], phi_r], axis=1)
+
+
+def _in_plane(path: Path, given: Mapping[str, Array], layout: Layout, record: dict[str, Any]) -> Array:
+    """Return the azimuth [rad] of positive theta_r in a text without azimuths, where the sign of theta_r has the side.
+
+    If lights have signs, too, both angles are places along one arc. Else positive theta_r is the mirror side.
+    """
+    if not np.any(given["theta_r"] < 0.0):
+        where = f"{path}: line {layout.line}"
+        text = "no column is the azimuth of the viewer, and no negative theta_r tells its side"
+        raise FileFormatError(f"{where}: {text}; name a column: --column delta_phi=NAME")
+    along = bool(np.any(given["theta_i"] < 0.0))
+    of_signs = (
+        "of the sign of theta_i are on the side of the light" if along else "at positive theta_r are on the mirror side"
+    )
+    text = f"No column is an azimuth: viewers were taken to be in the plane of incidence, and those {of_signs}."
+    note(record, f"{text} --azimuth forward exchanges the sides.")
+    return np.full(len(given["theta_r"]), 0.0 if along else np.pi)
 
 
 def _units(

@@ -42,7 +42,7 @@ _DIGITS = 5
 _LEAST_NM = 10.0  # of wavelengths in names without a unit
 _ANGLE_BYTES, _VALUE_BYTES, _MOST_BYTES = 8, 10, 40_000_000  # of a number in a row, and of a file, about
 _ANGLES = ("theta_i", "phi_i", "theta_r", "phi_r", "delta_phi", "theta_h", "phi_h", "theta_d", "phi_d")
-_ENOUGH = {"theta_i", "theta_r"}  # of a text of others, beside an azimuth
+_ENOUGH = {"theta_i", "theta_r"}  # of a text of others
 _COLUMNS = "columns: angles [degree], then f_r [1/sr], one column a wavelength; the last angle changes fastest"
 
 
@@ -141,7 +141,7 @@ def read(path: str | os.PathLike[str]) -> FileTable | Samples:
     names = tuple(name.strip() for name in line.split(","))
     if not line or line.startswith("#"):
         raise FileFormatError(f"{path}: it has no line with the names of columns")
-    if _COLUMNS not in comments and set(names) >= _ENOUGH and {"delta_phi", "phi_r"} & set(names):
+    if _COLUMNS not in comments and set(names) >= _ENOUGH:
         return text.read(path)
     numbers = _numbers(path, first, names, numbered)
     angles = tuple(name for name in names if name in _ANGLES)

@@ -101,9 +101,10 @@ def read(
     -------
     Samples
         Reflectance factors are divided by pi, and f_r cos by the cosine of theta_r. A negative polar angle is one at
-        the opposite azimuth. Where theta of most rows exceeds 90 degrees and phi of none does, the file has exchanged
-        the two letters, and the record says so. Uncertainties that are relative, or expanded by a factor k, are made
-        standard ones in 1/sr. Values that contradict at the same directions are an entry "contradiction" of the record.
+        the opposite azimuth; without azimuths, it is one on the other side of the plane of incidence. Where theta of
+        most rows exceeds 90 degrees and phi of none does, the file has exchanged the two letters, and the record says
+        so. Uncertainties that are relative, or expanded by a factor k, are made standard ones in 1/sr. Values that
+        contradict at the same directions are an entry "contradiction" of the record.
 
     Raises
     ------
@@ -165,7 +166,7 @@ def _layout(path: Path) -> Layout:
             if not _missing(roles_of([name for part in line.split(",") for name in part.split()])):
                 raise FileFormatError(f"{path}: line {number} has the names of columns, and no row of numbers follows")
         raise FileFormatError(
-            f"{path}: line 1: none of the first {_LONGEST_TITLE} lines is a row of four numbers or more"
+            f"{path}: line 1: none of the first {_LONGEST_TITLE} lines is a row of numbers, three below names or four"
         )
     if layout.damaged:
         raise FileFormatError(f"{path}: {layout.damaged}")
@@ -204,10 +205,7 @@ def _roles(path: Path, layout: Layout, columns: Mapping[str, str | Sequence[str]
 
 def _missing(roles: Mapping[str, list[int]]) -> str:
     """Return the roles that a text cannot do without and that are missing, as text."""
-    missing = [role for role in ("theta_i", "theta_r", "values") if role not in roles]
-    if not {"phi_r", "delta_phi"} & set(roles):
-        missing.append("phi_r or delta_phi")
-    return ", ".join(missing)
+    return ", ".join(role for role in ("theta_i", "theta_r", "values") if role not in roles)
 
 
 def _scale(
