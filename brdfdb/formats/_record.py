@@ -67,7 +67,7 @@ def record(
             "against": "the data" if known.measured else "the model",
             **table.error.overall.model_dump(include={"p99", "l1"}),
         },
-        "remarks": list(remarks),
+        "remarks": [*remarks, *extrapolated_remark(table)],
         "licence": f"{licence}; {_MEASURED}" if known.refractive_index else licence,
         "program": f"brdfdb {version('brdfdb')}",
     }
@@ -79,6 +79,15 @@ def specular_remark(table: Table) -> tuple[str, ...]:
         return ()
     share = f"up to {table.specular.max():.4g} of the light"
     return (f"not in the file: the specular part, {share} in the exact mirror direction",)
+
+
+def extrapolated_remark(table: Table) -> tuple[str, ...]:
+    """Return a sentence on the directions of a measured table that were not measured; none if all were."""
+    known = table.metadata.measured
+    if known is None or not known.extrapolated:
+        return ()
+    share = f"{100.0 * known.extrapolated:.3g} % of all pairs of directions"
+    return (f"{share} were not measured: f_r is extrapolated there, and its error is not known",)
 
 
 def lines(document: dict[str, Any]) -> list[str]:

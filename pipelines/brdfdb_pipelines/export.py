@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -11,6 +12,7 @@ from typing import Any, NamedTuple
 import brdfdb
 from brdfdb.errors import CannotHoldError, ParameterError, WriteError, counted
 from brdfdb.formats import EXPORTERS
+from brdfdb.formats._record import extrapolated_remark
 from brdfdb.formats._written import Written
 from brdfdb.store.summary_words import NOT_AUDITED, audited_materials
 from brdfdb_pipelines import terminal, workers
@@ -96,7 +98,8 @@ def _write(
     files: list[Written] = []
     try:
         for path, kind in paths or [(directory / f"{name}{exporter.suffix}", {})]:
-            files.append(exporter.write(table, path, verdict=verdict, **{**options, **kind}))
+            written = exporter.write(table, path, verdict=verdict, **{**options, **kind})
+            files.append(replace(written, remarks=(*written.remarks, *extrapolated_remark(table))))
     except (CannotHoldError, ParameterError) as error:  # options that some tables cannot have
         return _Export(name, files, str(error) if name in str(error) else f"{name}: {error}")
     return _Export(name, files)

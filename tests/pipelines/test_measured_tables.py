@@ -115,9 +115,17 @@ def test_record_of_an_exported_file_says_measured(folder: Path) -> None:
     measured = table.metadata.measured
     assert measured is not None
     assert measured.held_out is not None
-    for words in (measured.file_sha256, "clay.csv", "measured: run 12", "the data", str(measured.held_out.p95)):
+    of_extent = "of all pairs of directions were not measured"
+    stated = (measured.file_sha256, "clay.csv", "measured: run 12", "the data", str(measured.held_out.p95))
+    for words in (*stated, of_extent):
         assert words in text
     assert "computed from parameters" not in text
+
+
+def test_export_says_that_some_values_were_not_measured(folder: Path, capsys: Captured) -> None:
+    options = ("--store", folder / "store", "--out", folder / "out", "--tolerance", "0.3")
+    assert run("export", "csv", NAME, *options) == 0
+    assert "of all pairs of directions were not measured: f_r is extrapolated there" in capsys.readouterr().out
 
 
 def test_source_code_of_a_measured_table_is_refused_in_a_sentence(folder: Path, capsys: Captured) -> None:
