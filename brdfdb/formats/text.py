@@ -10,7 +10,7 @@ from __future__ import annotations
 import itertools
 import os
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -267,7 +267,7 @@ def _doubt_titles(layout: Layout, quantity: str, record: dict[str, Any]) -> None
             record["forward_title"] = shown
 
 
-def _wavelengths(path: Path, names: Iterable[str], layout: Layout) -> Array | None:
+def _wavelengths(path: Path, names: Sequence[str], layout: Layout) -> Array | None:
     """Return the wavelengths [nm] that names of columns give; None if one gives none."""
     lengths = [wavelength_of(name) for name in names]
     if None in lengths:
@@ -275,6 +275,8 @@ def _wavelengths(path: Path, names: Iterable[str], layout: Layout) -> Array | No
     at = np.array(lengths, dtype=np.float64)
     if np.unique(at).size != at.size:
         raise FileFormatError(f"{path}: line {layout.line}: a wavelength stands twice")
+    if at.min() < _LEAST_NM or any(name.startswith("-") for name in names):
+        raise FileFormatError(f"{path}: line {layout.line}: {', '.join(names)}: a wavelength is less than 10 nm")
     return at
 
 

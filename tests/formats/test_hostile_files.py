@@ -181,12 +181,13 @@ def test_an_archive_may_be_compressed_and_by_columns(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("theta_i,theta_r,brdf\n0,0,inf\n10,20,1\n", "infinite"),
-        ("theta_i,theta_r,brdf\nnan,0,1\n10,20,1\n", "theta_i"),
-        ("theta_i,theta_r,brdf\n1000,0,1\n10,20,1\n", "theta_i"),
-        ("theta_i,theta_r,brdf\n10,-10,1\n10,20,1\n", "theta_r"),
-        ("theta_i,theta_r,nannm\n10,10,1\n10,20,1\n", "a wavelength is nan nm; allowed are positive numbers"),
-        ("theta_i,theta_r,-5nm\n10,10,1\n10,20,1\n", "a wavelength is -5 nm"),
+        ("theta_i,theta_r,brdf\n0,-10,inf\n10,20,1\n", "line 2, field brdf: 'inf' is not a number"),
+        ("theta_i,theta_r,brdf\nnan,-10,1\n10,20,1\n", "field theta_i: an angle is missing"),
+        ("theta_i,theta_r,brdf\n1000,-10,1\n10,20,1\n", "theta_i of 1000 degrees is no polar angle"),
+        ("theta_i,theta_r,brdf\n10,-200,1\n10,20,1\n", "theta_r of 200 degrees is no polar angle"),
+        ("theta_i,theta_r,delta_phi,nannm\n10,10,0,1\n10,20,0,1\n", "is none of values"),
+        ("theta_i,theta_r,delta_phi,-5nm\n10,10,0,1\n10,20,0,1\n", "-5nm: a wavelength is less than 10 nm"),
+        ("theta_i,theta_r,delta_phi,-550nm\n10,10,0,1\n10,20,0,1\n", "-550nm: a wavelength is less than 10 nm"),
     ],
 )
 def test_samples_of_a_text_are_samples(text: str, words: str, tmp_path: Path) -> None:
