@@ -19,7 +19,6 @@ from brdfdb.formats._interface import TOLERANCE, Option
 from brdfdb.formats._json_tables import degrees_of
 from brdfdb.formats._nodes import samples_at_angles
 from brdfdb.formats._record import CONVENTION, record, specular_remark
-from brdfdb.measurements.samples import NM_PER, PER_SR
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -129,6 +128,8 @@ def read_dataset(path: Path, opened: xr.Dataset) -> FileTable | Samples:
     if set(brdf.dims) != {*names, *spectral} or not set(brdf.dims) <= set(opened.coords):
         raise FileFormatError(f"{path}: brdf over {', '.join(map(str, brdf.dims))} lacks axes or has too many")
     check_sizes(path, {name: opened[name].shape for name in ("brdf", *brdf.dims)})
+    from brdfdb.measurements.samples import PER_SR
+
     if _unit(brdf) not in PER_SR:
         raise FileFormatError(f"{path}: brdf has the units {_unit(brdf)!r}; allowed is sr-1")
     values = brdf.transpose(*names, *spectral).values
@@ -151,6 +152,8 @@ def _unit(variable: xr.DataArray) -> str:
 
 def _in_nm(path: Path, variable: xr.DataArray) -> NDArray[Any]:
     """Return wavelengths [nm], in the unit that a file names."""
+    from brdfdb.measurements.samples import NM_PER
+
     if _unit(variable) not in NM_PER:
         raise FileFormatError(f"{path}: {variable.name} has the units {_unit(variable)!r}; allowed are nm, um and m")
     scale = NM_PER[_unit(variable)]

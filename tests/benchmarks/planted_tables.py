@@ -138,6 +138,7 @@ def _shifted(table: Table) -> Table:
     return replace(table, grid=Grid(axes))
 
 
+_QUARTER = (np.arange(13) - 3) % 12  # nodes of azimuths 30 degrees apart, the last of which is the first
 PLANTED: dict[str, Callable[[], Table]] = {
     # as they were found from outside
     "copper times 0.8, whose stated p99 is above 1": lambda: times(copper(), 0.8),
@@ -151,7 +152,7 @@ PLANTED: dict[str, Callable[[], Table]] = {
     "copper seen from the other side": lambda: of_values(copper(), lambda values: values[:, :, ::-1]),
     "grooves in a mirror": lambda: of_values(grooves(), lambda values: values[:, ::-1, :, ::-1]),
     "grooves turned by 90 degrees": lambda: of_values(
-        grooves(), lambda values: np.take(np.take(values, np.arange(13) - 3, axis=1), np.arange(13) - 3, axis=3)
+        grooves(), lambda values: np.take(np.take(values, _QUARTER, axis=1), _QUARTER, axis=3)
     ),
     "grooves with azimuths of light and viewer exchanged": lambda: of_values(
         grooves(), lambda values: np.swapaxes(values, 1, 3)

@@ -38,7 +38,6 @@ NAME = "changing"
 KEPT = 60.0  # seconds for which a revision is kept: a busy machine may take long over a request that names one
 STEPS = 1000  # of albedo, from one revision to the next; far more than are current while a request is answered
 OFF = 1e-7  # of float32 tables, albedos up to 1: 3e-9 measured up to 0.06, neighbours are 1e-3 apart
-LEVELS = 0.51  # of 255: levels are whole numbers
 GROWTH = 1.1  # of memory, from the middle of the time to its end
 MANY = points(2000)
 MEASURED = "Answers of the service while new revisions are published: each must be of a revision that was current."
@@ -114,20 +113,6 @@ def listed(get: Get) -> Told:
     return [step_of(line)]
 
 
-def coloured(get: Get) -> Told:
-    """The colour in a list, once it is found: eight bits of sRGB, so that neighbours may look alike."""
-    (line,) = json.loads(get("/v1/materials"))["materials"]
-    found = step_of(line)
-    if line["colour"] is None:
-        return []
-    linear = found / STEPS
-    level = 255.0 * (12.92 * linear if linear <= 0.0031308 else 1.055 * linear ** (1 / 2.4) - 0.055)
-    levels = [int(line["colour"][at : at + 2], 16) for at in (1, 3, 5)]
-    if max(abs(each - level) for each in levels) > LEVELS:
-        raise RuntimeError(f"{line['colour']} is not the colour of {line['revision']}")
-    return [found]
-
-
 ASKED = {
     "one point": one,
     "one point of a revision": bound,
@@ -136,7 +121,6 @@ ASKED = {
     "albedo": albedo,
     "zip": downloaded,
     "list": listed,
-    "colour": coloured,
 }
 
 

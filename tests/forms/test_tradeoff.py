@@ -155,7 +155,7 @@ def test_samplers_of_a_chart_are_those_of_the_model(brass: Chart) -> None:
 def test_classes_are_told_by_azimuth_and_grazing() -> None:
     theta_i, theta_r = np.deg2rad([30.0, 30.0, 30.0, 80.0, 10.0]), np.deg2rad([30.0, 30.0, 30.0, 10.0, 74.0])
     wi, wr = unit_vector(theta_i, 0.4), unit_vector(theta_r, 0.4 + np.deg2rad([180.0, 20.0, 90.0, 136.0, 44.0]))
-    drawn = Draw(wi, wr, np.zeros(5, dtype=np.int64), np.ones(5), np.zeros(5, dtype=bool))
+    drawn = Draw(wi, wr, np.zeros(5, dtype=np.int64), np.ones(5), np.zeros(5, dtype=bool), np.ones(5, dtype=bool))
     found = {name: rows.tolist() for name, rows in classes(drawn).items()}
     assert found == {
         "forward": [True, False, False, True, False],
