@@ -439,26 +439,3 @@ def test_a_grid_may_count_azimuths_from_the_forward_direction(tmp_path: Path) ->
     tilted = listed.selected((listed.theta_i > 0.0) & (listed.theta_r > 0.0) & (listed.theta_r < 1.5))
     at = (tilted.theta_i, tilted.phi_i, tilted.theta_r, tilted.phi_r)
     assert there.lookup(*at) == pytest.approx(tilted.values[:, 0])
-
-
-@pytest.mark.parametrize("suffix", [".csv", ".txt"])
-def test_without_azimuths_the_signs_of_polar_angles_tell_the_side(suffix: str, tmp_path: Path) -> None:
-    path = tmp_path / f"plane{suffix}"
-    path.write_text("theta_i,theta_r,brdf\n30,-40,0.1\n30,0,0.2\n30,40,0.3\n")
-    samples = formats.samples(path)
-    assert np.round(np.degrees(samples.theta_r)).tolist() == [40.0, 0.0, 40.0]
-    assert np.cos(samples.phi_r - samples.phi_i)[[0, 2]].tolist() == pytest.approx([1.0, -1.0])
-    assert samples.values[:, 0].tolist() == [0.1, 0.2, 0.3]
-    assert any("No column is an azimuth" in sentence for sentence in statement(samples).notes)
-    assert not samples.turned
-    path.write_text("theta_i,theta_r,brdf\n-30,-40,0.1\n-30,0,0.2\n-30,40,0.3\n-50,40,0.3\n")
-    placed = formats.samples(path)
-    assert np.cos(placed.phi_r - placed.phi_i)[[0, 2, 3]].tolist() == pytest.approx([1.0, -1.0, -1.0])
-
-
-@pytest.mark.parametrize("suffix", [".csv", ".txt"])
-def test_without_azimuths_and_signs_a_side_is_asked_for(suffix: str, tmp_path: Path) -> None:
-    path = tmp_path / f"plane{suffix}"
-    path.write_text("theta_i,theta_r,brdf\n30,0,0.2\n30,40,0.3\n")
-    with pytest.raises(FileFormatError, match=r"no column is the azimuth .* --column delta_phi=NAME"):
-        formats.samples(path)

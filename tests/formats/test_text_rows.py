@@ -1,4 +1,4 @@
-"""Texts whose rows are not all alike: comments between them, rows of units, and directions that stand twice."""
+"""Texts whose rows are not all alike, or lie in one plane: comments between rows, rows of units, repeated directions."""
 
 from __future__ import annotations
 
@@ -148,3 +148,26 @@ def test_titles_of_cosines_and_forward_azimuths_are_doubted(tmp_path: Path) -> N
     assert not any("A title says" in sentence for sentence in stated)
     plain = "# values are f_r without the cosine\n# azimuth 0 is at the light, 180 is specular\n"
     assert statement(samples(tmp_path, f"{plain}{NAMES}\n{ROWS}")).notes == ()
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".txt"])
+def test_without_azimuths_the_signs_of_polar_angles_tell_the_side(suffix: str, tmp_path: Path) -> None:
+    path = tmp_path / f"plane{suffix}"
+    path.write_text("theta_i,theta_r,brdf\n30,-40,0.1\n30,0,0.2\n30,40,0.3\n")
+    samples = formats.samples(path)
+    assert np.round(np.degrees(samples.theta_r)).tolist() == [40.0, 0.0, 40.0]
+    assert np.cos(samples.phi_r - samples.phi_i)[[0, 2]].tolist() == pytest.approx([1.0, -1.0])
+    assert samples.values[:, 0].tolist() == [0.1, 0.2, 0.3]
+    assert any("No column is an azimuth" in sentence for sentence in statement(samples).notes)
+    assert not samples.turned
+    path.write_text("theta_i,theta_r,brdf\n-30,-40,0.1\n-30,0,0.2\n-30,40,0.3\n-50,40,0.3\n")
+    placed = formats.samples(path)
+    assert np.cos(placed.phi_r - placed.phi_i)[[0, 2, 3]].tolist() == pytest.approx([1.0, -1.0, -1.0])
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".txt"])
+def test_without_azimuths_and_signs_a_side_is_asked_for(suffix: str, tmp_path: Path) -> None:
+    path = tmp_path / f"plane{suffix}"
+    path.write_text("theta_i,theta_r,brdf\n30,0,0.2\n30,40,0.3\n")
+    with pytest.raises(FileFormatError, match=r"no column is the azimuth .* --column delta_phi=NAME"):
+        formats.samples(path)
