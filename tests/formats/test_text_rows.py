@@ -1,4 +1,4 @@
-"""Texts whose rows are not all alike, or lie in one plane: comments between rows, rows of units, repeated directions."""
+"""Texts whose rows are not all alike, or lie in one plane: comments and units among them, repeated directions."""
 
 from __future__ import annotations
 
