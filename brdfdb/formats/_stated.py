@@ -1,4 +1,4 @@
-"""What a file does not say of itself and the user states: where its azimuths begin, and its wavelength."""
+"""Facts that a file leaves out and the user states: the begin of its azimuths, and its wavelength."""
 
 from __future__ import annotations
 

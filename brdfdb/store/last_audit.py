@@ -32,7 +32,7 @@ class ShownSentence(BaseModel):
 
 
 class Audited(BaseModel):
-    """What an audit says of a material, as far as lists and pages show it; other fields are kept."""
+    """Findings of an audit on a material, as far as lists and pages show them; other fields are kept."""
 
     model_config = ConfigDict(extra="allow")
 

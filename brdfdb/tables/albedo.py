@@ -144,7 +144,7 @@ def hemispherical_albedo(theta_i_deg: Axis, albedo: Floats) -> Floats:
 
 
 class Reflected(NamedTuple):
-    """What a surface reflects, averaged over phi_i: arrays (theta_i, wavelengths) [1], one wavelength if grey.
+    """Share of light reflected, averaged over phi_i: arrays (theta_i, wavelengths) [1], one wavelength if grey.
 
     `albedo` is without the `specular` part, `hemispherical` (wavelengths,) of light from everywhere with it. `error` is
     the largest estimate of the error of the integration.

@@ -180,7 +180,7 @@ def curve(browser: Chromium, kind: str | int, view: str = "cut") -> np.ndarray:
 
 
 def labels(browser: Chromium) -> list[str]:
-    """What the curves of the cut stand for."""
+    """Labels of the curves of the cut."""
     found = browser.evaluate("[...document.querySelectorAll('#cut > svg path.curve')].map(each => each.dataset.label)")
     return [str(each) for each in found]
 

@@ -79,7 +79,7 @@ def generated(tmp_path_factory: pytest.TempPathFactory) -> Iterator[types.Module
 
 @pytest.fixture(scope="module")
 def service(tmp_path_factory: pytest.TempPathFactory, root: Path) -> Iterator[str]:
-    """Where a store with an audit is served."""
+    """Address of a service of a store with an audit."""
     own = Path(shutil.copytree(root, tmp_path_factory.mktemp("generated") / "store"))
     finding = report(own) | {"findings": {key: {"verdict": "not judged", "reason": "a test"} for key in FINDINGS}}
     audit = {"when": "2026-11-21T12:00:00Z", "materials": [finding]}
@@ -89,7 +89,7 @@ def service(tmp_path_factory: pytest.TempPathFactory, root: Path) -> Iterator[st
 
 
 def called(package: types.ModuleType, address: str, tag: str, name: str, arguments: dict[str, Any]) -> Any:
-    """What an operation of the generated client answers."""
+    """Answer of an operation of the generated client."""
     operation = importlib.import_module(f"{package.__name__}.api.{tag}.{name}")
     models = importlib.import_module(f"{package.__name__}.models")
     bodies = {key: value for key, value in arguments.items() if key[0].isupper()}

@@ -35,7 +35,7 @@ _AT_ONCE = 25_000  # points whose spectra are in memory at once while colours ar
 
 
 class Surface(NamedTuple):
-    """What is looked up.
+    """Subject of a lookup.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What a request asks for: typed parameters of queries, and points from JSON and .npy, in degrees and checked."""
+"""Contents of requests: typed parameters of queries, and points from JSON and .npy, in degrees and checked."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ class Query(BaseModel):
 
 
 class Values(Query):
-    """How values are given: as a spectrum or a colour, as JSON or .npy."""
+    """Form of values: a spectrum or a colour, as JSON or .npy."""
 
     output: Literal["spectrum", "xyz", "linear-srgb"] = Field(
         default="spectrum", description="colours are in 1/sr like f_r: white is Y = 1/pi"
@@ -92,7 +92,7 @@ class Values(Query):
 
 
 class OfTable(Values):
-    """How values of a table are given; or of the model that it was made of."""
+    """Form of values of a table, or of the model that it was made of."""
 
     source: Literal["table", "model"] = Field(
         default="table", alias="from", description="the table, or the model that it was made of"
@@ -100,7 +100,7 @@ class OfTable(Values):
 
 
 class Stated(OfTable):
-    """How values of a table are given, with the errors that it states."""
+    """Form of values of a table, with the errors that it states."""
 
     error: Flag = Field(
         default=False, description="the error that the table states beside the values; npy then has a first axis for it"
