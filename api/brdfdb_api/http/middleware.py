@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import functools
-import mmap
+import io
 import os
 import random
 import re
@@ -12,6 +12,7 @@ import tempfile
 import time
 import traceback
 from collections.abc import Awaitable, Callable
+from typing import IO
 
 from prometheus_client import REGISTRY, CollectorRegistry, Counter, Histogram, generate_latest
 from starlette.concurrency import run_in_threadpool
@@ -210,24 +211,23 @@ class _Exchange:
             raise RequestError(503, detail, retry_after_s=round(STALLED_S))
         unread[place] += size
         try:
-            body: bytes | mmap.mmap = self.large
-            if place == "files":
-                body = await run_in_threadpool(_in_file, self.large)
-            self.large = None
-            for start in range(0, size, PIECE):
-                end = start + PIECE
-                await self._sent({"type": "http.response.body", "body": body[start:end], "more_body": end < size})
+            in_memory = place == "memory"
+            with io.BytesIO(self.large) if in_memory else await run_in_threadpool(_in_file, self.large) as file:
+                self.large = None
+                for end in range(PIECE, size + PIECE, PIECE):
+                    piece = {"type": "http.response.body", "body": file.read(PIECE), "more_body": end < size}
+                    await self._sent(piece)
             self.ended = True
         finally:
             unread[place] -= size
 
 
-def _in_file(content: bytes) -> mmap.mmap:
-    """Return a temporary file with this content."""
-    with tempfile.TemporaryFile() as file:
-        file.write(content)
-        file.flush()
-        return mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
+def _in_file(content: bytes) -> IO[bytes]:
+    """Return a temporary file with this content, to be read from its start."""
+    file = tempfile.TemporaryFile()  # noqa: SIM115 the caller closes it
+    file.write(content)
+    file.seek(0)
+    return file
 
 
 def points_counted(source: str, count: int) -> None:
