@@ -25,6 +25,7 @@ from brdfdb.tables.tabulation import tabulate
 from brdfdb_api.http.app import create_app
 from brdfdb_api.http.connection import Connection
 from brdfdb_api.server import Server
+from brdfdb_api.serving.log import flush
 from brdfdb_api.serving.settings import Settings
 
 PROBLEM = "application/problem+json"
@@ -64,7 +65,9 @@ class Client:
             async with httpx.AsyncClient(transport=transport, base_url="http://test") as client:
                 return await client.request(method, url, **request)
 
-        return asyncio.run(send())
+        answer = asyncio.run(send())
+        flush()  # the log, before other tests read what is written to standard error
+        return answer
 
     def get(self, url: str, **request: Any) -> httpx.Response:
         return self.request("GET", url, **request)

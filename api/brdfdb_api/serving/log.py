@@ -23,6 +23,7 @@ _STDERR = 2
 _waiting: deque[bytes] = deque()
 _dropped = 0
 _wake = threading.Event()
+_hurry = threading.Event()
 _starting = threading.Lock()
 _thread: threading.Thread | None = None
 
@@ -48,8 +49,10 @@ def write(record: dict[str, object]) -> None:
 def flush() -> None:
     """Wait until all lines are written, but not longer than `LAST_S`."""
     end = time.monotonic() + LAST_S
+    _hurry.set()
     while _waiting and time.monotonic() < end:
-        time.sleep(0.001)
+        time.sleep(0.0005)
+    _hurry.clear()
 
 
 class Handler(logging.Handler):
@@ -79,7 +82,7 @@ def _start() -> None:
 def _run() -> None:
     while True:
         _wake.wait()
-        time.sleep(BATCH_S)
+        _hurry.wait(BATCH_S)
         _wake.clear()
         while _waiting:
             _write_some()
