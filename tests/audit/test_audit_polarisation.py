@@ -71,8 +71,8 @@ def test_eigenvalues_are_those_of_known_matrices() -> None:
 
 def test_matrices_of_the_model_are_realisable_to_rounding() -> None:
     wi, wr = directions(500)
-    mueller = models.he_torrance_mueller_vectors(wi, wr, **rough().arguments(500.0))
-    assert coherency_eigenvalues(mueller).min() >= -1e-14  # measured -5e-16
+    mueller = models.he_torrance_mueller_vectors(wi, wr, **rough(a=0.0).arguments(500.0))
+    assert coherency_eigenvalues(mueller).min() >= -1e-14  # measured -6e-16
 
 
 def test_an_unpolarised_table_has_nothing_to_judge(table: Table) -> None:

@@ -76,7 +76,7 @@ def test_elements_keep_to_the_tolerance_and_to_what_is_stated(table: Table) -> N
     assert record.error is not None
     assert p99.max() <= TOLERANCE
     assert record.error.worst_p99 <= TOLERANCE
-    assert np.all(p99 <= 1.2 * np.array(record.error.p99) + 1e-12)  # other directions: measured 1.02
+    assert np.all(p99 <= 1.5 * np.array(record.error.p99) + 1e-12)  # at other directions; measured 1.17
     assert record.error.between_max is not None
     assert np.max(record.error.max) >= record.error.worst_p99
 
