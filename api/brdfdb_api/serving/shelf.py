@@ -5,13 +5,12 @@ from __future__ import annotations
 import contextlib
 import threading
 from collections import OrderedDict
-from collections.abc import Iterator, Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
 
 from brdfdb.errors import StoreError, UnknownMaterialError
-from brdfdb.store.decoding import read_metadata
-from brdfdb.store.last_audit import Audited, AuditFile
+from brdfdb.store.catalogue import line_of
+from brdfdb.store.last_audit import AuditFile, Verdict
 from brdfdb.store.manifest import check_manifest
 from brdfdb.store.reader import Store
 from brdfdb_api.serving.settings import Settings
@@ -20,14 +19,6 @@ if TYPE_CHECKING:
     from brdfdb.tables.table import Table
 
 PICTURES = 256  # thumbnails that are kept, of 60 kB at most
-
-
-class Verdict(NamedTuple):
-    """The audit of a material: the findings, their date, and whether they are about the current revision."""
-
-    finding: Audited
-    when: str
-    current: bool
 
 
 class Shelf:
@@ -111,9 +102,9 @@ class Shelf:
             known = self._summaries.get(name)
             if known is None or known[0] != digest:
                 check_manifest(group, digest, contents=False)
-                known = self._summaries[name] = digest, _described(name, group, dict(head))
+                known = self._summaries[name] = digest, line_of(name, group, head)
         except (UnknownMaterialError, StoreError) as error:
-            return {"name": name, "damaged": str(error), "href": f"/v1/materials/{name}"}
+            return {"name": name, "damaged": str(error)}
         verdict = self.verdict(name)
         audited = verdict.finding.model_dump() if verdict and verdict.current else {}
         return {**known[1], **{key: audited.get(key) for key in ("verdict", "as_published", "conserves_energy")}}
@@ -146,34 +137,3 @@ class Shelf:
         when, by_name = self._audit.read()
         audited = by_name.get(name)
         return None if audited is None else Verdict(audited, when, audited.revision == self.head(name))
-
-
-def _described(name: str, group: Path, head: dict[str, Any]) -> dict[str, Any]:
-    """Return the line of one revision in a list."""
-    metadata = read_metadata(group)
-    return {
-        "name": name,
-        "title": metadata.title or "",
-        "model": metadata.model,
-        "model_title": metadata.model_title or metadata.model or "",
-        "paper": metadata.model_reference or "",
-        "source": metadata.source or "",
-        "measured": metadata.measured is not None,
-        "anisotropic": metadata.anisotropic,
-        "wavelength_range_nm": metadata.wavelength_range_nm or None,
-        "spectrum": spectrum_of(metadata.wavelength_range_nm),
-        "incomplete": metadata.gaps or None,
-        "formula_error": None if metadata.formula_error is None else metadata.formula_error.in_lists(),
-        "largest_albedo": None if metadata.largest_albedo is None else metadata.largest_albedo.model_dump(mode="json"),
-        "revision": group.name,
-        **{key: head.get(key) for key in ("error_p99", "created", "bytes")},
-        "href": f"/v1/materials/{name}",
-        "thumbnail": f"/v1/materials/{name}/thumbnail.png",
-    }
-
-
-def spectrum_of(range_nm: Sequence[float]) -> str:
-    """Return whether a table has colours: grey, one wavelength or spectral, by its first and last wavelength [nm]."""
-    if not range_nm:
-        return "grey"
-    return "one wavelength" if range_nm[0] == range_nm[-1] else "spectral"

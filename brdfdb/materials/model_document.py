@@ -1,0 +1,67 @@
+"""The document of a model: its parameters as recipes write them, with the values that papers publish."""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import asdict
+from typing import Any
+
+from pydantic import BaseModel, Field
+
+from brdfdb.materials.preset_files import presets
+from brdfdb.materials.written_parameters import as_written
+from brdfdb.parameters import ModelSpec
+
+
+class Mark(BaseModel):
+    """A value that a paper publishes."""
+
+    material: str
+    value: float
+
+
+class ParameterOfModel(BaseModel):
+    """A parameter of a model as recipes write it."""
+
+    name: str
+    symbol: str = Field(description="of the paper")
+    unit: str
+    low: float
+    high: float
+    meaning: str
+    default: float | bool | None = Field(description="null: it must be given")
+    reflectance: bool = Field(description="whether it may be a spectrum")
+    published: list[Mark] = Field(description="values of the materials that the papers print")
+    typical: list[float] | None = Field(description="the smallest and the largest of them; null: none")
+
+
+class ModelDocument(BaseModel):
+    """A model and its parameters."""
+
+    name: str
+    version: int
+    title: str
+    equation: str
+    paper: str = Field(description="key of the paper, such as he1991")
+    spectral: bool = Field(description="whether it needs a refractive index")
+    specular: bool = Field(description="whether it has a specular part")
+    parameters: list[ParameterOfModel]
+
+
+@functools.cache
+def document_of(spec: ModelSpec) -> dict[str, Any]:
+    """Return the fields of `ModelDocument`."""
+    papers = [(name, material.file_parameters()) for name, material in presets().items() if material.model == spec.name]
+    parameters = []
+    for parameter in map(as_written, spec.parameters):
+        values = [(name, written[parameter.name]) for name, written in papers]
+        marks = [{"material": name, "value": float(value)} for name, value in values if isinstance(value, float | int)]
+        ends: list[Any] = [mark["value"] for mark in marks]
+        typical = [min(ends), max(ends)] if ends else None
+        parameters.append({**asdict(parameter), "published": marks, "typical": typical})
+    return {
+        **{key: getattr(spec, key) for key in ("name", "version", "title", "equation", "spectral")},
+        "paper": spec.reference,
+        "specular": spec.specular is not None,
+        "parameters": parameters,
+    }
