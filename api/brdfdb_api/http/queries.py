@@ -47,9 +47,9 @@ Wavelengths = Annotated[tuple[Finite, ...], Field(description="wavelength [nm], 
 
 
 class Query(BaseModel):
-    """The parameters of a query; others are refused."""
+    """The parameters of a query; `Address` refuses others."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True)
 
 
 class Options(Query):
