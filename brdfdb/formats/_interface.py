@@ -77,6 +77,27 @@ class Option:
         return int(value) if is_whole else value
 
 
+_KINDS = ((bool, "boolean"), (str, "string"), (object, "number"))
+
+
+def schema_of(of: Mapping[str, Option]) -> tuple[dict[str, Any], str]:
+    """Return the JSON Schema of an option of one or more formats, with the values that any allows, and its help.
+
+    It has no default: generated clients send defaults, and a format refuses options of others.
+    """
+    kinds = {next(word for kind, word in _KINDS if isinstance(option.default, kind)) for option in of.values()}
+    schema: dict[str, Any] = {"type": kinds.pop() if len(kinds) == 1 else "string"}
+    if schema["type"] == "number":
+        ends = [end for option in of.values() for end in (option.low, option.high, float(option.default))]
+        schema |= {"minimum": min(ends), "maximum": max(ends)}
+    elif all(option.choices for option in of.values()):
+        schema["enum"] = list(dict.fromkeys(choice for option in of.values() for choice in option.choices))
+    words: dict[str, list[str]] = {}
+    for key, option in of.items():
+        words.setdefault(f"{option.help}; {option.allowed}; default {option.default}", []).append(key)
+    return schema, ". ".join(f"{', '.join(keys)}: {sentence}" for sentence, keys in words.items())
+
+
 TOLERANCE = Option(
     "tolerance",
     0.02,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -121,3 +121,15 @@ class Choice(BaseModel):
             and self.anisotropic in (None, line.get("anisotropic"))
             and all(low <= wavelength <= high for wavelength in self.wavelength_nm)
         )
+
+    @property
+    def of_names(self) -> bool:
+        """True if the names of materials are enough to choose and to sort them."""
+        return all(getattr(self, name) == field.default for name, field in Choice.model_fields.items())
+
+    def chosen(self, names: Sequence[str], line: Callable[[str], Mapping[str, Any]]) -> list[tuple[bool, float, str]]:
+        """Return the places of the materials that the filters let through, in order; `line` returns a line by name."""
+        if self.of_names:
+            return [self.rank(name, {}) for name in sorted(names)]
+        lines = ((name, line(name)) for name in names)
+        return sorted(self.rank(name, known) for name, known in lines if self.lets_through(known))

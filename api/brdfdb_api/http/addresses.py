@@ -16,7 +16,7 @@ from pydantic.json_schema import JsonSchemaMode, models_json_schema
 from starlette.requests import Request
 from starlette.responses import Response
 
-from brdfdb.formats import EXPORTERS, Option, options_of
+from brdfdb.formats import EXPORTERS, Option, options_of, schema_of
 from brdfdb_api.http.errors import PROBLEM_JSON, RequestError
 from brdfdb_api.http.queries import names_of, parsed, shortened
 from brdfdb_api.http.responses import JSON, NPY, REVISION, Problem, unchanged
@@ -56,7 +56,6 @@ _SERVED = {
     "rgl": {"megabytes": 64.0},
     **{file_format: {"size": 16.0} for file_format in ("astm", "fred", "ssdd", "zemax")},
 }
-_KINDS = ((bool, "boolean"), (str, "string"), (object, "number"))
 
 
 def shelf_of(request: Request) -> Shelf:
@@ -181,22 +180,8 @@ def served_options(file_format: str) -> dict[str, Option]:
 
 
 def _option(name: str) -> dict[str, Any]:
-    """Return the parameter of an option of one or more formats, with the values that any of them allows.
-
-    It has no default: generated clients send defaults, and a format refuses options of others.
-    """
-    of = {key: options[name] for key in EXPORTERS if name in (options := served_options(key))}
-    kinds = {next(word for kind, word in _KINDS if isinstance(option.default, kind)) for option in of.values()}
-    schema: dict[str, Any] = {"type": kinds.pop() if len(kinds) == 1 else "string"}
-    if schema["type"] == "number":
-        ends = [end for option in of.values() for end in (option.low, option.high, float(option.default))]
-        schema |= {"minimum": min(ends), "maximum": max(ends)}
-    elif all(option.choices for option in of.values()):
-        schema["enum"] = list(dict.fromkeys(choice for option in of.values() for choice in option.choices))
-    words: dict[str, list[str]] = {}
-    for key, option in of.items():
-        words.setdefault(f"{option.help}; {option.allowed}; default {option.default}", []).append(key)
-    text = ". ".join(f"{', '.join(keys)}: {sentence}" for sentence, keys in words.items())
+    """Return the parameter of an option of one or more formats."""
+    schema, text = schema_of({key: options[name] for key in EXPORTERS if name in (options := served_options(key))})
     return {"name": name, "in": "query", "required": False, "description": text, "schema": schema}
 
 

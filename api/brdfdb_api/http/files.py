@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import contextlib
 import re
-import tempfile
 import zipfile
-from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -15,19 +12,17 @@ from starlette.requests import Request
 from starlette.responses import FileResponse, Response, StreamingResponse
 
 from brdfdb import __version__
-from brdfdb.errors import StoreError, UnknownMaterialError
+from brdfdb.errors import StoreError
+from brdfdb.store.archive import ZIP, root_group, zipped
 from brdfdb.store.files import sha256_of
 from brdfdb.store.manifest import check_manifest
-from brdfdb.store.paths import METADATA, manifest_path
-from brdfdb.store.sealed_json import read_json
+from brdfdb.store.paths import manifest_path
 from brdfdb_api.http.addresses import Revision, addresses, answers, both, shelf_of
 from brdfdb_api.http.errors import RequestError
 from brdfdb_api.http.responses import Document, cache_headers, tagged
 
-ZIP = "application/zip"
 BYTES = "application/octet-stream"
 
-_PIECE = 1 << 20
 _RANGE = re.compile(r"bytes=(?:(?P<first>\d{1,18})-(?:\d{1,18})?|-(?P<last>\d{1,18}))")  # others are not read
 
 files = addresses()
@@ -98,23 +93,7 @@ def root(request: Request) -> Response:
 
     A material that is damaged is left out.
     """
-    shelf = shelf_of(request)
-    metadata: dict[str, Any] = {"materials": _group()}
-    for name in shelf.names():
-        with contextlib.suppress(StoreError, UnknownMaterialError):
-            group, digest = shelf.store.location(name)
-            check_manifest(group, digest, contents=False)
-            whole = read_json(group / METADATA)
-            arrays = whole.pop("consolidated_metadata", {}).get("metadata", {})
-            place = f"materials/{name}/{group.name}"
-            metadata |= {f"materials/{name}": _group(revision=group.name), place: whole}
-            metadata |= {f"{place}/{key}": array for key, array in arrays.items()}
-    consolidated = {"kind": "inline", "must_understand": False, "metadata": metadata}
-    return tagged({**_group(), "consolidated_metadata": consolidated}, "store")
-
-
-def _group(**attributes: Any) -> dict[str, Any]:
-    return {"zarr_format": 3, "node_type": "group", "attributes": attributes}
+    return tagged(root_group(shelf_of(request).store), "store")
 
 
 def _located(request: Request, name: str, revision: str | None) -> tuple[Path, str]:
@@ -127,14 +106,3 @@ def _located(request: Request, name: str, revision: str | None) -> tuple[Path, s
     if not manifest_path(group).is_file():
         raise StoreError(f"{name} {group.name} is damaged: its manifest is missing")
     return group, digest
-
-
-def zipped(folder: Path, names: Iterable[str], compression: int = zipfile.ZIP_DEFLATED) -> Iterator[bytes]:
-    """Yield files of a folder as a zip archive in pieces, from a temporary file: memory does not grow with a table."""
-    with tempfile.TemporaryFile() as file:
-        with zipfile.ZipFile(file, "w", compression) as archive:
-            for name in sorted(names):
-                archive.write(folder / name, name)
-        file.seek(0)
-        while piece := file.read(_PIECE):
-            yield piece

@@ -119,15 +119,10 @@ class CatalogueQuery(Choice, Query):
             raise RequestError(422, "cursor: it is not that of `next` of a page", "cursor") from None
 
     @property
-    def chosen(self) -> dict[str, Any]:
+    def given(self) -> dict[str, Any]:
         """The parameters that were given, as a query has them."""
         given = self.model_dump(exclude={"cursor"}, exclude_defaults=True)
         return {key: str(value).lower() if isinstance(value, bool) else value for key, value in given.items()}
-
-    @property
-    def filters(self) -> bool:
-        """True if some materials may be left out."""
-        return bool(self.chosen.keys() - {"limit", "sort"})
 
 
 @router.get("/v1/materials", tags=["materials"], responses=answers(Catalogue, 304, 404, 503))
@@ -138,20 +133,17 @@ def catalogue(request: Request, query: Annotated[CatalogueQuery, InQuery()]) -> 
     if query.family:
         members = shelf.store.family_content(query.family)["members"]
         names = [name for name in names if name in members]
-    known = {name: shelf.summary(name) for name in names} if query.filters or query.sort != "name" else {}
-    ranks = [query.rank(name, known.get(name, {})) for name in names if not known or query.lets_through(known[name])]
-    ranks.sort()
-    after = query.after
-    page = [rank for rank in ranks if rank > after][: query.limit]
-    lines = [known.get(name) or shelf.summary(name) for _, _, name in page]
+    places, after = query.chosen(names, shelf.summary), query.after
+    page = [place for place in places if place > after][: query.limit]
+    lines = [shelf.summary(name) for _, _, name in page]
     for line in lines:
         address = f"/v1/materials/{line['name']}"
         line |= {"href": address} if "damaged" in line else {"href": address, "thumbnail": f"{address}/thumbnail.png"}
     following = None
-    if page and ranks[-1] > page[-1]:
+    if page and places[-1] > page[-1]:
         cursor = json_bytes(page[-1]).decode()
-        following = f"/v1/materials?{urlencode({**query.chosen, 'cursor': cursor}, doseq=True)}"
-    return tagged({"materials": lines, "total": len(ranks), "next": following}, "materials")
+        following = f"/v1/materials?{urlencode({**query.given, 'cursor': cursor}, doseq=True)}"
+    return tagged({"materials": lines, "total": len(places), "next": following}, "materials")
 
 
 @both(router, "", tags=["materials"], responses=answers(Material, 304, 404, 503))

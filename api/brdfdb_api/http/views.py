@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import tempfile
-from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 from weakref import WeakKeyDictionary
 
@@ -18,7 +16,8 @@ from starlette.responses import Response
 
 from brdfdb import __version__
 from brdfdb.errors import CannotHoldError, ParameterError
-from brdfdb.formats import EXPORTERS
+from brdfdb.formats import EXPORTERS, packed
+from brdfdb.store.archive import ZIP
 from brdfdb.store.summary_words import NOT_AUDITED
 from brdfdb.tables.evaluation import Surface
 from brdfdb.tables.lobe_views import MOST_POINTS, view_directions
@@ -35,7 +34,6 @@ from brdfdb_api.http.addresses import (
     shelf_of,
 )
 from brdfdb_api.http.errors import RequestError
-from brdfdb_api.http.files import ZIP, zipped
 from brdfdb_api.http.lookups import checked_size, evaluate, refused, surface_in, tag_in
 from brdfdb_api.http.queries import Light, LobeQuery, Options, Query, parsed
 from brdfdb_api.http.responses import (
@@ -186,19 +184,11 @@ def _exported(
     file_format: str, table: Table, verdict: str | None, options: dict[str, Any], headers: dict[str, str]
 ) -> Response:
     """Return a file of another format, or an archive of several, with these headers and its name."""
-    exporter = EXPORTERS[file_format]
-    kind = f"_{options.get('kind', exporter.kinds[0])}" if exporter.kinds else ""
-    with tempfile.TemporaryDirectory() as folder:  # formats write files
-        path = FilePath(folder) / f"{table.name}{kind}{exporter.suffix}"
-        try:
-            written = exporter.write(table, path, verdict=verdict or NOT_AUDITED, **options)
-        except (CannotHoldError, ParameterError) as error:
-            raise RequestError(422, str(error), getattr(error, "parameter", None)) from None
-        single = len(written.paths) == 1 and path.is_file()
-        names = [str(file.relative_to(folder)) for file in FilePath(folder).rglob("*") if file.is_file()]
-        content = path.read_bytes() if single else b"".join(zipped(FilePath(folder), names))
-    media_type = exporter.media_type if single else ZIP
-    named = {"Content-Disposition": f'attachment; filename="{path.name}{"" if single else ".zip"}"'}
+    try:
+        name, media_type, content = packed(table, file_format, verdict=verdict or NOT_AUDITED, **options)
+    except (CannotHoldError, ParameterError) as error:
+        raise RequestError(422, str(error), getattr(error, "parameter", None)) from None
+    named = {"Content-Disposition": f'attachment; filename="{name}"'}
     return Response(content, media_type=media_type, headers=headers | named)
 
 
