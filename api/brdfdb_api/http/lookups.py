@@ -31,19 +31,19 @@ _PARAMETERS = (*ANGLES, "wavelength_nm", "illuminant", "error")  # of the librar
 
 
 @contextlib.contextmanager
-def refused(*parameters: str) -> Iterator[None]:
-    """Turn errors about these parameters, or about any if none is named, into refusals (422)."""
+def refused() -> Iterator[None]:
+    """Turn errors about the parameters of a request into refusals (422)."""
     try:
         yield
     except ParameterError as error:
-        if parameters and error.parameter not in parameters:
-            raise
         raise RequestError(422, str(error), error.parameter) from error
 
 
 def surface_in(table: Table, options: OfTable) -> Surface:
     """Return a table, or the model that it was made of; RequestError (422) if it keeps none."""
-    with refused("from"):
+    if options.source == "table":
+        return surface_of(table)
+    with refused():
         return surface_of(table, options.source)
 
 
@@ -54,9 +54,13 @@ def tag_in(table: Table, surface: Surface) -> str:
 
 def evaluate(points: Points, options: Options, surface: Surface, *, specular: bool = True) -> Values:
     """Look up points; RequestError (422) outside the range of the surface, or where it makes no colour."""
-    error = getattr(options, "error", False)
-    with refused(*_PARAMETERS):
-        return surface.values(points, options.output, options.illuminant, error=error, specular=specular)
+    stated = getattr(options, "error", False)
+    try:
+        return surface.values(points, options.output, options.illuminant, error=stated, specular=specular)
+    except ParameterError as error:
+        if error.parameter not in _PARAMETERS:
+            raise
+        raise RequestError(422, str(error), error.parameter) from error
 
 
 def checked_size(max_points: int, points: Points, options: Options, surface: Surface, kind: Format) -> int:

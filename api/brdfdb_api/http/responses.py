@@ -263,7 +263,8 @@ def tag_of(table: Table, *more: object) -> str:
 
     It names the digest, too, because revisions are numbered anew in a new store.
     """
-    return "-".join(map(str, (table.name, table.revision, table.digest[:16], __version__, *more)))
+    tag = f"{table.name}-{table.revision}-{table.digest[:16]}-{__version__}"
+    return "-".join((tag, *map(str, more))) if more else tag
 
 
 def cache_headers(tag: str, kind: str = "json", *, immutable: bool = False) -> dict[str, str]:
