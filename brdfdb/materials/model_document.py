@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import functools
+from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any
 
 from pydantic import BaseModel, Field
 
+from brdfdb.errors import MaterialError, ParameterError
+from brdfdb.materials.material import Material
 from brdfdb.materials.preset_files import presets
 from brdfdb.materials.written_parameters import as_written
 from brdfdb.parameters import ModelSpec
@@ -65,3 +68,22 @@ def document_of(spec: ModelSpec) -> dict[str, Any]:
         "specular": spec.specular is not None,
         "parameters": parameters,
     }
+
+
+def material_of(spec: ModelSpec, parameters: Mapping[str, Any], refractive_index: str | None = None) -> Material:
+    """Return a material without a name at parameters as recipes write them; files are not read.
+
+    Raises
+    ------
+    ParameterError
+        If they describe no material.
+    """
+    for name, value in parameters.items():
+        if isinstance(value, Mapping) and "csv" in value:
+            raise ParameterError(name, "files are not read over HTTP; give wavelengths_nm and values", value)
+    fields = {"title": "of a request", "model": spec.name, "source": "a request", "parameters": parameters}
+    index = {} if refractive_index is None else {"refractive_index": refractive_index}
+    try:
+        return Material.from_table("request", fields | index)
+    except MaterialError as error:
+        raise ParameterError(error.parameter, error.sentence, error.value, error.allowed) from None

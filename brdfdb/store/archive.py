@@ -9,6 +9,8 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
+from pydantic import BaseModel
+
 from brdfdb.errors import StoreError, UnknownMaterialError
 from brdfdb.store.manifest import check_manifest
 from brdfdb.store.paths import METADATA
@@ -18,6 +20,15 @@ from brdfdb.store.sealed_json import read_json
 ZIP = "application/zip"
 
 _PIECE = 1 << 20
+
+
+class Group(BaseModel):
+    """A zarr group (version 3) with the metadata of all below it."""
+
+    zarr_format: int
+    node_type: str
+    attributes: dict[str, Any]
+    consolidated_metadata: dict[str, Any]
 
 
 def zipped(folder: Path, names: Iterable[str], compression: int = zipfile.ZIP_DEFLATED) -> Iterator[bytes]:
@@ -32,7 +43,7 @@ def zipped(folder: Path, names: Iterable[str], compression: int = zipfile.ZIP_DE
 
 
 def root_group(store: Store) -> dict[str, Any]:
-    """Return the metadata of a zarr group, version 3, that holds all current revisions as materials/NAME/REVISION.
+    """Return the fields of `Group` for one that holds all current revisions as materials/NAME/REVISION.
 
     A material that is damaged is left out.
     """

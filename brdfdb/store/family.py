@@ -32,13 +32,12 @@ from brdfdb.tables.table_base import Stated
 
 FORMAT = "brdfdb-family"
 FORMAT_VERSION: Literal[1] = 1
-
 _STRICT = ConfigDict(frozen=True, extra="forbid")
 _SAME = 1e-12  # relative tolerance for treating a parameter as equal to a member's value
 
 
-class Sweep(BaseModel):
-    """Which tables make a family."""
+class FamilyLine(BaseModel):
+    """A family, as lists show it."""
 
     model_config = _STRICT
 
@@ -49,6 +48,11 @@ class Sweep(BaseModel):
         description="values of each swept parameter, named and in the unit as in files: degrees under names in _deg"
     )
     members: list[str] = Field(description="names of the materials; the last axis runs fastest")
+
+
+class Sweep(FamilyLine):
+    """Which tables make a family."""
+
     request_sha256: list[str] = Field(description="of the request that each member was built for")
 
     @property

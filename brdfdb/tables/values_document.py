@@ -7,6 +7,7 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import BaseModel, Field
 
+from brdfdb.tables.albedo import AlbedoDocument
 from brdfdb.tables.evaluation import Output, Values
 from brdfdb.tables.lobe_views import View as ViewName
 
@@ -46,6 +47,57 @@ class View(BaseModel):
         description="of the axes of brdf, in order; in a cut theta_r is negative back towards the light; in a "
         "hemisphere delta_phi is phi_r - phi_i"
     )
+
+
+class Lookup(Evaluated):
+    """Values of a material."""
+
+    material: str
+    revision: str
+
+
+class Lookups(BaseModel):
+    """Values of several materials."""
+
+    materials: list[Lookup]
+
+
+class Lobe(Lookup, View):
+    """f_r of a material for one light over viewers, or over half and difference angles."""
+
+
+class Albedo(AlbedoDocument):
+    """Directional albedo of a table."""
+
+    material: str
+    revision: str
+
+
+class OfModel(BaseModel):
+    """The model, and all of its parameters."""
+
+    model: str
+    model_version: int
+    parameters: dict[str, Any]
+
+
+class ModelLookup(Evaluated, OfModel):
+    """Values of a model."""
+
+
+class ModelLobe(Evaluated, View, OfModel):
+    """f_r of a model for one light."""
+
+
+class ModelAlbedo(AlbedoDocument, OfModel):
+    """Directional albedo of a model."""
+
+
+class FamilyLookup(Evaluated):
+    """Values of a family."""
+
+    family: str
+    parameters: dict[str, float]
 
 
 def values_document(values: Values) -> dict[str, Any]:

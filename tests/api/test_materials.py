@@ -14,9 +14,9 @@ import xarray as xr
 from brdfdb import __version__
 from brdfdb.store.publication import publish_dataset
 from brdfdb.store.reader import Store
+from brdfdb.store.shelf import Shelf
 from brdfdb_api.http.app import create_app
 from brdfdb_api.serving.settings import Settings
-from brdfdb_api.serving.shelf import Shelf
 from tests.api.a_store import VISIBLE_NM, Client, client_of, publish
 
 FOIL = "/v1/materials/copper-foil"

@@ -178,8 +178,8 @@ def test_a_failure_is_in_the_log_and_not_in_the_answer(
     def fail(*_: Any) -> Any:
         raise RuntimeError("secret")
 
-    monkeypatch.setattr("brdfdb_api.serving.shelf.Shelf.held", fail)
-    monkeypatch.setattr("brdfdb_api.serving.shelf.Shelf.table", fail)
+    monkeypatch.setattr("brdfdb.store.shelf.Shelf.held", fail)
+    monkeypatch.setattr("brdfdb.store.shelf.Shelf.table", fail)
     assert "secret" not in client.problem("GET", address, 500, headers={"X-Request-ID": "mine"})["detail"]
     failed, answered = log()  # a line each, the traceback included
     assert (failed["request"], failed["failed"]) == ("mine", "RuntimeError: secret")

@@ -17,10 +17,10 @@ from starlette.requests import Request
 from starlette.responses import Response
 
 from brdfdb.formats import EXPORTERS, Option, options_of, schema_of
+from brdfdb.store.shelf import Shelf
 from brdfdb_api.http.errors import PROBLEM_JSON, RequestError
 from brdfdb_api.http.queries import names_of, parsed, shortened
 from brdfdb_api.http.responses import JSON, NPY, REVISION, Problem, unchanged
-from brdfdb_api.serving.shelf import Shelf
 
 T = TypeVar("T")
 

@@ -16,18 +16,18 @@ from starlette.middleware.cors import CORSMiddleware
 from starlette.responses import Response
 from starlette.types import ASGIApp, Receive, Scope, Send
 
+from brdfdb.store.shelf import Shelf
 from brdfdb_api.http.addresses import schemas
 from brdfdb_api.http.errors import HANDLED, RequestError, handler, problem_of
 from brdfdb_api.http.files import files
-from brdfdb_api.http.lookups import LARGE_AT_ONCE
+from brdfdb_api.http.lookups import LARGE_AT_ONCE, answer_point, lookups
 from brdfdb_api.http.middleware import Edge
 from brdfdb_api.http.models import models
 from brdfdb_api.http.pages import pages
 from brdfdb_api.http.responses import REVISION
-from brdfdb_api.http.routes import EXPORTS_AT_ONCE, answer_point, router
-from brdfdb_api.http.views import views
+from brdfdb_api.http.routes import router
+from brdfdb_api.http.views import EXPORTS_AT_ONCE, views
 from brdfdb_api.serving.settings import Settings
-from brdfdb_api.serving.shelf import Shelf
 
 if TYPE_CHECKING:
     from brdfdb.store.reader import Store
@@ -83,26 +83,26 @@ def create_app(settings: Settings | None = None, store: Store | None = None) -> 
         redirect_slashes=False,  # an unknown address is 404
         openapi_url=None,  # `pages` has it
     )
-    app.state.settings = settings or Settings.from_environment()
-    app.state.failed = functools.partial(problem_of, root=app.state.settings.store.absolute())
-    app.state.shelf = Shelf(app.state.settings, store)
+    given = app.state.settings = settings or Settings.from_environment()
+    app.state.failed = functools.partial(problem_of, root=given.store.absolute())
+    app.state.shelf = Shelf(given.store, given.audit_file, given.cache_bytes, given.snapshot, store)
     app.state.large = asyncio.Semaphore(LARGE_AT_ONCE)
     app.state.exports = asyncio.Semaphore(EXPORTS_AT_ONCE)
     app.state.routes = []
-    for part in (router, views, models, files, pages):
+    for part in (router, lookups, views, models, files, pages):
         app.include_router(part)
         app.state.routes += part.routes
     for kind in HANDLED:
         app.add_exception_handler(kind, handler)
-    limit, level = app.state.settings.max_body_bytes, app.state.settings.log_level
+    limit, level = given.max_body_bytes, given.log_level
     app.outermost = Edge(app.routed, limit=limit, lookup=answer_point, failed=app.state.failed, log_level=level)
-    if app.state.settings.cors_origins:
+    if given.cors_origins:
         app.outermost = _Cors(
             app.outermost,
-            allow_origins=app.state.settings.cors_origins,
+            allow_origins=given.cors_origins,
             allow_methods=["GET", "POST"],
             allow_headers=["*"],
-            expose_headers=["ETag", "X-Request-ID", REVISION],
+            expose_headers=["ETag", "Retry-After", "X-Request-ID", REVISION],
         )
     return app
 
@@ -119,7 +119,7 @@ class _Cors(CORSMiddleware):
 
 @contextlib.asynccontextmanager
 async def _warmed(app: FastAPI) -> AsyncIterator[None]:
-    """Run a thread that finds the colours of the first page of a list, until the application ends."""
+    """Load the kernels of lookups in a thread, while the application answers already."""
     threading.Thread(target=app.state.shelf.warm, daemon=True).start()
     yield
 

@@ -5,15 +5,13 @@ from __future__ import annotations
 import re
 import zipfile
 from pathlib import Path
-from typing import Any
 
-from pydantic import BaseModel
 from starlette.requests import Request
 from starlette.responses import FileResponse, Response, StreamingResponse
 
 from brdfdb import __version__
 from brdfdb.errors import StoreError
-from brdfdb.store.archive import ZIP, root_group, zipped
+from brdfdb.store.archive import ZIP, Group, root_group, zipped
 from brdfdb.store.files import sha256_of
 from brdfdb.store.manifest import check_manifest
 from brdfdb.store.paths import manifest_path
@@ -26,15 +24,6 @@ BYTES = "application/octet-stream"
 _RANGE = re.compile(r"bytes=(?:(?P<first>\d{1,18})-(?:\d{1,18})?|-(?P<last>\d{1,18}))")  # others are not read
 
 files = addresses()
-
-
-class Group(BaseModel):
-    """A zarr group (version 3) with the metadata of all below it."""
-
-    zarr_format: int
-    node_type: str
-    attributes: dict[str, Any]
-    consolidated_metadata: dict[str, Any]
 
 
 @both(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Annotated, Any
 
 import numpy as np
@@ -12,18 +11,19 @@ from pydantic import BaseModel, ConfigDict, Field, WithJsonSchema
 from starlette.requests import Request
 from starlette.responses import Response
 
-from brdfdb.errors import MaterialError, UnknownModelError
+from brdfdb.errors import UnknownModelError
 from brdfdb.materials import Material
-from brdfdb.materials.model_document import document_of
+from brdfdb.materials.model_document import document_of, material_of
 from brdfdb.materials.spectrum import Spectrum
 from brdfdb.models import MODELS
 from brdfdb.parameters import ModelSpec
 from brdfdb.spectra import PICTURE_NM
+from brdfdb.store.family import FamilyLine
 from brdfdb.tables.albedo import reflected_by
 from brdfdb.tables.evaluation import Surface
 from brdfdb.tables.points import PointsBody
+from brdfdb.tables.values_document import FamilyLookup, ModelAlbedo, ModelLobe, ModelLookup
 from brdfdb_api.http.addresses import NPY_ANSWER, Content, accept_of, addresses, answers, body, shelf_of
-from brdfdb_api.http.errors import RequestError
 from brdfdb_api.http.lookups import checked_size, refused, write_answer
 from brdfdb_api.http.queries import Flag, Light, Options, Query, Wavelengths, from_json
 from brdfdb_api.http.responses import (
@@ -31,12 +31,7 @@ from brdfdb_api.http.responses import (
     Document,
     Encoded,
     Families,
-    Family,
-    FamilyLookup,
     Model,
-    ModelAlbedo,
-    ModelLobe,
-    ModelLookup,
     Models,
     media_type,
 )
@@ -115,22 +110,9 @@ def _with_address(spec: ModelSpec) -> dict[str, Any]:
 
 
 def _material(spec: ModelSpec, given: Parameters) -> Material:
-    """Return the material of a request, checked as those of recipes are; RequestError (422) if it is none."""
-    for name, value in given.parameters.items():
-        if isinstance(value, Mapping) and "csv" in value:
-            raise RequestError(422, f"{name}: files are not read over HTTP; give wavelengths_nm and values", name)
-    index = {} if given.refractive_index is None else {"refractive_index": given.refractive_index}
-    fields = {
-        "title": "of a request",
-        "model": spec.name,
-        "source": "a request",
-        "parameters": given.parameters,
-        **index,
-    }
-    try:
-        return Material.from_table("request", fields)
-    except MaterialError as error:
-        raise RequestError(422, f"{error.parameter}: {error.sentence}", error.parameter) from None
+    """Return the material of a request; RequestError (422) if it is none."""
+    with refused():
+        return material_of(spec, given.parameters, given.refractive_index)
 
 
 def _surface(spec: ModelSpec, given: Parameters) -> tuple[Surface, dict[str, Any]]:
@@ -157,7 +139,7 @@ def _looked_up(
 @models.post(
     "/v1/models/{model}/lookup",
     tags=["models"],
-    responses=answers(ModelLookup, 404, 413, 503, media=NPY_ANSWER),
+    responses=answers(ModelLookup, 404, 413, 415, 503, media=NPY_ANSWER),
     openapi_extra=body(PointsAt),
 )
 def model_lookup(request: Request, spec: Spec, query: Annotated[Options, InQuery()], content: Content) -> Response:
@@ -173,7 +155,7 @@ def model_lookup(request: Request, spec: Spec, query: Annotated[Options, InQuery
 @models.post(
     "/v1/models/{model}/lobe",
     tags=["models"],
-    responses=answers(ModelLobe, 404, 413, 503, media={NPY: "brdf as a .npy file"}),
+    responses=answers(ModelLobe, 404, 413, 415, 503, media={NPY: "brdf as a .npy file"}),
     openapi_extra=body(Parameters),
 )
 def model_lobe(request: Request, spec: Spec, query: Annotated[LobeOptions, InQuery()], content: Content) -> Response:
@@ -192,17 +174,15 @@ class WavelengthQuery(Query):
 @models.post(
     "/v1/models/{model}/albedo",
     tags=["models"],
-    responses=answers(ModelAlbedo, 404, 413, 503),
+    responses=answers(ModelAlbedo, 404, 413, 415, 503),
     openapi_extra=body(Parameters),
 )
 def model_albedo(spec: Spec, query: Annotated[WavelengthQuery, InQuery()], content: Content) -> Response:
     """Return the directional and the hemispherical albedo [1] of a model, to a thousandth."""
     surface, about = _surface(spec, from_json(Parameters, content))
-    at = (
-        surface.wavelength_nm
-        if surface.wavelength_nm is None or not query.wavelength_nm
-        else np.array(query.wavelength_nm)
-    )
+    at = surface.wavelength_nm
+    if at is not None and query.wavelength_nm:
+        at = np.array(query.wavelength_nm)
     with refused():
         return Document(about | reflected_by(surface.source, at).document(at), NO_STORE)
 
@@ -210,7 +190,7 @@ def model_albedo(spec: Spec, query: Annotated[WavelengthQuery, InQuery()], conte
 @models.post(
     "/v1/models/{model}/sphere",
     tags=["models"],
-    responses=answers(None, 404, 413, 503, media=SPHERE),
+    responses=answers(None, 404, 413, 415, 503, media=SPHERE),
     openapi_extra=body(Parameters),
 )
 def model_sphere(spec: Spec, query: Annotated[SphereQuery, InQuery()], content: Content) -> Response:
@@ -224,14 +204,14 @@ def family_list(request: Request) -> Response:
     """Return the families of the store: materials of one model between whose parameters a lookup may lie."""
     store = shelf_of(request).store
     contents = (store.family_content(name) for name in store.families())
-    shown = ({key: content[key] for key in Family.model_fields} for content in contents)
+    shown = ({key: content[key] for key in FamilyLine.model_fields} for content in contents)
     return Document({"families": list(shown)})
 
 
 @models.post(
     "/v1/families/{family}/lookup",
     tags=["models"],
-    responses=answers(FamilyLookup, 404, 413, 503, media=NPY_ANSWER),
+    responses=answers(FamilyLookup, 404, 413, 415, 503, media=NPY_ANSWER),
     openapi_extra=body(PointsOfFamily),
 )
 def family_lookup(

@@ -23,9 +23,8 @@ from starlette.types import Receive, Scope, Send
 from brdfdb import __version__
 from brdfdb.materials.model_document import ModelDocument
 from brdfdb.store.catalogue import Line
+from brdfdb.store.family import FamilyLine
 from brdfdb.store.material_document import MaterialDocument
-from brdfdb.tables.albedo import AlbedoDocument
-from brdfdb.tables.values_document import Evaluated, View
 
 if TYPE_CHECKING:
     from brdfdb.tables.table import Table
@@ -89,71 +88,10 @@ class Models(BaseModel):
     models: list[Model]
 
 
-class Family(BaseModel):
-    """A family of materials."""
-
-    name: str
-    title: str
-    model: str
-    axes: dict[str, list[float]] = Field(description="values of the swept parameters, as recipes write them")
-    members: list[str] = Field(description="names of the materials; the last axis runs fastest")
-
-
 class Families(BaseModel):
     """All families of the store."""
 
-    families: list[Family]
-
-
-class Lookup(Evaluated):
-    """Values of a material."""
-
-    material: str
-    revision: str
-
-
-class Lookups(BaseModel):
-    """Values of several materials."""
-
-    materials: list[Lookup]
-
-
-class Lobe(Lookup, View):
-    """f_r of a material for one light over viewers, or over half and difference angles."""
-
-
-class Albedo(AlbedoDocument):
-    """Directional albedo of a table."""
-
-    material: str
-    revision: str
-
-
-class OfModel(BaseModel):
-    """The model, and all of its parameters."""
-
-    model: str
-    model_version: int
-    parameters: dict[str, Any]
-
-
-class ModelLookup(Evaluated, OfModel):
-    """Values of a model."""
-
-
-class ModelLobe(Evaluated, View, OfModel):
-    """f_r of a model for one light."""
-
-
-class ModelAlbedo(AlbedoDocument, OfModel):
-    """Directional albedo of a model."""
-
-
-class FamilyLookup(Evaluated):
-    """Values of a family."""
-
-    family: str
-    parameters: dict[str, float]
+    families: list[FamilyLine]
 
 
 class _Audited:

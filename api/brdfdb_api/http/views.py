@@ -17,12 +17,14 @@ from starlette.responses import Response
 from brdfdb import __version__
 from brdfdb.errors import CannotHoldError, ParameterError
 from brdfdb.formats import EXPORTERS, packed
+from brdfdb.scenes import lit_sphere
 from brdfdb.store.archive import ZIP
+from brdfdb.store.shelf import Shelf
 from brdfdb.store.summary_words import NOT_AUDITED
 from brdfdb.tables.evaluation import Surface
 from brdfdb.tables.lobe_views import MOST_POINTS, view_directions
 from brdfdb.tables.points import Points, listed
-from brdfdb.tables.values_document import plain, values_document
+from brdfdb.tables.values_document import Albedo, Lobe, plain, values_document
 from brdfdb_api.http.addresses import (
     EXPORT_OPTIONS,
     Revision,
@@ -38,24 +40,23 @@ from brdfdb_api.http.lookups import checked_size, evaluate, refused, surface_in,
 from brdfdb_api.http.queries import Light, LobeQuery, Options, Query, parsed
 from brdfdb_api.http.responses import (
     NPY,
-    Albedo,
     Audit,
     Document,
-    Lobe,
     cache_headers,
     json_bytes,
     npy_bytes,
     tag_of,
 )
-from brdfdb_api.http.routes import EXPORT_WAIT_S
 
 if TYPE_CHECKING:
     from brdfdb.tables.table import Table
-    from brdfdb_api.serving.shelf import Shelf
 
-_ALBEDOS: WeakKeyDictionary[Table, bytes] = WeakKeyDictionary()  # kept as long as the table
+# Kept as long as the table: its albedo, and the last thumbnail with its size
+_ALBEDOS: WeakKeyDictionary[Table, bytes] = WeakKeyDictionary()
+_PICTURES: WeakKeyDictionary[Table, tuple[int, bytes]] = WeakKeyDictionary()
 
 SPHERE = {"image/png": "sRGB with transparent corners", NPY: "linear sRGB and coverage (size, size, 4), not clipped"}
+EXPORTS_AT_ONCE, EXPORT_WAIT_S = 2, 10  # files of other formats that are made at a time, and the wait for a turn [s]
 THUMBNAIL, MOST = 96, 256  # pixels across a thumbnail: default and largest number
 
 views = addresses()
@@ -218,11 +219,11 @@ def sphere(
 
 def sphere_answer(surface: Any, query: SphereQuery, headers: dict[str, str]) -> Response:
     """Return the picture of a material or a table."""
-    from brdfdb.scenes.lit_sphere import DRAFT, linear_sphere, sphere_png
-
     if query.format == "png":
-        return Response(sphere_png(surface, query.size, DRAFT), media_type="image/png", headers=headers)
-    linear = linear_sphere(surface, query.size, detail=DRAFT).astype(np.float32)
+        return Response(
+            lit_sphere.sphere_png(surface, query.size, lit_sphere.DRAFT), media_type="image/png", headers=headers
+        )
+    linear = lit_sphere.linear_sphere(surface, query.size, detail=lit_sphere.DRAFT).astype(np.float32)
     return Response(npy_bytes(linear), media_type=NPY, headers=headers)
 
 
@@ -230,8 +231,11 @@ def sphere_answer(surface: Any, query: SphereQuery, headers: dict[str, str]) -> 
 def thumbnail(
     request: Request, name: str, query: Annotated[ThumbnailQuery, InQuery()], revision: Revision = None
 ) -> Response:
-    """Return a small picture of the table for lists; those asked for last are kept in memory."""
-    shelf = shelf_of(request)
-    table = shelf.table(name, revision)
+    """Return a small picture of the table for lists; the last one of a table is kept with it."""
+    table = shelf_of(request).table(name, revision)
     headers = cache_headers(tag_of(table, query.size), "png")
-    return Response(shelf.picture(table, query.size), media_type="image/png", headers=headers)
+    size, picture = _PICTURES.get(table, (0, b""))
+    if size != query.size:
+        picture = lit_sphere.sphere_png(table, query.size, lit_sphere.DRAFT)
+        _PICTURES[table] = query.size, picture
+    return Response(picture, media_type="image/png", headers=headers)

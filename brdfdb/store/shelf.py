@@ -1,53 +1,55 @@
-"""The tables that are served: a store that may change or vanish, the lines of lists, verdicts, and pictures."""
+"""A store that may change or vanish while it is read: its tables, the lines of lists, and the verdicts of its audit."""
 
 from __future__ import annotations
 
 import contextlib
-import threading
-from collections import OrderedDict
 from collections.abc import Iterator
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from brdfdb.errors import StoreError, UnknownMaterialError
 from brdfdb.store.catalogue import line_of
 from brdfdb.store.last_audit import AuditFile, Verdict
 from brdfdb.store.manifest import check_manifest
-from brdfdb.store.reader import Store
-from brdfdb_api.serving.settings import Settings
+from brdfdb.store.reader import CACHE_BYTES, Store
 
 if TYPE_CHECKING:
     from brdfdb.tables.table import Table
 
-PICTURES = 256  # thumbnails that are kept, of 60 kB at most
-
 
 class Shelf:
-    """The materials that an application serves.
+    """The materials of a store, as a program shows them that runs while the store changes.
 
     Parameters
     ----------
-    settings : Settings
-        Where the store is.
+    root, cache_bytes, snapshot
+        As of `Store`. It is opened when it is first needed, so that there may be none yet.
+    audit_file : Path
+        What ``brdfdb audit`` wrote as JSON; it may be missing.
     store : Store, optional
-        An open one. By default it is opened when it is first needed, so that there may be none yet.
+        An open one in place of `root`.
     """
 
-    def __init__(self, settings: Settings, store: Store | None = None) -> None:
-        self._settings = settings
-        self._root = settings.store.absolute()  # resolved now: the working directory may change
-        self._store = store
+    def __init__(
+        self,
+        root: Path,
+        audit_file: Path,
+        cache_bytes: int = CACHE_BYTES,
+        snapshot: str | None = None,
+        store: Store | None = None,
+    ) -> None:
+        self._root = root.absolute()  # resolved now: the working directory may change
+        self._cache_bytes, self._snapshot, self._store = cache_bytes, snapshot, store
         self._seen: set[str] = set()
         self._summaries: dict[str, tuple[str, dict[str, Any]]] = {}
-        self._pictures: OrderedDict[tuple[str, int], bytes] = OrderedDict()
-        self._audit = AuditFile(settings.audit_file)
-        self._lock = threading.Lock()
+        self._audit = AuditFile(audit_file)
         self.warming = False  # kernels are being loaded, or compiled for half a minute
 
     @property
     def store(self) -> Store:
         """Open store; StoreError if there is none."""
         if self._store is None:
-            self._store = Store(self._root, self._settings.cache_bytes, snapshot=self._settings.snapshot)
+            self._store = Store(self._root, self._cache_bytes, snapshot=self._snapshot)
         return self._store
 
     def held(self, name: str) -> Table | None:
@@ -108,19 +110,6 @@ class Shelf:
         verdict = self.verdict(name)
         audited = verdict.finding.model_dump() if verdict and verdict.current else {}
         return {**known[1], **{key: audited.get(key) for key in ("verdict", "as_published", "conserves_energy")}}
-
-    def picture(self, table: Table, size: int) -> bytes:
-        """Return the picture of a table, `size` pixels across, as a PNG file; those used last are kept."""
-        from brdfdb.scenes.lit_sphere import DRAFT, sphere_png
-
-        key = table.digest, size
-        picture = self._pictures.get(key) or sphere_png(table, size, DRAFT)
-        with self._lock:
-            self._pictures[key] = picture
-            self._pictures.move_to_end(key)
-            while len(self._pictures) > PICTURES:
-                self._pictures.popitem(last=False)
-        return picture
 
     def warm(self) -> None:
         """Load the kernels of lookups."""
