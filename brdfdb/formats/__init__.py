@@ -41,7 +41,8 @@ __all__ = [
     "parsed_options",
     "read",
     "samples",
-    "schema_of",
+    "served_options",
+    "served_schemas",
     "write",
 ]
 
@@ -108,6 +109,18 @@ def write(
     exporter = EXPORTERS[file_format]
     parsed = parsed_options(exporter, {name: _text(value) for name, value in options.items()})
     return exporter.write(table, Path(path), verdict=verdict, **parsed)
+
+
+def served_options(file_format: str) -> dict[str, Option]:
+    """Return the options of a format by name, with the ranges that a service allows."""
+    return {name: option.served for name, option in options_of(EXPORTERS[file_format]).items()}
+
+
+def served_schemas() -> dict[str, tuple[dict[str, Any], str]]:
+    """Return the JSON Schema and the help of each option of any format by name, as a service allows it."""
+    options = {file_format: served_options(file_format) for file_format in EXPORTERS}
+    names = dict.fromkeys(name for known in options.values() for name in known)
+    return {name: schema_of({key: known[name] for key, known in options.items() if name in known}) for name in names}
 
 
 def packed(table: Table, file_format: str, *, verdict: str, **options: Any) -> tuple[str, str, bytes]:

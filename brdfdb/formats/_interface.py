@@ -31,6 +31,8 @@ class Option:
         Range of a number, both ends included.
     choices : tuple of str
         Values of a text.
+    most_served : float
+        Largest number for which a service makes a file: larger ones take gigabytes or minutes.
     """
 
     name: str
@@ -39,6 +41,12 @@ class Option:
     low: float = -math.inf
     high: float = math.inf
     choices: tuple[str, ...] = ()
+    most_served: float = math.inf
+
+    @property
+    def served(self) -> Option:
+        """The option with the range that a service allows."""
+        return replace(self, high=min(self.high, self.most_served))
 
     @property
     def allowed(self) -> str:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import functools
 from collections.abc import Mapping
 from dataclasses import asdict
-from typing import Any
+from typing import Annotated, Any
 
-from pydantic import BaseModel, Field
+from pydantic import BaseModel, ConfigDict, Field, WithJsonSchema
 
 from brdfdb.errors import MaterialError, ParameterError
 from brdfdb.materials.material import Material
@@ -70,20 +70,32 @@ def document_of(spec: ModelSpec) -> dict[str, Any]:
     }
 
 
-def material_of(spec: ModelSpec, parameters: Mapping[str, Any], refractive_index: str | None = None) -> Material:
-    """Return a material without a name at parameters as recipes write them; files are not read.
+class Parameters(BaseModel):
+    """A material as recipes define it: angles in degrees under names in _deg."""
 
-    Raises
-    ------
-    ParameterError
-        If they describe no material.
-    """
-    for name, value in parameters.items():
-        if isinstance(value, Mapping) and "csv" in value:
-            raise ParameterError(name, "files are not read over HTTP; give wavelengths_nm and values", value)
-    fields = {"title": "of a request", "model": spec.name, "source": "a request", "parameters": parameters}
-    index = {} if refractive_index is None else {"refractive_index": refractive_index}
-    try:
-        return Material.from_table("request", fields | index)
-    except MaterialError as error:
-        raise ParameterError(error.parameter, error.sentence, error.value, error.allowed) from None
+    model_config = ConfigDict(extra="forbid", json_schema_extra={"example": {"parameters": {"rho": 0.5}}})
+
+    parameters: Annotated[
+        dict[str, Any],
+        WithJsonSchema(
+            {
+                "type": "object",
+                "additionalProperties": {"anyOf": [{"type": "number"}, {"type": "boolean"}, {"type": "object"}]},
+            }
+        ),
+    ] = Field(description="by name, as recipes write them; a reflectance may be a spectrum")
+    refractive_index: str | None = Field(
+        default=None, description="of a spectral model: SHELF/BOOK/PAGE, or constant/N/K"
+    )
+
+    def material(self, spec: ModelSpec) -> Material:
+        """Return the material, without a name; ParameterError if it is none. Files are not read."""
+        for name, value in self.parameters.items():
+            if isinstance(value, Mapping) and "csv" in value:
+                raise ParameterError(name, "files are not read over HTTP; give wavelengths_nm and values", value)
+        fields = {"title": "of a request", "model": spec.name, "source": "a request", "parameters": self.parameters}
+        index = {} if self.refractive_index is None else {"refractive_index": self.refractive_index}
+        try:
+            return Material.from_table("request", fields | index)
+        except MaterialError as error:
+            raise ParameterError(error.parameter, error.sentence, error.value, error.allowed) from None

@@ -40,6 +40,11 @@ class Points(NamedTuple):
     shape: tuple[int, ...]
     wavelength_nm: float | NDArray[np.float64] | None
 
+    @classmethod
+    def of(cls, angles: Angles, wavelength_nm: float | NDArray[np.float64] | None) -> Points:
+        """Return points at angles [rad]."""
+        return cls(angles, np.broadcast_shapes(*(np.shape(angle) for angle in angles)), wavelength_nm)
+
     @property
     def count(self) -> int:  # type: ignore[override]
         """Return the number of points."""
@@ -143,8 +148,7 @@ class PointsBody(BaseModel):
     @property
     def points(self) -> Points:
         """The points."""
-        shape = np.broadcast_shapes(*(angle.shape for angle in self.angles))
-        return Points(self.angles, shape, self.wavelength_nm)
+        return Points.of(self.angles, self.wavelength_nm)
 
 
 def fields_of_npy(body: bytes) -> dict[str, Any]:

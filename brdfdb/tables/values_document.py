@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, Literal
 
 import numpy as np
@@ -114,6 +115,20 @@ def values_document(values: Values) -> dict[str, Any]:
         "extrapolated": plain(surface.source.extrapolated(*points.angles)) if known else None,
         "specular_reflectance": plain(values.specular_reflectance),
     }
+
+
+def lobe_document(
+    values: Values, axes_deg: Mapping[str, Any], view: ViewName, theta_i_deg: float, phi_i_deg: float
+) -> dict[str, Any]:
+    """Return the fields of `View` and `Evaluated` of a lobe; of half-difference there is no one light."""
+    surface, no_light = values.surface, view == "half-difference"
+    document = values_document(values)
+    if surface.kind == "table" and surface.source.metadata.measured is not None:
+        document["extrapolated"] = plain(surface.source.extrapolated(*values.points.angles))
+    if no_light:
+        document["specular_reflectance"] = None
+    theta_i = None if no_light else theta_i_deg
+    return {"view": view, "theta_i": theta_i, "phi_i": phi_i_deg, "axes_deg": axes_deg, **document}
 
 
 def plain(array: Any) -> Any:

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import functools
 import inspect
-import math
 from collections.abc import Callable, Coroutine, Mapping
-from dataclasses import replace
 from typing import Annotated, Any, TypeVar
 
 from fastapi import APIRouter, Depends
@@ -16,7 +14,6 @@ from pydantic.json_schema import JsonSchemaMode, models_json_schema
 from starlette.requests import Request
 from starlette.responses import Response
 
-from brdfdb.formats import EXPORTERS, Option, options_of, schema_of
 from brdfdb.store.shelf import Shelf
 from brdfdb_api.http.errors import PROBLEM_JSON, RequestError
 from brdfdb_api.http.queries import names_of, parsed, shortened
@@ -47,14 +44,6 @@ _HEADERS = {
     REVISION: "revision of the values",
     "Content-Disposition": "name of the file",
     "Retry-After": "seconds after which the same request may succeed",
-}
-# Sizes that the service makes a file of: larger ones take gigabytes or minutes, and are for `brdfdb export`
-_SERVED = {
-    "eradiate": {"nodes": 129.0},
-    "png": {"size": 512.0},
-    "radiance": {"cells": 600_000.0},
-    "rgl": {"megabytes": 64.0},
-    **{file_format: {"size": 16.0} for file_format in ("astm", "fred", "ssdd", "zemax")},
 }
 
 
@@ -168,22 +157,3 @@ def body(model: type[BaseModel], *, npy: bool = False) -> dict[str, Any]:
         content[NPY] = {"schema": {"type": "string", "format": "binary", "description": NPY_BODY}}
     words = f"{model.__doc__} {NPY_BODY if npy else ''}".strip()
     return {"requestBody": {"required": True, "description": words, "content": content}}
-
-
-def served_options(file_format: str) -> dict[str, Option]:
-    """Return the options of a format by name, with the ranges that the service allows."""
-    highest = _SERVED.get(file_format, {})
-    return {
-        name: replace(option, high=min(option.high, highest.get(name, math.inf)))
-        for name, option in options_of(EXPORTERS[file_format]).items()
-    }
-
-
-def _option(name: str) -> dict[str, Any]:
-    """Return the parameter of an option of one or more formats."""
-    schema, text = schema_of({key: options[name] for key in EXPORTERS if name in (options := served_options(key))})
-    return {"name": name, "in": "query", "required": False, "description": text, "schema": schema}
-
-
-# Of all formats: an option that a format does not have is refused
-EXPORT_OPTIONS = [_option(name) for name in dict.fromkeys(name for key in EXPORTERS for name in served_options(key))]

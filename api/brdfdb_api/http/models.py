@@ -7,13 +7,12 @@ from typing import Annotated, Any
 import numpy as np
 from fastapi import Depends
 from fastapi import Query as InQuery
-from pydantic import BaseModel, ConfigDict, Field, WithJsonSchema
+from pydantic import ConfigDict, Field
 from starlette.requests import Request
 from starlette.responses import Response
 
 from brdfdb.errors import UnknownModelError
-from brdfdb.materials import Material
-from brdfdb.materials.model_document import document_of, material_of
+from brdfdb.materials.model_document import Parameters, document_of
 from brdfdb.materials.spectrum import Spectrum
 from brdfdb.models import MODELS
 from brdfdb.parameters import ModelSpec
@@ -39,25 +38,6 @@ from brdfdb_api.http.views import SPHERE, SphereQuery, lobe_answer, sphere_answe
 
 models = addresses()
 NO_STORE = {"Cache-Control": "no-store"}
-
-
-class Parameters(BaseModel):
-    """A material as recipes define it: angles in degrees under names in _deg."""
-
-    model_config = ConfigDict(extra="forbid", json_schema_extra={"example": {"parameters": {"rho": 0.5}}})
-
-    parameters: Annotated[
-        dict[str, Any],
-        WithJsonSchema(
-            {
-                "type": "object",
-                "additionalProperties": {"anyOf": [{"type": "number"}, {"type": "boolean"}, {"type": "object"}]},
-            }
-        ),
-    ] = Field(description="by name, as recipes write them; a reflectance may be a spectrum")
-    refractive_index: str | None = Field(
-        default=None, description="of a spectral model: SHELF/BOOK/PAGE, or constant/N/K"
-    )
 
 
 class PointsAt(PointsBody, Parameters):
@@ -109,15 +89,10 @@ def _with_address(spec: ModelSpec) -> dict[str, Any]:
     return {**document_of(spec), "href": f"/v1/models/{spec.name}"}
 
 
-def _material(spec: ModelSpec, given: Parameters) -> Material:
-    """Return the material of a request; RequestError (422) if it is none."""
-    with refused():
-        return material_of(spec, given.parameters, given.refractive_index)
-
-
 def _surface(spec: ModelSpec, given: Parameters) -> tuple[Surface, dict[str, Any]]:
     """Return the material of a request, by default at the wavelengths of pictures, and what answers say of it."""
-    material = _material(spec, given)
+    with refused():
+        material = given.material(spec)
     written = {
         name: value.model_dump(mode="json") if isinstance(value, Spectrum) else value
         for name, value in material.file_parameters().items()
@@ -196,7 +171,7 @@ def model_albedo(spec: Spec, query: Annotated[WavelengthQuery, InQuery()], conte
 def model_sphere(spec: Spec, query: Annotated[SphereQuery, InQuery()], content: Content) -> Response:
     """Return the picture of a sphere of a model in the light of a studio, drawn as a draft."""
     with refused():
-        return sphere_answer(_material(spec, from_json(Parameters, content)), query, NO_STORE)
+        return sphere_answer(from_json(Parameters, content).material(spec), query, NO_STORE)
 
 
 @models.get("/v1/families", tags=["models"], responses=answers(Families, 503))

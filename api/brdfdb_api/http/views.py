@@ -16,7 +16,7 @@ from starlette.responses import Response
 
 from brdfdb import __version__
 from brdfdb.errors import CannotHoldError, ParameterError
-from brdfdb.formats import EXPORTERS, packed
+from brdfdb.formats import EXPORTERS, packed, served_options, served_schemas
 from brdfdb.scenes import lit_sphere
 from brdfdb.store.archive import ZIP
 from brdfdb.store.shelf import Shelf
@@ -24,15 +24,13 @@ from brdfdb.store.summary_words import NOT_AUDITED
 from brdfdb.tables.evaluation import Surface
 from brdfdb.tables.lobe_views import MOST_POINTS, view_directions
 from brdfdb.tables.points import Points, listed
-from brdfdb.tables.values_document import Albedo, Lobe, plain, values_document
+from brdfdb.tables.values_document import Albedo, Lobe, lobe_document
 from brdfdb_api.http.addresses import (
-    EXPORT_OPTIONS,
     Revision,
     accept_of,
     addresses,
     answers,
     both,
-    served_options,
     shelf_of,
 )
 from brdfdb_api.http.errors import RequestError
@@ -58,6 +56,12 @@ _PICTURES: WeakKeyDictionary[Table, tuple[int, bytes]] = WeakKeyDictionary()
 SPHERE = {"image/png": "sRGB with transparent corners", NPY: "linear sRGB and coverage (size, size, 4), not clipped"}
 EXPORTS_AT_ONCE, EXPORT_WAIT_S = 2, 10  # files of other formats that are made at a time, and the wait for a turn [s]
 THUMBNAIL, MOST = 96, 256  # pixels across a thumbnail: default and largest number
+
+# Of all formats: an option that a format does not have is refused
+EXPORT_OPTIONS = [
+    {"name": name, "in": "query", "required": False, "description": text, "schema": schema}
+    for name, (schema, text) in served_schemas().items()
+]
 
 views = addresses()
 
@@ -111,24 +115,13 @@ def lobe_answer(
     """Return the answer with the lobe of a surface; `about` begins the document."""
     kind = options.kind(accept_of(request))
     axes, angles = view_directions(light.view, light.theta_i, light.phi_i)
-    shape = np.broadcast_shapes(*(np.shape(angle) for angle in angles))
-    points = Points(angles, shape, listed(light.wavelength_nm))
+    points = Points.of(angles, listed(light.wavelength_nm))
     # The view fixes the points; the client chooses only the wavelengths.
     checked_size(max(request.app.state.settings.max_points, MOST_POINTS), points, options, surface, kind)
     values = evaluate(points, options, surface)
     if kind == "npy":
         return Response(npy_bytes(values.brdf), media_type=NPY, headers=headers)
-    no_light = light.view == "half-difference"
-    about |= {
-        "view": light.view,
-        "theta_i": None if no_light else light.theta_i,
-        "phi_i": light.phi_i,
-        "axes_deg": axes,
-    }
-    document = about | values_document(values)
-    if surface.kind == "table" and surface.source.metadata.measured is not None:
-        document["extrapolated"] = plain(surface.source.extrapolated(*angles))
-    return Document(document | ({"specular_reflectance": None} if no_light else {}), headers)
+    return Document(about | lobe_document(values, axes, light.view, light.theta_i, light.phi_i), headers)
 
 
 @both(
