@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import contextlib
 import io
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Annotated, Any
 
 import numpy as np
 from fastapi import Query as InQuery
 from starlette.concurrency import run_in_threadpool
-from starlette.datastructures import State
 from starlette.requests import Request
 from starlette.responses import Response
 from starlette.types import Scope
@@ -115,26 +114,6 @@ def checked_size(max_points: int, points: Points, options: Options, surface: Sur
     return values
 
 
-async def answered(
-    state: State, surface: Surface, options: Options, kind: Format, size: int, read: Callable[[], Points], write: Any
-) -> Response:
-    """Read the points of a body of `size` bytes and write their values: in a thread if they are many."""
-
-    def checked() -> tuple[Points, int]:
-        points = read()
-        return points, checked_size(state.settings.max_points, points, options, surface, kind)
-
-    if size > INLINE_BYTES:
-        async with state.large if size > LARGE_BYTES else contextlib.nullcontext():
-            return await run_in_threadpool(lambda: write(checked()[0]))
-    points, values = checked()
-    # a row and a column of angles take few bytes and make many points
-    async with state.large if values > LARGE_VALUES else contextlib.nullcontext():
-        # a thread costs about as long as 1000 values do
-        slow = values > INLINE_VALUES or surface.kind != "table" or options.output != "spectrum"
-        return await run_in_threadpool(write, points) if slow else write(points)
-
-
 def write_answer(
     points: Points, options: Options, surface: Surface, kind: Format, headers: Encoded, about: dict[str, Any]
 ) -> Response:
@@ -222,13 +201,25 @@ async def lookup_points(
         raise RequestError(422, "wavelength_nm: a JSON body holds it, not the query", "wavelength_nm")
     kind = query.kind(accept_of(request), binary=binary)
     table = await _table(shelf_of(request), name, revision)
-    surface, content = surface_in(table, query), await request.body()
+    surface, content, state = surface_in(table, query), await request.body(), request.app.state
     about, headers = {"material": table.name, "revision": table.revision}, lookup_headers(None, table.revision, kind)
-    return await answered(
-        *(request.app.state, surface, query, kind, len(content)),
-        lambda: from_array(content, query.wavelength_nm) if binary else from_json(PointsBody, content).points,
-        lambda points: write_answer(points, query, surface, kind, headers, about),
-    )
+
+    def read() -> tuple[Points, int]:
+        points = from_array(content, query.wavelength_nm) if binary else from_json(PointsBody, content).points
+        return points, checked_size(state.settings.max_points, points, query, surface, kind)
+
+    def write(points: Points) -> Response:
+        return write_answer(points, query, surface, kind, headers, about)
+
+    if len(content) > INLINE_BYTES:
+        async with state.large if len(content) > LARGE_BYTES else contextlib.nullcontext():
+            return await run_in_threadpool(lambda: write(read()[0]))
+    points, values = read()
+    # a row and a column of angles take few bytes and make many points
+    async with state.large if values > LARGE_VALUES else contextlib.nullcontext():
+        # a thread costs about as long as 1000 values do
+        slow = values > INLINE_VALUES or surface.kind != "table" or query.output != "spectrum"
+        return await run_in_threadpool(write, points) if slow else write(points)
 
 
 @lookups.post(
