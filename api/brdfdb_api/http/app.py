@@ -54,7 +54,9 @@ class Application(FastAPI):
         await super().__call__(scope, receive, send)
 
     def openapi(self) -> dict[str, Any]:
-        return {**super().openapi(), "components": {"schemas": schemas()}}
+        if self.openapi_schema is None:
+            super().openapi()["components"] = {"schemas": schemas()}  # FastAPI keeps the document
+        return super().openapi()
 
 
 def create_app(settings: Settings | None = None, store: Store | None = None) -> FastAPI:
