@@ -52,6 +52,7 @@ def _compiled(function: F, *, forceinline: bool) -> F:
     except RuntimeError:  # neither beside the sources nor at home can anything be written: nothing is stored
         return cast(F, numba.njit(**options)(function))
     _stamp(compiled._cache)
+    _load_alone(compiled._cache)
     return cast(F, compiled)
 
 
@@ -74,6 +75,20 @@ def _stamp(cache: Any) -> None:
             save(*arguments)
 
     cache.save_overload = try_to_save
+
+
+def _load_alone(cache: Any) -> None:
+    """Load stored code without numba's 200 modules of Python functions that it can compile: 0.3 s a process.
+
+    Stored code needs the runtime alone. numba loads the modules itself before it compiles anything.
+    """
+    from numba.core.runtime.nrt import rtsys
+
+    def load_overload(signature: Any, context: Any) -> Any:
+        rtsys.initialize(context)
+        return cache._load_overload(signature, context)
+
+    cache.load_overload = load_overload
 
 
 def is_cached(kernel: Any) -> bool:

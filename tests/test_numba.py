@@ -139,6 +139,19 @@ print(json.dumps([len(at_import.buffer), len(at_call.buffer)]))
     assert at_call > 0
 
 
+def test_stored_code_loads_without_what_numba_needs_to_compile(tmp_path: Path) -> None:
+    program = """
+import json, sys
+from brdfdb.fresnel import reflectance
+
+print(json.dumps([reflectance(0.5, 1.3, 2.0), "numba.np.linalg" in sys.modules]))
+"""
+    first, compiles = run(program, NUMBA_CACHE_DIR=str(tmp_path))
+    again, loads = run(program, NUMBA_CACHE_DIR=str(tmp_path))
+    assert (compiles, loads) == (True, False)
+    assert first == again
+
+
 def square(x: float, y: float) -> float:
     return x * x / y
 
