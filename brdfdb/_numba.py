@@ -80,12 +80,16 @@ def _stamp(cache: Any) -> None:
 def _load_alone(cache: Any) -> None:
     """Load stored code without numba's 200 modules of Python functions that it can compile: 0.3 s a process.
 
-    Stored code needs the runtime alone. numba loads the modules itself before it compiles anything.
+    Stored code needs the runtime, and the loop of a ufunc around it constants. numba loads the modules itself before
+    it compiles anything else.
     """
+    from numba.core.imputils import builtin_registry
     from numba.core.runtime.nrt import rtsys
+    from numba.cpython import numbers  # noqa: F401, adds constants to the registry
 
     def load_overload(signature: Any, context: Any) -> Any:
         rtsys.initialize(context)
+        context.install_registry(builtin_registry)
         return cache._load_overload(signature, context)
 
     cache.load_overload = load_overload
@@ -129,6 +133,7 @@ def _ufunc(function: Callable[..., Any], arity: int) -> Callable[..., Any]:
     try:
         ufunc = vectorize(cache=True)(function)
         _stamp(ufunc._dispatcher.cache)
+        _load_alone(ufunc._dispatcher.cache)
     except RuntimeError:  # as in `_compiled`
         ufunc = vectorize()(function)
     ufunc.add(numba.float64(*[numba.float64] * arity))

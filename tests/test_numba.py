@@ -142,9 +142,10 @@ print(json.dumps([len(at_import.buffer), len(at_call.buffer)]))
 def test_stored_code_loads_without_what_numba_needs_to_compile(tmp_path: Path) -> None:
     program = """
 import json, sys
-from brdfdb.fresnel import reflectance
+from brdfdb.fresnel import reflectance, unpolarised
 
-print(json.dumps([reflectance(0.5, 1.3, 2.0), "numba.np.linalg" in sys.modules]))
+values = [reflectance(0.5, 1.3, 2.0), *unpolarised([0.5, 1.0], 1.3, 2.0)]
+print(json.dumps([values, "numba.np.linalg" in sys.modules]))
 """
     first, compiles = run(program, NUMBA_CACHE_DIR=str(tmp_path))
     again, loads = run(program, NUMBA_CACHE_DIR=str(tmp_path))
