@@ -342,7 +342,7 @@ def _normal(how: Interpolation, problem: _Problem, phi: Floats) -> tuple[Floats,
 
 
 def _solved(matrix: Floats, right: Floats, smooth: Floats) -> Floats:
-    """Return the weights of radial functions; their values at all centres make them smooth where samples do not tell."""
+    """Return the weights of radial functions; values at all centres make them smooth where samples do not tell."""
     from scipy.linalg import cho_factor, cho_solve
 
     whole = matrix + smooth
