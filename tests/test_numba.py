@@ -153,6 +153,26 @@ print(json.dumps([values, "numba.np.linalg" in sys.modules]))
     assert first == again
 
 
+def test_stored_lookups_load_without_what_numba_needs_to_compile() -> None:
+    program = """
+import json, sys
+import numpy as np
+from brdfdb.materials import presets
+from brdfdb.tables.grids import Grid
+from brdfdb.tables.layout import Layout
+from brdfdb.tables.table import Table
+
+quarter = np.linspace(0.0, 85.0, 4)
+grid = Grid({"theta_i": quarter, "theta_r": quarter, "delta_phi": np.linspace(0.0, 180.0, 4)})
+table = Table.of(Layout(presets()["clay-vase"], grid), np.zeros((4, 4, 4), dtype=np.float32))
+up = np.array([[0.0, 0.0, 1.0]])
+table.lookup_vectors(up, up)
+print(json.dumps("numba.np.linalg" in sys.modules))
+"""
+    run(program)  # compiles what is not stored yet
+    assert run(program) is False
+
+
 def square(x: float, y: float) -> float:
     return x * x / y
 
