@@ -112,10 +112,7 @@ def run(
         made = import_tables.make([target for target, _ in result.statements], tables)
         result.refused += made.refused
         result.report = made.report
-        if made.report and tables.store:
-            from brdfdb_pipelines import import_summary  # with the audit, which takes a second to load
-
-            audited = import_summary.lines_of(tables.store, made.report)
+        audited = _lines(tables.store, made.report) if made.report and tables.store else []
     if json:
         print(_json.dumps(_document(result, audited), indent=1, ensure_ascii=False, allow_nan=False))
     elif result.report is not None and tables is not None:
@@ -123,6 +120,12 @@ def run(
 
         import_summary.show(audited, result.report, tables.tolerance)
     return result
+
+
+def _lines(store: Path, report: AuditReport) -> list[Line]:
+    from brdfdb_pipelines.import_summary import lines_of  # with the audit, which takes half a second to load
+
+    return lines_of(store, report)
 
 
 def _document(result: Imported, audited: Sequence[Line]) -> dict[str, Any]:
