@@ -83,11 +83,10 @@ def run(
     _check_path(report_path)
     tasks: dict[str, Task] = {name: partial(_audited, root, name, name in allow) for name in materials}
     atlas, gallery = _figures() if figures else ({}, {})
-    drawn = [*atlas, *gallery]
-    tasks |= {f"figure {key}": partial(_drawn, key) for key in drawn}
+    tasks |= {f"figure {key}": partial(_drawn, key) for key in (*atlas, *gallery)}
     done: dict[str, Any] = {}
     with terminal.progress() as bar:
-        task = bar.add_task("auditing tables, computing figures" if drawn else "auditing tables", total=len(tasks))
+        task = bar.add_task("auditing tables, computing figures" if figures else "auditing tables", total=len(tasks))
         for name, outcome in _outcomes(tasks, jobs):
             done[name] = outcome
             bar.advance(task)
