@@ -29,7 +29,7 @@ LOOKUP_ROUTES = (LOOKUP_ROUTE, "/v1/materials/{name}/revisions/{revision}/lookup
 
 GONE = 499  # status of a request whose client went away, as nginx counts it
 SMALL = 64 * 2**10  # size up to which bodies and answers are not counted [byte]
-BODIES = 1.5  # bodies of the largest size that may be in memory together
+BODIES = 1  # bodies of the largest size that may be in memory together
 STALLED_S = 10.0  # longest time without a piece of a body [s]
 RATE = 100_000  # lowest speed at which a body may arrive after the first `STALLED_S` [byte/s]
 PIECE = 256 * 2**10  # size of the pieces of larger answers [byte]
