@@ -150,8 +150,8 @@ async def looked_up(
         return (surface, points, about), checked_size(state.settings.max_points, points, options, surface, kind)
 
     inline = size <= INLINE_BYTES
-    asked, values = checked_too() if inline else await in_thread(state, checked_too, large=size > LARGE_BYTES)
-    surface, points, about = asked
+    parts, values = checked_too() if inline else await in_thread(state, checked_too, large=size > LARGE_BYTES)
+    surface, points, about = parts
 
     def write() -> Response:
         with contextlib.nullcontext() if surface.kind == "table" else refused():
