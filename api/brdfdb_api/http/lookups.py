@@ -140,17 +140,23 @@ def checked_size(max_points: int, points: Points, options: Options, surface: Sur
 
 
 async def looked_up(
-    request: Request, options: Options, kind: Format, headers: Encoded, size: int, read: Callable[[], Asked]
+    request: Request,
+    options: Options,
+    kind: Format,
+    headers: Encoded,
+    size: int,
+    read: Callable[[], Asked],
+    *,
+    quick: bool = False,
 ) -> Response:
-    """Answer a body of `size` bytes: read it and look its points up, in a thread where that takes longer than one."""
+    """Answer a body of `size` bytes: read it, in a thread unless it is `quick`, and look its points up."""
     state = request.app.state
 
     def checked_too() -> tuple[Asked, int]:
         surface, points, about = read()
         return (surface, points, about), checked_size(state.settings.max_points, points, options, surface, kind)
 
-    inline = size <= INLINE_BYTES
-    parts, values = checked_too() if inline else await in_thread(state, checked_too, large=size > LARGE_BYTES)
+    parts, values = checked_too() if quick else await in_thread(state, checked_too, large=size > LARGE_BYTES)
     surface, points, about = parts
 
     def write() -> Response:
@@ -257,7 +263,8 @@ async def lookup_points(
         points = from_array(content, query.wavelength_nm) if binary else from_json(PointsBody, content).points
         return surface, points, about
 
-    return await looked_up(request, query, kind, headers, len(content), read)
+    quick = len(content) <= INLINE_BYTES
+    return await looked_up(request, query, kind, headers, len(content), read, quick=quick)
 
 
 @lookups.post(
