@@ -166,7 +166,7 @@ def test_large_bodies_that_are_withheld_keep_out_large_ones_alone_and_not_for_go
     monkeypatch.setattr(middleware, "STALLED_S", 3.0)
     array = npy(np.full((10_000, 4), 30.0))
     large = post(array, f"Content-Type: {NPY}")
-    assert middleware.SMALL < len(array) < LIMIT < middleware.BODIES * LIMIT < 2 * len(array)
+    assert middleware.SMALL < len(array) < middleware.BODIES * LIMIT < 2 * len(array)
     with contextlib.closing(connected(port, large[:-1])):
         refusal = b""
 

@@ -29,7 +29,7 @@ LOOKUP_ROUTES = (LOOKUP_ROUTE, "/v1/materials/{name}/revisions/{revision}/lookup
 
 GONE = 499  # status of a request whose client went away, as nginx counts it
 SMALL = 64 * 2**10  # size up to which bodies and answers are not counted [byte]
-BODIES = 1.5  # bodies of the largest size that may be in memory together
+BODIES = 1  # bodies of the largest size that may be in memory together
 STALLED_S = 10.0  # longest time without a piece of a body [s]
 RATE = 100_000  # lowest speed at which a body may arrive after the first `STALLED_S` [byte/s]
 PIECE = 256 * 2**10  # size of the pieces of larger answers [byte]
@@ -228,16 +228,6 @@ def _in_file(content: bytes) -> IO[bytes]:
     file.write(content)
     file.seek(0)
     return file
-
-
-def points_counted(source: str, count: int) -> None:
-    """Add to the pairs of directions that were looked up in a "table" or "model"."""
-    _points(source).inc(count)
-
-
-@functools.cache
-def _points(source: str) -> Counter:
-    return POINTS.labels(source)
 
 
 @functools.lru_cache(maxsize=4096)
