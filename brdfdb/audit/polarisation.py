@@ -76,9 +76,9 @@ class PolarisationFinding(Finding):
         )
 
     def sentences(self) -> list[Sentence]:
-        """Return a sentence on the smallest eigenvalue and the error of the elements; none without lookups."""
+        """Return a sentence on the smallest eigenvalue and the error of the elements."""
         if not self.lookups:
-            return []
+            return [self.sentence(self.verdict, "the table is unpolarised")]
         allowed = number(-self.eigenvalue_tolerance, 2)
         text = f"smallest eigenvalue {number(self.smallest_eigenvalue, 2)}, of {allowed} allowed"
         if self.smallest_eigenvalue < -self.eigenvalue_tolerance:

@@ -148,15 +148,6 @@ def planned_theta_d(source: Source, wavelength_nm: NDArray[np.float64], toleranc
             )
 
 
-def angles_of_vectors(wi: Floats, wr: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-    """Return theta_i, phi_i, theta_r, phi_r [rad] of unit vectors (..., 3). The azimuth of a pole is 0."""
-    angles = []
-    for w in (np.asarray(wi, np.float64), np.asarray(wr, np.float64)):
-        x, y = w[..., 0] + 0.0, w[..., 1] + 0.0  # -0 is 0
-        angles += [np.arctan2(np.hypot(x, y), w[..., 2]), np.arctan2(y, x)]
-    return angles[0], angles[1], angles[2], angles[3]
-
-
 def checked_facets(arrays: Mapping[str, NDArray[Any]], wavelengths: int) -> Facets | None:
     """Return the polarisation among stored arrays; None without it, ParameterError if the arrays do not fit."""
     if "mueller" not in arrays:

@@ -12,7 +12,15 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from brdfdb._elementary import COS_HORIZON
 from brdfdb.errors import ParameterError
-from brdfdb.geometry import HALF_PI, asked_for, checked_angles, checked_vectors, radians, shape_of_angles
+from brdfdb.geometry import (
+    HALF_PI,
+    asked_for,
+    checked_angles,
+    checked_vectors,
+    radians,
+    shape_of_angles,
+    spherical_angles,
+)
 from brdfdb.materials.source import FourAngles
 from brdfdb.notebook import polar_sketch
 from brdfdb.parameters import Floats
@@ -21,7 +29,7 @@ from brdfdb.tables._interpolation import Axes, prepared
 from brdfdb.tables.grids import Axis, Grid, axes_among, check_wavelengths
 from brdfdb.tables.layout import PLAIN, Interpolation, Layout
 from brdfdb.tables.metadata import TableMetadata
-from brdfdb.tables.polarisation import Facets, angles_of_vectors, checked_facets, facets_of
+from brdfdb.tables.polarisation import Facets, checked_facets, facets_of
 from brdfdb.tables.table_base import BaseTable
 
 # how numbers become f_r, the axes, the numbers, how many a node, how they make up a spectrum, the uniform part
@@ -241,7 +249,8 @@ class Table(BaseTable):
     def mueller_vectors(self, wi: ArrayLike, wr: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:
         """Interpolate the Mueller BRDF [1/sr] for unit vectors (..., 3), as `mueller`. The azimuth of a pole is 0."""
         vectors = checked_vectors(wi, wr)
-        matrix = self.mueller(*angles_of_vectors(vectors.w_i, vectors.w_r), wavelength_nm)
+        angles = (*spherical_angles(vectors.w_i), *spherical_angles(vectors.w_r))
+        matrix = self.mueller(*angles, wavelength_nm)
         return matrix.astype(vectors.dtype)
 
     def mueller_in_plane(self, wi: ArrayLike, wr: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:

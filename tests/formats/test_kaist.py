@@ -15,12 +15,12 @@ from brdfdb import formats
 from brdfdb.errors import CannotHoldError, ParameterError
 from brdfdb.formats import kaist
 from brdfdb.formats._rgl_tensor import read_tensors
-from brdfdb.geometry import unit_vector
+from brdfdb.geometry import spherical_angles, unit_vector
 from brdfdb.materials import Material
 from brdfdb.measurements.samples import Samples
 from brdfdb.tables import stokes
 from brdfdb.tables.planner import plan
-from brdfdb.tables.polarisation import angles_of_vectors, planned_theta_d
+from brdfdb.tables.polarisation import planned_theta_d
 from brdfdb.tables.table import Table, table_from
 from brdfdb.tables.tabulation import tabulate
 from tests.formats.round_trip import round_trip
@@ -82,7 +82,7 @@ def test_matrices_are_those_of_mitsuba(path: Path) -> None:
         interaction.wavelengths = [NM] * 4
         value = surface.eval(mitsuba.BSDFContext(), interaction, mitsuba.Vector3f(*light))
         theirs.append([[np.array(value[i, j])[0] / light[2] for j in range(4)] for i in range(4)])
-    _, phi_i, _, phi_r = angles_of_vectors(wi, wr)
+    phi_i, phi_r = (spherical_angles(w)[1] for w in (wi, wr))
     x_i, x_r = (np.array([np.array(mitsuba.mueller.stokes_basis(mitsuba.Vector3f(*k))) for k in w]) for w in (-wi, wr))
     light, viewer = turned(x_i, phi_i, -wi), turned(x_r, phi_r, wr)
     ours = FLIPPED @ viewer @ plastic().mueller_vectors(wi, wr, NM) @ np.swapaxes(light, -1, -2) @ FLIPPED
