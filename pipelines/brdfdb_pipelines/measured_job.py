@@ -60,7 +60,7 @@ class MeasuredTable(BaseModel):
     columns: dict[str, Texts] = Field(
         default={}, description="headers of the columns of a text, by role, such as theta_i; by default by their names"
     )
-    quantity: Literal["", "f_r", "reflectance_factor", "f_r_cos"] = Field(
+    quantity: Literal["", "f_r", "reflectance_factor", "f_r_cos", "f_r_cos_i"] = Field(
         default="", description="quantity of the values of a text; by default by names and titles"
     )
     angles: Literal["", "deg", "rad"] = Field(
