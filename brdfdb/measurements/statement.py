@@ -309,8 +309,9 @@ def _on_pairs(known: Statement) -> list[str]:
         return ["Reciprocity: no sample is the swap of another."]
     pairs = known.reciprocity
     return [
-        f"Reciprocity: {counted(pairs.pairs, 'pair')} of samples with light and viewer exchanged; median asymmetry "
-        f"{100.0 * pairs.median:.3g} %, largest {100.0 * pairs.largest:.3g} %."
+        f"Reciprocity: {counted(pairs.pairs, 'pair')} of {'nodes' if known.nodes else 'samples'} with light and viewer "
+        f"exchanged; asymmetry |f - f'| / (|f| + |f'|) of these: median {100.0 * pairs.median:.3g} %, largest "
+        f"{100.0 * pairs.largest:.3g} %."
     ]
 
 

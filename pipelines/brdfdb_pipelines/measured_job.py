@@ -33,7 +33,7 @@ from brdfdb_pipelines.recipe_grids import STRICT, RecipeError
 if TYPE_CHECKING:
     from brdfdb.formats._readings import FileTable
 
-MEASURED_VERSION = 7  # of the way from a file to the values of its table
+MEASURED_VERSION = 8  # of the way from a file to the values of its table
 # Keys of a request that are left out where they are empty.
 _ADDED = {"columns", "quantity", "angles", "azimuth", "wavelength_nm", "side"}
 _MARGINS = 3  # tables of data that are made to conserve, each a little darker, until none is above 1
