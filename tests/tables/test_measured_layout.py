@@ -81,6 +81,23 @@ def test_a_narrow_lobe_that_is_not_its_own_mirror_image_is_sampled_as_densely_as
     assert of_table == pytest.approx(albedo, rel=0.01)  # measured 0.002; 7 times as much on nodes 7 degrees apart
 
 
+def test_a_slope_at_the_horizon_makes_no_value_far_above_those_of_the_data() -> None:
+    def f_r(wi: Floats, wr: Floats) -> Floats:
+        half = (wi + wr) / np.linalg.norm(wi + wr, axis=1, keepdims=True)
+        lowest = np.minimum(wi[:, 2], wr[:, 2])
+        steep = 1e-3 * np.exp(9.0 * np.exp(-lowest / 0.01))
+        return np.asarray((steep + 5.0 * np.exp((half[:, 2] ** 2 - 1.0) * 100.0))[:, np.newaxis])
+
+    source = MeasuredSource.of_function(f_r, ("grey",), None, name="x", title="x", provenance="x")
+    table = Table.of(*tabulated(source, None, 0.05))
+    theta, turn = np.meshgrid(radians(np.linspace(60.0, 89.9, 150)), np.linspace(0.0, np.pi, 91), indexing="ij")
+    for light in (85.0, 87.5):
+        viewers = unit_vector(theta.ravel(), turn.ravel())
+        wi = np.broadcast_to(unit_vector(radians(light), 0.0), viewers.shape)
+        # measured 1.9; 28 and 10 where the slope goes on without an end
+        assert table.lookup_vectors(wi, viewers).max() < 3.0 * f_r(wi, viewers).max()
+
+
 def test_half_of_phi_d_is_refused_for_a_source_that_is_not_reciprocal() -> None:
     source = MeasuredSource.of_function(_lopsided, ("grey",), None, name="x", title="x", provenance="x")
     grid = Grid({"theta_h": [0.0, 90.0], "theta_d": [0.0, 90.0], "phi_d": [0.0, 90.0]})
