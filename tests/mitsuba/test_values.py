@@ -1,0 +1,116 @@
+"""Values of the plugins against `brdfdb.models`: random directions, corners of the directions, and all variants."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from brdfdb.geometry import unit_vector
+from brdfdb.models import he_torrance_specular
+from tests.mitsuba.surfaces import SUBJECTS, WAVELENGTH_NM, Array, Subject, directions, evaluated, interaction, variant
+from tests.models.hazard_directions import EXACT, NEAR
+from tests.models.hazards import BY_NAME
+
+PAIRS = 100_000
+# Relative; the largest measured is 1.1e-5, where f_r is 1e-9 /sr. Smaller values are the far tail of a Gaussian, of
+# whose exponent float32 keeps too few digits
+FLOAT32, FLOOR = 2e-5, 1e-9
+# Of Oren-Nayar's fit, which falls to 0 next to the horizon: 1e-7 /sr of the values that are subtracted
+FIT_FLOOR = 5e-3
+
+
+def misses(subject: Subject, value: Array, wi: Array, wr: Array) -> Array:
+    """Relative differences of f_r from the model."""
+    expected = subject.f_r(wi, wr)
+    floor = FIT_FLOOR if subject.plugin == "brdfdb_oren_nayar" else FLOOR
+    return np.asarray(np.abs(value / wr[:, 2] - expected) / np.maximum(expected, floor))
+
+
+@pytest.mark.parametrize("subject", SUBJECTS, ids=str)
+def test_values_are_those_of_the_model(subject: Subject) -> None:
+    mitsuba = variant("llvm_ad_mono")
+    wi, wr = directions(PAIRS)
+    value, density = evaluated(mitsuba, mitsuba.load_dict(subject.document), wi, wr)
+    assert np.max(misses(subject, value, wi, wr)) <= FLOAT32
+    assert np.all(np.isfinite(density))
+
+
+def plugin_of(model: str, parameters: dict[str, float]) -> dict[str, Any]:
+    if model == "he_torrance":
+        return {"type": "brdfdb_he_torrance", **parameters}
+    return {"type": "brdfdb_ward" if model.startswith("ward") else "brdfdb_oren_nayar", "form": model, **parameters}
+
+
+@pytest.mark.parametrize("model", dict.fromkeys(subject.model for subject in SUBJECTS))
+def test_no_value_is_nan_at_the_corners(model: str) -> None:
+    mitsuba = variant("llvm_ad_mono")
+    import drjit
+
+    corners = np.array([*EXACT.values(), *NEAR])
+    wi, wr = unit_vector(corners[:, 0], corners[:, 1]), unit_vector(corners[:, 2], corners[:, 3])
+    wi, wr = (np.concatenate([w, w * (1.0, 1.0, -1.0)]) for w in (wi, wr))  # below the horizon, too
+    subject = BY_NAME[model]
+    for parameters in (*subject.parameters, *subject.slow, *subject.very_slow):
+        if "interreflection" in parameters:
+            parameters = parameters | {"interreflection": bool(parameters["interreflection"])}
+        surface = mitsuba.load_dict(plugin_of(model, parameters))
+        value, density = evaluated(mitsuba, surface, wi, wr)
+        assert np.all(np.isfinite(value))
+        assert np.all(value >= 0.0)
+        assert np.all(np.isfinite(density))
+        assert np.all(value[(wi[:, 2] <= 0.0) | (wr[:, 2] <= 0.0)] == 0.0)
+        drjit.flush_malloc_cache()
+
+
+@pytest.mark.parametrize("name", ["scalar_rgb", "scalar_spectral", "llvm_ad_rgb", "llvm_ad_spectral"])
+def test_each_variant_evaluates_the_same_model(name: str) -> None:
+    mitsuba = variant(name)
+    wi, wr = unit_vector(0.6, 0.4), unit_vector(0.7, 3.4)
+    for subject in (SUBJECTS[0], SUBJECTS[9], SUBJECTS[-1]):
+        place = mitsuba.SurfaceInteraction3f()
+        place.wi = mitsuba.Vector3f(wi.tolist())
+        if name.endswith("spectral"):
+            place.wavelengths = [WAVELENGTH_NM] * 4
+        surface = mitsuba.load_dict(subject.document)
+        viewer = mitsuba.Vector3f(wr.tolist())
+        value, density = surface.eval_pdf(mitsuba.BSDFContext(), place, viewer)
+        channels = np.ravel(value)
+        expected = subject.f_r(np.float32(wi)[np.newaxis], np.float32(wr)[np.newaxis]) * wr[2]
+        np.testing.assert_allclose(channels, np.full(channels.size, expected), rtol=FLOAT32)
+        sample, weight = surface.sample(mitsuba.BSDFContext(), place, 0.7, mitsuba.Point2f(0.3, 0.4))
+        again, at = surface.eval_pdf(mitsuba.BSDFContext(), place, sample.wo)
+        np.testing.assert_allclose(np.ravel(weight) * np.ravel(sample.pdf), np.ravel(again), rtol=1e-4)
+        np.testing.assert_allclose(np.ravel(sample.pdf), np.ravel(at), rtol=1e-4)
+        assert surface.pdf(mitsuba.BSDFContext(), place, viewer) == density
+
+
+def test_channels_of_rgb_have_wavelengths_of_their_own() -> None:
+    mitsuba = variant("llvm_ad_rgb")
+    from brdfdb.mitsuba.he_torrance import WAVELENGTHS_NM
+
+    subject = SUBJECTS[-1]
+    document = {name: value for name, value in subject.document.items() if name != "wavelength_nm"}
+    wi, wr = np.array([[0.6, 0.0, 0.8]], np.float32), np.array([[-0.8, 0.0, 0.6]], np.float32)
+    place = mitsuba.SurfaceInteraction3f()
+    place.wi = mitsuba.Vector3f(wi[0].tolist())
+    value = mitsuba.load_dict(document).eval(mitsuba.BSDFContext(), place, mitsuba.Vector3f(wr[0].tolist()))
+    channels = [subject.model_at(wavelength, wi, wr)[0] * wr[0, 2] for wavelength in WAVELENGTHS_NM]
+    np.testing.assert_allclose(np.ravel(value), channels, rtol=FLOAT32)
+
+
+def test_the_specular_part_is_that_of_the_model() -> None:
+    mitsuba = variant("llvm_ad_mono")
+    subject = SUBJECTS[-2]
+    theta = np.linspace(0.0, 1.57, 200)
+    wi = unit_vector(theta, np.full(200, 0.3)).astype(np.float32)
+    context = mitsuba.BSDFContext()
+    context.type_mask = mitsuba.BSDFFlags.DeltaReflection
+    surface = mitsuba.load_dict(subject.document)
+    sample, weight = surface.sample(context, interaction(mitsuba, wi), 0.5, mitsuba.Point2f(0.5, 0.5))
+    np.testing.assert_array_equal(np.array(sample.wo).T, wi * np.float32([-1.0, -1.0, 1.0]))
+    arguments = {name: value for name, value in subject.arguments.items() if name != "a"}
+    sines = np.hypot(wi[:, 0].astype(np.float64), wi[:, 1])
+    expected = he_torrance_specular(np.arctan2(sines, wi[:, 2]), **arguments)
+    np.testing.assert_allclose(np.array(weight)[0], expected, rtol=FLOAT32)
