@@ -6,9 +6,10 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import drjit as dr
-import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
+
+from brdfdb.mitsuba._buffers import Buffer
 
 Array = NDArray[np.float64]
 
@@ -48,27 +49,18 @@ class Patches:
             p, q = axes[0].nodes[:, :, np.newaxis, np.newaxis], axes[1].nodes
             values = function(*np.broadcast_arrays(p, q))
             powers = np.einsum("kx,pxqy,ly->pqkl", _TO_POWERS, values, _TO_POWERS)
-        self._numbers = np.ascontiguousarray(powers.reshape(-1, _DEGREE + 1), dtype=np.float32)
-        self._arrays: dict[str, Any] = {}
+        self._rows = Buffer(powers)
 
     def __call__(self, *variables: Any) -> Any:
         """Return the function at numbers, or arrays of one number a ray."""
         places = [axis.place(x) for axis, x in zip(self._axes, variables, strict=True)]
-        number = places[0][0]
+        number, x = places[0]
+        size = _DEGREE + 1
         if len(places) == 1:
-            return _polynomial(self._row(number), places[0][1])
-        row = (number * self._axes[1].patches + places[1][0]) * (_DEGREE + 1)
-        x, y = places[0][1], places[1][1]
-        return _polynomial([_polynomial(self._row(row + k), y) for k in range(_DEGREE + 1)], x)
-
-    def _row(self, number: Any) -> Any:
-        """Return the four coefficients of a row."""
-        if not dr.is_jit_v(number):
-            return self._numbers[int(number)].tolist()
-        variant = mi.variant()
-        if variant not in self._arrays:
-            self._arrays[variant] = mi.Float(self._numbers.ravel())
-        return dr.gather(mi.Vector4f, self._arrays[variant], mi.UInt32(number))
+            return _polynomial(self._rows.four(number * size), x)
+        column, y = places[1]
+        first = (number * self._axes[1].patches + column) * size * size
+        return _polynomial([_polynomial(self._rows.four(first + size * k), y) for k in range(size)], x)
 
 
 def _polynomial(coefficients: Any, x: Any) -> Any:

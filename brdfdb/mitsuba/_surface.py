@@ -2,19 +2,34 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import drjit as dr
 import mitsuba as mi
 
-from brdfdb.mitsuba._gaussian_lobe import Lobe, density, draw
 from brdfdb.mitsuba._parameters import Parameters
 
 Values = dict[str, Any]
 
-_ALONE = 0.9  # share of samples in the lobe where the glossy component is alone. The rest finds its tails
-
 GLOSSY, DIFFUSE, SPECULAR = "glossy", "diffuse", "specular"
+
+
+class Lobe(Protocol):
+    """The directions around the mirror direction that a sampler prefers, with a share [1] of all samples."""
+
+    @property
+    def share(self) -> Any:
+        """The share [1] of samples that follow the lobe."""
+
+    @property
+    def alone(self) -> float:
+        """This share if the glossy part is alone."""
+
+    def draw(self, wi: Any, choice: Any, sample: Any) -> Any:
+        """Return directions for a random number and a point in the unit square."""
+
+    def density(self, wi: Any, wo: Any) -> Any:
+        """Return the density [1/sr] of these directions."""
 
 
 class Formula:
@@ -30,6 +45,15 @@ class Formula:
     def at(self, interaction: Any, active: Any) -> Values:
         """Return the parameters where a ray meets the surface."""
         return self.parameters.at(interaction, active)
+
+    def traverse(self, callback: Any) -> None:
+        """Show the parameters to the scene."""
+        self.parameters.traverse(callback)
+
+    @property
+    def description(self) -> list[str]:
+        """The lines of a text about the plugin."""
+        return [f"{name} = {texture}" for name, texture in self.parameters.textures.items()]
 
     def parts(self, values: Values, wi: Any, wo: Any) -> dict[str, Any]:
         """Return f_r [1/sr] of each part but the specular one, no cosine, for directions above the horizon."""
@@ -73,7 +97,7 @@ class _Methods:
         self.m_flags = combined
 
     def traverse(self, callback: Any) -> None:
-        self._formula.parameters.traverse(callback)
+        self._formula.traverse(callback)
 
     def eval(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
         return self.eval_pdf(ctx, si, wo, active)[0]
@@ -85,7 +109,7 @@ class _Methods:
         above = active & (si.wi.z > 0.0) & (wo.z > 0.0)
         values = self._formula.at(si, above)
         light, viewer = _or_normal(above, si.wi), _or_normal(above, wo)
-        lobe = _detached(self._formula.lobe(values, light))
+        lobe = self._formula.lobe(values, light)
         pdf = _density(self._shares(ctx, values, lobe, light), lobe, light, viewer)
         value = self._f_r(ctx, values, light, viewer) * viewer.z
         return mi.depolarizer(dr.select(above, value, 0.0)), dr.select(above, pdf, 0.0)
@@ -94,12 +118,13 @@ class _Methods:
         above = active & (si.wi.z > 0.0)
         values = self._formula.at(si, above)
         light = _or_normal(above, si.wi)
-        lobe = _detached(self._formula.lobe(values, light))
+        lobe = self._formula.lobe(values, light)
         shares = self._shares(ctx, values, lobe, light)
         is_specular, in_lobe = sample1 < shares.specular, sample1 < shares.specular + shares.lobe
         wo = mi.warp.square_to_cosine_hemisphere(sample2)
         if lobe is not None:
-            wo = dr.select(in_lobe, draw(lobe, light, sample2), wo)
+            choice = (sample1 - shares.specular) / dr.maximum(shares.lobe, 1e-6)  # in [0, 1] where it counts
+            wo = dr.select(in_lobe, lobe.draw(light, choice, sample2), wo)
         if SPECULAR in self._formula.components:
             wo = dr.select(is_specular, mi.reflect(light), wo)
         above &= wo.z > 0.0
@@ -124,7 +149,7 @@ class _Methods:
         return self._formula.parts(values, straight, straight)[self._formula.components[-1]] * dr.pi
 
     def to_string(self) -> str:
-        lines = [f"  {name} = {texture}," for name, texture in self._formula.parameters.textures.items()]
+        lines = (f"  {line}," for line in self._formula.description)
         return "\n".join((f"{type(self._formula).__name__}[", *lines, "]"))
 
     def _f_r(self, ctx: Any, values: Values, wi: Any, wo: Any) -> Any:
@@ -142,7 +167,7 @@ class _Methods:
         glossy, diffuse = self._enabled(ctx, GLOSSY), self._enabled(ctx, DIFFUSE)
         in_lobe: Any = 0.0
         if lobe is not None and glossy:
-            in_lobe = lobe.share if diffuse else _ALONE
+            in_lobe = lobe.share if diffuse else lobe.alone
         specular: Any = 0.0
         if self._enabled(ctx, SPECULAR):
             specular = dr.detach(self._formula.specular_share(values, wi)) if glossy or diffuse else 1.0
@@ -175,11 +200,6 @@ def _flag(part: str) -> Any:
     return {GLOSSY: flags.GlossyReflection, DIFFUSE: flags.DiffuseReflection, SPECULAR: flags.DeltaReflection}[part]
 
 
-def _detached(lobe: Lobe | None) -> Lobe | None:
-    """Return a lobe without derivatives: directions are drawn and weighted alike whatever the parameters are."""
-    return None if lobe is None else Lobe(*(dr.detach(value) for value in lobe))
-
-
 def _or_normal(above: Any, w: Any) -> Any:
     """Return `w`, and the normal where it lies below the horizon, so that derivatives there are 0 and not nan."""
     return dr.select(above, w, mi.Vector3f(0.0, 0.0, 1.0))
@@ -187,4 +207,4 @@ def _or_normal(above: Any, w: Any) -> Any:
 
 def _density(shares: _Shares, lobe: Lobe | None, wi: Any, wo: Any) -> Any:
     cosine = shares.cosine * dr.maximum(wo.z, 0.0) * dr.inv_pi
-    return cosine if lobe is None else cosine + shares.lobe * density(lobe, wi, wo)
+    return cosine if lobe is None else cosine + shares.lobe * lobe.density(wi, wo)

@@ -8,14 +8,12 @@ import drjit as dr
 import mitsuba as mi
 
 from brdfdb.mitsuba._diffraction_series import diffraction_series, effective_variance
-from brdfdb.mitsuba._gaussian_lobe import Lobe
+from brdfdb.mitsuba._gaussian_lobe import GaussianLobe
 from brdfdb.mitsuba._parameters import Parameters
 from brdfdb.mitsuba._surface import DIFFUSE, GLOSSY, SPECULAR, Formula, Values
+from brdfdb.mitsuba._wavelengths import channels_nm
 from brdfdb.models import MODELS
 from brdfdb.models.he_torrance_1991 import WAVELENGTH_NM, K, N
-
-# Dominant wavelengths [nm] of the primaries of sRGB, for variants without a spectrum. Green stands for mono
-WAVELENGTHS_NM = (611.4, 549.1, 464.2)
 
 _LEAST_COS = 6.1e-17  # cosine of the horizon: the model is finite there
 _LEAST = 1e-30
@@ -126,9 +124,7 @@ class HeTorrance(Formula):
     def _wavelengths_nm(self, interaction: Any) -> Any:
         if mi.is_spectral:
             return mi.UnpolarizedSpectrum(interaction.wavelengths)
-        if self._wavelength_nm:
-            return mi.UnpolarizedSpectrum(self._wavelength_nm)
-        return mi.UnpolarizedSpectrum(WAVELENGTHS_NM[1] if mi.is_monochromatic else WAVELENGTHS_NM)
+        return mi.UnpolarizedSpectrum(self._wavelength_nm or channels_nm())
 
     def parts(self, values: Values, wi: Any, wo: Any) -> dict[str, Any]:
         """Return f_r [1/sr] of the directional diffuse and of the uniform diffuse part."""
@@ -147,7 +143,7 @@ class HeTorrance(Formula):
         directional, uniform = self._diffuse_albedos(values, wi)
         return specular / dr.maximum(specular + directional + uniform, _LEAST)
 
-    def lobe(self, values: Values, wi: Any) -> Lobe:
+    def lobe(self, values: Values, wi: Any) -> GaussianLobe:
         """Return the lobe of `brdfdb.models.he_torrance`, as wide as that of the widest channel."""
         surface = values["surface"]
         v_z = 2.0 * dr.maximum(wi.z, _STEEPEST)
@@ -156,7 +152,7 @@ class HeTorrance(Formula):
         alpha = dr.clip(alpha, *_ALPHA_RANGE)
         directional, uniform = self._diffuse_albedos(values, wi)
         share = 0.9 * directional / dr.maximum(directional + uniform, _LEAST)
-        return Lobe(share, alpha, alpha)
+        return GaussianLobe.of(share, alpha, alpha)
 
     def _diffuse_albedos(self, values: Values, wi: Any) -> tuple[Any, Any]:
         """Return rough albedos [1] of both diffuse parts, the mean over the channels."""

@@ -10,12 +10,14 @@ import mitsuba as mi
 from brdfdb.mitsuba._surface import Formula, surface_class
 from brdfdb.mitsuba.he_torrance import HeTorrance
 from brdfdb.mitsuba.oren_nayar import OrenNayar
+from brdfdb.mitsuba.table import TableFormula
 from brdfdb.mitsuba.ward import Ward
 
 PLUGINS: dict[str, Callable[[Any], Formula]] = {
     "brdfdb_ward": Ward,
     "brdfdb_oren_nayar": OrenNayar,
     "brdfdb_he_torrance": HeTorrance,
+    "brdfdb_table": TableFormula,
 }
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import drjit as dr
 
 from brdfdb.errors import ParameterError
-from brdfdb.mitsuba._gaussian_lobe import Lobe
+from brdfdb.mitsuba._gaussian_lobe import GaussianLobe
 from brdfdb.mitsuba._parameters import Parameters
 from brdfdb.mitsuba._surface import DIFFUSE, GLOSSY, Formula, Values
 from brdfdb.models import MODELS
@@ -64,10 +64,10 @@ class Ward(Formula):
         density = lobe_density(self._form, wi, wo, values["alpha_x"], values["alpha_y"])
         return {GLOSSY: values["rho_s"] * density, DIFFUSE: values["rho_d"] * dr.inv_pi}
 
-    def lobe(self, values: Values, wi: Any) -> Lobe:  # noqa: ARG002  # that of other models depends on the light
+    def lobe(self, values: Values, wi: Any) -> GaussianLobe:  # noqa: ARG002  # that of other models depends on the light
         """Return the lobe: its share follows from the reflectances."""
         specular, diffuse = dr.mean(values["rho_s"]), dr.mean(values["rho_d"])
         share = specular / dr.maximum(specular + diffuse, _LEAST)
         if self._form == "ward_half_vector":
             share = dr.minimum(share, _WIDE_SHARE)
-        return Lobe(share, values["alpha_x"], values["alpha_y"])
+        return GaussianLobe.of(share, values["alpha_x"], values["alpha_y"])

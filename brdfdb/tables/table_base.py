@@ -135,8 +135,8 @@ class BaseTable(Lookups):
 
         v1, v2 = np.broadcast_arrays(check_uniform("u1", u1), check_uniform("u2", u2))
         i = checked_vectors(wi, wi).w_i.astype(np.float64)
-        wr = self._sampler.draw(v1, v2, i)
-        density = self._sampler.density(i, wr)
+        wr = self.sampler.draw(v1, v2, i)
+        density = self.sampler.density(i, wr)
         f_r = self.lookup_vectors(np.broadcast_to(i, wr.shape), wr, wavelength_nm)
         tail = (1,) * (np.ndim(f_r) - density.ndim)
         cosine = np.maximum(wr[..., 2], 0.0).reshape(density.shape + tail)
@@ -146,11 +146,11 @@ class BaseTable(Lookups):
     def pdf(self, wi: ArrayLike, wr: ArrayLike) -> Floats:
         """Return the density [1/sr] with which `sample` draws `wr` for the light `wi`; unit vectors (..., 3)."""
         vectors = checked_vectors(wi, wr)
-        return self._sampler.density(vectors.w_i.astype(np.float64), vectors.w_r.astype(np.float64))[()]
+        return self.sampler.density(vectors.w_i.astype(np.float64), vectors.w_r.astype(np.float64))[()]
 
     @functools.cached_property
-    def _sampler(self) -> Sampler:
-        """The sampler, computed from lookups when it is first used."""
+    def sampler(self) -> Sampler:
+        """The sampler of `sample`, computed from lookups when it is first used."""
         at = self.wavelength_nm
         chosen = None if at is None else at[np.unique(np.linspace(0, at.size - 1, _SAMPLED).astype(np.int64))]
 

@@ -88,7 +88,7 @@ def test_each_variant_evaluates_the_same_model(name: str) -> None:
 
 def test_channels_of_rgb_have_wavelengths_of_their_own() -> None:
     mitsuba = variant("llvm_ad_rgb")
-    from brdfdb.mitsuba.he_torrance import WAVELENGTHS_NM
+    from brdfdb.mitsuba._wavelengths import WAVELENGTHS_NM
 
     subject = SUBJECTS[-1]
     document = {name: value for name, value in subject.document.items() if name != "wavelength_nm"}
