@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
+import drjit as dr
 import mitsuba as mi
 
 from brdfdb.errors import ParameterError
+from brdfdb.materials.written_parameters import as_written, written_name
 from brdfdb.parameters import ModelSpec, Parameter
 
 # Widths along both axes that are given as one property, as in Mitsuba's own plugins
@@ -16,22 +18,25 @@ _BOTH = {"alpha": ("alpha_x", "alpha_y")}
 class Parameters:
     """Textures and switches that are read from the properties of a plugin, by the names of the model's parameters.
 
-    Reflectances, n and k have a value for each channel or wavelength. All other parameters have a single value.
+    Reflectances, n and k have a value for each channel or wavelength. All other parameters have a single value. Angles
+    are in degrees, under names that end in ``_deg``.
     """
 
     def __init__(self, props: Any, spec: ModelSpec, coloured: tuple[Parameter, ...] = ()) -> None:
         self.textures: dict[str, Any] = {}
         self._coloured = {p.name for p in (*spec.parameters, *coloured) if p.reflectance or p in coloured}
+        self._angles = {parameter.name for parameter in spec.parameters if parameter.unit == "rad"}
         self._switches: dict[str, bool] = {}
         self._names: dict[str, str] = {}
         for parameter in (*spec.parameters, *coloured):
             name = parameter.name
-            common = next((both for both, names in _BOTH.items() if name in names and both in props), name)
+            written = written_name(parameter)
+            common = next((both for both, names in _BOTH.items() if name in names and both in props), written)
             self._names[name] = common
             if isinstance(parameter.default, bool):
                 self._switches[name] = bool(props.get(name, parameter.default))
             elif common not in self.textures:
-                self.textures[common] = _texture(props, common, parameter)
+                self.textures[common] = _texture(props, common, as_written(parameter))
 
     def at(self, interaction: Any, active: Any) -> dict[str, Any]:
         """Return the values of all parameters where a ray meets the surface, by name."""
@@ -40,7 +45,8 @@ class Parameters:
             if name not in self._switches:
                 texture = self.textures[common]
                 many = name in self._coloured
-                values[name] = texture.eval(interaction, active) if many else texture.eval_1(interaction, active)
+                value = texture.eval(interaction, active) if many else texture.eval_1(interaction, active)
+                values[name] = dr.deg2rad(value) if name in self._angles else value
         return values
 
     def traverse(self, callback: Any) -> None:

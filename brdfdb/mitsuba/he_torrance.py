@@ -100,7 +100,7 @@ def directional_diffuse(wi: Any, wo: Any, surface: _Surface) -> Any:
 class HeTorrance(Formula):
     """The plugin ``brdfdb_he_torrance``. Its parameters are those of the model; n and k are spectra.
 
-    `wavelength_nm` sets one wavelength for all channels of a variant that is not spectral. Without it the channels have
+    `wavelength_nm` sets one wavelength for all channels. Without it, those of a variant without a spectrum have
     `WAVELENGTHS_NM`.
     """
 
@@ -122,7 +122,7 @@ class HeTorrance(Formula):
         return values
 
     def _wavelengths_nm(self, interaction: Any) -> Any:
-        if mi.is_spectral:
+        if mi.is_spectral and not self._wavelength_nm:
             return mi.UnpolarizedSpectrum(interaction.wavelengths)
         return mi.UnpolarizedSpectrum(self._wavelength_nm or channels_nm())
 

@@ -47,14 +47,25 @@ class Subject:
         """The plugin as Mitsuba loads it."""
         form = {} if self.plugin == "brdfdb_he_torrance" else {"form": self.model}
         wavelength = {"wavelength_nm": WAVELENGTH_NM} if self.index else {}
-        return {"type": self.plugin, **form, **self.parameters, **self.index, **wavelength}
+        numbers = {self.written(name): self.as_written(name) for name in (*self.parameters, *self.index)}
+        return {"type": self.plugin, **form, **numbers, **wavelength}
+
+    def written(self, name: str) -> str:
+        """Return the name of a parameter in Mitsuba."""
+        return "sigma_deg" if name == "sigma" else name
+
+    def as_written(self, name: str) -> float:
+        """Return a parameter as Mitsuba takes it: angles in degrees."""
+        value = {**self.parameters, **self.index}[name]
+        return float(np.rad2deg(value)) if name == "sigma" else value
 
     @property
     def arguments(self) -> dict[str, float]:
         """The arguments of the model, rounded to float32 as Mitsuba reads them."""
         wavelength = {"wavelength_nm": WAVELENGTH_NM} if self.index else {}
-        given = {**self.parameters, **self.index}
-        return {name: float(np.float32(value)) for name, value in given.items()} | wavelength
+        given = {name: float(np.float32(self.as_written(name))) for name in (*self.parameters, *self.index)}
+        radians = {name: float(np.deg2rad(value)) for name, value in given.items() if name == "sigma"}
+        return given | radians | wavelength
 
     def f_r(self, wi: Array, wr: Array) -> Array:
         """Return f_r [1/sr] of the model for vectors of float32."""

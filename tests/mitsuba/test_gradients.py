@@ -51,13 +51,15 @@ def test_derivatives_are_those_of_the_model(subject: Subject, name: str) -> None
     wi, wr = directions(PAIRS)
     surface = mitsuba.load_dict(subject.document)
     parameters = mitsuba.traverse(surface)
-    key = f"{name}.value"
+    key = f"{subject.written(name)}.value"
     drjit.enable_grad(parameters[key])
     parameters.update()
     viewers = mitsuba.Vector3f(np.ascontiguousarray(wr.T))
     value = surface.eval(mitsuba.BSDFContext(), interaction(mitsuba, wi), viewers)
     drjit.forward(parameters[key])
     gradient = np.array(drjit.grad(value))[0] / wr[:, 2]
+    if name == "sigma":
+        gradient = np.rad2deg(gradient)  # 1 / radian
     f_r = subject.f_r(wi, wr)
     expected = difference(subject, name, wi, wr)
     scale = np.maximum(np.abs(expected), CANCELLED * f_r / subject.arguments[name])
@@ -78,7 +80,7 @@ def test_derivatives_are_the_same_backwards(subject: Subject) -> None:
         for derive in (drjit.forward, drjit.backward):
             surface = mitsuba.load_dict(subject.document)
             parameters = mitsuba.traverse(surface)
-            parameter = parameters[f"{name}.value"]
+            parameter = parameters[f"{subject.written(name)}.value"]
             drjit.enable_grad(parameter)
             parameters.update()
             total = drjit.mean(surface.eval(mitsuba.BSDFContext(), interaction(mitsuba, wi), viewers), axis=None)

@@ -37,7 +37,12 @@ def test_values_are_those_of_the_model(subject: Subject) -> None:
     assert np.all(np.isfinite(density))
 
 
-def plugin_of(model: str, parameters: dict[str, float]) -> dict[str, Any]:
+def plugin_of(model: str, parameters: dict[str, Any]) -> dict[str, Any]:
+    if "sigma" in parameters:
+        parameters = {"sigma_deg": float(np.rad2deg(parameters["sigma"]))} | parameters
+        del parameters["sigma"]
+    if "interreflection" in parameters:
+        parameters = parameters | {"interreflection": bool(parameters["interreflection"])}
     if model == "he_torrance":
         return {"type": "brdfdb_he_torrance", **parameters}
     return {"type": "brdfdb_ward" if model.startswith("ward") else "brdfdb_oren_nayar", "form": model, **parameters}
@@ -53,8 +58,6 @@ def test_no_value_is_nan_at_the_corners(model: str) -> None:
     wi, wr = (np.concatenate([w, w * (1.0, 1.0, -1.0)]) for w in (wi, wr))  # below the horizon, too
     subject = BY_NAME[model]
     for parameters in (*subject.parameters, *subject.slow, *subject.very_slow):
-        if "interreflection" in parameters:
-            parameters = parameters | {"interreflection": bool(parameters["interreflection"])}
         surface = mitsuba.load_dict(plugin_of(model, parameters))
         value, density = evaluated(mitsuba, surface, wi, wr)
         assert np.all(np.isfinite(value))
