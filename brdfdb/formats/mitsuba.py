@@ -46,8 +46,13 @@ PLUGINS = {
     "ward_bounded": ("brdfdb_ward", True),
     "oren_nayar": ("brdfdb_oren_nayar", True),
     "oren_nayar_qualitative": ("brdfdb_oren_nayar", True),
+    "oren_nayar_fujii": ("brdfdb_oren_nayar", True),
     "oren_nayar_energy_preserving": ("brdfdb_oren_nayar", True),
     "he_torrance": ("brdfdb_he_torrance", False),
+    "minnaert": ("brdfdb_minnaert", False),
+    "rpv": ("brdfdb_rpv", False),
+    "ross_li": ("brdfdb_ross_li", False),
+    "hapke": ("brdfdb_hapke", False),
 }
 VERSION = "3.0.0"
 HOLDS = "the parameters of a plugin of Mitsuba, whose f_r [1/sr] is times the cosine of the viewer in Mitsuba"

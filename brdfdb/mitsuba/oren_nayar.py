@@ -65,6 +65,15 @@ def energy_preserving(wi: Any, wo: Any, values: Values) -> Any:
     return single + rho_ms * (dr.inv_pi * A * r / (_C1 - _C2) * _lost(wi) * _lost(wo))
 
 
+def fujii(wi: Any, wo: Any, values: Values) -> Any:
+    """Return f_r [1/sr] of Fujii's form of the qualitative model, as `brdfdb.models.oren_nayar_fujii`."""
+    sigma = values["sigma"]
+    s = wi.x * wo.x + wi.y * wo.y
+    A = 1.0 / (dr.pi + (dr.pi / 2 - 2.0 / 3.0) * sigma)
+    along = s / dr.select(s > 0.0, dr.maximum(wi.z, wo.z), 1.0)
+    return values["rho"] * dr.maximum(A + sigma * A * along, 0.0)
+
+
 def _lost(w: Any) -> Any:
     """Return (1 - E_FON) / (A r) [1], the loss of a single scattering, without a difference that cancels at grazing."""
     sin, cos = _sine(w), w.z
@@ -80,6 +89,7 @@ def _sine(w: Any) -> Any:
 _FORMULAS = {
     "oren_nayar": functional,
     "oren_nayar_qualitative": qualitative,
+    "oren_nayar_fujii": fujii,
     "oren_nayar_energy_preserving": energy_preserving,
 }
 FORMS = tuple(_FORMULAS)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from typing import Any
 
 import mitsuba as mi
 
 from brdfdb.mitsuba._surface import Formula, surface_class
+from brdfdb.mitsuba.diffuse import FORMULAS, Diffuse
 from brdfdb.mitsuba.he_torrance import HeTorrance
 from brdfdb.mitsuba.oren_nayar import OrenNayar
 from brdfdb.mitsuba.table import TableFormula
@@ -18,6 +20,7 @@ PLUGINS: dict[str, Callable[[Any], Formula]] = {
     "brdfdb_oren_nayar": OrenNayar,
     "brdfdb_he_torrance": HeTorrance,
     "brdfdb_table": TableFormula,
+    **{f"brdfdb_{model}": functools.partial(Diffuse, model=model) for model in FORMULAS},
 }
 
 

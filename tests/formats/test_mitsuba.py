@@ -76,11 +76,13 @@ def test_the_table_is_taken_if_it_is_asked_for(kind: str, tmp_path: Path) -> Non
 def test_models_with_a_plugin_are_those_that_mitsuba_registers() -> None:
     variant("scalar_rgb")
     from brdfdb.mitsuba import PLUGINS
+    from brdfdb.mitsuba.diffuse import FORMULAS
     from brdfdb.mitsuba.oren_nayar import FORMS as OREN_NAYAR
     from brdfdb.mitsuba.ward import FORMS as WARD
 
     forms = {"brdfdb_ward": WARD, "brdfdb_oren_nayar": OREN_NAYAR}
     expected = {form: (plugin, True) for plugin, known in forms.items() for form in known}
-    assert expected | {"he_torrance": ("brdfdb_he_torrance", False)} == exporter.PLUGINS
+    expected |= {name: (f"brdfdb_{name}", False) for name in ("he_torrance", *FORMULAS)}
+    assert expected == exporter.PLUGINS
     assert {plugin for plugin, _ in exporter.PLUGINS.values()} | {"brdfdb_table"} == set(PLUGINS)
     assert set(exporter.PLUGINS) <= set(MODELS)

@@ -16,6 +16,7 @@ from brdfdb.models import MODELS
 Array = NDArray[Any]
 
 WAVELENGTH_NM = 500.0
+WITH_FORMS = ("brdfdb_ward", "brdfdb_oren_nayar")
 COPPER = {"n": 1.13, "k": 2.56}
 
 
@@ -45,26 +46,29 @@ class Subject:
     @property
     def document(self) -> dict[str, Any]:
         """The plugin as Mitsuba loads it."""
-        form = {} if self.plugin == "brdfdb_he_torrance" else {"form": self.model}
+        form = {"form": self.model} if self.plugin in WITH_FORMS else {}
         wavelength = {"wavelength_nm": WAVELENGTH_NM} if self.index else {}
         numbers = {self.written(name): self.as_written(name) for name in (*self.parameters, *self.index)}
         return {"type": self.plugin, **form, **numbers, **wavelength}
 
     def written(self, name: str) -> str:
         """Return the name of a parameter in Mitsuba."""
-        return "sigma_deg" if name == "sigma" else name
+        return f"{name}_deg" if self._is_angle(name) else name
 
     def as_written(self, name: str) -> float:
         """Return a parameter as Mitsuba takes it: angles in degrees."""
         value = {**self.parameters, **self.index}[name]
-        return float(np.rad2deg(value)) if name == "sigma" else value
+        return float(np.rad2deg(value)) if self._is_angle(name) else value
+
+    def _is_angle(self, name: str) -> bool:
+        return name in self.parameters and MODELS[self.model].parameter(name).unit == "rad"
 
     @property
     def arguments(self) -> dict[str, float]:
         """The arguments of the model, rounded to float32 as Mitsuba reads them."""
         wavelength = {"wavelength_nm": WAVELENGTH_NM} if self.index else {}
         given = {name: float(np.float32(self.as_written(name))) for name in (*self.parameters, *self.index)}
-        radians = {name: float(np.deg2rad(value)) for name, value in given.items() if name == "sigma"}
+        radians = {name: float(np.deg2rad(value)) for name, value in given.items() if self._is_angle(name)}
         return given | radians | wavelength
 
     def f_r(self, wi: Array, wr: Array) -> Array:
@@ -76,6 +80,15 @@ class Subject:
         at = {"wavelength_nm": wavelength_nm} if self.index else {}
         vectors = MODELS[self.model].vectors
         return np.asarray(vectors(wi.astype(np.float64), wr.astype(np.float64), **(self.arguments | at)))
+
+    @property
+    def floor(self) -> float:
+        """The value [1/sr] below which a difference is relative to the floor.
+
+        Far tails of a Gaussian are left out, of whose exponent float32 keeps too few digits. Oren-Nayar's fit and
+        Ross-Li are differences that fall to 0 next to the horizon.
+        """
+        return 5e-3 if self.model in ("oren_nayar", "ross_li") else 1e-9
 
     def __str__(self) -> str:
         return "-".join((self.model, *(f"{value:g}" for value in self.parameters.values())))
@@ -100,6 +113,11 @@ SUBJECTS = (
         for s in (0.1, 0.6)
     ),
     *(Subject("brdfdb_oren_nayar", "oren_nayar_energy_preserving", {"rho": 0.7, "roughness": r}) for r in (0.1, 0.9)),
+    Subject("brdfdb_oren_nayar", "oren_nayar_fujii", {"rho": 0.7, "sigma": 0.6}),
+    Subject("brdfdb_minnaert", "minnaert", {"k": 0.8, "rho": 0.5}),
+    Subject("brdfdb_rpv", "rpv", {"rho_0": 0.06, "k": 0.7, "asymmetry": -0.2, "rho_c": 0.3}),
+    Subject("brdfdb_ross_li", "ross_li", {"f_iso": 0.2097, "f_vol": 0.0814, "f_geo": 0.0041}),
+    Subject("brdfdb_hapke", "hapke", {"w": 0.5, "b": 0.2, "c": 0.6, "b_0": 0.8, "h": 0.08, "theta_bar": 0.25}),
     *(he_torrance(*surface) for surface in ((0.1, 2.0), (0.6, 2.5))),
 )
 

@@ -58,14 +58,14 @@ def test_derivatives_are_those_of_the_model(subject: Subject, name: str) -> None
     value = surface.eval(mitsuba.BSDFContext(), interaction(mitsuba, wi), viewers)
     drjit.forward(parameters[key])
     gradient = np.array(drjit.grad(value))[0] / wr[:, 2]
-    if name == "sigma":
+    if subject.written(name) != name:
         gradient = np.rad2deg(gradient)  # 1 / radian
     f_r = subject.f_r(wi, wr)
     expected = difference(subject, name, wi, wr)
     scale = np.maximum(np.abs(expected), CANCELLED * f_r / subject.arguments[name])
     seen = f_r > FLOOR
     assert np.all(np.isfinite(gradient))
-    assert np.max((np.abs(gradient - expected) / scale)[seen]) <= GRADIENT
+    assert np.max(np.abs(gradient - expected)[seen] / scale[seen]) <= GRADIENT
 
 
 @pytest.mark.parametrize("subject", [SUBJECTS[1], SUBJECTS[9], SUBJECTS[-1]], ids=str)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,18 +15,14 @@ from tests.models.hazard_directions import EXACT, NEAR
 from tests.models.hazards import BY_NAME
 
 PAIRS = 100_000
-# Relative; the largest measured is 1.1e-5, where f_r is 1e-9 /sr. Smaller values are the far tail of a Gaussian, of
-# whose exponent float32 keeps too few digits
-FLOAT32, FLOOR = 2e-5, 1e-9
-# Of Oren-Nayar's fit, which falls to 0 next to the horizon: 1e-7 /sr of the values that are subtracted
-FIT_FLOOR = 5e-3
+# Relative; the largest measured is 1.1e-5, where f_r is 1e-9 /sr
+FLOAT32 = 2e-5
 
 
 def misses(subject: Subject, value: Array, wi: Array, wr: Array) -> Array:
     """Relative differences of f_r from the model."""
     expected = subject.f_r(wi, wr)
-    floor = FIT_FLOOR if subject.plugin == "brdfdb_oren_nayar" else FLOOR
-    return np.asarray(np.abs(value / wr[:, 2] - expected) / np.maximum(expected, floor))
+    return np.asarray(np.abs(value / wr[:, 2] - expected) / np.maximum(expected, subject.floor))
 
 
 @pytest.mark.parametrize("subject", SUBJECTS, ids=str)
@@ -37,28 +34,26 @@ def test_values_are_those_of_the_model(subject: Subject) -> None:
     assert np.all(np.isfinite(density))
 
 
-def plugin_of(model: str, parameters: dict[str, Any]) -> dict[str, Any]:
-    if "sigma" in parameters:
-        parameters = {"sigma_deg": float(np.rad2deg(parameters["sigma"]))} | parameters
-        del parameters["sigma"]
+def plugin_of(subject: Subject, parameters: dict[str, Any]) -> dict[str, Any]:
+    known = {name: parameters[name] for name in parameters if name not in ("wavelength_nm", "interreflection")}
+    index = {name: known.pop(name) for name in ("n", "k") if name in known and subject.index}
+    document = replace(subject, parameters=known, index=index).document
     if "interreflection" in parameters:
-        parameters = parameters | {"interreflection": bool(parameters["interreflection"])}
-    if model == "he_torrance":
-        return {"type": "brdfdb_he_torrance", **parameters}
-    return {"type": "brdfdb_ward" if model.startswith("ward") else "brdfdb_oren_nayar", "form": model, **parameters}
+        document["interreflection"] = bool(parameters["interreflection"])
+    return document | {name: parameters[name] for name in ("wavelength_nm",) if name in parameters}
 
 
-@pytest.mark.parametrize("model", dict.fromkeys(subject.model for subject in SUBJECTS))
-def test_no_value_is_nan_at_the_corners(model: str) -> None:
+@pytest.mark.parametrize("judged", {subject.model: subject for subject in SUBJECTS}.values(), ids=str)
+def test_no_value_is_nan_at_the_corners(judged: Subject) -> None:
     mitsuba = variant("llvm_ad_mono")
     import drjit
 
     corners = np.array([*EXACT.values(), *NEAR])
     wi, wr = unit_vector(corners[:, 0], corners[:, 1]), unit_vector(corners[:, 2], corners[:, 3])
     wi, wr = (np.concatenate([w, w * (1.0, 1.0, -1.0)]) for w in (wi, wr))  # below the horizon, too
-    subject = BY_NAME[model]
+    subject = BY_NAME[judged.model]
     for parameters in (*subject.parameters, *subject.slow, *subject.very_slow):
-        surface = mitsuba.load_dict(plugin_of(model, parameters))
+        surface = mitsuba.load_dict(plugin_of(judged, parameters))
         value, density = evaluated(mitsuba, surface, wi, wr)
         assert np.all(np.isfinite(value))
         assert np.all(value >= 0.0)
