@@ -38,7 +38,7 @@ def loaded(name: str, store: str | None) -> Table:
         return table
     dataset = opened.dataset(name, table.revision).load()
     arrays = {str(key): np.asarray(variable.values) for key, variable in dataset.variables.items()}
-    return table_from(name, table.revision, arrays, dataset.attrs)
+    return table_from(name, table.revision, arrays, table.attrs)
 
 
 class TableFormula(Formula):

@@ -13,6 +13,7 @@ from brdfdb.tables.albedo import directional_albedo
 from brdfdb.tables.planner import plan
 from brdfdb.tables.table import Table
 from brdfdb.tables.tabulation import tabulate
+from tests.api.a_store import publish, serving
 from tests.formats.small_tables import ANISOTROPIC, GREY, KINDS, SMOOTH, SPECTRAL, small_table
 from tests.mitsuba.surfaces import directions, interaction, variant
 from tests.store.a_store import lambert
@@ -164,3 +165,20 @@ def test_the_numbers_of_a_table_have_derivatives(monkeypatch: pytest.MonkeyPatch
     tabulated = table.lookup_vectors(wi, wr) - table.uniform[0]
     expected = np.sum((tabulated + table.interpolation.offset * power) * wr[:, 2])
     assert float(np.sum(np.array(drjit.grad(numbers)))) == pytest.approx(expected, rel=1e-3)
+
+
+def test_a_table_behind_a_service_is_that_of_the_directory(tmp_path: Path) -> None:
+    mitsuba = variant("scalar_spectral")
+    publish(tmp_path, "foil", "he_torrance", refractive_index="main/Cu/Johnson", sigma_0_um=0.1, tau_um=2.0)
+    place = mitsuba.SurfaceInteraction3f()
+    place.wi, place.wavelengths = mitsuba.Vector3f(0.6, 0.0, 0.8), [450.0, 500.0, 550.0, 600.0]
+    values, specular = [], mitsuba.BSDFContext()
+    specular.type_mask = mitsuba.BSDFFlags.DeltaReflection
+    with serving(tmp_path) as url:
+        for store in (str(tmp_path), url):
+            surface = mitsuba.load_dict({"type": "brdfdb_table", "material": "foil", "store": store})
+            value = surface.eval(mitsuba.BSDFContext(), place, mitsuba.Vector3f(-0.48, 0.0, 0.8772))
+            _, weight = surface.sample(specular, place, 0.4, mitsuba.Point2f(0.3, 0.7))
+            values.append(np.array([np.ravel(value), np.ravel(weight)]))
+    np.testing.assert_array_equal(values[0], values[1])
+    assert np.all(values[0] > 0.0)
