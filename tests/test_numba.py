@@ -139,6 +139,40 @@ print(json.dumps([len(at_import.buffer), len(at_call.buffer)]))
     assert at_call > 0
 
 
+def test_stored_code_loads_without_what_numba_needs_to_compile(tmp_path: Path) -> None:
+    program = """
+import json, sys
+from brdfdb.fresnel import reflectance, unpolarised
+
+values = [reflectance(0.5, 1.3, 2.0), *unpolarised([0.5, 1.0], 1.3, 2.0)]
+print(json.dumps([values, "numba.np.linalg" in sys.modules]))
+"""
+    first, compiles = run(program, NUMBA_CACHE_DIR=str(tmp_path))
+    again, loads = run(program, NUMBA_CACHE_DIR=str(tmp_path))
+    assert (compiles, loads) == (True, False)
+    assert first == again
+
+
+def test_stored_lookups_load_without_what_numba_needs_to_compile() -> None:
+    program = """
+import json, sys
+import numpy as np
+from brdfdb.materials import presets
+from brdfdb.tables.grids import Grid
+from brdfdb.tables.layout import Layout
+from brdfdb.tables.table import Table
+
+quarter = np.linspace(0.0, 85.0, 4)
+grid = Grid({"theta_i": quarter, "theta_r": quarter, "delta_phi": np.linspace(0.0, 180.0, 4)})
+table = Table.of(Layout(presets()["clay-vase"], grid), np.zeros((4, 4, 4), dtype=np.float32))
+up = np.array([[0.0, 0.0, 1.0]])
+table.lookup_vectors(up, up)
+print(json.dumps("numba.np.linalg" in sys.modules))
+"""
+    run(program)  # compiles what is not stored yet
+    assert run(program) is False
+
+
 def square(x: float, y: float) -> float:
     return x * x / y
 

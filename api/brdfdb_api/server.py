@@ -13,20 +13,24 @@ import tempfile
 import threading
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
-import orjson
 import uvicorn
 
 import brdfdb
 from brdfdb.errors import BrdfdbError, ParameterError
-from brdfdb_api.http.protocol import BoundedProtocol
+from brdfdb_api.http.connection import Connection
+from brdfdb_api.serving import log
 from brdfdb_api.serving.settings import Settings
 
 PAUSE_S = 1.0  # time before a failed worker is replaced [s]
+LAST_S = 0.5  # time after the signal to stop in which requests on connections that are open are answered [s]
 GRACE_S = 10  # time for requests in flight when the server stops [s]
+STOPPED_S = LAST_S + GRACE_S + 3.0  # time after which a worker that was told to stop is killed [s]
+BEAT_S = 1  # time between signs of life of a worker [s]
+HALTED_S = 15.0  # time without one after which a worker is replaced [s]
 
-LOG = logging.getLogger("brdfdb.server")
-OTHERS = ("uvicorn", LOG.name, "py.warnings")  # loggers other than that of requests
+OTHERS = ("uvicorn", "py.warnings")  # loggers of other packages
 
 
 class ServerError(BrdfdbError):
@@ -65,18 +69,36 @@ def serve(store_dir: Path, host: str, port: int, workers: int = 1, snapshot: str
         os.environ["BRDFDB_SNAPSHOT"] = snapshot
     settings = Settings.from_environment()
     brdfdb.open(store_dir, snapshot=settings.snapshot)
-    config = _config()
     with contextlib.ExitStack() as stack:
         listener = stack.enter_context(_listening(host, port))
         port = listener.getsockname()[1]
         print(f"serving {store_dir} at http://{f'[{host}]' if ':' in host else host}:{port}/", flush=True)
         stack.enter_context(_ended_by_signals())
         if workers == 1:
-            uvicorn.Server(config).run(sockets=[listener])
+            Server(_config()).run(sockets=[listener])
         else:
             # directory where workers write their counts, so that each can report all of them
             counts = stack.enter_context(tempfile.TemporaryDirectory(prefix="brdfdb-metrics-"))
             asyncio.run(_keep(workers, listener, counts))
+
+
+class Server(uvicorn.Server):
+    """A server that ends connections without requests, and answers what is on its way when it stops."""
+
+    async def on_tick(self, counter: int) -> bool:
+        if counter % 10 == 0:  # each second
+            now = asyncio.get_running_loop().time()
+            for connection in tuple(self.server_state.connections):
+                if isinstance(connection, Connection):
+                    connection.end_if_quiet(now)
+        return await super().on_tick(counter)
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        for listener in self.servers:
+            listener.close()
+        self.server_state.default_headers.append((b"connection", b"close"))  # clients send no more requests
+        await asyncio.sleep(LAST_S)
+        await super().shutdown(sockets)
 
 
 async def _keep(workers: int, listener: socket.socket, counts: str) -> None:
@@ -94,15 +116,29 @@ async def _keep(workers: int, listener: socket.socket, counts: str) -> None:
     async def worker() -> int:
         # In a process group of its own: Ctrl-C goes to this process only. The worker stops when its stdin ends.
         process = await asyncio.create_subprocess_exec(
-            *command, stdin=asyncio.subprocess.PIPE, pass_fds=[listener.fileno()], process_group=0, env=environment
+            *command,
+            stdin=asyncio.subprocess.PIPE,
+            stdout=asyncio.subprocess.PIPE,
+            pass_fds=[listener.fileno()],
+            process_group=0,
+            env=environment,
         )
-        ends = asyncio.create_task(process.wait()), asyncio.create_task(stopping.wait())
+        assert process.stdin is not None
+        assert process.stdout is not None
+        ends = asyncio.create_task(_ended(process.stdout)), asyncio.create_task(stopping.wait())
         await asyncio.wait(ends, return_when=asyncio.FIRST_COMPLETED)
         if not stopping.is_set():
-            LOG.error("worker %d ended with status %d", process.pid, await process.wait())
-        assert process.stdin is not None
+            if ends[0].result() == "halted":
+                log.write({"failed": f"worker {process.pid} gave no sign of life for {HALTED_S:g} s"})
+                process.kill()
+            log.write({"failed": f"worker {process.pid} ended with status {await process.wait()}"})
         process.stdin.close()
-        return await process.wait()
+        try:
+            return await asyncio.wait_for(process.wait(), STOPPED_S)
+        except TimeoutError:
+            log.write({"failed": f"worker {process.pid} did not stop"})
+            process.kill()
+            return await process.wait()
 
     async def place() -> int:
         status = 0
@@ -121,9 +157,28 @@ async def _keep(workers: int, listener: socket.socket, counts: str) -> None:
         raise ServerError(f"a worker ended with status {status}; its log says why")
 
 
+async def _ended(signs: asyncio.StreamReader) -> str:
+    """Wait until a worker ends or, once it has begun to give signs of life, halts."""
+    limit = None  # kernels and packages are loaded before the first sign
+    try:
+        while await asyncio.wait_for(signs.read(64), limit):
+            limit = HALTED_S
+    except TimeoutError:
+        return "halted"
+    return "ended"
+
+
 def _work(descriptor: int) -> None:
-    """Run a worker on the socket that the parent listens on."""
-    server = uvicorn.Server(_config())
+    """Run a worker on the socket that the parent listens on, until stdin ends; signs of life go to stdout."""
+    signs = os.dup(sys.stdout.fileno())
+    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
+    os.set_blocking(signs, False)
+
+    async def beat() -> None:
+        with contextlib.suppress(OSError):  # nobody reads any more
+            os.write(signs, b".")
+
+    server = Server(_config(callback_notify=beat, timeout_notify=BEAT_S))
 
     def wait() -> None:
         os.read(sys.stdin.fileno(), 1)
@@ -134,33 +189,24 @@ def _work(descriptor: int) -> None:
         server.run(sockets=[socket.socket(fileno=descriptor)])
 
 
-def _config() -> uvicorn.Config:
+def _config(**keywords: Any) -> uvicorn.Config:
     logging.captureWarnings(True)
     return uvicorn.Config(
         "brdfdb_api:create_app",
         factory=True,
-        http=BoundedProtocol,
+        http=Connection,
+        ws="none",
         access_log=False,
         log_config={
             "version": 1,
             "disable_existing_loggers": False,
-            "formatters": {"lines": {"()": _Lines}},
-            "handlers": {"stderr": {"class": "logging.StreamHandler", "formatter": "lines"}},
-            "loggers": {name: {"handlers": ["stderr"], "propagate": False} for name in OTHERS},
+            "handlers": {"lines": {"()": log.Handler}},
+            "loggers": {name: {"handlers": ["lines"], "propagate": False} for name in OTHERS},
         },
         log_level="warning",
         timeout_graceful_shutdown=GRACE_S,
+        **keywords,
     )
-
-
-class _Lines(logging.Formatter):
-    """Formatter of other messages of the server as lines of JSON."""
-
-    def format(self, record: logging.LogRecord) -> str:
-        line = {"time": round(record.created, 3), "failed": record.getMessage().strip()}
-        if record.exc_info:
-            line["traceback"] = self.formatException(record.exc_info)
-        return orjson.dumps(line).decode()
 
 
 @contextlib.contextmanager

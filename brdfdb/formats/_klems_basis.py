@@ -14,7 +14,7 @@ Index = NDArray[np.int64]
 Evaluate = Callable[[Floats, Floats], Floats]  # f_r (..., C) at unit vectors (..., 3) of light and viewer
 
 _NODE = 0.5 / np.sqrt(3.0)  # distance of the two Gauss-Legendre nodes of an axis from the middle of a cell of length 1
-_AT_ONCE = 1 << 15  # cells that are evaluated at a time
+_AT_ONCE = 1 << 13  # cells that are evaluated at a time
 _LIGHTS = {145: 4, 77: 5, 41: 6}  # nodes of the light along each axis of a patch, by the number of patches
 _DEEPEST = 6  # halvings of a patch of the viewer
 _AROUND = 2  # halvings of the patch that is a whole ring
@@ -170,13 +170,14 @@ def _refined(
             wi = light(basis, incident[pair], nodes[node])
             place = corner[some, np.newaxis] + length * (0.5 + _NODE * (2.0 * halves - 1.0))
             wr = basis.vectors(viewer[pair, np.newaxis], place)
-            values = evaluate(wi[:, np.newaxis], wr)
-            mean[some], spread[some] = values.mean(axis=1), np.ptp(values, axis=1)
-            lit[some] = _at_mirror(wi, wr)
+            values = np.ascontiguousarray(np.moveaxis(evaluate(wi[:, np.newaxis], wr), 1, 0))  # reduced faster
+            mean[some], spread[some] = values.mean(axis=0), np.ptp(values, axis=0)
+            if depth < _AT_LEAST:
+                lit[some] = _at_mirror(wi, wr)
         pair = item // count
         weight = length**2 * basis.solid_angles[viewer[pair]][:, np.newaxis]
         divided = np.any((spread > _STEEP * mean) & (spread * weight > negligible), axis=-1)
-        divided |= lit & (depth < _AT_LEAST)
+        divided |= lit
         divided |= (viewer[pair] == 0) & (depth < _AROUND)
         divided &= depth < _DEEPEST
         np.add.at(result, item[~divided], length**2 * mean[~divided])

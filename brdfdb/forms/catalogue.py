@@ -62,7 +62,9 @@ class Form:
         True for a form that repeats another one with float32 vectors and values. It takes as much work, and its error
         is rounding.
     layout : Layout or None
-        The layout of a table that was tabulated here, from which it can be tabulated again.
+        The layout of a table that was tabulated here.
+    values : array or None
+        All values of such a table: who publishes it need not tabulate again.
     copied : callable or None
         For a table, a function without arguments. It returns an evaluation that reads a copy of the values, like
         another table of this size.
@@ -77,6 +79,7 @@ class Form:
     dtype: type[np.floating[Any]] = np.float64
     rounded: bool = False
     layout: Layout | None = None
+    values: NDArray[np.float32] | None = None
     copied: Callable[[], Evaluate] | None = None
 
 
@@ -197,7 +200,7 @@ def _tables(
 
 def _table(layout: Layout, key: str, title: str) -> Form:
     values = np.concatenate([tabulation.block(layout, rows) for rows in layout.blocks])
-    return replace(of_table(Table.of(layout, values), key, title), layout=layout)
+    return replace(of_table(Table.of(layout, values), key, title), layout=layout, values=values)
 
 
 def of_family(family: Family) -> Form:

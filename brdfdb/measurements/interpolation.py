@@ -103,9 +103,14 @@ def _logarithm(f_r: Floats, level: Floats) -> Floats:
 
 def _radial(x: Floats, centres: Floats) -> Floats:
     """Return (1 + r) exp(-r) of the distances r between points (N, D) and centres (M, D)."""
-    square = np.sum(x**2, axis=1)[:, np.newaxis] + np.sum(centres**2, axis=1) - 2.0 * x @ centres.T
-    r = np.sqrt(np.maximum(square, 0.0))
-    return np.asarray((1.0 + r) * np.exp(-r))
+    r: Floats = np.sum(x**2, axis=1)[:, np.newaxis] + np.sum(centres**2, axis=1)
+    r -= 2.0 * x @ centres.T  # in place: new memory takes as long as the exponential
+    np.sqrt(np.maximum(r, 0.0, out=r), out=r)
+    decay = np.negative(r)
+    np.exp(decay, out=decay)
+    r += 1.0
+    r *= decay
+    return r
 
 
 def lambert_and_lobe(samples: Samples) -> tuple[Base, float, str]:
@@ -295,7 +300,7 @@ def fit(samples: Samples, base: Base | None = None) -> Fitted:
     centres = problem.some(order[:_CENTRES])
     held_out = _stated(samples, problem, _held_out(chosen, problem, centres), chosen, scheme)
     at = _x(chosen, centres)
-    weights = _solved(*_normal(chosen, problem, at), at)
+    weights = _solved(*_normal(chosen, problem, _radial(_x(chosen, problem), at)), _radial(at, at))
     return Fitted(replace(chosen, centres=at, weights=weights), held_out, words if base is None else "the given base")
 
 
@@ -330,18 +335,17 @@ def _x(how: Interpolation, problem: _Problem) -> Floats:
     return features(problem.wi, problem.wr, how.alpha, how.scales[:3], turned=how.turned)
 
 
-def _normal(how: Interpolation, problem: _Problem, at: Floats) -> tuple[Floats, Floats]:
-    """Return the matrix and the right sides of the normal equations of some samples."""
-    phi = _radial(_x(how, problem), at)
+def _normal(how: Interpolation, problem: _Problem, phi: Floats) -> tuple[Floats, Floats]:
+    """Return the matrix and the right sides of the normal equations of some samples, from radial functions at them."""
     weighted = phi / (problem.noise**2 + how.scales.noise**2)[:, np.newaxis]
     return weighted.T @ phi, weighted.T @ (problem.y - how.mean)
 
 
-def _solved(matrix: Floats, right: Floats, at: Floats) -> Floats:
-    """Return the weights of radial functions at some centres, smooth where samples do not tell."""
+def _solved(matrix: Floats, right: Floats, smooth: Floats) -> Floats:
+    """Return the weights of radial functions; values at all centres make them smooth where samples do not tell."""
     from scipy.linalg import cho_factor, cho_solve
 
-    whole = matrix + _radial(at, at)
+    whole = matrix + smooth
     whole[np.diag_indices_from(whole)] *= 1.0 + _JITTER
     return np.asarray(cho_solve(cho_factor(whole), right))
 
@@ -352,13 +356,13 @@ def _held_out(how: Interpolation, problem: _Problem, centres: _Problem) -> Float
     The centres of radial functions stay: only values tell, not places.
     """
     at = _x(how, centres)
-    matrix, right = _normal(how, problem, at)
+    phi, smooth = _radial(_x(how, problem), at), _radial(at, at)
+    matrix, right = _normal(how, problem, phi)
     predicted = np.empty_like(problem.y)
     for group in np.unique(problem.group):
-        own = problem.some(problem.group == group)
-        own_matrix, own_right = _normal(how, own, at)
-        weights = _solved(matrix - own_matrix, right - own_right, at)
-        predicted[problem.group == group] = _radial(_x(how, own), at) @ weights + how.mean
+        own = problem.group == group
+        own_matrix, own_right = _normal(how, problem.some(own), phi[own])
+        predicted[own] = phi[own] @ _solved(matrix - own_matrix, right - own_right, smooth) + how.mean
     return predicted
 
 

@@ -208,9 +208,10 @@ def interpolated(axes: Axes, table: NDArray[np.float32], channels: int, x: Array
     cell, share = np.empty((x.shape[0], BLOCK), np.int64), np.empty((x.shape[0], BLOCK))
     for axis in range(x.shape[0]):
         locate(axes, axis, x[axis], count, cell[axis], share[axis])
-    if channels == 1 and x.shape[0] == 3 and axes.width.sum() == 6:
+    width = axes.width  # summed by hand: a method would load all that numba knows of arrays with the stored kernel
+    if channels == 1 and x.shape[0] == 3 and width[0] + width[1] + width[2] == 6:
         trilinear(axes, cell, share, count, table, numbers)
-    elif channels == 1 and x.shape[0] == 3 and axes.width.sum() == 12:
+    elif channels == 1 and x.shape[0] == 3 and width[0] + width[1] + width[2] == 12:
         tricubic(axes, cell, share, count, table, numbers)
     else:
         weighted(axes, cell, share, count, table, channels, numbers)

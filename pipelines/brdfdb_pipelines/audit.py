@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import as_completed
 from concurrent.futures.process import BrokenProcessPool
 from datetime import UTC, datetime
@@ -13,11 +13,10 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import brdfdb
-from brdfdb.atlas import ATLAS
 from brdfdb.audit import FINDINGS, AuditReport, audit, report
 from brdfdb.audit.answers import NO_PAPER
 from brdfdb.errors import BrdfdbError, ParameterError, StoreError
-from brdfdb.gallery import GALLERY
+from brdfdb.figure import Figure
 from brdfdb.materials import presets
 from brdfdb.models import MODELS
 from brdfdb.store.reader import Store
@@ -25,6 +24,7 @@ from brdfdb.store.summary_words import REPORT_OF_SOME
 from brdfdb_pipelines import audit_page, terminal, workers
 
 Task = Callable[[], Any]
+Figures = Mapping[str, Callable[[], Figure]]
 
 
 class Section(NamedTuple):
@@ -82,11 +82,11 @@ def run(
         raise ParameterError("--allow", sentence, unused[0], tuple(materials))
     _check_path(report_path)
     tasks: dict[str, Task] = {name: partial(_audited, root, name, name in allow) for name in materials}
-    drawn = [*ATLAS, *GALLERY] if figures else []
-    tasks |= {f"figure {key}": partial(_drawn, key) for key in drawn}
+    atlas, gallery = _figures() if figures else ({}, {})
+    tasks |= {f"figure {key}": partial(_drawn, key) for key in (*atlas, *gallery)}
     done: dict[str, Any] = {}
     with terminal.progress() as bar:
-        task = bar.add_task("auditing tables, computing figures" if drawn else "auditing tables", total=len(tasks))
+        task = bar.add_task("auditing tables, computing figures" if figures else "auditing tables", total=len(tasks))
         for name, outcome in _outcomes(tasks, jobs):
             done[name] = outcome
             bar.advance(task)
@@ -98,8 +98,8 @@ def run(
         audits,
         store=str(root),
         when=datetime.now(UTC).replace(microsecond=0),
-        atlas=[done[f"figure {key}"].subject for key in ATLAS if figures],
-        gallery=[done[f"figure {key}"].subject for key in GALLERY if figures],
+        atlas=[done[f"figure {key}"].subject for key in atlas],
+        gallery=[done[f"figure {key}"].subject for key in gallery],
         damaged=damaged,
     )
     whole = audit_report if report_path != root / REPORT_OF_SOME else _with_former(audit_report, report_path, store)
@@ -172,8 +172,17 @@ def _audited(root: Path, name: str, accept_excess: bool) -> Section | StoreError
     return Section(audited, audit_page.plots_of(audited))
 
 
+def _figures() -> tuple[Figures, Figures]:
+    """Return the figures of the atlas and of the gallery, whose modules take half a second to load."""
+    from brdfdb.atlas import ATLAS
+    from brdfdb.gallery import GALLERY
+
+    return ATLAS, GALLERY
+
+
 def _drawn(key: str) -> Section:
-    figure = (ATLAS.get(key) or GALLERY[key])()
+    atlas, gallery = _figures()
+    figure = (atlas.get(key) or gallery[key])()
     return Section(figure, audit_page.plots_of(figure))
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from brdfdb.errors import StoreError
 from brdfdb.store.publication import publish_layout
@@ -24,7 +25,9 @@ class Built(NamedTuple):
     sentence: str
 
 
-def build(root: Path, layouts: Mapping[str, Layout]) -> dict[str, Built]:
+def build(
+    root: Path, layouts: Mapping[str, Layout], values: Mapping[str, NDArray[np.float32] | None] | None = None
+) -> dict[str, Built]:
     """Publish tables under names of materials, each with its error against the model that it stands for.
 
     Parameters
@@ -33,6 +36,8 @@ def build(root: Path, layouts: Mapping[str, Layout]) -> dict[str, Built]:
         Directory of an existing store.
     layouts : mapping
         Layouts by the name under which their table is published. A table that is current already stays.
+    values : mapping, optional
+        Values of tables by the same names, where they are known. Other tables are tabulated.
 
     Raises
     ------
@@ -43,17 +48,17 @@ def build(root: Path, layouts: Mapping[str, Layout]) -> dict[str, Built]:
     with terminal.progress() as bar:
         task = bar.add_task("building tables", total=len(layouts))
         for name, layout in layouts.items():
-            built[name] = _build(root, name, layout)
+            built[name] = _build(root, name, layout, (values or {}).get(name))
             bar.advance(task)
     return built
 
 
-def _build(root: Path, name: str, layout: Layout) -> Built:
+def _build(root: Path, name: str, layout: Layout, values: NDArray[np.float32] | None) -> Built:
     store = Store(root)
     if _is_there(store, name, layout):
         return Built(store.head(name), f"{store.head(name)} of the store is this table")
     before = _before(store, name)
-    revision, _, error = publish_layout(root, name, layout)
+    revision, _, error = publish_layout(root, name, layout, values=values)
     model = layout.source.attributes().get("model", "a function")
     stated = f"{model}, whose error (p99) is {terminal.error(error.overall.p99)}"
     return Built(revision, f"{revision} is a table of {stated}; it {before}")

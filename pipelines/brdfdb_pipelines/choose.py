@@ -121,7 +121,8 @@ def _run(
         for key, form in forms.items()
         if form.layout is not None and key not in scene.stored
     }
-    built = build(store, layouts) if store is not None and layouts else {}
+    values = {key: forms[key].values for key in layouts}
+    built = build(store, layouts, values) if store is not None and layouts else {}
     described = describe(
         scene,
         chosen,

@@ -8,16 +8,19 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from brdfdb import formats
-from brdfdb.audit import AuditReport
 from brdfdb.errors import BrdfdbError, MissingExtraError, ParameterError
 from brdfdb.formats.netcdf import write_samples
 from brdfdb.measurements.samples import Samples
 from brdfdb.measurements.statement import Statement, statement
-from brdfdb_pipelines import import_summary, import_tables, terminal
+from brdfdb_pipelines import import_tables, terminal
 from brdfdb_pipelines.import_tables import Tables, Target
+
+if TYPE_CHECKING:
+    from brdfdb.audit import AuditReport
+    from brdfdb_pipelines.import_summary import Line
 
 PATIENCE_S = 2.0  # time [s] after which the bar of progress appears
 
@@ -104,26 +107,36 @@ def run(
             lines = [f"{target.label}: {known.name}", *(f"  {sentence}" for sentence in known.sentences)]
             lines += [f"  written: {out}"] if out is not None else []
             print(terminal.plain("\n".join(lines)), flush=True)
-    audited: list[import_summary.Line] = []
+    audited: list[Line] = []
     if tables is not None and result.statements:
         made = import_tables.make([target for target, _ in result.statements], tables)
         result.refused += made.refused
         result.report = made.report
-        audited = import_summary.lines_of(tables.store, made.report) if made.report and tables.store else []
+        audited = _lines(tables.store, made.report) if made.report and tables.store else []
     if json:
         print(_json.dumps(_document(result, audited), indent=1, ensure_ascii=False, allow_nan=False))
     elif result.report is not None and tables is not None:
+        from brdfdb_pipelines import import_summary
+
         import_summary.show(audited, result.report, tables.tolerance)
     return result
 
 
-def _document(result: Imported, audited: Sequence[import_summary.Line]) -> dict[str, Any]:
+def _lines(store: Path, report: AuditReport) -> list[Line]:
+    from brdfdb_pipelines.import_summary import lines_of  # with the audit, which takes half a second to load
+
+    return lines_of(store, report)
+
+
+def _document(result: Imported, audited: Sequence[Line]) -> dict[str, Any]:
     """Return the result as JSON."""
     document: dict[str, Any] = {
         "statements": [{"file": target.label, **known.document()} for target, known in result.statements],
         "refused": result.refused,
     }
     if result.report is not None:
+        from brdfdb_pipelines import import_summary
+
         document |= import_summary.document(audited, result.report)
     return document
 

@@ -8,9 +8,8 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from brdfdb.audit import AuditReport
 from brdfdb.errors import BrdfdbError, ParameterError, StoreError
 from brdfdb.materials import presets
 from brdfdb.materials.recipe_text import toml_of
@@ -20,12 +19,15 @@ from brdfdb.store.files import write_file
 from brdfdb.store.paths import NAME
 from brdfdb.store.summary_words import REPORT_OF_SOME
 from brdfdb.tables.planner import check_tolerance
-from brdfdb_pipelines import audit, build_resources, workers
+from brdfdb_pipelines import build_resources, workers
 from brdfdb_pipelines.build import build
 from brdfdb_pipelines.build_progress import Bars, Event
 from brdfdb_pipelines.measured_job import MeasuredTable, measured_table
 from brdfdb_pipelines.recipe_file import Recipe
 from brdfdb_pipelines.workers import Workers, WorkersError
+
+if TYPE_CHECKING:
+    from brdfdb.audit import AuditReport
 
 TOLERANCE = 0.05  # of tables, by default
 
@@ -165,6 +167,8 @@ def make(targets: Sequence[Target], tables: Tables) -> Made:
         return made
     kept = _build(recipe, tables.store, min(tables.jobs, len(targets)), made)
     if kept:
+        from brdfdb_pipelines import audit
+
         made.report = audit.run(
             tables.store,
             kept,

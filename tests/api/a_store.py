@@ -23,6 +23,9 @@ from brdfdb.tables.grids import Grid
 from brdfdb.tables.layout import Layout
 from brdfdb.tables.tabulation import tabulate
 from brdfdb_api.http.app import create_app
+from brdfdb_api.http.connection import Connection
+from brdfdb_api.server import Server
+from brdfdb_api.serving.log import flush
 from brdfdb_api.serving.settings import Settings
 
 PROBLEM = "application/problem+json"
@@ -62,7 +65,9 @@ class Client:
             async with httpx.AsyncClient(transport=transport, base_url="http://test") as client:
                 return await client.request(method, url, **request)
 
-        return asyncio.run(send())
+        answer = asyncio.run(send())
+        flush()  # the log, before other tests read what is written to standard error
+        return answer
 
     def get(self, url: str, **request: Any) -> httpx.Response:
         return self.request("GET", url, **request)
@@ -93,7 +98,8 @@ def serving(root: Path, **settings: Any) -> Iterator[str]:
     """The address of a service in a thread of this process."""
     app = create_app(Settings(store=root, log_level="error", **settings))
     with socket.create_server(("127.0.0.1", 0)) as listener:
-        server = uvicorn.Server(uvicorn.Config(app, log_level="error", timeout_graceful_shutdown=1, lifespan="off"))
+        config = uvicorn.Config(app, http=Connection, log_level="error", timeout_graceful_shutdown=1, lifespan="off")
+        server = Server(config)
         thread = threading.Thread(target=server.run, kwargs={"sockets": [listener]})
         thread.start()
         try:

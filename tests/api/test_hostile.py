@@ -26,7 +26,7 @@ from brdfdb.store.publication import publish_dataset
 from brdfdb.tables.grids import Grid
 from brdfdb.tables.layout import Layout
 from brdfdb.tables.tabulation import tabulate
-from brdfdb_api.http.protocol import HEAD_BYTES
+from brdfdb_api.http.connection import HEAD_BYTES
 
 GRID = Grid({"theta_i": [0, 30, 60, 85], "theta_r": [0, 30, 60, 85], "delta_phi": [0, 90, 180]})
 LOOKUP = "/v1/materials/white/lookup"

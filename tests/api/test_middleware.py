@@ -10,13 +10,11 @@ from pathlib import Path
 from typing import Any
 from unittest.mock import AsyncMock
 
-import httpx
 import pytest
 
-from brdfdb_api.http.app import create_app
 from brdfdb_api.http.errors import problem_of
 from brdfdb_api.http.middleware import Edge
-from brdfdb_api.serving.settings import Settings
+from brdfdb_api.serving.log import flush
 from tests.api.a_store import Client, client_of, npy
 
 FELT = "/v1/materials/grey-felt"
@@ -80,27 +78,6 @@ def test_head_is_get_without_the_body(client: Client, address: str) -> None:
         assert asked.headers.get(name) == got.headers.get(name)
 
 
-def test_bodies_that_wait_are_counted_together(root: Path) -> None:
-    app = create_app(Settings(store=root, max_body_bytes=1000, log_level="error"))
-
-    async def ask(count: int) -> list[int]:
-        free = asyncio.Event()
-
-        async def slow() -> Any:
-            yield b" " * 900
-            await free.wait()
-
-        async with httpx.AsyncClient(transport=httpx.ASGITransport(app), base_url="http://test") as http:
-            asked = [asyncio.create_task(http.post(f"{FELT}/lookup", content=slow())) for _ in range(count)]
-            await asyncio.wait(asked, timeout=0.5)
-            free.set()
-            return sorted(answer.status_code for answer in await asyncio.gather(*asked))
-
-    assert asyncio.run(ask(8)) == [422] * 8
-    assert asyncio.run(ask(10)) == [422] * 8 + [503] * 2
-    assert asyncio.run(ask(8)) == [422] * 8
-
-
 def test_a_server_is_ready_when_its_kernels_are_loaded(client: Client) -> None:
     shelf = client.app.state.shelf
     shelf.warming = True
@@ -116,7 +93,14 @@ Log = Callable[[], list[dict[str, Any]]]
 @pytest.fixture
 def log(capfd: pytest.CaptureFixture[str]) -> Log:
     """The lines of the log since it was read last."""
-    return lambda: [json.loads(line) for line in capfd.readouterr().err.splitlines()]
+
+    def lines() -> list[dict[str, Any]]:
+        flush()
+        return [json.loads(line) for line in capfd.readouterr().err.splitlines()]
+
+    flush()  # lines of tests before
+    capfd.readouterr()
+    return lines
 
 
 REQUESTS = [(POINT, 200), (FELT, 200), ("/nothing", 404), (f"{FELT}/lookup", 422)]
@@ -149,8 +133,10 @@ def test_a_line_of_the_log_is_whole_where_several_write(
 ) -> None:
     query = "&".join(f"wavelength_nm={wavelength}.25" for wavelength in range(400, 441))
     client.get(f"{POINT}&{query}")
+    flush()
     assert json.loads(capfd.readouterr().err)["query"].endswith("wavelength_nm=440.25")
     client.get(f"/{character * 2000}?{'%01' * 2000}", headers={"X-Request-ID": "i" * 64})
+    flush()
     written = capfd.readouterr().err
     assert len(written.encode()) <= 4096
     assert written.isascii()

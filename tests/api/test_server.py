@@ -13,17 +13,14 @@ import subprocess
 import sys
 import threading
 import time
-import urllib.request
 from collections import Counter
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 
-from brdfdb_api.http.protocol import HEAD_BYTES
 from tests.api.a_store import publish
 
-PAGE = Path(__file__).parents[2] / "docs" / "reference" / "http.md"
 LOOKUP = "/v1/materials/grey/lookup?theta_i=10&theta_r=20"
 BODY = b'{"theta_i": 10, "theta_r": 20}'
 COUNTED = re.compile(r'^brdfdb_requests_total{route="/v1/materials/{name}/lookup",status="200"} (\d+)', re.MULTILINE)
@@ -260,28 +257,6 @@ def test_workers_end_with_the_command_that_started_them_even_while_they_start(st
         wait_until(lambda: not any(map(_runs, workers)))
     assert len(workers) == 2
     assert server.logged() == []
-
-
-def test_uvicorn_as_the_page_on_http_starts_it_logs_once_and_bounds_heads(store: Path, tmp_path: Path) -> None:
-    (words,) = re.findall(r"^uvicorn (--factory .*)$", PAGE.read_text(), flags=re.MULTILINE)
-    command = [sys.executable, "-m", "uvicorn", *words.split(), "--port", "0"]
-    log = tmp_path / "log"
-    with (
-        log.open("w") as errors,
-        subprocess.Popen(
-            command, env={**os.environ, "BRDFDB_STORE": str(store)}, stdout=errors, stderr=errors
-        ) as process,
-    ):
-        try:
-            wait_until(lambda: "running on" in log.read_text())
-            port = int(re.findall(r"http://127.0.0.1:(\d+)", log.read_text())[0])
-            urllib.request.urlopen(f"http://127.0.0.1:{port}/healthz", timeout=WAIT_S).close()
-            with socket.create_connection(("127.0.0.1", port), timeout=WAIT_S) as connection:
-                connection.sendall(b"GET /".ljust(HEAD_BYTES + 1, b"x"))
-                assert connection.recv(65536).startswith(b"HTTP/1.1 400 ")
-        finally:
-            process.terminate()
-    assert len([line for line in log.read_text().splitlines() if "/healthz" in line]) == 1
 
 
 def _runs(pid: int) -> bool:

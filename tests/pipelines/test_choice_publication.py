@@ -11,11 +11,13 @@ import pytest
 import brdfdb
 from brdfdb.audit.pairs import pairs_of
 from brdfdb.audit.table_error import table_error_of
+from brdfdb.forms.catalogue import forms
 from brdfdb.materials import presets
 from brdfdb.store.marker import make_store
 from brdfdb.tables.grids import Grid
 from brdfdb.tables.layout import Layout
 from brdfdb.tables.planner import plan
+from brdfdb.tables.tabulation import tabulate
 from brdfdb_pipelines import choice_publication, terminal
 from brdfdb_pipelines.choice_publication import Built, with_reason
 
@@ -88,3 +90,11 @@ def test_a_damaged_table_is_replaced(store: Path) -> None:
     (group / "brdf" / "c" / "0" / "0" / "0").write_bytes(b"")
     assert choice_publication.build(store, {NAME: layout(10)})[NAME].revision == "r000002"
     brdfdb.open(store).verify(NAME)
+
+
+def test_a_table_with_the_values_of_its_form_is_that_which_would_be_tabulated(store: Path) -> None:
+    form = next(form for form in forms(layout(10).source, None, [0.1]) if form.layout is not None)
+    assert form.layout is not None
+    choice_publication.build(store, {NAME: form.layout}, {NAME: form.values})
+    stored = brdfdb.open(store).dataset(NAME)[form.layout.variable]
+    np.testing.assert_array_equal(stored, tabulate(form.layout)[form.layout.variable])

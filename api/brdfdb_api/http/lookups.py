@@ -27,8 +27,8 @@ T = TypeVar("T")
 INLINE_VALUES = 1000  # larger lookups run in a thread, so that the event loop can serve others
 INLINE_BYTES = 96 * 2**10  # larger bodies are read in a thread; 1000 points take about this many bytes
 # Number of larger bodies, or larger answers, that are processed at a time
-LARGE_BYTES, LARGE_VALUES, LARGE_AT_ONCE = 2**20, 100_000, 8
-LIMITS = {"json": (1, 100), "npy": (100, 1000)}  # points and values of one answer, as multiples of max_points
+LARGE_BYTES, LARGE_VALUES, LARGE_AT_ONCE = 2**20, 100_000, 2
+LIMITS = {"json": (1, 100), "npy": (100, 800)}  # points and values of one answer, as multiples of max_points
 SPECTRA_OF_COLOURS = 10  # factor on the number of values where only colours are returned
 _PARAMETERS = (*ANGLES, "wavelength_nm", "illuminant", "error")  # of the library, which a request calls the same
 _AT_ONCE = 25_000  # points whose spectra are in memory at once while colours are computed

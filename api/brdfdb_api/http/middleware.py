@@ -1,29 +1,39 @@
-"""The outermost ASGI layer: request ids, the log, metrics, and one-point lookups, which skip all that lies behind."""
+"""The outermost ASGI layer: request ids, the log, metrics, room for bodies and answers, and lookups of one point."""
 
 from __future__ import annotations
 
-import contextlib
+import asyncio
 import functools
+import io
 import os
 import random
 import re
+import tempfile
 import time
 import traceback
 from collections.abc import Awaitable, Callable
+from typing import IO
 
-import orjson
 from prometheus_client import REGISTRY, CollectorRegistry, Counter, Histogram, generate_latest
+from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response
+from starlette.routing import Route, Router
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from brdfdb_api.http.errors import RequestError
+from brdfdb_api.serving import log
 from brdfdb_api.serving.settings import LogLevel
 
-LOOKUP = re.compile(r"/v1/materials/([^/]+)(?:/revisions/([^/]+))?/lookup")
 LOOKUP_ROUTE = "/v1/materials/{name}/lookup"
+LOOKUP_ROUTES = (LOOKUP_ROUTE, "/v1/materials/{name}/revisions/{revision}/lookup")
 
 GONE = 499  # status of a request whose client went away, as nginx counts it
-BODIES = 8  # bodies of the largest size that may be in memory together
+SMALL = 64 * 2**10  # size up to which bodies and answers are not counted [byte]
+BODIES = 1  # bodies of the largest size that may be in memory together
+STALLED_S = 10.0  # longest time without a piece of a body [s]
+RATE = 100_000  # lowest speed at which a body may arrive after the first `STALLED_S` [byte/s]
+PIECE = 256 * 2**10  # size of the pieces of larger answers [byte]
+ROOM = {"memory": 64 * 2**20, "files": 2**31}  # bytes of larger answers that may wait to be read
 _REQUEST_ID = re.compile(rb"[A-Za-z0-9._-]{1,64}")
 
 # made once per process, like the registry
@@ -37,10 +47,6 @@ SECONDS = Histogram(
 POINTS = Counter("brdfdb_points", "Pairs of directions looked up", ["source"])
 
 LOGGED_FROM: dict[LogLevel, int] = {"info": 0, "warning": 400, "error": 500}  # lowest status that is logged
-LINE = 4096  # length of a line [byte] beyond which pipes mix the lines of several workers
-SHOWN = 100  # characters of a path, and of a query, in a shortened line
-KEPT = {"failed": slice(SHOWN), "traceback": slice(-1000, None)}
-_STDERR = 2
 
 Answerer = Callable[[Scope, str, str | None], Awaitable[ASGIApp]]
 
@@ -70,9 +76,12 @@ class Edge:
         failed: Callable[[Exception], Response],
         log_level: LogLevel,
     ) -> None:
-        self.app, self.limit, self.lookup, self.failed = app, limit, lookup, failed
+        points = [Route(path, _Point(lookup), methods=["GET"]) for path in LOOKUP_ROUTES]
+        self.app, self.get = app, Router(points, default=app, redirect_slashes=False)
+        self.limit, self.failed = limit, failed
         self.logged_from = LOGGED_FROM[log_level]
-        self.waiting = 0  # bytes of bodies in memory
+        self.bodies = 0  # bytes of larger bodies in memory
+        self.unread = dict.fromkeys(ROOM, 0)  # bytes of larger answers
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] != "http":
@@ -82,60 +91,91 @@ class Edge:
         exchange, original_scope = _Exchange(self, scope, receive, send), scope
         if scope["method"] == "HEAD":  # answered like GET, without the body
             scope = {**scope, "method": "GET"}
-        route = ""
         try:
-            if scope["method"] == "GET" and (match := LOOKUP.fullmatch(scope["path"])):
-                route = LOOKUP_ROUTE
-                answer = await self.lookup(scope, match[1], match[2])
-                await answer(scope, receive, exchange.send)
-            else:
-                await self.app(scope, exchange.receive, exchange.send)
+            app = self.get if scope["method"] == "GET" else self.app
+            await app(scope, exchange.receive, exchange.send)
+            await exchange.send_large()
         except Exception as error:
             refusal = self.failed(error)
             if refusal.status_code == 500 and not exchange.gone:
-                failed = f"{type(error).__name__}: {error}"
-                _log(original_scope, exchange.id, failed=_ascii(failed), traceback=_ascii(traceback.format_exc()))
-            if exchange.status == 0:
+                failed, lines = log.ascii_of(f"{type(error).__name__}: {error}"), log.ascii_of(traceback.format_exc())
+                log.write({**_about(original_scope, exchange.id), "failed": failed, "traceback": lines})
+            if not exchange.started:
                 await refusal(scope, receive, exchange.send)
             elif not exchange.ended:  # the answer has started: no other is possible
                 exchange.status = 500
                 raise
         finally:
-            self.waiting -= exchange.size
+            self.bodies -= exchange.counted
             seconds = time.perf_counter() - start
             status = exchange.status or GONE  # no client waits for a cancelled request
-            requests, observed = _counters(route or getattr(scope.get("route"), "path", "other"), status)
+            requests, observed = _counters(getattr(scope.get("route"), "path", "other"), status)
             requests.inc()
             observed.observe(seconds)
             if status >= self.logged_from:
-                _log(original_scope, exchange.id, status=status, ms=round(1e3 * seconds, 3))
+                log.write(_about(original_scope, exchange.id) | {"status": status, "ms": round(1e3 * seconds, 3)})
+
+
+class _Point:
+    """An ASGI application that answers GET of a lookup; the route of requests to it, for their counts."""
+
+    path = LOOKUP_ROUTE
+
+    def __init__(self, lookup: Answerer) -> None:
+        self.lookup = lookup
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        scope["route"] = self
+        named = scope["path_params"]
+        answer = await self.lookup(scope, named["name"], named.get("revision"))
+        await answer(scope, receive, send)
 
 
 class _Exchange:
-    """A request and its answer: counts the bytes of the body, also over all requests, and gives the answer an id."""
+    """A request and its answer: room and time for the body, an id, and a large answer sent as it is read."""
 
     def __init__(self, edge: Edge, scope: Scope, receive: Receive, send: Send) -> None:
         self.edge, self._receive, self._send = edge, receive, send
         self.id = _request_id(scope)
         self.head = scope["method"] == "HEAD"
         self.size = 0  # bytes of the body so far
-        self.status = 0  # status of the answer, once it has started
-        self.ended = self.gone = False
+        self.counted = 0  # those that count
+        self.begun_at = 0.0  # time when the body was first waited for [s]
+        self.whole = False  # whether the body is
+        self.status = 0  # status of the answer, once there is one
+        self.start: Message | None = None  # the head of the answer, which waits for the first piece of the body
+        self.large: bytes | None = None  # the body of an answer that is sent once the application has ended
+        self.started = self.ended = self.gone = False
 
     async def receive(self) -> Message:
-        message = await self._receive()
+        message = await (self._receive() if self.whole else self._piece())
         if message["type"] == "http.disconnect":
             if not self.ended:
                 self.gone, self.status, self.ended = True, GONE, True
             return message
+        self.whole = not message.get("more_body", False)
         size = len(message.get("body", b""))
         self.size += size
-        self.edge.waiting += size
         if self.size > self.edge.limit:
             raise RequestError(413, f"the body is larger than the {self.edge.limit} bytes that are allowed")
-        if self.edge.waiting > BODIES * self.edge.limit:
-            raise RequestError(503, "the server holds as many large bodies as it can; ask again later")
+        if self.size > SMALL:
+            self.edge.bodies += self.size - self.counted
+            self.counted = self.size
+            if self.edge.bodies > BODIES * self.edge.limit:
+                detail = "the server holds as many large bodies as it can; ask again later"
+                raise RequestError(503, detail, retry_after_s=round(STALLED_S))
         return message
+
+    async def _piece(self) -> Message:
+        """Return the next piece of the body; RequestError (408) if it does not come in time."""
+        now = asyncio.get_running_loop().time()
+        self.begun_at = self.begun_at or now
+        try:
+            async with asyncio.timeout_at(min(now, self.begun_at + self.size / RATE) + STALLED_S):
+                return await self._receive()
+        except TimeoutError:
+            detail = f"the body did not arrive in time: within {STALLED_S:g} s, or at {RATE} bytes a second"
+            raise RequestError(408, detail) from None
 
     async def send(self, message: Message) -> None:
         if self.gone:
@@ -143,11 +183,51 @@ class _Exchange:
         if message["type"] == "http.response.start":
             self.status = message["status"]
             message["headers"] = [*message["headers"], (b"x-request-id", self.id)]
-        else:
-            self.ended = not message.get("more_body", False)
-            if self.head:
-                message = {**message, "body": b""}
+            self.start = message
+            return
+        if self.head:
+            message = {**message, "body": b""}
+        more = message.get("more_body", False)
+        if not more and len(message.get("body", b"")) > SMALL:
+            self.large = message["body"]
+            return
+        await self._sent(message)
+        self.ended = not more
+
+    async def _sent(self, message: Message) -> None:
+        if self.start is not None:
+            start, self.start, self.started = self.start, None, True
+            await self._send(start)
         await self._send(message)
+
+    async def send_large(self) -> None:
+        """Send a large answer in pieces, as fast as they are read. What does not fit in memory waits in a file."""
+        if self.large is None:
+            return
+        size, unread = len(self.large), self.edge.unread
+        place = next((place for place, room in ROOM.items() if unread[place] + size <= room), None)
+        if place is None:
+            detail = "too many large answers wait to be read; ask again later"
+            raise RequestError(503, detail, retry_after_s=round(STALLED_S))
+        unread[place] += size
+        try:
+            in_memory = place == "memory"
+            with io.BytesIO(self.large) if in_memory else await run_in_threadpool(_in_file, self.large) as file:
+                self.large = None
+                for end in range(PIECE, size + PIECE, PIECE):
+                    piece = {"type": "http.response.body", "body": file.read(PIECE), "more_body": end < size}
+                    await self._sent(piece)
+            self.ended = True
+        finally:
+            unread[place] -= size
+
+
+def _in_file(content: bytes) -> IO[bytes]:
+    """Return a temporary file with this content, to be read from its start."""
+    file = tempfile.TemporaryFile()  # noqa: SIM115 the caller closes it
+    file.write(content)
+    file.seek(0)
+    return file
 
 
 def points_counted(source: str, count: int) -> None:
@@ -185,27 +265,13 @@ def _request_id(scope: Scope) -> bytes:
     return b"%016x" % random.getrandbits(64)
 
 
-def _log(scope: Scope, request_id: bytes, **more: object) -> None:
-    """Write a line of JSON to standard error in one call: `logging` takes as long as a lookup."""
+def _about(scope: Scope, request_id: bytes) -> dict[str, object]:
+    """Return what a line of the log says of a request."""
     client = scope.get("client")
-    record = {
-        "time": round(time.time(), 3),
+    return {
         "request": request_id.decode(),
         "client": client[0] if client else "",
         "method": scope["method"],
-        "path": _ascii(scope["path"]),
+        "path": log.ascii_of(scope["path"]),
         "query": scope["query_string"].decode("ascii", "backslashreplace"),
-        **more,
     }
-    line = orjson.dumps(record, option=orjson.OPT_APPEND_NEWLINE)
-    if len(line) > LINE:  # an escaped character takes six at most
-        shown = {"path": record["path"][:SHOWN], "query": record["query"][:SHOWN]}
-        shown |= {key: str(more[key])[part] for key, part in KEPT.items() if key in more}
-        line = orjson.dumps(record | shown, option=orjson.OPT_APPEND_NEWLINE)
-    with contextlib.suppress(OSError):  # the reader has gone
-        os.write(_STDERR, line)
-
-
-def _ascii(text: str) -> str:
-    """Return ASCII text, which orjson writes and terminals show: other characters, lone surrogates too, are escaped."""
-    return text.encode("ascii", "backslashreplace").decode()

@@ -271,9 +271,9 @@ def media_type(kind: str) -> str:
 
 def npy_bytes(array: NDArray[Any]) -> bytes:
     """Return an array as a .npy file."""
-    buffer = io.BytesIO()
-    np.save(buffer, array, allow_pickle=False)
-    return buffer.getvalue()
+    buffer, array = io.BytesIO(), np.asarray(array, order="C")
+    np.lib.format.write_array_header_1_0(buffer, np.lib.format.header_data_from_array_1_0(array))
+    return b"".join((buffer.getvalue(), array.data))  # np.save copies twice
 
 
 class Encoded(dict[str, str]):

@@ -1,0 +1,253 @@
+"""Clients that withhold bytes, read nothing or smuggle requests: others are served, and memory and time are bounded."""
+
+from __future__ import annotations
+
+import contextlib
+import http.client
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from urllib.parse import urlsplit
+
+import numpy as np
+import pytest
+
+from brdfdb_api.http import connection as connections
+from brdfdb_api.http import middleware
+from tests.api.a_store import npy, publish, serving
+
+PATH = "/v1/materials/grey/lookup"
+POINT = f"{PATH}?theta_i=10&theta_r=20"
+NPY = "application/x-npy"
+BODY = b'{"theta_i": 10, "theta_r": 20}'
+SHORT_S = 0.4  # deadlines in these tests [s]
+WAIT_S = 30.0
+LIMIT = 400_000  # bytes of a body that the service of these tests takes
+
+
+@pytest.fixture(scope="module")
+def store(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    root = tmp_path_factory.mktemp("abuse") / "store"
+    publish(root, "grey", "lambert", rho=0.25)
+    return root
+
+
+@pytest.fixture
+def port(store: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
+    """A service with short deadlines and little room."""
+    monkeypatch.setattr(connections, "QUIET_S", SHORT_S)
+    monkeypatch.setattr(middleware, "STALLED_S", SHORT_S)
+    monkeypatch.setattr(middleware, "ROOM", {"memory": 17_000_000, "files": 33_000_000})
+    with serving(store, max_body_bytes=LIMIT) as address:
+        yield urlsplit(address).port or 0
+
+
+def connected(port: int, data: bytes = b"", room: int | None = None) -> socket.socket:
+    """A connection over which bytes were sent; the system keeps about `room` bytes of what comes back."""
+    connection = socket.socket()
+    connection.settimeout(WAIT_S)
+    if room is not None:
+        connection.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, room)
+    connection.connect(("127.0.0.1", port))
+    connection.sendall(data)
+    return connection
+
+
+def all_of(connection: socket.socket) -> bytes:
+    """What comes until the server closes the connection."""
+    parts = []
+    with contextlib.suppress(ConnectionResetError):
+        while part := connection.recv(1 << 20):
+            parts.append(part)
+    connection.close()
+    return b"".join(parts)
+
+
+def get(port: int, path: str = POINT) -> tuple[int, bytes]:
+    with contextlib.closing(http.client.HTTPConnection("127.0.0.1", port, timeout=WAIT_S)) as client:
+        client.request("GET", path)
+        answer = client.getresponse()
+        return answer.status, answer.read()
+
+
+def post(body: bytes, *fields: str, path: str = PATH, length: int | None = None) -> bytes:
+    lines = [f"POST {path} HTTP/1.1", "Host: x", *fields, f"Content-Length: {len(body) if length is None else length}"]
+    return "\r\n".join([*lines, "", ""]).encode() + body
+
+
+def wait_until(true: Callable[[], bool]) -> None:
+    deadline = time.monotonic() + WAIT_S
+    while not true():
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+
+
+UPGRADES = {
+    "HTTP/2": ("Connection: Upgrade, HTTP2-Settings", "Upgrade: h2c", "HTTP2-Settings: AAMAAABkAAQAAP__"),
+    "TLS": ("Connection: upgrade", "Upgrade: TLS/1.2"),
+    "websocket": ("Connection: Upgrade", "Upgrade: websocket", "Sec-WebSocket-Version: 13"),
+}
+
+
+@pytest.mark.parametrize("offer", UPGRADES)
+@pytest.mark.parametrize("cut", [None, 40, -35, -10], ids=["whole", "head", "line", "body"])
+def test_bodies_beside_offers_of_other_protocols_are_read(port: int, offer: str, cut: int | None) -> None:
+    request = post(BODY, *UPGRADES[offer])
+    connection = connected(port, request[:cut])
+    if cut is not None:
+        time.sleep(0.05)
+        connection.sendall(request[cut:])
+    connection.sendall(f"GET {POINT} HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n".encode())
+    answers = all_of(connection)
+    assert answers.count(b"HTTP/1.1 200 ") == 2
+    assert answers.count(b'"material":"grey"') == 2
+
+
+def test_thousands_of_offers_in_one_read_are_answered_one_by_one(port: int) -> None:
+    head = "\r\n".join(["GET /healthz HTTP/1.1", "Host: x", *UPGRADES["HTTP/2"], "", ""]).encode()
+    last = b"GET /healthz HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n"
+    assert all_of(connected(port, head * 2000 + last)).count(b"HTTP/1.1 200 ") == 2001
+
+
+def test_connect_is_refused(port: int) -> None:
+    assert all_of(connected(port, b"CONNECT x:1 HTTP/1.1\r\nHost: x\r\n\r\n")).startswith(b"HTTP/1.1 400 ")
+
+
+@pytest.mark.parametrize("offer", ["h2c", "TLS/1.2"])
+def test_a_body_that_looks_like_heads_stays_a_body_also_after_an_early_refusal(port: int, offer: str) -> None:
+    # 404 comes while the body arrives; what it contains must be no request, whatever is done to offers in heads
+    inner = f"GET {POINT} HTTP/1.1\r\nHost: x\r\nConnection: Upgrade\r\nUpgrade: {offer}\r\n\r\n".encode()
+    chunk = b"%x\r\n%s\r\n" % (len(inner), inner)
+    connection = connected(
+        port, b"POST /v1/nothing HTTP/1.1\r\nHost: x\r\nTransfer-Encoding: chunked\r\n\r\n" + chunk[:20]
+    )
+    time.sleep(0.1)
+    connection.sendall(chunk[20:] + b"0\r\n\r\n")
+    connection.sendall(b"GET /healthz HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n")
+    answers = all_of(connection)
+    assert answers.count(b"HTTP/1.1 ") == 2
+    assert b'"material"' not in answers
+    assert answers.endswith(b'{"status":"ok"}')
+
+
+@pytest.mark.parametrize("start", [b"", b"GET /healthz HTTP/1.1\r\nHost: x\r\nA: ", b"POST /"])
+def test_a_connection_whose_head_does_not_arrive_is_ended(port: int, start: bytes) -> None:
+    begin = time.monotonic()
+    assert all_of(connected(port, start)) == b""
+    assert SHORT_S <= time.monotonic() - begin < WAIT_S
+
+
+def test_a_head_that_arrives_byte_by_byte_is_ended_too(port: int) -> None:
+    connection, sent = connected(port, b"GET /healthz HTTP/1.1\r\nHost: x\r\nA: "), 0
+    with contextlib.suppress(OSError):
+        while sent < 400:
+            sent += connection.send(b"b")
+            time.sleep(0.05)
+    connection.close()
+    assert sent < 400
+
+
+def test_a_body_that_stops_arriving_is_refused_in_time(port: int) -> None:
+    with connected(port, post(BODY[:10], length=len(BODY))) as connection:
+        answer = connection.recv(65536)
+    assert answer.startswith(b"HTTP/1.1 408 ")
+    assert json.loads(answer.partition(b"\r\n\r\n")[2])["detail"].startswith("the body did not arrive in time")
+
+
+def test_large_bodies_that_are_withheld_keep_out_large_ones_alone_and_not_for_good(
+    port: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(middleware, "STALLED_S", 3.0)
+    array = npy(np.full((10_000, 4), 30.0))
+    large = post(array, f"Content-Type: {NPY}")
+    assert middleware.SMALL < len(array) < middleware.BODIES * LIMIT < 2 * len(array)
+    with contextlib.closing(connected(port, large[:-1])):
+        refusal = b""
+
+        def full() -> bool:
+            nonlocal refusal
+            refusal = _answer(port, large)
+            return refusal.startswith(b"HTTP/1.1 503 ")
+
+        wait_until(full)
+        assert b"\r\nretry-after: 3\r\n" in refusal
+        assert _answer(port, post(BODY)).startswith(b"HTTP/1.1 200 ")
+        wait_until(lambda: _answer(port, large).startswith(b"HTTP/1.1 200 "))
+
+
+def _answer(port: int, request: bytes) -> bytes:
+    """The first piece of the answer to a request."""
+    with connected(port, request) as connection:
+        return connection.recv(65536)
+
+
+def test_answers_that_are_not_read_wait_in_little_room_and_are_ended(port: int) -> None:
+    # a million numbers: the system itself keeps 4 MB of an answer that is not read
+    rows = {"theta_i": [[10.0]] * 1000, "theta_r": [[*range(80)] * 12 + [1.0] * 40]}
+    request = post(json.dumps(rows).encode(), path=f"{PATH}?format=npy")
+    with contextlib.ExitStack() as stack:
+        for _ in range(8):
+            stack.enter_context(contextlib.closing(connected(port, request, 4096)))
+        wait_until(lambda: b" 503 " in _answer(port, request))  # in memory and in files there is no more room
+        assert get(port)[0] == 200
+        wait_until(lambda: _answer(port, request).startswith(b"HTTP/1.1 200 "))  # those that were not read are ended
+    whole = all_of(connected(port, request.replace(b"Host: x", b"Host: x\r\nConnection: close")))
+    np.testing.assert_allclose(np.frombuffer(whole[-8_000_000:]), 0.25 / np.pi, rtol=1e-6)
+
+
+SCRIPT = """
+import sys
+from pathlib import Path
+from brdfdb_api import server
+{}
+server.serve(Path(sys.argv[1]), "127.0.0.1", 0, workers=2)
+"""
+
+
+@contextlib.contextmanager
+def process(store: Path, change: str, **pipes: int) -> Iterator[tuple[subprocess.Popen[str], int]]:
+    """`brdfdb serve` with two workers and a constant that is changed; its process and port."""
+    command = [sys.executable, "-c", SCRIPT.format(change), str(store)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, **pipes) as served:
+        try:
+            assert served.stdout is not None
+            port = int(served.stdout.readline().rsplit(":", 1)[1].strip(" /\n"))
+            wait_until(lambda: len(_children(served.pid)) == 2)
+            for _ in range(4):  # about both
+                wait_until(lambda: get(port, "/readyz")[0] == 200)
+            yield served, port
+        finally:
+            served.kill()
+
+
+def _children(pid: int) -> set[int]:
+    return {int(child) for child in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()}
+
+
+def test_a_log_that_nobody_reads_stops_neither_answers_nor_the_end(store: Path) -> None:
+    with process(store, "pass", stderr=subprocess.PIPE) as (served, port):
+        query = f"{POINT}&phi_r={'0' * 3000}"
+        for _ in range(100):  # 300 kB of lines; a pipe holds 64
+            assert get(port, query)[0] == 200
+        served.send_signal(signal.SIGTERM)
+        assert served.wait(WAIT_S) == 0
+
+
+def test_a_halted_worker_is_replaced_and_does_not_keep_the_server_from_ending(store: Path) -> None:
+    with process(store, "server.HALTED_S, server.STOPPED_S = 6.0, 1.0", stderr=subprocess.DEVNULL) as (served, port):
+        before = _children(served.pid)
+        os.kill(min(before), signal.SIGSTOP)
+        wait_until(lambda: len(_children(served.pid) - before) == 1)
+        assert not Path(f"/proc/{min(before)}").exists()
+        for _ in range(4):
+            assert get(port)[0] == 200
+        os.kill(max(before), signal.SIGSTOP)
+        served.send_signal(signal.SIGTERM)
+        assert served.wait(WAIT_S) == 0
+    assert not Path(f"/proc/{max(before)}").exists()
