@@ -18,14 +18,15 @@ _BOTH = {"alpha": ("alpha_x", "alpha_y")}
 class Parameters:
     """Textures and switches that are read from the properties of a plugin, by the names of the model's parameters.
 
-    Reflectances, n and k have a value for each channel or wavelength. All other parameters have a single value. Angles
-    are in degrees, under names that end in ``_deg``.
+    Reflectances, n and k have a value for each channel or wavelength. All other parameters have a single value, which
+    is moved to the end of its range if a texture is beyond. Angles are in degrees, under names that end in ``_deg``.
     """
 
     def __init__(self, props: Any, spec: ModelSpec, coloured: tuple[Parameter, ...] = ()) -> None:
         self.textures: dict[str, Any] = {}
         self._coloured = {p.name for p in (*spec.parameters, *coloured) if p.reflectance or p in coloured}
         self._angles = {parameter.name for parameter in spec.parameters if parameter.unit == "rad"}
+        self._ranges = {parameter.name: (parameter.low, parameter.high) for parameter in spec.parameters}
         self._switches: dict[str, bool] = {}
         self._names: dict[str, str] = {}
         for parameter in (*spec.parameters, *coloured):
@@ -44,9 +45,12 @@ class Parameters:
         for name, common in self._names.items():
             if name not in self._switches:
                 texture = self.textures[common]
-                many = name in self._coloured
-                value = texture.eval(interaction, active) if many else texture.eval_1(interaction, active)
-                values[name] = dr.deg2rad(value) if name in self._angles else value
+                if name in self._coloured:
+                    values[name] = texture.eval(interaction, active)
+                else:
+                    value = texture.eval_1(interaction, active)
+                    value = dr.deg2rad(value) if name in self._angles else value
+                    values[name] = dr.clip(value, *self._ranges[name])
         return values
 
     def traverse(self, callback: Any) -> None:

@@ -10,6 +10,7 @@ import pytest
 
 from brdfdb.geometry import unit_vector
 from brdfdb.models import he_torrance_specular
+from brdfdb.models import ward_vectors as ward
 from tests.mitsuba.surfaces import SUBJECTS, WAVELENGTH_NM, Array, Subject, directions, evaluated, interaction, variant
 from tests.models.hazard_directions import EXACT, NEAR
 from tests.models.hazards import BY_NAME
@@ -112,3 +113,35 @@ def test_the_specular_part_is_that_of_the_model() -> None:
     sines = np.hypot(wi[:, 0].astype(np.float64), wi[:, 1])
     expected = he_torrance_specular(np.arctan2(sines, wi[:, 2]), **arguments)
     np.testing.assert_allclose(np.array(weight)[0], expected, rtol=FLOAT32)
+
+
+def test_textures_are_parameters_and_stay_within_their_range() -> None:
+    mitsuba = variant("scalar_rgb")
+    picture = np.array([[[0.0], [0.25]], [[0.5], [3.0]]], np.float32)
+    texture = {"type": "bitmap", "data": mitsuba.TensorXf(picture), "raw": True, "filter_type": "nearest"}
+    surface = mitsuba.load_dict({"type": "brdfdb_ward", "rho_d": 0.1, "rho_s": 0.5, "alpha": texture})
+    wi, wr = unit_vector(0.6, 0.4), unit_vector(0.7, 3.4)
+    place, viewer = mitsuba.SurfaceInteraction3f(), mitsuba.Vector3f(wr.tolist())
+    place.wi = mitsuba.Vector3f(wi.tolist())
+    for (row, column), alpha in np.ndenumerate(np.clip(picture[..., 0].astype(np.float64), 1e-6, 2.0)):
+        place.uv = mitsuba.Point2f(0.25 + 0.5 * column, 0.25 + 0.5 * row)
+        value, density = surface.eval_pdf(mitsuba.BSDFContext(), place, viewer)
+        expected = ward(wi, wr, rho_d=0.1, rho_s=0.5, alpha_x=alpha, alpha_y=alpha)
+        np.testing.assert_allclose(np.ravel(value) / wr[2], np.full(3, expected), rtol=1e-4)
+        assert np.isfinite(density)
+
+
+def test_bad_parameters_are_named() -> None:
+    mitsuba = variant("scalar_rgb")
+    good = {"type": "brdfdb_ward", "rho_d": 0.1, "rho_s": 0.5, "alpha": 0.2}
+    for change, sentence in (
+        ({"rho_d": 1.5}, r"rho_d: 1\.5 is outside \[0, 1\]"),
+        ({"alpha": 0.0}, r"alpha_x: 0 is outside \[1e-06, 2\]"),
+        ({"form": "phong"}, "form: 'phong' is none of ward, ward_half_vector, ward_duer, ward_bounded"),
+    ):
+        with pytest.raises(RuntimeError, match=sentence):
+            mitsuba.load_dict(good | change)
+    with pytest.raises(RuntimeError, match=r"rho_s: a number in \[0, 1\] or a texture is missing"):
+        mitsuba.load_dict({name: value for name, value in good.items() if name != "rho_s"})
+    with pytest.raises(RuntimeError, match=r"sigma_deg: 100 is outside \[0, 90\] degree"):
+        mitsuba.load_dict({"type": "brdfdb_oren_nayar", "rho": 0.5, "sigma_deg": 100.0})
