@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import importlib.metadata
 import os
-import re
-import shutil
-import subprocess
 import sys
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
+
+from _site.llvm import llvm_path
 
 project = "brdfdb"
 author = "the authors of brdfdb"
@@ -34,12 +33,9 @@ nb_execution_timeout = 300  # seconds a cell, on a busy machine too; tutorials t
 nb_merge_streams = True
 
 # Mitsuba's LLVM variants need LLVM 19 or newer. Without it their page is built, and its code does not run
-if "DRJIT_LIBLLVM_PATH" not in os.environ and (ldconfig := shutil.which("ldconfig", path="/usr/sbin:/sbin:/usr/bin")):
-    listed = subprocess.run([ldconfig, "-p"], capture_output=True, text=True, check=False).stdout.splitlines()
-    newest = max((line for line in listed if re.search(r"libLLVM\.so\.(19|2\d)", line)), default="")
-    if newest:
-        os.environ["DRJIT_LIBLLVM_PATH"] = newest.split()[-1]
-nb_execution_excludepatterns = [] if "DRJIT_LIBLLVM_PATH" in os.environ else ["tutorials/mitsuba.md"]
+if llvm := llvm_path():
+    os.environ["DRJIT_LIBLLVM_PATH"] = llvm
+nb_execution_excludepatterns = [] if llvm else ["tutorials/mitsuba.md"]
 myst_enable_extensions = ["colon_fence", "deflist"]
 myst_heading_anchors = 3
 
