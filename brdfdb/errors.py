@@ -92,7 +92,7 @@ class UnknownMaterialError(BrdfdbError, KeyError):
         Up to five names that are close to it.
     """
 
-    kind = "material"
+    kind, place = "material", " in the store"
 
     def __init__(self, name: str, names: Iterable[str] = ()) -> None:
         super().__init__(name)
@@ -102,13 +102,19 @@ class UnknownMaterialError(BrdfdbError, KeyError):
     def __str__(self) -> str:
         hint = f"; closest: {', '.join(self.closest)}" if self.closest else ""
         shown = self.name if len(self.name) <= _SHOWN else f"{self.name[:_SHOWN]}..."
-        return f"no {self.kind} {shown!r} in the store{hint}"
+        return f"no {self.kind} {shown!r}{self.place}{hint}"
 
 
 class UnknownFamilyError(UnknownMaterialError):
     """A name that is not that of a family in the store."""
 
     kind = "family"
+
+
+class UnknownModelError(UnknownMaterialError):
+    """A name that is not that of a model."""
+
+    kind, place = "model", ""
 
 
 class UnknownRevisionError(BrdfdbError, KeyError):
@@ -124,7 +130,7 @@ class BusyError(BrdfdbError):
 
 # Modules that an optional extra of the distribution installs. The service needs those of scenes, too
 EXTRAS = {
-    "serve": ("fastapi", "uvicorn", "uvloop", "httptools", "orjson", "prometheus_client"),
+    "serve": ("fastapi", "uvicorn", "uvloop", "httptools", "orjson", "prometheus_client", "pydantic_settings"),
     "scenes": ("colour", "matplotlib", "OpenEXR", "scipy"),
     "report": ("jinja2", "matplotlib", "mpmath", "colour"),
     "dask": ("distributed",),
@@ -183,6 +189,7 @@ _LIMITS = {
 _PATTERNS = {
     "^[a-z0-9]+(-[a-z0-9]+)*$": "lower-case letters, digits and single hyphens",
     "^[^/]+/[^/]+/[^/]+$": "SHELF/BOOK/PAGE of refractiveindex.info",
+    r"^(\*|https?://[^/]+)$": "* or an origin such as https://example.org",
 }
 
 

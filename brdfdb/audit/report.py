@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from datetime import datetime
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, cast
 
 from pydantic import BaseModel, BeforeValidator, Field, GetJsonSchemaHandler, SerializeAsAny
-from pydantic_core import CoreSchema
+from pydantic_core import CoreSchema, core_schema
 
 from brdfdb.audit.answers import AS_PUBLISHED, CONSERVES_ENERGY, Answer
 from brdfdb.audit.finding import STRICT, F, Finding, NotJudged, Sentence, Verdict
@@ -30,14 +30,21 @@ def _finding(key: str, value: Any) -> Finding:
     return (FINDINGS[key] if judged else NotJudged).model_validate(value)
 
 
+def _referred(kind: type[Finding]) -> CoreSchema:
+    """Return the schema of a finding under a name, so that documents define it once and refer to it."""
+    schema: Any = kind.__pydantic_core_schema__
+    if schema["type"] == "definitions":
+        return cast(CoreSchema, schema)
+    return core_schema.definitions_schema(core_schema.definition_reference_schema(schema["ref"]), [schema])
+
+
 class _Registered:
     """The JSON schema of findings: for each kind of the registry, the finding or `NotJudged`."""
 
     @classmethod
     def __get_pydantic_json_schema__(cls, _: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
-        not_judged = handler(NotJudged.__pydantic_core_schema__)
         properties = {
-            key: {"anyOf": [handler(kind.__pydantic_core_schema__), not_judged]} for key, kind in FINDINGS.items()
+            key: {"anyOf": [handler(_referred(kind)), handler(_referred(NotJudged))]} for key, kind in FINDINGS.items()
         }
         return {"type": "object", "properties": properties, "required": [*FINDINGS], "additionalProperties": False}
 

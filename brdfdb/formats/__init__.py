@@ -9,6 +9,7 @@ from __future__ import annotations
 import importlib
 import os
 import pkgutil
+import tempfile
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -18,8 +19,9 @@ import numpy as np
 
 from brdfdb.errors import FileFormatError, ParameterError
 from brdfdb.formats._input import check_file
-from brdfdb.formats._interface import Exporter, Importer, Option, options_of, parsed_options
+from brdfdb.formats._interface import Exporter, Importer, Option, options_of, parsed_options, schema_of
 from brdfdb.formats._stated import AZIMUTHS, at_wavelength, from_forward
+from brdfdb.store.archive import ZIP, zipped
 
 if TYPE_CHECKING:
     from brdfdb.formats._readings import FileTable
@@ -35,9 +37,12 @@ __all__ = [
     "Option",
     "members",
     "options_of",
+    "packed",
     "parsed_options",
     "read",
     "samples",
+    "served_options",
+    "served_schemas",
     "write",
 ]
 
@@ -104,6 +109,35 @@ def write(
     exporter = EXPORTERS[file_format]
     parsed = parsed_options(exporter, {name: _text(value) for name, value in options.items()})
     return exporter.write(table, Path(path), verdict=verdict, **parsed)
+
+
+def served_options(file_format: str) -> dict[str, Option]:
+    """Return the options of a format by name, with the ranges that a service allows."""
+    return {name: option.served for name, option in options_of(EXPORTERS[file_format]).items()}
+
+
+def served_schemas() -> dict[str, tuple[dict[str, Any], str]]:
+    """Return the JSON Schema and the help of each option of any format by name, as a service allows it."""
+    options = {file_format: served_options(file_format) for file_format in EXPORTERS}
+    names = dict.fromkeys(name for known in options.values() for name in known)
+    return {name: schema_of({key: known[name] for key, known in options.items() if name in known}) for name in names}
+
+
+def packed(table: Table, file_format: str, *, verdict: str, **options: Any) -> tuple[str, str, bytes]:
+    """Return the name, the media type and the bytes of a file of another format; several files as a zip archive.
+
+    `options` are values that `Option.parse` returned. Errors are those of `write`.
+    """
+    exporter = EXPORTERS[file_format]
+    kind = f"_{options.get('kind', exporter.kinds[0])}" if exporter.kinds else ""
+    with tempfile.TemporaryDirectory() as name:  # formats write files
+        folder = Path(name)
+        path = folder / f"{table.name}{kind}{exporter.suffix}"
+        written = exporter.write(table, path, verdict=verdict, **options)
+        if len(written.paths) == 1 and path.is_file():
+            return path.name, exporter.media_type, path.read_bytes()
+        names = [str(file.relative_to(folder)) for file in folder.rglob("*") if file.is_file()]
+        return f"{path.name}.zip", ZIP, b"".join(zipped(folder, names))
 
 
 def _text(value: Any) -> str:

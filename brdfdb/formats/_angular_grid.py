@@ -44,7 +44,14 @@ _NEAR = 0.85  # a grid whose error is above this share of the tolerance is small
 _SAMPLE = 20_000  # nodes of the grid that the size of a node in the file is taken from
 _SHRUNK = 0.99  # share of the nodes that should fit, when a file was too large
 
-SIZE = Option("size", 16.0, "largest file [MB]: a table that needs more is written with the error it has", 0.1, 1000.0)
+SIZE = Option(
+    "size",
+    16.0,
+    "largest file [MB]: a table that needs more is written with the error it has",
+    low=0.1,
+    high=1000.0,
+    most_served=16.0,
+)
 
 
 class Sink(Protocol):

@@ -31,6 +31,8 @@ class Option:
         Range of a number, both ends included.
     choices : tuple of str
         Values of a text.
+    most_served : float
+        Largest number for which a service makes a file: larger ones take gigabytes or minutes.
     """
 
     name: str
@@ -39,6 +41,12 @@ class Option:
     low: float = -math.inf
     high: float = math.inf
     choices: tuple[str, ...] = ()
+    most_served: float = math.inf
+
+    @property
+    def served(self) -> Option:
+        """The option with the range that a service allows."""
+        return replace(self, high=min(self.high, self.most_served))
 
     @property
     def allowed(self) -> str:
@@ -75,6 +83,27 @@ class Option:
         if (not self.low <= value <= self.high and value != self.default) or (is_whole and value != int(value)):
             raise ParameterError(self.name, f"{text!r} is not {self.allowed}", text, (self.low, self.high))
         return int(value) if is_whole else value
+
+
+_KINDS = ((bool, "boolean"), (str, "string"), (object, "number"))
+
+
+def schema_of(of: Mapping[str, Option]) -> tuple[dict[str, Any], str]:
+    """Return the JSON Schema of an option of one or more formats, with the values that any allows, and its help.
+
+    It has no default: generated clients send defaults, and a format refuses options of others.
+    """
+    kinds = {next(word for kind, word in _KINDS if isinstance(option.default, kind)) for option in of.values()}
+    schema: dict[str, Any] = {"type": kinds.pop() if len(kinds) == 1 else "string"}
+    if schema["type"] == "number":
+        ends = [end for option in of.values() for end in (option.low, option.high, float(option.default))]
+        schema |= {"minimum": min(ends), "maximum": max(ends)}
+    elif all(option.choices for option in of.values()):
+        schema["enum"] = list(dict.fromkeys(choice for option in of.values() for choice in option.choices))
+    words: dict[str, list[str]] = {}
+    for key, option in of.items():
+        words.setdefault(f"{option.help}; {option.allowed}; default {option.default}", []).append(key)
+    return schema, ". ".join(f"{', '.join(keys)}: {sentence}" for sentence, keys in words.items())
 
 
 TOLERANCE = Option(

@@ -48,7 +48,14 @@ kinds = ()
 options = (
     TOLERANCE,
     WAVELENGTH,
-    Option("nodes", 0, "number of cosines of light and viewer; 0: as few as the tolerance takes", low=3.0, high=513.0),
+    Option(
+        "nodes",
+        0,
+        "number of cosines of light and viewer; 0: as few as the tolerance takes",
+        low=3.0,
+        high=513.0,
+        most_served=129.0,
+    ),
 )
 _DIMS = ("cos_theta_o", "phi_d", "cos_theta_i")
 _COSINES = (2, 4, 6, 9, 13, 19, 28, 41, 60, 88, 129, 193)

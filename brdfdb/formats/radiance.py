@@ -52,6 +52,7 @@ options = (
         "most cells of a tree, of about 7 bytes each; a third where all would not be enough",
         low=1.0,
         high=2e7,
+        most_served=600_000.0,
     ),
 )
 

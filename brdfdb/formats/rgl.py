@@ -42,6 +42,7 @@ options = (
         "largest file [MB]: a table that needs more is written with the error it has",
         low=0.1,
         high=2000.0,
+        most_served=64.0,
     ),
     Option(
         "azimuth",

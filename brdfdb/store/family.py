@@ -24,6 +24,7 @@ from brdfdb.models import MODELS
 from brdfdb.notebook import card, percent
 from brdfdb.parameters import Floats, Parameter
 from brdfdb.store.sealed_json import read_sealed
+from brdfdb.tables.evaluation import Surface
 from brdfdb.tables.grids import Axis
 from brdfdb.tables.stated_error import Error
 from brdfdb.tables.table import Table
@@ -31,13 +32,12 @@ from brdfdb.tables.table_base import Stated
 
 FORMAT = "brdfdb-family"
 FORMAT_VERSION: Literal[1] = 1
-
 _STRICT = ConfigDict(frozen=True, extra="forbid")
 _SAME = 1e-12  # relative tolerance for treating a parameter as equal to a member's value
 
 
-class Sweep(BaseModel):
-    """Which tables make a family."""
+class FamilyLine(BaseModel):
+    """A family, as lists show it."""
 
     model_config = _STRICT
 
@@ -48,6 +48,11 @@ class Sweep(BaseModel):
         description="values of each swept parameter, named and in the unit as in files: degrees under names in _deg"
     )
     members: list[str] = Field(description="names of the materials; the last axis runs fastest")
+
+
+class Sweep(FamilyLine):
+    """Which tables make a family."""
+
     request_sha256: list[str] = Field(description="of the request that each member was built for")
 
     @property
@@ -62,6 +67,20 @@ class Sweep(BaseModel):
         return {
             parameter.name: np.array([radians(v) if parameter.unit == "rad" else v for v in self.axes[written]])
             for written, parameter in self.parameters.items()
+        }
+
+    def in_model_units(self, written: Mapping[str, float]) -> dict[str, float]:
+        """Return parameters, as files write them, by the names and in the units of the model: angles in radians.
+
+        Raises ParameterError for a name that is not that of a swept parameter.
+        """
+        swept = self.parameters
+        for name, value in written.items():
+            if name not in swept:
+                raise ParameterError(name, f"the parameters of {self.name} are {', '.join(swept)}", value, tuple(swept))
+        return {
+            swept[name].name: float(radians(value)) if swept[name].unit == "rad" else value
+            for name, value in written.items()
         }
 
 
@@ -202,6 +221,15 @@ class _Part(NamedTuple):
     weight: float
 
 
+class _AtParameters:
+    """A family at some parameters, looked up as a table is."""
+
+    def __init__(self, family: Family, at: dict[str, float]) -> None:
+        self.lookup = functools.partial(family.lookup, **at)
+        self.lookup_with_error = functools.partial(family.lookup_with_error, **at)
+        self.specular_reflectance = functools.partial(family.specular_reflectance, **at)
+
+
 class Family:
     """A family opened for reading: f_r at any parameters within the swept ranges, without the model.
 
@@ -257,6 +285,10 @@ class Family:
     def wavelength_nm(self) -> Axis | None:
         """Wavelengths [nm] of all members; None if they are grey."""
         return self._member(0).wavelength_nm
+
+    def surface(self, written: Mapping[str, float]) -> Surface:
+        """Return the family at parameters as files write them; a lookup raises what `lookup` does."""
+        return Surface(_AtParameters(self, self.record.in_model_units(written)), "family", self.wavelength_nm)
 
     def lookup(
         self,

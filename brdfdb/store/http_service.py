@@ -8,6 +8,7 @@ import json
 import os
 import re
 import threading
+import time
 import weakref
 from collections.abc import Mapping
 from contextlib import suppress
@@ -25,11 +26,9 @@ from brdfdb.errors import (
 )
 
 TIMEOUT_S = 60.0  # for each step of an exchange: to connect, to send, to receive
-
+PATIENCE_S = 20.0  # in all, for a service that is busy and says when to ask again; to mend a store takes longer
 
 NPY = "application/x-npy"
-
-
 JSON = "application/json"
 
 
@@ -145,7 +144,16 @@ class Service:
         raise TooLargeError(sentence) if status == 413 else StoreError(sentence)
 
     def _answer(self, path: str, body: bytes | None, media: str) -> tuple[http.client.HTTPResponse, bytes]:
-        """Return a whole answer, and its bytes."""
+        """Return a whole answer, and its bytes; one that names a short wait is asked for again after it."""
+        end = time.monotonic() + min(self.timeout_s, PATIENCE_S)
+        while True:
+            response, answer = self._exchanged(path, body, media)
+            wait = response.getheader("Retry-After", "") if response.status == 503 else ""
+            if not wait.isdecimal() or time.monotonic() + int(wait) > end:
+                return response, answer
+            time.sleep(int(wait))
+
+    def _exchanged(self, path: str, body: bytes | None, media: str) -> tuple[http.client.HTTPResponse, bytes]:
         headers = {"Accept": media} if body is None else {"Accept": media, "Content-Type": media}
         request = ("GET" if body is None else "POST", self._path + path, body, headers)
         connection = self._connection()

@@ -31,18 +31,31 @@ class ShownSentence(BaseModel):
     where: str = Field(default="", description="place of the quote")
 
 
-class Audited(BaseModel):
-    """Findings of an audit on a material, as far as lists and pages show them; other fields are kept."""
+class AuditSummary(BaseModel):
+    """The verdict of an audit, its answers to two questions, and its findings in sentences."""
 
-    model_config = ConfigDict(extra="allow")
-
-    material: str
     revision: str = Field(description="that was audited")
     model: str
     verdict: str
     sentences: list[ShownSentence]
     as_published: ShownAnswer = Field(description="of the table: is it what the paper says?")
     conserves_energy: ShownAnswer = Field(description="of the model: does the published model conserve energy?")
+
+
+class Audited(AuditSummary):
+    """Findings of an audit on a material, as far as lists and pages show them; other fields are kept."""
+
+    model_config = ConfigDict(extra="allow")
+
+    material: str
+
+
+class Verdict(NamedTuple):
+    """The audit of a material: the findings, their date, and whether they are about the current revision."""
+
+    finding: Audited
+    when: str
+    current: bool
 
 
 class Report(NamedTuple):

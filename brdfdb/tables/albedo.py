@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from pydantic import BaseModel, Field
 
 from brdfdb.geometry import radians
 from brdfdb.integrals.quadrature import MOST_PANELS, Albedo, reflected_share
@@ -155,6 +156,28 @@ class Reflected(NamedTuple):
     specular: Floats
     hemispherical: Floats
     error: float
+
+    def document(self, wavelength_nm: Axis | None) -> dict[str, Any]:
+        """Return the fields of `AlbedoDocument`, with numpy arrays."""
+        return {
+            "wavelength_nm": wavelength_nm,
+            "theta_i": np.ascontiguousarray(self.theta_i_deg),
+            "albedo": np.ascontiguousarray(self.albedo),
+            "specular_reflectance": np.ascontiguousarray(self.specular),
+            "hemispherical": self.hemispherical,
+            "error": self.error,
+        }
+
+
+class AlbedoDocument(BaseModel):
+    """Directional albedo: the share of light from theta_i that is reflected, averaged over phi_i."""
+
+    wavelength_nm: list[float] | None = Field(description="null: grey")
+    theta_i: list[float] = Field(description="degrees")
+    albedo: list[list[float]] = Field(description="[theta_i][wavelength], without the specular part")
+    specular_reflectance: list[list[float]] = Field(description="[theta_i][wavelength], the specular part")
+    hemispherical: list[float] = Field(description="[wavelength], of light that is the same from everywhere, both")
+    error: float = Field(description="of albedo, the largest estimate of the integration")
 
 
 def reflected(table: Table) -> Reflected:

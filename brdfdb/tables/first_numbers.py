@@ -34,7 +34,7 @@ class FormulaError(BaseModel):
         return None if self.overall is None else self.overall.p99
 
     def in_lists(self) -> dict[str, Any]:
-        """Return what lists show: the standing, the rung, and the error that 99 of 100 values keep to."""
+        """Return the fields of `FormulaRung`."""
         return {"against": self.against, "rung": self.rung, "p99": self.p99}
 
     def in_words(self) -> str:
@@ -44,6 +44,16 @@ class FormulaError(BaseModel):
             "highest rung": f"exact form of its model: {self.rung}",
             "none known": "no higher rung is known",
         }[self.against]
+
+
+class FormulaRung(BaseModel):
+    """Standing of a formula among the forms of its surface, as lists show it."""
+
+    against: Rung = Field(
+        description="measured: against a higher rung; highest rung: it is that rung; none known: it is a fit"
+    )
+    rung: str = Field(description="name of the highest rung; empty: none is known")
+    p99: float | None = Field(description="relative error that 99 of 100 values keep to; null: no rung is known")
 
 
 class LargestAlbedo(BaseModel):

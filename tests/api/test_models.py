@@ -195,7 +195,7 @@ def test_a_family_between_its_members(tmp_path: Path) -> None:
     for parameters, said in (
         ({"rho": 0.9}, "rho: 0.9 is outside [0.2, 0.8]"),
         ({}, "rho: "),
-        ({"sigma_deg": 3.0}, "sigma_deg: unknown parameter; allowed are rho"),
+        ({"sigma_deg": 3.0}, "sigma_deg: the parameters of tiles are rho"),
     ):
         problem = client.problem("POST", "/v1/families/tiles/lookup", 422, json=body | {"parameters": parameters})
         assert problem["detail"].startswith(said)

@@ -115,6 +115,27 @@ TOO_LARGE = answer(PAGE, "413 Request Entity Too Large", "Content-Type: text/htm
 FAR_TOO_LARGE = bytes(16_000_000)  # more than sockets keep: it cannot be sent to whom does not read it
 
 
+BUSY = answer(b'{"detail": "the server is busy"}', "503 Service Unavailable", "Retry-After: 1")
+
+
+def test_a_busy_service_is_asked_again_when_it_says(monkeypatch: pytest.MonkeyPatch) -> None:
+    pauses: list[float] = []
+    monkeypatch.setattr(http_service.time, "sleep", pauses.append)
+    with answering(BUSY, READY, BUSY, READY) as (url, asked):  # it is opened, and counts its materials
+        assert len(http_client.RemoteStore(url)) == 3
+    assert (pauses, len(asked)) == ([1, 1], 4)
+
+
+@pytest.mark.parametrize(("wait", "timeout_s"), [("60", 60.0), ("1", 0.5), ("Wed, 21 Oct 2026 07:28:00 GMT", 60.0)])
+def test_a_wait_that_is_too_long_is_an_error_at_once(
+    monkeypatch: pytest.MonkeyPatch, wait: str, timeout_s: float
+) -> None:
+    monkeypatch.setattr(http_service.time, "sleep", lambda _: pytest.fail("waits"))
+    refusal = BUSY.replace(b"Retry-After: 1", f"Retry-After: {wait}".encode())
+    with answering(refusal) as (url, _), pytest.raises(StoreError, match=r"^the server is busy$"):
+        http_client.RemoteStore(url, timeout_s=timeout_s)
+
+
 def test_a_connection_that_was_closed_in_between_is_made_anew() -> None:
     with answering(READY, READY) as (url, asked):
         assert len(http_client.RemoteStore(url)) == 3

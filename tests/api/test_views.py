@@ -21,7 +21,6 @@ from brdfdb.spectra import srgb_weights
 from brdfdb.store.reader import Store
 from brdfdb.tables import slices
 from brdfdb.tables.albedo import directional_albedo
-from brdfdb_api.serving import shelf
 from tests.api.a_store import NPY, VISIBLE_NM, Client, client_of, degrees, publish, read_npy
 
 FOIL, FELT, TILE, METAL = (
@@ -339,12 +338,14 @@ def test_thumbnails_are_kept_and_change_with_the_table(
     assert again.content != first.content
 
 
-def test_few_thumbnails_are_kept(own: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(shelf, "PICTURES", 2)
-    client = client_of(own)
-    for size in (16, 17, 18):
+def test_one_thumbnail_of_a_table_is_kept(client: Client, monkeypatch: pytest.MonkeyPatch) -> None:
+    drawn, draw = [], lit_sphere.sphere_png
+    monkeypatch.setattr(
+        lit_sphere, "sphere_png", lambda table, size, detail: drawn.append(size) or draw(table, size, detail)
+    )
+    for size in (16, 16, 17, 16):
         assert client.get(f"{TILE}/thumbnail.png?size={size}").status_code == 200
-    assert [size for _, size in client.app.state.shelf._pictures] == [17, 18]
+    assert drawn == [16, 17, 16]
 
 
 def test_a_sphere_is_that_of_the_table(client: Client, store: Store) -> None:

@@ -12,7 +12,7 @@ import pytest
 import brdfdb
 from brdfdb import formats
 from brdfdb.errors import FileFormatError, ParameterError
-from brdfdb.formats import EXPORTERS, Option, options_of, parsed_options
+from brdfdb.formats import EXPORTERS, Option, options_of, parsed_options, served_options
 from brdfdb.formats._readings import FileTable
 from brdfdb.formats._written import Written
 from brdfdb.materials import Material
@@ -20,7 +20,7 @@ from brdfdb.store.publication import publish_dataset
 from brdfdb.tables.grids import Grid
 from brdfdb.tables.layout import Layout
 from brdfdb.tables.tabulation import tabulate
-from brdfdb_api.http.addresses import EXPORT_OPTIONS, served_options
+from brdfdb_api.http.views import EXPORT_OPTIONS
 from tests.api.a_store import client_of
 from tests.pipelines.command import Captured, run
 

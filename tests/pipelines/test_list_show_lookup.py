@@ -60,6 +60,37 @@ def test_list_has_a_column_with_the_stated_error(planned: Path, capsys: Captured
     ]
 
 
+@pytest.mark.parametrize(
+    ("options", "names"),
+    [
+        (("--sort", "name"), ["rolled-brass", "scene-copper-sphere"]),
+        (("--sort=-bytes",), ["scene-copper-sphere", "rolled-brass"]),
+        (("--model", "ward"), ["rolled-brass"]),
+        (("--paper", "HE1991"), ["scene-copper-sphere"]),
+        (("--words", "copper rough"), ["scene-copper-sphere"]),
+        (("--words", "copper", "--model", "ward"), []),
+    ],
+)
+def test_list_shows_some_materials_in_an_order(
+    planned: Path, capsys: Captured, options: tuple[str, ...], names: list[str]
+) -> None:
+    assert run("list", "--store", planned, *options) == 0
+    first = [line.split()[0] for line in capsys.readouterr().out.splitlines()]
+    assert [name for name in first if name in ("rolled-brass", "scene-copper-sphere")] == names
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (("--sort", "colour"), "--sort: 'colour' is not one of 'name', "),
+        (("--presets", "--model", "ward"), "--model: does not go with --presets"),
+    ],
+)
+def test_list_refuses_what_it_cannot_do(planned: Path, capsys: Captured, options: tuple[str, ...], said: str) -> None:
+    assert run("list", "--store", planned, *options) == 2
+    assert said in capsys.readouterr().err
+
+
 def test_a_table_of_another_program_is_shown_with_a_sentence_on_what_it_lacks(tmp_path: Path, capsys: Captured) -> None:
     grid = Grid({"theta_i": [0, 45, 85], "theta_r": [0, 45, 85], "delta_phi": [0, 90, 180]})
     whole = tabulate(Layout(presets()["clay-vase"], grid))

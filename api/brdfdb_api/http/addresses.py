@@ -4,21 +4,20 @@ from __future__ import annotations
 
 import functools
 import inspect
-import math
-from collections.abc import Callable, Coroutine
-from dataclasses import replace
+from collections.abc import Callable, Coroutine, Mapping
 from typing import Annotated, Any, TypeVar
 
 from fastapi import APIRouter, Depends
 from fastapi.routing import APIRoute
 from pydantic import BaseModel, WithJsonSchema
+from pydantic.json_schema import JsonSchemaMode, models_json_schema
 from starlette.requests import Request
 from starlette.responses import Response
 
-from brdfdb.formats import EXPORTERS, Option, options_of
-from brdfdb_api.http.queries import names_of, parsed
-from brdfdb_api.http.responses import NPY, REVISION, Problem, unchanged
-from brdfdb_api.serving.shelf import Shelf
+from brdfdb.store.shelf import Shelf
+from brdfdb_api.http.errors import PROBLEM_JSON, RequestError
+from brdfdb_api.http.queries import names_of, parsed, shortened
+from brdfdb_api.http.responses import JSON, NPY, REVISION, Problem, unchanged
 
 T = TypeVar("T")
 
@@ -28,39 +27,35 @@ NPY_BODY = (
     "Or .npy of shape (..., 4), float32 or float64: theta_i, phi_i, theta_r, phi_r. Other media are read as JSON."
 )
 
-_OTHERS: dict[int, dict[str, Any]] = {
-    304: {"description": "The ETag in If-None-Match still holds"},
-    404: {"description": "No such name or revision; the closest names are listed", "model": Problem},
-    413: {"description": "Too large a body, or too many points for one answer", "model": Problem},
-    422: {"description": "A parameter is missing, unknown or out of range; it is named", "model": Problem},
-    503: {
-        "description": "The store, or the files of this material, cannot be read; or too much is asked for at once",
-        "model": Problem,
-    },
+_REFERENCE = "#/components/schemas/{model}"
+_OTHERS = {
+    304: "The ETag in If-None-Match still holds",
+    404: "No such name or revision; the closest names are listed",
+    413: "Too large a body, or too many points for one answer",
+    415: "The body is compressed",
+    416: "The file ends before the range begins",
+    422: "A parameter is missing, unknown or out of range; it is named",
+    503: "The store, or the files of this material, cannot be read; or too much is asked for at once",
 }
 _HEADERS = {
     "X-Request-ID": "that of the request, or a new one; the log has it, too",
     "ETag": "changes with the answer",
-    "Cache-Control": "how long the answer holds: that of a revision for good",
+    "Cache-Control": "how long the answer holds: what a revision stores for good",
     REVISION: "revision of the values",
     "Content-Disposition": "name of the file",
-    "Retry-After": "seconds after which the same request may succeed, where that is known",
+    "Retry-After": "seconds after which the same request may succeed",
 }
-# Sizes that the service makes a file of: larger ones take gigabytes or minutes, and are for `brdfdb export`
-_SERVED = {
-    "eradiate": {"nodes": 129.0},
-    "png": {"size": 512.0},
-    "radiance": {"cells": 600_000.0},
-    "rgl": {"megabytes": 64.0},
-    **{file_format: {"size": 16.0} for file_format in ("astm", "fred", "ssdd", "zemax")},
-}
-_KINDS = ((bool, "boolean"), (str, "string"), (object, "number"))
 
 
 def shelf_of(request: Request) -> Shelf:
     """Return the shelf of the application."""
     shelf: Shelf = request.app.state.shelf
     return shelf
+
+
+def accept_of(request: Request) -> str:
+    """Return the header Accept, which may come in several lines."""
+    return ",".join(request.headers.getlist("accept"))
 
 
 async def _content(request: Request) -> bytes:
@@ -82,6 +77,9 @@ class Address(APIRoute):
         async def answer(request: Request) -> Response:
             if not reads_itself:
                 parsed(request.scope["query_string"], names)
+            if (coding := request.headers.get("content-encoding", "identity").lower()) != "identity":
+                sentence = f"Content-Encoding: {shortened(coding)!r} is not read; send the body as it is"
+                raise RequestError(415, sentence, Accept_Encoding="identity")
             return unchanged(await handle(request), request.headers.get("if-none-match"))
 
         return answer
@@ -111,71 +109,51 @@ def both(
     return add
 
 
+_DESCRIBED: dict[str, tuple[type[BaseModel], JsonSchemaMode]] = {}  # models of the document, by their names
+
+
+def _schema(model: type[BaseModel], mode: JsonSchemaMode = "serialization") -> dict[str, Any]:
+    """Return a reference to the JSON Schema of a model, which becomes one of the `schemas` of the document."""
+    _DESCRIBED[model.__name__] = model, mode
+    return {"schema": {"$ref": _REFERENCE.format(model=model.__name__)}}
+
+
+def schemas() -> dict[str, Any]:
+    """Return the JSON Schemas of all bodies and answers by name."""
+    schemas: dict[str, Any] = models_json_schema([*_DESCRIBED.values()], ref_template=_REFERENCE)[1]["$defs"]
+    return schemas
+
+
 def answers(
-    model: Any, *statuses: int, media: dict[str, str] | None = None, headers: tuple[str, ...] = ()
+    model: type[BaseModel] | None, *statuses: int, media: Mapping[str, str] = {}, headers: tuple[str, ...] = ()
 ) -> dict[int | str, dict[str, Any]]:
     """Return the OpenAPI description of the answers of an address: `model` at 200 or other media, and `statuses`."""
-    success: dict[str, Any] = {"description": "Success"} | ({} if model is None else {"model": model})
-    if media is not None:
-        success["content"] = {
-            kind: {"schema": {"type": "string", "description": text} | ({} if "text" in kind else {"format": "binary"})}
-            for kind, text in media.items()
-        }
+    content = {} if model is None else {JSON: _schema(model)}  # first: generated clients take the first that they read
+    for kind, text in media.items():
+        binary = {} if "text" in kind else {"format": "binary"}
+        content[kind] = {"schema": {"type": "string", "description": text, **binary}}
     cached = ("ETag", "Cache-Control") if 304 in statuses else ()
-    described: dict[int | str, dict[str, Any]] = {200: _with_headers(success, *cached, *headers)}
+    described: dict[int | str, dict[str, Any]] = {200: _answer("Success", *cached, *headers, content=content)}
     for status in (*statuses, 422):
         more = {304: cached, 503: ("Retry-After",)}.get(status, ())
-        described[status] = _with_headers(_OTHERS[status], *more)
+        problem = {} if status < 400 else {"content": {PROBLEM_JSON: _schema(Problem)}}
+        described[status] = _answer(_OTHERS[status], *more, **problem)
     return described
 
 
-def _with_headers(answer: dict[str, Any], *names: str) -> dict[str, Any]:
+def _answer(description: str, *names: str, **more: Any) -> dict[str, Any]:
     headers = {
         name: {"description": _HEADERS[name], "schema": {"type": "integer" if name == "Retry-After" else "string"}}
         for name in ("X-Request-ID", *names)
     }
-    return {**answer, "headers": headers}
+    return {"description": description, "headers": headers, **more}
 
 
 def body(model: type[BaseModel], *, npy: bool = False) -> dict[str, Any]:
     """Return the OpenAPI description of a body that is JSON, or .npy, too."""
-    schema = model.model_json_schema()
-    example = schema.pop("example", None)
-    content = {"application/json": {"schema": schema} | ({} if example is None else {"example": example})}
+    example: Any = model.model_config.get("json_schema_extra")
+    content = {JSON: {**_schema(model, "validation"), **example}}
     if npy:
         content[NPY] = {"schema": {"type": "string", "format": "binary", "description": NPY_BODY}}
     words = f"{model.__doc__} {NPY_BODY if npy else ''}".strip()
     return {"requestBody": {"required": True, "description": words, "content": content}}
-
-
-def served_options(file_format: str) -> dict[str, Option]:
-    """Return the options of a format by name, with the ranges that the service allows."""
-    highest = _SERVED.get(file_format, {})
-    return {
-        name: replace(option, high=min(option.high, highest.get(name, math.inf)))
-        for name, option in options_of(EXPORTERS[file_format]).items()
-    }
-
-
-def _option(name: str) -> dict[str, Any]:
-    """Return the parameter of an option of one or more formats, with the values that any of them allows.
-
-    It has no default: generated clients send defaults, and a format refuses options of others.
-    """
-    of = {key: options[name] for key in EXPORTERS if name in (options := served_options(key))}
-    kinds = {next(word for kind, word in _KINDS if isinstance(option.default, kind)) for option in of.values()}
-    schema: dict[str, Any] = {"type": kinds.pop() if len(kinds) == 1 else "string"}
-    if schema["type"] == "number":
-        ends = [end for option in of.values() for end in (option.low, option.high, float(option.default))]
-        schema |= {"minimum": min(ends), "maximum": max(ends)}
-    elif all(option.choices for option in of.values()):
-        schema["enum"] = list(dict.fromkeys(choice for option in of.values() for choice in option.choices))
-    words: dict[str, list[str]] = {}
-    for key, option in of.items():
-        words.setdefault(f"{option.help}; {option.allowed}; default {option.default}", []).append(key)
-    text = ". ".join(f"{', '.join(keys)}: {sentence}" for sentence, keys in words.items())
-    return {"name": name, "in": "query", "required": False, "description": text, "schema": schema}
-
-
-# Of all formats: an option that a format does not have is refused
-EXPORT_OPTIONS = [_option(name) for name in dict.fromkeys(name for key in EXPORTERS for name in served_options(key))]

@@ -4,27 +4,30 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import functools
 import threading
 from collections.abc import AsyncIterator
 from typing import TYPE_CHECKING, Any
 
 import orjson
 from fastapi import FastAPI
+from starlette.datastructures import Headers
 from starlette.middleware.cors import CORSMiddleware
-from starlette.middleware.gzip import GZipMiddleware
+from starlette.responses import Response
 from starlette.types import ASGIApp, Receive, Scope, Send
 
-from brdfdb_api.http.errors import HANDLED, PROBLEM_JSON, handler, problem_of
+from brdfdb.store.shelf import Shelf
+from brdfdb_api.http.addresses import schemas
+from brdfdb_api.http.errors import HANDLED, RequestError, handler, problem_of
 from brdfdb_api.http.files import files
-from brdfdb_api.http.lookups import LARGE_AT_ONCE
+from brdfdb_api.http.lookups import LARGE_AT_ONCE, answer_point, lookups
 from brdfdb_api.http.middleware import Edge
 from brdfdb_api.http.models import models
 from brdfdb_api.http.pages import pages
 from brdfdb_api.http.responses import REVISION
-from brdfdb_api.http.routes import EXPORTS_AT_ONCE, answer_point, router
-from brdfdb_api.http.views import views
+from brdfdb_api.http.routes import router
+from brdfdb_api.http.views import EXPORTS_AT_ONCE, views
 from brdfdb_api.serving.settings import Settings
-from brdfdb_api.serving.shelf import Shelf
 
 if TYPE_CHECKING:
     from brdfdb.store.reader import Store
@@ -37,12 +40,8 @@ phi_r - phi_i = 0 looks back towards the light, 180 is the side of the mirror di
 application/problem+json document with one sentence."""
 
 
-# Media types that are not compressed: binary numbers hardly shrink, and files are compressed already
-UNCOMPRESSED = (*("application/x-npy", "application/octet-stream", "application/zip"), "image/*", "text/*")
-
-
 class Application(FastAPI):
-    """FastAPI behind an edge, whose OpenAPI document gives problems the media type that they are sent with."""
+    """FastAPI behind an edge, whose OpenAPI document has the schemas that its answers name."""
 
     outermost: ASGIApp
 
@@ -55,34 +54,9 @@ class Application(FastAPI):
         await super().__call__(scope, receive, send)
 
     def openapi(self) -> dict[str, Any]:
-        document = super().openapi()
-        schemas = document["components"]["schemas"]
-        for path in document["paths"].values():
-            for operation in path.values():
-                for status, response in operation["responses"].items():
-                    content = response.get("content", {})
-                    if "$ref" in content.get("application/json", {}).get(
-                        "schema", {}
-                    ):  # first: generated clients take the first that they can read
-                        kind = PROBLEM_JSON if status >= "400" else "application/json"
-                        response["content"] = {kind: content.pop("application/json"), **content}
-        for part in (*document["paths"].values(), *list(schemas.values())):
-            for key, value in part.items():
-                part[key] = _named(value, schemas)
-        return document
-
-
-def _named(part: Any, schemas: dict[str, Any]) -> Any:
-    """Return a part of the document with references to the objects that have titles, which join the schemas."""
-    if isinstance(part, list):
-        return [_named(item, schemas) for item in part]
-    if not isinstance(part, dict):
-        return part
-    part = {key: _named(value, schemas) for key, value in part.items()}
-    if part.get("type") != "object" or "properties" not in part or not isinstance(part.get("title"), str):
-        return part
-    schemas.setdefault(part["title"], part)
-    return {"$ref": f"#/components/schemas/{part['title']}"}
+        if self.openapi_schema is None:
+            super().openapi()["components"] = {"schemas": schemas()}  # FastAPI keeps the document
+        return super().openapi()
 
 
 def create_app(settings: Settings | None = None, store: Store | None = None) -> FastAPI:
@@ -109,35 +83,45 @@ def create_app(settings: Settings | None = None, store: Store | None = None) -> 
         generate_unique_id_function=lambda route: route.name,
         lifespan=_warmed,
         redirect_slashes=False,  # an unknown address is 404
+        openapi_url=None,  # `pages` has it
     )
-    app.state.settings = settings or Settings.from_environment()
-    app.state.shelf = Shelf(app.state.settings, store)
+    given = app.state.settings = settings or Settings.from_environment()
+    app.state.failed = functools.partial(problem_of, root=given.store.absolute())
+    app.state.shelf = Shelf(given.store, given.audit_file, given.cache_bytes, given.snapshot, store)
     app.state.large = asyncio.Semaphore(LARGE_AT_ONCE)
     app.state.exports = asyncio.Semaphore(EXPORTS_AT_ONCE)
-    app.include_router(router)
-    app.include_router(views)
-    app.include_router(models)
-    app.include_router(files)
-    app.include_router(pages)
+    app.state.routes = []
+    for part in (router, lookups, views, models, files, pages):
+        app.include_router(part)
+        app.state.routes += part.routes
     for kind in HANDLED:
         app.add_exception_handler(kind, handler)
-    app.add_middleware(GZipMiddleware, minimum_size=1024, compresslevel=5, exclude_content_types=UNCOMPRESSED)
-    limit, level = app.state.settings.max_body_bytes, app.state.settings.log_level
-    app.outermost = Edge(app.routed, limit=limit, lookup=answer_point, failed=problem_of, log_level=level)
-    if app.state.settings.cors_origins:
-        app.outermost = CORSMiddleware(
+    limit, level = given.max_body_bytes, given.log_level
+    app.outermost = Edge(app.routed, limit=limit, lookup=answer_point, failed=app.state.failed, log_level=level)
+    if given.cors_origins:
+        app.outermost = _Cors(
             app.outermost,
-            allow_origins=app.state.settings.cors_origins,
+            allow_origins=given.cors_origins,
             allow_methods=["GET", "POST"],
             allow_headers=["*"],
-            expose_headers=["ETag", "X-Request-ID", REVISION],
+            expose_headers=["ETag", "Retry-After", "X-Request-ID", REVISION],
         )
     return app
 
 
+class _Cors(CORSMiddleware):
+    """CORS whose refusals are problems, too."""
+
+    def preflight_response(self, request_headers: Headers) -> Response:
+        answer = super().preflight_response(request_headers)
+        if answer.status_code < 400:
+            return answer
+        return problem_of(RequestError(answer.status_code, bytes(answer.body).decode()))
+
+
 @contextlib.asynccontextmanager
 async def _warmed(app: FastAPI) -> AsyncIterator[None]:
-    """Run a thread that finds the colours of the first page of a list, until the application ends."""
+    """Load the kernels of lookups in a thread, while the application answers already."""
     threading.Thread(target=app.state.shelf.warm, daemon=True).start()
     yield
 

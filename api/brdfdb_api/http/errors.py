@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from http import HTTPStatus
+from pathlib import Path
 from typing import Any
 
 import orjson
@@ -11,10 +12,13 @@ from fastapi.exceptions import RequestValidationError
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.responses import Response
+from starlette.routing import Match
 
 from brdfdb.errors import BrdfdbError, StoreError, UnknownMaterialError, UnknownRevisionError, sentence_of
 
 PROBLEM_JSON = "application/problem+json"
+
+BUSY_S, DAMAGED_S = 1, 60  # seconds to wait for a turn, and until somebody may have mended a store
 
 # Phrases of RFC 9110; those of http.HTTPStatus differ between versions of Python
 _TITLES = {413: "Content Too Large", 422: "Unprocessable Content"}
@@ -32,16 +36,17 @@ class RequestError(BrdfdbError):
     parameter : str, optional
         The parameter that is at fault.
     retry_after_s : int, optional [s]
-        Time after which the same request may succeed.
+        Time after which the same request may succeed, of status 503.
+    **headers : str
+        Headers of the answer, with ``_`` in place of ``-``.
     """
 
     def __init__(
-        self, status: int, detail: str, parameter: str | None = None, *, retry_after_s: int | None = None
+        self, status: int, detail: str, parameter: str | None = None, *, retry_after_s: int = BUSY_S, **headers: str
     ) -> None:
         super().__init__(detail)
-        self.status = status
-        self.parameter = parameter
-        self.headers = {} if retry_after_s is None else {"Retry-After": str(retry_after_s)}
+        self.status, self.parameter, self.retry_after_s = status, parameter, retry_after_s
+        self.headers = {name.replace("_", "-"): value for name, value in headers.items()}
 
 
 # Classes that the router hands to `handler`. Exception is what the server logs with its traceback, so that the other
@@ -52,19 +57,25 @@ HANDLED = (
 )
 
 
-async def handler(_: Request, error: Exception) -> Response:
+async def handler(request: Request, error: Exception) -> Response:
     """Return the answer of the router to an exception."""
-    return problem_of(error)
+    answer: Response = request.app.state.failed(error)
+    if answer.status_code == 405:  # the router names the methods of one route of several
+        routes = [route for route in request.app.state.routes if route.matches(request.scope)[0] is not Match.NONE]
+        methods = {method for route in routes for method in route.methods}
+        answer.headers["Allow"] = ", ".join(sorted(methods | {"HEAD"} if "GET" in methods else methods))
+    return answer
 
 
-def problem_of(error: Exception) -> Response:
-    """Return the answer to an exception.
+def problem_of(error: Exception, root: Path | None = None) -> Response:
+    """Return the answer to an exception; of the path of the store, its `root`, it shows the last name only.
 
     A ParameterError that reaches this table is about a parameter that no client gave, so it is a bug: 500.
     """
     match error:
         case RequestError():
-            return _problem(error.status, str(error), error.parameter, headers=error.headers)
+            wait = {"Retry-After": str(error.retry_after_s)} if error.status == 503 else {}
+            return _problem(error.status, str(error), error.parameter, headers=error.headers | wait)
         case RequestValidationError():
             first = error.errors()[0]
             parameter = str(first["loc"][1])  # ("query", name, ...)
@@ -74,7 +85,8 @@ def problem_of(error: Exception) -> Response:
         case UnknownRevisionError():
             return _problem(404, str(error), "revision")
         case StoreError():
-            return _problem(503, str(error))
+            detail = str(error) if root is None else str(error).replace(str(root), root.name)
+            return _problem(503, detail, headers={"Retry-After": str(DAMAGED_S)})
         case HTTPException():
             return _problem(error.status_code, error.detail, headers=dict(error.headers or {}))
         case _:

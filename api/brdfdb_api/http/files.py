@@ -2,42 +2,28 @@
 
 from __future__ import annotations
 
-import contextlib
-import hashlib
-import tempfile
+import re
 import zipfile
-from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import Any
 
-from pydantic import BaseModel
 from starlette.requests import Request
 from starlette.responses import FileResponse, Response, StreamingResponse
 
-from brdfdb.errors import StoreError, UnknownMaterialError
+from brdfdb import __version__
+from brdfdb.errors import StoreError
+from brdfdb.store.archive import ZIP, Group, root_group, zipped
 from brdfdb.store.files import sha256_of
 from brdfdb.store.manifest import check_manifest
-from brdfdb.store.paths import METADATA, manifest_path
-from brdfdb.store.sealed_json import read_json
+from brdfdb.store.paths import manifest_path
 from brdfdb_api.http.addresses import Revision, addresses, answers, both, shelf_of
 from brdfdb_api.http.errors import RequestError
-from brdfdb_api.http.responses import cache_headers, json_response
+from brdfdb_api.http.responses import Document, cache_headers, tagged
 
-ZIP = "application/zip"
 BYTES = "application/octet-stream"
 
-_PIECE = 1 << 20
+_RANGE = re.compile(r"bytes=(?:(?P<first>\d{1,18})-(?:\d{1,18})?|-(?P<last>\d{1,18}))")  # others are not read
 
 files = addresses()
-
-
-class Group(BaseModel):
-    """A zarr group (version 3) with the metadata of all below it."""
-
-    zarr_format: int
-    node_type: str
-    attributes: dict[str, Any]
-    consolidated_metadata: dict[str, Any]
 
 
 @both(
@@ -53,7 +39,7 @@ class Group(BaseModel):
 def download(request: Request, name: str, revision: Revision = None) -> Response:
     """Return a revision as one uncompressed zip file: xarray.open_zarr(zarr.storage.ZipStore(path, mode="r"))."""
     group, digest = _located(request, name, revision)
-    headers = cache_headers(f"{name}-{group.name}-{digest[:16]}", "zip", immutable=revision is not None)
+    headers = cache_headers(f"{name}-{group.name}-{digest[:16]}-{__version__}", "zip", immutable=revision is not None)
     headers["Content-Disposition"] = f'attachment; filename="{name}-{group.name}.zarr.zip"'
     listed = check_manifest(group, digest, contents=True)["files"]
     return StreamingResponse(zipped(group, listed, zipfile.ZIP_STORED), media_type=ZIP, headers=headers)
@@ -62,7 +48,7 @@ def download(request: Request, name: str, revision: Revision = None) -> Response
 @files.get(
     "/v1/store/materials/{name}/{revision}/{file:path}",
     tags=["files"],
-    responses=answers(None, 304, 404, 503, media={BYTES: "a file of the zarr group"}),
+    responses=answers(None, 304, 404, 416, 503, media={BYTES: "a file of the zarr group"}),
 )
 def stored_file(request: Request, name: str, revision: str, file: str) -> Response:
     """Return a file of a revision: ``xarray.open_zarr(".../v1/store/materials/NAME/REVISION")`` reads these."""
@@ -70,12 +56,24 @@ def stored_file(request: Request, name: str, revision: str, file: str) -> Respon
     listed = check_manifest(group, digest, contents=False)["files"]
     if file not in listed:
         raise RequestError(404, f"{name} {revision} has no such file")
-    kind = "json" if file.endswith(".json") else "file"  # JSON may be compressed on its way
-    headers = cache_headers(f"{name}-{revision}-{listed[file]['sha256'][:16]}", kind, immutable=True)
-    if sha256_of(group / file) != listed[file]["sha256"]:  # a cache would keep it forever
+    path, digest = group / file, listed[file]["sha256"]
+    if sha256_of(path) != digest:  # a cache would keep it forever
         raise StoreError(f"{name} {revision} is damaged: the content of {file} changed")
-    media = "application/json" if file.endswith(".json") else BYTES
-    return FileResponse(group / file, media_type=media, headers=headers)
+    is_json = file.endswith(".json")  # JSON may be compressed on its way
+    headers = cache_headers(f"{name}-{revision}-{digest[:16]}", "json" if is_json else "file", immutable=True)
+    if is_json:
+        return Document(path.read_bytes(), headers)
+    _check_range(request, listed[file]["size"])
+    return FileResponse(path, media_type=BYTES, headers=headers)
+
+
+def _check_range(request: Request, size: int) -> None:
+    """Forget a range that is not one of bytes; RequestError (416) for one that begins after the end of the file."""
+    part = _RANGE.fullmatch(request.headers.get("range", ""))
+    if part is None:
+        request.scope["headers"] = [header for header in request.scope["headers"] if header[0] != b"range"]
+    elif int(part["first"] or 0) >= size or (part["last"] == "0" and not part["first"]):
+        raise RequestError(416, f"the file has {size} bytes", Content_Range=f"bytes */{size}")
 
 
 @files.get("/v1/store/zarr.json", tags=["files"], responses=answers(Group, 304, 503))
@@ -84,25 +82,7 @@ def root(request: Request) -> Response:
 
     A material that is damaged is left out.
     """
-    shelf = shelf_of(request)
-    metadata: dict[str, Any] = {"materials": _group()}
-    for name in shelf.names():
-        with contextlib.suppress(StoreError, UnknownMaterialError):
-            group, digest = shelf.store.location(name)
-            check_manifest(group, digest, contents=False)
-            whole = read_json(group / METADATA)
-            arrays = whole.pop("consolidated_metadata", {}).get("metadata", {})
-            place = f"materials/{name}/{group.name}"
-            metadata |= {f"materials/{name}": _group(revision=group.name), place: whole}
-            metadata |= {f"{place}/{key}": array for key, array in arrays.items()}
-    consolidated = {"kind": "inline", "must_understand": False, "metadata": metadata}
-    answer = json_response({**_group(), "consolidated_metadata": consolidated})
-    answer.headers.update(cache_headers(f"store-{hashlib.sha256(answer.body).hexdigest()[:16]}"))
-    return answer
-
-
-def _group(**attributes: Any) -> dict[str, Any]:
-    return {"zarr_format": 3, "node_type": "group", "attributes": attributes}
+    return tagged(root_group(shelf_of(request).store), "store")
 
 
 def _located(request: Request, name: str, revision: str | None) -> tuple[Path, str]:
@@ -115,14 +95,3 @@ def _located(request: Request, name: str, revision: str | None) -> tuple[Path, s
     if not manifest_path(group).is_file():
         raise StoreError(f"{name} {group.name} is damaged: its manifest is missing")
     return group, digest
-
-
-def zipped(folder: Path, names: Iterable[str], compression: int = zipfile.ZIP_DEFLATED) -> Iterator[bytes]:
-    """Yield files of a folder as a zip archive in pieces, from a temporary file: memory does not grow with a table."""
-    with tempfile.TemporaryFile() as file:
-        with zipfile.ZipFile(file, "w", compression) as archive:
-            for name in sorted(names):
-                archive.write(folder / name, name)
-        file.seek(0)
-        while piece := file.read(_PIECE):
-            yield piece

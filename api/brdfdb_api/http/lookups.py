@@ -1,28 +1,54 @@
-"""Values of tables, models and families at the points of a request, and the answers that hold them."""
+"""Lookups: values of tables, models and families at the points of a request, and the addresses of tables."""
 
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+import io
+from collections.abc import Iterator
+from typing import Annotated, Any
 
 import numpy as np
-from numpy.typing import NDArray
+from fastapi import Query as InQuery
 from starlette.concurrency import run_in_threadpool
-from starlette.datastructures import State
+from starlette.requests import Request
 from starlette.responses import Response
+from starlette.types import Scope
 
 from brdfdb.errors import ParameterError
+from brdfdb.store.shelf import Shelf
+from brdfdb.tables.evaluation import Surface, Values, surface_of
+from brdfdb.tables.points import ANGLES, Points, PointsBody
+from brdfdb.tables.table import Table
+from brdfdb.tables.values_document import Lookup, Lookups, values_document
+from brdfdb_api.http.addresses import NPY_ANSWER, Content, Revision, accept_of, addresses, answers, body, both, shelf_of
 from brdfdb_api.http.errors import RequestError
 from brdfdb_api.http.middleware import points_counted
-from brdfdb_api.http.queries import ANGLES, Angles, Format, Points, Values
-from brdfdb_api.http.responses import Encoded, EncodedResponse, json_bytes, npy_bytes, plain
-
-if TYPE_CHECKING:
-    from brdfdb.materials import Material
-    from brdfdb.tables.table import Table
-
-T = TypeVar("T")
+from brdfdb_api.http.queries import (
+    BodyQuery,
+    Format,
+    ManyBody,
+    ManyQuery,
+    OfTable,
+    Options,
+    PointQuery,
+    checked,
+    from_array,
+    from_json,
+    names_of,
+    parsed,
+)
+from brdfdb_api.http.responses import (
+    JSON,
+    NPY,
+    REVISION,
+    Encoded,
+    EncodedResponse,
+    json_bytes,
+    lookup_headers,
+    npy_bytes,
+    tag_of,
+    unchanged,
+)
 
 INLINE_VALUES = 1000  # larger lookups run in a thread, so that the event loop can serve others
 INLINE_BYTES = 96 * 2**10  # larger bodies are read in a thread; 1000 points take about this many bytes
@@ -31,84 +57,11 @@ LARGE_BYTES, LARGE_VALUES, LARGE_AT_ONCE = 2**20, 100_000, 2
 LIMITS = {"json": (1, 100), "npy": (100, 800)}  # points and values of one answer, as multiples of max_points
 SPECTRA_OF_COLOURS = 10  # factor on the number of values where only colours are returned
 _PARAMETERS = (*ANGLES, "wavelength_nm", "illuminant", "error")  # of the library, which a request calls the same
-_AT_ONCE = 25_000  # points whose spectra are in memory at once while colours are computed
 
 
-class Surface(NamedTuple):
-    """Subject of a lookup.
+NPZ = "application/x-npz"
 
-    Attributes
-    ----------
-    source : Table, Material or other object
-        It has `lookup` and `specular_reflectance`; a table has `lookup_with_error` and `extrapolated`, too.
-    kind : str
-        "table", "model" or "family".
-    wavelength_nm : array (L,) [nm] or None
-        Wavelengths that are meant where a request names none; None: grey.
-    """
-
-    source: Any
-    kind: str
-    wavelength_nm: NDArray[np.float64] | None
-
-    def wavelengths(self, points: Points) -> Any:
-        """Return the wavelengths [nm] of the values at some points; None if they are grey."""
-        return self.wavelength_nm if points.wavelength_nm is None else points.wavelength_nm
-
-
-def surface_of(table: Table, kind: str) -> Surface:
-    """Return a table, or the model that it was made of; RequestError (422) if it keeps none."""
-    if kind == "table":
-        return Surface(table, kind, table.wavelength_nm)
-    from brdfdb.materials import Material
-
-    if not isinstance(table.source, Material):
-        raise RequestError(422, f"from: the table of {table.name} keeps no model; ask for from=table", "from")
-    return Surface(_InRange(table.source, table), kind, table.wavelength_nm)
-
-
-class _InRange(NamedTuple):
-    """A material at the wavelengths that a table covers."""
-
-    material: Material
-    table: Table
-
-    def lookup(self, *given: Any) -> Any:
-        self.table.specular_reflectance(0.0, given[-1])  # refuses wavelengths outside the table
-        return self.material.lookup(*given)
-
-    def specular_reflectance(self, theta_i: Any, wavelength_nm: Any) -> Any:
-        return self.material.specular_reflectance(theta_i, wavelength_nm)
-
-
-class Found(NamedTuple):
-    """The result of a lookup: f_r [1/sr], its error or None, the specular part or None; colours on the last axis."""
-
-    brdf: Any
-    error: Any
-    specular_reflectance: Any
-
-
-def evaluate(points: Points, options: Values, surface: Surface, *, error: bool = False, specular: bool = True) -> Found:
-    """Look up points, with the stated `error`, and with the `specular` part at their theta_i.
-
-    Raises RequestError (422) outside the range of the surface, or where it makes no colour.
-    """
-    source = surface.source
-    # A table takes None as all of its wavelengths, which is faster than naming them
-    at = points.wavelength_nm if surface.kind == "table" else surface.wavelengths(points)
-
-    def spectra(angles: Angles) -> tuple[Any, Any]:
-        return source.lookup_with_error(*angles, at) if error else (source.lookup(*angles, at), None)
-
-    try:
-        if options.output != "spectrum":
-            return _coloured(points, options, surface, spectra, error=error, specular=specular)
-        return Found(*spectra(points.angles), source.specular_reflectance(points.angles[0], at) if specular else None)
-    except ParameterError as error:
-        if error.parameter not in _PARAMETERS:
-            raise
-        raise RequestError(422, str(error), error.parameter) from error
+lookups = addresses()
 
 
 @contextlib.contextmanager
@@ -120,48 +73,31 @@ def refused() -> Iterator[None]:
         raise RequestError(422, str(error), error.parameter) from error
 
 
-def _coloured(
-    points: Points,
-    options: Values,
-    surface: Surface,
-    spectra: Callable[[Angles], tuple[Any, Any]],
-    *,
-    error: bool,
-    specular: bool,
-) -> Found:
-    """Return colours of spectra, in batches of points: 41 values of each of a million points would be 300 MB."""
-    from brdfdb.spectra import colour_weights
-
-    assert options.output != "spectrum"
-    wavelengths, grey = surface.wavelengths(points), surface.wavelength_nm is None
-    if grey and points.wavelength_nm is not None:
-        raise RequestError(422, "wavelength_nm: a colour of a grey material has no wavelengths", "wavelength_nm")
-    of = colour_weights(options.output, None if grey else np.atleast_1d(wavelengths), options.illuminant or "D65")
-    flat = [np.broadcast_to(angle, points.shape).reshape(-1) for angle in points.angles]
-    brdf, stated = np.empty((points.count, 3)), np.empty((points.count, 3)) if error else None
-    for start in range(0, points.count, _AT_ONCE):
-        rows = slice(start, start + _AT_ONCE)
-        t_i, p_i, t_r, p_r = (angle[rows] for angle in flat)
-        spectrum, errors = spectra((t_i, p_i, t_r, p_r))
-        brdf[rows] = _mixed(spectrum, of, grey)
-        if stated is not None:
-            stated[rows] = _mixed(errors, np.abs(of), grey)
-    shape = (*points.shape, 3)
-    dirac = surface.source.specular_reflectance(points.angles[0], wavelengths) if specular else None
-    return Found(
-        brdf.reshape(shape),
-        None if stated is None else stated.reshape(shape),
-        None if dirac is None else _mixed(dirac, of, grey),
-    )
+def surface_in(table: Table, options: OfTable) -> Surface:
+    """Return a table, or the model that it was made of; RequestError (422) if it keeps none."""
+    if options.source == "table":
+        return surface_of(table)
+    with refused():
+        return surface_of(table, options.source)
 
 
-def _mixed(values: Any, of: NDArray[np.float64], grey: bool) -> Any:
-    """Return colours (..., 3) of spectra (..., L), or of grey values (...)."""
-    whole = np.asarray(values)
-    return np.asarray((whole[..., np.newaxis] if grey else whole) @ of)
+def tag_in(table: Table, surface: Surface) -> str:
+    """Return the ETag of values of a table, or of its model, whose version it names then."""
+    return tag_of(table, surface.source.material.spec.version) if surface.kind == "model" else tag_of(table)
 
 
-def checked_size(max_points: int, points: Points, options: Values, surface: Surface, kind: Format) -> int:
+def evaluate(points: Points, options: Options, surface: Surface, *, specular: bool = True) -> Values:
+    """Look up points; RequestError (422) outside the range of the surface, or where it makes no colour."""
+    stated = getattr(options, "error", False)
+    try:
+        return surface.values(points, options.output, options.illuminant, error=stated, specular=specular)
+    except ParameterError as error:
+        if error.parameter not in _PARAMETERS:
+            raise
+        raise RequestError(422, str(error), error.parameter) from error
+
+
+def checked_size(max_points: int, points: Points, options: Options, surface: Surface, kind: Format) -> int:
     """Return the number of values to look up; RequestError (413) if they are too many for one answer."""
     most_points, most_values = (factor * max_points for factor in LIMITS[kind])
     if points.count > most_points:
@@ -178,51 +114,141 @@ def checked_size(max_points: int, points: Points, options: Values, surface: Surf
     return values
 
 
-async def answered(
-    state: State, surface: Surface, options: Values, kind: Format, size: int, read: Callable[[], Points], write: Any
-) -> Response:
-    """Read the points of a body of `size` bytes and write their values: in a thread if they are many."""
-
-    def checked() -> tuple[Points, int]:
-        points = read()
-        return points, checked_size(state.settings.max_points, points, options, surface, kind)
-
-    if size > INLINE_BYTES:
-        async with state.large if size > LARGE_BYTES else contextlib.nullcontext():
-            return await run_in_threadpool(lambda: write(checked()[0]))
-    points, values = checked()
-    # a row and a column of angles take few bytes and make many points
-    async with state.large if values > LARGE_VALUES else contextlib.nullcontext():
-        # a thread costs about as long as 1000 values do
-        slow = values > INLINE_VALUES or surface.kind != "table" or options.output != "spectrum"
-        return await run_in_threadpool(write, points) if slow else write(points)
-
-
 def write_answer(
-    points: Points, options: Values, surface: Surface, kind: Format, headers: Encoded, about: dict[str, Any]
+    points: Points, options: Options, surface: Surface, kind: Format, headers: Encoded, about: dict[str, Any]
 ) -> Response:
     """Look the points up and write them as `kind`; `about` begins the document."""
-    error = getattr(options, "error", False)
-    values = evaluate(points, options, surface, error=error, specular=kind == "json")
+    values = evaluate(points, options, surface, specular=kind == "json")
     points_counted(surface.kind, points.count)
     if kind == "npy":
         content = npy_bytes(values.brdf if values.error is None else np.stack([values.brdf, values.error]))
         return EncodedResponse(content, headers)
-    return EncodedResponse(json_bytes(document_of(points, options, surface, values, about)), headers)
+    return EncodedResponse(json_bytes(about | values_document(values)), headers)
 
 
-def document_of(
-    points: Points, options: Values, surface: Surface, values: Found, about: dict[str, Any]
-) -> dict[str, Any]:
-    """Return the document of an answer, which begins with `about`."""
-    stated, of_table = values.error is not None, surface.kind == "table"
-    return {
-        **about,
-        "source": surface.kind,
-        **options.document(),
-        "wavelength_nm": surface.wavelengths(points),
-        "brdf": plain(values.brdf),
-        "error": plain(values.error) if stated else None,
-        "extrapolated": plain(surface.source.extrapolated(*points.angles)) if stated and of_table else None,
-        "specular_reflectance": plain(values.specular_reflectance),
-    }
+@both(
+    lookups,
+    "/lookup",
+    tags=["lookup"],
+    responses=answers(Lookup, 304, 404, 413, 503, media=NPY_ANSWER, headers=(REVISION,)),
+)
+async def lookup_point(
+    request: Request,
+    name: str,
+    query: Annotated[PointQuery, InQuery()],  # noqa: ARG001 of the document
+    revision: Revision = None,
+) -> Response:
+    """Return the BRDF at one pair of directions (angles in degrees).
+
+    The wavelengths are an axis, unless wavelength_nm is one number or the material is grey. Below the horizon (theta
+    above 90 degrees) the BRDF is 0.
+    """
+    return await answer_point(request.scope, name, revision)
+
+
+_OF_POINTS = names_of(PointQuery)
+
+
+async def answer_point(scope: Scope, name: str, revision: str | None) -> Response:
+    """Answer GET of a lookup, from the query as it came: what lies behind the edge takes three times as long."""
+    query = checked(PointQuery, parsed(scope["query_string"], _OF_POINTS), "query")
+    accept = held = ""
+    for key, value in scope["headers"]:
+        if key == b"accept":
+            accept += f",{value.decode('latin-1')}"  # the header may come in several lines
+        elif key == b"if-none-match":
+            held = value.decode("latin-1")
+    state, kind, points = scope["app"].state, query.kind(accept), query.points
+    table = await _table(state.shelf, name, revision)
+    surface = surface_in(table, query)
+    computed = query.source == "model" or query.output != "spectrum"
+    headers = lookup_headers(
+        tag_in(table, surface), table.revision, kind, immutable=revision is not None and not computed
+    )
+    values = checked_size(state.settings.max_points, points, query, surface, kind)
+    slow = values > INLINE_VALUES or computed
+    given = (points, query, surface, kind, headers, {"material": table.name, "revision": table.revision})
+    answer = await run_in_threadpool(write_answer, *given) if slow else write_answer(*given)
+    return unchanged(answer, held) if held else answer
+
+
+async def _table(shelf: Shelf, name: str, revision: str | None) -> Table:
+    """Return a table at once if it is decoded, else from a thread."""
+    table = shelf.held(name)
+    if table is not None and revision in (None, table.revision):
+        return table
+    return await run_in_threadpool(shelf.table, name, revision)
+
+
+@both(
+    lookups,
+    "/lookup",
+    method="POST",
+    tags=["lookup"],
+    responses=answers(Lookup, 404, 413, 415, 503, media=NPY_ANSWER, headers=(REVISION,)),
+    openapi_extra=body(PointsBody, npy=True),
+)
+async def lookup_points(
+    request: Request, name: str, query: Annotated[BodyQuery, InQuery()], revision: Revision = None
+) -> Response:
+    """Return the BRDF at many pairs of directions (angles in degrees), in the shape that the angles broadcast to.
+
+    The wavelengths are a last axis, unless wavelength_nm is one number or the material is grey. Below the horizon
+    (theta above 90 degrees) the BRDF is 0. A body of any media type but .npy is read as JSON.
+    """
+    binary = request.headers.get("content-type", "").partition(";")[0].strip().lower() == NPY
+    if query.wavelength_nm and not binary:
+        raise RequestError(422, "wavelength_nm: a JSON body holds it, not the query", "wavelength_nm")
+    kind = query.kind(accept_of(request), binary=binary)
+    table = await _table(shelf_of(request), name, revision)
+    surface, content, state = surface_in(table, query), await request.body(), request.app.state
+    about, headers = {"material": table.name, "revision": table.revision}, lookup_headers(None, table.revision, kind)
+
+    def read() -> tuple[Points, int]:
+        points = from_array(content, query.wavelength_nm) if binary else from_json(PointsBody, content).points
+        return points, checked_size(state.settings.max_points, points, query, surface, kind)
+
+    def write(points: Points) -> Response:
+        return write_answer(points, query, surface, kind, headers, about)
+
+    if len(content) > INLINE_BYTES:
+        async with state.large if len(content) > LARGE_BYTES else contextlib.nullcontext():
+            return await run_in_threadpool(lambda: write(read()[0]))
+    points, values = read()
+    # a row and a column of angles take few bytes and make many points
+    async with state.large if values > LARGE_VALUES else contextlib.nullcontext():
+        # a thread costs about as long as 1000 values do
+        slow = values > INLINE_VALUES or surface.kind != "table" or query.output != "spectrum"
+        return await run_in_threadpool(write, points) if slow else write(points)
+
+
+@lookups.post(
+    "/v1/lookup",
+    tags=["lookup"],
+    responses=answers(Lookups, 404, 413, 415, 503, media={NPZ: "an array a material, by its name"}),
+    openapi_extra=body(ManyBody),
+)
+def lookup_many(request: Request, query: Annotated[ManyQuery, InQuery()], content: Content) -> Response:
+    """Return the BRDF of several materials at the same pairs of directions (angles in degrees)."""
+    given, shelf = from_json(ManyBody, content), shelf_of(request)
+    points = given.points
+    kind: Format = "npy" if query.format == "npz" else "json"
+    max_points, total, results = request.app.state.settings.max_points, 0, {}
+    for name in dict.fromkeys(given.materials):
+        table = shelf.table(name)
+        surface = surface_in(table, query)
+        total += checked_size(max_points, points, query, surface, kind)
+        if total > (most := LIMITS[kind][1] * max_points):
+            raise RequestError(413, f"the values of all materials are more than the {most} that one answer may hold")
+        results[name] = table.revision, evaluate(points, query, surface)
+    if kind == "npy":
+        arrays = {name: values.brdf for name, (_, values) in results.items()}
+        arrays |= {f"{name}.error": values.error for name, (_, values) in results.items() if values.error is not None}
+        data = io.BytesIO()
+        np.savez(data, **arrays)
+        return Response(data.getvalue(), media_type=NPZ, headers={"Cache-Control": "no-store"})
+    documents = [
+        {"material": name, "revision": revision, **values_document(values)}
+        for name, (revision, values) in results.items()
+    ]
+    return Response(json_bytes({"materials": documents}), media_type=JSON, headers={"Cache-Control": "no-store"})

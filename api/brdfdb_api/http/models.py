@@ -2,67 +2,42 @@
 
 from __future__ import annotations
 
-import functools
-from collections.abc import Mapping
-from dataclasses import asdict
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+from typing import Annotated, Any
 
 import numpy as np
 from fastapi import Depends
 from fastapi import Query as InQuery
-from pydantic import BaseModel, ConfigDict, Field, WithJsonSchema
+from pydantic import ConfigDict, Field
 from starlette.requests import Request
 from starlette.responses import Response
 
-from brdfdb.errors import MaterialError, UnknownMaterialError
-from brdfdb.geometry import radians
+from brdfdb.errors import UnknownModelError
+from brdfdb.materials.model_document import Parameters, document_of
+from brdfdb.materials.spectrum import Spectrum
+from brdfdb.models import MODELS
 from brdfdb.parameters import ModelSpec
-from brdfdb_api.http.addresses import NPY_ANSWER, Content, addresses, answers, body, shelf_of
-from brdfdb_api.http.errors import RequestError
-from brdfdb_api.http.lookups import Surface, checked_size, refused, write_answer
-from brdfdb_api.http.queries import Flag, Light, PointsBody, Query, Values, Wavelengths, from_json, unknown
+from brdfdb.spectra import PICTURE_NM
+from brdfdb.store.family import FamilyLine
+from brdfdb.tables.albedo import reflected_by
+from brdfdb.tables.evaluation import Surface
+from brdfdb.tables.points import PointsBody
+from brdfdb.tables.values_document import FamilyLookup, ModelAlbedo, ModelLobe, ModelLookup
+from brdfdb_api.http.addresses import NPY_ANSWER, Content, accept_of, addresses, answers, body, shelf_of
+from brdfdb_api.http.lookups import checked_size, refused, write_answer
+from brdfdb_api.http.queries import Flag, Light, Options, Query, Wavelengths, from_json
 from brdfdb_api.http.responses import (
     NPY,
-    AlbedoValues,
+    Document,
     Encoded,
-    Evaluated,
-    View,
-    json_response,
+    Families,
+    Model,
+    Models,
     media_type,
 )
-from brdfdb_api.http.views import SPHERE, SphereQuery, albedo_document, lobe_answer, sphere_answer
-
-if TYPE_CHECKING:
-    from brdfdb.materials import Material
+from brdfdb_api.http.views import SPHERE, SphereQuery, lobe_answer, sphere_answer
 
 models = addresses()
 NO_STORE = {"Cache-Control": "no-store"}
-
-
-class UnknownModelError(UnknownMaterialError):
-    """A name that is not that of a model."""
-
-    def __str__(self) -> str:
-        return super().__str__().replace("no material", "no model").replace(" in the store", "")
-
-
-class Parameters(BaseModel):
-    """A material as recipes define it: angles in degrees under names in _deg."""
-
-    model_config = ConfigDict(extra="forbid", json_schema_extra={"example": {"parameters": {"rho": 0.5}}})
-
-    parameters: Annotated[
-        dict[str, Any],
-        WithJsonSchema(
-            {
-                "type": "object",
-                "additionalProperties": {"anyOf": [{"type": "number"}, {"type": "boolean"}, {"type": "object"}]},
-            }
-        ),
-    ] = Field(description="by name, as recipes write them; a reflectance may be a spectrum")
-    refractive_index: str | None = Field(
-        default=None, description="of a spectral model: SHELF/BOOK/PAGE, or constant/N/K"
-    )
 
 
 class PointsAt(PointsBody, Parameters):
@@ -79,127 +54,17 @@ class PointsOfFamily(PointsBody):
     parameters: dict[str, float] = Field(description="one for each swept parameter, as recipes write them")
 
 
-class FamilyQuery(Values):
+class FamilyQuery(Options):
     """The query of a lookup in a family."""
 
     error: Flag = Field(default=False, description="the error that the family states beside the values")
 
 
-class LobeValues(Light, Values):
+class LobeOptions(Light, Options):
     """The query of a lobe of a model."""
 
 
-class Mark(BaseModel):
-    """A value that a paper publishes."""
-
-    material: str
-    value: float
-
-
-class ParameterOfModel(BaseModel):
-    """A parameter of a model as recipes write it."""
-
-    name: str
-    symbol: str = Field(description="of the paper")
-    unit: str
-    low: float
-    high: float
-    meaning: str
-    default: float | bool | None = Field(description="null: it must be given")
-    reflectance: bool = Field(description="whether it may be a spectrum")
-    published: list[Mark] = Field(description="values of the materials that the papers print")
-    typical: list[float] | None = Field(description="the smallest and the largest of them; null: none")
-
-
-class Model(BaseModel):
-    """A model and its parameters."""
-
-    name: str
-    version: int
-    title: str
-    equation: str
-    paper: str = Field(description="key of the paper, such as he1991")
-    spectral: bool = Field(description="whether it needs a refractive index")
-    specular: bool = Field(description="whether it has a specular part")
-    parameters: list[ParameterOfModel]
-    href: str
-
-
-class Models(BaseModel):
-    """All models."""
-
-    models: list[Model]
-
-
-class OfModel(BaseModel):
-    """The model, and all of its parameters."""
-
-    model: str
-    model_version: int
-    parameters: dict[str, Any]
-
-
-class ModelLookup(Evaluated, OfModel):
-    """Values of a model."""
-
-
-class ModelLobe(Evaluated, View, OfModel):
-    """f_r of a model for one light."""
-
-
-class ModelAlbedo(AlbedoValues, OfModel):
-    """Directional albedo of a model."""
-
-
-class Family(BaseModel):
-    """A family of materials."""
-
-    name: str
-    title: str
-    model: str
-    axes: dict[str, list[float]] = Field(description="values of the swept parameters, as recipes write them")
-    members: list[str] = Field(description="names of the materials; the last axis runs fastest")
-
-
-class Families(BaseModel):
-    """All families of the store."""
-
-    families: list[Family]
-
-
-class FamilyLookup(Evaluated):
-    """Values of a family."""
-
-    family: str
-    parameters: dict[str, float]
-
-
-@functools.cache
-def _described(spec: ModelSpec) -> dict[str, Any]:
-    """Return the document of a model."""
-    from brdfdb.materials import presets
-    from brdfdb.materials.written_parameters import as_written
-
-    papers = [(name, material.file_parameters()) for name, material in presets().items() if material.model == spec.name]
-    parameters = []
-    for parameter in map(as_written, spec.parameters):
-        values = [(name, written[parameter.name]) for name, written in papers]
-        marks = [{"material": name, "value": float(value)} for name, value in values if isinstance(value, float | int)]
-        ends: list[Any] = [mark["value"] for mark in marks]
-        typical = [min(ends), max(ends)] if ends else None
-        parameters.append({**asdict(parameter), "published": marks, "typical": typical})
-    return {
-        **{key: getattr(spec, key) for key in ("name", "version", "title", "equation", "spectral")},
-        "paper": spec.reference,
-        "specular": spec.specular is not None,
-        "parameters": parameters,
-        "href": f"/v1/models/{spec.name}",
-    }
-
-
 def _spec(model: str) -> ModelSpec:
-    from brdfdb.models import MODELS
-
     if model not in MODELS:
         raise UnknownModelError(model, MODELS)
     return MODELS[model]
@@ -211,44 +76,23 @@ Spec = Annotated[ModelSpec, Depends(_spec)]
 @models.get("/v1/models", tags=["models"], responses=answers(Models))
 def model_list() -> Response:
     """Return all models: parameters with units, ranges, and the values that the papers publish."""
-    from brdfdb.models import MODELS
-
-    return json_response({"models": [_described(spec) for spec in MODELS.values()]})
+    return Document({"models": [_with_address(spec) for spec in MODELS.values()]})
 
 
 @models.get("/v1/models/{model}", tags=["models"], responses=answers(Model, 404))
 def model_document(spec: Spec) -> Response:
     """Return one model."""
-    return json_response(_described(spec))
+    return Document(_with_address(spec))
 
 
-def _material(spec: ModelSpec, given: Parameters) -> Material:
-    """Return the material of a request, checked as those of recipes are; RequestError (422) if it is none."""
-    from brdfdb.materials import Material
-
-    for name, value in given.parameters.items():
-        if isinstance(value, Mapping) and "csv" in value:
-            raise RequestError(422, f"{name}: files are not read over HTTP; give wavelengths_nm and values", name)
-    index = {} if given.refractive_index is None else {"refractive_index": given.refractive_index}
-    fields = {
-        "title": "of a request",
-        "model": spec.name,
-        "source": "a request",
-        "parameters": given.parameters,
-        **index,
-    }
-    try:
-        return Material.from_table("request", fields)
-    except MaterialError as error:
-        raise RequestError(422, f"{error.parameter}: {error.sentence}", error.parameter) from None
+def _with_address(spec: ModelSpec) -> dict[str, Any]:
+    return {**document_of(spec), "href": f"/v1/models/{spec.name}"}
 
 
 def _surface(spec: ModelSpec, given: Parameters) -> tuple[Surface, dict[str, Any]]:
     """Return the material of a request, by default at the wavelengths of pictures, and what answers say of it."""
-    from brdfdb.materials.spectrum import Spectrum
-    from brdfdb.spectra import PICTURE_NM
-
-    material = _material(spec, given)
+    with refused():
+        material = given.material(spec)
     written = {
         name: value.model_dump(mode="json") if isinstance(value, Spectrum) else value
         for name, value in material.file_parameters().items()
@@ -257,8 +101,10 @@ def _surface(spec: ModelSpec, given: Parameters) -> tuple[Surface, dict[str, Any
     return Surface(material, "model", PICTURE_NM if material.spectral else None), about
 
 
-def _looked_up(request: Request, surface: Surface, query: Values, given: PointsBody, about: dict[str, Any]) -> Response:
-    kind, points = query.kind(request.headers.get("accept", "")), given.points
+def _looked_up(
+    request: Request, surface: Surface, query: Options, given: PointsBody, about: dict[str, Any]
+) -> Response:
+    kind, points = query.kind(accept_of(request)), given.points
     checked_size(request.app.state.settings.max_points, points, query, surface, kind)
     headers = Encoded({**NO_STORE, "Content-Type": media_type(kind)})
     with refused():
@@ -268,10 +114,10 @@ def _looked_up(request: Request, surface: Surface, query: Values, given: PointsB
 @models.post(
     "/v1/models/{model}/lookup",
     tags=["models"],
-    responses=answers(ModelLookup, 404, 413, 503, media=NPY_ANSWER),
+    responses=answers(ModelLookup, 404, 413, 415, 503, media=NPY_ANSWER),
     openapi_extra=body(PointsAt),
 )
-def model_lookup(request: Request, spec: Spec, query: Annotated[Values, InQuery()], content: Content) -> Response:
+def model_lookup(request: Request, spec: Spec, query: Annotated[Options, InQuery()], content: Content) -> Response:
     """Return the BRDF of a model at its parameters and many pairs of directions (angles in degrees).
 
     A spectral model is evaluated from 420 to 680 nm in steps of 20 nm, unless wavelength_nm says otherwise.
@@ -284,10 +130,10 @@ def model_lookup(request: Request, spec: Spec, query: Annotated[Values, InQuery(
 @models.post(
     "/v1/models/{model}/lobe",
     tags=["models"],
-    responses=answers(ModelLobe, 404, 413, 503, media={NPY: "brdf as a .npy file"}),
+    responses=answers(ModelLobe, 404, 413, 415, 503, media={NPY: "brdf as a .npy file"}),
     openapi_extra=body(Parameters),
 )
-def model_lobe(request: Request, spec: Spec, query: Annotated[LobeValues, InQuery()], content: Content) -> Response:
+def model_lobe(request: Request, spec: Spec, query: Annotated[LobeOptions, InQuery()], content: Content) -> Response:
     """Return f_r [1/sr] of a model for one light, in a view as of a material."""
     surface, about = _surface(spec, from_json(Parameters, content))
     with refused():
@@ -303,41 +149,29 @@ class WavelengthQuery(Query):
 @models.post(
     "/v1/models/{model}/albedo",
     tags=["models"],
-    responses=answers(ModelAlbedo, 404, 413, 503),
+    responses=answers(ModelAlbedo, 404, 413, 415, 503),
     openapi_extra=body(Parameters),
 )
 def model_albedo(spec: Spec, query: Annotated[WavelengthQuery, InQuery()], content: Content) -> Response:
     """Return the directional and the hemispherical albedo [1] of a model, to a thousandth."""
-    from brdfdb.tables.albedo import reflected_by
-
     surface, about = _surface(spec, from_json(Parameters, content))
-    at = (
-        surface.wavelength_nm
-        if surface.wavelength_nm is None or not query.wavelength_nm
-        else np.array(query.wavelength_nm)
-    )
+    at = surface.wavelength_nm
+    if at is not None and query.wavelength_nm:
+        at = np.array(query.wavelength_nm)
     with refused():
-        return json_response(albedo_document(reflected_by(surface.source, at), at, about), NO_STORE)
+        return Document(about | reflected_by(surface.source, at).document(at), NO_STORE)
 
 
 @models.post(
     "/v1/models/{model}/sphere",
     tags=["models"],
-    responses=answers(None, 404, 413, 503, media=SPHERE),
+    responses=answers(None, 404, 413, 415, 503, media=SPHERE),
     openapi_extra=body(Parameters),
 )
 def model_sphere(spec: Spec, query: Annotated[SphereQuery, InQuery()], content: Content) -> Response:
     """Return the picture of a sphere of a model in the light of a studio, drawn as a draft."""
     with refused():
-        return sphere_answer(_material(spec, from_json(Parameters, content)), query, NO_STORE)
-
-
-class _Blended(NamedTuple):
-    """A family at some parameters, looked up as a table is."""
-
-    lookup: Any
-    lookup_with_error: Any
-    specular_reflectance: Any
+        return sphere_answer(from_json(Parameters, content).material(spec), query, NO_STORE)
 
 
 @models.get("/v1/families", tags=["models"], responses=answers(Families, 503))
@@ -345,31 +179,21 @@ def family_list(request: Request) -> Response:
     """Return the families of the store: materials of one model between whose parameters a lookup may lie."""
     store = shelf_of(request).store
     contents = (store.family_content(name) for name in store.families())
-    shown = ({key: content[key] for key in Family.model_fields} for content in contents)
-    return json_response({"families": list(shown)})
+    shown = ({key: content[key] for key in FamilyLine.model_fields} for content in contents)
+    return Document({"families": list(shown)})
 
 
 @models.post(
     "/v1/families/{family}/lookup",
     tags=["models"],
-    responses=answers(FamilyLookup, 404, 413, 503, media=NPY_ANSWER),
+    responses=answers(FamilyLookup, 404, 413, 415, 503, media=NPY_ANSWER),
     openapi_extra=body(PointsOfFamily),
 )
 def family_lookup(
     request: Request, family: str, query: Annotated[FamilyQuery, InQuery()], content: Content
 ) -> Response:
     """Return the BRDF of a family at parameters between those of its members, interpolated in their tables."""
-    opened, given = shelf_of(request).store.family(family), from_json(PointsOfFamily, content)
-    swept = opened.record.parameters
-    for name in given.parameters:
-        if name not in swept:
-            raise unknown(name, tuple(swept))
-    at = {
-        swept[name].name: float(radians(value)) if swept[name].unit == "rad" else value
-        for name, value in given.parameters.items()
-    }
-    functions = (opened.lookup, opened.lookup_with_error, opened.specular_reflectance)
-    surface = Surface(
-        _Blended(*(functools.partial(function, **at) for function in functions)), "family", opened.wavelength_nm
-    )
+    given = from_json(PointsOfFamily, content)
+    with refused():
+        surface = shelf_of(request).store.family(family).surface(given.parameters)
     return _looked_up(request, surface, query, given, {"family": family, "parameters": given.parameters})

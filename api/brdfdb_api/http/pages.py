@@ -1,31 +1,15 @@
-"""The explorer, a page at `/`: its files, and its modules as one script."""
+"""The pages: the explorer at `/`, the OpenAPI document, and at `/docs` a list of its operations."""
 
 from __future__ import annotations
-
-import functools
-import gzip
-import hashlib
-import re
-from collections.abc import Iterator
-from importlib.resources import files
-from pathlib import PurePath
 
 from fastapi import APIRouter
 from starlette.requests import Request
 from starlette.responses import Response
 
+from brdfdb_api.explorer.bundle import MEDIA, content_of
+from brdfdb_api.explorer.operations import page_of
 from brdfdb_api.http.errors import RequestError
-from brdfdb_api.http.responses import unchanged
-
-SCRIPT = "text/javascript; charset=utf-8"
-_COMMENT = re.compile(r"^[ \t]*(?:/\*\*(?:[^*]|\*(?!/))*\*/|//.*)\n", re.MULTILINE)
-_IMPORT = re.compile(r"""^import ([^;]+) from "\./(.+)";$""", re.MULTILINE)
-_TYPES = {".html": "text/html; charset=utf-8", ".css": "text/css; charset=utf-8", ".js": SCRIPT}
-_VIEWS = "views.js"
-FOLDER = files("brdfdb_api").joinpath("explorer")
-_BUNDLE = "explorer.js"  # all modules in one answer: a slow connection waits 0.4 s for each six of them
-# Media types of all files of the explorer: those of the folder, the list of its views, and all modules as one
-MEDIA = {file.name: _TYPES[PurePath(file.name).suffix] for file in FOLDER.iterdir()} | {_VIEWS: SCRIPT, _BUNDLE: SCRIPT}
+from brdfdb_api.http.responses import preferred, tagged, unchanged
 
 POLICY = "; ".join(
     (
@@ -33,9 +17,21 @@ POLICY = "; ".join(
         *("base-uri 'none'", "form-action 'none'", "frame-ancestors 'none'"),
     )
 )
-_SAFE = {"Content-Security-Policy": POLICY, "X-Content-Type-Options": "nosniff", "Referrer-Policy": "no-referrer"}
+SAFE = {"Content-Security-Policy": POLICY, "X-Content-Type-Options": "nosniff", "Referrer-Policy": "no-referrer"}
 
 pages = APIRouter(include_in_schema=False)
+
+
+@pages.get("/openapi.json")
+def document(request: Request) -> Response:
+    """Return the OpenAPI document."""
+    return unchanged(tagged(request.app.openapi(), "openapi"), request.headers.get("if-none-match"))
+
+
+@pages.get("/docs")
+def operations(request: Request) -> Response:
+    """Return a page with all operations, which needs nothing from elsewhere."""
+    return Response(page_of(request.app.openapi()), media_type=MEDIA["index.html"], headers=SAFE)
 
 
 @pages.get("/")
@@ -49,62 +45,13 @@ def explorer_file(request: Request, file: str) -> Response:
     """Return a file of the explorer."""
     if file not in MEDIA:
         raise RequestError(404, "the explorer has no such file")
-    packed = "gzip" in request.headers.get("accept-encoding", "")
-    content, tag = _file(file, packed=packed)
+    packed = preferred(request.headers.get("accept-encoding", ""), "identity", "gzip") == "gzip"
+    content, tag = content_of(file, packed=packed)
     headers = {
-        **_SAFE,
+        **SAFE,
         "ETag": f'"{tag}"',
         "Cache-Control": "no-cache",
         "Vary": "Accept-Encoding",
         **({"Content-Encoding": "gzip"} if packed else {}),
     }
     return unchanged(Response(content, media_type=MEDIA[file], headers=headers), request.headers.get("if-none-match"))
-
-
-@functools.cache
-def _file(name: str, *, packed: bool) -> tuple[bytes, str]:
-    """Return a file of the explorer and its digest."""
-    content = _text(name).encode()
-    content = gzip.compress(content, 9, mtime=0) if packed else content
-    return content, hashlib.sha256(content).hexdigest()[:16]
-
-
-def _text(name: str) -> str:
-    if name == _BUNDLE:
-        return "const modules = {};\n" + "".join(_modules("main.js", set()))
-    return _views() if name == _VIEWS else FOLDER.joinpath(name).read_text(encoding="utf-8")
-
-
-def _modules(name: str, before: set[str]) -> Iterator[str]:
-    """Yield a module as a function that is called once, after those that it imports and are not `before`.
-
-    Imports are lines of their own, and exports declare a constant, a function or a class, or are a default.
-    """
-    before.add(name)
-    text = re.sub(r"^ +", "", _COMMENT.sub("", _text(name)), flags=re.MULTILINE)
-    for _, other in _IMPORT.findall(text):
-        if other not in before:
-            yield from _modules(other, before)
-    text = _IMPORT.sub(lambda line: f"const {_bound(line[1])} = modules[{line[2]!r}];", text)
-    names = re.findall(r"^export (?:async )?(?:const|function\*?|class) (\w+)", text, re.MULTILINE)
-    text = re.sub("^export default ", "const exported = ", text, flags=re.MULTILINE)
-    exports = ", ".join([*names, *(["default: exported"] if "\nconst exported = " in text else [])])
-    text = re.sub("^export ", "", text, flags=re.MULTILINE)
-    yield f"modules[{name!r}] = (() => {{\n{text}return {{ {exports} }};\n}})();\n"
-
-
-def _bound(names: str) -> str:
-    """Return the pattern that takes the names of an import from the exports of a module."""
-    if names.startswith("*"):
-        return names.removeprefix("* as ")
-    return names.replace(" as ", ": ") if names.startswith("{") else f"{{ default: {names} }}"
-
-
-def _views() -> str:
-    """Return a script that exports VIEWS: the views of all modules ``view_*.js`` by name, in their order."""
-    modules = sorted(name for name in MEDIA if name.startswith("view_"))
-    lines = [f'import view{number} from "./{name}";' for number, name in enumerate(modules)]
-    views = ", ".join(f"view{number}" for number in range(len(modules)))
-    lines.append("const by = (a, b) => a.order - b.order;")
-    lines.append(f"export const VIEWS = Object.fromEntries([{views}].sort(by).map((view) => [view.name, view]));")
-    return "\n".join(lines) + "\n"

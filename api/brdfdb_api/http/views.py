@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import tempfile
-from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 from weakref import WeakKeyDictionary
 
@@ -18,38 +16,52 @@ from starlette.responses import Response
 
 from brdfdb import __version__
 from brdfdb.errors import CannotHoldError, ParameterError
-from brdfdb.formats import EXPORTERS
+from brdfdb.formats import EXPORTERS, packed, served_options, served_schemas
+from brdfdb.scenes import lit_sphere
+from brdfdb.store.archive import ZIP
+from brdfdb.store.shelf import Shelf
 from brdfdb.store.summary_words import NOT_AUDITED
+from brdfdb.tables.evaluation import Surface
 from brdfdb.tables.lobe_views import MOST_POINTS, view_directions
-from brdfdb_api.http.addresses import EXPORT_OPTIONS, Revision, addresses, answers, both, served_options, shelf_of
+from brdfdb.tables.points import Points, listed
+from brdfdb.tables.values_document import Albedo, Lobe, lobe_document
+from brdfdb_api.http.addresses import (
+    Revision,
+    accept_of,
+    addresses,
+    answers,
+    both,
+    shelf_of,
+)
 from brdfdb_api.http.errors import RequestError
-from brdfdb_api.http.files import ZIP, zipped
-from brdfdb_api.http.lookups import Surface, checked_size, document_of, evaluate, surface_of
-from brdfdb_api.http.queries import Light, LobeQuery, Points, Query, Values, listed, parsed
+from brdfdb_api.http.lookups import checked_size, evaluate, refused, surface_in, tag_in
+from brdfdb_api.http.queries import Light, LobeQuery, Options, Query, parsed
 from brdfdb_api.http.responses import (
-    JSON,
     NPY,
-    Albedo,
     Audit,
-    Lobe,
+    Document,
     cache_headers,
     json_bytes,
-    json_response,
     npy_bytes,
-    plain,
     tag_of,
 )
-from brdfdb_api.http.routes import EXPORT_WAIT_S
 
 if TYPE_CHECKING:
-    from brdfdb.tables.albedo import Reflected
     from brdfdb.tables.table import Table
-    from brdfdb_api.serving.shelf import Shelf
 
-_ALBEDOS: WeakKeyDictionary[Table, bytes] = WeakKeyDictionary()  # kept as long as the table
+# Kept as long as the table: its albedo, and the last thumbnail with its size
+_ALBEDOS: WeakKeyDictionary[Table, bytes] = WeakKeyDictionary()
+_PICTURES: WeakKeyDictionary[Table, tuple[int, bytes]] = WeakKeyDictionary()
 
 SPHERE = {"image/png": "sRGB with transparent corners", NPY: "linear sRGB and coverage (size, size, 4), not clipped"}
+EXPORTS_AT_ONCE, EXPORT_WAIT_S = 2, 10  # files of other formats that are made at a time, and the wait for a turn [s]
 THUMBNAIL, MOST = 96, 256  # pixels across a thumbnail: default and largest number
+
+# Of all formats: an option that a format does not have is refused
+EXPORT_OPTIONS = [
+    {"name": name, "in": "query", "required": False, "description": text, "schema": schema}
+    for name, (schema, text) in served_schemas().items()
+]
 
 views = addresses()
 
@@ -71,32 +83,12 @@ class ThumbnailQuery(Query):
 def albedo(request: Request, name: str, revision: Revision = None) -> Response:
     """Return the directional and the hemispherical albedo [1] of the table."""
     table = shelf_of(request).table(name, revision)
-    headers = cache_headers(tag_of(table), immutable=revision is not None)
-    document = _ALBEDOS.get(table)
-    if document is None:
-        document = _ALBEDOS[table] = _albedo(table)
-    return Response(document, media_type=JSON, headers=headers)
+    if table not in _ALBEDOS:
+        from brdfdb.tables.albedo import reflected
 
-
-def _albedo(table: Table) -> bytes:
-    """Return the document."""
-    from brdfdb.tables.albedo import reflected
-
-    about = {"material": table.name, "revision": table.revision}
-    return json_bytes(albedo_document(reflected(table), table.wavelength_nm, about))
-
-
-def albedo_document(albedo: Reflected, wavelength_nm: Any, about: dict[str, Any]) -> dict[str, Any]:
-    """Return the document of what a surface reflects; `about` begins it."""
-    return {
-        **about,
-        "wavelength_nm": wavelength_nm,
-        "theta_i": np.ascontiguousarray(albedo.theta_i_deg),
-        "albedo": np.ascontiguousarray(albedo.albedo),
-        "specular_reflectance": np.ascontiguousarray(albedo.specular),
-        "hemispherical": albedo.hemispherical,
-        "error": albedo.error,
-    }
+        about = {"material": table.name, "revision": table.revision}
+        _ALBEDOS[table] = json_bytes(about | reflected(table).document(table.wavelength_nm))
+    return Document(_ALBEDOS[table], cache_headers(tag_of(table)))
 
 
 @both(
@@ -111,37 +103,25 @@ def lobe(request: Request, name: str, query: Annotated[LobeQuery, InQuery()], re
     Viewers are closer together around the mirror direction. In half-difference, phi_h is phi_i and phi_d is 90 degrees.
     """
     table = shelf_of(request).table(name, revision)
-    headers = cache_headers(
-        tag_of(table), query.kind(request.headers.get("accept", "")), immutable=revision is not None
-    )
+    surface = surface_in(table, query)
+    headers = cache_headers(tag_in(table, surface), query.kind(accept_of(request)))
     about = {"material": table.name, "revision": table.revision}
-    return lobe_answer(request, surface_of(table, query.source), query, query, about, headers)
+    return lobe_answer(request, surface, query, query, about, headers)
 
 
 def lobe_answer(
-    request: Request, surface: Surface, light: Light, options: Values, about: dict[str, Any], headers: dict[str, str]
+    request: Request, surface: Surface, light: Light, options: Options, about: dict[str, Any], headers: dict[str, str]
 ) -> Response:
     """Return the answer with the lobe of a surface; `about` begins the document."""
-    kind = options.kind(request.headers.get("accept", ""))
+    kind = options.kind(accept_of(request))
     axes, angles = view_directions(light.view, light.theta_i, light.phi_i)
-    shape = np.broadcast_shapes(*(np.shape(angle) for angle in angles))
-    points = Points(angles, shape, listed(light.wavelength_nm))
+    points = Points.of(angles, listed(light.wavelength_nm))
     # The view fixes the points; the client chooses only the wavelengths.
     checked_size(max(request.app.state.settings.max_points, MOST_POINTS), points, options, surface, kind)
     values = evaluate(points, options, surface)
     if kind == "npy":
         return Response(npy_bytes(values.brdf), media_type=NPY, headers=headers)
-    no_light = light.view == "half-difference"
-    about |= {
-        "view": light.view,
-        "theta_i": None if no_light else light.theta_i,
-        "phi_i": light.phi_i,
-        "axes_deg": axes,
-    }
-    document = document_of(points, options, surface, values, about)
-    if surface.kind == "table" and surface.source.metadata.measured is not None:
-        document["extrapolated"] = plain(surface.source.extrapolated(*angles))
-    return json_response(document | ({"specular_reflectance": None} if no_light else {}), headers)
+    return Document(about | lobe_document(values, axes, light.view, light.theta_i, light.phi_i), headers)
 
 
 @both(
@@ -166,13 +146,11 @@ async def export(
         raise RequestError(404, f"{file_format!r} is no format; there are {', '.join(EXPORTERS)}")
     allowed = served_options(file_format)
     query = parsed(request.scope["query_string"], allowed)
-    try:
+    with refused():
         options = {option: allowed[option].parse(text) for option, text in query.items()}
-    except ParameterError as error:
-        raise RequestError(422, str(error), error.parameter) from None
     table, verdict = await run_in_threadpool(_with_verdict, shelf_of(request), name, revision)
     # The file states the verdict, which a later audit may change, and the program. A weak tag: some state the time
-    headers = cache_headers(f"{tag_of(table)}-{verdict}-{__version__}", file_format)
+    headers = cache_headers(tag_of(table, verdict), file_format)
     headers["ETag"] = f"W/{headers['ETag']}"
     if request.headers.get("if-none-match") == headers["ETag"]:  # a file takes seconds
         return Response(status_code=304, headers=headers)
@@ -200,19 +178,11 @@ def _exported(
     file_format: str, table: Table, verdict: str | None, options: dict[str, Any], headers: dict[str, str]
 ) -> Response:
     """Return a file of another format, or an archive of several, with these headers and its name."""
-    exporter = EXPORTERS[file_format]
-    kind = f"_{options.get('kind', exporter.kinds[0])}" if exporter.kinds else ""
-    with tempfile.TemporaryDirectory() as folder:  # formats write files
-        path = FilePath(folder) / f"{table.name}{kind}{exporter.suffix}"
-        try:
-            written = exporter.write(table, path, verdict=verdict or NOT_AUDITED, **options)
-        except (CannotHoldError, ParameterError) as error:
-            raise RequestError(422, str(error), getattr(error, "parameter", None)) from None
-        single = len(written.paths) == 1 and path.is_file()
-        names = [str(file.relative_to(folder)) for file in FilePath(folder).rglob("*") if file.is_file()]
-        content = path.read_bytes() if single else b"".join(zipped(FilePath(folder), names))
-    media_type = exporter.media_type if single else ZIP
-    named = {"Content-Disposition": f'attachment; filename="{path.name}{"" if single else ".zip"}"'}
+    try:
+        name, media_type, content = packed(table, file_format, verdict=verdict or NOT_AUDITED, **options)
+    except (CannotHoldError, ParameterError) as error:
+        raise RequestError(422, str(error), getattr(error, "parameter", None)) from None
+    named = {"Content-Disposition": f'attachment; filename="{name}"'}
     return Response(content, media_type=media_type, headers=headers | named)
 
 
@@ -227,8 +197,8 @@ def audit(request: Request, name: str, revision: Revision = None) -> Response:
         raise RequestError(404, f"{name}: no audit of it is here; `brdfdb audit` makes one")
     audited = verdict.finding.revision
     document = {"material": name, "revision": audited, "current": audited == current, "when": verdict.when}
-    headers = cache_headers(f"{name}-{current}-{verdict.when}")
-    return json_response({**document, "finding": verdict.finding.model_dump(exclude_unset=True)}, headers)
+    headers = cache_headers(f"{name}-{current}-{verdict.when}-{__version__}")
+    return Document({**document, "finding": verdict.finding.model_dump(exclude_unset=True)}, headers)
 
 
 @both(views, "/sphere", tags=["views"], responses=answers(None, 304, 404, 503, media=SPHERE))
@@ -237,16 +207,16 @@ def sphere(
 ) -> Response:
     """Return the picture of a sphere of the table in the light of a studio, drawn as a draft."""
     table = shelf_of(request).table(name, revision)
-    return sphere_answer(table, query, _of_picture(table, query.size, query.format))
+    return sphere_answer(table, query, cache_headers(tag_of(table, query.size), query.format))
 
 
 def sphere_answer(surface: Any, query: SphereQuery, headers: dict[str, str]) -> Response:
     """Return the picture of a material or a table."""
-    from brdfdb.scenes.lit_sphere import DRAFT, linear_sphere, sphere_png
-
     if query.format == "png":
-        return Response(sphere_png(surface, query.size, DRAFT), media_type="image/png", headers=headers)
-    linear = linear_sphere(surface, query.size, detail=DRAFT).astype(np.float32)
+        return Response(
+            lit_sphere.sphere_png(surface, query.size, lit_sphere.DRAFT), media_type="image/png", headers=headers
+        )
+    linear = lit_sphere.linear_sphere(surface, query.size, detail=lit_sphere.DRAFT).astype(np.float32)
     return Response(npy_bytes(linear), media_type=NPY, headers=headers)
 
 
@@ -254,13 +224,11 @@ def sphere_answer(surface: Any, query: SphereQuery, headers: dict[str, str]) -> 
 def thumbnail(
     request: Request, name: str, query: Annotated[ThumbnailQuery, InQuery()], revision: Revision = None
 ) -> Response:
-    """Return a small picture of the table for lists; those asked for last are kept in memory."""
-    shelf = shelf_of(request)
-    table = shelf.table(name, revision)
-    headers = _of_picture(table, query.size, "png")
-    return Response(shelf.picture(table, query.size), media_type="image/png", headers=headers)
-
-
-def _of_picture(table: Table, size: int, kind: str) -> dict[str, str]:
-    """Return the headers of a picture, which changes with the program, too."""
-    return cache_headers(f"{tag_of(table)}-{__version__}-{size}", kind)
+    """Return a small picture of the table for lists; the last one of a table is kept with it."""
+    table = shelf_of(request).table(name, revision)
+    headers = cache_headers(tag_of(table, query.size), "png")
+    size, picture = _PICTURES.get(table, (0, b""))
+    if size != query.size:
+        picture = lit_sphere.sphere_png(table, query.size, lit_sphere.DRAFT)
+        _PICTURES[table] = query.size, picture
+    return Response(picture, media_type="image/png", headers=headers)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import itertools
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import brdfdb
-from brdfdb.errors import ParameterError, StoreError, counted
+from brdfdb.errors import ParameterError, StoreError, counted, sentence_of
 from brdfdb_pipelines.commands._arguments import add_snapshot, add_store
 
 if TYPE_CHECKING:
@@ -19,6 +20,11 @@ if TYPE_CHECKING:
 
 HELP = "List the materials and families of the store, or the presets."
 
+_FILTERS = {
+    "model": "list materials of this model only; measured: those of measured data",
+    "paper": "list materials only with this in the key of the paper or in the source",
+    "words": "list materials only with all of these words in name, title, model or source",
+}
 _WORDS = 5  # number of words that all sources must share before they are printed once
 
 
@@ -29,19 +35,28 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--library", metavar="NAME", help="with --presets, the library to list, such as metals (default: papers)"
     )
+    for flag, words in _FILTERS.items():
+        parser.add_argument(f"--{flag}", default="", metavar=flag.upper(), help=words)
+    parser.add_argument(
+        "--sort", default="name", help="name, error_p99, created or bytes; -error_p99 and so on: the largest first"
+    )
     add_snapshot(parser)
 
 
 def run(options: argparse.Namespace) -> int:
     """Print a line for each material and family."""
+    given = [flag for flag in _FILTERS if getattr(options, flag)]
     if options.presets:
+        if given:
+            raise ParameterError(f"--{given[0]}", "does not go with --presets", getattr(options, given[0]))
         _print_presets(options.library)
         return 0
     if options.library is not None:
         raise ParameterError("--library", "goes with --presets", options.library)
     root: Path = options.store
     store = brdfdb.open(root, snapshot=options.snapshot)
-    damaged = _print_materials(store, root) + _print_families(store)
+    names = _chosen(store, options)
+    damaged = _print_materials(store, root, names) + ([] if given else _print_families(store))
     if damaged:
         raise StoreError("; ".join(damaged))
     return 0
@@ -83,7 +98,25 @@ def _colours(material: Material) -> str:
     return f"{at[0]:g} nm" if at is not None and len(at) == 1 else "spectral"
 
 
-def _print_materials(store: Store, root: Path) -> list[str]:
+def _chosen(store: Store, options: argparse.Namespace) -> list[str]:
+    """Return the names of the materials that the options let through, in order; a damaged one has no line."""
+    from pydantic import ValidationError
+
+    from brdfdb.store.catalogue import Choice, line_of
+
+    def line(name: str) -> dict[str, Any]:
+        with contextlib.suppress(StoreError):
+            return line_of(name, store.path(name), store.summary(name))
+        return {"name": name}
+
+    try:
+        choice = Choice(sort=options.sort, model=options.model, paper=options.paper, q=options.words)
+    except ValidationError as error:
+        raise ParameterError("--sort", sentence_of(error.errors()[0]), options.sort) from None
+    return [name for _, _, name in choice.chosen(list(store), line)]
+
+
+def _print_materials(store: Store, root: Path, names: Sequence[str]) -> list[str]:
     """Print a line for each material from its pointer and the last audit; return a sentence for each damaged one."""
     from brdfdb.store.summary_words import (
         COLUMNS,
@@ -99,7 +132,7 @@ def _print_materials(store: Store, root: Path) -> list[str]:
 
     rows, damaged, incomplete = [], [], []
     audits = last_audit(root)
-    for name in store:
+    for name in names:
         try:
             head = store.summary(name)
             if not (head["title"] and head["model"]):  # the pointer of a whole table has both

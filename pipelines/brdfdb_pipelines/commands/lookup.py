@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -60,7 +60,7 @@ def run(options: argparse.Namespace) -> int:
     if options.name not in store and options.name in store.families():
         source = store.family(options.name)
         written = _swept(source, options.set)
-        point = _in_model_units(source, written)
+        point = source.record.in_model_units(written)
         head: dict[str, Any] = {"family": options.name, "parameters": written}
         specular_part = source.record.specular_error is not None
     else:
@@ -127,13 +127,3 @@ def _swept(family: Family, settings: Sequence[str]) -> dict[str, float]:
                 (low, high),
             )
     return {name: values[name] for name in axes}
-
-
-def _in_model_units(family: Family, written: Mapping[str, float]) -> dict[str, float]:
-    """Return parameters by the names and in the units of the model: angles in radians."""
-    from brdfdb.geometry import radians
-
-    return {
-        parameter.name: float(radians(written[name])) if parameter.unit == "rad" else written[name]
-        for name, parameter in family.record.parameters.items()
-    }

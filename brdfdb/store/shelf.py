@@ -1,62 +1,55 @@
-"""The tables that are served: a store that may change or vanish, the lines of lists, verdicts, and pictures."""
+"""A store that may change or vanish while it is read: its tables, the lines of lists, and the verdicts of its audit."""
 
 from __future__ import annotations
 
 import contextlib
-import threading
-from collections import OrderedDict
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from brdfdb.errors import StoreError, UnknownMaterialError
-from brdfdb.store.decoding import read_metadata
-from brdfdb.store.last_audit import Audited, AuditFile
+from brdfdb.store.catalogue import line_of
+from brdfdb.store.last_audit import AuditFile, Verdict
 from brdfdb.store.manifest import check_manifest
-from brdfdb.store.reader import Store
-from brdfdb_api.serving.settings import Settings
+from brdfdb.store.reader import CACHE_BYTES, Store
 
 if TYPE_CHECKING:
     from brdfdb.tables.table import Table
 
-PICTURES = 256  # thumbnails that are kept, of 60 kB at most
-
-
-class Verdict(NamedTuple):
-    """The audit of a material: the findings, their date, and whether they are about the current revision."""
-
-    finding: Audited
-    when: str
-    current: bool
-
 
 class Shelf:
-    """The materials that an application serves.
+    """The materials of a store, as a program shows them that runs while the store changes.
 
     Parameters
     ----------
-    settings : Settings
-        Where the store is.
+    root, cache_bytes, snapshot
+        As of `Store`. It is opened when it is first needed, so that there may be none yet.
+    audit_file : Path
+        What ``brdfdb audit`` wrote as JSON; it may be missing.
     store : Store, optional
-        An open one. By default it is opened when it is first needed, so that there may be none yet.
+        An open one in place of `root`.
     """
 
-    def __init__(self, settings: Settings, store: Store | None = None) -> None:
-        self._settings = settings
-        self._root = settings.store.absolute()  # resolved now: the working directory may change
-        self._store = store
+    def __init__(
+        self,
+        root: Path,
+        audit_file: Path,
+        cache_bytes: int = CACHE_BYTES,
+        snapshot: str | None = None,
+        store: Store | None = None,
+    ) -> None:
+        self._root = root.absolute()  # resolved now: the working directory may change
+        self._cache_bytes, self._snapshot, self._store = cache_bytes, snapshot, store
         self._seen: set[str] = set()
         self._summaries: dict[str, tuple[str, dict[str, Any]]] = {}
-        self._pictures: OrderedDict[tuple[str, int], bytes] = OrderedDict()
-        self._audit = AuditFile(settings.audit_file)
-        self._lock = threading.Lock()
+        self._audit = AuditFile(audit_file)
         self.warming = False  # kernels are being loaded, or compiled for half a minute
 
     @property
     def store(self) -> Store:
         """Open store; StoreError if there is none."""
         if self._store is None:
-            self._store = Store(self._root, self._settings.cache_bytes, snapshot=self._settings.snapshot)
+            self._store = Store(self._root, self._cache_bytes, snapshot=self._snapshot)
         return self._store
 
     def held(self, name: str) -> Table | None:
@@ -111,25 +104,12 @@ class Shelf:
             known = self._summaries.get(name)
             if known is None or known[0] != digest:
                 check_manifest(group, digest, contents=False)
-                known = self._summaries[name] = digest, _described(name, group, dict(head))
+                known = self._summaries[name] = digest, line_of(name, group, head)
         except (UnknownMaterialError, StoreError) as error:
-            return {"name": name, "damaged": str(error), "href": f"/v1/materials/{name}"}
+            return {"name": name, "damaged": str(error)}
         verdict = self.verdict(name)
         audited = verdict.finding.model_dump() if verdict and verdict.current else {}
         return {**known[1], **{key: audited.get(key) for key in ("verdict", "as_published", "conserves_energy")}}
-
-    def picture(self, table: Table, size: int) -> bytes:
-        """Return the picture of a table, `size` pixels across, as a PNG file; those used last are kept."""
-        from brdfdb.scenes.lit_sphere import DRAFT, sphere_png
-
-        key = table.digest, size
-        picture = self._pictures.get(key) or sphere_png(table, size, DRAFT)
-        with self._lock:
-            self._pictures[key] = picture
-            self._pictures.move_to_end(key)
-            while len(self._pictures) > PICTURES:
-                self._pictures.popitem(last=False)
-        return picture
 
     def warm(self) -> None:
         """Load the kernels of lookups."""
@@ -146,34 +126,3 @@ class Shelf:
         when, by_name = self._audit.read()
         audited = by_name.get(name)
         return None if audited is None else Verdict(audited, when, audited.revision == self.head(name))
-
-
-def _described(name: str, group: Path, head: dict[str, Any]) -> dict[str, Any]:
-    """Return the line of one revision in a list."""
-    metadata = read_metadata(group)
-    return {
-        "name": name,
-        "title": metadata.title or "",
-        "model": metadata.model,
-        "model_title": metadata.model_title or metadata.model or "",
-        "paper": metadata.model_reference or "",
-        "source": metadata.source or "",
-        "measured": metadata.measured is not None,
-        "anisotropic": metadata.anisotropic,
-        "wavelength_range_nm": metadata.wavelength_range_nm or None,
-        "spectrum": spectrum_of(metadata.wavelength_range_nm),
-        "incomplete": metadata.gaps or None,
-        "formula_error": None if metadata.formula_error is None else metadata.formula_error.in_lists(),
-        "largest_albedo": None if metadata.largest_albedo is None else metadata.largest_albedo.model_dump(mode="json"),
-        "revision": group.name,
-        **{key: head.get(key) for key in ("error_p99", "created", "bytes")},
-        "href": f"/v1/materials/{name}",
-        "thumbnail": f"/v1/materials/{name}/thumbnail.png",
-    }
-
-
-def spectrum_of(range_nm: Sequence[float]) -> str:
-    """Return whether a table has colours: grey, one wavelength or spectral, by its first and last wavelength [nm]."""
-    if not range_nm:
-        return "grey"
-    return "one wavelength" if range_nm[0] == range_nm[-1] else "spectral"

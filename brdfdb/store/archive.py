@@ -1,0 +1,65 @@
+"""Files of a folder as one zip archive, and all current revisions as one zarr group."""
+
+from __future__ import annotations
+
+import contextlib
+import tempfile
+import zipfile
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel
+
+from brdfdb.errors import StoreError, UnknownMaterialError
+from brdfdb.store.manifest import check_manifest
+from brdfdb.store.paths import METADATA
+from brdfdb.store.reader import Store
+from brdfdb.store.sealed_json import read_json
+
+ZIP = "application/zip"
+
+_PIECE = 1 << 20
+
+
+class Group(BaseModel):
+    """A zarr group (version 3) with the metadata of all below it."""
+
+    zarr_format: int
+    node_type: str
+    attributes: dict[str, Any]
+    consolidated_metadata: dict[str, Any]
+
+
+def zipped(folder: Path, names: Iterable[str], compression: int = zipfile.ZIP_DEFLATED) -> Iterator[bytes]:
+    """Yield files of a folder as a zip archive in pieces, from a temporary file: memory does not grow with a table."""
+    with tempfile.TemporaryFile() as file:
+        with zipfile.ZipFile(file, "w", compression) as archive:
+            for name in sorted(names):
+                archive.write(folder / name, name)
+        file.seek(0)
+        while piece := file.read(_PIECE):
+            yield piece
+
+
+def root_group(store: Store) -> dict[str, Any]:
+    """Return the fields of `Group` for one that holds all current revisions as materials/NAME/REVISION.
+
+    A material that is damaged is left out.
+    """
+    metadata: dict[str, Any] = {"materials": _group()}
+    for name in store:
+        with contextlib.suppress(StoreError, UnknownMaterialError):
+            group, digest = store.location(name)
+            check_manifest(group, digest, contents=False)
+            whole = read_json(group / METADATA)
+            arrays = whole.pop("consolidated_metadata", {}).get("metadata", {})
+            place = f"materials/{name}/{group.name}"
+            metadata |= {f"materials/{name}": _group(revision=group.name), place: whole}
+            metadata |= {f"{place}/{key}": array for key, array in arrays.items()}
+    consolidated = {"kind": "inline", "must_understand": False, "metadata": metadata}
+    return {**_group(), "consolidated_metadata": consolidated}
+
+
+def _group(**attributes: Any) -> dict[str, Any]:
+    return {"zarr_format": 3, "node_type": "group", "attributes": attributes}

@@ -1,0 +1,138 @@
+"""Documents of values: what a lookup, and the view of a lobe, found."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Literal
+
+import numpy as np
+from pydantic import BaseModel, Field
+
+from brdfdb.tables.albedo import AlbedoDocument
+from brdfdb.tables.evaluation import Output, Values
+from brdfdb.tables.lobe_views import View as ViewName
+
+
+class Evaluated(BaseModel):
+    """Values of a BRDF."""
+
+    source: Literal["table", "model", "family"]
+    unit: str = Field(description="unit of brdf and error: 1/sr")
+    output: Output
+    illuminant: str | None = Field(description="of a colour; null of a spectrum")
+    wavelength_nm: float | list[float] | None = Field(description="of the values [nm]; null: grey")
+    brdf: float | list[Any] = Field(
+        description="shape of the broadcast angles, or of axes_deg, then the wavelengths unless they are one number or "
+        "null; of a colour, then three numbers"
+    )
+    error: float | list[Any] | None = Field(
+        description="in the shape of brdf, 99 of 100 values are within that of the model, or of what was measured; "
+        "null: not asked for, and in a list: not known, because it is extrapolated"
+    )
+    extrapolated: bool | list[Any] | None = Field(
+        description="shape of the broadcast angles; true: outside of the directions that were measured; null: error "
+        "was not asked for"
+    )
+    specular_reflectance: float | list[Any] | None = Field(
+        description="specular part, a reflectance without unit that is not in brdf: shape of theta_i, then as brdf"
+    )
+
+
+class View(BaseModel):
+    """One light, and the axes of the values."""
+
+    view: ViewName
+    theta_i: float | None = Field(description="degrees; null of half-difference")
+    phi_i: float
+    axes_deg: dict[str, list[float]] = Field(
+        description="of the axes of brdf, in order; in a cut theta_r is negative back towards the light; in a "
+        "hemisphere delta_phi is phi_r - phi_i"
+    )
+
+
+class Lookup(Evaluated):
+    """Values of a material."""
+
+    material: str
+    revision: str
+
+
+class Lookups(BaseModel):
+    """Values of several materials."""
+
+    materials: list[Lookup]
+
+
+class Lobe(Lookup, View):
+    """f_r of a material for one light over viewers, or over half and difference angles."""
+
+
+class Albedo(AlbedoDocument):
+    """Directional albedo of a table."""
+
+    material: str
+    revision: str
+
+
+class OfModel(BaseModel):
+    """The model, and all of its parameters."""
+
+    model: str
+    model_version: int
+    parameters: dict[str, Any]
+
+
+class ModelLookup(Evaluated, OfModel):
+    """Values of a model."""
+
+
+class ModelLobe(Evaluated, View, OfModel):
+    """f_r of a model for one light."""
+
+
+class ModelAlbedo(AlbedoDocument, OfModel):
+    """Directional albedo of a model."""
+
+
+class FamilyLookup(Evaluated):
+    """Values of a family."""
+
+    family: str
+    parameters: dict[str, float]
+
+
+def values_document(values: Values) -> dict[str, Any]:
+    """Return the fields of `Evaluated`, with numpy arrays."""
+    surface, points, known = values.surface, values.points, values.error is not None and values.surface.kind == "table"
+    return {
+        "source": surface.kind,
+        "unit": "1/sr",
+        "output": values.output,
+        "illuminant": values.illuminant,
+        "wavelength_nm": surface.wavelengths(points),
+        "brdf": plain(values.brdf),
+        "error": plain(values.error),
+        "extrapolated": plain(surface.source.extrapolated(*points.angles)) if known else None,
+        "specular_reflectance": plain(values.specular_reflectance),
+    }
+
+
+def lobe_document(
+    values: Values, axes_deg: Mapping[str, Any], view: ViewName, theta_i_deg: float, phi_i_deg: float
+) -> dict[str, Any]:
+    """Return the fields of `View` and `Evaluated` of a lobe; of half-difference there is no one light."""
+    surface, no_light = values.surface, view == "half-difference"
+    document = values_document(values)
+    if surface.kind == "table" and surface.source.metadata.measured is not None:
+        document["extrapolated"] = plain(surface.source.extrapolated(*values.points.angles))
+    if no_light:
+        document["specular_reflectance"] = None
+    theta_i = None if no_light else theta_i_deg
+    return {"view": view, "theta_i": theta_i, "phi_i": phi_i_deg, "axes_deg": axes_deg, **document}
+
+
+def plain(array: Any) -> Any:
+    """Return what orjson can write: a number for a 0-d array, contiguous memory for any other."""
+    if isinstance(array, np.ndarray):
+        return np.ascontiguousarray(array) if array.ndim else array.item()
+    return array
