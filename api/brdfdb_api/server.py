@@ -153,6 +153,7 @@ async def _keep(workers: int, listener: socket.socket, counts: str) -> None:
     for number in (signal.SIGINT, signal.SIGTERM):
         loop.add_signal_handler(number, stop)
     status = max(await asyncio.gather(*(place() for _ in range(workers))))
+    log.flush()
     if status > 0:
         raise ServerError(f"a worker ended with status {status}; its log says why")
 

@@ -14,7 +14,7 @@ import pytest
 from brdfdb import __version__, formats
 from brdfdb.formats._written import Written
 from brdfdb.tables.table import Table
-from brdfdb_api.http import views
+from brdfdb_api.http import lookups
 from tests.api.a_store import Client, client_of
 
 FOIL, FELT, TILE, METAL = (
@@ -51,7 +51,7 @@ def test_few_files_are_made_at_once(root: Path, monkeypatch: pytest.MonkeyPatch)
         return Written((path,))
 
     monkeypatch.setattr(formats.EXPORTERS["csv"], "write", write)
-    monkeypatch.setattr(views, "EXPORT_WAIT_S", 1)
+    monkeypatch.setattr(lookups, "TURN_S", 1.0)
     app = client_of(root).app
 
     async def ask() -> tuple[list[httpx.Response], list[httpx.Response]]:
@@ -91,3 +91,35 @@ def test_the_tag_of_a_file_is_weak_and_names_the_program(client: Client) -> None
 )
 def test_a_client_that_holds_anything_is_told_of_a_bad_request(client: Client, address: str, status: int) -> None:
     assert client.get(address, headers={"If-None-Match": "*"}).status_code == status
+
+
+MANY = {"theta_i": [10.0] * 20, "theta_r": 20}
+LARGE = [
+    (f"{TILE}/lookup", MANY),
+    ("/v1/models/lambert/lookup", {**MANY, "parameters": {"rho": 0.5}}),
+    ("/v1/lookup", {**MANY, "materials": ["white-tile"]}),
+]
+
+
+@pytest.mark.parametrize(("address", "body"), LARGE)
+def test_many_values_wait_for_a_turn_and_not_for_good(
+    root: Path, monkeypatch: pytest.MonkeyPatch, address: str, body: dict[str, Any]
+) -> None:
+    monkeypatch.setattr(lookups, "TURN_S", 0.1)
+    monkeypatch.setattr(lookups, "INLINE_VALUES", 5)
+    monkeypatch.setattr(lookups, "LARGE_VALUES", 10)
+    app = client_of(root).app
+
+    async def ask() -> list[httpx.Response]:
+        transport = httpx.ASGITransport(app, raise_app_exceptions=False)
+        async with httpx.AsyncClient(transport=transport, base_url="http://test") as client:
+            for _ in range(lookups.LARGE_AT_ONCE):
+                await app.state.large.acquire()
+            few = {**MANY, "theta_i": 10.0}
+            answers = [await client.post(address, json=body), await client.post(f"{TILE}/lookup", json=few)]
+            app.state.large.release()
+            return [*answers, await client.post(address, json=body)]
+
+    refused, small, again = asyncio.run(ask())
+    assert (refused.status_code, refused.headers["retry-after"]) == (503, "0")
+    assert (small.status_code, again.status_code) == (200, 200)

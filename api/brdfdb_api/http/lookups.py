@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import io
-from collections.abc import Iterator
-from typing import Annotated, Any
+from collections.abc import AsyncIterator, Callable, Iterator
+from typing import Annotated, Any, TypeVar
 
 import numpy as np
 from fastapi import Query as InQuery
 from starlette.concurrency import run_in_threadpool
+from starlette.datastructures import State
 from starlette.requests import Request
 from starlette.responses import Response
 from starlette.types import Scope
@@ -22,7 +24,7 @@ from brdfdb.tables.table import Table
 from brdfdb.tables.values_document import Lookup, Lookups, values_document
 from brdfdb_api.http.addresses import NPY_ANSWER, Content, Revision, accept_of, addresses, answers, body, both, shelf_of
 from brdfdb_api.http.errors import RequestError
-from brdfdb_api.http.middleware import points_counted
+from brdfdb_api.http.middleware import POINTS
 from brdfdb_api.http.queries import (
     BodyQuery,
     Format,
@@ -50,16 +52,18 @@ from brdfdb_api.http.responses import (
     unchanged,
 )
 
+T = TypeVar("T")
+
 INLINE_VALUES = 1000  # larger lookups run in a thread, so that the event loop can serve others
 INLINE_BYTES = 96 * 2**10  # larger bodies are read in a thread; 1000 points take about this many bytes
 # Number of larger bodies, or larger answers, that are processed at a time
 LARGE_BYTES, LARGE_VALUES, LARGE_AT_ONCE = 2**20, 100_000, 2
+TURN_S = 10.0  # longest wait for a turn [s]
 LIMITS = {"json": (1, 100), "npy": (100, 800)}  # points and values of one answer, as multiples of max_points
 SPECTRA_OF_COLOURS = 10  # factor on the number of values where only colours are returned
 _PARAMETERS = (*ANGLES, "wavelength_nm", "illuminant", "error")  # of the library, which a request calls the same
-
-
 NPZ = "application/x-npz"
+Asked = tuple[Surface, Points, dict[str, Any]]  # surface and points of a body, and what the answer says of them
 
 lookups = addresses()
 
@@ -71,6 +75,27 @@ def refused() -> Iterator[None]:
         yield
     except ParameterError as error:
         raise RequestError(422, str(error), error.parameter) from error
+
+
+@contextlib.asynccontextmanager
+async def turn(turns: asyncio.Semaphore) -> AsyncIterator[None]:
+    """Wait for a turn; RequestError (503) if none comes within `TURN_S`."""
+    try:
+        async with asyncio.timeout(TURN_S):
+            await turns.acquire()
+    except TimeoutError:
+        detail = "the server does as much at once as it can; ask again later"
+        raise RequestError(503, detail, retry_after_s=round(TURN_S)) from None
+    try:
+        yield
+    finally:
+        turns.release()
+
+
+async def in_thread(state: State, work: Callable[[], T], *, large: bool) -> T:
+    """Return what work returns, done in a thread; large work waits for a turn."""
+    async with turn(state.large) if large else contextlib.nullcontext():
+        return await run_in_threadpool(work)
 
 
 def surface_in(table: Table, options: OfTable) -> Surface:
@@ -114,12 +139,42 @@ def checked_size(max_points: int, points: Points, options: Options, surface: Sur
     return values
 
 
+async def looked_up(
+    request: Request,
+    options: Options,
+    kind: Format,
+    headers: Encoded,
+    size: int,
+    read: Callable[[], Asked],
+    *,
+    quick: bool = False,
+) -> Response:
+    """Answer a body of `size` bytes: read it, in a thread unless it is `quick`, and look its points up."""
+    state = request.app.state
+
+    def checked_too() -> tuple[Asked, int]:
+        surface, points, about = read()
+        return (surface, points, about), checked_size(state.settings.max_points, points, options, surface, kind)
+
+    parts, values = checked_too() if quick else await in_thread(state, checked_too, large=size > LARGE_BYTES)
+    surface, points, about = parts
+
+    def write() -> Response:
+        with contextlib.nullcontext() if surface.kind == "table" else refused():
+            return write_answer(points, options, surface, kind, headers, about)
+
+    if values <= INLINE_VALUES and surface.kind == "table" and options.output == "spectrum":
+        return write()
+    # a row and a column of angles take few bytes and make many points
+    return await in_thread(state, write, large=values > LARGE_VALUES)
+
+
 def write_answer(
     points: Points, options: Options, surface: Surface, kind: Format, headers: Encoded, about: dict[str, Any]
 ) -> Response:
     """Look the points up and write them as `kind`; `about` begins the document."""
     values = evaluate(points, options, surface, specular=kind == "json")
-    points_counted(surface.kind, points.count)
+    POINTS.labels(surface.kind).inc(points.count)
     if kind == "npy":
         content = npy_bytes(values.brdf if values.error is None else np.stack([values.brdf, values.error]))
         return EncodedResponse(content, headers)
@@ -201,25 +256,15 @@ async def lookup_points(
         raise RequestError(422, "wavelength_nm: a JSON body holds it, not the query", "wavelength_nm")
     kind = query.kind(accept_of(request), binary=binary)
     table = await _table(shelf_of(request), name, revision)
-    surface, content, state = surface_in(table, query), await request.body(), request.app.state
+    surface, content = surface_in(table, query), await request.body()
     about, headers = {"material": table.name, "revision": table.revision}, lookup_headers(None, table.revision, kind)
 
-    def read() -> tuple[Points, int]:
+    def read() -> Asked:
         points = from_array(content, query.wavelength_nm) if binary else from_json(PointsBody, content).points
-        return points, checked_size(state.settings.max_points, points, query, surface, kind)
+        return surface, points, about
 
-    def write(points: Points) -> Response:
-        return write_answer(points, query, surface, kind, headers, about)
-
-    if len(content) > INLINE_BYTES:
-        async with state.large if len(content) > LARGE_BYTES else contextlib.nullcontext():
-            return await run_in_threadpool(lambda: write(read()[0]))
-    points, values = read()
-    # a row and a column of angles take few bytes and make many points
-    async with state.large if values > LARGE_VALUES else contextlib.nullcontext():
-        # a thread costs about as long as 1000 values do
-        slow = values > INLINE_VALUES or surface.kind != "table" or query.output != "spectrum"
-        return await run_in_threadpool(write, points) if slow else write(points)
+    quick = len(content) <= INLINE_BYTES
+    return await looked_up(request, query, kind, headers, len(content), read, quick=quick)
 
 
 @lookups.post(
@@ -228,8 +273,12 @@ async def lookup_points(
     responses=answers(Lookups, 404, 413, 415, 503, media={NPZ: "an array a material, by its name"}),
     openapi_extra=body(ManyBody),
 )
-def lookup_many(request: Request, query: Annotated[ManyQuery, InQuery()], content: Content) -> Response:
+async def lookup_many(request: Request, query: Annotated[ManyQuery, InQuery()], content: Content) -> Response:
     """Return the BRDF of several materials at the same pairs of directions (angles in degrees)."""
+    return await in_thread(request.app.state, lambda: _many(request, query, content), large=True)
+
+
+def _many(request: Request, query: ManyQuery, content: bytes) -> Response:
     given, shelf = from_json(ManyBody, content), shelf_of(request)
     points = given.points
     kind: Format = "npy" if query.format == "npz" else "json"

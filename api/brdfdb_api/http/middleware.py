@@ -230,16 +230,6 @@ def _in_file(content: bytes) -> IO[bytes]:
     return file
 
 
-def points_counted(source: str, count: int) -> None:
-    """Add to the pairs of directions that were looked up in a "table" or "model"."""
-    _points(source).inc(count)
-
-
-@functools.cache
-def _points(source: str) -> Counter:
-    return POINTS.labels(source)
-
-
 @functools.lru_cache(maxsize=4096)
 def _counters(route: str, status: int) -> tuple[Counter, Histogram]:
     """Return the counters of a route and a status, cached: finding labels takes as long as a lookup."""

@@ -23,17 +23,9 @@ from brdfdb.tables.evaluation import Surface
 from brdfdb.tables.points import PointsBody
 from brdfdb.tables.values_document import FamilyLookup, ModelAlbedo, ModelLobe, ModelLookup
 from brdfdb_api.http.addresses import NPY_ANSWER, Content, accept_of, addresses, answers, body, shelf_of
-from brdfdb_api.http.lookups import checked_size, refused, write_answer
-from brdfdb_api.http.queries import Flag, Light, Options, Query, Wavelengths, from_json
-from brdfdb_api.http.responses import (
-    NPY,
-    Document,
-    Encoded,
-    Families,
-    Model,
-    Models,
-    media_type,
-)
+from brdfdb_api.http.lookups import Asked, looked_up, refused
+from brdfdb_api.http.queries import Flag, Format, Light, Options, Query, Wavelengths, from_json
+from brdfdb_api.http.responses import NPY, Document, Encoded, Families, Model, Models, media_type
 from brdfdb_api.http.views import SPHERE, SphereQuery, lobe_answer, sphere_answer
 
 models = addresses()
@@ -101,14 +93,9 @@ def _surface(spec: ModelSpec, given: Parameters) -> tuple[Surface, dict[str, Any
     return Surface(material, "model", PICTURE_NM if material.spectral else None), about
 
 
-def _looked_up(
-    request: Request, surface: Surface, query: Options, given: PointsBody, about: dict[str, Any]
-) -> Response:
-    kind, points = query.kind(accept_of(request)), given.points
-    checked_size(request.app.state.settings.max_points, points, query, surface, kind)
-    headers = Encoded({**NO_STORE, "Content-Type": media_type(kind)})
-    with refused():
-        return write_answer(points, query, surface, kind, headers, about)
+def _form(request: Request, query: Options) -> tuple[Format, Encoded]:
+    kind = query.kind(accept_of(request))
+    return kind, Encoded({**NO_STORE, "Content-Type": media_type(kind)})
 
 
 @models.post(
@@ -117,14 +104,20 @@ def _looked_up(
     responses=answers(ModelLookup, 404, 413, 415, 503, media=NPY_ANSWER),
     openapi_extra=body(PointsAt),
 )
-def model_lookup(request: Request, spec: Spec, query: Annotated[Options, InQuery()], content: Content) -> Response:
+async def model_lookup(
+    request: Request, spec: Spec, query: Annotated[Options, InQuery()], content: Content
+) -> Response:
     """Return the BRDF of a model at its parameters and many pairs of directions (angles in degrees).
 
     A spectral model is evaluated from 420 to 680 nm in steps of 20 nm, unless wavelength_nm says otherwise.
     """
-    given = from_json(PointsAt, content)
-    surface, about = _surface(spec, given)
-    return _looked_up(request, surface, query, given, about)
+
+    def read() -> Asked:
+        given = from_json(PointsAt, content)
+        surface, about = _surface(spec, given)
+        return surface, given.points, about
+
+    return await looked_up(request, query, *_form(request, query), len(content), read)
 
 
 @models.post(
@@ -189,11 +182,15 @@ def family_list(request: Request) -> Response:
     responses=answers(FamilyLookup, 404, 413, 415, 503, media=NPY_ANSWER),
     openapi_extra=body(PointsOfFamily),
 )
-def family_lookup(
+async def family_lookup(
     request: Request, family: str, query: Annotated[FamilyQuery, InQuery()], content: Content
 ) -> Response:
     """Return the BRDF of a family at parameters between those of its members, interpolated in their tables."""
-    given = from_json(PointsOfFamily, content)
-    with refused():
-        surface = shelf_of(request).store.family(family).surface(given.parameters)
-    return _looked_up(request, surface, query, given, {"family": family, "parameters": given.parameters})
+
+    def read() -> Asked:
+        given = from_json(PointsOfFamily, content)
+        with refused():
+            surface = shelf_of(request).store.family(family).surface(given.parameters)
+        return surface, given.points, {"family": family, "parameters": given.parameters}
+
+    return await looked_up(request, query, *_form(request, query), len(content), read)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 from urllib.parse import urlencode
 
 import numpy as np
@@ -18,24 +18,8 @@ from brdfdb.store.material_document import material_document
 from brdfdb_api.http import middleware
 from brdfdb_api.http.addresses import Revision, addresses, answers, both, shelf_of
 from brdfdb_api.http.errors import RequestError
-from brdfdb_api.http.queries import (
-    Flag,
-    Query,
-    Wavelengths,
-)
-from brdfdb_api.http.responses import (
-    Catalogue,
-    Document,
-    Health,
-    Material,
-    cache_headers,
-    json_bytes,
-    tag_of,
-    tagged,
-)
-
-if TYPE_CHECKING:
-    pass
+from brdfdb_api.http.queries import Flag, Query, Wavelengths
+from brdfdb_api.http.responses import Catalogue, Document, Health, Material, cache_headers, json_bytes, tag_of, tagged
 
 PAGE, MOST = 100, 1000  # materials on a page: default and largest number
 PARTS = ("lookup", "albedo", "lobe", "sphere", "thumbnail.png", "audit", "download.zarr")  # of a material

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 from weakref import WeakKeyDictionary
 
@@ -25,26 +24,11 @@ from brdfdb.tables.evaluation import Surface
 from brdfdb.tables.lobe_views import MOST_POINTS, view_directions
 from brdfdb.tables.points import Points, listed
 from brdfdb.tables.values_document import Albedo, Lobe, lobe_document
-from brdfdb_api.http.addresses import (
-    Revision,
-    accept_of,
-    addresses,
-    answers,
-    both,
-    shelf_of,
-)
+from brdfdb_api.http.addresses import Revision, accept_of, addresses, answers, both, shelf_of
 from brdfdb_api.http.errors import RequestError
-from brdfdb_api.http.lookups import checked_size, evaluate, refused, surface_in, tag_in
+from brdfdb_api.http.lookups import checked_size, evaluate, refused, surface_in, tag_in, turn
 from brdfdb_api.http.queries import Light, LobeQuery, Options, Query, parsed
-from brdfdb_api.http.responses import (
-    NPY,
-    Audit,
-    Document,
-    cache_headers,
-    json_bytes,
-    npy_bytes,
-    tag_of,
-)
+from brdfdb_api.http.responses import NPY, Audit, Document, cache_headers, json_bytes, npy_bytes, tag_of
 
 if TYPE_CHECKING:
     from brdfdb.tables.table import Table
@@ -54,7 +38,7 @@ _ALBEDOS: WeakKeyDictionary[Table, bytes] = WeakKeyDictionary()
 _PICTURES: WeakKeyDictionary[Table, tuple[int, bytes]] = WeakKeyDictionary()
 
 SPHERE = {"image/png": "sRGB with transparent corners", NPY: "linear sRGB and coverage (size, size, 4), not clipped"}
-EXPORTS_AT_ONCE, EXPORT_WAIT_S = 2, 10  # files of other formats that are made at a time, and the wait for a turn [s]
+EXPORTS_AT_ONCE = 2  # files of other formats that are made at a time
 THUMBNAIL, MOST = 96, 256  # pixels across a thumbnail: default and largest number
 
 # Of all formats: an option that a format does not have is refused
@@ -116,8 +100,8 @@ def lobe_answer(
     kind = options.kind(accept_of(request))
     axes, angles = view_directions(light.view, light.theta_i, light.phi_i)
     points = Points.of(angles, listed(light.wavelength_nm))
-    # The view fixes the points; the client chooses only the wavelengths.
-    checked_size(max(request.app.state.settings.max_points, MOST_POINTS), points, options, surface, kind)
+    # The view fixes the points; the client chooses only the wavelengths. Bytes have the limit of JSON, too
+    checked_size(max(request.app.state.settings.max_points, MOST_POINTS), points, options, surface, "json")
     values = evaluate(points, options, surface)
     if kind == "npy":
         return Response(npy_bytes(values.brdf), media_type=NPY, headers=headers)
@@ -154,18 +138,8 @@ async def export(
     headers["ETag"] = f"W/{headers['ETag']}"
     if request.headers.get("if-none-match") == headers["ETag"]:  # a file takes seconds
         return Response(status_code=304, headers=headers)
-    exports = request.app.state.exports
-    try:
-        async with asyncio.timeout(EXPORT_WAIT_S):
-            await exports.acquire()
-    except TimeoutError:
-        raise RequestError(
-            503, "the server makes as many files as it can; ask again later", retry_after_s=EXPORT_WAIT_S
-        ) from None
-    try:
+    async with turn(request.app.state.exports):
         return await run_in_threadpool(_exported, file_format, table, verdict, options, headers)
-    finally:
-        exports.release()
 
 
 def _with_verdict(shelf: Shelf, name: str, revision: str | None) -> tuple[Table, str | None]:

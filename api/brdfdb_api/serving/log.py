@@ -24,8 +24,7 @@ _waiting: deque[bytes] = deque()
 _dropped = 0
 _wake = threading.Event()
 _hurry = threading.Event()
-_starting = threading.Lock()
-_thread: threading.Thread | None = None
+_never_written = threading.Lock()
 
 
 def write(record: dict[str, object]) -> None:
@@ -42,8 +41,9 @@ def write(record: dict[str, object]) -> None:
     _waiting.append(line)
     if not _wake.is_set():
         _wake.set()
-        if _thread is None:
-            _start()
+        if _never_written.acquire(blocking=False):  # once
+            threading.Thread(target=_run, daemon=True, name="log").start()
+            atexit.register(flush)
 
 
 def flush() -> None:
@@ -68,15 +68,6 @@ class Handler(logging.Handler):
 def ascii_of(text: str) -> str:
     """Return ASCII text, which orjson writes and terminals show: other characters, lone surrogates too, are escaped."""
     return text.encode("ascii", "backslashreplace").decode()
-
-
-def _start() -> None:
-    global _thread
-    with _starting:
-        if _thread is None:
-            _thread = threading.Thread(target=_run, daemon=True, name="log")
-            _thread.start()
-            atexit.register(flush)
 
 
 def _run() -> None:
