@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import importlib.metadata
+import os
 import sys
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
+
+from _site.llvm import llvm_path
 
 project = "brdfdb"
 author = "the authors of brdfdb"
@@ -28,6 +31,11 @@ nb_execution_in_temp = True
 nb_execution_raise_on_error = True
 nb_execution_timeout = 300  # seconds a cell, on a busy machine too; tutorials take less than a minute
 nb_merge_streams = True
+
+# Mitsuba's LLVM variants need LLVM 19 or newer. Without it their page is built, and its code does not run
+if llvm := llvm_path():
+    os.environ["DRJIT_LIBLLVM_PATH"] = llvm
+nb_execution_excludepatterns = [] if llvm else ["tutorials/mitsuba.md"]
 myst_enable_extensions = ["colon_fence", "deflist"]
 myst_heading_anchors = 3
 

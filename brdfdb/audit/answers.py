@@ -74,8 +74,11 @@ def _of_data(energy: Energy) -> Answer:
     where = f"{most} at {table.max_at_theta_i_deg:.3g}°"
     if table.verdict == "violates":
         text = f"the data do not: {where}"
+    elif table.reason:
+        text = f"cannot be judged: {where}, within the error of the table"
+        return Answer(word="not judged", text=text, reason=table.reason)
     else:
-        text = f"the data do{', within their uncertainty' if table.reason else ''}: {where}"
+        text = f"the data do: {where}"
     return Answer(word=table.verdict, text=text, reason=table.reason or text)
 
 

@@ -107,9 +107,9 @@ class Reciprocity(Finding):
         return [self.sentence(self.verdict, text if most <= allowed else f"not reciprocal: {text}")]
 
     def _of_measured(self) -> str:
-        """Return the asymmetry of measured data in words."""
+        """Return the asymmetry of a table of measured data in words."""
         worst = max((asymmetry for _, asymmetry in self.named() if asymmetry.measured), key=lambda one: one.p99 or 0.0)
-        text = f"asymmetry of the data: median {_shown(worst.median)}, 99 of 100 up to {_shown(worst.p99)}"
+        text = f"asymmetry of the table: median {_shown(worst.median)}, 99 of 100 up to {_shown(worst.p99)}"
         if worst.tolerance is None:
             return f"{text}; not judged, because their uncertainty is not known"
         return f"{text}, of {number(worst.tolerance, 2)} that their uncertainty and the error of the table explain"

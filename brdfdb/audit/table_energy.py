@@ -77,6 +77,18 @@ class TableEnergy(BaseModel):
     verdict: Verdict
     reason: str = Field(description="also if a table passes because of its stated error")
 
+    @property
+    def uncertainty(self) -> float | None:
+        """Return the part of the largest albedo [1] that the stated error of its band may make; None if none is stated.
+
+        It is that of the worst wavelength.
+        """
+        if self.bands is None or self.max_albedo is None:
+            return None
+        edges = np.array(self.bands.theta_i_deg)
+        band = int(np.clip(np.searchsorted(edges, self.max_at_theta_i_deg, side="right") - 1, 0, edges.size - 2))
+        return self.max_albedo * max(self.bands.stated_error[band])
+
 
 class _Judge(NamedTuple):
     """Averages of an albedo that are judged, and the excess that the stated error of the table explains.

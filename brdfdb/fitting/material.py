@@ -15,7 +15,10 @@ from brdfdb.measurements.measured_source import slug
 
 
 def material_of(surface: Surface, point: Point, samples: Samples) -> tuple[Material | None, str | None]:
-    """Return a fit as a material and its text in a recipe; None for a sum, and for colours without wavelengths."""
+    """Return a fit as a material and its text in a recipe; None for a sum, and for colours without wavelengths.
+
+    Reflectances of samples with a wavelength are spectra, also of one wavelength: the material holds there only.
+    """
     at = samples.wavelength_nm
     several = len(samples.channels) > 1
     if len(surface.terms) > 1 or (several and at is None):
@@ -27,8 +30,9 @@ def material_of(surface: Surface, point: Point, samples: Samples) -> tuple[Mater
     for parameter in spec.parameters:
         name = parameter.name
         column = next((i for i, one in enumerate(surface.coefficients) if one.name == name), None)
-        if column is not None and several and at is not None and parameter.reflectance:
-            spectrum = [rounded(value) for value in point.values[column].tolist()]
+        if at is not None and parameter.reflectance and (column is not None or not several):
+            fitted = [numbers[name]] if column is None else point.values[column].tolist()
+            spectrum = [rounded(value) for value in fitted]
             values[name] = {"wavelengths_nm": at.tolist(), "values": spectrum, "origin": origin}
             continue
         if column is not None and several:
@@ -41,8 +45,11 @@ def material_of(surface: Surface, point: Point, samples: Samples) -> tuple[Mater
         table["refractive_index"] = f"constant/{rounded(numbers['n'])!r}/{rounded(numbers['k'])!r}"
     elif surface.entry is not None and spec.spectral:
         table["refractive_index"] = surface.entry
-    if spec.spectral or (several and surface.coefficients):
+    spectra = any(isinstance(value, dict) for value in values.values())
+    if spec.spectral or spectra:
         table["wavelengths_nm"] = surface.wavelength_nm.tolist()
+    elif at is not None:
+        table["note"] = f"fitted at {at[0]:g} nm; the model is grey, and its numbers hold at this wavelength only"
     table["parameters"] = values
     name = slug(f"{samples.name}-as-{spec.name}")[:MOST_NAME].rstrip("-")
     return Material.from_table(name, table), toml_of(name, table)

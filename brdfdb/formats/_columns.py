@@ -36,6 +36,7 @@ _QUANTITIES = {
     "f_r": ("brdf", "f_r", "fr", "bsdf", "value", "values"),
     "reflectance_factor": ("brf", "rf", "hcrf", "bcrf", "reflectance_factor", "r_factor"),
     "f_r_cos": ("dsf", "ccbrdf", "brdf_cos", "f_r_cos", "fr_cos", "brdfcos"),
+    "f_r_cos_i": ("f_r_cos_i",),
 }
 QUANTITIES = tuple(_QUANTITIES)
 _UNCERTAINTY = (
@@ -70,25 +71,12 @@ _OF_PERCENT = re.compile(
 )
 _OF_UNCERTAINTY = re.compile(r"uncertaint|error|deviation|\bstd\b", re.IGNORECASE)
 _NUMBER_NM = re.compile(r"(?P<word>[a-z_]*?)[_@]?(?P<number>\d+(?:\.\d+)?)_?(?P<unit>nm|um|µm|μm)?$")
-_PERCENT = re.compile(r"%|(?:^|[\W_])(?:percent|pct)(?:$|[\W_])", re.IGNORECASE)
-_BRACKETS = re.compile(r"[\[(](.*?)[\])]")
-_KNOWN_UNITS = (
-    "",
-    "-",
-    "1",
-    "1/sr",
-    "/sr",
-    "sr-1",
-    "sr^-1",
-    "sr**-1",
-    "sr⁻¹",
-    "sr^{-1}",
-    "per sr",
-    "nm",
-    "um",
-    "µm",
-    "μm",
-)
+BRACKETS = re.compile(r"[\[(](.*?)[\])]")
+_OF_NO_COSINE = re.compile(r"(?<!cos)(?<!cos )(?<!cosine)(?<!cosine )[\[(].*?[\])]", re.IGNORECASE)
+_NM_IN_BRACKETS = re.compile(r"[\[(]\s*(\d+(?:\.\d+)? ?(?:nm|um|µm|μm))\s*[\])]")
+_OF_COSINE = re.compile(r"(?P<word>.+?)_?cos(?:ine)?(?:_(?P<angle>.+))?")
+INDEX = "index"  # name of a first column whose header is empty
+UNKNOWN_COSINE = "?"  # quantity of f_r times the cosine of an angle that is not known
 _FEWEST_NAMES = 3  # fields of a line of names that are no numbers: those of the angles
 _COMMENT = re.compile(r"^\s*(?:#|%|//|!)+\s?")
 
@@ -256,11 +244,14 @@ def _are_units(text: str, delimiter: str | None, count: int) -> bool:
 
 
 def _split(text: str, delimiter: str | None, count: int) -> tuple[str, ...]:
-    """Return the names in a line if it has as many as there are columns, with the delimiter of rows or another one."""
+    """Return the names in a line if it has as many as there are columns, with the delimiter of rows or another one.
+
+    The first may be empty: pandas writes the numbers of rows into such a column.
+    """
     for sign in dict.fromkeys((delimiter, None, ",", ";", "\t")):
-        names = fields_of(text, sign)
-        if len(names) == count and all(names):
-            return tuple(names)
+        first, *others = fields_of(text, sign)
+        if len(others) == count - 1 and all(others) and (first or len(others) >= _FEWEST_NAMES):
+            return (first or INDEX, *others)
     return ()
 
 
@@ -291,7 +282,7 @@ def role_of(name: str) -> str:
         return "uncertainty"
     if plain in _WAVELENGTH or (plain.rpartition("_")[0] in _WAVELENGTH and length_unit(name) is not None):
         return "wavelength"
-    if wavelength_of(name) is not None or any(plain in names for names in _QUANTITIES.values()):
+    if wavelength_of(name) is not None or _is_quantity(plain):
         return "values"
     for side, words in (("i", _LIGHT), ("r", _VIEWER)):
         for kind, angles in (("theta", _POLAR), ("phi", _AZIMUTH)):
@@ -312,7 +303,7 @@ def roles_of(names: Sequence[str]) -> dict[str, list[int]]:
                 at = plain.index(f"{angle}_s")
                 roles[f"{angle}_i"] = [column for column in roles.get(f"{angle}_i", []) if column != at]
                 roles[f"{angle}_r"] = [at]
-    bare = [_BRACKETS.sub("", name).strip() for name in names]
+    bare = [BRACKETS.sub("", name).strip() for name in names]
     for colour in _COLOURS:
         if "values" not in roles and set(colour) <= set(bare):
             roles["values"] = [bare.index(channel) for channel in colour]
@@ -332,7 +323,7 @@ def plain_name(name: str) -> str:
 
 def angle_unit(name: str) -> str:
     """Return the unit of angles that a name gives: one of `ANGLE_UNITS`, the text in its brackets, or "" if none."""
-    for unit in (text.strip() for text in _BRACKETS.findall(name)):
+    for unit in (text.strip() for text in BRACKETS.findall(name)):
         if unit:
             return next((key for key, words in _ANGLE_WORDS.items() if unit.lower().rstrip(".") in words), unit)
     if match := re.search(r"[\W_](m?rad)", name.lower()):
@@ -346,37 +337,51 @@ def length_unit(name: str) -> float | None:
     return None if match is None else next(nm for unit, nm in _LENGTHS.items() if match[1].lower().startswith(unit))
 
 
-def in_percent(name: str) -> bool:
-    """Return True if a name says that its numbers are percent."""
-    return _PERCENT.search(name) is not None
-
-
-def unknown_unit(name: str) -> str:
-    """Return the unit in brackets of a name of values if it is none that is known, else an empty text."""
-    units = [unit.strip() for unit in _BRACKETS.findall(name)]
-    return next((unit for unit in units if unit.lower() not in _KNOWN_UNITS and not in_percent(unit)), "")
-
-
 def wavelength_of(name: str) -> float | None:
-    """Return the wavelength [nm] that a name gives, such as 550nm or BRF_1.6um; None if it gives none."""
+    """Return the wavelength [nm] that a name gives, such as 550nm or BRF_1.6um; None if it gives none.
+
+    A quantity may have it in brackets, with its unit: BRF (550 nm).
+    """
     match = _NUMBER_NM.fullmatch(plain_name(name))
     if match is None:
-        return None
+        inner = _NM_IN_BRACKETS.search(name)
+        return wavelength_of(inner[1]) if inner and _is_quantity(plain_name(name)) else None
     word, number, unit = match["word"], float(match["number"]), match["unit"]
-    if word and not any(word.rstrip("_") in (*names, "r", "reflectance") for names in _QUANTITIES.values()):
+    if word and not (_is_quantity(word.rstrip("_")) or word.rstrip("_") in ("r", "reflectance")):
         return None
     if unit is None:
         return number if number >= 100.0 else None
     return number if unit == "nm" else 1e3 * number
 
 
-def quantity_of(names: Iterable[str]) -> str:
-    """Return the quantity that names of columns of values give: one of `QUANTITIES`, or "" if they give none."""
-    for name in names:
-        plain = plain_name(name)
-        match = _NUMBER_NM.fullmatch(plain)
-        word = match["word"].rstrip("_") if match else plain
-        for quantity, words in _QUANTITIES.items():
-            if word in words:
+def _is_quantity(plain: str) -> bool:
+    """Return True if a plain name is that of a quantity, also times a cosine."""
+    return any(plain in words for words in _QUANTITIES.values()) or _cosine_in(plain) is not None
+
+
+def _cosine_in(plain: str) -> str | None:
+    """Return the angle in the name of f_r times a cosine, such as theta_i, "" if it gives none; None of other names."""
+    match = _OF_COSINE.fullmatch(plain)
+    return (match["angle"] or "") if match and match["word"] in _QUANTITIES["f_r"] else None
+
+
+def quantity_of(name: str, columns: Sequence[str]) -> str:
+    """Return the quantity that the name of a column of values gives: one of `QUANTITIES`, or "" if it gives none.
+
+    It is `UNKNOWN_COSINE` if f_r is multiplied by the cosine of an angle that is neither that of the light nor that of
+    the viewer. The names of all columns tell whether theta_s is the one or the other.
+    """
+    plain = plain_name(name)
+    match = _NUMBER_NM.fullmatch(plain)
+    word = match["word"].rstrip("_") if match else plain
+    angle = _cosine_in(plain_name(re.sub(r"[\[\](){}]", " ", _OF_NO_COSINE.sub("", name))))
+    if angle:
+        roles = roles_of(columns)
+        for role, quantity in (("theta_r", "f_r_cos"), ("theta_i", "f_r_cos_i")):
+            if {angle, f"theta_{angle}"} & {plain_name(columns[column]) for column in roles.get(role, ())}:
                 return quantity
-    return ""
+        if angle in ("s", "theta_s"):
+            return UNKNOWN_COSINE
+        of_viewer, of_light = role_of(angle) == "theta_r" or angle in _VIEWER, role_of(angle) == "theta_i"
+        return "f_r_cos" if of_viewer else "f_r_cos_i" if of_light or angle in _LIGHT else UNKNOWN_COSINE
+    return next((quantity for quantity, words in _QUANTITIES.items() if word in words), "")

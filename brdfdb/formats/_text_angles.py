@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -12,10 +13,13 @@ from numpy.typing import NDArray
 from brdfdb.errors import FileFormatError
 from brdfdb.formats._columns import ANGLE_UNITS, ANGLES, AZIMUTHS, Layout, angle_unit, plain_name
 from brdfdb.formats._record import note
+from brdfdb.formats._text_rows import line_of_row
 
 Array = NDArray[np.float64]
 
 _WORDS = {"deg": "degrees", "rad": "radians", "mrad": "milliradians"}
+_OF_ANGLES = re.compile(r"\bangles?\b[^.;\d]{0,40}\b(deg(?:rees?)?|(?:milli)?radians?|m?rad)\b", re.IGNORECASE)
+_SHOWN = 200  # characters of a title that a sentence repeats
 _FLAT = 1e-6  # sine of an angle to the plane of incidence that is rounding
 _UPRIGHT = np.radians(90.0 + 1e-6)
 
@@ -29,8 +33,8 @@ def angles_of_rows(
     given = {name: rows[:, roles[name][0]] for name in ANGLES if name in roles}
     for name, column in given.items():
         if np.any(np.isnan(column)):
-            line = f"line {layout.line}, field {layout.names[roles[name][0]]}"
-            raise FileFormatError(f"{path}: {line}: an angle is missing")
+            number = line_of_row(path, layout, int(np.argmax(np.isnan(column))))
+            raise FileFormatError(f"{path}: line {number}, field {layout.names[roles[name][0]]}: an angle is missing")
     units = _units(path, given, roles, layout, unit, record)
     if "delta_phi" in given and plain_name(layout.names[roles["delta_phi"][0]]) in AZIMUTHS:
         note(
@@ -53,8 +57,9 @@ def angles_of_rows(
             given["delta_phi"] = np.where(theta < 0.0, given["delta_phi"] - np.pi, given["delta_phi"])
         given[f"theta_{side}"] = np.abs(theta)
         if np.any(np.abs(theta) > np.pi * (1.0 + 1e-9)):
-            shown = np.rad2deg(np.abs(theta).max())
-            raise FileFormatError(f"{path}: line {layout.line}: theta_{side} of {shown:g} degrees is no polar angle")
+            row = int(np.argmax(np.abs(theta)))
+            shown, line = np.rad2deg(np.abs(theta[row])), line_of_row(path, layout, row)
+            raise FileFormatError(f"{path}: line {line}: theta_{side} of {shown:g} degrees is no polar angle")
     phi_i = given["phi_i"]
     phi_r = given["phi_r"] if "phi_r" in given else phi_i + given["delta_phi"]
     flat = np.abs(np.sin(phi_r - phi_i)) * np.sin(given["theta_r"]) < _FLAT
@@ -90,7 +95,7 @@ def _units(
     unit: str,
     record: dict[str, Any],
 ) -> dict[str, str]:
-    """Return the unit of each angle: the one that the user states, or that of its name, or that of other names."""
+    """Return the unit of each angle: that of the user, or of its name, or of other names, or of a title on angles."""
     if unit != "auto":
         return dict.fromkeys(given, unit)
     units = {}
@@ -101,8 +106,14 @@ def _units(
             where = f"{path}: line {layout.line}, field {column}"
             raise FileFormatError(f"{where}: the unit {units[name]!r} is none of angles; allowed are deg, rad and mrad")
     named = sorted(set(units.values()) - {""})
-    other = named[0] if len(named) == 1 else "deg"  # of columns whose names give none
     unnamed = {name: column for name, column in given.items() if not units[name]}
+    titles = [line for line in layout.titles if _OF_ANGLES.search(line)]
+    stated = {angle_unit(f"[{match[1]}]") for line in titles for match in _OF_ANGLES.finditer(line)}
+    if unnamed and not named and len(stated) == 1:
+        unit = stated.pop()
+        note(record, f"Angles were taken as {_WORDS[unit]}: a title says {titles[0].strip()[:_SHOWN]!r}.")
+        return dict.fromkeys(given, unit)
+    other = named[0] if len(named) == 1 else "deg"  # of columns whose names give none
     if other == "deg" and unnamed and _may_be_radians(unnamed):
         if named:
             columns = [layout.names[roles[name][0]] for name in unnamed]

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 from array import array
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +14,7 @@ from numpy.typing import NDArray
 from brdfdb.errors import FileFormatError
 from brdfdb.formats._columns import Layout, angle_unit, comment_of, fields_of, header_of, number_of
 from brdfdb.formats._record import of_comments
+from brdfdb.formats._text_end import check_last_number, has_open_end
 from brdfdb.formats._text_file import lines_of
 
 _ANGLE_UNIT = re.compile(r"(?<![\d.])(?<![\d.] )\b(?:degrees?|deg|m?rad|(?:milli)?radians?)\b", re.IGNORECASE)
@@ -34,15 +37,14 @@ def rows_of(path: Path, layout: Layout, *, one_wavelength: bool) -> NDArray[np.f
     Raises
     ------
     FileFormatError
-        If a row is damaged, or stands below a comment with other columns, another unit of angles or another wavelength.
+        If a row is damaged, stands below a comment with other columns, another unit of angles or another wavelength, or
+        the file was cut within its last number.
     """
     numbers, count = array("d"), len(layout.names)
     decimals = ""  # the sign before decimals: a comma beside points may be that of thousands
     other = ""  # a sentence on the last comments: rows below them are not as those above
-    for line_number, line in lines_of(path):
-        if line_number < layout.first or not line.strip():
-            continue
-        if line.lstrip().startswith(("#", "%")):
+    for line_number, line in _from_first(path, layout):
+        if _is_comment(line):
             text = comment_of(line)
             other = other or _other_rows(text, line_number, layout, one_wavelength=one_wavelength)
             continue
@@ -64,7 +66,25 @@ def rows_of(path: Path, layout: Layout, *, one_wavelength: bool) -> NDArray[np.f
                 )
             decimals = sign
             numbers.append(number)
+    if has_open_end(path):
+        rows = ((number, line) for number, line in _from_first(path, layout) if not _is_comment(line))
+        check_last_number(path, ((number, fields_of(line, layout.delimiter)[-1]) for number, line in rows))
     return np.frombuffer(numbers, dtype=np.float64).reshape(-1, count)
+
+
+def line_of_row(path: Path, layout: Layout, row: int) -> int:
+    """Return the number of the line that has a row, whose number counts from 0."""
+    rows = (number for number, line in _from_first(path, layout) if not _is_comment(line))
+    return next(itertools.islice(rows, row, None))
+
+
+def _from_first(path: Path, layout: Layout) -> Iterator[tuple[int, str]]:
+    """Yield the lines from the first row on, with their numbers, without empty ones."""
+    return ((number, line) for number, line in lines_of(path) if number >= layout.first and line.strip())
+
+
+def _is_comment(line: str) -> bool:
+    return line.lstrip().startswith(("#", "%"))
 
 
 def _other_rows(text: str, number: int, layout: Layout, *, one_wavelength: bool) -> str:

@@ -30,6 +30,7 @@ from brdfdb.formats._channels import at_wavelength
 from brdfdb.formats._interface import TOLERANCE, WAVELENGTH
 from brdfdb.formats._nodes import samples_at_angles
 from brdfdb.formats._record import record, specular_remark
+from brdfdb.formats._text_end import check_last_number, doubt_end, has_open_end
 from brdfdb.formats._text_file import lines_of
 from brdfdb.formats._written import Written, whole
 
@@ -147,6 +148,7 @@ def read(path: str | os.PathLike[str]) -> FileTable | Samples:
     name, nm = str(known.get("name") or path.name.partition(".")[0]), known.get("wavelength_nm")
     at = np.array([float(nm)]) if isinstance(nm, int | float) else None
     channels = ("grey",) if at is None else (f"{at[0]:g}nm",)
+    doubt_end(path, rows[:, :2], known)
     grid = _grid(rows)
     angles = np.deg2rad(rows[:, :4])
     angles[:, 3] = np.deg2rad((rows[:, 1] + 180.0 - rows[:, 3]) % 360.0)
@@ -186,6 +188,7 @@ def _rows(path: Path) -> NDArray[np.float64]:
         raise FileFormatError(f"{path}: line 1: it does not begin with the lines {_TITLE!r} and {_FORMAT!r}")
     numbers = array("d")
     light: list[float] | None = None
+    bare = 0  # line of a light below which no viewer stands yet
     try:
         scale = float(second.partition("scale=")[2].split()[0])
     except (ValueError, IndexError):
@@ -198,14 +201,22 @@ def _rows(path: Path) -> NDArray[np.float64]:
         if not np.all(np.isfinite(line)):
             raise FileFormatError(f"{path}: line {number} holds a number that is not finite")
         if len(line) == 2:
-            light = line
+            if bare:
+                raise FileFormatError(f"{path}: line {bare} is a light without viewers")
+            light, bare = line, number
         elif len(line) == 3 and light is not None:
             numbers.extend([*light, *line[:2], scale * line[2]])
+            bare = 0
         elif line:
             count = counted(len(line), "number")
             raise FileFormatError(f"{path}: line {number} has {count}; a light has two, and a viewer below it three")
     if not numbers:
         raise FileFormatError(f"{path}: it holds no values")
+    if bare:
+        raise FileFormatError(f"{path}: line {bare} is a light without viewers: the file was cut")
+    if has_open_end(path):
+        words = ((number, text.split()) for number, text in lines_of(path) if number > 2)
+        check_last_number(path, ((number, some[2]) for number, some in words if len(some) == 3))
     return np.frombuffer(numbers, dtype=np.float64).reshape(-1, 5)
 
 

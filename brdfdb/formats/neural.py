@@ -81,7 +81,7 @@ def read(path: str | os.PathLike[str], member: str = "") -> FileTable:
 
     path = Path(path)
     name, content = _content(path, member)
-    layers = _layers(path, content)
+    layers = _layers(f"{path}: {name}" if name != path.stem else f"{path}", content)
     evaluate = functools.partial(_evaluated, layers)
     return FileTable(name, RGB, None, evaluate, {"network": _NETWORK}, functools.partial(_samples, name, evaluate))
 
@@ -118,8 +118,9 @@ def _content(path: Path, member: str) -> tuple[str, bytes]:
             raise ParameterError("member", f"{some} of {path}: {shown}", member, tuple(names.values()))
         if wanted[0].file_size > _MOST_BYTES:
             raise FileFormatError(f"{path}: {wanted[0].filename} has {wanted[0].file_size} bytes")
-        with archive.open(wanted[0]) as stream:
-            return names[wanted[0].filename], stream.read(_MOST_BYTES)
+        name = names[wanted[0].filename]
+        with _sound(f"{path}: {name}"), archive.open(wanted[0]) as stream:
+            return name, stream.read(_MOST_BYTES)
 
 
 def members(path: str | os.PathLike[str]) -> list[str]:
@@ -145,11 +146,17 @@ def members(path: str | os.PathLike[str]) -> list[str]:
 @contextlib.contextmanager
 def _opened(path: Path) -> Iterator[zipfile.ZipFile]:
     """Open an archive; FileFormatError if it is damaged."""
+    with _sound(f"{path}: it is no archive, or"), zipfile.ZipFile(path) as archive:
+        yield archive
+
+
+@contextlib.contextmanager
+def _sound(subject: str) -> Iterator[None]:
+    """Raise FileFormatError, with a subject, for what the parser of archives comes to."""
     try:
-        with zipfile.ZipFile(path) as archive:
-            yield archive
+        yield
     except (zipfile.BadZipFile, EOFError, NotImplementedError, RuntimeError, zlib.error) as error:
-        raise FileFormatError(f"{path}: it is no archive, or is damaged ({error})") from error
+        raise FileFormatError(f"{subject} is damaged ({error})") from error
 
 
 def _entries(archive: zipfile.ZipFile) -> list[zipfile.ZipInfo]:
@@ -157,7 +164,7 @@ def _entries(archive: zipfile.ZipFile) -> list[zipfile.ZipInfo]:
     return [entry for entry in archive.infolist()[:_MOST_MEMBERS] if entry.filename.endswith(suffix)]
 
 
-def _layers(path: Path, content: bytes) -> list[tuple[Floats, Floats]]:
+def _layers(path: str, content: bytes) -> list[tuple[Floats, Floats]]:
     """Return the weights and biases of the layers."""
     h5py = import_extra("h5py")
     layers: list[tuple[Floats, Floats]] = []

@@ -2,7 +2,7 @@
 
 Columns are recognised by their names, such as ``theta_i``, ``sza``, ``view_z``, ``raa`` or ``550nm``, or the caller
 names them. Titles may stand before the names. Values are f_r in 1/sr, reflectance factors (pi f_r), or f_r times the
-cosine of the viewer.
+cosine of the viewer or the light.
 """
 
 from __future__ import annotations
@@ -22,22 +22,23 @@ from brdfdb.errors import FileFormatError, ParameterError
 from brdfdb.formats._columns import (
     ANGLES,
     QUANTITIES,
+    UNKNOWN_COSINE,
     Layout,
-    in_percent,
     layout_of,
     length_unit,
     plain_name,
     quantity_of,
     roles_of,
-    unknown_unit,
     wavelength_of,
 )
 from brdfdb.formats._nodes import samples_at_angles
 from brdfdb.formats._record import note, of_comments
 from brdfdb.formats._text_angles import angles_of_rows
+from brdfdb.formats._text_end import doubt_end
 from brdfdb.formats._text_file import check_text, lines_of
-from brdfdb.formats._text_rows import rows_of
+from brdfdb.formats._text_rows import line_of_row, rows_of
 from brdfdb.formats._text_uncertainties import uncertainty_of
+from brdfdb.formats._value_units import PERCENT, is_logarithm, scale_of, units_in
 
 if TYPE_CHECKING:
     from brdfdb.measurements.samples import Samples
@@ -55,6 +56,7 @@ HOW = "theta_i=NAME and so on, at the command line --column theta_i=NAME"  # col
 _OF_COSINE = re.compile(r"\b(?:times|multiplied|including|with)\b.{0,20}\bcos(?:ine)?\b|\* ?cos\b", re.IGNORECASE)
 _OF_FORWARD = re.compile(r"\b(?:azimuths?|phi)\b.*\b0\b[^\d,;]*\b(?:forward|specular|mirror)\b", re.IGNORECASE)
 _NO = re.compile(r"\b(?:no|not|without|divided|excluding)\b", re.IGNORECASE)
+_GRAZING = 1e-6  # cosine below which f_r cannot be made of f_r times it
 _SHOWN = 200  # characters of names that a sentence repeats
 
 
@@ -88,8 +90,10 @@ def read(
     ----------
     path : path
         The file.
-    quantity : {"auto", "f_r", "reflectance_factor", "f_r_cos"}
-        Quantity of the values. By default the one that names or titles give, such as BRF, and else f_r.
+    quantity : {"auto", "f_r", "reflectance_factor", "f_r_cos", "f_r_cos_i"}
+        Quantity of the values: f_r_cos is f_r times the cosine of the viewer, f_r_cos_i that of the light. By default
+        the one that names or titles give, such as BRF, and else f_r. With a quantity, numbers whose unit is not known
+        are taken as they stand.
     angles : {"auto", "deg", "rad"}
         Unit of the angles. By default the one that names, or a row of units below them, give (mrad, too), and else
         degrees; the record has a note where the numbers may be radians as well.
@@ -100,19 +104,20 @@ def read(
     Returns
     -------
     Samples
-        Reflectance factors are divided by pi, and f_r cos by the cosine of theta_r. A negative polar angle is one at
-        the opposite azimuth; without azimuths, it is one on the other side of the plane of incidence. Where theta of
-        most rows exceeds 90 degrees and phi of none does, the file has exchanged the two letters, and the record says
-        so. Uncertainties that are relative, or expanded by a factor k, are made standard ones in 1/sr. Values that
-        contradict at the same directions are an entry "contradiction" of the record.
+        Reflectance factors are divided by pi, f_r_cos by the cosine of theta_r and f_r_cos_i by that of theta_i. A
+        negative polar angle is one at the opposite azimuth; without azimuths, it is one on the other side of the plane
+        of incidence. Where theta of most rows exceeds 90 degrees and phi of none does, the file has exchanged the two
+        letters, and the record says so. Uncertainties that are relative, or expanded by a factor k, are made standard
+        ones in 1/sr. Values that contradict at the same directions are an entry "contradiction" of the record.
 
     Raises
     ------
     ParameterError
         If there is no such role, column, quantity or unit.
     FileFormatError
-        If the file is no text of numbers, a column is missing, a unit of angles is not known, or rows stand below a
-        comment that changes their wavelength, columns or units; with the line and the field.
+        If the file is no text of numbers, a column is missing, a unit of angles or values is not known, the cosine in
+        a name of values is that of another angle, or rows stand below a comment that changes their wavelength, columns
+        or units; with the line and the field.
     """
     from brdfdb.measurements.joining import contradiction_within
 
@@ -126,9 +131,10 @@ def read(
     rows = rows_of(path, layout, one_wavelength="wavelength" not in roles and len(roles["values"]) == 1)
     record: dict[str, Any] = {"titles": list(layout.titles)} if layout.titles else {}
     turned = angles_of_rows(path, rows, roles, layout, angles, record)
+    doubt_end(path, np.rad2deg(turned[:, :2]), record)
     names = [layout.names[column] for column in roles["values"]]
-    scale = _scale(path, names, layout, quantity, turned[:, 2], record)
-    values, uncertainty = _values(path, rows, roles, layout, scale, record)
+    scale = _scale(path, names, layout, quantity, turned, record)
+    values, uncertainty = _values(path, rows, roles, layout, scale, record, stated=quantity != "auto")
     at = _wavelengths(path, names, layout)
     if "wavelength" in roles:
         if values.shape[1] != 1:
@@ -146,8 +152,7 @@ def read(
         at = np.array([length])
         note(record, f"The wavelength {length:g} nm was read from the titles of the file.")
     channels = [f"{nm:g}nm" for nm in at] if at is not None else ["grey"] if len(names) == 1 else names
-    if channels == ["r", "g", "b"]:
-        channels = ["R", "G", "B"]
+    channels = ["R", "G", "B"] if channels == ["r", "g", "b"] else channels
     left = set(range(len(layout.names))) - {column for columns_ in roles.values() for column in columns_}
     if left:
         record["columns_left_out"] = [layout.names[column] for column in sorted(left)]
@@ -209,10 +214,14 @@ def _missing(roles: Mapping[str, list[int]]) -> str:
 
 
 def _scale(
-    path: Path, names: Sequence[str], layout: Layout, quantity: str, theta_r: Array, record: dict[str, Any]
+    path: Path, names: Sequence[str], layout: Layout, quantity: str, angles: Array, record: dict[str, Any]
 ) -> Array:
     """Return the factors, shape (N, C) or (1, C), that make f_r of values: each column has the quantity of its name."""
-    quantities = [quantity_of([name]) for name in names]
+    quantities = [quantity_of(name, layout.names) for name in names]
+    if quantity == "auto" and UNKNOWN_COSINE in quantities:
+        where = f"line {layout.line}, field {names[quantities.index(UNKNOWN_COSINE)]}"
+        text = "the cosine is neither that of the viewer nor that of the light; --quantity f_r_cos divides by the first"
+        raise FileFormatError(f"{path}: {where}: {text}, and --quantity f_r_cos_i by the second")
     distinct = sorted(set(quantities) - {""})
     if len(distinct) > 1 and any(wavelength_of(name) is None for name in names):
         shown = " and ".join(next(n for n, q in zip(names, quantities, strict=True) if q == one) for one in distinct)
@@ -224,36 +233,65 @@ def _scale(
         other = "reflectance_factor"
     quantities = [one or other for one in quantities]
     record["quantity"] = next((one for one in quantities if one != "f_r"), "f_r")
-    cosine = np.cos(theta_r)
+    of_light, of_viewer = (
+        np.where(cosine > _GRAZING, 1.0 / np.maximum(cosine, _GRAZING), np.nan)
+        for cosine in np.cos(angles[:, [0, 2]]).T
+    )
     of_quantity = {
-        "f_r": np.ones_like(cosine),
-        "reflectance_factor": np.full_like(cosine, 1.0 / np.pi),
-        "f_r_cos": np.where(cosine > 1e-6, 1.0 / np.maximum(cosine, 1e-6), np.nan),
+        "f_r": np.ones_like(of_light),
+        "reflectance_factor": np.full_like(of_light, 1.0 / np.pi),
+        "f_r_cos": of_viewer,
+        "f_r_cos_i": of_light,
     }
     return np.stack([of_quantity[one] for one in quantities], axis=1)
 
 
 def _values(
-    path: Path, rows: Array, roles: Mapping[str, list[int]], layout: Layout, scale: Array, record: dict[str, Any]
+    path: Path,
+    rows: Array,
+    roles: Mapping[str, list[int]],
+    layout: Layout,
+    scale: Array,
+    record: dict[str, Any],
+    *,
+    stated: bool,
 ) -> tuple[Array, Array | None]:
-    """Return f_r [1/sr] of rows, shape (N, C), and their uncertainties if there are any."""
+    """Return f_r [1/sr] of rows, shape (N, C), and their uncertainties if there are any.
+
+    A unit that is not known is refused, unless the user has stated the quantity.
+    """
     names = {role: [layout.described[column] for column in roles.get(role, ())] for role in ("values", "uncertainty")}
+    factors = []
     for name in names["values"]:
-        if unit := unknown_unit(name):
+        factor, unit = scale_of(name)
+        where = f"{path}: line {layout.line}, field {name}"
+        if is_logarithm(name):
+            raise FileFormatError(f"{where}: values are logarithms; write f_r itself")
+        if unit and not stated:
+            known = "known are 1/sr, 1/msr, % and these times a power of ten such as 10^-3"
+            raise FileFormatError(
+                f"{where}: the unit {unit!r} is not known; {known}; --quantity f_r takes numbers as they stand"
+            )
+        if unit:
             note(record, f"The unit {unit!r} of the column {name} is not known: its numbers were taken as they stand.")
-    percent = np.array([in_percent(name) for name in names["values"]])
+        factors.append(factor)
+    percent = any(PERCENT.search(name) for name in names["values"])
     if layout.names_percent and not any("[" in name or "(" in name for name in names["values"]):
-        percent[:] = True
-    if percent.any():
+        factors, percent = [0.01] * len(factors), True
+    if percent:
         note(record, "Values in percent were divided by 100.")
-    values: Array = rows[:, roles["values"]] * np.where(percent, 0.01, 1.0) * scale
+    elif any(factor != 1.0 for factor in factors):
+        shown = " and ".join(f"{factor:g}" for factor in sorted(set(factors)))
+        note(record, f"Values were multiplied by {shown}, as their unit says.")
+    of_values = np.array(factors) * scale
+    values: Array = rows[:, roles["values"]] * of_values
     if "uncertainty" not in roles:
         return values, None
     given = rows[:, roles["uncertainty"]]
     if given.shape != values.shape:
         raise FileFormatError(f"{path}: line {layout.line}: there are not as many uncertainties as values")
-    of_values = np.where(percent, 0.01, 1.0) * scale
-    return values, uncertainty_of(path, layout.line, names["uncertainty"], given, values, of_values, record)
+    where = f"{path}: line {layout.line}"
+    return values, uncertainty_of(where, names["uncertainty"], given, values, scale, np.array(factors), record)
 
 
 def _doubt_titles(layout: Layout, quantity: str, record: dict[str, Any]) -> None:
@@ -261,7 +299,7 @@ def _doubt_titles(layout: Layout, quantity: str, record: dict[str, Any]) -> None
     for line in layout.titles:
         shown = line.strip()[:_SHOWN]
         if quantity == "auto" and record["quantity"] == "f_r" and _OF_COSINE.search(line) and not _NO.search(line):
-            text = "were read as f_r; --quantity f_r_cos divides them by the cosine of the viewer"
+            text = "were read as f_r; --quantity f_r_cos divides by the cosine of the viewer, f_r_cos_i by the light's"
             note(record, f"Cosine? A title says {shown!r}, and values {text}.")
         if _OF_FORWARD.search(line) and not _NO.search(line):
             record["forward_title"] = shown
@@ -284,11 +322,12 @@ def _nm(path: Path, lengths: Array, name: str, layout: Layout, record: dict[str,
     """Return wavelengths in nm, by the unit that a name gives, or by their size."""
     where = f"{path}: line {layout.line}, field {name}"
     if np.any(np.isnan(lengths)):
-        raise FileFormatError(f"{where}: a wavelength is missing")
+        line = line_of_row(path, layout, int(np.argmax(np.isnan(lengths))))
+        raise FileFormatError(f"{path}: line {line}, field {name}: a wavelength is missing")
     unit_nm, word = length_unit(name), ""
     if unit_nm is None:
-        if unit := unknown_unit(name):
-            raise FileFormatError(f"{where}: the unit {unit!r} is none of wavelengths; allowed are nm, um and m")
+        if units := units_in(name):
+            raise FileFormatError(f"{where}: the unit {units[0]!r} is none of wavelengths; allowed are nm, um and m")
         low, high = float(lengths.min()), float(lengths.max())
         if low < _LEAST_NM <= _LEAST_UM <= high:
             raise FileFormatError(f"{where}: {low:g} and {high:g} have no unit in common; write it into the name")

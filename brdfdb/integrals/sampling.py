@@ -80,7 +80,7 @@ def sample(model: ModelSpec | str, u1: ArrayLike, u2: ArrayLike, wi: ArrayLike, 
     """
     spec = spec_of(model)
     parameters = named(spec, parameters)
-    v1, v2 = _uniform("u1", u1), _uniform("u2", u2)
+    v1, v2 = check_uniform("u1", u1), check_uniform("u2", u2)
     i = checked_vectors(wi, wi).w_i.astype(np.float64)
     lobe = lobe_of(spec, i, parameters)
     wr = directions(lobe, v1, v2, i)
@@ -139,7 +139,8 @@ def lobe_of(spec: ModelSpec, i: Array, parameters: Mapping[str, ArrayLike]) -> L
     return DIFFUSE if spec.lobe is None else spec.lobe(i[..., 2], **parameters)
 
 
-def _uniform(name: str, u: ArrayLike) -> Array:
+def check_uniform(name: str, u: ArrayLike) -> Array:
+    """Return random numbers as float64; ParameterError if one is outside [0, 1]. nan passes through."""
     array = np.asarray(u)
     if array.dtype.kind not in "iuf":
         raise ParameterError(name, f"{u!r} is not a number in [0, 1]")

@@ -16,7 +16,7 @@ MOST_VALUES = 10_000  # of a spectrum
 _LEAST_NM = 20.0  # below it, the wavelengths of a spectrum are likely to be micrometres
 UPSAMPLED = "assumed: the smooth spectrum of Jakob and Hanika 2019 with this colour under D65"
 
-Values = Annotated[tuple[float, ...], Field(min_length=2, max_length=MOST_VALUES, fail_fast=True)]
+Values = Annotated[tuple[float, ...], Field(min_length=1, max_length=MOST_VALUES, fail_fast=True)]
 
 
 class Spectrum(BaseModel):
@@ -27,7 +27,8 @@ class Spectrum(BaseModel):
     wavelengths_nm : tuple of float
         Wavelengths [nm], strictly increasing.
     values : tuple of float
-        Reflectance [1] at each of them. Between two of them it is a straight line; outside there is no value.
+        Reflectance [1] at each of them, one or more. Between two of them it is a straight line; outside there is no
+        value.
     origin : str
         The source of the values in words.
 
@@ -75,6 +76,8 @@ class Spectrum(BaseModel):
         return np.asarray(np.interp(wavelength_nm, self.wavelengths_nm, self.values))
 
     def __str__(self) -> str:
+        if len(self.values) == 1:
+            return f"{self.values[0]:.6g} at {self.wavelengths_nm[0]:g} nm"
         low, high = min(self.values), max(self.values)
         return f"{low:.3g} to {high:.3g} over {self.wavelengths_nm[0]:g} to {self.wavelengths_nm[-1]:g} nm"
 

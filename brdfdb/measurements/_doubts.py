@@ -14,6 +14,8 @@ from brdfdb.parameters import Floats
 _EXCESS = 1.02  # albedo above which the unit is doubted
 _BLACK = 2e-4  # albedo below which the unit is doubted: the blackest coatings reflect more
 _MISSING = np.array([-1.0, -99.0, -999.0, -9999.0])  # numbers that files write for values that are missing
+_FILLED = np.array([9.99, 99.99, 999.99, 99999.0, 1e20, 9.96921e36])  # the same above 0; the last two are of netCDF
+_FAR = 10.0  # times the largest other value is where a number is a mark
 _LOBE, _LEVEL = 2.0, 1.25  # f_r of a lobe over the median from which on there is one, and below which there is none
 _ABOUT_DEG = 15.0  # angles to the mirror direction and to the light within which lobes are looked for
 _TILTED_DEG = (20.0, 75.0)  # polar angles of lights that tell the sides apart
@@ -44,12 +46,15 @@ def units(samples: Samples, incidences: Sequence[Incidence]) -> tuple[str, ...]:
 
 
 def missing(samples: Samples) -> tuple[str, ...]:
-    """Return whether negative values look like marks of missing ones, in a sentence with the number of the file."""
+    """Return whether negative values, or the largest, look like marks of missing ones, in a sentence."""
     known = samples.values[samples.known]
+    scale = np.pi if samples.record.get("quantity") == "reflectance_factor" else 1.0
     low = float(known.min(initial=0.0))
     if low >= 0.0:
-        return ()
-    number = low * (np.pi if samples.record.get("quantity") == "reflectance_factor" else 1.0)
+        return _missing_above(known, scale)
+    if not np.any(known > 0.0):
+        return ("Sign? No value is above 0: f_r is not negative, and nothing can be tabulated or fitted.",)
+    number = low * scale
     marks = np.isclose(known, low, rtol=1e-9, atol=0.0)
     count, others = int(marks.sum()), known[~marks]
     if not others.size or (count == 1 and not np.isclose(number, _MISSING).any()):
@@ -59,6 +64,25 @@ def missing(samples: Samples) -> tuple[str, ...]:
         verb, they = ("is", "does it") if count == 1 else ("are", "do they")
         return (f"{counted(count, 'value')} {verb} {number:.4g}: {they} mean missing?",)
     return ()
+
+
+def _missing_above(known: Floats, scale: float) -> tuple[str, ...]:
+    """Return whether the largest values look like marks of missing ones: nines that are far above the others."""
+    high = float(known.max(initial=0.0))
+    marks = np.isclose(known, high, rtol=1e-9, atol=0.0)
+    count, others = int(marks.sum()), known[~marks]
+    nines = np.isclose(high * scale, -_MISSING).any() or np.isclose(high * scale, _FILLED, rtol=1e-6).any()
+    if not others.size or not nines or high <= _FAR * float(others.max()):
+        return ()
+    verb, they = ("is", "does it") if count == 1 else ("are", "do they")
+    return (f"{counted(count, 'value')} {verb} {high * scale:.4g}: {they} mean missing?",)
+
+
+def is_constant(samples: Samples) -> bool:
+    """Return True if f_r of each channel with a few values is one number at all directions."""
+    seen = samples.known.sum(axis=0) >= _FEWEST
+    values = np.where(samples.known, samples.values, np.nan)[:, seen]
+    return bool(seen.any() and np.all(np.nanmin(values, axis=0) == np.nanmax(values, axis=0)))
 
 
 def azimuths(samples: Samples, delta_deg: Floats) -> tuple[str, ...]:

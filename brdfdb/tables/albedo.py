@@ -278,7 +278,7 @@ def _integrated(table: Table, theta_i_deg: Axis, tolerance: float) -> TableAlbed
     """Return the albedo by quadrature of lookups, at all wavelengths at once."""
     width = wavelengths_of(table)
     phi_i_deg = np.zeros(1)
-    if table.anisotropic:
+    if table.grid.turned:
         phi_i_deg = np.arange(0.0, 360.0 / table.grid.copies + 1.0, _PHI_I_STEP_DEG)
     albedo, error = np.empty((theta_i_deg.size, phi_i_deg.size, width)), np.empty((theta_i_deg.size, phi_i_deg.size))
     source = table.source

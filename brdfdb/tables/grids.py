@@ -89,6 +89,11 @@ class Grid:
         return len(self.axes) == 4
 
     @property
+    def turned(self) -> bool:
+        """True if a turn of the surface may change the values: of two nodes of phi_h, 0 and 360, both have the same."""
+        return self.anisotropic and not (self.half_difference and self.axes["phi_h"].size == 2)
+
+    @property
     def half_difference(self) -> bool:
         """True if the axes are those of half and difference vectors."""
         return "theta_h" in self.axes

@@ -72,10 +72,11 @@ def tabulated(
     floor = error_measurement.floor_of(truth, drawn)
     weight = np.where(drawn.above, drawn.weight, 0.0)
     layout, values, reached = None, np.empty(0, np.float32), math.inf
-    for count in _ANISOTROPIC_LADDER if source.anisotropic else _LADDER:
+    chiral = source.measured is not None and source.measured.chiral
+    for count in _ANISOTROPIC_LADDER if source.anisotropic and not chiral else _LADDER:
         layout = Layout(
             source,
-            _grid(source, count),
+            _grid(source, count, chiral=chiral),
             wavelength_nm,
             Interpolation("cubic", True, offset),
             spectra=None if mixture is None else mixture.spectra,
@@ -96,11 +97,14 @@ def tabulated(
     return replace(layout, reason=reason), values
 
 
-def _grid(source: Source, count: int) -> Grid:
-    """Return a grid with `count` nodes of its first axis, which makes use of the symmetries of the source."""
+def _grid(source: Source, count: int, *, chiral: bool) -> Grid:
+    """Return a grid with `count` nodes of its first axis, which makes use of the symmetries of the source.
+
+    That of a `chiral` source, which is the same at each turn of the surface, has two nodes of phi_h.
+    """
     lobe = source.lobe(np.ones(1), None)
     alpha = None if lobe is None else float(lobe.alpha_x[0])
-    half = alpha is not None and alpha < _WIDE
+    half = chiral or (alpha is not None and alpha < _WIDE)
     names: tuple[str, ...]
     if source.anisotropic:
         names = ANISOTROPIC_HALF_DIFFERENCE_AXES if half else ANISOTROPIC_AXES
@@ -115,7 +119,7 @@ def _grid(source: Source, count: int) -> Grid:
         if name == "phi_d":
             end *= (1 + source.anisotropic) * (2 - source.reciprocal)
             s = np.linspace(0.0, 1.0, max(4, round(_SHARES[name] * count * (2 - source.reciprocal))))
-        axes[name] = _placed(name, s, float(power), end)
+        axes[name] = np.array([0.0, 360.0]) if chiral and name == "phi_h" else _placed(name, s, float(power), end)
     return Grid(axes)
 
 

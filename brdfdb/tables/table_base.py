@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 from abc import abstractmethod
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,9 +20,14 @@ from brdfdb.tables._interpolation import weights_of_nodes
 from brdfdb.tables.grids import Axis
 from brdfdb.tables.metadata import TableMetadata
 from brdfdb.tables.plot import Plot
+from brdfdb.tables.sampler import Sampler, cells_of
 from brdfdb.tables.stated_error import Error, stated
 
+if TYPE_CHECKING:
+    from brdfdb.integrals.sampling import Sample
+
 _MOST_KNOWN = 64  # single wavelengths that are remembered
+_SAMPLED = 5  # wavelengths whose mean decides how directions are drawn
 
 
 class Located(NamedTuple):
@@ -95,6 +100,65 @@ class BaseTable(Lookups):
     def plot(self) -> Plot:
         """Plots of the table with matplotlib: `Plot.lobe`, `Plot.cuts`, `Plot.albedo` and `Plot.slices`."""
         return Plot(self)
+
+    def sample(self, u1: ArrayLike, u2: ArrayLike, wi: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Sample:
+        """Draw a viewer for each light `wi` from the table alone. By reciprocity it is also the next light of a path.
+
+        Parameters
+        ----------
+        u1, u2 : array_like
+            Uniform random numbers in [0, 1]. Stratified numbers give stratified directions.
+        wi : array_like
+            Unit vectors of the light, of shape (..., 3).
+        wavelength_nm : float or array_like (M,) [nm], optional
+            As in `lookup`, of the weights. Directions do not depend on it.
+
+        Returns
+        -------
+        Sample
+            (wr, pdf, weight), float64: unit vectors, their density [1/sr] over the sphere, and f_r cos theta_r / pdf
+            [1], shaped as f_r is by `lookup_vectors`. They are nan where an argument is nan.
+
+        Raises
+        ------
+        ParameterError
+            If an argument is outside its range.
+
+        Notes
+        -----
+        Half vectors are drawn from cells of constant density in (theta_h, phi_h), by marginal and conditional
+        distributions. Cells hold the reflected light for 17 lights from the normal to the horizon; in between, one of
+        the two next lights is drawn. A fifth of the directions follows the cosine, so that no weight is above 5 pi f_r.
+        The specular part is not drawn: add `specular_reflectance` in the mirror direction.
+        """
+        from brdfdb.integrals.sampling import Sample, check_uniform
+
+        v1, v2 = np.broadcast_arrays(check_uniform("u1", u1), check_uniform("u2", u2))
+        i = checked_vectors(wi, wi).w_i.astype(np.float64)
+        wr = self.sampler.draw(v1, v2, i)
+        density = self.sampler.density(i, wr)
+        f_r = self.lookup_vectors(np.broadcast_to(i, wr.shape), wr, wavelength_nm)
+        tail = (1,) * (np.ndim(f_r) - density.ndim)
+        cosine = np.maximum(wr[..., 2], 0.0).reshape(density.shape + tail)
+        pdf = np.broadcast_to(density.reshape(density.shape + tail), np.shape(f_r))
+        return Sample(wr, density[()], np.divide(f_r * cosine, pdf, out=np.zeros(pdf.shape), where=pdf != 0.0)[()])
+
+    def pdf(self, wi: ArrayLike, wr: ArrayLike) -> Floats:
+        """Return the density [1/sr] with which `sample` draws `wr` for the light `wi`; unit vectors (..., 3)."""
+        vectors = checked_vectors(wi, wr)
+        return self.sampler.density(vectors.w_i.astype(np.float64), vectors.w_r.astype(np.float64))[()]
+
+    @functools.cached_property
+    def sampler(self) -> Sampler:
+        """The sampler of `sample`, computed from lookups when it is first used."""
+        at = self.wavelength_nm
+        chosen = None if at is None else at[np.unique(np.linspace(0, at.size - 1, _SAMPLED).astype(np.int64))]
+
+        def mean(wi: NDArray[np.float64], wr: NDArray[np.float64]) -> NDArray[np.float64]:
+            values = np.asarray(self.lookup_vectors(wi, wr, chosen), dtype=np.float64)
+            return values if chosen is None else np.asarray(values.mean(axis=-1))
+
+        return Sampler(cells_of(mean, anisotropic=self.anisotropic))
 
     @abstractmethod
     def specular_reflectance(self, theta_i: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:

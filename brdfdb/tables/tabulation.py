@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 _SLOPE_STEP = np.deg2rad(2.0)  # from which the slope at the horizon is taken
 POLE_END_DEG = 89.9  # of light and viewer, where the pole of a model is tabulated as it is
+_RISE = 1.0  # largest rise of the stored numbers of measured data beyond the horizon: their slopes there have no reason
 _CONTINUED = 7.5  # how many such steps numbers go on with it beyond the horizon
 # Where the specular part is tabulated, unless on an axis theta_i that somebody gave: a planner has no nodes for it
 SPECULAR_THETA_DEG = np.append(np.arange(0.0, 60.0, 0.5), np.arange(60.0, 90.01, 0.1).round(1))
@@ -186,7 +187,8 @@ def continued(layout: Layout, theta_h: Floats, phi_h: Floats, theta_d: Floats, p
         step = np.minimum(_SLOPE_STEP, 0.5 * largest)
         inside = numbers(layout, *_half_vectors(theta_h, phi_h, np.maximum(held - step, 0.0), phi_d))
         share = np.minimum(beyond / np.broadcast_to(np.maximum(step, 1e-9), beyond.shape), _CONTINUED)
-        values += share[..., np.newaxis] * (values - inside)
+        change = share[..., np.newaxis] * (values - inside)
+        values += np.minimum(change, _RISE) if isinstance(layout.source, MeasuredSource) else change
     return values
 
 

@@ -97,7 +97,7 @@ class Bars:
                 self._progress.console.print(
                     f"{event['material']} failed: {event['error']}", markup=False, soft_wrap=True
                 )
-                self._ended(event["material"])
+                self._ended(event["material"], made=False)
             case "block":
                 self._block(event)
             case "family":
@@ -111,13 +111,14 @@ class Bars:
             case "published" | "adopted" | "unchanged":
                 self._ended(event["material"])
 
-    def _ended(self, name: str) -> None:
-        """Remove the bar of a table, and advance that of all measured ones if it is measured."""
+    def _ended(self, name: str, *, made: bool = True) -> None:
+        """Remove the bar of a table, and advance that of all measured ones if it is measured and was made."""
         if (task := self._tables.pop(name, None)) is not None:
             self._progress.remove_task(task)
         if name in self._measuring and self._measured is not None:
             self._measuring.remove(name)
-            self._advance(self._measured)
+            if made:
+                self._advance(self._measured)
 
     def _begun(self, description: str, total: int, unit: str) -> TaskID:
         return self._progress.add_task(description, total=total, unit=unit, rate=f"0/{total} {unit}")

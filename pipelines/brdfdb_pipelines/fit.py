@@ -173,9 +173,7 @@ def recipe_of(document: Fits) -> str:
     """Return a recipe of the best fit that is one model; BrdfdbError if none is."""
     best = next((one for one in document.fits if one.recipe is not None), None)
     if best is None or best.material is None or best.recipe is None:
-        raise BrdfdbError(
-            f"{document.name}: no fit is one model of the registry with wavelengths, so that there is no recipe"
-        )
+        raise BrdfdbError(f"{document.name}: {_no_recipe(document)}")
     return f'materials = ["{best.material.name}"]\ntolerance = {TOLERANCE:g}\n\n{best.recipe}'
 
 
@@ -228,7 +226,7 @@ def lines(document: Fits) -> list[str]:
             f"phi_r {farthest.phi_r_deg:g}°"
         )
     if best.recipe is None:
-        return [*text, *_alternative(document.fits)]
+        return [*text, *(_alternative(document.fits) or ["", _no_recipe(document)])]
     return [*text, "", *best.recipe.splitlines()]
 
 
@@ -241,6 +239,16 @@ def _aperture(document: Fits) -> list[str]:
         if known is not None
     ]
     return [f"  seen through the aperture: {', '.join(cones)}"] if cones else []
+
+
+def _no_recipe(document: Fits) -> str:
+    """Return a sentence on why no fit is a recipe."""
+    why = "all are sums, or one model with amplitudes of channels that are no spectra"
+    if len(document.channels) > 1 and document.wavelengths_nm is None:
+        why = "the channels have no wavelengths; --channel fits one of them"
+    elif all("+" in one.model for one in document.fits):
+        why = "all are sums, and a recipe takes one model"
+    return f"no fit is one model of the registry with wavelengths, so that there is no recipe: {why}"
 
 
 def _alternative(ranked: Sequence[Fit]) -> list[str]:

@@ -107,6 +107,8 @@ def run(
             lines = [f"{target.label}: {known.name}", *(f"  {sentence}" for sentence in known.sentences)]
             lines += [f"  written: {out}"] if out is not None else []
             print(terminal.plain("\n".join(lines)), flush=True)
+    if count > 1 and (lost := count - len(result.statements)):
+        terminal.say(f"{lost} of {count} materials {'was' if lost == 1 else 'were'} not imported")
     audited: list[Line] = []
     if tables is not None and result.statements:
         made = import_tables.make([target for target, _ in result.statements], tables)

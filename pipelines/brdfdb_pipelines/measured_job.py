@@ -33,7 +33,7 @@ from brdfdb_pipelines.recipe_grids import STRICT, RecipeError
 if TYPE_CHECKING:
     from brdfdb.formats._readings import FileTable
 
-MEASURED_VERSION = 7  # of the way from a file to the values of its table
+MEASURED_VERSION = 8  # of the way from a file to the values of its table
 # Keys of a request that are left out where they are empty.
 _ADDED = {"columns", "quantity", "angles", "azimuth", "wavelength_nm", "side"}
 _MARGINS = 3  # tables of data that are made to conserve, each a little darker, until none is above 1
@@ -60,7 +60,7 @@ class MeasuredTable(BaseModel):
     columns: dict[str, Texts] = Field(
         default={}, description="headers of the columns of a text, by role, such as theta_i; by default by their names"
     )
-    quantity: Literal["", "f_r", "reflectance_factor", "f_r_cos"] = Field(
+    quantity: Literal["", "f_r", "reflectance_factor", "f_r_cos", "f_r_cos_i"] = Field(
         default="", description="quantity of the values of a text; by default by names and titles"
     )
     angles: Literal["", "deg", "rad"] = Field(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import os
 import re
 import shutil
 from importlib.util import find_spec
@@ -23,6 +24,10 @@ needs = {
     "explorer": pytest.mark.skipif(explorer.program() is None, reason="no Chromium is installed"),
     "against_cpp": pytest.mark.skipif(shutil.which("g++") is None, reason="g++ is not installed"),
     "mitsuba_microfacet": pytest.mark.skipif(find_spec("mitsuba") is None, reason="mitsuba is not installed"),
+    "mitsuba_plugins": pytest.mark.skipif(
+        find_spec("mitsuba") is None or "DRJIT_LIBLLVM_PATH" not in os.environ,
+        reason="mitsuba is not installed, or DRJIT_LIBLLVM_PATH names no LLVM 19",
+    ),
     "rgl": pytest.mark.skipif(find_spec("mitsuba") is None, reason="mitsuba is not installed"),
     "radiance": pytest.mark.skipif(
         None in (find_spec("pyradiance"), find_spec("pywincalc")), reason="pyradiance or pywincalc is not installed"

@@ -107,3 +107,16 @@ def test_damaged_files_and_archives_are_refused(tmp_path: Path) -> None:
             member.write(bytes(1 << 20))
     with pytest.raises(FileFormatError, match=r"x\.h5 has 20971520 bytes"):
         formats.samples(bomb)
+
+
+def test_a_damaged_member_of_an_archive_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "materials.zip"
+    with zipfile.ZipFile(path, "w") as archive:
+        for name in ("red", "white"):
+            archive.writestr(f"{name}.h5", network())
+    content = bytearray(path.read_bytes())
+    content[content.index(b"PK\x03\x04", 4) + 200] ^= 255
+    path.write_bytes(content)
+    assert formats.samples(path, member="red").name == "red"
+    with pytest.raises(FileFormatError, match=r"materials\.zip: white is damaged \(Bad CRC-32"):
+        formats.samples(path, member="white")

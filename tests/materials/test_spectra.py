@@ -82,7 +82,7 @@ def test_a_file_and_a_list_hold_the_same_values(tmp_path: Path) -> None:
         ({"rho_d": {"wavelengths_nm": [400, 700], "values": [0.1, 1.2]}}, "rho_d: 1.2 is outside [0, 1]"),
         ({"rho_d": {"wavelengths_nm": [700, 400], "values": [0.1, 0.2]}}, "must be positive and increase strictly"),
         ({"rho_d": {"wavelengths_nm": [400, 500, 600], "values": [0.1, 0.2]}}, "2 are given for 3 wavelengths"),
-        ({"rho_d": {"wavelengths_nm": [400], "values": [0.1]}}, "rho_d: wavelengths_nm"),
+        ({"rho_d": {"wavelengths_nm": [], "values": []}}, "rho_d: wavelengths_nm"),
         ({"rho_d": {"wavelengths_nm": [400, 500], "values": [0.1, float("nan")]}}, "rho_d: values.1"),
         ({"rho_d": "red"}, "rho_d: 'red' is not a number"),
     ],
@@ -197,3 +197,11 @@ def test_a_form_that_says_it_is_a_polynomial_is_one(model: str) -> None:
             np.testing.assert_allclose(made, direct, rtol=1e-11, err_msg=form.key)
             judged += 1
     assert judged > 4
+
+
+def test_a_spectrum_of_one_wavelength_has_no_value_at_another() -> None:
+    spectrum = Spectrum(wavelengths_nm=(650.0,), values=(0.2,), origin="fitted")
+    assert spectrum.at("rho", np.array([650.0])).tolist() == [0.2]
+    assert str(spectrum) == "0.2 at 650 nm"
+    with pytest.raises(ParameterError, match=r"450 has no rho, whose spectrum covers \[650, 650\] nm"):
+        spectrum.at("rho", np.array([450.0]))

@@ -68,10 +68,17 @@ def test_thinning_does_not_follow_the_noise_of_single_pixels() -> None:
     assert len(kept[0] & kept[1]) > 0.93 * len(kept[0] | kept[1])  # 0.76 where each pixel is judged by itself
 
 
-@pytest.mark.parametrize(("name", "theta_i", "most"), [("rolled-brass", 45.0, 1e-3), ("rolled-aluminum", 60.0, 4e-3)])
-def test_the_lens_that_blurs_wider_along_theta_is_undone(name: str, theta_i: float, most: float) -> None:
-    """Without noise, f_r in the lobe is that of a round aperture; with the blur of the lens it is 2.5 times as far."""
-    quiet = replace(SMALL, full_well=1e9, read_noise=0.0, bits=24)
+@pytest.mark.parametrize(
+    ("name", "theta_i", "width", "most"),
+    [("rolled-brass", 45.0, 324, 1e-3), ("rolled-aluminum", 60.0, 324, 1.5e-3), ("rolled-brass", 45.0, 216, 1.1e-3)],
+)
+def test_the_lens_that_blurs_wider_along_theta_is_undone(name: str, theta_i: float, width: int, most: float) -> None:
+    """Without noise, f_r in the lobe is that of a round aperture; with the blur of the lens it is 2.5 times as far.
+
+    Second derivatives of a picture smoothed over two pixels leave 2.6e-3 of the second and 1.4e-3 of the third.
+    """
+    height = width * SMALL.height // SMALL.width
+    quiet = replace(SMALL, width=width, height=height, full_well=1e9, read_noise=0.0, bits=24)
     samples = reduced(taken(name, quiet, theta_i), thin=False)
     expected = averaged(brdf_of(name), quiet.instrument)(samples.w_i, samples.w_r)
     lobe = expected > 0.1 * expected.max()

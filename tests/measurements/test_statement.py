@@ -165,9 +165,12 @@ def test_the_document_is_json_with_the_sentences() -> None:
         (-5.0, 2, "2 values are -5: do they mean missing?"),  # far below all others
         (-1e-3, 3, None),  # noise about a dark value
         (-5.0, 1, None),
+        (9999.0, 3, "3 values are 9999: do they mean missing?"),
+        (999.0, 1, "1 value is 999: does it mean missing?"),
+        (120.0, 1, None),  # a lobe
     ],
 )
-def test_negative_numbers_that_may_mean_missing_are_stated(number: float, count: int, sentence: str | None) -> None:
+def test_numbers_that_may_mean_missing_are_stated(number: float, count: int, sentence: str | None) -> None:
     sheet = samples()
     values = sheet.values * np.linspace(0.9, 1.1, len(sheet))[:, np.newaxis]
     values[10 : 10 + count] = number
@@ -175,6 +178,14 @@ def test_negative_numbers_that_may_mean_missing_are_stated(number: float, count:
     assert [hint for hint in hints if "missing" in hint] == ([sentence] if sentence else [])
     factors = replace(sheet, values=values / np.pi, record={"quantity": "reflectance_factor"})
     assert any(hint == sentence for hint in statement(factors).hints) == (sentence is not None)
+
+
+def test_values_of_one_number_and_values_below_0_are_stated() -> None:
+    sheet = samples()
+    assert "f_r is one number at all directions: the samples tell no shape." in statement(sheet).sentences
+    varied = replace(sheet, values=sheet.values * np.linspace(0.9, 1.1, len(sheet))[:, np.newaxis])
+    assert not any("one number" in sentence for sentence in statement(varied).sentences)
+    assert any(hint.startswith("Sign?") for hint in statement(replace(varied, values=-varied.values)).hints)
 
 
 def test_numbers_in_sentences_have_four_digits_at_most() -> None:

@@ -53,3 +53,14 @@ def test_lines_are_json_and_bars_are_on_stderr(capsys: pytest.CaptureFixture[str
     assert out == ""
     assert "waiting for grey: another build is at work on it" in err
     assert "grey failed: [no] idea" in err
+
+
+def test_a_table_of_measured_data_that_failed_does_not_count_as_done(capsys: pytest.CaptureFixture[str]) -> None:
+    with Bars() as bars:
+        for name in ("grey", "white"):
+            bars({"event": "measuring", "material": name, "tables": 2})
+        bars({"event": "failed", "material": "grey", "error": "no idea"})
+        bars({"event": "published", "material": "white", "revision": "r000001", "bytes": 1, "why": "new"})
+        (overall,) = bars._progress.tasks
+        assert (overall.completed, overall.fields["rate"]) == (1, "1/2 tables")
+    capsys.readouterr()

@@ -160,6 +160,30 @@ def test_the_recipe_builds(tile: Path, tmp_path: Path, capsys: Captured) -> None
     capsys.readouterr()
 
 
+@pytest.mark.parametrize("model", ["ward", "ggx_schlick", "abg"])
+def test_the_recipe_of_a_fit_at_one_wavelength_holds_there(
+    model: str, tile: Path, tmp_path: Path, capsys: Captured
+) -> None:
+    recipe, store = tmp_path / "fit.toml", tmp_path / "store"
+    assert run("fit", tile, "--model", model, "--wavelength-nm", "650", "--recipe", recipe) == 0
+    assert run("build", recipe, "--store", store, "--jobs", "1") == 0
+    name = f"tile-as-{model.replace('_', '-')}"
+    lookup = ("lookup", name, 30, 0, 30, 170, "--store", store)
+    capsys.readouterr()
+    if model == "abg":  # no parameter of it is a reflectance, which could be a spectrum
+        assert run("show", name, "--store", store) == 0
+        assert "note        fitted at 650 nm; the model is grey" in capsys.readouterr().out
+        return
+    assert run(*lookup, "--wavelength-nm", "650") == 0
+    assert run(*lookup, "--wavelength-nm", "450") == 2
+    assert "450 is outside [650, 650] nm" in capsys.readouterr().err
+    assert run("show", name, "--store", store) == 0
+    shown = capsys.readouterr().out
+    assert "wavelength      650 nm only" in shown
+    assert " at 650 nm; fitted to tile" in shown
+    assert not re.search(r"\dfitted", shown)
+
+
 def test_an_aperture_can_be_said(tile: Path, tmp_path: Path, capsys: Captured) -> None:
     out = tmp_path / "fit.json"
     assert run("fit", tile, "--model", "ward", "--receiver-deg", "4", "--source-deg", "1", "--json", out) == 0
@@ -314,7 +338,10 @@ def test_files_without_a_usable_sample_are_refused(tmp_path: Path, capsys: Captu
 def test_a_sum_has_no_recipe(tile: Path, tmp_path: Path, capsys: Captured) -> None:
     recipe = tmp_path / "fit.toml"
     assert run("fit", tile, "--model", "lambert + ward", "--recipe", recipe) == 2
-    assert "no fit is one model of the registry" in capsys.readouterr().err
+    captured = capsys.readouterr()
+    reason = "so that there is no recipe: all are sums, and a recipe takes one model"
+    assert reason in captured.err
+    assert reason in captured.out  # also where no recipe is asked for
     assert not recipe.exists()
 
 

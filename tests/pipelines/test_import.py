@@ -109,6 +109,14 @@ def test_fits_take_azimuths_from_the_forward_direction(tmp_path: Path, capsys: C
     assert "--azimuth: " in capsys.readouterr().err
 
 
+def test_materials_that_are_lost_are_counted(tile: Path, tmp_path: Path, capsys: Captured) -> None:
+    files = [tile, tmp_path / "none.csv", tmp_path / "neither.csv"]
+    assert run("import", *files, *OPTIONS) == 2
+    *sentences, count = capsys.readouterr().err.splitlines()
+    assert [file.name in sentence for file, sentence in zip(files[1:], sentences, strict=True)] == [True, True]
+    assert count == "brdfdb: 2 of 3 materials were not imported"
+
+
 def test_percentages_of_summaries_are_plain_numbers() -> None:
     assert [_percent(value) for value in (None, 0.00123, 0.0999, 0.995, 2.5, 123.0)] == [
         *("-", "0.12 %", "10 %", "100 %", "250 %", "12300 %")

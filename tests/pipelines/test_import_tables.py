@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import tomllib
 import zipfile
 from pathlib import Path
@@ -80,6 +81,17 @@ def test_an_archive_is_imported_and_audited_whole(archive: Path, tmp_path: Path,
     looked_up = brdfdb.open(store)["dark-grey"].lookup_vectors(*directions, 550.0)
     assert np.ravel(looked_up) == pytest.approx(expected, rel=0.02)
     assert (store / "audit-part.json").exists()
+
+
+def test_an_albedo_that_the_error_of_the_table_does_not_tell_from_1_is_not_judged(
+    tmp_path: Path, capsys: Captured
+) -> None:
+    white = scattered(lambda wi, _: np.full((len(wi), 1), 0.999 / np.pi), 240, 0.03)
+    assert run("import", _csv(tmp_path / "white.csv", white), "--store", tmp_path / "store", *ONE_JOB) == 0
+    printed = capsys.readouterr().out
+    (line,) = [line for line in printed.splitlines() if line.startswith("white ")]
+    assert re.search(r"(0\.9|1\.0)\d? ± 0\.0\d at .* not judged", line)
+    assert printed.endswith("1 table audited: passes 0, not judged 1\n")
 
 
 def test_audits_of_earlier_imports_are_kept_as_long_as_their_tables_are_current(

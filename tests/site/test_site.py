@@ -6,6 +6,7 @@ import functools
 import importlib
 import inspect
 import pkgutil
+import runpy
 import threading
 import tomllib
 from collections.abc import Iterator
@@ -119,9 +120,11 @@ def test_pages_with_code_have_run(site: Path, pages: dict[Path, Page]) -> None:
     executed = [path for path in (ROOT / "docs").rglob("*.md") if "file_format: mystnb" in path.read_text("utf-8")[:99]]
     tutorials = {path for path in (ROOT / "docs" / "tutorials").glob("*.md") if path.stem != "index"}
     assert tutorials <= set(executed)
+    has_llvm = runpy.run_path(str(ROOT / "docs" / "_site" / "llvm.py"))["llvm_path"]() != ""
     for path in executed:
         page = pages[site / path.relative_to(ROOT / "docs").with_suffix(".html")]
-        assert "cell_output" in page.classes, path
+        if path.stem != "mitsuba" or has_llvm:  # that page runs where LLVM 19 is installed
+            assert "cell_output" in page.classes, path
         assert "traceback" not in page.classes, path
 
 

@@ -24,8 +24,9 @@ def add_reading(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--quantity",
-        choices=("f_r", "reflectance_factor", "f_r_cos"),
-        help="quantity of the values of a text (default: the one that its names or titles give, else f_r)",
+        choices=("f_r", "reflectance_factor", "f_r_cos", "f_r_cos_i"),
+        help="quantity of the values of a text; f_r_cos is f_r times the cosine of the viewer, f_r_cos_i that of the "
+        "light (default: the one that its names or titles give, else f_r)",
     )
     parser.add_argument(
         "--angles", choices=("deg", "rad"), help="unit of the angles of a text (default: by its names, else degrees)"

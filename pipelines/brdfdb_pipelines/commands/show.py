@@ -102,7 +102,7 @@ def _origin(metadata: TableMetadata) -> list[str]:
         if parameter in metadata.assumed:
             note = f"assumed, see {'the note' if metadata.assumed[parameter] is None else 'below'}"
         text = f"{value:.6g}" if isinstance(value, float) else str(value)
-        note = f"; {note}" if note and len(text) > _VALUE_WIDTH else note
+        note = f"; {note}" if note and len(text) >= _VALUE_WIDTH else note
         lines.append(f"    {parameter:<16}{text:<{_VALUE_WIDTH}}{note}".rstrip())
     if metadata.source is not None:
         lines.append(f"  source      {metadata.source}")

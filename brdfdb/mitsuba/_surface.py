@@ -1,0 +1,210 @@
+"""The BSDF that all models share: components, their sampler and their density, around the formula of a model."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple, Protocol
+
+import drjit as dr
+import mitsuba as mi
+
+from brdfdb.mitsuba._parameters import Parameters
+
+Values = dict[str, Any]
+
+GLOSSY, DIFFUSE, SPECULAR = "glossy", "diffuse", "specular"
+
+
+class Lobe(Protocol):
+    """The directions around the mirror direction that a sampler prefers, with a share [1] of all samples."""
+
+    @property
+    def share(self) -> Any:
+        """The share [1] of samples that follow the lobe."""
+
+    @property
+    def alone(self) -> float:
+        """This share if the glossy part is alone."""
+
+    def draw(self, wi: Any, choice: Any, sample: Any) -> Any:
+        """Return directions for a random number and a point in the unit square."""
+
+    def density(self, wi: Any, wo: Any) -> Any:
+        """Return the density [1/sr] of these directions."""
+
+
+class Formula:
+    """A model in Dr.Jit. Its parameters are read from the properties of the plugin.
+
+    `components` are the parts of the BSDF in the order in which Mitsuba numbers them.
+    """
+
+    components: tuple[str, ...]
+    anisotropic = False
+    parameters: Parameters
+
+    def at(self, interaction: Any, active: Any) -> Values:
+        """Return the parameters where a ray meets the surface."""
+        return self.parameters.at(interaction, active)
+
+    def traverse(self, callback: Any) -> None:
+        """Show the parameters to the scene."""
+        self.parameters.traverse(callback)
+
+    @property
+    def description(self) -> list[str]:
+        """The lines of a text about the plugin."""
+        return [f"{name} = {texture}" for name, texture in self.parameters.textures.items()]
+
+    def parts(self, values: Values, wi: Any, wo: Any) -> dict[str, Any]:
+        """Return f_r [1/sr] of each part but the specular one, no cosine, for directions above the horizon."""
+        raise NotImplementedError
+
+    def lobe(self, values: Values, wi: Any) -> Lobe | None:  # noqa: ARG002  # of a model that is diffuse
+        """Return the lobe of the glossy part; None if there is no such part."""
+        return None
+
+    def specular(self, values: Values, wi: Any) -> Any:  # noqa: ARG002  # of a model without a specular part
+        """Return the specular reflectance [1]."""
+        return 0.0
+
+    def specular_share(self, values: Values, wi: Any) -> Any:  # noqa: ARG002  # of a model without a specular part
+        """Return the share [1] of samples in the mirror direction."""
+        return 0.0
+
+
+class _Shares(NamedTuple):
+    """Probabilities [1] of the three ways to draw a direction. Their sum is 1, or 0 where nothing is drawn."""
+
+    specular: Any
+    lobe: Any
+    cosine: Any
+
+
+class _Methods:
+    """The methods of a BSDF that is black from below, around a formula."""
+
+    m_components: list[Any]
+    m_flags: Any
+
+    def __init__(self, props: Any, formula: Formula) -> None:
+        mi.BSDF.__init__(self, props)
+        self._formula = formula
+        of_axes = mi.BSDFFlags.Anisotropic if formula.anisotropic else mi.BSDFFlags.Empty
+        self.m_components = [_flag(part) | mi.BSDFFlags.FrontSide | of_axes for part in formula.components]
+        combined = mi.BSDFFlags.FrontSide | of_axes
+        for part in formula.components:
+            combined |= _flag(part)
+        self.m_flags = combined
+
+    def traverse(self, callback: Any) -> None:
+        self._formula.traverse(callback)
+
+    def eval(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
+        return self.eval_pdf(ctx, si, wo, active)[0]
+
+    def pdf(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
+        return self.eval_pdf(ctx, si, wo, active)[1]
+
+    def eval_pdf(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
+        above = active & (si.wi.z > 0.0) & (wo.z > 0.0)
+        values = self._formula.at(si, above)
+        light, viewer = _or_normal(above, si.wi), _or_normal(above, wo)
+        lobe = self._formula.lobe(values, light)
+        pdf = _density(self._shares(ctx, values, lobe, light), lobe, light, viewer)
+        value = self._f_r(ctx, values, light, viewer) * viewer.z
+        return mi.depolarizer(dr.select(above, value, 0.0)), dr.select(above, pdf, 0.0)
+
+    def sample(self, ctx: Any, si: Any, sample1: Any, sample2: Any, active: Any = True) -> Any:
+        above = active & (si.wi.z > 0.0)
+        values = self._formula.at(si, above)
+        light = _or_normal(above, si.wi)
+        lobe = self._formula.lobe(values, light)
+        shares = self._shares(ctx, values, lobe, light)
+        is_specular, in_lobe = sample1 < shares.specular, sample1 < shares.specular + shares.lobe
+        wo = mi.warp.square_to_cosine_hemisphere(sample2)
+        if lobe is not None:
+            choice = (sample1 - shares.specular) / dr.maximum(shares.lobe, 1e-6)  # in [0, 1] where it counts
+            wo = dr.select(in_lobe, lobe.draw(light, choice, sample2), wo)
+        if SPECULAR in self._formula.components:
+            wo = dr.select(is_specular, mi.reflect(light), wo)
+        above &= wo.z > 0.0
+        viewer = _or_normal(above, wo)
+        pdf = _density(shares, lobe, light, viewer)
+        above &= pdf > 0.0
+        pdf = dr.select(above, pdf, 1.0)
+        weight = self._f_r(ctx, values, light, viewer) * (viewer.z / pdf)
+        if SPECULAR in self._formula.components:
+            probability = dr.select(is_specular, shares.specular, 1.0)
+            weight = dr.select(is_specular, self._formula.specular(values, light) / probability, weight)
+            pdf = dr.select(is_specular, probability, pdf)
+            above |= is_specular & active & (si.wi.z > 0.0)
+        record = dr.zeros(mi.BSDFSample3f)
+        record.wo, record.pdf, record.eta = wo, dr.select(above, pdf, 0.0), 1.0
+        record.sampled_type, record.sampled_component = self._kind(ctx, is_specular, in_lobe)
+        return record, mi.depolarizer(dr.select(above, weight, 0.0))
+
+    def eval_diffuse_reflectance(self, si: Any, active: Any = True) -> Any:
+        straight = mi.Vector3f(0.0, 0.0, 1.0)
+        values = self._formula.at(si, active)
+        return self._formula.parts(values, straight, straight)[self._formula.components[-1]] * dr.pi
+
+    def to_string(self) -> str:
+        lines = (f"  {line}," for line in self._formula.description)
+        return "\n".join((f"{type(self._formula).__name__}[", *lines, "]"))
+
+    def _f_r(self, ctx: Any, values: Values, wi: Any, wo: Any) -> Any:
+        total = mi.UnpolarizedSpectrum(0.0)
+        for part, value in self._formula.parts(values, wi, wo).items():
+            total += value * self._enabled(ctx, part)
+        return total
+
+    def _enabled(self, ctx: Any, part: str) -> float:
+        """Return 1 if the context asks for a component, else 0."""
+        components = self._formula.components
+        return float(part in components and ctx.is_enabled(_flag(part), components.index(part)))
+
+    def _shares(self, ctx: Any, values: Values, lobe: Lobe | None, wi: Any) -> _Shares:
+        glossy, diffuse = self._enabled(ctx, GLOSSY), self._enabled(ctx, DIFFUSE)
+        in_lobe: Any = 0.0
+        if lobe is not None and glossy:
+            in_lobe = lobe.share if diffuse else lobe.alone
+        specular: Any = 0.0
+        if self._enabled(ctx, SPECULAR):
+            specular = dr.detach(self._formula.specular_share(values, wi)) if glossy or diffuse else 1.0
+        rest = (1.0 - specular) * max(glossy, diffuse)
+        return _Shares(specular, rest * in_lobe, rest * (1.0 - in_lobe))
+
+    def _kind(self, ctx: Any, is_specular: Any, in_lobe: Any) -> tuple[Any, Any]:
+        """Return type and number of the component that was drawn. The cosine draws what is diffuse, if anything."""
+        components = self._formula.components
+        kind, number = mi.UInt32(0), mi.UInt32(0)
+        for part, chosen in ((GLOSSY, True), (DIFFUSE, True), (GLOSSY, in_lobe), (SPECULAR, is_specular)):
+            if self._enabled(ctx, part):
+                kind = dr.select(chosen, mi.UInt32(int(_flag(part))), kind)
+                number = dr.select(chosen, mi.UInt32(components.index(part)), number)
+        return kind, number
+
+
+def surface_class() -> Any:
+    """Return the class of BSDFs for the variant of Mitsuba that is set. It takes properties and a formula.
+
+    Each variant has a base class of its own, which allows no second one.
+    """
+    methods = {name: method for name, method in vars(_Methods).items() if callable(method)}
+    return type(mi.BSDF)("Surface", (mi.BSDF,), methods)
+
+
+def _flag(part: str) -> Any:
+    """Return the flag of a component."""
+    flags = mi.BSDFFlags
+    return {GLOSSY: flags.GlossyReflection, DIFFUSE: flags.DiffuseReflection, SPECULAR: flags.DeltaReflection}[part]
+
+
+def _or_normal(above: Any, w: Any) -> Any:
+    """Return `w`, and the normal where it lies below the horizon, so that derivatives there are 0 and not nan."""
+    return dr.select(above, w, mi.Vector3f(0.0, 0.0, 1.0))
+
+
+def _density(shares: _Shares, lobe: Lobe | None, wi: Any, wo: Any) -> Any:
+    cosine = shares.cosine * dr.maximum(wo.z, 0.0) * dr.inv_pi
+    return cosine if lobe is None else cosine + shares.lobe * lobe.density(wi, wo)

@@ -1,0 +1,161 @@
+"""He, Torrance, Sillion and Greenberg 1991 in Dr.Jit: the directional diffuse, uniform diffuse and specular part."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import drjit as dr
+import mitsuba as mi
+
+from brdfdb.mitsuba._diffraction_series import diffraction_series, effective_variance
+from brdfdb.mitsuba._gaussian_lobe import GaussianLobe
+from brdfdb.mitsuba._parameters import Parameters
+from brdfdb.mitsuba._surface import DIFFUSE, GLOSSY, SPECULAR, Formula, Values
+from brdfdb.mitsuba._wavelengths import channels_nm
+from brdfdb.models import MODELS
+from brdfdb.models.he_torrance_1991 import WAVELENGTH_NM, K, N
+
+_LEAST_COS = 6.1e-17  # cosine of the horizon: the model is finite there
+_LEAST = 1e-30
+_X_MAX = 9.0  # largest x; erfc(x) and exp(-x^2) are 0 in float32 well below it
+_LARGEST = 1e38  # f_r [1/sr] stays below
+_STEEPEST, _ALPHA_RANGE = 1e-3, (1e-6, 2.0)  # least cosine and range of alpha in the lobe of samples
+
+
+class _Surface(NamedTuple):
+    """Factors g / (v_z^2 (sigma / sigma_0)^2) and V / v_xy^2, the ratio sigma_0 / tau, and n and k, all [1]."""
+
+    wave: Any
+    correlation: Any
+    slope: Any
+    n: Any
+    k: Any
+
+
+def shadowing_and_hidden(w: Any, slope: Any) -> tuple[Any, Any]:
+    """Return S_1(theta) / cos theta [1] of eqs 23-25, and K [1] of eqs 82-83, of a direction above the horizon."""
+    sin, cos = dr.sqrt(dr.maximum(dr.square(w.x) + dr.square(w.y), _LEAST)), dr.maximum(w.z, _LEAST_COS)
+    x = dr.minimum(cos / dr.maximum(2.0 * slope * sin, _LEAST), _X_MAX)
+    gaussian = dr.select(x < _X_MAX, dr.exp(-dr.square(x)), 0.0)
+    erfc = gaussian * _erfcx(x)
+    Q = 1.0 - 0.5 * erfc
+    return Q / (Q * cos + slope * dr.inv_sqrt_pi * sin * gaussian), sin / cos * erfc
+
+
+def _erfcx(x: Any) -> Any:
+    """Return exp(x^2) erfc(x) [1] for x >= 0, within 3e-7 relative."""
+    s = (x - 3.0) / (x + 3.0)
+    # (x + 3) erfcx(x), Chebyshev's series
+    p: Any = 6.78438519e-05
+    for coefficient in (
+        *(-0.000210922502, -0.000507882505, 0.00297335628, -0.00123234629, -0.0268017128),
+        *(0.119532295, -0.310471714, 0.590227962, -0.883394241, 1.07400692),
+    ):
+        p = p * s + coefficient
+    return p / (x + 3.0)
+
+
+def reflectance(cos: Any, n: Any, k: Any) -> Any:
+    """Return |F|^2 [1] of unpolarised light at an interface to n + ik, as `brdfdb.fresnel.unpolarised`."""
+    cos2, sin2 = dr.square(cos), (1.0 - cos) * (1.0 + cos)
+    e_re = (n - k) * (n + k)
+    n_less_1 = n - 1.0
+    w_re, w_im = n_less_1 * (n_less_1 + 2.0) - dr.square(k), 2.0 * n * k
+    # q = a + ib is the root of cos^2 + w with parts that are not negative
+    q2_re = dr.select(cos2 < 0.5, cos2 + w_re, e_re - sin2)
+    large = dr.sqrt(dr.maximum(0.5 * (_modulus(q2_re, w_im) + dr.abs(q2_re)), _LEAST))
+    small = 0.5 * w_im / large
+    a, b = dr.select(q2_re >= 0.0, large, small), dr.select(q2_re >= 0.0, small, large)
+    w_abs = _modulus(w_re, w_im)
+    F_s = w_abs / dr.maximum(dr.square(cos + a) + dr.square(b), _LEAST)
+    below = dr.square(e_re * cos + a) + dr.square(w_im * cos + b)
+    F_p = w_abs * _modulus(cos2 * e_re - sin2, cos2 * w_im) / dr.maximum(below, _LEAST)
+    return dr.minimum(0.5 * (dr.square(F_s) + dr.square(F_p)), 1.0)
+
+
+def _modulus(re: Any, im: Any) -> Any:
+    return dr.sqrt(dr.maximum(dr.square(re) + dr.square(im), _LEAST))
+
+
+def directional_diffuse(wi: Any, wo: Any, surface: _Surface) -> Any:
+    """Return f_r [1/sr] of eq. 71 for directions above the horizon."""
+    light, K_i = shadowing_and_hidden(wi, surface.slope)
+    viewer, K_r = shadowing_and_hidden(wo, surface.slope)
+    # Eqs (79)-(83)
+    g_over_vz2 = surface.wave * effective_variance(K_i + K_r)
+    v_z2 = dr.square(dr.maximum(wi.z, _LEAST_COS) + dr.maximum(wo.z, _LEAST_COS))
+    # Eq. (84): k_r - k_i is the sum of our directions
+    v_xy2 = dr.square(wi.x + wo.x) + dr.square(wi.y + wo.y)
+    v2 = v_xy2 + v_z2
+    # Eq. (78)
+    g, V = g_over_vz2 * v_z2, surface.correlation * v_xy2
+    series = mi.UnpolarizedSpectrum([diffraction_series(*pair) for pair in zip(g, V, strict=True)])
+    # Eq. (75), at the bisecting angle
+    F2 = reflectance(dr.minimum(0.5 * dr.sqrt(v2), 1.0), surface.n, surface.k)
+    # Eqs (71) and (76)
+    value = series * F2 * g_over_vz2 * (0.25 / dr.pi) * surface.correlation * (v2 * light) * (v2 * viewer)
+    return dr.minimum(value, _LARGEST)
+
+
+class HeTorrance(Formula):
+    """The plugin ``brdfdb_he_torrance``. Its parameters are those of the model; n and k are spectra.
+
+    `wavelength_nm` sets one wavelength for all channels. Without it, those of a variant without a spectrum have
+    `WAVELENGTHS_NM`.
+    """
+
+    components = (GLOSSY, DIFFUSE, SPECULAR)
+
+    def __init__(self, props: Any) -> None:
+        self.parameters = Parameters(props, MODELS["he_torrance"], coloured=(N, K))
+        self._wavelength_nm = props.get("wavelength_nm", 0.0)
+        if self._wavelength_nm:
+            WAVELENGTH_NM.check(self._wavelength_nm)
+
+    def at(self, interaction: Any, active: Any) -> Values:
+        """Return the parameters and the surface as the light of each channel sees it."""
+        values = self.parameters.at(interaction, active)
+        wavelength_um = self._wavelengths_nm(interaction) / 1000.0
+        sigma_0, tau = values["sigma_0_um"], values["tau_um"]
+        wave, correlation = dr.square(2.0 * dr.pi * sigma_0 / wavelength_um), dr.square(dr.pi * tau / wavelength_um)
+        values["surface"] = _Surface(wave, correlation, sigma_0 / tau, values["n"], values["k"])
+        return values
+
+    def _wavelengths_nm(self, interaction: Any) -> Any:
+        if mi.is_spectral and not self._wavelength_nm:
+            return mi.UnpolarizedSpectrum(interaction.wavelengths)
+        return mi.UnpolarizedSpectrum(self._wavelength_nm or channels_nm())
+
+    def parts(self, values: Values, wi: Any, wo: Any) -> dict[str, Any]:
+        """Return f_r [1/sr] of the directional diffuse and of the uniform diffuse part."""
+        return {GLOSSY: directional_diffuse(wi, wo, values["surface"]), DIFFUSE: values["a"] * dr.inv_pi}
+
+    def specular(self, values: Values, wi: Any) -> Any:
+        """Return the specular reflectance [1], eq. 73."""
+        surface = values["surface"]
+        over_cos, K_i = shadowing_and_hidden(wi, surface.slope)
+        g = 4.0 * dr.square(wi.z) * surface.wave * effective_variance(2.0 * K_i)
+        return reflectance(wi.z, surface.n, surface.k) * dr.exp(-g) * dr.square(over_cos * wi.z)
+
+    def specular_share(self, values: Values, wi: Any) -> Any:
+        """Return the share [1] of samples in the mirror direction: that of the light, roughly."""
+        specular = dr.mean(self.specular(values, wi))
+        directional, uniform = self._diffuse_albedos(values, wi)
+        return specular / dr.maximum(specular + directional + uniform, _LEAST)
+
+    def lobe(self, values: Values, wi: Any) -> GaussianLobe:
+        """Return the lobe of `brdfdb.models.he_torrance`, as wide as that of the widest channel."""
+        surface = values["surface"]
+        v_z = 2.0 * dr.maximum(wi.z, _STEEPEST)
+        g = surface.wave * dr.square(v_z)
+        alpha = dr.max(dr.sqrt(dr.maximum(g, 1.0) / surface.correlation) / v_z)
+        alpha = dr.clip(alpha, *_ALPHA_RANGE)
+        directional, uniform = self._diffuse_albedos(values, wi)
+        share = 0.9 * directional / dr.maximum(directional + uniform, _LEAST)
+        return GaussianLobe.of(share, alpha, alpha)
+
+    def _diffuse_albedos(self, values: Values, wi: Any) -> tuple[Any, Any]:
+        """Return rough albedos [1] of both diffuse parts, the mean over the channels."""
+        surface = values["surface"]
+        scattered = 1.0 - dr.exp(-4.0 * surface.wave * dr.square(wi.z))
+        return dr.mean(reflectance(wi.z, surface.n, surface.k) * scattered), dr.mean(values["a"])

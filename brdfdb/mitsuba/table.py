@@ -1,0 +1,163 @@
+"""Tables of a store or a service in Dr.Jit: interpolated as `Table.lookup` does, and sampled from the table alone."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from brdfdb.errors import ParameterError
+from brdfdb.geometry import radians, unit_vector
+from brdfdb.mitsuba._buffers import Buffer
+from brdfdb.mitsuba._cells_lobe import CellsLobe
+from brdfdb.mitsuba._grid_points import points
+from brdfdb.mitsuba._grid_values import GridValues
+from brdfdb.mitsuba._surface import DIFFUSE, GLOSSY, SPECULAR, Formula, Values
+from brdfdb.mitsuba._wavelengths import Columns
+from brdfdb.store.opening import open as open_store
+from brdfdb.tables._interpolation import prepared, weights_of_nodes
+from brdfdb.tables.table import Table, table_from
+
+Array = NDArray[np.float64]
+
+_LEAST_COS = 6.1e-17  # cosine of the horizon, as of `Table.lookup`
+_LARGEST = 1e38  # f_r [1/sr] stays below
+_DRAWN = 256  # directions from which the albedo of the table is estimated, to share samples with the specular part
+_TURN = (np.sqrt(5.0) - 1.0) / 2.0  # the golden section
+_LEAST = 1e-6
+
+
+def loaded(name: str, store: str | None) -> Table:
+    """Return a table of a store or a service, with all its numbers in memory."""
+    opened = open_store(store)
+    table = opened[name]
+    if isinstance(table, Table):
+        return table
+    dataset = opened.dataset(name, table.revision).load()
+    arrays = {str(key): np.asarray(variable.values) for key, variable in dataset.variables.items()}
+    return table_from(name, table.revision, arrays, table.attrs)
+
+
+class TableFormula(Formula):
+    """The plugin ``brdfdb_table``: the table of a `material` in a `store`, a directory or the address of a service.
+
+    Without `store` it is that of the environment variable ``BRDFDB_STORE``. Its parts are the tabulated one, the
+    uniform one and the specular one. Variants without a spectrum look up `WAVELENGTHS_NM`.
+    """
+
+    def __init__(self, props: Any) -> None:
+        if "material" not in props:
+            raise ParameterError("material", "the name of a material in the store is missing")
+        table = loaded(props["material"], props.get("store", None))
+        self.name, self.anisotropic = table.name, table.anisotropic
+        self._grid, self._how, self._mixed = table.grid, table.interpolation, table.part_nm is not None
+        self._columns = Columns(table.wavelength_nm)
+        axes = prepared([radians(nodes) for nodes in table.axes_deg.values()], table.grid.ends, cubic=self._how.cubic)
+        numbers = table.values.reshape(*table.grid.shape, -1)
+        weights = self._weights(table)
+        mixing = weights.T if table.spectra is None else table.spectra @ weights.T
+        # Linear in the numbers: the channels of the variant take the place of those of the table
+        self._whole = not mi.is_spectral and not self._mixed
+        self._values = GridValues(axes, np.asarray(numbers @ mixing, np.float32) if self._whole else numbers)
+        self._rows = Buffer(mixing)
+        self._lobe = CellsLobe(table.sampler.cells)
+        self.components = (GLOSSY,)
+        if table.uniform is not None and np.any(table.uniform > 0.0):
+            self.components = (*self.components, DIFFUSE)
+            self._uniform = Buffer(np.maximum(weights @ np.broadcast_to(table.uniform, weights.shape[1]), 0.0))
+        if table.specular is not None and np.any(table.specular > 0.0):
+            self.components = (*self.components, SPECULAR)
+            self._read_specular(table)
+
+    def _weights(self, table: Table) -> Array:
+        """Return the weights (columns, L) of the wavelengths of the table."""
+        if table.wavelength_nm is None or self._columns.at_nm is None:
+            return np.ones((1, 1))
+        index, weight = weights_of_nodes(table.wavelength_nm, self._columns.at_nm)
+        matrix = np.zeros((self._columns.count, table.wavelength_nm.size))
+        np.add.at(matrix, (np.arange(self._columns.count)[:, np.newaxis], index), weight)
+        return matrix
+
+    def _read_specular(self, table: Table) -> None:
+        nodes = table.specular_theta_deg
+        theta = radians(table.axes_deg["theta_i"] if nodes is None else nodes)
+        self._specular_nodes, self._specular_last = Buffer(theta), theta.size - 2
+        self._specular = Buffer(table.specular_reflectance(theta, self._columns.at_nm))
+        number = np.arange(_DRAWN)
+        wi = unit_vector(theta, np.zeros(theta.size))[:, np.newaxis]
+        drawn = table.sample((number + 0.5) / _DRAWN, number * _TURN % 1.0, wi)
+        self._albedo = Buffer(drawn.weight.reshape(theta.size, _DRAWN, -1).mean(axis=(1, 2)))
+
+    def at(self, interaction: Any, active: Any) -> Values:  # noqa: ARG002  # a table is the same all over the surface
+        """Return the places of the wavelengths in the table."""
+        return {"places": self._columns.places(interaction)}
+
+    def parts(self, values: Values, wi: Any, wo: Any) -> dict[str, Any]:
+        """Return f_r [1/sr] of the tabulated part and of the uniform part."""
+        numbers = self._values(points(self._grid, wi, wo))
+        if self._mixed:
+            numbers = [self._f_r(number) for number in numbers]
+        places = values["places"]
+        totals = [numbers[int(place)] if self._whole else self._total(numbers, place) for place in places]
+        if not self._mixed:
+            totals = [self._f_r(total) for total in totals]
+        glossy = dr.maximum(mi.UnpolarizedSpectrum(totals), 0.0) * self._off_the_pole(wi, wo)
+        parts = {GLOSSY: dr.minimum(glossy, _LARGEST)}
+        if DIFFUSE in self.components:
+            uniform = [self._columns.read(self._uniform, 0, place) for place in places]
+            parts[DIFFUSE] = mi.UnpolarizedSpectrum(uniform)
+        return parts
+
+    def _total(self, numbers: list[Any], place: Any) -> Any:
+        """Return the number at a wavelength, from those of the channels of the table."""
+        rows = (self._columns.read(self._rows, channel, place) for channel in range(len(numbers)))
+        return sum(number * row for number, row in zip(numbers, rows, strict=True))
+
+    def _f_r(self, number: Any) -> Any:
+        return dr.maximum(dr.exp(number) - self._how.offset, 0.0) if self._how.logarithm else number
+
+    def _off_the_pole(self, wi: Any, wo: Any) -> Any:
+        cos_i, cos_r = dr.maximum(wi.z, _LEAST_COS), dr.maximum(wo.z, _LEAST_COS)
+        if self._how.power == 0.5:
+            return dr.rsqrt(cos_i) * dr.rsqrt(cos_r)
+        return 1.0 / cos_i / cos_r if self._how.power == 1.0 else 1.0
+
+    def lobe(self, values: Values, wi: Any) -> CellsLobe:  # noqa: ARG002  # the lobe of other models depends on them
+        """Return the cells of the table."""
+        return self._lobe
+
+    def specular(self, values: Values, wi: Any) -> Any:
+        """Return the specular reflectance [1]."""
+        row, share = self._specular_place(wi)
+        read = self._columns.read
+        rows = [
+            read(self._specular, row, place) * (1.0 - share) + read(self._specular, row + 1, place) * share
+            for place in values["places"]
+        ]
+        return mi.UnpolarizedSpectrum(rows)
+
+    def specular_share(self, values: Values, wi: Any) -> Any:
+        """Return the share [1] of samples in the mirror direction, that of the light."""
+        row, share = self._specular_place(wi)
+        scattered = self._albedo.at(row) * (1.0 - share) + self._albedo.at(row + 1) * share
+        specular = dr.mean(self.specular(values, wi))
+        return specular / dr.maximum(specular + scattered, _LEAST)
+
+    def _specular_place(self, wi: Any) -> tuple[Any, Any]:
+        theta = dr.atan2(dr.sqrt(dr.square(wi.x) + dr.square(wi.y)), wi.z)
+        row = self._specular_nodes.cell(theta, self._specular_last + 1)
+        begin, end = self._specular_nodes.at(row), self._specular_nodes.at(row + 1)
+        return row, dr.clip((theta - begin) / (end - begin), 0.0, 1.0)
+
+    def traverse(self, callback: Any) -> None:
+        """Show the numbers of the table to the scene as differentiable parameters."""
+        for channel, numbers in enumerate(self._values.buffers):
+            callback.put(f"values_{channel}", numbers.loaded(), mi.ParamFlags.Differentiable)
+
+    @property
+    def description(self) -> list[str]:
+        """The lines of a text about the plugin."""
+        return [f"material = {self.name}"]

@@ -1,0 +1,230 @@
+"""Directions drawn from a table alone: cells of half vectors for some lights, mixed with the cosine."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brdfdb.geometry import radians, unit_vector
+
+Array = NDArray[np.float64]
+# f_r [1/sr] for unit vectors of lights and viewers, in their broadcast shape
+Evaluate = Callable[[Array, Array], Array]
+
+# Share of directions that follow the cells. The cosine draws the others, which bounds weights by 5 pi f_r
+LOBE_SHARE = 0.8
+# Lights whose cells are stored. In between, one of the lights next to it is drawn
+_LIGHTS_DEG = (0, 12, 24, 34, 43, 51, 58, 64, 69, 73, 77, 80, 83, 85.5, 87.5, 88.8, 89.5)
+_TURNS = 16  # azimuths of lights of an anisotropic table
+THETA_CELLS, PHI_CELLS = 64, 32
+# Angles of half vectors from which the edges of cells are chosen: half of them by the reflected light
+_FINE, _LEAST, _EVEN = 400, 1e-5, 0.35
+_FLAT = 1e-100  # z of a half vector up to which the density counts as 0
+_GAUSS = (0.5 - 0.5 / np.sqrt(3.0), 0.5 + 0.5 / np.sqrt(3.0))  # places in a cell at which f_r is evaluated
+
+
+class Cells(NamedTuple):
+    """Probabilities of half vectors, constant in each cell.
+
+    Attributes
+    ----------
+    theta_i : array (K,) [rad]
+        Polar angles of the lights.
+    turns : int
+        Number of azimuths of the lights, evenly around the circle; 1 of an isotropic table, whose half vectors are
+        turned with the light.
+    edges : array (T + 1,) [1]
+        Edges of cells in 1 - cos(theta_h), from 0 to 1. Edges in phi_h are even from 0 to 2 pi.
+    probability : array (K * turns, T, P) [1]
+        Probability of each cell, lights with their azimuths one after another.
+    """
+
+    theta_i: Array
+    turns: int
+    edges: Array
+    probability: Array
+
+    @property
+    def along_theta(self) -> Array:
+        """Cumulative probabilities (lights, T + 1) [1] over theta_h."""
+        return _cumulative(self.probability.sum(axis=2))
+
+    @property
+    def along_phi(self) -> Array:
+        """Cumulative probabilities (lights, T, P + 1) [1] over phi_h, in each ring of theta_h."""
+        return _cumulative(self.probability)
+
+    @property
+    def density(self) -> Array:
+        """Density (lights, T, P) [1/sr] of half vectors in each cell."""
+        area = np.diff(self.edges)[:, np.newaxis] * (2.0 * np.pi / self.probability.shape[2])
+        return np.asarray(self.probability / area)
+
+
+def _cumulative(probability: Array) -> Array:
+    total = np.sum(probability, axis=-1, keepdims=True)
+    even = np.full_like(probability, 1.0 / probability.shape[-1])
+    share = np.divide(probability, total, out=even, where=total > 0.0)
+    summed = np.cumsum(share, axis=-1)
+    summed = np.concatenate([np.zeros_like(total), summed / summed[..., -1:]], axis=-1)
+    return np.asarray(summed)
+
+
+def cells_of(evaluate: Evaluate, *, anisotropic: bool) -> Cells:
+    """Return the cells of a table: the reflected light over half vectors, for lights from the normal to the horizon.
+
+    `evaluate` takes unit vectors of lights and viewers, shape (N, 3), and returns f_r [1/sr].
+    """
+    theta_i = radians(_LIGHTS_DEG)
+    turns = _TURNS if anisotropic else 1
+    phi_i = 2.0 * np.pi * np.arange(turns) / turns
+    lights = unit_vector(theta_i[:, np.newaxis], phi_i).reshape(-1, 1, 1, 3)
+    edges = _edges(evaluate, lights)
+    places = edges[:-1, np.newaxis] + np.diff(edges)[:, np.newaxis] * np.array(_GAUSS)
+    # The two halves of an isotropic lobe are alike
+    columns = PHI_CELLS if anisotropic else PHI_CELLS // 2
+    phi_h = (np.arange(columns)[:, np.newaxis] + np.array(_GAUSS)) * (2.0 * np.pi / PHI_CELLS)
+    h = unit_vector(np.arccos(1.0 - places.reshape(-1, 1)), phi_h.reshape(1, -1))
+    light = _light_by_half_vector(evaluate, lights, h)
+    mean = light.reshape(len(lights), THETA_CELLS, 2, columns, 2).mean(axis=(2, 4))
+    if not anisotropic:
+        mean = np.concatenate([mean, mean[:, :, ::-1]], axis=2)
+    probability = mean * np.diff(edges)[:, np.newaxis]
+    total = probability.sum(axis=(1, 2), keepdims=True)
+    even = np.broadcast_to(np.diff(edges)[:, np.newaxis] / PHI_CELLS, probability.shape).copy()
+    return Cells(theta_i, turns, edges, np.divide(probability, total, out=even, where=total > 0.0))
+
+
+def _edges(evaluate: Evaluate, lights: Array) -> Array:
+    """Return edges in 1 - cos(theta_h) between which about as much light is reflected, and none is very wide."""
+    theta_h = np.concatenate([[0.0], np.geomspace(_LEAST, np.pi / 2, _FINE)])
+    middle = 0.5 * (theta_h[:-1] + theta_h[1:])
+    phi_h = (np.arange(12) + 0.5) * (np.pi / 6)
+    rings = _light_by_half_vector(evaluate, lights, unit_vector(middle[:, np.newaxis], phi_h)).mean(axis=2)
+    rings = rings * np.diff(-np.cos(theta_h))
+    total = rings.sum(axis=1, keepdims=True)
+    share = np.divide(rings, total, out=np.zeros_like(rings), where=total > 0.0).mean(axis=0)
+    summed = (1.0 - _EVEN) * np.cumsum(share) / max(share.sum(), 1e-300) + _EVEN * theta_h[1:] / theta_h[-1]
+    chosen = np.interp(np.linspace(0.0, 1.0, THETA_CELLS + 1), np.append(0.0, summed / summed[-1]), theta_h)
+    edges = 2.0 * np.sin(0.5 * chosen) ** 2
+    edges[0], edges[-1] = 0.0, 1.0
+    return np.asarray(edges)
+
+
+def _light_by_half_vector(evaluate: Evaluate, lights: Array, h: Array) -> Array:
+    """Return the density [1/sr] of reflected light over half vectors, f_r cos theta_r 4 (h.i)."""
+    along = np.sum(lights * h, axis=-1)
+    viewers = 2.0 * along[..., np.newaxis] * h - lights
+    seen = (viewers[..., 2] > 0.0) & (along > 0.0)
+    values = np.zeros(seen.shape)
+    i = np.broadcast_to(lights, viewers.shape)[seen]
+    values[seen] = np.maximum(evaluate(i, viewers[seen]), 0.0) * viewers[seen][:, 2] * 4.0 * along[seen]
+    return values
+
+
+class Sampler:
+    """Directions of viewers drawn from cells and from the cosine, with their density."""
+
+    def __init__(self, cells: Cells) -> None:
+        self.cells = cells
+        lights, rings, columns = cells.probability.shape
+        # Rows of cumulative numbers, each one above the last: one search finds the place in any row
+        self._theta = (cells.along_theta + np.arange(lights)[:, np.newaxis]).ravel()
+        self._phi = (cells.along_phi.reshape(-1, columns + 1) + np.arange(lights * rings)[:, np.newaxis]).ravel()
+        self._density = cells.density
+
+    def draw(self, u1: Array, u2: Array, wi: Array) -> Array:
+        """Return directions (..., 3) for random numbers and unit vectors (..., 3). Some are below the horizon."""
+        in_lobe = u1 < LOBE_SHARE
+        # The first number is used again, in the component and in the cell that it has chosen
+        first = np.clip(np.where(in_lobe, u1 / LOBE_SHARE, (u1 - LOBE_SHARE) / (1.0 - LOBE_SHARE)), 0.0, 1.0)
+        sin, angle = np.sqrt(first), 2.0 * np.pi * u2
+        cosine = np.stack(np.broadcast_arrays(sin * np.cos(angle), sin * np.sin(angle), np.sqrt(1.0 - first)), axis=-1)
+        h = self._half_vector(first, u2, wi)
+        mirrored = 2.0 * np.sum(h * wi, axis=-1, keepdims=True) * h - wi
+        return np.asarray(np.where(in_lobe[..., np.newaxis], mirrored, cosine + 0.0 * mirrored))
+
+    def _half_vector(self, u1: Array, u2: Array, wi: Array) -> Array:
+        cells = self.cells
+        _, rings, columns = cells.probability.shape
+        row: NDArray[np.int64] = np.zeros((), np.int64)
+        for number, weight, rows in self._near(wi):
+            # One of two neighbours is drawn with its weight
+            second = u1 < weight
+            low, width = np.where(second, 0.0, weight), np.where(second, weight, 1.0 - weight)
+            u1 = np.divide(u1 - low, width, out=np.zeros(second.shape), where=width > 0.0)
+            row = row + np.where(second, rows[1][number], rows[0][number])
+        place, ring = _place(self._theta, row, u1, rings)
+        versine = cells.edges[ring] + np.diff(cells.edges)[ring] * place
+        place, column = _place(self._phi, row * rings + ring, u2, columns)
+        phi = (column + place) * (2.0 * np.pi / columns)
+        sin = np.sqrt(versine * (2.0 - versine))
+        return self._turned(np.stack([sin * np.cos(phi), sin * np.sin(phi), 1.0 - versine], axis=-1), wi, 1.0)
+
+    def density(self, wi: Array, wr: Array) -> Array:
+        """Return the density [1/sr] of `draw` over the sphere, for unit vectors (..., 3)."""
+        cells = self.cells
+        h = wi + wr
+        length = np.sqrt(np.sum(h * h, axis=-1))
+        apart = np.abs(h[..., 2]) > _FLAT  # no half vector is drawn at the horizon
+        # A half vector whose back the light sees is that of directions below the horizon
+        h = h / np.copysign(np.where(apart, length, 1.0), h[..., 2])[..., np.newaxis]
+        local = self._turned(h, np.broadcast_to(wi, h.shape), -1.0)
+        # 1 - cos(theta_h), without a difference of numbers near 1
+        versine = (local[..., 0] ** 2 + local[..., 1] ** 2) / (1.0 + np.maximum(local[..., 2], 0.0))
+        _, rings, columns = cells.probability.shape
+        ring = np.clip(np.searchsorted(cells.edges, versine, side="right") - 1, 0, rings - 1)
+        phi = np.arctan2(local[..., 1], local[..., 0]) % (2.0 * np.pi)
+        column = np.clip(np.nan_to_num(phi * (columns / (2.0 * np.pi))), 0, columns - 1).astype(np.int64)
+        of_h = self._mixed(np.broadcast_to(wi, h.shape), ring, column)
+        mirrored = np.divide(of_h, 2.0 * length, out=np.zeros(of_h.shape), where=apart)  # h.i = length / 2
+        cosine = np.maximum(wr[..., 2], 0.0) / np.pi + 0.0 * length  # nan is passed on
+        return np.asarray(LOBE_SHARE * mirrored + (1.0 - LOBE_SHARE) * cosine)
+
+    def _mixed(self, wi: Array, ring: NDArray[np.int64], column: NDArray[np.int64]) -> Array:
+        total, axes = np.zeros(ring.shape), self._near(wi)
+        for choice in np.ndindex((2,) * len(axes)):
+            weight, row = np.ones(ring.shape), np.zeros(ring.shape, np.int64)
+            for side, (number, share, rows) in zip(choice, axes, strict=True):
+                weight, row = weight * (share if side else 1.0 - share), row + rows[side][number]
+            total += weight * self._density[row, ring, column]
+        return total
+
+    def _near(self, wi: Array) -> list[tuple[NDArray[np.int64], Array, NDArray[np.int64]]]:
+        """Return for each axis of lights the number of an interval, the weight of its end, and rows of both ends."""
+        theta_i, turns = self.cells.theta_i, self.cells.turns
+        theta = np.arctan2(np.hypot(wi[..., 0], wi[..., 1]), wi[..., 2])
+        number = np.clip(np.searchsorted(theta_i, theta, side="right") - 1, 0, theta_i.size - 2)
+        weight = np.clip((theta - theta_i[number]) / np.diff(theta_i)[number], 0.0, 1.0)
+        rows = np.arange(theta_i.size - 1) * turns
+        axes = [(number, weight, np.stack([rows, rows + turns]))]
+        if turns > 1:
+            turn = np.arctan2(wi[..., 1], wi[..., 0]) % (2.0 * np.pi) * (turns / (2.0 * np.pi))
+            whole = np.clip(np.nan_to_num(np.floor(turn)), 0.0, turns - 1.0).astype(np.int64)
+            turned = np.arange(turns)
+            axes.append((whole, np.clip(turn - whole, 0.0, 1.0), np.stack([turned, (turned + 1) % turns])))
+        return axes
+
+    def _turned(self, h: Array, wi: Array, sign: float) -> Array:
+        """Return half vectors of an isotropic table turned by the azimuth of the light; others stay."""
+        if self.cells.turns > 1:
+            return h
+        sin = np.hypot(wi[..., 0], wi[..., 1])
+        upright = sin == 0.0
+        cos_phi = np.where(upright, 1.0, wi[..., 0] / np.where(upright, 1.0, sin))
+        sin_phi = sign * np.where(upright, 0.0, wi[..., 1] / np.where(upright, 1.0, sin))
+        x, y = h[..., 0], h[..., 1]
+        return np.stack([x * cos_phi - y * sin_phi, x * sin_phi + y * cos_phi, h[..., 2]], axis=-1)
+
+
+def _place(rows: Array, row: NDArray[np.int64], u: Array, count: int) -> tuple[Array, NDArray[np.int64]]:
+    """Return the place in a cell and its number, for a random number in a cumulative row of `count` cells."""
+    first = row * (count + 1)
+    cell = np.clip(np.searchsorted(rows, row + u, side="right") - 1 - first, 0, count - 1)
+    low, high = rows[first + cell], rows[first + cell + 1]
+    width = high - low
+    place = np.divide(row + u - low, width, out=np.full(width.shape, 0.5), where=width > 0.0)
+    return np.clip(place, 0.0, 1.0), cell

@@ -1,0 +1,184 @@
+"""The plugin of tables: values and densities of `Table`, on the four grids, linear and cubic, in parts."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from brdfdb.geometry import unit_vector
+from brdfdb.tables.albedo import directional_albedo
+from brdfdb.tables.planner import plan
+from brdfdb.tables.table import Table
+from brdfdb.tables.tabulation import tabulate
+from tests.api.a_store import publish, serving
+from tests.formats.small_tables import ANISOTROPIC, GREY, KINDS, SMOOTH, SPECTRAL, small_table
+from tests.mitsuba.surfaces import directions, interaction, variant
+from tests.store.a_store import lambert
+from tests.tables.made_up import WAVELENGTHS, made_up
+from tests.tables.test_mixture import NM, PAINTED
+
+PAIRS = 20_000
+# Of f_r and of densities: angles of float32 in tables whose logarithm is steep. The largest measured is 2e-4, and
+# 99.9 % of the pairs differ by less than 3e-5. Below the floor [1/sr], sums of numbers of a table cancel
+FLOAT32, MOST, FLOOR = 5e-4, 5e-5, 5e-3
+# Of 1000 densities, those next to an edge of a cell may be of the neighbour
+OTHER_CELLS = 0.002
+LIGHTS_DEG, TURNED = (0.0, 20.0, 45.0, 60.0, 75.0, 85.0), np.pi / 6
+FURNACE = 3e-3
+
+
+def painted() -> Table:
+    layout = plan(PAINTED, NM, 0.1)
+    assert layout.part_nm is not None
+    arrays = tabulate(layout)
+    from brdfdb.tables.table import table_from
+
+    return table_from("painted", "", {str(k): np.asarray(v.values) for k, v in arrays.variables.items()}, arrays.attrs)
+
+
+TABLES: dict[str, Any] = {
+    **{kind: (lambda kind=kind: small_table(kind)) for kind in KINDS},
+    "linear": lambda: made_up("isotropic", WAVELENGTHS, dirac=True),
+    "linear-anisotropic": lambda: made_up("anisotropic"),
+    "mixture": painted,
+}
+
+
+def surface_of(mitsuba: Any, monkeypatch: pytest.MonkeyPatch, table: Table) -> Any:
+    import brdfdb.mitsuba.table
+
+    monkeypatch.setattr(brdfdb.mitsuba.table, "loaded", lambda *_: table)
+    return mitsuba.load_dict({"type": "brdfdb_table", "material": table.name})
+
+
+def smooth(mitsuba: Any) -> Any:
+    context = mitsuba.BSDFContext()
+    context.type_mask = mitsuba.BSDFFlags.Glossy | mitsuba.BSDFFlags.Diffuse
+    return context
+
+
+@pytest.mark.parametrize("name", ["llvm_ad_mono", "llvm_ad_spectral"])
+@pytest.mark.parametrize("kind", TABLES)
+def test_values_and_densities_are_those_of_the_table(kind: str, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    mitsuba = variant(name)
+    table = TABLES[kind]()
+    surface = surface_of(mitsuba, monkeypatch, table)
+    wi, wr = directions(PAIRS)
+    place = interaction(mitsuba, wi)
+    at = np.array([549.1])
+    if name.endswith("spectral"):
+        at = np.array([400.0, 480.25, 549.1, 700.0])
+        place.wavelengths = at.tolist()
+    viewers = mitsuba.Vector3f(np.ascontiguousarray(wr.T))
+    value, density = surface.eval_pdf(smooth(mitsuba), place, viewers)
+    wi, wr = wi.astype(np.float64), wr.astype(np.float64)
+    stored = table.wavelength_nm
+    wavelength = None if stored is None else np.clip(at, stored[0], stored[-1])
+    expected = table.lookup_vectors(wi, wr, wavelength)
+    expected = np.broadcast_to(expected.T if stored is not None else expected, np.shape(value))
+    difference = np.abs(np.array(value) / wr[:, 2] - expected) / np.maximum(expected, FLOOR)
+    assert np.max(difference) <= FLOAT32
+    assert np.quantile(difference, 0.999) <= MOST
+    difference = np.abs(np.array(density) / table.pdf(wi, wr) - 1.0)
+    assert np.mean(difference > FLOAT32) <= OTHER_CELLS
+
+
+@pytest.mark.parametrize("kind", [GREY, ANISOTROPIC, SPECTRAL, SMOOTH])
+def test_densities_of_samples_pass_mitsubas_chi2(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    mitsuba = variant("llvm_ad_mono")
+    import drjit
+    from mitsuba.chi2 import ChiSquareTest, SphericalDomain
+
+    surface, context = surface_of(mitsuba, monkeypatch, small_table(kind)), smooth(mitsuba)
+    for theta_deg in LIGHTS_DEG:
+        wi = unit_vector(np.deg2rad(theta_deg), TURNED)[np.newaxis]
+
+        # Mitsuba's own adapter leaves out directions in which f_r is 0, as it is in parts of a table
+        def sample(u: Any, wi: Any = wi) -> Any:
+            drawn, _ = surface.sample(context, interaction(mitsuba, wi), u[0], mitsuba.Point2f(u[1], u[2]))
+            return drawn.wo, drjit.select(drawn.pdf > 0.0, 1.0, 0.0)
+
+        def density(wo: Any, wi: Any = wi) -> Any:
+            return surface.pdf(context, interaction(mitsuba, wi), wo)
+
+        test = ChiSquareTest(SphericalDomain(), sample, density, 3, sample_count=200_000, res=101, ires=20)
+        assert test.run(0.01, len(LIGHTS_DEG), quiet=True), f"{theta_deg} degrees: {test.messages}"
+
+
+@pytest.mark.parametrize("kind", [GREY, ANISOTROPIC, SPECTRAL, SMOOTH])
+def test_weights_of_samples_add_up_to_our_albedo(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    mitsuba = variant("llvm_ad_mono")
+    table = small_table(kind)
+    surface = surface_of(mitsuba, monkeypatch, table)
+    count = 1 << 18
+    choice, u, v = (np.arange(count) * 1.2207440846057596 ** -np.array([[1.0], [2.0], [3.0]]) % 1.0).astype(np.float32)
+    for theta_deg in LIGHTS_DEG:
+        wi = np.tile(unit_vector(np.deg2rad(theta_deg), TURNED), (count, 1))
+        place, point = interaction(mitsuba, wi), mitsuba.Point2f(u, v)
+        _, weight = surface.sample(mitsuba.BSDFContext(), place, mitsuba.Float(choice), point)
+        albedo = directional_albedo(table, np.array([theta_deg])).albedo[0, 1 if table.anisotropic else 0]
+        nm = table.wavelength_nm
+        at = None if nm is None else float(np.clip(549.1, nm[0], nm[-1]))
+        expected = albedo[0] if nm is None else np.interp(at, nm, albedo)
+        expected += float(table.specular_reflectance(np.deg2rad(theta_deg), at))
+        assert np.mean(np.array(weight)[0], dtype=np.float64) == pytest.approx(expected, rel=FURNACE)
+
+
+@pytest.mark.parametrize("name", ["scalar_rgb", "scalar_spectral", "llvm_ad_rgb"])
+def test_each_variant_reads_a_store(name: str, tmp_path: Path) -> None:
+    from brdfdb.store.publication import publish_dataset
+
+    mitsuba = variant(name)
+    publish_dataset(tmp_path, "white", lambert(0.5))
+    surface = mitsuba.load_dict({"type": "brdfdb_table", "material": "white", "store": str(tmp_path)})
+    place = mitsuba.SurfaceInteraction3f()
+    place.wi = mitsuba.Vector3f(0.6, 0.0, 0.8)
+    context, viewer = mitsuba.BSDFContext(), mitsuba.Vector3f(-0.48, 0.64, 0.6)
+    np.testing.assert_allclose(np.ravel(surface.eval(context, place, viewer)), 0.5 / np.pi * 0.6, rtol=1e-6)
+    sample, weight = surface.sample(context, place, 0.4, mitsuba.Point2f(0.3, 0.7))
+    reflected = np.ravel(weight) * np.ravel(sample.pdf)
+    np.testing.assert_allclose(reflected, np.full(reflected.size, 0.5 / np.pi * np.ravel(sample.wo.z)), rtol=1e-5)
+    np.testing.assert_allclose(np.ravel(sample.pdf), np.ravel(surface.pdf(context, place, sample.wo)), rtol=1e-5)
+    with pytest.raises(RuntimeError, match="no-such"):
+        mitsuba.load_dict({"type": "brdfdb_table", "material": "no-such", "store": str(tmp_path)})
+
+
+def test_the_numbers_of_a_table_have_derivatives(monkeypatch: pytest.MonkeyPatch) -> None:
+    mitsuba = variant("llvm_ad_mono")
+    import drjit
+
+    table = small_table(GREY)
+    surface = surface_of(mitsuba, monkeypatch, table)
+    parameters = mitsuba.traverse(surface)
+    numbers = parameters["values_0"]
+    drjit.enable_grad(numbers)
+    parameters.update()
+    wi, wr = directions(100)
+    value = surface.eval(mitsuba.BSDFContext(), interaction(mitsuba, wi), mitsuba.Vector3f(np.ascontiguousarray(wr.T)))
+    drjit.backward(drjit.sum(value, axis=None))
+    # All numbers larger by one: the logarithm of f_r and of the offset
+    wi, wr = wi.astype(np.float64), wr.astype(np.float64)
+    power = (wi[:, 2] * wr[:, 2]) ** -table.interpolation.power
+    tabulated = table.lookup_vectors(wi, wr) - table.uniform[0]
+    expected = np.sum((tabulated + table.interpolation.offset * power) * wr[:, 2])
+    assert float(np.sum(np.array(drjit.grad(numbers)))) == pytest.approx(expected, rel=1e-3)
+
+
+def test_a_table_behind_a_service_is_that_of_the_directory(tmp_path: Path) -> None:
+    mitsuba = variant("scalar_spectral")
+    publish(tmp_path, "foil", "he_torrance", refractive_index="main/Cu/Johnson", sigma_0_um=0.1, tau_um=2.0)
+    place = mitsuba.SurfaceInteraction3f()
+    place.wi, place.wavelengths = mitsuba.Vector3f(0.6, 0.0, 0.8), [450.0, 500.0, 550.0, 600.0]
+    values, specular = [], mitsuba.BSDFContext()
+    specular.type_mask = mitsuba.BSDFFlags.DeltaReflection
+    with serving(tmp_path) as url:
+        for store in (str(tmp_path), url):
+            surface = mitsuba.load_dict({"type": "brdfdb_table", "material": "foil", "store": store})
+            value = surface.eval(mitsuba.BSDFContext(), place, mitsuba.Vector3f(-0.48, 0.0, 0.8772))
+            _, weight = surface.sample(specular, place, 0.4, mitsuba.Point2f(0.3, 0.7))
+            values.append(np.array([np.ravel(value), np.ravel(weight)]))
+    np.testing.assert_array_equal(values[0], values[1])
+    assert np.all(values[0] > 0.0)
