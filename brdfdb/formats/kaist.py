@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from brdfdb.errors import CannotHoldError, FileFormatError
 from brdfdb.formats._angles import HalfDifference
 from brdfdb.formats._channels import Channels
-from brdfdb.formats._interface import TOLERANCE, Option
+from brdfdb.formats._interface import MEGABYTES, TOLERANCE
 from brdfdb.formats._nodes import samples_of_grid
 from brdfdb.formats._record import document_of, record, specular_remark
 from brdfdb.formats._rgl_tensor import MAGIC, read_tensors, write_tensors
@@ -43,13 +43,7 @@ tools = "Mitsuba 3 (`measured_polarized`)"
 kinds = ()
 options = (
     TOLERANCE,
-    Option(
-        "megabytes",
-        64.0,
-        "largest file [MB]: a table that needs more is written with the error it has",
-        low=0.1,
-        high=2000.0,
-    ),
+    MEGABYTES,
 )
 HOLDS = (
     "Mueller BRDF M [1/sr] without the cosine, between Stokes bases of the plane of light and viewer: x along its "
