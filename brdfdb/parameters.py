@@ -131,6 +131,18 @@ class Diagnostic(NamedTuple):
     value: Callable[[Arguments], float]
 
 
+class Polarised(NamedTuple):
+    """The polarised form of a model whose light was reflected once, by a facet, or is uniform and unpolarised.
+
+    `mueller` is the Mueller BRDF [1/sr], ``mueller(wi, wr, *, parameters)`` of shape (..., 4, 4). Its first element is
+    f_r. `facet` is the Mueller matrix of the facet over its first element, ``facet(theta_d, *, n, k)``, between the s
+    and p of the plane of light and viewer, which are 2 theta_d apart. `brdfdb.tables.stokes` states the convention.
+    """
+
+    mueller: Callable[..., Floats]
+    facet: Callable[..., Floats]
+
+
 @dataclass(frozen=True)
 class ModelSpec:
     """The specification of a model. No code outside the model's own modules knows a model by name.
@@ -160,7 +172,7 @@ class ModelSpec:
     For audits, `limits` gives the limits that a paper states, judged at some arguments. `slow` marks a model whose
     values are integrals, of about 30 us each: audits compute fewer of them. `uniform_bound_cosine` marks a model whose
     uniform part is limited by energy conservation only. It returns the lowest cos theta_i [1] at which the largest
-    reflectance is searched.
+    reflectance is searched. `polarised` is the polarised form of the model; None: it is of unpolarised light.
     """
 
     name: str
@@ -189,6 +201,7 @@ class ModelSpec:
     limits: Callable[[Arguments], Iterable[StatedLimit]] | None = None
     slow: bool = False
     uniform_bound_cosine: Callable[[Arguments], float] | None = None
+    polarised: Polarised | None = None
 
     def parameter(self, name: str) -> Parameter:
         """Return the parameter called `name`; KeyError if the model has none."""

@@ -84,6 +84,7 @@ def dense_table(
     most_values: int = MOST_BYTES // 4,
     digits: int = 0,
     last_deg: float = 90.0,
+    channels: Channels | None = None,
 ) -> DenseTable:
     """Return a table on the smallest plain grid that is within a tolerance, or on a regular one.
 
@@ -105,13 +106,15 @@ def dense_table(
         Significant digits that values are rounded to; 0: float32.
     last_deg : float [degree]
         Last polar angle of light and viewer that the format takes.
+    channels : Channels, optional
+        The channels of the file, by default those of the table.
 
     Raises
     ------
     ParameterError
         If a regular grid has more values.
     """
-    whole = Comparison(table)
+    whole = Comparison(table, channels)
     few = _at_few_wavelengths(table, whole)
     names = _names(table)
     tried = [names[axes]] if axes != "smallest" else list(names.values())

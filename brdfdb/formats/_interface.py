@@ -119,6 +119,15 @@ FIXED = replace(
     help="largest error against the table that 99 of 100 values may have: a larger one is reported, the grid is fixed",
 )
 
+MEGABYTES = Option(
+    "megabytes",
+    64.0,
+    "largest file [MB]: a table that needs more is written with the error it has",
+    low=0.1,
+    high=2000.0,
+    most_served=64.0,
+)
+
 WAVELENGTH = Option("wavelength", 550.0, "wavelength of a spectral table that is written [nm]", low=1.0, high=1e6)
 
 

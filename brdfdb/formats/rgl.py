@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from brdfdb.formats._interface import TOLERANCE, Option
+from brdfdb.formats._interface import MEGABYTES, TOLERANCE, Option
 
 if TYPE_CHECKING:
     from brdfdb.formats._readings import FileTable
@@ -36,14 +36,7 @@ tools = "Mitsuba 3 (`measured`), pbrt-v4, RGL's loader"
 kinds = ("spectral", "rgb")
 options = (
     TOLERANCE,
-    Option(
-        "megabytes",
-        64.0,
-        "largest file [MB]: a table that needs more is written with the error it has",
-        low=0.1,
-        high=2000.0,
-        most_served=64.0,
-    ),
+    MEGABYTES,
     Option(
         "azimuth",
         "reduced",

@@ -24,9 +24,8 @@ from brdfdb.models._he_torrance_kernels import (
     specular_rows,
     vector_rows,
 )
-from brdfdb.models._he_torrance_validity import G_ALONG_NORMAL, limits, lowest_cosine
 from brdfdb.models._rows import by_rows, by_rows_of_vectors
-from brdfdb.parameters import Arguments, Floats, FormKind, ModelForm, ModelSpec, Parameter, bytes_of
+from brdfdb.parameters import Arguments, Floats, FormKind, ModelForm, Parameter, bytes_of
 
 WAVELENGTH_NM = Parameter("wavelength_nm", "λ", "nm", 1e-3, 1e7, "wavelength in vacuum")
 SIGMA_0_UM = Parameter("sigma_0_um", "σ_0", "µm", 0.0, 1e4, "rms roughness; 0 is a mirror")
@@ -370,26 +369,3 @@ def forms(arguments: Arguments) -> Iterator[ModelForm]:
     yield form("beckmann-corrected", "Beckmann, first order in 1/g", "approximation", corrected)
     limit = functools.partial(with_sum, series=LIMIT)
     yield form("beckmann", "Beckmann's limit, g to infinity", "customary", limit)
-
-
-SPEC = ModelSpec(
-    name="he_torrance",
-    version=2,
-    title="He-Torrance, unpolarised",
-    equation="eqs 71-84",
-    reference="he1991",
-    parameters=(SIGMA_0_UM, TAU_UM, A),
-    evaluate=he_torrance,
-    vectors=he_torrance_vectors,
-    specular=he_torrance_specular,
-    specular_parameters=("wavelength_nm", "sigma_0_um", "tau_um", "n", "k"),
-    spectral=True,
-    uniform="a",
-    lobe=lobe,
-    lossless=lossless,
-    forms=forms,
-    highest_rung="the whole sum of eq. 78",
-    diagnostic=G_ALONG_NORMAL,
-    limits=limits,
-    uniform_bound_cosine=lowest_cosine,
-)

@@ -1,21 +1,14 @@
 """He et al. 1991, polarised light: Jones matrices of the facet reflection, eqs 59-65, and Mueller matrices.
 
-This docstring is the only statement of the convention:
+`brdfdb.tables.stokes` states the convention: directions, Stokes vectors, and the basis (s, p) of the mean surface.
+Beyond it:
 
-* Directions w_i (light) and w_r (viewer) point away from the surface. The light travels along k_i = -w_i before and
-  along k_r = w_r after reflection. z is the normal of the mean surface.
-* s = z x w / abs(z x w) for either direction. For the azimuth phi that is s = (-sin phi, cos phi, 0), which at the pole
-  w = z is its limit along that azimuth. The functions of unit vectors take 0 as the azimuth of the pole itself.
-* p = s x k with the direction k in which the light travels, so that (p, s, k) is right-handed. p_i = -(cos theta
-  cos phi, cos theta sin phi, -sin theta) for the light, and p_r is the same vector of theta_r, phi_r with a plus sign.
-  The bases of the paper (eqs 14, 35) are these, but its s_r and p_r have the opposite sign. No Mueller matrix depends
-  on that sign.
-* Fields vary as exp(i k.r - i omega t), and the index is n + ik. Complex amplitudes are those of the electric field.
-* Stokes vector (I, Q, U, V): I = abs(E_s)^2 + abs(E_p)^2, Q = abs(E_s)^2 - abs(E_p)^2, U + iV = 2 E_s conj(E_p).
-  Q > 0 is s-polarised, and U > 0 is linear along s + p. V > 0 has positive helicity, E_s = i E_p: at a fixed point the
-  field turns from p to s, counter-clockwise for an observer who looks towards the incoming light.
-* Matrices act on columns from the left: a row belongs to the reflected, a column to the incident field. Index 0 is s
-  and 1 is p.
+* For the azimuth phi, s = (-sin phi, cos phi, 0), which at the pole w = z is its limit along that azimuth.
+  p_i = -(cos theta cos phi, cos theta sin phi, -sin theta) for the light, and p_r is the same vector of theta_r, phi_r
+  with a plus sign. The bases of the paper (eqs 14, 35) are these, but its s_r and p_r have the opposite sign. No
+  Mueller matrix depends on that sign.
+* The index is n + ik. Complex amplitudes are those of the electric field.
+* Jones matrices act on columns from the left. Index 0 is s and 1 is p.
 * Reciprocity, when light and viewer are exchanged: J' = Z J^T Z with Z = diag(1, -1), and M' = D M^T D with
   D = diag(1, 1, -1, 1). The sign comes from p = s x k: the same wave travelling back has the opposite p.
 """
@@ -126,10 +119,9 @@ def he_torrance_mueller(
     Returns
     -------
     array [1/sr]
-        In the broadcast shape of all arguments and (4, 4). The matrix gives the Stokes vector (I, Q, U, V) of the
-        reflected radiance from that of the irradiance. Q > 0 is s-polarised, and the docstring of the module states the
-        rest of the convention. It is 0 below the horizon and nan where an angle is nan. Element [0, 0] is
-        `he_torrance`.
+        In the broadcast shape of all arguments and (4, 4). The matrix gives the Stokes vector of the reflected radiance
+        from that of the irradiance, in the convention of `brdfdb.tables.stokes`. It is 0 below the horizon and nan
+        where an angle is nan. Element [0, 0] is `he_torrance`.
 
     Raises
     ------
@@ -232,13 +224,48 @@ def he_torrance_specular_mueller_vectors(
     return _finished_specular(checked_vectors(wi, wi), surface)
 
 
-def _finished_specular(directions: Directions, surface: unpolarised.Surface) -> Floats:
-    rho_s = unpolarised.rho_s(directions, surface)
-    half_sum, half_difference = fresnel.half_sum_and_difference(directions.cos_i, surface.n, surface.k)
+def he_torrance_facet_mueller(theta_d: ArrayLike, *, n: ArrayLike, k: ArrayLike) -> Floats:
+    """Return the Mueller matrix [1] of the facet over its first element, between s and p of the plane of the light.
+
+    Parameters
+    ----------
+    theta_d : array_like [rad]
+        Angle of incidence on the facet, half the angle between light and viewer, in [0, pi/2].
+    n, k : array_like [1]
+        Complex refractive index n + ik, as in `he_torrance_jones`.
+
+    Returns
+    -------
+    array [1]
+        In the broadcast shape of all arguments and (4, 4). Three of its elements are independent: [0, 1] = [1, 0],
+        [2, 2] = [3, 3] and [2, 3] = -[3, 2]; [0, 0] and [1, 1] are 1, all others 0. The matrix is 0 where nothing is
+        reflected, and beyond pi/2.
+
+    References
+    ----------
+    he1991 (eqs 59-65)
+
+    Examples
+    --------
+    >>> round(float(he_torrance_facet_mueller(0.9828, n=1.5, k=0.0)[0, 1]), 3)  # Brewster's angle
+    1.0
+    """
+    directions = checked_angles(theta_d, 0.0, 0.0, 0.0)
+    return _normalised_facet(directions, unpolarised.N.check(n), unpolarised.K.check(k))
+
+
+def _normalised_facet(directions: Directions, n: Floats, k: Floats) -> Floats:
+    half_sum, half_difference = fresnel.half_sum_and_difference(directions.cos_i, n, k)
     F_s, F_p = half_sum + half_difference, half_sum - half_difference
     M = _mueller(F_s, np.zeros_like(F_s), np.zeros_like(F_s), F_p)
     reflectance = M[..., :1, :1]
     relative = np.divide(M, reflectance, out=np.zeros_like(M), where=reflectance > 0.0)
+    return finished(relative, directions, trailing=2)
+
+
+def _finished_specular(directions: Directions, surface: unpolarised.Surface) -> Floats:
+    rho_s = unpolarised.rho_s(directions, surface)
+    relative = _normalised_facet(directions, surface.n, surface.k)
     return finished(rho_s[..., None, None] * relative, directions, trailing=2)
 
 

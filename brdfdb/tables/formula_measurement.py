@@ -14,6 +14,8 @@ from brdfdb.tables import error_measurement
 from brdfdb.tables.albedo import largest_albedo
 from brdfdb.tables.first_numbers import FormulaError
 from brdfdb.tables.layout import Layout
+from brdfdb.tables.polarisation_measurement import element_error
+from brdfdb.tables.polarisation_record import record
 from brdfdb.tables.stated_error import Overall
 from brdfdb.tables.table import Table
 from brdfdb.tables.worst_pair import worst_pair
@@ -39,12 +41,16 @@ def first_numbers(layout: Layout, read: Callable[[slice], NDArray[np.float32]]) 
     Returns
     -------
     dict
-        `formula_error`, and `largest_albedo` unless the table has more than `_LARGE` values.
+        `formula_error`; `largest_albedo` unless the table has more than `_LARGE` values; `polarisation` of a polarised
+        table.
     """
     numbers: dict[str, Any] = {"formula_error": formula_error_of(layout.source, layout.wavelength_nm)}
     if layout.size <= _LARGE:
         table = Table.of(layout, read(slice(0, layout.shape[0])))
         numbers["largest_albedo"] = largest_albedo(table, layout.source)
+    if layout.facet_theta_d_deg is not None:
+        whole = Table.of(layout, read(slice(0, layout.shape[0])))
+        numbers["polarisation"] = record(element_error(whole, layout.source))
     return numbers
 
 

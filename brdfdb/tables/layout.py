@@ -16,6 +16,7 @@ from pydantic import ConfigDict
 
 from brdfdb.errors import BrdfdbError, ParameterError
 from brdfdb.materials import Material, Source, source_of
+from brdfdb.materials.polarised import polarised_source
 from brdfdb.parameters import Floats
 from brdfdb.tables.grids import Grid, check_wavelengths
 
@@ -104,6 +105,9 @@ class Layout:
         coefficients. With `part_nm` the rows say how f_r at those wavelengths makes f_r at all.
     part_nm : array of shape (parts,) [nm], optional
         Wavelengths of the parts of a table whose spectra mix f_r itself: nodes store the numbers at these wavelengths.
+    facet_theta_d_deg : array of shape (T,) [degree], optional
+        Half angles between light and viewer, from 0 to 90, at which a polarised table stores its Mueller matrix; see
+        `brdfdb.tables.polarisation`.
     bits : int
         Bits of the mantissa to keep, in [1, 23].
     reason : str
@@ -114,7 +118,7 @@ class Layout:
     ValueError
         If grid or wavelengths do not suit the source: no wavelengths for a spectral one, an isotropic grid for an
         anisotropic one, an azimuth of 90 or 180 degrees for a surface without the symmetry of an ellipse, a node at 90
-        degrees where f_r has a pole.
+        degrees where f_r has a pole, Mueller matrices of a source that has none.
     """
 
     source: Source
@@ -125,6 +129,7 @@ class Layout:
     bits: int = 23
     reason: str = ""
     part_nm: NDArray[np.float64] | None = None
+    facet_theta_d_deg: NDArray[np.float64] | None = None
 
     def __post_init__(self) -> None:
         source = self.source
@@ -144,6 +149,8 @@ class Layout:
         if self.wavelength_nm is not None:
             object.__setattr__(self, "wavelength_nm", check_wavelengths(self.wavelength_nm))
             source.brdf_at(self.wavelength_nm)
+        if self.facet_theta_d_deg is not None:
+            polarised_source(source)
 
     @property
     def plain(self) -> bool:
@@ -212,6 +219,7 @@ class Layout:
             "bits": self.bits,
             "reason": self.reason,
             **({} if self.part_nm is None else {"part_nm": self.part_nm.tolist()}),
+            **({} if self.facet_theta_d_deg is None else {"facet_theta_d_deg": self.facet_theta_d_deg.tolist()}),
         }
 
     @classmethod
@@ -231,7 +239,7 @@ class Layout:
             )
         arrays = {
             name: None if document.get(name) is None else np.array(document[name])
-            for name in ("wavelength_nm", "spectra", "part_nm")
+            for name in ("wavelength_nm", "spectra", "part_nm", "facet_theta_d_deg")
         }
         return cls(
             source,

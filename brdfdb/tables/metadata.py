@@ -13,6 +13,7 @@ from brdfdb.materials.spectrum import Spectrum
 from brdfdb.measurements.record import Measured
 from brdfdb.tables.first_numbers import FormulaError, LargestAlbedo
 from brdfdb.tables.layout import Interpolation
+from brdfdb.tables.polarisation_record import Polarisation
 from brdfdb.tables.stated_error import Error
 
 MANTISSA_BITS = 23  # of a float32 value
@@ -98,6 +99,9 @@ class TableMetadata(BaseModel):
     )
     request_sha256: str | None = Field(default=None, description="sha256 of the whole request")
     error: Error | None = Field(default=None, description="the stated error; null: not measured")
+    polarisation: Polarisation | None = Field(
+        default=None, description="Mueller matrices of the table, and their stated error; null: it is unpolarised"
+    )
     formula_error: FormulaError | None = Field(
         default=None, description="error of the model against the highest rung of its surface; null: not measured"
     )

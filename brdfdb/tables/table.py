@@ -12,15 +12,24 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from brdfdb._elementary import COS_HORIZON
 from brdfdb.errors import ParameterError
-from brdfdb.geometry import HALF_PI, asked_for, checked_angles, checked_vectors, radians, shape_of_angles
+from brdfdb.geometry import (
+    HALF_PI,
+    asked_for,
+    checked_angles,
+    checked_vectors,
+    radians,
+    shape_of_angles,
+    spherical_angles,
+)
 from brdfdb.materials.source import FourAngles
 from brdfdb.notebook import polar_sketch
 from brdfdb.parameters import Floats
-from brdfdb.tables import _kernels
+from brdfdb.tables import _kernels, stokes
 from brdfdb.tables._interpolation import Axes, prepared
 from brdfdb.tables.grids import Axis, Grid, axes_among, check_wavelengths
 from brdfdb.tables.layout import PLAIN, Interpolation, Layout
 from brdfdb.tables.metadata import TableMetadata
+from brdfdb.tables.polarisation import Facets, checked_facets, facets_of
 from brdfdb.tables.table_base import BaseTable
 
 # how numbers become f_r, the axes, the numbers, how many a node, how they make up a spectrum, the uniform part
@@ -63,6 +72,8 @@ class Table(BaseTable):
     n, k : array (L,) [1] or None
         Refractive index and extinction coefficient that the store says the table was computed with. Lookups do not
         read them.
+    facets : Facets or None
+        The polarisation; None of an unpolarised table.
     """
 
     name: str
@@ -80,6 +91,7 @@ class Table(BaseTable):
     part_nm: Axis | None = field(default=None, repr=False)
     n: Axis | None = field(default=None, repr=False)
     k: Axis | None = field(default=None, repr=False)
+    facets: Facets | None = field(default=None, repr=False)
 
     @classmethod
     def of(cls, layout: Layout, values: NDArray[np.float32], grid: Grid | None = None) -> Table:
@@ -96,6 +108,7 @@ class Table(BaseTable):
             spectra=layout.spectra,
             uniform=layout.uniform,
             part_nm=layout.part_nm,
+            facets=facets_of(layout),
         )
 
     @property
@@ -132,7 +145,7 @@ class Table(BaseTable):
     def nbytes(self) -> int:
         """Size [byte] of the arrays that lookups read."""
         arrays = (self.values, self.specular, self.spectra, self.uniform)
-        return sum(array.nbytes for array in arrays if array is not None)
+        return sum(array.nbytes for array in (*arrays, self.facets) if array is not None)
 
     @property
     def values_are_brdf(self) -> bool:
@@ -205,6 +218,92 @@ class Table(BaseTable):
         if not _kernels.specular(nodes, rows, at.nodes, at.weight, _flat(given, given.shape, dtype), horizon, values):
             checked_angles(theta_i, 0.0, 0.0, 0.0)
         return values.reshape(given.shape + at.tail)[()]
+
+    def mueller(
+        self,
+        theta_i: ArrayLike,
+        phi_i: ArrayLike,
+        theta_r: ArrayLike,
+        phi_r: ArrayLike,
+        wavelength_nm: ArrayLike | None = None,
+    ) -> Floats:
+        """Interpolate the Mueller BRDF [1/sr]: f_r times the normalised Mueller matrix.
+
+        Parameters and errors are those of `lookup`; ParameterError, too, if the table is unpolarised.
+
+        Returns
+        -------
+        array [1/sr]
+            Shaped as by `lookup`, and (4, 4). It gives the Stokes vector of the reflected radiance from that of the
+            irradiance, between bases of the surface, in the convention of `brdfdb.tables.stokes`. Element [0, 0] is
+            `lookup`. 0 below the horizon, nan where an angle is nan.
+        """
+        facets = self._polarised
+        at = self._wavelengths(wavelength_nm)
+        f_r = self.lookup(theta_i, phi_i, theta_r, phi_r, wavelength_nm)
+        values = np.asarray(f_r if at.tail else np.asarray(f_r)[..., np.newaxis])
+        normalised = facets.of_surface((theta_i, phi_i, theta_r, phi_r), values, at)
+        matrix = np.where(values == 0.0, 0.0, values)[..., np.newaxis, np.newaxis] * normalised
+        return np.asarray(matrix if at.tail else matrix[..., 0, :, :], dtype=np.asarray(f_r).dtype)
+
+    def mueller_vectors(self, wi: ArrayLike, wr: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:
+        """Interpolate the Mueller BRDF [1/sr] for unit vectors (..., 3), as `mueller`. The azimuth of a pole is 0."""
+        vectors = checked_vectors(wi, wr)
+        angles = (*spherical_angles(vectors.w_i), *spherical_angles(vectors.w_r))
+        matrix = self.mueller(*angles, wavelength_nm)
+        return matrix.astype(vectors.dtype)
+
+    def mueller_in_plane(self, wi: ArrayLike, wr: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:
+        """Interpolate the Mueller BRDF [1/sr] between bases of the plane of light and viewer; as `mueller_vectors`."""
+        facets, at = self._polarised, self._wavelengths(wavelength_nm)
+        vectors = checked_vectors(wi, wr)
+        f_r = np.asarray(self.lookup_vectors(wi, wr, wavelength_nm))
+        values = f_r if at.tail else f_r[..., np.newaxis]
+        theta_d = stokes.half_angle(*(w.astype(np.float64) for w in (vectors.w_i, vectors.w_r)))
+        matrix = values[..., np.newaxis, np.newaxis] * facets.in_plane(theta_d, values, at)
+        return np.asarray(matrix if at.tail else matrix[..., 0, :, :], dtype=vectors.dtype)
+
+    def facet_mueller(self, theta_d: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:
+        """Interpolate the Mueller matrix [1] of a facet over its first element, between bases of the plane.
+
+        Parameters
+        ----------
+        theta_d : array_like [rad]
+            Half the angle between light and viewer, in [0, pi/2].
+        wavelength_nm : float or array_like (M,) [nm], optional
+            As in `lookup`.
+
+        Returns
+        -------
+        array [1]
+            Shaped as by `lookup`, and (4, 4).
+        """
+        facets, at = self._polarised, self._wavelengths(wavelength_nm)
+        matrix = facets.facet(np.asarray(theta_d, np.float64), at)
+        return matrix if at.tail else matrix[..., 0, :, :]
+
+    def depolarised(self, wavelength_nm: ArrayLike | None = None) -> Floats:
+        """Interpolate the depolarised part of f_r [1/sr], which is uniform, shape (M,); () for one wavelength."""
+        at = self._wavelengths(wavelength_nm)
+        return self._polarised.depolarised_at(at).reshape(at.tail)
+
+    def specular_mueller(self, theta_i: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:
+        """Interpolate the Mueller matrix [1] of the specular part, towards the mirror direction at phi_i + pi.
+
+        Parameters, errors and shape are those of `specular_reflectance`, with (4, 4) added; bases are those of the
+        surface, which are those of the plane. ParameterError, too, if the table is unpolarised.
+        """
+        specular = np.asarray(self.specular_reflectance(theta_i, wavelength_nm))
+        matrix = specular[..., np.newaxis, np.newaxis] * self.facet_mueller(theta_i, wavelength_nm)
+        return np.asarray(matrix, dtype=specular.dtype)
+
+    @property
+    def _polarised(self) -> Facets:
+        if self.facets is None:
+            raise ParameterError(
+                "polarised", f"the table of {self.name} is unpolarised; build it with polarised = true in its recipe"
+            )
+        return self.facets
 
     @functools.cached_property
     def _specular_rows(self) -> tuple[NDArray[np.float64], NDArray[np.float32]]:
@@ -301,4 +400,5 @@ def table_from(name: str, revision: str, arrays: Mapping[str, NDArray[Any]], att
         part_nm=part_nm,
         n=arrays.get("n"),
         k=arrays.get("k"),
+        facets=checked_facets(arrays, 1 if wavelength_nm is None else wavelength_nm.size),
     )

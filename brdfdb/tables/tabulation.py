@@ -15,6 +15,8 @@ from brdfdb.parameters import Floats
 from brdfdb.tables.grids import RECIPROCITY, Axis, Grid
 from brdfdb.tables.layout import TABLE_VERSION, Layout
 from brdfdb.tables.metadata import TableMetadata
+from brdfdb.tables.polarisation import facets_of
+from brdfdb.tables.polarisation_record import record
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -232,6 +234,13 @@ def frame(layout: Layout) -> Frame:
         )
     if isinstance(source, MeasuredSource) and source.measured.extent is not None:
         variables["extrapolated"] = Variable(grid.names, extrapolated(source, grid), VARIABLES["extrapolated"])
+    if (facets := facets_of(layout)) is not None:
+        coordinates["mueller_theta_d"] = _coordinate("mueller_theta_d", facets.theta_d_deg)
+        named = ("mueller_theta_d", "wavelength", "element")
+        variables["mueller"] = Variable(named, facets.elements, VARIABLES["mueller"])
+        depolarised = facets.depolarised if facets.depolarised.size > 1 else facets.depolarised[0]
+        at = ("wavelength",) if facets.depolarised.size > 1 else ()
+        variables["depolarised"] = Variable(at, np.asarray(depolarised), VARIABLES["depolarised"])
     return Frame(variables, coordinates, metadata_of(layout).attributes())
 
 
@@ -289,6 +298,7 @@ def metadata_of(layout: Layout) -> TableMetadata:
         bits=layout.bits,
         reconstruction=_reconstruction(layout),
         reason=layout.reason,
+        polarisation=None if layout.facet_theta_d_deg is None else record(),
     )
 
 
@@ -303,6 +313,7 @@ _LONG_NAMES = {
     "phi_h": "azimuth of the half vector",
     "theta_d": "angle between light and half vector",
     "phi_d": "azimuth of the light about the half vector",
+    "mueller_theta_d": "half the angle between light and viewer, of the Mueller matrix",
 }
 
 VARIABLES = {
@@ -311,5 +322,7 @@ VARIABLES = {
     "spectra": {"units": "1", "long_name": "how the parts make up each wavelength"},
     "mixture": {"units": "1", "long_name": "how f_r of the parts makes f_r at each wavelength"},
     "extrapolated": {"long_name": "true: the node lies outside of the directions that were measured"},
+    "mueller": {"units": "1", "long_name": "elements of the Mueller matrix, as the attribute polarisation says"},
+    "depolarised": {"units": "sr-1", "long_name": "the part of f_r that is not polarised"},
     "uniform": {"units": "sr-1", "long_name": "the part of f_r that is the same in all directions"},
 }

@@ -11,6 +11,7 @@ from pydantic import BaseModel, Field
 from brdfdb.tables.albedo import AlbedoDocument
 from brdfdb.tables.evaluation import Output, Values
 from brdfdb.tables.lobe_views import View as ViewName
+from brdfdb.tables.stokes_document import StokesDocument
 
 
 class Evaluated(BaseModel):
@@ -55,6 +56,9 @@ class Lookup(Evaluated):
 
     material: str
     revision: str
+    stokes: StokesDocument | None = Field(
+        default=None, description="reflected light of a polarised table; missing: not asked for"
+    )
 
 
 class Lookups(BaseModel):

@@ -6,7 +6,7 @@ import fnmatch
 import itertools
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -23,12 +23,15 @@ from pydantic import (
 
 from brdfdb.errors import MaterialError, ParameterError, sentence_of
 from brdfdb.materials import PAPERS, Material, exact_material, presets, written_name
+from brdfdb.materials.polarised import polarised_source
 from brdfdb.models import MODELS
 from brdfdb.store.family import Sweep
 from brdfdb.store.paths import NAME
 from brdfdb.tables.grids import Axis, Grid, check_wavelengths
 from brdfdb.tables.layout import TABLE_VERSION, Interpolation, Layout, digest
 from brdfdb.tables.planner import PLAN_VERSION, coarsest, offset_of, plan
+from brdfdb.tables.polarisation import GRID_TOLERANCE, planned_theta_d
+from brdfdb.tables.polarisation_record import POLARISATION_VERSION
 from brdfdb_pipelines import preset_names, toml_file
 from brdfdb_pipelines.measured_job import MeasuredJob, measured_job
 from brdfdb_pipelines.recipe_grids import LIST, STRICT, Grids, Nodes, Range, RecipeError, nodes_of
@@ -53,9 +56,19 @@ class Job:
     interpolation: str = "linear"
     planned_on: Material | None = None
     family: Mapping[str, Any] | None = None
+    polarised: bool = False
 
     def layout(self) -> Layout:
         """Return the layout of the table; to a tolerance, this takes the planner a second or more."""
+        layout = self._unpolarised()
+        if not self.polarised:
+            return layout
+        assert self.wavelength_nm is not None  # of all models with Mueller matrices
+        within = GRID_TOLERANCE if self.tolerance is None else self.tolerance
+        nodes = planned_theta_d(self.material, self.wavelength_nm, within)
+        return replace(layout, facet_theta_d_deg=nodes)
+
+    def _unpolarised(self) -> Layout:
         if self.grid is not None:
             method, logarithm = self.interpolation.removeprefix("log-"), self.interpolation.startswith("log-")
             offset = offset_of(self.material, self.wavelength_nm) if logarithm else 0.0
@@ -68,6 +81,8 @@ class Job:
         """Raise the ParameterError that `layout` would raise for what does not suit the material."""
         grid = coarsest(self.material) if self.grid is None else self.grid
         layout = Layout(self.material, grid, self.wavelength_nm)
+        if self.polarised:
+            polarised_source(self.material)
         if layout.size > _MOST_VALUES:
             shape = " x ".join(map(str, layout.shape))
             raise RecipeError("", f"{shape} are {layout.size:.3g} values, more than the {_MOST_VALUES:.3g} of a table")
@@ -87,9 +102,11 @@ class Job:
         """Everything that decides the table, ready for JSON: the same request makes the same table."""
         member = {} if self.family is None else {"family": dict(self.family)}
         alike = {} if self.planned_on is None else {"planned_on": self.planned_on.document()}
+        polarised = {"polarised": POLARISATION_VERSION} if self.polarised else {}
         return {
             **member,
             **alike,
+            **polarised,
             "table_version": TABLE_VERSION,
             **self.material.document(),
             "wavelength_nm": None if self.wavelength_nm is None else self.wavelength_nm.tolist(),
@@ -123,6 +140,10 @@ class Recipe(BaseModel):
     forms: Literal["exact", "paper"] = Field(
         default="paper",
         description="exact: tabulate the integral that a formula approximates, if there is one, except of families",
+    )
+    polarised: bool = Field(
+        default=False,
+        description="true: tabulate Mueller matrices, too, to the tolerance; for models of polarised light",
     )
     define: dict[str, dict[str, Any]] = Field(
         default={},
@@ -162,7 +183,10 @@ class Recipe(BaseModel):
         grids = {name: self._grid(grid, name) for name, grid in given.items()}
         wavelengths = self._wavelengths()
         jobs = []
-        for named, family in self._selected():
+        selected = self._selected()
+        if self.polarised and self._measured:
+            raise RecipeError("polarised", f"{self._measured[0].name} is measured, and f_r alone is known of it")
+        for named, family in selected:
             material = exact_material(named) if self.forms == "exact" and family is None else named
             wavelength_nm = None
             if material.spectral:
@@ -178,6 +202,7 @@ class Recipe(BaseModel):
                 *(material, wavelength_nm, grids.get(kind), self.tolerance, self.interpolation or "linear"),
                 planned_on=None if material is named or self.tolerance is None else named,
                 family=family,
+                polarised=self.polarised,
             )
             try:
                 job.check()

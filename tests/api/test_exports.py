@@ -26,6 +26,7 @@ FOIL, FELT, TILE, METAL = (
     ("query", "highest"),
     [
         ("rgl?megabytes=65", 64),
+        ("kaist?megabytes=65", 64),
         ("radiance?cells=600001", 600_000),
         ("png?size=513", 512),
         ("eradiate?nodes=130", 129),

@@ -300,7 +300,7 @@ def test_unknown_query_of_a_post(client: Client) -> None:
     problem = client.problem("POST", f"{FOIL}?theta_i=3", 422, json={"theta_i": 1, "theta_r": 2})
     assert (
         problem["detail"]
-        == "theta_i: unknown parameter; allowed are output, illuminant, format, from, error, wavelength_nm"
+        == "theta_i: unknown parameter; allowed are output, illuminant, format, from, error, stokes, wavelength_nm"
     )
 
 

@@ -43,7 +43,17 @@ class Brightness(Finding):
 
 def test_the_modules_of_the_room_are_the_registry_in_their_order() -> None:
     assert list(FINDINGS) == [
-        *("energy", "reciprocity", "values", "nodes", "smoothness", "table_error", "sampling", "validity")
+        *(
+            "energy",
+            "reciprocity",
+            "values",
+            "nodes",
+            "smoothness",
+            "table_error",
+            "polarisation",
+            "sampling",
+            "validity",
+        )
     ]
     for key, kind in FINDINGS.items():
         assert (kind.key, kind.__module__) == (key, f"brdfdb.audit.{key}")

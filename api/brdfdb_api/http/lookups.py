@@ -20,6 +20,7 @@ from brdfdb.errors import ParameterError
 from brdfdb.store.shelf import Shelf
 from brdfdb.tables.evaluation import Surface, Values, surface_of
 from brdfdb.tables.points import ANGLES, Points, PointsBody
+from brdfdb.tables.stokes_document import reflected, stokes_document
 from brdfdb.tables.table import Table
 from brdfdb.tables.values_document import Lookup, Lookups, values_document
 from brdfdb_api.http.addresses import NPY_ANSWER, Content, Revision, accept_of, addresses, answers, body, both, shelf_of
@@ -60,6 +61,7 @@ INLINE_BYTES = 96 * 2**10  # larger bodies are read in a thread; 1000 points tak
 LARGE_BYTES, LARGE_VALUES, LARGE_AT_ONCE = 2**20, 100_000, 2
 TURN_S = 10.0  # longest wait for a turn [s]
 LIMITS = {"json": (1, 100), "npy": (100, 800)}  # points and values of one answer, as multiples of max_points
+MATRIX = 16  # elements of the Mueller matrix that a Stokes vector takes
 SPECTRA_OF_COLOURS = 10  # factor on the number of values where only colours are returned
 _PARAMETERS = (*ANGLES, "wavelength_nm", "illuminant", "error")  # of the library, which a request calls the same
 NPZ = "application/x-npz"
@@ -132,6 +134,7 @@ def checked_size(max_points: int, points: Points, options: Options, surface: Sur
         )
     wavelengths = surface.wavelengths(points)
     values = points.count * (1 if wavelengths is None else int(np.size(wavelengths)))
+    values *= 1 if getattr(options, "incident", None) is None else MATRIX
     if options.output != "spectrum" and surface.kind == "table":
         most_values *= SPECTRA_OF_COLOURS
     if values > most_values:
@@ -173,8 +176,18 @@ def write_answer(
     points: Points, options: Options, surface: Surface, kind: Format, headers: Encoded, about: dict[str, Any]
 ) -> Response:
     """Look the points up and write them as `kind`; `about` begins the document."""
-    values = evaluate(points, options, surface, specular=kind == "json")
+    incident = getattr(options, "incident", None)
     POINTS.labels(surface.kind).inc(points.count)
+    if incident is not None:
+        if surface.source.facets is None:
+            raise RequestError(422, f"stokes: the table of {surface.source.name} is unpolarised", "stokes")
+        if kind == "npy" and getattr(options, "error", False):
+            raise RequestError(422, "stokes: a .npy answer holds either Stokes vectors or errors", "stokes")
+        with refused():
+            if kind == "npy":
+                return EncodedResponse(npy_bytes(reflected(surface.source, points, incident)), headers)
+            about = about | {"stokes": stokes_document(surface.source, points, incident)}
+    values = evaluate(points, options, surface, specular=kind == "json")
     if kind == "npy":
         content = npy_bytes(values.brdf if values.error is None else np.stack([values.brdf, values.error]))
         return EncodedResponse(content, headers)
@@ -216,7 +229,7 @@ async def answer_point(scope: Scope, name: str, revision: str | None) -> Respons
     state, kind, points = scope["app"].state, query.kind(accept), query.points
     table = await _table(state.shelf, name, revision)
     surface = surface_in(table, query)
-    computed = query.source == "model" or query.output != "spectrum"
+    computed = query.source == "model" or query.output != "spectrum" or query.stokes is not None
     headers = lookup_headers(
         tag_in(table, surface), table.revision, kind, immutable=revision is not None and not computed
     )

@@ -25,6 +25,7 @@ from brdfdb.errors import ParameterError
 from brdfdb.tables.evaluation import Output
 from brdfdb.tables.lobe_views import View
 from brdfdb.tables.points import TURN, Points, PointsBody, fields_of_npy, listed
+from brdfdb.tables.stokes_document import checked_stokes
 from brdfdb_api.http.errors import RequestError
 from brdfdb_api.http.responses import JSON, NPY, preferred
 
@@ -101,7 +102,37 @@ class Stated(OfTable):
         return error
 
 
-class BodyQuery(Stated):
+class Polarised(Stated):
+    """Form of values of a table, with the light that a polarised one reflects."""
+
+    stokes: str | None = Field(
+        default=None,
+        description="incident Stokes vector I,Q,U,V: answers of polarised tables hold that of the reflected light; npy "
+        "holds it in place of f_r, on a last axis",
+    )
+
+    @field_validator("stokes")
+    @classmethod
+    def _of_light(cls, text: str | None, info: ValidationInfo) -> str | None:
+        if text is None:
+            return None
+        if info.data.get("source") == "model" or info.data.get("output") != "spectrum":
+            raise ValueError("it goes with from=table and output=spectrum alone")
+        try:
+            checked_stokes([float(number) for number in text.split(",")])
+        except ParameterError as error:
+            raise ValueError(error.sentence) from None
+        except ValueError:
+            raise ValueError(f"{shortened(text)!r} is not made of four finite numbers, I,Q,U,V") from None
+        return text
+
+    @property
+    def incident(self) -> tuple[float, ...] | None:
+        """The incident Stokes vector; None if none was given."""
+        return None if self.stokes is None else tuple(map(float, self.stokes.split(",")))
+
+
+class BodyQuery(Polarised):
     """The query of a lookup whose points are in the body."""
 
     wavelength_nm: Wavelengths = Field(default=(), description="wavelength [nm] of a .npy body; JSON holds its own")
@@ -115,7 +146,7 @@ class ManyQuery(Stated):
     )  # type: ignore[assignment]
 
 
-class PointQuery(Stated):
+class PointQuery(Polarised):
     """The query of a lookup of one point."""
 
     wavelength_nm: Wavelengths = ()

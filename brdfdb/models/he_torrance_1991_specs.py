@@ -1,0 +1,41 @@
+"""Specification of the model of He et al. 1991, with its Mueller matrices."""
+
+from __future__ import annotations
+
+from brdfdb.models._he_torrance_validity import G_ALONG_NORMAL, limits, lowest_cosine
+from brdfdb.models.he_torrance_1991 import (
+    SIGMA_0_UM,
+    TAU_UM,
+    A,
+    forms,
+    he_torrance,
+    he_torrance_specular,
+    he_torrance_vectors,
+    lobe,
+    lossless,
+)
+from brdfdb.models.he_torrance_1991_polarised import he_torrance_facet_mueller, he_torrance_mueller_vectors
+from brdfdb.parameters import ModelSpec, Polarised
+
+SPEC = ModelSpec(
+    name="he_torrance",
+    version=2,
+    title="He-Torrance, unpolarised",
+    equation="eqs 71-84",
+    reference="he1991",
+    parameters=(SIGMA_0_UM, TAU_UM, A),
+    evaluate=he_torrance,
+    vectors=he_torrance_vectors,
+    specular=he_torrance_specular,
+    specular_parameters=("wavelength_nm", "sigma_0_um", "tau_um", "n", "k"),
+    spectral=True,
+    uniform="a",
+    lobe=lobe,
+    lossless=lossless,
+    forms=forms,
+    highest_rung="the whole sum of eq. 78",
+    diagnostic=G_ALONG_NORMAL,
+    limits=limits,
+    uniform_bound_cosine=lowest_cosine,
+    polarised=Polarised(mueller=he_torrance_mueller_vectors, facet=he_torrance_facet_mueller),
+)

@@ -1,0 +1,94 @@
+"""Stokes vectors and their bases: THE convention of polarised light, and rotations between bases.
+
+* The Stokes vector is (I, Q, U, V) of the fields E_s and E_p that travel along k, varying as exp(i k.r - i omega t):
+  I = abs(E_s)^2 + abs(E_p)^2, Q = abs(E_s)^2 - abs(E_p)^2, U + iV = 2 E_s conj(E_p). Q > 0 is s-polarised, U > 0 is
+  linear along s + p, and V > 0 turns counter-clockwise for an observer who looks towards the incoming light.
+* (p, s, k) is right-handed: p = s x k. Light travels along -w_i before and along w_r after reflection.
+* The basis of the surface: s = z x w / abs(z x w) for light and viewer, horizontal, which is (-sin phi, cos phi, 0).
+  Functions of unit vectors take 0 as the azimuth of the pole.
+* The basis of the plane of light and viewer, in which a facet mirrors one to the other: s along w_i x w_r for both.
+* A Mueller matrix acts on the column of the incident light: a row belongs to the reflected light.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from brdfdb.geometry import unit_vector
+
+_NO_PLANE = 1e-12  # sine of the angle between light and viewer below which any plane through both serves
+
+CONVENTION = (
+    "Stokes vectors (I, Q, U, V): Q > 0 is s-polarised, U > 0 linear along s + p, V > 0 counter-clockwise for an "
+    "observer who looks towards the incoming light; p = s x k, with k the direction of travel"
+)
+SURFACE_BASIS = "s = z x w / |z x w|, horizontal, for light and viewer"
+PLANE_BASIS = "s = w_i x w_r / |w_i x w_r|, normal to the plane of light and viewer, for both"
+
+
+class Plane(NamedTuple):
+    """The plane of light and viewer, seen from the basis of the surface.
+
+    Attributes
+    ----------
+    theta_d : array [rad]
+        Half the angle between light and viewer.
+    light, viewer : array (..., 4, 4)
+        Rotations of Stokes vectors: of the light from the basis of the surface to that of the plane, of the viewer from
+        that of the plane to that of the surface. The Mueller matrix between bases of the surface is
+        ``viewer @ M @ light`` of that between bases of the plane.
+    """
+
+    theta_d: NDArray[np.float64]
+    light: NDArray[np.float64]
+    viewer: NDArray[np.float64]
+
+
+def rotation(angle: ArrayLike) -> NDArray[np.float64]:
+    """Return the rotation (..., 4, 4) of Stokes vectors to a basis whose s is turned by `angle` [rad] from s to p.
+
+    Examples
+    --------
+    >>> (rotation(np.pi / 4) @ [1.0, 0.0, 1.0, 0.0]).round(9).tolist()  # linear along s + p is s there
+    [1.0, 1.0, 0.0, 0.0]
+    """
+    twice = 2.0 * np.asarray(angle, dtype=np.float64)
+    return _turned(np.cos(twice), np.sin(twice))
+
+
+def plane(theta_i: ArrayLike, phi_i: ArrayLike, theta_r: ArrayLike, phi_r: ArrayLike) -> Plane:
+    """Return the plane of light and viewer at angles [rad], which broadcast."""
+    angles = np.broadcast_arrays(*(np.asarray(angle, np.float64) for angle in (theta_i, phi_i, theta_r, phi_r)))
+    w_i, w_r = unit_vector(angles[0], angles[1]), unit_vector(angles[2], angles[3])
+    s_i, s_r = horizontal(angles[1]), horizontal(angles[3])
+    normal = np.cross(w_i, w_r)
+    length = np.linalg.norm(normal, axis=-1, keepdims=True)
+    s = np.where(length > _NO_PLANE, normal / np.maximum(length, _NO_PLANE), s_i)
+    return Plane(half_angle(w_i, w_r), _to(s, s_i, -w_i), np.swapaxes(_to(s, s_r, w_r), -1, -2))
+
+
+def half_angle(w_i: NDArray[np.float64], w_r: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return theta_d [rad], half the angle between unit vectors (..., 3)."""
+    return np.asarray(np.arctan2(np.linalg.norm(w_i - w_r, axis=-1), np.linalg.norm(w_i + w_r, axis=-1)))
+
+
+def horizontal(phi: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return s (..., 3) of the basis of the surface for a direction of azimuth phi [rad]."""
+    return np.stack([-np.sin(phi), np.cos(phi), np.zeros_like(phi)], axis=-1)
+
+
+def _to(s: NDArray[np.float64], own: NDArray[np.float64], k: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the rotation to the basis of `s` from that of `own`, unit vectors normal to the direction of travel k."""
+    cos, sin = np.sum(s * own, axis=-1), np.sum(s * np.cross(own, k), axis=-1)
+    return _turned(cos * cos - sin * sin, 2.0 * cos * sin)
+
+
+def _turned(cos: NDArray[np.float64], sin: NDArray[np.float64]) -> NDArray[np.float64]:
+    matrix = np.zeros((*np.shape(cos), 4, 4))
+    matrix[..., 0, 0] = matrix[..., 3, 3] = 1.0
+    matrix[..., 1, 1] = matrix[..., 2, 2] = cos
+    matrix[..., 1, 2], matrix[..., 2, 1] = sin, -sin
+    return matrix

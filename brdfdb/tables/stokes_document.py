@@ -1,0 +1,64 @@
+"""Documents of reflected Stokes vectors: what a polarised table makes of one incident Stokes vector."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from pydantic import BaseModel, Field
+
+from brdfdb.errors import ParameterError
+from brdfdb.parameters import Floats
+from brdfdb.tables import stokes
+from brdfdb.tables.points import Points
+
+if TYPE_CHECKING:
+    from brdfdb.tables.table import Table
+
+_ROUNDING = 1e-6  # of the degree of polarisation of what is written as decimals
+
+
+class StokesDocument(BaseModel):
+    """Reflected light of a polarised table, for one incident Stokes vector."""
+
+    incident: list[float] = Field(description="Stokes vector (I, Q, U, V) of the irradiance")
+    reflected: list[Any] = Field(description="Stokes vector of the radiance [1/sr]: shape of brdf, then I, Q, U, V")
+    specular: list[Any] = Field(
+        description="of the specular part, without unit, towards phi_i + 180 degrees: shape of specular_reflectance, "
+        "then I, Q, U, V"
+    )
+    convention: str = Field(description="meaning of Q, U and V, in words")
+    basis: str = Field(description="basis of both vectors, in words")
+    element_error: float | None = Field(
+        description="99 of 100 of the elements m_ij / m_00 of the Mueller matrix are within it; null: not stated"
+    )
+
+
+def checked_stokes(numbers: Sequence[float]) -> tuple[float, ...]:
+    """Return a Stokes vector; ParameterError if it is none of any light."""
+    if len(numbers) != 4 or not np.all(np.isfinite(numbers)):
+        raise ParameterError("stokes", "it is not made of four finite numbers, I,Q,U,V", tuple(numbers))
+    intensity, *others = numbers
+    if not float(np.linalg.norm(others)) <= (1.0 + _ROUNDING) * intensity:
+        raise ParameterError("stokes", f"Q, U and V make more than I = {intensity:g}, which no light does", numbers)
+    return tuple(numbers)
+
+
+def reflected(table: Table, points: Points, incident: Sequence[float]) -> Floats:
+    """Return Stokes vectors [1/sr] of reflected light, shape of the lookup and 4; ParameterError as by `mueller`."""
+    return np.asarray(table.mueller(*points.angles, points.wavelength_nm) @ np.array(incident))
+
+
+def stokes_document(table: Table, points: Points, incident: Sequence[float]) -> dict[str, Any]:
+    """Return the fields of `StokesDocument`, with numpy arrays; ParameterError as by `Table.mueller`."""
+    record = table.metadata.polarisation
+    specular = table.specular_mueller(points.angles[0], points.wavelength_nm) @ np.array(incident)
+    return {
+        "incident": list(incident),
+        "reflected": reflected(table, points, incident),
+        "specular": np.ascontiguousarray(specular),
+        "convention": stokes.CONVENTION,
+        "basis": stokes.SURFACE_BASIS,
+        "element_error": None if record is None or record.error is None else record.error.worst_p99,
+    }
