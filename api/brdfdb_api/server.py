@@ -29,6 +29,7 @@ GRACE_S = 10  # time for requests in flight when the server stops [s]
 STOPPED_S = LAST_S + GRACE_S + 3.0  # time after which a worker that was told to stop is killed [s]
 BEAT_S = 1  # time between signs of life of a worker [s]
 HALTED_S = 15.0  # time without one after which a worker is replaced [s]
+LOADED_S = 120.0  # time until the first one: packages are loaded [s]
 
 OTHERS = ("uvicorn", "py.warnings")  # loggers of other packages
 
@@ -159,8 +160,8 @@ async def _keep(workers: int, listener: socket.socket, counts: str) -> None:
 
 
 async def _ended(signs: asyncio.StreamReader) -> str:
-    """Wait until a worker ends or, once it has begun to give signs of life, halts."""
-    limit = None  # kernels and packages are loaded before the first sign
+    """Wait until a worker ends or halts."""
+    limit = LOADED_S
     try:
         while await asyncio.wait_for(signs.read(64), limit):
             limit = HALTED_S

@@ -95,7 +95,7 @@ class AuditFile:
         try:
             document = json.loads(self._path.read_bytes())
             when, entries, by_name = str(document["when"]), list(document["materials"]), {}
-        except (OSError, ValueError, KeyError, TypeError):
+        except (OSError, ValueError, KeyError, TypeError, RecursionError):
             return Report("", {})
         for entry in entries:
             with contextlib.suppress(ValidationError):

@@ -35,14 +35,19 @@ class StokesDocument(BaseModel):
     )
 
 
-def checked_stokes(numbers: Sequence[float]) -> tuple[float, ...]:
-    """Return a Stokes vector; ParameterError if it is none of any light."""
-    if len(numbers) != 4 or not np.all(np.isfinite(numbers)):
-        raise ParameterError("stokes", "it is not made of four finite numbers, I,Q,U,V", tuple(numbers))
+def read_stokes(text: str) -> tuple[float, ...]:
+    """Return the Stokes vector of a text such as 1,0.5,0,0; ParameterError if it is none of any light."""
+    try:
+        numbers = tuple(float(number) for number in text.split(","))
+    except ValueError:
+        numbers = ()
+    if len(numbers) != 4 or "_" in text or not np.all(np.isfinite(numbers)):
+        shown = text.encode("ascii", "backslashreplace").decode()[:40]
+        raise ParameterError("stokes", f"{shown!r} is not made of four finite numbers, I,Q,U,V", text)
     intensity, *others = numbers
     if not float(np.linalg.norm(others)) <= (1.0 + _ROUNDING) * intensity:
-        raise ParameterError("stokes", f"Q, U and V make more than I = {intensity:g}, which no light does", numbers)
-    return tuple(numbers)
+        raise ParameterError("stokes", f"Q, U and V make more than I = {intensity:g}, which no light does", text)
+    return numbers
 
 
 def reflected(table: Table, points: Points, incident: Sequence[float]) -> Floats:

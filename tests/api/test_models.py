@@ -248,3 +248,11 @@ def test_several_materials_count_together(client: Client) -> None:
 def test_limits_are_those_of_the_service(root: Path) -> None:
     body = {**PLASTER, "theta_i": 1, "theta_r": [2] * 5}
     client_of(root, max_points=4).problem("POST", "/v1/models/oren_nayar/lookup", 413, json=body)
+
+
+def test_a_name_that_is_no_text_and_a_very_long_one_are_shown_in_part(client: Client) -> None:
+    for name in ("\\ud800", "a" * 60_000):
+        body = f'{{"parameters": {{"{name}": 1, "rho": 0.5}}, "theta_i": 1, "theta_r": 1}}'
+        problem = client.problem("POST", "/v1/models/lambert/lookup", 422, content=body)
+        assert len(problem["detail"]) <= 2000
+        assert len(problem["parameter"]) <= 100

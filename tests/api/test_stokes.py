@@ -76,9 +76,9 @@ def test_answers_without_a_stokes_vector_are_as_they_were(client: Client) -> Non
 @pytest.mark.parametrize(
     ("query", "sentence"),
     [
-        ({"stokes": "1,0"}, "stokes: it is not made of four finite numbers, I,Q,U,V"),
+        ({"stokes": "1,0"}, "stokes: '1,0' is not made of four finite numbers, I,Q,U,V"),
         ({"stokes": "1,0,0,x"}, "stokes: '1,0,0,x' is not made of four finite numbers, I,Q,U,V"),
-        ({"stokes": "1,0,0,nan"}, "stokes: it is not made of four finite numbers, I,Q,U,V"),
+        ({"stokes": "1,0,0,nan"}, "stokes: '1,0,0,nan' is not made of four finite numbers, I,Q,U,V"),
         ({"stokes": "1,1,1,0"}, "stokes: Q, U and V make more than I = 1, which no light does"),
         ({"stokes": "1,0,0,0", "from": "model"}, "stokes: it goes with from=table and output=spectrum alone"),
         ({"stokes": "1,0,0,0", "output": "xyz"}, "stokes: it goes with from=table and output=spectrum alone"),

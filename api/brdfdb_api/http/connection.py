@@ -5,8 +5,12 @@ from __future__ import annotations
 import sys
 from typing import Any
 
+import httptools
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 
+from brdfdb_api.http.errors import RequestError, problem_of
+
+PIPELINED = 1000  # requests that may wait for the answer to an earlier one
 HEAD_BYTES = 64 * 2**10  # limit on a head [byte]; httptools reads no longer addresses
 # Time in which a head must arrive, and a piece of an answer be read [s]. uvicorn closes kept connections that send
 # nothing after 5 s already
@@ -49,7 +53,16 @@ class Connection(HttpToolsProtocol):
 
     def on_headers_complete(self) -> None:
         self._pending = 0
+        if not self.flow.write_paused:
+            self._quiet_since = self.loop.time()
         super().on_headers_complete()
+        if len(self.pipeline) > PIPELINED:
+            self.transport.abort()
+
+    def on_response_complete(self) -> None:
+        super().on_response_complete()  # reads on, whatever waits already
+        if self.pipeline:
+            self.flow.pause_reading()
 
     def on_body(self, body: bytes) -> None:
         self._pending = 0
@@ -58,6 +71,17 @@ class Connection(HttpToolsProtocol):
     def resume_writing(self) -> None:
         self._quiet_since = self.loop.time()  # a piece of the answer was read
         super().resume_writing()
+
+    def send_400_response(self, msg: str) -> None:
+        """Refuse what is no HTTP; answers to earlier requests come first, and are the last then."""
+        cycle = self.cycle
+        if cycle is not None and not cycle.response_complete and (cycle.response_started or not cycle.more_body):
+            cycle.keep_alive = False
+            return
+        answer = problem_of(RequestError(400, msg))
+        fields = b"".join(b"%s: %s\r\n" % field for field in (*answer.raw_headers, (b"connection", b"close")))
+        self.transport.write(b"HTTP/1.1 400 Bad Request\r\n" + fields + b"\r\n" + answer.body)
+        self.transport.close()
 
     def _should_upgrade(self) -> bool:
         return True  # the request waits for `handle_websocket_upgrade`
@@ -73,4 +97,5 @@ class Connection(HttpToolsProtocol):
             return
         line = b"%s %s HTTP/%s\r\n" % (self.parser.get_method(), self.url, self.parser.get_http_version().encode())
         fields = (b"%s: %s\r\n" % field for field in self.headers if field[0] != b"upgrade")
+        self.parser = httptools.HttpRequestParser(self)  # the other one reads nothing after a message that closes
         self._parts += [memoryview(self._part)[error.args[0] :], b"".join((line, *fields, b"\r\n"))]

@@ -105,10 +105,16 @@ def _problem(
         "type": "about:blank",
         "title": _TITLES.get(status) or HTTPStatus(status).phrase,
         "status": status,
-        "detail": detail.encode(errors="backslashreplace").decode(),  # paths may have what is no text
+        "detail": _shown(detail, 2000),
     }
     if parameter is not None:
-        problem["parameter"] = parameter
+        problem["parameter"] = _shown(parameter, 100)
     if closest is not None:
         problem["closest"] = list(closest)
     return Response(orjson.dumps(problem), status_code=status, media_type=PROBLEM_JSON, headers=headers)
+
+
+def _shown(text: str, most: int) -> str:
+    """Return what is shown of a text: paths and names may have what is no text, and requests long names."""
+    text = text.encode(errors="backslashreplace").decode()
+    return text if len(text) <= most else f"{text[: most - 1]}…"

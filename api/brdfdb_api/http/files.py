@@ -21,7 +21,7 @@ from brdfdb_api.http.responses import Document, cache_headers, tagged
 
 BYTES = "application/octet-stream"
 
-_RANGE = re.compile(r"bytes=(?:(?P<first>\d{1,18})-(?:\d{1,18})?|-(?P<last>\d{1,18}))")  # others are not read
+_RANGE = re.compile(r"bytes=(?:(?P<first>\d{1,18})-(?P<end>\d{1,18})?|-(?P<last>\d{1,18}))")  # others are not read
 
 files = addresses()
 
@@ -70,7 +70,7 @@ def stored_file(request: Request, name: str, revision: str, file: str) -> Respon
 def _check_range(request: Request, size: int) -> None:
     """Forget a range that is not one of bytes; RequestError (416) for one that begins after the end of the file."""
     part = _RANGE.fullmatch(request.headers.get("range", ""))
-    if part is None:
+    if part is None or (part["end"] and int(part["end"]) < int(part["first"])):
         request.scope["headers"] = [header for header in request.scope["headers"] if header[0] != b"range"]
     elif int(part["first"] or 0) >= size or (part["last"] == "0" and not part["first"]):
         raise RequestError(416, f"the file has {size} bytes", Content_Range=f"bytes */{size}")

@@ -30,8 +30,8 @@ LOOKUP_ROUTES = (LOOKUP_ROUTE, "/v1/materials/{name}/revisions/{revision}/lookup
 GONE = 499  # status of a request whose client went away, as nginx counts it
 SMALL = 64 * 2**10  # size up to which bodies and answers are not counted [byte]
 BODIES = 1  # bodies of the largest size that may be in memory together
-STALLED_S = 10.0  # longest time without a piece of a body [s]
-RATE = 100_000  # lowest speed at which a body may arrive after the first `STALLED_S` [byte/s]
+STALLED_S = 10.0  # time that a body may be late [s]: behind `RATE`, the lowest speed at which it may arrive
+RATE = 100_000  # [byte/s]
 PIECE = 256 * 2**10  # size of the pieces of larger answers [byte]
 ROOM = {"memory": 64 * 2**20, "files": 2**31}  # bytes of larger answers that may wait to be read
 _REQUEST_ID = re.compile(rb"[A-Za-z0-9._-]{1,64}")
@@ -140,7 +140,7 @@ class _Exchange:
         self.head = scope["method"] == "HEAD"
         self.size = 0  # bytes of the body so far
         self.counted = 0  # those that count
-        self.begun_at = 0.0  # time when the body was first waited for [s]
+        self.due_at = 0.0  # time when the next piece of the body must have come [s]
         self.whole = False  # whether the body is
         self.status = 0  # status of the answer, once there is one
         self.start: Message | None = None  # the head of the answer, which waits for the first piece of the body
@@ -168,14 +168,16 @@ class _Exchange:
 
     async def _piece(self) -> Message:
         """Return the next piece of the body; RequestError (408) if it does not come in time."""
-        now = asyncio.get_running_loop().time()
-        self.begun_at = self.begun_at or now
+        now = asyncio.get_running_loop().time
+        self.due_at = self.due_at or now() + STALLED_S
         try:
-            async with asyncio.timeout_at(min(now, self.begun_at + self.size / RATE) + STALLED_S):
-                return await self._receive()
+            async with asyncio.timeout_at(self.due_at):
+                message = await self._receive()
         except TimeoutError:
-            detail = f"the body did not arrive in time: within {STALLED_S:g} s, or at {RATE} bytes a second"
+            detail = f"the body did not arrive in time: at {RATE} bytes a second, after the first {STALLED_S:g} s"
             raise RequestError(408, detail) from None
+        self.due_at = min(now() + STALLED_S, self.due_at + len(message.get("body", b"")) / RATE)
+        return message
 
     async def send(self, message: Message) -> None:
         if self.gone:
@@ -202,6 +204,8 @@ class _Exchange:
 
     async def send_large(self) -> None:
         """Send a large answer in pieces, as fast as they are read. What does not fit in memory waits in a file."""
+        self.edge.bodies -= self.counted  # nobody needs the body any more
+        self.counted = 0
         if self.large is None:
             return
         size, unread = len(self.large), self.edge.unread
@@ -218,6 +222,8 @@ class _Exchange:
                     piece = {"type": "http.response.body", "body": file.read(PIECE), "more_body": end < size}
                     await self._sent(piece)
             self.ended = True
+        except OSError as error:  # no room for the file
+            raise RequestError(503, "no large answer can wait to be read; ask again later") from error
         finally:
             unread[place] -= size
 

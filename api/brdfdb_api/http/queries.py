@@ -25,7 +25,7 @@ from brdfdb.errors import ParameterError
 from brdfdb.tables.evaluation import Output
 from brdfdb.tables.lobe_views import View
 from brdfdb.tables.points import TURN, Points, PointsBody, fields_of_npy, listed
-from brdfdb.tables.stokes_document import checked_stokes
+from brdfdb.tables.stokes_document import read_stokes
 from brdfdb_api.http.errors import RequestError
 from brdfdb_api.http.responses import JSON, NPY, preferred
 
@@ -42,7 +42,7 @@ def _digits(value: object) -> object:
 
 
 Finite = Annotated[float, Field(allow_inf_nan=False), BeforeValidator(_digits)]
-Polar = Annotated[float, Field(ge=0.0, le=180.0), BeforeValidator(_digits)]
+Polar = Annotated[Finite, Field(ge=0.0, le=180.0)]
 Flag = Annotated[bool, BeforeValidator(lambda text: {"true": True, "false": False}.get(text, text)), Strict()]
 Wavelengths = Annotated[tuple[Finite, ...], Field(description="wavelength [nm], repeatable; missing: all of the table")]
 
@@ -119,17 +119,15 @@ class Polarised(Stated):
         if info.data.get("source") == "model" or info.data.get("output") != "spectrum":
             raise ValueError("it goes with from=table and output=spectrum alone")
         try:
-            checked_stokes([float(number) for number in text.split(",")])
+            read_stokes(text)
         except ParameterError as error:
             raise ValueError(error.sentence) from None
-        except ValueError:
-            raise ValueError(f"{shortened(text)!r} is not made of four finite numbers, I,Q,U,V") from None
         return text
 
     @property
     def incident(self) -> tuple[float, ...] | None:
         """The incident Stokes vector; None if none was given."""
-        return None if self.stokes is None else tuple(map(float, self.stokes.split(",")))
+        return None if self.stokes is None else read_stokes(self.stokes)
 
 
 class BodyQuery(Polarised):
