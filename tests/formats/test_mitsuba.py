@@ -13,6 +13,7 @@ from brdfdb.formats import mitsuba as exporter
 from brdfdb.geometry import unit_vector
 from brdfdb.materials import Material
 from brdfdb.models import MODELS
+from brdfdb.models.mitsuba_plugins import OF_MITSUBA
 from brdfdb.store.publication import publish_dataset
 from brdfdb.tables.table import Table
 from tests.formats.small_tables import ANISOTROPIC, DIFFUSE, GREY, KINDS, SMOOTH, SPECTRAL, small_table
@@ -83,6 +84,6 @@ def test_models_with_a_plugin_are_those_that_mitsuba_registers() -> None:
     forms = {"brdfdb_ward": WARD, "brdfdb_oren_nayar": OREN_NAYAR}
     expected = {form: (plugin, True) for plugin, known in forms.items() for form in known}
     expected |= {name: (f"brdfdb_{name}", False) for name in ("he_torrance", *FORMULAS)}
-    assert expected == exporter.PLUGINS
-    assert {plugin for plugin, _ in exporter.PLUGINS.values()} | {"brdfdb_table"} == set(PLUGINS)
-    assert set(exporter.PLUGINS) <= set(MODELS)
+    assert expected == OF_MITSUBA
+    assert {plugin for plugin, _ in OF_MITSUBA.values()} | {"brdfdb_table"} == set(PLUGINS)
+    assert set(OF_MITSUBA) <= set(MODELS)
