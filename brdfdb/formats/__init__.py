@@ -298,7 +298,8 @@ def _chosen(path: Path, file_format: str) -> Importer:
         if importer.recognises(head):
             return importer
     for name, exporter in only_written.items():
-        if path.name.endswith(exporter.suffix):
+        recognises = getattr(exporter, "recognises", None)
+        if path.name.endswith(exporter.suffix) and (recognises is None or recognises(head)):
             raise FileFormatError(f"{path}: files of {name} are only written, not read")
     from brdfdb.fitting.published import SUFFIX
 

@@ -80,6 +80,11 @@ def write(table: Table, path: str | os.PathLike[str], *, plugin: str = MODEL, ve
     return Written((Path(path), beside(Path(path))), remarks=remarks)
 
 
+def recognises(head: bytes) -> bool:
+    """Return True if the first bytes of a file are those of a scene: others have the suffix, too."""
+    return b"<scene" in head
+
+
 def _of_model(table: Table, material: Material) -> dict[str, Any]:
     """Return the plugin of a model as a dictionary. Angles are in degrees, wavelengths in nm."""
     from brdfdb.materials.spectrum import Spectrum

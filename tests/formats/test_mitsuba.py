@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from brdfdb import formats
+from brdfdb.errors import FileFormatError
 from brdfdb.formats import mitsuba as exporter
 from brdfdb.geometry import unit_vector
 from brdfdb.materials import Material
@@ -48,6 +50,15 @@ def test_both_files_are_the_model_of_the_material(kind: str, tmp_path: Path) -> 
     for surface in (from_dictionary, scene.shapes()[0].bsdf()):
         np.testing.assert_allclose(f_r(mitsuba, surface), expected, rtol=FLOAT32)
     assert '"audit": "passes"' in written.paths[0].read_text(encoding="utf-8")
+
+
+def test_a_scene_is_only_written_and_other_xml_is_of_no_format(tmp_path: Path) -> None:
+    path = exporter.write(small_table(GREY), tmp_path / "grey.xml").paths[0]
+    with pytest.raises(FileFormatError, match="files of mitsuba are only written, not read"):
+        formats.read(path)
+    path.write_text("<house/>", encoding="utf-8")
+    with pytest.raises(FileFormatError, match="no format recognises it"):
+        formats.read(path)
 
 
 def test_a_table_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
