@@ -21,7 +21,6 @@ from brdfdb.errors import FileFormatError, ParameterError
 from brdfdb.formats._input import check_file
 from brdfdb.formats._interface import Exporter, Importer, Option, options_of, parsed_options, schema_of
 from brdfdb.formats._stated import AZIMUTHS, at_wavelength, from_forward
-from brdfdb.store.archive import ZIP, zipped
 
 if TYPE_CHECKING:
     from brdfdb.formats._readings import FileTable
@@ -128,6 +127,8 @@ def packed(table: Table, file_format: str, *, verdict: str, **options: Any) -> t
 
     `options` are values that `Option.parse` returned. Errors are those of `write`.
     """
+    from brdfdb.store.archive import ZIP, zipped  # the parser of the command line loads no store
+
     exporter = EXPORTERS[file_format]
     kind = f"_{options.get('kind', exporter.kinds[0])}" if exporter.kinds else ""
     with tempfile.TemporaryDirectory() as name:  # formats write files
@@ -297,7 +298,8 @@ def _chosen(path: Path, file_format: str) -> Importer:
         if importer.recognises(head):
             return importer
     for name, exporter in only_written.items():
-        if path.name.endswith(exporter.suffix):
+        recognises = getattr(exporter, "recognises", None)
+        if path.name.endswith(exporter.suffix) and (recognises is None or recognises(head)):
             raise FileFormatError(f"{path}: files of {name} are only written, not read")
     from brdfdb.fitting.published import SUFFIX
 

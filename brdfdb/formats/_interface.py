@@ -154,7 +154,8 @@ class Exporter(Protocol):
     write : callable
         ``write(table, path, verdict=None, **options)`` writes the file, and those that stand beside it: whole, or not
         at all. `verdict` is that of the audit of this revision, or None where the caller knows none. It raises
-        CannotHoldError for a table that the format has no place for.
+        CannotHoldError for a table that the format has no place for. A module without `read` may have `recognises`, as
+        importers do: files with its suffix are then of this format only if it recognises them.
     """
 
     suffix: str

@@ -38,22 +38,6 @@ options = (
     Option("plugin", MODEL, "the plugin of the model, if Mitsuba has one, or that of tables", choices=(MODEL, TABLE)),
 )
 
-# Models with a plugin, and its property `form` where it has several
-PLUGINS = {
-    "ward": ("brdfdb_ward", True),
-    "ward_half_vector": ("brdfdb_ward", True),
-    "ward_duer": ("brdfdb_ward", True),
-    "ward_bounded": ("brdfdb_ward", True),
-    "oren_nayar": ("brdfdb_oren_nayar", True),
-    "oren_nayar_qualitative": ("brdfdb_oren_nayar", True),
-    "oren_nayar_fujii": ("brdfdb_oren_nayar", True),
-    "oren_nayar_energy_preserving": ("brdfdb_oren_nayar", True),
-    "he_torrance": ("brdfdb_he_torrance", False),
-    "minnaert": ("brdfdb_minnaert", False),
-    "rpv": ("brdfdb_rpv", False),
-    "ross_li": ("brdfdb_ross_li", False),
-    "hapke": ("brdfdb_hapke", False),
-}
 VERSION = "3.0.0"
 HOLDS = "the parameters of a plugin of Mitsuba, whose f_r [1/sr] is times the cosine of the viewer in Mitsuba"
 _DIGITS = 9  # of numbers of a spectrum: float32 has fewer
@@ -79,11 +63,12 @@ def write(table: Table, path: str | os.PathLike[str], *, plugin: str = MODEL, ve
         If a file cannot be written.
     """
     from brdfdb.materials import Material
+    from brdfdb.models.mitsuba_plugins import OF_MITSUBA
 
     source = table.source
     document: dict[str, Any] = {"type": "brdfdb_table", "material": table.name}
     remarks: tuple[str, ...] = ()
-    if plugin == MODEL and isinstance(source, Material) and source.model in PLUGINS:
+    if plugin == MODEL and isinstance(source, Material) and source.model in OF_MITSUBA:
         document = _of_model(table, source)
     elif plugin == MODEL:
         remarks = ("Mitsuba has no plugin of its model, and reads the table from the store that BRDFDB_STORE names",)
@@ -95,11 +80,17 @@ def write(table: Table, path: str | os.PathLike[str], *, plugin: str = MODEL, ve
     return Written((Path(path), beside(Path(path))), remarks=remarks)
 
 
+def recognises(head: bytes) -> bool:
+    """Return True if the first bytes of a file are those of a scene: others have the suffix, too."""
+    return b"<scene" in head
+
+
 def _of_model(table: Table, material: Material) -> dict[str, Any]:
     """Return the plugin of a model as a dictionary. Angles are in degrees, wavelengths in nm."""
     from brdfdb.materials.spectrum import Spectrum
+    from brdfdb.models.mitsuba_plugins import OF_MITSUBA
 
-    name, has_forms = PLUGINS[material.model]
+    name, has_forms = OF_MITSUBA[material.model]
     document: dict[str, Any] = {"type": name, **({"form": material.model} if has_forms else {})}
     for key, value in material.file_parameters().items():
         if isinstance(value, Spectrum):

@@ -9,10 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from brdfdb import formats
+from brdfdb.errors import FileFormatError
 from brdfdb.formats import mitsuba as exporter
 from brdfdb.geometry import unit_vector
 from brdfdb.materials import Material
 from brdfdb.models import MODELS
+from brdfdb.models.mitsuba_plugins import OF_MITSUBA
 from brdfdb.store.publication import publish_dataset
 from brdfdb.tables.table import Table
 from tests.formats.small_tables import ANISOTROPIC, DIFFUSE, GREY, KINDS, SMOOTH, SPECTRAL, small_table
@@ -49,6 +52,15 @@ def test_both_files_are_the_model_of_the_material(kind: str, tmp_path: Path) -> 
     assert '"audit": "passes"' in written.paths[0].read_text(encoding="utf-8")
 
 
+def test_a_scene_is_only_written_and_other_xml_is_of_no_format(tmp_path: Path) -> None:
+    path = exporter.write(small_table(GREY), tmp_path / "grey.xml").paths[0]
+    with pytest.raises(FileFormatError, match="files of mitsuba are only written, not read"):
+        formats.read(path)
+    path.write_text("<house/>", encoding="utf-8")
+    with pytest.raises(FileFormatError, match="no format recognises it"):
+        formats.read(path)
+
+
 def test_a_table_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     mitsuba = variant("scalar_spectral")
     publish_dataset(tmp_path / "store", "white", lambert(0.5))
@@ -83,6 +95,6 @@ def test_models_with_a_plugin_are_those_that_mitsuba_registers() -> None:
     forms = {"brdfdb_ward": WARD, "brdfdb_oren_nayar": OREN_NAYAR}
     expected = {form: (plugin, True) for plugin, known in forms.items() for form in known}
     expected |= {name: (f"brdfdb_{name}", False) for name in ("he_torrance", *FORMULAS)}
-    assert expected == exporter.PLUGINS
-    assert {plugin for plugin, _ in exporter.PLUGINS.values()} | {"brdfdb_table"} == set(PLUGINS)
-    assert set(exporter.PLUGINS) <= set(MODELS)
+    assert expected == OF_MITSUBA
+    assert {plugin for plugin, _ in OF_MITSUBA.values()} | {"brdfdb_table"} == set(PLUGINS)
+    assert set(OF_MITSUBA) <= set(MODELS)

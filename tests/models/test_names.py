@@ -16,7 +16,8 @@ from brdfdb.models import MODELS
 
 LIBRARY = Path(brdfdb.__file__).parent
 ROOTS = (LIBRARY, *(Path(package.__file__).parent for package in (brdfdb_pipelines, brdfdb_api) if package.__file__))
-THEIRS = ("models", "reference", "misprints", "gallery", "atlas")  # rooms with a page for each paper
+# Rooms with a page for each paper, and the room that has the formulas of the models in Dr.Jit
+THEIRS = ("models", "reference", "misprints", "gallery", "atlas", "mitsuba")
 FILES = [
     path
     for root in ROOTS

@@ -72,9 +72,9 @@ def test_a_lookup_of_one_value_does_not_load_numba(built: Path) -> None:
 
 def test_a_format_that_does_not_exist_points_to_what_there_is(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit):
-        cli.main(["export", "mitsuba"])
+        cli.main(["export", "pdf"])
     err = capsys.readouterr().err
-    assert "invalid choice: 'mitsuba'; choose from astm, bird, " in err
+    assert "invalid choice: 'pdf'; choose from astm, bird, " in err
     assert "; rgl is for Mitsuba 3 and pbrt, netcdf, csv and numpy for everybody" in err
 
 
