@@ -41,10 +41,9 @@ def store(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def port(store: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
-    """A service with short deadlines and little room."""
+    """A service with short deadlines."""
     monkeypatch.setattr(connections, "QUIET_S", SHORT_S)
     monkeypatch.setattr(middleware, "STALLED_S", SHORT_S)
-    monkeypatch.setattr(middleware, "ROOM", {"memory": 17_000_000, "files": 33_000_000})
     with serving(store, max_body_bytes=LIMIT) as address:
         yield urlsplit(address).port or 0
 
@@ -249,12 +248,16 @@ def _answer(port: int, request: bytes) -> bytes:
         return connection.recv(65536)
 
 
-def test_answers_that_are_not_read_wait_in_little_room_and_are_ended(port: int) -> None:
+def test_answers_that_are_not_read_wait_in_little_room_and_are_ended(
+    port: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(connections, "QUIET_S", 5.0)
+    monkeypatch.setattr(middleware, "ROOM", {"memory": 9_000_000, "files": 9_000_000})  # one answer in each
     # a million numbers: the system itself keeps 4 MB of an answer that is not read
     rows = {"theta_i": [[10.0]] * 1000, "theta_r": [[*range(80)] * 12 + [1.0] * 40]}
     request = post(json.dumps(rows).encode(), path=f"{PATH}?format=npy")
     with contextlib.ExitStack() as stack:
-        for _ in range(8):
+        for _ in range(4):
             stack.enter_context(contextlib.closing(connected(port, request, 4096)))
         wait_until(lambda: b" 503 " in _answer(port, request))  # in memory and in files there is no more room
         assert get(port)[0] == 200

@@ -8,8 +8,6 @@ from typing import Any
 import httptools
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 
-from brdfdb_api.http.errors import RequestError, problem_of
-
 PIPELINED = 1000  # requests that may wait for the answer to an earlier one
 HEAD_BYTES = 64 * 2**10  # limit on a head [byte]; httptools reads no longer addresses
 # Time in which a head must arrive, and a piece of an answer be read [s]. uvicorn closes kept connections that send
@@ -78,6 +76,8 @@ class Connection(HttpToolsProtocol):
         if cycle is not None and not cycle.response_complete and (cycle.response_started or not cycle.more_body):
             cycle.keep_alive = False
             return
+        from brdfdb_api.http.errors import RequestError, problem_of  # loads fastapi, which workers alone need
+
         answer = problem_of(RequestError(400, msg))
         fields = b"".join(b"%s: %s\r\n" % field for field in (*answer.raw_headers, (b"connection", b"close")))
         self.transport.write(b"HTTP/1.1 400 Bad Request\r\n" + fields + b"\r\n" + answer.body)
