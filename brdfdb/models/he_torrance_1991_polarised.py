@@ -241,6 +241,11 @@ def he_torrance_facet_mueller(theta_d: ArrayLike, *, n: ArrayLike, k: ArrayLike)
         [2, 2] = [3, 3] and [2, 3] = -[3, 2]; [0, 0] and [1, 1] are 1, all others 0. The matrix is 0 where nothing is
         reflected, and beyond pi/2.
 
+    Raises
+    ------
+    ParameterError
+        If theta_d, n or k is outside of its range.
+
     References
     ----------
     he1991 (eqs 59-65)
