@@ -60,7 +60,7 @@ def connected(port: int, data: bytes = b"", room: int | None = None) -> socket.s
 
 
 def all_of(connection: socket.socket) -> bytes:
-    """What comes until the server closes the connection."""
+    """Return what comes until the server closes the connection."""
     parts = []
     with contextlib.suppress(ConnectionResetError):
         while part := connection.recv(1 << 20):

@@ -47,7 +47,7 @@ POSTED = {
 
 @pytest.fixture(scope="module")
 def address(root: Path) -> Iterator[str]:
-    """Where `brdfdb serve` serves with the lowest versions."""
+    """Address of `brdfdb serve` with the lowest versions."""
     command = [sys.executable, "-m", "brdfdb_pipelines.cli", "serve", "--store", str(root), "--port", "0"]
     path = os.pathsep.join([FOLDER, *filter(None, [os.environ.get("PYTHONPATH", "")])])
     with subprocess.Popen(
