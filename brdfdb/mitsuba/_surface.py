@@ -50,6 +50,9 @@ class Formula:
         """Show the parameters to the scene."""
         self.parameters.traverse(callback)
 
+    def parameters_changed(self) -> None:
+        """Take what the scene has changed. Textures need nothing."""
+
     @property
     def description(self) -> list[str]:
         """The lines of a text about the plugin."""
@@ -98,6 +101,9 @@ class _Methods:
 
     def traverse(self, callback: Any) -> None:
         self._formula.traverse(callback)
+
+    def parameters_changed(self, keys: Any = ()) -> None:  # noqa: ARG002  # all are taken
+        self._formula.parameters_changed()
 
     def eval(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
         return self.eval_pdf(ctx, si, wo, active)[0]

@@ -154,8 +154,12 @@ class TableFormula(Formula):
 
     def traverse(self, callback: Any) -> None:
         """Show the numbers of the table to the scene as differentiable parameters."""
-        for channel, numbers in enumerate(self._values.buffers):
+        for channel, numbers in enumerate(self._values.nodes):
             callback.put(f"values_{channel}", numbers.loaded(), mi.ParamFlags.Differentiable)
+
+    def parameters_changed(self) -> None:
+        """Take numbers that the scene has changed."""
+        self._values.refresh()
 
     @property
     def description(self) -> list[str]:
