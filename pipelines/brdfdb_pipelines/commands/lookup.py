@@ -35,9 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--json", action="store_true", help="print JSON")
     parser.add_argument("--with-error", action="store_true", help="print the stated error of each value, too")
-    parser.add_argument(
-        "--stokes", metavar="I,Q,U,V", help="incident light: print what is reflected of it"
-    )
+    parser.add_argument("--stokes", metavar="I,Q,U,V", help="incident light: print what is reflected of it")
     add_snapshot(parser)
 
 
