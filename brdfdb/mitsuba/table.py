@@ -195,8 +195,8 @@ class _Facets:
     def at(self, places: list[Any], wi: Any, wo: Any) -> Facet:
         """Return the matrix of each channel."""
         theta_d = dr.atan2(dr.norm(wi - wo), dr.norm(wi + wo))
-        each = [self._elements([theta_d, self._columns.nm(place)]) for place in places]
-        return Facet(*(mi.UnpolarizedSpectrum([elements[k] for elements in each]) for k in range(3)))
+        channels = [self._elements([theta_d, self._columns.nm(place)]) for place in places]
+        return Facet(*(mi.UnpolarizedSpectrum([elements[k] for elements in channels]) for k in range(3)))
 
     def inside(self, places: list[Any]) -> Any:
         """Return what is depolarised [1/sr] and stands among the numbers of the table, not beside them."""

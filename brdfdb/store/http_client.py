@@ -160,8 +160,8 @@ class RemoteTable(BaseTable):
                 point = zip(("theta_i", "phi_i", "theta_r", "phi_r"), points[0].tolist(), strict=True)
                 return self._service.array(f"{self._path}?{urlencode([*query, *point])}", axes)
 
-            each = count * (16 if light else 1)  # values, as services count them
-            _in_parts(ask, values, min(_NPY_POINTS, max(1, _NPY_VALUES // each)))
+            size = count * (16 if light else 1)  # values, as services count them
+            _in_parts(ask, values, min(_NPY_POINTS, max(1, _NPY_VALUES // size)))
         tail = (*tail, *elements)
         return finished(values.reshape(shape + tail), given, trailing=len(tail))
 

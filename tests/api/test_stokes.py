@@ -113,8 +113,8 @@ def test_a_table_behind_a_service_has_the_matrices_of_the_directory(root: Path) 
     with serving(root) as url:
         remote = brdfdb.open(url)["made-up"]
         for at in (None, float(WAVELENGTHS[0]), np.array(WAVELENGTHS[:2])):
-            found = remote.mueller(theta_i, 0.2, 0.7, phi_r, at)
-            np.testing.assert_allclose(found, table.mueller(theta_i, 0.2, 0.7, phi_r, at), rtol=1e-9, atol=1e-12)
+            matrix = remote.mueller(theta_i, 0.2, 0.7, phi_r, at)
+            np.testing.assert_allclose(matrix, table.mueller(theta_i, 0.2, 0.7, phi_r, at), rtol=1e-9, atol=1e-12)
         np.testing.assert_allclose(remote.mueller(0.3, 0.2, 0.7, 2.0), table.mueller(0.3, 0.2, 0.7, 2.0), atol=1e-12)
         assert np.all(np.isnan(remote.mueller(np.nan, 0.2, 0.7, 2.0)))
         with pytest.raises(brdfdb.errors.BrdfdbError, match="unpolarised"):

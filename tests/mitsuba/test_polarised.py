@@ -133,12 +133,12 @@ def test_importance_travels_the_other_way(name: str) -> None:
     surface = mitsuba.load_dict(he_torrance(*INDICES["copper"]))
     importance = mitsuba.BSDFContext(mitsuba.TransportMode.Importance)
     one, other = mitsuba.Vector3f(0.6, 0.0, 0.8), mitsuba.Vector3f(-0.48, 0.64, 0.6)
-    found = []
+    values = []
     for context, wi, wo in ((mitsuba.BSDFContext(), one, other), (importance, other, one)):
         place = mitsuba.SurfaceInteraction3f()
         place.wi = wi
-        found.append(np.array(matrices_of_one(surface.eval(context, place, wo))) / float(np.ravel(wo.z)[0]))
-    np.testing.assert_allclose(found[0], found[1], rtol=1e-4, atol=1e-7)
+        values.append(np.array(matrices_of_one(surface.eval(context, place, wo))) / float(np.ravel(wo.z)[0]))
+    np.testing.assert_allclose(values[0], values[1], rtol=1e-4, atol=1e-7)
 
 
 def matrices_of_one(value: Any) -> list[list[float]]:
