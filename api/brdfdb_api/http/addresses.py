@@ -68,6 +68,10 @@ Content = Annotated[bytes, Depends(_content)]  # of addresses that run in a thre
 class Address(APIRoute):
     """An address that refuses parameters of the query that it does not name, and sends nothing that a client holds."""
 
+    def __init__(self, path: str, endpoint: Callable[..., Any], **keywords: Any) -> None:
+        super().__init__(path, endpoint, **keywords)
+        self.summary = " ".join(self.description.partition("\n\n")[0].splitlines()).removesuffix(".")
+
     def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
         handle = super().get_route_handler()
         kinds: list[Any] = [parameter.field_info.annotation for parameter in self.dependant.query_params]

@@ -20,7 +20,7 @@ from brdfdb.store.shelf import Shelf
 from brdfdb_api.http.addresses import schemas
 from brdfdb_api.http.errors import HANDLED, RequestError, handler, problem_of
 from brdfdb_api.http.files import files
-from brdfdb_api.http.lookups import LARGE_AT_ONCE, answer_point, lookups
+from brdfdb_api.http.lookups import LARGE_AT_ONCE, Quick, lookups
 from brdfdb_api.http.middleware import Edge
 from brdfdb_api.http.models import models
 from brdfdb_api.http.pages import pages
@@ -97,7 +97,8 @@ def create_app(settings: Settings | None = None, store: Store | None = None) -> 
     for kind in HANDLED:
         app.add_exception_handler(kind, handler)
     limit, level = given.max_body_bytes, given.log_level
-    app.outermost = Edge(app.routed, limit=limit, lookup=answer_point, failed=app.state.failed, log_level=level)
+    quick = [route for route in lookups.routes if isinstance(route, Quick)]
+    app.outermost = Edge(app.routed, limit=limit, quick=quick, failed=app.state.failed, log_level=level)
     if given.cors_origins:
         app.outermost = _Cors(
             app.outermost,

@@ -4,27 +4,39 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import functools
 import io
-from collections.abc import AsyncIterator, Callable, Iterator
+from collections.abc import AsyncIterator, Callable
 from typing import Annotated, Any, TypeVar
 
 import numpy as np
+from fastapi import Depends
 from fastapi import Query as InQuery
 from starlette.concurrency import run_in_threadpool
 from starlette.datastructures import State
 from starlette.requests import Request
 from starlette.responses import Response
-from starlette.types import Scope
+from starlette.types import Receive, Scope, Send
 
 from brdfdb.errors import ParameterError
 from brdfdb.store.shelf import Shelf
 from brdfdb.tables.evaluation import Surface, Values, surface_of
 from brdfdb.tables.points import ANGLES, Points, PointsBody
-from brdfdb.tables.stokes_document import reflected, stokes_document
 from brdfdb.tables.table import Table
 from brdfdb.tables.values_document import Lookup, Lookups, values_document
-from brdfdb_api.http.addresses import NPY_ANSWER, Content, Revision, accept_of, addresses, answers, body, both, shelf_of
-from brdfdb_api.http.errors import RequestError
+from brdfdb_api.http.addresses import (
+    NPY_ANSWER,
+    Address,
+    Content,
+    Revision,
+    accept_of,
+    addresses,
+    answers,
+    body,
+    both,
+    shelf_of,
+)
+from brdfdb_api.http.errors import RequestError, refused
 from brdfdb_api.http.middleware import POINTS
 from brdfdb_api.http.queries import (
     BodyQuery,
@@ -44,13 +56,13 @@ from brdfdb_api.http.responses import (
     JSON,
     NPY,
     REVISION,
+    Answer,
     Encoded,
-    EncodedResponse,
     json_bytes,
-    lookup_headers,
     npy_bytes,
     tag_of,
     unchanged,
+    value_headers,
 )
 
 T = TypeVar("T")
@@ -63,20 +75,30 @@ TURN_S = 10.0  # longest wait for a turn [s]
 LIMITS = {"json": (1, 100), "npy": (100, 800)}  # points and values of one answer, as multiples of max_points
 MATRIX = 16  # elements of the Mueller matrix that a Stokes vector takes
 SPECTRA_OF_COLOURS = 10  # factor on the number of values where only colours are returned
-_PARAMETERS = (*ANGLES, "wavelength_nm", "illuminant", "error")  # of the library, which a request calls the same
+_PARAMETERS = (
+    *ANGLES,
+    "wavelength_nm",
+    "illuminant",
+    "error",
+    "stokes",
+)  # of the library, which a request calls the same
 NPZ = "application/x-npz"
 Asked = tuple[Surface, Points, dict[str, Any]]  # surface and points of a body, and what the answer says of them
 
 lookups = addresses()
 
 
-@contextlib.contextmanager
-def refused() -> Iterator[None]:
-    """Turn errors about the parameters of a request into refusals (422)."""
-    try:
-        yield
-    except ParameterError as error:
-        raise RequestError(422, str(error), error.parameter) from error
+class Quick(Address):
+    """GET of a lookup of one point. FastAPI describes it; to answer it, too, takes FastAPI three times as long."""
+
+    def __init__(self, *args: Any, **keywords: Any) -> None:
+        super().__init__(*args, **keywords)
+        self.app = _answered
+
+
+async def _answered(scope: Scope, receive: Receive, send: Send) -> None:
+    answer = await point_of(scope)
+    await answer(scope, receive, send)
 
 
 @contextlib.asynccontextmanager
@@ -92,6 +114,14 @@ async def turn(turns: asyncio.Semaphore) -> AsyncIterator[None]:
         yield
     finally:
         turns.release()
+
+
+async def _large(request: Request) -> AsyncIterator[None]:
+    async with turn(request.app.state.large):
+        yield
+
+
+LARGE = Depends(_large)  # of addresses that take much memory, or much time
 
 
 async def in_thread(state: State, work: Callable[[], T], *, large: bool) -> T:
@@ -115,13 +145,15 @@ def tag_in(table: Table, surface: Surface) -> str:
 
 def evaluate(points: Points, options: Options, surface: Surface, *, specular: bool = True) -> Values:
     """Look up points; RequestError (422) outside the range of the surface, or where it makes no colour."""
-    stated = getattr(options, "error", False)
+    error, incident = getattr(options, "error", False), getattr(options, "stokes", None)
     try:
-        return surface.values(points, options.output, options.illuminant, error=stated, specular=specular)
-    except ParameterError as error:
-        if error.parameter not in _PARAMETERS:
+        return surface.values(
+            points, options.output, options.illuminant, error=error, specular=specular, incident=incident
+        )
+    except ParameterError as wrong:
+        if surface.kind == "table" and wrong.parameter not in _PARAMETERS:
             raise
-        raise RequestError(422, str(error), error.parameter) from error
+        raise RequestError(422, str(wrong), wrong.parameter) from wrong
 
 
 def checked_size(max_points: int, points: Points, options: Options, surface: Surface, kind: Format) -> int:
@@ -134,7 +166,7 @@ def checked_size(max_points: int, points: Points, options: Options, surface: Sur
         )
     wavelengths = surface.wavelengths(points)
     values = points.count * (1 if wavelengths is None else int(np.size(wavelengths)))
-    values *= 1 if getattr(options, "incident", None) is None else MATRIX
+    values *= 1 if getattr(options, "stokes", None) is None else MATRIX
     if options.output != "spectrum" and surface.kind == "table":
         most_values *= SPECTRA_OF_COLOURS
     if values > most_values:
@@ -145,15 +177,14 @@ def checked_size(max_points: int, points: Points, options: Options, surface: Sur
 async def looked_up(
     request: Request,
     options: Options,
-    kind: Format,
-    headers: Encoded,
     size: int,
     read: Callable[[], Asked],
     *,
+    binary: bool = False,
     quick: bool = False,
 ) -> Response:
     """Answer a body of `size` bytes: read it, in a thread unless it is `quick`, and look its points up."""
-    state = request.app.state
+    state, kind = request.app.state, options.kind(accept_of(request), binary=binary)
 
     def checked_too() -> tuple[Asked, int]:
         surface, points, about = read()
@@ -161,14 +192,11 @@ async def looked_up(
 
     parts, values = checked_too() if quick else await in_thread(state, checked_too, large=size > LARGE_BYTES)
     surface, points, about = parts
-
-    def write() -> Response:
-        with contextlib.nullcontext() if surface.kind == "table" else refused():
-            return write_answer(points, options, surface, kind, headers, about)
-
+    headers = value_headers(kind, None, about.get("revision"))
     if values <= INLINE_VALUES and surface.kind == "table" and options.output == "spectrum":
-        return write()
+        return write_answer(points, options, surface, kind, headers, about)
     # a row and a column of angles take few bytes and make many points
+    write = functools.partial(write_answer, points, options, surface, kind, headers, about)
     return await in_thread(state, write, large=values > LARGE_VALUES)
 
 
@@ -176,22 +204,10 @@ def write_answer(
     points: Points, options: Options, surface: Surface, kind: Format, headers: Encoded, about: dict[str, Any]
 ) -> Response:
     """Look the points up and write them as `kind`; `about` begins the document."""
-    incident = getattr(options, "incident", None)
     POINTS.labels(surface.kind).inc(points.count)
-    if incident is not None:
-        if surface.source.facets is None:
-            raise RequestError(422, f"stokes: the table of {surface.source.name} is unpolarised", "stokes")
-        if kind == "npy" and getattr(options, "error", False):
-            raise RequestError(422, "stokes: a .npy answer holds either Stokes vectors or errors", "stokes")
-        with refused():
-            if kind == "npy":
-                return EncodedResponse(npy_bytes(reflected(surface.source, points, incident)), headers)
-            about = about | {"stokes": stokes_document(surface.source, points, incident)}
     values = evaluate(points, options, surface, specular=kind == "json")
-    if kind == "npy":
-        content = npy_bytes(values.brdf if values.error is None else np.stack([values.brdf, values.error]))
-        return EncodedResponse(content, headers)
-    return EncodedResponse(json_bytes(about | values_document(values)), headers)
+    content = npy_bytes(values.array) if kind == "npy" else json_bytes(about | values_document(values))
+    return Answer(content, headers)
 
 
 @both(
@@ -199,27 +215,29 @@ def write_answer(
     "/lookup",
     tags=["lookup"],
     responses=answers(Lookup, 304, 404, 413, 503, media=NPY_ANSWER, headers=(REVISION,)),
+    route_class_override=Quick,
 )
 async def lookup_point(
     request: Request,
-    name: str,
-    query: Annotated[PointQuery, InQuery()],  # noqa: ARG001 of the document
-    revision: Revision = None,
+    name: str,  # noqa: ARG001 of the document, like those below
+    query: Annotated[PointQuery, InQuery()],  # noqa: ARG001
+    revision: Revision = None,  # noqa: ARG001
 ) -> Response:
     """Return the BRDF at one pair of directions (angles in degrees).
 
     The wavelengths are an axis, unless wavelength_nm is one number or the material is grey. Below the horizon (theta
     above 90 degrees) the BRDF is 0.
     """
-    return await answer_point(request.scope, name, revision)
+    return await point_of(request.scope)
 
 
 _OF_POINTS = names_of(PointQuery)
 
 
-async def answer_point(scope: Scope, name: str, revision: str | None) -> Response:
-    """Answer GET of a lookup, from the query as it came: what lies behind the edge takes three times as long."""
-    query = checked(PointQuery, parsed(scope["query_string"], _OF_POINTS), "query")
+async def point_of(scope: Scope) -> Response:
+    """Return the answer to GET of a lookup, from the query as it came."""
+    name, revision = scope["path_params"]["name"], scope["path_params"].get("revision")
+    query = checked(PointQuery, parsed(scope["query_string"], _OF_POINTS))
     accept = held = ""
     for key, value in scope["headers"]:
         if key == b"accept":
@@ -230,9 +248,8 @@ async def answer_point(scope: Scope, name: str, revision: str | None) -> Respons
     table = await _table(state.shelf, name, revision)
     surface = surface_in(table, query)
     computed = query.source == "model" or query.output != "spectrum" or query.stokes is not None
-    headers = lookup_headers(
-        tag_in(table, surface), table.revision, kind, immutable=revision is not None and not computed
-    )
+    tag, immutable = tag_in(table, surface), revision is not None and not computed
+    headers = value_headers(kind, tag, table.revision, immutable=immutable)
     values = checked_size(state.settings.max_points, points, query, surface, kind)
     slow = values > INLINE_VALUES or computed
     given = (points, query, surface, kind, headers, {"material": table.name, "revision": table.revision})
@@ -267,17 +284,16 @@ async def lookup_points(
     binary = request.headers.get("content-type", "").partition(";")[0].strip().lower() == NPY
     if query.wavelength_nm and not binary:
         raise RequestError(422, "wavelength_nm: a JSON body holds it, not the query", "wavelength_nm")
-    kind = query.kind(accept_of(request), binary=binary)
     table = await _table(shelf_of(request), name, revision)
     surface, content = surface_in(table, query), await request.body()
-    about, headers = {"material": table.name, "revision": table.revision}, lookup_headers(None, table.revision, kind)
+    about = {"material": table.name, "revision": table.revision}
 
     def read() -> Asked:
         points = from_array(content, query.wavelength_nm) if binary else from_json(PointsBody, content).points
         return surface, points, about
 
     quick = len(content) <= INLINE_BYTES
-    return await looked_up(request, query, kind, headers, len(content), read, quick=quick)
+    return await looked_up(request, query, len(content), read, binary=binary, quick=quick)
 
 
 @lookups.post(
@@ -285,18 +301,15 @@ async def lookup_points(
     tags=["lookup"],
     responses=answers(Lookups, 404, 413, 415, 503, media={NPZ: "an array a material, by its name"}),
     openapi_extra=body(ManyBody),
+    dependencies=[LARGE],
 )
-async def lookup_many(request: Request, query: Annotated[ManyQuery, InQuery()], content: Content) -> Response:
+def lookup_many(request: Request, query: Annotated[ManyQuery, InQuery()], content: Content) -> Response:
     """Return the BRDF of several materials at the same pairs of directions (angles in degrees)."""
-    return await in_thread(request.app.state, lambda: _many(request, query, content), large=True)
-
-
-def _many(request: Request, query: ManyQuery, content: bytes) -> Response:
     given, shelf = from_json(ManyBody, content), shelf_of(request)
     points = given.points
     kind: Format = "npy" if query.format == "npz" else "json"
     max_points, total, results = request.app.state.settings.max_points, 0, {}
-    for name in dict.fromkeys(given.materials):
+    for name in given.materials:
         table = shelf.table(name)
         surface = surface_in(table, query)
         total += checked_size(max_points, points, query, surface, kind)

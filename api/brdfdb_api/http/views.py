@@ -25,8 +25,8 @@ from brdfdb.tables.lobe_views import MOST_POINTS, view_directions
 from brdfdb.tables.points import Points, listed
 from brdfdb.tables.values_document import Albedo, Lobe, lobe_document
 from brdfdb_api.http.addresses import Revision, accept_of, addresses, answers, both, shelf_of
-from brdfdb_api.http.errors import RequestError
-from brdfdb_api.http.lookups import checked_size, evaluate, refused, surface_in, tag_in, turn
+from brdfdb_api.http.errors import RequestError, refused
+from brdfdb_api.http.lookups import LARGE, checked_size, evaluate, surface_in, tag_in, turn
 from brdfdb_api.http.queries import Light, LobeQuery, Options, Query, parsed
 from brdfdb_api.http.responses import NPY, Audit, Document, cache_headers, json_bytes, npy_bytes, tag_of
 
@@ -175,7 +175,7 @@ def audit(request: Request, name: str, revision: Revision = None) -> Response:
     return Document({**document, "finding": verdict.finding.model_dump(exclude_unset=True)}, headers)
 
 
-@both(views, "/sphere", tags=["views"], responses=answers(None, 304, 404, 503, media=SPHERE))
+@both(views, "/sphere", tags=["views"], responses=answers(None, 304, 404, 503, media=SPHERE), dependencies=[LARGE])
 def sphere(
     request: Request, name: str, query: Annotated[SphereQuery, InQuery()], revision: Revision = None
 ) -> Response:
@@ -194,7 +194,13 @@ def sphere_answer(surface: Any, query: SphereQuery, headers: dict[str, str]) -> 
     return Response(npy_bytes(linear), media_type=NPY, headers=headers)
 
 
-@both(views, "/thumbnail.png", tags=["views"], responses=answers(None, 304, 404, 503, media={"image/png": "a sphere"}))
+@both(
+    views,
+    "/thumbnail.png",
+    tags=["views"],
+    responses=answers(None, 304, 404, 503, media={"image/png": "a sphere"}),
+    dependencies=[LARGE],
+)
 def thumbnail(
     request: Request, name: str, query: Annotated[ThumbnailQuery, InQuery()], revision: Revision = None
 ) -> Response:
