@@ -16,14 +16,7 @@ from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import Match
 
-from brdfdb.errors import (
-    BrdfdbError,
-    ParameterError,
-    StoreError,
-    UnknownMaterialError,
-    UnknownRevisionError,
-    sentence_of,
-)
+from brdfdb import errors
 
 PROBLEM_JSON = "application/problem+json"
 
@@ -33,7 +26,7 @@ BUSY_S, DAMAGED_S = 1, 60  # seconds to wait for a turn, and until somebody may 
 _TITLES = {413: "Content Too Large", 422: "Unprocessable Content"}
 
 
-class RequestError(BrdfdbError):
+class RequestError(errors.BrdfdbError):
     """A refused request.
 
     Parameters
@@ -60,25 +53,25 @@ class RequestError(BrdfdbError):
 
 @contextlib.contextmanager
 def refused() -> Iterator[None]:
-    """Turn errors about the parameters of a request into refusals (422)."""
+    """Turn errors about the parameters of a request, or what its format cannot hold, into refusals (422)."""
     try:
         yield
-    except ParameterError as error:
-        raise RequestError(422, str(error), error.parameter) from error
+    except (errors.ParameterError, errors.CannotHoldError) as error:
+        raise RequestError(422, str(error), getattr(error, "parameter", None)) from error
 
 
 def refusal_of(finding: Mapping[str, Any]) -> RequestError:
     """Return the refusal (422) of a finding of pydantic; it names the parameter, or else the body."""
     wrong = finding.get("ctx", {}).get("error")
-    parameter = wrong.parameter if isinstance(wrong, ParameterError) else str((*finding["loc"], "body")[0])
-    return RequestError(422, f"{parameter}: {sentence_of(finding)}", parameter)
+    parameter = wrong.parameter if isinstance(wrong, errors.ParameterError) else str((*finding["loc"], "body")[0])
+    return RequestError(422, f"{parameter}: {errors.sentence_of(finding)}", parameter)
 
 
 # Classes that the router hands to `handler`. Exception is what the server logs with its traceback, so that the other
 # errors of brdfdb are not named here: in a service they are bugs
 HANDLED = (
-    *(RequestError, RequestValidationError, UnknownMaterialError, UnknownRevisionError, StoreError),
-    *(HTTPException, Exception),
+    *(errors.UnknownMaterialError, errors.UnknownRevisionError, errors.StoreError),
+    *(RequestError, RequestValidationError, HTTPException, Exception),
 )
 
 
@@ -113,12 +106,12 @@ def problem_of(error: Exception, root: Path | None = None) -> Response:
         case RequestValidationError():
             first = error.errors()[0]
             return problem_of(refusal_of({**first, "loc": first["loc"][1:]}))  # ("query", name, ...)
-        case UnknownMaterialError():
+        case errors.UnknownMaterialError():
             parameter = "name" if error.kind == "material" else error.kind
             return _problem(404, str(error), parameter, closest=error.closest)
-        case UnknownRevisionError():
+        case errors.UnknownRevisionError():
             return _problem(404, str(error), "revision")
-        case StoreError():
+        case errors.StoreError():
             detail = str(error) if root is None else str(error).replace(str(root), root.name)
             return _problem(503, detail, headers={"Retry-After": str(DAMAGED_S)})
         case OSError() if error.errno in (errno.EMFILE, errno.ENFILE):

@@ -21,6 +21,7 @@ from pydantic import (
     WithJsonSchema,
     field_validator,
 )
+from starlette.requests import Request
 
 from brdfdb.tables.evaluation import Output
 from brdfdb.tables.lobe_views import View
@@ -81,18 +82,18 @@ class Options(Query):
 
 
 class OfTable(Options):
-    """Form of values of a table, or of the model that it was made of."""
+    """Form of values of a table, or of its model; of a table with its stated errors, and the light that it reflects."""
 
     source: Literal["table", "model"] = Field(
         default="table", alias="from", description="the table, or the model that it was made of"
     )
-
-
-class Stated(OfTable):
-    """Form of values of a table, with the errors that it states."""
-
     error: Flag = Field(
         default=False, description="the error that the table states beside the values; npy then has a first axis for it"
+    )
+    stokes: Stokes = Field(
+        default=None,
+        description="incident Stokes vector I,Q,U,V: answers of polarised tables hold that of the reflected light; npy "
+        "holds it in place of f_r, on a last axis",
     )
 
     @field_validator("error")
@@ -101,16 +102,6 @@ class Stated(OfTable):
         if error and info.data.get("source") == "model":
             raise ValueError("the model has none; it is the table that states one")
         return error
-
-
-class Polarised(Stated):
-    """Form of values of a table, with the light that a polarised one reflects."""
-
-    stokes: Stokes = Field(
-        default=None,
-        description="incident Stokes vector I,Q,U,V: answers of polarised tables hold that of the reflected light; npy "
-        "holds it in place of f_r, on a last axis",
-    )
 
     @field_validator("stokes")
     @classmethod
@@ -126,13 +117,13 @@ class Polarised(Stated):
         return kind
 
 
-class BodyQuery(Polarised):
+class BodyQuery(OfTable):
     """The query of a lookup whose points are in the body."""
 
     wavelength_nm: Wavelengths = Field(default=(), description="wavelength [nm] of a .npy body; JSON holds its own")
 
 
-class ManyQuery(Stated):
+class ManyQuery(OfTable):
     """The query of a lookup of many materials."""
 
     format: Literal["json", "npz"] = Field(
@@ -140,7 +131,7 @@ class ManyQuery(Stated):
     )  # type: ignore[assignment]
 
 
-class PointQuery(Polarised):
+class PointQuery(OfTable):
     """The query of a lookup of one point."""
 
     wavelength_nm: Wavelengths = ()
@@ -169,6 +160,11 @@ class Light(Query):
 
 class LobeQuery(Light, OfTable):
     """The query of a lobe of a table."""
+
+
+def accept_of(request: Request) -> str:
+    """Return the header Accept, which may come in several lines."""
+    return ",".join(request.headers.getlist("accept"))
 
 
 class ManyBody(PointsBody):
