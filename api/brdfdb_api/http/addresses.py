@@ -145,8 +145,8 @@ def answers(
     """Return the OpenAPI description of the answers of an address: `model` at 200 or other media, and `statuses`."""
     content = {} if model is None else {JSON: _schema(model)}  # first: generated clients take the first that they read
     for kind, text in media.items():
-        binary = {} if "text" in kind else {"format": "binary"}
-        content[kind] = {"schema": {"type": "string", "description": text, **binary}}
+        binary = {"type": "string"} if "text" in kind else {"type": "string", "format": "binary"}
+        content[kind] = {"schema": {"description": text, **({"type": "object"} if kind == JSON else binary)}}
     cached = ("ETag", "Cache-Control") if 304 in statuses else ()
     described: dict[int | str, dict[str, Any]] = {200: _answer("Success", *cached, *headers, content=content)}
     for status in (*statuses, 422):

@@ -170,13 +170,7 @@ def sphere_answer(surface: Any, query: SphereQuery, headers: dict[str, str]) -> 
     return Response(npy_bytes(linear), media_type=NPY, headers=headers)
 
 
-@both(
-    views,
-    "/thumbnail.png",
-    tags=["views"],
-    responses=answers(None, 304, 404, 503, media={"image/png": "a sphere"}),
-    dependencies=[LARGE],
-)
+@both(views, "/thumbnail.png", tags=["views"], responses=answers(None, 304, 404, 503, media={"image/png": "a sphere"}))
 def thumbnail(
     request: Request, name: str, query: Annotated[ThumbnailQuery, InQuery()], revision: Revision = None
 ) -> Response:
