@@ -123,12 +123,8 @@ class _Cors(CORSMiddleware):
 @contextlib.asynccontextmanager
 async def _warmed(app: FastAPI) -> AsyncIterator[None]:
     """Load the kernels of lookups and what pictures share in a thread, while the application answers already."""
-
-    def warm() -> None:
-        app.state.shelf.warm()
-        lit_sphere.prepare()
-
-    threading.Thread(target=warm, daemon=True).start()
+    loads = (app.state.shelf.warm, lit_sphere.prepare)
+    threading.Thread(target=lambda: [load() for load in loads], daemon=True).start()
     yield
 
 
