@@ -70,7 +70,7 @@ def measure(run: Run, browser: Chromium, address: str, quick: bool) -> None:
         for _ in range(repeats):
             browser.open(address + link)
             shown(browser)
-            first.append(browser.evaluate("performance.getEntriesByName('first')[0].duration"))
+            first.append(browser.until("performance.getEntriesByName('first')[0]?.duration"))
             whole.append(milliseconds(browser))
             browser.until(LOADED)  # what still comes would take its share of the connection from the next page
         table.add(title, repeats, *(float(each(times)) for times in (first, whole) for each in (np.median, max)))
