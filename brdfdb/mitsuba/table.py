@@ -13,6 +13,7 @@ from brdfdb.errors import ParameterError
 from brdfdb.geometry import radians, unit_vector
 from brdfdb.mitsuba._buffers import Buffer
 from brdfdb.mitsuba._cells_lobe import CellsLobe
+from brdfdb.mitsuba._grid_axis import GridAxis
 from brdfdb.mitsuba._grid_points import points
 from brdfdb.mitsuba._grid_values import GridValues
 from brdfdb.mitsuba._mueller import Facet
@@ -87,7 +88,7 @@ class TableFormula(Formula):
     def _read_specular(self, table: Table) -> None:
         nodes = table.specular_theta_deg
         theta = radians(table.axes_deg["theta_i"] if nodes is None else nodes)
-        self._specular_nodes, self._specular_last = Buffer(theta), theta.size - 2
+        self._specular_axis = GridAxis(prepared([theta], [("open", "open")], cubic=False), 0)
         self._specular = Buffer(table.specular_reflectance(theta, self._columns.at_nm))
         number = np.arange(_DRAWN)
         wi = unit_vector(theta, np.zeros(theta.size))[:, np.newaxis]
@@ -158,10 +159,7 @@ class TableFormula(Formula):
         return specular / dr.maximum(specular + scattered, _LEAST)
 
     def _specular_place(self, wi: Any) -> tuple[Any, Any]:
-        theta = dr.atan2(dr.sqrt(dr.square(wi.x) + dr.square(wi.y)), wi.z)
-        row = self._specular_nodes.cell(theta, self._specular_last + 1)
-        begin, end = self._specular_nodes.at(row), self._specular_nodes.at(row + 1)
-        return row, dr.clip((theta - begin) / (end - begin), 0.0, 1.0)
+        return self._specular_axis.place(dr.atan2(dr.sqrt(dr.square(wi.x) + dr.square(wi.y)), wi.z))
 
     def traverse(self, callback: Any) -> None:
         """Show the numbers of the table to the scene as differentiable parameters."""
