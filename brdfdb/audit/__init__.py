@@ -63,6 +63,7 @@ def audit(table: Table, *, source: Source | None = None, accept_excess: bool = F
     return MaterialAudit(
         material=table.name,
         revision=table.revision,
+        manifest_sha256=table.digest,
         model=source.model if isinstance(source, Material) else "",
         findings=subject.findings,
         sentences=sentences,
