@@ -377,7 +377,9 @@ def gaussian(*features: Floats, lit: bool = True, bounce: bool = True, nodes: in
     return direct.reshape(shape), bounced.reshape(shape)
 
 
-def _integrated(columns: Floats, lit: bool, bounce: bool, nodes: int) -> tuple[Floats, Floats]:
+def _integrated(
+    columns: NDArray[np.float64], lit: bool, bounce: bool, nodes: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return both parts [1] of values whose features are columns of an array of shape (5, N)."""
     direct, bounced = np.empty(columns.shape[1]), np.empty(columns.shape[1])
     with np.errstate(all="ignore"):  # as in `elementwise`, nan is passed on
