@@ -16,6 +16,7 @@ from starlette.middleware.cors import CORSMiddleware
 from starlette.responses import Response
 from starlette.types import ASGIApp, Receive, Scope, Send
 
+from brdfdb.scenes import lit_sphere
 from brdfdb.store.shelf import Shelf
 from brdfdb_api.http.addresses import schemas
 from brdfdb_api.http.errors import HANDLED, RequestError, handler, problem_of
@@ -121,8 +122,9 @@ class _Cors(CORSMiddleware):
 
 @contextlib.asynccontextmanager
 async def _warmed(app: FastAPI) -> AsyncIterator[None]:
-    """Load the kernels of lookups in a thread, while the application answers already."""
-    threading.Thread(target=app.state.shelf.warm, daemon=True).start()
+    """Load the kernels of lookups and what pictures share in a thread, while the application answers already."""
+    loads = (app.state.shelf.warm, lit_sphere.prepare)
+    threading.Thread(target=lambda: [load() for load in loads], daemon=True).start()
     yield
 
 
