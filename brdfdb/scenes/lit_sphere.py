@@ -8,6 +8,7 @@ import threading
 import zlib
 from collections.abc import Callable
 from typing import NamedTuple
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -127,6 +128,18 @@ def sphere_png(surface: Source | BaseTable, size: int = SIZE, detail: Detail = F
         for kind, content in ((b"IHDR", header), (b"IDAT", data), (b"IEND", b""))
     )
     return b"\x89PNG\r\n\x1a\n" + b"".join(chunks)
+
+
+def thumbnail_png(table: BaseTable, size: int) -> bytes:
+    """Return the bytes of a small picture, drawn as a draft as by `sphere_png`; the last one is kept with its table."""
+    kept_size, picture = _THUMBNAILS.get(table, (0, b""))
+    if kept_size != size:
+        picture = sphere_png(table, size, DRAFT)
+        _THUMBNAILS[table] = size, picture
+    return picture
+
+
+_THUMBNAILS: WeakKeyDictionary[BaseTable, tuple[int, bytes]] = WeakKeyDictionary()
 
 
 def prepare() -> None:
