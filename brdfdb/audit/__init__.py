@@ -13,7 +13,7 @@ from brdfdb.audit.report import AuditReport, MaterialAudit, explanations
 from brdfdb.errors import ParameterError
 from brdfdb.figure import Figure
 from brdfdb.materials import Material, Source
-from brdfdb.shared_integrals import sharing
+from brdfdb.models.shared_integrals import sharing
 from brdfdb.tables.table import Table
 
 __all__ = ["FINDINGS", "AuditReport", "Finding", "MaterialAudit", "audit", "report"]

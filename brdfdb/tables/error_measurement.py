@@ -17,7 +17,7 @@ from brdfdb.materials import FunctionRecord, Source
 from brdfdb.measurements import MeasuredSource
 from brdfdb.measurements.extent import Extent
 from brdfdb.parameters import Floats
-from brdfdb.shared_integrals import sharing
+from brdfdb.models.shared_integrals import sharing
 from brdfdb.tables import places
 from brdfdb.tables._interpolation import weights_of_nodes
 from brdfdb.tables.grids import Grid

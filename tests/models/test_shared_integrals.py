@@ -7,7 +7,7 @@ import pytest
 
 from brdfdb.geometry import unit_vector
 from brdfdb.models import _oren_nayar_facets, oren_nayar_gaussian_vectors
-from brdfdb.shared_integrals import shared, sharing
+from brdfdb.models.shared_integrals import shared, sharing
 
 SIGMA = 0.4321  # of no other test: integrals are kept for a whole process
 
