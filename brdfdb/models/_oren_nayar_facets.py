@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from brdfdb._elementary import arcsin, exp
 from brdfdb._numba import elementwise, kernel
-from brdfdb.parameters import Floats
 from brdfdb.models.shared_integrals import shared
+from brdfdb.parameters import Floats
 
 _TINY = 1e-300  # guard against 0 / 0 only: the numbers that it is added to or compared with are 0 or above 1e-40
 _SMOOTH = 1e-30  # deviation of the slope [rad] below which f_r does not change, not even at 90 degrees

@@ -16,8 +16,8 @@ from brdfdb.integrals.sampling import mirrored_in_lobe, mixture_density
 from brdfdb.materials import FunctionRecord, Source
 from brdfdb.measurements import MeasuredSource
 from brdfdb.measurements.extent import Extent
-from brdfdb.parameters import Floats
 from brdfdb.models.shared_integrals import sharing
+from brdfdb.parameters import Floats
 from brdfdb.tables import places
 from brdfdb.tables._interpolation import weights_of_nodes
 from brdfdb.tables.grids import Grid
