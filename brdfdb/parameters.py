@@ -143,6 +143,13 @@ class Polarised(NamedTuple):
     facet: Callable[..., Floats]
 
 
+class Gradient(NamedTuple):
+    """f_r [1/sr] of a model and its derivatives by parameters, by their names, in 1/sr over the unit of each."""
+
+    f_r: Floats
+    derivatives: dict[str, Floats]
+
+
 @dataclass(frozen=True)
 class ModelSpec:
     """The specification of a model. No code outside the model's own modules knows a model by name.
@@ -173,6 +180,7 @@ class ModelSpec:
     values are integrals, of about 30 us each: audits compute fewer of them. `uniform_bound_cosine` marks a model whose
     uniform part is limited by energy conservation only. It returns the lowest cos theta_i [1] at which the largest
     reflectance is searched. `polarised` is the polarised form of the model; None: it is of unpolarised light.
+    `gradient` is called as `vectors` is, and returns the `Gradient`; None: nobody has derived it.
     """
 
     name: str
@@ -202,6 +210,7 @@ class ModelSpec:
     slow: bool = False
     uniform_bound_cosine: Callable[[Arguments], float] | None = None
     polarised: Polarised | None = None
+    gradient: Callable[..., Gradient] | None = None
 
     def parameter(self, name: str) -> Parameter:
         """Return the parameter called `name`; KeyError if the model has none."""

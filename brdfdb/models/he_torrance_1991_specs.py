@@ -9,6 +9,7 @@ from brdfdb.models.he_torrance_1991 import (
     A,
     forms,
     he_torrance,
+    he_torrance_gradient,
     he_torrance_specular,
     he_torrance_vectors,
     lobe,
@@ -38,4 +39,5 @@ SPEC = ModelSpec(
     limits=limits,
     uniform_bound_cosine=lowest_cosine,
     polarised=Polarised(mueller=he_torrance_mueller_vectors, facet=he_torrance_facet_mueller),
+    gradient=he_torrance_gradient,
 )

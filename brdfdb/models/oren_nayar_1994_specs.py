@@ -14,7 +14,9 @@ from brdfdb.models.oren_nayar_1994 import (
     RHO,
     SIGMA,
     oren_nayar,
+    oren_nayar_gradient,
     oren_nayar_qualitative,
+    oren_nayar_qualitative_gradient,
     oren_nayar_qualitative_vectors,
     oren_nayar_vectors,
 )
@@ -117,6 +119,7 @@ SPEC = ModelSpec(
     forms=forms,
     exact_model=_integrated,
     limits=_limits,
+    gradient=oren_nayar_gradient,
 )
 QUALITATIVE_SPEC = ModelSpec(
     name="oren_nayar_qualitative",
@@ -134,6 +137,7 @@ QUALITATIVE_SPEC = ModelSpec(
     forms=forms,
     exact_model=_integrated,
     limits=_limits,
+    gradient=oren_nayar_qualitative_gradient,
 )
 UNIDIRECTIONAL_SPEC = ModelSpec(
     name="oren_nayar_unidirectional",

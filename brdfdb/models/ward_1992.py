@@ -17,6 +17,7 @@ from brdfdb.models._ward_lobes import (
     RHO_S,
     by_angles,
     by_vectors,
+    gradient_of,
     lobe,
     lossless,
     wide_lobe,
@@ -226,6 +227,7 @@ SPEC = ModelSpec(
     lossless=lossless,
     forms=forms,
     limits=limits,
+    gradient=gradient_of(ELLIPTICAL),
 )
 HALF_VECTOR_SPEC = ModelSpec(
     name="ward_half_vector",
@@ -246,4 +248,5 @@ HALF_VECTOR_SPEC = ModelSpec(
     forms=forms,
     exact_model=lambda parameters: ("ward", dict(parameters)),
     limits=limits,
+    gradient=gradient_of(HALF_VECTOR),
 )
