@@ -150,6 +150,21 @@ class Gradient(NamedTuple):
     derivatives: dict[str, Floats]
 
 
+class Draw(NamedTuple):
+    """The usual ranges of parameters, from which training sets draw materials, and the condition that materials keep.
+
+    Parameters without a range have the whole of theirs. `allowed` returns which of many materials keep the condition,
+    and `condition` says it in words.
+    """
+
+    ranges: dict[str, tuple[float, float]]
+    allowed: Callable[[Arguments], NDArray[np.bool_]] | None = None
+    condition: str = ""
+
+
+_WHOLE_RANGES = Draw({})
+
+
 @dataclass(frozen=True)
 class ModelSpec:
     """The specification of a model. No code outside the model's own modules knows a model by name.
@@ -181,6 +196,7 @@ class ModelSpec:
     uniform part is limited by energy conservation only. It returns the lowest cos theta_i [1] at which the largest
     reflectance is searched. `polarised` is the polarised form of the model; None: it is of unpolarised light.
     `gradient` is called as `vectors` is, and returns the `Gradient`; None: nobody has derived it.
+    `draw` says which materials training sets draw.
     """
 
     name: str
@@ -211,6 +227,7 @@ class ModelSpec:
     uniform_bound_cosine: Callable[[Arguments], float] | None = None
     polarised: Polarised | None = None
     gradient: Callable[..., Gradient] | None = None
+    draw: Draw = _WHOLE_RANGES
 
     def parameter(self, name: str) -> Parameter:
         """Return the parameter called `name`; KeyError if the model has none."""

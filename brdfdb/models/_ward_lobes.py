@@ -15,7 +15,7 @@ from brdfdb._numba import kernel
 from brdfdb.geometry import checked_angles, checked_vectors, finished
 from brdfdb.lobes import Lobe
 from brdfdb.models._rows import by_rows, by_rows_of_vectors
-from brdfdb.parameters import Floats, Gradient, Parameter
+from brdfdb.parameters import Draw, Floats, Gradient, Parameter
 
 RHO_D = Parameter("rho_d", "ρ_d", "1", 0.0, 1.0, "diffuse reflectance", reflectance=True)
 RHO_S = Parameter(
@@ -23,6 +23,12 @@ RHO_S = Parameter(
 )
 ALPHA_X = Parameter("alpha_x", "α_x", "1", 1e-6, 2.0, "width of the slopes along x, exp(-(s / alpha)^2)")
 ALPHA_Y = Parameter("alpha_y", "α_y", "1", 1e-6, 2.0, "width of the slopes along y")
+
+DRAW = Draw(
+    {"alpha_x": (0.01, 0.5), "alpha_y": (0.01, 0.5)},
+    lambda given: (given["rho_d"] + given["rho_s"] <= 1.0) & (given["alpha_x"] >= given["alpha_y"]),
+    "rho_d + rho_s <= 1, and alpha_x >= alpha_y: the others are the same surfaces, turned",
+)
 
 Rows = NDArray[np.float64]
 

@@ -40,7 +40,7 @@ from brdfdb.models.oren_nayar_1994_surfaces import (
     oren_nayar_unidirectional,
     oren_nayar_unidirectional_vectors,
 )
-from brdfdb.parameters import Arguments, ModelSpec, StatedLimit, white
+from brdfdb.parameters import Arguments, Draw, ModelSpec, StatedLimit, white
 
 # Shares of a Gaussian of slopes beyond 90 degrees, up to which a surface is inside the limits or at their edge
 _BEYOND, _FAR_BEYOND = 0.01, 0.1
@@ -103,6 +103,8 @@ def _integrated(parameters: Mapping[str, Any]) -> tuple[str, dict[str, Any]] | N
     return "oren_nayar_gaussian", {"rho": parameters["rho"], "sigma": parameters["sigma"]}
 
 
+_DRAW = Draw({"sigma": (0.0, math.pi / 3.0), "offset": (0.33, 0.57)})
+
 SPEC = ModelSpec(
     name="oren_nayar",
     version=2,
@@ -120,6 +122,7 @@ SPEC = ModelSpec(
     exact_model=_integrated,
     limits=_limits,
     gradient=oren_nayar_gradient,
+    draw=_DRAW,
 )
 QUALITATIVE_SPEC = ModelSpec(
     name="oren_nayar_qualitative",
@@ -138,6 +141,7 @@ QUALITATIVE_SPEC = ModelSpec(
     exact_model=_integrated,
     limits=_limits,
     gradient=oren_nayar_qualitative_gradient,
+    draw=_DRAW,
 )
 UNIDIRECTIONAL_SPEC = ModelSpec(
     name="oren_nayar_unidirectional",

@@ -11,6 +11,7 @@ from brdfdb.models._limits import standing
 from brdfdb.models._ward_lobes import (
     ALPHA_X,
     ALPHA_Y,
+    DRAW,
     ELLIPTICAL,
     HALF_VECTOR,
     RHO_D,
@@ -228,6 +229,7 @@ SPEC = ModelSpec(
     forms=forms,
     limits=limits,
     gradient=gradient_of(ELLIPTICAL),
+    draw=DRAW,
 )
 HALF_VECTOR_SPEC = ModelSpec(
     name="ward_half_vector",
@@ -249,4 +251,5 @@ HALF_VECTOR_SPEC = ModelSpec(
     exact_model=lambda parameters: ("ward", dict(parameters)),
     limits=limits,
     gradient=gradient_of(HALF_VECTOR),
+    draw=DRAW,
 )

@@ -151,8 +151,8 @@ def beside_differences(run: Run, models: Sequence[str], count: int, repeats: int
     """Measure fits with the derivatives of models beside fits with differences, the better of some repeats of each."""
     columns = [Column(name="model", width=24), Column(name="values, differences", unit="M")]
     columns += [Column(name="values", unit="M"), Column(name="gradients", unit="M")]
-    columns += [Column(name="time over that with differences"), Column(name="cost over that with differences, less 1")]
-    table = run.table(f"one fit of {count} samples with derivatives", *columns)
+    columns += [Column(name="time over that with differences"), Column(name="difference")]
+    table = run.table(f"one fit of {count} samples with derivatives; difference of its cost, relative", *columns)
     for name, (model, material) in ((name, DERIVED[name]) for name in models):
         few = samples(presets()[material], 0)
         rows = np.tile(np.arange(len(few)), -(-count // len(few)))[:count]
