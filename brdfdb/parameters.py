@@ -153,16 +153,16 @@ class Gradient(NamedTuple):
 class Draw(NamedTuple):
     """The usual ranges of parameters, from which training sets draw materials, and the condition that materials keep.
 
-    Parameters without a range have the whole of theirs. `allowed` returns which of many materials keep the condition,
-    and `condition` says it in words.
+    A range is the name of a parameter and both ends, in the units of the model. Parameters without one have the whole
+    of theirs. `allowed` returns which of many materials keep the condition, and `condition` says it in words.
     """
 
-    ranges: dict[str, tuple[float, float]]
+    ranges: tuple[tuple[str, float, float], ...] = ()
     allowed: Callable[[Arguments], NDArray[np.bool_]] | None = None
     condition: str = ""
 
 
-_WHOLE_RANGES = Draw({})
+_WHOLE_RANGES = Draw()
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from brdfdb.parameters import Arguments, ModelSpec, Parameter
 Array = NDArray[np.float64]
 
 _LIGHT = (WAVELENGTH_NM, N, K)  # that a spectral model takes beside its parameters
-_LIGHT_RANGES = {"wavelength_nm": (400.0, 700.0), "n": (0.2, 3.0), "k": (0.0, 8.0)}
+_LIGHT_RANGES = (("wavelength_nm", 400.0, 700.0), ("n", 0.2, 3.0), ("k", 0.0, 8.0))
 _DECADE = 10.0  # ratio of the ends of a range from which on it is drawn evenly in its logarithm
 _LEAST_SHARE = 0.01  # of the drawn materials that must keep the condition
 _SPARE = 1.05  # more are drawn than the share of the last draw asks for
@@ -50,11 +50,12 @@ def axes_of(spec: ModelSpec, ranges: Mapping[str, tuple[float, float]]) -> list[
     ParameterError
         If a name is unknown, or a range is not within that of the parameter.
     """
+    usual = {name: ends for name, *ends in (*spec.draw.ranges, *_LIGHT_RANGES)}
     axes = []
     for one in (*spec.parameters, *(_LIGHT if spec.spectral else ())):
         if isinstance(one.default, bool):
             continue
-        low, high = (spec.draw.ranges | _LIGHT_RANGES).get(one.name, (one.low, one.high))
+        low, high = usual.get(one.name, (one.low, one.high))
         if one.unit == "rad":
             low, high = round(float(degrees(low)), 12), round(float(degrees(high)), 12)
         axes.append(Axis(as_written(one), low, high))

@@ -25,7 +25,7 @@ ALPHA_X = Parameter("alpha_x", "α_x", "1", 1e-6, 2.0, "width of the slopes alon
 ALPHA_Y = Parameter("alpha_y", "α_y", "1", 1e-6, 2.0, "width of the slopes along y")
 
 DRAW = Draw(
-    {"alpha_x": (0.01, 0.5), "alpha_y": (0.01, 0.5)},
+    (("alpha_x", 0.01, 0.5), ("alpha_y", 0.01, 0.5)),
     lambda given: (given["rho_d"] + given["rho_s"] <= 1.0) & (given["alpha_x"] >= given["alpha_y"]),
     "rho_d + rho_s <= 1, and alpha_x >= alpha_y: the others are the same surfaces, turned",
 )

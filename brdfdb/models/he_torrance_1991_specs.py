@@ -41,7 +41,7 @@ SPEC = ModelSpec(
     polarised=Polarised(mueller=he_torrance_mueller_vectors, facet=he_torrance_facet_mueller),
     gradient=he_torrance_gradient,
     draw=Draw(
-        {"sigma_0_um": (0.01, 5.0), "tau_um": (0.1, 50.0), "a": (0.0, 0.3)},
+        (("sigma_0_um", 0.01, 5.0), ("tau_um", 0.1, 50.0), ("a", 0.0, 0.3)),
         lambda given: given["sigma_0_um"] <= given["tau_um"],
         "sigma_0_um <= tau_um: the paper holds for slopes below 1",
     ),

@@ -103,7 +103,7 @@ def _integrated(parameters: Mapping[str, Any]) -> tuple[str, dict[str, Any]] | N
     return "oren_nayar_gaussian", {"rho": parameters["rho"], "sigma": parameters["sigma"]}
 
 
-_DRAW = Draw({"sigma": (0.0, math.pi / 3.0), "offset": (0.33, 0.57)})
+_DRAW = Draw((("sigma", 0.0, math.pi / 3.0), ("offset", 0.33, 0.57)))
 
 SPEC = ModelSpec(
     name="oren_nayar",
