@@ -74,7 +74,7 @@ def _moves(surface: Surface, variable: int, x: Array, numbers: list[dict[str, fl
         names = term.tied if term.tied and one.name == term.tied[0] else (one.name,)
         moves[owner] = dict.fromkeys(names, one.slope(float(x[variable])))
         return moves
-    labels = [each.name for each in surface.shape]
+    labels = [member.name for member in surface.shape]
     ends = {name: surface.shape[labels.index(name)].value(float(x[labels.index(name)])) for name in (NORMAL, EDGE)}
     for number, term in enumerate(surface.terms):
         if term.spec.spectral and numbers[number]["k"] > 0.0:
