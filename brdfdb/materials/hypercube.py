@@ -11,12 +11,16 @@ from numpy.typing import NDArray
 from brdfdb.errors import ParameterError, import_extra
 from brdfdb.geometry import degrees
 from brdfdb.materials.written_parameters import as_written
-from brdfdb.models.he_torrance_1991 import WAVELENGTH_NM, K, N
 from brdfdb.parameters import Arguments, ModelSpec, Parameter
 
 Array = NDArray[np.float64]
 
-_LIGHT = (WAVELENGTH_NM, N, K)  # that a spectral model takes beside its parameters
+# That a spectral model takes beside its parameters
+_LIGHT = (
+    Parameter("wavelength_nm", "λ", "nm", 1e-3, 1e7, "wavelength in vacuum"),
+    Parameter("n", "n", "1", 1e-3, 100.0, "refractive index"),
+    Parameter("k", "k", "1", 0.0, 1e4, "extinction coefficient"),
+)
 _LIGHT_RANGES = (("wavelength_nm", 400.0, 700.0), ("n", 0.2, 3.0), ("k", 0.0, 8.0))
 _DECADE = 10.0  # ratio of the ends of a range from which on it is drawn evenly in its logarithm
 _LEAST_SHARE = 0.01  # of the drawn materials that must keep the condition
