@@ -20,7 +20,7 @@ __all__ = ["__version__", "open", "presets"]
 
 # Rooms that are imported when they are first used; their modules are imported by name
 _ROOMS = (
-    *("atlas", "audit", "formats", "forms", "fresnel", "gallery", "geometry", "integrals", "materials"),
+    *("atlas", "audit", "derivatives", "formats", "forms", "fresnel", "gallery", "geometry", "integrals", "materials"),
     *("measurements", "misprints", "mitsuba", "models", "roughness", "scenes", "spectra", "store", "tables"),
 )
 

@@ -10,6 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from brdfdb._numba import elementwise, kernel
 
+_SQRT_HALF = 0.7071067811865476
+
 
 @kernel
 def _interface(cos_theta: float, n: float, k: float) -> tuple[float, float, float, float, float]:
@@ -96,6 +98,30 @@ def _amplitudes(cos_theta: float, n: float, k: float) -> tuple[complex, complex]
     d_s = complex(cos_theta + a, b)
     d_p = complex(e_re * cos_theta + a, w_im * cos_theta + b)
     return -w / (d_s * d_s), w * complex(cos2 * e_re - sin2, cos2 * w_im) / (d_p * d_p)
+
+
+@kernel
+def reflectance_slopes(cos_theta: float, n: float, k: float) -> tuple[float, float]:
+    """Return the derivatives [1] of |F|^2 of unpolarised light by n and by k.
+
+    F_s and F_p are analytic in n + ik, so that the derivative of |F|^2 by n is 2 Re(conj(F) F') and by k
+    -2 Im(conj(F) F'). At the onset of total reflection (q = 0) both are infinite, and 0 here.
+    """
+    F_s, F_p = _amplitudes(cos_theta, n, k)
+    w_re, w_im, e_re, a, b = _interface(cos_theta, n, k)
+    q = complex(a, b)
+    if a == 0.0 and b == 0.0:
+        return 0.0, 0.0
+    index = complex(n, k)
+    d_s = complex(cos_theta + a, b)
+    d_p = complex(e_re * cos_theta + a, w_im * cos_theta + b)
+    common = 2.0 * cos_theta * index / q
+    slope_s = -common / (d_s * d_s)
+    # 2 q^2 - (1 + w), in a form that keeps its digits
+    cos_2theta = (cos_theta - _SQRT_HALF) * (cos_theta + _SQRT_HALF) * 2.0
+    slope_p = common * complex(cos_2theta + w_re, w_im) / (d_p * d_p)
+    both = F_s.conjugate() * slope_s + F_p.conjugate() * slope_p
+    return both.real, -both.imag
 
 
 @kernel

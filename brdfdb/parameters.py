@@ -143,6 +143,28 @@ class Polarised(NamedTuple):
     facet: Callable[..., Floats]
 
 
+class Gradient(NamedTuple):
+    """f_r [1/sr] of a model and its derivatives by parameters, by their names, in 1/sr over the unit of each."""
+
+    f_r: Floats
+    derivatives: dict[str, Floats]
+
+
+class Draw(NamedTuple):
+    """The usual ranges of parameters, from which training sets draw materials, and the condition that materials keep.
+
+    A range is the name of a parameter and both ends, in the units of the model. Parameters without one have the whole
+    of theirs. `allowed` returns which of many materials keep the condition, and `condition` says it in words.
+    """
+
+    ranges: tuple[tuple[str, float, float], ...] = ()
+    allowed: Callable[[Arguments], NDArray[np.bool_]] | None = None
+    condition: str = ""
+
+
+_WHOLE_RANGES = Draw()
+
+
 @dataclass(frozen=True)
 class ModelSpec:
     """The specification of a model. No code outside the model's own modules knows a model by name.
@@ -173,6 +195,8 @@ class ModelSpec:
     values are integrals, of about 30 us each: audits compute fewer of them. `uniform_bound_cosine` marks a model whose
     uniform part is limited by energy conservation only. It returns the lowest cos theta_i [1] at which the largest
     reflectance is searched. `polarised` is the polarised form of the model; None: it is of unpolarised light.
+    `gradient` is called as `vectors` is, and returns the `Gradient`; None: nobody has derived it.
+    `draw` says which materials training sets draw.
     """
 
     name: str
@@ -202,6 +226,8 @@ class ModelSpec:
     slow: bool = False
     uniform_bound_cosine: Callable[[Arguments], float] | None = None
     polarised: Polarised | None = None
+    gradient: Callable[..., Gradient] | None = None
+    draw: Draw = _WHOLE_RANGES
 
     def parameter(self, name: str) -> Parameter:
         """Return the parameter called `name`; KeyError if the model has none."""

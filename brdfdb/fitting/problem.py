@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from brdfdb.fitting.projection import COARSE, FINE, cost_of, project, slopes_of
 from brdfdb.fitting.residuals import Residual
+from brdfdb.fitting.shape_slopes import basis_slopes
 from brdfdb.fitting.surface import Surface, total
 from brdfdb.fitting.variables import best_apart, spread
 from brdfdb.measurements.aperture import RESOLVED, View
@@ -106,16 +107,25 @@ class Problem:
         return Point(x, values, basis, f_r, residuals, float(np.sum(cost_of(residuals, self.scale))))
 
     def shape_jacobian(self, point: Point) -> Floats:
-        """Return the derivatives (S, N, C) of residuals by the free shape variables, at fixed coefficients."""
+        """Return the derivatives (S, N, C) of residuals by the free shape variables, at fixed coefficients.
+
+        Models that have a gradient give them, the others differences.
+        """
         monomials = self.surface.monomials(point.values)
         slope = self.residual.slope(point.f_r)
-        steps = np.where(point.x[self.free] > 0.5, -_STEP, _STEP)
-        moved = np.tile(point.x, (len(self.free), 1))
-        moved[np.arange(len(self.free)), self.free] += steps
         columns = np.zeros((len(self.free), *point.f_r.shape))
-        if self.free:
-            for number, basis in enumerate(self.surface.bases(moved, self.view)):
-                columns[number] = slope * (total(basis, monomials) - point.f_r) / steps[number]
+        derived = basis_slopes(self.surface, point.x, self.view)
+        rest = [column for column, variable in enumerate(self.free) if variable not in derived]
+        for column, variable in enumerate(self.free):
+            if variable in derived:
+                columns[column] = slope * total(derived[variable], monomials)
+        variables = np.array(self.free, dtype=np.int64)[rest]
+        steps = np.where(point.x[variables] > 0.5, -_STEP, _STEP)
+        moved = np.tile(point.x, (len(rest), 1))
+        moved[np.arange(len(rest)), variables] += steps
+        if rest:
+            for column, step, basis in zip(rest, steps, self.surface.bases(moved, self.view), strict=True):
+                columns[column] = slope * (total(basis, monomials) - point.f_r) / step
         return columns
 
     def coefficient_jacobian(self, point: Point) -> tuple[Floats, NDArray[np.bool_]]:

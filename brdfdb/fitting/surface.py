@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -113,18 +114,23 @@ class Term:
             return None
         middle = {name: 0.5 * unit_of(self.spec.parameter(name)) for name in self.linear}
         with np.errstate(all="ignore"):
-            lobe = self.spec.lobe(np.asarray(1.0), **_columns(points), **middle)
+            lobe = self.spec.lobe(np.asarray(1.0), **columns(points), **middle)
         return np.broadcast_to(np.minimum(lobe.alpha_x, lobe.alpha_y).reshape(-1), len(points))
+
+    @cached_property
+    def nodes(self) -> list[dict[str, float]]:
+        """The coefficients at which the model is evaluated for the factors of its monomials."""
+        if self.scaled:
+            return [{}]
+        units = [unit_of(self.spec.parameter(name)) for name in self.linear]
+        return [
+            {name: u * unit for name, u, unit in zip(self.linear, node, units, strict=True)}
+            for node in self.polynomial.nodes.tolist()
+        ]
 
     def _computed(self, view: View, points: Sequence[Numbers]) -> Floats:
         """Return the factors (B, M, N) [1/sr] of the monomials at points that are not known yet."""
-        nodes: list[dict[str, Any]] = [{}]
-        if not self.scaled:
-            units = [unit_of(self.spec.parameter(name)) for name in self.linear]
-            nodes = [
-                {name: u * unit for name, u, unit in zip(self.linear, node, units, strict=True)}
-                for node in self.polynomial.nodes.tolist()
-            ]
+        nodes = self.nodes
         rows = [{**one, **node} for one in points for node in nodes]
         widths = self.widths(points) if view.half_angle else None
         of_rows = np.full(len(rows), np.inf) if widths is None else np.repeat(widths, len(nodes))
@@ -139,7 +145,7 @@ class Term:
 
     def _seen(self, view: View, width: float, points: Sequence[Numbers]) -> Floats:
         """Return f_r (B, N) [1/sr] as an instrument sees it, with the specular part that falls into its aperture."""
-        given, shape = _columns(points), (len(points), len(view))
+        given, shape = columns(points), (len(points), len(view))
         if not view.half_angle:
             return np.asarray(self.spec.vectors(view.w_i, view.w_r, **given)).reshape(shape)
         f_r = view.mean(lambda wi, wr: self.spec.vectors(wi, wr, **given).T, width).T.reshape(shape)
@@ -352,7 +358,7 @@ class Surface:
         return np.array([of_term for of_term in widths if of_term is not None]).reshape(-1, len(points)).T
 
 
-def _columns(points: Sequence[Numbers]) -> dict[str, Any]:
+def columns(points: Sequence[Numbers]) -> dict[str, Any]:
     """Return the arguments of points as columns (B, 1), or as one number where all have the same."""
     columns: dict[str, Any] = {}
     for name, first in points[0].items():

@@ -37,6 +37,10 @@ class Variable:
             return min(max(self.low * float((self.high / self.low) ** u), self.low), self.high)
         return self.low + (self.high - self.low) * u
 
+    def slope(self, u: float) -> float:
+        """Return the derivative of the value at u in [0, 1]."""
+        return self.value(u) * math.log(self.high / self.low) if self.logarithmic else self.high - self.low
+
     @property
     def step(self) -> float:
         """A tenth of the range, or half an octave of a logarithmic one."""
@@ -67,6 +71,20 @@ def index_of(normal: float, edge: float) -> tuple[float, float]:
     n = min((1.0 + root) / (1.0 - root), _MOST_N) ** (2.0 * edge - 1.0)
     k2 = (normal * (n + 1.0) ** 2 - (n - 1.0) ** 2) / (1.0 - normal)
     return n, math.sqrt(max(k2, 0.0))
+
+
+def index_slopes(normal: float, edge: float) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Return the derivatives of n and k of `index_of` by `normal`, and those by `edge`; those of k are 0 where k is."""
+    root = math.sqrt(normal)
+    most = (1.0 + root) / (1.0 - root)
+    n, k = index_of(normal, edge)
+    power = 2.0 * edge - 1.0
+    by_normal = n * power / (most * root * (1.0 - root) ** 2) if most < _MOST_N else 0.0
+    by_edge = 2.0 * n * math.log(min(most, _MOST_N))
+    half = 0.5 / k if k > 0.0 else 0.0  # k is a square root
+    k2_by_n = (2.0 * normal * (n + 1.0) - 2.0 * (n - 1.0)) / (1.0 - normal)
+    k2_by_normal = 4.0 * n / (1.0 - normal) ** 2
+    return (by_normal, half * (k2_by_n * by_normal + k2_by_normal)), (by_edge, half * k2_by_n * by_edge)
 
 
 def switches(spec: ModelSpec) -> dict[str, float]:

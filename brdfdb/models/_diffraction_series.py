@@ -12,7 +12,7 @@ from brdfdb._elementary import BLOCK, exp, log, summand_exp
 from brdfdb._numba import kernel, loop
 from brdfdb.parameters import Floats
 
-ROWS_OF_WORK, GROUPS = 13, 5  # rows of the two work arrays of `log_series`, of BLOCK numbers each
+ROWS_OF_WORK, GROUPS = 15, 5  # rows of the two work arrays of `log_series`, of BLOCK numbers each
 
 # Position of the peak that separates two methods: below, the sum is taken term by term, above, by the trapezoid rule
 _SUM_BELOW = 40.0
@@ -92,6 +92,39 @@ def log_series(
     of the trapezoid rule grow as 1 / reach, so that its number of nodes falls as the square of reach. work, of shape
     (ROWS_OF_WORK, BLOCK), and index, of shape (GROUPS, BLOCK), are overwritten.
     """
+    _log_series(False, g, V, reach, log_sum, log_sum, log_sum, work, index)
+
+
+@loop
+def log_series_and_slopes(
+    g: NDArray[np.float64],
+    V: NDArray[np.float64],
+    log_sum: NDArray[np.float64],
+    by_g: NDArray[np.float64],
+    by_V: NDArray[np.float64],
+    work: NDArray[np.float64],
+    index: NDArray[np.int64],
+) -> None:
+    """Fill log_sum as `log_series` does, and its derivatives by ln(g), increased by 1, and by ln(V).
+
+    They are means over the terms: <m> - g, and -V <1/m>.
+    """
+    _log_series(True, g, V, 1.0, log_sum, by_g, by_V, work, index)
+
+
+@kernel
+def _log_series(
+    slopes: bool,
+    g: NDArray[np.float64],
+    V: NDArray[np.float64],
+    reach: float,
+    log_sum: NDArray[np.float64],
+    by_g: NDArray[np.float64],
+    by_V: NDArray[np.float64],
+    work: NDArray[np.float64],
+    index: NDArray[np.int64],
+) -> None:
+    """Sum, and where `slopes` is true fill in the derivatives, too: the callers know it, and LLVM drops the rest."""
     count = log_sum.shape[0]
     log_g, u, m_star = work[0], work[1], work[2]
     for i in range(count):
@@ -112,13 +145,14 @@ def log_series(
         if members.shape[0] == 0:
             continue
         if group < 3:
-            _term_by_term(g, V, log_g, u, m_star, members, reach, log_sum, rest)
+            _term_by_term(slopes, g, V, log_g, u, m_star, members, reach, log_sum, by_g, by_V, rest)
         else:
-            _trapezoid(g, V, log_g, u, m_star, members, group == 4, reach, log_sum, rest)
+            _trapezoid(slopes, g, V, log_g, u, m_star, members, group == 4, reach, log_sum, by_g, by_V, rest)
 
 
-@loop
+@kernel
 def _term_by_term(
+    slopes: bool,
     all_g: NDArray[np.float64],
     all_V: NDArray[np.float64],
     all_log_g: NDArray[np.float64],
@@ -127,9 +161,11 @@ def _term_by_term(
     index: NDArray[np.int64],
     reach: float,
     log_sum: NDArray[np.float64],
+    by_g: NDArray[np.float64],
+    by_V: NDArray[np.float64],
     work: NDArray[np.float64],
 ) -> None:
-    V, log_g, shift, total = work[0], work[1], work[2], work[3]
+    V, log_g, shift, total, sum_m, sum_inverse = work[0], work[1], work[2], work[3], work[4], work[5]
     count = index.shape[0]
     lowest, highest = float(_TERMS), 1.0
     for i in range(count):
@@ -141,17 +177,56 @@ def _term_by_term(
         # The largest term, roughly, is taken out of the exponentials, so that they neither overflow nor underflow
         near = max(1.0, np.floor(m + 0.5))
         shift[i] = (near - 1.0) * log_g[i] - _LOG_FACTORIAL_TIMES_M[int(near)] - V[i] / near
-        total[i] = 0.0
+        total[i], sum_m[i], sum_inverse[i] = 0.0, 0.0, 0.0
     for m in range(max(1, int(lowest)), min(int(highest) + 1, _TERMS)):
         constant, inverse, power = _LOG_FACTORIAL_TIMES_M[m], 1.0 / m, m - 1.0
         for i in range(count):
-            total[i] += summand_exp(power * log_g[i] - constant - V[i] * inverse - shift[i])
+            term = summand_exp(power * log_g[i] - constant - V[i] * inverse - shift[i])
+            total[i] += term
+            if slopes:
+                sum_m[i] += power * term
+                sum_inverse[i] += inverse * term
     for i in range(count):
-        log_sum[index[i]] = log(total[i]) + shift[i] - all_g[index[i]]
+        at = index[i]
+        log_sum[at] = log(total[i]) + shift[i] - all_g[at]
+        if slopes:
+            by_g[at] = 1.0 + (sum_m[i] / total[i] - all_g[at])
+            by_V[at] = -V[i] * sum_inverse[i] / total[i]
 
 
-@loop
+@kernel
+def _add_node(slopes: bool, close: bool, distance: float, count: int, work: NDArray[np.float64]) -> None:
+    """Add a node of the trapezoid rule to the sums in work, whose rows `_trapezoid` names."""
+    m_star, a, b, step, m_inverse = work[0], work[1], work[2], work[3], work[4]
+    d, inverse, total, sum_bend, sum_inverse = work[7], work[8], work[9], work[10], work[11]
+    if close:
+        for i in range(count):
+            t = distance * step[i]
+            bend = -0.5 * t * t * (1 + t * (2 / 3 + t * (1 / 4 + t * (1 / 15 + t * (1 / 72)))))
+            term = summand_exp(m_star[i] * bend - d[i] * inverse[i] * (a[i] * d[i] - b[i]) - 0.5 * t)
+            total[i] += term
+            if slopes:
+                sum_inverse[i] += term * inverse[i]
+                sum_bend[i] += term * (m_star[i] * bend + a[i] * d[i] * d[i] * inverse[i])
+    else:
+        for i in range(count):
+            t = distance * step[i]
+            bend = (d[i] - t) - t * d[i]
+            m_i = inverse[i] * m_inverse[i]
+            m_i2 = m_i * m_i
+            stirling_error = m_i * (1 / 12 - m_i2 * (1 / 360 - m_i2 * (1 / 1260)))
+            exponent = m_star[i] * bend - d[i] * inverse[i] * (a[i] * d[i] - b[i])
+            term = summand_exp(exponent - 0.5 * t - stirling_error)
+            total[i] += term
+            if slopes:
+                stirling_slope = m_i * (1 / 12 - m_i2 * (1 / 120 - m_i2 * (1 / 252)))
+                sum_inverse[i] += term * inverse[i]
+                sum_bend[i] += term * (m_star[i] * bend + a[i] * d[i] * d[i] * inverse[i] + stirling_slope)
+
+
+@kernel
 def _trapezoid(
+    slopes: bool,
     all_g: NDArray[np.float64],
     all_V: NDArray[np.float64],
     all_log_g: NDArray[np.float64],
@@ -161,6 +236,8 @@ def _trapezoid(
     close: bool,
     reach: float,
     log_sum: NDArray[np.float64],
+    by_g: NDArray[np.float64],
+    by_V: NDArray[np.float64],
     work: NDArray[np.float64],
 ) -> None:
     """Sum by the trapezoid rule in t, where m = m* e^t.
@@ -172,6 +249,7 @@ def _trapezoid(
     """
     m_star, a, b, step, m_inverse = work[0], work[1], work[2], work[3], work[4]
     ratio, ratio_inverse, d, inverse, total = work[5], work[6], work[7], work[8], work[9]
+    sum_bend, sum_inverse = work[10], work[11]
     count = index.shape[0]
     right, left = 0.0, 0.0
     for i in range(count):
@@ -185,7 +263,7 @@ def _trapezoid(
         step[i] = h / deviations
         right = max(right, reach * _REACH / h)
         left = max(left, reach * (_REACH + reach * _LEFT_SKEW / deviations) / h)
-        total[i] = 0.0
+        total[i], sum_bend[i], sum_inverse[i] = 0.0, 0.0, 0.0
     for side in range(2):
         sign = 1.0 if side == 0 else -1.0
         nodes = int(right if side == 0 else left) + 2
@@ -203,21 +281,7 @@ def _trapezoid(
                     d[i] += ratio[i] * (1.0 + d[i])
                 for i in range(count):
                     inverse[i] *= ratio_inverse[i]
-            distance = sign * j
-            if close:
-                for i in range(count):
-                    t = distance * step[i]
-                    bend = -0.5 * t * t * (1 + t * (2 / 3 + t * (1 / 4 + t * (1 / 15 + t * (1 / 72)))))
-                    total[i] += summand_exp(m_star[i] * bend - d[i] * inverse[i] * (a[i] * d[i] - b[i]) - 0.5 * t)
-            else:
-                for i in range(count):
-                    t = distance * step[i]
-                    bend = (d[i] - t) - t * d[i]
-                    m_i = inverse[i] * m_inverse[i]
-                    m_i2 = m_i * m_i
-                    stirling_error = m_i * (1 / 12 - m_i2 * (1 / 360 - m_i2 * (1 / 1260)))
-                    exponent = m_star[i] * bend - d[i] * inverse[i] * (a[i] * d[i] - b[i])
-                    total[i] += summand_exp(exponent - 0.5 * t - stirling_error)
+            _add_node(slopes, close, sign * j, count, work)
     for i in range(count):
         at = index[i]
         # The exponent at the peak, m* (1 - u / 2 - V / m*^2) - g, without its cancellation
@@ -225,6 +289,13 @@ def _trapezoid(
         if close:
             peak -= m_inverse[i] / 12
         log_sum[at] = peak + log(total[i] * step[i] / (_SQRT_TWO_PI * math.sqrt(m_star[i]))) - all_log_g[at]
+        if slopes:
+            # The mean of the derivative of the exponent by t is 0. It gives <m - m*> = m* <d> from means that do not
+            # cancel, as those of m and m* would
+            mean_inverse = sum_inverse[i] / total[i]
+            beyond_peak = (sum_bend[i] / total[i] + b[i] * mean_inverse - 0.5) / (1.0 + all_u[at])
+            by_g[at] = beyond_peak + all_g[at] * math.expm1(0.5 * all_u[at])
+            by_V[at] = -(a[i] + b[i]) * mean_inverse
 
 
 @loop

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from brdfdb._elementary import BLOCK, cosine, erfcx, exp, log
 from brdfdb._numba import elementwise, kernel, loop
-from brdfdb.fresnel import reflectance
+from brdfdb.fresnel import reflectance, reflectance_slopes
 from brdfdb.models._diffraction_series import (
     G_HIGH,
     G_LOW,
@@ -17,6 +17,7 @@ from brdfdb.models._diffraction_series import (
     Q_PATCHES,
     ROWS_OF_WORK,
     log_series,
+    log_series_and_slopes,
     log_series_of_row,
     nearer_lambert_w,
     roughly_lambert_w,
@@ -48,6 +49,21 @@ def _shadowing_and_hidden(sin_theta: float, cos_theta: float, slope: float) -> t
 
 
 @kernel
+def _slopes_of_shadowing(sin_theta: float, cos_theta: float, slope: float) -> tuple[float, float]:
+    """Return the derivatives by ln(slope) of ln(S_1) and of K, which `_shadowing_and_hidden` gives."""
+    valley = 2.0 * slope * sin_theta
+    x = cos_theta / (valley if valley > 0.0 else 1.0)
+    x = _X_MAX if valley == 0.0 or x > _X_MAX else x
+    gaussian = exp(-x * x)
+    Q = 1.0 - 0.5 * gaussian * erfcx(x)
+    # dQ / d ln(slope) = -x e^(-x^2) / sqrt(pi). In the denominator Q cos + slope / sqrt(pi) sin e^(-x^2) it cancels
+    # against the derivative of the Gaussian
+    narrow = slope * _INVERSE_SQRT_PI * sin_theta * gaussian
+    by_shadowing = -_INVERSE_SQRT_PI * x * gaussian / Q - narrow / (Q * cos_theta + narrow)
+    return by_shadowing, _INVERSE_SQRT_PI * gaussian / slope if gaussian > 0.0 else 0.0
+
+
+@kernel
 def _shadowing_over_cos(sin_theta: float, cos_theta: float, slope: float) -> float:
     return _shadowing_and_hidden(sin_theta, cos_theta, slope)[0]
 
@@ -65,14 +81,20 @@ def _difference_of_sines(sin_i: float, cos_i: float, sin_r: float, cos_r: float)
 
 
 @kernel
-def _effective_variance(K: float) -> float:
-    """Return (sigma / sigma_0)^2 [1] of eqs 80-81 for K = K_i + K_r, where z_0^2 / sigma_0^2 = W_0(K^2 / (8 pi))."""
+def _height_squared(K: float) -> float:
+    """Return z_0^2 / sigma_0^2 = W_0(K^2 / (8 pi)) [1] of eq. 81 for K = K_i + K_r."""
     y = K * K * (0.125 / np.pi)
     series = y * (1.0 - y * (1.0 - y * (1.5 - y * (8.0 / 3.0))))
     large = 1e-4 if y < 1e-4 else y
     log_y = log(large)
     w = nearer_lambert_w(nearer_lambert_w(roughly_lambert_w(large, log_y), log_y), log_y)
-    return 1.0 / (1.0 + (series if y < 1e-4 else w))
+    return series if y < 1e-4 else w
+
+
+@kernel
+def _effective_variance(K: float) -> float:
+    """Return (sigma / sigma_0)^2 [1] of eq. 80 for K = K_i + K_r."""
+    return 1.0 / (1.0 + _height_squared(K))
 
 
 shadowing = elementwise(_shadowing_over_cos)
@@ -211,6 +233,22 @@ def scattered(
 
 
 @loop
+def _geometry_of(i: Floats, r: Floats, geometry: NDArray[np.float64]) -> None:
+    """Fill in the rows of geometry that `_evaluate` reads, for at most BLOCK pairs of unit vectors in flat arrays."""
+    count = i.shape[0] // 3
+    for j in range(count):
+        geometry[0, j] = math.sqrt(np.float64(i[3 * j]) ** 2 + np.float64(i[3 * j + 1]) ** 2)
+        geometry[1, j] = cosine(np.float64(i[3 * j + 2]))
+    for j in range(count):
+        geometry[2, j] = math.sqrt(np.float64(r[3 * j]) ** 2 + np.float64(r[3 * j + 1]) ** 2)
+        geometry[3, j] = cosine(np.float64(r[3 * j + 2]))
+    for j in range(count):
+        # Eq. (84): k_r - k_i is the sum of our directions
+        v_x, v_y = np.float64(i[3 * j]) + r[3 * j], np.float64(i[3 * j + 1]) + r[3 * j + 1]
+        geometry[4, j] = v_x * v_x + v_y * v_y
+
+
+@loop
 def _vectors(w_i: Floats, w_r: Floats, surface: NDArray[np.float64], series: int, reach: float, f_r: Floats) -> None:
     """Evaluate f_r [1/sr] as `scattered` does, for unit vectors of shape (N, 3) and a surface of shape (6, 1)."""
     work, index = np.empty((4 + ROWS_OF_WORK, BLOCK)), np.empty((GROUPS, BLOCK), np.int64)
@@ -222,16 +260,7 @@ def _vectors(w_i: Floats, w_r: Floats, surface: NDArray[np.float64], series: int
         count = min(BLOCK, f_r.shape[0] - start)
         i, r = w_i[start : start + count].reshape(-1), w_r[start : start + count].reshape(-1)
         f = f_r[start : start + count]
-        for j in range(count):
-            geometry[0, j] = math.sqrt(np.float64(i[3 * j]) ** 2 + np.float64(i[3 * j + 1]) ** 2)
-            geometry[1, j] = cosine(np.float64(i[3 * j + 2]))
-        for j in range(count):
-            geometry[2, j] = math.sqrt(np.float64(r[3 * j]) ** 2 + np.float64(r[3 * j + 1]) ** 2)
-            geometry[3, j] = cosine(np.float64(r[3 * j + 2]))
-        for j in range(count):
-            # Eq. (84): k_r - k_i is the sum of our directions
-            v_x, v_y = np.float64(i[3 * j]) + r[3 * j], np.float64(i[3 * j + 1]) + r[3 * j + 1]
-            geometry[4, j] = v_x * v_x + v_y * v_y
+        _geometry_of(i, r, geometry)
         _evaluate(geometry, lanes, series, reach, values[:count], work, index)
         for j in range(count):
             f[j] = values[j] * (0.0 if i[3 * j + 2] < 0.0 or r[3 * j + 2] < 0.0 else 1.0)  # nan stays nan
@@ -242,6 +271,91 @@ def vector_rows(w_i: Floats, w_r: Floats, series: int, reach: float, scalars: ND
     for row in range(f_r.shape[0]):
         surface = scalars[row].reshape(6, 1)
         _vectors(w_i[min(row, w_i.shape[0] - 1)], w_r[min(row, w_r.shape[0] - 1)], surface, series, reach, f_r[row])
+
+
+@loop
+def _gradient(
+    geometry: NDArray[np.float64],
+    surface: NDArray[np.float64],
+    values: NDArray[np.float64],
+    work: NDArray[np.float64],
+    index: NDArray[np.int64],
+) -> None:
+    """Evaluate the directional diffuse part and its derivatives at no more than BLOCK pairs of directions.
+
+    The rows of values, of shape (5, pairs), are f_r [1/sr] and its derivatives [1/sr] by ln(sigma_0), ln(tau), n and k.
+    surface has the rows of `_evaluate` for one surface.
+    """
+    wave, correlation, slope, n, k = surface[0], surface[1], surface[2], surface[3], surface[4]
+    count = values.shape[1]
+    g, V, log_sum, by_g, by_V = work[0, :count], work[1, :count], work[2, :count], work[3, :count], work[4, :count]
+    factor, by_slope, growth = work[5], work[6], work[7]
+    for j in range(count):
+        # Eqs (23)-(25), (79)-(83), as in `_roughness`
+        sin_i, cos_i, sin_r, cos_r = geometry[0, j], geometry[1, j], geometry[2, j], geometry[3, j]
+        light, K_i = _shadowing_and_hidden(sin_i, cos_i, slope)
+        viewer, K_r = _shadowing_and_hidden(sin_r, cos_r, slope)
+        light_slope, K_i_slope = _slopes_of_shadowing(sin_i, cos_i, slope)
+        viewer_slope, K_r_slope = _slopes_of_shadowing(sin_r, cos_r, slope)
+        K = K_i + K_r
+        height = _height_squared(K)
+        variance = 1.0 / (1.0 + height)
+        by_slope[j] = light_slope + viewer_slope
+        # The derivative of ln(sigma^2 / sigma_0^2) by ln(slope): W' = W / (y (1 + W)) with y = K^2 / (8 pi)
+        growth[j] = -2.0 * variance * variance * (height / K) * (K_i_slope + K_r_slope) if K > 0.0 else 0.0
+        v_z2 = (cos_i + cos_r) ** 2
+        v2 = geometry[4, j] + v_z2
+        g[j] = wave * variance * v_z2
+        V[j] = correlation * geometry[4, j]
+        # Eqs (71) and (76)
+        factor[j] = correlation * (0.25 / np.pi) * light * viewer * wave * variance * v2 * v2
+    # Eq. (78)
+    log_series_and_slopes(g, V, log_sum, by_g, by_V, work[8:], index)
+    for j in range(count):
+        half = 0.5 * math.sqrt(geometry[4, j] + (geometry[1, j] + geometry[3, j]) ** 2)
+        half = 1.0 if half > 1.0 else half
+        # Eq. (75), at the bisecting angle
+        F2 = reflectance(half, n, k)
+        F2_by_n, F2_by_k = reflectance_slopes(half, n, k)
+        of_mirror = factor[j] * exp(log_sum[j])
+        f_r = of_mirror * F2
+        # slope is sigma_0 / tau, g goes with (sigma_0 / lambda)^2 and the variance, V with tau^2
+        common = by_slope[j] + growth[j] * by_g[j]
+        values[0, j] = f_r
+        values[1, j] = f_r * (common + 2.0 * by_g[j])
+        values[2, j] = f_r * (2.0 + 2.0 * by_V[j] - common)
+        values[3, j] = of_mirror * F2_by_n
+        values[4, j] = of_mirror * F2_by_k
+
+
+@kernel
+def gradient_rows(w_i: Floats, w_r: Floats, scalars: NDArray[np.float64], values: Floats) -> None:
+    """Fill in f_r [1/sr] and its derivatives by sigma_0, tau, n, k and a, values of shape (6, rows, length).
+
+    scalars holds the rows of `scattered` and then sigma_0 and tau.
+    """
+    work, index = np.empty((8 + ROWS_OF_WORK, BLOCK)), np.empty((GROUPS, BLOCK), np.int64)
+    geometry, block = np.empty((5, BLOCK)), np.empty((5, BLOCK))
+    for row in range(values.shape[1]):
+        s = scalars[row]
+        uniform, sigma_0, tau = s[5], s[6], s[7]
+        per_sigma_0 = 1.0 / sigma_0 if sigma_0 > 0.0 else 0.0  # f_r goes with its square
+        for start in range(0, values.shape[2], BLOCK):
+            count = min(BLOCK, values.shape[2] - start)
+            i = w_i[min(row, w_i.shape[0] - 1), start : start + count].reshape(-1)
+            r = w_r[min(row, w_r.shape[0] - 1), start : start + count].reshape(-1)
+            _geometry_of(i, r, geometry)
+            _gradient(geometry, s, block[:, :count], work, index)
+            of_row = values[:, row, start : start + count]
+            for j in range(count):
+                above = 0.0 if i[3 * j + 2] < 0.0 or r[3 * j + 2] < 0.0 else 1.0  # nan stays nan
+                f_r = block[0, j]
+                of_row[0, j] = above * (f_r + uniform)
+                of_row[1, j] = above * block[1, j] * per_sigma_0
+                of_row[2, j] = above * block[2, j] / tau
+                of_row[3, j] = above * block[3, j]
+                of_row[4, j] = above * block[4, j]
+                of_row[5, j] = above / np.pi + 0.0 * f_r
 
 
 @kernel

@@ -41,18 +41,21 @@ def by_rows(loop: Loop, columns: Sequence[Floats], scalars: Sequence[Floats], dt
     return values.reshape(shape)[()]
 
 
-def by_rows_of_vectors(loop: Loop, directions: Vectors, scalars: Sequence[Floats]) -> Floats:
+def by_rows_of_vectors(
+    loop: Loop, directions: Vectors, scalars: Sequence[Floats], several: tuple[int, ...] = ()
+) -> Floats:
     """Call ``loop(w_i, w_r, scalars, values)`` as `by_rows` does, with unit vectors of shape (rows or 1, length, 3).
 
     The loop itself writes 0 below the horizon and nan where a vector is nan. Values have the dtype of the directions.
+    With `several` = (count,) it fills values of shape (count, rows, length), and that axis comes first in the result.
     """
     w_i, w_r = directions.w_i, directions.w_r
     shape = np.broadcast_shapes(w_i.shape[:-1], w_r.shape[:-1], *(np.shape(array) for array in scalars))
     rows, length, leading = _split(shape, scalars)
-    values: Floats = np.empty((rows, length), dtype=directions.dtype)
+    values: Floats = np.empty((*several, rows, length), dtype=directions.dtype)
     if values.size:
         loop(*(_vectors(w, shape, rows, length) for w in (w_i, w_r)), _packed(scalars, leading, rows), values)
-    return values.reshape(shape)[()]
+    return values.reshape((*several, *shape))[()]
 
 
 def _split(shape: tuple[int, ...], scalars: Sequence[Floats]) -> tuple[int, int, tuple[int, ...]]:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import functools
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from brdfdb._numba import kernel
 from brdfdb.geometry import checked_angles, checked_vectors, finished
 from brdfdb.lobes import Lobe
 from brdfdb.models._rows import by_rows, by_rows_of_vectors
-from brdfdb.parameters import Floats, Parameter
+from brdfdb.parameters import Draw, Floats, Gradient, Parameter
 
 RHO_D = Parameter("rho_d", "ρ_d", "1", 0.0, 1.0, "diffuse reflectance", reflectance=True)
 RHO_S = Parameter(
@@ -22,6 +23,12 @@ RHO_S = Parameter(
 )
 ALPHA_X = Parameter("alpha_x", "α_x", "1", 1e-6, 2.0, "width of the slopes along x, exp(-(s / alpha)^2)")
 ALPHA_Y = Parameter("alpha_y", "α_y", "1", 1e-6, 2.0, "width of the slopes along y")
+
+DRAW = Draw(
+    (("alpha_x", 0.01, 0.5), ("alpha_y", 0.01, 0.5)),
+    lambda given: (given["rho_d"] + given["rho_s"] <= 1.0) & (given["alpha_x"] >= given["alpha_y"]),
+    "rho_d + rho_s <= 1, and alpha_x >= alpha_y: the others are the same surfaces, turned",
+)
 
 Rows = NDArray[np.float64]
 
@@ -96,6 +103,39 @@ def _vector_rows(form: int, w_i: Floats, w_r: Floats, scalars: Rows, f_r: Floats
             f[j] = (uniform + lobe) * (0.0 if z_i < 0.0 or z_r < 0.0 else 1.0)  # nan stays nan
 
 
+@kernel
+def _gradient_rows(form: int, w_i: Floats, w_r: Floats, scalars: Rows, values: Floats) -> None:
+    """Fill in f_r [1/sr] and its derivatives by rho_d, rho_s, alpha_x, alpha_y, values of shape (5, rows, length)."""
+    for row in range(values.shape[1]):
+        s = scalars[row]
+        f_r, by_rho_d, by_rho_s = values[0, row], values[1, row], values[2, row]
+        by_alpha_x, by_alpha_y = values[3, row], values[4, row]
+        scale = s[1] if s[1] > 0.0 else 1.0  # of the lobe, whose derivative by rho_s is not 0 where the lobe is
+        share = 1.0 if s[1] > 0.0 else 0.0
+        uniform, peak, u_x, u_y = _constants(s[0], scale, s[2], s[3])
+        i, r = w_i[min(row, w_i.shape[0] - 1)].reshape(-1), w_r[min(row, w_r.shape[0] - 1)].reshape(-1)
+        for j in range(f_r.shape[0]):
+            z_i, z_r = np.float64(i[3 * j + 2]), np.float64(r[3 * j + 2])
+            h_x, h_y = np.float64(i[3 * j]) + r[3 * j], np.float64(i[3 * j + 1]) + r[3 * j + 1]
+            cos_i, cos_r = cosine(z_i), cosine(z_r)
+            h_z = cos_i + cos_r
+            above = 0.0 if z_i < 0.0 or z_r < 0.0 else 1.0  # nan stays nan
+            lobe = above * _lobe(form, h_x, h_y, h_z, cos_i * cos_r, peak, u_x, u_y)
+            changing = share * (0.0 if lobe == _LARGEST else lobe)
+            # All forms are rho_s / (alpha_x alpha_y) exp(-(h_x / alpha_x)^2 / width - (h_y / alpha_y)^2 / width) times
+            # a factor without parameters
+            width = h_z * h_z
+            if form == HALF_VECTOR:
+                length = math.sqrt(h_x * h_x + h_y * h_y + width)
+                width = 0.5 * length * (length + h_z)
+            twice = 2.0 / width
+            f_r[j] = above * uniform + share * lobe
+            by_rho_d[j] = above / np.pi + 0.0 * lobe
+            by_rho_s[j] = lobe / scale
+            by_alpha_x[j] = changing * u_x * (twice * (h_x * u_x) ** 2 - 1.0)
+            by_alpha_y[j] = changing * u_y * (twice * (h_y * u_y) ** 2 - 1.0)
+
+
 # Each form has a loop of its own: where the form is known there is no branch, and the loop vectorises. Each is compiled
 # when it is first called.
 
@@ -111,6 +151,11 @@ def _elliptical_vectors(w_i: Floats, w_r: Floats, scalars: Rows, f_r: Floats) ->
 
 
 @kernel
+def _elliptical_gradient(w_i: Floats, w_r: Floats, scalars: Rows, values: Floats) -> None:
+    _gradient_rows(ELLIPTICAL, w_i, w_r, scalars, values)
+
+
+@kernel
 def _half_vector_angles(cos_phi: Rows, sin_phi: Rows, scalars: Rows, f_r: Rows) -> None:
     _angle_rows(HALF_VECTOR, cos_phi, sin_phi, scalars, f_r)
 
@@ -118,6 +163,11 @@ def _half_vector_angles(cos_phi: Rows, sin_phi: Rows, scalars: Rows, f_r: Rows) 
 @kernel
 def _half_vector_vectors(w_i: Floats, w_r: Floats, scalars: Rows, f_r: Floats) -> None:
     _vector_rows(HALF_VECTOR, w_i, w_r, scalars, f_r)
+
+
+@kernel
+def _half_vector_gradient(w_i: Floats, w_r: Floats, scalars: Rows, values: Floats) -> None:
+    _gradient_rows(HALF_VECTOR, w_i, w_r, scalars, values)
 
 
 @kernel
@@ -131,6 +181,11 @@ def _duer_vectors(w_i: Floats, w_r: Floats, scalars: Rows, f_r: Floats) -> None:
 
 
 @kernel
+def _duer_gradient(w_i: Floats, w_r: Floats, scalars: Rows, values: Floats) -> None:
+    _gradient_rows(DUER, w_i, w_r, scalars, values)
+
+
+@kernel
 def _bounded_angles(cos_phi: Rows, sin_phi: Rows, scalars: Rows, f_r: Rows) -> None:
     _angle_rows(BOUNDED, cos_phi, sin_phi, scalars, f_r)
 
@@ -140,8 +195,14 @@ def _bounded_vectors(w_i: Floats, w_r: Floats, scalars: Rows, f_r: Floats) -> No
     _vector_rows(BOUNDED, w_i, w_r, scalars, f_r)
 
 
+@kernel
+def _bounded_gradient(w_i: Floats, w_r: Floats, scalars: Rows, values: Floats) -> None:
+    _gradient_rows(BOUNDED, w_i, w_r, scalars, values)
+
+
 _ANGLE_LOOPS = (_elliptical_angles, _half_vector_angles, _duer_angles, _bounded_angles)
 _VECTOR_LOOPS = (_elliptical_vectors, _half_vector_vectors, _duer_vectors, _bounded_vectors)
+_GRADIENT_LOOPS = (_elliptical_gradient, _half_vector_gradient, _duer_gradient, _bounded_gradient)
 
 
 def by_angles(
@@ -173,6 +234,27 @@ def by_vectors(
     """Return f_r [1/sr] of one form for unit vectors. All arguments are checked."""
     parameters = _checked(rho_d, rho_s, alpha_x, alpha_y)
     return by_rows_of_vectors(_VECTOR_LOOPS[form], checked_vectors(wi, wr), parameters)
+
+
+def gradient_of(form: int) -> Callable[..., Gradient]:
+    """Return the function that is the gradient of one form."""
+    return functools.partial(_gradient, form)
+
+
+def _gradient(
+    form: int,
+    wi: ArrayLike,
+    wr: ArrayLike,
+    *,
+    rho_d: ArrayLike,
+    rho_s: ArrayLike,
+    alpha_x: ArrayLike,
+    alpha_y: ArrayLike,
+) -> Gradient:
+    names = (RHO_D.name, RHO_S.name, ALPHA_X.name, ALPHA_Y.name)
+    parameters = _checked(rho_d, rho_s, alpha_x, alpha_y)
+    f_r, *derivatives = by_rows_of_vectors(_GRADIENT_LOOPS[form], checked_vectors(wi, wr), parameters, (5,))
+    return Gradient(f_r, dict(zip(names, derivatives, strict=True)))
 
 
 def _checked(rho_d: ArrayLike, rho_s: ArrayLike, alpha_x: ArrayLike, alpha_y: ArrayLike) -> tuple[Floats, ...]:

@@ -20,12 +20,13 @@ from brdfdb.models._he_torrance_kernels import (
     WORTH_THE_TABLE,
     angle_rows,
     difference_of_sines,
+    gradient_rows,
     scattered,
     specular_rows,
     vector_rows,
 )
 from brdfdb.models._rows import by_rows, by_rows_of_vectors
-from brdfdb.parameters import Arguments, Floats, FormKind, ModelForm, Parameter, bytes_of
+from brdfdb.parameters import Arguments, Floats, FormKind, Gradient, ModelForm, Parameter, bytes_of
 
 WAVELENGTH_NM = Parameter("wavelength_nm", "λ", "nm", 1e-3, 1e7, "wavelength in vacuum")
 SIGMA_0_UM = Parameter("sigma_0_um", "σ_0", "µm", 0.0, 1e4, "rms roughness; 0 is a mirror")
@@ -159,6 +160,25 @@ def he_torrance_vectors(
     """Return `he_torrance` [1/sr] for unit vectors `wi` (light) and `wr` (viewer) of shape (..., 3)."""
     surface = checked_surface(wavelength_nm, sigma_0_um, tau_um, n, k)
     return _f_r(checked_vectors(wi, wr), surface, A.check(a))
+
+
+def he_torrance_gradient(
+    wi: ArrayLike,
+    wr: ArrayLike,
+    *,
+    wavelength_nm: ArrayLike,
+    sigma_0_um: ArrayLike,
+    tau_um: ArrayLike,
+    n: ArrayLike,
+    k: ArrayLike,
+    a: ArrayLike = 0.0,
+) -> Gradient:
+    """Return the gradient of `he_torrance_vectors`, by n and k, too."""
+    surface = checked_surface(wavelength_nm, sigma_0_um, tau_um, n, k)
+    scalars = (*surface.features, surface.n, surface.k, A.check(a) / np.pi, surface.sigma_0, surface.tau)
+    names = (SIGMA_0_UM.name, TAU_UM.name, N.name, K.name, A.name)
+    f_r, *derivatives = by_rows_of_vectors(gradient_rows, checked_vectors(wi, wr), scalars, (6,))
+    return Gradient(f_r, dict(zip(names, derivatives, strict=True)))
 
 
 def _f_r(directions: Directions, surface: Surface, albedo: Floats) -> Floats:

@@ -9,13 +9,14 @@ from brdfdb.models.he_torrance_1991 import (
     A,
     forms,
     he_torrance,
+    he_torrance_gradient,
     he_torrance_specular,
     he_torrance_vectors,
     lobe,
     lossless,
 )
 from brdfdb.models.he_torrance_1991_polarised import he_torrance_facet_mueller, he_torrance_mueller_vectors
-from brdfdb.parameters import ModelSpec, Polarised
+from brdfdb.parameters import Draw, ModelSpec, Polarised
 
 SPEC = ModelSpec(
     name="he_torrance",
@@ -38,4 +39,10 @@ SPEC = ModelSpec(
     limits=limits,
     uniform_bound_cosine=lowest_cosine,
     polarised=Polarised(mueller=he_torrance_mueller_vectors, facet=he_torrance_facet_mueller),
+    gradient=he_torrance_gradient,
+    draw=Draw(
+        (("sigma_0_um", 0.01, 5.0), ("tau_um", 0.1, 50.0), ("a", 0.0, 0.3)),
+        lambda given: given["sigma_0_um"] <= given["tau_um"],
+        "sigma_0_um <= tau_um: the paper holds for slopes below 1",
+    ),
 )

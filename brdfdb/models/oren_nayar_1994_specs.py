@@ -14,7 +14,9 @@ from brdfdb.models.oren_nayar_1994 import (
     RHO,
     SIGMA,
     oren_nayar,
+    oren_nayar_gradient,
     oren_nayar_qualitative,
+    oren_nayar_qualitative_gradient,
     oren_nayar_qualitative_vectors,
     oren_nayar_vectors,
 )
@@ -38,7 +40,7 @@ from brdfdb.models.oren_nayar_1994_surfaces import (
     oren_nayar_unidirectional,
     oren_nayar_unidirectional_vectors,
 )
-from brdfdb.parameters import Arguments, ModelSpec, StatedLimit, white
+from brdfdb.parameters import Arguments, Draw, ModelSpec, StatedLimit, white
 
 # Shares of a Gaussian of slopes beyond 90 degrees, up to which a surface is inside the limits or at their edge
 _BEYOND, _FAR_BEYOND = 0.01, 0.1
@@ -101,6 +103,8 @@ def _integrated(parameters: Mapping[str, Any]) -> tuple[str, dict[str, Any]] | N
     return "oren_nayar_gaussian", {"rho": parameters["rho"], "sigma": parameters["sigma"]}
 
 
+_DRAW = Draw((("sigma", 0.0, math.pi / 3.0), ("offset", 0.33, 0.57)))
+
 SPEC = ModelSpec(
     name="oren_nayar",
     version=2,
@@ -117,6 +121,8 @@ SPEC = ModelSpec(
     forms=forms,
     exact_model=_integrated,
     limits=_limits,
+    gradient=oren_nayar_gradient,
+    draw=_DRAW,
 )
 QUALITATIVE_SPEC = ModelSpec(
     name="oren_nayar_qualitative",
@@ -134,6 +140,8 @@ QUALITATIVE_SPEC = ModelSpec(
     forms=forms,
     exact_model=_integrated,
     limits=_limits,
+    gradient=oren_nayar_qualitative_gradient,
+    draw=_DRAW,
 )
 UNIDIRECTIONAL_SPEC = ModelSpec(
     name="oren_nayar_unidirectional",

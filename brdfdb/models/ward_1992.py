@@ -11,12 +11,14 @@ from brdfdb.models._limits import standing
 from brdfdb.models._ward_lobes import (
     ALPHA_X,
     ALPHA_Y,
+    DRAW,
     ELLIPTICAL,
     HALF_VECTOR,
     RHO_D,
     RHO_S,
     by_angles,
     by_vectors,
+    gradient_of,
     lobe,
     lossless,
     wide_lobe,
@@ -226,6 +228,8 @@ SPEC = ModelSpec(
     lossless=lossless,
     forms=forms,
     limits=limits,
+    gradient=gradient_of(ELLIPTICAL),
+    draw=DRAW,
 )
 HALF_VECTOR_SPEC = ModelSpec(
     name="ward_half_vector",
@@ -246,4 +250,6 @@ HALF_VECTOR_SPEC = ModelSpec(
     forms=forms,
     exact_model=lambda parameters: ("ward", dict(parameters)),
     limits=limits,
+    gradient=gradient_of(HALF_VECTOR),
+    draw=DRAW,
 )

@@ -35,21 +35,18 @@ def chunk_name(layout: Layout, number: int) -> str:
     return "/".join([layout.variable, "c", str(number), *["0"] * (len(layout.shape) - 1)])
 
 
-def encoded(layout: Layout, number: int, values: NDArray[np.float32]) -> bytes:
-    """Return the bytes of the file of a block: those that zarr writes with `COMPRESSORS`, without its event loop.
+def chunk_bytes(values: NDArray[np.floating[Any]], rows: int) -> bytes:
+    """Return the bytes that zarr writes for a chunk in float32 with `COMPRESSORS`, without its event loop.
 
     Parameters
     ----------
-    layout : Layout
-        Of the table.
-    number : int
-        Of the block.
-    values : float32 array
-        The block, as `tabulate.block` returns it.
+    values : array
+        The rows of the chunk; fewer than `rows` are filled up with nan, because chunks are of one size.
+    rows : int
+        Rows of a chunk.
     """
-    rows = layout.blocks[number]
-    if rows.stop - rows.start < layout.block_rows:  # chunks are of one size: the last is filled up
-        whole = np.full((layout.block_rows, *layout.shape[1:]), np.nan, dtype=np.float32)
+    if len(values) < rows:
+        whole = np.full((rows, *values.shape[1:]), np.nan, dtype=np.float32)
         whole[: len(values)] = values
         values = whole
     data: bytes = chunks.BLOSC.encode(np.ascontiguousarray(values, dtype="<f4"))
@@ -58,7 +55,7 @@ def encoded(layout: Layout, number: int, values: NDArray[np.float32]) -> bytes:
 
 
 def decoded(layout: Layout, number: int, data: bytes) -> NDArray[np.float32]:
-    """Return the block that the bytes of a file hold: the inverse of `encoded`.
+    """Return the block that the bytes of a file hold: the inverse of `chunk_bytes`.
 
     Raises
     ------
@@ -78,11 +75,11 @@ def array_metadata(layout: Layout) -> bytes:
     rest = tuple(layout.shape[1:])
     attributes = json.dumps(VARIABLES[layout.variable])
     shape, chunk = (layout.shape[0], *rest), (layout.block_rows, *rest)
-    return _array_files(tuple(layout.dims), shape, chunk, "<f4", attributes, None)[METADATA]
+    return array_files(tuple(layout.dims), shape, chunk, "<f4", attributes, None)[METADATA]
 
 
 @lru_cache(maxsize=256)
-def _array_files(
+def array_files(
     dims: tuple[str, ...],
     shape: tuple[int, ...],
     chunk: tuple[int, ...],
@@ -111,7 +108,7 @@ def _array_files(
 def frame_files(layout: Layout, frame: Frame) -> dict[str, bytes]:
     """Return all files of a revision but the blocks: metadata, coordinates and small variables."""
     others = {f"{layout.variable}/{METADATA}": array_metadata(layout)}
-    return _group_files({**frame.variables, **frame.coordinates}, frame.attrs, others)
+    return group_files({**frame.variables, **frame.coordinates}, frame.attrs, others)
 
 
 def _chunks(shape: tuple[int, ...]) -> tuple[int, ...]:
@@ -128,10 +125,10 @@ def dataset_files(dataset: xr.Dataset) -> dict[str, bytes]:
         str(name): Variable(tuple(map(str, variable.dims)), np.asarray(variable.values), variable.attrs)
         for name, variable in dataset.variables.items()
     }
-    return _group_files(variables, dataset.attrs, {})
+    return group_files(variables, dataset.attrs, {})
 
 
-def _group_files(
+def group_files(
     variables: Mapping[str, Variable], attrs: Mapping[str, Any], others: Mapping[str, bytes]
 ) -> dict[str, bytes]:
     """Return the files of a group of plain arrays; the metadata of the group repeats those of the arrays.
@@ -141,7 +138,7 @@ def _group_files(
     """
     files = dict(others)
     for name, (dims, values, attributes) in variables.items():
-        written = _array_files(
+        written = array_files(
             dims,
             values.shape,
             _chunks(values.shape),

@@ -124,7 +124,7 @@ def write_block(staging: str, layout: str, number: int) -> Block:
     StoreError
         If it cannot be written.
     """
-    from brdfdb.store.codec import chunk_name, encoded
+    from brdfdb.store.codec import chunk_bytes, chunk_name
 
     directory = Path(staging)
     table = _layout(layout)
@@ -133,7 +133,7 @@ def write_block(staging: str, layout: str, number: int) -> Block:
     marker = directory / "blocks" / f"{number:06d}.json"
     if (entry := _kept(marker, path, layout)) is not None:
         return {"name": name, "entry": entry, "kept": True}
-    data = encoded(table, number, tabulation.block(table, table.blocks[number]))
+    data = chunk_bytes(tabulation.block(table, table.blocks[number]), table.block_rows)
     with writing(store_of_staged(directory), table.source.name):
         entry = write_file(path, data, directory)
         write_json(marker, {**entry, "layout": _short(layout)}, directory)

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
-from brdfdb.store.codec import encoded
+from brdfdb.store.codec import chunk_bytes
 from brdfdb.tables.layout import Layout
 from brdfdb.tables.tabulation import block
 from brdfdb_pipelines.build import build
@@ -45,7 +45,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     tasks.sort(key=lambda task: task[0].size, reverse=True)
     total = sum(job.layout().size for job in recipe.jobs())
     for layout in {layout.source.model: layout for layout, _ in tasks}.values():  # compile before the clock runs
-        encoded(layout, 0, block(layout, layout.blocks[0]))
+        chunk_bytes(block(layout, layout.blocks[0]), layout.block_rows)
     best: dict[str, float] = {}
     with ThreadPoolExecutor(options.jobs) as pool:
         at = Workers(pool, lambda: options.jobs)
@@ -55,7 +55,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return block(layout, layout.blocks[number])
 
         def encode(task: tuple[Layout, int], values: NDArray[np.float32]) -> int:
-            return len(encoded(*task, values))
+            return len(chunk_bytes(values, task[0].block_rows))
 
         for _ in range(1 if options.quick else options.repeat):  # in turn, so that a noisy machine is unfair to none
             start = time.perf_counter()

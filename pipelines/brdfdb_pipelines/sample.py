@@ -1,0 +1,253 @@
+"""The sample job: a training set of materials times directions, written chunk by chunk into one zarr group."""
+
+from __future__ import annotations
+
+import functools
+import importlib.metadata
+import json
+import os
+from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brdfdb.errors import BrdfdbError, ParameterError
+from brdfdb.geometry import radians, unit_vector
+from brdfdb.materials.hypercube import Axis, axes_of, in_units, materials, pairs
+from brdfdb.models import MODELS
+from brdfdb.parameters import Floats, ModelSpec
+from brdfdb.store.codec import array_files, chunk_bytes, group_files
+from brdfdb.store.files import write_file
+from brdfdb.store.paths import METADATA
+from brdfdb.tables.tabulation import Variable
+from brdfdb_pipelines import terminal
+
+Array = NDArray[np.float64]
+
+_CHUNK_VALUES = 1 << 20  # values of a chunk, 4 MB
+_DIMENSIONS = ("material", "direction")
+_LAST = "last.json"  # the metadata of the group until all chunks are there: nothing opens the directory before
+
+
+class SampleError(BrdfdbError):
+    """A training set that cannot be written."""
+
+
+@dataclass(frozen=True)
+class TrainingSet:
+    """A training set before its values: the drawn materials and directions.
+
+    Attributes
+    ----------
+    spec : ModelSpec
+        The model.
+    axes : list of Axis
+        Its drawn parameters.
+    written : dict
+        Their values (M,), as files write them.
+    angles : dict
+        Angles (D,) [degree] of light and viewer.
+    gradients : bool
+        True if derivatives by the drawn parameters stand beside f_r.
+    """
+
+    spec: ModelSpec
+    axes: list[Axis]
+    written: dict[str, Array]
+    angles: dict[str, Array]
+    gradients: bool
+
+    @functools.cached_property
+    def shape(self) -> tuple[int, int]:
+        """Numbers of materials and of directions."""
+        return len(next(iter(self.written.values()))), len(self.angles["theta_i"])
+
+    @functools.cached_property
+    def rows(self) -> int:
+        """Materials of a chunk."""
+        return min(max(1, _CHUNK_VALUES // self.shape[1]), self.shape[0])
+
+    @functools.cached_property
+    def arguments(self) -> Mapping[str, Array]:
+        """Parameters (M,) in the units of the model."""
+        return in_units(self.axes, self.written)
+
+    @functools.cached_property
+    def directions(self) -> tuple[Array, Array]:
+        """Unit vectors (D, 3) of light and viewer."""
+        theta_i, phi_i, theta_r, phi_r = (radians(angle) for angle in self.angles.values())
+        return unit_vector(theta_i, phi_i), unit_vector(theta_r, phi_r)
+
+    @functools.cached_property
+    def variables(self) -> dict[str, dict[str, str]]:
+        """Attributes of the arrays by their names: f_r, and its derivatives."""
+        attributes = {"f_r": {"units": "1/sr", "long_name": "BRDF, without the cosine"}}
+        if self.gradients:
+            for axis in self._derived:
+                unit = "" if axis.parameter.unit == "1" else f"/{axis.parameter.unit}"
+                attributes[f"f_r_by_{axis.parameter.name}"] = {
+                    "units": f"1/sr{unit}",
+                    "long_name": f"derivative of f_r by {axis.parameter.name}",
+                }
+        return attributes
+
+    @property
+    def _derived(self) -> list[Axis]:
+        return [axis for axis in self.axes if axis.parameter.name != "wavelength_nm"]
+
+    def values(self, chunk: int) -> list[Floats]:
+        """Return the arrays (materials of the chunk, D) of `variables`."""
+        part = slice(chunk * self.rows, (chunk + 1) * self.rows)
+        columns = {name: values[part, np.newaxis] for name, values in self.arguments.items()}
+        if not self.gradients:
+            return [self.spec.vectors(*self.directions, **columns)]
+        assert self.spec.gradient is not None
+        gradient = self.spec.gradient(*self.directions, **columns)
+        derivatives = []
+        for axis in self._derived:
+            angle = axis.parameter.unit == "degree"
+            by = gradient.derivatives[axis.parameter.name.removesuffix("_deg") if angle else axis.parameter.name]
+            derivatives.append(radians(by) if angle else by)  # 1 / degree
+        return [gradient.f_r, *derivatives]
+
+
+def run(
+    model: str,
+    out: Path,
+    *,
+    count: int,
+    directions: int,
+    ranges: Mapping[str, tuple[float, float]] | None = None,
+    seed: int = 0,
+    gradients: bool = False,
+    jobs: int = 1,
+) -> None:
+    """Write a training set, or go on with one that was interrupted.
+
+    Parameters
+    ----------
+    model : str
+        A name in `brdfdb.models.MODELS`.
+    out : Path
+        The zarr group to write. Until it is complete its name ends in ``.partial``.
+    count, directions : int
+        Materials, and pairs of directions that all of them share.
+    ranges : mapping of str to (float, float), optional
+        Ranges of parameters in place of the usual ones, by names and in units as files write them.
+    seed : int
+        The same seed draws the same set.
+    gradients : bool
+        Write derivatives by the drawn parameters, too.
+    jobs : int
+        Threads.
+
+    Raises
+    ------
+    ParameterError
+        If the model is unknown or has no derivatives, or a range is refused.
+    SampleError
+        If the group is there already, or another set is half written under its name.
+    """
+    spec = MODELS[model]
+    if seed < 0:
+        raise ParameterError("--seed", f"{seed} is not at least 0", seed)
+    if gradients and spec.gradient is None:
+        known = [one.name for one in MODELS.values() if one.gradient is not None]
+        text = f"{model} has no derivatives; those that have: {', '.join(known)}"
+        raise ParameterError("--gradients", text, model, known)
+    if os.path.lexists(out):
+        raise SampleError(f"{out} is there already; remove it, or give another name")
+    axes = axes_of(spec, ranges or {})
+    made = TrainingSet(spec, axes, materials(spec, axes, count, seed), pairs(directions, seed), gradients)
+    partial = out.with_name(f"{out.name}.partial")
+    files = group_files(_coordinates(made), _attributes(made, seed), _arrays(made))
+    last = files.pop(METADATA)
+    if (partial / _LAST).exists() and (partial / _LAST).read_bytes() != last:
+        raise SampleError(f"{partial} is a part of another set; finish that one, or remove it")
+    partial.mkdir(parents=True, exist_ok=True)
+    for name, data in files.items():
+        write_file(partial / name, data, partial)
+    write_file(partial / _LAST, last, partial)
+    _write_chunks(made, partial, jobs)
+    os.replace(partial / _LAST, partial / METADATA)
+    os.replace(partial, out)
+    size = terminal.size(sum(file.stat().st_size for file in out.rglob("*") if file.is_file()))
+    print(f"{out}: {count} materials of {model} times {directions} directions, {size}")
+
+
+def _write_chunks(made: TrainingSet, partial: Path, jobs: int) -> None:
+    """Write the chunks that are missing. A chunk is there whole or not at all."""
+    chunks = range(-(-made.shape[0] // made.rows))
+    name = next(reversed(made.variables))  # it is written last
+    missing = [chunk for chunk in chunks if not _chunk_file(partial, name, chunk).exists()]
+    for half in partial.glob(".*"):  # files that a kill left
+        half.unlink()
+    with terminal.progress() as bar, ThreadPoolExecutor(jobs) as executor:
+        task = bar.add_task(made.spec.name, total=len(chunks), completed=len(chunks) - len(missing))
+        try:
+            for _ in executor.map(functools.partial(_write_chunk, made, partial), missing):
+                bar.advance(task)
+        except BaseException:
+            executor.shutdown(cancel_futures=True)
+            raise
+
+
+def _write_chunk(made: TrainingSet, partial: Path, chunk: int) -> None:
+    for name, values in zip(made.variables, made.values(chunk), strict=True):
+        write_file(_chunk_file(partial, name, chunk), chunk_bytes(values, made.rows), partial)
+
+
+def _chunk_file(partial: Path, name: str, chunk: int) -> Path:
+    return partial / name / "c" / str(chunk) / "0"
+
+
+def _arrays(made: TrainingSet) -> dict[str, bytes]:
+    """Return the metadata of the arrays whose chunks are written one by one."""
+    chunks = (made.rows, made.shape[1])
+    return {
+        f"{name}/{METADATA}": array_files(_DIMENSIONS, made.shape, chunks, "<f4", json.dumps(attributes), None)[
+            METADATA
+        ]
+        for name, attributes in made.variables.items()
+    }
+
+
+def _coordinates(made: TrainingSet) -> dict[str, Variable]:
+    """Return parameters along the materials, and angles along the directions."""
+    variables = {
+        axis.parameter.name: Variable(
+            _DIMENSIONS[:1],
+            made.written[axis.parameter.name],
+            {"units": axis.parameter.unit, "long_name": axis.parameter.meaning},
+        )
+        for axis in made.axes
+    }
+    return variables | {
+        name: Variable(_DIMENSIONS[1:], angles, {"units": "degree"}) for name, angles in made.angles.items()
+    }
+
+
+def _attributes(made: TrainingSet, seed: int) -> dict[str, Any]:
+    """Return the attributes of the group."""
+    spec = made.spec
+    fixed = {one.name: one.default for one in spec.parameters if isinstance(one.default, bool)}
+    return {
+        "coordinates": " ".join([*made.written, *made.angles]),
+        "title": f"Training set: {made.shape[0]} materials of {spec.title}",
+        "model": spec.name,
+        "model_version": spec.version,
+        "form": spec.equation,
+        "reference": spec.reference,
+        "seed": seed,
+        "ranges": {axis.parameter.name: [axis.low, axis.high] for axis in made.axes},
+        "logarithmic": [axis.parameter.name for axis in made.axes if axis.logarithmic],
+        "condition": spec.draw.condition,
+        "fixed": fixed,
+        "materials": "Latin hypercube over the ranges",
+        "directions": "Latin hypercube, even in solid angle; every material has all of them",
+        "versions": {name: importlib.metadata.version(name) for name in ("brdfdb", "numpy", "scipy")},
+    }

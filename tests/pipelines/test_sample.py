@@ -1,0 +1,138 @@
+"""The command `brdfdb sample`: what a training set holds, conditions and ranges, a kill, and what is refused."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from scipy.stats import kstest
+
+from brdfdb.derivatives import gradient
+from brdfdb.models import MODELS
+from brdfdb_pipelines import sample
+from tests.pipelines.command import Captured, run
+
+SINGLE = 2.0**-23  # relative rounding of float32
+SMALL = ("--count", 40, "--directions", 25)
+
+
+def angles(made: xr.Dataset) -> list[np.ndarray]:
+    return [np.deg2rad(made[name].values) for name in ("theta_i", "phi_i", "theta_r", "phi_r")]
+
+
+@pytest.mark.parametrize("model", ["ward", "oren_nayar", "he_torrance"])
+def test_values_and_gradients_are_those_of_the_model(model: str, tmp_path: Path, capsys: Captured) -> None:
+    out = tmp_path / "set.zarr"
+    assert run("sample", model, *SMALL, "--gradients", "--out", out) == 0
+    assert "40 materials" in capsys.readouterr().out
+    made = xr.open_zarr(out)
+    drawn = [name for name in made.coords if made[name].dims == ("material",)]
+    columns = {str(name): made[name].values[:, np.newaxis] for name in drawn}
+    degree = {name.removesuffix("_deg"): np.deg2rad(columns.pop(name)) for name in list(columns) if "_deg" in name}
+    expected = gradient(model, *angles(made), **columns, **degree)
+    np.testing.assert_allclose(made["f_r"], expected.f_r, rtol=SINGLE, atol=1e-30)
+    for name, values in expected.derivatives.items():
+        written = f"f_r_by_{name}_deg" if name in degree else f"f_r_by_{name}"
+        scale = np.pi / 180.0 if name in degree else 1.0
+        np.testing.assert_allclose(made[written], scale * values, rtol=SINGLE, atol=1e-30)
+    if degree:
+        assert made["f_r_by_sigma_deg"].attrs["units"] == "1/sr/degree"
+    assert made.attrs["model_version"] == MODELS[model].version
+    assert made.attrs["seed"] == 0
+    assert set(made.attrs["ranges"]) == set(drawn)
+
+
+def test_materials_keep_condition_and_ranges_and_directions_are_even(tmp_path: Path) -> None:
+    out = tmp_path / "set.zarr"
+    given = ("--range", "alpha_x=0.1:0.2", "--range", "rho_d=0:0.7", "--seed", 3)
+    assert run("sample", "ward", "--count", 3000, "--directions", 500, *given, "--out", out) == 0
+    made = xr.open_zarr(out)
+    assert np.all(made["rho_d"] + made["rho_s"] <= 1.0)
+    assert np.all(made["alpha_y"] <= made["alpha_x"])
+    assert 0.1 <= float(made["alpha_x"].min()) <= float(made["alpha_x"].max()) <= 0.2
+    assert made.attrs["ranges"]["alpha_x"] == [0.1, 0.2]
+    for name in ("theta_i", "theta_r"):
+        cosines = np.sort(np.cos(np.deg2rad(made[name].values)))
+        assert np.all(np.floor(cosines * 500) == np.arange(500))  # one in each stratum
+    assert kstest(made["phi_i"] / 360.0, "uniform").pvalue > 0.01
+
+
+def test_the_same_seed_draws_the_same_set(tmp_path: Path) -> None:
+    for name, seed in (("a", 1), ("b", 1), ("c", 2)):
+        assert run("sample", "oren_nayar", *SMALL, "--seed", seed, "--out", tmp_path / name) == 0
+    a, b, c = (xr.open_zarr(tmp_path / name).load() for name in "abc")
+    xr.testing.assert_identical(a, b)
+    assert not np.array_equal(a["rho"], c["rho"])
+
+
+def test_a_killed_set_does_not_look_complete_and_goes_on(tmp_path: Path) -> None:
+    whole, out = tmp_path / "whole.zarr", tmp_path / "set.zarr"
+    arguments = ("sample", "ward", "--count", "12000", "--directions", "2000", "--jobs", "1")
+    command = [sys.executable, "-m", "brdfdb_pipelines.cli", *arguments, "--out", str(out)]
+    partial = tmp_path / "set.zarr.partial"
+    process = subprocess.Popen(command, stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
+    while process.poll() is None and len([*partial.glob("f_r/c/*/0")]) < 2:
+        time.sleep(0.001)
+    os.kill(process.pid, signal.SIGKILL)
+    assert process.wait() == -signal.SIGKILL
+    assert not out.exists()
+    with pytest.raises((FileNotFoundError, ValueError)):
+        xr.open_zarr(partial, consolidated=False)
+    kept = {path: path.stat().st_mtime_ns for path in partial.glob("f_r/c/*/0")}
+    assert 2 <= len(kept) < 23
+    assert run(*arguments[:-2], "--seed", 1, "--out", out) == 2  # another set
+    assert run(*arguments, "--out", out) == 0
+    assert not partial.exists()
+    assert all((out / path.relative_to(partial)).stat().st_mtime_ns == at for path, at in kept.items())
+    assert run(*arguments, "--out", whole) == 0
+    xr.testing.assert_identical(xr.open_zarr(out).load(), xr.open_zarr(whole).load())
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (("lambert", "--gradients"), "--gradients: lambert has no derivatives; those that have: oren_nayar, "),
+        (("lambrt",), "model: 'lambrt' is not one of "),
+        (("ward", "--range", "rho=0:1"), "--range rho: the parameters of ward are rho_d, rho_s, alpha_x, alpha_y"),
+        (("ward", "--range", "rho_d=0:2"), "--range rho_d: 0:2 is no range within [0, 1]"),
+        (("ward", "--range", "rho_d=0.3:0.1"), "--range rho_d: 0.3:0.1 is no range within [0, 1]"),
+        (("ward", "--range", "rho_d=nan:1"), "--range rho_d: nan:1 is no range within [0, 1]"),
+        (("ward", "--range", "rho_d=0.3"), "--range rho_d=0.3: NAME=LOW:HIGH is a range, such as "),
+        (("ward", "--range", "rho_d=0.9:1", "--range", "rho_s=0.9:1"), "--range: 0 of 40 materials keep rho_d + "),
+        (("ward", "--seed", "-1"), "--seed: -1 is not at least 0"),
+    ],
+)
+def test_what_is_refused(arguments: tuple[str, ...], sentence: str, tmp_path: Path, capsys: Captured) -> None:
+    assert run("sample", *arguments, *SMALL, "--out", tmp_path / "set.zarr") == 2
+    assert capsys.readouterr().err.startswith(f"brdfdb: {sentence}")
+    assert [*tmp_path.iterdir()] == []
+
+
+def test_a_set_that_is_there_is_kept(tmp_path: Path, capsys: Captured) -> None:
+    out = tmp_path / "set.zarr"
+    out.write_text("mine", encoding="utf-8")
+    assert run("sample", "ward", *SMALL, "--out", out) == 2
+    assert "is there already; remove it, or give another name" in capsys.readouterr().err
+    assert out.read_text(encoding="utf-8") == "mine"
+
+
+def test_memory_is_that_of_a_chunk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    sizes = []
+    values = sample.TrainingSet.values
+
+    def noted(made: sample.TrainingSet, chunk: int) -> list[np.ndarray]:
+        arrays = values(made, chunk)
+        sizes.append(arrays[0].size)
+        return arrays
+
+    monkeypatch.setattr(sample.TrainingSet, "values", noted)
+    sample.run("ward", tmp_path / "set.zarr", count=3000, directions=1000)
+    assert max(sizes) <= 2**20
+    assert len(sizes) == 3
