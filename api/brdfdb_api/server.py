@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import logging
 import os
+import shutil
 import signal
 import socket
 import sys
@@ -29,6 +30,7 @@ GRACE_S = 10  # time for requests in flight when the server stops [s]
 STOPPED_S = LAST_S + GRACE_S + 3.0  # time after which a worker that was told to stop is killed [s]
 BEAT_S = 1  # time between signs of life of a worker [s]
 HALTED_S = 15.0  # time without one after which a worker is replaced [s]
+COUNTS_BYTES = 2**20  # room for the counts of one kind of a worker; all addresses and statuses take a tenth
 LOADED_S = 120.0  # time until the first one: packages are loaded [s]
 
 OTHERS = ("uvicorn", "py.warnings")  # loggers of other packages
@@ -79,7 +81,8 @@ def serve(store_dir: Path, host: str, port: int, workers: int = 1, snapshot: str
             Server(_config()).run(sockets=[listener])
         else:
             # directory where workers write their counts, so that each can report all of them
-            counts = stack.enter_context(tempfile.TemporaryDirectory(prefix="brdfdb-metrics-"))
+            place = tempfile.TemporaryDirectory(prefix="brdfdb-metrics-", ignore_cleanup_errors=True)
+            counts = stack.enter_context(place)
             asyncio.run(_keep(workers, listener, counts))
 
 
@@ -182,8 +185,19 @@ def _work(descriptor: int) -> None:
 
     server = Server(_config(callback_notify=beat, timeout_notify=BEAT_S))
 
+    counts = Path(os.environ["PROMETHEUS_MULTIPROC_DIR"])
+    for kind in ("counter", "histogram"):  # files that are memory: without their blocks a full disk kills the process
+        try:
+            with (counts / f"{kind}_{os.getpid()}.db").open("wb") as file:
+                os.posix_fallocate(file.fileno(), 0, COUNTS_BYTES)
+        except FileNotFoundError:  # the parent was killed
+            return
+
     def wait() -> None:
         os.read(sys.stdin.fileno(), 1)
+        shutil.rmtree(counts, ignore_errors=True)  # all workers stop; the parent may have been killed
+        if not server.started:
+            os._exit(0)  # there is nothing to answer
         server.should_exit = True
 
     threading.Thread(target=wait, daemon=True).start()

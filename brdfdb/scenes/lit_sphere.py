@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import functools
 import struct
+import threading
 import zlib
 from collections.abc import Callable
 from typing import NamedTuple
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +20,7 @@ from brdfdb.materials import FunctionRecord, Source
 from brdfdb.parameters import Floats
 from brdfdb.scenes.environment import widest_lobe
 from brdfdb.scenes.studio import studio
-from brdfdb.spectra import PICTURE_NM, colour_science, picture_wavelengths, srgb_weights
+from brdfdb.spectra import PICTURE_NM, colour_science, picture_wavelengths, refractive_index, srgb_weights
 from brdfdb.tables.table_base import BaseTable
 
 Array = NDArray[np.float64]
@@ -35,6 +37,7 @@ _ROWS, _COLUMNS, _COARSE = 385, 768, 8
 # Standard deviations of the blurred light, and the radius of a sample from which each is used
 _BLURS_DEG = np.array([3.5, 7.0])
 _BLURS_FROM = radians(np.array([1.2, 2.4]))
+_TABULATION = threading.Lock()  # threads that begin together wait for one table: each would take 0.4 s of its own
 _BLOCK_SIZE = 2**17  # directions of light of a block of normals of anisotropic surfaces: arrays stay in the cache
 
 
@@ -125,6 +128,25 @@ def sphere_png(surface: Source | BaseTable, size: int = SIZE, detail: Detail = F
         for kind, content in ((b"IHDR", header), (b"IDAT", data), (b"IEND", b""))
     )
     return b"\x89PNG\r\n\x1a\n" + b"".join(chunks)
+
+
+def thumbnail_png(table: BaseTable, size: int) -> bytes:
+    """Return the bytes of a small picture, drawn as a draft as by `sphere_png`; the last one is kept with its table."""
+    kept_size, picture = _THUMBNAILS.get(table, (0, b""))
+    if kept_size != size:
+        picture = sphere_png(table, size, DRAFT)
+        _THUMBNAILS[table] = size, picture
+    return picture
+
+
+_THUMBNAILS: WeakKeyDictionary[BaseTable, tuple[int, bytes]] = WeakKeyDictionary()
+
+
+def prepare() -> None:
+    """Load what all pictures share, in two seconds: colours, the table of a studio's light, refractive indices."""
+    srgb_weights(tuple(PICTURE_NM.tolist()))
+    _tabulated(studio)
+    refractive_index("main/Al/Rakic", 550.0)
 
 
 def linear_sphere(surface: Source | BaseTable, size: int = SIZE, light: Light = studio, detail: Detail = FINE) -> Array:
@@ -308,8 +330,13 @@ class _Sky(NamedTuple):
     brightest: float
 
 
-@functools.lru_cache(maxsize=4)
 def _tabulated(light: Light) -> _Sky:
+    with _TABULATION:
+        return _table_of(light)
+
+
+@functools.lru_cache(maxsize=4)
+def _table_of(light: Light) -> _Sky:
     def grid(rows: int, columns: int) -> tuple[Array, Array]:
         theta = np.linspace(0.0, np.pi, rows)[:, np.newaxis]
         return theta, unit_vector(theta, 2.0 * np.pi * np.arange(columns) / columns)

@@ -10,6 +10,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from brdfdb.errors import ParameterError
+from brdfdb.models import MODELS
 from brdfdb.store.decoding import read_metadata
 from brdfdb.store.last_audit import ShownAnswer
 from brdfdb.store.summary_words import NOT_AUDITED
@@ -111,11 +113,10 @@ class Choice(BaseModel):
     def lets_through(self, line: Mapping[str, Any]) -> bool:
         """Return True if the filters let a line through."""
         text = " ".join(str(line.get(key) or "") for key in _SEARCHED).casefold()
-        papers = f"{line.get('paper', '')} {line.get('source', '')}".casefold()
         low, high = line.get("wavelength_range_nm") or (0.0, math.inf)
         return (
             self.model in ("", line.get("model", ""), "measured" if line.get("measured") else "")
-            and self.paper.casefold() in papers
+            and self.paper.casefold() in _papers(line)
             and all(word in text for word in self.q.casefold().split())
             and self.verdict in (None, line.get("verdict") or NOT_AUDITED)
             and self.anisotropic in (None, line.get("anisotropic"))
@@ -128,8 +129,27 @@ class Choice(BaseModel):
         return all(getattr(self, name) == field.default for name, field in Choice.model_fields.items())
 
     def chosen(self, names: Sequence[str], line: Callable[[str], Mapping[str, Any]]) -> list[tuple[bool, float, str]]:
-        """Return the places of the materials that the filters let through, in order; `line` returns a line by name."""
+        """Return the places of the materials that the filters let through, in order; `line` returns a line by name.
+
+        Raises
+        ------
+        ParameterError
+            For a model or a paper that neither this program nor a line knows.
+        """
         if self.of_names:
             return [self.rank(name, {}) for name in sorted(names)]
-        lines = ((name, line(name)) for name in names)
-        return sorted(self.rank(name, known) for name, known in lines if self.lets_through(known))
+        lines = {name: line(name) for name in names}
+        models = {"measured", *MODELS, *(str(known["model"]) for known in lines.values() if known.get("model"))}
+        if self.model and self.model not in models:
+            raise ParameterError("model", f"{self.model!r} is not one of {', '.join(sorted(models))}", self.model)
+        texts = [_papers(known) for known in lines.values()]
+        keys = {*(spec.reference for spec in MODELS.values()), *(str(known.get("paper")) for known in lines.values())}
+        if not any(self.paper.casefold() in text for text in (*texts, *map(str.casefold, keys))):
+            shown = ", ".join(sorted(keys - {"", "None"}))
+            raise ParameterError("paper", f"{self.paper!r} is in no source, and in none of {shown}", self.paper)
+        return sorted(self.rank(name, known) for name, known in lines.items() if self.lets_through(known))
+
+
+def _papers(line: Mapping[str, Any]) -> str:
+    """Return the text in which papers are looked for."""
+    return f"{line.get('paper', '')} {line.get('source', '')}".casefold()

@@ -56,6 +56,8 @@ class MaterialDocument(BaseModel):
     parameters: list[ParameterDocument]
     anisotropic: bool
     wavelength_nm: list[float] | None = Field(description="wavelengths [nm]; null: grey")
+    n: list[float] | None = Field(description="refractive index [1] at the wavelengths; null: the model has none")
+    k: list[float] | None = Field(description="extinction coefficient [1] at the wavelengths")
     spectrum: SpectrumKind
     axes_deg: dict[str, list[float]] = Field(description="the grid of the table [degrees]")
     specular: bool = Field(description="whether there is a specular part: specular_reflectance is not 0 everywhere")
@@ -81,6 +83,8 @@ def material_document(table: Table, verdict: Verdict | None) -> dict[str, Any]:
         "parameters": _parameters(metadata),
         "anisotropic": table.anisotropic,
         "wavelength_nm": table.wavelength_nm,
+        "n": table.n,
+        "k": table.k,
         "spectrum": spectrum_of([] if table.wavelength_nm is None else table.wavelength_nm.tolist()),
         "axes_deg": {axis: np.ascontiguousarray(values) for axis, values in table.axes_deg.items()},
         "specular": table.specular is not None,

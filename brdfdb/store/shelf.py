@@ -11,6 +11,7 @@ from brdfdb.errors import StoreError, UnknownMaterialError
 from brdfdb.store.catalogue import line_of
 from brdfdb.store.last_audit import AuditFile, Verdict
 from brdfdb.store.manifest import check_manifest
+from brdfdb.store.paths import manifest_path
 from brdfdb.store.reader import CACHE_BYTES, Store
 
 if TYPE_CHECKING:
@@ -78,6 +79,15 @@ class Shelf:
         """Return the current revision of a material; errors as of `table`."""
         with self._named(name):
             return self.store.head(name)
+
+    def located(self, name: str, revision: str | None = None) -> tuple[Path, str]:
+        """Return the directory of a revision, and the digest of its manifest; errors as of `table`."""
+        with self._named(name):
+            group, digest = self.store.location(name) if revision is None else self.store.located(name, revision)
+            if not manifest_path(group).is_file():
+                raise StoreError(f"{name} {group.name} is damaged: its manifest is missing")
+        self._seen.add(name)
+        return group, digest
 
     @contextlib.contextmanager
     def _named(self, name: str) -> Iterator[None]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from typing import Any, NamedTuple
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from pydantic import BaseModel, Field
@@ -181,8 +182,13 @@ class AlbedoDocument(BaseModel):
 
 
 def reflected(table: Table) -> Reflected:
-    """Return what a table reflects; the integration takes a third of a second if it is not exact."""
-    return _reflected(directional_albedo(table), table, table.wavelength_nm)
+    """Return what a table reflects, integrated once: it takes a third of a second if it is not exact."""
+    if table not in _REFLECTED:
+        _REFLECTED[table] = _reflected(directional_albedo(table), table, table.wavelength_nm)
+    return _REFLECTED[table]
+
+
+_REFLECTED: WeakKeyDictionary[Table, Reflected] = WeakKeyDictionary()
 
 
 def reflected_by(source: Source, wavelength_nm: Axis | None) -> Reflected:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
@@ -12,6 +12,7 @@ from brdfdb.errors import ParameterError
 from brdfdb.materials import Material
 from brdfdb.spectra import ILLUMINANT, colour_weights
 from brdfdb.tables.points import Angles, Points
+from brdfdb.tables.stokes_document import stokes_document
 
 if TYPE_CHECKING:
     from brdfdb.tables.table import Table
@@ -22,7 +23,10 @@ _AT_ONCE = 25_000  # points whose spectra are in memory at once while colours ar
 
 
 class Values(NamedTuple):
-    """Values at points: f_r [1/sr], its error or None, the specular part or None; colours on the last axis."""
+    """Values at points: f_r [1/sr], its error or None, the specular part or None; colours on the last axis.
+
+    `stokes` has the fields of `StokesDocument`, or is None where no incident Stokes vector was given.
+    """
 
     surface: Surface
     points: Points
@@ -31,6 +35,14 @@ class Values(NamedTuple):
     brdf: Any
     error: Any
     specular_reflectance: Any
+    stokes: dict[str, Any] | None = None
+
+    @property
+    def array(self) -> NDArray[np.float64]:
+        """One array: the reflected Stokes vectors where there are some; else f_r, or f_r and error on a first axis."""
+        if self.stokes is not None:
+            return np.asarray(self.stokes["reflected"])
+        return np.asarray(self.brdf if self.error is None else np.stack([self.brdf, self.error]))
 
 
 class Surface(NamedTuple):
@@ -62,14 +74,19 @@ class Surface(NamedTuple):
         *,
         error: bool = False,
         specular: bool = True,
+        incident: Sequence[float] | None = None,
     ) -> Values:
         """Return the values at points, with the stated `error`, and with the `specular` part at their theta_i.
+
+        With an `incident` Stokes vector (I, Q, U, V) the light that a polarised table reflects is beside its spectra.
 
         Raises
         ------
         ParameterError
-            Outside the range of the surface, or where it makes no colour.
+            Outside the range of the surface, where it makes no colour, or where it is not polarised.
         """
+        if incident is not None and getattr(self.source, "facets", None) is None:
+            raise ParameterError("stokes", f"the table of {self.source.name} is unpolarised", incident)
         # A table takes None as all of its wavelengths, which is faster than naming them
         at = points.wavelength_nm if self.kind == "table" else self.wavelengths(points)
 
@@ -81,7 +98,8 @@ class Surface(NamedTuple):
             return self.source.specular_reflectance(points.angles[0], at) if specular else None
 
         if output == "spectrum":
-            return Values(self, points, output, None, *spectra(points.angles), dirac())
+            stokes = None if incident is None else stokes_document(self.source, points, incident)
+            return Values(self, points, output, None, *spectra(points.angles), dirac(), stokes)
         grey = self.wavelength_nm is None
         if grey and points.wavelength_nm is not None:
             raise ParameterError("wavelength_nm", "a colour of a grey material has no wavelengths")

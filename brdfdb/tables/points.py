@@ -138,11 +138,13 @@ class PointsBody(BaseModel):
 
     @model_validator(mode="after")
     def _broadcast(self) -> Self:
-        try:
-            np.broadcast_shapes(*(angle.shape for angle in self.angles))
-        except ValueError:
-            shapes = ", ".join(f"{name} {angle.shape}" for name, angle in zip(ANGLES, self.angles, strict=True))
-            raise ValueError(f"their shapes do not broadcast: {shapes}") from None
+        shape: tuple[int, ...] = ()
+        for name, angle in zip(ANGLES, self.angles, strict=True):
+            try:
+                shape = np.broadcast_shapes(shape, angle.shape)
+            except ValueError:
+                shapes = ", ".join(f"{key} {value.shape}" for key, value in zip(ANGLES, self.angles, strict=True))
+                raise ParameterError(name, f"the shapes do not broadcast: {shapes}") from None
         return self
 
     @property
@@ -161,11 +163,11 @@ def fields_of_npy(body: bytes) -> dict[str, Any]:
     """
     degrees = _npy(body)
     if degrees.ndim == 0 or degrees.shape[-1] != 4:
-        raise ParameterError("the body", f"its shape {degrees.shape} is not (..., 4): {', '.join(ANGLES)}")
+        raise ParameterError("body", f"its shape {degrees.shape} is not (..., 4): {', '.join(ANGLES)}")
     if degrees.ndim > _MOST_AXES + 1:
-        raise ParameterError("the body", f"{degrees.ndim} axes; at most {_MOST_AXES + 1} are allowed")
+        raise ParameterError("body", f"it has {degrees.ndim} axes; at most {_MOST_AXES + 1} are allowed")
     if degrees.size == 0:
-        raise ParameterError("the body", "an empty array")
+        raise ParameterError("body", "it is an empty array")
     return {name: np.asarray(degrees[..., column]) for column, name in enumerate(ANGLES)}
 
 
@@ -177,10 +179,10 @@ def _npy(body: bytes) -> NDArray[Any]:
         read = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}[version]
         shape, by_columns, dtype = read(stream, max_header_size=_HEADER_BYTES)
     except Exception:  # the header is Python text, and reading it raises errors of many kinds
-        raise ParameterError("the body", "not a .npy file") from None
+        raise ParameterError("body", "it is not a .npy file") from None
     if dtype not in (np.dtype("<f4"), np.dtype("<f8")):
-        raise ParameterError("the body", f"{str(dtype)[:_SHOWN]} is not float32 or float64, little endian")
+        raise ParameterError("body", f"its type {str(dtype)[:_SHOWN]} is not float32 or float64, little endian")
     data = memoryview(body)[stream.tell() :]
     if math.prod(shape) * dtype.itemsize != len(data) or any(size < 0 for size in shape):
-        raise ParameterError("the body", "shorter or longer than its .npy header says")
+        raise ParameterError("body", "it is shorter or longer than its .npy header says")
     return np.frombuffer(data, dtype).reshape(shape, order="F" if by_columns else "C")

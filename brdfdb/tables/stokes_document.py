@@ -9,7 +9,6 @@ import numpy as np
 from pydantic import BaseModel, Field
 
 from brdfdb.errors import ParameterError
-from brdfdb.parameters import Floats
 from brdfdb.tables import stokes
 from brdfdb.tables.points import Points
 
@@ -50,18 +49,14 @@ def read_stokes(text: str) -> tuple[float, ...]:
     return numbers
 
 
-def reflected(table: Table, points: Points, incident: Sequence[float]) -> Floats:
-    """Return Stokes vectors [1/sr] of reflected light, shape of the lookup and 4; ParameterError as by `mueller`."""
-    return np.asarray(table.mueller(*points.angles, points.wavelength_nm) @ np.array(incident))
-
-
 def stokes_document(table: Table, points: Points, incident: Sequence[float]) -> dict[str, Any]:
     """Return the fields of `StokesDocument`, with numpy arrays; ParameterError as by `Table.mueller`."""
     record = table.metadata.polarisation
-    specular = table.specular_mueller(points.angles[0], points.wavelength_nm) @ np.array(incident)
+    light = np.array(incident)
+    specular = table.specular_mueller(points.angles[0], points.wavelength_nm) @ light
     return {
         "incident": list(incident),
-        "reflected": reflected(table, points, incident),
+        "reflected": np.ascontiguousarray(table.mueller(*points.angles, points.wavelength_nm) @ light),
         "specular": np.ascontiguousarray(specular),
         "convention": stokes.CONVENTION,
         "basis": stokes.SURFACE_BASIS,

@@ -345,12 +345,9 @@ class BaseTable(Lookups):
             return _on_axis(np.zeros(1), np.zeros(flat.size), wanted.shape)
         outside = (flat < stored[0]) | (flat > stored[-1])
         if np.any(outside):
-            raise ParameterError(
-                "wavelength_nm",
-                f"{flat[outside][0]:.9g} is outside [{stored[0]:g}, {stored[-1]:g}] nm of {self.name}",
-                float(flat[outside][0]),
-                (float(stored[0]), float(stored[-1])),
-            )
+            wrong, low, high = float(flat[outside][0]), float(stored[0]), float(stored[-1])
+            range_nm = f"outside [{low:g}, {high:g}] nm of" if low < high else f"not {low:g} nm, the one wavelength of"
+            raise ParameterError("wavelength_nm", f"{wrong:.9g} is {range_nm} {self.name}", wrong, (low, high))
         return _on_axis(stored, flat, wanted.shape)
 
 

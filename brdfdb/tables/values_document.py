@@ -106,7 +106,7 @@ class FamilyLookup(Evaluated):
 
 
 def values_document(values: Values) -> dict[str, Any]:
-    """Return the fields of `Evaluated`, with numpy arrays."""
+    """Return the fields of `Evaluated`, and those of the reflected light if there is some, with numpy arrays."""
     surface, points, known = values.surface, values.points, values.error is not None and values.surface.kind == "table"
     return {
         "source": surface.kind,
@@ -118,6 +118,7 @@ def values_document(values: Values) -> dict[str, Any]:
         "error": plain(values.error),
         "extrapolated": plain(surface.source.extrapolated(*points.angles)) if known else None,
         "specular_reflectance": plain(values.specular_reflectance),
+        **({} if values.stokes is None else {"stokes": values.stokes}),
     }
 
 

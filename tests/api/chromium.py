@@ -168,7 +168,8 @@ def chosen(browser: Chromium) -> str:
 
 def milliseconds(browser: Chromium) -> float:
     """From what asked for a picture, a hand or the page, to the picture."""
-    return float(browser.evaluate("performance.getEntriesByName('picture')[0].duration"))
+    # there is none for a moment while a picture is drawn again, finely
+    return float(browser.until("performance.getEntriesByName('picture')[0]?.duration"))
 
 
 def curve(browser: Chromium, kind: str | int, view: str = "cut") -> np.ndarray:

@@ -20,7 +20,7 @@ from brdfdb_api.serving.settings import Settings
 FOLDER = Path(bundle.__file__).parent
 NAMES = sorted(path.name for path in FOLDER.iterdir() if path.suffix in (".html", ".css", ".js"))
 OUTSIDE = re.compile(r"(?:https?:)?//[a-z0-9-]+\.[a-z0-9.-]+[^\s\"']*")
-FIRST = ("index.html", "explorer.css", "explorer.js")  # before there is a picture
+FIRST = ("index.html", "begin.js", "explorer.css", "explorer.js")  # before there is a picture
 VIEWS = """\
 /** @type {Record<string, import("./main.js").View>} */
 export const VIEWS = {};
@@ -76,10 +76,10 @@ def test_nothing_is_fetched_from_elsewhere(name: str) -> None:
     assert set(re.findall(r'from "\./(.*?)"', text)) <= {*NAMES, "views.js"}
 
 
-def test_the_page_is_at_the_root_and_asks_for_one_script() -> None:
+def test_the_page_is_at_the_root_and_asks_for_what_begins_and_one_script() -> None:
     answer = get("/")
     assert answer.text == get("/explorer/index.html").text
-    assert re.findall(r'<script .*src="(.*?)"', answer.text) == ["explorer/explorer.js"]
+    assert re.findall(r'<script .*src="(.*?)"', answer.text) == ["explorer/begin.js", "explorer/explorer.js"]
     assert 'rel="icon" href="data:,"' in answer.text
 
 

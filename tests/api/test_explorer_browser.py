@@ -83,9 +83,11 @@ def test_a_slider_has_one_request_on_its_way_and_ends_where_it_rests(chromium: C
     chromium.open(f"{address}#material=scene-copper-sphere&view=hemisphere")
     shown(chromium, "view=hemisphere")
     chromium.evaluate(
-        "asked = [], (was => { fetch = (...all) => {"
+        "asked = [], under = 0, most = 0, (was => { fetch = async (...all) => {"
+        "  if (!all[1]?.body) return was(...all);"  # of the list, and of models
         "  asked.push(JSON.parse(all[1].body).theta_i);"
-        "  return was(...all);"
+        "  most = Math.max(most, under += 1);"
+        "  try { return await was(...all); } finally { under -= 1; }"
         "}; })(fetch);"
         "for (let theta = 20; theta <= 40; theta += 1) {"
         "  controls.elements.theta_i.value = theta;"
@@ -93,9 +95,12 @@ def test_a_slider_has_one_request_on_its_way_and_ends_where_it_rests(chromium: C
         "}"
     )
     shown(chromium, "theta_i=40")
-    assert chromium.evaluate("asked") == [20, 40]
-    chromium.until("picture.ariaBusy === 'false'")
+    chromium.until("picture.dataset.detail === 'fine' && picture.ariaBusy === 'false'")
     assert "theta_i=40" in chromium.evaluate("picture.dataset.shown")
+    first, *rest = chromium.evaluate("asked")
+    assert (first, set(rest)) == (20, {40})
+    assert len(rest) <= 2  # quickly, and finely once it rests
+    assert chromium.evaluate("most") == 1
 
 
 def test_a_verdict_is_a_sentence_and_its_details_are_folded(chromium: Chromium, address: str) -> None:
@@ -128,6 +133,23 @@ def test_the_list_has_pictures_and_marks_only_what_is_wrong(chromium: Chromium, 
     assert marks == [[], ["energy: no: albedo 1.2 at 90°"], []]
     chromium.until(f"{lines}.every(each => each.querySelector('img').naturalWidth > 40)")
     assert chromium.errors == []
+
+
+def test_what_is_asked_for_early_is_asked_for_once_and_thumbnails_wait(chromium: Chromium, address: str) -> None:
+    for link, name in (("", "scene-copper-sphere"), ("#material=foam&view=cut", "foam")):
+        chromium.open(address + link)
+        shown(chromium, f"material={name}")
+        chromium.until("picture.ariaBusy === 'false' && document.querySelector('#list img').src")
+        loaded = chromium.evaluate(
+            "performance.getEntriesByType('resource').map(({ name, startTime }) => [name, startTime])"
+        )
+        for path in ("v1/materials?limit=1000", f"v1/materials/{name}"):
+            assert [each for each, _ in loaded].count(address + path) == 1
+        end = chromium.evaluate(
+            "(({ startTime, duration }) => startTime + duration)(performance.getEntriesByName('picture')[0])"
+        )
+        assert all(start >= end for each, start in loaded if "thumbnail" in each)
+        assert chromium.errors == []
 
 
 def test_a_picture_that_is_on_its_way_is_said_to_be(chromium: Chromium, address: str) -> None:
@@ -218,6 +240,7 @@ def test_what_fails_is_said_in_the_page(chromium: Chromium, address: str) -> Non
     chromium.open(f"{address}#material=fome")
     said = chromium.until("document.querySelector('#message')?.textContent")
     assert said == "no material 'fome' in the store; closest: foam"
+    assert chromium.errors == []  # an address that is not there would be one
     resting = "['views', 'controls', 'copies'].map(id => document.getElementById(id).inert)"
     assert chromium.evaluate(resting) == [True, True, True]
     assert chromium.evaluate("message.getAttribute('role')") == "status"

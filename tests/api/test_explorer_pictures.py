@@ -197,6 +197,9 @@ def test_the_axis_of_a_spectrum_is_wider_than_rounding(chromium: Chromium, addre
     shown(chromium, "view=spectrum")
     _, top, _, height, low, high = frame(chromium, "spectrum")
     assert high - low > np.log10(1.5)
+    assert (
+        len(chromium.evaluate("[...document.querySelectorAll('#spectrum text.end')].map(each => each.textContent)")) > 2
+    )
     ys = np.concatenate([curve(chromium, number, "spectrum")[:, 1] for number in range(2)])
     assert top < ys.min() <= ys.max() < top + height
 

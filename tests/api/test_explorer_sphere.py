@@ -9,7 +9,7 @@ import pytest
 
 import brdfdb
 from brdfdb.geometry import unit_vector
-from brdfdb.spectra import srgb_weights
+from brdfdb.spectra import srgb_weights, xyz_weights
 from tests.api.a_store import publish, serving
 from tests.api.chromium import Chromium, box, image, shown
 
@@ -112,6 +112,9 @@ def test_a_mirror_shows_its_surroundings_and_the_light(chromium: Chromium, tmp_p
             shown(chromium, f"view={view}")
             assert "The spike is the specular part" in chromium.evaluate("caption.textContent")
         assert chromium.evaluate("document.querySelectorAll('#cut path.spike').length") == 1
+        part = 100.0 * table.specular_reflectance(np.deg2rad(40.0), at) @ xyz_weights(tuple(at), "D65")[:, 1]
+        named = chromium.evaluate("[...document.querySelectorAll('#cut .strong')].map(each => each.textContent)")
+        assert named == ["specular part", f"{part:.3g} %"]
         assert chromium.errors == []
     normal, _ = normals()
     mirror = 2.0 * normal[:, 2:] * normal - [0.0, 0.0, 1.0]
@@ -123,6 +126,20 @@ def test_a_mirror_shows_its_surroundings_and_the_light(chromium: Chromium, tmp_p
     print(f"a mirror: off by {off.max():.2f} at most")
     assert off.max() < 2.0
     assert (drawn[normal @ half > np.cos(np.deg2rad(0.8))] == 255.0).all()
+
+
+def test_a_sphere_that_is_nearly_black_says_so_and_can_be_brightened(chromium: Chromium, tmp_path: Path) -> None:
+    publish(tmp_path / "store", "soot", "lambert", rho=0.002)
+    with serving(tmp_path / "store") as address:
+        dark = levels(chromium, f"{address}#material=soot&view=sphere")
+        assert "Nearly black" in chromium.evaluate("sphere.innerText")
+        chromium.evaluate("document.querySelector('#sphere button').click()")
+        shown(chromium, "exposure=8")
+        chromium.until("picture.dataset.detail === 'fine' && picture.ariaBusy === 'false'")
+        bright = image(chromium, "#sphere canvas")
+        assert dark.max() < 25 < 150 < bright[..., :3].max()
+        assert chromium.evaluate("sphere.innerText").strip() == ""
+        assert chromium.errors == []
 
 
 def test_a_hand_and_keys_move_the_light_to_where_they_point(chromium: Chromium, address: str) -> None:

@@ -36,7 +36,7 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
 
 @SCHEMA.parametrize()
 @settings(
-    max_examples=12,
+    max_examples=45,
     deadline=None,
     derandomize=True,
     suppress_health_check=list(HealthCheck),

@@ -251,7 +251,7 @@ def test_a_bad_body_names_the_parameter(client: Client, body: str, parameter: st
 def test_a_body_that_is_no_object(client: Client, body: bytes) -> None:
     problem = client.problem("POST", FOIL, 422, content=body)
     assert "JSON" in problem["detail"]
-    assert "parameter" not in problem
+    assert problem["parameter"] == "body"
 
 
 def test_the_body_is_not_echoed(client: Client) -> None:
@@ -292,6 +292,7 @@ def test_an_error_about_no_parameter_of_the_request_is_ours(
 
 def test_shapes_that_do_not_broadcast(client: Client) -> None:
     problem = client.problem("POST", FOIL, 422, json={"theta_i": [1, 2], "theta_r": [1, 2, 3]})
+    assert problem["parameter"] == "theta_r"
     assert "theta_i (2,)" in problem["detail"]
     assert "theta_r (3,)" in problem["detail"]
 

@@ -83,7 +83,7 @@ def test_a_table_of_another_program_is_served_with_a_sentence_on_what_it_lacks(o
     ("query", "names"),
     [
         ("model=ward", ["brushed-metal"]),
-        ("model=phong", []),
+        ("model=hapke", []),
         ("paper=he1991", ["copper-foil"]),
         ("paper=NO+PAPER,+GREY", ["grey-felt"]),
         ("q=felt+test", ["grey-felt"]),

@@ -148,7 +148,7 @@ def test_an_answer_that_breaks_in_the_middle_is_a_failure(log: Log) -> None:
         await send({"type": "http.response.body", "body": b"first", "more_body": True})
         raise OSError("the disk \udcff")
 
-    edge = Edge(breaks, limit=1, lookup=AsyncMock(), failed=problem_of, log_level="error")
+    edge = Edge(breaks, limit=1, quick=(), failed=problem_of, log_level="error")
     scope = {"type": "http", "method": "GET", "path": "/", "query_string": b"", "headers": []}
     with pytest.raises(OSError, match="the disk"):
         asyncio.run(edge(scope, AsyncMock(), AsyncMock()))

@@ -136,7 +136,7 @@ def pixels(content: bytes) -> np.ndarray:
             "sigma_deg: 91 is outside [0, 90] degree",
         ),
         ("he_torrance/lobe", {"parameters": COPPER["parameters"]}, 422, "refractive_index: the spectral model"),
-        ("he_torrance/sphere", {**COPPER, "refractive_index": "main/Cx/Q"}, 422, "refractive index entry: 'main/Cx/Q'"),
+        ("he_torrance/sphere", {**COPPER, "refractive_index": "main/Cx/Q"}, 422, "refractive_index: 'main/Cx/Q'"),
         ("he_torrance/lobe?wavelength_nm=9", COPPER, 422, "wavelength_nm: 9 has no refractive index"),
         ("lambert/lobe", {}, 422, "parameters: is missing"),
         ("lambert/lobe", {"parameters": [1]}, 422, "parameters: [1] is not a table"),

@@ -256,7 +256,15 @@ def test_workers_end_with_the_command_that_started_them_even_while_they_start(st
         server.process.kill()
         wait_until(lambda: not any(map(_runs, workers)))
     assert len(workers) == 2
+    assert list(tmp_path.glob("brdfdb-metrics-*")) == []
     assert server.logged() == []
+
+
+def test_counts_of_workers_have_room_before_a_disk_is_full(pair: Serving) -> None:
+    (folder,) = pair.log.parent.glob("brdfdb-metrics-*")
+    files = [file.stat() for file in folder.glob("*.db")]
+    assert len(files) >= 4
+    assert all(512 * file.st_blocks >= file.st_size for file in files)  # SIGBUS ends who writes to what has no block
 
 
 def _runs(pid: int) -> bool:

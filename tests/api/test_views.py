@@ -105,12 +105,11 @@ def test_a_lobe_is_npy_for_those_who_accept_it(client: Client) -> None:
     np.testing.assert_array_equal(read_npy(binary.content), named.json()["brdf"])
 
 
-def test_of_a_lobe_nothing_is_documented_that_it_refuses(client: Client) -> None:
-    described = client.get("/openapi.json").json()["paths"]["/v1/materials/{name}/lobe"]["get"]
-    texts = [each["description"] for each in described["parameters"] if "description" in each]
-    texts.append(described["responses"]["200"]["content"][NPY]["schema"]["description"])
-    assert len(texts) >= 9
-    assert not any("error" in text for text in texts)
+def test_a_lobe_states_its_error_as_a_lookup_does(client: Client) -> None:
+    document = client.get(f"{FOIL}/lobe?error=true").json()
+    assert np.shape(document["error"]) == np.shape(document["brdf"])
+    array = read_npy(client.get(f"{FOIL}/lobe?error=true&format=npy").content)
+    np.testing.assert_allclose(array, [document["brdf"], document["error"]], rtol=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -123,7 +122,7 @@ def test_of_a_lobe_nothing_is_documented_that_it_refuses(client: Client) -> None
         ("theta_r=3", "theta_r"),
         ("wavelength_nm=200", "wavelength_nm"),
         ("output=rgb", "output"),
-        ("error=true", "error"),
+        ("error=true&from=model", "error"),
     ],
 )
 def test_a_bad_lobe_names_the_parameter(client: Client, query: str, parameter: str) -> None:

@@ -14,8 +14,7 @@ SCRIPT = "text/javascript; charset=utf-8"
 _COMMENT = re.compile(r"^[ \t]*(?:/\*\*(?:[^*]|\*(?!/))*\*/|//.*)\n", re.MULTILINE)
 _IMPORT = re.compile(r"""^import ([^;]+) from "\./(.+)";$""", re.MULTILINE)
 _TYPES = {".html": "text/html; charset=utf-8", ".css": "text/css; charset=utf-8", ".js": SCRIPT}
-_VIEWS = "views.js"
-_BUNDLE = "explorer.js"  # all modules in one answer: a slow connection waits 0.4 s for each six of them
+_VIEWS, _BUNDLE = "views.js", "explorer.js"  # all modules in one answer: a slow connection waits 0.4 s for each six
 FOLDER = files("brdfdb_api").joinpath("explorer")
 # Media types of all files of the explorer: those of the folder, the list of its views, and all modules as one
 MEDIA = {

@@ -1,13 +1,13 @@
 // The list of materials: fetched page by page, searched, filtered, and walked with arrow keys.
 
-import { AGAIN_MS, Problem, json } from "./api.js";
-import { byId, chip, element, isGood, isWrong } from "./dom.js";
+import { AGAIN_MS, Problem, json, withQuery } from "./api.js";
+import { LIST } from "./begin.js";
+import { byId, chip, element, isGood, isWrong, percent } from "./dom.js";
 
 const search = byId("search", HTMLInputElement),
   count = byId("count", HTMLElement),
   list = byId("list", HTMLElement);
 const [model, paper, verdict] = ["model", "paper", "verdict"].map((id) => byId(id, HTMLSelectElement));
-const FIRST = "scene-copper-sphere"; // to look at: colour, a lobe and a specular part
 
 /** @type {any[]} */
 const materials = [];
@@ -16,13 +16,11 @@ let active = null; // the option that arrow keys have reached
 let chosen = "";
 let painted = false;
 let choose = (/** @type {string} */ _) => {};
-
-/** The one to look at first.
- * @param {any[]} all */
-export const first = (all) =>
-  all.find(({ name, damaged }) => name === FIRST && !damaged) ??
-  all.find(({ damaged, spectrum }) => !damaged && spectrum === "spectral") ??
-  all.find(({ damaged }) => !damaged);
+let arrive = () => {};
+/** @type {Promise<void>} */
+const begun = new Promise((resolve) => (arrive = resolve)); // the first page is there, or has failed
+const [NEAR, MOST_NEAR] = [0.6, 5]; // likeness from which names are offered for an unknown one, and how many
+const DARK = 0.02; // largest albedo of what is nearly black beside the others
 
 /** All options. */
 const options = () => /** @type {HTMLElement[]} */ ([...list.children]);
@@ -34,7 +32,7 @@ const options = () => /** @type {HTMLElement[]} */ ([...list.children]);
  * @param {() => void} onFail */
 export async function load(onChoose, onPage, onFail) {
   choose = onChoose;
-  for (let path = "v1/materials?limit=1000"; path;) {
+  for (let path = LIST; path;) {
     const page = await arrived(path, onFail);
     materials.push(...page.materials);
     list.append(...page.materials.map(option));
@@ -46,6 +44,7 @@ export async function load(onChoose, onPage, onFail) {
     filter();
     if (painted) paint();
     onPage(materials);
+    arrive();
     path = page.next?.replace(/^\//, "");
   }
 }
@@ -60,6 +59,7 @@ async function arrived(path, onFail) {
     } catch (error) {
       count.textContent = error instanceof Error ? error.message : String(error);
       onFail();
+      arrive();
       if (!(error instanceof Problem && error.passes)) throw error;
       await pause(AGAIN_MS);
     }
@@ -68,10 +68,49 @@ async function arrived(path, onFail) {
 
 const pause = (/** @type {number} */ ms) => new Promise((resolve) => setTimeout(resolve, ms));
 
-/** Show the pictures of the list, which wait for the first picture of the page. */
+/** Raise a problem with the closest names if no material has a name. The list tells, and for a name that it lacks a
+ * search of the store: an address that does not exist would be an error of the page, too.
+ * @param {string} name */
+export async function check(name) {
+  await begun;
+  const has = (/** @type {any[]} */ some) => some.some((each) => each.name === name);
+  if (!materials.length || has(materials)) return;
+  if (has((await json(withQuery("v1/materials", { q: name, limit: 1000 }))).materials)) return;
+  const near = materials
+    .map((each) => ({ name: each.name, like: likeness(name, each.name) }))
+    .filter(({ like }) => like >= NEAR)
+    .sort((a, b) => b.like - a.like)
+    .slice(0, MOST_NEAR);
+  const words = near.length ? `; closest: ${near.map((each) => each.name).join(", ")}` : "";
+  throw new Problem(`no material '${name}' in the store${words}`);
+}
+
+/** How alike two names are, 0 to 1: the share of their letters that they have in common, in the same order.
+ * @param {string} a
+ * @param {string} b */
+function likeness(a, b) {
+  let row = Array(b.length + 1).fill(0); // longest common subsequence of what is read of a, and the first letters of b
+  for (const letter of a) {
+    const next = [0];
+    for (let j = 0; j < b.length; j += 1) next.push(letter === b[j] ? row[j] + 1 : Math.max(row[j + 1], next[j]));
+    row = next;
+  }
+  return (2 * row[b.length]) / (a.length + b.length || 1);
+}
+
+// browsers that load images lazily begin far below what is seen: 49 pictures in place of 8
+const seen = new IntersectionObserver((entries) => {
+  for (const { target, isIntersecting } of entries) {
+    if (!isIntersecting || !(target instanceof HTMLImageElement)) continue;
+    target.src = target.dataset.src ?? "";
+    seen.unobserve(target);
+  }
+});
+
+/** Show the pictures of the list, as they come into sight; they wait for the first picture of the page. */
 export function paint() {
   painted = true;
-  for (const each of list.querySelectorAll("img")) if (each.dataset.src && !each.src) each.src = each.dataset.src;
+  for (const each of list.querySelectorAll("img")) if (each.dataset.src && !each.src) seen.observe(each);
 }
 
 /** Show what was learnt of a material since its line was made: its verdict.
@@ -90,7 +129,7 @@ export function mark(name) {
   chosen = name;
   for (const each of options()) each.setAttribute("aria-selected", String(each.dataset.name === name));
   const now = options().find((each) => each.dataset.name === name);
-  if (now) reach(now);
+  if (now) reach(now, "middle");
 }
 
 /** The paper in a source such as "Ward 1992, section 6".
@@ -129,7 +168,7 @@ const modelOf = (/** @type {any} */ each) => (each.measured ? "measured" : (each
 
 /** @param {any} each */
 function option(each) {
-  const image = element("img", { alt: "", width: 44, height: 44, loading: "lazy", decoding: "async" });
+  const image = element("img", { alt: "", width: 44, height: 44, decoding: "async" });
   if (each.thumbnail) image.dataset.src = `${each.thumbnail.slice(1)}?size=88`;
   const name = element("span", { className: "name" }, each.title || each.name);
   const made = element(
@@ -154,10 +193,10 @@ function option(each) {
 
 /** What a material is, in a line.
  * @param {any} each */
-const about = ({ damaged, measured, model_title: title, spectrum, anisotropic }) =>
+const about = ({ damaged, measured, model_title: title, spectrum, anisotropic, largest_albedo: most }) =>
   damaged
     ? ""
-    : [measured ? "measured" : title, spectrum === "spectral" ? "" : spectrum, anisotropic ? "anisotropic" : ""]
+    : [most?.albedo < DARK ? `reflects ${percent(most.albedo)}` : "", measured ? "measured" : title, spectrum === "spectral" ? "" : spectrum, anisotropic ? "anisotropic" : ""]
         .filter(Boolean)
         .join(", ");
 
@@ -187,20 +226,24 @@ function filter() {
     shown.length === materials.length
       ? `${materials.length} materials`
       : `${shown.length} of ${materials.length} materials`;
-  reach(shown.find((each) => each.dataset.name === chosen) ?? shown[0]);
+  reach(shown.find((each) => each.dataset.name === chosen) ?? shown[0], "middle");
 }
 
 const visible = () => options().filter((each) => !each.hidden);
 
-/** @param {HTMLElement | undefined} to */
-function reach(to) {
+/** Make a line the active one, and scroll to it where it is out of sight: to the nearest edge, or to the middle.
+ * @param {HTMLElement | undefined} to
+ * @param {"edge" | "middle"} place */
+function reach(to, place = "edge") {
   active?.classList.remove("active");
   active = to ?? null;
   active?.classList.add("active");
   if (active) {
     // within the list alone: the page stays where it is
-    const { offsetTop: top, offsetHeight: height } = active;
-    list.scrollTop = Math.min(top, Math.max(list.scrollTop, top + height - list.clientHeight));
+    const { offsetTop: top, offsetHeight: height } = active,
+      last = top + height - list.clientHeight;
+    const seen = list.scrollTop <= top && list.scrollTop >= last;
+    if (!seen) list.scrollTop = place === "middle" ? (top + last) / 2 : Math.min(top, Math.max(list.scrollTop, last));
   }
   for (const each of [list, search]) each.setAttribute("aria-activedescendant", active?.id ?? "");
 }

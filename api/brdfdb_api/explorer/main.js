@@ -1,6 +1,7 @@
 // The page: what changes the state, and the one loop that turns the state into pictures.
 
 import { AGAIN_MS, Problem, json } from "./api.js";
+import * as begin from "./begin.js";
 import * as controls from "./controls.js";
 import * as copy from "./copy.js";
 import { byId, element } from "./dom.js";
@@ -52,7 +53,8 @@ let linked = 0,
   again = 0;
 let stale = false,
   fresh = true; // whether parameters have moved; whether the facts are to be shown anew
-let drawn = false; // whether there has been a picture; what is not needed for it waits
+let drawn = false, // whether there has been a picture; what is not needed for it waits
+  complete = false; // whether all pictures of a view have been there, for which those of the list wait
 let quick = false,
   resting = 0; // whether a slider moves; the picture is drawn again, finely, once it rests
 /** @type {Map<string, { key: string, hurried: boolean, answers: any[] }>} */
@@ -131,6 +133,7 @@ async function work() {
       await draw(now, start, signal);
       say(missing);
       picture.dataset.shown = toHash(now);
+      picture.dataset.detail = now.quick ? "quick" : "fine";
     } catch (problem) {
       if (signal.aborted) continue;
       const error = problem instanceof Error ? problem : new Error(String(problem));
@@ -166,13 +169,14 @@ async function draw(now, start, signal) {
   const words = drawn ? [] : [await one(views[0], 0)]; // on a slow connection the first picture has no rivals
   if (!drawn) {
     drawn = true;
-    list.paint();
     parameters.offer(choose).catch((error) => say(error.message));
   }
-  parameters.show(series[0]);
+  parameters.show(series[0], now);
   words.push(...(await Promise.all(views.slice(words.length).map((view, i) => one(view, i + words.length)))));
   signal.throwIfAborted();
   performance.measure("picture", { start, end: performance.now() });
+  if (!complete) list.paint();
+  complete = true;
   caption.replaceChildren(...words.map((text) => element("p", {}, text)));
 }
 
@@ -325,7 +329,7 @@ list
       if (series.length) controls.show(state, series);
       for (const each of series) if (each.source !== "parameters") list.update(each.info);
       list.mark(subjectOf(state.material).base);
-      const first = list.first(materials);
+      const first = begin.first(materials);
       if (!state.material && first) {
         state = { ...state, material: first.name };
         redraw(0);

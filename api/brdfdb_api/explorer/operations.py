@@ -11,8 +11,7 @@ _PAGE = """<!doctype html>
 <head><meta charset="utf-8"><meta name="viewport" content="width=device-width"><title>{title}: operations</title>
 <link rel="stylesheet" href="/explorer/explorer.css"></head>
 <body><main>
-<h1>{title}: operations</h1>
-<p>{description}</p>
+<h1>{title}: operations</h1><p>{description}</p>
 <p><a href="/openapi.json">openapi.json</a> has all of this with the schemas of bodies and answers.</p>
 {operations}
 </main></body></html>

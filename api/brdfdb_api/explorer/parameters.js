@@ -2,7 +2,8 @@
 
 import { address, json } from "./api.js";
 import { copyText } from "./copy.js";
-import { byId, element, short } from "./dom.js";
+import { byId, closest, element, short } from "./dom.js";
+import { check } from "./list.js";
 import { PICTURE_NM, changedText, subjectOf } from "./state.js";
 
 /** @typedef {import("./state.js").State} State */
@@ -17,12 +18,17 @@ const panel = byId("parameters", HTMLElement);
 const BEYOND = 3; // factor by which sliders go beyond what is published, where a parameter has no end of its own
 const DECADES = 30; // ratio of published values from which on a slider is logarithmic
 
+/** Whether a base is a model, and no material.
+ * @param {string} base */
+export const isModel = (base) => base.startsWith(OF_MODEL);
+
 const OF_MODEL = "*"; // before the name of a model, which stands for a material of typical parameters
 const [N, K] = ["n", "k"];
+const GREEN_NM = 550; // at which n and k are shown where a picture has all wavelengths
 /** @type {Parameter[]} */
 const INDEX = [
   { name: N, unit: "1", low: 0.05, high: 4, meaning: "refractive index", default: 1.5, typical: null, published: [] },
-  { name: K, unit: "1", low: 0, high: 8, meaning: "absorption index", default: 0, typical: null, published: [] },
+  { name: K, unit: "1", low: 0, high: 8, meaning: "extinction coefficient", default: 0, typical: null, published: [] },
 ];
 
 /** @type {Map<string, Promise<any>>} */
@@ -44,7 +50,8 @@ const modelOf = (/** @type {string} */ name) => known(`v1/models/${encodeURIComp
  * @param {string} base
  * @returns {Promise<{ material: any, model: any }>} */
 async function begun(base) {
-  if (!base.startsWith(OF_MODEL)) {
+  if (!isModel(base)) {
+    await check(base);
     const material = await known(address(base));
     return { material, model: await modelOf(material.model) };
   }
@@ -88,8 +95,11 @@ export async function described(base, changes) {
     ...Object.fromEntries(material.parameters.map((/** @type {any} */ { name, value }) => [name, value])),
     ...moved,
   };
+  const own = indexOf(material, null);
   const index =
-    n === undefined && k === undefined ? material.attributes.refractive_index : `constant/${n ?? 1.5}/${k ?? 0}`;
+    n === undefined && k === undefined
+      ? material.attributes.refractive_index
+      : `constant/${n ?? own.n}/${k ?? own.k}`;
   const info = {
     ...material,
     error: null,
@@ -99,7 +109,7 @@ export async function described(base, changes) {
     changes,
     base: material,
     model_title: model.title,
-    title: base.startsWith(OF_MODEL) ? material.title : `${material.title}, changed`,
+    title: isModel(base) ? material.title : `${material.title}, changed`,
   };
   return { info, recipe: { parameters, ...(model.spectral && { refractive_index: index }) } };
 }
@@ -116,24 +126,26 @@ export function forget() {
 }
 
 /** Show the sliders of a series: of measured data there are none.
- * @param {Series} series */
-export async function show({ info, name, source }) {
+ * @param {Series} series
+ * @param {State} state */
+export async function show({ info, name, source }, { nm }) {
   if (source === "table") documents.set(address(name), Promise.resolve(info));
   const changes = source === "parameters" ? info.changes : {},
     found = info.model && !info.measured ? await begun(name).catch(() => null) : null;
   if (!found) return forget();
   const { recipe } = await described(name, changes),
-    [n, k] = indexOf(recipe.refractive_index);
+    index = indexOf(N in changes || K in changes ? { attributes: recipe } : found.material, nm);
   /** @type {Record<string, any>} */
-  const values = { ...recipe.parameters, [N]: n, [K]: k };
+  const values = { ...recipe.parameters, [N]: index.n, [K]: index.k };
   if (shown !== name) build(found.model, values, name);
   panel.hidden = false;
   for (const input of panel.querySelectorAll("input")) {
     const { at, share } = tracks[input.name],
       value = values[input.name],
       unit = input.dataset.unit ?? "";
-    if (value === undefined || at(Number(input.value)) !== value) input.value = String(share(value ?? 1));
-    const text = value === undefined ? recipe.refractive_index : `${short(value)}${unit}`;
+    if (at(Number(input.value)) !== value) input.value = String(share(value));
+    const where = [N, K].includes(input.name) ? index.where : "",
+      text = `${short(value)}${unit}${where}`;
     input.setAttribute("aria-valuetext", text);
     const said = input.closest("label")?.querySelector(".said");
     if (said) said.textContent = text;
@@ -141,11 +153,18 @@ export async function show({ info, name, source }) {
   return undefined;
 }
 
-/** n and k of a constant refractive index; of another none.
- * @param {string | undefined} index
- * @returns {(number | undefined)[]} */
-const indexOf = (index) =>
-  index?.startsWith("constant/") ? index.split("/").slice(1).map(Number) : [undefined, undefined];
+/** n and k of a material, and at which wavelength they are that: of a constant index at all.
+ * @param {{ attributes: any, n?: number[], k?: number[], wavelength_nm?: number[] }} material
+ * @param {number | null} nm
+ * @returns {{ n: number, k: number, where: string }} */
+function indexOf({ attributes, n, k, wavelength_nm: at }, nm) {
+  const [kind, ...constants] = (attributes.refractive_index ?? "").split("/");
+  if (kind === "constant") return { n: Number(constants[0]), k: Number(constants[1]), where: "" };
+  if (!n || !k || !at) return { n: 1.5, k: 0, where: "" };
+  const i = closest(at, nm ?? GREEN_NM);
+  const [there, lost] = [n[i], k[i]].map((value) => Number(value.toPrecision(4)));
+  return { n: there, k: lost, where: at.length > 1 ? ` at ${at[i]} nm` : "" };
+}
 
 /** @type {Record<string, Track>} */
 let tracks = {};
@@ -185,7 +204,15 @@ function build(model, values, name) {
     return element(
       "div",
       {},
-      element("label", { title: meaning }, key, " ", element("span", { className: "said" }), input),
+      element(
+        "label",
+        { title: meaning },
+        `${key} `,
+        element("span", { className: "said" }),
+        " ",
+        element("span", { className: "quiet" }, meaning.split(/[;:,]/)[0]),
+        input,
+      ),
       marks,
     );
   });
@@ -275,7 +302,7 @@ export function listen(choose, now, say) {
       { material, compare } = now();
     if (key) move(key, Number(value));
     const { base, changes } = subjectOf(material);
-    if (action === "reset") choose({ material: base.startsWith(OF_MODEL) ? `${base}()` : base });
+    if (action === "reset") choose({ material: isModel(base) ? `${base}()` : base });
     if (action === "keep" && !compare.includes(material)) choose({ compare: [...compare, material] });
     if (action === "recipe")
       described(base, changes ?? {}).then(({ info, recipe }) => copyText(written(recipe, info), say));

@@ -1,12 +1,14 @@
 // Scales of f_r, linear or logarithmic, and the words that captions share.
 
-import { closest, element, short } from "./dom.js";
+import { steps } from "./chart.js";
+import { closest, element, percent, short } from "./dom.js";
 import { makesColour, nearest } from "./series.js";
 
 /** @typedef {import("./state.js").State} State */
 /** @typedef {import("./series.js").Series} Series */
 
-const APART = 0.13; // of the length of a colour bar, between its marks
+const [APART, SHORT] = [0.13, 5]; // share of a colour bar between its marks of so many letters
+const FEW = 3; // numbers that a logarithmic axis has at least
 const DECADES = 5; // of a logarithmic scale, below its largest value
 
 /** Ends of an axis over some values: of a logarithmic one in decades, which moves less while one turns.
@@ -40,9 +42,9 @@ export function ticks([low, high], { scale }) {
     const powers = Array.from({ length: Math.ceil(high) - Math.floor(low) + 1 }, (_, i) => Math.floor(low) + i);
     const between = high - low > 3 ? [1] : [1, 2, 5];
     const all = powers.flatMap((power) => between.map((digit) => digit * 10 ** power));
-    return all
-      .filter((value) => Math.log10(value) >= low - 1e-9 && Math.log10(value) <= high + 1e-9)
-      .map((value) => [Math.log10(value), short(Number(value.toPrecision(3))).replace("1 × ", "")]);
+    const inside = all.filter((value) => Math.log10(value) >= low - 1e-9 && Math.log10(value) <= high + 1e-9);
+    const few = inside.length < FEW ? steps([10 ** low, 10 ** high], 6) : inside; // round numbers are closer together
+    return few.map((value) => [Math.log10(value), short(Number(value.toPrecision(3))).replace("1 × ", "")]);
   }
   const rough = high / 4,
     power = 10 ** Math.floor(Math.log10(rough));
@@ -110,7 +112,7 @@ export function colourBar(marks) {
   const texts = [];
   let last = -1;
   for (const [share, text] of marks) {
-    if (share - last < APART) continue;
+    if (share - last < APART * Math.max(text.length / SHORT, 1)) continue;
     last = share;
     const mark = element("span", {}, text);
     mark.style.left = `${100 * share}%`;
@@ -134,7 +136,7 @@ export function unseenWords({ info }, { nm }) {
  * @param {number[]} parts the specular reflectance of each, 0 for none */
 export function specularWords(series, parts) {
   const words = series.flatMap(({ label }, i) =>
-    parts[i] ? [series.length > 1 ? `${short(parts[i])} (${label})` : short(parts[i])] : [],
+    parts[i] ? [series.length > 1 ? `${percent(parts[i])} (${label})` : percent(parts[i])] : [],
   );
   return words.length ? ` The spike is the specular part, which has no f_r: ${words.join(", ")} of the light.` : "";
 }

@@ -1,7 +1,8 @@
 // What a picture shows, one or more series of values: of a table, of its model, or of a model with other parameters.
 
 import { address, json, withQuery } from "./api.js";
-import { changed, described } from "./parameters.js";
+import { check } from "./list.js";
+import { changed, described, isModel } from "./parameters.js";
 import { PICTURE_NM, subjectOf } from "./state.js";
 
 /** @typedef {import("./state.js").State} State */
@@ -37,6 +38,7 @@ const ownModel = (material, text) => subjectOf(material).base + (subjectOf(mater
 async function oneOf(text, signal) {
   const { base, model, changes } = subjectOf(text);
   const rest = { text, name: base, label: "", colour: "", dash: "" };
+  if (!isModel(base)) await check(base);
   if (changes) return { ...rest, source: "parameters", ...(await described(base, changes)) };
   return { ...rest, source: model ? "model" : "table", info: await json(address(base), signal) };
 }

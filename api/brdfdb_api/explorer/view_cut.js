@@ -13,6 +13,7 @@ const RADIAN = Math.PI / 180;
 const TOP = 26,
   STRIP = 110,
   LABEL = 40; // pixels: room above, height of what tells the difference, width of a number
+const WORDS = 88; // pixels that the name of the specular part takes
 const NEAR = 24; // pixels from the light in which a hand takes it
 
 let centre = [0, 0]; // of the polar picture [pixel]
@@ -110,10 +111,12 @@ const reading = (curves, theta) =>
 function flat(into, curves, range, state, specular) {
   const up = { title: "fᵣ [1/sr]", range, ticks: ticks(range, state), height: scaled(state, range[0]) };
   const top = state.scale === "log" ? 10 ** range[1] : range[1],
-    bottom = state.scale === "log" ? 10 ** range[0] : 0;
+    bottom = state.scale === "log" ? 10 ** range[0] : 0,
+    part = Math.max(...specular);
   const marks = (/** @type {(x: number, y: number) => [number, number]} */ place) => [
     path([place(-state.theta_i, bottom), place(-state.theta_i, top)], "light"),
-    path([place(state.theta_i, bottom), place(state.theta_i, top)], Math.max(...specular) > 0 ? "spike" : "mirror"),
+    path([place(state.theta_i, bottom), place(state.theta_i, top)], part > 0 ? "spike" : "mirror"),
+    ...(part > 0 ? [nameOf(part, place(state.theta_i, top))] : []),
   ];
   chart(
     into,
@@ -124,6 +127,12 @@ function flat(into, curves, range, state, specular) {
     marks,
   );
 }
+
+/** The name of a specular part, beside the upper end of its spike.
+ * @param {number} part
+ * @param {[number, number]} end */
+const nameOf = (part, [x, y]) =>
+  svg("text", { x: x - 6, y: y + 16, class: "strong end" }, `specular part ${percent(part)}`);
 
 /** The cut as a polar picture.
  * @param {HTMLElement} into
@@ -151,7 +160,8 @@ function round(into, curves, range, state, specular, off) {
     ...(part > 0
       ? [
           path([at(state.theta_i, 0), at(state.theta_i, radius)], "spike"),
-          svg("text", { x: u + 8, y: v + 4, class: "strong" }, short(part)),
+          svg("text", { x: Math.min(u + 8, width - WORDS), y: v - 2, class: "strong" }, "specular part"),
+          svg("text", { x: Math.min(u + 8, width - WORDS), y: v + 12, class: "strong" }, percent(part)),
         ]
       : []),
     svg("circle", { cx: x, cy: y, r: 7, class: "lamp" }),
@@ -173,7 +183,9 @@ function round(into, curves, range, state, specular, off) {
   );
   const rays = [
     { label: "light", colour: ink("third"), dash: "2 3" },
-    { label: "mirror direction", colour: ink("muted"), dash: "2 3" },
+    part > 0
+      ? { label: "specular part", colour: ink("spike") }
+      : { label: "mirror direction", colour: ink("muted"), dash: "2 3" },
   ];
   into.replaceChildren(
     picture,

@@ -12,6 +12,7 @@ import { add, between, lightOf, lune, moments, surroundings } from "./sphere_sce
 
 const SIZE = 320,
   QUICK = 160; // pixels across, and while a slider moves
+const [DARK, BRIGHT, MOST_EV] = [0.03, 0.5, 8]; // largest linear value that is hardly seen; one to brighten it to
 const KEPT = 16; // surroundings, which stay the same while the light moves
 const ENCODED = Uint8Array.from({ length: 4097 }, (_, i) => {
   // bytes of sRGB (IEC 61966-2-1)
@@ -121,8 +122,8 @@ function spheres(into, series, answers, state) {
   while (into.children.length > answers.length) into.lastChild?.remove();
   answers.forEach((found, i) => {
     const [canvas, label] = into.children[i].children;
-    if (canvas instanceof HTMLCanvasElement) (found.around ? paint : develop)(canvas, found, state);
-    label.textContent = series.length > 1 ? series[i].label : "";
+    const seen = canvas instanceof HTMLCanvasElement ? (found.around ? paint : develop)(canvas, found, state) : 1;
+    label.replaceChildren(series.length > 1 ? series[i].label : "", ...(seen < DARK ? brightened(seen, state) : []));
   });
   const specular = answers.some(({ around }) =>
     around?.specular?.flat().some((/** @type {number} */ part) => part > 0),
@@ -132,14 +133,27 @@ function spheres(into, series, answers, state) {
   return WORDS + (state.surround === "sky" ? SKY : "") + (specular ? SPECULAR : "") + unseenWords(series[0], state);
 }
 
-/** @param {HTMLCanvasElement} canvas
+/** What is said of a sphere that is nearly black, with a button that brightens it.
+ * @param {number} seen its largest linear value
+ * @param {State} state */
+function brightened(seen, { exposure }) {
+  const ev = Math.min(Math.ceil(exposure + Math.log2(BRIGHT / Math.max(seen, 1e-9))), MOST_EV);
+  if (ev <= exposure) return [];
+  const button = element("button", { type: "button" }, `Show at +${ev} EV`);
+  button.dataset.exposure = String(ev);
+  return [element("p", {}, "Nearly black beside a white surface"), button];
+}
+
+/** Paint a sphere; its largest linear value.
+ * @param {HTMLCanvasElement} canvas
  * @param {{ values: ArrayLike<number>, of: { rays: number, rings: number, turn: number }, around: Around }} found
  * @param {State} state */
 function paint(canvas, { values: f_r, of: nodes, around }, state) {
   const size = state.quick ? QUICK : SIZE,
     context = canvas.getContext("2d"),
     image = context?.createImageData(size, size);
-  if (!context || !image) return;
+  if (!context || !image) return 0;
+  let most = 0;
   Object.assign(canvas, { width: size, height: size });
   const light = lightOf(state),
     of = { ...around, moments: state.surround === "sky" ? around.moments : null };
@@ -162,15 +176,17 @@ function paint(canvas, { values: f_r, of: nodes, around }, state) {
         seen.fill(0);
       }
       add(x, y, z, light, of, seen);
+      most = Math.max(most, seen[0], seen[1], seen[2]);
       for (let k = 0; k < 3; k += 1)
         image.data[pixel + k] = ENCODED[Math.round(Math.min(Math.max(bright * seen[k], 0), 4096))];
       image.data[pixel + 3] = 255;
     }
   }
   context.putImageData(image, 0, 0);
+  return most * 2 ** state.exposure;
 }
 
-/** Show a picture of linear colours and their coverage.
+/** Show a picture of linear colours and their coverage; its largest linear value.
  * @param {HTMLCanvasElement} canvas
  * @param {{ values: ArrayLike<number> }} found
  * @param {State} state */
@@ -178,13 +194,16 @@ function develop(canvas, { values: linear }, { exposure }) {
   const context = canvas.getContext("2d"),
     image = context?.createImageData(SIZE, SIZE),
     bright = 4096 * 2 ** exposure;
-  if (!context || !image) return;
+  if (!context || !image) return 0;
+  let most = 0;
   Object.assign(canvas, { width: SIZE, height: SIZE });
   for (let i = 0; i < linear.length; i += 1) {
+    if (i % 4 < 3) most = Math.max(most, linear[i]);
     image.data[i] =
       i % 4 === 3 ? 255 * linear[i] : ENCODED[Math.round(Math.min(Math.max(bright * linear[i], 0), 4096))];
   }
   context.putImageData(image, 0, 0);
+  return most * 2 ** exposure;
 }
 
 /** Let a hand and arrow keys move the light over the sphere.
@@ -208,8 +227,12 @@ function moves(into, choose, now) {
     });
   };
   into.addEventListener("pointerdown", (event) => {
-    if (event.target instanceof HTMLCanvasElement) into.setPointerCapture(event.pointerId);
+    if (!(event.target instanceof HTMLCanvasElement)) return;
+    into.setPointerCapture(event.pointerId);
     move(event);
+  });
+  into.addEventListener("click", ({ target }) => {
+    if (target instanceof HTMLButtonElement) choose({ exposure: Number(target.dataset.exposure) });
   });
   into.addEventListener("pointermove", move);
   into.addEventListener("keydown", (event) => {

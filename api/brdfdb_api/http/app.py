@@ -14,13 +14,14 @@ from fastapi import FastAPI
 from starlette.datastructures import Headers
 from starlette.middleware.cors import CORSMiddleware
 from starlette.responses import Response
-from starlette.types import ASGIApp, Receive, Scope, Send
+from starlette.types import ASGIApp
 
+from brdfdb.scenes import lit_sphere
 from brdfdb.store.shelf import Shelf
-from brdfdb_api.http.addresses import schemas
+from brdfdb_api.http.addresses import Quick, schemas
 from brdfdb_api.http.errors import HANDLED, RequestError, handler, problem_of
 from brdfdb_api.http.files import files
-from brdfdb_api.http.lookups import LARGE_AT_ONCE, answer_point, lookups
+from brdfdb_api.http.lookups import LARGE_AT_ONCE, lookups
 from brdfdb_api.http.middleware import Edge
 from brdfdb_api.http.models import models
 from brdfdb_api.http.pages import pages
@@ -43,15 +44,19 @@ application/problem+json document with one sentence."""
 class Application(FastAPI):
     """FastAPI behind an edge, whose OpenAPI document has the schemas that its answers name."""
 
-    outermost: ASGIApp
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        scope["app"] = self
-        await self.outermost(scope, receive, send)
-
-    async def routed(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Run the router, which lies behind the edge."""
-        await super().__call__(scope, receive, send)
+    def build_middleware_stack(self) -> ASGIApp:
+        given, inner = self.state.settings, super().build_middleware_stack()
+        quick = [route for route in lookups.routes if isinstance(route, Quick)]
+        edge = Edge(inner, given.max_body_bytes, quick, self.state.failed, given.log_level)
+        if not given.cors_origins:
+            return edge
+        return _Cors(
+            edge,
+            allow_origins=given.cors_origins,
+            allow_methods=["GET", "POST"],
+            allow_headers=["*"],
+            expose_headers=["ETag", "Retry-After", "X-Request-ID", REVISION],
+        )
 
     def openapi(self) -> dict[str, Any]:
         if self.openapi_schema is None:
@@ -96,16 +101,6 @@ def create_app(settings: Settings | None = None, store: Store | None = None) -> 
         app.state.routes += part.routes
     for kind in HANDLED:
         app.add_exception_handler(kind, handler)
-    limit, level = given.max_body_bytes, given.log_level
-    app.outermost = Edge(app.routed, limit=limit, lookup=answer_point, failed=app.state.failed, log_level=level)
-    if given.cors_origins:
-        app.outermost = _Cors(
-            app.outermost,
-            allow_origins=given.cors_origins,
-            allow_methods=["GET", "POST"],
-            allow_headers=["*"],
-            expose_headers=["ETag", "Retry-After", "X-Request-ID", REVISION],
-        )
     return app
 
 
@@ -121,8 +116,9 @@ class _Cors(CORSMiddleware):
 
 @contextlib.asynccontextmanager
 async def _warmed(app: FastAPI) -> AsyncIterator[None]:
-    """Load the kernels of lookups in a thread, while the application answers already."""
-    threading.Thread(target=app.state.shelf.warm, daemon=True).start()
+    """Load the kernels of lookups and what pictures share in a thread, while the application answers already."""
+    loads = (app.state.shelf.warm, lit_sphere.prepare)
+    threading.Thread(target=lambda: [load() for load in loads], daemon=True).start()
     yield
 
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import contextlib
+import errno
+from collections.abc import Iterator, Mapping, Sequence
 from http import HTTPStatus
 from pathlib import Path
 from typing import Any
@@ -14,7 +16,7 @@ from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import Match
 
-from brdfdb.errors import BrdfdbError, StoreError, UnknownMaterialError, UnknownRevisionError, sentence_of
+from brdfdb import errors
 
 PROBLEM_JSON = "application/problem+json"
 
@@ -24,7 +26,7 @@ BUSY_S, DAMAGED_S = 1, 60  # seconds to wait for a turn, and until somebody may 
 _TITLES = {413: "Content Too Large", 422: "Unprocessable Content"}
 
 
-class RequestError(BrdfdbError):
+class RequestError(errors.BrdfdbError):
     """A refused request.
 
     Parameters
@@ -49,22 +51,47 @@ class RequestError(BrdfdbError):
         self.headers = {name.replace("_", "-"): value for name, value in headers.items()}
 
 
+@contextlib.contextmanager
+def refused() -> Iterator[None]:
+    """Turn errors about the parameters of a request, or what its format cannot hold, into refusals (422)."""
+    try:
+        yield
+    except (errors.ParameterError, errors.CannotHoldError) as error:
+        raise RequestError(422, str(error), getattr(error, "parameter", None)) from error
+
+
+def refusal_of(finding: Mapping[str, Any]) -> RequestError:
+    """Return the refusal (422) of a finding of pydantic; it names the parameter, or else the body."""
+    wrong = finding.get("ctx", {}).get("error")
+    parameter = wrong.parameter if isinstance(wrong, errors.ParameterError) else str((*finding["loc"], "body")[0])
+    return RequestError(422, f"{parameter}: {errors.sentence_of(finding)}", parameter)
+
+
 # Classes that the router hands to `handler`. Exception is what the server logs with its traceback, so that the other
 # errors of brdfdb are not named here: in a service they are bugs
 HANDLED = (
-    *(RequestError, RequestValidationError, UnknownMaterialError, UnknownRevisionError, StoreError),
-    *(HTTPException, Exception),
+    *(errors.UnknownMaterialError, errors.UnknownRevisionError, errors.StoreError),
+    *(RequestError, RequestValidationError, HTTPException, Exception),
 )
 
 
 async def handler(request: Request, error: Exception) -> Response:
     """Return the answer of the router to an exception."""
+    if isinstance(error, HTTPException) and error.status_code in (404, 405):
+        error = _not_routed(request)
     answer: Response = request.app.state.failed(error)
-    if answer.status_code == 405:  # the router names the methods of one route of several
-        routes = [route for route in request.app.state.routes if route.matches(request.scope)[0] is not Match.NONE]
-        methods = {method for route in routes for method in route.methods}
-        answer.headers["Allow"] = ", ".join(sorted(methods | {"HEAD"} if "GET" in methods else methods))
     return answer
+
+
+def _not_routed(request: Request) -> RequestError:
+    """Return the refusal of an address that there is not (404), or not for the method of the request (405)."""
+    routes = [route for route in request.app.state.routes if route.matches(request.scope)[0] is not Match.NONE]
+    if not routes:
+        return RequestError(404, f"{request.scope['path'][:100]!r} is no address; /docs lists all that there are")
+    methods = {method for route in routes for method in route.methods}  # the router names those of one route only
+    allowed = ", ".join(sorted(methods | {"HEAD"} if "GET" in methods else methods))
+    method = request.method[:20]
+    return RequestError(405, f"{method} is not allowed at this address; allowed are {allowed}", Allow=allowed)
 
 
 def problem_of(error: Exception, root: Path | None = None) -> Response:
@@ -78,15 +105,17 @@ def problem_of(error: Exception, root: Path | None = None) -> Response:
             return _problem(error.status, str(error), error.parameter, headers=error.headers | wait)
         case RequestValidationError():
             first = error.errors()[0]
-            parameter = str(first["loc"][1])  # ("query", name, ...)
-            return _problem(422, f"{parameter}: {sentence_of(first)}", parameter)
-        case UnknownMaterialError():
-            return _problem(404, str(error), closest=error.closest)
-        case UnknownRevisionError():
+            return problem_of(refusal_of({**first, "loc": first["loc"][1:]}))  # ("query", name, ...)
+        case errors.UnknownMaterialError():
+            parameter = "name" if error.kind == "material" else error.kind
+            return _problem(404, str(error), parameter, closest=error.closest)
+        case errors.UnknownRevisionError():
             return _problem(404, str(error), "revision")
-        case StoreError():
+        case errors.StoreError():
             detail = str(error) if root is None else str(error).replace(str(root), root.name)
             return _problem(503, detail, headers={"Retry-After": str(DAMAGED_S)})
+        case OSError() if error.errno in (errno.EMFILE, errno.ENFILE):
+            return problem_of(RequestError(503, "too many files and connections are open; ask again later"))
         case HTTPException():
             return _problem(error.status_code, error.detail, headers=dict(error.headers or {}))
         case _:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import zipfile
-from pathlib import Path
 
 from starlette.requests import Request
 from starlette.responses import FileResponse, Response, StreamingResponse
@@ -14,7 +13,6 @@ from brdfdb.errors import StoreError
 from brdfdb.store.archive import ZIP, Group, root_group, zipped
 from brdfdb.store.files import sha256_of
 from brdfdb.store.manifest import check_manifest
-from brdfdb.store.paths import manifest_path
 from brdfdb_api.http.addresses import Revision, addresses, answers, both, shelf_of
 from brdfdb_api.http.errors import RequestError
 from brdfdb_api.http.responses import Document, cache_headers, tagged
@@ -38,7 +36,7 @@ files = addresses()
 )
 def download(request: Request, name: str, revision: Revision = None) -> Response:
     """Return a revision as one uncompressed zip file: xarray.open_zarr(zarr.storage.ZipStore(path, mode="r"))."""
-    group, digest = _located(request, name, revision)
+    group, digest = shelf_of(request).located(name, revision)
     headers = cache_headers(f"{name}-{group.name}-{digest[:16]}-{__version__}", "zip", immutable=revision is not None)
     headers["Content-Disposition"] = f'attachment; filename="{name}-{group.name}.zarr.zip"'
     listed = check_manifest(group, digest, contents=True)["files"]
@@ -52,7 +50,7 @@ def download(request: Request, name: str, revision: Revision = None) -> Response
 )
 def stored_file(request: Request, name: str, revision: str, file: str) -> Response:
     """Return a file of a revision: ``xarray.open_zarr(".../v1/store/materials/NAME/REVISION")`` reads these."""
-    group, digest = _located(request, name, revision)
+    group, digest = shelf_of(request).located(name, revision)
     listed = check_manifest(group, digest, contents=False)["files"]
     if file not in listed:
         raise RequestError(404, f"{name} {revision} has no such file")
@@ -83,15 +81,3 @@ def root(request: Request) -> Response:
     A material that is damaged is left out.
     """
     return tagged(root_group(shelf_of(request).store), "store")
-
-
-def _located(request: Request, name: str, revision: str | None) -> tuple[Path, str]:
-    """Return the directory of a revision that the store has, and the digest of its manifest.
-
-    Names are compared with what is there, never joined unseen.
-    """
-    shelf = shelf_of(request)
-    group, digest = shelf.store.located(name, revision or shelf.head(name))
-    if not manifest_path(group).is_file():
-        raise StoreError(f"{name} {group.name} is damaged: its manifest is missing")
-    return group, digest

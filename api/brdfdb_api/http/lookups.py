@@ -5,53 +5,27 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import io
-from collections.abc import AsyncIterator, Callable, Iterator
+from collections.abc import AsyncIterator, Callable
 from typing import Annotated, Any, TypeVar
 
 import numpy as np
+from fastapi import Depends
 from fastapi import Query as InQuery
 from starlette.concurrency import run_in_threadpool
 from starlette.datastructures import State
 from starlette.requests import Request
 from starlette.responses import Response
-from starlette.types import Scope
 
 from brdfdb.errors import ParameterError
 from brdfdb.store.shelf import Shelf
 from brdfdb.tables.evaluation import Surface, Values, surface_of
 from brdfdb.tables.points import ANGLES, Points, PointsBody
-from brdfdb.tables.stokes_document import reflected, stokes_document
 from brdfdb.tables.table import Table
 from brdfdb.tables.values_document import Lookup, Lookups, values_document
-from brdfdb_api.http.addresses import NPY_ANSWER, Content, Revision, accept_of, addresses, answers, body, both, shelf_of
-from brdfdb_api.http.errors import RequestError
+from brdfdb_api.http import queries, responses
+from brdfdb_api.http.addresses import NPY_ANSWER, Content, Quick, Revision, addresses, answers, body, both, shelf_of
+from brdfdb_api.http.errors import RequestError, refused
 from brdfdb_api.http.middleware import POINTS
-from brdfdb_api.http.queries import (
-    BodyQuery,
-    Format,
-    ManyBody,
-    ManyQuery,
-    OfTable,
-    Options,
-    PointQuery,
-    checked,
-    from_array,
-    from_json,
-    names_of,
-    parsed,
-)
-from brdfdb_api.http.responses import (
-    JSON,
-    NPY,
-    REVISION,
-    Encoded,
-    EncodedResponse,
-    json_bytes,
-    lookup_headers,
-    npy_bytes,
-    tag_of,
-    unchanged,
-)
 
 T = TypeVar("T")
 
@@ -63,20 +37,12 @@ TURN_S = 10.0  # longest wait for a turn [s]
 LIMITS = {"json": (1, 100), "npy": (100, 800)}  # points and values of one answer, as multiples of max_points
 MATRIX = 16  # elements of the Mueller matrix that a Stokes vector takes
 SPECTRA_OF_COLOURS = 10  # factor on the number of values where only colours are returned
-_PARAMETERS = (*ANGLES, "wavelength_nm", "illuminant", "error")  # of the library, which a request calls the same
+# Parameters of the library that a request calls the same
+_PARAMETERS = (*ANGLES, "wavelength_nm", *queries.OfTable.model_fields)
 NPZ = "application/x-npz"
 Asked = tuple[Surface, Points, dict[str, Any]]  # surface and points of a body, and what the answer says of them
 
 lookups = addresses()
-
-
-@contextlib.contextmanager
-def refused() -> Iterator[None]:
-    """Turn errors about the parameters of a request into refusals (422)."""
-    try:
-        yield
-    except ParameterError as error:
-        raise RequestError(422, str(error), error.parameter) from error
 
 
 @contextlib.asynccontextmanager
@@ -94,13 +60,21 @@ async def turn(turns: asyncio.Semaphore) -> AsyncIterator[None]:
         turns.release()
 
 
+async def _large(request: Request) -> AsyncIterator[None]:
+    async with turn(request.app.state.large):
+        yield
+
+
+LARGE = Depends(_large)  # of addresses that take much memory, or much time
+
+
 async def in_thread(state: State, work: Callable[[], T], *, large: bool) -> T:
     """Return what work returns, done in a thread; large work waits for a turn."""
     async with turn(state.large) if large else contextlib.nullcontext():
         return await run_in_threadpool(work)
 
 
-def surface_in(table: Table, options: OfTable) -> Surface:
+def surface_in(table: Table, options: queries.OfTable) -> Surface:
     """Return a table, or the model that it was made of; RequestError (422) if it keeps none."""
     if options.source == "table":
         return surface_of(table)
@@ -110,21 +84,27 @@ def surface_in(table: Table, options: OfTable) -> Surface:
 
 def tag_in(table: Table, surface: Surface) -> str:
     """Return the ETag of values of a table, or of its model, whose version it names then."""
-    return tag_of(table, surface.source.material.spec.version) if surface.kind == "model" else tag_of(table)
+    if surface.kind == "table":
+        return responses.tag_of(table)
+    return responses.tag_of(table, surface.source.material.spec.version)
 
 
-def evaluate(points: Points, options: Options, surface: Surface, *, specular: bool = True) -> Values:
+def evaluate(points: Points, options: queries.Options, surface: Surface, *, specular: bool = True) -> Values:
     """Look up points; RequestError (422) outside the range of the surface, or where it makes no colour."""
-    stated = getattr(options, "error", False)
+    error, incident = getattr(options, "error", False), getattr(options, "stokes", None)  # models have neither
     try:
-        return surface.values(points, options.output, options.illuminant, error=stated, specular=specular)
-    except ParameterError as error:
-        if error.parameter not in _PARAMETERS:
+        return surface.values(
+            points, options.output, options.illuminant, error=error, specular=specular, incident=incident
+        )
+    except ParameterError as wrong:
+        if surface.kind == "table" and wrong.parameter not in _PARAMETERS:
             raise
-        raise RequestError(422, str(error), error.parameter) from error
+        raise RequestError(422, str(wrong), wrong.parameter) from wrong
 
 
-def checked_size(max_points: int, points: Points, options: Options, surface: Surface, kind: Format) -> int:
+def checked_size(
+    max_points: int, points: Points, options: queries.Options, surface: Surface, kind: queries.Format
+) -> int:
     """Return the number of values to look up; RequestError (413) if they are too many for one answer."""
     most_points, most_values = (factor * max_points for factor in LIMITS[kind])
     if points.count > most_points:
@@ -134,7 +114,7 @@ def checked_size(max_points: int, points: Points, options: Options, surface: Sur
         )
     wavelengths = surface.wavelengths(points)
     values = points.count * (1 if wavelengths is None else int(np.size(wavelengths)))
-    values *= 1 if getattr(options, "incident", None) is None else MATRIX
+    values *= 1 if getattr(options, "stokes", None) is None else MATRIX
     if options.output != "spectrum" and surface.kind == "table":
         most_values *= SPECTRA_OF_COLOURS
     if values > most_values:
@@ -144,27 +124,38 @@ def checked_size(max_points: int, points: Points, options: Options, surface: Sur
 
 async def looked_up(
     request: Request,
-    options: Options,
-    kind: Format,
-    headers: Encoded,
+    options: queries.Options,
     size: int,
     read: Callable[[], Asked],
     *,
+    binary: bool = False,
     quick: bool = False,
 ) -> Response:
     """Answer a body of `size` bytes: read it, in a thread unless it is `quick`, and look its points up."""
-    state = request.app.state
+    state, kind = request.app.state, options.kind(queries.accept_of(request), binary=binary)
+    surface, points, about = read() if quick else await in_thread(state, read, large=size > LARGE_BYTES)
+    headers = responses.value_headers(kind, None, about.get("revision"))
+    return await answered(state, points, options, surface, kind, headers, about)
 
-    def checked_too() -> tuple[Asked, int]:
-        surface, points, about = read()
-        return (surface, points, about), checked_size(state.settings.max_points, points, options, surface, kind)
 
-    parts, values = checked_too() if quick else await in_thread(state, checked_too, large=size > LARGE_BYTES)
-    surface, points, about = parts
+async def answered(
+    state: State,
+    points: Points,
+    options: queries.Options,
+    surface: Surface,
+    kind: queries.Format,
+    headers: responses.Encoded,
+    about: Any,
+) -> Response:
+    """Look the points up and write them as `kind`, in a thread unless that is quick; `about` begins the document."""
+    values = checked_size(state.settings.max_points, points, options, surface, kind)
 
     def write() -> Response:
-        with contextlib.nullcontext() if surface.kind == "table" else refused():
-            return write_answer(points, options, surface, kind, headers, about)
+        POINTS.labels(surface.kind).inc(points.count)
+        values = evaluate(points, options, surface, specular=kind == "json")
+        if kind == "npy":
+            return responses.Answer(responses.npy_bytes(values.array), headers)
+        return responses.Answer(responses.json_bytes(about | values_document(values)), headers)
 
     if values <= INLINE_VALUES and surface.kind == "table" and options.output == "spectrum":
         return write()
@@ -172,38 +163,20 @@ async def looked_up(
     return await in_thread(state, write, large=values > LARGE_VALUES)
 
 
-def write_answer(
-    points: Points, options: Options, surface: Surface, kind: Format, headers: Encoded, about: dict[str, Any]
-) -> Response:
-    """Look the points up and write them as `kind`; `about` begins the document."""
-    incident = getattr(options, "incident", None)
-    POINTS.labels(surface.kind).inc(points.count)
-    if incident is not None:
-        if surface.source.facets is None:
-            raise RequestError(422, f"stokes: the table of {surface.source.name} is unpolarised", "stokes")
-        if kind == "npy" and getattr(options, "error", False):
-            raise RequestError(422, "stokes: a .npy answer holds either Stokes vectors or errors", "stokes")
-        with refused():
-            if kind == "npy":
-                return EncodedResponse(npy_bytes(reflected(surface.source, points, incident)), headers)
-            about = about | {"stokes": stokes_document(surface.source, points, incident)}
-    values = evaluate(points, options, surface, specular=kind == "json")
-    if kind == "npy":
-        content = npy_bytes(values.brdf if values.error is None else np.stack([values.brdf, values.error]))
-        return EncodedResponse(content, headers)
-    return EncodedResponse(json_bytes(about | values_document(values)), headers)
+_OF_POINTS = queries.names_of(queries.PointQuery)
 
 
 @both(
     lookups,
     "/lookup",
     tags=["lookup"],
-    responses=answers(Lookup, 304, 404, 413, 503, media=NPY_ANSWER, headers=(REVISION,)),
+    responses=answers(Lookup, 304, 404, 413, 503, media=NPY_ANSWER, headers=(responses.REVISION,)),
+    route_class_override=Quick,
 )
 async def lookup_point(
     request: Request,
     name: str,
-    query: Annotated[PointQuery, InQuery()],  # noqa: ARG001 of the document
+    query: Annotated[queries.PointQuery, InQuery()],  # of the document
     revision: Revision = None,
 ) -> Response:
     """Return the BRDF at one pair of directions (angles in degrees).
@@ -211,15 +184,8 @@ async def lookup_point(
     The wavelengths are an axis, unless wavelength_nm is one number or the material is grey. Below the horizon (theta
     above 90 degrees) the BRDF is 0.
     """
-    return await answer_point(request.scope, name, revision)
-
-
-_OF_POINTS = names_of(PointQuery)
-
-
-async def answer_point(scope: Scope, name: str, revision: str | None) -> Response:
-    """Answer GET of a lookup, from the query as it came: what lies behind the edge takes three times as long."""
-    query = checked(PointQuery, parsed(scope["query_string"], _OF_POINTS), "query")
+    scope = request.scope
+    query = queries.checked(queries.PointQuery, queries.parsed(scope["query_string"], _OF_POINTS))
     accept = held = ""
     for key, value in scope["headers"]:
         if key == b"accept":
@@ -230,14 +196,11 @@ async def answer_point(scope: Scope, name: str, revision: str | None) -> Respons
     table = await _table(state.shelf, name, revision)
     surface = surface_in(table, query)
     computed = query.source == "model" or query.output != "spectrum" or query.stokes is not None
-    headers = lookup_headers(
-        tag_in(table, surface), table.revision, kind, immutable=revision is not None and not computed
-    )
-    values = checked_size(state.settings.max_points, points, query, surface, kind)
-    slow = values > INLINE_VALUES or computed
-    given = (points, query, surface, kind, headers, {"material": table.name, "revision": table.revision})
-    answer = await run_in_threadpool(write_answer, *given) if slow else write_answer(*given)
-    return unchanged(answer, held) if held else answer
+    tag, immutable = tag_in(table, surface), revision is not None and not computed
+    headers = responses.value_headers(kind, tag, table.revision, immutable=immutable)
+    about = {"material": table.name, "revision": table.revision}
+    answer = await answered(state, points, query, surface, kind, headers, about)
+    return responses.unchanged(answer, held) if held else answer
 
 
 async def _table(shelf: Shelf, name: str, revision: str | None) -> Table:
@@ -253,50 +216,47 @@ async def _table(shelf: Shelf, name: str, revision: str | None) -> Table:
     "/lookup",
     method="POST",
     tags=["lookup"],
-    responses=answers(Lookup, 404, 413, 415, 503, media=NPY_ANSWER, headers=(REVISION,)),
+    responses=answers(Lookup, 404, 413, 415, 503, media=NPY_ANSWER, headers=(responses.REVISION,)),
     openapi_extra=body(PointsBody, npy=True),
 )
 async def lookup_points(
-    request: Request, name: str, query: Annotated[BodyQuery, InQuery()], revision: Revision = None
+    request: Request, name: str, query: Annotated[queries.BodyQuery, InQuery()], revision: Revision = None
 ) -> Response:
     """Return the BRDF at many pairs of directions (angles in degrees), in the shape that the angles broadcast to.
 
     The wavelengths are a last axis, unless wavelength_nm is one number or the material is grey. Below the horizon
     (theta above 90 degrees) the BRDF is 0. A body of any media type but .npy is read as JSON.
     """
-    binary = request.headers.get("content-type", "").partition(";")[0].strip().lower() == NPY
+    binary = request.headers.get("content-type", "").partition(";")[0].strip().lower() == responses.NPY
     if query.wavelength_nm and not binary:
         raise RequestError(422, "wavelength_nm: a JSON body holds it, not the query", "wavelength_nm")
-    kind = query.kind(accept_of(request), binary=binary)
     table = await _table(shelf_of(request), name, revision)
     surface, content = surface_in(table, query), await request.body()
-    about, headers = {"material": table.name, "revision": table.revision}, lookup_headers(None, table.revision, kind)
+    about = {"material": table.name, "revision": table.revision}
 
     def read() -> Asked:
-        points = from_array(content, query.wavelength_nm) if binary else from_json(PointsBody, content).points
-        return surface, points, about
+        if binary:
+            return surface, queries.from_array(content, query.wavelength_nm), about
+        return surface, queries.from_json(PointsBody, content).points, about
 
     quick = len(content) <= INLINE_BYTES
-    return await looked_up(request, query, kind, headers, len(content), read, quick=quick)
+    return await looked_up(request, query, len(content), read, binary=binary, quick=quick)
 
 
 @lookups.post(
     "/v1/lookup",
     tags=["lookup"],
     responses=answers(Lookups, 404, 413, 415, 503, media={NPZ: "an array a material, by its name"}),
-    openapi_extra=body(ManyBody),
+    openapi_extra=body(queries.ManyBody),
+    dependencies=[LARGE],
 )
-async def lookup_many(request: Request, query: Annotated[ManyQuery, InQuery()], content: Content) -> Response:
+def lookup_many(request: Request, query: Annotated[queries.ManyQuery, InQuery()], content: Content) -> Response:
     """Return the BRDF of several materials at the same pairs of directions (angles in degrees)."""
-    return await in_thread(request.app.state, lambda: _many(request, query, content), large=True)
-
-
-def _many(request: Request, query: ManyQuery, content: bytes) -> Response:
-    given, shelf = from_json(ManyBody, content), shelf_of(request)
+    given, shelf = queries.from_json(queries.ManyBody, content), shelf_of(request)
     points = given.points
-    kind: Format = "npy" if query.format == "npz" else "json"
+    kind: queries.Format = "npy" if query.format == "npz" else "json"
     max_points, total, results = request.app.state.settings.max_points, 0, {}
-    for name in dict.fromkeys(given.materials):
+    for name in given.materials:
         table = shelf.table(name)
         surface = surface_in(table, query)
         total += checked_size(max_points, points, query, surface, kind)
@@ -306,11 +266,14 @@ def _many(request: Request, query: ManyQuery, content: bytes) -> Response:
     if kind == "npy":
         arrays = {name: values.brdf for name, (_, values) in results.items()}
         arrays |= {f"{name}.error": values.error for name, (_, values) in results.items() if values.error is not None}
+        arrays |= {
+            f"{name}.stokes": values.stokes["reflected"] for name, (_, values) in results.items() if values.stokes
+        }
         data = io.BytesIO()
         np.savez(data, **arrays)
-        return Response(data.getvalue(), media_type=NPZ, headers={"Cache-Control": "no-store"})
+        return Response(data.getvalue(), media_type=NPZ, headers=responses.NO_STORE)
     documents = [
         {"material": name, "revision": revision, **values_document(values)}
         for name, (revision, values) in results.items()
     ]
-    return Response(json_bytes({"materials": documents}), media_type=JSON, headers={"Cache-Control": "no-store"})
+    return responses.Answer(responses.json_bytes({"materials": documents}), responses.value_headers("json"))

@@ -11,21 +11,18 @@ import re
 import tempfile
 import time
 import traceback
-from collections.abc import Awaitable, Callable
+from collections.abc import Callable, Sequence
 from typing import IO
 
 from prometheus_client import REGISTRY, CollectorRegistry, Counter, Histogram, generate_latest
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response
-from starlette.routing import Route, Router
+from starlette.routing import BaseRoute, Router
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from brdfdb_api.http.errors import RequestError
 from brdfdb_api.serving import log
 from brdfdb_api.serving.settings import LogLevel
-
-LOOKUP_ROUTE = "/v1/materials/{name}/lookup"
-LOOKUP_ROUTES = (LOOKUP_ROUTE, "/v1/materials/{name}/revisions/{revision}/lookup")
 
 GONE = 499  # status of a request whose client went away, as nginx counts it
 SMALL = 64 * 2**10  # size up to which bodies and answers are not counted [byte]
@@ -48,8 +45,6 @@ POINTS = Counter("brdfdb_points", "Pairs of directions looked up", ["source"])
 
 LOGGED_FROM: dict[LogLevel, int] = {"info": 0, "warning": 400, "error": 500}  # lowest status that is logged
 
-Answerer = Callable[[Scope, str, str | None], Awaitable[ASGIApp]]
-
 
 class Edge:
     """ASGI middleware around the whole application.
@@ -57,11 +52,11 @@ class Edge:
     Parameters
     ----------
     app : ASGI application
-        What answers all but lookups of one point.
+        What answers all other requests.
     limit : int
         Bytes that a body may have; past that, reading it is a RequestError (413), counted while it arrives.
-    lookup : callable
-        Answers GET of a lookup: from the scope, the name of a material and of a revision, or None for the current one.
+    quick : sequence of routes
+        GET at their addresses is answered without the application.
     failed : callable
         From an exception to the answer.
     log_level : str
@@ -72,12 +67,11 @@ class Edge:
         self,
         app: ASGIApp,
         limit: int,
-        lookup: Answerer,
+        quick: Sequence[BaseRoute],
         failed: Callable[[Exception], Response],
         log_level: LogLevel,
     ) -> None:
-        points = [Route(path, _Point(lookup), methods=["GET"]) for path in LOOKUP_ROUTES]
-        self.app, self.get = app, Router(points, default=app, redirect_slashes=False)
+        self.app, self.get = app, Router(quick, default=app, redirect_slashes=False)
         self.limit, self.failed = limit, failed
         self.logged_from = LOGGED_FROM[log_level]
         self.bodies = 0  # bytes of larger bodies in memory
@@ -114,21 +108,6 @@ class Edge:
             observed.observe(seconds)
             if status >= self.logged_from:
                 log.write(_about(original_scope, exchange.id) | {"status": status, "ms": round(1e3 * seconds, 3)})
-
-
-class _Point:
-    """An ASGI application that answers GET of a lookup; the route of requests to it, for their counts."""
-
-    path = LOOKUP_ROUTE
-
-    def __init__(self, lookup: Answerer) -> None:
-        self.lookup = lookup
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        scope["route"] = self
-        named = scope["path_params"]
-        answer = await self.lookup(scope, named["name"], named.get("revision"))
-        await answer(scope, receive, send)
 
 
 class _Exchange:

@@ -22,14 +22,14 @@ from brdfdb.tables.albedo import reflected_by
 from brdfdb.tables.evaluation import Surface
 from brdfdb.tables.points import PointsBody
 from brdfdb.tables.values_document import FamilyLookup, ModelAlbedo, ModelLobe, ModelLookup
-from brdfdb_api.http.addresses import NPY_ANSWER, Content, accept_of, addresses, answers, body, shelf_of
-from brdfdb_api.http.lookups import Asked, looked_up, refused
-from brdfdb_api.http.queries import Flag, Format, Light, Options, Query, Wavelengths, from_json
-from brdfdb_api.http.responses import NPY, Document, Encoded, Families, Model, Models, media_type
+from brdfdb_api.http.addresses import NPY_ANSWER, Content, addresses, answers, body, shelf_of
+from brdfdb_api.http.errors import refused
+from brdfdb_api.http.lookups import LARGE, Asked, looked_up
+from brdfdb_api.http.queries import Flag, Light, Options, Query, Wavelengths, from_json
+from brdfdb_api.http.responses import NO_STORE, NPY, Document, Families, Model, Models
 from brdfdb_api.http.views import SPHERE, SphereQuery, lobe_answer, sphere_answer
 
 models = addresses()
-NO_STORE = {"Cache-Control": "no-store"}
 
 
 class PointsAt(PointsBody, Parameters):
@@ -93,11 +93,6 @@ def _surface(spec: ModelSpec, given: Parameters) -> tuple[Surface, dict[str, Any
     return Surface(material, "model", PICTURE_NM if material.spectral else None), about
 
 
-def _form(request: Request, query: Options) -> tuple[Format, Encoded]:
-    kind = query.kind(accept_of(request))
-    return kind, Encoded({**NO_STORE, "Content-Type": media_type(kind)})
-
-
 @models.post(
     "/v1/models/{model}/lookup",
     tags=["models"],
@@ -117,7 +112,7 @@ async def model_lookup(
         surface, about = _surface(spec, given)
         return surface, given.points, about
 
-    return await looked_up(request, query, *_form(request, query), len(content), read)
+    return await looked_up(request, query, len(content), read)
 
 
 @models.post(
@@ -127,10 +122,12 @@ async def model_lookup(
     openapi_extra=body(Parameters),
 )
 def model_lobe(request: Request, spec: Spec, query: Annotated[LobeOptions, InQuery()], content: Content) -> Response:
-    """Return f_r [1/sr] of a model for one light, in a view as of a material."""
+    """Return f_r [1/sr] of a model for one light, in a view as of a material.
+
+    The first request for a model after an installation may take 20 s, in which its kernels are compiled.
+    """
     surface, about = _surface(spec, from_json(Parameters, content))
-    with refused():
-        return lobe_answer(request, surface, query, query, about, NO_STORE)
+    return lobe_answer(request, surface, query, query, about, NO_STORE)
 
 
 class WavelengthQuery(Query):
@@ -160,6 +157,7 @@ def model_albedo(spec: Spec, query: Annotated[WavelengthQuery, InQuery()], conte
     tags=["models"],
     responses=answers(None, 404, 413, 415, 503, media=SPHERE),
     openapi_extra=body(Parameters),
+    dependencies=[LARGE],
 )
 def model_sphere(spec: Spec, query: Annotated[SphereQuery, InQuery()], content: Content) -> Response:
     """Return the picture of a sphere of a model in the light of a studio, drawn as a draft."""
@@ -193,4 +191,4 @@ async def family_lookup(
             surface = shelf_of(request).store.family(family).surface(given.parameters)
         return surface, given.points, {"family": family, "parameters": given.parameters}
 
-    return await looked_up(request, query, *_form(request, query), len(content), read)
+    return await looked_up(request, query, len(content), read)

@@ -9,24 +9,25 @@ from typing import Annotated, Any, Literal, TypeVar
 from urllib.parse import parse_qsl
 
 import orjson
-from fastapi.exceptions import RequestValidationError
 from pydantic import (
     BaseModel,
     BeforeValidator,
     ConfigDict,
     Field,
+    PlainValidator,
     Strict,
     ValidationError,
     ValidationInfo,
+    WithJsonSchema,
     field_validator,
 )
+from starlette.requests import Request
 
-from brdfdb.errors import ParameterError
 from brdfdb.tables.evaluation import Output
 from brdfdb.tables.lobe_views import View
 from brdfdb.tables.points import TURN, Points, PointsBody, fields_of_npy, listed
 from brdfdb.tables.stokes_document import read_stokes
-from brdfdb_api.http.errors import RequestError
+from brdfdb_api.http.errors import RequestError, refusal_of, refused
 from brdfdb_api.http.responses import JSON, NPY, preferred
 
 JSON_BYTES = 8 * 2**20  # limit on a JSON body [byte]: numbers in lists take twenty times the memory of the text
@@ -44,6 +45,7 @@ def _digits(value: object) -> object:
 Finite = Annotated[float, Field(allow_inf_nan=False), BeforeValidator(_digits)]
 Polar = Annotated[Finite, Field(ge=0.0, le=180.0)]
 Flag = Annotated[bool, BeforeValidator(lambda text: {"true": True, "false": False}.get(text, text)), Strict()]
+Stokes = Annotated[Any, PlainValidator(read_stokes), WithJsonSchema({"anyOf": [{"type": "string"}, {"type": "null"}]})]
 Wavelengths = Annotated[tuple[Finite, ...], Field(description="wavelength [nm], repeatable; missing: all of the table")]
 
 
@@ -80,18 +82,18 @@ class Options(Query):
 
 
 class OfTable(Options):
-    """Form of values of a table, or of the model that it was made of."""
+    """Form of values of a table, or of its model; of a table with its stated errors, and the light that it reflects."""
 
     source: Literal["table", "model"] = Field(
         default="table", alias="from", description="the table, or the model that it was made of"
     )
-
-
-class Stated(OfTable):
-    """Form of values of a table, with the errors that it states."""
-
     error: Flag = Field(
         default=False, description="the error that the table states beside the values; npy then has a first axis for it"
+    )
+    stokes: Stokes = Field(
+        default=None,
+        description="incident Stokes vector I,Q,U,V: answers of polarised tables hold that of the reflected light; npy "
+        "holds it in place of f_r, on a last axis",
     )
 
     @field_validator("error")
@@ -101,42 +103,27 @@ class Stated(OfTable):
             raise ValueError("the model has none; it is the table that states one")
         return error
 
-
-class Polarised(Stated):
-    """Form of values of a table, with the light that a polarised one reflects."""
-
-    stokes: str | None = Field(
-        default=None,
-        description="incident Stokes vector I,Q,U,V: answers of polarised tables hold that of the reflected light; npy "
-        "holds it in place of f_r, on a last axis",
-    )
-
     @field_validator("stokes")
     @classmethod
-    def _of_light(cls, text: str | None, info: ValidationInfo) -> str | None:
-        if text is None:
-            return None
-        if info.data.get("source") == "model" or info.data.get("output") != "spectrum":
+    def _of_light(cls, stokes: tuple[float, ...] | None, info: ValidationInfo) -> tuple[float, ...] | None:
+        if stokes and (info.data.get("source") == "model" or info.data.get("output") != "spectrum"):
             raise ValueError("it goes with from=table and output=spectrum alone")
-        try:
-            read_stokes(text)
-        except ParameterError as error:
-            raise ValueError(error.sentence) from None
-        return text
+        return stokes
 
-    @property
-    def incident(self) -> tuple[float, ...] | None:
-        """The incident Stokes vector; None if none was given."""
-        return None if self.stokes is None else read_stokes(self.stokes)
+    def kind(self, accept: str, *, binary: bool = False) -> Format:
+        kind = super().kind(accept, binary=binary)
+        if kind == "npy" and self.stokes and self.error:
+            raise RequestError(422, "stokes: a .npy answer holds either Stokes vectors or errors", "stokes")
+        return kind
 
 
-class BodyQuery(Polarised):
+class BodyQuery(OfTable):
     """The query of a lookup whose points are in the body."""
 
     wavelength_nm: Wavelengths = Field(default=(), description="wavelength [nm] of a .npy body; JSON holds its own")
 
 
-class ManyQuery(Stated):
+class ManyQuery(OfTable):
     """The query of a lookup of many materials."""
 
     format: Literal["json", "npz"] = Field(
@@ -144,7 +131,7 @@ class ManyQuery(Stated):
     )  # type: ignore[assignment]
 
 
-class PointQuery(Polarised):
+class PointQuery(OfTable):
     """The query of a lookup of one point."""
 
     wavelength_nm: Wavelengths = ()
@@ -175,6 +162,11 @@ class LobeQuery(Light, OfTable):
     """The query of a lobe of a table."""
 
 
+def accept_of(request: Request) -> str:
+    """Return the header Accept, which may come in several lines."""
+    return ",".join(request.headers.getlist("accept"))
+
+
 class ManyBody(PointsBody):
     """Points that are looked up in several materials."""
 
@@ -183,6 +175,14 @@ class ManyBody(PointsBody):
     )
 
     materials: list[str] = Field(min_length=1, max_length=1000, description="names, each once")
+
+    @field_validator("materials")
+    @classmethod
+    def _each_once(cls, names: list[str]) -> list[str]:
+        for place, name in enumerate(names):
+            if name in names[:place]:
+                raise ValueError(f"{shortened(name)!r} is given more than once")
+        return names
 
 
 def from_json(model: type[M], body: bytes) -> M:
@@ -198,13 +198,20 @@ def from_json(model: type[M], body: bytes) -> M:
         try:
             fields = json.loads(body)
         except (ValueError, RecursionError):
-            raise RequestError(422, "the body is not JSON") from None
+            raise RequestError(422, "body: it is not JSON", "body") from None
     if not isinstance(fields, dict):
-        raise RequestError(422, f"the body is not a JSON object with {', '.join(model.model_fields)}")
-    return checked(model, fields, "body")
+        raise RequestError(422, f"body: it is not a JSON object with {', '.join(model.model_fields)}", "body")
+    return checked(model, fields)
 
 
-def checked(model: type[M], fields: dict[str, Any], where: str) -> M:
+def from_array(body: bytes, wavelengths: Sequence[float]) -> Points:
+    """Return the points of a .npy body; RequestError (422) if it is none."""
+    with refused():
+        fields = fields_of_npy(body)
+    return checked(PointsBody, fields | {"wavelength_nm": listed(wavelengths)}).points
+
+
+def checked(model: type[M], fields: dict[str, Any]) -> M:
     """Return fields as a model; a refusal (422) names the first that is unknown, missing or not allowed."""
     try:
         return model.model_validate(fields)
@@ -212,16 +219,7 @@ def checked(model: type[M], fields: dict[str, Any], where: str) -> M:
         for name in fields:
             if name not in (names := names_of(model)):
                 raise unknown(name, names) from None
-        first = error.errors(include_url=False)[0]
-        raise RequestValidationError([{**first, "loc": (where, *(first["loc"] or ("the angles",)))}]) from None
-
-
-def from_array(body: bytes, wavelengths: Sequence[float]) -> Points:
-    """Return the points of a .npy body; RequestError (422) if it is none."""
-    try:
-        return checked(PointsBody, fields_of_npy(body) | {"wavelength_nm": listed(wavelengths)}, "body").points
-    except ParameterError as error:
-        raise RequestError(422, str(error)) from None
+        raise refusal_of(error.errors(include_url=False)[0]) from None
 
 
 def parsed(query: bytes, allowed: Collection[str]) -> dict[str, Any]:

@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 JSON = "application/json"
 NPY = "application/x-npy"
 REVISION = "Brdfdb-Revision"  # header that names the revision of the values of a lookup
+NO_STORE = {"Cache-Control": "no-store"}
+Encoded = list[tuple[bytes, bytes]]  # headers
 COMPRESSED_FROM = 1024  # length of a document [byte]
 _QUALITY = re.compile(r"(?<![^\s;])q=(0(?:\.\d*)?|1(?:\.0*)?)\s*(?:;|$)")
 
@@ -160,11 +162,6 @@ class Document(Response):
         await super().__call__(scope, receive, send)
 
 
-def media_type(kind: str) -> str:
-    """Return the media type of a format."""
-    return NPY if kind == "npy" else JSON
-
-
 def npy_bytes(array: NDArray[Any]) -> bytes:
     """Return an array as a .npy file."""
     buffer, array = io.BytesIO(), np.asarray(array, order="C")
@@ -172,28 +169,24 @@ def npy_bytes(array: NDArray[Any]) -> bytes:
     return b"".join((buffer.getvalue(), array.data))  # np.save copies twice
 
 
-class Encoded(dict[str, str]):
-    """Headers that many answers share, encoded once: encoding takes as long as the lookup of a point."""
-
-    @functools.cached_property
-    def raw(self) -> list[tuple[bytes, bytes]]:
-        """Encoded headers, as they are sent."""
-        return [(name.lower().encode("latin-1"), value.encode("latin-1")) for name, value in self.items()]
-
-
-class EncodedResponse(Response):
-    """An answer with encoded headers, which also name its media type."""
+class Answer(Response):
+    """Values as JSON or .npy, with headers that many answers share: to encode them takes as long as to look them up."""
 
     def __init__(self, content: bytes, headers: Encoded) -> None:
         self.status_code, self.background, self.body = 200, None, content
-        self.raw_headers = [*headers.raw, (b"content-length", str(len(content)).encode())]
+        self.raw_headers = [*headers, (b"content-length", b"%d" % len(content))]
 
 
 @functools.lru_cache(maxsize=1024)
-def lookup_headers(tag: str | None, revision: str, kind: str, *, immutable: bool = False) -> Encoded:
-    """Return the headers of the answer to a lookup: its tag (None: not to be cached) and the revision of its values."""
-    cached = {"Cache-Control": "no-store"} if tag is None else cache_headers(tag, kind, immutable=immutable)
-    return Encoded({**cached, REVISION: revision, "Content-Type": media_type(kind)})
+def value_headers(
+    kind: str, tag: str | None = None, revision: str | None = None, *, immutable: bool = False
+) -> Encoded:
+    """Return the headers of values of a `kind`: of a tag (None: not to be cached), and a revision if there is one."""
+    named = NO_STORE if tag is None else cache_headers(tag, kind, immutable=immutable)
+    if revision is not None:
+        named = named | {REVISION: revision}
+    named = named | {"Content-Type": NPY if kind == "npy" else JSON}
+    return [(name.lower().encode(), value.encode()) for name, value in named.items()]
 
 
 def tag_of(table: Table, *more: object) -> str:

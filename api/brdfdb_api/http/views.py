@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any, Literal
-from weakref import WeakKeyDictionary
+import functools
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from fastapi import Path
@@ -14,28 +14,20 @@ from starlette.requests import Request
 from starlette.responses import Response
 
 from brdfdb import __version__
-from brdfdb.errors import CannotHoldError, ParameterError
 from brdfdb.formats import EXPORTERS, packed, served_options, served_schemas
 from brdfdb.scenes import lit_sphere
 from brdfdb.store.archive import ZIP
-from brdfdb.store.shelf import Shelf
 from brdfdb.store.summary_words import NOT_AUDITED
+from brdfdb.tables.albedo import reflected
 from brdfdb.tables.evaluation import Surface
 from brdfdb.tables.lobe_views import MOST_POINTS, view_directions
 from brdfdb.tables.points import Points, listed
 from brdfdb.tables.values_document import Albedo, Lobe, lobe_document
-from brdfdb_api.http.addresses import Revision, accept_of, addresses, answers, both, shelf_of
-from brdfdb_api.http.errors import RequestError
-from brdfdb_api.http.lookups import checked_size, evaluate, refused, surface_in, tag_in, turn
-from brdfdb_api.http.queries import Light, LobeQuery, Options, Query, parsed
-from brdfdb_api.http.responses import NPY, Audit, Document, cache_headers, json_bytes, npy_bytes, tag_of
-
-if TYPE_CHECKING:
-    from brdfdb.tables.table import Table
-
-# Kept as long as the table: its albedo, and the last thumbnail with its size
-_ALBEDOS: WeakKeyDictionary[Table, bytes] = WeakKeyDictionary()
-_PICTURES: WeakKeyDictionary[Table, tuple[int, bytes]] = WeakKeyDictionary()
+from brdfdb_api.http.addresses import NPY_ANSWER, Revision, addresses, answers, both, shelf_of
+from brdfdb_api.http.errors import RequestError, refused
+from brdfdb_api.http.lookups import LARGE, checked_size, evaluate, surface_in, tag_in, turn
+from brdfdb_api.http.queries import Light, LobeQuery, Options, Query, accept_of, parsed
+from brdfdb_api.http.responses import NPY, Audit, Document, cache_headers, npy_bytes, tag_of
 
 SPHERE = {"image/png": "sRGB with transparent corners", NPY: "linear sRGB and coverage (size, size, 4), not clipped"}
 EXPORTS_AT_ONCE = 2  # files of other formats that are made at a time
@@ -67,19 +59,15 @@ class ThumbnailQuery(Query):
 def albedo(request: Request, name: str, revision: Revision = None) -> Response:
     """Return the directional and the hemispherical albedo [1] of the table."""
     table = shelf_of(request).table(name, revision)
-    if table not in _ALBEDOS:
-        from brdfdb.tables.albedo import reflected
-
-        about = {"material": table.name, "revision": table.revision}
-        _ALBEDOS[table] = json_bytes(about | reflected(table).document(table.wavelength_nm))
-    return Document(_ALBEDOS[table], cache_headers(tag_of(table)))
+    about = {"material": table.name, "revision": table.revision}
+    return Document(about | reflected(table).document(table.wavelength_nm), cache_headers(tag_of(table)))
 
 
 @both(
     views,
     "/lobe",
     tags=["views"],
-    responses=answers(Lobe, 304, 404, 413, 503, media={NPY: "brdf as a .npy file"}),
+    responses=answers(Lobe, 304, 404, 413, 503, media=NPY_ANSWER),
 )
 def lobe(request: Request, name: str, query: Annotated[LobeQuery, InQuery()], revision: Revision = None) -> Response:
     """Return f_r [1/sr] for one light, in the plane of incidence or over all viewers; or over theta_h and theta_d.
@@ -104,7 +92,7 @@ def lobe_answer(
     checked_size(max(request.app.state.settings.max_points, MOST_POINTS), points, options, surface, "json")
     values = evaluate(points, options, surface)
     if kind == "npy":
-        return Response(npy_bytes(values.brdf), media_type=NPY, headers=headers)
+        return Response(npy_bytes(values.array), media_type=NPY, headers=headers)
     return Document(about | lobe_document(values, axes, light.view, light.theta_i, light.phi_i), headers)
 
 
@@ -132,32 +120,20 @@ async def export(
     query = parsed(request.scope["query_string"], allowed)
     with refused():
         options = {option: allowed[option].parse(text) for option, text in query.items()}
-    table, verdict = await run_in_threadpool(_with_verdict, shelf_of(request), name, revision)
+    shelf = shelf_of(request)
+    table, known = await run_in_threadpool(lambda: (shelf.table(name, revision), shelf.verdict(name)))
+    verdict = known.finding.verdict if known and known.finding.revision == table.revision else None
     # The file states the verdict, which a later audit may change, and the program. A weak tag: some state the time
     headers = cache_headers(tag_of(table, verdict), file_format)
     headers["ETag"] = f"W/{headers['ETag']}"
     if request.headers.get("if-none-match") == headers["ETag"]:  # a file takes seconds
         return Response(status_code=304, headers=headers)
+    pack = functools.partial(packed, table, file_format, verdict=verdict or NOT_AUDITED, **options)
     async with turn(request.app.state.exports):
-        return await run_in_threadpool(_exported, file_format, table, verdict, options, headers)
-
-
-def _with_verdict(shelf: Shelf, name: str, revision: str | None) -> tuple[Table, str | None]:
-    """Return a table, and the verdict of the audit of its revision."""
-    table, known = shelf.table(name, revision), shelf.verdict(name)
-    return table, known.finding.verdict if known and known.finding.revision == table.revision else None
-
-
-def _exported(
-    file_format: str, table: Table, verdict: str | None, options: dict[str, Any], headers: dict[str, str]
-) -> Response:
-    """Return a file of another format, or an archive of several, with these headers and its name."""
-    try:
-        name, media_type, content = packed(table, file_format, verdict=verdict or NOT_AUDITED, **options)
-    except (CannotHoldError, ParameterError) as error:
-        raise RequestError(422, str(error), getattr(error, "parameter", None)) from None
-    named = {"Content-Disposition": f'attachment; filename="{name}"'}
-    return Response(content, media_type=media_type, headers=headers | named)
+        with refused():
+            file, media_type, content = await run_in_threadpool(pack)
+    headers["Content-Disposition"] = f'attachment; filename="{file}"'
+    return Response(content, media_type=media_type, headers=headers)
 
 
 @both(views, "/audit", tags=["views"], responses=answers(Audit, 304, 404, 503))
@@ -175,7 +151,7 @@ def audit(request: Request, name: str, revision: Revision = None) -> Response:
     return Document({**document, "finding": verdict.finding.model_dump(exclude_unset=True)}, headers)
 
 
-@both(views, "/sphere", tags=["views"], responses=answers(None, 304, 404, 503, media=SPHERE))
+@both(views, "/sphere", tags=["views"], responses=answers(None, 304, 404, 503, media=SPHERE), dependencies=[LARGE])
 def sphere(
     request: Request, name: str, query: Annotated[SphereQuery, InQuery()], revision: Revision = None
 ) -> Response:
@@ -198,11 +174,7 @@ def sphere_answer(surface: Any, query: SphereQuery, headers: dict[str, str]) -> 
 def thumbnail(
     request: Request, name: str, query: Annotated[ThumbnailQuery, InQuery()], revision: Revision = None
 ) -> Response:
-    """Return a small picture of the table for lists; the last one of a table is kept with it."""
+    """Return a small picture of the table for lists."""
     table = shelf_of(request).table(name, revision)
     headers = cache_headers(tag_of(table, query.size), "png")
-    size, picture = _PICTURES.get(table, (0, b""))
-    if size != query.size:
-        picture = lit_sphere.sphere_png(table, query.size, lit_sphere.DRAFT)
-        _PICTURES[table] = query.size, picture
-    return Response(picture, media_type="image/png", headers=headers)
+    return Response(lit_sphere.thumbnail_png(table, query.size), media_type="image/png", headers=headers)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import atexit
 import contextlib
+import functools
 import logging
 import os
 import threading
@@ -24,7 +25,6 @@ _waiting: deque[bytes] = deque()
 _dropped = 0
 _wake = threading.Event()
 _hurry = threading.Event()
-_never_written = threading.Lock()
 
 
 def write(record: dict[str, object]) -> None:
@@ -40,10 +40,8 @@ def write(record: dict[str, object]) -> None:
         return
     _waiting.append(line)
     if not _wake.is_set():
+        _start()
         _wake.set()
-        if _never_written.acquire(blocking=False):  # once
-            threading.Thread(target=_run, daemon=True, name="log").start()
-            atexit.register(flush)
 
 
 def flush() -> None:
@@ -68,6 +66,12 @@ class Handler(logging.Handler):
 def ascii_of(text: str) -> str:
     """Return ASCII text, which orjson writes and terminals show: other characters, lone surrogates too, are escaped."""
     return text.encode("ascii", "backslashreplace").decode()
+
+
+@functools.cache
+def _start() -> None:
+    threading.Thread(target=_run, daemon=True, name="log").start()
+    atexit.register(flush)
 
 
 def _run() -> None:

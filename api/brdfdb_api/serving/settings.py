@@ -13,18 +13,11 @@ from brdfdb.errors import ParameterError, sentence_of
 LogLevel = Literal["info", "warning", "error"]
 
 
-def _positive(value: Any) -> Any:
-    text = str(value)
-    if not (text.isascii() and text.isdecimal() and int(text) > 0):
-        raise ValueError(f"{text!r} is not a positive whole number")
-    return value
-
-
 def _origins(value: Any) -> Any:
     return tuple(filter(None, map(str.strip, value.split(",")))) if isinstance(value, str) else value
 
 
-Positive = Annotated[int, BeforeValidator(_positive)]
+Positive = Annotated[int, Field(gt=0)]
 Origin = Annotated[str, Field(pattern=r"^(\*|https?://[^/]+)$")]
 
 
