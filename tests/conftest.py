@@ -1,10 +1,11 @@
-"""The browser of all tests, and Hypothesis without chance and without a clock."""
+"""The browser of all tests, the order of their files, and Hypothesis without chance and without a clock."""
 
 from __future__ import annotations
 
+import gc
 import os
 import shutil
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 
 import pytest
 from hypothesis import settings
@@ -19,6 +20,17 @@ settings.load_profile("brdfdb")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 _LONG = {"site", "test_house.py"}  # the site and the static checks take minutes in one piece
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection() -> Generator[None, object, object]:
+    """Search no garbage among modules and tests while they are collected, nor later: they stay until the end."""
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.freeze()
+        gc.enable()
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -13,6 +13,7 @@ from brdfdb.audit.report import AuditReport, MaterialAudit, explanations
 from brdfdb.errors import ParameterError
 from brdfdb.figure import Figure
 from brdfdb.materials import Material, Source
+from brdfdb.models.shared_integrals import sharing
 from brdfdb.tables.table import Table
 
 __all__ = ["FINDINGS", "AuditReport", "Finding", "MaterialAudit", "audit", "report"]
@@ -52,17 +53,19 @@ def audit(table: Table, *, source: Source | None = None, accept_excess: bool = F
         source = table.source
     subject = Subject(table, source, accept_excess)
     sentences: list[Sentence] = []
-    for key, kind in FINDINGS.items():
-        finding = subject.findings[key] = kind.judge(subject)
-        if isinstance(finding, NotJudged):
-            sentences.append(kind.sentence("not judged", finding.reason))
-        else:
-            sentences += finding.sentences()
+    with sharing():  # albedo, furnace and errors of a model integrate at the same directions
+        for key, kind in FINDINGS.items():
+            finding = subject.findings[key] = kind.judge(subject)
+            if isinstance(finding, NotJudged):
+                sentences.append(kind.sentence("not judged", finding.reason))
+            else:
+                sentences += finding.sentences()
     words = {finding.verdict for finding in subject.findings.values()}
     verdict: Verdict = next((word for word in DECISIVE if word in words), "passes")
     return MaterialAudit(
         material=table.name,
         revision=table.revision,
+        manifest_sha256=table.digest,
         model=source.model if isinstance(source, Material) else "",
         findings=subject.findings,
         sentences=sentences,

@@ -59,6 +59,8 @@ class MaterialAudit(BaseModel):
 
     material: str
     revision: str
+    manifest_sha256: str = Field(default="", description="of the revision; empty: the table is not from a store")
+    program: str = Field(default="", description="digest of the program that audited; empty: not recorded")
     model: str = Field(description="name of the model behind the table; empty: the table was audited alone")
     findings: Findings = Field(description="by key; the report explains each of them")
     sentences: list[Sentence] = Field(description="all findings in words, for programs without this library")
@@ -112,7 +114,7 @@ class AuditReport(BaseModel):
     model_config = STRICT
 
     format: Literal["brdfdb-audit"] = "brdfdb-audit"
-    version: Literal[6] = 6
+    version: Literal[7] = 7
     store: str = Field(description="directory of the store")
     brdfdb: str = Field(description="version of the library")
     when: datetime = Field(description="of the last run; audits that a report of some materials keeps may be older")
@@ -126,3 +128,10 @@ class AuditReport(BaseModel):
     violations: list[str] = Field(
         description="names of the materials with a violation that is neither known as published nor accepted"
     )
+    program: str = Field(default="", description="digest of the program of the last run: models, audits and materials")
+    taken_over: list[str] = Field(
+        default=[], description="materials of the last run whose audits an earlier report had, of the same bytes"
+    )
+    page_subjects: list[str] = Field(default=[], description="keys of the materials and figures on the page")
+    page_sha256: str = Field(default="", description="of the page; empty: not recorded")
+    sha256: str = Field(default="", description="of this document, one line, with this last field empty")

@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+import sys
 from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
+
+_SEVERAL = {"Float": "ArrayXf", "Float64": "ArrayXf64"}
+_LINE = 64  # bytes: an address that is a multiple of it lets Dr.Jit load several numbers at once
 
 
 class Buffer:
     """A flat array of numbers, loaded once into each variant that reads it."""
 
     def __init__(self, numbers: ArrayLike) -> None:
-        self.numbers = np.ascontiguousarray(numbers, dtype=np.float32).ravel()
+        self.numbers = _aligned(np.asarray(numbers, dtype=np.float32).ravel())
         self._arrays: dict[str | None, Any] = {}
 
     def at(self, index: Any) -> Any:
@@ -23,12 +27,20 @@ class Buffer:
             return float(self.numbers[int(index)])
         return dr.gather(mi.Float, self.loaded(), mi.UInt32(index))
 
-    def four(self, index: Any) -> Any:
-        """Return four numbers one after another, of which `index` is the first."""
+    def row(self, index: Any, width: int) -> list[Any]:
+        """Return the numbers of a row of 1, 2, 4 or a multiple of eight numbers, in a few loads."""
         if not dr.is_jit_v(index):
-            return self.numbers[int(index) : int(index) + 4].tolist()
+            return [float(x) for x in self.numbers[int(index) * width : (int(index) + 1) * width]]
         loaded, first = self.loaded(), mi.UInt32(index)
-        return [dr.gather(mi.Float, loaded, first + k) for k in range(4)]
+        if width == 1:
+            return [dr.gather(mi.Float, loaded, first)]
+        if width == 2:
+            return list(dr.gather(mi.Point2f, loaded, first))
+        if width <= 4:
+            return list(dr.gather(mi.Vector4f, loaded, first))
+        several, eighths = getattr(sys.modules[mi.Float.__module__], _SEVERAL[mi.Float.__name__]), width // 8
+        shape = (8, dr.width(first))
+        return [x for k in range(eighths) for x in dr.gather(several, loaded, first * eighths + k, shape=shape)]
 
     def cell(self, x: Any, count: int, first: Any = 0) -> Any:
         """Return the number of the cell, of `count`, that holds x between numbers that increase, from `first` on."""
@@ -43,3 +55,23 @@ class Buffer:
         if variant not in self._arrays:
             self._arrays[variant] = mi.Float(self.numbers)
         return self._arrays[variant]
+
+    def replace(self, numbers: Any) -> None:
+        """Take other numbers, an array of the variant that may have derivatives."""
+        self._arrays[mi.variant()] = numbers
+
+
+def _aligned(numbers: NDArray[np.float32]) -> NDArray[np.float32]:
+    room = np.empty(numbers.size + _LINE // 4, np.float32)
+    first = -room.ctypes.data % _LINE // 4
+    aligned = room[first : first + numbers.size]
+    aligned[:] = numbers
+    return aligned
+
+
+def polynomial(coefficients: Any, x: Any) -> Any:
+    """Return the polynomial with coefficients that begin with the constant one."""
+    total = coefficients[-1]
+    for coefficient in coefficients[-2::-1]:
+        total = dr.fma(total, x, coefficient)
+    return total

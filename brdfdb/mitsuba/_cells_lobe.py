@@ -1,4 +1,4 @@
-"""Samples from the cells of a table in Dr.Jit: `brdfdb.tables.sampler`."""
+"""Samples from the cells of a table in Dr.Jit: `brdfdb.tables.sampler`, with alias tables in place of searches."""
 
 from __future__ import annotations
 
@@ -6,12 +6,48 @@ from typing import Any
 
 import drjit as dr
 import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
 
 from brdfdb.mitsuba._buffers import Buffer
+from brdfdb.mitsuba._grid_axis import GridAxis
+from brdfdb.tables._interpolation import prepared
 from brdfdb.tables.sampler import LOBE_SHARE, Cells
+
+Array = NDArray[np.float64]
 
 _FLAT = 1e-10  # z of a half vector up to which the density counts as 0
 _LEAST = 1e-20
+
+
+class _Alias:
+    """Rows of probabilities, from which one number draws a cell and the place in it (Walker 1977)."""
+
+    def __init__(self, probability: Array) -> None:
+        """Take probabilities (rows, cells) whose sums are 1."""
+        rows, self._count = probability.shape
+        left = probability * self._count
+        begin, alias = np.ones_like(left), np.zeros_like(left)
+        settled = np.zeros(left.shape, bool)
+        every = np.arange(rows)
+        for _ in range(self._count):
+            # What a cell lacks to 1 comes from the fullest one
+            poor = np.argmin(np.where(settled, np.inf, left), axis=1)
+            rich = np.argmax(np.where(settled, -np.inf, left), axis=1)
+            begin[every, poor], alias[every, poor] = np.clip(left[every, poor], 0.0, 1.0), rich
+            left[every, rich] -= 1.0 - begin[every, poor]
+            settled[every, poor] = True
+        self._rows = Buffer(np.stack([begin, alias], axis=-1))
+
+    def draw(self, row: Any, u: Any) -> tuple[Any, Any]:
+        """Return the cell of a row that a random number chooses, and the place in it in [0, 1]."""
+        scaled = u * self._count
+        own = dr.minimum(dr.floor(scaled), self._count - 1.0)
+        rest = scaled - own
+        begin, alias = self._rows.row(row * self._count + mi.UInt32(own), 2)
+        kept = rest < begin
+        place = dr.select(kept, rest, rest - begin) / dr.maximum(dr.select(kept, begin, 1.0 - begin), _LEAST)
+        return mi.UInt32(dr.select(kept, own, alias)), dr.clip(place, 0.0, 1.0)
 
 
 class CellsLobe:
@@ -20,26 +56,31 @@ class CellsLobe:
     share = alone = LOBE_SHARE
 
     def __init__(self, cells: Cells) -> None:
-        self._lights, self._rings, self._columns = cells.probability.shape
+        lights, self._rings, self._columns = cells.probability.shape
         self._turns = cells.turns
-        self._theta_i = Buffer(cells.theta_i)
-        self._edges = Buffer(cells.edges)
-        self._along_theta, self._along_phi = Buffer(cells.along_theta), Buffer(cells.along_phi)
-        self._density = Buffer(cells.density)
-        self._thetas = cells.theta_i.size
+        self._theta_i = _axis(cells.theta_i)
+        # Rings are found by the logarithm: those of a narrow lobe differ in size by orders of magnitude
+        self._log_edges = _axis(np.log(np.append(0.5 * cells.edges[1], cells.edges[1:])))
+        self._edges = Buffer(np.stack([cells.edges[:-1], np.diff(cells.edges)], axis=1))
+        self._along_theta = _Alias(np.diff(cells.along_theta))
+        self._along_phi = _Alias(np.diff(cells.along_phi).reshape(-1, self._columns))
+        # The cells of two lights beside one another
+        density = cells.density.reshape(lights // self._turns, self._turns, self._rings, self._columns)
+        self._density = Buffer(np.stack([density[:-1], density[1:]], axis=-1))
 
     def draw(self, wi: Any, choice: Any, sample: Any) -> Any:
         """Return the direction `wi` mirrored in a half vector of the cells."""
-        row: Any = mi.UInt32(0)
-        for weight, low, high in self._near(wi):
-            second = choice < weight
-            width = dr.maximum(dr.select(second, weight, 1.0 - weight), _LEAST)
-            choice = (choice - dr.select(second, 0.0, weight)) / width
-            row = row + dr.select(second, high, low)
-        ring, u = self._drawn(self._along_theta, row, sample.x, self._rings)
-        low_edge = self._edges.at(ring)
-        versine = low_edge + (self._edges.at(ring + 1) - low_edge) * u
-        column, v = self._drawn(self._along_phi, row * self._rings + ring, sample.y, self._columns)
+        light, weight = self._light(wi)
+        second, choice = _chosen(choice, weight)
+        row = (light + dr.select(second, mi.UInt32(1), mi.UInt32(0))) * self._turns
+        if self._turns > 1:
+            turn, following, weight = self._turn(wi)
+            second, _ = _chosen(choice, weight)
+            row = row + dr.select(second, following, turn)
+        ring, u = self._along_theta.draw(row, sample.x)
+        low, width = self._edges.row(ring, 2)
+        versine = low + width * u
+        column, v = self._along_phi.draw(row * self._rings + ring, sample.y)
         sin_phi, cos_phi = dr.sincos((mi.Float(column) + v) * (dr.two_pi / self._columns))
         sin = dr.sqrt(dr.maximum(versine * (2.0 - versine), 0.0))
         h = self._turned(mi.Vector3f(sin * cos_phi, sin * sin_phi, 1.0 - versine), wi, 1.0)
@@ -48,44 +89,33 @@ class CellsLobe:
     def density(self, wi: Any, wo: Any) -> Any:
         """Return the density [1/sr] of the directions that `draw` gives, for directions above the horizon."""
         h = wi + wo
-        length = dr.norm(h)
-        local = self._turned(h / length, wi, -1.0)
+        inverse = dr.rsqrt(dr.maximum(dr.squared_norm(h), _LEAST))
+        local = self._turned(h * inverse, wi, -1.0)
         versine = (dr.square(local.x) + dr.square(local.y)) / (1.0 + local.z)
-        ring = self._edges.cell(versine, self._rings)
-        phi = dr.atan2(local.y, local.x)
-        turn = dr.select(phi < 0.0, phi + dr.two_pi, phi) * (self._columns / dr.two_pi)
-        column = mi.UInt32(dr.clip(dr.floor(turn), 0.0, self._columns - 1.0))
-        total: Any = 0.0
+        ring, _ = self._log_edges.place(dr.log(dr.maximum(versine, _LEAST)))
+        column = mi.UInt32(dr.minimum(_turns(local, self._columns), self._columns - 1.0))
+        light, weight = self._light(wi)
         rows: list[tuple[Any, Any]] = [(1.0, mi.UInt32(0))]
-        for weight, low, high in self._near(wi):
-            pairs = ((1.0 - weight, low), (weight, high))
-            rows = [(share * part, row + number) for share, row in rows for part, number in pairs]
-        for share, row in rows:
-            total = total + share * self._density.at((row * self._rings + ring) * self._columns + column)
-        return dr.select(h.z > _FLAT, total / (2.0 * length), 0.0)
-
-    def _near(self, wi: Any) -> list[tuple[Any, Any, Any]]:
-        """Return for each axis of lights the weight of the second of two neighbours, and the rows of both."""
-        theta = dr.atan2(dr.sqrt(dr.square(wi.x) + dr.square(wi.y)), wi.z)
-        number = self._theta_i.cell(theta, self._thetas - 1)
-        begin, end = self._theta_i.at(number), self._theta_i.at(number + 1)
-        row = number * self._turns
-        axes = [(dr.clip((theta - begin) / (end - begin), 0.0, 1.0), row, row + self._turns)]
         if self._turns > 1:
-            phi = dr.atan2(wi.y, wi.x)
-            turn = dr.select(phi < 0.0, phi + dr.two_pi, phi) * (self._turns / dr.two_pi)
-            whole = dr.clip(dr.floor(turn), 0.0, self._turns - 1.0)
-            last = whole >= self._turns - 1.0
-            following = mi.UInt32(dr.select(last, 0.0, whole + 1.0))
-            axes.append((dr.clip(turn - whole, 0.0, 1.0), mi.UInt32(whole), following))
-        return axes
+            turn, following, share = self._turn(wi)
+            rows = [(1.0 - share, turn), (share, following)]
+        total: Any = 0.0
+        for share, row in rows:
+            place = ((light * self._turns + row) * self._rings + ring) * self._columns + column
+            begin, end = self._density.row(place, 2)
+            total = total + share * (begin + weight * (end - begin))
+        return dr.select(h.z > _FLAT, 0.5 * total * inverse, 0.0)
 
-    def _drawn(self, sums: Buffer, row: Any, u: Any, count: int) -> tuple[Any, Any]:
-        """Return the cell that a random number chooses in a cumulative row, and the place in it."""
-        first = row * (count + 1)
-        cell = sums.cell(u, count, first)
-        low, high = sums.at(first + cell), sums.at(first + cell + 1)
-        return cell, dr.clip((u - low) / dr.maximum(high - low, _LEAST), 0.0, 1.0)
+    def _light(self, wi: Any) -> tuple[Any, Any]:
+        """Return the number of the light before `wi` in theta, and the weight of the one behind."""
+        return self._theta_i.place(dr.atan2(dr.sqrt(dr.square(wi.x) + dr.square(wi.y)), wi.z))
+
+    def _turn(self, wi: Any) -> tuple[Any, Any, Any]:
+        """Return the numbers of the azimuths of lights before and behind `wi`, and the weight of the second."""
+        turn = _turns(wi, self._turns)
+        whole = dr.minimum(dr.floor(turn), self._turns - 1.0)
+        following = dr.select(whole >= self._turns - 1.0, 0.0, whole + 1.0)
+        return mi.UInt32(whole), mi.UInt32(following), dr.clip(turn - whole, 0.0, 1.0)
 
     def _turned(self, h: Any, wi: Any, sign: float) -> Any:
         """Return half vectors of an isotropic table turned by the azimuth of the light; others stay."""
@@ -96,3 +126,20 @@ class CellsLobe:
         inverse = dr.rsqrt(dr.select(upright, 1.0, sin2))
         cos_phi, sin_phi = dr.select(upright, 1.0, wi.x * inverse), dr.select(upright, 0.0, sign * wi.y * inverse)
         return mi.Vector3f(h.x * cos_phi - h.y * sin_phi, h.x * sin_phi + h.y * cos_phi, h.z)
+
+
+def _axis(nodes: Array) -> GridAxis:
+    return GridAxis(prepared([nodes], [("open", "open")], cubic=False), 0)
+
+
+def _turns(w: Any, count: int) -> Any:
+    """Return the azimuth in parts of the turn, from 0 to their number."""
+    phi = dr.atan2(w.y, w.x)
+    return dr.select(phi < 0.0, phi + dr.two_pi, phi) * (count / dr.two_pi)
+
+
+def _chosen(choice: Any, weight: Any) -> tuple[Any, Any]:
+    """Return whether a random number chooses the second of two with its weight, and the number to choose again."""
+    second = choice < weight
+    low, width = dr.select(second, 0.0, weight), dr.select(second, weight, 1.0 - weight)
+    return second, (choice - low) / dr.maximum(width, _LEAST)

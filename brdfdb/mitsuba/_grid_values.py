@@ -1,4 +1,8 @@
-"""Interpolation of a table in Dr.Jit, linear or cubic on each axis: `brdfdb.tables._interpolation`."""
+"""Interpolation of a table in Dr.Jit, linear or cubic on each axis: `brdfdb.tables._interpolation`.
+
+Numbers are stored as polynomials cell by cell, so that a few loads of adjacent numbers fetch a whole cell. This takes
+up to 64 times the memory. If it is more than a cache holds, the first axes have weights of their nodes instead.
+"""
 
 from __future__ import annotations
 
@@ -11,54 +15,16 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from brdfdb.mitsuba._buffers import Buffer
+from brdfdb.mitsuba._buffers import Buffer, polynomial
+from brdfdb.mitsuba._grid_axis import GridAxis
 from brdfdb.tables._interpolation import Axes
 
+Array = NDArray[np.float64]
 
-class _Axis:
-    """One axis: the cell of a point, the numbers of the nodes that count, and their weights."""
-
-    def __init__(self, axes: Axes, number: int) -> None:
-        first, count = int(axes.first[number]), int(axes.counts[number])
-        rows = slice(first, first + count)
-        nodes = axes.nodes[rows]
-        self.last = count - 2
-        self.low, self.high = float(nodes[0]), float(nodes[-1])
-        self.scale = float(axes.scale[number])
-        self.uniform = bool(axes.uniform[number])
-        self.cubic = bool(axes.width[number] == 4)
-        # Nodes in an order in which those that count in a cell follow one another
-        stencil = axes.stencil[rows]
-        self.order = np.append(stencil[:-1, 0], stencil[-2, 1:]) if self.cubic else np.arange(count)
-        begin = int(axes.bucket_first[number])
-        end = int(axes.bucket_first[number + 1]) if number + 1 < axes.counts.size else axes.bucket.size
-        self._bucket = Buffer(axes.bucket[begin:end])
-        # Cells that begin in one bucket, at most: so many steps may follow the first guess
-        self._steps = 0 if self.uniform else int(np.max(np.bincount(((nodes - self.low) * self.scale).astype(int))))
-        self._nodes, self._inverse = Buffer(nodes), Buffer(axes.inverse[rows])
-        self._slopes = Buffer(axes.slopes[rows])
-
-    def place(self, x: Any) -> tuple[Any, list[Any]]:
-        """Return the number of the first node that counts, in the order above, and the weights of all that count."""
-        if self.uniform:
-            scaled = (x - self.low) * self.scale
-            cell = dr.floor(dr.clip(dr.detach(scaled), 0.0, float(self.last)))
-            t = dr.clip(scaled - cell, 0.0, 1.0)
-        else:
-            inside = dr.clip(x, self.low, self.high)
-            cell = self._bucket.at(dr.floor((dr.detach(inside) - self.low) * self.scale))
-            for _ in range(self._steps):
-                cell = dr.select(
-                    (cell < self.last) & (dr.detach(inside) > self._nodes.at(cell + 1.0)), cell + 1.0, cell
-                )
-            t = dr.clip((inside - self._nodes.at(cell)) * self._inverse.at(cell), 0.0, 1.0)
-        if not self.cubic:
-            return mi.UInt32(cell), [1.0 - t, t]
-        begin, end = self._slopes.four(cell * 8.0), self._slopes.four(cell * 8.0 + 4.0)
-        t2, rest = dr.square(t), 1.0 - t
-        rise, m_0, m_1 = t2 * (3.0 - 2.0 * t), t * dr.square(rest), t2 * (t - 1.0)
-        weights = [m_0 * a + m_1 * b for a, b in zip(begin, end, strict=True)]
-        return mi.UInt32(cell), [weights[0], weights[1] + (1.0 - rise), weights[2] + rise, weights[3]]
+_MOST_NUMBERS = 1 << 21  # of polynomials of a channel
+_ALIKE = (
+    4.0 * np.finfo(np.float32).eps
+)  # of the largest number: an axis along which numbers differ less counts for none
 
 
 class GridValues:
@@ -66,25 +32,87 @@ class GridValues:
 
     def __init__(self, axes: Axes, numbers: NDArray[np.float32]) -> None:
         """Take prepared axes, and numbers over them and, last, over channels."""
-        self._axes = [_Axis(axes, number) for number in range(axes.counts.size)]
-        ordered = numbers[np.ix_(*(axis.order for axis in self._axes), np.arange(numbers.shape[-1]))]
-        self.channels = numbers.shape[-1]
-        sizes = ordered.shape[:-1]
-        self._strides = [int(np.prod(sizes[k + 1 :])) for k in range(len(sizes))]
-        self.buffers = [Buffer(ordered[..., channel]) for channel in range(self.channels)]
+        self._axes: list[tuple[int, GridAxis]] = []
+        alike = _ALIKE * float(np.max(np.abs(numbers)))
+        for number in range(axes.counts.size):
+            if np.all(np.ptp(numbers, axis=number) <= alike):
+                numbers = np.mean(numbers, axis=number, keepdims=True, dtype=np.float64)
+            else:
+                self._axes.append((number, GridAxis(axes, number)))
+        self._shape = tuple(axis.cells + 1 for _, axis in self._axes)
+        flat = numbers.reshape(-1, numbers.shape[-1]).T
+        self.channels = len(flat)
+        self._outer = self._first_whole(int(np.prod(self._shape)))
+        self.nodes = [Buffer(channel) for channel in flat]
+        self._cells = [Buffer(self._polynomials(channel.astype(np.float64))) for channel in flat]
+
+    def _first_whole(self, size: int) -> int:
+        """Return the number of axes that come before those with polynomials."""
+        first = len(self._axes)
+        while first > 0:
+            size *= self._axes[first - 1][1].width
+            if size > _MOST_NUMBERS:
+                return first
+            first -= 1
+        return 0
+
+    def _polynomials(self, numbers: Any) -> Any:
+        """Return flat coefficients over outer nodes, cells and powers, of flat numbers over nodes."""
+        shape = list(self._shape)
+        for place in range(self._outer, len(shape)):
+            axis = self._axes[place][1]
+            at = np.moveaxis(np.arange(int(np.prod(shape))).reshape(shape), place, -1)[..., axis.stencil]
+            at = np.repeat(at[..., np.newaxis, :], axis.width, axis=-2)
+            weight = np.broadcast_to(axis.powers, at.shape)
+            # The cells take the place of the nodes, the powers come last
+            at, weight = np.moveaxis(at, -3, place), np.moveaxis(weight, -3, place)
+            shape = list(at.shape[:-1])
+            numbers = sum(_taken(numbers, at[..., k]) * _like(numbers, weight[..., k]) for k in range(axis.width))
+        return numbers
+
+    def refresh(self) -> None:
+        """Compute the polynomials of numbers at nodes that have been changed."""
+        for nodes, cells in zip(self.nodes, self._cells, strict=True):
+            cells.replace(self._polynomials(nodes.loaded()))
 
     def __call__(self, coordinates: Sequence[Any]) -> list[Any]:
         """Return the number of each channel."""
-        places = [axis.place(x) for axis, x in zip(self._axes, coordinates, strict=True)]
-        *outer, (cell, inner) = places
+        places = [axis.place(coordinates[number]) for number, axis in self._axes]
+        outer, inner = self._axes[: self._outer], self._axes[self._outer :]
+        shape = (*self._shape[: self._outer], *(axis.cells for _, axis in inner))
+        strides = [int(np.prod(shape[k + 1 :])) for k in range(len(shape))]
+        ways = []
+        for (_, axis), (cell, t), stride in zip(outer, places, strides, strict=False):
+            nodes = [node * stride for node in axis.nodes_of(cell)]
+            ways.append(list(zip(nodes, axis.weights(cell, t), strict=True)))
+        base: Any = mi.UInt32(0)
+        for (cell, _), stride in zip(places[self._outer :], strides[self._outer :], strict=True):
+            base = base + cell * stride
+        widths = [axis.width for _, axis in inner]
+        variables = [t for _, t in places[self._outer :]]
         totals: list[Any] = [0.0] * self.channels
-        for choice in itertools.product(*(range(len(weights)) for _, weights in outer)):
-            first, weight = cell, 1.0
-            for number, (node, (begin, weights)) in enumerate(zip(choice, outer, strict=True)):
-                first = first + (begin + node) * self._strides[number]
-                weight = weight * weights[node]
-            for channel, buffer in enumerate(self.buffers):
-                numbers = buffer.four(first) if len(inner) == 4 else [buffer.at(first), buffer.at(first + 1)]
-                line = sum((w * value for w, value in zip(inner[1:], numbers[1:], strict=True)), inner[0] * numbers[0])
-                totals[channel] = totals[channel] + weight * line
+        for choice in itertools.product(*ways):
+            first, weight = base, 1.0
+            for offset, share in choice:
+                first, weight = first + offset, weight * share
+            for channel, cells in enumerate(self._cells):
+                row = cells.row(first, int(np.prod(widths)))
+                totals[channel] = totals[channel] + weight * _nested(row, widths, variables)
         return totals
+
+
+def _nested(row: list[Any], widths: list[int], variables: list[Any]) -> Any:
+    """Return the polynomial in several variables, the last one first."""
+    for width, variable in zip(reversed(widths), reversed(variables), strict=True):
+        row = [polynomial(row[k : k + width], variable) for k in range(0, len(row), width)]
+    return row[0]
+
+
+def _taken(numbers: Any, at: NDArray[np.int64]) -> Any:
+    if isinstance(numbers, np.ndarray):
+        return numbers[at.ravel()]
+    return dr.gather(mi.Float, numbers, mi.UInt32(at.ravel().astype(np.uint32)))
+
+
+def _like(numbers: Any, weight: Array) -> Any:
+    return weight.ravel() if isinstance(numbers, np.ndarray) else mi.Float(weight.ravel().astype(np.float32))

@@ -9,7 +9,7 @@ import drjit as dr
 import numpy as np
 from numpy.typing import NDArray
 
-from brdfdb.mitsuba._buffers import Buffer
+from brdfdb.mitsuba._buffers import Buffer, polynomial
 
 Array = NDArray[np.float64]
 
@@ -57,11 +57,7 @@ class Patches:
         number, x = places[0]
         size = _DEGREE + 1
         if len(places) == 1:
-            return _polynomial(self._rows.four(number * size), x)
+            return polynomial(self._rows.row(number, size), x)
         column, y = places[1]
-        first = (number * self._axes[1].patches + column) * size * size
-        return _polynomial([_polynomial(self._rows.four(first + size * k), y) for k in range(size)], x)
-
-
-def _polynomial(coefficients: Any, x: Any) -> Any:
-    return coefficients[0] + x * (coefficients[1] + x * (coefficients[2] + x * coefficients[3]))
+        row = self._rows.row(number * self._axes[1].patches + column, size * size)
+        return polynomial([polynomial(row[size * k : size * (k + 1)], y) for k in range(size)], x)

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple, Protocol
 import drjit as dr
 import mitsuba as mi
 
+from brdfdb.mitsuba._mueller import Facet, matrix
 from brdfdb.mitsuba._parameters import Parameters
 
 Values = dict[str, Any]
@@ -50,6 +51,9 @@ class Formula:
         """Show the parameters to the scene."""
         self.parameters.traverse(callback)
 
+    def parameters_changed(self) -> None:
+        """Take what the scene has changed. Textures need nothing."""
+
     @property
     def description(self) -> list[str]:
         """The lines of a text about the plugin."""
@@ -58,6 +62,17 @@ class Formula:
     def parts(self, values: Values, wi: Any, wo: Any) -> dict[str, Any]:
         """Return f_r [1/sr] of each part but the specular one, no cosine, for directions above the horizon."""
         raise NotImplementedError
+
+    def facet(self, values: Values, wi: Any, wo: Any) -> Facet | None:  # noqa: ARG002  # of a model without polarisation
+        """Return what the glossy and the specular part do to polarised light; None if they depolarise it.
+
+        The diffuse part always does.
+        """
+        return None
+
+    def depolarised(self, values: Values) -> Any:  # noqa: ARG002  # of models whose glossy part is all polarised
+        """Return what is depolarised of the glossy part of f_r [1/sr]."""
+        return 0.0
 
     def lobe(self, values: Values, wi: Any) -> Lobe | None:  # noqa: ARG002  # of a model that is diffuse
         """Return the lobe of the glossy part; None if there is no such part."""
@@ -99,6 +114,9 @@ class _Methods:
     def traverse(self, callback: Any) -> None:
         self._formula.traverse(callback)
 
+    def parameters_changed(self, keys: Any = ()) -> None:  # noqa: ARG002  # all are taken
+        self._formula.parameters_changed()
+
     def eval(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
         return self.eval_pdf(ctx, si, wo, active)[0]
 
@@ -111,8 +129,8 @@ class _Methods:
         light, viewer = _or_normal(above, si.wi), _or_normal(above, wo)
         lobe = self._formula.lobe(values, light)
         pdf = _density(self._shares(ctx, values, lobe, light), lobe, light, viewer)
-        value = self._f_r(ctx, values, light, viewer) * viewer.z
-        return mi.depolarizer(dr.select(above, value, 0.0)), dr.select(above, pdf, 0.0)
+        factor = dr.select(above, viewer.z, 0.0)
+        return self._reflected(ctx, values, light, viewer, factor), dr.select(above, pdf, 0.0)
 
     def sample(self, ctx: Any, si: Any, sample1: Any, sample2: Any, active: Any = True) -> Any:
         above = active & (si.wi.z > 0.0)
@@ -132,16 +150,19 @@ class _Methods:
         pdf = _density(shares, lobe, light, viewer)
         above &= pdf > 0.0
         pdf = dr.select(above, pdf, 1.0)
-        weight = self._f_r(ctx, values, light, viewer) * (viewer.z / pdf)
+        factor = dr.select(above, viewer.z / pdf, 0.0)
+        specular: Any = None
         if SPECULAR in self._formula.components:
             probability = dr.select(is_specular, shares.specular, 1.0)
-            weight = dr.select(is_specular, self._formula.specular(values, light) / probability, weight)
             pdf = dr.select(is_specular, probability, pdf)
             above |= is_specular & active & (si.wi.z > 0.0)
+            specular = dr.select(is_specular & above, self._formula.specular(values, light) / probability, 0.0)
+            factor = dr.select(is_specular, 0.0, factor)
+            viewer = dr.select(is_specular, wo, viewer)
         record = dr.zeros(mi.BSDFSample3f)
         record.wo, record.pdf, record.eta = wo, dr.select(above, pdf, 0.0), 1.0
         record.sampled_type, record.sampled_component = self._kind(ctx, is_specular, in_lobe)
-        return record, mi.depolarizer(dr.select(above, weight, 0.0))
+        return record, self._reflected(ctx, values, light, viewer, factor, specular)
 
     def eval_diffuse_reflectance(self, si: Any, active: Any = True) -> Any:
         straight = mi.Vector3f(0.0, 0.0, 1.0)
@@ -152,11 +173,20 @@ class _Methods:
         lines = (f"  {line}," for line in self._formula.description)
         return "\n".join((f"{type(self._formula).__name__}[", *lines, "]"))
 
-    def _f_r(self, ctx: Any, values: Values, wi: Any, wo: Any) -> Any:
-        total = mi.UnpolarizedSpectrum(0.0)
-        for part, value in self._formula.parts(values, wi, wo).items():
-            total += value * self._enabled(ctx, part)
-        return total
+    def _reflected(self, ctx: Any, values: Values, wi: Any, wo: Any, factor: Any, specular: Any = None) -> Any:
+        """Return f_r times a factor and the specular part, as a matrix in polarised variants."""
+        zero = mi.UnpolarizedSpectrum(0.0)
+        parts = self._formula.parts(values, wi, wo)
+        of_each = {part: zero + value * self._enabled(ctx, part) for part, value in parts.items()}
+        glossy, diffuse = of_each.get(GLOSSY, zero), of_each.get(DIFFUSE, zero)
+        facet = self._formula.facet(values, wi, wo) if mi.is_polarized else None
+        if facet is None:
+            value = (glossy + diffuse) * factor
+            return mi.depolarizer(value if specular is None else value + specular)
+        hidden = dr.minimum(glossy, self._formula.depolarised(values))
+        mirrored = (glossy - hidden) * factor
+        mirrored = mirrored if specular is None else mirrored + specular
+        return matrix(ctx, wi, wo, facet, mirrored, (diffuse + hidden) * factor)
 
     def _enabled(self, ctx: Any, part: str) -> float:
         """Return 1 if the context asks for a component, else 0."""

@@ -48,6 +48,14 @@ class Columns:
         wavelengths = mi.UnpolarizedSpectrum(interaction.wavelengths)
         return [dr.clip((nm - float(self.at_nm[0])) / step, 0.0, self.count - 1.0) for nm in wavelengths]
 
+    def nm(self, place: Any) -> Any:
+        """Return the wavelength [nm] at a place; 0 of a grey table."""
+        if self.at_nm is None:
+            return 0.0
+        if not self._between:
+            return mi.Float(float(self.at_nm[int(place)]))
+        return float(self.at_nm[0]) + place * float(self.at_nm[1] - self.at_nm[0])
+
     def read(self, rows: Buffer, row: Any, place: Any) -> Any:
         """Return the number of a row at a place."""
         first = row * self.count

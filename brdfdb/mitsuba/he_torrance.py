@@ -9,6 +9,7 @@ import mitsuba as mi
 
 from brdfdb.mitsuba._diffraction_series import diffraction_series, effective_variance
 from brdfdb.mitsuba._gaussian_lobe import GaussianLobe
+from brdfdb.mitsuba._mueller import Facet
 from brdfdb.mitsuba._parameters import Parameters
 from brdfdb.mitsuba._surface import DIFFUSE, GLOSSY, SPECULAR, Formula, Values
 from brdfdb.mitsuba._wavelengths import channels_nm
@@ -55,22 +56,50 @@ def _erfcx(x: Any) -> Any:
     return p / (x + 3.0)
 
 
-def reflectance(cos: Any, n: Any, k: Any) -> Any:
-    """Return |F|^2 [1] of unpolarised light at an interface to n + ik, as `brdfdb.fresnel.unpolarised`."""
+class _Interface(NamedTuple):
+    """An interface to n + ik at one angle: (n + ik)^2 - 1 = w, and the root q = a + ib of cos^2 + w, a, b >= 0."""
+
+    w_re: Any
+    w_im: Any
+    e_re: Any
+    a: Any
+    b: Any
+
+
+def _interface(cos: Any, n: Any, k: Any) -> _Interface:
     cos2, sin2 = dr.square(cos), (1.0 - cos) * (1.0 + cos)
     e_re = (n - k) * (n + k)
     n_less_1 = n - 1.0
     w_re, w_im = n_less_1 * (n_less_1 + 2.0) - dr.square(k), 2.0 * n * k
-    # q = a + ib is the root of cos^2 + w with parts that are not negative
     q2_re = dr.select(cos2 < 0.5, cos2 + w_re, e_re - sin2)
     large = dr.sqrt(dr.maximum(0.5 * (_modulus(q2_re, w_im) + dr.abs(q2_re)), _LEAST))
     small = 0.5 * w_im / large
     a, b = dr.select(q2_re >= 0.0, large, small), dr.select(q2_re >= 0.0, small, large)
+    return _Interface(w_re, w_im, e_re, a, b)
+
+
+def reflectance(cos: Any, n: Any, k: Any) -> Any:
+    """Return |F|^2 [1] of unpolarised light at an interface to n + ik, as `brdfdb.fresnel.unpolarised`."""
+    w_re, w_im, e_re, a, b = _interface(cos, n, k)
+    cos2, sin2 = dr.square(cos), (1.0 - cos) * (1.0 + cos)
     w_abs = _modulus(w_re, w_im)
     F_s = w_abs / dr.maximum(dr.square(cos + a) + dr.square(b), _LEAST)
     below = dr.square(e_re * cos + a) + dr.square(w_im * cos + b)
     F_p = w_abs * _modulus(cos2 * e_re - sin2, cos2 * w_im) / dr.maximum(below, _LEAST)
     return dr.minimum(0.5 * (dr.square(F_s) + dr.square(F_p)), 1.0)
+
+
+def facet(cos: Any, n: Any, k: Any) -> Facet:
+    """Return the Mueller matrix of an interface to n + ik, as `brdfdb.models.he_torrance_facet_mueller`.
+
+    F_s + F_p and F_s - F_p are sin^2 and q cos times one number, so that neither is a difference.
+    """
+    _, _, _, a, b = _interface(cos, n, k)
+    sin2 = (1.0 - cos) * (1.0 + cos)
+    of_sum, of_difference = dr.square(sin2), (dr.square(a) + dr.square(b)) * dr.square(cos)
+    inverse = 1.0 / dr.maximum(of_sum + of_difference, _LEAST)
+    crossed = 2.0 * sin2 * cos * inverse
+    return Facet(crossed * a, (of_sum - of_difference) * inverse, -crossed * b)
 
 
 def _modulus(re: Any, im: Any) -> Any:
@@ -129,6 +158,11 @@ class HeTorrance(Formula):
     def parts(self, values: Values, wi: Any, wo: Any) -> dict[str, Any]:
         """Return f_r [1/sr] of the directional diffuse and of the uniform diffuse part."""
         return {GLOSSY: directional_diffuse(wi, wo, values["surface"]), DIFFUSE: values["a"] * dr.inv_pi}
+
+    def facet(self, values: Values, wi: Any, wo: Any) -> Facet:
+        """Return the Mueller matrix at the bisecting angle, which for the specular part is that of incidence."""
+        surface = values["surface"]
+        return facet(dr.minimum(0.5 * dr.norm(wi + wo), 1.0), surface.n, surface.k)
 
     def specular(self, values: Values, wi: Any) -> Any:
         """Return the specular reflectance [1], eq. 73."""

@@ -12,6 +12,7 @@ from brdfdb.mitsuba._surface import Formula, surface_class
 from brdfdb.mitsuba.diffuse import FORMULAS, Diffuse
 from brdfdb.mitsuba.he_torrance import HeTorrance
 from brdfdb.mitsuba.oren_nayar import OrenNayar
+from brdfdb.mitsuba.stray_light import FORMS, StrayLight
 from brdfdb.mitsuba.table import TableFormula
 from brdfdb.mitsuba.ward import Ward
 
@@ -21,6 +22,7 @@ PLUGINS: dict[str, Callable[[Any], Formula]] = {
     "brdfdb_he_torrance": HeTorrance,
     "brdfdb_table": TableFormula,
     **{f"brdfdb_{model}": functools.partial(Diffuse, model=model) for model in FORMULAS},
+    **{f"brdfdb_{model}": functools.partial(StrayLight, model=model) for model in FORMS},
 }
 
 

@@ -13,12 +13,15 @@ from brdfdb.errors import ParameterError
 from brdfdb.geometry import radians, unit_vector
 from brdfdb.mitsuba._buffers import Buffer
 from brdfdb.mitsuba._cells_lobe import CellsLobe
+from brdfdb.mitsuba._grid_axis import GridAxis
 from brdfdb.mitsuba._grid_points import points
 from brdfdb.mitsuba._grid_values import GridValues
+from brdfdb.mitsuba._mueller import Facet
 from brdfdb.mitsuba._surface import DIFFUSE, GLOSSY, SPECULAR, Formula, Values
 from brdfdb.mitsuba._wavelengths import Columns
 from brdfdb.store.opening import open as open_store
 from brdfdb.tables._interpolation import prepared, weights_of_nodes
+from brdfdb.tables.polarisation import Facets
 from brdfdb.tables.table import Table, table_from
 
 Array = NDArray[np.float64]
@@ -63,6 +66,7 @@ class TableFormula(Formula):
         self._whole = not mi.is_spectral and not self._mixed
         self._values = GridValues(axes, np.asarray(numbers @ mixing, np.float32) if self._whole else numbers)
         self._rows = Buffer(mixing)
+        self._facets = _Facets(table.facets, table, self._columns) if mi.is_polarized and table.facets else None
         self._lobe = CellsLobe(table.sampler.cells)
         self.components = (GLOSSY,)
         if table.uniform is not None and np.any(table.uniform > 0.0):
@@ -84,7 +88,7 @@ class TableFormula(Formula):
     def _read_specular(self, table: Table) -> None:
         nodes = table.specular_theta_deg
         theta = radians(table.axes_deg["theta_i"] if nodes is None else nodes)
-        self._specular_nodes, self._specular_last = Buffer(theta), theta.size - 2
+        self._specular_axis = GridAxis(prepared([theta], [("open", "open")], cubic=False), 0)
         self._specular = Buffer(table.specular_reflectance(theta, self._columns.at_nm))
         number = np.arange(_DRAWN)
         wi = unit_vector(theta, np.zeros(theta.size))[:, np.newaxis]
@@ -125,6 +129,14 @@ class TableFormula(Formula):
             return dr.rsqrt(cos_i) * dr.rsqrt(cos_r)
         return 1.0 / cos_i / cos_r if self._how.power == 1.0 else 1.0
 
+    def facet(self, values: Values, wi: Any, wo: Any) -> Facet | None:
+        """Return the Mueller matrix of a facet; None if the table is unpolarised."""
+        return None if self._facets is None else self._facets.at(values["places"], wi, wo)
+
+    def depolarised(self, values: Values) -> Any:
+        """Return what is depolarised of the tabulated part [1/sr]: a uniform part that is among its numbers."""
+        return 0.0 if self._facets is None else self._facets.inside(values["places"])
+
     def lobe(self, values: Values, wi: Any) -> CellsLobe:  # noqa: ARG002  # the lobe of other models depends on them
         """Return the cells of the table."""
         return self._lobe
@@ -147,17 +159,43 @@ class TableFormula(Formula):
         return specular / dr.maximum(specular + scattered, _LEAST)
 
     def _specular_place(self, wi: Any) -> tuple[Any, Any]:
-        theta = dr.atan2(dr.sqrt(dr.square(wi.x) + dr.square(wi.y)), wi.z)
-        row = self._specular_nodes.cell(theta, self._specular_last + 1)
-        begin, end = self._specular_nodes.at(row), self._specular_nodes.at(row + 1)
-        return row, dr.clip((theta - begin) / (end - begin), 0.0, 1.0)
+        return self._specular_axis.place(dr.atan2(dr.sqrt(dr.square(wi.x) + dr.square(wi.y)), wi.z))
 
     def traverse(self, callback: Any) -> None:
         """Show the numbers of the table to the scene as differentiable parameters."""
-        for channel, numbers in enumerate(self._values.buffers):
+        for channel, numbers in enumerate(self._values.nodes):
             callback.put(f"values_{channel}", numbers.loaded(), mi.ParamFlags.Differentiable)
+
+    def parameters_changed(self) -> None:
+        """Take numbers that the scene has changed."""
+        self._values.refresh()
 
     @property
     def description(self) -> list[str]:
         """The lines of a text about the plugin."""
         return [f"material = {self.name}"]
+
+
+class _Facets:
+    """The polarisation of a table: `brdfdb.tables.polarisation.Facets`."""
+
+    def __init__(self, facets: Facets, table: Table, columns: Columns) -> None:
+        assert columns.at_nm is not None  # of all tables with Mueller matrices
+        assert table.wavelength_nm is not None
+        nodes = [radians(facets.theta_d_deg), *([table.wavelength_nm] if table.wavelength_nm.size > 1 else [])]
+        axes = prepared(nodes, [("open", "open")] * len(nodes), cubic=True)
+        self._elements = GridValues(axes, facets.elements.reshape(*(axis.size for axis in nodes), -1))
+        self._columns = columns
+        beside = 0.0 if table.uniform is None else table.uniform
+        inside = np.broadcast_to(np.maximum(facets.depolarised - beside, 0.0), table.wavelength_nm.shape)
+        self._inside = Buffer(np.interp(columns.at_nm, table.wavelength_nm, inside))
+
+    def at(self, places: list[Any], wi: Any, wo: Any) -> Facet:
+        """Return the matrix of each channel."""
+        theta_d = dr.atan2(dr.norm(wi - wo), dr.norm(wi + wo))
+        channels = [self._elements([theta_d, self._columns.nm(place)]) for place in places]
+        return Facet(*(mi.UnpolarizedSpectrum([elements[k] for elements in channels]) for k in range(3)))
+
+    def inside(self, places: list[Any]) -> Any:
+        """Return what is depolarised [1/sr] and stands among the numbers of the table, not beside them."""
+        return mi.UnpolarizedSpectrum([self._columns.read(self._inside, 0, place) for place in places])

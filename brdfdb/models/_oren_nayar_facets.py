@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from brdfdb._elementary import arcsin, exp
 from brdfdb._numba import elementwise, kernel
+from brdfdb.models.shared_integrals import shared
 from brdfdb.parameters import Floats
 
 _TINY = 1e-300  # guard against 0 / 0 only: the numbers that it is added to or compared with are 0 or above 1e-40
@@ -369,7 +370,18 @@ def gaussian(*features: Floats, lit: bool = True, bounce: bool = True, nodes: in
     columns = np.empty((len(features), int(np.prod(shape))))
     for column, feature in zip(columns, features, strict=True):
         column[:] = np.broadcast_to(feature, shape).ravel()
+    # the albedo of a facet is no feature: materials of one sigma share the integrals
+    direct, bounced = shared(
+        columns, ("gaussian", lit, bounce, nodes), lambda: _integrated(columns, lit, bounce, nodes)
+    )
+    return direct.reshape(shape), bounced.reshape(shape)
+
+
+def _integrated(
+    columns: NDArray[np.float64], lit: bool, bounce: bool, nodes: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return both parts [1] of values whose features are columns of an array of shape (5, N)."""
     direct, bounced = np.empty(columns.shape[1]), np.empty(columns.shape[1])
     with np.errstate(all="ignore"):  # as in `elementwise`, nan is passed on
         _gaussian_loop(columns, _gauss_legendre(nodes), _gauss_legendre(NODES), lit, bounce, direct, bounced)
-    return direct.reshape(shape), bounced.reshape(shape)
+    return direct, bounced

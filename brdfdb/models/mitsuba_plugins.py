@@ -17,4 +17,6 @@ OF_MITSUBA: dict[str, tuple[str, bool]] = {
     "rpv": ("brdfdb_rpv", False),
     "ross_li": ("brdfdb_ross_li", False),
     "hapke": ("brdfdb_hapke", False),
+    "abg": ("brdfdb_abg", False),
+    "harvey_shack": ("brdfdb_harvey_shack", False),
 }

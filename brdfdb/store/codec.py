@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any
 import google_crc32c
 import numpy as np
 import zarr
-from numcodecs import Blosc
 from numpy.typing import NDArray
 from zarr.codecs import BloscCodec, Crc32cCodec
 from zarr.core.buffer import Buffer
 from zarr.storage import MemoryStore
 
 from brdfdb.errors import StoreError
+from brdfdb.store import chunks
 from brdfdb.store.paths import METADATA
 from brdfdb.tables.layout import Layout
 from brdfdb.tables.tabulation import VARIABLES, Frame, Variable
@@ -28,7 +28,6 @@ _CHUNK_VALUES = 1 << 20  # values of a chunk of a dataset that comes as a whole,
 
 # crc32c last: without it nearly every flipped bit reads back as a plausible number
 COMPRESSORS = (BloscCodec(cname="zstd", clevel=1, shuffle="shuffle"), Crc32cCodec())
-_BLOSC = Blosc(cname="zstd", clevel=1, shuffle=Blosc.SHUFFLE)
 
 
 def chunk_name(layout: Layout, number: int) -> str:
@@ -53,7 +52,7 @@ def encoded(layout: Layout, number: int, values: NDArray[np.float32]) -> bytes:
         whole = np.full((layout.block_rows, *layout.shape[1:]), np.nan, dtype=np.float32)
         whole[: len(values)] = values
         values = whole
-    data: bytes = _BLOSC.encode(np.ascontiguousarray(values, dtype="<f4"))
+    data: bytes = chunks.BLOSC.encode(np.ascontiguousarray(values, dtype="<f4"))
     checksum: int = google_crc32c.value(data)
     return data + checksum.to_bytes(4, "little")
 
@@ -66,10 +65,11 @@ def decoded(layout: Layout, number: int, data: bytes) -> NDArray[np.float32]:
     StoreError
         If the checksum is not that of the bytes.
     """
-    if google_crc32c.value(data[:-4]) != int.from_bytes(data[-4:], "little"):
+    content = chunks.decoded(data)
+    if content is None:
         raise StoreError(f"{layout.source.name}: the checksum of {chunk_name(layout, number)} is wrong")
     rows = layout.blocks[number]
-    whole = np.frombuffer(_BLOSC.decode(data[:-4]), dtype="<f4").reshape(layout.block_rows, *layout.shape[1:])
+    whole = np.frombuffer(content, dtype="<f4").reshape(layout.block_rows, *layout.shape[1:])
     return whole[: rows.stop - rows.start]
 
 
@@ -77,15 +77,15 @@ def array_metadata(layout: Layout) -> bytes:
     """Return the metadata of the array that holds the blocks."""
     rest = tuple(layout.shape[1:])
     attributes = json.dumps(VARIABLES[layout.variable])
-    shape, chunks = (layout.shape[0], *rest), (layout.block_rows, *rest)
-    return _array_files(tuple(layout.dims), shape, chunks, "<f4", attributes, None)[METADATA]
+    shape, chunk = (layout.shape[0], *rest), (layout.block_rows, *rest)
+    return _array_files(tuple(layout.dims), shape, chunk, "<f4", attributes, None)[METADATA]
 
 
 @lru_cache(maxsize=256)
 def _array_files(
     dims: tuple[str, ...],
     shape: tuple[int, ...],
-    chunks: tuple[int, ...],
+    chunk: tuple[int, ...],
     dtype: str,
     attributes: str,
     data: bytes | None,
@@ -95,7 +95,7 @@ def _array_files(
     array = zarr.create_array(
         MemoryStore(files),
         shape=shape,
-        chunks=chunks,
+        chunks=chunk,
         dtype=dtype,
         compressors=COMPRESSORS,
         fill_value=np.nan,  # zarr's own 0 reads as a plausible black material

@@ -13,33 +13,41 @@ from brdfdb.errors import (
     ParameterError,
     StoreError,
 )
+from brdfdb.store.chunks import Group, read_group
+from brdfdb.store.files import Entry
 from brdfdb.store.paths import METADATA
 from brdfdb.store.sealed_json import read_json
 
 if TYPE_CHECKING:
-    from brdfdb.store.zarr_store import Whole
     from brdfdb.tables.metadata import TableMetadata
     from brdfdb.tables.table import Table
 
 
-def decode(name: str, path: Path, files: Whole, digest: str) -> Table:
+def decode(name: str, path: Path, files: Mapping[str, Entry], digest: str) -> Table:
     """Return the table of a revision; StoreError if it is damaged, or no table that this program can look up."""
+    try:
+        arrays, dims, attrs = read_group(path, files) or _read_by_zarr(path, files)
+    except StoreError:
+        raise
+    except Exception as error:  # codecs raise many kinds; each means that the bytes are damaged
+        raise StoreError(f"{name} {path.name} is damaged: its values cannot be decoded") from error
+    try:
+        return replace(table_of(name, path.name, arrays, dims, attrs), digest=digest)
+    except ValueError as error:  # written by another program
+        raise StoreError(f"{name} {path.name} cannot be looked up: {error}") from error
+
+
+def _read_by_zarr(path: Path, files: Mapping[str, Entry]) -> Group:
+    """Return the arrays of a revision that another program wrote, in any encoding that zarr reads."""
     import numpy as np
     import zarr
 
-    try:
-        group = zarr.open_group(files, mode="r")
-        stored = dict(group.arrays())
-        arrays = {key: np.asarray(array[...]) for key, array in stored.items()}
-    except StoreError:
-        raise
-    except Exception as error:  # zarr's codecs raise many kinds; each means that the bytes are damaged
-        raise StoreError(f"{name} {path.name} is damaged: its values cannot be decoded") from error
+    from brdfdb.store.zarr_store import Whole
+
+    group = zarr.open_group(Whole(path, files), mode="r")
+    stored = dict(group.arrays())
     dims = {key: array.metadata.dimension_names or () for key, array in stored.items()}  # type: ignore[union-attr]
-    try:
-        return replace(table_of(name, path.name, arrays, dims, dict(group.attrs)), digest=digest)
-    except ValueError as error:  # written by another program
-        raise StoreError(f"{name} {path.name} cannot be looked up: {error}") from error
+    return Group({key: np.asarray(array[...]) for key, array in stored.items()}, dims, dict(group.attrs))
 
 
 def table_of(

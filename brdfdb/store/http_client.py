@@ -37,6 +37,7 @@ if TYPE_CHECKING:
 
 
 # Limits of one request. Services and proxies accept them by default; an answer 413 halves them
+_LIGHTS = ("1,0,0,0", "1,1,0,0", "1,0,1,0", "1,0,0,1")  # of which three are polarised: a matrix from its columns
 _NPY_POINTS, _NPY_VALUES = 32_000, 2_000_000  # bodies of 1.02 MB, of which nginx takes 1.05; larger ones are no faster
 _JSON_POINTS, _JSON_VALUES = 10_000, 200_000
 _WAVELENGTHS = 200  # stand in the address, 33 bytes each; nginx cuts it at 8 kB
@@ -105,6 +106,22 @@ class RemoteTable(BaseTable):
             _in_parts(ask, values, min(_JSON_POINTS, max(1, _JSON_VALUES // count)))
         return finished(values.reshape(given.theta_i.shape + tail), given, trailing=len(tail))
 
+    def mueller(
+        self,
+        theta_i: ArrayLike,
+        phi_i: ArrayLike,
+        theta_r: ArrayLike,
+        phi_r: ArrayLike,
+        wavelength_nm: ArrayLike | None = None,
+    ) -> Floats:
+        """Return the Mueller BRDF [1/sr] as `Table.mueller`, from what the service reflects of four lights."""
+        self._wavelengths(wavelength_nm)
+        shape_of_angles(*(np.asarray(angle) for angle in (theta_i, phi_i, theta_r, phi_r)))
+        given = checked_angles(theta_i, phi_i, theta_r, phi_r)
+        angles = (given.theta_i, given.phi_i, given.theta_r, given.phi_r)
+        unpolarised, *polarised = (self._looked_up(angles, given, wavelength_nm, light) for light in _LIGHTS)
+        return np.stack([unpolarised, *(reflected - unpolarised for reflected in polarised)], axis=-1)
+
     @property
     def _path(self) -> str:
         return f"/v1/materials/{self.name}/revisions/{self.revision}/lookup"
@@ -114,20 +131,26 @@ class RemoteTable(BaseTable):
         at = self._wavelengths(wavelength_nm)
         return at.size, at.tail
 
-    def _looked_up(self, angles: Sequence[NDArray[Any]], given: Directions, wavelength_nm: ArrayLike | None) -> Floats:
-        """f_r [1/sr] at checked angles [rad], which are those of the directions `given`."""
+    def _looked_up(
+        self, angles: Sequence[NDArray[Any]], given: Directions, wavelength_nm: ArrayLike | None, light: str = ""
+    ) -> Floats:
+        """Return f_r [1/sr] at checked angles [rad], those of the directions `given`; of a light, what is reflected."""
         count, tail = self._asked(wavelength_nm)
         if wavelength_nm is not None and count > _WAVELENGTHS:
             starts = range(_WAVELENGTHS, count, _WAVELENGTHS)
-            parts = (self._looked_up(angles, given, part) for part in np.split(np.asarray(wavelength_nm), starts))
-            return np.concatenate(list(parts), axis=-1)
+            parts = (
+                self._looked_up(angles, given, part, light) for part in np.split(np.asarray(wavelength_nm), starts)
+            )
+            return np.concatenate(list(parts), axis=-2 if light else -1)
         shape = np.broadcast_shapes(*(angle.shape for angle in angles))
         flat = [np.broadcast_to(_sendable(angle), shape).reshape(-1) for angle in angles]
-        values = np.empty((flat[0].size, count))
+        elements = (4,) if light else ()
+        values = np.empty((flat[0].size, count, *elements))
         if values.size:
             at = [] if wavelength_nm is None else np.ravel(np.asarray(wavelength_nm, dtype=np.float64)).tolist()
             query = [("format", "npy"), *(("wavelength_nm", one) for one in at)]
-            axes = () if len(at) == 1 else tail  # an address cannot tell a list of one from a number
+            query += [("stokes", light)] if light else []
+            axes = (*(() if len(at) == 1 else tail), *elements)  # an address cannot tell a list of one from a number
 
             def ask(part: slice) -> Any:
                 points = np.stack([angle[part] for angle in flat], axis=-1)
@@ -137,7 +160,9 @@ class RemoteTable(BaseTable):
                 point = zip(("theta_i", "phi_i", "theta_r", "phi_r"), points[0].tolist(), strict=True)
                 return self._service.array(f"{self._path}?{urlencode([*query, *point])}", axes)
 
-            _in_parts(ask, values, min(_NPY_POINTS, max(1, _NPY_VALUES // count)))
+            size = count * (16 if light else 1)  # values, as services count them
+            _in_parts(ask, values, min(_NPY_POINTS, max(1, _NPY_VALUES // size)))
+        tail = (*tail, *elements)
         return finished(values.reshape(shape + tail), given, trailing=len(tail))
 
 

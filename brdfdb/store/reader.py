@@ -205,13 +205,11 @@ class Store(Mapping[str, "Table"]):
         key = name, digest
         if (held := self._used(key)) is not None:
             return held
-        from brdfdb.store.zarr_store import Whole  # loads zarr
-
         with self._decoding:  # who asks for the same table meanwhile waits for it
             if (held := self._used(key)) is not None:
                 return held
             files = check_manifest(group, digest, contents=False)["files"]
-            table = decode(name, group, Whole(group, files), digest)
+            table = decode(name, group, files, digest)
             with self._lock:
                 self._decoded[key] = table
                 size = sum(decoded.nbytes for decoded in self._decoded.values())

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -11,8 +10,8 @@ from zarr.core.buffer import Buffer, BufferPrototype
 from zarr.storage import LocalStore
 
 from brdfdb.errors import StoreError
+from brdfdb.store.chunks import check_file
 from brdfdb.store.files import Entry
-from brdfdb.store.paths import manifest_path
 
 
 class Whole(LocalStore):
@@ -34,17 +33,11 @@ class Whole(LocalStore):
         self, key: str, prototype: BufferPrototype | None = None, byte_range: ByteRequest | None = None
     ) -> Buffer | None:
         """Return a file, as `LocalStore.get` does; StoreError for one that should be there, or is another one."""
-        where = f"{self.root.parent.name} {self.root.name}"
         try:
             value = await super().get(key, prototype, byte_range)
         except OSError as error:
+            where = f"{self.root.parent.name} {self.root.name}"
             raise StoreError(f"{where} is damaged: {key} cannot be read: {error.strerror}") from error
-        if (entry := self._files.get(key)) is None:
-            return value
-        if value is None:
-            if not manifest_path(self.root).is_file():
-                raise StoreError(f"{where} was removed while it was read; open the material anew")
-            raise StoreError(f"{where} is damaged: {key} is missing")
-        if byte_range is None and hashlib.sha256(value.to_bytes()).hexdigest() != entry["sha256"]:
-            raise StoreError(f"{where} is damaged: the content of {key} changed")
+        content = None if value is None or key not in self._files else value.to_bytes()
+        check_file(self.root, key, content, self._files, whole=byte_range is None)
         return value

@@ -16,6 +16,7 @@ from brdfdb.integrals.sampling import mirrored_in_lobe, mixture_density
 from brdfdb.materials import FunctionRecord, Source
 from brdfdb.measurements import MeasuredSource
 from brdfdb.measurements.extent import Extent
+from brdfdb.models.shared_integrals import sharing
 from brdfdb.parameters import Floats
 from brdfdb.tables import places
 from brdfdb.tables._interpolation import weights_of_nodes
@@ -131,9 +132,10 @@ def model_values(source: Source, wavelength_nm: NDArray[np.float64] | None, wi: 
     """Return f_r [1/sr] of a source, of shape (N, L), L = 1 for a grey one."""
     brdf = source.brdf_at(wavelength_nm)
     values = np.empty((len(wi), 1 if wavelength_nm is None else wavelength_nm.size))
-    for start in range(0, len(wi), _EVALUATED):
-        some = slice(start, start + _EVALUATED)
-        values[some] = brdf(wi[some], wr[some])
+    with sharing():
+        for start in range(0, len(wi), _EVALUATED):
+            some = slice(start, start + _EVALUATED)
+            values[some] = brdf(wi[some], wr[some])
     return values
 
 

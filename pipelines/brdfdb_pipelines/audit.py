@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import hashlib
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import as_completed
@@ -21,7 +22,8 @@ from brdfdb.materials import presets
 from brdfdb.models import MODELS
 from brdfdb.store.reader import Store
 from brdfdb.store.summary_words import REPORT_OF_SOME
-from brdfdb_pipelines import audit_page, terminal, workers
+from brdfdb_pipelines import audit_page, former_audit, terminal, workers
+from brdfdb_pipelines.former_audit import Former
 
 Task = Callable[[], Any]
 Figures = Mapping[str, Callable[[], Figure]]
@@ -31,7 +33,7 @@ class Section(NamedTuple):
     """Result of a task, with its plots for the page."""
 
     subject: Any
-    plots: list[audit_page.Plot]
+    plots: list[audit_page.Plot] | None  # None: they are on the page already
 
 
 def run(
@@ -43,6 +45,7 @@ def run(
     figures: bool = True,
     allow: Sequence[str] = (),
     shown: bool = True,
+    again: bool = False,
 ) -> AuditReport:
     """Audit the named materials of a store, or all of them.
 
@@ -64,6 +67,9 @@ def run(
         Materials whose models may reflect more than they receive. The report records that this was accepted.
     shown : bool
         Print the findings.
+    again : bool
+        Audit everything. Else what the report at `report_path` says of the same bytes, by the same program, is taken
+        from it.
 
     Raises
     ------
@@ -81,15 +87,9 @@ def run(
         sentence = f"{unused[0]} is not among the materials to audit, {', '.join(materials)}"
         raise ParameterError("--allow", sentence, unused[0], tuple(materials))
     _check_path(report_path)
-    tasks: dict[str, Task] = {name: partial(_audited, root, name, name in allow) for name in materials}
+    before = former_audit.NOTHING if again else former_audit.former_of(report_path, store, materials, allow)
     atlas, gallery = _figures() if figures else ({}, {})
-    tasks |= {f"figure {key}": partial(_drawn, key) for key in (*atlas, *gallery)}
-    done: dict[str, Any] = {}
-    with terminal.progress() as bar:
-        task = bar.add_task("auditing tables, computing figures" if figures else "auditing tables", total=len(tasks))
-        for name, outcome in _outcomes(tasks, jobs):
-            done[name] = outcome
-            bar.advance(task)
+    done = _done(root, materials, [*atlas, *gallery], before, allow=allow, jobs=jobs)
     audits = [done[name].subject for name in materials if isinstance(done[name], Section)]
     damaged = [str(done[name]) for name in materials if isinstance(done[name], StoreError)]
     if damaged and not audits:
@@ -102,27 +102,73 @@ def run(
         gallery=[done[f"figure {key}"].subject for key in gallery],
         damaged=damaged,
     )
-    whole = audit_report if report_path != root / REPORT_OF_SOME else _with_former(audit_report, report_path, store)
-    report_path.write_text(whole.model_dump_json() + "\n", encoding="utf-8")
-    plots = {
-        audit_page.key_of(section.subject): section.plots for section in done.values() if isinstance(section, Section)
-    }
-    page_path = report_path.with_suffix(".html")
-    page_path.write_text(audit_page.render(audit_report, plots), encoding="utf-8")
+    sections = [section for section in done.values() if isinstance(section, Section)]
+    taken_over = [name for name in materials if name in before.audits]
+    audit_report = audit_report.model_copy(update={"taken_over": taken_over})
+    audit_report = _written(audit_report, sections, before, report_path, store)
     if shown:
         _print(root, audit_report, report_path)
+        if before.when is not None and taken_over:
+            share = f"{len(taken_over)} of {len(audits)} taken from the report of {before.when:%Y-%m-%d %H:%M} UTC"
+            print(f"{share}, of the same bytes by the same program; --all audits everything")
     if damaged:
         raise StoreError("; ".join(damaged))
     return audit_report
 
 
+def _done(
+    root: Path, materials: Sequence[str], figures: Sequence[str], before: Former, *, allow: Sequence[str], jobs: int
+) -> dict[str, Any]:
+    """Return the section or the error of each material and, named "figure KEY", of each figure, in their order.
+
+    What the last report had is drawn again where the page is not the one that was written with it.
+    """
+    known: dict[str, Any] = {name: before.audits[name] for name in materials if name in before.audits}
+    known |= {f"figure {key}": before.figures[key] for key in figures if key in before.figures}
+    order = [*materials, *(f"figure {key}" for key in figures)]
+    tasks: dict[str, Task] = {
+        name: partial(_audited, root, name, name in allow) for name in materials if name not in known
+    }
+    tasks |= {f"figure {key}": partial(_drawn, key) for key in figures if f"figure {key}" not in known}
+    if not tasks and tuple(audit_page.key_of(known[name]) for name in order) == before.page:
+        return {name: Section(known[name], None) for name in order}
+    tasks |= {name: partial(_section, subject) for name, subject in known.items()}
+    done: dict[str, Any] = {}
+    with terminal.progress() as bar:
+        task = bar.add_task("auditing tables, computing figures" if figures else "auditing tables", total=len(tasks))
+        for name, outcome in _outcomes(tasks, jobs):
+            done[name] = outcome
+            bar.advance(task)
+    return {name: done[name] for name in order}
+
+
+def _section(subject: Any) -> Section:
+    return Section(subject, audit_page.plots_of(subject))
+
+
+def _written(
+    audit_report: AuditReport, sections: Sequence[Section], before: Former, report_path: Path, store: Store
+) -> AuditReport:
+    """Write the page, unless nothing on it changed, and the report; return it with what it says of both."""
+    subjects = [audit_page.key_of(section.subject) for section in sections]
+    page_path = report_path.with_suffix(".html")
+    if tuple(subjects) != before.page or any(section.plots is not None for section in sections):
+        plots = {key: section.plots or [] for key, section in zip(subjects, sections, strict=True)}
+        page_path.write_text(audit_page.render(audit_report, plots), encoding="utf-8")
+    page = {"page_subjects": subjects, "page_sha256": hashlib.sha256(page_path.read_bytes()).hexdigest()}
+    audit_report = audit_report.model_copy(update={"program": former_audit.program(), **page})
+    of_some = report_path == store.root / REPORT_OF_SOME
+    whole = _with_former(audit_report, report_path, store) if of_some else audit_report
+    report_path.write_bytes(former_audit.sealed(whole))
+    return audit_report
+
+
 def _with_former(audit_report: AuditReport, path: Path, store: Store) -> AuditReport:
     """Return a report with the audits of an earlier one at `path` that are of other tables, and of current ones."""
-    try:
-        former = AuditReport.model_validate_json(path.read_bytes()).materials
-    except (OSError, ValueError):  # none yet, or that of another version
+    former = former_audit.read_former(path)
+    if former is None:
         return audit_report
-    audits = {audited.material: audited for audited in former if audited.material in store}
+    audits = {audited.material: audited for audited in former.materials if audited.material in store}
     audits = {name: audited for name, audited in audits.items() if audited.revision == store.head(name)}
     audits |= {audited.material: audited for audited in audit_report.materials}
     violations = [name for name, audited in audits.items() if audited.verdict == "violates"]
@@ -165,11 +211,12 @@ def _audited(root: Path, name: str, accept_excess: bool) -> Section | StoreError
     try:
         store.verify(name)
         audited = audit(store[name], accept_excess=accept_excess)
+        audited = audited.model_copy(update={"program": former_audit.program()})
     except StoreError as error:
         return error
     except BrdfdbError as error:  # undamaged files that do not hold a table
         return StoreError(f"{name} cannot be audited: {error}")
-    return Section(audited, audit_page.plots_of(audited))
+    return _section(audited)
 
 
 def _figures() -> tuple[Figures, Figures]:
@@ -182,8 +229,7 @@ def _figures() -> tuple[Figures, Figures]:
 
 def _drawn(key: str) -> Section:
     atlas, gallery = _figures()
-    figure = (atlas.get(key) or gallery[key])()
-    return Section(figure, audit_page.plots_of(figure))
+    return _section((atlas.get(key) or gallery[key])())
 
 
 def _why(store: Store, name: str) -> str:

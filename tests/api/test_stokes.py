@@ -11,7 +11,7 @@ import pytest
 import brdfdb
 from brdfdb.store.publication import publish_layout
 from brdfdb.tables import stokes
-from tests.api.a_store import NPY, Client, client_of, npy, publish, read_npy
+from tests.api.a_store import NPY, Client, client_of, npy, publish, read_npy, serving
 from tests.tables.test_polarisation import WAVELENGTHS, polarised, rough
 
 COPPER = "/v1/materials/made-up/lookup"
@@ -105,3 +105,17 @@ def test_a_matrix_counts_as_sixteen_values(client: Client) -> None:
     headers = {"content-type": NPY}
     refused = client.problem("POST", COPPER, 413, content=npy(many), headers=headers, params={"stokes": "1,0,0,0"})
     assert refused["detail"].startswith("9600000 values are more than the")
+
+
+def test_a_table_behind_a_service_has_the_matrices_of_the_directory(root: Path) -> None:
+    table = brdfdb.open(root)["made-up"]
+    theta_i, phi_r = np.array([[0.3], [1.2]]), np.array([0.4, 2.0, 3.1])
+    with serving(root) as url:
+        remote = brdfdb.open(url)["made-up"]
+        for at in (None, float(WAVELENGTHS[0]), np.array(WAVELENGTHS[:2])):
+            matrix = remote.mueller(theta_i, 0.2, 0.7, phi_r, at)
+            np.testing.assert_allclose(matrix, table.mueller(theta_i, 0.2, 0.7, phi_r, at), rtol=1e-9, atol=1e-12)
+        np.testing.assert_allclose(remote.mueller(0.3, 0.2, 0.7, 2.0), table.mueller(0.3, 0.2, 0.7, 2.0), atol=1e-12)
+        assert np.all(np.isnan(remote.mueller(np.nan, 0.2, 0.7, 2.0)))
+        with pytest.raises(brdfdb.errors.BrdfdbError, match="unpolarised"):
+            brdfdb.open(url)["white-tile"].mueller(0.3, 0.2, 0.7, 2.0)

@@ -2,8 +2,9 @@
 
 Needs LLVM 19, which $DRJIT_LIBLLVM_PATH names. Values are compared at random pairs of directions, half of the viewers
 near the mirror direction. The white furnace is the mean weight of samples for lights from the normal to 85 degrees.
-Speeds are millions of f_r a second of processor time, the best of several, all in one run. Other programs on the
-machine matter little to them. Exits with 1 if a value is off by more than 2e-5, or of tables one in 1000 by more than
+Speeds are millions of f_r a second of processor time, the best of several, all in one run and one thread. Other
+programs on the machine matter little to them. Pictures are of one scene with one integrator and as many samples: a
+sphere under a lamp and a sky. Exits with 1 if a value is off by more than 2e-5, or of tables one in 1000 by more than
 5e-5, if a test of densities rejects, or if a furnace is off by 0.3 %.
 """
 
@@ -34,6 +35,7 @@ REQUIRED, OF_TABLES, FURNACE = 2e-5, 5e-5, 3e-3
 TABLE_FLOOR = 5e-3  # [1/sr] smaller values of tables are compared with it
 SIGNIFICANCE = 0.01
 FULL, QUICK = (100_000, 4_000_000, 1 << 20, 15), (10_000, 10_000, 1 << 18, 1)  # pairs, evaluations, samples, repeats
+PASSES = 128  # samples of a pixel
 TABLES, TOLERANCE = ("white-ceramic-tile", "rolled-brass", "clay-vase", "magnesium-oxide-ceramic"), 0.01
 MEASURED = "BSDF plugins of Mitsuba 3 against brdfdb.models, their samplers, and their speed beside roughconductor."
 
@@ -102,6 +104,36 @@ def speeds(mitsuba: Any, surface: Any, count: int, repeats: int) -> tuple[float,
     )
 
 
+def picture_seconds(mitsuba: Any, bsdf: dict[str, Any], samples: int, repeats: int) -> float:
+    """Return the processor time [s] of a picture of a sphere."""
+    import drjit
+
+    camera = mitsuba.ScalarTransform4f().look_at(origin=[0, -5, 0], target=[0, 0, 0], up=[0, 0, 1])
+    film = {"type": "hdrfilm", "width": 128, "height": 128, "pixel_format": "luminance", "rfilter": {"type": "box"}}
+    scene = mitsuba.load_dict(
+        {
+            "type": "scene",
+            "integrator": {"type": "path", "max_depth": 3},
+            "sensor": {"type": "perspective", "fov": 25, "to_world": camera, "film": film},
+            "sky": {"type": "constant", "radiance": 0.3},
+            "lamp": {
+                "type": "sphere",
+                "center": [3, -4, 3],
+                "radius": 0.7,
+                "emitter": {"type": "area", "radiance": 20.0},
+            },
+            "sphere": {"type": "sphere", "bsdf": bsdf},
+        }
+    )
+    seconds = []
+    for seed in range(repeats + 1):  # the first run compiles
+        began = time.process_time()
+        drjit.eval(mitsuba.render(scene, spp=samples, seed=seed))
+        drjit.sync_thread()
+        seconds.append(time.process_time() - began)
+    return min(seconds[1:])
+
+
 def compare(run: Run, mitsuba: Any, pairs: int, samples: int) -> bool:
     """Compare all plugins of models with their models; return True if all are as near as is required."""
     columns = ("value", "lights whose density is accepted", "furnace")
@@ -144,17 +176,21 @@ def compare_tables(run: Run, mitsuba: Any, root: str, names: Sequence[str], pair
 
 def time_all(run: Run, mitsuba: Any, root: str, names: Sequence[str], count: int, repeats: int) -> None:
     """Print speeds of plugins beside that of roughconductor."""
-    columns = ("values", "samples")
-    columns_of_speed = [Column(name=name, unit="million/s") for name in columns]
-    share = Column(name="values, share of roughconductor")
-    table = run.table("Speed of one processor, LLVM, mono", Column(name="plugin", width=44), *columns_of_speed, share)
+    import drjit
+
+    drjit.set_thread_count(1)
+    speed = [Column(name=name, unit="million/s") for name in ("values", "samples")]
+    shares = [Column(name=f"{name}, share of roughconductor") for name in ("values", "samples", "pictures")]
+    table = run.table("Speed of one processor, LLVM, mono", Column(name="plugin", width=44), *speed, *shares)
+    passes = 4 if repeats == 1 else PASSES
     conductor = {"type": "roughconductor", "alpha": 0.1, "eta": 1.13, "k": 2.56}
     documents = {"roughconductor": conductor, **{str(subject): subject.document for subject in SUBJECTS[::2]}}
     documents |= {f"table of {name}": {"type": "brdfdb_table", "material": name, "store": root} for name in names}
     for name, document in documents.items():
-        beside, _ = speeds(mitsuba, mitsuba.load_dict(conductor), count, repeats)
+        beside = speeds(mitsuba, mitsuba.load_dict(conductor), count, repeats)
         values, samples = speeds(mitsuba, mitsuba.load_dict(document), count, repeats)
-        table.add(name, values, samples, values / beside)
+        picture, other = (picture_seconds(mitsuba, bsdf, passes, min(repeats, 5)) for bsdf in (conductor, document))
+        table.add(name, values, samples, values / beside[0], samples / beside[1], picture / other)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -5,20 +5,17 @@ from __future__ import annotations
 import functools
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from brdfdb import formats
 from brdfdb.errors import CannotHoldError, ParameterError
 from brdfdb.formats import kaist
 from brdfdb.formats._rgl_tensor import read_tensors
-from brdfdb.geometry import spherical_angles, unit_vector
+from brdfdb.geometry import unit_vector
 from brdfdb.materials import Material
 from brdfdb.measurements.samples import Samples
-from brdfdb.tables import stokes
 from brdfdb.tables.planner import plan
 from brdfdb.tables.polarisation import planned_theta_d
 from brdfdb.tables.table import Table, table_from
@@ -26,16 +23,11 @@ from brdfdb.tables.tabulation import tabulate
 from tests.formats.round_trip import round_trip
 from tests.formats.small_tables import GREY, small_table
 from tests.formats.test_rgl import mitsuba_of
+from tests.mitsuba.polarised import as_mitsuba_has_them, off_by, picture_of_lookups, picture_of_mitsuba
 
 VARIANT = "scalar_spectral_polarized"
-FLIPPED = np.diag([1.0, 1.0, -1.0, -1.0])  # U and V of Mitsuba have the opposite sign
 TOLERANCE, NM = 0.005, 500.0
 IMAGE = 0.01  # largest share of a Stokes component that a picture is off by; measured 0.0019
-SIZE, FINE = 32, 16  # pixels of the picture, and samples of each, along one side
-RADIUS = 0.95
-LIGHT = np.array([0.8, 0.3, 0.52]) / np.linalg.norm([0.8, 0.3, 0.52])
-
-Array = NDArray[Any]
 
 
 @functools.cache
@@ -64,12 +56,6 @@ def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def turned(s: Array, phi: Array, k: Array) -> Array:
-    """Return rotations of Stokes vectors from bases of the surface to those with s along a vector; travel along k."""
-    own = stokes.horizontal(phi)
-    return stokes.rotation(np.arctan2(np.sum(s * np.cross(own, k), axis=-1), np.sum(s * own, axis=-1)))
-
-
 def test_matrices_are_those_of_mitsuba(path: Path) -> None:
     mitsuba = mitsuba_of(VARIANT)
     surface = mitsuba.load_dict({"type": "measured_polarized", "filename": str(path)})
@@ -82,74 +68,19 @@ def test_matrices_are_those_of_mitsuba(path: Path) -> None:
         interaction.wavelengths = [NM] * 4
         value = surface.eval(mitsuba.BSDFContext(), interaction, mitsuba.Vector3f(*light))
         theirs.append([[np.array(value[i, j])[0] / light[2] for j in range(4)] for i in range(4)])
-    phi_i, phi_r = (spherical_angles(w)[1] for w in (wi, wr))
-    x_i, x_r = (np.array([np.array(mitsuba.mueller.stokes_basis(mitsuba.Vector3f(*k))) for k in w]) for w in (-wi, wr))
-    light, viewer = turned(x_i, phi_i, -wi), turned(x_r, phi_r, wr)
-    ours = FLIPPED @ viewer @ plastic().mueller_vectors(wi, wr, NM) @ np.swapaxes(light, -1, -2) @ FLIPPED
+    ours = as_mitsuba_has_them(mitsuba, plastic().mueller_vectors(wi, wr, NM), wi, wr)
     wrong = np.abs(np.array(theirs) - ours) / ours[:, :1, :1]
     assert np.percentile(wrong, 99.0, axis=0).max() <= TOLERANCE  # measured 0.0046
     assert np.abs(ours[:, 1:, 1:] / ours[:, :1, :1]).max() > 0.5  # the light is polarised
 
 
-def of_mitsuba(path: Path) -> Array:
-    """Return the picture (SIZE, SIZE, 4) of a sphere in directional light: luminances of I, Q, U and V."""
-    mitsuba = mitsuba_of(VARIANT)
-    film = {"type": "hdrfilm", "width": SIZE, "height": SIZE, "rfilter": {"type": "box"}, "pixel_format": "luminance"}
-    camera = mitsuba.ScalarTransform4f().look_at([0, 0, 5], [0, 0, 0], [0, 1, 0])
-    surface = {"type": "measured_polarized", "filename": str(path), "wavelength": NM}
-    scene = mitsuba.load_dict(
-        {
-            "type": "scene",
-            "integrator": {"type": "stokes", "nested": {"type": "direct"}},
-            "sensor": {
-                "type": "orthographic",
-                "to_world": camera,
-                "film": film,
-                "sampler": {"type": "stratified", "sample_count": FINE**2},
-            },
-            "sun": {
-                "type": "directional",
-                "direction": (-LIGHT).tolist(),
-                "irradiance": {"type": "uniform", "value": 1.0},
-            },
-            "ball": {"type": "sphere", "radius": RADIUS, "bsdf": surface},
-        }
-    )
-    rgb = np.array(mitsuba.render(scene))[..., 1:].reshape(SIZE, SIZE, 4, 3)
-    return np.asarray(rgb @ [0.2126, 0.7152, 0.0722])
-
-
-def of_ours() -> Array:
-    """Return the same picture from lookups; light in the basis of the camera, whose x is that of the picture."""
-    at = (np.arange(SIZE * FINE) + 0.5) * (2.0 / (SIZE * FINE)) - 1.0
-    x, y = np.meshgrid(at, -at)
-    seen = x**2 + y**2 < RADIUS**2
-    z = np.sqrt(RADIUS**2 - x[seen] ** 2 - y[seen] ** 2)
-    normal = np.stack([x[seen], y[seen], z], axis=-1) / RADIUS
-    across = np.cross([0.0, 1.0, 0.3], normal)
-    across /= np.linalg.norm(across, axis=-1, keepdims=True)
-    frame = np.stack([across, np.cross(normal, across), normal], axis=1)
-    viewer = np.array([0.0, 0.0, 1.0])
-    local_i, local_r = frame @ LIGHT, frame @ viewer
-    lit = local_i[:, 2] > 0.0
-    reflected = np.zeros((len(normal), 4))
-    matrices = plastic().mueller_in_plane(local_i[lit], local_r[lit], NM)
-    reflected[lit] = matrices[:, :, 0] * local_i[lit][:, 2:]  # of unpolarised light, in the basis of the plane
-    s = np.cross(LIGHT, viewer) / np.linalg.norm(np.cross(LIGHT, viewer))
-    camera = np.array([1.0, 0.0, 0.0])
-    angle = np.arctan2(camera @ np.cross(s, viewer), camera @ s)
-    picture = np.zeros((*x.shape, 4))
-    picture[seen] = reflected @ (FLIPPED @ stokes.rotation(angle)).T
-    return np.asarray(picture.reshape(SIZE, FINE, SIZE, FINE, 4).mean(axis=(1, 3)))
-
-
 def test_the_stokes_picture_of_a_sphere_is_that_of_mitsuba(path: Path) -> None:
-    theirs, ours = of_mitsuba(path), of_ours()
+    surface = {"type": "measured_polarized", "filename": str(path), "wavelength": NM}
+    theirs = picture_of_mitsuba(mitsuba_of(VARIANT), surface)
+    ours = picture_of_lookups(lambda wi, wr: plastic().mueller_in_plane(wi, wr, NM))
     polarised = np.abs(ours[..., 1:3]).sum() / ours[..., 0].sum()
     assert polarised > 0.1
-    for component in (0, 1, 2):
-        wrong = np.abs(theirs[..., component] - ours[..., component]).sum()
-        assert wrong <= IMAGE * np.abs(ours[..., component]).sum(), component
+    assert max(off_by(theirs, ours)) <= IMAGE
     assert np.abs(theirs[..., 3]).max() <= 1e-6  # one reflection of unpolarised light makes no circular light
     assert np.abs(ours[..., 3]).max() <= 1e-6
 

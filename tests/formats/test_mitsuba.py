@@ -90,11 +90,12 @@ def test_models_with_a_plugin_are_those_that_mitsuba_registers() -> None:
     from brdfdb.mitsuba import PLUGINS
     from brdfdb.mitsuba.diffuse import FORMULAS
     from brdfdb.mitsuba.oren_nayar import FORMS as OREN_NAYAR
+    from brdfdb.mitsuba.stray_light import FORMS as STRAY_LIGHT
     from brdfdb.mitsuba.ward import FORMS as WARD
 
     forms = {"brdfdb_ward": WARD, "brdfdb_oren_nayar": OREN_NAYAR}
     expected = {form: (plugin, True) for plugin, known in forms.items() for form in known}
-    expected |= {name: (f"brdfdb_{name}", False) for name in ("he_torrance", *FORMULAS)}
+    expected |= {name: (f"brdfdb_{name}", False) for name in ("he_torrance", *FORMULAS, *STRAY_LIGHT)}
     assert expected == OF_MITSUBA
     assert {plugin for plugin, _ in OF_MITSUBA.values()} | {"brdfdb_table"} == set(PLUGINS)
     assert set(OF_MITSUBA) <= set(MODELS)

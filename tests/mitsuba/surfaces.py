@@ -118,6 +118,8 @@ SUBJECTS = (
     Subject("brdfdb_rpv", "rpv", {"rho_0": 0.06, "k": 0.7, "asymmetry": -0.2, "rho_c": 0.3}),
     Subject("brdfdb_ross_li", "ross_li", {"f_iso": 0.2097, "f_vol": 0.0814, "f_geo": 0.0041}),
     Subject("brdfdb_hapke", "hapke", {"w": 0.5, "b": 0.2, "c": 0.6, "b_0": 0.8, "h": 0.08, "theta_bar": 0.25}),
+    *(Subject("brdfdb_abg", "abg", {"a": 0.002, "b": b, "g": 1.8}) for b in (0.02, 0.3)),
+    *(Subject("brdfdb_harvey_shack", "harvey_shack", {"b_0": 1.0, "knee": k, "slope": -1.5}) for k in (0.1, 0.3)),
     *(he_torrance(*surface) for surface in ((0.1, 2.0), (0.6, 2.5))),
 )
 

@@ -62,7 +62,7 @@ def test_derivatives_are_those_of_the_model(subject: Subject, name: str) -> None
         gradient = np.rad2deg(gradient)  # 1 / radian
     f_r = subject.f_r(wi, wr)
     expected = difference(subject, name, wi, wr)
-    scale = np.maximum(np.abs(expected), CANCELLED * f_r / subject.arguments[name])
+    scale = np.maximum(np.abs(expected), CANCELLED * f_r / abs(subject.arguments[name]))
     seen = f_r > FLOOR
     assert np.all(np.isfinite(gradient))
     assert np.max(np.abs(gradient - expected)[seen] / scale[seen]) <= GRADIENT

@@ -14,7 +14,7 @@ from brdfdb.tables.planner import plan
 from brdfdb.tables.table import Table
 from brdfdb.tables.tabulation import tabulate
 from tests.api.a_store import publish, serving
-from tests.formats.small_tables import ANISOTROPIC, GREY, KINDS, SMOOTH, SPECTRAL, small_table
+from tests.formats.small_tables import ANISOTROPIC, DIFFUSE, GREY, KINDS, SMOOTH, SPECTRAL, small_table
 from tests.mitsuba.surfaces import directions, interaction, variant
 from tests.store.a_store import lambert
 from tests.tables.made_up import WAVELENGTHS, made_up
@@ -182,3 +182,32 @@ def test_a_table_behind_a_service_is_that_of_the_directory(tmp_path: Path) -> No
             values.append(np.array([np.ravel(value), np.ravel(weight)]))
     np.testing.assert_array_equal(values[0], values[1])
     assert np.all(values[0] > 0.0)
+
+
+def test_two_tables_in_a_scene_have_derivatives(monkeypatch: pytest.MonkeyPatch) -> None:
+    mitsuba = variant("llvm_ad_mono")
+    import drjit
+
+    import brdfdb.mitsuba.table
+
+    monkeypatch.setattr(brdfdb.mitsuba.table, "loaded", lambda name, _: small_table(name))
+    spheres = {
+        kind: {"type": "sphere", "center": [x, 0, 5], "bsdf": {"type": "brdfdb_table", "material": kind}}
+        for kind, x in ((GREY, -1.1), (DIFFUSE, 1.1))
+    }
+    film = {"type": "hdrfilm", "width": 16, "height": 16, "pixel_format": "luminance"}
+    sensor = {"type": "perspective", "fov": 45, "film": film}
+    scene = mitsuba.load_dict(
+        {"type": "scene", "integrator": {"type": "prb"}, "sensor": sensor, "sky": {"type": "constant"}, **spheres}
+    )
+    parameters = mitsuba.traverse(scene)
+    keys = [f"{kind}.bsdf.values_0" for kind in spheres]
+    for key in keys:
+        drjit.enable_grad(parameters[key])
+    parameters.update()
+    picture = mitsuba.render(scene, parameters, spp=16)
+    drjit.backward(drjit.mean(picture, axis=None))
+    for key in keys:
+        gradient = np.array(drjit.grad(parameters[key]))
+        assert np.all(np.isfinite(gradient))
+        assert np.sum(gradient) > 0.0  # a brighter table, a brighter picture

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import brdfdb
@@ -42,6 +44,17 @@ def test_a_polarised_recipe_builds_tables_that_are_looked_up_and_pass(
     assert cli.main(build) == 0
     assert brdfdb.open(store)["magnesium-oxide-ceramic"].revision == "r000001"
     assert "unchanged" in capsys.readouterr().out
+    lookup = ["lookup", "magnesium-oxide-ceramic", "60", "0", "50", "165", "--store", str(store)]
+    assert cli.main([*lookup, "--stokes", "1,0,1,0", "--json"]) == 0
+    light = json.loads(capsys.readouterr().out)["stokes"]
+    expected = table.mueller(*np.radians([60.0, 0.0, 50.0, 165.0])) @ [1.0, 0.0, 1.0, 0.0]
+    np.testing.assert_allclose(light["reflected"], expected, rtol=1e-12)
+    assert cli.main([*lookup, "--stokes", "1,0,1,0"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[1].startswith(f"500 nm  I, Q, U, V: {expected[0, 0]:.6g}, {expected[0, 1]:.6g}")
+    assert "Q > 0 is s-polarised" in lines[2]
+    assert cli.main([*lookup, "--stokes", "1,2,0,0"]) != 0
+    assert "stokes: Q, U and V make more than I = 1" in capsys.readouterr().err
 
 
 def test_requests_of_unpolarised_tables_do_not_mention_polarisation(tmp_path: Path) -> None:

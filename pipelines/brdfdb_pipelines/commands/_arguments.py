@@ -47,6 +47,14 @@ def processors() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
+def share_cores() -> None:
+    """Let linear algebra use one thread a worker; call this before numpy is imported.
+
+    The workers fill the cores. Threads of linear algebra beside them wait for one another, and take as much time again.
+    """
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+
 def add_out(parser: argparse.ArgumentParser, directory: str) -> None:
     """Add the option --out DIR with its default."""
     parser.add_argument(

@@ -6,7 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from brdfdb_pipelines.commands._arguments import add_jobs, add_store
+from brdfdb_pipelines.commands._arguments import add_jobs, add_store, share_cores
 from brdfdb_pipelines.exit_codes import INTERRUPTED, VIOLATED
 
 HELP = "Audit the energy, reciprocity, smoothness and error of tables and their models; exit 1 on a violation."
@@ -31,11 +31,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="NAME",
         help="materials whose models may reflect more than they receive: accepted, and shown as such",
     )
+    parser.add_argument(
+        "--all",
+        action="store_true",
+        help="audit everything (default: what the last report says of the same bytes, by the same program, is kept)",
+    )
     parser.add_argument("--no-figures", action="store_true", help="leave out the stability atlas and the gallery")
 
 
 def run(options: argparse.Namespace) -> int:
     """Audit the materials; return `VIOLATED` if there is a new violation."""
+    share_cores()
     from brdfdb.store.summary_words import REPORT_OF_ALL, REPORT_OF_SOME
     from brdfdb_pipelines import audit
 
@@ -48,6 +54,7 @@ def run(options: argparse.Namespace) -> int:
             jobs=options.jobs,
             figures=not (options.names or options.no_figures),
             allow=options.allow,
+            again=options.all,
         )
     except KeyboardInterrupt:
         print("brdfdb: interrupted; no report was written, an earlier one is unchanged", file=sys.stderr)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import math
-import os
 import shlex
 import sys
 import time
@@ -12,7 +11,7 @@ from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from brdfdb_pipelines.commands._arguments import add_jobs, add_store, byte_count
+from brdfdb_pipelines.commands._arguments import add_jobs, add_store, byte_count, share_cores
 from brdfdb_pipelines.exit_codes import INTERRUPTED
 
 if TYPE_CHECKING:
@@ -48,9 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Build the recipe, show progress, and print what was built."""
-    # Read when numpy is imported, below. The workers fill the cores: threads of linear algebra beside them wait for one
-    # another, and take as much time again
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    share_cores()
     try:
         _build(options)
     except KeyboardInterrupt:

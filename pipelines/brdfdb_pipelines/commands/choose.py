@@ -6,7 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from brdfdb_pipelines.commands._arguments import MOST_WIDTH, add_out, add_scene, whole_number
+from brdfdb_pipelines.commands._arguments import MOST_WIDTH, add_out, add_scene, share_cores, whole_number
 from brdfdb_pipelines.exit_codes import INTERRUPTED
 
 HELP = "Choose the cheapest form of each material that a scene cannot tell from the model."
@@ -34,6 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Choose for the scene."""
+    share_cores()
     from brdfdb_pipelines import choose
 
     try:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from brdfdb_pipelines.commands._arguments import add_store, picture_file
+from brdfdb_pipelines.commands._arguments import add_store, picture_file, share_cores
 
 HELP = "Convert a material to another model: its closest parameters, and the error that is left."
 
@@ -46,6 +46,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Search, and print the parameters with what is left."""
+    share_cores()
     from brdfdb.errors import import_extra
     from brdfdb_pipelines import convert
 

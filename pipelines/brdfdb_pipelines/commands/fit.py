@@ -6,6 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
+from brdfdb_pipelines.commands._arguments import share_cores
 from brdfdb_pipelines.commands._reading import add_reading, reading_keys
 from brdfdb_pipelines.exit_codes import INTERRUPTED
 
@@ -55,6 +56,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Fit, and print the ranking."""
+    share_cores()
     from brdfdb.errors import counted, import_extra
     from brdfdb.fitting.published import SUFFIX
     from brdfdb_pipelines import fit

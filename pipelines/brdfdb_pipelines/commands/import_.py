@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import argparse
-import os
 from pathlib import Path
 
-from brdfdb_pipelines.commands._arguments import add_jobs
+from brdfdb_pipelines.commands._arguments import add_jobs, share_cores
 from brdfdb_pipelines.commands._reading import add_reading, reading_keys
 from brdfdb_pipelines.exit_codes import REFUSED, VIOLATED
 
@@ -46,7 +45,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Read the files, print a statement on each, and make tables; return the exit code of the command."""
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # processes fill the cores: threads beside them wait
+    share_cores()
     from brdfdb.errors import ParameterError
     from brdfdb_pipelines import import_samples
     from brdfdb_pipelines.import_tables import TOLERANCE, Tables

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 HELP = "Print f_r [1/sr] of a material, or a family, at one pair of directions."
 
+_STOKES = ("reflected", "specular")
 _ANGLES = ("theta_i", "phi_i", "theta_r", "phi_r")
 
 
@@ -34,6 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--json", action="store_true", help="print JSON")
     parser.add_argument("--with-error", action="store_true", help="print the stated error of each value, too")
+    parser.add_argument("--stokes", metavar="I,Q,U,V", help="incident light: print what is reflected of it")
     add_snapshot(parser)
 
 
@@ -70,6 +72,7 @@ def run(options: argparse.Namespace) -> int:
         head = {"material": options.name, "revision": source.revision}
         specular_part = source.specular is not None
     theta_i, phi_i, theta_r, phi_r = radians(angles_deg)
+    light = _reflected(source, angles_deg, options)
     error = None
     outside = isinstance(source, Table) and bool(source.extrapolated(theta_i, phi_i, theta_r, phi_r))
     if options.with_error:
@@ -88,6 +91,7 @@ def run(options: argparse.Namespace) -> int:
             **({} if error is None else {"error": [None if math.isnan(one) else one for one in error.tolist()]}),
             **({"extrapolated": outside} if isinstance(source, Table) else {}),
             "specular_reflectance": specular.tolist(),
+            **({} if light is None else {"stokes": light}),
         }
         print(json.dumps(answer))
         return 0
@@ -96,9 +100,33 @@ def run(options: argparse.Namespace) -> int:
         mirrored = f"  and {specular[index]:.6g} of the light in the exact mirror direction" if specular_part else ""
         within = "" if error is None or outside else f" +- {error[index]:.2g}"
         print(f"{at}{value:.6g}{within} /sr{mirrored}")
+        if light is not None:
+            numbers = ", ".join(f"{number:.6g}" for number in light["reflected"][index])
+            print(f"{at}I, Q, U, V: {numbers} /sr")
+    if light is not None:
+        print(f"{light['convention']}. {light['basis']}")
     if outside:
         print("extrapolated: outside of the directions that were measured, where the error is not known")
     return 0
+
+
+def _reflected(source: Table | Family, angles_deg: list[float], options: argparse.Namespace) -> dict[str, Any] | None:
+    """Return the reflected Stokes vectors as the service answers them; None if no incident light is given."""
+    import numpy as np
+
+    from brdfdb.geometry import radians
+    from brdfdb.tables.points import Points
+    from brdfdb.tables.stokes_document import read_stokes, stokes_document
+    from brdfdb.tables.table import Table
+
+    if options.stokes is None:
+        return None
+    incident = read_stokes(options.stokes)
+    if not isinstance(source, Table):
+        raise ParameterError("stokes", f"{options.name} is a family, which has no Mueller matrices", options.stokes)
+    at = None if options.wavelength_nm is None else np.array(options.wavelength_nm)
+    document = stokes_document(source, Points.of(tuple(radians(angles_deg)), at), incident)
+    return {key: np.asarray(value).tolist() if key in _STOKES else value for key, value in document.items()}
 
 
 def _swept(family: Family, settings: Sequence[str]) -> dict[str, float]:
