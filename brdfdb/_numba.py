@@ -10,6 +10,7 @@ from __future__ import annotations
 import contextlib
 import functools
 import hashlib
+import inspect
 import os
 import threading
 from collections.abc import Callable
@@ -22,7 +23,13 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 # Kernels stay functions of Python, and numba is not imported. numba reads the same variable
 INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
-SHARED = ("_elementary.py", "fresnel.py", "tables/_interpolation.py", "models/_diffraction_series.py")
+SHARED = (
+    "_elementary.py",
+    "tables/_vectors.py",
+    "fresnel.py",
+    "tables/_interpolation.py",
+    "models/_diffraction_series.py",
+)
 
 
 def kernel(function: F) -> F:
@@ -54,6 +61,37 @@ def _compiled(function: F, *, forceinline: bool) -> F:
     _stamp(compiled._cache)
     _load_alone(compiled._cache)
     return cast(F, compiled)
+
+
+def instructions(write: Callable[..., Any]) -> Callable[[F], F]:
+    """Compile a function of arrays and scalars as ``write(ir, builder, *arguments)`` writes it in LLVM's language.
+
+    An array arrives as the pointer to its first number. The function takes uint64 and float64 and returns a float64.
+    """
+
+    def decorated(function: F) -> F:
+        if INTERPRETED:
+            return function
+        import numba
+        from numba.core.cgutils import ir  # type: ignore[attr-defined]  # it is llvmlite's
+        from numba.extending import intrinsic
+
+        def code(context: Any, builder: Any, signature: Any, given: Any) -> Any:
+            arguments = [
+                context.make_array(kind)(context, builder, value).data if isinstance(kind, numba.types.Array) else value
+                for kind, value in zip(signature.args, given, strict=True)
+            ]
+            return write(ir, builder, *arguments)
+
+        def typed(_: Any, *arguments: Any) -> Any:
+            return numba.float64(*arguments), code
+
+        own = inspect.signature(function)
+        context = inspect.Parameter("context", inspect.Parameter.POSITIONAL_OR_KEYWORD)
+        typed.__signature__ = own.replace(parameters=[context, *own.parameters.values()])  # type: ignore[attr-defined]
+        return cast(F, intrinsic(typed))
+
+    return decorated
 
 
 @functools.cache

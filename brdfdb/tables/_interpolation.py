@@ -8,11 +8,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brdfdb._numba import kernel
+from brdfdb._numba import kernel, loop
+from brdfdb.tables._vectors import CUBIC_COLUMNS, tricubic_cell, trilinear_cell
 
 Array = NDArray[np.float64]
 
 _AT_END = 4  # first column of `Axes.slopes` for the end of a cell; those for its beginning come first
+POINTS = 1024  # points in a block of a lookup: a block costs as much as 60 points
 _MOST_BUCKETS = 1 << 15  # of an axis: nodes closer together than a part in this share a bucket
 
 
@@ -39,6 +41,9 @@ class Axes(NamedTuple):
         The numbers of those nodes; if two count, they are in the middle. Of a periodic axis the last is the first.
     slopes : float64 (nodes, 8)
         The slopes at both ends of a cell, times its length, as weights of those nodes.
+    lines : float64 (nodes, 16)
+        For each cell the weights of four neighbouring nodes that stand for the slopes at both its ends, and for its
+        two ends. Empty if an axis has no four neighbours in each cell.
     """
 
     counts: NDArray[np.int64]
@@ -53,6 +58,7 @@ class Axes(NamedTuple):
     width: NDArray[np.int64]
     stencil: NDArray[np.int64]
     slopes: Array
+    lines: Array
 
 
 def prepared(axes: Sequence[Array], ends: Sequence[tuple[str, str]], *, cubic: bool) -> Axes:
@@ -87,6 +93,7 @@ def prepared(axes: Sequence[Array], ends: Sequence[tuple[str, str]], *, cubic: b
         width=np.array([4 if cubic and nodes.size > 2 else 2 for nodes in axes]),
         stencil=np.concatenate([stencil for stencil, _ in cells]),
         slopes=np.concatenate([slopes for _, slopes in cells]),
+        lines=_lines(cells, ends) if cubic else np.empty((0, CUBIC_COLUMNS)),
     )
 
 
@@ -170,6 +177,24 @@ def _cubic_cells(nodes: Array, ends: tuple[str, str]) -> tuple[NDArray[np.int64]
     return stencil, slopes.reshape(count, 8)
 
 
+def _lines(cells: Sequence[tuple[NDArray[np.int64], Array]], ends: Sequence[tuple[str, str]]) -> Array:
+    """Return `Axes.lines`. A mirrored node outside is one inside, whose weight it adds to."""
+    if any(len(stencil) < 4 or "periodic" in end for (stencil, _), end in zip(cells, ends, strict=True)):
+        return np.empty((0, CUBIC_COLUMNS))
+    lines = []
+    for stencil, slopes in cells:
+        line, rows = np.zeros((len(stencil), 4, 4)), np.arange(len(stencil) - 1)
+        begin = np.clip(rows - 1, 0, len(stencil) - 4)
+        for k in range(4):
+            node = stencil[:-1, k] - begin
+            for end in range(2):
+                line[rows, end, node] += slopes[:-1, 4 * end + k]
+        line[rows, 2, rows - begin] = 1.0
+        line[rows, 3, rows + 1 - begin] = 1.0
+        lines.append(line.reshape(-1, CUBIC_COLUMNS))
+    return np.concatenate(lines)
+
+
 def _beyond(nodes: Array, end: str, low: bool) -> tuple[int, float]:
     """Return the number and place of the node one beyond an end of an axis; the place is nan if nothing is known."""
     last = nodes.size - 1
@@ -194,114 +219,98 @@ def _slopes(a: Any, b: Any, c: Any, at: Any) -> Array:
 
 
 @kernel
-def locate(axes: Axes, axis: int, x: Array, count: int, cell: NDArray[np.int64], share: Array) -> None:
-    """Write the cell of each point on one axis, and the share of it in [0, 1]; a point beyond an end is moved to it."""
-    first = np.uint64(axes.first[axis])
-    buckets = np.uint64(axes.bucket_first[axis])
-    last = axes.counts[axis] - 2
-    low, high = axes.nodes[first], axes.nodes[first + np.uint64(last + 1)]
-    scale = axes.scale[axis]
-    if axes.uniform[axis]:
+def locate(axes: Axes, axis: int, x: Array, count: int, cell: NDArray[np.int32]) -> None:
+    """Write the cell of each point on one axis, and replace x by the share of it in [0, 1] that lies before the point.
+
+    A point beyond an end is moved to it. x and cell have a row an axis.
+    """
+    row = np.uint64(axis)
+    first = np.uint64(axes.first[row])
+    last = axes.counts[row] - 2
+    low, scale = axes.nodes[first], axes.scale[row]
+    if axes.uniform[row]:
         top = float(last)
         for j in range(count):
-            y = (x[j] - low) * scale
+            y = (x[row, j] - low) * scale
             y = y if y > 0.0 else 0.0  # nan too
             whole = np.floor(y)
             whole = whole if whole < top else top
             y = y - whole
-            share[j] = y if y < 1.0 else 1.0
-            cell[j] = np.int64(whole)
+            x[row, j] = y if y < 1.0 else 1.0
+            cell[row, j] = np.int32(whole)
         return
+    high = axes.nodes[first + np.uint64(last + 1)]
     for j in range(count):
-        y = x[j] if x[j] < high else high
+        y = x[row, j] if x[row, j] < high else high
         y = y if y > low else low  # nan too
-        share[j] = y
-        cell[j] = np.int64((y - low) * scale)
-    one = np.uint64(1)
-    if axes.crowded[axis]:  # more nodes than buckets
-        for j in range(count):
-            c = np.uint64(axes.bucket[buckets + np.uint64(cell[j])])
-            while share[j] > axes.nodes[first + c + one]:
-                c += one
-            share[j] = (share[j] - axes.nodes[first + c]) * axes.inverse[first + c]
-            cell[j] = np.int64(c)
-        return
+        x[row, j] = y
+        cell[row, j] = np.int32((y - low) * scale)
+    one, buckets = np.uint64(1), np.uint64(axes.bucket_first[row])
+    crowded = axes.crowded[row]  # a bucket may have more nodes than one
     for j in range(count):
-        y = share[j]
-        c = np.uint64(axes.bucket[buckets + np.uint64(cell[j])])
+        y = x[row, j]
+        c = np.uint64(axes.bucket[buckets + np.uint64(cell[row, j])])
         c += np.uint64(y > axes.nodes[first + c + one])
-        share[j] = (y - axes.nodes[first + c]) * axes.inverse[first + c]
-        cell[j] = np.int64(c)
+        if crowded:
+            while y > axes.nodes[first + c + one]:
+                c += one
+        x[row, j] = (y - axes.nodes[first + c]) * axes.inverse[first + c]
+        cell[row, j] = np.int32(c)
 
 
 @kernel
-def _weigh(axes: Axes, axis: int, c: int, t: float, stride: int, at: NDArray[np.uint64], w: Array) -> None:
-    """Write offsets and weights of the nodes that count for a point into row `axis` of `at` and `w`."""
+def _weigh(axes: Axes, axis: int, c: int, t: float, stride: int, row: int, at: NDArray[np.uint64], w: Array) -> None:
+    """Write offsets and weights of the nodes that count for a point into a row of `at` and `w`."""
     k = np.uint64(axes.first[axis] + c)
     if axes.width[axis] == 2:
-        at[axis, 0], at[axis, 1] = np.uint64(axes.stencil[k, 1] * stride), np.uint64(axes.stencil[k, 2] * stride)
-        w[axis, 0], w[axis, 1] = 1.0 - t, t
+        at[row, 0], at[row, 1] = np.uint64(axes.stencil[k, 1] * stride), np.uint64(axes.stencil[k, 2] * stride)
+        w[row, 0], w[row, 1] = 1.0 - t, t
         return
     t2 = t * t
     h_1 = t2 * (3.0 - 2.0 * t)
     m_0, m_1 = t * (1.0 - t) * (1.0 - t), t2 * (t - 1.0)
     for node in range(4):
-        at[axis, node] = np.uint64(axes.stencil[k, node] * stride)
-        w[axis, node] = m_0 * axes.slopes[k, node] + m_1 * axes.slopes[k, node + _AT_END]
-    w[axis, 1] += 1.0 - h_1
-    w[axis, 2] += h_1
+        at[row, node] = np.uint64(axes.stencil[k, node] * stride)
+        w[row, node] = m_0 * axes.slopes[k, node] + m_1 * axes.slopes[k, node + _AT_END]
+    w[row, 1] += 1.0 - h_1
+    w[row, 2] += h_1
 
 
 @kernel
 def trilinear(
-    axes: Axes, cell: NDArray[np.int64], share: Array, count: int, table: NDArray[np.float32], out: Array
+    axes: Axes, cell: NDArray[np.int32], share: Array, count: int, table: NDArray[np.float32], out: Array
 ) -> None:
     """Interpolate linearly on three axes of a table with one value a node, at the points of `locate`."""
     n_1, n_2 = axes.counts[1], axes.counts[2]
-    one, row, layer = np.uint64(1), np.uint64(n_2), np.uint64(n_1 * n_2)
+    row, layer = np.uint64(n_2), np.uint64(n_1 * n_2)
     for j in range(count):
-        o = np.uint64((cell[0, j] * n_1 + cell[1, j]) * n_2 + cell[2, j])
-        t_0, t_1, t_2 = share[0, j], share[1, j], share[2, j]
-        p, q, r = o + row, o + layer, o + layer + row
-        s_2 = 1.0 - t_2
-        a = s_2 * table[o] + t_2 * table[o + one]
-        b = s_2 * table[p] + t_2 * table[p + one]
-        c = s_2 * table[q] + t_2 * table[q + one]
-        d = s_2 * table[r] + t_2 * table[r + one]
-        a = a + t_1 * (b - a)
-        c = c + t_1 * (d - c)
-        out[j] = a + t_0 * (c - a)
+        o = np.uint64((np.int64(cell[0, j]) * n_1 + cell[1, j]) * n_2 + cell[2, j])
+        out[j] = trilinear_cell(table, o, row, layer, share[0, j], share[1, j], share[2, j])
 
 
 @kernel
 def tricubic(
-    axes: Axes, cell: NDArray[np.int64], share: Array, count: int, table: NDArray[np.float32], out: Array
+    axes: Axes, cell: NDArray[np.int32], share: Array, count: int, table: NDArray[np.float32], out: Array
 ) -> None:
-    """Interpolate with cubics on three axes of a table with one value a node, at the points of `locate`."""
-    at, w = np.empty((3, 4), np.uint64), np.empty((3, 4))
+    """Interpolate with cubics on three axes of a table with one value a node, if `axes.lines` is not empty."""
+    n_0, n_1, n_2 = axes.counts[0], axes.counts[1], axes.counts[2]
+    row, layer = np.uint64(n_2), np.uint64(n_1 * n_2)
+    lines = axes.lines.reshape(-1)
+    first = axes.first[0], axes.first[1], axes.first[2]
     for j in range(count):
-        stride = 1
-        for back in range(3):  # not one line for each axis: `_weigh` would be compiled three times
-            axis = 2 - back
-            _weigh(axes, axis, cell[axis, j], share[axis, j], stride, at, w)
-            stride *= axes.counts[axis]
-        p, q, r, s = at[2, 0], at[2, 1], at[2, 2], at[2, 3]
-        a, b, c, d = w[2, 0], w[2, 1], w[2, 2], w[2, 3]
-        total = 0.0
-        for i in range(4):
-            layer = 0.0
-            for k in range(4):
-                o = at[0, i] + at[1, k]
-                line = (a * table[o + p] + b * table[o + q]) + (c * table[o + r] + d * table[o + s])
-                layer += w[1, k] * line
-            total += w[0, i] * layer
-        out[j] = total
+        i, k, m = np.int64(cell[0, j]), np.int64(cell[1, j]), np.int64(cell[2, j])
+        begin_0, begin_1 = min(max(i - 1, 0), n_0 - 4), min(max(k - 1, 0), n_1 - 4)
+        o = np.uint64((begin_0 * n_1 + begin_1) * n_2 + min(max(m - 1, 0), n_2 - 4))
+        k_0, k_1 = np.uint64((first[0] + i) * CUBIC_COLUMNS), np.uint64((first[1] + k) * CUBIC_COLUMNS)
+        k_2 = np.uint64((first[2] + m) * CUBIC_COLUMNS)
+        t_0, t_1, t_2 = share[0, j], share[1, j], share[2, j]
+        out[j] = tricubic_cell(table, lines, o, row, layer, k_0, k_1, k_2, t_0, t_1, t_2)
 
 
 @kernel
 def weighted(
     axes: Axes,
-    cell: NDArray[np.int64],
+    cell: NDArray[np.int32],
     share: Array,
     count: int,
     table: NDArray[np.float32],
@@ -323,7 +332,7 @@ def weighted(
         stride = channels
         for back in range(dimensions):
             axis = dimensions - 1 - back
-            _weigh(axes, axis, cell[axis, j], share[axis, j], stride, at[lead:], w[lead:])
+            _weigh(axes, axis, int(cell[axis, j]), share[axis, j], stride, lead + axis, at, w)
             stride *= axes.counts[axis]
         if channels == 1:
             total = 0.0
@@ -348,3 +357,28 @@ def weighted(
                         if factor != 0.0:
                             for channel in range(channels):
                                 out[j * channels + channel] += factor * table[base + np.uint64(channel)]
+
+
+@loop
+def interpolated(
+    axes: Axes,
+    table: NDArray[np.float32],
+    channels: int,
+    x: Array,
+    count: int,
+    numbers: Array,
+    cell: NDArray[np.int32],
+) -> None:
+    """Interpolate the numbers of a table at points on its grid: `channels` numbers a point, point after point.
+
+    `cell` has the shape of `x`. Both are overwritten.
+    """
+    for axis in range(x.shape[0]):
+        locate(axes, axis, x, count, cell)
+    width = axes.width  # summed by hand: a method would load all that numba knows of arrays with the stored kernel
+    if channels == 1 and x.shape[0] == 3 and width[0] + width[1] + width[2] == 6:
+        trilinear(axes, cell, x, count, table, numbers)
+    elif channels == 1 and x.shape[0] == 3 and axes.lines.shape[0] > 0:
+        tricubic(axes, cell, x, count, table, numbers)
+    else:
+        weighted(axes, cell, x, count, table, channels, numbers)

@@ -10,13 +10,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brdfdb._elementary import BLOCK, arcsin, cos, cosine, exp, sine
+from brdfdb._elementary import arctan, cos, cosine, exp, sine
 from brdfdb._numba import kernel, loop
-from brdfdb.tables._interpolation import Axes, locate, tricubic, trilinear, weighted
+from brdfdb.tables._interpolation import POINTS, Axes, interpolated
 
 Array = NDArray[np.float64]
 
-PI, TURN, HALF_PI, PHI_MAX = np.pi, 2.0 * np.pi, np.pi / 2.0, 1e15
+PI, TURN, HALF_PI, QUARTER_PI, PHI_MAX = np.pi, 2.0 * np.pi, np.pi / 2.0, np.pi / 4.0, 1e15
+TAN_PI_8 = 0.41421356237309503
 
 
 class Rule(NamedTuple):
@@ -43,8 +44,11 @@ class Rule(NamedTuple):
 @kernel
 def angle(y: float, x: float) -> float:
     """Return atan2(y, x) [rad] of a point in the first quadrant, the axes included; 0 at the origin."""
-    length = np.sqrt(x * x + y * y)
-    a = arcsin(min(x, y) / (length if length > 0.0 else 1.0))
+    small, large = min(x, y), max(x, y)
+    diagonal = small > TAN_PI_8 * large  # arctan(t) = pi / 4 - arctan((1 - t) / (1 + t)), without a second division
+    above, below = (large - small, large + small) if diagonal else (small, large)
+    a = arctan(above / (below if below > 0.0 else 1.0))
+    a = QUARTER_PI - a if diagonal else a
     return float(HALF_PI - a if y > x else a)
 
 
@@ -114,7 +118,8 @@ def points_of_angles(
 
 @loop
 def points_of_vectors(rule: Rule, ui: Array, ur: Array, count: int, x: Array, mu: Array, scratch: Array) -> None:
-    """Write points on either kind of grid, of unit vectors in flat arrays, and mu = cos theta_i cos theta_r.
+    """Write points on either kind of grid, of unit vectors in flat arrays, and mu = cos theta_i cos theta_r if the rule
+    has a power.
 
     `scratch` holds four rows. One loop for the products and one for each angle: all in one would not vectorise.
     """
@@ -138,8 +143,9 @@ def points_of_vectors(rule: Rule, ui: Array, ur: Array, count: int, x: Array, mu
             light_phi[j] = phi
             viewer[j] = _polar(ur[3 * j], ur[3 * j + 1], ur[3 * j + 2])
             viewer_phi[j] = _folded(other, TURN)
-    for j in range(count):
-        mu[j] = cosine(np.float64(ui[3 * j + 2])) * cosine(np.float64(ur[3 * j + 2]))
+    if rule.power != 0.0:
+        for j in range(count):
+            mu[j] = cosine(np.float64(ui[3 * j + 2])) * cosine(np.float64(ur[3 * j + 2]))
 
 
 @kernel
@@ -203,21 +209,6 @@ def _light_and_viewer(
 
 
 @loop
-def interpolated(axes: Axes, table: NDArray[np.float32], channels: int, x: Array, count: int, numbers: Array) -> None:
-    """Interpolate the numbers of a table at points on its grid: `channels` numbers a point, point after point."""
-    cell, share = np.empty((x.shape[0], BLOCK), np.int64), np.empty((x.shape[0], BLOCK))
-    for axis in range(x.shape[0]):
-        locate(axes, axis, x[axis], count, cell[axis], share[axis])
-    width = axes.width  # summed by hand: a method would load all that numba knows of arrays with the stored kernel
-    if channels == 1 and x.shape[0] == 3 and width[0] + width[1] + width[2] == 6:
-        trilinear(axes, cell, share, count, table, numbers)
-    elif channels == 1 and x.shape[0] == 3 and width[0] + width[1] + width[2] == 12:
-        tricubic(axes, cell, share, count, table, numbers)
-    else:
-        weighted(axes, cell, share, count, table, channels, numbers)
-
-
-@loop
 def finished(
     rule: Rule,
     numbers: Array,
@@ -262,7 +253,7 @@ def finished(
             value = numbers[j]
             value = exp(value) - rule.offset if rule.logarithm else value
             numbers[j] = 0.0 if rule.overshoots and value < 0.0 else value  # nan stays nan
-    total, column = np.empty(BLOCK), np.empty(channels)
+    total, column = np.empty(count), np.empty(channels)
     for m in range(wavelengths):
         apart, lowest, overshoots = 0.0, 0.0, True
         for side in range(4):
@@ -335,13 +326,14 @@ def by_angles(
     out: Array,
 ) -> bool:
     """Write f_r [1/sr] of directions by angles [rad]. Return False if any angle is out of range."""
-    x, mu, scratch = np.empty((axes.counts.size, BLOCK)), np.empty(BLOCK), np.empty((4, BLOCK))
-    wi, wr = np.empty(3 * BLOCK), np.empty(3 * BLOCK)
-    numbers = np.empty(BLOCK * channels)
+    most = min(POINTS, theta_i.size)
+    x, mu, scratch = np.empty((axes.counts.size, most)), np.empty(most), np.empty((4, most))
+    wi, wr = np.empty(3 * most), np.empty(3 * most)
+    numbers, cell = np.empty(most * channels), np.empty(x.shape, np.int32)
     wavelengths = nodes.shape[0]
     good = True
-    for start in range(0, theta_i.size, BLOCK):
-        count = min(BLOCK, theta_i.size - start)
+    for start in range(0, theta_i.size, POINTS):
+        count = min(POINTS, theta_i.size - start)
         block = slice(start, start + count)  # an index that starts at 0 is known not to be negative: loops vectorise
         t_i, p_i, t_r, p_r = theta_i[block], phi_i[block], theta_r[block], phi_r[block]
         f_r = out[start * wavelengths : (start + count) * wavelengths]
@@ -351,7 +343,7 @@ def by_angles(
             points_of_vectors(rule, wi, wr, count, x, mu, scratch)
         else:
             points_of_angles(rule, t_i, p_i, t_r, p_r, count, x, mu)
-        interpolated(axes, table, channels, x, count, numbers)
+        interpolated(axes, table, channels, x, count, numbers, cell)
         finished(rule, numbers, channels, mu, spectra, uniform, nodes, weight, count, f_r)
         odd = 0
         for j in range(count):
@@ -389,15 +381,16 @@ def by_vectors(
     out: Array,
 ) -> None:
     """Write f_r [1/sr] of directions by unit vectors, flat arrays of three numbers each, on either kind of grid."""
-    x, mu, scratch = np.empty((axes.counts.size, BLOCK)), np.empty(BLOCK), np.empty((4, BLOCK))
-    numbers = np.empty(BLOCK * channels)
     points, wavelengths = wi.size // 3, nodes.shape[0]
-    for start in range(0, points, BLOCK):
-        count = min(BLOCK, points - start)
+    most = min(POINTS, points)
+    x, mu, scratch = np.empty((axes.counts.size, most)), np.empty(most), np.empty((4, most))
+    numbers, cell = np.empty(most * channels), np.empty(x.shape, np.int32)
+    for start in range(0, points, POINTS):
+        count = min(POINTS, points - start)
         ui, ur = wi[3 * start : 3 * (start + count)], wr[3 * start : 3 * (start + count)]
         f_r = out[start * wavelengths : (start + count) * wavelengths]
         points_of_vectors(rule, ui, ur, count, x, mu, scratch)
-        interpolated(axes, table, channels, x, count, numbers)
+        interpolated(axes, table, channels, x, count, numbers, cell)
         finished(rule, numbers, channels, mu, spectra, uniform, nodes, weight, count, f_r)
         odd = 0
         for j in range(count):

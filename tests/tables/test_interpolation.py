@@ -31,10 +31,10 @@ def at(axes: Axes, points: NDArray[np.float64], table: NDArray[np.float32], chan
     return out
 
 
-def _located(axes: Axes, points: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    cell, share = np.empty(points.shape, np.int64), np.empty(points.shape)
-    for axis, x in enumerate(points):
-        locate(axes, axis, np.ascontiguousarray(x), x.size, cell[axis], share[axis])
+def _located(axes: Axes, points: NDArray[np.float64]) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
+    cell, share = np.empty(points.shape, np.int32), points.copy()
+    for axis in range(len(points)):
+        locate(axes, axis, share, points.shape[1], cell)
     return cell, share
 
 
@@ -135,16 +135,26 @@ def test_linear_interpolation_is_scipys(dimensions: int, channels: int) -> None:
         np.testing.assert_allclose(out, expected[:BLOCK, 0], atol=1e-14)
 
 
-def test_the_kernel_for_three_cubic_axes_is_the_general_one() -> None:
+@pytest.mark.parametrize("sizes", [(8, 13, 5), (4, 13, 4)])
+@pytest.mark.parametrize("end", [("even", "open"), ("open", "even"), ("even", "even"), OPEN])
+def test_the_kernel_for_three_cubic_axes_is_the_general_one(sizes: tuple[int, ...], end: tuple[str, str]) -> None:
     rng = np.random.default_rng(5)
-    axes = [UNEQUAL, EQUAL, UNEQUAL[:5]]
-    table = rng.random((8, 13, 5)).astype(np.float32)
-    ready = prepared(axes, [("even", "open"), ("periodic", "periodic"), OPEN], cubic=True)
+    axes = [nodes[:size] for nodes, size in zip((UNEQUAL, EQUAL, UNEQUAL), sizes, strict=True)]
+    table = rng.random(sizes).astype(np.float32)
+    ready = prepared(axes, [("even", "open"), end, end], cubic=True)
     points = np.stack([rng.uniform(0.0, nodes[-1], BLOCK) for nodes in axes])
+    points[:, :4] = [axis[[0, 1, -2, -1]] for axis in axes]
     cell, share = _located(ready, points)
     out = np.empty(BLOCK)
     tricubic(ready, cell, share, BLOCK, table.reshape(-1), out)
-    np.testing.assert_allclose(out, at(ready, points, table), atol=1e-14)
+    general = prepared(axes, [("even", "open"), end, end], cubic=True)._replace(lines=np.empty((0, 16)))
+    np.testing.assert_allclose(out, at(general, points, table), rtol=1e-14, atol=1e-14)
+    assert out[0] == table[0, 0, 0]  # exact on a node
+
+
+@pytest.mark.parametrize(("size", "end"), [(5, ("periodic", "periodic")), (3, OPEN)])
+def test_an_axis_without_four_neighbours_takes_the_general_kernel(size: int, end: tuple[str, str]) -> None:
+    assert prepared([UNEQUAL, UNEQUAL[:size], UNEQUAL], [OPEN, end, OPEN], cubic=True).lines.size == 0
 
 
 @NODES
