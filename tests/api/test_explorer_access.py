@@ -73,3 +73,8 @@ def test_a_phone_shows_the_picture_first(chromium: Chromium, address: str) -> No
         _, top, _, tall = box(chromium, "#sphere canvas")
         assert 0 < top < top + tall < height
         assert chromium.evaluate("search.getBoundingClientRect().top") > height
+        was = chromium.evaluate("[location.hash, picture.dataset.shown]")
+        chromium.evaluate("document.querySelector('header a').click()")  # one link at the top reaches the list
+        assert chromium.evaluate("document.activeElement.id") == "search"
+        assert 0 <= chromium.evaluate("search.getBoundingClientRect().top") < height
+        assert chromium.evaluate("[location.hash, picture.dataset.shown]") == was

@@ -116,7 +116,7 @@ def test_numbers_of_the_scale_do_not_overlap_on_a_phone(chromium: Chromium, addr
     chromium.open(f"{address}#material={name}&view=cut", 390)
     shown(chromium, f"material={name}")
     boxes = chromium.evaluate(
-        "[...document.querySelectorAll('#cut text:not(.strong)')].map(each => each.getBoundingClientRect())"
+        "[...document.querySelectorAll('#cut text')].map(each => each.getBoundingClientRect())"
         ".map(({ left, right, bottom }) => [bottom, left, right])"
     )
     line = sorted(box for box in boxes if box[0] == max(bottom for bottom, _, _ in boxes))

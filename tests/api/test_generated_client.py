@@ -134,6 +134,16 @@ def test_numbers_come_through(generated: types.ModuleType, service: str) -> None
     assert "zarr.json" in zipfile.ZipFile(io.BytesIO(zipped)).namelist()
 
 
+def test_npy_comes_back_as_the_bytes_of_an_answer(generated: types.ModuleType, service: str) -> None:
+    operation = importlib.import_module("generated_client.api.lookup.lookup_points")
+    models = importlib.import_module("generated_client.models")
+    body = models.PointsBody.from_dict(LIGHT)
+    request = operation._get_kwargs("white-tile", body=body, format_=models.LookupPointsFormatType0.NPY)
+    with generated.Client(base_url=service) as client:
+        answer = client.get_httpx_client().request(**request)
+    np.testing.assert_allclose(np.load(io.BytesIO(answer.content)), [1.0 / np.pi] * 2, rtol=1e-6)
+
+
 def test_npy_goes_there(generated: types.ModuleType, service: str) -> None:
     operation = importlib.import_module("generated_client.api.lookup.lookup_points")
     kind = importlib.import_module("generated_client.models").LookupPointsFormatType0.JSON

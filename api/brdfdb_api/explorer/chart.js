@@ -18,8 +18,9 @@ const TALL = 330; // pixels of the frame
  * @param {Across} across
  * @param {Up} up
  * @param {(x: number) => string} reads
- * @param {(place: (x: number, y: number) => [number, number]) => SVGElement[]} more what is drawn below the curves */
-export function chart(into, curves, across, up, reads, more = () => []) {
+ * @param {(place: (x: number, y: number) => [number, number]) => SVGElement[]} more what is drawn below the curves
+ * @param {{ label: string, colour: string, dash?: string }[]} lines what the legend says of that */
+export function chart(into, curves, across, up, reads, more = () => [], lines = []) {
   const width = Math.max(into.clientWidth, 240),
     tall = Math.min(TALL, Math.max(200, 0.75 * width));
   const [right, bottom] = [width - RIGHT, TOP + tall];
@@ -91,7 +92,7 @@ export function chart(into, curves, across, up, reads, more = () => []) {
   picture.dataset.range = up.range.join(" ");
   into.replaceChildren(
     picture,
-    element("p", { className: "legend quiet" }, ...(curves.length > 1 ? curves.map(legend) : []), read),
+    element("p", { className: "legend quiet" }, ...[...(curves.length > 1 ? curves : []), ...lines].map(legend), read),
   );
   reader(
     into,

@@ -33,13 +33,23 @@ export function listen(choose, now) {
     ({ target }) => target instanceof HTMLInputElement && choose({ view: target.value }),
   );
   form.addEventListener("submit", (event) => event.preventDefault());
+  const compare = () => {
+    const { value } = field("compare");
+    if (value && !now().compare.includes(value)) choose({ compare: [...now().compare, value] });
+  };
+  let typed = false; // keys in a closed list pass over other names: Enter takes the one that is reached
+  field("compare").addEventListener("pointerdown", () => (typed = false));
+  field("compare").addEventListener("keydown", (/** @type {KeyboardEvent} */ event) => {
+    if (event.key === "Enter" && typed) compare();
+    typed = !["Enter", "Tab"].includes(event.key) && !event.altKey && (event.key !== " " || typed);
+  });
   form.addEventListener("input", ({ target }) => {
     const { name, checked, value } = /** @type {HTMLInputElement} */ (target);
     if (name === "colour") choose({ nm: checked ? null : Number(field("nm").value) });
     else if (name === "log") choose({ scale: checked ? "log" : "linear" });
     else if (CHOSEN.includes(name)) choose({ [name]: value });
     else if (name !== "compare") choose({ [name]: Number(value) });
-    else if (value && !now().compare.includes(value)) choose({ compare: [...now().compare, value] });
+    else if (!typed) compare();
   });
   beside.addEventListener("click", ({ target }) => {
     const text = target instanceof HTMLElement && target.dataset.text;
@@ -51,7 +61,7 @@ export function listen(choose, now) {
  * @param {any[]} materials */
 export function offer(materials) {
   field("compare").replaceChildren(
-    new Option("add …", ""),
+    new Option("add … (Enter confirms)", ""),
     new Option("its own model or table", MODEL),
     ...materials.filter((each) => !each.damaged).map((each) => new Option(each.title, each.name)),
   );

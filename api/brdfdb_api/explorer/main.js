@@ -42,7 +42,7 @@ const REST_MS = 250; // after which a slider rests
 const LINK_MS = 200; // browsers slow pages down that write their address at every move of a slider
 const MOVED = ["theta_i", "phi_i", "theta_r", "turn", "nm", "exposure"];
 
-let state = fromHash(location.hash, VIEWS);
+let { state, wrong } = fromHash(location.hash, VIEWS); // wrong: what is wrong in the link, until a hand changes something
 /** @type {Series[]} */
 let series = []; // what is shown; emptied when it has to be found anew
 let stop = new AbortController();
@@ -59,6 +59,8 @@ let quick = false,
   resting = 0; // whether a slider moves; the picture is drawn again, finely, once it rests
 /** @type {Map<string, { key: string, hurried: boolean, answers: any[] }>} */
 const before = new Map(); // the last answers to each view
+/** @type {Map<string, { key: string, problem: Problem }>} */
+const refused = new Map(); // the last questions of each view that were, which are not asked again
 let missing = ""; // why what is compared with is not shown
 
 /** The views that are drawn for one.
@@ -90,6 +92,7 @@ function change(part) {
     subjectOf(part.material ?? "").base === subjectOf(state.material).base;
   const moved = slid || Object.keys(part).every((key) => MOVED.includes(key));
   state = { ...state, ...part };
+  wrong = [];
   if ("material" in part || "compare" in part) {
     if (!slid) series = [];
     fresh = !slid;
@@ -131,7 +134,7 @@ async function work() {
     }, SLOW_MS);
     try {
       await draw(now, start, signal);
-      say(missing);
+      say([...wrong, missing].filter(Boolean).join(" "));
       picture.dataset.shown = toHash(now);
       picture.dataset.detail = now.quick ? "quick" : "fine";
     } catch (problem) {
@@ -196,7 +199,10 @@ function forget(now) {
   shown(null);
   list.paint();
   caption.textContent = "";
-  if (series.length) return;
+  if (series.length) {
+    parameters.show(series[0], now); // to move away from what was refused
+    return;
+  }
   title.textContent = now.material;
   facts.forget();
   parameters.forget();
@@ -255,11 +261,16 @@ async function answersTo(view, now, signal, lastTry = false) {
     all.some(({ info }) => info.anisotropic),
     asked,
   ]);
+  const no = refused.get(view.name);
+  if (no?.key === key) throw no.problem;
   const kept = before.get(view.name);
   const answers =
     kept?.key === key && (hurried || !kept.hurried)
       ? kept.answers
-      : await Promise.all(known.map((each) => answer(each, now, all, signal)));
+      : await Promise.all(known.map((each) => answer(each, now, all, signal))).catch((problem) => {
+          if (problem instanceof Problem && !problem.passes) refused.set(view.name, { key, problem });
+          throw problem;
+        });
   signal.throwIfAborted();
   if (answers !== kept?.answers) before.set(view.name, { key, hurried, answers });
   if (lastTry || !answers.some((found, i) => outdates(found, known[i]))) return { known, answers };
@@ -310,7 +321,8 @@ addEventListener("hashchange", () => {
   // a link, or the way back
   clearTimeout(linked);
   const held = fromHash(location.hash, VIEWS);
-  change({ ...held, material: held.material || state.material });
+  change({ ...held.state, material: held.state.material || state.material });
+  wrong = held.wrong;
 });
 let width = picture.clientWidth;
 new ResizeObserver(() => {
@@ -319,6 +331,12 @@ new ResizeObserver(() => {
   if (series.length) redraw();
 }).observe(picture);
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => series.length && redraw());
+for (const link of document.querySelectorAll("a[href^='#']")) {
+  link.addEventListener("click", (event) => {
+    event.preventDefault(); // the address holds what is shown
+    byId(link.getAttribute("href")?.slice(1) ?? "", HTMLElement).focus();
+  });
+}
 shown(state.view); // an empty frame
 if (state.material) redraw(0);
 list

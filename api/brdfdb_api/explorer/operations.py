@@ -9,16 +9,15 @@ from typing import Any
 _PAGE = """<!doctype html>
 <html lang="en">
 <head><meta charset="utf-8"><meta name="viewport" content="width=device-width"><title>{title}: operations</title>
-<link rel="stylesheet" href="/explorer/explorer.css"></head>
-<body><main>
+<link rel="icon" href="data:,"><link rel="stylesheet" href="/explorer/explorer.css"></head>
+<body><main class="text">
 <h1>{title}: operations</h1><p>{description}</p>
 <p><a href="/openapi.json">openapi.json</a> has all of this with the schemas of bodies and answers.</p>
-{operations}
-</main></body></html>
+{operations}</main></body></html>
 """
 _OPERATION = """<section><h2>{method} {path}</h2>
-<p>{summary}</p>
-<ul>{parameters}</ul></section>"""
+<p>{summary}</p><ul>{parameters}</ul></section>"""
+_NAMED = {"name": "a material", "file": "a file of the table", "file_format": "a format", "revision": "a revision"}
 
 
 def page_of(document: Mapping[str, Any]) -> str:
@@ -40,7 +39,7 @@ def page_of(document: Mapping[str, Any]) -> str:
 
 
 def _parameter(parameter: Mapping[str, Any]) -> str:
-    schema = parameter["schema"]
-    words = parameter.get("description") or schema.get("description", "")
+    schema, name = parameter["schema"], parameter["name"]
+    words = parameter.get("description") or schema.get("description") or f"name of {_NAMED.get(name, f'a {name}')}"
     needed = ", required" if parameter.get("required") and parameter["in"] == "query" else ""
-    return f"<li><code>{escape(parameter['name'])}</code> ({parameter['in']}{needed}): {escape(words)}</li>"
+    return f"<li><code>{escape(name)}</code> ({parameter['in']}{needed}): {escape(words)}</li>"

@@ -52,29 +52,55 @@ const RANGES = {
 };
 // Wavelengths at which pictures look up spectra, as `brdfdb render`
 export const PICTURE_NM = Array.from({ length: 14 }, (_, i) => 420 + 20 * i);
+const CHANGED = /^(.*?)\((.*)\)$/; // NAME(parameter=value,...)
 const MOST = 7; // subjects that are compared with: there are as many more colours
 
-/** The state that a link holds, of some views; what it does not hold, or holds wrongly, is as at the start.
+/** The state that a link holds, of some views, and sentences on what it holds wrongly. A number out of range is the
+ * nearest that is allowed; what it does not hold, or holds wrongly otherwise, is as at the start.
  * @param {string} hash
  * @param {Record<string, unknown>} views
- * @returns {State} */
+ * @returns {{ state: State, wrong: string[] }} */
 export function fromHash(hash, views) {
   /** @type {Record<string, any>} */
   const state = { ...DEFAULTS, compare: [] };
+  /** @type {string[]} */
+  const wrong = [];
   /** @type {Record<string, string[]>} */
   const choices = { ...CHOICES, view: Object.keys(views) };
   for (const [key, text] of new URLSearchParams(hash.replace(/^#/, ""))) {
     if (key in RANGES) {
-      const value = Number(text),
+      const value = text.trim() ? Number(text) : NaN,
         [low, high] = RANGES[key];
-      if (text !== "" && value >= low && value <= high) state[key] = value;
+      if (!Number.isNaN(value)) state[key] = Math.min(Math.max(value, low), high);
+      if (state[key] !== value)
+        wrong.push(`${key} is a number from ${low} to ${high}, and not '${text}': ${state[key] ?? "all"} is shown.`);
     } else if (key === "compare") {
-      if (text && !state.compare.includes(text)) state.compare = [...state.compare, text].slice(0, MOST);
-    } else if (key in choices ? choices[key].includes(text) : key === "material") {
-      state[key] = text;
+      const kept = numbersOf(text, wrong);
+      if (kept && !state.compare.includes(kept)) state.compare = [...state.compare, kept].slice(0, MOST);
+    } else if (key === "material") {
+      state.material = numbersOf(text, wrong);
+    } else if (key in choices) {
+      if (choices[key].includes(text)) state[key] = text;
+      else wrong.push(`${key} is one of ${choices[key].join(", ")}, and not '${text}': ${state[key]} is shown.`);
     }
   }
-  return /** @type {State} */ (state);
+  return { state: /** @type {State} */ (state), wrong };
+}
+
+/** A subject without parameters that are no numbers; of a material without any other, it is the one published.
+ * @param {string} text
+ * @param {string[]} wrong sentences, to which those on such parameters are added */
+function numbersOf(text, wrong) {
+  const [, base, inside] = CHANGED.exec(text) ?? [];
+  if (base === undefined) return text;
+  const own = base.startsWith("*") ? "typical" : "published";
+  const kept = inside.split(",").filter((pair) => {
+    const [name, value = ""] = pair.split("=");
+    if (value.trim() && Number.isFinite(Number(value))) return true;
+    if (pair) wrong.push(`${name} is a number, and not '${value}': the ${own} value is shown.`);
+    return false;
+  });
+  return kept.length || base.startsWith("*") ? `${base}(${kept.join(",")})` : base;
 }
 
 /** The end of a link: what differs from the start.
@@ -99,7 +125,7 @@ const plain = (text) => encodeURIComponent(text).replace(/%3A|%3D|%2C/g, (code) 
  * @param {string} text
  * @returns {Subject} */
 export function subjectOf(text) {
-  const [, base, changed] = /^(.*?)\((.*)\)$/.exec(text) ?? [];
+  const [, base, changed] = CHANGED.exec(text) ?? [];
   if (base !== undefined) {
     const pairs = changed
       .split(",")

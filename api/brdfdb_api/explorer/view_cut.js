@@ -13,7 +13,6 @@ const RADIAN = Math.PI / 180;
 const TOP = 26,
   STRIP = 110,
   LABEL = 40; // pixels: room above, height of what tells the difference, width of a number
-const WORDS = 88; // pixels that the name of the specular part takes
 const NEAR = 24; // pixels from the light in which a hand takes it
 
 let centre = [0, 0]; // of the polar picture [pixel]
@@ -116,7 +115,6 @@ function flat(into, curves, range, state, specular) {
   const marks = (/** @type {(x: number, y: number) => [number, number]} */ place) => [
     path([place(-state.theta_i, bottom), place(-state.theta_i, top)], "light"),
     path([place(state.theta_i, bottom), place(state.theta_i, top)], part > 0 ? "spike" : "mirror"),
-    ...(part > 0 ? [nameOf(part, place(state.theta_i, top))] : []),
   ];
   chart(
     into,
@@ -125,14 +123,18 @@ function flat(into, curves, range, state, specular) {
     up,
     (theta) => reading(curves, theta),
     marks,
+    rays(part),
   );
 }
 
-/** The name of a specular part, beside the upper end of its spike.
- * @param {number} part
- * @param {[number, number]} end */
-const nameOf = (part, [x, y]) =>
-  svg("text", { x: x - 6, y: y + 16, class: "strong end" }, `specular part ${percent(part)}`);
+/** Lines of the legend for the light, and for the specular part or the mirror direction without one.
+ * @param {number} part */
+const rays = (part) => [
+  { label: "light", colour: ink("third"), dash: "2 3" },
+  part > 0
+    ? { label: `specular part ${percent(part)}`, colour: ink("spike") }
+    : { label: "mirror direction", colour: ink("muted"), dash: "2 3" },
+];
 
 /** The cut as a polar picture.
  * @param {HTMLElement} into
@@ -150,20 +152,13 @@ function round(into, curves, range, state, specular, off) {
   const at = (theta, r) => [width / 2 + r * Math.sin(theta * RADIAN), TOP + radius - r * Math.cos(theta * RADIAN)];
   const part = Math.max(...specular);
   centre = at(0, 0);
-  const [x, y] = at(-state.theta_i, radius),
-    [u, v] = at(state.theta_i, radius * 0.62);
+  const [x, y] = at(-state.theta_i, radius);
   const parts = [
     ...frame(at, radius, range, state),
     path([at(-state.theta_i, 0), at(-state.theta_i, radius)], "light"),
     path([at(state.theta_i, 0), at(state.theta_i, radius)], "mirror"),
     ...curves.flatMap((curve) => strokes(curve, (theta, value) => at(theta, out(value)))),
-    ...(part > 0
-      ? [
-          path([at(state.theta_i, 0), at(state.theta_i, radius)], "spike"),
-          svg("text", { x: Math.min(u + 8, width - WORDS), y: v - 2, class: "strong" }, "specular part"),
-          svg("text", { x: Math.min(u + 8, width - WORDS), y: v + 12, class: "strong" }, percent(part)),
-        ]
-      : []),
+    ...(part > 0 ? [path([at(state.theta_i, 0), at(state.theta_i, radius)], "spike")] : []),
     svg("circle", { cx: x, cy: y, r: 7, class: "lamp" }),
   ];
   let bottom = TOP + radius + 24;
@@ -181,15 +176,9 @@ function round(into, curves, range, state, specular, off) {
     [-89, 89],
     (theta) => reading(curves, theta),
   );
-  const rays = [
-    { label: "light", colour: ink("third"), dash: "2 3" },
-    part > 0
-      ? { label: "specular part", colour: ink("spike") }
-      : { label: "mirror direction", colour: ink("muted"), dash: "2 3" },
-  ];
   into.replaceChildren(
     picture,
-    element("p", { className: "legend quiet" }, ...[...(curves.length > 1 ? curves : []), ...rays].map(legend), read),
+    element("p", { className: "legend quiet" }, ...[...(curves.length > 1 ? curves : []), ...rays(part)].map(legend), read),
   );
 }
 
