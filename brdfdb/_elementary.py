@@ -1,4 +1,4 @@
-"""Elementary functions of kernels: exp, log, sine, arcsin, arctan, erfc without branches, so that loops vectorise.
+"""Elementary functions of kernels: exp, log, sine, arcsin, erfc without branches, so that loops over them vectorise.
 
 Those of libm do not vectorise without SVML, which pip wheels do not ship. Kernels of any file may call these functions:
 this file is one of `_numba.SHARED`, so that their callers are compiled again after a change.
@@ -117,25 +117,6 @@ def arcsin(x: float) -> float:
     p = p * u + 0.04464285723723301
     p = p * u + 0.0749999999990911
     p = p * u + 0.16666666666667013
-    return x + x * u * p
-
-
-@kernel
-def arctan(x: float) -> float:
-    """Return the arctangent [rad] of x, for abs(x) <= tan(pi / 8), within 3e-16 relative."""
-    u = x * x
-    # arctan(x) / x, Chebyshev's series to 1e-17
-    p = -0.019176885636589053
-    p = p * u + 0.039231657085083686
-    p = p * u - 0.050854496960392584
-    p = p * u + 0.05858148904795124
-    p = p * u - 0.0666451144646022
-    p = p * u + 0.07692183190760651
-    p = p * u - 0.09090904578121085
-    p = p * u + 0.11111111015256292
-    p = p * u - 0.14285714284666542
-    p = p * u + 0.1999999999999552
-    p = p * u - 0.3333333333333333
     return x + x * u * p
 
 

@@ -98,9 +98,18 @@ class Server(uvicorn.Server):
         return await super().on_tick(counter)
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
-        for listener in self.servers:
-            listener.close()
+        accepted = []
+        for listener in sockets or ():  # its end resets connections that nobody has accepted
+            listener.listen(0)  # few come while the last ones are accepted
+            with contextlib.suppress(BlockingIOError):
+                while True:
+                    accepted.append(listener.accept()[0])
+        for server in self.servers:
+            server.close()
         self.server_state.default_headers.append((b"connection", b"close"))  # clients send no more requests
+        state = {"config": self.config, "server_state": self.server_state, "app_state": self.lifespan.state}
+        for connection in accepted:
+            await asyncio.get_running_loop().connect_accepted_socket(lambda: Connection(**state), connection)
         await asyncio.sleep(LAST_S)
         await super().shutdown(sockets)
 
@@ -191,6 +200,9 @@ def _work(descriptor: int) -> None:
             with (counts / f"{kind}_{os.getpid()}.db").open("wb") as file:
                 os.posix_fallocate(file.fileno(), 0, COUNTS_BYTES)
         except FileNotFoundError:  # the parent was killed
+            return
+        except OSError as error:  # no room: the next worker tries again
+            log.write({"failed": f"a worker cannot start: {error.strerror}: {counts}"})
             return
 
     def wait() -> None:

@@ -137,8 +137,9 @@ def packed(table: Table, file_format: str, *, verdict: str, **options: Any) -> t
         written = exporter.write(table, path, verdict=verdict, **options)
         if len(written.paths) == 1 and path.is_file():
             return path.name, exporter.media_type, path.read_bytes()
-        names = [str(file.relative_to(folder)) for file in folder.rglob("*") if file.is_file()]
-        return f"{path.name}.zip", ZIP, b"".join(zipped(folder, names))
+        files = sorted(file for file in folder.rglob("*") if file.is_file())
+        contents = ((str(file.relative_to(folder)), file.read_bytes()) for file in files)
+        return f"{path.name}.zip", ZIP, b"".join(zipped(contents))
 
 
 def _text(value: Any) -> str:

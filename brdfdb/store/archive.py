@@ -6,7 +6,6 @@ import contextlib
 import tempfile
 import zipfile
 from collections.abc import Iterable, Iterator
-from pathlib import Path
 from typing import Any
 
 from pydantic import BaseModel
@@ -31,12 +30,12 @@ class Group(BaseModel):
     consolidated_metadata: dict[str, Any]
 
 
-def zipped(folder: Path, names: Iterable[str], compression: int = zipfile.ZIP_DEFLATED) -> Iterator[bytes]:
-    """Yield files of a folder as a zip archive in pieces, from a temporary file: memory does not grow with a table."""
+def zipped(contents: Iterable[tuple[str, bytes]], compression: int = zipfile.ZIP_DEFLATED) -> Iterator[bytes]:
+    """Yield named contents as a zip archive in pieces, from a temporary file: memory holds one of them at a time."""
     with tempfile.TemporaryFile() as file:
-        with zipfile.ZipFile(file, "w", compression) as archive:
-            for name in sorted(names):
-                archive.write(folder / name, name)
+        with zipfile.ZipFile(file, "w") as archive:
+            for name, content in contents:
+                archive.writestr(zipfile.ZipInfo(name), content, compression)  # without the time: the same bytes again
         file.seek(0)
         while piece := file.read(_PIECE):
             yield piece

@@ -75,7 +75,7 @@ def read_group(group: Path, files: Mapping[str, Entry]) -> Group | None:
     ValueError, KeyError, TypeError, RuntimeError
         If the files do not hold arrays.
     """
-    metadata = json.loads(_bytes(group, METADATA, files))
+    metadata = json.loads(checked_bytes(group, METADATA, files))
     described = (metadata.get("consolidated_metadata") or {}).get("metadata")
     if described is None or not all(_ours(array) for array in described.values()):
         return None
@@ -99,12 +99,14 @@ def _ours(array: Mapping[str, Any]) -> bool:
 
 def _array(group: Path, name: str, array: Mapping[str, Any], files: Mapping[str, Entry]) -> NDArray[Any]:
     """Return an array [native byte order] from the files of its chunks."""
-    _bytes(group, f"{name}/{METADATA}", files)  # nothing reads it here, and it is checked as the rest of the revision
+    checked_bytes(
+        group, f"{name}/{METADATA}", files
+    )  # nothing reads it here, and it is checked as the rest of the revision
     shape, chunk = array["shape"], array["chunk_grid"]["configuration"]["chunk_shape"]
     dtype = np.dtype(array["data_type"])
     values = np.empty(shape, dtype=dtype)
     for number in itertools.product(*(range(-(-size // step)) for size, step in zip(shape, chunk, strict=True))):
-        data = decoded(_bytes(group, "/".join([name, "c", *map(str, number)]), files))
+        data = decoded(checked_bytes(group, "/".join([name, "c", *map(str, number)]), files))
         if data is None:
             where = f"{group.parent.name} {group.name}"
             raise StoreError(f"{where} is damaged: its values cannot be decoded")
@@ -122,8 +124,23 @@ def decoded(data: bytes) -> bytes | None:
     return values
 
 
-def _bytes(group: Path, key: str, files: Mapping[str, Entry]) -> bytes:
-    """Return the content of a file of a revision, which was checked."""
+def checked_bytes(group: Path, key: str, files: Mapping[str, Entry]) -> bytes:
+    """Return the content of a file of a revision, checked once it is in memory.
+
+    Parameters
+    ----------
+    group : Path
+        Directory of the revision.
+    key : str
+        Path of the file in it.
+    files : mapping
+        Size and sha256 of each file of the revision.
+
+    Raises
+    ------
+    StoreError
+        If the file is missing, cannot be read or changed.
+    """
     try:
         value = regular_bytes(group / key)
     except (FileNotFoundError, NotADirectoryError):

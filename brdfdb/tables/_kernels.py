@@ -10,14 +10,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brdfdb._elementary import arctan, cos, cosine, exp, sine
+from brdfdb._elementary import arcsin, cos, cosine, exp, sine
 from brdfdb._numba import kernel, loop
 from brdfdb.tables._interpolation import POINTS, Axes, interpolated
 
 Array = NDArray[np.float64]
 
-PI, TURN, HALF_PI, QUARTER_PI, PHI_MAX = np.pi, 2.0 * np.pi, np.pi / 2.0, np.pi / 4.0, 1e15
-TAN_PI_8 = 0.41421356237309503
+PI, TURN, HALF_PI, PHI_MAX = np.pi, 2.0 * np.pi, np.pi / 2.0, 1e15
 
 
 class Rule(NamedTuple):
@@ -44,11 +43,8 @@ class Rule(NamedTuple):
 @kernel
 def angle(y: float, x: float) -> float:
     """Return atan2(y, x) [rad] of a point in the first quadrant, the axes included; 0 at the origin."""
-    small, large = min(x, y), max(x, y)
-    diagonal = small > TAN_PI_8 * large  # arctan(t) = pi / 4 - arctan((1 - t) / (1 + t)), without a second division
-    above, below = (large - small, large + small) if diagonal else (small, large)
-    a = arctan(above / (below if below > 0.0 else 1.0))
-    a = QUARTER_PI - a if diagonal else a
+    length = np.sqrt(x * x + y * y)
+    a = arcsin(min(x, y) / (length if length > 0.0 else 1.0))
     return float(HALF_PI - a if y > x else a)
 
 

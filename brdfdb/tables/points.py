@@ -185,4 +185,7 @@ def _npy(body: bytes) -> NDArray[Any]:
     data = memoryview(body)[stream.tell() :]
     if math.prod(shape) * dtype.itemsize != len(data) or any(size < 0 for size in shape):
         raise ParameterError("body", "it is shorter or longer than its .npy header says")
-    return np.frombuffer(data, dtype).reshape(shape, order="F" if by_columns else "C")
+    try:
+        return np.frombuffer(data, dtype).reshape(shape, order="F" if by_columns else "C")
+    except (TypeError, ValueError):  # an empty array with an axis that is too long, too many axes, or True for a length
+        raise ParameterError("body", "its .npy header gives a shape that no array has") from None

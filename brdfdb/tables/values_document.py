@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Mapping
 from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import BaseModel, Field
 
 from brdfdb.tables.albedo import AlbedoDocument
@@ -141,3 +143,17 @@ def plain(array: Any) -> Any:
     if isinstance(array, np.ndarray):
         return np.ascontiguousarray(array) if array.ndim else array.item()
     return array
+
+
+def arrays_of(values: Mapping[str, Values]) -> dict[str, NDArray[Any]]:
+    """Return the arrays of values by name: NAME, NAME.error, and NAME.stokes of the reflected light."""
+    arrays = {name: np.asarray(found.brdf) for name, found in values.items()}
+    arrays |= {f"{name}.error": np.asarray(found.error) for name, found in values.items() if found.error is not None}
+    return arrays | {f"{name}.stokes": found.stokes["reflected"] for name, found in values.items() if found.stokes}
+
+
+def npy_bytes(array: NDArray[Any]) -> bytes:
+    """Return an array as a .npy file."""
+    buffer, array = io.BytesIO(), np.asarray(array, order="C")
+    np.lib.format.write_array_header_1_0(buffer, np.lib.format.header_data_from_array_1_0(array))
+    return b"".join((buffer.getvalue(), array.data))  # np.save copies twice

@@ -98,8 +98,13 @@ def test_a_file_that_changed_in_place_is_not_sent_to_be_kept_for_good(own: Path)
     for address in addresses:
         said = client.problem("GET", address, 503)["detail"]
         assert said == f"copper-foil r000001 is damaged: the content of {CHUNK} changed"
+    chunk.unlink()
+    for address in addresses:
+        assert "missing" in client.problem("GET", address, 503)["detail"]
     chunk.write_bytes(sound)
-    assert [client.get(address).status_code for address in addresses] == [200] * 3
+    answers = [client.get(address) for address in addresses]
+    assert [answer.status_code for answer in answers] == [200] * 3
+    assert answers[1].content == answers[2].content == client.get(addresses[1]).content
 
 
 def test_a_zip_that_xarray_opens(client: Client, store: Store, tmp_path: Path) -> None:

@@ -193,6 +193,10 @@ ARRAYS = {
     "three columns": npy("(1, 3)", bytes(24)),
     "no columns": npy("()", bytes(8)),
     "no rows": npy("(0, 4)"),
+    "no rows, and more of them than 64 bits count": npy("(0, 1000000000000000000000000000000, 4)"),
+    "no columns of more than memory": npy("(4611686018427387904, 0, 4)"),
+    "seventy axes": npy(f"({'1, ' * 70}4)", bytes(32)),
+    "truth for a length": npy("(True, 4)", bytes(32)),
     "nan": npy("(1, 4)", struct.pack("<4d", float("nan"), 0, 0, 0)),
     "an infinite azimuth": npy("(1, 4)", struct.pack("<4d", 1, float("inf"), 0, 0)),
 }
@@ -358,6 +362,18 @@ def test_an_offer_of_http_2_is_ignored(server: Server) -> None:
         answer = connection.getresponse()
         assert (answer.status, json.loads(answer.read())["material"]) == (200, "white")
     connection.close()
+
+
+def test_fields_behind_a_body_are_no_headers(server: Server) -> None:
+    head = f"POST {LOOKUP} HTTP/1.1\r\nHost: x\r\nConnection: close\r\nTransfer-Encoding: chunked\r\n\r\n"
+    body = b'{"theta_i":45,"theta_r":30}'
+    fields = b"Accept: application/x-npy\r\nContent-Encoding: gzip\r\nX-Request-ID: mine\r\n\r\n"
+    with socket.create_connection(("127.0.0.1", server.port), timeout=60) as connection:
+        connection.sendall(head.encode() + b"%x\r\n%b\r\n0\r\n" % (len(body), body) + fields)
+        answer = b"".join(iter(lambda: connection.recv(65536), b""))
+    assert answer.startswith(b"HTTP/1.1 200 ")
+    assert b"content-type: application/json" in answer
+    assert b"mine" not in answer
 
 
 def test_heads_are_counted_one_by_one(server: Server) -> None:

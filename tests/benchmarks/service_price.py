@@ -33,7 +33,7 @@ from tests.benchmarks.recording import Column, Run
 from tests.benchmarks.service import NAMES, as_npy, cpu_seconds, get, load, made_store, points, post, served
 
 NAME = NAMES[0]
-ROUNDS, SECONDS, QUICK_SECONDS = 3, 1.0, 0.05
+ROUNDS, SECONDS, QUICK_SECONDS = 3, 1.0, 0.3
 MEASURED = "Processor time of a request to the service, to a bare FastAPI endpoint, and to a naive application."
 
 

@@ -176,7 +176,7 @@ def test_the_recipe_of_a_fit_at_one_wavelength_holds_there(
         return
     assert run(*lookup, "--wavelength-nm", "650") == 0
     assert run(*lookup, "--wavelength-nm", "450") == 2
-    assert "450 is outside [650, 650] nm" in capsys.readouterr().err
+    assert "450 is not 650 nm, the one wavelength of" in capsys.readouterr().err
     assert run("show", name, "--store", store) == 0
     shown = capsys.readouterr().out
     assert "wavelength      650 nm only" in shown

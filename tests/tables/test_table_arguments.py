@@ -183,7 +183,7 @@ def test_a_grey_table_is_the_same_at_any_wavelength() -> None:
         (WAVELENGTHS, 399.9, "wavelength_nm: 399.9 is outside [400, 2000] nm of random"),
         (WAVELENGTHS, [500.0, 2001.0], "wavelength_nm: 2001 is outside [400, 2000] nm of random"),
         (WAVELENGTHS, 2000.00001, "wavelength_nm: 2000.00001 is outside [400, 2000] nm of random"),
-        (WAVELENGTHS[:1], 401.0, "wavelength_nm: 401 is outside [400, 400] nm of random"),
+        (WAVELENGTHS[:1], 401.0, "wavelength_nm: 401 is not 400 nm, the one wavelength of random"),
         (WAVELENGTHS, np.nan, "wavelength_nm: nan is not a positive number of nanometres"),
         (None, [500.0, np.nan], "wavelength_nm: nan is not a positive number of nanometres"),
         (None, np.inf, "wavelength_nm: inf is not a positive number of nanometres"),

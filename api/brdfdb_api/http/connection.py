@@ -54,6 +54,7 @@ class Connection(HttpToolsProtocol):
         if not self.flow.write_paused:
             self._quiet_since = self.loop.time()
         super().on_headers_complete()
+        self.scope["headers"] = [*self.headers]  # fields behind the body, which come later, are none (RFC 9110, 6.5.1)
         if len(self.pipeline) > PIPELINED:
             self.transport.abort()
 

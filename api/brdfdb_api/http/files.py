@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 import zipfile
 
 from starlette.requests import Request
-from starlette.responses import FileResponse, Response, StreamingResponse
+from starlette.responses import Response, StreamingResponse
 
 from brdfdb import __version__
-from brdfdb.errors import StoreError
 from brdfdb.store.archive import ZIP, Group, root_group, zipped
-from brdfdb.store.files import sha256_of
+from brdfdb.store.chunks import checked_bytes
 from brdfdb.store.manifest import check_manifest
 from brdfdb_api.http.addresses import Revision, addresses, answers, both, shelf_of
 from brdfdb_api.http.errors import RequestError
@@ -39,8 +39,11 @@ def download(request: Request, name: str, revision: Revision = None) -> Response
     group, digest = shelf_of(request).located(name, revision)
     headers = cache_headers(f"{name}-{group.name}-{digest[:16]}-{__version__}", "zip", immutable=revision is not None)
     headers["Content-Disposition"] = f'attachment; filename="{name}-{group.name}.zarr.zip"'
-    listed = check_manifest(group, digest, contents=True)["files"]
-    return StreamingResponse(zipped(group, listed, zipfile.ZIP_STORED), media_type=ZIP, headers=headers)
+    listed = check_manifest(group, digest, contents=False)["files"]
+    contents = ((name, checked_bytes(group, name, listed)) for name in sorted(listed))
+    pieces = zipped(contents, zipfile.ZIP_STORED)
+    whole = itertools.chain([next(pieces)], pieces)  # all is read before the answer begins
+    return StreamingResponse(whole, media_type=ZIP, headers=headers)
 
 
 @files.get(
@@ -54,24 +57,26 @@ def stored_file(request: Request, name: str, revision: str, file: str) -> Respon
     listed = check_manifest(group, digest, contents=False)["files"]
     if file not in listed:
         raise RequestError(404, f"{name} {revision} has no such file")
-    path, digest = group / file, listed[file]["sha256"]
-    if sha256_of(path) != digest:  # a cache would keep it forever
-        raise StoreError(f"{name} {revision} is damaged: the content of {file} changed")
+    content = checked_bytes(group, file, listed)  # a cache would keep damaged ones forever
     is_json = file.endswith(".json")  # JSON may be compressed on its way
-    headers = cache_headers(f"{name}-{revision}-{digest[:16]}", "json" if is_json else "file", immutable=True)
-    if is_json:
-        return Document(path.read_bytes(), headers)
-    _check_range(request, listed[file]["size"])
-    return FileResponse(path, media_type=BYTES, headers=headers)
+    tag = f"{name}-{revision}-{listed[file]['sha256'][:16]}"
+    headers = cache_headers(tag, "json" if is_json else "file", immutable=True)
+    return Document(content, headers) if is_json else _ranged(request, content, headers)
 
 
-def _check_range(request: Request, size: int) -> None:
-    """Forget a range that is not one of bytes; RequestError (416) for one that begins after the end of the file."""
-    part = _RANGE.fullmatch(request.headers.get("range", ""))
-    if part is None or (part["end"] and int(part["end"]) < int(part["first"])):
-        request.scope["headers"] = [header for header in request.scope["headers"] if header[0] != b"range"]
-    elif int(part["first"] or 0) >= size or (part["last"] == "0" and not part["first"]):
+def _ranged(request: Request, content: bytes, headers: dict[str, str]) -> Response:
+    """Return the range of bytes that a request names, or all; RequestError (416) if it begins after the end."""
+    part, size = _RANGE.fullmatch(request.headers.get("range", "")), len(content)
+    headers = headers | {"Accept-Ranges": "bytes"}
+    other = request.headers.get("if-range", headers["ETag"]) != headers["ETag"]
+    if part is None or other or (part["end"] and int(part["end"]) < int(part["first"])):
+        return Response(content, media_type=BYTES, headers=headers)
+    first = max(0, size - int(part["last"])) if part["last"] else int(part["first"])
+    if first >= size:
         raise RequestError(416, f"the file has {size} bytes", Content_Range=f"bytes */{size}")
+    piece = content[first : int(part["end"] or size) + 1]
+    headers["Content-Range"] = f"bytes {first}-{first + len(piece) - 1}/{size}"
+    return Response(piece, 206, headers, BYTES)
 
 
 @files.get("/v1/store/zarr.json", tags=["files"], responses=answers(Group, 304, 503))

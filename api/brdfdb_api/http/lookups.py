@@ -21,7 +21,7 @@ from brdfdb.store.shelf import Shelf
 from brdfdb.tables.evaluation import Surface, Values, surface_of
 from brdfdb.tables.points import ANGLES, Points, PointsBody
 from brdfdb.tables.table import Table
-from brdfdb.tables.values_document import Lookup, Lookups, values_document
+from brdfdb.tables.values_document import Lookup, Lookups, arrays_of, npy_bytes, values_document
 from brdfdb_api.http import queries, responses
 from brdfdb_api.http.addresses import NPY_ANSWER, Content, Quick, Revision, addresses, answers, body, both, shelf_of
 from brdfdb_api.http.errors import RequestError, refused
@@ -34,7 +34,7 @@ INLINE_BYTES = 96 * 2**10  # larger bodies are read in a thread; 1000 points tak
 # Number of larger bodies, or larger answers, that are processed at a time
 LARGE_BYTES, LARGE_VALUES, LARGE_AT_ONCE = 2**20, 100_000, 2
 TURN_S = 10.0  # longest wait for a turn [s]
-LIMITS = {"json": (1, 100), "npy": (100, 800)}  # points and values of one answer, as multiples of max_points
+LIMITS = {"json": (1, 100), "npy": (100, 400)}  # points and values of one answer, as multiples of max_points
 MATRIX = 16  # elements of the Mueller matrix that a Stokes vector takes
 SPECTRA_OF_COLOURS = 10  # factor on the number of values where only colours are returned
 # Parameters of the library that a request calls the same
@@ -154,7 +154,7 @@ async def answered(
         POINTS.labels(surface.kind).inc(points.count)
         values = evaluate(points, options, surface, specular=kind == "json")
         if kind == "npy":
-            return responses.Answer(responses.npy_bytes(values.array), headers)
+            return responses.Answer(npy_bytes(values.array), headers)
         return responses.Answer(responses.json_bytes(about | values_document(values)), headers)
 
     if values <= INLINE_VALUES and surface.kind == "table" and options.output == "spectrum":
@@ -264,12 +264,8 @@ def lookup_many(request: Request, query: Annotated[queries.ManyQuery, InQuery()]
             raise RequestError(413, f"the values of all materials are more than the {most} that one answer may hold")
         results[name] = table.revision, evaluate(points, query, surface)
     if kind == "npy":
-        arrays = {name: values.brdf for name, (_, values) in results.items()}
-        arrays |= {f"{name}.error": values.error for name, (_, values) in results.items() if values.error is not None}
-        arrays |= {
-            f"{name}.stokes": values.stokes["reflected"] for name, (_, values) in results.items() if values.stokes
-        }
         data = io.BytesIO()
+        arrays: dict[str, Any] = arrays_of({name: values for name, (_, values) in results.items()})
         np.savez(data, **arrays)
         return Response(data.getvalue(), media_type=NPZ, headers=responses.NO_STORE)
     documents = [

@@ -6,13 +6,10 @@ import contextlib
 import functools
 import gzip
 import hashlib
-import io
 import re
 from typing import TYPE_CHECKING, Annotated, Any
 
-import numpy as np
 import orjson
-from numpy.typing import NDArray
 from pydantic import BaseModel, Field, GetJsonSchemaHandler
 from pydantic_core import CoreSchema
 from starlette.concurrency import run_in_threadpool
@@ -160,13 +157,6 @@ class Document(Response):
             self.body = await run_in_threadpool(gzip.compress, self.body, 1, mtime=0)
             self.headers.update({"Content-Encoding": "gzip", "Content-Length": str(len(self.body))})
         await super().__call__(scope, receive, send)
-
-
-def npy_bytes(array: NDArray[Any]) -> bytes:
-    """Return an array as a .npy file."""
-    buffer, array = io.BytesIO(), np.asarray(array, order="C")
-    np.lib.format.write_array_header_1_0(buffer, np.lib.format.header_data_from_array_1_0(array))
-    return b"".join((buffer.getvalue(), array.data))  # np.save copies twice
 
 
 class Answer(Response):

@@ -22,12 +22,12 @@ from brdfdb.tables.albedo import reflected
 from brdfdb.tables.evaluation import Surface
 from brdfdb.tables.lobe_views import MOST_POINTS, view_directions
 from brdfdb.tables.points import Points, listed
-from brdfdb.tables.values_document import Albedo, Lobe, lobe_document
+from brdfdb.tables.values_document import Albedo, Lobe, lobe_document, npy_bytes
 from brdfdb_api.http.addresses import NPY_ANSWER, Revision, addresses, answers, both, shelf_of
 from brdfdb_api.http.errors import RequestError, refused
 from brdfdb_api.http.lookups import LARGE, checked_size, evaluate, surface_in, tag_in, turn
 from brdfdb_api.http.queries import Light, LobeQuery, Options, Query, accept_of, parsed
-from brdfdb_api.http.responses import NPY, Audit, Document, cache_headers, npy_bytes, tag_of
+from brdfdb_api.http.responses import NPY, Audit, Document, cache_headers, tag_of
 
 SPHERE = {"image/png": "sRGB with transparent corners", NPY: "linear sRGB and coverage (size, size, 4), not clipped"}
 EXPORTS_AT_ONCE = 2  # files of other formats that are made at a time
