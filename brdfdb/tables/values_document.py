@@ -147,9 +147,9 @@ def plain(array: Any) -> Any:
 
 def arrays_of(values: Mapping[str, Values]) -> dict[str, NDArray[Any]]:
     """Return the arrays of values by name: NAME, NAME.error, and NAME.stokes of the reflected light."""
-    arrays = {name: np.asarray(found.brdf) for name, found in values.items()}
-    arrays |= {f"{name}.error": np.asarray(found.error) for name, found in values.items() if found.error is not None}
-    return arrays | {f"{name}.stokes": found.stokes["reflected"] for name, found in values.items() if found.stokes}
+    arrays = {name: np.asarray(entry.brdf) for name, entry in values.items()}
+    arrays |= {f"{name}.error": np.asarray(entry.error) for name, entry in values.items() if entry.error is not None}
+    return arrays | {f"{name}.stokes": entry.stokes["reflected"] for name, entry in values.items() if entry.stokes}
 
 
 def npy_bytes(array: NDArray[Any]) -> bytes:
