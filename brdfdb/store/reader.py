@@ -60,6 +60,7 @@ if TYPE_CHECKING:
 
 
 CACHE_BYTES = 256 * 2**20  # of decoded tables that a Store keeps
+_OBJECTS_BYTES = 20_000  # of a decoded table beside its arrays: metadata and what kernels take
 
 
 class Store(Mapping[str, "Table"]):
@@ -212,9 +213,9 @@ class Store(Mapping[str, "Table"]):
             table = decode(name, group, files, digest)
             with self._lock:
                 self._decoded[key] = table
-                size = sum(decoded.nbytes for decoded in self._decoded.values())
+                size = sum(decoded.nbytes + _OBJECTS_BYTES for decoded in self._decoded.values())
                 while size > self._cache_bytes and len(self._decoded) > 1:
-                    size -= self._decoded.popitem(last=False)[1].nbytes
+                    size -= self._decoded.popitem(last=False)[1].nbytes + _OBJECTS_BYTES
             return table
 
     def _used(self, key: tuple[str, str]) -> Table | None:

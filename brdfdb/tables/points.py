@@ -107,6 +107,8 @@ def _wavelengths(value: Any) -> float | NDArray[np.float64] | None:
     array = _numbers(value)
     if array.ndim > 1:
         raise ValueError("not a number or a flat list of numbers")
+    if np.any(bad := ~(np.isfinite(array) & (array > 0.0))):
+        raise ValueError(f"{array[bad].flat[0]:g} is not a positive number of nanometres")
     return array if array.ndim else array.item()
 
 

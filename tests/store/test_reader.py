@@ -156,7 +156,7 @@ def test_a_table_never_mixes_two_revisions(root: Path, monkeypatch: pytest.Monke
 def test_decoded_tables_are_kept_and_the_one_not_used_for_longest_goes(root: Path) -> None:
     publish(root, grey=lambert(0.5), black=lambert(0.0))
     size = brdfdb.open(root)["white"].nbytes
-    store = Store(root, cache_bytes=2 * size)
+    store = Store(root, cache_bytes=2 * (size + module._OBJECTS_BYTES))
     white, grey = store["white"], store["grey"]
     assert store["white"] is white
     black = store["black"]
