@@ -1,4 +1,4 @@
-"""The last report of an audit: what of it still holds, and the seal that says that nobody changed it."""
+"""Findings taken over from the last report, and tests of whether that report still holds."""
 
 from __future__ import annotations
 
