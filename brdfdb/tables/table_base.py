@@ -127,9 +127,9 @@ class BaseTable(Lookups):
         Notes
         -----
         Half vectors are drawn from cells of constant density in (theta_h, phi_h), by marginal and conditional
-        distributions. Cells hold the reflected light for 17 lights from the normal to the horizon; in between, one of
-        the two next lights is drawn. A fifth of the directions follows the cosine, so that no weight is above 5 pi f_r.
-        The specular part is not drawn: add `specular_reflectance` in the mirror direction.
+        distributions. Cells hold the reflected light for 17 lights from the normal to the horizon. In between, the
+        distributions of the two next lights are mixed. A fifth of the directions follows the cosine, so that no weight
+        is above 5 pi f_r. The specular part is not drawn: add `specular_reflectance` in the mirror direction.
         """
         from brdfdb.integrals.sampling import Sample, check_uniform
 
