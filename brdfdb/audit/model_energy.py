@@ -27,6 +27,7 @@ EnergyVerdict = Literal["conserves", "loses", "gains", "known published excess",
 
 # Absolute tolerance of each albedo [1], of which four digits are shown, and of one that is closer to a limit
 TOLERANCE, FINE = 1e-5, 1e-6
+SURE_DECIMALS = 5  # decimals of an albedo that its tolerance leaves
 MOST_PANELS = 1000  # number of panels at which the quadrature of one light stops
 BOUND_TOLERANCE = 2e-5  # absolute tolerance of the largest a(lambda) [1]
 # Lights at round angles [degree]. Gauss's nodes in theta_i are added to them, so that the mean over uniform light,
@@ -379,9 +380,9 @@ def _white_of(source: Source, wavelength_nm: Axis | None) -> _White | None:
 def _furnace(white: _White, lights: _Lights, reflected: _Reflected) -> Furnace:
     """Return the white furnace of a source from the albedos of its lossless form."""
     wavelengths = white.nm
-    low, high = (
-        np.unravel_index(extreme(reflected.largest), reflected.largest.shape) for extreme in (np.argmin, np.argmax)
-    )
+    # Albedos that differ by less than their error are alike, and the smallest of their angles stands for them
+    alike = np.round(reflected.largest, SURE_DECIMALS)
+    low, high = (np.unravel_index(extreme(alike), alike.shape) for extreme in (np.argmin, np.argmax))
     return Furnace(
         lossless=", ".join(f"{name} = {value:.4g}" for name, value in white.lossless.changes.items()),
         theta_i_deg=lights.theta_i_deg.tolist(),

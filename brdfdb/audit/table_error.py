@@ -10,7 +10,8 @@ from brdfdb.audit.likeness import bias_of, likeness_of
 from brdfdb.audit.nodes import Nodes
 from brdfdb.audit.pairs import SEED, Pairs, representative_nm
 from brdfdb.audit.statement import Disagreement, contradictions, disagreements
-from brdfdb.figure import Map, Panel, error_in_words, number, rows
+from brdfdb.error_words import error_in_words
+from brdfdb.figure import Map, Panel, number, rows
 from brdfdb.geometry import radians, unit_vector
 from brdfdb.materials import Source
 from brdfdb.parameters import Floats
