@@ -13,7 +13,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
 
-from brdfdb.error_words import error_in_words
+from brdfdb.notebook import error_in_words
 
 _LONGEST = 1000  # characters of a sentence: what a recipe gives may be a megabyte
 _FOLDED = 8  # width of a column of text below which a table is wider than the terminal instead
