@@ -92,8 +92,8 @@ def directional_albedo(
         below = rows[(theta[rows] > HALF_PI) & np.isfinite(phi[rows])]
         albedo.flat[below], error.flat[below] = 0.0, 0.0
         above = above[np.isfinite(phi[above])]
-        found = spectral_albedo(spec, theta[above], phi[above], one, tolerance=tolerance, most_panels=MOST_PANELS)
-        albedo.flat[above], error.flat[above] = found.albedo[:, 0], found.error
+        integrals = spectral_albedo(spec, theta[above], phi[above], one, tolerance=tolerance, most_panels=MOST_PANELS)
+        albedo.flat[above], error.flat[above] = integrals.albedo[:, 0], integrals.error
     if specular and spec.specular is not None:
         albedo = albedo + spec.specular(thetas, **{name: parameters[name] for name in spec.specular_parameters})
     return Albedo(albedo[()], error[()])
