@@ -30,7 +30,6 @@ from brdfdb.errors import (
     UnknownRevisionError,
 )
 from brdfdb.notebook import listing, percent
-from brdfdb.store.decoding import decode, read_metadata
 from brdfdb.store.files import regular_bytes
 from brdfdb.store.manifest import check_manifest, read_manifest, whole_revisions
 from brdfdb.store.marker import check_marker
@@ -210,6 +209,8 @@ class Store(Mapping[str, "Table"]):
             if (held := self._used(key)) is not None:
                 return held
             files = check_manifest(group, digest, contents=False)["files"]
+            from brdfdb.store.decoding import decode  # lists need no arrays
+
             table = decode(name, group, files, digest)
             with self._lock:
                 self._decoded[key] = table
@@ -253,6 +254,8 @@ class Store(Mapping[str, "Table"]):
 
     def metadata(self, name: str) -> TableMetadata:
         """Return the metadata of the current revision, without decoding its values; errors as by `summary`."""
+        from brdfdb.store.decoding import read_metadata
+
         group, digest = self.location(name)
         check_manifest(group, digest, contents=False)
         return read_metadata(group)

@@ -24,10 +24,8 @@ from brdfdb.store.paths import (
     staging_path,
 )
 from brdfdb.store.pointer import known_manifests, point_to
-from brdfdb.store.publication import adoptable
 from brdfdb.store.reader import Store
 from brdfdb.store.snapshot_record import read_snapshot, snapshot_names
-from brdfdb.tables.layout import digest
 
 SNAPSHOTS = ".snapshots"  # the lock that snapshots and collections take in turns; no material has such a name
 
@@ -53,6 +51,8 @@ class Standing:
 
 def standing(root: Path, name: str, request: Mapping[str, Any]) -> Standing:
     """Return how a material stands to a request, after a look at every byte of the revisions in question."""
+    from brdfdb.tables.layout import digest  # it imports models, which histories and collections do not need
+
     wanted = digest(request)
     store = Store(root)
     try:
@@ -67,6 +67,19 @@ def standing(root: Path, name: str, request: Mapping[str, Any]) -> Standing:
         why = str(error)
     sound = adoptable(root, name, wanted)
     return Standing("missing", "", why) if sound is None else Standing("adoptable", sound, why)
+
+
+def adoptable(root: Path, name: str, request_sha256: str) -> str | None:
+    """Return the newest revision of a material that answers a request and is undamaged; None without any."""
+    material = material_path(root, name)
+    known = known_manifests(material)
+    for group in reversed(whole_revisions(material)):
+        with suppress(StoreError):
+            manifest, digest = read_manifest(group, known.get(group.name))
+            if manifest["summary"]["request_sha256"] == request_sha256:
+                check_manifest(group, digest, contents=True)
+                return group.name
+    return None
 
 
 def difference(old: Mapping[str, Any], new: Mapping[str, Any]) -> str:

@@ -19,7 +19,7 @@ from brdfdb.store import codec, publication, snapshots, verification
 from brdfdb.store.marker import make_store
 from brdfdb.store.paths import manifest_path
 from brdfdb.store.publication import publish_dataset
-from brdfdb.store.revisions import collect, history, rollback, standing
+from brdfdb.store.revisions import adoptable, collect, history, rollback, standing
 from brdfdb.store.sealed_json import sealed, unsealed
 from brdfdb.tables.layout import digest
 from tests.store.a_white import lambert, rho
@@ -109,7 +109,7 @@ def test_an_altered_older_manifest_is_not_believed(root: Path) -> None:
     ):
         with pytest.raises(StoreError, match=said):
             ask()
-    assert publication.adoptable(root, "white", digest({"rho": 0.25})) is None
+    assert adoptable(root, "white", digest({"rho": 0.25})) is None
     (found,) = findings(root)
     assert found.startswith(
         "white r000001 is damaged: r000001.MANIFEST.json is not the one whose digest was recorded ("
