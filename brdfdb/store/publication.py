@@ -18,7 +18,7 @@ from brdfdb.errors import (
 from brdfdb.materials import Source
 from brdfdb.measurements import MeasuredSource
 from brdfdb.store.decoding import read_metadata, table_of
-from brdfdb.store.files import Entry, sync_directory, write_file
+from brdfdb.store.files import Entry, sync_directory, write_files
 from brdfdb.store.lock import Lock, writing
 from brdfdb.store.manifest import Manifest, Summary
 from brdfdb.store.marker import make_store
@@ -160,8 +160,7 @@ def publish_dataset(root: str | os.PathLike[str], name: str, dataset: xr.Dataset
             shutil.rmtree(staging, ignore_errors=True)
             try:
                 staging.mkdir()
-                written = {file: write_file(staging / "table" / file, data, staging) for file, data in files.items()}
-                return publish_staged(store, name, staging, written)
+                return publish_staged(store, name, staging, write_files(staging / "table", files, staging))
             finally:
                 shutil.rmtree(staging, ignore_errors=True)
 

@@ -289,11 +289,12 @@ class Store(Mapping[str, "Table"]):
 
     def family_content(self, name: str) -> dict[str, Any]:
         """Return the record of a family as JSON, which is all that lists show of it; errors as by `family`."""
-        if name not in self.families():
-            raise UnknownFamilyError(name, self.families())
-        if self.snapshot is not None:
+        path = family_path(self.root, name)
+        if self.snapshot is not None and name in self.snapshot["families"]:
             return self.snapshot["families"][name]
-        return read_sealed(family_path(self.root, name), f"the family {name}")
+        if self.snapshot is None and NAME.fullmatch(name) and path.exists():
+            return read_sealed(path, f"the family {name}")
+        raise UnknownFamilyError(name, self.families())
 
     def dataset(self, name: str, revision: str | None = None) -> xr.Dataset:
         """Return a revision, by default the current one, as a lazy Dataset: see `brdfdb.tables.xarray_view.opened`.

@@ -55,14 +55,14 @@ def standing(root: Path, name: str, request: Mapping[str, Any]) -> Standing:
 
     wanted = digest(request)
     store = Store(root)
+    why = "new"
     try:
-        group, _, head = store.current(name)
-        if head["request_sha256"] == wanted:
-            store.verify(name)
-            return Standing("current", group.name)
-        why = difference(store.metadata(name).whole_request, request)
-    except UnknownMaterialError:
-        why = "new"
+        if name in store:  # the error of `current` for one that is not compares its name with all others
+            group, _, head = store.current(name)
+            if head["request_sha256"] == wanted:
+                store.verify(name)
+                return Standing("current", group.name)
+            why = difference(store.metadata(name).whole_request, request)
     except StoreError as error:
         why = str(error)
     sound = adoptable(root, name, wanted)
@@ -224,8 +224,10 @@ def pinned(root: Path) -> dict[Path, str]:
 
 
 def _collect(store: Store, keep: int, damaged: bool, collected: Collected) -> None:
+    stay: dict[Path, set[Path]] = {}  # by material
     try:
-        stay = pinned(store.root)
+        for group in pinned(store.root):
+            stay.setdefault(group.parent, set()).add(group)
     except StoreError as error:
         raise StoreError(f"nothing is collected, since {error}; remove it with `brdfdb snapshot --remove`") from error
     for path in store.root.glob(f".{marker_path(store.root).name}.*"):
@@ -242,7 +244,7 @@ def _collect(store: Store, keep: int, damaged: bool, collected: Collected) -> No
                     if path != lock.path:
                         _remove(store.root, path, collected)
                 if material.is_dir():
-                    _collect_material(store, material, keep, damaged, set(stay), collected)
+                    _collect_material(store, material, keep, damaged, stay.get(material, set()), collected)
         except BusyError:
             collected.busy.append(name)
     for path in staged.iterdir():

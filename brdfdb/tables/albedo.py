@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 from weakref import WeakKeyDictionary
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel, Field
 
 from brdfdb.geometry import radians
@@ -90,13 +90,11 @@ def directional_albedo(table: Table, theta_i_deg: Axis | None = None, tolerance:
     if table.anisotropic:
         phi_i = table.axes_deg["phi_i"]
         phi_weights = _trapezoid_weights(radians(table.axes_deg["phi_r"]))
-        brdf = table.brdf.reshape(*table.brdf.shape[:4], -1)
-        albedo = np.einsum("ipjkw,j,k->ipw", brdf, theta_weights, phi_weights, optimize=True)
+        albedo = _sums(table.brdf, phi_i.size, np.outer(theta_weights, phi_weights))
     else:
         phi_i = np.zeros(1)
         phi_weights = 2.0 * _trapezoid_weights(radians(table.axes_deg["delta_phi"]))  # the other half by symmetry
-        brdf = table.brdf.reshape(*table.brdf.shape[:3], -1)
-        albedo = np.einsum("ijkw,j,k->iw", brdf, theta_weights, phi_weights, optimize=True)[:, np.newaxis]
+        albedo = _sums(table.brdf, 1, np.outer(theta_weights, phi_weights))
     lights = theta_i_deg
     if lights is None and table.metadata.reason:  # a planner's nodes are few
         lights = np.union1d(THETA_I_DEG, nodes)
@@ -104,6 +102,12 @@ def directional_albedo(table: Table, theta_i_deg: Axis | None = None, tolerance:
         matrix = np.stack([np.interp(lights, nodes, one) for one in np.eye(nodes.size)], axis=1)
         nodes, albedo = lights, np.tensordot(matrix, albedo, axes=1)
     return TableAlbedo(nodes, phi_i, np.asarray(albedo), np.zeros(nodes.size))
+
+
+def _sums(brdf: NDArray[np.float32], phi_i: int, weights: Floats) -> Floats:
+    """Return the weighted sums of f_r over viewers, shape (theta_i, phi_i, L), a row in float64 at a time."""
+    rows = brdf.reshape(len(brdf), phi_i, weights.size, -1)
+    return np.stack([np.einsum("pkl,k->pl", row.astype(np.float64), weights.ravel()) for row in rows])
 
 
 def tolerance_of(table: Table) -> float:

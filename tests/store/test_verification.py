@@ -15,7 +15,7 @@ import xarray as xr
 
 import brdfdb
 from brdfdb.errors import ParameterError, StoreError
-from brdfdb.store import codec, publication, snapshots, verification
+from brdfdb.store import codec, files, publication, snapshots, verification
 from brdfdb.store.marker import make_store
 from brdfdb.store.paths import manifest_path
 from brdfdb.store.publication import publish_dataset
@@ -233,7 +233,7 @@ def test_verify_remarks_on_what_a_table_does_not_state(root: Path) -> None:
 
 def test_verify_decodes_every_chunk(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(codec, "_CHUNK_VALUES", 9)
-    whole = publication.write_file
+    whole = files.write_file
 
     def spoil(path: Path, data: bytes, temporary: Path) -> object:
         if path.match("brdf/c/2/0/0"):  # written wrong, so that manifest and file agree
@@ -241,7 +241,7 @@ def test_verify_decodes_every_chunk(root: Path, monkeypatch: pytest.MonkeyPatch)
         return whole(path, data, temporary)
 
     with monkeypatch.context() as patch:
-        patch.setattr(publication, "write_file", spoil)
+        patch.setattr(files, "write_file", spoil)
         publish_dataset(root, "white", lambert(0.5))
     brdfdb.open(root).verify("white")
     (found,) = findings(root)
