@@ -26,6 +26,7 @@ from brdfdb.models._he_torrance_kernels import (
     vector_rows,
 )
 from brdfdb.models._rows import by_rows, by_rows_of_vectors
+from brdfdb.models.large_calls import for_large_calls
 from brdfdb.parameters import Arguments, Floats, FormKind, Gradient, ModelForm, Parameter, bytes_of
 
 WAVELENGTH_NM = Parameter("wavelength_nm", "λ", "nm", 1e-3, 1e7, "wavelength in vacuum")
@@ -79,6 +80,7 @@ def checked_surface(
     )
 
 
+@for_large_calls
 def he_torrance(
     theta_i: ArrayLike,
     phi_i: ArrayLike,
@@ -146,6 +148,7 @@ def he_torrance(
     return _f_r(checked_angles(theta_i, phi_i, theta_r, phi_r), surface, A.check(a))
 
 
+@for_large_calls
 def he_torrance_vectors(
     wi: ArrayLike,
     wr: ArrayLike,

@@ -19,6 +19,7 @@ from brdfdb.models._oren_nayar_kernels import (
     rest_of_angle,
 )
 from brdfdb.models._rows import by_rows, by_rows_of_vectors
+from brdfdb.models.large_calls import for_large_calls
 from brdfdb.parameters import Floats, Gradient, Parameter
 
 RHO = Parameter("rho", "ρ", "1", 0.0, 1.0, "albedo of a facet", reflectance=True)
@@ -36,6 +37,7 @@ class Parts(NamedTuple):
     interreflected: Floats
 
 
+@for_large_calls
 def oren_nayar(
     theta_i: ArrayLike,
     phi_i: ArrayLike,
@@ -105,6 +107,7 @@ def oren_nayar(
     return finished(by_rows(functional_angle_rows, (cos_dphi, one_less_cos), (*pair, *parameters)), angles)
 
 
+@for_large_calls
 def oren_nayar_vectors(
     wi: ArrayLike, wr: ArrayLike, *, rho: ArrayLike, sigma: ArrayLike, interreflection: ArrayLike = True
 ) -> Floats:
@@ -176,6 +179,7 @@ def _apart(directions: Directions, direct: Floats, total: Floats, rho: Floats, s
     return Parts(finished(direct, directions), finished(np.where(direct > 0.0, bounce, total), directions))
 
 
+@for_large_calls
 def oren_nayar_qualitative(
     theta_i: ArrayLike,
     phi_i: ArrayLike,
@@ -228,6 +232,7 @@ def oren_nayar_qualitative(
     return finished(by_rows(qualitative_angle_rows, (angles.cos_dphi,), (*pair, *parameters)), angles)
 
 
+@for_large_calls
 def oren_nayar_qualitative_vectors(
     wi: ArrayLike, wr: ArrayLike, *, rho: ArrayLike, sigma: ArrayLike, offset: ArrayLike = 0.33
 ) -> Floats:
