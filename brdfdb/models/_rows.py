@@ -74,7 +74,7 @@ def _column(array: Floats, shape: tuple[int, ...], rows: int, length: int) -> ND
 
 
 def _vectors(array: Floats, shape: tuple[int, ...], rows: int, length: int) -> NDArray[Any]:
-    shared = array.ndim > 1 and array.size == 3 * array.shape[-2] == 3 * length
+    shared = array.ndim > 1 and array.size == 3 * array.shape[-2] == 3 * length > 3  # a row of one value has its own
     wide = array if shared else np.broadcast_to(array, (*shape, 3))
     return _read_only(np.ascontiguousarray(wide).reshape(1 if shared else rows, length, 3))
 

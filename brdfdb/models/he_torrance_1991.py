@@ -219,9 +219,7 @@ def evaluated(directions: Directions, surface: Sequence[Floats], series: int = W
     sum is coarser. `surface` holds `Surface.features`, n, k and the uniform part [1/sr], which broadcast with the
     directions.
     """
-    uniform = all(np.size(feature) == 1 for feature in surface)
-    rows_of_one = all(np.ndim(feature) == 0 or np.shape(feature)[-1] == 1 for feature in surface)
-    if isinstance(directions, Vectors) and (uniform or (rows_of_one and directions.w_i.shape[-2:-1] > (1,))):
+    if isinstance(directions, Vectors):
 
         def rows(w_i: Floats, w_r: Floats, scalars: NDArray[np.float64], values: Floats) -> None:
             vector_rows(w_i, w_r, series, reach, scalars, values)
@@ -240,6 +238,7 @@ def evaluated(directions: Directions, surface: Sequence[Floats], series: int = W
         return finished(
             by_rows(tabulated_rows, (directions.one_plus_cos_dphi,), (*pair, *surface), directions.dtype), directions
         )
+    uniform = all(np.size(feature) == 1 for feature in surface)
     v_xy2, _ = v_squared(directions)
     features = np.empty((5, *shape))
     for i, feature in enumerate((*pair, v_xy2)):
