@@ -91,14 +91,15 @@ def oren_nayar(
     """
     angles = checked_angles(theta_i, phi_i, theta_r, phi_r)
     alpha, beta = np.maximum(angles.theta_i, angles.theta_r), np.minimum(angles.theta_i, angles.theta_r)
-    sin_alpha = np.maximum(angles.sin_i, angles.sin_r)
+    # Functions of alpha or beta are taken of each angle first, since axes are shorter than their pairs
+    versines = (2.0 * np.sin((HALF_PI - theta + HALF_PI_REST) / 2.0) ** 2 for theta in (angles.theta_i, angles.theta_r))
     pair = (
         alpha,
         beta,
         HALF_PI - beta + HALF_PI_REST,
-        sin_alpha,
-        2.0 * np.sin((HALF_PI - alpha + HALF_PI_REST) / 2.0) ** 2,
-        np.tan(beta),
+        np.maximum(angles.sin_i, angles.sin_r),
+        np.minimum(*versines),
+        np.minimum(np.tan(angles.theta_i), np.tan(angles.theta_r)),
         (angles.sin_i + angles.sin_r) / (angles.cos_i + angles.cos_r),  # tangent of the mean angle, without rounding it
     )
     cos_dphi = angles.cos_dphi
@@ -227,7 +228,7 @@ def oren_nayar_qualitative(
     0.2362
     """
     angles = checked_angles(theta_i, phi_i, theta_r, phi_r)
-    pair = np.maximum(angles.sin_i, angles.sin_r), np.tan(np.minimum(angles.theta_i, angles.theta_r))
+    pair = np.maximum(angles.sin_i, angles.sin_r), np.minimum(np.tan(angles.theta_i), np.tan(angles.theta_r))
     parameters = RHO.check(rho), SIGMA.check(sigma), OFFSET.check(offset)
     return finished(by_rows(qualitative_angle_rows, (angles.cos_dphi,), (*pair, *parameters)), angles)
 
