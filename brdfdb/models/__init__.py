@@ -1,7 +1,8 @@
 """The reflectance models: public functions, one module per paper, and the MODELS registry.
 
 Every function has the signature ``f(theta_i, phi_i, theta_r, phi_r, *, parameters)``. Angles are in radians and f_r is
-in 1/sr, without the cosine. Angles and parameters broadcast.
+in 1/sr, without the cosine. Angles and parameters broadcast. Functions that return f_r also take ``out``, a writable
+array for the result, and ``threads``, the number of threads that share a large call.
 
 MODELS also holds models of other people. An installed package names its `brdfdb.parameters.ModelSpec`, or an iterable
 of them, as an entry point of the group ``brdfdb.models``. A Python file that defines models is named by the environment

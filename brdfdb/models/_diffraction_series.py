@@ -337,6 +337,7 @@ G_LOW, G_HIGH = 1e-3, 1e7  # range of g in the table; below, the logarithm bends
 _LOG_G_LOW = math.log(G_LOW)
 _Q_HIGH = 8.7  # largest q; beyond, the sum is smaller than a normal float64
 _P_SIZE, _Q_SIZE = 0.8, 0.17  # size of a patch
+_ROUNDING = 1e-9  # of a patch, more than any rounding: a value does not depend on the others of its row
 _P_PATCHES, Q_PATCHES = math.ceil(math.log(G_HIGH / G_LOW) / _P_SIZE), math.ceil(_Q_HIGH / _Q_SIZE)
 TERMS, TERMS_OF_FLOAT32 = 16, 8  # terms of the series in p, and in q: whole vectors of the processor
 
@@ -375,8 +376,9 @@ def log_series_of_row(
     patch = min(max(int(p), 0), _P_PATCHES - 1)
     x = 2.0 * (p - patch) - 1.0
     inverse = 1.0 / (5.0 + g)
-    first = min(max(int(log(1.0 + V_low * inverse) * (1.0 / _Q_SIZE)), 0), Q_PATCHES - 1)
-    last = min(max(int(log(1.0 + V_high * inverse) * (1.0 / _Q_SIZE)), first), Q_PATCHES - 1)
+    # The ends of the row may round across the edge of a patch
+    first = min(max(int(log(1.0 + V_low * inverse) * (1.0 / _Q_SIZE) - _ROUNDING), 0), Q_PATCHES - 1)
+    last = min(max(int(log(1.0 + V_high * inverse) * (1.0 / _Q_SIZE) + _ROUNDING), first), Q_PATCHES - 1)
     # The polynomials in q at this g. Those of neighbouring patches lie side by side
     begin, end = first * terms, (last + 1) * terms
     polynomials = row.reshape(-1)[begin:end]
@@ -393,7 +395,7 @@ def log_series_of_row(
         log_sum[j] = log(1.0 + V[j] * inverse) * (1.0 / _Q_SIZE)
     for j in range(V.shape[0]):
         q = log_sum[j]
-        i = min(max(int(q), first), last)  # q at an end may round across the edge of a patch
+        i = min(max(int(q), first), last)
         y = 2.0 * (q - i) - 1.0
         along = row[i]
         value = along[terms - 1]

@@ -238,16 +238,21 @@ def _geometry_of(i: Floats, r: Floats, geometry: Array) -> None:
 
 @loop
 def _vectors(w_i: Floats, w_r: Floats, surface: Array, series: int, reach: float, f_r: Floats) -> None:
-    """Evaluate f_r [1/sr] as `scattered` does, for unit vectors of shape (N, 3) and a surface of shape (6, 1)."""
+    """Evaluate f_r [1/sr] as `scattered` does, for unit vectors in flat arrays and a surface of shape (1 or N, 6)."""
     work, index = np.empty((4 + ROWS_OF_WORK, BLOCK)), np.empty((GROUPS, BLOCK), np.int64)
     lanes, values, geometry = np.empty((6, BLOCK)), np.empty(BLOCK), np.empty((5, BLOCK))
     for column in range(6):
         for j in range(BLOCK):
-            lanes[column, j] = surface[column, 0]
+            lanes[column, j] = surface[0, column]
     for start in range(0, f_r.shape[0], BLOCK):
         count = min(BLOCK, f_r.shape[0] - start)
-        i, r = w_i[start : start + count].reshape(-1), w_r[start : start + count].reshape(-1)
+        i, r = w_i[3 * start : 3 * (start + count)], w_r[3 * start : 3 * (start + count)]
         f = f_r[start : start + count]
+        if surface.shape[0] > 1:
+            own = surface[start : start + count].reshape(-1)
+            for column in range(6):
+                for j in range(count):
+                    lanes[column, j] = own[6 * j + column]
         _geometry_of(i, r, geometry)
         _evaluate(geometry, lanes, series, reach, values[:count], work, index)
         for j in range(count):
@@ -256,9 +261,13 @@ def _vectors(w_i: Floats, w_r: Floats, surface: Array, series: int, reach: float
 
 @kernel
 def vector_rows(w_i: Floats, w_r: Floats, series: int, reach: float, scalars: Array, f_r: Floats) -> None:
+    """Evaluate rows of f_r [1/sr]. Rows of one value, each with a surface of its own, are one long row."""
+    if f_r.shape[1] == 1:
+        _vectors(w_i.reshape(-1), w_r.reshape(-1), scalars, series, reach, f_r.reshape(-1))
+        return
     for row in range(f_r.shape[0]):
-        surface = scalars[row].reshape(6, 1)
-        _vectors(w_i[min(row, w_i.shape[0] - 1)], w_r[min(row, w_r.shape[0] - 1)], surface, series, reach, f_r[row])
+        i, r = w_i[min(row, w_i.shape[0] - 1)].reshape(-1), w_r[min(row, w_r.shape[0] - 1)].reshape(-1)
+        _vectors(i, r, scalars[row : row + 1], series, reach, f_r[row])
 
 
 @loop

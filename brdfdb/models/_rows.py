@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from brdfdb.geometry import Vectors
+from brdfdb.models.large_calls import new_result
 from brdfdb.parameters import Floats
 
 Loop = Callable[..., None]
@@ -35,7 +36,7 @@ def by_rows(loop: Loop, columns: Sequence[Floats], scalars: Sequence[Floats], dt
     """
     shape = np.broadcast_shapes(*(np.shape(array) for array in (*columns, *scalars)))
     rows, length, leading = _split(shape, scalars)
-    values: Floats = np.empty((rows, length), dtype=dtype)
+    values: Floats = new_result(shape, dtype).reshape(rows, length)
     if values.size:
         loop(*(_column(array, shape, rows, length) for array in columns), _packed(scalars, leading, rows), values)
     return values.reshape(shape)[()]
@@ -52,7 +53,7 @@ def by_rows_of_vectors(
     w_i, w_r = directions.w_i, directions.w_r
     shape = np.broadcast_shapes(w_i.shape[:-1], w_r.shape[:-1], *(np.shape(array) for array in scalars))
     rows, length, leading = _split(shape, scalars)
-    values: Floats = np.empty((*several, rows, length), dtype=directions.dtype)
+    values: Floats = new_result((*several, *shape), directions.dtype).reshape(*several, rows, length)
     if values.size:
         loop(*(_vectors(w, shape, rows, length) for w in (w_i, w_r)), _packed(scalars, leading, rows), values)
     return values.reshape((*several, *shape))[()]
@@ -73,7 +74,7 @@ def _column(array: Floats, shape: tuple[int, ...], rows: int, length: int) -> ND
 
 
 def _vectors(array: Floats, shape: tuple[int, ...], rows: int, length: int) -> NDArray[Any]:
-    shared = array.ndim > 1 and array.size == 3 * array.shape[-2] == 3 * length
+    shared = array.ndim > 1 and array.size == 3 * array.shape[-2] == 3 * length > 3  # a row of one value has its own
     wide = array if shared else np.broadcast_to(array, (*shape, 3))
     return _read_only(np.ascontiguousarray(wide).reshape(1 if shared else rows, length, 3))
 

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from brdfdb._numba import elementwise, kernel
 from brdfdb.geometry import Directions, checked_angles, checked_vectors, finished
+from brdfdb.models.large_calls import for_large_calls
 from brdfdb.parameters import Floats, ModelSpec, Parameter, white
 
 RHO = Parameter("rho", "c", "1", 0.0, 1.0, "albedo of a sphere, for one scattering", reflectance=True)
@@ -123,6 +124,7 @@ _mean_features, _turned_features = elementwise(_h0_less_1), elementwise(_log_h1)
 _evaluate = elementwise(_lambert_sphere)
 
 
+@for_large_calls
 def lambert_sphere(
     theta_i: ArrayLike, phi_i: ArrayLike, theta_r: ArrayLike, phi_r: ArrayLike, *, rho: ArrayLike
 ) -> Floats:
@@ -165,6 +167,7 @@ def lambert_sphere(
     return _f_r(checked_angles(theta_i, phi_i, theta_r, phi_r), rho)
 
 
+@for_large_calls
 def lambert_sphere_vectors(wi: ArrayLike, wr: ArrayLike, *, rho: ArrayLike) -> Floats:
     """Return `lambert_sphere` for unit vectors `wi` (light) and `wr` (viewer) of shape (..., 3)."""
     return _f_r(checked_vectors(wi, wr), rho)

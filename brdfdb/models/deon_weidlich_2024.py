@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from brdfdb._numba import elementwise, kernel
 from brdfdb.geometry import Directions, checked_angles, checked_vectors, finished
+from brdfdb.models.large_calls import for_large_calls
 from brdfdb.parameters import Floats, ModelSpec, Parameter, white
 
 RHO = Parameter("rho", "c", "1", 0.0, 1.0, "albedo of a facet, for one scattering", reflectance=True)
@@ -160,6 +161,7 @@ def _vmf(
 _section, _evaluate = elementwise(_cross_section), elementwise(_vmf)
 
 
+@for_large_calls
 def vmf_diffuse(
     theta_i: ArrayLike,
     phi_i: ArrayLike,
@@ -214,6 +216,7 @@ def vmf_diffuse(
     return _f_r(checked_angles(theta_i, phi_i, theta_r, phi_r), rho, roughness)
 
 
+@for_large_calls
 def vmf_diffuse_vectors(wi: ArrayLike, wr: ArrayLike, *, rho: ArrayLike, roughness: ArrayLike) -> Floats:
     """Return `vmf_diffuse` for unit vectors `wi` (light) and `wr` (viewer) of shape (..., 3)."""
     return _f_r(checked_vectors(wi, wr), rho, roughness)

@@ -9,6 +9,7 @@ from brdfdb._elementary import cosine
 from brdfdb._numba import elementwise, kernel
 from brdfdb.geometry import checked_angles, checked_vectors, finished
 from brdfdb.models._rows import by_rows_of_vectors
+from brdfdb.models.large_calls import for_large_calls
 from brdfdb.parameters import Floats, ModelSpec, Parameter, white
 
 RHO = Parameter("rho", "ρ", "1", 0.0, 1.0, "albedo of the unnormalised lobe", reflectance=True)
@@ -40,6 +41,7 @@ def _vector_rows(w_i: Floats, w_r: Floats, scalars: NDArray[np.float64], f_r: Fl
             f[j] = value if z_i >= 0.0 and z_r >= 0.0 else 0.0 * (z_i + z_r + s)  # 0, or nan
 
 
+@for_large_calls
 def oren_nayar_fujii(
     theta_i: ArrayLike,
     phi_i: ArrayLike,
@@ -92,6 +94,7 @@ def oren_nayar_fujii(
     return finished(_evaluate(angles.cos_i, angles.cos_r, s, RHO.check(rho), SIGMA.check(sigma)), angles)
 
 
+@for_large_calls
 def oren_nayar_fujii_vectors(wi: ArrayLike, wr: ArrayLike, *, rho: ArrayLike, sigma: ArrayLike) -> Floats:
     """Return `oren_nayar_fujii` [1/sr] for unit vectors `wi` (light) and `wr` (viewer) of shape (..., 3)."""
     parameters = RHO.check(rho), SIGMA.check(sigma)

@@ -13,6 +13,7 @@ from brdfdb._elementary import arcsin, cosine, exp, log
 from brdfdb._numba import kernel
 from brdfdb.geometry import checked_angles, checked_vectors, finished
 from brdfdb.models._rows import by_rows, by_rows_of_vectors
+from brdfdb.models.large_calls import for_large_calls
 from brdfdb.parameters import Floats, ModelSpec, Parameter
 
 W = Parameter("w", "w", "1", 0.0, 1.0, "albedo of a grain for single scattering", reflectance=True)
@@ -148,6 +149,7 @@ def _vector_rows(w_i: Floats, w_r: Floats, scalars: Rows, f_r: Floats) -> None:
             f[j] = value * (0.0 if z_i < 0.0 or z_r < 0.0 else 1.0)  # nan stays nan
 
 
+@for_large_calls
 def hapke(
     theta_i: ArrayLike,
     phi_i: ArrayLike,
@@ -214,6 +216,7 @@ def hapke(
     return finished(by_rows(_angle_rows, columns, scalars), checked)
 
 
+@for_large_calls
 def hapke_vectors(
     wi: ArrayLike,
     wr: ArrayLike,

@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike
 from brdfdb.lobes import Lobe
 from brdfdb.models import _stray_light
 from brdfdb.models._stray_light import HARVEY, by_angles, by_vectors
+from brdfdb.models.large_calls import for_large_calls
 from brdfdb.parameters import Floats, ModelSpec, Parameter
 
 B_0 = Parameter("b_0", "b_0", "1/sr", 0.0, 1e9, "f_r in the mirror direction")
@@ -14,6 +15,7 @@ KNEE = Parameter("knee", "L", "1", 1e-5, 1.0, "distance from the mirror directio
 SLOPE = Parameter("slope", "s", "1", -6.0, 0.0, "exponent of the profile far from the mirror direction")
 
 
+@for_large_calls
 def harvey_shack(
     theta_i: ArrayLike,
     phi_i: ArrayLike,
@@ -67,6 +69,7 @@ def harvey_shack(
     return by_angles(HARVEY, (theta_i, phi_i, theta_r, phi_r), _checked(b_0, knee, slope))
 
 
+@for_large_calls
 def harvey_shack_vectors(wi: ArrayLike, wr: ArrayLike, *, b_0: ArrayLike, knee: ArrayLike, slope: ArrayLike) -> Floats:
     """Return `harvey_shack` [1/sr] for unit vectors `wi` (light) and `wr` (viewer) of shape (..., 3)."""
     return by_vectors(HARVEY, wi, wr, _checked(b_0, knee, slope))

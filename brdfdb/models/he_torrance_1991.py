@@ -26,6 +26,7 @@ from brdfdb.models._he_torrance_kernels import (
     vector_rows,
 )
 from brdfdb.models._rows import by_rows, by_rows_of_vectors
+from brdfdb.models.large_calls import for_large_calls
 from brdfdb.parameters import Arguments, Floats, FormKind, Gradient, ModelForm, Parameter, bytes_of
 
 WAVELENGTH_NM = Parameter("wavelength_nm", "λ", "nm", 1e-3, 1e7, "wavelength in vacuum")
@@ -79,6 +80,7 @@ def checked_surface(
     )
 
 
+@for_large_calls
 def he_torrance(
     theta_i: ArrayLike,
     phi_i: ArrayLike,
@@ -146,6 +148,7 @@ def he_torrance(
     return _f_r(checked_angles(theta_i, phi_i, theta_r, phi_r), surface, A.check(a))
 
 
+@for_large_calls
 def he_torrance_vectors(
     wi: ArrayLike,
     wr: ArrayLike,
@@ -216,9 +219,7 @@ def evaluated(directions: Directions, surface: Sequence[Floats], series: int = W
     sum is coarser. `surface` holds `Surface.features`, n, k and the uniform part [1/sr], which broadcast with the
     directions.
     """
-    uniform = all(np.size(feature) == 1 for feature in surface)
-    rows_of_one = all(np.ndim(feature) == 0 or np.shape(feature)[-1] == 1 for feature in surface)
-    if isinstance(directions, Vectors) and (uniform or (rows_of_one and directions.w_i.shape[-2:-1] > (1,))):
+    if isinstance(directions, Vectors):
 
         def rows(w_i: Floats, w_r: Floats, scalars: NDArray[np.float64], values: Floats) -> None:
             vector_rows(w_i, w_r, series, reach, scalars, values)
@@ -237,6 +238,7 @@ def evaluated(directions: Directions, surface: Sequence[Floats], series: int = W
         return finished(
             by_rows(tabulated_rows, (directions.one_plus_cos_dphi,), (*pair, *surface), directions.dtype), directions
         )
+    uniform = all(np.size(feature) == 1 for feature in surface)
     v_xy2, _ = v_squared(directions)
     features = np.empty((5, *shape))
     for i, feature in enumerate((*pair, v_xy2)):

@@ -21,6 +21,7 @@ from brdfdb.geometry import (
 from brdfdb.models import he_torrance_1991 as full
 from brdfdb.models._he_torrance_kernels import hidden, shadowing, variance
 from brdfdb.models.he_torrance_1991_polarised import unit_azimuth
+from brdfdb.models.large_calls import for_large_calls
 from brdfdb.parameters import Floats, Parameter
 
 SIGMA_0_OVER_TAU = Parameter("sigma_0_over_tau", "σ_0/τ", "1", 1e-6, 1e6, "rms roughness over autocorrelation length")
@@ -29,6 +30,7 @@ RECEIVED = Parameter("received_solid_angle_sr", "ω_r", "sr", 1e-12, 1.0, "solid
 RINGS = 8  # largest number of rings of nodes in a cone
 
 
+@for_large_calls
 def he_torrance_very_rough(
     theta_i: ArrayLike,
     phi_i: ArrayLike,
@@ -87,6 +89,7 @@ def he_torrance_very_rough(
     )
 
 
+@for_large_calls
 def he_torrance_very_rough_vectors(
     wi: ArrayLike, wr: ArrayLike, *, sigma_0_over_tau: ArrayLike, n: ArrayLike, k: ArrayLike, a: ArrayLike = 0.0
 ) -> Floats:

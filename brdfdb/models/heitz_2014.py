@@ -26,6 +26,7 @@ from brdfdb.models._microfacets import (
     metal,
     painted,
 )
+from brdfdb.models.large_calls import for_large_calls
 from brdfdb.models.walter_2007 import beckmann_separable_vectors, ggx_separable_vectors
 from brdfdb.models.ward_1992 import ward_vectors
 from brdfdb.parameters import Arguments, Floats, FormKind, ModelForm, ModelSpec, bytes_of
@@ -34,6 +35,7 @@ _GGX, _GGX_SCHLICK = (_microfacets.GGX, CORRELATED, EXACT), (_microfacets.GGX, C
 _BECKMANN, _BECKMANN_SCHLICK = (BECKMANN, CORRELATED, EXACT), (BECKMANN, CORRELATED, SCHLICK)
 
 
+@for_large_calls
 def ggx(
     theta_i: ArrayLike,
     phi_i: ArrayLike,
@@ -92,6 +94,7 @@ def ggx(
     return by_angles(_GGX, (theta_i, phi_i, theta_r, phi_r), facets)
 
 
+@for_large_calls
 def ggx_vectors(
     wi: ArrayLike,
     wr: ArrayLike,
@@ -106,6 +109,7 @@ def ggx_vectors(
     return by_vectors(_GGX, wi, wr, metal(alpha_x, alpha_y, n, k, wavelength_nm))
 
 
+@for_large_calls
 def ggx_schlick(
     theta_i: ArrayLike,
     phi_i: ArrayLike,
@@ -156,6 +160,7 @@ def ggx_schlick(
     return by_angles(_GGX_SCHLICK, (theta_i, phi_i, theta_r, phi_r), painted(rho_d, f_0, alpha_x, alpha_y))
 
 
+@for_large_calls
 def ggx_schlick_vectors(
     wi: ArrayLike, wr: ArrayLike, *, rho_d: ArrayLike, f_0: ArrayLike, alpha_x: ArrayLike, alpha_y: ArrayLike
 ) -> Floats:
@@ -163,6 +168,7 @@ def ggx_schlick_vectors(
     return by_vectors(_GGX_SCHLICK, wi, wr, painted(rho_d, f_0, alpha_x, alpha_y))
 
 
+@for_large_calls
 def beckmann(
     theta_i: ArrayLike,
     phi_i: ArrayLike,
@@ -213,6 +219,7 @@ def beckmann(
     return by_angles(_BECKMANN, (theta_i, phi_i, theta_r, phi_r), facets)
 
 
+@for_large_calls
 def beckmann_vectors(
     wi: ArrayLike,
     wr: ArrayLike,
@@ -227,6 +234,7 @@ def beckmann_vectors(
     return by_vectors(_BECKMANN, wi, wr, metal(alpha_x, alpha_y, n, k, wavelength_nm))
 
 
+@for_large_calls
 def beckmann_schlick(
     theta_i: ArrayLike,
     phi_i: ArrayLike,
@@ -274,6 +282,7 @@ def beckmann_schlick(
     return by_angles(_BECKMANN_SCHLICK, (theta_i, phi_i, theta_r, phi_r), painted(rho_d, f_0, alpha_x, alpha_y))
 
 
+@for_large_calls
 def beckmann_schlick_vectors(
     wi: ArrayLike, wr: ArrayLike, *, rho_d: ArrayLike, f_0: ArrayLike, alpha_x: ArrayLike, alpha_y: ArrayLike
 ) -> Floats:

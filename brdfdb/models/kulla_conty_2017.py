@@ -14,12 +14,14 @@ from brdfdb.models import _microfacets
 from brdfdb.models._ggx_albedo import lost_share, mean_lost_share, share_bytes
 from brdfdb.models._microfacets import CORRELATED, F_0, SCHLICK, by_checked_angles, by_vectors, painted
 from brdfdb.models.heitz_2014 import ggx_schlick_vectors
+from brdfdb.models.large_calls import for_large_calls_of_one
 from brdfdb.models.turquin_2019 import ALPHA, ggx_scaled_vectors
 from brdfdb.parameters import Arguments, Floats, ModelForm, ModelSpec, bytes_of
 
 _GGX = (_microfacets.GGX, CORRELATED, SCHLICK)
 
 
+@for_large_calls_of_one("alpha")
 def ggx_compensated(
     theta_i: ArrayLike, phi_i: ArrayLike, theta_r: ArrayLike, phi_r: ArrayLike, *, f_0: ArrayLike, alpha: ArrayLike
 ) -> Floats:
@@ -71,6 +73,7 @@ def ggx_compensated(
     return finished(single + _multiple(checked, f_0, alpha, bounces=2), checked)
 
 
+@for_large_calls_of_one("alpha")
 def ggx_compensated_vectors(wi: ArrayLike, wr: ArrayLike, *, f_0: ArrayLike, alpha: ArrayLike) -> Floats:
     """Return `ggx_compensated` [1/sr] for unit vectors `wi` (light) and `wr` (viewer) of shape (..., 3)."""
     return _of_vectors(wi, wr, f_0, alpha, bounces=2)

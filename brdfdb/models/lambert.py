@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from brdfdb._numba import kernel
 from brdfdb.geometry import checked_angles, checked_vectors, finished
 from brdfdb.models._rows import by_rows_of_vectors
+from brdfdb.models.large_calls import for_large_calls
 from brdfdb.parameters import Floats, ModelSpec, Parameter, white
 
 RHO = Parameter("rho", "ρ", "1", 0.0, 1.0, "albedo", reflectance=True)
@@ -24,6 +25,7 @@ def _vector_rows(w_i: Floats, w_r: Floats, scalars: NDArray[np.float64], f_r: Fl
             f[j] = nothing + (value if i[z] >= 0.0 and r[z] >= 0.0 else 0.0)
 
 
+@for_large_calls
 def lambert(theta_i: ArrayLike, phi_i: ArrayLike, theta_r: ArrayLike, phi_r: ArrayLike, *, rho: ArrayLike) -> Floats:
     """Return the BRDF [1/sr] of an ideal diffuser, the same in every direction.
 
@@ -57,6 +59,7 @@ def lambert(theta_i: ArrayLike, phi_i: ArrayLike, theta_r: ArrayLike, phi_r: Arr
     return finished(RHO.check(rho) / np.pi, angles)
 
 
+@for_large_calls
 def lambert_vectors(wi: ArrayLike, wr: ArrayLike, *, rho: ArrayLike) -> Floats:
     """Return `lambert` [1/sr] for unit vectors `wi` (light) and `wr` (viewer) of shape (..., 3)."""
     return by_rows_of_vectors(_vector_rows, checked_vectors(wi, wr), (RHO.check(rho),))

@@ -11,6 +11,7 @@ from brdfdb._elementary import arcsin, cosine
 from brdfdb._numba import kernel
 from brdfdb.geometry import checked_angles, checked_vectors, finished
 from brdfdb.models._rows import by_rows, by_rows_of_vectors
+from brdfdb.models.large_calls import for_large_calls
 from brdfdb.parameters import Floats, ModelSpec, Parameter
 
 F_ISO = Parameter("f_iso", "f_iso", "1", 0.0, 1.0, "weight of the uniform kernel", reflectance=True)
@@ -71,6 +72,7 @@ def _vector_rows(w_i: Floats, w_r: Floats, scalars: Rows, f_r: Floats) -> None:
             values[j] = value * (0.0 if z_i < 0.0 or z_r < 0.0 else 1.0)  # nan stays nan
 
 
+@for_large_calls
 def ross_li(
     theta_i: ArrayLike,
     phi_i: ArrayLike,
@@ -125,6 +127,7 @@ def ross_li(
     return finished(by_rows(_angle_rows, columns, scalars), checked)
 
 
+@for_large_calls
 def ross_li_vectors(wi: ArrayLike, wr: ArrayLike, *, f_iso: ArrayLike, f_vol: ArrayLike, f_geo: ArrayLike) -> Floats:
     """Return `ross_li` [1/sr] for unit vectors `wi` (light) and `wr` (viewer) of shape (..., 3)."""
     return by_rows_of_vectors(_vector_rows, checked_vectors(wi, wr), _checked(f_iso, f_vol, f_geo))

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from brdfdb._numba import elementwise, kernel
 from brdfdb.geometry import Directions, checked_angles, checked_vectors, finished
+from brdfdb.models.large_calls import for_large_calls
 from brdfdb.parameters import Floats, ModelSpec, Parameter, white
 
 K = Parameter("k", "k", "1", 0.0, 1.0, "limb darkening exponent; 1 is Lambert")
@@ -23,6 +24,7 @@ def _minnaert(cos_i: float, cos_r: float, k: float, rho: float) -> float:
 _evaluate = elementwise(_minnaert)
 
 
+@for_large_calls
 def minnaert(
     theta_i: ArrayLike,
     phi_i: ArrayLike,
@@ -70,6 +72,7 @@ def minnaert(
     return _f_r(checked_angles(theta_i, phi_i, theta_r, phi_r), k, rho)
 
 
+@for_large_calls
 def minnaert_vectors(wi: ArrayLike, wr: ArrayLike, *, k: ArrayLike, rho: ArrayLike = 1.0) -> Floats:
     """Return `minnaert` [1/sr] for unit vectors `wi` (light) and `wr` (viewer) of shape (..., 3)."""
     return _f_r(checked_vectors(wi, wr), k, rho)

@@ -19,6 +19,7 @@ from brdfdb.models._oren_nayar_kernels import (
     rest_of_angle,
 )
 from brdfdb.models._rows import by_rows, by_rows_of_vectors
+from brdfdb.models.large_calls import for_large_calls
 from brdfdb.parameters import Floats, Gradient, Parameter
 
 RHO = Parameter("rho", "ρ", "1", 0.0, 1.0, "albedo of a facet", reflectance=True)
@@ -36,6 +37,7 @@ class Parts(NamedTuple):
     interreflected: Floats
 
 
+@for_large_calls
 def oren_nayar(
     theta_i: ArrayLike,
     phi_i: ArrayLike,
@@ -89,14 +91,15 @@ def oren_nayar(
     """
     angles = checked_angles(theta_i, phi_i, theta_r, phi_r)
     alpha, beta = np.maximum(angles.theta_i, angles.theta_r), np.minimum(angles.theta_i, angles.theta_r)
-    sin_alpha = np.maximum(angles.sin_i, angles.sin_r)
+    # Functions of alpha or beta are taken of each angle first, since axes are shorter than their pairs
+    versines = (2.0 * np.sin((HALF_PI - theta + HALF_PI_REST) / 2.0) ** 2 for theta in (angles.theta_i, angles.theta_r))
     pair = (
         alpha,
         beta,
         HALF_PI - beta + HALF_PI_REST,
-        sin_alpha,
-        2.0 * np.sin((HALF_PI - alpha + HALF_PI_REST) / 2.0) ** 2,
-        np.tan(beta),
+        np.maximum(angles.sin_i, angles.sin_r),
+        np.minimum(*versines),
+        np.minimum(np.tan(angles.theta_i), np.tan(angles.theta_r)),
         (angles.sin_i + angles.sin_r) / (angles.cos_i + angles.cos_r),  # tangent of the mean angle, without rounding it
     )
     cos_dphi = angles.cos_dphi
@@ -105,6 +108,7 @@ def oren_nayar(
     return finished(by_rows(functional_angle_rows, (cos_dphi, one_less_cos), (*pair, *parameters)), angles)
 
 
+@for_large_calls
 def oren_nayar_vectors(
     wi: ArrayLike, wr: ArrayLike, *, rho: ArrayLike, sigma: ArrayLike, interreflection: ArrayLike = True
 ) -> Floats:
@@ -176,6 +180,7 @@ def _apart(directions: Directions, direct: Floats, total: Floats, rho: Floats, s
     return Parts(finished(direct, directions), finished(np.where(direct > 0.0, bounce, total), directions))
 
 
+@for_large_calls
 def oren_nayar_qualitative(
     theta_i: ArrayLike,
     phi_i: ArrayLike,
@@ -223,11 +228,12 @@ def oren_nayar_qualitative(
     0.2362
     """
     angles = checked_angles(theta_i, phi_i, theta_r, phi_r)
-    pair = np.maximum(angles.sin_i, angles.sin_r), np.tan(np.minimum(angles.theta_i, angles.theta_r))
+    pair = np.maximum(angles.sin_i, angles.sin_r), np.minimum(np.tan(angles.theta_i), np.tan(angles.theta_r))
     parameters = RHO.check(rho), SIGMA.check(sigma), OFFSET.check(offset)
     return finished(by_rows(qualitative_angle_rows, (angles.cos_dphi,), (*pair, *parameters)), angles)
 
 
+@for_large_calls
 def oren_nayar_qualitative_vectors(
     wi: ArrayLike, wr: ArrayLike, *, rho: ArrayLike, sigma: ArrayLike, offset: ArrayLike = 0.33
 ) -> Floats:

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from brdfdb.geometry import Directions, checked_angles, checked_vectors, finished
 from brdfdb.lobes import Lobe
 from brdfdb.models import torrance_sparrow_1967
+from brdfdb.models.large_calls import for_large_calls
 from brdfdb.models.oren_nayar_1994 import INTERREFLECTION, oren_nayar, oren_nayar_vectors
 from brdfdb.models.torrance_sparrow_1967 import torrance_sparrow, torrance_sparrow_vectors
 from brdfdb.parameters import Floats, Parameter
@@ -22,6 +23,7 @@ E_0 = Parameter(
 WITH_INTERREFLECTION = replace(INTERREFLECTION, default=False)
 
 
+@for_large_calls
 def oren_nayar_body_surface(
     theta_i: ArrayLike,
     phi_i: ArrayLike,
@@ -92,6 +94,7 @@ def oren_nayar_body_surface(
     return _sum(body, torrance_sparrow(*angles, sigma=sigma, n=n, k=k), k_b, k_s, e_0, directions)
 
 
+@for_large_calls
 def oren_nayar_body_surface_vectors(
     wi: ArrayLike,
     wr: ArrayLike,

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from brdfdb.geometry import Directions, checked_angles, checked_vectors, finished
 from brdfdb.models._oren_nayar_facets import NODES, bounce_of_cavity, direct_of_cavity, gaussian
 from brdfdb.models._oren_nayar_single_slope import bounce_of_slope, direct_of_slope, over_slopes
+from brdfdb.models.large_calls import for_large_calls
 from brdfdb.models.oren_nayar_1994 import RHO, SIGMA, Parts
 from brdfdb.parameters import Floats, Parameter
 
@@ -19,6 +20,7 @@ PHI_A = Parameter("phi_a", "φ_a", "rad", 0.0, np.pi, "azimuth of the facets' no
 PartName = Literal["direct", "interreflected"]  # a field of `Parts`
 
 
+@for_large_calls
 def oren_nayar_unidirectional(
     theta_i: ArrayLike,
     phi_i: ArrayLike,
@@ -75,6 +77,7 @@ def oren_nayar_unidirectional(
     return _total(*_unidirectional(checked_angles(theta_i, phi_i, theta_r, phi_r), rho, theta_a, phi_a))
 
 
+@for_large_calls
 def oren_nayar_unidirectional_vectors(
     wi: ArrayLike, wr: ArrayLike, *, rho: ArrayLike, theta_a: ArrayLike, phi_a: ArrayLike
 ) -> Floats:
@@ -159,6 +162,7 @@ def _part(part: PartName, direct: Floats, bounce: Floats, directions: Directions
     return finished(direct if part == "direct" else bounce, directions)
 
 
+@for_large_calls
 def oren_nayar_single_slope(
     theta_i: ArrayLike,
     phi_i: ArrayLike,
@@ -207,6 +211,7 @@ def oren_nayar_single_slope(
     return _total(*_single_slope(checked_angles(theta_i, phi_i, theta_r, phi_r), rho, theta_a))
 
 
+@for_large_calls
 def oren_nayar_single_slope_vectors(wi: ArrayLike, wr: ArrayLike, *, rho: ArrayLike, theta_a: ArrayLike) -> Floats:
     """Return `oren_nayar_single_slope` [1/sr] for unit vectors `wi` (light) and `wr` (viewer) of shape (..., 3)."""
     return _total(*_single_slope(checked_vectors(wi, wr), rho, theta_a))
@@ -290,6 +295,7 @@ def _features(directions: Directions) -> tuple[Floats, Floats, Floats, Floats]:
     return directions.sin_i / directions.cos_i, directions.sin_r / directions.cos_r, cos_dphi, one_less_cos
 
 
+@for_large_calls
 def oren_nayar_gaussian(
     theta_i: ArrayLike,
     phi_i: ArrayLike,
@@ -342,6 +348,7 @@ def oren_nayar_gaussian(
     return _total(*_gaussian(checked_angles(theta_i, phi_i, theta_r, phi_r), rho, sigma))
 
 
+@for_large_calls
 def oren_nayar_gaussian_vectors(wi: ArrayLike, wr: ArrayLike, *, rho: ArrayLike, sigma: ArrayLike) -> Floats:
     """Return `oren_nayar_gaussian` [1/sr] for unit vectors `wi` (light) and `wr` (viewer) of shape (..., 3)."""
     return _total(*_gaussian(checked_vectors(wi, wr), rho, sigma))

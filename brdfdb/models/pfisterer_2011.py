@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 from brdfdb.lobes import Lobe
 from brdfdb.models import _stray_light
 from brdfdb.models._stray_light import ABG, by_angles, by_vectors
+from brdfdb.models.large_calls import for_large_calls
 from brdfdb.parameters import Floats, ModelSpec, Parameter
 
 A = Parameter("a", "A", "1/sr", 0.0, 1.0, "level: f_r in the mirror direction is a / b")
@@ -15,6 +16,7 @@ B = Parameter("b", "B", "1", 1e-8, 10.0, "the profile bends at the distance b^(1
 G = Parameter("g", "g", "1", 0.5, 6.0, "the profile falls as distance^-g")
 
 
+@for_large_calls
 def abg(
     theta_i: ArrayLike,
     phi_i: ArrayLike,
@@ -68,6 +70,7 @@ def abg(
     return by_angles(ABG, (theta_i, phi_i, theta_r, phi_r), _checked(a, b, g))
 
 
+@for_large_calls
 def abg_vectors(wi: ArrayLike, wr: ArrayLike, *, a: ArrayLike, b: ArrayLike, g: ArrayLike) -> Floats:
     """Return `abg` [1/sr] for unit vectors `wi` (light) and `wr` (viewer) of shape (..., 3)."""
     return by_vectors(ABG, wi, wr, _checked(a, b, g))

@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 from brdfdb._elementary import arcsin
 from brdfdb._numba import elementwise, kernel
 from brdfdb.geometry import Directions, checked_angles, checked_vectors, finished
+from brdfdb.models.large_calls import for_large_calls
 from brdfdb.parameters import Floats, ModelSpec, Parameter, white
 
 RHO = Parameter("rho", "ρ", "1", 0.0, 1.0, "albedo of a single scattering; the albedo at 1", reflectance=True)
@@ -48,6 +49,7 @@ def _energy_preserving(
 _evaluate = elementwise(_energy_preserving)
 
 
+@for_large_calls
 def oren_nayar_energy_preserving(
     theta_i: ArrayLike,
     phi_i: ArrayLike,
@@ -96,6 +98,7 @@ def oren_nayar_energy_preserving(
     return _f_r(checked_angles(theta_i, phi_i, theta_r, phi_r), rho, roughness)
 
 
+@for_large_calls
 def oren_nayar_energy_preserving_vectors(
     wi: ArrayLike, wr: ArrayLike, *, rho: ArrayLike, roughness: ArrayLike
 ) -> Floats:

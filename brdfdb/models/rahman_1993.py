@@ -11,6 +11,7 @@ from brdfdb._elementary import cosine, exp, log
 from brdfdb._numba import kernel
 from brdfdb.geometry import checked_angles, checked_vectors, finished
 from brdfdb.models._rows import by_rows, by_rows_of_vectors
+from brdfdb.models.large_calls import for_large_calls
 from brdfdb.parameters import Floats, ModelSpec, Parameter
 
 RHO_0 = Parameter("rho_0", "ρ_0", "1", 0.0, 1.0, "level of the reflectance", reflectance=True)
@@ -80,6 +81,7 @@ def _vector_rows(w_i: Floats, w_r: Floats, scalars: Rows, f_r: Floats) -> None:
             f[j] = value * (0.0 if z_i < 0.0 or z_r < 0.0 else 1.0)  # nan stays nan
 
 
+@for_large_calls
 def rpv(
     theta_i: ArrayLike,
     phi_i: ArrayLike,
@@ -142,6 +144,7 @@ def rpv(
     return finished(by_rows(_angle_rows, columns, scalars), checked)
 
 
+@for_large_calls
 def rpv_vectors(
     wi: ArrayLike, wr: ArrayLike, *, rho_0: ArrayLike, k: ArrayLike, asymmetry: ArrayLike, rho_c: ArrayLike
 ) -> Floats:

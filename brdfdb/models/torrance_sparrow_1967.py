@@ -14,6 +14,7 @@ from brdfdb.fresnel import unpolarised
 from brdfdb.geometry import Directions, checked_angles, checked_vectors, finished
 from brdfdb.lobes import Lobe
 from brdfdb.models.he_torrance_1991 import K, N
+from brdfdb.models.large_calls import for_large_calls
 from brdfdb.parameters import Floats, ModelSpec, Parameter
 
 SIGMA = Parameter("sigma", "σ", "rad", 0.0, np.pi / 2, "standard deviation of the facets' slope angle")
@@ -55,6 +56,7 @@ def _half_angle_cosine(cos_i: float, sin_i: float, cos_r: float, sin_r: float, o
 _evaluate, _cosine = elementwise(_lobe), elementwise(_half_angle_cosine)
 
 
+@for_large_calls
 def torrance_sparrow(
     theta_i: ArrayLike,
     phi_i: ArrayLike,
@@ -111,6 +113,7 @@ def torrance_sparrow(
     return _f_r(checked_angles(theta_i, phi_i, theta_r, phi_r), sigma, n, k)
 
 
+@for_large_calls
 def torrance_sparrow_vectors(
     wi: ArrayLike, wr: ArrayLike, *, sigma: ArrayLike, n: ArrayLike | None = None, k: ArrayLike | None = None
 ) -> Floats:

@@ -8,6 +8,7 @@ from brdfdb.geometry import checked_angles, checked_vectors, finished
 from brdfdb.models import _microfacets
 from brdfdb.models._ggx_albedo import lost_share
 from brdfdb.models._microfacets import CORRELATED, F_0, SCHLICK, by_checked_angles, by_vectors, painted
+from brdfdb.models.large_calls import for_large_calls_of_one
 from brdfdb.parameters import Floats, Parameter
 
 ALPHA = Parameter("alpha", "α", "1", 1e-6, 1.0, "width of the facets' slopes")
@@ -15,6 +16,7 @@ ALPHA = Parameter("alpha", "α", "1", 1e-6, 1.0, "width of the facets' slopes")
 _GGX = (_microfacets.GGX, CORRELATED, SCHLICK)
 
 
+@for_large_calls_of_one("alpha")
 def ggx_scaled(
     theta_i: ArrayLike, phi_i: ArrayLike, theta_r: ArrayLike, phi_r: ArrayLike, *, f_0: ArrayLike, alpha: ArrayLike
 ) -> Floats:
@@ -63,6 +65,7 @@ def ggx_scaled(
     return finished(single * _scale(checked.cos_r, f_0, alpha), checked)
 
 
+@for_large_calls_of_one("alpha")
 def ggx_scaled_vectors(wi: ArrayLike, wr: ArrayLike, *, f_0: ArrayLike, alpha: ArrayLike) -> Floats:
     """Return `ggx_scaled` [1/sr] for unit vectors `wi` (light) and `wr` (viewer) of shape (..., 3)."""
     checked = checked_vectors(wi, wr)

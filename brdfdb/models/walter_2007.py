@@ -18,11 +18,13 @@ from brdfdb.models._microfacets import (
     lossless_metal,
     metal,
 )
+from brdfdb.models.large_calls import for_large_calls
 from brdfdb.parameters import Floats, ModelSpec
 
 _GGX, _BECKMANN = (_microfacets.GGX, SEPARABLE, EXACT), (BECKMANN, SEPARABLE, EXACT)
 
 
+@for_large_calls
 def ggx_separable(
     theta_i: ArrayLike,
     phi_i: ArrayLike,
@@ -80,6 +82,7 @@ def ggx_separable(
     return by_angles(_GGX, (theta_i, phi_i, theta_r, phi_r), facets)
 
 
+@for_large_calls
 def ggx_separable_vectors(
     wi: ArrayLike,
     wr: ArrayLike,
@@ -94,6 +97,7 @@ def ggx_separable_vectors(
     return by_vectors(_GGX, wi, wr, metal(alpha_x, alpha_y, n, k, wavelength_nm))
 
 
+@for_large_calls
 def beckmann_separable(
     theta_i: ArrayLike,
     phi_i: ArrayLike,
@@ -144,6 +148,7 @@ def beckmann_separable(
     return by_angles(_BECKMANN, (theta_i, phi_i, theta_r, phi_r), facets)
 
 
+@for_large_calls
 def beckmann_separable_vectors(
     wi: ArrayLike,
     wr: ArrayLike,

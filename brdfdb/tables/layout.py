@@ -14,7 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ConfigDict
 
+from brdfdb._elementary import COS_HORIZON
 from brdfdb.errors import BrdfdbError, ParameterError
+from brdfdb.geometry import HALF_PI
 from brdfdb.materials import Material, Source, source_of
 from brdfdb.materials.polarised import polarised_source
 from brdfdb.parameters import Floats
@@ -252,3 +254,27 @@ class Layout:
 def digest(document: Mapping[str, Any]) -> str:
     """Return the sha256 of a document, whatever the order of its keys."""
     return hashlib.sha256(json.dumps(document, sort_keys=True).encode()).hexdigest()
+
+
+def rebuilt(
+    numbers: Floats,
+    interpolation: Interpolation,
+    spectra: Floats | None,
+    uniform: Floats | None,
+    theta_i: Floats,
+    theta_r: Floats,
+    *,
+    mixed: bool,
+) -> Floats:
+    """Return f_r [1/sr] at nodes, shape (..., L), from the numbers there, shape (..., coefficients or L).
+
+    theta_i and theta_r [rad] broadcast to the shape of the nodes. It is 0 below the horizon. `mixed` says that the
+    spectra mix f_r, not logarithms.
+    """
+    wavelengths = numbers if spectra is None or mixed else numbers.astype(np.float64) @ spectra
+    mu = np.maximum(np.cos(theta_i), COS_HORIZON) * np.maximum(np.cos(theta_r), COS_HORIZON)
+    f_r = interpolation.f_r(wavelengths, mu)
+    if mixed and spectra is not None:
+        f_r = np.maximum(f_r @ spectra, 0.0)
+    f_r = f_r + (0.0 if uniform is None else uniform)
+    return np.asarray(np.where((np.maximum(theta_i, theta_r) > HALF_PI)[..., np.newaxis], 0.0, f_r))

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
-from brdfdb._elementary import COS_HORIZON
 from brdfdb.errors import ParameterError
 from brdfdb.geometry import (
     HALF_PI,
@@ -22,12 +21,13 @@ from brdfdb.geometry import (
     spherical_angles,
 )
 from brdfdb.materials.source import FourAngles
+from brdfdb.models.large_calls import array_for_result, filled
 from brdfdb.notebook import polar_sketch
 from brdfdb.parameters import Floats
 from brdfdb.tables import _kernels, stokes
 from brdfdb.tables._interpolation import Axes, prepared
 from brdfdb.tables.grids import Axis, Grid, axes_among, check_wavelengths
-from brdfdb.tables.layout import PLAIN, Interpolation, Layout
+from brdfdb.tables.layout import PLAIN, Interpolation, Layout, rebuilt
 from brdfdb.tables.metadata import TableMetadata
 from brdfdb.tables.polarisation import Facets, checked_facets, facets_of
 from brdfdb.tables.table_base import BaseTable
@@ -152,7 +152,47 @@ class Table(BaseTable):
         """True if the stored numbers are f_r itself."""
         return self.spectra is None and self.uniform is None and self.interpolation.plain
 
-    def _at_angles(self, angles: FourAngles, wavelength_nm: ArrayLike | None) -> Floats:
+    def lookup(
+        self,
+        theta_i: ArrayLike,
+        phi_i: ArrayLike,
+        theta_r: ArrayLike,
+        phi_r: ArrayLike,
+        wavelength_nm: ArrayLike | None = None,
+        *,
+        out: Floats | None = None,
+        threads: int = 1,
+    ) -> Floats:
+        """Interpolate f_r [1/sr] at angles.
+
+        Parameters
+        ----------
+        theta_i, phi_i, theta_r, phi_r : array_like [rad]
+            Directions of light (i) and viewer (r), pointing away from the surface; theta in [0, pi]; broadcast.
+        wavelength_nm : float or array_like (M,) [nm], optional
+            Within the range of a spectral table; by default its wavelengths. Grey tables take any.
+        out : array, optional
+            Writable, C-contiguous, in the shape and dtype of the result: it is written there and returned.
+        threads : int
+            Number of threads that share a large call, at least 1; by default 1. Values are the same bit for bit.
+
+        Returns
+        -------
+        array [1/sr]
+            In the shape of the angles, with a last axis for the wavelengths of a spectral table, or M if an array of
+            wavelengths was given; a single wavelength adds no axis. 0 below the horizon, nan where an angle is nan.
+            float32 arrays in give float32 out.
+
+        Raises
+        ------
+        ParameterError
+            If an argument is outside its range.
+        """
+        return self._at_angles((theta_i, phi_i, theta_r, phi_r), wavelength_nm, out, threads)
+
+    def _at_angles(
+        self, angles: FourAngles, wavelength_nm: ArrayLike | None, out: Floats | None = None, threads: int = 1
+    ) -> Floats:
         at = self._wavelengths(wavelength_nm)
         shape: tuple[int, ...] = ()
         if all(isinstance(angle, float) for angle in angles):  # broadcasting takes longer than the lookup of one point
@@ -166,22 +206,44 @@ class Table(BaseTable):
                 checked_angles(*angles)
             shape = shape_of_angles(*arrays)
             flat = [_flat(angle, shape, dtype) for angle in arrays]
-        values = np.empty(flat[0].size * at.size, dtype)
         horizon = float(dtype.type(HALF_PI))
-        if not _kernels.by_angles(
-            *self._kernel, at.nodes, at.weight, flat[0], flat[1], flat[2], flat[3], horizon, values
-        ):
-            checked_angles(*angles)
-        return values.reshape(shape + at.tail)[()]
 
-    def lookup_vectors(self, wi: ArrayLike, wr: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:
+        def write(part: slice, values: NDArray[Any]) -> None:
+            given = [angle[part] for angle in flat]
+            if not _kernels.by_angles(
+                *self._kernel, at.nodes, at.weight, given[0], given[1], given[2], given[3], horizon, values
+            ):
+                checked_angles(*angles)
+
+        arguments = dict(zip(("theta_i", "phi_i", "theta_r", "phi_r"), angles, strict=True))
+        values = filled(write, array_for_result(out, shape + at.tail, dtype, arguments), at.size, threads)
+        return values[()] if out is None else values
+
+    def lookup_vectors(
+        self,
+        wi: ArrayLike,
+        wr: ArrayLike,
+        wavelength_nm: ArrayLike | None = None,
+        *,
+        out: Floats | None = None,
+        threads: int = 1,
+    ) -> Floats:
+        """Interpolate f_r [1/sr] for unit vectors `wi` of the light and `wr` of the viewer, each of shape (..., 3).
+
+        Wavelengths, `out`, `threads`, result and errors are those of `lookup`.
+        """
         at = self._wavelengths(wavelength_nm)
         vectors = checked_vectors(wi, wr)
         shape = np.broadcast_shapes(vectors.w_i.shape, vectors.w_r.shape)
-        flat = [_flat(w, shape, vectors.dtype) for w in (vectors.w_i, vectors.w_r)]
-        values = np.empty(flat[0].size // 3 * at.size, vectors.dtype)
-        _kernels.by_vectors(*self._kernel, at.nodes, at.weight, flat[0], flat[1], values)
-        return values.reshape(shape[:-1] + at.tail)[()]
+        w_i, w_r = (_flat(w, shape, vectors.dtype) for w in (vectors.w_i, vectors.w_r))
+
+        def write(part: slice, values: NDArray[Any]) -> None:
+            numbers = slice(3 * part.start, 3 * part.stop)
+            _kernels.by_vectors(*self._kernel, at.nodes, at.weight, w_i[numbers], w_r[numbers], values)
+
+        result = array_for_result(out, shape[:-1] + at.tail, vectors.dtype, {"wi": wi, "wr": wr})
+        values = filled(write, result, at.size, threads)
+        return values[()] if out is None else values
 
     @functools.cached_property
     def _kernel(self) -> _Ready:
@@ -300,30 +362,6 @@ class Table(BaseTable):
                 "specular", f"shape {self.specular.shape} of {self.name} is not {expected}, two nodes or more"
             )
         return nodes, np.ascontiguousarray(self.specular.reshape(nodes.size, -1))
-
-
-def rebuilt(
-    numbers: Floats,
-    interpolation: Interpolation,
-    spectra: Floats | None,
-    uniform: Floats | None,
-    theta_i: Floats,
-    theta_r: Floats,
-    *,
-    mixed: bool,
-) -> Floats:
-    """Return f_r [1/sr] at nodes, shape (..., L), from the numbers there, shape (..., coefficients or L).
-
-    theta_i and theta_r [rad] broadcast to the shape of the nodes. It is 0 below the horizon. `mixed` says that the
-    spectra mix f_r, not logarithms.
-    """
-    wavelengths = numbers if spectra is None or mixed else numbers.astype(np.float64) @ spectra
-    mu = np.maximum(np.cos(theta_i), COS_HORIZON) * np.maximum(np.cos(theta_r), COS_HORIZON)
-    f_r = interpolation.f_r(wavelengths, mu)
-    if mixed and spectra is not None:
-        f_r = np.maximum(f_r @ spectra, 0.0)
-    f_r = f_r + (0.0 if uniform is None else uniform)
-    return np.asarray(np.where((np.maximum(theta_i, theta_r) > HALF_PI)[..., np.newaxis], 0.0, f_r))
 
 
 def _flat(array: NDArray[Any], shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:

@@ -14,8 +14,8 @@ from xarray.core import indexing
 
 from brdfdb.errors import ParameterError
 from brdfdb.tables.grids import axes_among, directions
+from brdfdb.tables.layout import rebuilt
 from brdfdb.tables.metadata import TableMetadata
-from brdfdb.tables.table import rebuilt
 from brdfdb.tables.tabulation import VARIABLES
 
 CF_VERSION = "CF-1.11"  # of the conventions that units, long_name and standard_name follow

@@ -36,8 +36,10 @@ from brdfdb.models import MODELS
 from tests.benchmarks.recording import Column, Run, Table
 
 FLAGS = ["-std=c++17", "-O3", "-march=native", "-ffast-math"]
+FLOAT32 = ["-DREAL=float", "-fsingle-precision-constant"]
 SEED = 1994
-AGREEMENT = 1e-8  # of values, relative; those below TINY are 0
+# Share of values that agree, and their largest relative difference; values below TINY are 0
+AGREEMENT = {"float64": (1.0, 1e-8), "float32": (0.99, 1e-3)}
 TINY = 1e-30
 ROWS = 2  # of theta_i at a time, as brdfdb.tables.tabulation cuts a grid of this size
 MEASURED = "Million values of f_r a second on one core: our models beside the same arithmetic in C++."
@@ -82,13 +84,15 @@ ANALYTIC: dict[str, dict[str, float]] = {
     "oren_nayar": {"rho": 0.9, "sigma": 0.5, "interreflection": 1.0},
     "oren_nayar_qualitative": {"rho": 0.9, "sigma": 0.5, "offset": 0.33},
 }
+IN_FLOAT32 = ("ward", "oren_nayar")
 SUMMED = ((10, 0.2516, 4.0), (500, 1.779, 20.0))  # g of the median direction, sigma_0 [um], floor; tau is 10 sigma_0
 ALUMINUM = {"wavelength_nm": 500.0, "n": 0.769, "k": 6.08, "a": 0.0}
+MANY_RATE = 1e3 / 170.0  # a surface of its own for each value of He-Torrance: 170 ns
 OVER_CPP, OVER_RANDOM, TABLE_RATE, GAUSSIAN_RATE = 0.9, 1.5, {"float64": 30.0, "float32": 80.0}, 0.02
 
 Call = Callable[[], Any]
 Clock = Callable[[], tuple[float, float]]  # median and least seconds of a pass
-Vectors = tuple[NDArray[np.float64], NDArray[np.float64]]
+Vectors = tuple[NDArray[Any], NDArray[Any]]
 
 
 @dataclass(frozen=True)
@@ -135,7 +139,7 @@ def columns() -> list[Column]:
         for name, unit in (("", "1e6/s"), (", best", "1e6/s"), (", spread", "%"))
     ]
     ratios = (Column(name="ratio"), Column(name="ratio of best"), Column(name="floor"), Column(name="verdict"))
-    return [Column(name="case / against", width=52), Column(name="timed"), *rates, *ratios]
+    return [Column(name="case / against", width=56), Column(name="timed"), *rates, *ratios]
 
 
 class Cpp:
@@ -160,25 +164,26 @@ class Cpp:
     def check(self, kernel: str, parameters: list[float], ours: NDArray[np.floating]) -> None:
         """Compare our values with those of the C++; SystemExit if they differ."""
         self._ask("dump", kernel, self.folder / "values", *parameters)
-        theirs = np.fromfile(self.folder / "values", count=ours.size)
-        error = np.max(np.abs(ours.ravel() - theirs) / np.maximum(np.abs(theirs), TINY))
-        if not error < AGREEMENT:
+        theirs = np.fromfile(self.folder / "values", ours.dtype, count=ours.size)
+        share, largest = AGREEMENT[ours.dtype.name]
+        if not np.quantile(np.abs(ours.ravel() - theirs) / np.maximum(np.abs(theirs), TINY), share) < largest:
             raise SystemExit(f"{kernel}: C++ and Python compute different things")
 
 
 @contextmanager
-def baseline(wi: NDArray[np.float64], wr: NDArray[np.float64], size: Size) -> Iterator[Cpp]:
-    """Compile baseline.cpp and start it on the directions and axes."""
+def baseline(wi: NDArray[Any], wr: NDArray[Any], size: Size) -> Iterator[Cpp]:
+    """Compile baseline.cpp and start it on the directions and axes, in the dtype of the directions."""
     compiler = shutil.which("g++")
     if compiler is None:
         raise SystemExit("g++ is not installed")
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         program = folder / "baseline"
-        subprocess.run([compiler, *FLAGS, "-o", program, Path(__file__).with_name("baseline.cpp")], check=True)
+        flags = FLAGS if wi.dtype == np.float64 else [*FLAGS, *FLOAT32]
+        subprocess.run([compiler, *flags, "-o", program, Path(__file__).with_name("baseline.cpp")], check=True)
         theta, phi = size.axes
         for array, file in ((wi, "w_i"), (wr, "w_r"), (theta, "theta"), (phi, "phi")):
-            array.tofile(folder / file)
+            array.astype(wi.dtype).tofile(folder / file)
         with subprocess.Popen([program, folder], text=True, stdin=PIPE, stdout=PIPE) as process:
             yield Cpp(process, folder)
             process.communicate()
@@ -253,13 +258,14 @@ def grid(model: str, theta: NDArray[Any], phi: NDArray[Any], **parameters: Any) 
 
 
 def analytic(model: str, cpp: Cpp, directions: Vectors, size: Size) -> Iterator[Row]:
-    """Random directions and a grid of one model, against C++ and against each other."""
+    """Random directions and a grid of one model, against C++ and against each other, in one dtype."""
+    dtype = directions[0].dtype
     parameters = ANALYTIC[model]
     values = list(parameters.values())
     contestants: dict[str, tuple[int, Clock]] = {}
     layouts: dict[str, Call] = {
         "": partial(MODELS[model].vectors, *directions, **parameters),
-        "_grid": partial(grid, model, *size.axes, **parameters),
+        "_grid": partial(grid, model, *(axis.astype(dtype) for axis in size.axes), **parameters),
     }
     for layout, public in layouts.items():
         ours = public()
@@ -280,7 +286,7 @@ def analytic(model: str, cpp: Cpp, directions: Vectors, size: Size) -> Iterator[
         ("grid / our random", "_grid", "", OVER_RANDOM),
     ):
         for kind in kinds:
-            yield Row(f"{model}, {case}", kind, rates[kind + ours], rates[theirs or kind], floor)
+            yield Row(f"{model} {dtype}, {case}", kind, rates[kind + ours], rates[theirs or kind], floor)
 
 
 def he_torrance(cpp: Cpp, directions: Vectors, size: Size) -> Iterator[Row]:
@@ -303,6 +309,12 @@ def he_torrance(cpp: Cpp, directions: Vectors, size: Size) -> Iterator[Row]:
         for stopped in ("1e-09", "1e-12"):
             for kind in [kind for kind in ("loop", "public") if kind in rates]:
                 yield Row(f"he_torrance, g ~ {g} / C++ to {stopped}", kind, rates[kind], rates[stopped], floor)
+    low, high = [400.0, -2.0, 3.0, 0.2, 0.0], [700.0, 0.5, 20.0, 2.5, 7.0]
+    nm, log_sigma_0, ratio, n, k = np.random.default_rng(SEED).uniform(low, high, (len(w_i), 5)).T.copy()
+    many = {"wavelength_nm": nm, "sigma_0_um": 10.0**log_sigma_0, "tau_um": ratio * 10.0**log_sigma_0, "n": n, "k": k}
+    public = partial(MODELS["he_torrance"].vectors, w_i, w_r, **many)
+    rates = in_turns(size.rounds, {"public": (len(w_i), clock(public, size.seconds))})
+    yield Row("he_torrance, random surfaces", "public", rates["public"], floor=MANY_RATE)
 
 
 def by_slabs(material: Material, axes: list[NDArray[Any]], spectrum: list[dict[str, Any]]) -> None:
@@ -391,7 +403,8 @@ def one_core() -> Iterator[None]:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Time all sections or those that are named, and print each row as it is known."""
-    sections = [*ANALYTIC, "he_torrance", "he_torrance_tables", "oren_nayar_gaussian"]
+    float32 = [f"{model}_float32" for model in IN_FLOAT32]
+    sections = [*ANALYTIC, *float32, "he_torrance", "he_torrance_tables", "oren_nayar_gaussian"]
     run = Run("against_cpp", "speed", "Models against C++", MEASURED)
     parser = run.parser(__doc__)
     parser.add_argument("section", nargs="*", help=", ".join(sections))
@@ -406,8 +419,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     rng = np.random.default_rng(SEED)
     directions = random_directions(rng, size.directions), random_directions(rng, size.directions)
     table = run.table("Values a second", *columns())
-    with one_core(), baseline(*directions, size) as cpp:
+    single = directions[0].astype(np.float32), directions[1].astype(np.float32)
+    with one_core(), baseline(*directions, size) as cpp, baseline(*single, size) as cpp32:
         runs: dict[str, Iterator[Row]] = {model: analytic(model, cpp, directions, size) for model in ANALYTIC}
+        runs |= {each: analytic(model, cpp32, single, size) for each, model in zip(float32, IN_FLOAT32, strict=True)}
         runs["he_torrance"] = he_torrance(cpp, directions, size)
         runs["he_torrance_tables"] = he_torrance_tables(size)
         runs["oren_nayar_gaussian"] = oren_nayar_gaussian(directions, size)
