@@ -38,6 +38,7 @@ _STRICTER = (1.0, 0.8, 0.65, 0.5, 0.4, 0.3, 0.2)  # tolerances at a few waveleng
 _OF_A_BAND = 30.0  # times the tolerance is what the 99th percentile of a band of theta_i may be
 _WAVELENGTHS = 4  # that the axes are chosen for; the finished table is measured at all
 _DRAWS, _FINAL_DRAWS = 700, 2000  # directions of a band of theta_i, for the axes and for the finished table
+_SOME = 8  # one of so many directions is measured first
 _SEED = 1994
 _BEYOND = 4.0  # safety factor on the node count where the grid extends below the horizon
 _HOPELESS = 8.0  # times the fewest values of another kind: a kind that takes so many is not looked into
@@ -118,18 +119,21 @@ def plan(
     task = _task(planned_on, wavelength_nm, tolerance, mixture)
     if not task.truth.any():
         return Layout(source, coarsest(source), wavelength_nm, reason="f_r is 0: all light is in the specular part")
-    table_kinds = tried = list(_table_kinds(task))
     final: _Final | None = None
-    for stricter in _STRICTER:
-        layout = _smallest(task._replace(tolerance=stricter * tolerance), tried)
-        if layout is not None:
-            tried = [kind for kind in table_kinds if _kind(kind[1]) == _kind(layout)]
-        finished = None
-        if layout is not None:
-            final = final or _final(source, wavelength_nm)
-            finished = _finished(replace(layout, source=source), final, wavelength_nm, tolerance, mixture)
-        if finished is not None:
-            return replace(finished, reason=_reason(finished, tolerance, table_kinds))
+    for hopeless in (_HOPELESS, math.inf):  # kinds that promised too many values are looked into if the others fail
+        table_kinds = left = list(_table_kinds(task, hopeless))
+        while left:
+            tried = left
+            for stricter in _STRICTER:
+                layout = _smallest(task._replace(tolerance=stricter * tolerance), tried)
+                if layout is None:
+                    break
+                tried = [kind for kind in left if _kind(kind[1]) == _kind(layout)]
+                final = final or _final(source, wavelength_nm)
+                finished = _finished(replace(layout, source=source), final, wavelength_nm, tolerance, mixture)
+                if finished is not None:
+                    return replace(finished, reason=_reason(finished, tolerance, table_kinds))
+            left = [kind for kind in left if all(kind is not other for other in tried)]
     raise ParameterError(
         "tolerance",
         f"{tolerance:g} takes more than {MOST_VALUES} values of {source.name}; ask for another error, "
@@ -148,6 +152,8 @@ def _order(kind: _TableKind) -> tuple[float, int]:
 def _smallest(task: _Task, table_kinds: list[_TableKind]) -> Layout | None:
     """Return the smallest table of some kinds that keeps to the tolerance of the task."""
     ranked = [kind for kind in sorted(table_kinds, key=_order) if kind[2]]
+    if not ranked:
+        return None
     for most in (0.5 * _HOPELESS * ranked[0][0], math.inf):  # nodes: a kind that takes many more than it seemed is left
         best: Layout | None = None
         tried: Counter[tuple[str, ...]] = Counter()
@@ -234,8 +240,11 @@ def _end(source: Source, name: str) -> float:
     return LINE[name][0]
 
 
-def _table_kinds(task: _Task) -> Iterator[_TableKind]:
-    """Yield kinds of tables, each with the number of values that it is likely to take; simple ones first."""
+def _table_kinds(task: _Task, hopeless: float = _HOPELESS) -> Iterator[_TableKind]:
+    """Yield kinds of tables, each with the number of values that it is likely to take; simple ones first.
+
+    A kind that takes `hopeless` times the fewest values is dropped as soon as some of its axes show it.
+    """
     source = task.source
     offset, floor = _offset(task), error_measurement.floor_of(task.truth, task.drawn)
     kinds: list[tuple[str, ...]]
@@ -268,7 +277,7 @@ def _table_kinds(task: _Task) -> Iterator[_TableKind]:
                         size *= needs[name].count(task.tolerance)
                         if name == "theta_h" and power == 0.0:
                             size *= _BEYOND
-                        if size > _HOPELESS * fewest:
+                        if size > hopeless * fewest:
                             needs = {}
                             break
                     fewest = min(fewest, size if needs else math.inf)
@@ -297,11 +306,24 @@ def _error(layout: Layout, values: NDArray[np.float32], drawn: error_measurement
     error = error_measurement.relative(looked_up, truth, error_measurement.floor_of(truth, drawn))
     wrong = drawn.weight @ np.abs(looked_up - truth)
     l1 = np.divide(wrong, drawn.weight @ truth, out=np.zeros_like(wrong), where=wrong > 0.0)
-    worst = max(np.percentile(error[drawn.above], 99, axis=0).max(), l1.max())
-    for band in np.unique(drawn.band):
-        in_band = error[drawn.above & (drawn.band == band)]
-        worst = max(worst, np.percentile(in_band, 99, axis=0).max() / _OF_A_BAND)
+    above = drawn.above
+    counted, band = np.ascontiguousarray(error[above].T), drawn.band[above]
+    worst = max(np.percentile(counted, 99, axis=1).max(), l1.max())
+    if counted.max() > _OF_A_BAND * worst:  # else no band can be worse
+        for row in np.unique(band):
+            worst = max(worst, np.percentile(counted[:, band == row], 99, axis=1).max() / _OF_A_BAND)
     return float(worst)
+
+
+def _keeps(layout: Layout, values: NDArray[np.float32], final: _Final, goal: float) -> bool:
+    """Return True if the errors of a table are within a goal; most that are not are known from a few directions."""
+    drawn, truth = final
+    few = slice(None, None, _SOME)
+    looked_up = Table.of(layout, values).lookup_vectors(drawn.wi[few], drawn.wr[few]).reshape(truth[few].shape)
+    error = error_measurement.relative(looked_up, truth[few], error_measurement.floor_of(truth, drawn))
+    beyond = np.count_nonzero((error > goal) & drawn.above[few, np.newaxis], axis=0).max()
+    most = 0.01 * np.count_nonzero(drawn.above) + 2.0  # with more the 99th percentile of all is beyond the goal
+    return bool(beyond <= most) and _error(layout, values, drawn, truth) <= goal
 
 
 def _values(layout: Layout) -> NDArray[np.float32]:
@@ -340,6 +362,10 @@ def _finished(
     goal = _MARGIN * tolerance
     reason = f"the smallest of those tried that keep 99 of 100 values within {tolerance:g} of the model, relative"
     spectra = None if mixture is None else mixture.spectra
+    if mixture is None and wavelength_nm is not None and layout.wavelength_nm is not None:
+        few = np.isin(wavelength_nm, layout.wavelength_nm)  # a table that fails at these fails at all of them
+        if not few.all() and not _keeps(layout, _values(layout), _Final(drawn, truth[:, few]), goal):
+            return None
     layout = replace(layout, wavelength_nm=wavelength_nm, reason=reason, spectra=spectra)
     whole = _values(layout)
     if mixture is None and layout.interpolation.logarithm and wavelength_nm is not None and wavelength_nm.size > 2:
@@ -351,11 +377,11 @@ def _finished(
         for parts in range(1, wavelength_nm.size // 2 + 1):
             factored = replace(layout, spectra=basis[:parts])
             values = (rows @ basis[:parts].T).astype(np.float32).reshape(factored.shape)
-            if _error(factored, values, drawn, truth) <= goal:
+            if _keeps(factored, values, final, goal):
                 layout, whole = factored, values
                 break
     for bits in _BITS if layout.size > _WORTH_ROUNDING else (23,):
         rounded = replace(layout, bits=bits)
-        if _error(rounded, tabulation.rounded(whole, bits), drawn, truth) <= goal:
+        if _keeps(rounded, tabulation.rounded(whole, bits), final, goal):
             return rounded
     return None
