@@ -76,7 +76,7 @@ class Need:
         return guessed if guessed <= _MOST_NODES else math.inf
 
     def more(self, count: float, steps: int) -> float:
-        """Return the number of nodes some steps of the ladder above a number; infinite beyond the largest sensible one."""
+        """Return the number of nodes some steps of the ladder above a number; infinite if it is not sensible."""
         for _ in range(steps):
             larger = [n for n in _COUNTS if n > count]
             count = larger[0] if larger else math.ceil(count * _COUNTS[-1] / _COUNTS[-2])
@@ -161,17 +161,17 @@ def _fractions(count: int) -> tuple[Floats, Floats]:
     return np.arange(float(count)), np.full(count, count - 1.0)
 
 
-_FRACTIONS: tuple[Floats, Floats] = tuple(np.concatenate(parts) for parts in zip(*map(_fractions, _COUNTS), strict=True))
+_FRACTIONS = tuple(np.concatenate(parts) for parts in zip(*map(_fractions, _COUNTS), strict=True))
 _SPLITS = np.cumsum(_COUNTS)[:-1]
 
 
-def _places(density: Floats, fractions: tuple[Floats, Floats]) -> Floats:
+def _places(density: Floats, fractions: tuple[Floats, ...]) -> Floats:
     """Return the places s in [0, 1] of quantiles of a density."""
     steps = 0.5 * (density[1:] + density[:-1])
     total = np.concatenate([[0.0], np.cumsum(steps)])
     number, last = fractions
     at = np.where(number == last, total[-1], number * (total[-1] / last))
-    return np.interp(at, total, np.linspace(0.0, 1.0, density.size))
+    return np.asarray(np.interp(at, total, np.linspace(0.0, 1.0, density.size)))
 
 
 def _left(layout: Layout, axis: int, at: NDArray[np.int64], rows: Floats, weights: Floats) -> float:

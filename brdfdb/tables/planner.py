@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -33,6 +33,11 @@ PLAN_VERSION = 1
 MOST_VALUES = 10_000_000  # of a table: a tolerance that takes more is refused
 _TRIED = 2  # ways to interpolate on each kind of grid, those that promise to be smallest
 _ROUNDS = 8  # of finer and coarser axes
+_STALLED, _PATIENCE = (
+    0.95,
+    2,
+)  # share of its error that a finer table keeps, rounds in turn: lines miss what an axis needs
+_STEPS = 2  # of the ladder of numbers of nodes, of an axis that lines misjudge
 _MARGIN = 0.88  # of the tolerance: other directions than the planner's find other errors
 _STRICTER = (1.0, 0.8, 0.65, 0.5, 0.4, 0.3, 0.2)  # tolerances at a few wavelengths, of that at all of them
 _OF_A_BAND = 30.0  # times the tolerance is what the 99th percentile of a band of theta_i may be
@@ -161,7 +166,8 @@ def _smallest(task: _Task, table_kinds: list[_TableKind]) -> Layout | None:
             tried[layout.grid.names] += 1
             if tried[layout.grid.names] <= _TRIED and (best is None or size < math.prod(best.grid.shape)):
                 values = min(MOST_VALUES, most * layout.size / math.prod(layout.grid.shape))
-                best = _refined(task, layout, needs, values if best is None else best.size) or best
+                smaller = _refined(task, layout, needs, values if best is None else best.size, probing=most == math.inf)
+                best = smaller or best
         if best is not None:
             return best
     return None
@@ -252,6 +258,8 @@ def _table_kinds(task: _Task, hopeless: float = _HOPELESS) -> Iterator[_TableKin
         kinds = [ANISOTROPIC_HALF_DIFFERENCE_AXES] if source.elliptical else [ANISOTROPIC_AXES]
     else:
         kinds = [ISOTROPIC_AXES, HALF_DIFFERENCE_AXES] if source.has_lobe else [ISOTROPIC_AXES]
+        if source.grazing_pole:  # over light and viewer it takes many nodes: where a lobe takes few, it is soon dropped
+            kinds = kinds[::-1]
     fewest = float(MOST_VALUES)
     for names in kinds:
         for power in (0.5, 1.0, 0.0) if source.grazing_pole else (0.0,):
@@ -284,11 +292,11 @@ def _table_kinds(task: _Task, hopeless: float = _HOPELESS) -> Iterator[_TableKin
                     yield size, chosen, needs
 
 
-def _with_axes(layout: Layout, needs: dict[str, Need], error: float) -> Layout | None:
-    """Return the layout whose axes leave the same error each; None if no known number of nodes does."""
+def _with_axes(layout: Layout, needs: dict[str, Need], error: float, finer: Mapping[str, int]) -> Layout | None:
+    """Return the layout whose axes leave the same error each, some of them finer; None if no known number does."""
     axes = {}
     for name, need in needs.items():
-        count = need.count(error)
+        count = need.more(need.count(error), finer.get(name, 0))
         if count == math.inf:
             return None
         axes[name] = need.nodes(int(count))
@@ -330,23 +338,52 @@ def _values(layout: Layout) -> NDArray[np.float32]:
     return np.concatenate([tabulation.block(layout, rows) for rows in layout.blocks])
 
 
-def _refined(task: _Task, layout: Layout, needs: dict[str, Need], most: float) -> Layout | None:
-    """Return the coarsest axes of those tried that keep to the tolerance with fewer than `most` values; or None."""
+def _refined(task: _Task, layout: Layout, needs: dict[str, Need], most: float, *, probing: bool) -> Layout | None:
+    """Return the coarsest axes of those tried that keep to the tolerance with fewer than `most` values; or None.
+
+    If `probing` and finer axes leave the error as it is, lines misjudge one of them: the one that helps most gets more.
+    """
     goal, error, best = _MARGIN * task.tolerance, task.tolerance, None
+    finer: dict[str, int] = {}  # steps on some axes beyond what lines tell
     known: dict[tuple[int, ...], float] = {}
-    for _ in range(_ROUNDS):
-        trial = _with_axes(layout, needs, error)
-        if trial is None or trial.size >= most:
-            break
+
+    def measured(trial: Layout) -> float:
         if trial.grid.shape not in known:
             known[trial.grid.shape] = _error(trial, _values(trial), task.drawn, task.truth) / goal
-        ratio = known[trial.grid.shape]
+        return known[trial.grid.shape]
+
+    last, stalled, rounds = math.inf, 0, _ROUNDS
+    while rounds > 0:
+        trial = _with_axes(layout, needs, error, finer)
+        if trial is None or trial.size >= most:
+            break
+        ratio = measured(trial)
         if ratio <= 1.0 and (best is None or trial.size < best.size):
             best = trial
         if 0.75 <= ratio <= 1.0 or (ratio < 1.0 and max(trial.grid.shape) == 2):
             break
-        error *= float(np.clip(0.85 / max(ratio, 1e-9), 0.25, 4.0))
+        stalled = stalled + 1 if probing and best is None and ratio > _STALLED * last else 0
+        last = min(last, ratio)
+        if stalled >= _PATIENCE:
+            steps = {axes: _with_axes(layout, needs, error, _finer(finer, axes)) for axes in _alike(needs)}
+            some = {axes: trial for axes, trial in steps.items() if trial is not None and trial.size < most}
+            if not some:
+                break
+            finer = _finer(finer, min(some, key=lambda axes: measured(some[axes])))
+        else:
+            rounds -= 1
+            error *= float(np.clip(0.85 / max(ratio, 1e-9), 0.25, 4.0))
     return best
+
+
+def _alike(needs: dict[str, Need]) -> list[tuple[str, ...]]:
+    """Return the axes, those that share a need together."""
+    return [tuple(name for name in needs if needs[name] is need) for need in dict.fromkeys(needs.values())]
+
+
+def _finer(finer: Mapping[str, int], axes: tuple[str, ...]) -> dict[str, int]:
+    """Return the steps beyond what lines tell, with more of them on some axes."""
+    return {**finer, **{name: finer.get(name, 0) + _STEPS for name in axes}}
 
 
 def _final(source: Source, wavelength_nm: NDArray[np.float64] | None) -> _Final:
