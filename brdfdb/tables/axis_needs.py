@@ -55,14 +55,13 @@ class Need:
         )
         density = smooth + _EASED * smooth.mean() + 1e-30
         self.density = density / density.sum()
-        self.counts = [n for n in _COUNTS if _spread(self.density, n) is not None]
+        self.points = _spread(self.density)
+        self.counts = [*self.points]
 
     def left(self, count: int) -> float:
         """Return the error that a number of nodes leaves."""
         if count not in self.known:
-            at = _spread(self.density, count)
-            assert at is not None
-            self.known[count] = _left(self.layout, self.axis, at, self.rows, self.weights)
+            self.known[count] = _left(self.layout, self.axis, self.points[count], self.rows, self.weights)
         return self.known[count]
 
     def count(self, error: float) -> float:
@@ -75,6 +74,13 @@ class Need:
             return self.counts[at]
         guessed = math.ceil(self.counts[-1] * (self.left(self.counts[-1]) / error) ** (1.0 / self.order))
         return guessed if guessed <= _MOST_NODES else math.inf
+
+    def more(self, count: float, steps: int) -> float:
+        """Return the number of nodes some steps of the ladder above a number; infinite if it is not sensible."""
+        for _ in range(steps):
+            larger = [n for n in _COUNTS if n > count]
+            count = larger[0] if larger else math.ceil(count * _COUNTS[-1] / _COUNTS[-2])
+        return count if count <= _MOST_NODES else math.inf
 
     def nodes(self, count: int) -> Axis:
         """Return so many nodes of the axis [degree], spread by the density."""
@@ -139,17 +145,33 @@ def lines(layout: Layout, axis: int, drawn: error_measurement.Draw, floor: Float
     return numbers, weight
 
 
-def _spread(density: Floats, count: int) -> NDArray[np.int64] | None:
-    """Return the points of a line that are nodes of an axis with so many; None if two would be the same."""
-    at = np.round(_quantiles(density, count) * (density.size - 1)).astype(np.int64)
-    return at if np.all(np.diff(at) > 0) else None
+def _spread(density: Floats) -> dict[int, NDArray[np.int64]]:
+    """Return the points of a line that are nodes of an axis, by their number; without numbers that repeat a point."""
+    at = np.round(_places(density, _FRACTIONS) * (density.size - 1)).astype(np.int64)
+    return {points.size: points for points in np.split(at, _SPLITS) if np.all(np.diff(points) > 0)}
 
 
 def _quantiles(density: Floats, count: int) -> Floats:
     """Return places s in [0, 1] between which the density of nodes has equal integrals."""
+    return _places(density, _fractions(count))
+
+
+def _fractions(count: int) -> tuple[Floats, Floats]:
+    """Return for each of so many quantiles its number and the number of the last."""
+    return np.arange(float(count)), np.full(count, count - 1.0)
+
+
+_FRACTIONS = tuple(np.concatenate(parts) for parts in zip(*map(_fractions, _COUNTS), strict=True))
+_SPLITS = np.cumsum(_COUNTS)[:-1]
+
+
+def _places(density: Floats, fractions: tuple[Floats, ...]) -> Floats:
+    """Return the places s in [0, 1] of quantiles of a density."""
     steps = 0.5 * (density[1:] + density[:-1])
     total = np.concatenate([[0.0], np.cumsum(steps)])
-    return np.interp(np.linspace(0.0, total[-1], count), total, np.linspace(0.0, 1.0, density.size))
+    number, last = fractions
+    at = np.where(number == last, total[-1], number * (total[-1] / last))
+    return np.asarray(np.interp(at, total, np.linspace(0.0, 1.0, density.size)))
 
 
 def _left(layout: Layout, axis: int, at: NDArray[np.int64], rows: Floats, weights: Floats) -> float:
@@ -162,4 +184,5 @@ def _left(layout: Layout, axis: int, at: NDArray[np.int64], rows: Floats, weight
     matrix = np.zeros((x.size, nodes.size))
     np.add.at(matrix, (np.arange(x.size)[:, np.newaxis], index), weight)
     error = np.abs(rows[:, at] @ matrix.T - rows) * weights
-    return float(np.percentile(error[weights > 0.0], 99)) if np.any(weights > 0.0) else 0.0
+    counted = error[weights > 0.0]
+    return float(np.percentile(counted, 99)) if counted.size else 0.0

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -33,11 +33,17 @@ PLAN_VERSION = 1
 MOST_VALUES = 10_000_000  # of a table: a tolerance that takes more is refused
 _TRIED = 2  # ways to interpolate on each kind of grid, those that promise to be smallest
 _ROUNDS = 8  # of finer and coarser axes
+_STALLED, _PATIENCE = (
+    0.95,
+    2,
+)  # share of its error that a finer table keeps, rounds in turn: lines miss what an axis needs
+_STEPS = 2  # of the ladder of numbers of nodes, of an axis that lines misjudge
 _MARGIN = 0.88  # of the tolerance: other directions than the planner's find other errors
 _STRICTER = (1.0, 0.8, 0.65, 0.5, 0.4, 0.3, 0.2)  # tolerances at a few wavelengths, of that at all of them
 _OF_A_BAND = 30.0  # times the tolerance is what the 99th percentile of a band of theta_i may be
 _WAVELENGTHS = 4  # that the axes are chosen for; the finished table is measured at all
 _DRAWS, _FINAL_DRAWS = 700, 2000  # directions of a band of theta_i, for the axes and for the finished table
+_SOME = 8  # one of so many directions is measured first
 _SEED = 1994
 _BEYOND = 4.0  # safety factor on the node count where the grid extends below the horizon
 _HOPELESS = 8.0  # times the fewest values of another kind: a kind that takes so many is not looked into
@@ -118,18 +124,21 @@ def plan(
     task = _task(planned_on, wavelength_nm, tolerance, mixture)
     if not task.truth.any():
         return Layout(source, coarsest(source), wavelength_nm, reason="f_r is 0: all light is in the specular part")
-    table_kinds = tried = list(_table_kinds(task))
     final: _Final | None = None
-    for stricter in _STRICTER:
-        layout = _smallest(task._replace(tolerance=stricter * tolerance), tried)
-        if layout is not None:
-            tried = [kind for kind in table_kinds if _kind(kind[1]) == _kind(layout)]
-        finished = None
-        if layout is not None:
-            final = final or _final(source, wavelength_nm)
-            finished = _finished(replace(layout, source=source), final, wavelength_nm, tolerance, mixture)
-        if finished is not None:
-            return replace(finished, reason=_reason(finished, tolerance, table_kinds))
+    for hopeless in (_HOPELESS, math.inf):  # kinds that promised too many values are looked into if the others fail
+        table_kinds = left = list(_table_kinds(task, hopeless))
+        while left:
+            tried = left
+            for stricter in _STRICTER:
+                layout = _smallest(task._replace(tolerance=stricter * tolerance), tried)
+                if layout is None:
+                    break
+                tried = [kind for kind in left if _kind(kind[1]) == _kind(layout)]
+                final = final or _final(source, wavelength_nm)
+                finished = _finished(replace(layout, source=source), final, wavelength_nm, tolerance, mixture)
+                if finished is not None:
+                    return replace(finished, reason=_reason(finished, tolerance, table_kinds))
+            left = [kind for kind in left if all(kind is not other for other in tried)]
     raise ParameterError(
         "tolerance",
         f"{tolerance:g} takes more than {MOST_VALUES} values of {source.name}; ask for another error, "
@@ -148,6 +157,8 @@ def _order(kind: _TableKind) -> tuple[float, int]:
 def _smallest(task: _Task, table_kinds: list[_TableKind]) -> Layout | None:
     """Return the smallest table of some kinds that keeps to the tolerance of the task."""
     ranked = [kind for kind in sorted(table_kinds, key=_order) if kind[2]]
+    if not ranked:
+        return None
     for most in (0.5 * _HOPELESS * ranked[0][0], math.inf):  # nodes: a kind that takes many more than it seemed is left
         best: Layout | None = None
         tried: Counter[tuple[str, ...]] = Counter()
@@ -155,7 +166,8 @@ def _smallest(task: _Task, table_kinds: list[_TableKind]) -> Layout | None:
             tried[layout.grid.names] += 1
             if tried[layout.grid.names] <= _TRIED and (best is None or size < math.prod(best.grid.shape)):
                 values = min(MOST_VALUES, most * layout.size / math.prod(layout.grid.shape))
-                best = _refined(task, layout, needs, values if best is None else best.size) or best
+                smaller = _refined(task, layout, needs, values if best is None else best.size, probing=most == math.inf)
+                best = smaller or best
         if best is not None:
             return best
     return None
@@ -234,8 +246,11 @@ def _end(source: Source, name: str) -> float:
     return LINE[name][0]
 
 
-def _table_kinds(task: _Task) -> Iterator[_TableKind]:
-    """Yield kinds of tables, each with the number of values that it is likely to take; simple ones first."""
+def _table_kinds(task: _Task, hopeless: float = _HOPELESS) -> Iterator[_TableKind]:
+    """Yield kinds of tables, each with the number of values that it is likely to take; simple ones first.
+
+    A kind that takes `hopeless` times the fewest values is dropped as soon as some of its axes show it.
+    """
     source = task.source
     offset, floor = _offset(task), error_measurement.floor_of(task.truth, task.drawn)
     kinds: list[tuple[str, ...]]
@@ -243,6 +258,8 @@ def _table_kinds(task: _Task) -> Iterator[_TableKind]:
         kinds = [ANISOTROPIC_HALF_DIFFERENCE_AXES] if source.elliptical else [ANISOTROPIC_AXES]
     else:
         kinds = [ISOTROPIC_AXES, HALF_DIFFERENCE_AXES] if source.has_lobe else [ISOTROPIC_AXES]
+        if source.grazing_pole:  # over light and viewer it takes many nodes: where a lobe takes few, it is soon dropped
+            kinds = kinds[::-1]
     fewest = float(MOST_VALUES)
     for names in kinds:
         for power in (0.5, 1.0, 0.0) if source.grazing_pole else (0.0,):
@@ -268,18 +285,18 @@ def _table_kinds(task: _Task) -> Iterator[_TableKind]:
                         size *= needs[name].count(task.tolerance)
                         if name == "theta_h" and power == 0.0:
                             size *= _BEYOND
-                        if size > _HOPELESS * fewest:
+                        if size > hopeless * fewest:
                             needs = {}
                             break
                     fewest = min(fewest, size if needs else math.inf)
                     yield size, chosen, needs
 
 
-def _with_axes(layout: Layout, needs: dict[str, Need], error: float) -> Layout | None:
-    """Return the layout whose axes leave the same error each; None if no known number of nodes does."""
+def _with_axes(layout: Layout, needs: dict[str, Need], error: float, finer: Mapping[str, int]) -> Layout | None:
+    """Return the layout whose axes leave the same error each, some of them finer; None if no known number does."""
     axes = {}
     for name, need in needs.items():
-        count = need.count(error)
+        count = need.more(need.count(error), finer.get(name, 0))
         if count == math.inf:
             return None
         axes[name] = need.nodes(int(count))
@@ -297,34 +314,76 @@ def _error(layout: Layout, values: NDArray[np.float32], drawn: error_measurement
     error = error_measurement.relative(looked_up, truth, error_measurement.floor_of(truth, drawn))
     wrong = drawn.weight @ np.abs(looked_up - truth)
     l1 = np.divide(wrong, drawn.weight @ truth, out=np.zeros_like(wrong), where=wrong > 0.0)
-    worst = max(np.percentile(error[drawn.above], 99, axis=0).max(), l1.max())
-    for band in np.unique(drawn.band):
-        in_band = error[drawn.above & (drawn.band == band)]
-        worst = max(worst, np.percentile(in_band, 99, axis=0).max() / _OF_A_BAND)
+    above = drawn.above
+    counted, band = np.ascontiguousarray(error[above].T), drawn.band[above]
+    worst = max(np.percentile(counted, 99, axis=1).max(), l1.max())
+    if counted.max() > _OF_A_BAND * worst:  # else no band can be worse
+        for row in np.unique(band):
+            worst = max(worst, np.percentile(counted[:, band == row], 99, axis=1).max() / _OF_A_BAND)
     return float(worst)
+
+
+def _keeps(layout: Layout, values: NDArray[np.float32], final: _Final, goal: float) -> bool:
+    """Return True if the errors of a table are within a goal; most that are not are known from a few directions."""
+    drawn, truth = final
+    few = slice(None, None, _SOME)
+    looked_up = Table.of(layout, values).lookup_vectors(drawn.wi[few], drawn.wr[few]).reshape(truth[few].shape)
+    error = error_measurement.relative(looked_up, truth[few], error_measurement.floor_of(truth, drawn))
+    beyond = np.count_nonzero((error > goal) & drawn.above[few, np.newaxis], axis=0).max()
+    most = 0.01 * np.count_nonzero(drawn.above) + 2.0  # with more the 99th percentile of all is beyond the goal
+    return bool(beyond <= most) and _error(layout, values, drawn, truth) <= goal
 
 
 def _values(layout: Layout) -> NDArray[np.float32]:
     return np.concatenate([tabulation.block(layout, rows) for rows in layout.blocks])
 
 
-def _refined(task: _Task, layout: Layout, needs: dict[str, Need], most: float) -> Layout | None:
-    """Return the coarsest axes of those tried that keep to the tolerance with fewer than `most` values; or None."""
+def _refined(task: _Task, layout: Layout, needs: dict[str, Need], most: float, *, probing: bool) -> Layout | None:
+    """Return the coarsest axes of those tried that keep to the tolerance with fewer than `most` values; or None.
+
+    If `probing` and finer axes leave the error as it is, lines misjudge one of them: the one that helps most gets more.
+    """
     goal, error, best = _MARGIN * task.tolerance, task.tolerance, None
+    finer: dict[str, int] = {}  # steps on some axes beyond what lines tell
     known: dict[tuple[int, ...], float] = {}
-    for _ in range(_ROUNDS):
-        trial = _with_axes(layout, needs, error)
-        if trial is None or trial.size >= most:
-            break
+
+    def measured(trial: Layout) -> float:
         if trial.grid.shape not in known:
             known[trial.grid.shape] = _error(trial, _values(trial), task.drawn, task.truth) / goal
-        ratio = known[trial.grid.shape]
+        return known[trial.grid.shape]
+
+    last, stalled, rounds = math.inf, 0, _ROUNDS
+    while rounds > 0:
+        trial = _with_axes(layout, needs, error, finer)
+        if trial is None or trial.size >= most:
+            break
+        ratio = measured(trial)
         if ratio <= 1.0 and (best is None or trial.size < best.size):
             best = trial
         if 0.75 <= ratio <= 1.0 or (ratio < 1.0 and max(trial.grid.shape) == 2):
             break
-        error *= float(np.clip(0.85 / max(ratio, 1e-9), 0.25, 4.0))
+        stalled = stalled + 1 if probing and best is None and ratio > _STALLED * last else 0
+        last = min(last, ratio)
+        if stalled >= _PATIENCE:
+            steps = {axes: _with_axes(layout, needs, error, _finer(finer, axes)) for axes in _alike(needs)}
+            some = {axes: trial for axes, trial in steps.items() if trial is not None and trial.size < most}
+            if not some:
+                break
+            finer = _finer(finer, min(some, key=lambda axes: measured(some[axes])))
+        else:
+            rounds -= 1
+            error *= float(np.clip(0.85 / max(ratio, 1e-9), 0.25, 4.0))
     return best
+
+
+def _alike(needs: dict[str, Need]) -> list[tuple[str, ...]]:
+    """Return the axes, those that share a need together."""
+    return [tuple(name for name in needs if needs[name] is need) for need in dict.fromkeys(needs.values())]
+
+
+def _finer(finer: Mapping[str, int], axes: tuple[str, ...]) -> dict[str, int]:
+    """Return the steps beyond what lines tell, with more of them on some axes."""
+    return {**finer, **{name: finer.get(name, 0) + _STEPS for name in axes}}
 
 
 def _final(source: Source, wavelength_nm: NDArray[np.float64] | None) -> _Final:
@@ -340,6 +399,10 @@ def _finished(
     goal = _MARGIN * tolerance
     reason = f"the smallest of those tried that keep 99 of 100 values within {tolerance:g} of the model, relative"
     spectra = None if mixture is None else mixture.spectra
+    if mixture is None and wavelength_nm is not None and layout.wavelength_nm is not None:
+        few = np.isin(wavelength_nm, layout.wavelength_nm)  # a table that fails at these fails at all of them
+        if not few.all() and not _keeps(layout, _values(layout), _Final(drawn, truth[:, few]), goal):
+            return None
     layout = replace(layout, wavelength_nm=wavelength_nm, reason=reason, spectra=spectra)
     whole = _values(layout)
     if mixture is None and layout.interpolation.logarithm and wavelength_nm is not None and wavelength_nm.size > 2:
@@ -351,11 +414,11 @@ def _finished(
         for parts in range(1, wavelength_nm.size // 2 + 1):
             factored = replace(layout, spectra=basis[:parts])
             values = (rows @ basis[:parts].T).astype(np.float32).reshape(factored.shape)
-            if _error(factored, values, drawn, truth) <= goal:
+            if _keeps(factored, values, final, goal):
                 layout, whole = factored, values
                 break
     for bits in _BITS if layout.size > _WORTH_ROUNDING else (23,):
         rounded = replace(layout, bits=bits)
-        if _error(rounded, tabulation.rounded(whole, bits), drawn, truth) <= goal:
+        if _keeps(rounded, tabulation.rounded(whole, bits), final, goal):
             return rounded
     return None

@@ -116,18 +116,12 @@ def _evaluated(layout: Layout, rows: slice, wavelength_nm: float | None) -> Floa
     if not (layout.grid.reciprocal and layout.source.reciprocal):
         return evaluate(*layout.grid.directions(rows))
     theta, _, delta_phi = (radians(nodes) for nodes in layout.grid.axes.values())
-    some, right, left = theta[rows], theta[rows.start :], theta[: rows.stop]
-    values = np.empty((some.size, theta.size, delta_phi.size))
-    values[:, rows.start :] = evaluate(*_spread(some, right, delta_phi))
-    swapped = evaluate(*_spread(left, some, delta_phi))
-    smaller = left < some[:, np.newaxis]
-    np.copyto(values[:, : rows.stop], np.swapaxes(swapped, 0, 1), where=smaller[..., np.newaxis])
-    return values
-
-
-def _spread(theta_i: Axis, theta_r: Axis, delta_phi: Axis) -> tuple[Axis, ...]:
-    light, seen, turned = np.ix_(theta_i, theta_r, delta_phi)
-    return light, np.zeros(()), seen, turned
+    row, column = (index.ravel() for index in np.indices((rows.stop - rows.start, theta.size)))
+    smaller, larger = np.minimum(row + rows.start, column), np.maximum(row + rows.start, column)
+    pairs, pair = np.unique(smaller * theta.size + larger, return_inverse=True)  # of which each is evaluated once
+    light, viewer = theta[pairs // theta.size], theta[pairs % theta.size]
+    values = evaluate(light[:, np.newaxis], np.zeros(()), viewer[:, np.newaxis], delta_phi)
+    return values[pair].reshape(-1, theta.size, delta_phi.size)
 
 
 def numbers(layout: Layout, wi: Floats, wr: Floats) -> Floats:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+import itertools
 import math
 
 import numpy as np
@@ -9,8 +11,8 @@ import pytest
 from numpy.typing import NDArray
 
 from brdfdb.materials import Material, exact_material, presets
-from brdfdb.tables import error_measurement, tabulation
-from brdfdb.tables.grids import ANISOTROPIC_HALF_DIFFERENCE_AXES, HALF_DIFFERENCE_AXES, ISOTROPIC_AXES
+from brdfdb.tables import error_measurement, planner, tabulation
+from brdfdb.tables.grids import ANISOTROPIC_HALF_DIFFERENCE_AXES, HALF_DIFFERENCE_AXES, ISOTROPIC_AXES, Grid
 from brdfdb.tables.layout import Layout
 from brdfdb.tables.planner import plan
 from brdfdb.tables.stated_error import Error
@@ -139,3 +141,79 @@ def test_grooves_are_planned_over_light_and_viewer() -> None:
     layout = plan(grooves, None, 0.2)
     assert layout.grid.copies == 1
     assert measured(layout).overall.p99 <= 0.2
+
+
+# Values of a plan relative to the smallest table of an exhaustive search: worst 1.92, rendered-sphere-10deg at 0.05
+TIMES_THE_SMALLEST = 2.0
+# The lobe of this one bends along phi_d where lines hardly see it; its table at 0.02 has 39600 values
+BOUNDED = {"rho_d": 0.2, "rho_s": 0.3, "alpha_x": 0.3, "alpha_y": 0.45}
+
+
+def ward_bounded(change: float = 0.0) -> Material:
+    parameters = BOUNDED | {"alpha_x": BOUNDED["alpha_x"] * (1.0 + change)}
+    return Material.from_table(
+        "bounded", {"title": "Bounded", "model": "ward_bounded", "source": "no paper", "parameters": parameters}
+    )
+
+
+@pytest.mark.parametrize("tolerance", [0.02, 0.005])
+def test_the_last_digit_of_a_parameter_decides_not_whether_a_table_is_found(tolerance: float) -> None:
+    """A kind of table that kept to 0.02 at few directions alone was the only one that was tried then."""
+    layouts = [plan(ward_bounded(change), None, tolerance) for change in (0.0, 1e-15, -3e-15, 1e-12)]
+    sizes = [layout.size for layout in layouts]
+    assert max(sizes) <= 3.0 * min(sizes)  # at 0.02 they are the same, at 0.005 their ladders part
+    for layout in layouts[:2]:
+        assert measured(layout).overall.p99 <= tolerance
+
+
+def test_a_kind_that_fails_at_all_directions_leaves_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
+    material, finished = presets()["glossy-grey-paper"], planner._finished
+    first = plan(material, None, TOLERANCE)
+    monkeypatch.setattr(
+        planner,
+        "_finished",
+        lambda layout, *others: None if layout.interpolation == first.interpolation else finished(layout, *others),
+    )
+    other = plan(material, None, TOLERANCE)
+    assert other.interpolation != first.interpolation
+    assert measured(other).overall.p99 <= TOLERANCE
+
+
+@pytest.mark.parametrize(
+    ("name", "tolerance"),
+    [
+        ("glossy-grey-paper", 0.05),
+        ("glossy-grey-paper", 0.01),
+        ("ivory-computer-plastic", 0.05),
+        ("ivory-computer-plastic", 0.01),
+        ("wall-plaster", 0.05),
+        ("rendered-sphere-10deg", 0.05),
+        ("rendered-sphere-10deg", 0.01),
+    ],
+)
+def test_no_table_of_an_exhaustive_search_has_half_the_values_of_a_plan(name: str, tolerance: float) -> None:
+    """Every number of nodes of each axis is tabulated and measured, of each kind of table that a plan looks into."""
+    material = presets()[name]
+    most = plan(material, None, tolerance).size / TIMES_THE_SMALLEST
+    task = planner._task(material, None, tolerance, None)
+    for _, layout, needs in (kind for kind in planner._table_kinds(task) if kind[2]):
+        shared = list(dict.fromkeys(needs.values()))
+        for counts in itertools.product(*(need.counts for need in shared)):
+            number = dict(zip(shared, counts, strict=True))
+            if math.prod(number[need] for need in needs.values()) < most:
+                axes = {axis: need.nodes(number[need]) for axis, need in needs.items()}
+                trial = dataclasses.replace(layout, grid=Grid(axes))
+                error = planner._error(trial, planner._values(trial), task.drawn, task.truth)
+                assert error > planner._MARGIN * tolerance, trial.grid.shape
+
+
+def test_few_directions_rule_out_only_what_all_of_them_do() -> None:
+    material = presets()["wall-plaster"]
+    final = planner._final(material, None)
+    for nodes in (3, 6, 9, 18):
+        theta = np.append(np.linspace(0.0, 88.0, nodes), 89.9)
+        layout = Layout(material, Grid({"theta_i": theta, "theta_r": theta, "delta_phi": np.linspace(0.0, 180.0, 8)}))
+        values = planner._values(layout)
+        error = planner._error(layout, values, *final)
+        for goal in (0.5 * error, 0.99 * error, 1.01 * error, 2.0 * error):
+            assert planner._keeps(layout, values, final, goal) == (error <= goal)
