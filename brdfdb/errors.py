@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import bisect
 import difflib
 import importlib
 from collections.abc import Iterable, Mapping
@@ -76,6 +77,9 @@ class StoreError(BrdfdbError):
     """A store that is missing, damaged, of another version, or cannot be written."""
 
 
+_COMPARED = 2000  # names that a wrong one is compared with: those next to it in the alphabet. Each takes 20 us
+
+
 class UnknownMaterialError(BrdfdbError, KeyError):
     """A name that is not in the store.
 
@@ -97,7 +101,9 @@ class UnknownMaterialError(BrdfdbError, KeyError):
     def __init__(self, name: str, names: Iterable[str] = ()) -> None:
         super().__init__(name)
         self.name = name
-        self.closest = difflib.get_close_matches(name, names, n=5, cutoff=0.4)
+        others = sorted(names)
+        at = max(0, bisect.bisect(others, name) - _COMPARED // 2)
+        self.closest = difflib.get_close_matches(name, others[at : at + _COMPARED], n=5, cutoff=0.4)
 
     def __str__(self) -> str:
         hint = f"; closest: {', '.join(self.closest)}" if self.closest else ""

@@ -14,8 +14,6 @@ Numbers = list[float | None]
 Role = Literal["ours", "printed", "textbook", "truth", "other"]
 
 _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-# Errors [1] that are not told apart, that read better as factors, and as factors with an exponent
-_SMALL_ERROR, _LARGE_ERROR, _HUGE_ERROR = 1e-5, 10.0, 1e4
 _STRICT = ConfigDict(frozen=True, extra="forbid")
 
 
@@ -137,17 +135,6 @@ def number(value: float | None, digits: int = 3) -> str:
         mantissa, exponent = f"{value:.1e}".split("e")
         return f"{mantissa.removesuffix('.0')}·10{superscript(int(exponent))}".replace("-", "−")
     return f"{value:.{digits}g}".replace("-", "−")
-
-
-def error_in_words(error: float | None) -> str:
-    """Return a relative error [1] as text: in percent, or above 1000 % as a factor."""
-    if error is None:
-        return "not measured"
-    if error < _SMALL_ERROR:
-        return "< 0.001 %"
-    if error > _LARGE_ERROR:
-        return f"a factor of {round(1.0 + error)}" if error < _HUGE_ERROR else f"a factor of {error:.2g}"
-    return f"{100.0 * error:.0f} %" if error >= 0.995 else f"{100.0 * error:#.2g}".rstrip(".") + " %"
 
 
 def superscript(exponent: int) -> str:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from brdfdb._numba import elementwise, kernel
+
+Array = NDArray[np.float64]
 
 _SQRT_HALF = 0.7071067811865476
 
@@ -125,27 +126,14 @@ def reflectance_slopes(cos_theta: float, n: float, k: float) -> tuple[float, flo
 
 
 @kernel
-def _fill_amplitudes(
-    cos_theta: NDArray[np.float64],
-    n: NDArray[np.float64],
-    k: NDArray[np.float64],
-    first: NDArray[np.complex128],
-    second: NDArray[np.complex128],
+def _fill(
+    halves: bool, cos_theta: Array, n: Array, k: Array, first: NDArray[np.complex128], second: NDArray[np.complex128]
 ) -> None:
     for j in range(cos_theta.shape[0]):
-        first[j], second[j] = _amplitudes(cos_theta[j], n[j], k[j])
-
-
-@kernel
-def _fill_half_sum_and_difference(
-    cos_theta: NDArray[np.float64],
-    n: NDArray[np.float64],
-    k: NDArray[np.float64],
-    first: NDArray[np.complex128],
-    second: NDArray[np.complex128],
-) -> None:
-    for j in range(cos_theta.shape[0]):
-        first[j], second[j] = _half_sum_and_difference(cos_theta[j], n[j], k[j])
+        if halves:
+            first[j], second[j] = _half_sum_and_difference(cos_theta[j], n[j], k[j])
+        else:
+            first[j], second[j] = _amplitudes(cos_theta[j], n[j], k[j])
 
 
 unpolarised = elementwise(reflectance)
@@ -159,17 +147,17 @@ def amplitudes(cos_theta: ArrayLike, n: ArrayLike, k: ArrayLike) -> tuple[Comple
     The time factor is exp(-i omega t). At normal incidence F_p = -F_s = (n + ik - 1) / (n + ik + 1), because reflection
     reverses p = s x (direction of propagation). At grazing both are -1.
     """
-    return _pair(_fill_amplitudes, cos_theta, n, k)
+    return _pair(False, cos_theta, n, k)
 
 
 def half_sum_and_difference(cos_theta: ArrayLike, n: ArrayLike, k: ArrayLike) -> tuple[Complexes, Complexes]:
     """Return (F_s + F_p) / 2 and (F_s - F_p) / 2 [1] of `amplitudes`, with all digits where one of them is nearly 0."""
-    return _pair(_fill_half_sum_and_difference, cos_theta, n, k)
+    return _pair(True, cos_theta, n, k)
 
 
-def _pair(fill: Callable[..., None], cos_theta: ArrayLike, n: ArrayLike, k: ArrayLike) -> tuple[Complexes, Complexes]:
+def _pair(halves: bool, cos_theta: ArrayLike, n: ArrayLike, k: ArrayLike) -> tuple[Complexes, Complexes]:
     arrays = np.broadcast_arrays(*(np.asarray(array, dtype=np.float64) for array in (cos_theta, n, k)))
     first, second = np.empty((2, arrays[0].size), dtype=np.complex128)
-    fill(*(np.ravel(array) for array in arrays), first, second)
+    _fill(halves, np.ravel(arrays[0]), np.ravel(arrays[1]), np.ravel(arrays[2]), first, second)
     shape = arrays[0].shape
     return first.reshape(shape)[()], second.reshape(shape)[()]

@@ -107,11 +107,16 @@ class Lobe(NamedTuple):
 
 
 def narrowest(lobe: Lobe | None) -> Lobe | None:
-    """Return a lobe as narrow as that of any wavelength: panels that resolve it resolve the others."""
+    """Return a lobe as narrow as that of any wavelength: panels that resolve it resolve the others.
+
+    Wavelengths are the last axis of the arrays of a lobe, where it has any.
+    """
     if lobe is None:
         return None
-    share, alpha_x, alpha_y = np.max(lobe.share), np.min(lobe.alpha_x), np.min(lobe.alpha_y)
-    return lobe._replace(share=np.asarray(share), alpha_x=np.asarray(alpha_x), alpha_y=np.asarray(alpha_y))
+    share, alpha_x, alpha_y = (np.atleast_1d(value) for value in (lobe.share, lobe.alpha_x, lobe.alpha_y))
+    return lobe._replace(
+        share=np.max(share, axis=-1), alpha_x=np.min(alpha_x, axis=-1), alpha_y=np.min(alpha_y, axis=-1)
+    )
 
 
 def around_mirror(theta_deg: float, lobe: Lobe) -> NDArray[np.float64]:

@@ -7,6 +7,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from typing import Any
 
+# Errors [1] that are not told apart, that read better as factors, and as factors with an exponent
+_SMALL_ERROR, _LARGE_ERROR, _HUGE_ERROR = 1e-5, 10.0, 1e4
 _CARD = (
     "display:inline-block;max-width:60em;padding:0.6em 1em;border:1px solid rgba(128,128,128,0.4);border-radius:6px;"
     "line-height:1.4;color:inherit"
@@ -61,6 +63,17 @@ def listing(kind: str, name: str, title: str, columns: Sequence[str], rows: Sequ
 def listed(parameters: Mapping[str, Any]) -> str:
     """Return parameters as text: names with their numbers, or with the range of their spectra."""
     return ", ".join(f"{name} = {value:g}" for name, value in parameters.items())
+
+
+def error_in_words(error: float | None) -> str:
+    """Return a relative error [1] as text: in percent, or above 1000 % as a factor."""
+    if error is None:
+        return "not measured"
+    if error < _SMALL_ERROR:
+        return "< 0.001 %"
+    if error > _LARGE_ERROR:
+        return f"a factor of {round(1.0 + error)}" if error < _HUGE_ERROR else f"a factor of {error:.2g}"
+    return f"{100.0 * error:.0f} %" if error >= 0.995 else f"{100.0 * error:#.2g}".rstrip(".") + " %"
 
 
 def percent(share: float | None) -> str:

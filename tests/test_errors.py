@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import difflib
 import math
 import pickle
 import sys
@@ -161,3 +162,17 @@ def test_a_finding_of_pydantic_is_said_in_our_words(field: str, value: object, s
 
 def test_a_number_of_one_has_no_plural() -> None:
     assert [counted(number, "table") for number in (0, 1, 2)] == ["0 tables", "1 table", "2 tables"]
+
+
+def test_a_wrong_name_is_compared_with_those_next_to_it_among_very_many(monkeypatch: pytest.MonkeyPatch) -> None:
+    names = [f"grey-{number:05d}" for number in range(50_000)]
+    compared, close = [], difflib.get_close_matches
+
+    def counted(name: str, others: list[str], n: int, cutoff: float) -> list[str]:
+        compared.append(len(others))
+        return close(name, others, n, cutoff)
+
+    monkeypatch.setattr(difflib, "get_close_matches", counted)
+    assert UnknownMaterialError("grey-314159", names).closest[0].startswith("grey-3141")
+    assert UnknownMaterialError("zinc", names).closest == []
+    assert compared == [2000, 1000]

@@ -6,38 +6,42 @@ from collections.abc import Sequence
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import BaseModel, Field
 
 from brdfdb.audit.excess import DIGITS, ENERGY_TOLERANCE, cause_of, crossing, limit_of, place
 from brdfdb.audit.finding import STRICT
 from brdfdb.figure import Numbers, numbers, rows
 from brdfdb.geometry import radians
-from brdfdb.integrals.quadrature import reflected_share
-from brdfdb.integrals.uniform_bound import largest_uniform_beside
+from brdfdb.integrals.quadrature import Albedo, reflected_share
+from brdfdb.integrals.uniform_bound import largest_uniform_beside, tops
 from brdfdb.lobes import narrowest
 from brdfdb.materials import Material, Source
 from brdfdb.materials.provenance import KnownExcess
 from brdfdb.materials.source import Lossless
+from brdfdb.models.shared_integrals import sharing
 from brdfdb.parameters import Floats
-from brdfdb.tables.albedo import source_albedo
 from brdfdb.tables.grids import Axis
 
 EnergyVerdict = Literal["conserves", "loses", "gains", "known published excess", "accepted excess", "violates"]
 
-TOLERANCE = 1e-6  # absolute tolerance of each albedo [1]
+# Absolute tolerance of each albedo [1], of which four digits are shown, and of one that is closer to a limit
+TOLERANCE, FINE = 1e-5, 1e-6
+SURE_DECIMALS = 5  # decimals of an albedo that its tolerance leaves
 MOST_PANELS = 1000  # number of panels at which the quadrature of one light stops
 BOUND_TOLERANCE = 2e-5  # absolute tolerance of the largest a(lambda) [1]
 # Lights at round angles [degree]. Gauss's nodes in theta_i are added to them, so that the mean over uniform light,
 # 2 int albedo cos theta_i sin theta_i dtheta_i, is a sum over lights that are computed anyway
 THETA_I_DEG = (0.0, 10.0, 30.0, 45.0, 60.0, 75.0, 80.0, 85.0, 87.5, 89.0, 89.5, 89.9)
 NODES = 16  # number of Gauss nodes: the mean differs by less than 2e-4 from that of 48 nodes, for all presets
-# Lights are added next to the largest albedo in at most ROUNDS rounds, until it differs by less than FLAT from its
-# neighbours
-ROUNDS, FLAT = 4, 1e-6
+# Lights are added next to the largest albedo in at most ROUNDS rounds: until it differs by less than FLAT from its
+# neighbours, or, after LEAST_ROUNDS, from the top of the parabola through them
+LEAST_ROUNDS, ROUNDS, FLAT = 2, 4, 1e-6
 # A lossless model loses light if it reflects less than this share at an angle [degree] up to this one. At larger angles
 # shadowing alone takes more from every model of single scattering
 LOSSLESS, LOSS_UP_TO_DEG = 0.99, 85.0
 GAIN = 1e-4  # smallest excess over 1 of a lossless model that is reported
+LIMITS = (LOSSLESS, 1.0, 1.0 + GAIN)  # albedos [1] that a verdict depends on
 # Azimuths of a light over a lobe with two axes; the other quadrants repeat them
 _ELLIPSE_DEG = np.array([0.0, 30.0, 60.0, 90.0])
 _TURN_DEG = np.arange(0.0, 360.0, 60.0)
@@ -102,6 +106,22 @@ class _Lights(NamedTuple):
     weights: Axis
 
 
+class _White(NamedTuple):
+    """The lossless form of a source, and the wavelengths [nm] of its white furnace; None if grey."""
+
+    lossless: Lossless
+    nm: Axis | None
+
+
+class _Model(NamedTuple):
+    """A source with its wavelengths [nm] and its lossless form, and the albedos [1] that its verdict depends on."""
+
+    source: Source
+    wavelength_nm: Axis | None
+    white: _White | None
+    limits: tuple[float, ...]
+
+
 class _Reflected(NamedTuple):
     """Albedos [1], shape (theta_i, wavelengths): largest and mean over azimuths, specular part included.
 
@@ -127,11 +147,15 @@ def model_energy_of(
     `known` is the excess that is known as published. `claim` is the sentence of a recipe on an excess: the reason
     quotes it, and it excuses nothing. With `accept_excess` an excess that is not known is accepted.
     """
+    limits = LIMITS if known is None else (*LIMITS, known.max_albedo)
+    model = _Model(source, wavelength_nm, _white_of(source, wavelength_nm), limits)
     lights = _lights(source)
-    reflected, furnace = _with_furnace(source, wavelength_nm, lights)
-    lights, reflected = _refined(source, wavelength_nm, lights, reflected)
+    with sharing():  # model and furnace are evaluated at the same directions
+        reflected, white = _reflected(model, lights)
+        furnace = None if model.white is None or white is None else _furnace(model.white, lights, white)
+        lights, reflected = _refined(model, lights, reflected)
+        first = _first_above_1(model, lights, reflected)
     theta, wavelength = _worst(reflected.largest)
-    first = _first_above_1(source, wavelength_nm, lights, reflected)
     verdict, reason = _verdict(lights, wavelength_nm, reflected, furnace, known)
     if verdict == "violates" and first is not None:
         reason += _explained(source, wavelength_nm, reflected, first, known, claim)
@@ -154,26 +178,26 @@ def model_energy_of(
     )
 
 
-def _refined(
-    source: Source, wavelength_nm: Axis | None, lights: _Lights, reflected: _Reflected
-) -> tuple[_Lights, _Reflected]:
+def _refined(model: _Model, lights: _Lights, reflected: _Reflected) -> tuple[_Lights, _Reflected]:
     """Return lights and albedos with more lights around the largest albedo, because peaks lie between round angles."""
-    for _ in range(ROUNDS):
+    for rounds in range(ROUNDS):
         worst, _ = _worst(reflected.largest)
-        around = slice(max(worst - 1, 0), worst + 2)
-        if not np.ptp(reflected.largest[around].max(axis=1)) > FLAT:  # nan is not
+        around, largest = slice(max(worst - 1, 0), worst + 2), reflected.largest.max(axis=1)
+        if not np.ptp(largest[around]) > FLAT:  # nan is not
+            break
+        if rounds >= LEAST_ROUNDS and tops(lights.theta_i_deg, largest[:, np.newaxis])[0] - largest[worst] <= FLAT:
             break
         beside = lights.theta_i_deg[around]
         between = np.round((beside[1:] + beside[:-1]) / 2.0, 4)
         more = _Lights(between, np.zeros(between.size))
         order = np.argsort(np.concatenate([lights.theta_i_deg, between]))
         lights = _Lights(*(np.concatenate(pair)[order] for pair in zip(lights, more, strict=True)))
-        new = _reflected(source, wavelength_nm, more)
+        new, _ = _reflected(model, more)
         reflected = _Reflected(*(np.concatenate(pair)[order] for pair in zip(reflected, new, strict=True)))
     return lights, reflected
 
 
-def _first_above_1(source: Source, wavelength_nm: Axis | None, lights: _Lights, reflected: _Reflected) -> float | None:
+def _first_above_1(model: _Model, lights: _Lights, reflected: _Reflected) -> float | None:
     """Return the angle [degree] above which an albedo exceeds 1, or None. It lies between two lights."""
 
     def excess(reflected: _Reflected) -> Axis:
@@ -187,7 +211,7 @@ def _first_above_1(source: Source, wavelength_nm: Axis | None, lights: _Lights, 
         return float(lights.theta_i_deg[first])
 
     def between(theta_i_deg: float) -> float:
-        return float(excess(_reflected(source, wavelength_nm, _Lights(np.array([theta_i_deg]), np.zeros(1))))[0])
+        return float(excess(_reflected(model, _Lights(np.array([theta_i_deg]), np.zeros(1)))[0])[0])
 
     return crossing(between, *lights.theta_i_deg[first - 1 : first + 1].tolist())
 
@@ -283,79 +307,84 @@ def _lights(source: Source) -> _Lights:
     return _Lights(theta_i_deg[order], weights[order])
 
 
-def _reflected(source: Source, wavelength_nm: Axis | None, lights: _Lights) -> _Reflected:
-    """Return the albedos [1] of a source for lights from all azimuths that differ."""
-    theta_i = radians(lights.theta_i_deg)
-    phi_i_deg, weights = np.zeros(1), np.ones(1)
-    if source.anisotropic and source.elliptical:
-        phi_i_deg, weights = _ELLIPSE_DEG, np.array([1.0, 2.0, 2.0, 1.0]) / 6.0
-    elif source.anisotropic:
-        phi_i_deg, weights = _TURN_DEG, np.full(_TURN_DEG.size, 1.0 / _TURN_DEG.size)
-    limits: dict[str, Any] = {"tolerance": TOLERANCE, "most_panels": MOST_PANELS}
-    albedos = [
-        [source_albedo(source, float(theta), float(phi), wavelength_nm, **limits) for phi in radians(phi_i_deg)]
-        for theta in theta_i
+def _reflected(model: _Model, lights: _Lights) -> tuple[_Reflected, _Reflected | None]:
+    """Return the albedos [1] of a source, and of its lossless form, for lights from all azimuths that differ.
+
+    Both are integrated over the same directions. Lights whose albedo is closer to a limit than its error are integrated
+    again, to `FINE`.
+    """
+    source, theta_i = model.source, radians(lights.theta_i_deg)
+    phi_i_deg, weights = _azimuths(source)
+    forms = [(source, model.wavelength_nm)]
+    if model.white is not None:
+        forms.append((model.white.lossless.source, model.white.nm))
+    widths = [1 if nm is None else nm.size for _, nm in forms]
+    specular = [
+        np.broadcast_to(np.reshape(form.specular_reflectance(theta_i, nm), (theta_i.size, -1)), (theta_i.size, width))
+        for (form, nm), width in zip(forms, widths, strict=True)
     ]
-    diffuse = np.array([[albedo.albedo for albedo in row] for row in albedos])
-    specular = np.reshape(source.specular_reflectance(theta_i, wavelength_nm), (theta_i.size, -1))
-    specular = np.broadcast_to(specular, diffuse[:, 0].shape)
-    mean = np.einsum("tpw,p->tw", diffuse, weights) + specular
-    error = np.array([[max(float(albedo.error) for albedo in row)] for row in albedos])
-    return _Reflected(diffuse.max(axis=1) + specular, mean, specular, error)
-
-
-def _with_furnace(source: Source, wavelength_nm: Axis | None, lights: _Lights) -> tuple[_Reflected, Furnace | None]:
-    """Return the albedos of a source and its white furnace, the latter at the first, middle and last wavelength."""
-    lossless = source.lossless
-    if lossless is None:
-        return _reflected(source, wavelength_nm, lights), None
-    if isinstance(source, Material) and source.spec.slow and not (source.spectral or source.anisotropic):
-        reflected, white = _reflected_together(source, lossless, lights)
-        return reflected, _furnace(lossless, None, lights, white)
-    wavelengths = wavelength_nm
-    if wavelength_nm is not None:
-        wavelengths = wavelength_nm[np.unique([0, wavelength_nm.size // 2, wavelength_nm.size - 1])]
-    white = _reflected(lossless.source, wavelengths, lights)
-    return _reflected(source, wavelength_nm, lights), _furnace(lossless, wavelengths, lights, white)
-
-
-def _reflected_together(source: Material, lossless: Lossless, lights: _Lights) -> tuple[_Reflected, _Reflected]:
-    """Return the albedos of a slow grey material and of its lossless form, from one integral over its facets."""
-    given = source.arguments()
-    both = {
-        name: np.array([value, lossless.changes[name]]) for name, value in given.items() if name in lossless.changes
-    }
+    evaluated = [form.brdf_at(nm) for form, nm in forms]
 
     def brdf(wi: Floats, wr: Floats) -> Floats:
-        values = source.spec.vectors(wi, wr.reshape(-1, 1, 3), **{**given, **both})
-        return np.asarray(values).reshape(*wr.shape[:-1], 2)
+        with np.errstate(all="ignore"):  # nodes lie in every corner; what is finite is tested, not flagged
+            return np.concatenate([f_r(wi, wr) for f_r in evaluated], axis=-1)
 
-    albedos = [
-        reflected_share(
+    def integrated(rows: NDArray[np.intp], tolerance: float) -> Albedo:
+        return reflected_share(
             brdf,
-            float(theta),
-            0.0,
-            narrowest(source.lobe(np.asarray(np.cos(theta)), None)),
-            tolerance=TOLERANCE,
+            theta_i[rows, np.newaxis],
+            radians(phi_i_deg),
+            narrowest(source.lobe(np.cos(theta_i[rows])[:, np.newaxis, np.newaxis], model.wavelength_nm)),
+            tolerance=tolerance,
             most_panels=MOST_PANELS,
-            width=2,
-            mirrored=True,
+            width=sum(widths),
+            # f_r is the same on both sides of a light along an axis of an ellipse
+            mirrored=(phi_i_deg % 90.0 == 0.0) & (source.elliptical or not source.anisotropic),
         )
-        for theta in radians(lights.theta_i_deg)
-    ]
-    columns = np.array([albedo.albedo for albedo in albedos])
-    error = np.array([[float(albedo.error)] for albedo in albedos])
-    own, white = (_Reflected(columns[:, [k]], columns[:, [k]], np.zeros((columns.shape[0], 1)), error) for k in (0, 1))
-    return own, white
 
-
-def _furnace(lossless: Lossless, wavelengths: Axis | None, lights: _Lights, reflected: _Reflected) -> Furnace:
-    """Return the white furnace of a source from the albedos of its lossless form."""
-    low, high = (
-        np.unravel_index(extreme(reflected.largest), reflected.largest.shape) for extreme in (np.argmin, np.argmax)
+    diffuse, error = integrated(np.arange(theta_i.size), TOLERANCE)
+    whole = diffuse + np.concatenate(specular, axis=1)[:, np.newaxis]
+    off = np.abs(np.subtract.outer(whole, model.limits)).min(axis=(2, 3))
+    near = np.flatnonzero(np.any(off <= error + ENERGY_TOLERANCE, axis=1))
+    if near.size:
+        diffuse[near], error[near] = integrated(near, FINE)
+    own, *others = (
+        _Reflected(
+            part.max(axis=1) + extra,
+            np.einsum("tpw,p->tw", part, weights) + extra,
+            extra,
+            np.max(error, axis=1, keepdims=True),
+        )
+        for part, extra in zip(np.split(diffuse, widths[:1], axis=2), specular, strict=False)
     )
+    return own, others[0] if others else None
+
+
+def _azimuths(source: Source) -> tuple[Axis, Axis]:
+    """Return the azimuths of lights [degree] that differ, and their weights in the mean over azimuths."""
+    if not source.anisotropic:
+        return np.zeros(1), np.ones(1)
+    if source.elliptical:
+        return _ELLIPSE_DEG, np.array([1.0, 2.0, 2.0, 1.0]) / 6.0
+    return _TURN_DEG, np.full(_TURN_DEG.size, 1.0 / _TURN_DEG.size)
+
+
+def _white_of(source: Source, wavelength_nm: Axis | None) -> _White | None:
+    """Return the lossless form of a source, with the first, the middle and the last wavelength; None if it has none."""
+    if source.lossless is None:
+        return None
+    few = None if wavelength_nm is None else np.unique([0, wavelength_nm.size // 2, wavelength_nm.size - 1])
+    return _White(source.lossless, None if wavelength_nm is None else wavelength_nm[few])
+
+
+def _furnace(white: _White, lights: _Lights, reflected: _Reflected) -> Furnace:
+    """Return the white furnace of a source from the albedos of its lossless form."""
+    wavelengths = white.nm
+    # Albedos that differ by less than their error are alike, and the smallest of their angles stands for them
+    alike = np.round(reflected.largest, SURE_DECIMALS)
+    low, high = (np.unravel_index(extreme(alike), alike.shape) for extreme in (np.argmin, np.argmax))
     return Furnace(
-        lossless=", ".join(f"{name} = {value:.4g}" for name, value in lossless.changes.items()),
+        lossless=", ".join(f"{name} = {value:.4g}" for name, value in white.lossless.changes.items()),
         theta_i_deg=lights.theta_i_deg.tolist(),
         wavelength_nm=None if wavelengths is None else wavelengths.tolist(),
         albedo=rows(reflected.largest, DIGITS),

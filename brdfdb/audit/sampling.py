@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-import mpmath
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
@@ -14,7 +13,7 @@ from brdfdb.audit.finding import Cell, Finding, NumberTable, Sentence, Subject, 
 from brdfdb.audit.pairs import SEED, representative_nm
 from brdfdb.figure import Numbers, number, numbers
 from brdfdb.geometry import radians, unit_vector
-from brdfdb.integrals.quadrature import directional_albedo
+from brdfdb.integrals.quadrature import spectral_albedo
 from brdfdb.integrals.sampling import lobe_of, mixture_density, sample
 from brdfdb.lobes import Lobe
 from brdfdb.materials import Material
@@ -27,7 +26,7 @@ THETA_I_DEG, PHI_I_DEG = (10.0, 45.0, 80.0), 30.0
 LEAST_CHANCE = 1e-6  # smallest p of a sound sampler
 STANDARD_ERRORS = 6.0  # allowed difference of the albedos, in standard errors; chance exceeds it once in 500 million
 _ROUNDING = 1e-12  # rounding error of a mean of equal weights
-_ALBEDO_TOLERANCE = 1e-6
+_ALBEDO_TOLERANCE = 1e-5  # of the albedo by quadrature, of which four digits are shown
 _ENOUGH = 10.0  # smallest expected number of samples in a bin
 # Edges of the bins of half vectors. t is the slope in widths of the lobe: its bins are tenths of the distribution, then
 # half octaves. psi is the azimuth on the ellipse of the lobe
@@ -124,7 +123,16 @@ def sampling_of(table: Table, material: Material) -> Sampling:
     wavelength = representative_nm(table)
     count = min(SAMPLES, FEWER_SAMPLES) if material.spec.slow else SAMPLES
     arguments = material.arguments(wavelength)
-    lights = [_light(material.spec, arguments, theta, count) for theta in THETA_I_DEG]
+    albedo, error = spectral_albedo(
+        material.spec,
+        radians(THETA_I_DEG),
+        radians(PHI_I_DEG),
+        arguments,
+        tolerance=_ALBEDO_TOLERANCE,
+        mirrored=not material.anisotropic,
+    )
+    integrated = zip(THETA_I_DEG, albedo[:, 0].tolist(), error.tolist(), strict=True)
+    lights = [_light(material.spec, arguments, theta, count, *of_light) for theta, *of_light in integrated]
     columns = {name: numbers([getattr(light, name) for light in lights]) for name in _Light._fields if name != "good"}
     return Sampling(
         samples=count,
@@ -136,24 +144,24 @@ def sampling_of(table: Table, material: Material) -> Sampling:
     )
 
 
-def _light(spec: ModelSpec, arguments: Mapping[str, Any], theta_i_deg: float, count: int) -> _Light:
-    theta_i, phi_i = float(radians(theta_i_deg)), float(radians(PHI_I_DEG))
-    wi = unit_vector(theta_i, phi_i)
+def _light(
+    spec: ModelSpec, arguments: Mapping[str, Any], theta_i_deg: float, count: int, albedo: float, error: float
+) -> _Light:
+    wi = unit_vector(radians(theta_i_deg), radians(PHI_I_DEG))
     u1, u2 = np.random.default_rng(SEED).random((2, count))
     drawn = sample(spec, u1, u2, wi, **arguments)
     mean, deviation = float(np.mean(drawn.weight)), float(np.std(drawn.weight, ddof=1))
     standard_error = deviation / np.sqrt(count)
-    albedo, error = directional_albedo(spec, theta_i, phi_i, tolerance=_ALBEDO_TOLERANCE, **arguments)
     p = _chance(drawn.wr, wi, lobe_of(spec, wi, arguments))
-    off = abs(mean - float(albedo))
-    allowed = STANDARD_ERRORS * standard_error + min(float(error), _ALBEDO_TOLERANCE) + _ROUNDING
+    off = abs(mean - albedo)
+    allowed = STANDARD_ERRORS * standard_error + min(error, _ALBEDO_TOLERANCE) + _ROUNDING
     return _Light(
         chi_square_p=p,
         largest_weight=float(np.max(drawn.weight)),
         weight_spread=deviation / mean if mean > 0.0 else 0.0,
         monte_carlo=mean,
         monte_carlo_error=standard_error,
-        quadrature=float(albedo),
+        quadrature=albedo,
         good=p >= LEAST_CHANCE and off <= allowed,
     )
 
@@ -164,6 +172,8 @@ def _chance(wr: Array, wi: Array, lobe: Lobe) -> float:
     Bins are in slopes in units of the lobe, so that they are fine enough for a narrow lobe, too. One bin holds all
     other directions.
     """
+    import mpmath  # it takes a tenth of a second, and other findings do without it
+
     alpha = np.array([lobe.alpha_x, lobe.alpha_y], dtype=np.float64)
     h = wr + wi
     s = h[:, :2] / h[:, 2:] / alpha

@@ -10,9 +10,10 @@ from brdfdb.audit.likeness import bias_of, likeness_of
 from brdfdb.audit.nodes import Nodes
 from brdfdb.audit.pairs import SEED, Pairs, representative_nm
 from brdfdb.audit.statement import Disagreement, contradictions, disagreements
-from brdfdb.figure import Map, Panel, error_in_words, number, rows
+from brdfdb.figure import Map, Panel, number, rows
 from brdfdb.geometry import radians, unit_vector
 from brdfdb.materials import Source
+from brdfdb.notebook import error_in_words
 from brdfdb.parameters import Floats
 from brdfdb.tables import error_measurement
 from brdfdb.tables.albedo import wavelengths_of

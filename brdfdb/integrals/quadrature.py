@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,58 +11,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from brdfdb.errors import ParameterError
 from brdfdb.geometry import HALF_PI, check_phi, check_theta, unit_vector
-from brdfdb.lobes import Lobe
+from brdfdb.integrals.panels import Indices, Integrand, integrated, rectangles
+from brdfdb.lobes import Lobe, narrowest
 from brdfdb.models import MODELS
 from brdfdb.parameters import Floats, ModelSpec
 
 Array = NDArray[np.float64]
-Integrand = Callable[[Array, Array], Array]
 
-# Nodes and weights, from 0 on, of Gauss's rule of 7 nodes on [-1, 1] and of Kronrod's rule of 15 that extends it
-_NODES = np.array(
-    [
-        0.0,
-        0.207784955007898467600689403773245,
-        0.405845151377397166906606412076961,
-        0.586087235467691130294144691693013,
-        0.741531185599394439863864773280788,
-        0.864864423359769072789712788640926,
-        0.949107912342758524526189684047851,
-        0.991455371120812639206854697526329,
-    ]
-)
-_KRONROD = np.array(
-    [
-        0.209482141084727828012999174891714,
-        0.204432940075298892414161999234649,
-        0.190350578064785409913256402421014,
-        0.169004726639267902826583426598550,
-        0.140653259715525918745189590510238,
-        0.104790010322250183839876322541518,
-        0.063092092629978553290700663189204,
-        0.022935322010529224963732008058970,
-    ]
-)
-_GAUSS = np.array(
-    [
-        0.417959183673469387755102040816327,
-        0.0,
-        0.381830050505118944950369775488975,
-        0.0,
-        0.279705391489276667901467771423780,
-        0.0,
-        0.129484966168869693270611432679082,
-        0.0,
-    ]
-)
-_X = np.concatenate([-_NODES[:0:-1], _NODES])
-_W_KRONROD = np.concatenate([_KRONROD[:0:-1], _KRONROD])
-_W_GAUSS = np.concatenate([_GAUSS[:0:-1], _GAUSS])
-
-# Safety factor on the difference of two rules, which an edge inside a panel makes too small. 1.6 was measured
-_SAFETY = 4.0
-_BATCH = 2000  # panels evaluated at a time, of 225 points each; fewer where a point has several values
-MOST_PANELS = 40_000  # number of panels at which the quadrature stops, whatever its error
+MOST_PANELS = 40_000  # number of panels of a light at which the quadrature stops, whatever its error
+_QUARTERS = HALF_PI * np.arange(5)
 
 
 class Albedo(NamedTuple):
@@ -128,11 +85,15 @@ def directional_albedo(
     _check_tolerance(tolerance)
     thetas, phis = check_theta("theta_i", theta_i), check_phi("phi_i", phi_i)
     arrays = np.broadcast_arrays(thetas, phis, *(np.asarray(value) for value in parameters.values()))
-    albedo, error = np.empty(arrays[0].shape), np.empty(arrays[0].shape)
-    for index in np.ndindex(arrays[0].shape):
-        theta, phi, *values = (array[index] for array in arrays)
-        one = dict(zip(parameters, values, strict=True))
-        albedo[index], error[index] = _albedo(spec, float(theta), float(phi), one, tolerance)
+    albedo, error = np.full(arrays[0].shape, np.nan), np.full(arrays[0].shape, np.nan)
+    theta, phi, *values = (array.ravel() for array in arrays)
+    for one, rows in _alike(parameters, values):
+        above = rows[theta[rows] <= HALF_PI]  # nan is not
+        below = rows[(theta[rows] > HALF_PI) & np.isfinite(phi[rows])]
+        albedo.flat[below], error.flat[below] = 0.0, 0.0
+        above = above[np.isfinite(phi[above])]
+        integrals = spectral_albedo(spec, theta[above], phi[above], one, tolerance=tolerance, most_panels=MOST_PANELS)
+        albedo.flat[above], error.flat[above] = integrals.albedo[:, 0], integrals.error
     if specular and spec.specular is not None:
         albedo = albedo + spec.specular(thetas, **{name: parameters[name] for name in spec.specular_parameters})
     return Albedo(albedo[()], error[()])
@@ -158,76 +119,80 @@ def spec_of(model: ModelSpec | str) -> ModelSpec:
     return model if isinstance(model, ModelSpec) else MODELS[model]
 
 
-def _albedo(
-    spec: ModelSpec, theta_i: float, phi_i: float, parameters: dict[str, Any], tolerance: float
-) -> tuple[float, float]:
-    wi = unit_vector(min(theta_i, HALF_PI), phi_i)
-    if np.isnan(wi).any():
-        return np.nan, np.nan
-    if theta_i > HALF_PI:
-        return 0.0, 0.0
-
-    def reflected(wr: Array) -> Array:
-        with np.errstate(all="ignore"):  # extreme nodes may raise flags; the values themselves are tested
-            f_r = spec.vectors(wi, wr.reshape(-1, 3), **parameters).reshape(wr.shape[:-1])  # one row is faster
-        return np.asarray(f_r * np.maximum(wr[..., 2], 0.0), dtype=np.float64)[..., np.newaxis]
-
-    lobe = None if spec.lobe is None else spec.lobe(wi[2], **parameters)
-    panels = _panels_of(reflected, wi, theta_i, phi_i, lobe)
-    albedo, error = _adaptive(*panels, tolerance)
-    return float(albedo[0]), error
+def _alike(parameters: Mapping[str, Any], values: Sequence[Floats]) -> Iterator[tuple[dict[str, Any], Indices]]:
+    """Yield each set of parameters, with the indices of all lights that have it."""
+    lights: dict[tuple[Any, ...], list[int]] = {}
+    for index, one in enumerate(zip(*(value.tolist() for value in values), strict=True)):
+        lights.setdefault(one, []).append(index)
+    for one, indices in lights.items():
+        yield dict(zip(parameters, one, strict=True)), np.array(indices)
 
 
 def reflected_share(
     brdf: Callable[[Array, Array], Floats],
-    theta_i: float,
-    phi_i: float,
+    theta_i: ArrayLike,
+    phi_i: ArrayLike,
     lobe: Lobe | None,
     *,
     tolerance: float,
     most_panels: int,
     width: int = 1,
-    mirrored: bool = False,
+    mirrored: ArrayLike = False,
 ) -> Albedo:
     """Return the directional albedo [1] of a function of unit vectors that gives several values of f_r at once.
+
+    All lights are integrated together, each on panels of its own.
 
     Parameters
     ----------
     brdf : callable
-        ``brdf(wi, wr)`` for a light (3,) and viewers (..., 3): f_r [1/sr] of shape (..., width).
-    theta_i, phi_i : float [rad]
-        Direction of the light, theta up to pi/2.
+        ``brdf(wi, wr)`` for unit vectors (N, 3): f_r [1/sr] of shape (N, width).
+    theta_i, phi_i : array_like [rad]
+        Directions of the lights, theta up to pi/2. They broadcast.
     lobe : Lobe or None
-        Lobe that all values share for this light; None if they share none.
+        Lobe that all values of a light share, with widths that are numbers or broadcast with the lights; None if they
+        share none.
     tolerance : float
-        Absolute error to stay below, for the worst of the values.
+        Absolute error to stay below, for the worst of the values of a light.
     most_panels : int
-        Number of panels at which the quadrature stops.
+        Number of panels at which the quadrature of a light stops.
     width : int
         Number of values that brdf gives for a pair of directions.
-    mirrored : bool
-        True if f_r is the same on both sides of the plane of incidence. Only one side is then integrated.
+    mirrored : array_like of bool
+        True if f_r is the same on both sides of the plane of incidence. Only one side is then integrated. It broadcasts
+        with the lights.
 
     Returns
     -------
     Albedo
-        Albedo of shape (width,), and one estimate of the error for all of them. It is above the tolerance where the
+        Albedo of shape (..., width), and one estimate of the error for each light. It is above the tolerance where the
         quadrature stopped early.
     """
-    wi = unit_vector(theta_i, phi_i)
+    theta, phi, one_side = np.broadcast_arrays(np.asarray(theta_i, dtype=np.float64), phi_i, mirrored)
+    if theta.size == 0:
+        return Albedo(np.empty((*theta.shape, width)), np.empty(theta.shape))
+    lights = unit_vector(theta.ravel(), phi.ravel())
+    sides = np.where(one_side.ravel(), 2.0, 1.0)
 
-    def reflected(wr: Array) -> Array:
-        return np.asarray(brdf(wi, wr) * np.maximum(wr[..., 2:], 0.0), dtype=np.float64)
+    def reflected(of: Indices, wr: Array, measure: Array) -> Array:
+        wi = np.broadcast_to(lights[of][:, np.newaxis, np.newaxis], wr.shape)
+        values = np.asarray(brdf(wi.reshape(-1, 3), wr.reshape(-1, 3)), dtype=np.float64)
+        values = values.reshape(*wr.shape[:-1], width) * np.maximum(wr[..., 2:], 0.0)
+        return np.asarray(values * (measure * sides[of][:, np.newaxis, np.newaxis])[..., np.newaxis])
 
-    panels = _panels_of(reflected, wi, theta_i, phi_i, lobe, mirrored)
-    albedo, error = _adaptive(*panels, tolerance, most_panels, width)
-    return Albedo(albedo, np.asarray(error))
+    if lobe is None:
+        integrand, panels, of = _over_the_hemisphere(reflected, theta.ravel(), phi.ravel(), one_side.ravel())
+    else:
+        widths = [np.broadcast_to(alpha, theta.shape).ravel() for alpha in (lobe.alpha_x, lobe.alpha_y)]
+        integrand, panels, of = _over_the_slopes(reflected, lights, np.clip(widths, 1e-9, 10.0), one_side.ravel())
+    albedo, error = integrated(integrand, panels, of, tolerance, most_panels, width)
+    return Albedo(albedo.reshape(*theta.shape, width), error.reshape(theta.shape)[()])
 
 
 def spectral_albedo(
     spec: ModelSpec,
-    theta_i: float,
-    phi_i: float,
+    theta_i: ArrayLike,
+    phi_i: ArrayLike,
     parameters: Mapping[str, Any],
     *,
     tolerance: float,
@@ -240,8 +205,8 @@ def spectral_albedo(
     ----------
     spec : ModelSpec
         The model.
-    theta_i, phi_i : float [rad]
-        Direction of the light, theta up to pi/2.
+    theta_i, phi_i : array_like [rad]
+        Directions of the lights, theta up to pi/2. They broadcast.
     parameters : mapping
         All parameters of the model: numbers, or arrays of one shape (L,).
     tolerance, most_panels, mirrored
@@ -263,15 +228,14 @@ def spectral_albedo(
 
     def brdf(wi: Array, wr: Array) -> Floats:
         with np.errstate(all="ignore"):  # extreme nodes may raise flags; the values themselves are tested
-            values = [spec.vectors(wi, wr.reshape(-1, 3), **one) for one in sets]  # one row is faster
-        return np.stack(values, axis=-1).reshape(*wr.shape[:-1], width)
+            return np.stack([spec.vectors(wi, wr, **one) for one in sets], axis=-1)
 
-    lobe = narrowest(spec, float(np.cos(theta_i)), parameters)
+    cos_i = np.cos(np.asarray(theta_i, dtype=np.float64))[..., np.newaxis]
     return reflected_share(
         brdf,
         theta_i,
         phi_i,
-        lobe,
+        narrowest(None if spec.lobe is None else spec.lobe(cos_i, **parameters)),
         tolerance=tolerance,
         most_panels=most_panels,
         width=width,
@@ -279,62 +243,53 @@ def spectral_albedo(
     )
 
 
-def narrowest(spec: ModelSpec, cos_i: float, parameters: Mapping[str, Any]) -> Lobe | None:
-    """Return the narrowest lobe of a model over its parameters. Panels that resolve it resolve the others."""
-    if spec.lobe is None:
-        return None
-    lobe = spec.lobe(np.asarray(cos_i), **parameters)
-    share, alpha_x, alpha_y = np.max(lobe.share), np.min(lobe.alpha_x), np.min(lobe.alpha_y)
-    return lobe._replace(share=np.asarray(share), alpha_x=np.asarray(alpha_x), alpha_y=np.asarray(alpha_y))
+_Reflected = Callable[[Indices, Array, Array], Array]
 
 
-def _panels_of(
-    reflected: Callable[[Array], Array],
-    wi: Array,
-    theta_i: float,
-    phi_i: float,
-    lobe: Lobe | None,
-    mirrored: bool = False,
-) -> tuple[Integrand, Array]:
-    """Return the integrand and its first panels, only on one side of the plane of incidence if f_r is mirrored."""
-    if lobe is None:
-        integrand, panels = _over_the_hemisphere(reflected, theta_i, phi_i)
-        begin = phi_i
-    else:
-        integrand, panels, begin = _over_the_slopes(reflected, wi, lobe)
-    if not mirrored:
-        return integrand, panels
-    side = (panels[:, 1] > begin) & (panels[:, 1] < begin + np.pi)
-    return (lambda x, psi: 2.0 * integrand(x, psi)), panels[side]
-
-
-def _over_the_hemisphere(reflected: Callable[[Array], Array], theta_i: float, phi_i: float) -> tuple[Integrand, Array]:
+def _over_the_hemisphere(
+    reflected: _Reflected, theta_i: Array, phi_i: Array, one_side: NDArray[np.bool_]
+) -> tuple[Integrand, Array, Indices]:
     """Return the integrand over theta_r and phi_r, and panels that end at the edges of Oren and Nayar's model."""
 
-    def integrand(theta: Array, phi: Array) -> Array:
-        return reflected(unit_vector(theta, phi)) * np.sin(theta)[..., np.newaxis]
+    def integrand(of: Indices, theta: Array, phi: Array) -> Array:
+        return reflected(of, unit_vector(theta, phi), np.sin(theta))
 
-    thetas = [0.0, theta_i, HALF_PI] if 0.0 < theta_i < HALF_PI else [0.0, HALF_PI / 2.0, HALF_PI]
-    return integrand, _panels(np.array(thetas), phi_i + HALF_PI * np.arange(5))
+    edges = np.where((theta_i > 0.0) & (theta_i < HALF_PI), theta_i, HALF_PI / 2.0)
+    panels = [
+        rectangles(np.array([0.0, edge, HALF_PI]), phi + _QUARTERS) for edge, phi in zip(edges, phi_i, strict=True)
+    ]
+    return integrand, *_sides(panels, phi_i, one_side)
 
 
-def _over_the_slopes(reflected: Callable[[Array], Array], wi: Array, lobe: Lobe) -> tuple[Integrand, Array, float]:
-    """Return the integrand over the slopes of the lobe, its panels, and the psi where one side of incidence begins.
+def _over_the_slopes(
+    reflected: _Reflected, lights: Array, widths: Array, one_side: NDArray[np.bool_]
+) -> tuple[Integrand, Array, Indices]:
+    """Return the integrand over the slopes of lobes, for lights (L, 3) and widths (2, L), and its panels.
 
     The integrand is a function of x in [0, 1], the position on a ray, and psi, the azimuth on the ellipse of the lobe.
-    The last result, a psi at the plane of incidence, is meant for a round lobe.
+    One side of the plane of incidence is that of a round lobe, or of a light along an axis of the ellipse.
     """
-    x_i, y_i, cos_i = wi
-    sin2_i = x_i**2 + y_i**2
-    alpha_x, alpha_y = (float(np.clip(alpha, 1e-9, 10.0)) for alpha in (lobe.alpha_x, lobe.alpha_y))
 
-    def integrand(x: Array, psi: Array) -> Array:
-        wr, measure = mirrored_on_rays((x_i, y_i, cos_i), alpha_x, alpha_y, x, psi)
-        return np.asarray(reflected(wr) * measure[..., np.newaxis])
+    def integrand(of: Indices, x: Array, psi: Array) -> Array:
+        x_i, y_i, cos_i, alpha_x, alpha_y = (column[of][:, np.newaxis, np.newaxis] for column in (*lights.T, *widths))
+        return reflected(of, *mirrored_on_rays((x_i, y_i, cos_i), alpha_x, alpha_y, x, psi))
 
     # At grazing the horizon leaps a quarter turn away from the light, so panels end there
-    across = np.arctan2(alpha_x * x_i, -alpha_y * y_i) if sin2_i > 0.0 else HALF_PI  # p = 0
-    return integrand, _panels(np.linspace(0.0, 1.0, 5), across + HALF_PI * np.arange(5)), float(across) + HALF_PI
+    x_i, y_i = lights[:, 0], lights[:, 1]
+    across = np.where(x_i**2 + y_i**2 > 0.0, np.arctan2(widths[0] * x_i, -widths[1] * y_i), HALF_PI)  # p = 0
+    panels = [rectangles(np.linspace(0.0, 1.0, 5), begin + _QUARTERS) for begin in across]
+    return integrand, *_sides(panels, across + HALF_PI, one_side)
+
+
+def _sides(panels: list[Array], begin: Array, one_side: NDArray[np.bool_]) -> tuple[Array, Indices]:
+    """Return the panels of all lights, and the light of each.
+
+    Where `one_side` says so, they cover one side of the plane of incidence, which begins at the azimuth `begin`.
+    """
+    of = np.repeat(np.arange(len(panels)), [len(some) for some in panels])
+    rows = np.concatenate(panels)
+    kept = ~one_side[of] | ((rows[:, 1] > begin[of]) & (rows[:, 1] < begin[of] + np.pi))
+    return rows[kept], of[kept]
 
 
 def mirrored_on_rays(
@@ -376,69 +331,3 @@ def mirrored_on_rays(
     wr = 2.0 * h_i[..., np.newaxis] * h - wi
     # d omega_r = 4 (h.i) d omega_h, d omega_h = cos^3 d(slopes), d(slopes) = alpha_x alpha_y t dt dpsi
     return wr, np.asarray(4.0 * h_i * cos_h**3 * (alpha_x * alpha_y) * t * jacobian)
-
-
-def _panels(first: Floats, second: Floats) -> Array:
-    """Return rectangles between edges as rows: the centre, then half the width, in the first and second variable."""
-    centres = [(edges[:-1] + edges[1:]) / 2.0 for edges in (first, second)]
-    halves = [np.diff(edges) / 2.0 for edges in (first, second)]
-    return np.stack(
-        [
-            *(grid.ravel() for grid in np.meshgrid(centres[0], centres[1], indexing="ij")),
-            *(grid.ravel() for grid in np.meshgrid(halves[0], halves[1], indexing="ij")),
-        ],
-        axis=-1,
-    )
-
-
-def _adaptive(
-    integrand: Integrand, panels: Array, tolerance: float, most_panels: int = MOST_PANELS, width: int = 1
-) -> tuple[Array, float]:
-    """Return the integrals (width,) over rectangles, and their error. Rectangles with large errors are halved."""
-    values, errors = _rules(integrand, panels, width)
-    done = 0
-    while errors.sum() > tolerance and done < most_panels:
-        # The panels with the largest errors are halved. The others add up to a part of the tolerance
-        total = errors.sum(axis=1)
-        order = np.argsort(total)[::-1]
-        rest = total.sum() - np.cumsum(total[order])
-        chosen = order[: 1 + int(np.count_nonzero(rest > 0.5 * tolerance))]
-        kept = np.setdiff1d(np.arange(total.size), chosen)
-        halved = _halved(panels[chosen], errors[chosen])
-        new_values, new_errors = _rules(integrand, halved, width)
-        panels = np.concatenate([panels[kept], halved])
-        values, errors = np.concatenate([values[kept], new_values]), np.concatenate([errors[kept], new_errors])
-        done += len(halved)
-    return values.sum(axis=0), float(errors.sum())
-
-
-def _halved(panels: Array, errors: Array) -> Array:
-    """Return each panel cut in two, across the variable in which its rules differ most."""
-    axis = np.argmax(errors, axis=1)
-    row = np.arange(len(panels))
-    low, high = panels.copy(), panels.copy()
-    half = panels[row, 2 + axis] / 2.0
-    for child, sign in ((low, -1.0), (high, 1.0)):
-        child[row, axis] += sign * half
-        child[row, 2 + axis] = half
-    return np.concatenate([low, high])
-
-
-def _rules(integrand: Integrand, panels: Array, width: int) -> tuple[Array, Array]:
-    """Return integrals over each panel, and their largest change with Gauss's rule in the first or second variable.
-
-    The integrand gives `width` values per point, in a last axis.
-    """
-    values, errors = np.empty((len(panels), width)), np.empty((len(panels), 2))
-    step = max(1, _BATCH // width)
-    for start in range(0, len(panels), step):
-        batch = slice(start, start + step)
-        c_1, c_2, h_1, h_2 = (column[:, np.newaxis, np.newaxis] for column in panels[batch].T)
-        f = integrand(*np.broadcast_arrays(c_1 + h_1 * _X[:, np.newaxis], c_2 + h_2 * _X))
-        by_first = _W_KRONROD @ f  # integral over the second variable, (panels, 15, width)
-        by_second = (_W_KRONROD @ f.reshape(*f.shape[:2], -1)).reshape(by_first.shape)
-        area = (h_1 * h_2)[:, 0]
-        values[batch] = area * (_W_KRONROD @ by_first)
-        errors[batch, 0] = _SAFETY * np.max(np.abs(values[batch] - area * (_W_GAUSS @ by_first)), axis=1)
-        errors[batch, 1] = _SAFETY * np.max(np.abs(values[batch] - area * (_W_GAUSS @ by_second)), axis=1)
-    return values, errors

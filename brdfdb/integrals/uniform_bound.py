@@ -70,7 +70,7 @@ def largest_uniform(model: ModelSpec | str, *, tolerance: float = 1e-6, **parame
     surfaces = {name: np.ravel(array) for name, array in zip(given, arrays, strict=True)}
     steepest = np.arccosh(1.0 / spec.uniform_bound_cosine(surfaces))
     theta_i = np.append(np.arctan(np.sinh(np.linspace(0.0, steepest, _ANGLES))), HALF_PI)
-    reflectance = np.stack([_reflectance(spec, theta, surfaces, tolerance) for theta in theta_i])
+    reflectance = _reflectance(spec, theta_i, surfaces, tolerance)
     return largest_uniform_beside(spec, theta_i, reflectance, surfaces, tolerance).reshape(arrays[0].shape)[()]
 
 
@@ -103,44 +103,45 @@ def largest_uniform_beside(
     peak = _peak(
         np.arcsinh(np.tan(theta_i[below])),
         reflectance[below],
-        lambda x: _reflectance(spec, float(np.arctan(np.sinh(x))), surfaces, tolerance),
+        lambda x: _reflectance(spec, np.arctan(np.sinh(x)), surfaces, tolerance),
         tolerance,
     )
     return np.asarray(np.maximum(0.0, 1.0 - np.maximum(peak, reflectance.max(axis=0))))
 
 
-def _reflectance(spec: ModelSpec, theta_i: float, surfaces: Mapping[str, ArrayLike], tolerance: float) -> Array:
-    """Return the reflectance [1] of all surfaces, specular and directional diffuse."""
+def _reflectance(spec: ModelSpec, theta_i: Array, surfaces: Mapping[str, ArrayLike], tolerance: float) -> Array:
+    """Return the reflectance (angles, surfaces) [1], specular and directional diffuse."""
     assert spec.uniform is not None
     arguments = {**surfaces, spec.uniform: 0.0}
     diffuse, _ = spectral_albedo(spec, theta_i, 0.0, arguments, tolerance=tolerance, mirrored=True)
     if spec.specular is None:
         return np.asarray(diffuse)
-    return np.asarray(diffuse + spec.specular(theta_i, **{name: surfaces[name] for name in spec.specular_parameters}))
+    given = {name: surfaces[name] for name in spec.specular_parameters}
+    return np.asarray(diffuse + spec.specular(theta_i[:, np.newaxis], **given))
 
 
-def _peak(x: Array, y: Floats, f: Callable[[float], Array], tolerance: float) -> Array:
+def _peak(x: Array, y: Floats, f: Callable[[Array], Array], tolerance: float) -> Array:
     """Return the largest value of each function, whose values y (x, functions) are known at increasing x.
 
     The steps around the largest value of a function are halved until the top of the parabola through the three highest
     values no longer moves.
     """
-    top = _tops(x, y)
+    top = tops(x, y)
     moving = np.ones(top.size, dtype=bool)
     for _ in range(_ROUNDS):
         at = np.unique(np.clip(np.argmax(y[:, moving], axis=0), 1, x.size - 2))
         fresh = np.unique([(x[i + side - 1] + x[i + side]) / 2.0 for i in at for side in (0, 1)])
-        x, y = np.append(x, fresh), np.concatenate([y, [f(one) for one in fresh]])
+        x, y = np.append(x, fresh), np.concatenate([y, f(fresh)])
         order = np.argsort(x)
         x, y, before = x[order], y[order], top
-        top = _tops(x, y)
+        top = tops(x, y)
         moving &= np.abs(top - before) > tolerance
         if not np.any(moving):
             break
     return top
 
 
-def _tops(x: Array, y: Floats) -> Array:
+def tops(x: Array, y: Floats) -> Array:
     """Return the tops of the parabolas through the largest values and their neighbours, between these neighbours."""
     middle = np.clip(np.argmax(y, axis=0), 1, x.size - 2)
     column = np.arange(y.shape[1])

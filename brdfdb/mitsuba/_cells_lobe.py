@@ -62,8 +62,8 @@ class CellsLobe:
         # Rings are found by the logarithm: those of a narrow lobe differ in size by orders of magnitude
         self._log_edges = _axis(np.log(np.append(0.5 * cells.edges[1], cells.edges[1:])))
         self._edges = Buffer(np.stack([cells.edges[:-1], np.diff(cells.edges)], axis=1))
-        self._along_theta = _Alias(np.diff(cells.along_theta))
-        self._along_phi = _Alias(np.diff(cells.along_phi).reshape(-1, self._columns))
+        self._along_theta = _Alias(cells.rings)
+        self._along_phi = _Alias(cells.along_phi.reshape(-1, self._columns))
         # The cells of two lights beside one another
         density = cells.density.reshape(lights // self._turns, self._turns, self._rings, self._columns)
         self._density = Buffer(np.stack([density[:-1], density[1:]], axis=-1))

@@ -12,6 +12,9 @@ from brdfdb._elementary import BLOCK, exp, log, summand_exp
 from brdfdb._numba import kernel, loop
 from brdfdb.parameters import Floats
 
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
 ROWS_OF_WORK, GROUPS = 15, 5  # rows of the two work arrays of `log_series`, of BLOCK numbers each
 
 # Position of the peak that separates two methods: below, the sum is taken term by term, above, by the trapezoid rule
@@ -78,14 +81,7 @@ def _exponent_at_peak(u: float) -> float:
 
 
 @loop
-def log_series(
-    g: NDArray[np.float64],
-    V: NDArray[np.float64],
-    reach: float,
-    log_sum: NDArray[np.float64],
-    work: NDArray[np.float64],
-    index: NDArray[np.int64],
-) -> None:
+def log_series(g: Array, V: Array, reach: float, log_sum: Array, work: Array, index: Indices) -> None:
     """Fill log_sum with the logarithm of `diffraction_series` for at most BLOCK values of g and V.
 
     reach, in (0, 1], is the share of the distance from the peak up to which terms are summed; 1 is the model. The steps
@@ -97,13 +93,7 @@ def log_series(
 
 @loop
 def log_series_and_slopes(
-    g: NDArray[np.float64],
-    V: NDArray[np.float64],
-    log_sum: NDArray[np.float64],
-    by_g: NDArray[np.float64],
-    by_V: NDArray[np.float64],
-    work: NDArray[np.float64],
-    index: NDArray[np.int64],
+    g: Array, V: Array, log_sum: Array, by_g: Array, by_V: Array, work: Array, index: Indices
 ) -> None:
     """Fill log_sum as `log_series` does, and its derivatives by ln(g), increased by 1, and by ln(V).
 
@@ -115,14 +105,14 @@ def log_series_and_slopes(
 @kernel
 def _log_series(
     slopes: bool,
-    g: NDArray[np.float64],
-    V: NDArray[np.float64],
+    g: Array,
+    V: Array,
     reach: float,
-    log_sum: NDArray[np.float64],
-    by_g: NDArray[np.float64],
-    by_V: NDArray[np.float64],
-    work: NDArray[np.float64],
-    index: NDArray[np.int64],
+    log_sum: Array,
+    by_g: Array,
+    by_V: Array,
+    work: Array,
+    index: Indices,
 ) -> None:
     """Sum, and where `slopes` is true fill in the derivatives, too: the callers know it, and LLVM drops the rest."""
     count = log_sum.shape[0]
@@ -153,17 +143,17 @@ def _log_series(
 @kernel
 def _term_by_term(
     slopes: bool,
-    all_g: NDArray[np.float64],
-    all_V: NDArray[np.float64],
-    all_log_g: NDArray[np.float64],
-    u: NDArray[np.float64],
-    m_star: NDArray[np.float64],
-    index: NDArray[np.int64],
+    all_g: Array,
+    all_V: Array,
+    all_log_g: Array,
+    u: Array,
+    m_star: Array,
+    index: Indices,
     reach: float,
-    log_sum: NDArray[np.float64],
-    by_g: NDArray[np.float64],
-    by_V: NDArray[np.float64],
-    work: NDArray[np.float64],
+    log_sum: Array,
+    by_g: Array,
+    by_V: Array,
+    work: Array,
 ) -> None:
     V, log_g, shift, total, sum_m, sum_inverse = work[0], work[1], work[2], work[3], work[4], work[5]
     count = index.shape[0]
@@ -195,7 +185,7 @@ def _term_by_term(
 
 
 @kernel
-def _add_node(slopes: bool, close: bool, distance: float, count: int, work: NDArray[np.float64]) -> None:
+def _add_node(slopes: bool, close: bool, distance: float, count: int, work: Array) -> None:
     """Add a node of the trapezoid rule to the sums in work, whose rows `_trapezoid` names."""
     m_star, a, b, step, m_inverse = work[0], work[1], work[2], work[3], work[4]
     d, inverse, total, sum_bend, sum_inverse = work[7], work[8], work[9], work[10], work[11]
@@ -227,18 +217,18 @@ def _add_node(slopes: bool, close: bool, distance: float, count: int, work: NDAr
 @kernel
 def _trapezoid(
     slopes: bool,
-    all_g: NDArray[np.float64],
-    all_V: NDArray[np.float64],
-    all_log_g: NDArray[np.float64],
-    all_u: NDArray[np.float64],
-    all_m_star: NDArray[np.float64],
-    index: NDArray[np.int64],
+    all_g: Array,
+    all_V: Array,
+    all_log_g: Array,
+    all_u: Array,
+    all_m_star: Array,
+    index: Indices,
     close: bool,
     reach: float,
-    log_sum: NDArray[np.float64],
-    by_g: NDArray[np.float64],
-    by_V: NDArray[np.float64],
-    work: NDArray[np.float64],
+    log_sum: Array,
+    by_g: Array,
+    by_V: Array,
+    work: Array,
 ) -> None:
     """Sum by the trapezoid rule in t, where m = m* e^t.
 
@@ -299,7 +289,7 @@ def _trapezoid(
 
 
 @loop
-def _series(g: NDArray[np.float64], V: NDArray[np.float64], log_sum: NDArray[np.float64]) -> None:
+def _series(g: Array, V: Array, log_sum: Array) -> None:
     work, index = np.empty((ROWS_OF_WORK, BLOCK)), np.empty((GROUPS, BLOCK), np.int64)
     for start in range(0, log_sum.shape[0], BLOCK):
         stop = min(start + BLOCK, log_sum.shape[0])
@@ -336,7 +326,7 @@ def diffraction_series(g: Floats, V: Floats) -> Floats:
     he1991, loader2000, corless1996
     """
     g_all, V_all = np.broadcast_arrays(np.asarray(g, dtype=np.float64), np.asarray(V, dtype=np.float64))
-    total: NDArray[np.float64] = np.empty(g_all.size)
+    total: Array = np.empty(g_all.size)
     _series(np.ravel(g_all), np.ravel(V_all), total)
     return np.exp(total, out=total).reshape(g_all.shape)[()]
 
@@ -353,7 +343,7 @@ TERMS, TERMS_OF_FLOAT32 = 16, 8  # terms of the series in p, and in q: whole vec
 
 
 @functools.cache
-def series_table(terms: int) -> NDArray[np.float64]:
+def series_table(terms: int) -> Array:
     """Return the table [1] of the logarithm of the sum, of shape (patches in p, terms, patches in q, terms).
 
     It takes at most 3 MB, and 30 ms to make. The error of the logarithm is below 1e-11 with TERMS, and below 2e-6 with
@@ -375,13 +365,7 @@ def series_table(terms: int) -> NDArray[np.float64]:
 
 @loop
 def log_series_of_row(
-    table: NDArray[np.float64],
-    g: float,
-    V: NDArray[np.float64],
-    V_low: float,
-    V_high: float,
-    log_sum: NDArray[np.float64],
-    row: NDArray[np.float64],
+    table: Array, g: float, V: Array, V_low: float, V_high: float, log_sum: Array, row: Array
 ) -> None:
     """Fill log_sum from the table, for one g with G_LOW <= g < G_HIGH and for V within [V_low, V_high].
 

@@ -24,6 +24,9 @@ from brdfdb.models._diffraction_series import (
 )
 from brdfdb.parameters import Floats
 
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
 _X_MAX = 30.0  # largest x; erfc(x) and exp(-x^2) are 0 in float64 well below it
 _INVERSE_SQRT_PI = 0.5641895835477563
 WORTH_THE_TABLE = 16  # values in a row from which on the table of the series is faster than the sum
@@ -104,12 +107,7 @@ difference_of_sines = elementwise(_difference_of_sines)
 
 
 @loop
-def _roughness(
-    geometry: NDArray[np.float64],
-    surface: NDArray[np.float64],
-    g_over_vz2: NDArray[np.float64],
-    shadow: NDArray[np.float64],
-) -> None:
+def _roughness(geometry: Array, surface: Array, g_over_vz2: Array, shadow: Array) -> None:
     """Fill in g / v_z^2 [1] and S / (cos theta_i cos theta_r) [1], the factors of eq. 71 set by the polar angles."""
     sin_i, cos_i, sin_r, cos_r = geometry[0], geometry[1], geometry[2], geometry[3]
     wave, slope = surface[0], surface[2]
@@ -126,9 +124,7 @@ def _roughness(
 
 
 @loop
-def _first_terms(
-    terms: int, g: NDArray[np.float64], V: NDArray[np.float64], total: NDArray[np.float64], power: NDArray[np.float64]
-) -> None:
+def _first_terms(terms: int, g: Array, V: Array, total: Array, power: Array) -> None:
     """Add the first terms of the sum of eq. 78 divided by g. power is overwritten."""
     count = total.shape[0]
     for j in range(count):
@@ -142,7 +138,7 @@ def _first_terms(
 
 
 @loop
-def _limit(corrected: bool, g: NDArray[np.float64], V: NDArray[np.float64], total: NDArray[np.float64]) -> None:
+def _limit(corrected: bool, g: Array, V: Array, total: Array) -> None:
     """Fill in the limit of the sum of eq. 78 divided by g for g -> infinity, e^-b / g^2 with b = V / g.
 
     `corrected` adds the first order in 1/g. The corrected factor is held above 0, since the expansion is meant for
@@ -157,13 +153,7 @@ def _limit(corrected: bool, g: NDArray[np.float64], V: NDArray[np.float64], tota
 
 @loop
 def _evaluate(
-    geometry: NDArray[np.float64],
-    surface: NDArray[np.float64],
-    series: int,
-    reach: float,
-    f_r: NDArray[np.float64],
-    work: NDArray[np.float64],
-    index: NDArray[np.int64],
+    geometry: Array, surface: Array, series: int, reach: float, f_r: Array, work: Array, index: Indices
 ) -> None:
     """Evaluate f_r [1/sr] at no more than BLOCK pairs of directions, with the sum of eq. 78 that `series` selects.
 
@@ -201,7 +191,7 @@ def _evaluate(
 
 
 @kernel
-def specular_rows(scalars: NDArray[np.float64], rho_s: NDArray[np.float64]) -> None:
+def specular_rows(scalars: Array, rho_s: Array) -> None:
     for row in range(rho_s.shape[0]):
         sin_i, cos_i, wave, slope = scalars[row, 0], scalars[row, 1], scalars[row, 2], scalars[row, 3]
         S_over_cos, K_i = _shadowing_and_hidden(sin_i, cos_i, slope)
@@ -212,9 +202,7 @@ def specular_rows(scalars: NDArray[np.float64], rho_s: NDArray[np.float64]) -> N
 
 
 @kernel
-def scattered(
-    features: NDArray[np.float64], surface: NDArray[np.float64], series: int, reach: float, f_r: NDArray[np.float64]
-) -> None:
+def scattered(features: Array, surface: Array, series: int, reach: float, f_r: Array) -> None:
     """Evaluate f_r [1/sr] of scattered pairs of directions.
 
     features has the shape (5, N) and the rows of `_evaluate`, surface the shape (6, 1) or (6, N).
@@ -233,7 +221,7 @@ def scattered(
 
 
 @loop
-def _geometry_of(i: Floats, r: Floats, geometry: NDArray[np.float64]) -> None:
+def _geometry_of(i: Floats, r: Floats, geometry: Array) -> None:
     """Fill in the rows of geometry that `_evaluate` reads, for at most BLOCK pairs of unit vectors in flat arrays."""
     count = i.shape[0] // 3
     for j in range(count):
@@ -249,7 +237,7 @@ def _geometry_of(i: Floats, r: Floats, geometry: NDArray[np.float64]) -> None:
 
 
 @loop
-def _vectors(w_i: Floats, w_r: Floats, surface: NDArray[np.float64], series: int, reach: float, f_r: Floats) -> None:
+def _vectors(w_i: Floats, w_r: Floats, surface: Array, series: int, reach: float, f_r: Floats) -> None:
     """Evaluate f_r [1/sr] as `scattered` does, for unit vectors in flat arrays and a surface of shape (1 or N, 6)."""
     work, index = np.empty((4 + ROWS_OF_WORK, BLOCK)), np.empty((GROUPS, BLOCK), np.int64)
     lanes, values, geometry = np.empty((6, BLOCK)), np.empty(BLOCK), np.empty((5, BLOCK))
@@ -272,7 +260,7 @@ def _vectors(w_i: Floats, w_r: Floats, surface: NDArray[np.float64], series: int
 
 
 @kernel
-def vector_rows(w_i: Floats, w_r: Floats, series: int, reach: float, scalars: NDArray[np.float64], f_r: Floats) -> None:
+def vector_rows(w_i: Floats, w_r: Floats, series: int, reach: float, scalars: Array, f_r: Floats) -> None:
     """Evaluate rows of f_r [1/sr]. Rows of one value, each with a surface of its own, are one long row."""
     if f_r.shape[1] == 1:
         _vectors(w_i.reshape(-1), w_r.reshape(-1), scalars, series, reach, f_r.reshape(-1))
@@ -283,13 +271,7 @@ def vector_rows(w_i: Floats, w_r: Floats, series: int, reach: float, scalars: ND
 
 
 @loop
-def _gradient(
-    geometry: NDArray[np.float64],
-    surface: NDArray[np.float64],
-    values: NDArray[np.float64],
-    work: NDArray[np.float64],
-    index: NDArray[np.int64],
-) -> None:
+def _gradient(geometry: Array, surface: Array, values: Array, work: Array, index: Indices) -> None:
     """Evaluate the directional diffuse part and its derivatives at no more than BLOCK pairs of directions.
 
     The rows of values, of shape (5, pairs), are f_r [1/sr] and its derivatives [1/sr] by ln(sigma_0), ln(tau), n and k.
@@ -338,7 +320,7 @@ def _gradient(
 
 
 @kernel
-def gradient_rows(w_i: Floats, w_r: Floats, scalars: NDArray[np.float64], values: Floats) -> None:
+def gradient_rows(w_i: Floats, w_r: Floats, scalars: Array, values: Floats) -> None:
     """Fill in f_r [1/sr] and its derivatives by sigma_0, tau, n, k and a, values of shape (6, rows, length).
 
     scalars holds the rows of `scattered` and then sigma_0 and tau.
@@ -368,12 +350,7 @@ def gradient_rows(w_i: Floats, w_r: Floats, scalars: NDArray[np.float64], values
 
 
 @kernel
-def angle_rows(
-    one_plus_cos: NDArray[np.float64],
-    table: NDArray[np.float64],
-    scalars: NDArray[np.float64],
-    f_r: Floats,
-) -> None:
+def angle_rows(one_plus_cos: Array, table: Array, scalars: Array, f_r: Floats) -> None:
     """Evaluate rows of f_r [1/sr] along the azimuth. A row shares polar angles and surface."""
     length = f_r.shape[1]
     work, index = np.empty((ROWS_OF_WORK, BLOCK)), np.empty((GROUPS, BLOCK), np.int64)

@@ -1,4 +1,4 @@
-"""Environments: radiance over the sphere, and directions towards it drawn from the lobe of a material."""
+"""Environments: radiance over the sphere, and directions towards it drawn where a material reflects."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from brdfdb.integrals.sampling import DIFFUSE, directions, mixture_density
 from brdfdb.lobes import Lobe
 from brdfdb.materials import Source
 from brdfdb.scenes.shapes import STRICT, Array
+from brdfdb.tables.table_source import TableSource
 
 # Least and largest share of directions that follow a lobe. With fewer, a few directions would carry all of a faint
 # gloss. The largest share bounds f_r cos / pdf in the tails, also for other forms at the same directions
@@ -43,7 +44,9 @@ class Environment(BaseModel):
 
     rows: list[list[float]] | None = Field(default=None, description="from the zenith to the nadir")
     file: str | None = Field(default=None, min_length=1, description="EXR, .npz or .npy; lies beside the scene")
-    samples: int = Field(default=32, ge=1, le=4096, description="directions for each point, drawn from its lobe")
+    samples: int = Field(
+        default=32, ge=1, le=4096, description="directions for each point, drawn from its lobe or table"
+    )
     seed: int = Field(default=0, ge=0, description="seed of the random turns of these directions from point to point")
 
     @field_validator("rows")
@@ -99,7 +102,7 @@ class Environment(BaseModel):
         return np.asarray((1.0 - down) * along(upper) + down * along(lower))
 
     def drawn(self, source: Source, wavelength_nm: Array, wr: Array, stream: tuple[int, ...]) -> Drawn:
-        """Draw directions for points of a source, from its lobe around the mirror direction and from the hemisphere.
+        """Draw directions for points of a source, from its table or from its lobe, and from the hemisphere.
 
         Parameters
         ----------
@@ -119,18 +122,25 @@ class Environment(BaseModel):
 
         Notes
         -----
-        By reciprocity the lobe around the mirror direction of the viewer equals that of the light. Half vectors follow
-        eq. (7) of Ward 1992 (``ward1992``), with its misprint corrected and weights in place of "uniformly weighted"
-        samples.
+        Directions of a table follow its own sampler, as in `Table.sample`, unless its f_r hardly varies. The sampler
+        finds peaks that no lobe states. For others, the lobe around the mirror direction of the viewer equals that of
+        the light by reciprocity. Half vectors follow eq. (7) of Ward 1992 (``ward1992``), with its misprint corrected
+        and weights in place of "uniformly weighted" samples.
         """
         turns = np.random.default_rng([self.seed, *stream]).random((2, 1, len(wr)))
         number = np.arange(self.samples)[:, np.newaxis]
         # The numbers are even over the unit square for any number of samples. Random turns make points independent
         u1, u2 = (number / self.samples + turns[0]) % 1.0, (number * _TURN + turns[1]) % 1.0
-        lobe = widest_lobe(source.lobe(wr[:, np.newaxis, 2], source.evaluated_at(wavelength_nm)), len(wr))
-        wi = directions(lobe, u1, u2, wr)
-        density = self.samples * mixture_density(lobe, wr, wi)
-        return Drawn(wi, np.divide(1.0, density, where=wi[..., 2] > 0.0, out=np.zeros(density.shape)))
+        sampler = source.sampler if isinstance(source, TableSource) else None
+        if sampler is not None:
+            wi = sampler.draw(u1, u2, wr)
+            density = sampler.density(wr, wi)
+        else:
+            lobe = widest_lobe(source.lobe(wr[:, np.newaxis, 2], source.evaluated_at(wavelength_nm)), len(wr))
+            wi = directions(lobe, u1, u2, wr)
+            density = mixture_density(lobe, wr, wi)
+        solid_angle = np.divide(1.0, self.samples * density, where=wi[..., 2] > 0.0, out=np.zeros(density.shape))
+        return Drawn(wi, solid_angle)
 
 
 class Drawn(NamedTuple):

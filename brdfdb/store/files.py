@@ -7,10 +7,14 @@ import hashlib
 import os
 import stat
 import uuid
+from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import TypedDict
 
 NON_BLOCKING = getattr(os, "O_NONBLOCK", 0)  # without it the opening of a pipe waits for its writer; Windows has none
+
+_AT_ONCE = 16  # files that are synced at once: each waits for the disk
 
 
 class Entry(TypedDict):
@@ -34,7 +38,7 @@ def sha256_of(path: str | Path) -> str:
         return hashlib.file_digest(handle, "sha256").hexdigest()
 
 
-def write_file(path: Path, data: bytes, temporary: Path) -> Entry:
+def write_file(path: Path, data: bytes, temporary: Path, *, sync: bool = True) -> Entry:
     """Write a file so that it is there whole, synced to disk, or not at all.
 
     Parameters
@@ -45,13 +49,16 @@ def write_file(path: Path, data: bytes, temporary: Path) -> Entry:
         All of its content.
     temporary : Path
         A directory of the same file system, where it lies until it is whole.
+    sync : bool
+        False for a file whose reader notices what a power cut left of it, and can do without.
     """
     half = temporary / f".{path.name}.{uuid.uuid4().hex}"
     try:
         with half.open("wb") as handle:
             handle.write(data)
-            handle.flush()
-            os.fsync(handle.fileno())
+            if sync:
+                handle.flush()
+                os.fsync(handle.fileno())
         try:
             os.replace(half, path)
         except FileNotFoundError:
@@ -61,6 +68,13 @@ def write_file(path: Path, data: bytes, temporary: Path) -> Entry:
         half.unlink(missing_ok=True)
         raise
     return {"size": len(data), "sha256": hashlib.sha256(data).hexdigest()}
+
+
+def write_files(directory: Path, contents: Mapping[str, bytes], temporary: Path) -> dict[str, Entry]:
+    """Write files by their paths inside a directory as `write_file` does: at once, since a disk syncs many as fast."""
+    with ThreadPoolExecutor(_AT_ONCE) as pool:
+        entries = pool.map(lambda file: write_file(directory / file, contents[file], temporary), contents)
+        return dict(zip(contents, entries, strict=True))
 
 
 def sync_directory(path: Path) -> None:

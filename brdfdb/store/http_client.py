@@ -106,18 +106,11 @@ class RemoteTable(BaseTable):
             _in_parts(ask, values, min(_JSON_POINTS, max(1, _JSON_VALUES // count)))
         return finished(values.reshape(given.theta_i.shape + tail), given, trailing=len(tail))
 
-    def mueller(
-        self,
-        theta_i: ArrayLike,
-        phi_i: ArrayLike,
-        theta_r: ArrayLike,
-        phi_r: ArrayLike,
-        wavelength_nm: ArrayLike | None = None,
-    ) -> Floats:
-        """Return the Mueller BRDF [1/sr] as `Table.mueller`, from what the service reflects of four lights."""
+    def _mueller_at(self, angles: FourAngles, wavelength_nm: ArrayLike | None) -> Floats:
+        """Return the Mueller BRDF [1/sr] from what the service reflects of four lights."""
         self._wavelengths(wavelength_nm)
-        shape_of_angles(*(np.asarray(angle) for angle in (theta_i, phi_i, theta_r, phi_r)))
-        given = checked_angles(theta_i, phi_i, theta_r, phi_r)
+        shape_of_angles(*(np.asarray(angle) for angle in angles))
+        given = checked_angles(*angles)
         angles = (given.theta_i, given.phi_i, given.theta_r, given.phi_r)
         unpolarised, *polarised = (self._looked_up(angles, given, wavelength_nm, light) for light in _LIGHTS)
         return np.stack([unpolarised, *(reflected - unpolarised for reflected in polarised)], axis=-1)

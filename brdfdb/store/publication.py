@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import shutil
 from collections.abc import Mapping
-from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -15,17 +14,16 @@ from numpy.typing import ArrayLike, NDArray
 
 from brdfdb.errors import (
     ParameterError,
-    StoreError,
 )
 from brdfdb.materials import Source
 from brdfdb.measurements import MeasuredSource
 from brdfdb.store.decoding import read_metadata, table_of
-from brdfdb.store.files import Entry, sync_directory, write_file
+from brdfdb.store.files import Entry, sync_directory, write_files
 from brdfdb.store.lock import Lock, writing
-from brdfdb.store.manifest import Manifest, Summary, check_manifest, read_manifest, whole_revisions
+from brdfdb.store.manifest import Manifest, Summary
 from brdfdb.store.marker import make_store
 from brdfdb.store.paths import NAME, manifest_path, material_path, staged_path
-from brdfdb.store.pointer import known_manifests, newest, point_to
+from brdfdb.store.pointer import newest, point_to
 from brdfdb.store.sealed_json import write_sealed
 from brdfdb.tables import error_measurement
 from brdfdb.tables.formula_measurement import first_numbers
@@ -162,8 +160,7 @@ def publish_dataset(root: str | os.PathLike[str], name: str, dataset: xr.Dataset
             shutil.rmtree(staging, ignore_errors=True)
             try:
                 staging.mkdir()
-                written = {file: write_file(staging / "table" / file, data, staging) for file, data in files.items()}
-                return publish_staged(store, name, staging, written)
+                return publish_staged(store, name, staging, write_files(staging / "table", files, staging))
             finally:
                 shutil.rmtree(staging, ignore_errors=True)
 
@@ -232,16 +229,3 @@ def publish_staged(root: Path, name: str, staging: Path, files: Mapping[str, Ent
         point_to(material, revision)
         shutil.rmtree(staging, ignore_errors=True)
     return revision, stored
-
-
-def adoptable(root: Path, name: str, request_sha256: str) -> str | None:
-    """Return the newest revision of a material that answers a request and is undamaged; None without any."""
-    material = material_path(root, name)
-    known = known_manifests(material)
-    for group in reversed(whole_revisions(material)):
-        with suppress(StoreError):
-            manifest, digest = read_manifest(group, known.get(group.name))
-            if manifest["summary"]["request_sha256"] == request_sha256:
-                check_manifest(group, digest, contents=True)
-                return group.name
-    return None

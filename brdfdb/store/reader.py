@@ -30,7 +30,6 @@ from brdfdb.errors import (
     UnknownRevisionError,
 )
 from brdfdb.notebook import listing, percent
-from brdfdb.store.decoding import decode, read_metadata
 from brdfdb.store.files import regular_bytes
 from brdfdb.store.manifest import check_manifest, read_manifest, whole_revisions
 from brdfdb.store.marker import check_marker
@@ -210,6 +209,8 @@ class Store(Mapping[str, "Table"]):
             if (held := self._used(key)) is not None:
                 return held
             files = check_manifest(group, digest, contents=False)["files"]
+            from brdfdb.store.decoding import decode  # lists need no arrays
+
             table = decode(name, group, files, digest)
             with self._lock:
                 self._decoded[key] = table
@@ -253,6 +254,8 @@ class Store(Mapping[str, "Table"]):
 
     def metadata(self, name: str) -> TableMetadata:
         """Return the metadata of the current revision, without decoding its values; errors as by `summary`."""
+        from brdfdb.store.decoding import read_metadata
+
         group, digest = self.location(name)
         check_manifest(group, digest, contents=False)
         return read_metadata(group)
@@ -286,11 +289,12 @@ class Store(Mapping[str, "Table"]):
 
     def family_content(self, name: str) -> dict[str, Any]:
         """Return the record of a family as JSON, which is all that lists show of it; errors as by `family`."""
-        if name not in self.families():
-            raise UnknownFamilyError(name, self.families())
-        if self.snapshot is not None:
+        path = family_path(self.root, name)
+        if self.snapshot is not None and name in self.snapshot["families"]:
             return self.snapshot["families"][name]
-        return read_sealed(family_path(self.root, name), f"the family {name}")
+        if self.snapshot is None and NAME.fullmatch(name) and path.exists():
+            return read_sealed(path, f"the family {name}")
+        raise UnknownFamilyError(name, self.families())
 
     def dataset(self, name: str, revision: str | None = None) -> xr.Dataset:
         """Return a revision, by default the current one, as a lazy Dataset: see `brdfdb.tables.xarray_view.opened`.

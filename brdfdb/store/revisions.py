@@ -24,10 +24,8 @@ from brdfdb.store.paths import (
     staging_path,
 )
 from brdfdb.store.pointer import known_manifests, point_to
-from brdfdb.store.publication import adoptable
 from brdfdb.store.reader import Store
 from brdfdb.store.snapshot_record import read_snapshot, snapshot_names
-from brdfdb.tables.layout import digest
 
 SNAPSHOTS = ".snapshots"  # the lock that snapshots and collections take in turns; no material has such a name
 
@@ -53,20 +51,35 @@ class Standing:
 
 def standing(root: Path, name: str, request: Mapping[str, Any]) -> Standing:
     """Return how a material stands to a request, after a look at every byte of the revisions in question."""
+    from brdfdb.tables.layout import digest  # it imports models, which histories and collections do not need
+
     wanted = digest(request)
     store = Store(root)
+    why = "new"
     try:
-        group, _, head = store.current(name)
-        if head["request_sha256"] == wanted:
-            store.verify(name)
-            return Standing("current", group.name)
-        why = difference(store.metadata(name).whole_request, request)
-    except UnknownMaterialError:
-        why = "new"
+        if name in store:  # the error of `current` for one that is not compares its name with all others
+            group, _, head = store.current(name)
+            if head["request_sha256"] == wanted:
+                store.verify(name)
+                return Standing("current", group.name)
+            why = difference(store.metadata(name).whole_request, request)
     except StoreError as error:
         why = str(error)
     sound = adoptable(root, name, wanted)
     return Standing("missing", "", why) if sound is None else Standing("adoptable", sound, why)
+
+
+def adoptable(root: Path, name: str, request_sha256: str) -> str | None:
+    """Return the newest revision of a material that answers a request and is undamaged; None without any."""
+    material = material_path(root, name)
+    known = known_manifests(material)
+    for group in reversed(whole_revisions(material)):
+        with suppress(StoreError):
+            manifest, digest = read_manifest(group, known.get(group.name))
+            if manifest["summary"]["request_sha256"] == request_sha256:
+                check_manifest(group, digest, contents=True)
+                return group.name
+    return None
 
 
 def difference(old: Mapping[str, Any], new: Mapping[str, Any]) -> str:
@@ -211,8 +224,10 @@ def pinned(root: Path) -> dict[Path, str]:
 
 
 def _collect(store: Store, keep: int, damaged: bool, collected: Collected) -> None:
+    stay: dict[Path, set[Path]] = {}  # by material
     try:
-        stay = pinned(store.root)
+        for group in pinned(store.root):
+            stay.setdefault(group.parent, set()).add(group)
     except StoreError as error:
         raise StoreError(f"nothing is collected, since {error}; remove it with `brdfdb snapshot --remove`") from error
     for path in store.root.glob(f".{marker_path(store.root).name}.*"):
@@ -229,7 +244,7 @@ def _collect(store: Store, keep: int, damaged: bool, collected: Collected) -> No
                     if path != lock.path:
                         _remove(store.root, path, collected)
                 if material.is_dir():
-                    _collect_material(store, material, keep, damaged, set(stay), collected)
+                    _collect_material(store, material, keep, damaged, stay.get(material, set()), collected)
         except BusyError:
             collected.busy.append(name)
     for path in staged.iterdir():

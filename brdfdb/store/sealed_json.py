@@ -101,9 +101,9 @@ def read_json(path: Path) -> dict[str, Any]:
     return json_object(path, data)
 
 
-def write_json(path: Path, content: Mapping[str, Any], temporary: Path | None = None) -> str:
+def write_json(path: Path, content: Mapping[str, Any], temporary: Path | None = None, *, sync: bool = True) -> str:
     """Write a JSON file as `write_file` does, by default by way of its own directory; return its sha256."""
-    return write_file(path, json.dumps(content, indent=1).encode(), temporary or path.parent)["sha256"]
+    return write_file(path, json.dumps(content, indent=1).encode(), temporary or path.parent, sync=sync)["sha256"]
 
 
 def write_sealed(path: Path, content: Mapping[str, Any], temporary: Path | None = None) -> str:

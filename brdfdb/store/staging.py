@@ -29,9 +29,9 @@ from brdfdb.errors import (
     BusyError,
     StoreError,
 )
-from brdfdb.store.files import Entry, sha256_of, write_file
+from brdfdb.store.files import Entry, sha256_of, write_file, write_files
 from brdfdb.store.lock import Lock, writing
-from brdfdb.store.paths import METADATA, marker_path, materials_path, request_path, staging_path, store_of_staged
+from brdfdb.store.paths import marker_path, materials_path, request_path, staging_path, store_of_staged
 from brdfdb.store.sealed_json import read_sealed, sealed, write_json
 from brdfdb.tables import tabulation
 from brdfdb.tables.layout import Layout, digest
@@ -69,7 +69,7 @@ def prepare(root: Path, name: str, request: Mapping[str, Any], layout: str) -> P
         texts = sealed(dict(request)), sealed(json.loads(layout))
         for file, text in zip(("request.json", "layout.json"), texts, strict=True):
             if not (staging / file).is_file() or (staging / file).read_bytes() != text:
-                write_file(staging / file, text, staging)
+                write_file(staging / file, text, staging, sync=False)  # the digest in its first line is checked
     return staging
 
 
@@ -136,7 +136,8 @@ def write_block(staging: str, layout: str, number: int) -> Block:
     data = chunk_bytes(tabulation.block(table, table.blocks[number]), table.block_rows)
     with writing(store_of_staged(directory), table.source.name):
         entry = write_file(path, data, directory)
-        write_json(marker, {**entry, "layout": _short(layout)}, directory)
+        # `_kept` reads the block, and notices what a power cut left of the marker
+        write_json(marker, {**entry, "layout": _short(layout)}, directory, sync=False)
     return {"name": name, "entry": entry, "kept": False}
 
 
@@ -167,15 +168,13 @@ def write_frame(staging: str, layout: str) -> dict[str, Entry]:
     StoreError
         If they cannot be written.
     """
-    from brdfdb.store.codec import array_metadata, frame_files
+    from brdfdb.store.codec import frame_files
     from brdfdb.tables.error_measurement import measure
     from brdfdb.tables.formula_measurement import first_numbers
 
     directory = Path(staging)
     table = _layout(layout)
     request = read_sealed(directory / "request.json", table.source.name)
-    with writing(store_of_staged(directory), table.source.name):
-        write_file(directory / "table" / table.variable / METADATA, array_metadata(table), directory)
     read = _reader(table, directory / "table")
     known = tabulation.metadata_of(table)
     measured = {
@@ -187,15 +186,17 @@ def write_frame(staging: str, layout: str) -> dict[str, Entry]:
     frame = tabulation.frame(table)
     attributes = {**frame.attrs, **metadata.attributes()}
     with writing(store_of_staged(directory), table.source.name):
-        return {
-            name: write_file(directory / "table" / name, data, directory)
-            for name, data in frame_files(table, frame._replace(attrs=attributes)).items()
-        }
+        files = frame_files(table, frame._replace(attrs=attributes))
+        return write_files(directory / "table", files, directory)
 
 
 def _reader(layout: Layout, table: Path) -> Callable[[slice], NDArray[np.float32]]:
-    """Return a function that reads rows of a table from the finished blocks in the group `table`."""
+    """Return a function that reads rows of a table from the finished blocks in the group `table`.
+
+    A table whose albedo is integrated is held as a whole, so that each block is decoded once.
+    """
     from brdfdb.store.codec import chunk_name, decoded
+    from brdfdb.tables.formula_measurement import LARGE
 
     @lru_cache(maxsize=4)
     def block(number: int) -> NDArray[np.float32]:
@@ -207,4 +208,9 @@ def _reader(layout: Layout, table: Path) -> Callable[[slice], NDArray[np.float32
         blocks = np.concatenate([block(number) for number in range(first, last + 1)])
         return blocks[rows.start - start : rows.stop - start]
 
-    return read
+    if layout.size > LARGE:
+        return read
+    whole = np.empty(layout.shape, dtype=np.float32)
+    for number, rows in enumerate(layout.blocks):
+        whole[rows] = decoded(layout, number, (table / chunk_name(layout, number)).read_bytes())
+    return whole.__getitem__

@@ -10,7 +10,6 @@ import numpy as np
 
 from brdfdb.errors import StoreError, UnknownMaterialError
 from brdfdb.store.decoding import read_metadata
-from brdfdb.store.family_records import verify_family
 from brdfdb.store.files import Entry
 from brdfdb.store.manifest import check_manifest, read_manifest, whole_revisions
 from brdfdb.store.paths import manifest_path, material_path, revision_path, snapshot_path
@@ -147,6 +146,8 @@ def _other_repair(root: Path, group: Path) -> str:
 
 def family(root: Path, name: str) -> tuple[int, list[Finding]]:
     """Check the record of a family; return its bytes, and what is wrong."""
+    from brdfdb.store.family_records import verify_family  # it measures families, which takes more imports
+
     try:
         return verify_family(root, name), []
     except StoreError as error:

@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 from weakref import WeakKeyDictionary
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel, Field
 
 from brdfdb.geometry import radians
@@ -89,13 +90,11 @@ def directional_albedo(table: Table, theta_i_deg: Axis | None = None, tolerance:
     if table.anisotropic:
         phi_i = table.axes_deg["phi_i"]
         phi_weights = _trapezoid_weights(radians(table.axes_deg["phi_r"]))
-        brdf = table.brdf.reshape(*table.brdf.shape[:4], -1)
-        albedo = np.einsum("ipjkw,j,k->ipw", brdf, theta_weights, phi_weights, optimize=True)
+        albedo = _sums(table.brdf, phi_i.size, np.outer(theta_weights, phi_weights))
     else:
         phi_i = np.zeros(1)
         phi_weights = 2.0 * _trapezoid_weights(radians(table.axes_deg["delta_phi"]))  # the other half by symmetry
-        brdf = table.brdf.reshape(*table.brdf.shape[:3], -1)
-        albedo = np.einsum("ijkw,j,k->iw", brdf, theta_weights, phi_weights, optimize=True)[:, np.newaxis]
+        albedo = _sums(table.brdf, 1, np.outer(theta_weights, phi_weights))
     lights = theta_i_deg
     if lights is None and table.metadata.reason:  # a planner's nodes are few
         lights = np.union1d(THETA_I_DEG, nodes)
@@ -103,6 +102,12 @@ def directional_albedo(table: Table, theta_i_deg: Axis | None = None, tolerance:
         matrix = np.stack([np.interp(lights, nodes, one) for one in np.eye(nodes.size)], axis=1)
         nodes, albedo = lights, np.tensordot(matrix, albedo, axes=1)
     return TableAlbedo(nodes, phi_i, np.asarray(albedo), np.zeros(nodes.size))
+
+
+def _sums(brdf: NDArray[np.float32], phi_i: int, weights: Floats) -> Floats:
+    """Return the weighted sums of f_r over viewers, shape (theta_i, phi_i, L), a row in float64 at a time."""
+    rows = brdf.reshape(len(brdf), phi_i, weights.size, -1)
+    return np.stack([np.einsum("pkl,k->pl", row.astype(np.float64), weights.ravel()) for row in rows])
 
 
 def tolerance_of(table: Table) -> float:
@@ -201,18 +206,9 @@ def reflected_by(source: Source, wavelength_nm: Axis | None) -> Reflected:
     """
     phi_i_deg = np.arange(0.0, 91.0 if source.elliptical else 361.0, _PHI_I_STEP_DEG)
     phi_i_deg = phi_i_deg if source.anisotropic else phi_i_deg[:1]
-    integrals = [
-        [
-            source_albedo(
-                source, float(radians(theta)), float(radians(phi)), wavelength_nm, tolerance=LARGEST_TOLERANCE
-            )
-            for phi in phi_i_deg
-        ]
-        for theta in THETA_I_DEG
-    ]
-    albedo = np.array([[one.albedo for one in row] for row in integrals])
-    error = np.array([max(one.error for one in row) for row in integrals])
-    return _reflected(TableAlbedo(THETA_I_DEG, phi_i_deg, albedo, error), source, wavelength_nm)
+    angles = radians(THETA_I_DEG)[:, np.newaxis], radians(phi_i_deg)
+    albedo, error = source_albedo(source, *angles, wavelength_nm, tolerance=LARGEST_TOLERANCE)
+    return _reflected(TableAlbedo(THETA_I_DEG, phi_i_deg, albedo, error.max(axis=1)), source, wavelength_nm)
 
 
 def _reflected(albedo: TableAlbedo, surface: Table | Source, wavelength_nm: Axis | None) -> Reflected:
@@ -226,8 +222,8 @@ def _reflected(albedo: TableAlbedo, surface: Table | Source, wavelength_nm: Axis
 
 def source_albedo(
     source: Source,
-    theta_i: float,
-    phi_i: float,
+    theta_i: ArrayLike,
+    phi_i: ArrayLike,
     wavelength_nm: Axis | None,
     *,
     tolerance: float,
@@ -239,8 +235,8 @@ def source_albedo(
     ----------
     source : Source
         Material or function.
-    theta_i, phi_i : float [rad]
-        Direction of the light, theta up to pi/2.
+    theta_i, phi_i : array_like [rad]
+        Directions of the lights, theta up to pi/2. They broadcast.
     wavelength_nm : array (L,) [nm], or None
         For spectral sources, and only for them.
     tolerance, most_panels
@@ -249,23 +245,25 @@ def source_albedo(
     Returns
     -------
     Albedo
-        Albedo of shape (L,), or (1,) of a grey source, without the specular part; and one estimate of its error.
+        Albedo of shape (..., L), or (..., 1) of a grey source, without the specular part; and an estimate of the error
+        for each light.
     """
+
+    f_r = source.brdf_at(wavelength_nm)
 
     def brdf(wi: Floats, wr: Floats) -> Floats:
         with np.errstate(all="ignore"):  # nodes lie in every corner; what is finite is tested, not flagged
-            values = source.lookup_vectors(wi, wr.reshape(-1, 3), wavelength_nm)  # in one row: models are faster so
-        return np.asarray(values).reshape(*wr.shape[:-1], width)
+            return f_r(wi, wr)
 
-    width = 1 if wavelength_nm is None else wavelength_nm.size
+    cos_i = np.cos(np.asarray(theta_i, dtype=np.float64))[..., np.newaxis]
     return reflected_share(
         brdf,
         theta_i,
         phi_i,
-        narrowest(source.lobe(np.asarray(np.cos(theta_i)), wavelength_nm)),
+        narrowest(source.lobe(cos_i, wavelength_nm)),
         tolerance=tolerance,
         most_panels=most_panels,
-        width=width,
+        width=1 if wavelength_nm is None else wavelength_nm.size,
         mirrored=not source.anisotropic,
     )
 
@@ -286,25 +284,21 @@ def _integrated(table: Table, theta_i_deg: Axis, tolerance: float) -> TableAlbed
     phi_i_deg = np.zeros(1)
     if table.grid.turned:
         phi_i_deg = np.arange(0.0, 360.0 / table.grid.copies + 1.0, _PHI_I_STEP_DEG)
-    albedo, error = np.empty((theta_i_deg.size, phi_i_deg.size, width)), np.empty((theta_i_deg.size, phi_i_deg.size))
-    source = table.source
+    source, theta_i = table.source, radians(theta_i_deg)[:, np.newaxis]
 
     def brdf(wi: Floats, wr: Floats) -> Floats:
-        return table.lookup_vectors(wi, wr).reshape(*wr.shape[:-1], width)
+        return table.lookup_vectors(wi, wr).reshape(len(wr), width)
 
-    for t, p in np.ndindex(*error.shape):
-        theta_i = float(radians(theta_i_deg[t]))
-        lobe = None if source is None else source.lobe(np.asarray(np.cos(theta_i)), table.wavelength_nm)
-        albedo[t, p], error[t, p] = reflected_share(
-            brdf,
-            theta_i,
-            float(radians(phi_i_deg[p])),
-            narrowest(lobe),
-            tolerance=tolerance,
-            most_panels=_MOST_PANELS,
-            width=width,
-            mirrored=not table.anisotropic,
-        )
+    albedo, error = reflected_share(
+        brdf,
+        theta_i,
+        radians(phi_i_deg),
+        narrowest(None if source is None else source.lobe(np.cos(theta_i)[..., np.newaxis], table.wavelength_nm)),
+        tolerance=tolerance,
+        most_panels=_MOST_PANELS,
+        width=width,
+        mirrored=not table.anisotropic,
+    )
     return TableAlbedo(theta_i_deg, phi_i_deg, albedo, error.max(axis=1))
 
 

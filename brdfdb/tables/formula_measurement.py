@@ -23,7 +23,7 @@ from brdfdb.tables.worst_pair import worst_pair
 DIRECTIONS, SEED = 1000, 1992  # directions of a band of theta_i, and their seed: those of the charts
 _WAVELENGTHS = 4  # largest number of wavelengths: a rung may be an integral for each of them
 
-_LARGE = 1 << 24  # number of values of a table that is not read whole for its albedo
+LARGE = 1 << 24  # number of values of a table that is not read whole for its albedo
 
 _NONE_KNOWN = FormulaError(against="none known", rung="", directions=0, overall=None, worst=None)
 
@@ -41,11 +41,11 @@ def first_numbers(layout: Layout, read: Callable[[slice], NDArray[np.float32]]) 
     Returns
     -------
     dict
-        `formula_error`; `largest_albedo` unless the table has more than `_LARGE` values; `polarisation` of a polarised
+        `formula_error`; `largest_albedo` unless the table has more than `LARGE` values; `polarisation` of a polarised
         table.
     """
     numbers: dict[str, Any] = {"formula_error": formula_error_of(layout.source, layout.wavelength_nm)}
-    if layout.size <= _LARGE:
+    if layout.size <= LARGE:
         table = Table.of(layout, read(slice(0, layout.shape[0])))
         numbers["largest_albedo"] = largest_albedo(table, layout.source)
     if layout.facet_theta_d_deg is not None:

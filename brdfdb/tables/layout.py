@@ -201,13 +201,11 @@ class Layout:
         """Number of rows of the first axis in a block: the piece that a worker computes, and a chunk of the store."""
         return max(1, min(self.shape[0], _BLOCK_VALUES // math.prod(self.shape[1:])))
 
-    @property
+    @functools.cached_property
     def blocks(self) -> list[slice]:
         """The rows of the first axis that each block holds."""
-        return [
-            slice(start, min(start + self.block_rows, self.shape[0]))
-            for start in range(0, self.shape[0], self.block_rows)
-        ]
+        rows, every = self.shape[0], self.block_rows
+        return [slice(start, min(start + every, rows)) for start in range(0, rows, every)]
 
     def document(self) -> dict[str, Any]:
         """Return all that decides the values, as JSON, but for the function of a source that is one."""

@@ -7,6 +7,7 @@ they have a pole.
 
 from __future__ import annotations
 
+import functools
 from typing import NamedTuple
 
 import numpy as np
@@ -63,8 +64,11 @@ def rows_of(directions: Directions) -> NDArray[np.int64]:
     return np.stack(np.broadcast_arrays(*rows))
 
 
+@functools.lru_cache(maxsize=4)
 def draw(count: int, seed: int) -> Pairs:
     """Draw pairs of directions in every place, `count` a sample; all angles are uniform.
+
+    The pairs are kept, since all tables share them: their arrays cannot be written.
 
     Alongside the light there are four samples a band, up to 85 degrees: exactly towards the light; within two degrees
     of that; at theta_r = theta_i; and within 10 degrees of that. With both directions beyond 85 degrees there are
@@ -101,12 +105,15 @@ def draw(count: int, seed: int) -> Pairs:
         ]
     rows, theta_i, theta_r, turns = zip(*samples, strict=True)
     phi_i = rng.uniform(0.0, 360.0, len(samples) * count)
-    return Pairs(
+    pairs = Pairs(
         unit_vector(radians(np.concatenate(theta_i)), radians(phi_i)),
         unit_vector(radians(np.concatenate(theta_r)), radians(phi_i + np.concatenate(turns))),
         np.repeat(rows, count),
         np.repeat(np.arange(len(samples)), count),
     )
+    for array in pairs:
+        array.flags.writeable = False
+    return pairs
 
 
 def _turn(rng: np.random.Generator, most: float, count: int) -> Floats:

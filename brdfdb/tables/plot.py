@@ -371,19 +371,16 @@ def albedo_shares(table: Plotted, phi_i: float, wavelength_nm: float | None) -> 
     def brdf(wi: Floats, wr: Floats) -> Floats:
         return np.asarray(table.lookup_vectors(wi, wr, wavelength_nm))[..., np.newaxis]
 
-    total = np.empty(theta_i.size)
     at = None if wavelength_nm is None else np.array([wavelength_nm])
-    for number, theta in enumerate(theta_i):
-        lobe = None if source is None else source.lobe(np.asarray(np.cos(theta)), at)
-        total[number] = reflected_share(
-            brdf,
-            float(theta),
-            phi_i,
-            narrowest(lobe),
-            tolerance=_TOLERANCE,
-            most_panels=_MOST_PANELS,
-            mirrored=not table.anisotropic,
-        ).albedo[0]
+    total = reflected_share(
+        brdf,
+        theta_i,
+        phi_i,
+        narrowest(None if source is None else source.lobe(np.cos(theta_i)[:, np.newaxis], at)),
+        tolerance=_TOLERANCE,
+        most_panels=_MOST_PANELS,
+        mirrored=not table.anisotropic,
+    ).albedo[:, 0]
     known = source.uniform_at(at) if isinstance(source, Material) else None
     uniform = np.minimum(np.full(theta_i.size, 0.0 if known is None else np.pi * float(known[0])), total)
     rest = "lobe" if isinstance(source, Material) and source.has_lobe else "reflected"

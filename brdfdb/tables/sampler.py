@@ -16,7 +16,7 @@ Evaluate = Callable[[Array, Array], Array]
 
 # Share of directions that follow the cells. The cosine draws the others, which bounds weights by 5 pi f_r
 LOBE_SHARE = 0.8
-# Lights whose cells are stored. In between, one of the lights next to it is drawn
+# Lights whose cells are stored. In between, those of the lights next to it are mixed
 _LIGHTS_DEG = (0, 12, 24, 34, 43, 51, 58, 64, 69, 73, 77, 80, 83, 85.5, 87.5, 88.8, 89.5)
 _TURNS = 16  # azimuths of lights of an anisotropic table
 THETA_CELLS, PHI_CELLS = 64, 32
@@ -48,29 +48,22 @@ class Cells(NamedTuple):
     probability: Array
 
     @property
-    def along_theta(self) -> Array:
-        """Cumulative probabilities (lights, T + 1) [1] over theta_h."""
-        return _cumulative(self.probability.sum(axis=2))
+    def rings(self) -> Array:
+        """Probabilities (lights, T) [1] of the rings of theta_h."""
+        return np.asarray(self.probability.sum(axis=2))
 
     @property
     def along_phi(self) -> Array:
-        """Cumulative probabilities (lights, T, P + 1) [1] over phi_h, in each ring of theta_h."""
-        return _cumulative(self.probability)
+        """Probabilities (lights, T, P) [1] of the cells of a ring if the ring is drawn; even if it never is."""
+        even = np.full_like(self.probability, 1.0 / self.probability.shape[2])
+        total = self.rings[..., np.newaxis]
+        return np.divide(self.probability, total, out=even, where=total > 0.0)
 
     @property
     def density(self) -> Array:
         """Density (lights, T, P) [1/sr] of half vectors in each cell."""
         area = np.diff(self.edges)[:, np.newaxis] * (2.0 * np.pi / self.probability.shape[2])
         return np.asarray(self.probability / area)
-
-
-def _cumulative(probability: Array) -> Array:
-    total = np.sum(probability, axis=-1, keepdims=True)
-    even = np.full_like(probability, 1.0 / probability.shape[-1])
-    share = np.divide(probability, total, out=even, where=total > 0.0)
-    summed = np.cumsum(share, axis=-1)
-    summed = np.concatenate([np.zeros_like(total), summed / summed[..., -1:]], axis=-1)
-    return np.asarray(summed)
 
 
 def cells_of(evaluate: Evaluate, *, anisotropic: bool) -> Cells:
@@ -130,10 +123,8 @@ class Sampler:
 
     def __init__(self, cells: Cells) -> None:
         self.cells = cells
-        lights, rings, columns = cells.probability.shape
-        # Rows of cumulative numbers, each one above the last: one search finds the place in any row
-        self._theta = (cells.along_theta + np.arange(lights)[:, np.newaxis]).ravel()
-        self._phi = (cells.along_phi.reshape(-1, columns + 1) + np.arange(lights * rings)[:, np.newaxis]).ravel()
+        self._theta = _summed(cells.rings)
+        self._phi = _summed(cells.probability)
         self._density = cells.density
 
     def draw(self, u1: Array, u2: Array, wi: Array) -> Array:
@@ -150,16 +141,11 @@ class Sampler:
     def _half_vector(self, u1: Array, u2: Array, wi: Array) -> Array:
         cells = self.cells
         _, rings, columns = cells.probability.shape
-        row: NDArray[np.int64] = np.zeros((), np.int64)
-        for number, weight, rows in self._near(wi):
-            # One of two neighbours is drawn with its weight
-            second = u1 < weight
-            low, width = np.where(second, 0.0, weight), np.where(second, weight, 1.0 - weight)
-            u1 = np.divide(u1 - low, width, out=np.zeros(second.shape), where=width > 0.0)
-            row = row + np.where(second, rows[1][number], rows[0][number])
-        place, ring = _place(self._theta, row, u1, rings)
+        # Cumulative numbers are mixed, not lights drawn: numbers that are even stay even over half vectors
+        lights = self._lights(wi)
+        place, ring = _place(self._theta, lights, u1)
         versine = cells.edges[ring] + np.diff(cells.edges)[ring] * place
-        place, column = _place(self._phi, row * rings + ring, u2, columns)
+        place, column = _place(self._phi, [(weight, row * rings + ring) for weight, row in lights], u2)
         phi = (column + place) * (2.0 * np.pi / columns)
         sin = np.sqrt(versine * (2.0 - versine))
         return self._turned(np.stack([sin * np.cos(phi), sin * np.sin(phi), 1.0 - versine], axis=-1), wi, 1.0)
@@ -179,34 +165,25 @@ class Sampler:
         ring = np.clip(np.searchsorted(cells.edges, versine, side="right") - 1, 0, rings - 1)
         phi = np.arctan2(local[..., 1], local[..., 0]) % (2.0 * np.pi)
         column = np.clip(np.nan_to_num(phi * (columns / (2.0 * np.pi))), 0, columns - 1).astype(np.int64)
-        of_h = self._mixed(np.broadcast_to(wi, h.shape), ring, column)
+        of_h = sum(weight * self._density[row, ring, column] for weight, row in self._lights(wi))
         mirrored = np.divide(of_h, 2.0 * length, out=np.zeros(of_h.shape), where=apart)  # h.i = length / 2
         cosine = np.maximum(wr[..., 2], 0.0) / np.pi + 0.0 * length  # nan is passed on
         return np.asarray(LOBE_SHARE * mirrored + (1.0 - LOBE_SHARE) * cosine)
 
-    def _mixed(self, wi: Array, ring: NDArray[np.int64], column: NDArray[np.int64]) -> Array:
-        total, axes = np.zeros(ring.shape), self._near(wi)
-        for choice in np.ndindex((2,) * len(axes)):
-            weight, row = np.ones(ring.shape), np.zeros(ring.shape, np.int64)
-            for side, (number, share, rows) in zip(choice, axes, strict=True):
-                weight, row = weight * (share if side else 1.0 - share), row + rows[side][number]
-            total += weight * self._density[row, ring, column]
-        return total
-
-    def _near(self, wi: Array) -> list[tuple[NDArray[np.int64], Array, NDArray[np.int64]]]:
-        """Return for each axis of lights the number of an interval, the weight of its end, and rows of both ends."""
+    def _lights(self, wi: Array) -> list[tuple[Array, NDArray[np.int64]]]:
+        """Return the weights and the rows of the lights around `wi`: two, or four of an anisotropic table."""
         theta_i, turns = self.cells.theta_i, self.cells.turns
         theta = np.arctan2(np.hypot(wi[..., 0], wi[..., 1]), wi[..., 2])
         number = np.clip(np.searchsorted(theta_i, theta, side="right") - 1, 0, theta_i.size - 2)
         weight = np.clip((theta - theta_i[number]) / np.diff(theta_i)[number], 0.0, 1.0)
-        rows = np.arange(theta_i.size - 1) * turns
-        axes = [(number, weight, np.stack([rows, rows + turns]))]
-        if turns > 1:
-            turn = np.arctan2(wi[..., 1], wi[..., 0]) % (2.0 * np.pi) * (turns / (2.0 * np.pi))
-            whole = np.clip(np.nan_to_num(np.floor(turn)), 0.0, turns - 1.0).astype(np.int64)
-            turned = np.arange(turns)
-            axes.append((whole, np.clip(turn - whole, 0.0, 1.0), np.stack([turned, (turned + 1) % turns])))
-        return axes
+        along = [(1.0 - weight, number * turns), (weight, (number + 1) * turns)]
+        if turns == 1:
+            return along
+        turn = np.arctan2(wi[..., 1], wi[..., 0]) % (2.0 * np.pi) * (turns / (2.0 * np.pi))
+        whole = np.clip(np.nan_to_num(np.floor(turn)), 0.0, turns - 1.0).astype(np.int64)
+        weight = np.clip(turn - whole, 0.0, 1.0)
+        around = [(1.0 - weight, whole), (weight, (whole + 1) % turns)]
+        return [(share * weight, row + turned) for share, row in along for weight, turned in around]
 
     def _turned(self, h: Array, wi: Array, sign: float) -> Array:
         """Return half vectors of an isotropic table turned by the azimuth of the light; others stay."""
@@ -220,11 +197,27 @@ class Sampler:
         return np.stack([x * cos_phi - y * sin_phi, x * sin_phi + y * cos_phi, h[..., 2]], axis=-1)
 
 
-def _place(rows: Array, row: NDArray[np.int64], u: Array, count: int) -> tuple[Array, NDArray[np.int64]]:
-    """Return the place in a cell and its number, for a random number in a cumulative row of `count` cells."""
-    first = row * (count + 1)
-    cell = np.clip(np.searchsorted(rows, row + u, side="right") - 1 - first, 0, count - 1)
-    low, high = rows[first + cell], rows[first + cell + 1]
+def _summed(probability: Array) -> Array:
+    """Return sums of the probabilities (..., K) up to each cell, (rows, K + 1)."""
+    rows = probability.reshape(-1, probability.shape[-1])
+    return np.concatenate([np.zeros((len(rows), 1)), np.cumsum(rows, axis=1)], axis=1)
+
+
+def _place(sums: Array, lights: list[tuple[Array, NDArray[np.int64]]], u: Array) -> tuple[Array, NDArray[np.int64]]:
+    """Return the place in a cell and its number, for a random number in the mixture of rows of sums over 2^m cells."""
+    flat, count = sums.ravel(), sums.shape[1] - 1
+    starts = [(weight, row * (count + 1)) for weight, row in lights]
+
+    def up_to(cell: NDArray[np.int64] | int) -> Array:
+        return np.asarray(sum(weight * flat[start + cell] for weight, start in starts))
+
+    wanted = u * up_to(count)
+    cell = np.zeros(wanted.shape, np.int64)
+    step = count // 2
+    while step:
+        cell = cell + step * (up_to(cell + step) <= wanted)
+        step //= 2
+    low, high = up_to(cell), up_to(cell + 1)
     width = high - low
-    place = np.divide(row + u - low, width, out=np.full(width.shape, 0.5), where=width > 0.0)
+    place = np.divide(wanted - low, width, out=np.full(width.shape, 0.5), where=width > 0.0)
     return np.clip(place, 0.0, 1.0), cell

@@ -281,30 +281,12 @@ class Table(BaseTable):
             checked_angles(theta_i, 0.0, 0.0, 0.0)
         return values.reshape(given.shape + at.tail)[()]
 
-    def mueller(
-        self,
-        theta_i: ArrayLike,
-        phi_i: ArrayLike,
-        theta_r: ArrayLike,
-        phi_r: ArrayLike,
-        wavelength_nm: ArrayLike | None = None,
-    ) -> Floats:
-        """Interpolate the Mueller BRDF [1/sr]: f_r times the normalised Mueller matrix.
-
-        Parameters and errors are those of `lookup`; ParameterError, too, if the table is unpolarised.
-
-        Returns
-        -------
-        array [1/sr]
-            Shaped as by `lookup`, and (4, 4). It gives the Stokes vector of the reflected radiance from that of the
-            irradiance, between bases of the surface, in the convention of `brdfdb.tables.stokes`. Element [0, 0] is
-            `lookup`. 0 below the horizon, nan where an angle is nan.
-        """
+    def _mueller_at(self, angles: FourAngles, wavelength_nm: ArrayLike | None) -> Floats:
         facets = self._polarised
         at = self._wavelengths(wavelength_nm)
-        f_r = self.lookup(theta_i, phi_i, theta_r, phi_r, wavelength_nm)
+        f_r = self._at_angles(angles, wavelength_nm)
         values = np.asarray(f_r if at.tail else np.asarray(f_r)[..., np.newaxis])
-        normalised = facets.of_surface((theta_i, phi_i, theta_r, phi_r), values, at)
+        normalised = facets.of_surface(angles, values, at)
         matrix = np.where(values == 0.0, 0.0, values)[..., np.newaxis, np.newaxis] * normalised
         return np.asarray(matrix if at.tail else matrix[..., 0, :, :], dtype=np.asarray(f_r).dtype)
 

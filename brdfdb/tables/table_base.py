@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from brdfdb.errors import BrdfdbError, ParameterError
 from brdfdb.geometry import Directions, checked_angles, checked_vectors
 from brdfdb.materials import FunctionRecord, Material, source_of
-from brdfdb.materials.source import Lookups
+from brdfdb.materials.source import FourAngles, Lookups
 from brdfdb.notebook import card, listed, percent, spectrum
 from brdfdb.parameters import Floats
 from brdfdb.tables._interpolation import weights_of_nodes
@@ -127,9 +127,9 @@ class BaseTable(Lookups):
         Notes
         -----
         Half vectors are drawn from cells of constant density in (theta_h, phi_h), by marginal and conditional
-        distributions. Cells hold the reflected light for 17 lights from the normal to the horizon; in between, one of
-        the two next lights is drawn. A fifth of the directions follows the cosine, so that no weight is above 5 pi f_r.
-        The specular part is not drawn: add `specular_reflectance` in the mirror direction.
+        distributions. Cells hold the reflected light for 17 lights from the normal to the horizon. In between, the
+        distributions of the two next lights are mixed. A fifth of the directions follows the cosine, so that no weight
+        is above 5 pi f_r. The specular part is not drawn: add `specular_reflectance` in the mirror direction.
         """
         from brdfdb.integrals.sampling import Sample, check_uniform
 
@@ -181,6 +181,31 @@ class BaseTable(Lookups):
         ParameterError, StoreError, UnknownRevisionError
             As by `lookup`.
         """
+
+    def mueller(
+        self,
+        theta_i: ArrayLike,
+        phi_i: ArrayLike,
+        theta_r: ArrayLike,
+        phi_r: ArrayLike,
+        wavelength_nm: ArrayLike | None = None,
+    ) -> Floats:
+        """Interpolate the Mueller BRDF [1/sr]: f_r times the normalised Mueller matrix.
+
+        Parameters and errors are those of `lookup`; ParameterError, too, if the table is unpolarised.
+
+        Returns
+        -------
+        array [1/sr]
+            Shaped as by `lookup`, and (4, 4). It gives the Stokes vector of the reflected radiance from that of the
+            irradiance, between bases of the surface, in the convention of `brdfdb.tables.stokes`. Element [0, 0] is
+            `lookup`. 0 below the horizon, nan where an angle is nan.
+        """
+        return self._mueller_at((theta_i, phi_i, theta_r, phi_r), wavelength_nm)
+
+    @abstractmethod
+    def _mueller_at(self, angles: FourAngles, wavelength_nm: ArrayLike | None) -> Floats:
+        """Return the Mueller BRDF [1/sr] as by `mueller`; the angles are not checked yet."""
 
     def lookup_with_error(
         self,

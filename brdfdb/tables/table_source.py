@@ -2,17 +2,27 @@
 
 from __future__ import annotations
 
+import functools
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import PrivateAttr
 
+from brdfdb.geometry import radians, unit_vector
 from brdfdb.materials import FunctionRecord, FunctionSource, Material, Source
 from brdfdb.materials.function_source import Function
 from brdfdb.measurements.record import Measured
 from brdfdb.parameters import Floats
+from brdfdb.tables.sampler import Sampler
 from brdfdb.tables.table import Table
+
+# Variance of f_r over its mean square, for directions that follow the cosine. Up to it, the cosine has less noise than
+# cells of a table: see docs/results/environments.json
+_EVEN = 0.1
+_LIGHTS_DEG, _DRAWN = (0.0, 25.0, 50.0, 70.0), 1024  # lights, and directions of each, that this variance is taken from
+_TURN = (np.sqrt(5.0) - 1.0) / 2.0  # the golden section
+_BLACK = 1e-100  # least albedo
 
 
 class TableSource(FunctionSource):
@@ -52,6 +62,18 @@ class TableSource(FunctionSource):
     def measured(self) -> Measured | None:
         """Return the record of the data if the table is measured, or None."""
         return self._table.metadata.measured
+
+    @functools.cached_property
+    def sampler(self) -> Sampler | None:
+        """The sampler of the table; None if f_r hardly varies, where the cosine draws directions with less noise."""
+        number, wi = np.arange(_DRAWN), unit_vector(radians(_LIGHTS_DEG)[:, np.newaxis], 0.0)
+        drawn = self._table.sample((number + 0.5) / _DRAWN, number * _TURN % 1.0, wi)
+        weight, pdf = (np.reshape(values, (*drawn.wr.shape[:2], -1)) for values in (drawn.weight, drawn.pdf))
+        mean, density, cosine = weight.mean(axis=-1), pdf[..., 0], np.maximum(drawn.wr[..., 2], 0.0)
+        square = np.divide(np.pi * mean**2 * density, cosine, out=np.zeros(cosine.shape), where=cosine > 0.0)
+        albedo = np.maximum(mean.mean(axis=1), _BLACK)
+        varies = np.mean(square.mean(axis=1) / albedo**2 - 1.0) > _EVEN
+        return self._table.sampler if varies else None
 
     @property
     def has_specular(self) -> bool:

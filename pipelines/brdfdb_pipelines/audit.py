@@ -25,7 +25,7 @@ from brdfdb.store.summary_words import REPORT_OF_SOME
 from brdfdb_pipelines import audit_page, former_audit, terminal, workers
 from brdfdb_pipelines.former_audit import Former
 
-Task = Callable[[], Any]
+Task = Callable[[], list[Any]]
 Figures = Mapping[str, Callable[[], Figure]]
 
 
@@ -126,24 +126,55 @@ def _done(
     known: dict[str, Any] = {name: before.audits[name] for name in materials if name in before.audits}
     known |= {f"figure {key}": before.figures[key] for key in figures if key in before.figures}
     order = [*materials, *(f"figure {key}" for key in figures)]
-    tasks: dict[str, Task] = {
-        name: partial(_audited, root, name, name in allow) for name in materials if name not in known
-    }
-    tasks |= {f"figure {key}": partial(_drawn, key) for key in figures if f"figure {key}" not in known}
-    if not tasks and tuple(audit_page.key_of(known[name]) for name in order) == before.page:
+    fresh = [name for name in order if name not in known]
+    if not fresh and tuple(audit_page.key_of(known[name]) for name in order) == before.page:
         return {name: Section(known[name], None) for name in order}
-    tasks |= {name: partial(_section, subject) for name, subject in known.items()}
+    # The longest tasks come first, so that no process works alone at the end
+    long, short = _groups(brdfdb.open(root), [name for name in materials if name not in known])
+    tasks: dict[tuple[str, ...], Task] = {group: partial(_audited, root, group, allow) for group in long}
+    tasks |= {(f"figure {key}",): partial(_drawn, key) for key in figures if f"figure {key}" not in known}
+    tasks |= {group: partial(_audited, root, group, allow) for group in short}
+    tasks |= {(name,): partial(_sections, subject) for name, subject in known.items()}
     done: dict[str, Any] = {}
     with terminal.progress() as bar:
-        task = bar.add_task("auditing tables, computing figures" if figures else "auditing tables", total=len(tasks))
-        for name, outcome in _outcomes(tasks, jobs):
-            done[name] = outcome
-            bar.advance(task)
+        task = bar.add_task("auditing tables, computing figures" if figures else "auditing tables", total=len(order))
+        for names, outcomes in _outcomes(tasks, jobs):
+            done |= zip(names, outcomes, strict=True)
+            bar.advance(task, len(names))
     return {name: done[name] for name in order}
 
 
-def _section(subject: Any) -> Section:
-    return Section(subject, audit_page.plots_of(subject))
+def _groups(store: Store, names: Sequence[str]) -> tuple[list[tuple[str, ...]], list[tuple[str, ...]]]:
+    """Return groups of materials, each for one task: those that take long, and the others; the largest come first.
+
+    Materials of a slow model whose reflectances alone differ are a group: one process integrates once for all of them.
+    """
+    groups: dict[Any, list[str]] = {}
+    sizes: dict[str, tuple[bool, int]] = {}
+    long = set()
+    for name in names:
+        try:
+            head, metadata = store.summary(name), store.metadata(name)
+        except StoreError:  # the audit of the material says what is wrong
+            groups[name], sizes[name] = [name], (False, 0)
+            continue
+        spec = None if metadata.model is None else MODELS.get(metadata.model)
+        slow = spec is not None and spec.slow
+        key: Any = name
+        if spec is not None and slow:
+            albedos = {parameter.name for parameter in spec.parameters if parameter.reflectance}
+            key = (spec.name, *((name, value) for name, value in metadata.parameters.items() if name not in albedos))
+        groups.setdefault(key, []).append(name)
+        sizes[name] = slow, head["bytes"]
+        if slow or len(set(head.get("wavelength_range_nm", []))) > 1:
+            long.add(name)
+    ordered = sorted((tuple(group) for group in groups.values()), key=lambda group: max(map(sizes.__getitem__, group)))
+    ordered.reverse()
+    return [group for group in ordered if group[0] in long], [group for group in ordered if group[0] not in long]
+
+
+def _sections(subject: Any) -> list[Section]:
+    return [Section(subject, audit_page.plots_of(subject))]
 
 
 def _written(
@@ -187,14 +218,14 @@ def _check_path(report_path: Path) -> None:
         raise ParameterError("--report", f"{report_path} does not end in .json", report_path)
 
 
-def _outcomes(tasks: dict[str, Task], jobs: int) -> Iterator[tuple[str, Any]]:
-    """Yield the name and the result of each task as it is done."""
+def _outcomes(tasks: dict[tuple[str, ...], Task], jobs: int) -> Iterator[tuple[tuple[str, ...], list[Any]]]:
+    """Yield the names and the results of each task as it is done."""
     if jobs == 1:
-        for name, task in tasks.items():
-            yield name, task()
+        for names, task in tasks.items():
+            yield names, task()
         return
     with workers.processes(jobs) as pool:
-        futures = {pool.executor.submit(task): name for name, task in tasks.items()}
+        futures = {pool.executor.submit(task): names for names, task in tasks.items()}
         try:
             for future in as_completed(futures):
                 yield futures[future], future.result()
@@ -205,18 +236,20 @@ def _outcomes(tasks: dict[str, Task], jobs: int) -> Iterator[tuple[str, Any]]:
                 future.cancel()
 
 
-def _audited(root: Path, name: str, accept_excess: bool) -> Section | StoreError:
-    """Audit one material; return an error of its files, so that the others are audited."""
+def _audited(root: Path, names: Sequence[str], allow: Sequence[str]) -> list[Section | StoreError]:
+    """Audit materials; return an error of its files in place of a damaged one, so that the others are audited."""
     store = brdfdb.open(root)
-    try:
-        store.verify(name)
-        audited = audit(store[name], accept_excess=accept_excess)
-        audited = audited.model_copy(update={"program": former_audit.program()})
-    except StoreError as error:
-        return error
-    except BrdfdbError as error:  # undamaged files that do not hold a table
-        return StoreError(f"{name} cannot be audited: {error}")
-    return _section(audited)
+    outcomes: list[Section | StoreError] = []
+    for name in names:
+        try:
+            store.verify(name)
+            audited = audit(store[name], accept_excess=name in allow)
+            outcomes += _sections(audited.model_copy(update={"program": former_audit.program()}))
+        except StoreError as error:
+            outcomes.append(error)
+        except BrdfdbError as error:  # undamaged files that do not hold a table
+            outcomes.append(StoreError(f"{name} cannot be audited: {error}"))
+    return outcomes
 
 
 def _figures() -> tuple[Figures, Figures]:
@@ -227,9 +260,9 @@ def _figures() -> tuple[Figures, Figures]:
     return ATLAS, GALLERY
 
 
-def _drawn(key: str) -> Section:
+def _drawn(key: str) -> list[Section]:
     atlas, gallery = _figures()
-    return _section((atlas.get(key) or gallery[key])())
+    return _sections((atlas.get(key) or gallery[key])())
 
 
 def _why(store: Store, name: str) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections import deque
 from collections.abc import Callable
-from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, wait
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -29,6 +29,7 @@ from brdfdb_pipelines.recipe_file import Job, Recipe
 from brdfdb_pipelines.workers import Workers, WorkersError
 
 _LOOK_S = 2.0  # interval [s] at which silent workers are checked
+_PUBLISHED = 16  # tables that are published at once: each waits for the disk several times, which serves many as fast
 _POLL_S = 0.1  # interval [s] at which a lock of another build is tried again
 
 
@@ -152,6 +153,8 @@ class _Builder:
         self.at, self.report, self.memory = at, report, memory
         self.task_bytes = 1
         self.running: dict[Future[Any], Callable[[Future[Any]], None]] = {}
+        self.publisher = ThreadPoolExecutor(_PUBLISHED)
+        self.publishing: set[Future[Any]] = set()  # those of the running ones that this process does itself
         self.surveys: dict[str, Survey] = {}
         self.waiting: deque[_Table] = deque()  # not begun
         self.open: list[_Table] = []
@@ -196,7 +199,7 @@ class _Builder:
         most = 2 * max(1, self.at.slots())  # so that a worker that finishes has a next task
         if self.memory is not None:
             most = min(most, self.memory // self.task_bytes)
-        return len(self.running) < max(1, most)
+        return len(self.running) - len(self.publishing) < max(1, most) and len(self.publishing) < _PUBLISHED
 
     def _wait(self) -> None:
         done, _ = wait(self.running, timeout=_LOOK_S, return_when=FIRST_COMPLETED)
@@ -204,6 +207,7 @@ class _Builder:
             self.report({"event": "idle"})
         self.idle = idle
         for future in done:
+            self.publishing.discard(future)
             self.running.pop(future)(future)
 
     def _leave(self) -> None:
@@ -211,6 +215,7 @@ class _Builder:
         for future in self.running:
             future.cancel()
         wait(self.running)
+        self.publisher.shutdown()
         for table in self.open:
             table.lock.__exit__(None, None, None)
 
@@ -356,14 +361,23 @@ class _Builder:
 
     def _framed(self, table: _Table, future: Future[dict[str, Entry]]) -> None:
         files = self._result(table.name, future)
-        if files is not None:
-            revision, stored = publish_staged(self.root, table.name, table.staging, {**table.files, **files})
+        if files is None:
+            self._close(table)
+            return
+        staged = (self.root, table.name, table.staging, {**table.files, **files})
+        publication = self.publisher.submit(publish_staged, *staged)
+        self.publishing.add(publication)
+        self.running[publication] = lambda future: self._published(table, future)
+
+    def _published(self, table: _Table, future: Future[tuple[str, int]]) -> None:
+        result = self._result(table.name, future)
+        if result is not None:
+            revision, stored = result
             why = table.survey.standing.why
             about = (table.survey.shape, table.survey.wavelengths)
             self.built[table.name] = Built(table.job, "published", revision, stored, why, *about)
-            self.report(
-                {"event": "published", "material": table.name, "revision": revision, "bytes": stored, "why": why}
-            )
+            event = {"event": "published", "material": table.name}
+            self.report({**event, "revision": revision, "bytes": stored, "why": why})
         self._close(table)
 
     # Measured tables, each by one task
@@ -376,15 +390,7 @@ class _Builder:
 
                 def then(future: Future[Tabulated], job: MeasuredJob = job) -> None:
                     if (result := self._result(job.name, future)) is not None:
-                        self.built[job.name] = Built(
-                            job,
-                            result.state,
-                            result.revision,
-                            result.bytes,
-                            result.why,
-                            result.shape,
-                            result.wavelengths,
-                        )
+                        self.built[job.name] = Built(job, *result)
                         event = {"event": result.state, "material": job.name, "revision": result.revision}
                         more = {} if result.state == "unchanged" else {"bytes": result.bytes, "why": result.why}
                         self.report({**event, **more})

@@ -28,7 +28,7 @@ _MACHINE = {
     *(errno.ENOMEM, errno.EAGAIN, errno.EMFILE, errno.ENFILE),
 }
 # Commands that evaluate no model, or one value: importing numba and loading compiled kernels takes longer
-_WITHOUT_KERNELS = {"gc", "history", "list", "lookup", "rollback", "snapshot"}
+_WITHOUT_KERNELS = {"gc", "history", "list", "lookup", "rollback", "snapshot", "verify"}
 _MODELS = "files of models"  # begins the names under which parsers keep --models
 _EPILOG = f"""\
 exit codes:

@@ -13,6 +13,8 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
 
+from brdfdb.notebook import error_in_words
+
 _LONGEST = 1000  # characters of a sentence: what a recipe gives may be a megabyte
 _FOLDED = 8  # width of a column of text below which a table is wider than the terminal instead
 _NARROW = 16  # width of a column of text below which a less important column is left out, if there is one
@@ -143,8 +145,6 @@ def size(count: float) -> str:
 
 def error(p99: float | None) -> str:
     """Return a relative error [1] as text in percent, or as a factor."""
-    from brdfdb.figure import error_in_words
-
     return error_in_words(p99)
 
 

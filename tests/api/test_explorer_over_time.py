@@ -14,6 +14,12 @@ from tests.api.chromium import Chromium, chosen, shown
 from tests.api.explored import AUDIT, FOUND
 
 LINE = "document.querySelector('#m-grey-felt .marks').textContent"
+LATE = """
+const { clone, json } = Response.prototype;
+const pause = () => new Promise((go) => setTimeout(go, 1000));
+async function late() { await pause(); pause().then(() => { globalThis.later = true; }); return json.call(this); }
+Response.prototype.clone = function () { return Object.assign(clone.call(this), { json: late }); };
+"""  # who reads a copy of an answer gets it a second after those who read the answer; another second is `later`
 
 
 def move(browser: Chromium, name: str, value: float) -> None:
@@ -48,6 +54,29 @@ def test_facts_and_the_line_of_the_list_are_of_the_revision_of_the_picture(
         assert f"within {100.0 * error.overall.p99:.3g} %" in known
         assert chromium.evaluate(LINE) == ""
         assert chromium.evaluate("[...verdict.options].map(each => each.value)") == ["", "not audited", "violates"]
+        assert chromium.errors == []
+
+
+def test_what_is_asked_for_early_is_taken_or_forgotten(chromium: Chromium, address: str) -> None:
+    added = chromium.send("Page.addScriptToEvaluateOnNewDocument", source=LATE)
+    chromium.open(f"{address}#material=foam")
+    shown(chromium, "material=foam")
+    chromium.send("Page.removeScriptToEvaluateOnNewDocument", **added)
+    chromium.until("globalThis.later")
+    names = chromium.evaluate("performance.getEntriesByType('resource').map(each => each.name)")
+    assert names.count(f"{address}v1/materials/foam") == 1
+    assert chromium.evaluate("early.size") == 0  # a later picture would be of an outdated answer
+    assert chromium.errors == []
+
+
+def test_facts_are_of_the_table_again_after_other_parameters(chromium: Chromium, own: Path) -> None:
+    with serving(own) as address:
+        chromium.open(f"{address}/#material=grey-felt(rho=0.3)")
+        shown(chromium, "material=grey-felt(rho=0.3)")
+        assert "parameters of your own" in chromium.evaluate("facts.textContent")
+        chromium.evaluate("location.hash = 'material=grey-felt'")
+        chromium.until("picture.dataset.shown === '#material=grey-felt'")
+        assert "grey-felt, revision r000001" in chromium.evaluate("facts.textContent")
         assert chromium.errors == []
 
 

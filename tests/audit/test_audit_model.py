@@ -80,7 +80,7 @@ def test_weights_that_are_a_hundredth_too_large_are_caught(monkeypatch: pytest.M
 
 
 def test_a_quadrature_that_gives_up_excuses_no_weights(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sampling, "directional_albedo", lambda *_, **__: Albedo(np.array(0.6), np.array(1.0)))
+    monkeypatch.setattr(sampling, "spectral_albedo", lambda *_, **__: Albedo(np.full((3, 1), 0.6), np.ones(3)))
     assert sampling_of(lambert(0.5), material("lambert", {"rho": 0.5})).verdict == "violates"
 
 

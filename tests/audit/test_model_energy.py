@@ -15,7 +15,15 @@ from brdfdb import fresnel
 from brdfdb.audit import energy as joined
 from brdfdb.audit import model_energy
 from brdfdb.audit.excess import published_excess
-from brdfdb.audit.model_energy import BOUND_TOLERANCE, TOLERANCE, EnergyVerdict, ModelEnergy, model_energy_of
+from brdfdb.audit.model_energy import (
+    BOUND_TOLERANCE,
+    FINE,
+    LIMITS,
+    TOLERANCE,
+    EnergyVerdict,
+    ModelEnergy,
+    model_energy_of,
+)
 from brdfdb.audit.table_energy import TableEnergy
 from brdfdb.integrals.quadrature import directional_albedo
 from brdfdb.integrals.uniform_bound import largest_uniform
@@ -304,7 +312,7 @@ def doctored(monkeypatch: pytest.MonkeyPatch, change: Callable[[Any, Any], Any])
 
 
 def test_a_model_that_is_not_finite_violates_and_is_null(monkeypatch: pytest.MonkeyPatch) -> None:
-    found = doctored(monkeypatch, lambda wi, wr: np.where(wr[..., 2] * wi[2] < 0.1, np.nan, 0.0))
+    found = doctored(monkeypatch, lambda wi, wr: np.where(wr[..., 2] * wi[..., 2] < 0.1, np.nan, 0.0))
     assert (found.verdict, found.max_albedo) == ("violates", None)
     assert found.reason == "the model reflects no finite share of what arrives at 0 degrees"
     assert ModelEnergy.model_validate_json(found.model_dump_json()) == found
@@ -312,7 +320,7 @@ def test_a_model_that_is_not_finite_violates_and_is_null(monkeypatch: pytest.Mon
 
 def test_an_integral_that_gives_up_at_one_light_excuses_no_other(monkeypatch: pytest.MonkeyPatch) -> None:
     def rough_at_60(wi: Any, wr: Any) -> Any:
-        dark = abs(wi[2] - 0.5) < 1e-9
+        dark = abs(wi[..., 2] - 0.5) < 1e-9
         return np.where(dark, -0.5 * np.sin(1e6 * wr[..., 0]) ** 2, 0.1) / np.pi
 
     found = doctored(monkeypatch, rough_at_60)
@@ -340,15 +348,41 @@ def test_bounds_of_many_surfaces_at_once_are_those_of_each() -> None:
     np.testing.assert_allclose(np.array(found.largest, dtype=float), together, atol=BOUND_TOLERANCE)
 
 
-def test_a_slow_model_and_its_furnace_from_one_integral_have_the_same_albedos() -> None:
-    facets = material("oren_nayar_gaussian", {"rho": 0.7, "sigma_deg": 30})
+@pytest.mark.parametrize(
+    ("model", "parameters"),
+    [
+        ("oren_nayar_gaussian", {"rho": 0.7, "sigma_deg": 30}),
+        ("ward", {"rho_d": 0.1, "rho_s": 0.2, "alpha_x": 0.1, "alpha_y": 0.3}),
+    ],
+)
+def test_a_model_and_its_furnace_over_the_same_directions_have_the_albedos_of_each(
+    model: str, parameters: dict[str, float]
+) -> None:
+    surface = material(model, parameters)
     lights = model_energy._Lights(np.array([0.0, 60.0]), np.zeros(2))
-    assert facets.lossless is not None
-    together = model_energy._reflected_together(facets, facets.lossless, lights)
-    for both, alone in zip(together, (facets, facets.lossless.source), strict=True):
-        expected = model_energy._reflected(alone, None, lights)
-        np.testing.assert_allclose(both.largest, expected.largest, atol=TOLERANCE)
-        np.testing.assert_allclose(both.mean, expected.mean, atol=TOLERANCE)
+    white = model_energy._white_of(surface, None)
+    assert white is not None
+    together = model_energy._reflected(model_energy._Model(surface, None, white, LIMITS), lights)
+    for both, alone in zip(together, (surface, white.lossless.source), strict=True):
+        expected, nothing = model_energy._reflected(model_energy._Model(alone, None, None, LIMITS), lights)
+        assert nothing is None
+        assert both is not None
+        np.testing.assert_allclose(both.largest, expected.largest, atol=2.0 * TOLERANCE)
+        np.testing.assert_allclose(both.mean, expected.mean, atol=2.0 * TOLERANCE)
+
+
+def test_an_albedo_is_integrated_again_where_it_is_closer_to_a_limit_than_its_error() -> None:
+    surface = material("ward", {"rho_d": 0.1, "rho_s": 0.2, "alpha_x": 0.15, "alpha_y": 0.15})
+    lights = model_energy._Lights(np.array([30.0, 80.0]), np.zeros(2))
+    coarse, _ = model_energy._reflected(model_energy._Model(surface, None, None, (2.0,)), lights)
+    assert FINE < coarse.error[1, 0] <= TOLERANCE
+    limit = float(coarse.largest[1, 0]) + 0.5 * float(coarse.error[1, 0])
+    fine, _ = model_energy._reflected(model_energy._Model(surface, None, None, (limit,)), lights)
+    assert fine.error[1, 0] <= FINE
+    assert fine.error[0, 0] == coarse.error[0, 0]
+    exact, _ = directional_albedo("ward", np.deg2rad(80.0), tolerance=1e-9, **surface.arguments())
+    assert abs(fine.largest[1, 0] - exact) <= fine.error[1, 0]
+    assert abs(coarse.largest[1, 0] - exact) <= coarse.error[1, 0]
 
 
 # Model and table together

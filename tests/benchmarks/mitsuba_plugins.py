@@ -36,7 +36,10 @@ TABLE_FLOOR = 5e-3  # [1/sr] smaller values of tables are compared with it
 SIGNIFICANCE = 0.01
 FULL, QUICK = (100_000, 4_000_000, 1 << 20, 15), (10_000, 10_000, 1 << 18, 1)  # pairs, evaluations, samples, repeats
 PASSES = 128  # samples of a pixel
-TABLES, TOLERANCE = ("white-ceramic-tile", "rolled-brass", "clay-vase", "magnesium-oxide-ceramic"), 0.01
+# The last is interpolated linearly, the others by cubics
+TABLES = ("white-ceramic-tile", "rolled-brass", "clay-vase", "magnesium-oxide-ceramic", "ivory-computer-plastic")
+TOLERANCE = 0.01
+TIMED = (*SUBJECTS[::2], SUBJECTS[-2])  # a surface of most forms; He-Torrance is rough, and smooth as the last one
 MEASURED = "BSDF plugins of Mitsuba 3 against brdfdb.models, their samplers, and their speed beside roughconductor."
 
 Array = NDArray[Any]
@@ -178,14 +181,18 @@ def time_all(run: Run, mitsuba: Any, root: str, names: Sequence[str], count: int
     """Print speeds of plugins beside that of roughconductor."""
     import drjit
 
+    import brdfdb
+
     drjit.set_thread_count(1)
     speed = [Column(name=name, unit="million/s") for name in ("values", "samples")]
     shares = [Column(name=f"{name}, share of roughconductor") for name in ("values", "samples", "pictures")]
     table = run.table("Speed of one processor, LLVM, mono", Column(name="plugin", width=44), *speed, *shares)
     passes = 4 if repeats == 1 else PASSES
     conductor = {"type": "roughconductor", "alpha": 0.1, "eta": 1.13, "k": 2.56}
-    documents = {"roughconductor": conductor, **{str(subject): subject.document for subject in SUBJECTS[::2]}}
-    documents |= {f"table of {name}": {"type": "brdfdb_table", "material": name, "store": root} for name in names}
+    documents = {"roughconductor": conductor, **{str(subject): subject.document for subject in TIMED}}
+    for name in names:
+        method = brdfdb.open(root)[name].metadata.interpolation.method
+        documents[f"table of {name}, {method}"] = {"type": "brdfdb_table", "material": name, "store": root}
     for name, document in documents.items():
         beside = speeds(mitsuba, mitsuba.load_dict(conductor), count, repeats)
         values, samples = speeds(mitsuba, mitsuba.load_dict(document), count, repeats)

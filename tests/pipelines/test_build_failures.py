@@ -121,16 +121,16 @@ def test_a_full_disk_is_one_sentence_and_what_was_written_is_kept(
     monkeypatch.setattr(layouts, "_BLOCK_VALUES", 50)
     write = files.write_file
 
-    def fill(path: Path, data: bytes, temporary: Path) -> Any:
+    def fill(path: Path, data: bytes, temporary: Path, **options: bool) -> Any:
         nonlocal written
         written += len(data)
         if written > 60_000:
             raise OSError(errno.ENOSPC, "No space left on device", str(path))
-        return write(path, data, temporary)
+        return write(path, data, temporary, **options)
 
     with monkeypatch.context() as patch:
-        for user in ("brdfdb.store.staging.write_file", "brdfdb.store.sealed_json.write_file"):
-            patch.setattr(user, fill)
+        for user in ("staging.write_file", "sealed_json.write_file", "files.write_file"):
+            patch.setattr(f"brdfdb.store.{user}", fill)
         assert cli.main(["build", str(recipe), "--store", str(root), "--jobs", "1"]) == 2
     out, err = capsys.readouterr()
     assert (out, err.count("brdfdb: ")) == ("", 1)

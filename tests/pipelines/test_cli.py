@@ -103,6 +103,23 @@ def test_a_build_writes_tables_without_xarray_and_history_reads_without_numba(bu
         assert done.stdout.splitlines()[-1] == "set()"
 
 
+@pytest.mark.parametrize(
+    ("command", "heavy"),
+    [
+        (["list"], {"numpy", "numba", "zarr", "xarray", "pydantic", "brdfdb.models"}),
+        (["verify", "foam"], {"numba", "xarray"}),
+        (["gc"], {"numba", "zarr", "xarray"}),
+        (["lookup", "foam", "10", "0", "10", "180"], {"numba", "zarr", "xarray"}),
+    ],
+)
+def test_a_command_loads_only_what_it_uses(command: list[str], heavy: set[str], built: Path) -> None:
+    arguments = [*command, "--store", str(built)]
+    script = f"import sys; from brdfdb_pipelines import cli; sys.argv[1:] = {arguments}; cli.main()"
+    script += f"; print(set(sys.modules) & {heavy})"
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "set()"
+
+
 # Build, list, show
 
 

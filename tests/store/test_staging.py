@@ -19,7 +19,7 @@ import xarray as xr
 
 import brdfdb
 from brdfdb.errors import StoreError
-from brdfdb.store import marker
+from brdfdb.store import codec, marker
 from brdfdb.store.lock import Lock
 from brdfdb.store.publication import publish_dataset, publish_staged
 from brdfdb.store.sealed_json import unsealed
@@ -120,7 +120,7 @@ def test_a_write_that_fails_leaves_the_old_revision_served(
     assert rho(root) == 0.75
 
 
-def test_every_directory_of_a_revision_is_synced_before_the_pointer_is_swapped(
+def test_all_of_a_revision_is_synced_before_the_pointer_is_swapped(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     synced: list[int] = []
@@ -141,9 +141,9 @@ def test_every_directory_of_a_revision_is_synced_before_the_pointer_is_swapped(
     publish_dataset(tmp_path, "white", lambert(0.5))
     (known,) = before
     group = tmp_path / "materials" / "white" / "r000001"
-    directories = [group, *(path for path in group.rglob("*") if path.is_dir()), *list(group.parents)[:3]]
-    assert len(directories) > 10
-    assert [path for path in directories if path.stat().st_ino not in known] == []
+    paths = [group, *group.rglob("*"), *list(group.parents)[:3], group.with_name("r000001.MANIFEST.json")]
+    assert len(paths) > 20
+    assert [path for path in paths if path.stat().st_ino not in known] == []
 
 
 # Imports once, then forks a writer for each line: a fork is safe while there is one thread
@@ -153,12 +153,12 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 import zarr, zarr.codecs
-from brdfdb.store import codec, pointer, publication, sealed_json
+from brdfdb.store import codec, files, pointer, publication, sealed_json
 
 def die(*_):
     os.kill(os.getpid(), signal.SIGKILL)
 
-places = {"pointer": pointer, "publication": publication, "sealed_json": sealed_json, "Path": Path}
+places = {"files": files, "pointer": pointer, "publication": publication, "sealed_json": sealed_json, "Path": Path}
 axes = {"theta_i": [0.0, 90.0], "theta_r": [0.0, 90.0], "delta_phi": [0.0, 180.0]}
 values = np.full((2, 2, 2), 9.0, dtype=np.float32)
 dataset = xr.Dataset({"brdf": (tuple(axes), values)}, coords=axes)  # the first one imports dask
@@ -188,7 +188,7 @@ def killed() -> Iterator[Callable[[Path, str], int]]:
 
 
 @pytest.mark.parametrize(
-    "step", ["publication write_file", "publication publish_staged", "publication sync_directory",
+    "step", ["files write_file", "publication publish_staged", "publication sync_directory",
              "publication write_sealed", "Path rename", "publication point_to", "pointer swap_sealed",
              "sealed_json sync_directory"],
 )  # fmt: skip
@@ -221,6 +221,21 @@ def test_a_killed_write_changes_nothing_for_readers_and_takes_no_number_twice(
 def staged_table(root: Path, text: str) -> Path:
     marker.make_store(root)
     return prepare(root, "white", REQUEST, text)
+
+
+def test_a_frame_decodes_each_block_once(tmp_path: Path, four_blocks: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    where = staged_table(tmp_path, four_blocks)
+    for number in range(4):
+        write_block(str(where), four_blocks, number)
+    numbers, decoded = [], codec.decoded
+
+    def counted(layout: Layout, number: int, data: bytes) -> np.ndarray:
+        numbers.append(number)
+        return decoded(layout, number, data)
+
+    monkeypatch.setattr(codec, "decoded", counted)
+    write_frame(str(where), four_blocks)
+    assert numbers == [0, 1, 2, 3]
 
 
 def test_blocks_and_frame_make_the_table_of_tabulate(tmp_path: Path, four_blocks: str) -> None:
@@ -332,16 +347,21 @@ def test_a_layout_is_kept_for_the_next_build(tmp_path: Path, four_blocks: str) -
 def test_a_block_that_cannot_be_written_is_one_sentence(
     tmp_path: Path, four_blocks: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    where = staged_table(tmp_path, four_blocks)
+    where, other = staged_table(tmp_path, four_blocks), staged_table(tmp_path / "other", four_blocks)
+    for number in range(4):
+        write_block(str(other), four_blocks, number)
 
     def full(*_: Any) -> None:
         raise OSError(errno.ENOSPC, "No space left on device")
 
     monkeypatch.setattr(os, "fsync", full)
-    for task in (lambda: write_block(str(where), four_blocks, 0), lambda: write_frame(str(where), four_blocks)):
+    for root, task in (
+        (tmp_path, lambda: write_block(str(where), four_blocks, 0)),
+        (tmp_path / "other", lambda: write_frame(str(other), four_blocks)),
+    ):
         with pytest.raises(StoreError) as caught:
             task()
-        assert str(caught.value) == f"cannot write white to the store at {tmp_path}: No space left on device"
+        assert str(caught.value) == f"cannot write white to the store at {root}: No space left on device"
     assert staged(tmp_path) == sorted(
         [f"white{part}" for part in ("", f"/{where.name}", *(f"/{where.name}/{end}" for end in
          ("blocks", "layout.json", "request.json")))]

@@ -15,11 +15,11 @@ import xarray as xr
 
 import brdfdb
 from brdfdb.errors import ParameterError, StoreError
-from brdfdb.store import codec, publication, snapshots, verification
+from brdfdb.store import codec, files, publication, snapshots, verification
 from brdfdb.store.marker import make_store
 from brdfdb.store.paths import manifest_path
 from brdfdb.store.publication import publish_dataset
-from brdfdb.store.revisions import collect, history, rollback, standing
+from brdfdb.store.revisions import adoptable, collect, history, rollback, standing
 from brdfdb.store.sealed_json import sealed, unsealed
 from brdfdb.tables.layout import digest
 from tests.store.a_white import lambert, rho
@@ -109,7 +109,7 @@ def test_an_altered_older_manifest_is_not_believed(root: Path) -> None:
     ):
         with pytest.raises(StoreError, match=said):
             ask()
-    assert publication.adoptable(root, "white", digest({"rho": 0.25})) is None
+    assert adoptable(root, "white", digest({"rho": 0.25})) is None
     (found,) = findings(root)
     assert found.startswith(
         "white r000001 is damaged: r000001.MANIFEST.json is not the one whose digest was recorded ("
@@ -233,7 +233,7 @@ def test_verify_remarks_on_what_a_table_does_not_state(root: Path) -> None:
 
 def test_verify_decodes_every_chunk(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(codec, "_CHUNK_VALUES", 9)
-    whole = publication.write_file
+    whole = files.write_file
 
     def spoil(path: Path, data: bytes, temporary: Path) -> object:
         if path.match("brdf/c/2/0/0"):  # written wrong, so that manifest and file agree
@@ -241,7 +241,7 @@ def test_verify_decodes_every_chunk(root: Path, monkeypatch: pytest.MonkeyPatch)
         return whole(path, data, temporary)
 
     with monkeypatch.context() as patch:
-        patch.setattr(publication, "write_file", spoil)
+        patch.setattr(files, "write_file", spoil)
         publish_dataset(root, "white", lambert(0.5))
     brdfdb.open(root).verify("white")
     (found,) = findings(root)

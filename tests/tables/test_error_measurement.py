@@ -62,6 +62,15 @@ def test_the_weights_of_a_draw_integrate(name: str) -> None:
     assert np.bincount(drawn.band).tolist() == [40_000] * 9
 
 
+@pytest.mark.parametrize("name", ["wall-plaster", "rolled-brass"])  # without a lobe, and with one
+def test_a_draw_that_is_written_to_leaves_the_next_one_alone(name: str) -> None:
+    first, expected = (draw(presets()[name], None, 50, 7) for _ in range(2))
+    for array in first:
+        array[:] = 0
+    for array, again in zip(expected, draw(presets()[name], None, 50, 7), strict=True):
+        np.testing.assert_array_equal(array, again)
+
+
 def test_half_of_a_draw_is_in_the_lobe_and_on_its_shoulder() -> None:
     paper = presets()["glossy-grey-paper"]
     drawn = draw(paper, None, 4000, 7)

@@ -44,6 +44,13 @@ def test_rows_broadcast_as_directions_do_and_a_direction_that_is_nan_has_some() 
     assert np.all((rows >= 0) & (rows < ROWS))
 
 
+def test_pairs_that_tables_share_cannot_be_written() -> None:
+    assert draw(50, 3) is draw(50, 3)
+    for array in draw(50, 3):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 0
+
+
 def test_what_is_drawn_in_a_place_is_there() -> None:
     pairs = draw(COUNT, 3)
     rows = rows_of(checked_vectors(pairs.wi, pairs.wr))

@@ -10,21 +10,27 @@ export const first = (all) =>
   all.find(({ damaged, spectrum }) => !damaged && spectrum === "spectral") ??
   all.find(({ damaged }) => !damaged);
 
-/** Answers on their way, by path; each is taken once. The script of the page has this module, too, and finds them.
+/** Answers on their way, by path; each is taken once, before the first picture, or never: later it may be outdated.
+ * The script of the page has this module, too, and finds them.
  * @type {Map<string, Promise<Response>>} */
 export const early = (/** @type {any} */ (globalThis).early ??= begun());
 
 function begun() {
-  const found = new Map([[LIST, fetch(LIST)]]);
-  found
-    .get(LIST)
-    ?.then(async (response) => {
-      const { materials = [] } = await response.clone().json();
-      const [, linked] = /[#&]material=([^&(:*]+)/.exec(location.hash) ?? [];
-      const name = linked ? materials.find((/** @type {any} */ each) => each.name === linked)?.name : first(materials)?.name;
-      const path = `v1/materials/${encodeURIComponent(name)}`;
-      if (name) found.set(path, fetch(path));
-    })
-    .catch(() => {}); // who takes the answer says what is wrong
+  const found = new Map([[LIST, fetch(LIST).then(withMaterial)]]);
+
+  /** The list, once the material that it leads to is asked for, too.
+   * @param {Response} response */
+  async function withMaterial(response) {
+    const { materials = [] } = await response
+      .clone()
+      .json()
+      .catch(() => ({}));
+    const [, linked] = /[#&]material=([^&(:*]+)/.exec(location.hash) ?? [];
+    const name = linked ? materials.find((/** @type {any} */ each) => each.name === linked)?.name : first(materials)?.name;
+    const path = `v1/materials/${encodeURIComponent(name)}`;
+    if (name) found.set(path, fetch(path));
+    return response;
+  }
+  found.get(LIST)?.catch(() => {}); // who takes it says what is wrong
   return found;
 }

@@ -86,10 +86,8 @@ function choose(part) {
 /** Change the state: a slider's next picture waits for the one that is being drawn, anything else stops it.
  * @type {Choose} */
 function change(part) {
-  const slid =
-    "material" in part &&
-    series[0]?.source === "parameters" &&
-    subjectOf(part.material ?? "").base === subjectOf(state.material).base;
+  const to = subjectOf(part.material ?? "");
+  const slid = series[0]?.source === "parameters" && to.changes !== null && to.base === subjectOf(state.material).base;
   const moved = slid || Object.keys(part).every((key) => MOVED.includes(key));
   state = { ...state, ...part };
   wrong = [];
@@ -172,6 +170,7 @@ async function draw(now, start, signal) {
   const words = drawn ? [] : [await one(views[0], 0)]; // on a slow connection the first picture has no rivals
   if (!drawn) {
     drawn = true;
+    begin.early.clear();
     parameters.offer(choose).catch((error) => say(error.message));
   }
   parameters.show(series[0], now);

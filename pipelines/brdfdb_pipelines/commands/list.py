@@ -100,6 +100,8 @@ def _colours(material: Material) -> str:
 
 def _chosen(store: Store, options: argparse.Namespace) -> list[str]:
     """Return the names of the materials that the options let through, in order; a damaged one has no line."""
+    if options.sort == "name" and not any(getattr(options, flag) for flag in _FILTERS):
+        return sorted(store)
     from pydantic import ValidationError
 
     from brdfdb.store.catalogue import Choice, line_of

@@ -282,7 +282,7 @@ def _print_albedo(table: Table) -> None:
     from brdfdb.geometry import radians
     from brdfdb.tables.albedo import directional_albedo
 
-    albedo = directional_albedo(table)
+    albedo = directional_albedo(table, np.array(ALBEDO_ANGLES_DEG))
     diffuse = albedo.mean
     wavelength = table.wavelength_nm
     columns = sorted({0, diffuse.shape[1] // 2, diffuse.shape[1] - 1})
@@ -301,7 +301,7 @@ def _print_albedo(table: Table) -> None:
     for w in columns:
         at = None if wavelength is None else float(wavelength[w])
         specular = table.specular_reflectance(radians(ALBEDO_ANGLES_DEG), at)
-        values = np.interp(ALBEDO_ANGLES_DEG, albedo.theta_i_deg, diffuse[:, w]) + specular
+        values = diffuse[:, w] + specular
         print(f"    {'grey' if at is None else f'{at:g} nm':<10}" + "".join(f"{value:9.4f}" for value in values))
 
 
