@@ -117,7 +117,8 @@ def points_of_vectors(rule: Rule, ui: Array, ur: Array, count: int, x: Array, mu
     """Write points on either kind of grid, of unit vectors in flat arrays, and mu = cos theta_i cos theta_r if the rule
     has a power.
 
-    `scratch` holds four rows. One loop for the products and one for each angle: all in one would not vectorise.
+    `scratch` holds six rows; the last gets the lower z, nan where a number of the vectors is nan or infinite. One loop
+    for the products and one for each angle: all in one would not vectorise.
     """
     if rule.half_difference:
         theta_h, theta_d, phi_d = x[0], x[x.shape[0] - 2], x[x.shape[0] - 1]
@@ -132,6 +133,9 @@ def points_of_vectors(rule: Rule, ui: Array, ur: Array, count: int, x: Array, mu
         _light_and_viewer(ui, ur, count, x[0], x[1], x[2], scratch)
     else:
         light, light_phi, viewer, viewer_phi = x[0], x[1], x[2], x[3]
+        for j in range(count):
+            total = ui[3 * j] + ui[3 * j + 1] + ur[3 * j] + ur[3 * j + 1]
+            scratch[5, j] = _lower(np.float64(ui[3 * j + 2]), np.float64(ur[3 * j + 2]), np.float64(total))
         for j in range(count):
             phi_i, phi_r = _full_turn(ui[3 * j + 1], ui[3 * j]), _full_turn(ur[3 * j + 1], ur[3 * j])
             phi, other = _turned(phi_i, phi_r, rule.copies)
@@ -150,15 +154,21 @@ def _polar(x: float, y: float, z: float) -> float:
 
 
 @kernel
+def _lower(z_i: float, z_r: float, others: float) -> float:
+    """Return the lower z of two vectors; nan if one is nan, or if what was made of the other numbers is not finite."""
+    return float((z_i if z_i < z_r else z_r) + 0.0 * (z_i + z_r + others))
+
+
+@kernel
 def _half_difference(
     ui: Array, ur: Array, count: int, theta_h: Array, theta_d: Array, phi_d: Array, scratch: Array, reciprocal: bool
 ) -> None:
     """Write theta_h, theta_d, and phi_d in the first quadrant, or in the first two if not `reciprocal`.
 
-    `scratch` gets the difference vector along theta_h and along phi_h, both times one positive number, and the
-    horizontal half vector; where that is nothing, the frame is that of phi_h = 0.
+    `scratch` gets the difference vector along theta_h and along phi_h, both times one positive number, the half vector,
+    and the lower z; where the half vector is not inclined, the frame is that of phi_h = 0.
     """
-    along, across, x_h, y_h = scratch[0], scratch[1], scratch[2], scratch[3]
+    along, across, x_h, y_h, z_h, lowest = scratch[0], scratch[1], scratch[2], scratch[3], scratch[4], scratch[5]
     for j in range(count):
         x_i, y_i, z_i = np.float64(ui[3 * j]), np.float64(ui[3 * j + 1]), np.float64(ui[3 * j + 2])
         x_r, y_r, z_r = np.float64(ur[3 * j]), np.float64(ur[3 * j + 1]), np.float64(ur[3 * j + 2])
@@ -171,14 +181,14 @@ def _half_difference(
         across[j] = d_y if pole else (d_y * h_x - d_x * h_y) * np.sqrt(h2)
         x_h[j] = 1.0 if pole else h_x
         y_h[j] = 0.0 if pole else h_y
-        theta_h[j] = np.sqrt(flat2)
-        theta_d[j] = np.sqrt(d_x * d_x + d_y * d_y + d_z * d_z)
+        z_h[j] = abs(h_z)
+        theta_h[j], theta_d[j] = np.sqrt(flat2), np.sqrt(d_x * d_x + d_y * d_y + d_z * d_z)
+        lowest[j] = _lower(z_i, z_r, h2 + theta_d[j])
         phi_d[j] = h2
     for j in range(count):
         theta_d[j] = angle(theta_d[j], np.sqrt(phi_d[j]))
     for j in range(count):
-        h_z = np.float64(ui[3 * j + 2]) + np.float64(ur[3 * j + 2])
-        theta_h[j] = angle(theta_h[j], abs(h_z))
+        theta_h[j] = angle(theta_h[j], z_h[j])
     for j in range(count):
         a = angle(abs(across[j]), abs(along[j]))
         phi_d[j] = a if reciprocal or along[j] >= 0.0 else PI - a
@@ -189,16 +199,18 @@ def _light_and_viewer(
     ui: Array, ur: Array, count: int, theta_i: Array, theta_r: Array, delta_phi: Array, scratch: Array
 ) -> None:
     """Write theta_i, theta_r and delta_phi."""
-    dot, cross = scratch[0], scratch[1]
+    dot, cross, z_light, z_viewer, lowest = scratch[0], scratch[1], scratch[2], scratch[3], scratch[5]
     for j in range(count):
-        x_i, y_i = np.float64(ui[3 * j]), np.float64(ui[3 * j + 1])
-        x_r, y_r = np.float64(ur[3 * j]), np.float64(ur[3 * j + 1])
+        x_i, y_i, z_i = np.float64(ui[3 * j]), np.float64(ui[3 * j + 1]), np.float64(ui[3 * j + 2])
+        x_r, y_r, z_r = np.float64(ur[3 * j]), np.float64(ur[3 * j + 1]), np.float64(ur[3 * j + 2])
         dot[j], cross[j] = x_i * x_r + y_i * y_r, x_i * y_r - y_i * x_r
         theta_i[j], theta_r[j] = np.sqrt(x_i * x_i + y_i * y_i), np.sqrt(x_r * x_r + y_r * y_r)
+        z_light[j], z_viewer[j] = abs(z_i), abs(z_r)
+        lowest[j] = _lower(z_i, z_r, dot[j] + cross[j])
     for j in range(count):
-        theta_i[j] = angle(theta_i[j], abs(np.float64(ui[3 * j + 2])))
+        theta_i[j] = angle(theta_i[j], z_light[j])
     for j in range(count):
-        theta_r[j] = angle(theta_r[j], abs(np.float64(ur[3 * j + 2])))
+        theta_r[j] = angle(theta_r[j], z_viewer[j])
     for j in range(count):
         turn = angle(abs(cross[j]), abs(dot[j]))
         delta_phi[j] = PI - turn if dot[j] < 0.0 else turn
@@ -323,7 +335,7 @@ def by_angles(
 ) -> bool:
     """Write f_r [1/sr] of directions by angles [rad]. Return False if any angle is out of range."""
     most = min(POINTS, theta_i.size)
-    x, mu, scratch = np.empty((axes.counts.size, most)), np.empty(most), np.empty((4, most))
+    x, mu, scratch = np.empty((axes.counts.size, most)), np.empty(most), np.empty((6, most))
     wi, wr = np.empty(3 * most), np.empty(3 * most)
     numbers, cell = np.empty(most * channels), np.empty(x.shape, np.int32)
     wavelengths = nodes.shape[0]
@@ -379,7 +391,7 @@ def by_vectors(
     """Write f_r [1/sr] of directions by unit vectors, flat arrays of three numbers each, on either kind of grid."""
     points, wavelengths = wi.size // 3, nodes.shape[0]
     most = min(POINTS, points)
-    x, mu, scratch = np.empty((axes.counts.size, most)), np.empty(most), np.empty((4, most))
+    x, mu, scratch = np.empty((axes.counts.size, most)), np.empty(most), np.empty((6, most))
     numbers, cell = np.empty(most * channels), np.empty(x.shape, np.int32)
     for start in range(0, points, POINTS):
         count = min(POINTS, points - start)
@@ -390,8 +402,7 @@ def by_vectors(
         finished(rule, numbers, channels, mu, spectra, uniform, nodes, weight, count, f_r)
         odd = 0
         for j in range(count):
-            flat = abs(ui[3 * j]) + abs(ui[3 * j + 1]) + abs(ur[3 * j]) + abs(ur[3 * j + 1])
-            odd += int(not ((ui[3 * j + 2] >= 0.0) & (ur[3 * j + 2] >= 0.0) & (flat < PHI_MAX)))
+            odd += int(not scratch[5, j] >= 0.0)
         if odd > 0:
             for j in range(count):
                 direction = ui[3 * j] + ui[3 * j + 1] + ui[3 * j + 2] + ur[3 * j] + ur[3 * j + 1] + ur[3 * j + 2]

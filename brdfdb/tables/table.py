@@ -374,7 +374,7 @@ def _flat(array: NDArray[Any], shape: tuple[int, ...], dtype: DTypeLike) -> NDAr
 
 def points(grid: Grid, wi: Floats, wr: Floats) -> NDArray[np.float64]:
     """Return the coordinates [rad] on a grid, of shape (axes, N), of unit vectors of shape (N, 3)."""
-    x, mu, scratch = np.empty((len(grid.axes), len(wi))), np.empty(len(wi)), np.empty((4, len(wi)))
+    x, mu, scratch = np.empty((len(grid.axes), len(wi))), np.empty(len(wi)), np.empty((6, len(wi)))
     rule = _kernels.Rule(grid.half_difference, grid.reciprocal, grid.copies, False, 0.0, 0.0, False, False)
     flat = [_flat(w, np.shape(w), np.float64) for w in (wi, wr)]
     _kernels.points_of_vectors(rule, flat[0], flat[1], len(wi), x, mu, scratch)
