@@ -33,10 +33,8 @@ PLAN_VERSION = 1
 MOST_VALUES = 10_000_000  # of a table: a tolerance that takes more is refused
 _TRIED = 2  # ways to interpolate on each kind of grid, those that promise to be smallest
 _ROUNDS = 8  # of finer and coarser axes
-_STALLED, _PATIENCE = (
-    0.95,
-    2,
-)  # share of its error that a finer table keeps, rounds in turn: lines miss what an axis needs
+_STALLED = 0.95  # share of its error that a finer table keeps if lines misjudge an axis
+_PATIENCE = 2  # such rounds, after which each axis is tried alone
 _STEPS = 2  # of the ladder of numbers of nodes, of an axis that lines misjudge
 _MARGIN = 0.88  # of the tolerance: other directions than the planner's find other errors
 _STRICTER = (1.0, 0.8, 0.65, 0.5, 0.4, 0.3, 0.2)  # tolerances at a few wavelengths, of that at all of them
