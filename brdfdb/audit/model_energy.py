@@ -327,7 +327,11 @@ def _reflected(model: _Model, lights: _Lights) -> tuple[_Reflected, _Reflected |
 
     def brdf(wi: Floats, wr: Floats) -> Floats:
         with np.errstate(all="ignore"):  # nodes lie in every corner; what is finite is tested, not flagged
-            return np.concatenate([f_r(wi, wr) for f_r in evaluated], axis=-1)
+            # f_r of a lossless form may be the same at all wavelengths, and have one column
+            values = [
+                np.broadcast_to(f_r(wi, wr), (len(wi), width)) for f_r, width in zip(evaluated, widths, strict=True)
+            ]
+        return np.concatenate(values, axis=-1)
 
     def integrated(rows: NDArray[np.intp], tolerance: float) -> Albedo:
         return reflected_share(

@@ -201,7 +201,7 @@ class Layout:
         """Number of rows of the first axis in a block: the piece that a worker computes, and a chunk of the store."""
         return max(1, min(self.shape[0], _BLOCK_VALUES // math.prod(self.shape[1:])))
 
-    @functools.cached_property
+    @property
     def blocks(self) -> list[slice]:
         """The rows of the first axis that each block holds."""
         rows, every = self.shape[0], self.block_rows
