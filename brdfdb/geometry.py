@@ -193,16 +193,17 @@ def checked_vectors(wi: ArrayLike, wr: ArrayLike) -> Vectors:
         shapes do not broadcast.
     """
     w_i, w_r = _unit_vectors("wi", wi), _unit_vectors("wr", wr)
-    _common_shape("wi, wr", w_i, w_r)
+    common_shape("wi, wr", w_i, w_r)
     return Vectors(w_i, w_r, asked_for(wi, wr))
 
 
 def shape_of_angles(*angles: NDArray[Any]) -> tuple[int, ...]:
     """Return the shape that the four angles broadcast to; ParameterError with their shapes if they do not."""
-    return _common_shape("theta_i, phi_i, theta_r, phi_r", *angles)
+    return common_shape("theta_i, phi_i, theta_r, phi_r", *angles)
 
 
-def _common_shape(names: str, *arrays: NDArray[Any]) -> tuple[int, ...]:
+def common_shape(names: str, *arrays: NDArray[Any]) -> tuple[int, ...]:
+    """Return the shape that arrays broadcast to; ParameterError with their names and shapes if they do not."""
     shapes = tuple(array.shape for array in arrays)
     try:
         return np.broadcast_shapes(*shapes)

@@ -24,6 +24,7 @@ _LIGHT = (
 _LIGHT_RANGES = (("wavelength_nm", 400.0, 700.0), ("n", 0.2, 3.0), ("k", 0.0, 8.0))
 _DECADE = 10.0  # ratio of the ends of a range from which on it is drawn evenly in its logarithm
 _LEAST_SHARE = 0.01  # of the drawn materials that must keep the condition
+_MANY = 1000  # drawn materials from which on that share is judged
 _SPARE = 1.05  # more are drawn than the share of the last draw asks for
 
 
@@ -97,9 +98,9 @@ def materials(spec: ModelSpec, axes: list[Axis], count: int, seed: int) -> dict[
         kept = int(np.sum(allowed))
         if kept >= count:
             return {name: column[allowed][:count] for name, column in values.items()}
-        if kept < _LEAST_SHARE * drawn:
+        if kept < _LEAST_SHARE * drawn and drawn >= _MANY:
             raise ParameterError("--range", f"{kept} of {drawn} materials keep {spec.draw.condition}", kept)
-        drawn = int(_SPARE * drawn * count / kept) + 1
+        drawn = int(_SPARE * drawn * count / kept) + 1 if kept else 10 * drawn
 
 
 def pairs(count: int, seed: int) -> dict[str, Array]:

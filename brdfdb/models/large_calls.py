@@ -60,7 +60,7 @@ def for_large_calls(function: Callable[P, Floats], together: str = "") -> LargeC
 
     @functools.wraps(function)
     def call(*directions: Any, out: Floats | None = None, threads: int = 1, **parameters: Any) -> Floats:
-        if out is None and threads == 1:
+        if out is None and type(threads) is int and threads == 1:
             return function(*directions, **parameters)
         given = signature.bind(*directions, **parameters).arguments
         whole = np.size(given.get(together, ())) > 1
@@ -79,7 +79,7 @@ def for_large_calls_of_one(together: str) -> Callable[[Callable[P, Floats]], Lar
 def _in_parts(
     function: Callable[..., Floats], given: dict[str, Any], out: Floats | None, threads: int, *, whole: bool
 ) -> Floats:
-    check_threads(threads)
+    threads = checked_threads(threads)
     try:
         shape = np.broadcast_shapes(
             *(np.shape(value)[: -1 if name in _VECTORS else None] for name, value in given.items())
@@ -130,10 +130,11 @@ def new_result(shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
     return np.empty(shape, dtype)
 
 
-def check_threads(threads: int) -> None:
-    """Raise a ParameterError if a number of threads is not a whole number of at least 1."""
+def checked_threads(threads: int) -> int:
+    """Return a number of threads; ParameterError if it is not a whole number of at least 1."""
     if isinstance(threads, bool) or not isinstance(threads, int | np.integer) or threads < 1:
         raise ParameterError("threads", f"{threads!r} is not a whole number of at least 1", threads)
+    return int(threads)
 
 
 def array_for_result(
@@ -178,7 +179,7 @@ def on_threads(work: Callable[[slice], None], parts: Sequence[slice], threads: i
 
 def filled(write: Callable[[slice, NDArray[Any]], None], result: NDArray[Any], channels: int, threads: int) -> Floats:
     """Return `result`, C-contiguous with `channels` values a point, after ``write(points, values)`` has filled it."""
-    check_threads(threads)
+    threads = checked_threads(threads)
     values = result.reshape(-1)
     points = values.size // max(channels, 1)
     if threads == 1:

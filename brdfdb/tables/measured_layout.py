@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from brdfdb.errors import ParameterError
 from brdfdb.geometry import degrees
 from brdfdb.materials import Source
 from brdfdb.measurements import MeasuredSource
@@ -56,7 +57,7 @@ def tabulated(
     Raises
     ------
     ParameterError
-        If the tolerance is outside its range.
+        If the tolerance is outside its range, or no value is above 0.
 
     Notes
     -----
@@ -69,6 +70,8 @@ def tabulated(
     mixture = mixture_of(source, wavelength_nm)
     drawn = error_measurement.draw(source, wavelength_nm, _DRAWS, _SEED)
     truth = error_measurement.model_values(source, wavelength_nm, drawn.wi, drawn.wr)
+    if not np.any(truth > 0.0):
+        raise ParameterError("values", "no value is above 0, which leaves nothing to tabulate", 0.0)
     floor = error_measurement.floor_of(truth, drawn)
     weight = np.where(drawn.above, drawn.weight, 0.0)
     layout, values, reached = None, np.empty(0, np.float32), math.inf

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from brdfdb.errors import BrdfdbError, ParameterError
-from brdfdb.geometry import Directions, checked_angles, checked_vectors
+from brdfdb.geometry import Directions, checked_angles, checked_vectors, common_shape
 from brdfdb.materials import FunctionRecord, Material, source_of
 from brdfdb.materials.source import FourAngles, Lookups
 from brdfdb.notebook import card, listed, percent, spectrum
@@ -133,8 +133,10 @@ class BaseTable(Lookups):
         """
         from brdfdb.integrals.sampling import Sample, check_uniform
 
-        v1, v2 = np.broadcast_arrays(check_uniform("u1", u1), check_uniform("u2", u2))
+        v1, v2 = check_uniform("u1", u1), check_uniform("u2", u2)
         i = checked_vectors(wi, wi).w_i.astype(np.float64)
+        common_shape("u1, u2, wi without its last axis", v1, v2, i[..., 0])
+        v1, v2 = np.broadcast_arrays(v1, v2)
         wr = self.sampler.draw(v1, v2, i)
         density = self.sampler.density(i, wr)
         f_r = self.lookup_vectors(np.broadcast_to(i, wr.shape), wr, wavelength_nm)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
+import fcntl
 import functools
 import importlib.metadata
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -150,7 +152,7 @@ def run(
     ParameterError
         If the model is unknown or has no derivatives, or a range is refused.
     SampleError
-        If the group is there already, or another set is half written under its name.
+        If the group is there already, another process writes it, or another set is half written under its name.
     """
     spec = MODELS[model]
     if seed < 0:
@@ -164,19 +166,45 @@ def run(
     axes = axes_of(spec, ranges or {})
     made = TrainingSet(spec, axes, materials(spec, axes, count, seed), pairs(directions, seed), gradients)
     partial = out.with_name(f"{out.name}.partial")
-    files = group_files(_coordinates(made), _attributes(made, seed), _arrays(made))
-    last = files.pop(METADATA)
-    if (partial / _LAST).exists() and (partial / _LAST).read_bytes() != last:
-        raise SampleError(f"{partial} is a part of another set; finish that one, or remove it")
-    partial.mkdir(parents=True, exist_ok=True)
-    for name, data in files.items():
-        write_file(partial / name, data, partial)
-    write_file(partial / _LAST, last, partial)
-    _write_chunks(made, partial, jobs)
-    os.replace(partial / _LAST, partial / METADATA)
-    os.replace(partial, out)
+    with _alone(partial, out):
+        _write(made, seed, partial, jobs)
+        os.replace(partial, out)
     size = terminal.size(sum(file.stat().st_size for file in out.rglob("*") if file.is_file()))
     print(f"{out}: {count} materials of {model} times {directions} directions, {size}")
+
+
+@contextlib.contextmanager
+def _alone(partial: Path, out: Path) -> Iterator[None]:
+    """Hold the directory of a set that is being written, as its only writer."""
+    partial.mkdir(parents=True, exist_ok=True)
+    handle = os.open(partial, os.O_RDONLY)
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        if os.path.lexists(out):  # another writer finished it meanwhile
+            with contextlib.suppress(OSError):
+                partial.rmdir()
+            raise SampleError(f"{out} is there already; remove it, or give another name")
+        yield
+    except BlockingIOError:
+        raise SampleError(f"another process writes {partial}; wait for it, or give another name") from None
+    finally:
+        os.close(handle)
+
+
+def _write(made: TrainingSet, seed: int, partial: Path, jobs: int) -> None:
+    """Write all files of a set that are missing. Its metadata come first, under another name, and last."""
+    files = group_files(_coordinates(made), _attributes(made, seed), _arrays(made))
+    last = files.pop(METADATA)
+    begun = [partial / name for name in (_LAST, METADATA) if (partial / name).exists()]
+    if any(file.read_bytes() != last for file in begun):
+        raise SampleError(f"{partial} is a part of another set; finish that one, or remove it")
+    if not begun and any(not file.name.startswith(".") for file in partial.iterdir()):
+        raise SampleError(f"{partial} holds files that are of no set; remove them, or give another name")
+    write_file(partial / _LAST, last, partial)
+    for name, data in files.items():
+        write_file(partial / name, data, partial)
+    _write_chunks(made, partial, jobs)
+    os.replace(partial / _LAST, partial / METADATA)
 
 
 def _write_chunks(made: TrainingSet, partial: Path, jobs: int) -> None:

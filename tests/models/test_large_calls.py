@@ -144,7 +144,14 @@ def test_an_exception_in_a_thread_reaches_the_caller() -> None:
         lambert(*angles(COUNT), rho=np.append(np.zeros(COUNT - 1), 1.5), threads=2)
 
 
-@pytest.mark.parametrize("threads", [0, -1, 1.5, "2", True + 0.5, None])
+def test_numbers_of_threads_may_be_those_of_numpy() -> None:
+    wi, wr = vectors(4)
+    assert np.array_equal(ward_vectors(wi, wr, **WARD, threads=np.uint8(2)), ward_vectors(wi, wr, **WARD))
+    table = made_up("isotropic")
+    assert np.array_equal(table.lookup_vectors(wi, wr, threads=np.int8(2)), table.lookup_vectors(wi, wr))
+
+
+@pytest.mark.parametrize("threads", [0, -1, 1.5, "2", True, 1.0, None])
 def test_a_number_of_threads_is_a_positive_whole_number(threads: Any) -> None:
     message = re.escape(f"threads: {threads!r} is not a whole number of at least 1")
     with pytest.raises(ParameterError, match=message):

@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -105,7 +106,7 @@ def test_a_killed_set_does_not_look_complete_and_goes_on(tmp_path: Path) -> None
         (("ward", "--range", "rho_d=0.3:0.1"), "--range rho_d: 0.3:0.1 is no range within [0, 1]"),
         (("ward", "--range", "rho_d=nan:1"), "--range rho_d: nan:1 is no range within [0, 1]"),
         (("ward", "--range", "rho_d=0.3"), "--range rho_d=0.3: NAME=LOW:HIGH is a range, such as "),
-        (("ward", "--range", "rho_d=0.9:1", "--range", "rho_s=0.9:1"), "--range: 0 of 40 materials keep rho_d + "),
+        (("ward", "--range", "rho_d=0.9:1", "--range", "rho_s=0.9:1"), "--range: 0 of 4000 materials keep rho_d + "),
         (("ward", "--seed", "-1"), "--seed: -1 is not at least 0"),
     ],
 )
@@ -121,6 +122,49 @@ def test_a_set_that_is_there_is_kept(tmp_path: Path, capsys: Captured) -> None:
     assert run("sample", "ward", *SMALL, "--out", out) == 2
     assert "is there already; remove it, or give another name" in capsys.readouterr().err
     assert out.read_text(encoding="utf-8") == "mine"
+
+
+def test_one_process_writes_a_set(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Captured) -> None:
+    out, chunks = tmp_path / "set.zarr", sample._write_chunks
+
+    def beside(*made: Any) -> None:
+        assert run("sample", "ward", *SMALL, "--seed", 3, "--out", out) == 2
+        assert f"another process writes {out}.partial; wait for it" in capsys.readouterr().err
+        chunks(*made)
+
+    monkeypatch.setattr(sample, "_write_chunks", beside)
+    assert run("sample", "ward", *SMALL, "--out", out) == 0
+    assert xr.open_zarr(out).attrs["seed"] == 0
+    assert not list(tmp_path.glob("*.partial"))
+
+
+def test_a_set_that_lacks_only_its_name_is_not_mixed_with_another(tmp_path: Path, capsys: Captured) -> None:
+    out = tmp_path / "set.zarr"
+    assert run("sample", "ward", *SMALL, "--out", out) == 0
+    values = xr.open_zarr(out)["f_r"].values
+    partial = out.rename(tmp_path / "set.zarr.partial")
+    assert run("sample", "ward", *SMALL, "--seed", 3, "--out", out) == 2
+    assert "is a part of another set" in capsys.readouterr().err
+    assert run("sample", "ward", *SMALL, "--out", out) == 0
+    assert np.array_equal(xr.open_zarr(out)["f_r"].values, values)
+    assert not partial.exists()
+
+
+def test_files_of_others_are_left_alone(tmp_path: Path, capsys: Captured) -> None:
+    note = tmp_path / "set.zarr.partial" / "notes.txt"
+    note.parent.mkdir()
+    note.write_text("mine", encoding="utf-8")
+    assert run("sample", "ward", *SMALL, "--out", tmp_path / "set.zarr") == 2
+    assert "holds files that are of no set" in capsys.readouterr().err
+    assert [file.name for file in note.parent.iterdir()] == ["notes.txt"]
+
+
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_few_materials_keep_a_condition_too(count: int, tmp_path: Path) -> None:
+    for seed in range(10):
+        out = tmp_path / f"{seed}.zarr"
+        assert run("sample", "ward", "--count", count, "--directions", 5, "--seed", seed, "--out", out) == 0
+        assert xr.open_zarr(out).sizes["material"] == count
 
 
 def test_memory_is_that_of_a_chunk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

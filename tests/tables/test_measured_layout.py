@@ -63,6 +63,15 @@ def _chiral(wi: Floats, wr: Floats) -> Floats:
     return np.asarray((0.02 + 800.0 * np.exp(-tan2 / 0.004**2) + 0.05 * (1.0 + side))[:, np.newaxis])
 
 
+def test_black_data_are_refused() -> None:
+    def black(wi: Floats, _: Floats) -> Floats:
+        return 0.0 * wi[:, 2:]
+
+    source = MeasuredSource.of_function(black, ("grey",), None, name="x", title="x", provenance="x")
+    with pytest.raises(ParameterError, match="values: no value is above 0"):
+        tabulated(source, None, 0.05)
+
+
 def test_a_narrow_lobe_that_is_not_its_own_mirror_image_is_sampled_as_densely_as_one_that_is() -> None:
     source = MeasuredSource.of_function(_chiral, ("grey",), None, name="x", title="x", provenance="x")
     assert source.measured.chiral

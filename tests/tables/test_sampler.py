@@ -105,6 +105,10 @@ def test_nan_goes_through_and_bad_numbers_are_named() -> None:
         table.sample(0.5, 1.5, [0.0, 0.0, 1.0])
     with pytest.raises(ParameterError, match="wi"):
         table.sample(0.5, 0.5, [0.0, 0.0, 2.0])
+    with pytest.raises(ParameterError, match=r"u1, u2, wi.*: the shapes \(3,\), \(4,\), \(\) do not broadcast"):
+        table.sample(np.zeros(3), np.zeros(4), [0.0, 0.0, 1.0])
+    with pytest.raises(ParameterError, match=r"the shapes \(3,\), \(\), \(4,\) do not broadcast"):
+        table.sample(np.zeros(3), 0.5, np.tile([0.0, 0.0, 1.0], (4, 1)))
 
 
 def test_one_wavelength_adds_no_axis() -> None:
