@@ -62,7 +62,7 @@ def store(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def estimates(source: TableSource, wr: Array, drawn_by: Source | None = None) -> Array:
-    """What surfaces that face up in a room reflect towards viewers (N, 3), by directions of a source: (N, L)."""
+    """Return the radiance (N, L) of surfaces that face up in a room towards viewers (N, 3), by drawn directions."""
     environment = around(ROOM, samples=SAMPLES)
     drawn = environment.drawn(drawn_by or source, WAVELENGTH, wr, (0,))
     weight = environment.radiance(drawn.wi) * np.maximum(drawn.wi[..., 2], 0.0) * drawn.solid_angle
