@@ -97,7 +97,7 @@ def test_readme_has_exactly_two_set_up_commands() -> None:
 def test_the_check_runs_the_readmes_two_commands() -> None:
     text = (ROOT / "README.md").read_text(encoding="utf-8")
     (command,) = [line for line in text.splitlines() if "-m pytest" in line]
-    assert command.startswith("python3 -m venv .venv && .venv/bin/pip install -e '.[test]'")
+    assert command.startswith("python3 -m venv .venv && .venv/bin/pip install --no-compile -e '.[test]'")
     check = (ROOT / ".ci" / "run").read_text(encoding="utf-8")
     assert "mapfile -t commands < <(grep '^python3 -m venv' README.md)" in check
     assert 'eval "$command"' in check

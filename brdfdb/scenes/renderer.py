@@ -198,8 +198,12 @@ def render(
     ------
     ParameterError
         If `brdfs` has a key that is no material of the scene, or one of them is no function or returns a wrong shape.
-        If a material is stated for invisible light.
+        If a material is stated for invisible light, or the view is that of another scene.
     """
+    for points in view.points:
+        if points.material not in scene.materials:
+            text = f"it shows {points.material}, which is no material of the scene; gather the view of this scene"
+            raise ParameterError("view", text, points.material, tuple(scene.materials))
     known = reflectors(scene) if materials is None else materials
     replaced = {name: _function(name, given) for name, given in ({} if brdfs is None else brdfs).items()}
     for name in replaced:

@@ -107,6 +107,7 @@ def test_a_killed_set_does_not_look_complete_and_goes_on(tmp_path: Path) -> None
         (("ward", "--range", "rho_d=nan:1"), "--range rho_d: nan:1 is no range within [0, 1]"),
         (("ward", "--range", "rho_d=0.3"), "--range rho_d=0.3: NAME=LOW:HIGH is a range, such as "),
         (("ward", "--range", "rho_d=0.9:1", "--range", "rho_s=0.9:1"), "--range: 0 of 4000 materials keep rho_d + "),
+        (("ward", "--range", "rho_d=0:1", "--range", "rho_d=0:0.5"), "--range rho_d: a parameter has one range, and "),
         (("ward", "--seed", "-1"), "--seed: -1 is not at least 0"),
     ],
 )

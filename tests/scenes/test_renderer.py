@@ -218,6 +218,13 @@ def test_a_function_for_what_is_no_material_of_the_scene_is_said_so() -> None:
         rendered(of, 4, brdfs={"thing": lambda wi, _wr, _wavelength_nm: np.ones((len(wi), 1))})
 
 
+def test_a_view_of_another_scene_is_said_so() -> None:
+    lights = [{"direction": [0.0, -1.0, 0.0]}]
+    view = gather(scene(SPHERE, "white", lights=lights), WIDTH)
+    with pytest.raises(ParameterError, match=r"^view: it shows white, which is no material of the scene; gather the"):
+        render(scene(SPHERE, "clay-vase", define={}, lights=lights), view)
+
+
 @pytest.mark.parametrize("columns", [(), (2,), (16, 1)], ids=str)
 def test_f_r_of_a_wrong_shape_is_said_so(columns: tuple[int, ...]) -> None:
     of = scene({"kind": "plane"}, "white", camera=ABOVE, lights=[{"direction": [0.0, 0.0, 1.0]}])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from pathlib import Path
 
 from brdfdb_pipelines.commands._arguments import add_jobs, whole_number
@@ -50,12 +51,24 @@ def run(options: argparse.Namespace) -> int:
         options.out,
         count=options.count,
         directions=options.directions,
-        ranges=dict(_range(text) for text in options.range),
+        ranges=_ranges(options.range),
         seed=options.seed,
         gradients=options.gradients,
         jobs=options.jobs,
     )
     return 0
+
+
+def _ranges(texts: Sequence[str]) -> dict[str, tuple[float, float]]:
+    from brdfdb.errors import ParameterError
+
+    ranges: dict[str, tuple[float, float]] = {}
+    for text in texts:
+        name, ends = _range(text)
+        if name in ranges:
+            raise ParameterError(f"--range {name}", "a parameter has one range, and this one has two", text)
+        ranges[name] = ends
+    return ranges
 
 
 def _range(text: str) -> tuple[str, tuple[float, float]]:
