@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -69,7 +70,7 @@ def _split(shape: tuple[int, ...], scalars: Sequence[Floats]) -> tuple[int, int,
     along = bool(shape) and all(np.ndim(array) == 0 or np.shape(array)[-1] == 1 for array in scalars)
     leading = (*shape[:-1], 1) if along else shape
     length = shape[-1] if along else 1
-    return int(np.prod(leading)), length, leading
+    return math.prod(leading), length, leading
 
 
 def _column(array: Floats, shape: tuple[int, ...], rows: int, length: int) -> NDArray[np.float64]:
