@@ -1,4 +1,4 @@
-"""Elementary functions of kernels: exp, log, sine, arcsin, erfc without branches, so that loops over them vectorise.
+"""Elementary functions of kernels: exp, log, sine, arcsin, arctan, erfc without branches, so that loops vectorise.
 
 Those of libm do not vectorise without SVML, which pip wheels do not ship. Kernels of any file may call these functions:
 this file is one of `_numba.SHARED`, so that their callers are compiled again after a change.
