@@ -28,6 +28,7 @@ SHARED = (
     "tables/_vectors.py",
     "fresnel.py",
     "tables/_interpolation.py",
+    "tables/_coordinates.py",
     "models/_diffraction_series.py",
 )
 
@@ -66,7 +67,8 @@ def _compiled(function: F, *, forceinline: bool) -> F:
 def instructions(write: Callable[..., Any]) -> Callable[[F], F]:
     """Compile a function of arrays and scalars as ``write(ir, builder, *arguments)`` writes it in LLVM's language.
 
-    An array arrives as the pointer to its first number. The function takes uint64 and float64 and returns a float64.
+    An array arrives as the pointer to its first number. The function takes uint64 and float64, and returns a float64 or
+    nothing, as its annotation says.
     """
 
     def decorated(function: F) -> F:
@@ -81,12 +83,14 @@ def instructions(write: Callable[..., Any]) -> Callable[[F], F]:
                 context.make_array(kind)(context, builder, value).data if isinstance(kind, numba.types.Array) else value
                 for kind, value in zip(signature.args, given, strict=True)
             ]
-            return write(ir, builder, *arguments)
+            result = write(ir, builder, *arguments)
+            return context.get_dummy_value() if result is None else result
 
         def typed(_: Any, *arguments: Any) -> Any:
-            return numba.float64(*arguments), code
+            return returned(*arguments), code
 
         own = inspect.signature(function)
+        returned = numba.void if own.return_annotation == "None" else numba.float64
         context = inspect.Parameter("context", inspect.Parameter.POSITIONAL_OR_KEYWORD)
         typed.__signature__ = own.replace(parameters=[context, *own.parameters.values()])  # type: ignore[attr-defined]
         return cast(F, intrinsic(typed))

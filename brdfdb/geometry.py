@@ -43,7 +43,7 @@ def check_theta(name: str, theta: ArrayLike) -> Floats:
     """
     array = _float_array(name, theta)
     bad = (array < 0.0) | (array > array.dtype.type(np.pi))
-    if np.any(bad):
+    if bad.any():
         first = np.atleast_1d(array)[np.atleast_1d(bad)][0]
         raise ParameterError(
             name,
@@ -58,7 +58,7 @@ def check_phi(name: str, phi: ArrayLike) -> Floats:
     """Return an azimuth [rad] as a float array; nan passes through, values outside [-1e15, 1e15] raise."""
     array = _float_array(name, phi)
     bad = np.abs(array) > PHI_MAX
-    if np.any(bad):
+    if bad.any():
         first = np.atleast_1d(array)[np.atleast_1d(bad)][0]
         raise ParameterError(
             name, f"{first:.9g} rad is outside [-{PHI_MAX:g}, {PHI_MAX:g}] rad", float(first), (-PHI_MAX, PHI_MAX)
@@ -252,10 +252,10 @@ def finished(values: Floats, directions: Directions, *, trailing: int = 0) -> Fl
 
     shape = np.broadcast_shapes(np.shape(values), *(aligned(angle).shape for angle in directions.given), own)
     result: Floats = values if np.shape(values) == shape else np.broadcast_to(values, shape)
-    if np.any(directions.below):
+    if directions.below.any():
         result = np.where(aligned(directions.below), 0.0, result)
     for angle in directions.given:
-        if np.any(np.isnan(angle)):
+        if np.isnan(angle).any():
             result = np.where(aligned(np.isnan(angle)), np.nan, result)
     if result.dtype != directions.dtype or not result.flags.writeable:
         result = result.astype(directions.dtype)

@@ -51,7 +51,7 @@ class Parameter:
             )
         array = given.astype(np.float64)
         bad = ~((array >= self.low) & (array <= self.high))  # True for nan, too
-        if np.any(bad):
+        if bad.any():
             first = array[bad].flat[0] if array.ndim else array[()]
             value, interval = f"{first:.16g}", self.interval
             if f"{first:g}" in (f"{self.low:g}", f"{self.high:g}"):  # next to an end: all digits, or they look alike

@@ -1,4 +1,4 @@
-"""Points on the four grids of tables, of unit vectors, in Dr.Jit: `brdfdb.tables._kernels.points_of_vectors`."""
+"""Points on the four grids of tables, of unit vectors, in Dr.Jit: `brdfdb.tables._coordinates.points_of_vectors`."""
 
 from __future__ import annotations
 

@@ -193,12 +193,12 @@ def _evaluate(
 @kernel
 def specular_rows(scalars: Array, rho_s: Array) -> None:
     for row in range(rho_s.shape[0]):
-        sin_i, cos_i, wave, slope = scalars[row, 0], scalars[row, 1], scalars[row, 2], scalars[row, 3]
+        sin_i, cos_i, wave, slope = scalars[0, row], scalars[1, row], scalars[2, row], scalars[3, row]
         S_over_cos, K_i = _shadowing_and_hidden(sin_i, cos_i, slope)
         # Eq. (79)
         g = 4.0 * cos_i * cos_i * wave * _effective_variance(2.0 * K_i)
         # Eq. (73)
-        rho_s[row] = reflectance(cos_i, scalars[row, 4], scalars[row, 5]) * exp(-g) * (S_over_cos * cos_i) ** 2
+        rho_s[row] = reflectance(cos_i, scalars[4, row], scalars[5, row]) * exp(-g) * (S_over_cos * cos_i) ** 2
 
 
 @kernel
@@ -369,9 +369,9 @@ def angle_rows(one_plus_cos: Array, table: Array, scalars: Array, f_r: Floats) -
             rows = min(BLOCK, f_r.shape[0] - row)
             for i in range(rows):
                 for column in range(10):
-                    lanes[column, i] = scalars[row + i, column]
+                    lanes[column, i] = scalars[column, row + i]
             _roughness(lanes[:4], lanes[4:], g_over_vz2[:rows], shadow[:rows])
-        s, f, turned = scalars[row], f_r[row], one_plus_cos[min(row, one_plus_cos.shape[0] - 1)]
+        s, f, turned = scalars[:, row], f_r[row], one_plus_cos[min(row, one_plus_cos.shape[0] - 1)]
         correlation, n, k, uniform = s[5], s[7], s[8], s[9]
         v_z2 = (s[1] + s[3]) ** 2
         g = g_over_vz2[lane] * v_z2

@@ -123,7 +123,7 @@ def _angle_rows(
     distribution: int, shadowing: int, fresnel: int, cos_phi: Rows, sin_phi: Rows, scalars: Rows, f_r: Rows
 ) -> None:
     for row in range(f_r.shape[0]):
-        s, f = scalars[row], f_r[row]
+        s, f = scalars[:, row], f_r[row]
         x_i, y_i, cos_i, sin_r, cos_r = s[0], s[1], s[2], s[3], s[4]
         uniform, first, second, alpha_x, alpha_y = s[5] / np.pi, s[6], s[7], s[8], s[9]
         slopes = 1.0 / alpha_x, 1.0 / alpha_y, 1.0 / (np.pi * alpha_x * alpha_y)

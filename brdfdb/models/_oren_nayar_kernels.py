@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from brdfdb._elementary import arcsin, cosine
+from brdfdb._elementary import BLOCK, cosine, twice_arctan
 from brdfdb._numba import elementwise, kernel
 from brdfdb.geometry import HALF_PI
 from brdfdb.parameters import Floats
@@ -15,6 +15,7 @@ from brdfdb.parameters import Floats
 HALF_PI_REST = 6.123233995736766e-17  # pi/2 less the float64 nearest to it
 _NO_AZIMUTH = 1e-300  # product of two sines below which an azimuth is undefined
 
+_Polar = tuple[float, float, float, float, float, float, float]
 _Pair = tuple[float, float, float, float, float, float, float, float, float]
 
 
@@ -22,7 +23,8 @@ _Pair = tuple[float, float, float, float, float, float, float, float, float]
 def _angle(sin_theta: float, cos_theta: float) -> tuple[float, float]:
     """Return a polar angle [rad] and its complement to pi/2 [rad], each with all its digits."""
     steep = sin_theta > cos_theta
-    small = arcsin(cos_theta if steep else sin_theta)
+    larger = sin_theta if steep else cos_theta
+    small = twice_arctan((cos_theta if steep else sin_theta) / (1.0 + larger))
     large = HALF_PI - small + HALF_PI_REST
     theta = large if steep else small
     rest = small if steep else large
@@ -99,22 +101,60 @@ def _f_r(c_0: float, backward: float, forward: float, c_2: float, cos_dphi: floa
 
 
 @kernel
+def _polar(
+    theta_i: float,
+    rest_i: float,
+    sin_i: float,
+    cos_i: float,
+    theta_r: float,
+    rest_r: float,
+    sin_r: float,
+    cos_r: float,
+    lower_light: bool,
+) -> _Polar:
+    """Return the seven arguments of `_functional` that two polar angles set, with complements, sines and cosines."""
+    alpha = theta_i if lower_light else theta_r
+    beta = theta_r if lower_light else theta_i
+    beta_rest = rest_r if lower_light else rest_i
+    sin_alpha = sin_i if lower_light else sin_r
+    cos_alpha = cos_i if lower_light else cos_r
+    tan_beta = (sin_r if lower_light else sin_i) / (cos_r if lower_light else cos_i)
+    versine_rest = cos_alpha * cos_alpha / (1.0 + sin_alpha)
+    tan_mean = (sin_i + sin_r) / (cos_i + cos_r)  # of the mean angle, without rounding it
+    return alpha, beta, beta_rest, sin_alpha, versine_rest, tan_beta, tan_mean
+
+
+@kernel
 def functional_angle_rows(
-    cos_dphi: NDArray[np.float64],
-    one_less_cos: NDArray[np.float64],
-    scalars: NDArray[np.float64],
-    f_r: NDArray[np.float64],
+    cos_dphi: NDArray[np.float64], one_less_cos: NDArray[np.float64], scalars: NDArray[np.float64], f_r: Floats
 ) -> None:
-    for row in range(f_r.shape[0]):
-        s, f = scalars[row], f_r[row]
-        C1, ratio, bounced = _roughness(s[7], s[8], s[9])
-        c_0, backward, forward, c_2 = _functional(
-            s[0], s[1], s[2], s[3], s[4], s[5], s[6], s[7] / np.pi, C1, ratio, bounced
-        )
-        shared = min(row, cos_dphi.shape[0] - 1)
-        cos, rest = cos_dphi[shared], one_less_cos[shared]
-        for j in range(f.shape[0]):
-            f[j] = _f_r(c_0, backward, forward, c_2, cos[j], rest[j])
+    """Fill in rows of f_r [1/sr]. The coefficients of a block of rows are computed at once: that loop vectorises."""
+    rows = f_r.shape[0]
+    work = np.empty((13, BLOCK))  # nine scalars of each row, and the four coefficients
+    for start in range(0, rows, BLOCK):
+        count = min(BLOCK, rows - start)
+        for column in range(9):
+            of_rows = scalars[column, start : start + count]
+            for j in range(count):
+                work[column, j] = of_rows[j]
+        for j in range(count):
+            theta_i, theta_r = work[0, j], work[3, j]
+            rest_i, rest_r = HALF_PI - theta_i + HALF_PI_REST, HALF_PI - theta_r + HALF_PI_REST
+            polar = _polar(
+                theta_i, rest_i, work[1, j], work[2, j], theta_r, rest_r, work[4, j], work[5, j], theta_i > theta_r
+            )
+            C1, ratio, bounced = _roughness(work[6, j], work[7, j], work[8, j])
+            scale = work[6, j] / np.pi
+            work[9, j], work[10, j], work[11, j], work[12, j] = _functional(
+                polar[0], polar[1], polar[2], polar[3], polar[4], polar[5], polar[6], scale, C1, ratio, bounced
+            )
+        for j in range(count):
+            row, f = start + j, f_r[start + j]
+            shared = min(row, cos_dphi.shape[0] - 1)
+            cos, rest = cos_dphi[shared], one_less_cos[shared]
+            c_0, backward, forward, c_2 = work[9, j], work[10, j], work[11, j], work[12, j]
+            for k in range(f.shape[0]):
+                f[k] = _f_r(c_0, backward, forward, c_2, cos[k], rest[k])
 
 
 @kernel
@@ -126,21 +166,13 @@ def _pair(x_i: float, y_i: float, z_i: float, x_r: float, y_r: float, z_r: float
     sin_i, sin_r = math.sqrt(sin2_i), math.sqrt(sin2_r)
     theta_i, rest_i = _angle(sin_i, cos_i)
     theta_r, rest_r = _angle(sin_r, cos_r)
-    lower_light = cos_i < cos_r
-    alpha = theta_i if lower_light else theta_r
-    beta = theta_r if lower_light else theta_i
-    beta_rest = rest_r if lower_light else rest_i
-    sin_alpha = sin_i if lower_light else sin_r
-    cos_alpha = cos_i if lower_light else cos_r
-    tan_beta = (sin_r if lower_light else sin_i) / (cos_r if lower_light else cos_i)
-    versine_rest = cos_alpha * cos_alpha / (1.0 + sin_alpha)
-    tan_mean = (sin_i + sin_r) / (cos_i + cos_r)
+    polar = _polar(theta_i, rest_i, sin_i, cos_i, theta_r, rest_r, sin_r, cos_r, cos_i < cos_r)
     product = sin_i * sin_r
     inverse = 1.0 / (_NO_AZIMUTH if product < _NO_AZIMUTH else product)
     cos_dphi = (x_i * x_r + y_i * y_r) * inverse
     sin_dphi = (x_i * y_r - y_i * x_r) * inverse
     one_less_cos = sin_dphi * sin_dphi / (1.0 + abs(cos_dphi))
-    return alpha, beta, beta_rest, sin_alpha, versine_rest, tan_beta, tan_mean, cos_dphi, one_less_cos
+    return *polar, cos_dphi, one_less_cos
 
 
 @kernel
@@ -197,11 +229,9 @@ def _qualitative(sin_alpha: float, tan_beta: float, rho: float, sigma: float, of
 
 
 @kernel
-def qualitative_angle_rows(
-    cos_dphi: NDArray[np.float64], scalars: NDArray[np.float64], f_r: NDArray[np.float64]
-) -> None:
+def qualitative_angle_rows(cos_dphi: NDArray[np.float64], scalars: NDArray[np.float64], f_r: Floats) -> None:
     for row in range(f_r.shape[0]):
-        s, f = scalars[row], f_r[row]
+        s, f = scalars[:, row], f_r[row]
         c_0, c_1 = _qualitative(s[0], s[1], s[2], s[3], s[4])
         cos = cos_dphi[min(row, cos_dphi.shape[0] - 1)]
         for j in range(f.shape[0]):

@@ -37,7 +37,7 @@ def _profile(form: int, x2: float, first: float, second: float, third: float) ->
 @kernel
 def _angle_rows(form: int, x_r: Rows, y_r: Rows, scalars: Rows, f_r: Rows) -> None:
     for row in range(f_r.shape[0]):
-        s, f = scalars[row], f_r[row]
+        s, f = scalars[:, row], f_r[row]
         x_i, y_i, first, second, third = s[0], s[1], s[2], s[3], s[4]
         r_x, r_y = x_r[min(row, x_r.shape[0] - 1)], y_r[min(row, y_r.shape[0] - 1)]
         for j in range(f.shape[0]):

@@ -115,7 +115,7 @@ def _half_azimuth(c_i: float, s_i: float, c_r: float, s_r: float) -> tuple[float
 @kernel
 def _angle_rows(cos_phi: Rows, sin_phi: Rows, scalars: Rows, f_r: Rows) -> None:
     for row in range(f_r.shape[0]):
-        s, f = scalars[row], f_r[row]
+        s, f = scalars[:, row], f_r[row]
         c_i, s_i, sin_i, cos_i, sin_r, cos_r = s[0], s[1], s[2], s[3], s[4], s[5]
         p = s[6], s[7], s[8], s[9], s[10], math.tan(s[11])
         c_phi, s_phi = cos_phi[min(row, cos_phi.shape[0] - 1)], sin_phi[min(row, sin_phi.shape[0] - 1)]

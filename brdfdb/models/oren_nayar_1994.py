@@ -7,9 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from brdfdb.geometry import HALF_PI, Directions, checked_angles, checked_vectors, finished
+from brdfdb.geometry import Directions, checked_angles, checked_vectors, finished
 from brdfdb.models._oren_nayar_kernels import (
-    HALF_PI_REST,
     functional_angle_rows,
     functional_gradient_rows,
     functional_vector_rows,
@@ -90,22 +89,12 @@ def oren_nayar(
     0.2639
     """
     angles = checked_angles(theta_i, phi_i, theta_r, phi_r)
-    alpha, beta = np.maximum(angles.theta_i, angles.theta_r), np.minimum(angles.theta_i, angles.theta_r)
-    # Functions of alpha or beta are taken of each angle first, since axes are shorter than their pairs
-    versines = (2.0 * np.sin((HALF_PI - theta + HALF_PI_REST) / 2.0) ** 2 for theta in (angles.theta_i, angles.theta_r))
-    pair = (
-        alpha,
-        beta,
-        HALF_PI - beta + HALF_PI_REST,
-        np.maximum(angles.sin_i, angles.sin_r),
-        np.minimum(*versines),
-        np.minimum(np.tan(angles.theta_i), np.tan(angles.theta_r)),
-        (angles.sin_i + angles.sin_r) / (angles.cos_i + angles.cos_r),  # tangent of the mean angle, without rounding it
-    )
+    polar = angles.theta_i, angles.sin_i, angles.cos_i, angles.theta_r, angles.sin_r, angles.cos_r
     cos_dphi = angles.cos_dphi
     one_less_cos = angles.sin_dphi**2 / (1.0 + np.abs(cos_dphi))  # 1 - |cos|, which tan_mean magnifies near grazing
     parameters = RHO.check(rho), SIGMA.check(sigma), INTERREFLECTION.check(interreflection)
-    return finished(by_rows(functional_angle_rows, (cos_dphi, one_less_cos), (*pair, *parameters)), angles)
+    columns, scalars = (cos_dphi, one_less_cos), (*polar, *parameters)
+    return finished(by_rows(functional_angle_rows, columns, scalars, angles.dtype), angles)
 
 
 @for_large_calls
@@ -230,7 +219,8 @@ def oren_nayar_qualitative(
     angles = checked_angles(theta_i, phi_i, theta_r, phi_r)
     pair = np.maximum(angles.sin_i, angles.sin_r), np.minimum(np.tan(angles.theta_i), np.tan(angles.theta_r))
     parameters = RHO.check(rho), SIGMA.check(sigma), OFFSET.check(offset)
-    return finished(by_rows(qualitative_angle_rows, (angles.cos_dphi,), (*pair, *parameters)), angles)
+    scalars = (*pair, *parameters)
+    return finished(by_rows(qualitative_angle_rows, (angles.cos_dphi,), scalars, angles.dtype), angles)
 
 
 @for_large_calls

@@ -60,7 +60,7 @@ def _f_r(
 @kernel
 def _angle_rows(cos_phi: Rows, sin_phi: Rows, scalars: Rows, f_r: Rows) -> None:
     for row in range(f_r.shape[0]):
-        s, f = scalars[row], f_r[row]
+        s, f = scalars[:, row], f_r[row]
         i, sin_r, cos_r = (s[0], s[1], s[2]), s[3], s[4]
         constants = _constants(s[5], s[6], s[7], s[8])
         c_phi, s_phi = cos_phi[min(row, cos_phi.shape[0] - 1)], sin_phi[min(row, sin_phi.shape[0] - 1)]

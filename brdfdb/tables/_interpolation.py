@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb._numba import kernel, loop
-from brdfdb.tables._vectors import CUBIC_COLUMNS, tricubic_cell, trilinear_cell
+from brdfdb.tables._vectors import CUBIC_COLUMNS, LANES, tricubic_cell, trilinear_cells
 
 Array = NDArray[np.float64]
 
@@ -277,15 +277,30 @@ def _weigh(axes: Axes, axis: int, c: int, t: float, stride: int, row: int, at: N
 
 
 @kernel
+def room(points: int) -> int:
+    """Return the points for which the arrays of a block have room: at most POINTS, and a multiple of LANES."""
+    return (min(POINTS, points) + LANES - 1) // LANES * LANES
+
+
+@kernel
 def trilinear(
     axes: Axes, cell: NDArray[np.int32], share: Array, count: int, table: NDArray[np.float32], out: Array
 ) -> None:
-    """Interpolate linearly on three axes of a table with one value a node, at the points of `locate`."""
+    """Interpolate linearly on three axes of a table with one value a node, at the points of `locate`.
+
+    The arrays have `room` for groups of LANES points. The last group is computed whole.
+    """
     n_1, n_2 = axes.counts[1], axes.counts[2]
     row, layer = np.uint64(n_2), np.uint64(n_1 * n_2)
+    groups = (count + LANES - 1) // LANES
+    first = np.empty(groups * LANES, np.uint64)
+    for j in range(count, groups * LANES):
+        first[j] = np.uint64(0)
     for j in range(count):
-        o = np.uint64((np.int64(cell[0, j]) * n_1 + cell[1, j]) * n_2 + cell[2, j])
-        out[j] = trilinear_cell(table, o, row, layer, share[0, j], share[1, j], share[2, j])
+        first[j] = np.uint64((np.int64(cell[0, j]) * n_1 + cell[1, j]) * n_2 + cell[2, j])
+    share_0, share_1, share_2 = share[0], share[1], share[2]
+    for group in range(groups):
+        trilinear_cells(table, first, row, layer, share_0, share_1, share_2, np.uint64(group * LANES), out)
 
 
 @kernel

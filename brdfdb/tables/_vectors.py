@@ -7,6 +7,7 @@ compiled. This file is one of `_numba.SHARED`.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from brdfdb._numba import instructions
 Array = NDArray[np.float64]
 Index = Any  # an int of Python, or a uint64 of a kernel
 CUBIC_COLUMNS = 16  # of `Axes.lines`: four vectors of four weights
+LANES = 4  # points that are interpolated linearly at once
 
 
 class _Writer:
@@ -35,6 +37,17 @@ class _Writer:
             return loaded
         return self.builder.fpext(loaded, self.ir.VectorType(self.ir.DoubleType(), lanes))
 
+    def store(self, pointer: Any, offset: Any, vector: Any) -> None:
+        """Store float64 from `offset` on."""
+        at = self.builder.bitcast(self.builder.gep(pointer, [offset]), vector.type.as_pointer())
+        self.builder.store(vector, at).align = 8
+
+    def shuffle(self, a: Any, b: Any, lanes: Sequence[int]) -> Any:
+        """Return the lanes of two vectors, numbered one after the other."""
+        int32 = self.ir.IntType(32)
+        mask = [self.ir.Constant(int32, lane) for lane in lanes]
+        return self.builder.shuffle_vector(a, b, self.ir.Constant(self.ir.VectorType(int32, len(mask)), mask))
+
     def add(self, a: Any, b: Any) -> Any:
         return self.builder.fadd(a, b, flags=("contract",))
 
@@ -49,45 +62,70 @@ class _Writer:
 
     def spread(self, scalar: Any, lanes: int) -> Any:
         """Return a vector with the scalar in every lane."""
-        int32 = self.ir.IntType(32)
         undefined = self.ir.Constant(self.ir.VectorType(scalar.type, lanes), self.ir.Undefined)
-        first = self.builder.insert_element(undefined, scalar, self.ir.Constant(int32, 0))
-        mask = self.ir.Constant(self.ir.VectorType(int32, lanes), [self.ir.Constant(int32, 0)] * lanes)
-        return self.builder.shuffle_vector(first, undefined, mask)
+        first = self.builder.insert_element(undefined, scalar, self.ir.Constant(self.ir.IntType(32), 0))
+        return self.shuffle(first, undefined, [0] * lanes)
 
     def one(self) -> Any:
         return self.ir.Constant(self.ir.DoubleType(), 1.0)
 
 
 def _write_trilinear(
-    ir: Any, builder: Any, table: Any, o: Any, row: Any, layer: Any, t_0: Any, t_1: Any, t_2: Any
-) -> Any:
+    ir: Any,
+    builder: Any,
+    table: Any,
+    first: Any,
+    row: Any,
+    layer: Any,
+    share_0: Any,
+    share_1: Any,
+    share_2: Any,
+    j: Any,
+    out: Any,
+) -> None:
     w = _Writer(ir, builder)
-    number = w.ir.FloatType()
-    q = builder.add(o, layer)
-    a, b, c, d = (w.load(table, at, number, 2) for at in (o, builder.add(o, row), q, builder.add(q, row)))
-    along_1, along_0 = w.spread(t_1, 2), w.spread(t_0, 2)
+    number, double = ir.FloatType(), ir.DoubleType()
+    places = [builder.load(builder.gep(first, [builder.add(j, ir.Constant(j.type, p))])) for p in range(LANES)]
+    ends = []
+    for step in (None, row, layer, builder.add(row, layer)):
+        pairs = [w.load(table, place if step is None else builder.add(place, step), number, 2) for place in places]
+        halves = [w.shuffle(pairs[0], pairs[1], range(4)), w.shuffle(pairs[2], pairs[3], range(4))]
+        ends.append(builder.fpext(w.shuffle(halves[0], halves[1], range(8)), ir.VectorType(double, 2 * LANES)))
+    a, b, c, d = ends
+    t_0, t_1, t_2 = (w.load(share, j, double, LANES) for share in (share_0, share_1, share_2))
+    along_1, along_0 = (w.shuffle(t, t, (0, 0, 1, 1, 2, 2, 3, 3)) for t in (t_1, t_0))
     a = w.add(a, w.mul(along_1, w.sub(b, a)))
     c = w.add(c, w.mul(along_1, w.sub(d, c)))
     a = w.add(a, w.mul(along_0, w.sub(c, a)))
-    return w.add(w.mul(w.sub(w.one(), t_2), w.lane(a, 0)), w.mul(t_2, w.lane(a, 1)))
+    before, after = w.shuffle(a, a, (0, 2, 4, 6)), w.shuffle(a, a, (1, 3, 5, 7))
+    w.store(out, j, w.add(w.mul(w.sub(w.spread(w.one(), LANES), t_2), before), w.mul(t_2, after)))
 
 
 @instructions(_write_trilinear)
-def trilinear_cell(
-    table: NDArray[np.float32], o: Index, row: Index, layer: Index, t_0: float, t_1: float, t_2: float
-) -> float:
-    """Return the number at a point in a cell, linear along three axes.
+def trilinear_cells(
+    table: NDArray[np.float32],
+    first: NDArray[np.uint64],
+    row: Index,
+    layer: Index,
+    share_0: Array,
+    share_1: Array,
+    share_2: Array,
+    j: Index,
+    out: Array,
+) -> None:
+    """Write the numbers at LANES points from the point `j` on, each linear along the three axes of its cell.
 
-    `o` is the first node of the cell in the table. The next along the axes are `layer`, `row` and 1 further. t_0, t_1
-    and t_2, in [0, 1], are the shares of the cell before the point.
+    `first` has the first node in the table of the cell of each point. The next along the axes are `layer`, `row` and 1
+    further. The shares, in [0, 1], say how much of the cell lies before the point on each axis.
     """
-    ends = []
-    for k in (o, o + 1):
-        a, b, c, d = (float(table[at]) for at in (k, k + row, k + layer, k + layer + row))
-        a, c = a + t_1 * (b - a), c + t_1 * (d - c)
-        ends.append(a + t_0 * (c - a))
-    return (1.0 - t_2) * ends[0] + t_2 * ends[1]
+    for point in range(int(j), int(j) + LANES):
+        t_0, t_1, t_2, o = share_0[point], share_1[point], share_2[point], int(first[point])
+        ends = []
+        for k in (o, o + 1):
+            a, b, c, d = (float(table[at]) for at in (k, k + row, k + layer, k + layer + row))
+            a, c = a + t_1 * (b - a), c + t_1 * (d - c)
+            ends.append(a + t_0 * (c - a))
+        out[point] = (1.0 - t_2) * ends[0] + t_2 * ends[1]
 
 
 def _write_tricubic(

@@ -24,7 +24,7 @@ from brdfdb.materials.source import FourAngles
 from brdfdb.models.large_calls import array_for_result, filled
 from brdfdb.notebook import polar_sketch
 from brdfdb.parameters import Floats
-from brdfdb.tables import _kernels, stokes
+from brdfdb.tables import _coordinates, _kernels, stokes
 from brdfdb.tables._interpolation import Axes, prepared
 from brdfdb.tables.grids import Axis, Grid, axes_among, check_wavelengths
 from brdfdb.tables.layout import PLAIN, Interpolation, Layout, rebuilt
@@ -33,7 +33,7 @@ from brdfdb.tables.polarisation import Facets, checked_facets, facets_of
 from brdfdb.tables.table_base import BaseTable
 
 # how numbers become f_r, the axes, the numbers, how many a node, how they make up a spectrum, the uniform part
-_Ready = tuple[_kernels.Rule, Axes, NDArray[np.float32], int, NDArray[np.float64], NDArray[np.float64]]
+_Ready = tuple[_coordinates.Rule, Axes, NDArray[np.float32], int, NDArray[np.float64], NDArray[np.float64]]
 
 # Cut that notebooks show: angles of viewer and light, and the wavelength
 _SKETCHED_DEG, _SKETCHED_LIGHT_DEG, _SKETCHED_NM = np.linspace(-88.0, 88.0, 177), 45.0, 550.0
@@ -251,7 +251,7 @@ class Table(BaseTable):
         grid, how = self.grid, self.interpolation
         # a cubic, and what continues beyond the horizon; a sum of positive numbers does not
         overshoots = how.logarithm or how.cubic or grid.half_difference
-        rule = _kernels.Rule(
+        rule = _coordinates.Rule(
             grid.half_difference,
             grid.reciprocal,
             grid.copies,
@@ -375,9 +375,9 @@ def _flat(array: NDArray[Any], shape: tuple[int, ...], dtype: DTypeLike) -> NDAr
 def points(grid: Grid, wi: Floats, wr: Floats) -> NDArray[np.float64]:
     """Return the coordinates [rad] on a grid, of shape (axes, N), of unit vectors of shape (N, 3)."""
     x, mu, scratch = np.empty((len(grid.axes), len(wi))), np.empty(len(wi)), np.empty((6, len(wi)))
-    rule = _kernels.Rule(grid.half_difference, grid.reciprocal, grid.copies, False, 0.0, 0.0, False, False)
+    rule = _coordinates.Rule(grid.half_difference, grid.reciprocal, grid.copies, False, 0.0, 0.0, False, False)
     flat = [_flat(w, np.shape(w), np.float64) for w in (wi, wr)]
-    _kernels.points_of_vectors(rule, flat[0], flat[1], len(wi), x, mu, scratch)
+    _coordinates.points_of_vectors(rule, flat[0], flat[1], len(wi), x, mu, scratch)
     return x
 
 

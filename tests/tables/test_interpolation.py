@@ -11,7 +11,16 @@ from scipy.interpolate import CubicHermiteSpline, RegularGridInterpolator
 
 from brdfdb._elementary import BLOCK
 from brdfdb.tables import _interpolation
-from brdfdb.tables._interpolation import Axes, locate, prepared, tricubic, trilinear, weighted, weights_of_nodes
+from brdfdb.tables._interpolation import (
+    Axes,
+    locate,
+    prepared,
+    room,
+    tricubic,
+    trilinear,
+    weighted,
+    weights_of_nodes,
+)
 
 EXACT = 2e-13  # measured: 4e-14, cubics on unequal steps down to 0.01
 UNEQUAL = np.array([0.0, 0.3, 0.35, 1.0, 1.7, 1.71, 2.9, 3.0])
@@ -133,6 +142,21 @@ def test_linear_interpolation_is_scipys(dimensions: int, channels: int) -> None:
         out = np.empty(BLOCK)
         trilinear(ready, cell, share, BLOCK, table.reshape(-1), out)
         np.testing.assert_allclose(out, expected[:BLOCK, 0], atol=1e-14)
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 4, 5, 7, BLOCK - 1])
+def test_points_that_do_not_fill_a_group_are_as_others(count: int) -> None:
+    rng = np.random.default_rng(6)
+    axes = [UNEQUAL, EQUAL, UNEQUAL[:5]]
+    table = rng.random([nodes.size for nodes in axes]).astype(np.float32)
+    ready = prepared(axes, [OPEN] * 3, cubic=False)
+    points = np.stack([rng.uniform(0.0, nodes[-1], count) for nodes in axes])
+    cell, share = np.full((3, room(count)), -1, np.int32), np.full((3, room(count)), np.nan)
+    cell[:, :count], share[:, :count] = _located(ready, points)
+    out = np.full(room(count) + 1, 7.0)
+    trilinear(ready, cell, share, count, table.reshape(-1), out)
+    np.testing.assert_allclose(out[:count], at(ready, points, table), rtol=EXACT)
+    assert out[-1] == 7.0
 
 
 @pytest.mark.parametrize("sizes", [(8, 13, 5), (4, 13, 4)])

@@ -14,7 +14,7 @@ from scipy.interpolate import RegularGridInterpolator
 from brdfdb.errors import ParameterError
 from brdfdb.geometry import unit_vector
 from brdfdb.materials import Material
-from brdfdb.tables import _kernels
+from brdfdb.tables import _coordinates, _kernels
 from brdfdb.tables import table as table_module
 from brdfdb.tables.grids import Grid
 from brdfdb.tables.layout import Interpolation, Layout
@@ -86,8 +86,8 @@ def test_kernels_see_arguments_of_one_type_whether_lookups_are_of_arrays_or_numb
     # they are compiled for each type, and what may be written to is another
     seen: dict[str, set[Any]] = {}
 
-    def spy(name: str) -> Any:
-        kernel = getattr(_kernels, name)
+    def spy(module: Any, name: str) -> Any:
+        kernel = getattr(module, name)
 
         def called(*arguments: Any) -> Any:
             types = [
@@ -98,8 +98,10 @@ def test_kernels_see_arguments_of_one_type_whether_lookups_are_of_arrays_or_numb
 
         return called
 
-    spies = {name: spy(name) for name in ("by_angles", "by_vectors", "points_of_vectors")}
-    monkeypatch.setattr(table_module, "_kernels", SimpleNamespace(Rule=_kernels.Rule, **spies))
+    lookups = {name: spy(_kernels, name) for name in ("by_angles", "by_vectors")}
+    monkeypatch.setattr(table_module, "_kernels", SimpleNamespace(**lookups))
+    coordinates = {"Rule": _coordinates.Rule, "points_of_vectors": spy(_coordinates, "points_of_vectors")}
+    monkeypatch.setattr(table_module, "_coordinates", SimpleNamespace(**coordinates))
     table, theta = made_up("isotropic"), np.linspace(0.0, 1.5, 4)
     w = unit_vector(theta, 0.0)
     table.lookup(0.5, 0.0, theta, np.pi)
@@ -108,7 +110,7 @@ def test_kernels_see_arguments_of_one_type_whether_lookups_are_of_arrays_or_numb
     table.lookup_vectors(w[0], w)
     table.lookup_vectors(w, w)
     points(table.grid, w, w)
-    assert {name: len(types) for name, types in seen.items()} == dict.fromkeys(spies, 1)
+    assert {name: len(types) for name, types in seen.items()} == dict.fromkeys((*lookups, "points_of_vectors"), 1)
     ((wi, wr, *_),) = seen["points_of_vectors"]
     assert wi == wr == (np.float64, 1, False)  # as `by_vectors` gives them
 
