@@ -175,9 +175,9 @@ def _chance(wr: Array, wi: Array, lobe: Lobe) -> float:
     import mpmath  # it takes a tenth of a second, and other findings do without it
 
     alpha = np.array([lobe.alpha_x, lobe.alpha_y], dtype=np.float64)
-    h = wr + wi
-    s = h[:, :2] / h[:, 2:] / alpha
-    t, psi = np.hypot(s[:, 0], s[:, 1]), np.arctan2(s[:, 1], s[:, 0])
+    h_x, h_y, h_z = (wr[:, axis] + wi[axis] for axis in range(3))
+    s_x, s_y = h_x / h_z / alpha[0], h_y / h_z / alpha[1]
+    t, psi = np.hypot(s_x, s_y), np.arctan2(s_y, s_x)
     t_edges = _t_edges(lobe)
     counts, _, _ = np.histogram2d(t, psi, bins=(t_edges, _PSI_EDGES))
     expected = len(wr) * _shares(wi, lobe, alpha, t_edges)

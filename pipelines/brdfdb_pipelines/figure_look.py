@@ -8,7 +8,6 @@ from collections.abc import Iterable, Sequence
 from typing import Literal, NamedTuple
 
 import numpy as np
-from matplotlib.ticker import LogLocator, MaxNLocator, MultipleLocator
 from numpy.typing import NDArray
 
 from brdfdb.figure import Curve, Numbers, Role, superscript
@@ -99,6 +98,8 @@ def ticks_of(low: float, high: float, *, log: bool, powers: bool = False) -> lis
 
     With `powers`, logarithmic axes have powers of ten as labels whatever their range, for panels side by side.
     """
+    from matplotlib.ticker import LogLocator, MaxNLocator, MultipleLocator  # it takes 0.2 s to load
+
     span = high - low
     if log and high / low > 20.0:
         locator: LogLocator | MaxNLocator | MultipleLocator = LogLocator(numticks=6)
@@ -112,6 +113,8 @@ def ticks_of(low: float, high: float, *, log: bool, powers: bool = False) -> lis
 
 def rings_of(largest: float) -> list[float]:
     """Return the radii of the rings of a polar panel, of which the last is no smaller than the largest radius."""
+    from matplotlib.ticker import MaxNLocator
+
     radii = MaxNLocator(4, steps=[1, 2, 2.5, 5, 10]).tick_values(0.0, largest or 1.0)
     return [float(radius) for radius in radii if radius > 0.0]
 

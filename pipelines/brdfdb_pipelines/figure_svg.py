@@ -7,14 +7,13 @@ from __future__ import annotations
 
 import base64
 import html
-import io
 import math
+import struct
+import zlib
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
-import matplotlib as mpl
 import numpy as np
-from matplotlib.image import imsave
 from numpy.typing import NDArray
 
 from brdfdb.figure import Curve, Map, Panel, Picture
@@ -51,7 +50,6 @@ _HANDLE = 20.8  # length of the line before a text of the legend
 _DIGIT, _SIGN, _POINT, _RAISED = 5.1, 6.7, 2.5, 3.4
 _COLOURS = 65  # number of colours of the bar beside a map
 _FAR = 2000.0  # distance below the axes of what has no logarithm: its line leaves the plot
-_NO_SOFTWARE: dict[str, str | None] = {"Software": None}
 
 
 def svg(drawing: Drawing, key: str) -> str:
@@ -184,6 +182,8 @@ def _polar(panel: Panel, key: str) -> str:
 
 def _map(drawn: Map) -> str:
     """Draw values as an image of few pixels; dark is the smallest value, or zero where both signs occur."""
+    import matplotlib as mpl
+
     box = _box(drawn.title, [], _MAP_HEIGHT, _BELOW, _MAP_RIGHT)
     values = np.array([array_of(row) for row in drawn.values])
     usable = values[np.isfinite(values) & ((values > 0.0) | (not drawn.log))]
@@ -372,9 +372,18 @@ def _image(pixels: NDArray[np.uint8], box: _Box) -> str:
 
 def _png(pixels: NDArray[np.uint8]) -> str:
     """Return pixels (rows, columns, RGBA) as the text of a PNG."""
-    image = io.BytesIO()
-    imsave(image, pixels, format="png", metadata=_NO_SOFTWARE)  # type: ignore[arg-type]  # None leaves a name out
-    return base64.b64encode(image.getvalue()).decode("ascii")
+    rows, columns, _ = pixels.shape
+    lines = np.zeros((rows, 1 + 4 * columns), dtype=np.uint8)  # a line begins with its filter, here none
+    lines[:, 1:] = pixels.reshape(rows, -1)
+    chunks = (
+        (b"IHDR", struct.pack(">IIBBBBB", columns, rows, 8, 6, 0, 0, 0)),
+        (b"IDAT", zlib.compress(lines.tobytes(), 9)),
+        (b"IEND", b""),
+    )
+    image = b"\x89PNG\r\n\x1a\n" + b"".join(
+        struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data)) for name, data in chunks
+    )
+    return base64.b64encode(image).decode("ascii")
 
 
 def _ticks_below(ticks: Iterable[tuple[float, str]], bottom: float) -> str:
