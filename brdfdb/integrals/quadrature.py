@@ -178,7 +178,8 @@ def reflected_share(
         wi = np.broadcast_to(lights[of][:, np.newaxis, np.newaxis], wr.shape)
         values = np.asarray(brdf(wi.reshape(-1, 3), wr.reshape(-1, 3)), dtype=np.float64)
         values = values.reshape(*wr.shape[:-1], width) * np.maximum(wr[..., 2:], 0.0)
-        return np.asarray(values * (measure * sides[of][:, np.newaxis, np.newaxis])[..., np.newaxis])
+        values *= (measure * sides[of][:, np.newaxis, np.newaxis])[..., np.newaxis]
+        return values
 
     if lobe is None:
         integrand, panels, of = _over_the_hemisphere(reflected, theta.ravel(), phi.ravel(), one_side.ravel())
