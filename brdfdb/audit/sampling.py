@@ -175,9 +175,9 @@ def _chance(wr: Array, wi: Array, lobe: Lobe) -> float:
     import mpmath  # it takes a tenth of a second, and other findings do without it
 
     alpha = np.array([lobe.alpha_x, lobe.alpha_y], dtype=np.float64)
-    h = wr + wi
-    s = h[:, :2] / h[:, 2:] / alpha
-    t, psi = np.hypot(s[:, 0], s[:, 1]), np.arctan2(s[:, 1], s[:, 0])
+    h_x, h_y, h_z = (wr[:, axis] + wi[axis] for axis in range(3))
+    s_x, s_y = h_x / h_z / alpha[0], h_y / h_z / alpha[1]
+    t, psi = np.hypot(s_x, s_y), np.arctan2(s_y, s_x)
     t_edges = _t_edges(lobe)
     counts, _, _ = np.histogram2d(t, psi, bins=(t_edges, _PSI_EDGES))
     expected = len(wr) * _shares(wi, lobe, alpha, t_edges)
@@ -200,7 +200,7 @@ def _shares(wi: Array, lobe: Lobe, alpha: Array, t_edges: Array) -> Array:
     cos_h = 1.0 / np.sqrt(1.0 + s_x * s_x + s_y * s_y)
     h = np.stack([s_x * cos_h, s_y * cos_h, cos_h], axis=-1)
     h_i = h @ wi
-    wr = 2.0 * h_i[..., np.newaxis] * h - wi
+    wr = np.stack([2.0 * h_i * h[..., axis] - wi[axis] for axis in range(3)], axis=-1)
     # d omega_r = 4 abs(h.i) d omega_h, d omega_h = cos^3 d(slopes), d(slopes) = alpha_x alpha_y t dt dpsi
     measure = 4.0 * np.abs(h_i) * cos_h**3 * alpha[0] * alpha[1] * t
     return np.asarray(np.einsum("abcd,ab,cd->ac", mixture_density(lobe, wi, wr) * measure, t_weight, psi_weight))

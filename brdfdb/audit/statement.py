@@ -9,6 +9,7 @@ integrals, l1 and the floor, are judged by standard errors.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterator
 from itertools import pairwise
 from typing import Literal, NamedTuple
@@ -230,13 +231,19 @@ def limits(stated: int, fresh: int, quantile: float) -> tuple[int, int]:
 
 def _probabilities(stated: int, fresh: int, rank: int) -> Floats:
     """Return the probability that 0, 1, ..., `fresh` values are above the `rank`-th smallest of `stated` others."""
-    log_factorial = np.concatenate([[0.0], np.cumsum(np.log(np.arange(1.0, stated + fresh + 1.0)))])
+    log_factorial = _log_factorials(1 << (stated + fresh).bit_length())
     above = np.arange(fresh + 1)
     # Number of orders of all values in which so many of the fresh ones are above
     orders = _choose(log_factorial, fresh - above + rank - 1, rank - 1) + _choose(
         log_factorial, above + stated - rank, stated - rank
     )
     return np.asarray(np.exp(orders - _choose(log_factorial, np.array(stated + fresh), stated)))
+
+
+@functools.cache
+def _log_factorials(count: int) -> Floats:
+    """Return ln(n!) of n below `count`."""
+    return np.concatenate([[0.0], np.cumsum(np.log(np.arange(1.0, count)))])
 
 
 def _choose(log_factorial: Floats, n: Counts, k: int) -> Floats:

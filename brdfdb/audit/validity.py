@@ -5,17 +5,11 @@ from __future__ import annotations
 from pydantic import BaseModel, Field
 
 from brdfdb.audit.finding import RANKS, STRICT, Cell, Finding, Sentence, Subject
-from brdfdb.errors import counted
 from brdfdb.materials import Material
+from brdfdb.materials.stated_limits import counts_of, in_words, limits_of
 from brdfdb.parameters import Standing, StatedLimit
 from brdfdb.tables.grids import Axis
 
-_WORDS: dict[Standing, str] = {
-    "outside": "not kept",
-    "at the edge": "at the edge",
-    "unknown": "not known",
-    "inside": "kept",
-}
 _ORDER: tuple[Standing, ...] = ("inside", "at the edge", "outside")
 
 
@@ -56,7 +50,7 @@ class Validity(Finding):
     def sentences(self) -> list[Sentence]:
         """Return a sentence on all limits, and one on each limit with the quotation from the paper."""
         return [
-            self.sentence(self.verdict, self.in_words()),
+            self.sentence(self.verdict, in_words([limit.standing for limit in self.limits])),
             *(
                 self.sentence(
                     limit.standing,
@@ -71,27 +65,15 @@ class Validity(Finding):
 
     def cells(self) -> list[Cell]:
         """Return the number of limits that are not kept, or at the edge."""
-        edges = [(word, count) for word, count in self._counts() if word in ("at the edge", "outside")]
-        text = ", ".join(f"{count} of {len(self.limits)} limits {_WORDS[word]}" for word, count in edges)
-        return [Cell(self.verdict, text, -RANKS[self.verdict])]
-
-    def in_words(self) -> str:
-        """Return the number of limits that are kept, at the edge and not kept, in a few words."""
-        if not self.limits:
-            return "its paper states no limits"
-        counts = ", ".join(f"{count} {_WORDS[word]}" for word, count in self._counts())
-        return f"its paper states {counted(len(self.limits), 'limit')}: {counts}"
-
-    def _counts(self) -> list[tuple[Standing, int]]:
-        """Return the standings that occur, the worst first, with the number of limits of each."""
         standings = [limit.standing for limit in self.limits]
-        return [(word, standings.count(word)) for word in _WORDS if word in standings]
+        edges = [words for word, words in counts_of(standings) if word in ("at the edge", "outside")]
+        text = ", ".join(words.replace(" ", f" of {len(self.limits)} limits ", 1) for words in edges)
+        return [Cell(self.verdict, text, -RANKS[self.verdict])]
 
 
 def validity_of(material: Material, wavelength_nm: Axis | None) -> Validity:
     """Return the limits of the model, judged at the wavelengths [nm] of the table."""
-    stated = material.spec.limits
-    limits = [] if stated is None else [_limit(limit) for limit in stated(material.arguments(wavelength_nm))]
+    limits = [_limit(limit) for limit in limits_of(material, wavelength_nm)]
     known = [limit.standing for limit in limits if limit.standing != "unknown"]
     return Validity(limits=limits, verdict=max(known, key=_ORDER.index, default="inside"))
 

@@ -178,7 +178,8 @@ def reflected_share(
         wi = np.broadcast_to(lights[of][:, np.newaxis, np.newaxis], wr.shape)
         values = np.asarray(brdf(wi.reshape(-1, 3), wr.reshape(-1, 3)), dtype=np.float64)
         values = values.reshape(*wr.shape[:-1], width) * np.maximum(wr[..., 2:], 0.0)
-        return np.asarray(values * (measure * sides[of][:, np.newaxis, np.newaxis])[..., np.newaxis])
+        values *= (measure * sides[of][:, np.newaxis, np.newaxis])[..., np.newaxis]
+        return values
 
     if lobe is None:
         integrand, panels, of = _over_the_hemisphere(reflected, theta.ravel(), phi.ravel(), one_side.ravel())
@@ -325,9 +326,9 @@ def mirrored_on_rays(
     # dt / dx
     jacobian = np.sqrt(1.0 + t * t) * stretch
     cos_h = 1.0 / np.sqrt(1.0 + t * t * s2)
-    h = np.stack([t * s_x * cos_h, t * s_y * cos_h, cos_h], axis=-1)
     h_i = (cos_i + t * p) * cos_h
-    wi = np.stack(np.broadcast_arrays(*i), axis=-1)
-    wr = 2.0 * h_i[..., np.newaxis] * h - wi
+    wr = np.empty((*np.shape(t), 3))
+    for axis, (h, w_i) in enumerate(((t * s_x * cos_h, x_i), (t * s_y * cos_h, y_i), (cos_h, cos_i))):
+        wr[..., axis] = 2.0 * h_i * h - w_i
     # d omega_r = 4 (h.i) d omega_h, d omega_h = cos^3 d(slopes), d(slopes) = alpha_x alpha_y t dt dpsi
     return wr, np.asarray(4.0 * h_i * cos_h**3 * (alpha_x * alpha_y) * t * jacobian)

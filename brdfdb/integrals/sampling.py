@@ -162,15 +162,16 @@ def directions(lobe: Lobe, u1: Array, u2: Array, i: Array) -> Array:
     angle = 2.0 * np.pi * u2
     mirror = _mirrored_in_visible if lobe.visible else mirrored_in_lobe
     mirrored = mirror(np.clip(stretched, _TINY, 1.0), angle, i, lobe)
-    return np.where(in_lobe[..., np.newaxis], mirrored, _cosine_weighted(np.clip(stretched, 0.0, 1.0), angle))
+    others = _cosine_weighted(np.clip(stretched, 0.0, 1.0), angle)
+    chosen = [np.where(in_lobe, mirrored[..., axis], other) for axis, other in enumerate(others)]
+    return _vectors(*chosen)
 
 
 def mirrored_in_lobe(u1: Array, angle: Array, i: Array, lobe: Lobe) -> Array:
     """Return the light (..., 3) mirrored in half vectors whose slopes follow the distribution of the lobe."""
     radius = lobe.distribution.radius(u1)
     s_x, s_y = radius * lobe.alpha_x * np.cos(angle), radius * lobe.alpha_y * np.sin(angle)
-    s_x, s_y = np.broadcast_arrays(s_x, s_y)
-    return _mirrored(np.stack([s_x, s_y, np.ones_like(s_x)], axis=-1), i)
+    return _mirrored((s_x, s_y, np.ones(())), i)
 
 
 def _mirrored_in_visible(u1: Array, angle: Array, i: Array, lobe: Lobe) -> Array:
@@ -180,23 +181,33 @@ def _mirrored_in_visible(u1: Array, angle: Array, i: Array, lobe: Lobe) -> Array
     x, y, z = np.broadcast_arrays(lobe.alpha_x * i[..., 0], lobe.alpha_y * i[..., 1], i[..., 2])
     w = np.stack([x, y, z], axis=-1) / _stretched_length(i, lobe)[..., np.newaxis]
     h_x, h_y, h_z = np.moveaxis(lobe.distribution.visible(u1, angle, w), -1, 0)
-    return _mirrored(np.stack([lobe.alpha_x * h_x, lobe.alpha_y * h_y, h_z], axis=-1), i)
+    return _mirrored((lobe.alpha_x * h_x, lobe.alpha_y * h_y, h_z), i)
 
 
 def _stretched_length(i: Array, lobe: Lobe) -> Array:
     return np.asarray(np.sqrt((lobe.alpha_x * i[..., 0]) ** 2 + (lobe.alpha_y * i[..., 1]) ** 2 + i[..., 2] ** 2))
 
 
-def _mirrored(h: Array, i: Array) -> Array:
-    """Return the light mirrored in half vectors of any length."""
-    h = h / np.sqrt(np.maximum(np.sum(h * h, axis=-1, keepdims=True), _TINY))
-    return np.asarray(2.0 * np.sum(h * i, axis=-1, keepdims=True) * h - i)
+def _mirrored(h: tuple[Array, Array, Array], i: Array) -> Array:
+    """Return the light mirrored in half vectors of any length, of which `h` holds the components."""
+    x, y, z = h
+    length = np.sqrt(np.maximum(x * x + y * y + z * z, _TINY))
+    unit = x / length, y / length, z / length
+    h_i = unit[0] * i[..., 0] + unit[1] * i[..., 1] + unit[2] * i[..., 2]
+    return _vectors(*(2.0 * h_i * component - i[..., axis] for axis, component in enumerate(unit)))
 
 
-def _cosine_weighted(u1: Array, angle: Array) -> Array:
+def _vectors(x: Array, y: Array, z: Array) -> Array:
+    """Return vectors (..., 3) of components, written one by one: arithmetic along an axis of three numbers is slow."""
+    vectors = np.empty((*np.broadcast_shapes(x.shape, y.shape, z.shape), 3))
+    for axis, component in enumerate((x, y, z)):
+        vectors[..., axis] = component
+    return vectors
+
+
+def _cosine_weighted(u1: Array, angle: Array) -> tuple[Array, Array, Array]:
     sin_theta = np.sqrt(u1)
-    x, y, z = np.broadcast_arrays(sin_theta * np.cos(angle), sin_theta * np.sin(angle), np.sqrt(1.0 - u1))
-    return np.stack([x, y, z], axis=-1)
+    return sin_theta * np.cos(angle), sin_theta * np.sin(angle), np.sqrt(1.0 - u1)
 
 
 def mixture_density(lobe: Lobe, i: Array, r: Array) -> Array:

@@ -91,7 +91,7 @@ class Material(BaseModel, Lookups):
     known_excess: KnownExcess | None = None
 
     # Arguments of the model that replace those of the material: for its lossless form, or without its uniform part
-    _changed: dict[str, float | Spectrum] = PrivateAttr(default_factory=dict)
+    _changed: dict[str, float | Spectrum | NDArray[np.float64]] = PrivateAttr(default_factory=dict)
 
     @classmethod
     def from_table(cls, name: str, table: Mapping[str, Any], folder: Path | None = None) -> Material:
@@ -240,7 +240,7 @@ class Material(BaseModel, Lookups):
 
     def without_uniform(self) -> Material:
         """Return the material without its uniform part."""
-        return self if self.spec.uniform is None else self._with({self.spec.uniform: 0.0})
+        return self if self.spec.uniform is None else self.changed({self.spec.uniform: 0.0})
 
     @property
     def lossless(self) -> Lossless | None:
@@ -248,9 +248,10 @@ class Material(BaseModel, Lookups):
         if self.spec.lossless is None:
             return None
         changes = made_lossless(self.spec.lossless, self.parameters)
-        return Lossless(self._with(changes), changes)
+        return Lossless(self.changed(changes), changes)
 
-    def _with(self, changes: Mapping[str, float | Spectrum]) -> Material:
+    def changed(self, changes: Mapping[str, float | Spectrum | NDArray[np.float64]]) -> Material:
+        """Return the material with other arguments of its model, such as n and k [1] at the wavelengths of a table."""
         changed = self.model_copy()
         changed._changed = {**self._changed, **changes}
         return changed
@@ -270,8 +271,7 @@ class Material(BaseModel, Lookups):
         Parameters
         ----------
         wavelength_nm : array_like [nm], optional
-            Wavelengths for a spectral material. The default is the wavelengths for which the parameters are stated.
-            Grey materials ignore them.
+            Wavelengths for a spectral material, by default those of its parameters; grey materials ignore them.
 
         Returns
         -------
@@ -287,8 +287,7 @@ class Material(BaseModel, Lookups):
         given = {**self.parameters, **self._changed}
         if not self.spectral:
             return given
-        if wavelength_nm is None:
-            wavelength_nm = self.wavelengths_nm
+        wavelength_nm = self.wavelengths_nm if wavelength_nm is None else wavelength_nm
         if wavelength_nm is None:
             reason = f"its model {self.model} is spectral" if self.spec.spectral else "a parameter is a spectrum"
             raise ParameterError("wavelength_nm", f"{self.name} needs wavelengths, {reason}")
@@ -298,9 +297,10 @@ class Material(BaseModel, Lookups):
         }
         if self.refractive_index is None:
             return arguments
+        if {"n", "k"} <= self._changed.keys():  # the entry takes half a second to load
+            return arguments | {"wavelength_nm": wavelength}
         n, k = refractive_index(self.refractive_index, wavelength)
-        indices = {"wavelength_nm": wavelength, "n": n, "k": k}
-        return arguments | {name: value for name, value in indices.items() if name not in self._changed}
+        return {**arguments, "wavelength_nm": wavelength, "n": arguments.get("n", n), "k": arguments.get("k", k)}
 
     def brdf_at(
         self,

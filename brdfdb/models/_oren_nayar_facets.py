@@ -280,8 +280,8 @@ def _normalisation(sigma: float, x_max: float, nodes: NDArray[np.float64], weigh
 
 @kernel
 def _gaussian(
-    t_i: float,
-    t_r: float,
+    t_small: float,
+    t_large: float,
     cos_dphi: float,
     sin_dphi: float,
     sigma: float,
@@ -294,11 +294,11 @@ def _gaussian(
 ) -> tuple[float, float]:
     """Return direct and twice reflected light [1] of eq. (8) with eqs (10) to (20), from the tangents of polar angles.
 
-    The weight of eq. (26) is not normalised. x and w are the nodes and weights of the quadrature.
+    `sin_dphi` is not negative. The weight of eq. (26) is not normalised. x and w are the nodes and weights of the
+    quadrature.
     """
-    if math.isnan(t_i + t_r + cos_dphi + sin_dphi):
+    if math.isnan(t_small + t_large + cos_dphi + sin_dphi):
         return math.nan, math.nan
-    t_small, t_large, sin_dphi = min(t_i, t_r), max(t_i, t_r), abs(sin_dphi)
     direct = bounced = 0.0
     # Half a turn of azimuths is enough, since a cavity has two facets. It is split into the azimuths where the two
     # slopes have the same sign and those where they have opposite signs. The slopes are t sin(azimuth from one end) and
@@ -370,7 +370,10 @@ def gaussian(*features: Floats, lit: bool = True, bounce: bool = True, nodes: in
     columns = np.empty((len(features), int(np.prod(shape))))
     for column, feature in zip(columns, features, strict=True):
         column[:] = np.broadcast_to(feature, shape).ravel()
-    # the albedo of a facet is no feature: materials of one sigma share the integrals
+    # Light and viewer may be exchanged, and the plane of incidence mirrored: such pairs share the integrals
+    columns[:2] = np.minimum(columns[0], columns[1]), np.maximum(columns[0], columns[1])
+    np.abs(columns[3], out=columns[3])
+    # The albedo of a facet is no feature: materials of one sigma share the integrals
     direct, bounced = shared(
         columns, ("gaussian", lit, bounce, nodes), lambda: _integrated(columns, lit, bounce, nodes)
     )

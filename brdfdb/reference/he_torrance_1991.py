@@ -191,13 +191,13 @@ def series(g: Number, V: Number) -> Number:
     """
     with mp.workdps(mp.dps + 20):  # log(largest term) is a difference of numbers near g ln g
         g, V = mp.mpf(g), mp.mpf(V)
-        total = mp.zero
+        total, least = mp.zero, mp.mpf("1e-50")
         if g > 0:
             peak = _largest_term(g, V)
             for start, step in ((peak, 1), (peak - 1, -1)):
                 for term in _terms(g, V, start, step):
                     total += term
-                    if term < total * mp.mpf("1e-50"):
+                    if term < total * least:
                         break
     return +total  # rounded to the 40 digits
 

@@ -12,7 +12,7 @@ from pydantic import BaseModel, Field
 from brdfdb.geometry import radians
 from brdfdb.integrals.quadrature import MOST_PANELS, Albedo, reflected_share
 from brdfdb.lobes import narrowest
-from brdfdb.materials import Source
+from brdfdb.materials import FunctionRecord, Source
 from brdfdb.parameters import Floats
 from brdfdb.tables.first_numbers import LargestAlbedo
 from brdfdb.tables.grids import Axis
@@ -56,7 +56,9 @@ class TableAlbedo(NamedTuple):
         return np.asarray(np.einsum("tpw,p->tw", self.albedo, weights))
 
 
-def directional_albedo(table: Table, theta_i_deg: Axis | None = None, tolerance: float | None = None) -> TableAlbedo:
+def directional_albedo(
+    table: Table, theta_i_deg: Axis | None = None, tolerance: float | None = None, source: Source | None = None
+) -> TableAlbedo:
     """Integrate f_r cos theta_r over the hemisphere [1], as the table gives f_r between its nodes.
 
     Parameters
@@ -67,6 +69,8 @@ def directional_albedo(table: Table, theta_i_deg: Axis | None = None, tolerance:
         The lights, in [0, 90].
     tolerance : float [1], optional
         Absolute tolerance of the quadrature, where the integral is not exact; by default `tolerance_of`.
+    source : Source, optional
+        Source whose lobe the quadrature follows; by default that of the table.
 
     Returns
     -------
@@ -84,7 +88,8 @@ def directional_albedo(table: Table, theta_i_deg: Axis | None = None, tolerance:
     """
     if not linear_in_angles(table):
         within = tolerance_of(table) if tolerance is None else tolerance
-        return _integrated(table, THETA_I_DEG if theta_i_deg is None else theta_i_deg, within)
+        of_lobe = table.source if source is None else source
+        return _integrated(table, of_lobe, THETA_I_DEG if theta_i_deg is None else theta_i_deg, within)
     nodes = table.axes_deg["theta_i"]
     theta_weights = _theta_weights(radians(table.axes_deg["theta_r"]))
     if table.anisotropic:
@@ -278,13 +283,15 @@ def wavelengths_of(table: Table) -> int:
     return 1 if table.wavelength_nm is None else table.wavelength_nm.size
 
 
-def _integrated(table: Table, theta_i_deg: Axis, tolerance: float) -> TableAlbedo:
+def _integrated(
+    table: Table, source: Source | FunctionRecord | None, theta_i_deg: Axis, tolerance: float
+) -> TableAlbedo:
     """Return the albedo by quadrature of lookups, at all wavelengths at once."""
     width = wavelengths_of(table)
     phi_i_deg = np.zeros(1)
     if table.grid.turned:
         phi_i_deg = np.arange(0.0, 360.0 / table.grid.copies + 1.0, _PHI_I_STEP_DEG)
-    source, theta_i = table.source, radians(theta_i_deg)[:, np.newaxis]
+    theta_i = radians(theta_i_deg)[:, np.newaxis]
 
     def brdf(wi: Floats, wr: Floats) -> Floats:
         return table.lookup_vectors(wi, wr).reshape(len(wr), width)

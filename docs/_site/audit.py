@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import NamedTuple
 
 from brdfdb.audit import AuditReport, MaterialAudit
-from brdfdb_pipelines import figure_svg
+from brdfdb_pipelines import figure_look
 
 _PLOT = re.compile(r'<figure class="(\w+)" data-name="([^"]+)-\d+">(<svg.*?</svg>)</figure>', re.DOTALL)
-_STYLES = Path(figure_svg.__file__).parent / "templates" / "page.css"
+_STYLES = Path(figure_look.__file__).parent / "templates" / "page.css"
 
 
 class Plot(NamedTuple):
@@ -50,7 +50,7 @@ def style() -> str:
     text = _STYLES.read_text(encoding="utf-8")
     dark = text[text.index("prefers-color-scheme: dark") :]
     dark = dark[: dark.index("\n}")]
-    light = {name: colour for colour, name in figure_svg.VARIABLES.items()} | _colours(text[: text.index("@media")])
+    light = {name: colour for colour, name in figure_look.VARIABLES.items()} | _colours(text[: text.index("@media")])
     return f"html {{{_listed(light)}}}\nhtml[data-theme=dark] {{{_listed(_colours(dark))}}}\n"
 
 

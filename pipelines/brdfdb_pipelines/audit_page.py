@@ -13,7 +13,7 @@ from brdfdb.audit.energy import Energy
 from brdfdb.audit.finding import LAST, LEVELS, RANKS, Cell, Finding, NotJudged, NumberTable, Word
 from brdfdb.audit.validity import Validity
 from brdfdb.figure import Figure
-from brdfdb_pipelines import figure_svg, html_page
+from brdfdb_pipelines import figure_look, figure_svg, html_page
 
 PAPERS = {
     "ward1992": "Ward 1992: Measuring and modeling anisotropic reflection",
@@ -108,7 +108,7 @@ def render(report: AuditReport, plots: Mapping[str, list[Plot]] | None = None) -
         columns=columns(),
         counts=[(word, sum(verdict == word for verdict in energy.values())) for word in _COUNTED],
         gallery=_by_paper(report.gallery),
-        colours=figure_svg.VARIABLES,
+        colours=figure_look.VARIABLES,
     )
 
 

@@ -12,12 +12,12 @@ from matplotlib.figure import Figure as Canvas
 
 from brdfdb.figure import Figure, Panel
 from brdfdb.store.files import write_file
-from brdfdb_pipelines import figure_svg
+from brdfdb_pipelines import figure_canvas
 
 _COLUMNS, _PLOT, _LEFT, _RIGHT, _ABOVE, _BELOW, _HEAD = 2, 150.0, 46.0, 12.0, 44.0, 38.0, 40.0  # in points
 _WIDTH = 360.0  # of a column
 _DPI = 110
-_STYLE: dict[Any, Any] = figure_svg.STYLE | {"svg.hashsalt": "brdfdb", "font.family": "sans-serif"}
+_STYLE: dict[Any, Any] = figure_canvas.STYLE | {"svg.hashsalt": "brdfdb", "font.family": "sans-serif"}
 _BLANK: dict[str, Any] = {"Date": None, "Creator": None, "Format": None, "Type": None}
 
 
@@ -33,7 +33,7 @@ def svg(figure: Figure) -> str:
     with mpl.rc_context(_STYLE):
         text = io.StringIO()
         _drawn(figure).savefig(text, format="svg", metadata=_BLANK)
-    opening, rest = figure_svg.kept_ids(figure_svg.shortened(text.getvalue()), "c").split(">", 1)
+    opening, rest = figure_canvas.kept_ids(figure_canvas.shortened(text.getvalue()), "c").split(">", 1)
     described = html.escape(f"{figure.title}. {figure.caption}")
     plate = '<rect width="100%" height="100%" fill="#fff"/>'
     return f'{opening} font-family="sans-serif" role="img" aria-label="{described}">{plate}{rest}\n'
@@ -63,7 +63,7 @@ def _drawn(figure: Figure) -> Canvas:
         axes.tick_params(length=0)
         canvas.text((left + 8.0) / width, 1.0 - (top + 6.0) / height, panel.title, va="top", fontweight="bold")
         canvas.legend(
-            handles=figure_svg.curves_on(axes, panel, powers=True),
+            handles=figure_canvas.curves_on(axes, panel),
             loc="upper left",
             bbox_to_anchor=((left + 4.0) / width, 1.0 - (top + 14.0) / height),
             ncols=2,

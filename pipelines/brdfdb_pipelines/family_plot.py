@@ -16,7 +16,7 @@ from matplotlib.text import OffsetFrom
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
 from brdfdb.forms.tradeoff_document import Between, Curve, Diagnostic, FamilyChart, Form
-from brdfdb_pipelines import figure_svg, terminal
+from brdfdb_pipelines import figure_look, terminal
 from brdfdb_pipelines.plot_panels import (
     BELOW,
     GAP,
@@ -97,7 +97,7 @@ def drawn(whole: FamilyChart) -> Canvas:
     _costs(canvas.add_axes(box(left, _FAMILY_ABOVE, WIDTH - RIGHT - left)), whole)
     forms: list[Curve | Between] = [*whole.curves, *([whole.between] if whole.between else [])]
     bar = Line2D(
-        [], [], color=figure_svg.MUTED, linewidth=3.0, alpha=0.3, label="from the least to the most of the members"
+        [], [], color=figure_look.MUTED, linewidth=3.0, alpha=0.3, label="from the least to the most of the members"
     )
     legend(canvas, {form.kind for form in forms}, [bar], bottom, height)
     table_of(
@@ -141,7 +141,7 @@ def _sweep(
 
 
 def headed(axes: Axes, text: str) -> None:
-    axes.set_title(text, fontsize=8, color=figure_svg.MUTED, loc="left")
+    axes.set_title(text, fontsize=8, color=figure_look.MUTED, loc="left")
 
 
 def _diagnostic(axes: Axes, x: list[float], diagnostic: Diagnostic) -> None:

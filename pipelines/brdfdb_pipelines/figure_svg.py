@@ -1,85 +1,55 @@
-"""Panels, maps and pictures as inline SVG, whose colours are variables of the page that they stand on."""
+"""Panels, maps and pictures as inline SVG, whose colours are variables of the page that they stand on.
+
+The SVG is written as text, because matplotlib takes 45 ms for a plot of two lines.
+"""
 
 from __future__ import annotations
 
 import base64
 import html
-import io
 import math
-import re
-from collections import Counter
-from collections.abc import Iterable
-from typing import Any, Literal, NamedTuple
+import struct
+import zlib
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple
 
-import matplotlib as mpl
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure as Canvas
-from matplotlib.image import imsave
-from matplotlib.lines import Line2D
-from matplotlib.patches import Wedge
-from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, MaxNLocator, MultipleLocator, NullLocator
 from numpy.typing import NDArray
 
-from brdfdb.figure import Curve, Map, Numbers, Panel, Picture, Role, superscript
+from brdfdb.figure import Curve, Map, Panel, Picture
+from brdfdb_pipelines.figure_look import (
+    DOT,
+    FRAME_WIDTH,
+    GRID,
+    GRID_WIDTH,
+    MUTED,
+    TRUTH,
+    VARIABLES,
+    Look,
+    Tick,
+    array_of,
+    limits_of,
+    looks_of,
+    plain,
+    rings_of,
+    ticks_of,
+)
 
 Floats = NDArray[np.float64]
 Drawing = Panel | Map | Picture
 
-# What is drawn with, and the variable that stands in its place. The light page has these very colours, which tell
-# apart with any kind of colour blindness (after Okabe and Ito); they differ in their lines, too.
-OURS, PRINTED, TEXTBOOK, TRUTH = "#0b5fc0", "#c8401e", "#b47400", "#1b2028"
-OTHERS = ("#00806b", "#8c4aa6", "#3e97cf", "#c0568f", "#77771e", "#6b7280")
-GRID, MUTED = "#dde2e8", "#5a6470"
 PLATE = "#14171c"  # behind pictures, in the dark as in the light
-VARIABLES = {
-    OURS: "--ours",
-    PRINTED: "--printed",
-    TEXTBOOK: "--textbook",
-    TRUTH: "--truth",
-    **{colour: f"--other-{index}" for index, colour in enumerate(OTHERS)},
-    GRID: "--grid",
-    MUTED: "--muted",
-}
-
-
-class _Look(NamedTuple):
-    """Look of a line, and the lines below it: a thin truth stays visible on a strong line of ours."""
-
-    colour: str
-    width: float
-    dashes: tuple[float, ...]
-    order: int
-
-
-_LOOKS = {
-    "ours": _Look(OURS, 2.2, (), 3),
-    "printed": _Look(PRINTED, 1.5, (4, 2), 4),
-    "textbook": _Look(TEXTBOOK, 1.6, (1, 1.4), 4),
-    "truth": _Look(TRUTH, 0.9, (), 5),
-}
-_DOT = 3.4  # diameter [point] of a sample
-_OTHER_DASHES = ((), (6, 1.5), (5, 1.5, 1, 1.5), (2, 1), (8, 1.5, 1, 1.5, 1, 1.5), (1, 2.5))
 
 # In points, of which a figure is as wide whatever it shows: rows of figures keep in line
 WIDTH, _PLOT_HEIGHT, _LEFT, _RIGHT, _BELOW, _ROW, _TITLE = 300.0, 150.0, 44.0, 10.0, 34.0, 12.0, 15.0
-_LETTER, _SAMPLE = 4.9, 34.0  # width of a letter of the legend, on average, and of what stands before the text
-STYLE: dict[Any, Any] = {
-    "svg.fonttype": "none",  # text stays text: small, and set in the font of the page
-    "text.parse_math": False,  # a $ in a name is one
-    "path.simplify": True,
-    "font.size": 8.0,
-    "axes.edgecolor": GRID,
-    "axes.labelcolor": MUTED,
-    "xtick.labelcolor": MUTED,
-    "ytick.labelcolor": MUTED,
-    "text.color": TRUTH,
-    "axes.linewidth": 0.8,
-    "axes.axisbelow": True,
-}
-_PIXELS_PER_INCH = 72  # of maps
-_BLANK: dict[str, Any] = {"Date": None, "Creator": None, "Format": None, "Type": None}
-_NO_SOFTWARE: Any = {"Software": None}
+_POLAR_HEIGHT, _POLAR_BELOW = 156.0, 18.0
+_MAP_HEIGHT, _MAP_RIGHT, _BAR_GAP, _BAR_WIDTH = 162.0, 62.0, 7.5, 7.5
+_LETTER, _SAMPLE = 4.9, 34.0  # width of a letter of the legend, on average, and of what stands around the text
+_HANDLE = 20.8  # length of the line before a text of the legend
+# Widths of the characters of ticks
+_DIGIT, _SIGN, _POINT, _RAISED = 5.1, 6.7, 2.5, 3.4
+_COLOURS = 65  # number of colours of the bar beside a map
+_FAR = 2000.0  # distance below the axes of what has no logarithm: its line leaves the plot
 
 
 def svg(drawing: Drawing, key: str) -> str:
@@ -105,83 +75,117 @@ def svg(drawing: Drawing, key: str) -> str:
     """
     if isinstance(drawing, Picture):
         return _picture(drawing)
-    with mpl.rc_context({**STYLE, "svg.hashsalt": key}):
-        if isinstance(drawing, Map):
-            canvas = _map(drawing)
-        else:
-            canvas = _polar(drawing) if drawing.kind == "polar" else _curves(drawing)
-        text = io.StringIO()
-        canvas.savefig(text, format="svg", transparent=True, dpi=_PIXELS_PER_INCH, metadata=_BLANK)
-    return _inline(text.getvalue(), key, _described(drawing))
+    if isinstance(drawing, Map):
+        return _map(drawing)
+    return _polar(drawing, key) if drawing.kind == "polar" else _curves(drawing, key)
 
 
-def _curves(panel: Panel) -> Canvas:
-    canvas, axes = _canvas(panel.title, [curve.label for curve in panel.curves], _PLOT_HEIGHT)
-    _legend(canvas, curves_on(axes, panel), bool(panel.title))
-    return canvas
+class _Axis(NamedTuple):
+    """An axis: its limits, and where they lie in the drawing."""
+
+    low: float
+    high: float
+    begin: float
+    end: float
+    log: bool
+
+    def at(self, values: Floats) -> Floats:
+        """Return the positions of values; what has no logarithm lies far before the beginning."""
+        low, high = self.low, self.high
+        if self.log:
+            low, high = math.log(low), math.log(high)
+            with np.errstate(divide="ignore"):
+                values = np.log(np.maximum(values, 0.0))
+        positions = self.begin + (values - low) * ((self.end - self.begin) / (high - low))
+        far = self.begin - math.copysign(_FAR, self.end - self.begin)
+        return np.asarray(np.where(np.isneginf(values), far, positions))
+
+    def values_at(self, positions: NDArray[np.floating]) -> Floats:
+        """Return the values at positions."""
+        share = (positions - self.begin) / (self.end - self.begin)
+        if self.log:
+            return np.asarray(self.low * (self.high / self.low) ** share)
+        return np.asarray(self.low + (self.high - self.low) * share)
+
+    def placed(self, ticks: Sequence[Tick]) -> list[tuple[float, str]]:
+        """Return the positions of ticks, with their labels."""
+        return list(zip(self.at(np.array([tick.at for tick in ticks])).tolist(), (t.label for t in ticks), strict=True))
 
 
-def curves_on(axes: Axes, panel: Panel, *, powers: bool = False) -> list[Line2D]:
-    """Draw the curves of a panel, its axes and their labels; return the lines, for a legend.
+class _Box(NamedTuple):
+    """The place of axes in a drawing of a height, below its title and its legend."""
 
-    With `powers`, logarithmic axes have powers of ten as labels whatever their range, for panels side by side.
-    """
-    lines = _lines(panel.curves)
-    for index, (curve, line) in enumerate(zip(panel.curves, lines, strict=True)):
-        line.set_data(curve.x, _array(curve.y).tolist())
-        line.set_gid(f"curve-{index}")
-        axes.add_line(line)
-    _scale(axes, "x", [x for curve in panel.curves for x in curve.x], log=panel.log_x, powers=powers)
-    _scale(axes, "y", [y for curve in panel.curves for y in curve.y], log=panel.log_y, powers=powers)
-    axes.grid(color=GRID, linewidth=0.6, clip_on=False)
-    axes.set_xlabel(panel.x_label)
-    axes.set_ylabel(panel.y_label)
-    axes.spines[["top", "right"]].set_visible(False)
-    return lines
+    left: float
+    right: float
+    top: float
+    bottom: float
+    height: float
+
+    @property
+    def middle(self) -> float:
+        return (self.left + self.right) / 2.0
 
 
-def _polar(panel: Panel) -> Canvas:
+def _curves(panel: Panel, key: str) -> str:
+    box = _box(panel.title, panel.curves, _PLOT_HEIGHT, _BELOW)
+    limits = limits_of([x for curve in panel.curves for x in curve.x], "x", log=panel.log_x)
+    x = _Axis(*limits, box.left, box.right, panel.log_x)
+    limits = limits_of([y for curve in panel.curves for y in curve.y], "y", log=panel.log_y)
+    y = _Axis(*limits, box.bottom, box.top, panel.log_y)
+    across, up = (axis.placed(ticks_of(axis.low, axis.high, log=axis.log)) for axis in (x, y))
+    grid = "".join(f"M{_n(at)} {_n(box.top)}V{_n(box.bottom)}" for at, _ in across)
+    grid += "".join(f"M{_n(box.left)} {_n(at)}H{_n(box.right)}" for at, _ in up)
+    frame = f"M{_n(box.left)} {_n(box.top)}V{_n(box.bottom)}H{_n(box.right)}"
+    parts = [
+        f'<path d="{grid}" {_line(GRID, GRID_WIDTH)}/>' if grid else "",
+        f'<path d="{frame}" {_line(GRID, FRAME_WIDTH)}/>',
+        _ticks_below(across, box.bottom),
+        _ticks_beside(up, box.left - 3.5, "end"),
+        _label_below(panel.x_label, box),
+        _turned(panel.y_label, box.left - 9.4 - _widest(up), (box.top + box.bottom) / 2.0),
+    ]
+    points = [(x.at(np.array(curve.x)), y.at(array_of(curve.y))) for curve in panel.curves]
+    return _whole(panel, box, [*parts, _lines(panel.curves, points, box, key)])
+
+
+def _polar(panel: Panel, key: str) -> str:
     """Draw the upper half disc, with the normal at the top."""
     if panel.log_x or panel.log_y:
         raise ValueError(f"{panel.title!r}: the axes of a polar panel are linear")
     if any(abs(x) > 90.0 for curve in panel.curves for x in curve.x):
         raise ValueError(f"{panel.title!r}: angles of a polar panel are between -90 and 90 degrees")
-    canvas, axes = _canvas(panel.title, [curve.label for curve in panel.curves], _PLOT_HEIGHT + 6.0, below=18.0)
-    values = [y for curve in panel.curves for y in curve.y if y is not None]
-    rings = [
-        r for r in MaxNLocator(4, steps=[1, 2, 2.5, 5, 10]).tick_values(0.0, max(values, default=0.0) or 1.0) if r > 0.0
-    ]
-    edge = rings[-1]
+    box = _box(panel.title, panel.curves, _POLAR_HEIGHT, _POLAR_BELOW)
+    box = box._replace(left=6.0, right=WIDTH - 6.0)
+    rings = rings_of(max((y for curve in panel.curves for y in curve.y if y is not None), default=0.0))
+    radius = min((box.right - box.left) / 2.2, (box.bottom - box.top) / 1.18)  # what is beside and below has labels
+    x, y = box.middle, box.top + 1.1 * radius
+    arcs, labels = "", ""
     for ring in rings:
-        axes.add_patch(Wedge((0.0, 0.0), ring / edge, 0.0, 180.0, fill=False, edgecolor=GRID, linewidth=0.6))
-        axes.text(ring / edge, -0.03, _plain(ring), ha="center", va="top", color=MUTED, fontsize=7)
+        r = radius * ring / rings[-1]
+        arcs += f"M{_n(x - r)} {_n(y)}A{_n(r)} {_n(r)} 0 0 1 {_n(x + r)} {_n(y)}z"
+        labels += _text(x + r, y + 9.2, plain(ring))
     for angle in (-60, -30, 0, 30, 60):
         across, up = math.sin(math.radians(angle)), math.cos(math.radians(angle))
-        axes.add_line(Line2D([0.0, across], [0.0, up], color=GRID, linewidth=0.6))
-        axes.text(1.07 * across, 1.05 * up, f"{_plain(angle)}°", ha="center", va="center", color=MUTED, fontsize=7)
-    lines = _lines(panel.curves)
-    for index, (curve, line) in enumerate(zip(panel.curves, lines, strict=True)):
-        theta, radius = np.radians(curve.x), _array(curve.y) / edge
-        line.set_data((radius * np.sin(theta)).tolist(), (radius * np.cos(theta)).tolist())
-        line.set_gid(f"curve-{index}")
-        axes.add_line(line)
-    box = axes.get_position()
-    axes.set_position((0.02, box.y0, 0.96, box.height))
-    axes.set_aspect("equal")
-    axes.set_xlim(-1.1, 1.1)
-    axes.set_ylim(-0.08, 1.1)
-    axes.xaxis.set_major_locator(NullLocator())
-    axes.yaxis.set_major_locator(NullLocator())
-    axes.spines[:].set_visible(False)
-    axes.set_xlabel(f"{panel.y_label} over {panel.x_label}", labelpad=3.0)
-    _legend(canvas, lines, bool(panel.title))
-    return canvas
+        arcs += f"M{_n(x)} {_n(y)}L{_n(x + radius * across)} {_n(y - radius * up)}"
+        labels += _text(x + 1.07 * radius * across, y + 1.8 - 1.05 * radius * up, f"{plain(angle)}°")
+    parts = [
+        f'<path d="{arcs}" {_line(GRID, GRID_WIDTH)}/>',
+        f'<g style="font-size:7px;text-anchor:middle;fill:{_colour(MUTED)}">{labels}</g>',
+        _labels("middle", _text(x, box.bottom + 9.2, f"{panel.y_label} over {panel.x_label}")),
+    ]
+    points = []
+    for curve in panel.curves:
+        theta, distance = np.radians(curve.x), array_of(curve.y) * (radius / rings[-1])
+        points.append((x + distance * np.sin(theta), y - distance * np.cos(theta)))
+    return _whole(panel, box, [*parts, _lines(panel.curves, points, box, key)])
 
 
-def _map(drawn: Map) -> Canvas:
+def _map(drawn: Map) -> str:
     """Draw values as an image of few pixels; dark is the smallest value, or zero where both signs occur."""
-    canvas, axes = _canvas(drawn.title, [], _PLOT_HEIGHT + 12.0, right=62.0)
-    values = np.array([_array(row) for row in drawn.values])
+    import matplotlib as mpl
+
+    box = _box(drawn.title, [], _MAP_HEIGHT, _BELOW, _MAP_RIGHT)
+    values = np.array([array_of(row) for row in drawn.values])
     usable = values[np.isfinite(values) & ((values > 0.0) | (not drawn.log))]
     low, high = (float(usable.min()), float(usable.max())) if usable.size else (1.0, 10.0)
     name = "viridis"
@@ -192,33 +196,36 @@ def _map(drawn: Map) -> Canvas:
         low, high = (low / 2.0, 2.0 * high) if drawn.log else (low - 0.5, high + 0.5)
     low = low if drawn.low is None else drawn.low
     high = high if drawn.high is None else drawn.high
-    norm = (mpl.colors.LogNorm if drawn.log else mpl.colors.Normalize)(low, high, clip=True)
-    shown = np.ma.masked_invalid(np.where(values > 0.0, values, np.nan) if drawn.log else values)
-    axes.set_xscale("log" if drawn.log_x else "linear")
-    axes.set_yscale("log" if drawn.log_y else "linear")
-    x, y = _edges(drawn.x, log=drawn.log_x), _edges(drawn.y, log=drawn.log_y)
-    axes.pcolormesh(x, y, shown, cmap=name, norm=norm, rasterized=True)
-    if len(drawn.x) > 1 and len(drawn.y) > 1:  # half of the outermost values would lie beyond the axes
-        axes.set_xlim(drawn.x[0], drawn.x[-1])
-        axes.set_ylim(drawn.y[0], drawn.y[-1])
-    _ticks(axes, "x", *axes.get_xlim(), log=drawn.log_x)
-    _ticks(axes, "y", *axes.get_ylim(), log=drawn.log_y)
-    axes.set_xlabel(drawn.x_label)
-    axes.set_ylabel(drawn.y_label)
-    box = axes.get_position()
-    bar = canvas.add_axes((box.x1 + 0.025, box.y0, 0.025, box.height))
-    steps = np.geomspace(low, high, 65) if drawn.log else np.linspace(low, high, 65)
-    middle = np.sqrt(steps[1:] * steps[:-1]) if drawn.log else (steps[1:] + steps[:-1]) / 2.0
-    bar.pcolormesh([0.0, 1.0], steps, middle[:, np.newaxis], cmap=name, norm=norm, rasterized=True)
-    bar.set_yscale("log" if drawn.log else "linear")
-    bar.set_ylim(low, high)
-    _ticks(bar, "y", low, high, log=drawn.log)
-    bar.xaxis.set_major_locator(NullLocator())
-    bar.yaxis.tick_right()
-    bar.yaxis.set_label_position("right")
-    bar.tick_params(length=0)
-    bar.set_ylabel(drawn.value_label)
-    return canvas
+    bar = _Axis(low, high, box.bottom, box.top, drawn.log)
+
+    def pixels(values: Floats) -> NDArray[np.uint8]:
+        share = (bar.at(values) - bar.begin) / (bar.end - bar.begin)
+        share = np.where((values > 0.0) | (not drawn.log), np.clip(share, 0.0, 1.0), np.nan)
+        return np.asarray(mpl.colormaps[name](np.ma.masked_invalid(share), bytes=True))
+
+    x_edges, y_edges = _edges(drawn.x, log=drawn.log_x), _edges(drawn.y, log=drawn.log_y)
+    # Half of the outermost values would lie beyond the axes
+    whole = len(drawn.x) > 1 and len(drawn.y) > 1
+    (left, *_, right), (below, *_, above) = (drawn.x, drawn.y) if whole else (x_edges.tolist(), y_edges.tolist())
+    x = _Axis(left, right, box.left, box.right, drawn.log_x)
+    y = _Axis(below, above, box.bottom, box.top, drawn.log_y)
+    columns = _cells(x_edges, x.values_at(box.left + 0.5 + np.arange(round(box.right - box.left))))
+    rows = _cells(y_edges, y.values_at(box.top + 0.5 + np.arange(round(box.bottom - box.top))))
+    at = box.right + _BAR_GAP
+    steps = bar.values_at(box.top + (np.arange(_COLOURS) + 0.5) * ((box.bottom - box.top) / _COLOURS))
+    bar_box = box._replace(left=at, right=at + _BAR_WIDTH)
+    across, up, beside = (axis.placed(ticks_of(axis.low, axis.high, log=axis.log)) for axis in (x, y, bar))
+    parts = [
+        _image(pixels(values[rows[:, np.newaxis], columns]), box),
+        _image(pixels(steps[:, np.newaxis]), bar_box),
+        _ticks_below(across, box.bottom),
+        _ticks_beside(up, box.left - 3.5, "end"),
+        _ticks_beside(beside, bar_box.right + 3.5, "start"),
+        _label_below(drawn.x_label, box),
+        _turned(drawn.y_label, box.left - 9.4 - _widest(up), (box.top + box.bottom) / 2.0),
+        _turned(drawn.value_label, bar_box.right + 14.4 + _widest(beside), (box.top + box.bottom) / 2.0),
+    ]
+    return _whole(drawn, box, parts)
 
 
 def _edges(centres: list[float], *, log: bool) -> Floats:
@@ -229,16 +236,18 @@ def _edges(centres: list[float], *, log: bool) -> Floats:
     return np.exp(edges) if log else edges
 
 
+def _cells(edges: Floats, values: Floats) -> NDArray[np.intp]:
+    return np.clip(np.searchsorted(edges, values, side="right") - 1, 0, edges.size - 2)
+
+
 def _picture(picture: Picture) -> str:
     """Draw an image in sRGB, one pixel a value; the background is transparent."""
-    radiance = np.array([_array(row) for row in picture.radiance])
+    radiance = np.array([array_of(row) for row in picture.radiance])
     linear = np.clip(np.nan_to_num(radiance), 0.0, 1.0)
     encoded = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1.0 / 2.4) - 0.055)
-    image = io.BytesIO()
     grey = np.stack([encoded] * 3 + [np.isfinite(radiance).astype(np.float64)], axis=-1)
-    imsave(image, np.round(255.0 * grey).astype(np.uint8), format="png", metadata=_NO_SOFTWARE)
+    data = _png(np.round(255.0 * grey).astype(np.uint8))
     rows, columns = radiance.shape
-    data = base64.b64encode(image.getvalue()).decode("ascii")
     side, above = 150.0, 16.0 if picture.title else 0.0
     height = side * rows / columns
     title = (
@@ -266,173 +275,157 @@ def _described(drawing: Drawing) -> str:
     return html.escape(text)
 
 
-def _canvas(
-    title: str, labels: list[str], plot: float, right: float = _RIGHT, below: float = _BELOW
-) -> tuple[Canvas, Axes]:
-    """Return a figure with room for its title and for a legend above the axes, where it hides no curve."""
-    above = 13.0 + (_TITLE if title else 0.0) + _ROW * math.ceil(len(labels) / _columns(labels))
-    height = above + plot + below
-    canvas = Canvas(figsize=(WIDTH / 72.0, height / 72.0))
-    axes = canvas.add_axes((_LEFT / WIDTH, below / height, (WIDTH - _LEFT - right) / WIDTH, plot / height))
-    axes.tick_params(length=0)
-    if title:
-        canvas.text(6.0 / WIDTH, 1.0 - 4.0 / height, title, va="top", fontsize=9, fontweight="bold")
-    return canvas, axes
+def _box(title: str, curves: Sequence[Curve], plot: float, below: float, right: float = _RIGHT) -> _Box:
+    """Return the place of axes, with room for a title and a legend above, where it hides no curve."""
+    top = 13.0 + (_TITLE if title else 0.0) + _ROW * math.ceil(len(curves) / _columns([c.label for c in curves]))
+    return _Box(_LEFT, WIDTH - right, top, top + plot, top + plot + below)
 
 
-def _columns(labels: list[str]) -> int:
-    """Return the number of columns of a legend that fit; matplotlib fills them one after the other."""
+def _whole(drawing: Panel | Map, box: _Box, parts: Iterable[str]) -> str:
+    """Return a drawing with its title, and with the legend of a panel."""
+    title = ""
+    if drawing.title:
+        look = f"font-size:9px;font-weight:700;fill:{_colour(TRUTH)}"
+        title = f'<text x="6" y="10.8" style="{look}">{_escaped(drawing.title)}</text>'
+    legend = "" if isinstance(drawing, Map) else _legend(drawing.curves, _TITLE if drawing.title else 0.0)
+    inside = "".join([title, legend, *parts])
+    size = f'viewBox="0 0 {WIDTH:g} {_n(box.height)}"'
+    return f'<svg {size} role="img" aria-label="{_described(drawing)}">{inside}</svg>'
+
+
+def _columns(labels: Sequence[str]) -> int:
+    """Return the number of columns of a legend that fit; its columns are filled one after the other."""
     for columns in range(len(labels), 1, -1):
-        widest = [max(map(len, column)) for column in np.array_split(np.array(labels), columns)]
-        if sum(_SAMPLE + _LETTER * letters for letters in widest) < WIDTH - 12.0:
+        if sum(_widths(labels, columns)) < WIDTH - 12.0:
             return columns
     return 1
 
 
-def _legend(canvas: Canvas, lines: list[Line2D], titled: bool) -> None:
-    top = 1.0 - (4.0 + (_TITLE if titled else 0.0)) / (72.0 * canvas.get_figheight())
-    canvas.legend(
-        handles=lines,
-        loc="upper left",
-        bbox_to_anchor=(2.0 / WIDTH, top),
-        ncols=_columns([str(line.get_label()) for line in lines]),
-        frameon=False,
-        borderpad=0.2,
-        labelspacing=0.35,
-        handlelength=2.6,
-        columnspacing=1.2,
-        handletextpad=0.5,
-        fontsize=8,
+def _widths(labels: Sequence[str], columns: int) -> list[float]:
+    parts = np.array_split(np.array(labels), columns)
+    return [_SAMPLE + _LETTER * max(map(len, part.tolist()), default=0) for part in parts]
+
+
+def _legend(curves: Sequence[Curve], above: float) -> str:
+    labels = [curve.label for curve in curves]
+    columns = _columns(labels)
+    column_of = np.array_split(np.arange(len(curves)), columns)
+    lefts = np.cumsum([7.6, *_widths(labels, columns)]).tolist()
+    looks = looks_of(curves)
+    handles, texts = "", ""
+    for left, members in zip(lefts[:-1], column_of, strict=True):
+        for row, index in enumerate(members.tolist()):
+            y = 12.9 + above + _ROW * row
+            path = f"M{_n(left + _HANDLE / 2.0)} {_n(y)}h0" if curves[index].dots else f"M{_n(left)} {_n(y)}h{_HANDLE}"
+            handles += f'<path d="{path}" {_drawn(curves[index], looks[index])}/>'
+            texts += _text(left + _HANDLE + 4.0, y + 2.8, labels[index])
+    return f'{handles}<g style="font-size:8px;fill:{_colour(TRUTH)}">{texts}</g>' if labels else ""
+
+
+def _lines(curves: Sequence[Curve], points: Sequence[tuple[Floats, Floats]], box: _Box, key: str) -> str:
+    """Return the curves inside the axes, those above others last."""
+    looks = looks_of(curves)
+    lines = [
+        f'<g data-curve="{index}"><path d="{_path(*points[index], dots=curves[index].dots)}" '
+        f"{_drawn(curves[index], looks[index])}/></g>"
+        for index in sorted(range(len(curves)), key=lambda index: looks[index].order)
+    ]
+    left, top, width, height = (_n(v) for v in (box.left, box.top, box.right - box.left, box.bottom - box.top))
+    inside = f'<clipPath id="{key}-axes"><rect x="{left}" y="{top}" width="{width}" height="{height}"/></clipPath>'
+    return f'{inside}<g clip-path="url(#{key}-axes)">{"".join(lines)}</g>'
+
+
+def _path(x: Floats, y: Floats, *, dots: bool) -> str:
+    """Return the path of a line through points, with gaps where one is not finite, or a point at each of them."""
+    path, pen = [], "M"
+    for across, down, seen in zip(x.tolist(), y.tolist(), (np.isfinite(x) & np.isfinite(y)).tolist(), strict=True):
+        if not seen:
+            pen = "M"
+            continue
+        path.append(f"{pen}{_n(across)} {_n(down)}{'h0' if dots else ''}")
+        pen = "M" if dots else "L" if pen == "M" else " "
+    return "".join(path)
+
+
+def _drawn(curve: Curve, look: Look) -> str:
+    """Return the attributes of the path of a curve."""
+    if curve.dots:
+        return _line(look.colour, DOT, "round")
+    dashes = ",".join(_n(look.width * dash) for dash in look.dashes)
+    return _line(look.colour, look.width, "" if dashes else "square", dashes)
+
+
+def _line(colour: str, width: float, cap: str = "", dashes: str = "") -> str:
+    style = f"fill:none;stroke:{_colour(colour)};stroke-width:{width:g}"
+    style += f";stroke-linecap:{cap}" if cap else ""
+    return f'style="{style}{f";stroke-dasharray:{dashes}" if dashes else ""}"'
+
+
+def _image(pixels: NDArray[np.uint8], box: _Box) -> str:
+    left, top, width, height = (_n(v) for v in (box.left, box.top, box.right - box.left, box.bottom - box.top))
+    place = f'x="{left}" y="{top}" width="{width}" height="{height}"'
+    return (
+        f'<image {place} preserveAspectRatio="none" href="data:image/png;base64,{_png(pixels)}"/>'
+        f"<rect {place} {_line(GRID, FRAME_WIDTH)}/>"
     )
 
 
-def _lines(curves: list[Curve]) -> list[Line2D]:
-    """Draw an empty line for each curve, in the style of its role, or in the next style of the cycle."""
-    lines, others = [], 0
-    seen: Counter[Role] = Counter()
-    for curve in curves:
-        if curve.role == "other":
-            look = _Look(OTHERS[others % len(OTHERS)], 1.5, _OTHER_DASHES[others % len(OTHERS)], 3)
-            others += 1
-        else:
-            look = _LOOKS[curve.role]
-            if seen[curve.role]:  # more of one role: the same colour, other dashes
-                look = look._replace(dashes=_OTHER_DASHES[(seen[curve.role] + 1) % len(_OTHER_DASHES)])
-            seen[curve.role] += 1
-        line = Line2D(
-            [],
-            [],
-            color=look.colour,
-            linewidth=look.width,
-            linestyle="none" if curve.dots else (0, look.dashes) if look.dashes else "-",
-            marker="o" if curve.dots else "none",
-            markersize=_DOT,
-            markeredgewidth=0.0,
-            zorder=look.order,
-        )
-        line.set_label(curve.label)
-        lines.append(line)
-    return lines
+def _png(pixels: NDArray[np.uint8]) -> str:
+    """Return pixels (rows, columns, RGBA) as the text of a PNG."""
+    rows, columns, _ = pixels.shape
+    lines = np.zeros((rows, 1 + 4 * columns), dtype=np.uint8)  # a line begins with its filter, here none
+    lines[:, 1:] = pixels.reshape(rows, -1)
+    chunks = (
+        (b"IHDR", struct.pack(">IIBBBBB", columns, rows, 8, 6, 0, 0, 0)),
+        (b"IDAT", zlib.compress(lines.tobytes(), 9)),
+        (b"IEND", b""),
+    )
+    image = b"\x89PNG\r\n\x1a\n" + b"".join(
+        struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data)) for name, data in chunks
+    )
+    return base64.b64encode(image).decode("ascii")
 
 
-def _scale(
-    axes: Axes, which: Literal["x", "y"], values: Iterable[float | None], *, log: bool, powers: bool = False
-) -> None:
-    """Set limits and ticks; limits start at 0 where that costs less than half of the height."""
-    finite = [v for v in values if v is not None and math.isfinite(v) and (v > 0.0 or not log)]
-    low, high = (min(finite), max(finite)) if finite else (0.1, 1.0)
-    if log:
-        low, high = (low / 2.0, high * 2.0) if low == high else (low, high)
-        pad = (high / low) ** (0.04 if which == "y" else 0.0)
-        low, high = low / pad, high * pad
-    else:
-        if low == high:
-            low, high = low - 0.5, high + 0.5
-        if which == "y":
-            if 0.0 <= low < 0.5 * high:
-                low = 0.0
-            pad = 0.04 * (high - low)
-            low, high = (low if low == 0.0 else low - pad), high + pad
-    (axes.set_xscale if which == "x" else axes.set_yscale)("log" if log else "linear")
-    (axes.set_xlim if which == "x" else axes.set_ylim)(low, high)
-    _ticks(axes, which, low, high, log=log, powers=powers)
+def _ticks_below(ticks: Iterable[tuple[float, str]], bottom: float) -> str:
+    return _labels("middle", "".join(_text(at, bottom + 9.6, label) for at, label in ticks))
 
 
-def _ticks(axes: Axes, which: Literal["x", "y"], low: float, high: float, *, log: bool, powers: bool = False) -> None:
-    axis = axes.xaxis if which == "x" else axes.yaxis
-    span = high - low
-    if log and high / low > 20.0:
-        axis.set_major_locator(LogLocator(numticks=6))
-        as_power = powers or high / low > 1e5  # all labels of an axis or none
-        axis.set_major_formatter(FuncFormatter(lambda value, _: _power(value) if as_power else _plain(value)))
-    else:
-        degrees = any(abs(span - turn) < 0.1 * turn for turn in (90.0, 180.0, 360.0))
-        locator = MultipleLocator(15.0 * round(span / 90.0)) if degrees else MaxNLocator(6, steps=[1, 2, 2.5, 5, 10])
-        inside = [tick for tick in locator.tick_values(low, high) if low <= tick <= high]
-        axis.set_major_locator(FixedLocator(inside))
-        axis.set_major_formatter(FuncFormatter(lambda value, _: _plain(value)))
-    axis.set_minor_locator(NullLocator())
+def _ticks_beside(ticks: Iterable[tuple[float, str]], x: float, anchor: str) -> str:
+    return _labels(anchor, "".join(_text(x, at + 3.0, label) for at, label in ticks))
 
 
-def _plain(value: float) -> str:
-    return f"{value:.6g}".replace("-", "−")
+def _widest(ticks: Iterable[tuple[float, str]]) -> float:
+    """Return the width [point] of the widest label."""
+    widths = {**dict.fromkeys("0123456789", _DIGIT), "−": _SIGN, ".": _POINT}
+    return max((sum(widths.get(letter, _RAISED) for letter in label) for _, label in ticks), default=0.0)
 
 
-def _power(value: float) -> str:
-    """Return the label of a power of ten; empty below the smallest float."""
-    if value <= 0.0:
-        return ""
-    exponent = round(math.log10(value))
-    return "10" + superscript(exponent) if exponent else "1"
+def _label_below(label: str, box: _Box) -> str:
+    return _labels("middle", _text(box.middle, box.bottom + 21.6, label))
 
 
-def _array(values: Numbers) -> Floats:
-    return np.array([math.nan if value is None else value for value in values], dtype=np.float64)
+def _turned(label: str, x: float, y: float) -> str:
+    """Return a text that runs upwards."""
+    turn = f'transform="rotate(-90 {_n(x)} {_n(y)})"'
+    return _labels("middle", f'<text x="{_n(x)}" y="{_n(y)}" {turn}>{_escaped(label)}</text>') if label else ""
 
 
-def shortened(text: str) -> str:
-    """Return an SVG of matplotlib from its first tag on, without invisible digits, names and bytes."""
-    text = text[text.index("<svg") :]
-    for unseen in (
-        r"<!--.*?-->",
-        r"<metadata>.*?</metadata>",
-        r"<defs>\s*<style.*?</defs>",
-        r"<g id=\"patch_1\">.*?</g>",
-    ):
-        text = re.sub(unseen, "", text, flags=re.DOTALL)
-    text = re.sub(r"font-family:[^;\"]*;?", "", text)  # that of the page
-    return re.sub(r"<[^>]+>", _terse, text)
+def _labels(anchor: str, texts: str) -> str:
+    return f'<g style="font-size:8px;text-anchor:{anchor};fill:{_colour(MUTED)}">{texts}</g>' if texts else ""
 
 
-def kept_ids(text: str, prefix: str) -> str:
-    """Return an SVG in which only elements that others refer to have ids, each with a prefix."""
-    used = set(re.findall(r'(?:url\(|href=")#([^)"]+)', text))
-    text = re.sub(r' id="([^"]*)"', lambda m: f' id="{prefix}-{m[1]}"' if m[1] in used else "", text)
-    text = re.sub(r'(url\(|href=")#', rf"\1#{prefix}-", text)
-    text = re.sub(r">\s+<", "><", text).strip()
-    return re.sub(r"<g/>|<g></g>", "", text)
+def _text(x: float, y: float, text: str) -> str:
+    return f'<text x="{_n(x)}" y="{_n(y)}">{_escaped(text)}</text>' if text else ""
 
 
-def _inline(text: str, key: str, described: str) -> str:
-    """Return an SVG for a page, with variables for colours and unique ids."""
-    text = shortened(text)
-    (box,) = re.findall(r'viewBox="[^"]*"', text)
-    text = text[text.index(">") + 1 :]
-    text = re.sub(r"<[^>]+>", _with_variables, text)
-    text = re.sub(r' id="curve-(\d+)"', r' data-curve="\1"', text).replace("xlink:href", "href")
-    return f'<svg {box} role="img" aria-label="{described}">{kept_ids(text, key)}'
+def _escaped(text: str) -> str:
+    return html.escape(text, quote=False)
 
 
-def _with_variables(tag: re.Match[str]) -> str:
-    return re.sub(r"#[0-9a-f]{6}\b", lambda colour: f"var({VARIABLES[colour[0]]})", tag[0])
+def _colour(colour: str) -> str:
+    return f"var({VARIABLES[colour]})"
 
 
-def _terse(tag: re.Match[str]) -> str:
-    """Return a tag with one decimal per point."""
-    text = re.sub(r' transform="rotate\(-0 [^"]*"', "", tag[0])
-    if "scale(" not in text:
-        text = re.sub(r"-?\d+\.\d{2,}(?!\w)", lambda number: f"{float(number[0]):.1f}".removesuffix(".0"), text)
-    text = re.sub(r"\s+", " ", text)
-    if not re.search(r"[CQ] ", text):
-        text = re.sub(r"(?<=\d) L ", " ", text)  # a line goes on as one; a curve would as a curve
-    return text.replace(": ", ":").replace("; ", ";").replace(' "', '"')
+def _n(value: float) -> str:
+    """Return a position with one decimal."""
+    return f"{value:.1f}".removesuffix(".0")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from brdfdb.figure import Figure
 from brdfdb.fitting.document import Fits
-from brdfdb_pipelines import figure_svg, html_page
+from brdfdb_pipelines import figure_look, figure_svg, html_page
 
 
 def render(document: Fits, figure: Figure) -> str:
@@ -33,6 +33,6 @@ def render(document: Fits, figure: Figure) -> str:
             best=document.fits[0],
             plots=plots,
             captions={"curves": f"{cuts}.", "map": maps},
-            colours=figure_svg.VARIABLES,
+            colours=figure_look.VARIABLES,
         )
     )

@@ -14,13 +14,13 @@ from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullLocat
 
 from brdfdb.forms.catalogue import Kind
 from brdfdb.forms.tradeoff_document import Chart, FamilyChart, Form
-from brdfdb_pipelines import figure_svg, terminal
+from brdfdb_pipelines import figure_look, terminal
 
 WIDTH, PLOT, ABOVE, BELOW, ROW = 1000.0, 270.0, 64.0, 58.0, 12.0  # points
 LEFT, GAP, RIGHT = 66.0, 14.0, 12.0
 SMALLEST = 1e-6  # smaller errors are drawn at this one: the exact form, and forms that differ from it by rounding
 _LETTER, LINE = 4.1, 9.0  # width and height of a letter of a label, on average
-LEADER: dict[str, Any] = {"arrowstyle": "-", "color": figure_svg.MUTED, "linewidth": 0.5}
+LEADER: dict[str, Any] = {"arrowstyle": "-", "color": figure_look.MUTED, "linewidth": 0.5}
 _NEAR = 10.0  # distance [points] of a text from its point beyond which a line joins them
 
 
@@ -30,14 +30,14 @@ class Look(NamedTuple):
 
 
 LOOKS: dict[Kind, Look] = {
-    "exact": Look(figure_svg.TRUTH, "o"),
-    "quadrature": Look(figure_svg.TRUTH, "P"),
-    "closed form": Look(figure_svg.OURS, "D"),
-    "approximation": Look(figure_svg.TEXTBOOK, "s"),
-    "customary": Look(figure_svg.OTHERS[2], "p"),
-    "printed": Look(figure_svg.PRINTED, "X"),
-    "other model": Look(figure_svg.MUTED, "v"),
-    "table": Look(figure_svg.OTHERS[0], "^"),
+    "exact": Look(figure_look.TRUTH, "o"),
+    "quadrature": Look(figure_look.TRUTH, "P"),
+    "closed form": Look(figure_look.OURS, "D"),
+    "approximation": Look(figure_look.TEXTBOOK, "s"),
+    "customary": Look(figure_look.OTHERS[2], "p"),
+    "printed": Look(figure_look.PRINTED, "X"),
+    "other model": Look(figure_look.MUTED, "v"),
+    "table": Look(figure_look.OTHERS[0], "^"),
 }
 
 
@@ -58,7 +58,7 @@ def wavelengths(chart: Chart | FamilyChart) -> str:
 def error_axis(axes: Axes, top: float) -> None:
     axes.set_yscale("log")
     axes.set_ylim(SMALLEST / 2.0, top)
-    axes.grid(color=figure_svg.GRID, linewidth=0.6, clip_on=False)
+    axes.grid(color=figure_look.GRID, linewidth=0.6, clip_on=False)
     axes.tick_params(length=0)
     axes.spines[["top", "right"]].set_visible(False)
     powers = range(round(math.log10(SMALLEST)), math.floor(math.log10(top)) + 1)
@@ -121,7 +121,7 @@ def labelled(axes: Axes, labels: Sequence[Label]) -> None:
             va="center",
             fontsize=7.5,
             fontweight="bold" if label.bold else "normal",
-            color=figure_svg.TRUTH if label.bold else figure_svg.MUTED,
+            color=figure_look.TRUTH if label.bold else figure_look.MUTED,
             zorder=4,
             bbox={"facecolor": "white", "alpha": 0.7, "edgecolor": "none", "pad": 0.3},
             arrowprops={**LEADER, "relpos": (side, 0.5)} if abs(best[1]) > _NEAR else None,
@@ -165,7 +165,7 @@ def legend(canvas: Canvas, present: set[Kind], lines: Sequence[Line2D], top: flo
         if k in present
     ]
     handles.append(
-        Line2D([], [], linestyle="", color=figure_svg.TRUTH, marker="o", markersize=5, label="hollow: float32")
+        Line2D([], [], linestyle="", color=figure_look.TRUTH, marker="o", markersize=5, label="hollow: float32")
     )
     handles[-1].set_markerfacecolor("white")
     handles += lines
@@ -190,7 +190,7 @@ def table_of(
     height: float,
 ) -> None:
     """Draw a numbered row for each form, those of the front in bold."""
-    row_of(canvas, columns, 0, ("", "", *heads), top, height, color=figure_svg.MUTED)
+    row_of(canvas, columns, 0, ("", "", *heads), top, height, color=figure_look.MUTED)
     for number, (form, cells, bold) in enumerate(rows, 1):
         style = {"fontweight": "bold" if bold else "normal", "color": LOOKS[form.kind].colour}
         row_of(canvas, columns, number, (str(number), form.title, *cells), top, height, **style)

@@ -15,7 +15,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
 from brdfdb.forms.tradeoff_document import Chart, Cost, FamilyChart, Point, Sampler
-from brdfdb_pipelines import family_plot, figure_svg, terminal
+from brdfdb_pipelines import family_plot, figure_canvas, figure_look, terminal
 from brdfdb_pipelines.plot_panels import (
     ABOVE,
     BELOW,
@@ -45,7 +45,7 @@ _DPI = 110
 COLUMNS = (18.0, 230.0, 278.0, 412.0, 462.0, 512.0, 566.0, 656.0, 704.0, 756.0, 818.0, 940.0, 988.0)
 _SAMPLER_COLUMNS = (18.0, 300.0, 390.0, 480.0, 620.0, 710.0, 800.0, 940.0)
 _BARS = 76.0  # height of the panels of samplers
-_STYLE: dict[Any, Any] = figure_svg.STYLE | {"svg.hashsalt": "brdfdb", "font.family": "sans-serif"}
+_STYLE: dict[Any, Any] = figure_canvas.STYLE | {"svg.hashsalt": "brdfdb", "font.family": "sans-serif"}
 _BLANK: dict[str, Any] = {"Date": None, "Creator": None, "Format": None, "Type": None}
 
 
@@ -54,7 +54,7 @@ def svg(chart: Chart | FamilyChart) -> str:
     with mpl.rc_context(_STYLE):
         text = io.StringIO()
         _canvas(chart).savefig(text, format="svg", metadata=_BLANK)
-    opening, rest = figure_svg.kept_ids(figure_svg.shortened(text.getvalue()), "c").split(">", 1)
+    opening, rest = figure_canvas.kept_ids(figure_canvas.shortened(text.getvalue()), "c").split(">", 1)
     described = html.escape(f"{chart.title}: error of each form over its cost")
     plate = '<rect width="100%" height="100%" fill="#fff"/>'
     return f'{opening} font-family="sans-serif" role="img" aria-label="{described}">{plate}{rest}\n'
@@ -104,9 +104,9 @@ def _drawn(chart: Chart) -> Canvas:
         else:
             axes.tick_params(labelleft=False)
         left += share * room + GAP
-    lines = [Line2D([], [], color=figure_svg.OURS, linewidth=5.0, alpha=0.16, label="front")]
+    lines = [Line2D([], [], color=figure_look.OURS, linewidth=5.0, alpha=0.16, label="front")]
     if len(chart.ladder) > 1:
-        lines.append(Line2D([], [], color=figure_svg.TRUTH, linestyle=(0, (4, 2)), linewidth=1.0, label="ladder"))
+        lines.append(Line2D([], [], color=figure_look.TRUTH, linestyle=(0, (4, 2)), linewidth=1.0, label="ladder"))
     legend(canvas, {point.kind for point in chart.points}, lines, ABOVE + PLOT, height)
     fronts = {*chart.fronts.batch, *chart.fronts.single}
     rows = []
@@ -165,7 +165,7 @@ def _samplers(canvas: Canvas, chart: Chart, top: float, height: float) -> None:
         ("", "samplers of the material's model", *heads),
         top,
         height,
-        color=figure_svg.MUTED,
+        color=figure_look.MUTED,
     )
     for number, sampler in enumerate(chart.samplers, 1):
         cells = (str(number), sampler.title, *works(sampler))
@@ -179,8 +179,8 @@ def _samplers(canvas: Canvas, chart: Chart, top: float, height: float) -> None:
         axes.set_xscale("log")
         for y, work in enumerate(values):
             least = max(work.low_ms, 1e-6)
-            axes.plot([least, max(work.high_ms, least)], [y, y], color=figure_svg.OURS, linewidth=4.0, alpha=0.4)
-            axes.plot(max(work.ms, 1e-6), y, "o", color=figure_svg.OURS, markersize=4.5)
+            axes.plot([least, max(work.high_ms, least)], [y, y], color=figure_look.OURS, linewidth=4.0, alpha=0.4)
+            axes.plot(max(work.ms, 1e-6), y, "o", color=figure_look.OURS, markersize=4.5)
         axes.set_yticks(range(len(values)), [sampler.key for sampler in chart.samplers])
         axes.set_ylim(len(values) - 0.4, -0.6)
         ends = [max(value, 1e-6) for work in values for value in (work.low_ms, work.high_ms)]
@@ -190,7 +190,7 @@ def _samplers(canvas: Canvas, chart: Chart, top: float, height: float) -> None:
         )
         axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         axes.xaxis.set_minor_locator(NullLocator())
-        axes.grid(color=figure_svg.GRID, linewidth=0.6, axis="x")
+        axes.grid(color=figure_look.GRID, linewidth=0.6, axis="x")
         axes.tick_params(length=0)
         axes.spines[["top", "right"]].set_visible(False)
         axes.set_xlabel(f"ms to a standard deviation of 1 %: {label}")
@@ -207,10 +207,10 @@ def _panel(
         corner = costs[key][1], height_of(points[key].l1)
         steps += [(steps[-1][0], corner[1]), corner] if steps else [corner]
     if steps:
-        axes.plot(*zip(*steps, strict=True), color=figure_svg.OURS, linewidth=5.0, alpha=0.16, zorder=1, clip_on=False)
+        axes.plot(*zip(*steps, strict=True), color=figure_look.OURS, linewidth=5.0, alpha=0.16, zorder=1, clip_on=False)
     if len(chart.ladder) > 1:
         rungs = [(costs[key][1], height_of(points[key].l1)) for key in chart.ladder]
-        axes.plot(*zip(*rungs, strict=True), color=figure_svg.TRUTH, linestyle=(0, (4, 2)), linewidth=1.0, zorder=1.5)
+        axes.plot(*zip(*rungs, strict=True), color=figure_look.TRUTH, linestyle=(0, (4, 2)), linewidth=1.0, zorder=1.5)
     for key, point in points.items():
         look, (first, middle, last), y = LOOKS[point.kind], costs[key], height_of(point.l1)
         line: dict[str, Any] = {"color": look.colour, "zorder": 2, "clip_on": False}

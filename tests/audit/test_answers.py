@@ -111,4 +111,4 @@ def test_limits_that_are_not_kept_are_counted_as_such(standings: tuple[Any, ...]
     validity = material("paint").of(Validity)
     limits = [validity.limits[0].model_copy(update={"standing": standing}) for standing in standings]
     changed = validity.model_copy(update={"limits": limits})
-    assert (changed.cells()[0].text, changed.in_words()) == (cell, words)
+    assert (changed.cells()[0].text, changed.sentences()[0].text) == (cell, words)

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 
-from brdfdb_pipelines import audit_page, figure_svg
+from brdfdb_pipelines import audit_page, figure_look
 from tests.pipelines.a_report import ODD, whole
 
 PROBE = """<script>
@@ -123,7 +123,7 @@ def test_the_page_works_in_a_browser_at_any_width(browser: str, tmp_path: Path, 
         assert each["filtered"] == ["oxide"]
         assert each["open"] == ["m-brass"]
         assert ET.fromstring(each["saved"]).tag == "{http://www.w3.org/2000/svg}svg"
-        assert figure_svg.OURS in each["saved"]
+        assert figure_look.OURS in each["saved"]
         assert "var(" not in each["saved"]
 
 

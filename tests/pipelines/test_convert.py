@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from brdfdb.figure import Panel, curve_of
 from brdfdb_pipelines import recipe_file
-from brdfdb_pipelines.figure_svg import curves_on
+from brdfdb_pipelines.figure_canvas import curves_on
 from tests.pipelines.command import Captured, run
 
 
@@ -67,7 +67,7 @@ def test_logarithmic_panels_side_by_side_have_the_same_kind_of_labels() -> None:
         curve = curve_of("a lobe", [0.0, 1.0], [low, 1.0])
         panel = Panel(x_label="x", y_label="y", curves=[curve], log_y=True)
         axes = Figure().add_subplot()
-        curves_on(axes, panel, powers=True)
+        curves_on(axes, panel)
         labels.append([label.get_text() for label in axes.get_yticklabels()])
     assert "10⁻²" in labels[0]
     assert "10⁻⁴" in labels[1]

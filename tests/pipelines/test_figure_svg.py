@@ -13,7 +13,7 @@ import pytest
 from matplotlib.image import imread
 
 from brdfdb.figure import Curve, Map, Panel, Picture, Role, numbers
-from brdfdb_pipelines import figure_svg
+from brdfdb_pipelines import figure_look, figure_svg
 
 RNG = np.random.default_rng(7)
 X = np.linspace(0.0, 90.0, 40)
@@ -86,6 +86,23 @@ def test_what_is_missing_is_a_gap() -> None:
     assert len(points(svg, 0)) == len(X) - 2
 
 
+def test_what_has_no_logarithm_leaves_the_axes_downwards() -> None:
+    y = Y.copy()
+    y[10] = 0.0
+    svg = figure_svg.svg(panel(curve(y), log_y=True), "key")
+    drawn = points(svg, 0)
+    (bottom,) = {float(v) for v in re.findall(r"V([\d.]+)H", svg)}
+    assert -drawn[10, 1] > bottom
+    assert -np.delete(drawn, 10, axis=0)[:, 1].max() < bottom
+    assert "clip-path" in svg
+
+
+def test_samples_are_dots_that_no_line_joins() -> None:
+    svg = figure_svg.svg(panel(Curve(label="samples", x=[0.0, 1.0, 2.0], y=[1.0, None, 3.0], dots=True)), "key")
+    (path,) = re.findall(r'<g data-curve="0"><path d="([^"]*)"[^>]*stroke-linecap:round', svg)
+    assert re.fullmatch(r"(M[\d.]+ [\d.]+h0){2}", path)
+
+
 def test_lines_of_a_role_look_the_same_whatever_is_beside_them() -> None:
     def looks(svg: str) -> list[str]:
         found = re.findall(r'<g data-curve="(\d)"><path [^>]*style="([^"]*)"', svg)
@@ -151,14 +168,14 @@ def test_a_drawing_is_small_well_formed_and_in_variables(name: str) -> None:
     assert root.get("aria-label")
     assert len(svg) < LARGEST
     assert set(re.findall(r"#[0-9a-f]{6}\b", svg)) <= {figure_svg.PLATE}
-    assert set(re.findall(r"var\((--[\w-]+)\)", svg)) <= set(figure_svg.VARIABLES.values())
+    assert set(re.findall(r"var\((--[\w-]+)\)", svg)) <= set(figure_look.VARIABLES.values())
     assert "http" not in svg
     assert "<style" not in svg  # would be one of the page
 
 
 @pytest.mark.parametrize("name", DRAWINGS)
 def test_every_step_of_a_path_has_the_numbers_that_it_needs(name: str) -> None:
-    wanted = {"M": 2, "L": 2, "Q": 4, "C": 6, "z": 0}
+    wanted = {"M": 2, "L": 2, "H": 1, "V": 1, "h": 1, "A": 7, "z": 0}
     for path in re.findall(r' d="([^"]*)"', figure_svg.svg(DRAWINGS[name], "key")):
         for step, rest in re.findall(r"([A-Za-z])([^A-Za-z]*)", path):
             count = len(rest.split())
@@ -167,11 +184,12 @@ def test_every_step_of_a_path_has_the_numbers_that_it_needs(name: str) -> None:
 
 def test_a_polar_plot_stands_on_its_diameter() -> None:
     svg = figure_svg.svg(DRAWINGS["polar"], "key")
-    arcs = [path for path in re.findall(r' d="([^"]*)"', svg) if "C" in path]
-    ends = [np.array(re.findall(r"-?[\d.]+", path), dtype=float).reshape(-1, 2) for path in arcs]
+    arcs = np.array(re.findall(r"M([\d.]+) ([\d.]+)A([\d.]+) ([\d.]+) 0 0 1 ([\d.]+) ([\d.]+)z", svg), dtype=float)
     assert len(arcs) > 1
-    assert len({tuple(each[-2]) for each in ends}) == 1  # from the end of its arc each goes by the centre
-    assert all(each[0].tolist() == each[-1].tolist() and each[-1, 1] == each[-2, 1] for each in ends)
+    left, height, radius, _, right, end = arcs.T
+    assert len({*height, *end}) == 1
+    assert len(set((left + right).round(0))) == 1  # of one centre
+    assert np.abs(right - left - 2.0 * radius).max() <= 2.0 * PATH_TOLERANCE
 
 
 def test_ids_of_two_drawings_differ_and_references_find_theirs() -> None:
@@ -213,11 +231,9 @@ def test_a_map_has_a_colour_for_each_value_and_none_where_there_is_none() -> Non
 
 
 def image_of(drawn: Map) -> Any:
-    """The pixels of a map as the page shows them turned over, (rows, columns, RGBA)."""
-    image, _bar = re.findall(
-        r'<image href="data:image/png;base64,\s*([^"]+)" transform="scale\(1 -1\)', figure_svg.svg(drawn, "key")
-    )
-    return imread(io.BytesIO(base64.b64decode(image)))
+    """The pixels of a map, the lowest row first, (rows, columns, RGBA)."""
+    image, _bar = re.findall(r'<image [^>]*href="data:image/png;base64,([^"]+)"', figure_svg.svg(drawn, "key"))
+    return imread(io.BytesIO(base64.b64decode(image)))[::-1]
 
 
 def test_values_of_a_map_over_logarithmic_axes_meet_half_way_between_the_logarithms() -> None:

@@ -139,8 +139,8 @@ def test_the_page_is_html_with_figures_and_no_script(answer: Answer) -> None:
     assert figures == ["curves"] * 3 + ["map"] * 3
     first = text[text.index('<figure class="curves"') : text.index("</figure>")]
     line, dots = first[first.index('data-curve="0"') :].split('data-curve="1"')
-    assert "<use" not in line
-    assert dots.count("<use") == 21  # 18 samples in the plane and 2 at the normal; the last is that of the legend
+    assert "h0" not in line
+    assert dots.count("h0") == 20  # 18 samples in the plane and 2 at the normal
 
 
 def test_the_recipe_is_that_of_the_best_model(answer: Answer) -> None:

@@ -11,12 +11,14 @@ import numpy as np
 import pytest
 
 import brdfdb
-from brdfdb.materials import presets
+from brdfdb.materials import Material, presets
 from brdfdb.store.publication import publish_dataset
+from brdfdb.tables.albedo import directional_albedo
 from brdfdb.tables.grids import Grid
 from brdfdb.tables.layout import Layout
 from brdfdb.tables.tabulation import tabulate
 from brdfdb_pipelines import cli, terminal
+from brdfdb_pipelines.commands import show
 
 RECIPE = """\
 materials = ["rolled-brass", "scene-copper-sphere"]
@@ -227,3 +229,18 @@ def test_a_title_of_a_strange_store_cannot_write_on_the_terminal(tmp_path: Path,
 def test_an_azimuth_without_meaning_is_refused_in_degrees(built: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run("lookup", "foam", 30, 1e300, 40, 0, "--store", built) == 2
     assert capsys.readouterr().err == "brdfdb: phi_i: 1e+300 is outside [-5.72958e+16, 5.72958e+16] degrees\n"
+
+
+def test_n_and_k_of_a_table_take_the_place_of_their_entry(planned: Path) -> None:
+    """What `show` computes is the same with the n and k that the table holds."""
+    table = brdfdb.open(planned)["scene-copper-sphere"]
+    source = show._source_of(table)
+    assert isinstance(source, Material)
+    assert isinstance(table.source, Material)
+    held, looked_up = (material.arguments(table.wavelength_nm) for material in (source, table.source))
+    assert held.keys() == looked_up.keys()
+    for name, value in looked_up.items():
+        np.testing.assert_array_equal(held[name], value)
+    angles = np.array(show.ALBEDO_ANGLES_DEG)
+    albedos = [directional_albedo(table, angles, source=material).albedo for material in (source, None)]
+    np.testing.assert_array_equal(*albedos)

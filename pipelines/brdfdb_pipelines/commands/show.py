@@ -11,10 +11,12 @@ import brdfdb
 from brdfdb_pipelines.commands._arguments import add_snapshot, add_store
 
 if TYPE_CHECKING:
+    from brdfdb.materials import Material
     from brdfdb.materials.provenance import Assumption
     from brdfdb.store.family import Family
     from brdfdb.store.summary_words import Audited
     from brdfdb.tables.first_numbers import FormulaError
+    from brdfdb.tables.grids import Axis
     from brdfdb.tables.metadata import TableMetadata
     from brdfdb.tables.stated_error import Error, Overall
     from brdfdb.tables.table import Table
@@ -61,8 +63,9 @@ def _print_material(table: Table, path: Path, audited: Audited | None) -> None:
     if metadata.measured is None:
         _print_formula_error(metadata.formula_error)
     _print_answers(audited, table.name, measured=metadata.measured is not None)
-    _print_validity(table)
-    _print_albedo(table)
+    source = _source_of(table)
+    _print_validity(source, table.wavelength_nm)
+    _print_albedo(table, source)
     print(f"  files       {path} (zarr v3, {terminal.size(_stored(path))})")
 
 
@@ -259,30 +262,38 @@ def _print_answers(audited: Audited | None, name: str, *, measured: bool) -> Non
     print(f"              {whose} conserve energy? {both[1]}")
 
 
-def _print_validity(table: Table) -> None:
-    """Print how many limits of its paper a material keeps, and each limit that it does not keep."""
-    from brdfdb.audit.validity import validity_of
+def _source_of(table: Table) -> Material | None:
+    """Return the material of a table, with the n and k of the table: their entry takes half a second to load."""
     from brdfdb.materials import Material
-    from brdfdb_pipelines import terminal
 
     if not isinstance(table.source, Material):
+        return None
+    return table.source if table.n is None or table.k is None else table.source.changed({"n": table.n, "k": table.k})
+
+
+def _print_validity(material: Material | None, wavelength_nm: Axis | None) -> None:
+    """Print how many limits of its paper a material keeps, and each limit that it does not keep."""
+    from brdfdb.materials.stated_limits import in_words, limits_of
+    from brdfdb_pipelines import terminal
+
+    if material is None:
         return
-    validity = validity_of(table.source, table.wavelength_nm)
-    print(f"  validity    {validity.in_words()}")
-    for limit in validity.limits:
+    limits = limits_of(material, wavelength_nm)
+    print(f"  validity    {in_words([limit.standing for limit in limits])}")
+    for limit in limits:
         if limit.standing in ("at the edge", "outside"):
             kept = "at the edge" if limit.standing == "at the edge" else "not kept"
             print(terminal.plain(f"    {kept:<16}{limit.quantity}: {limit.value} ({limit.valid}); {limit.where}"))
 
 
-def _print_albedo(table: Table) -> None:
+def _print_albedo(table: Table, material: Material | None) -> None:
     """Print the directional albedo [1] of the table at a few angles, at the first, middle and last wavelength."""
     import numpy as np
 
     from brdfdb.geometry import radians
     from brdfdb.tables.albedo import directional_albedo
 
-    albedo = directional_albedo(table, np.array(ALBEDO_ANGLES_DEG))
+    albedo = directional_albedo(table, np.array(ALBEDO_ANGLES_DEG), source=material)
     diffuse = albedo.mean
     wavelength = table.wavelength_nm
     columns = sorted({0, diffuse.shape[1] // 2, diffuse.shape[1] - 1})
