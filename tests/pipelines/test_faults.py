@@ -24,7 +24,7 @@ from tests.pipelines.recipes import anisotropic, isotropic, material
 
 KILLS = 50
 SEED = 20261121
-WAIT_S = 60.0
+WAIT_S = 300.0
 PAUSE_S = 0.005  # between reads: the builds need the processor, too
 
 
