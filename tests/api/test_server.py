@@ -26,7 +26,7 @@ LOOKUP = "/v1/materials/grey/lookup?theta_i=10&theta_r=20"
 BODY = b'{"theta_i": 10, "theta_r": 20}'
 COUNTED = re.compile(r'^brdfdb_requests_total{route="/v1/materials/{name}/lookup",status="200"} (\d+)', re.MULTILINE)
 WAIT_S = 300  # for what takes a second or two where the machine has nothing else to do
-LAST_S = 5.0  # time in which requests on open connections are answered after the signal to stop; half a second else [s]
+LAST_S = 2.0  # time in which requests on open connections are answered after the signal to stop; half a second else [s]
 # The command that serves, and the program that it starts as a worker. A worker that a test halts is not replaced
 # meanwhile, and on a busy machine requests in flight take longer than ten seconds
 SERVE = """
