@@ -19,7 +19,6 @@ from pathlib import Path
 
 import pytest
 
-from brdfdb_api import server
 from tests.api.a_store import publish
 
 LOOKUP = "/v1/materials/grey/lookup?theta_i=10&theta_r=20"
@@ -101,9 +100,7 @@ class Serving:
 
 
 @contextlib.contextmanager
-def serving(
-    store: Path, log: Path, workers: int, *, ready: bool = True, last_s: float = server.LAST_S
-) -> Iterator[Serving]:
+def serving(store: Path, log: Path, workers: int, *, ready: bool = True, last_s: float = 0.5) -> Iterator[Serving]:
     """A command that serves a store; if `ready`, with the kernels of all workers loaded."""
     worker = log.with_name("worker")
     worker.write_text(WORKER.format(sys.executable, last_s), encoding="utf-8")
