@@ -29,7 +29,7 @@ exclude_patterns = ["_build", "**/.ipynb_checkpoints"]
 nb_execution_mode = "force"
 nb_execution_in_temp = True
 nb_execution_raise_on_error = True
-nb_execution_timeout = 300  # seconds a cell, on a busy machine too; tutorials take less than a minute
+nb_execution_timeout = 900  # seconds a cell, on a busy machine too; tutorials take less than a minute
 nb_merge_streams = True
 
 # Mitsuba's LLVM variants need LLVM 19 or newer. Without it their page is built, and its code does not run

@@ -19,7 +19,7 @@ settings.load_profile("brdfdb")
 # one another, and take time of the processor while they wait
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-_LONG = {"site", "test_house.py"}  # the site and the static checks take minutes in one piece
+_LONG = {"site", "test_house.py", "test_numba.py"}  # the site, the static checks and cold kernels take minutes
 
 
 @pytest.hookimpl(wrapper=True)

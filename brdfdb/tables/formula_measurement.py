@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.materials import Material, Source
+from brdfdb.models.shared_integrals import sharing
 from brdfdb.parameters import ModelForm
 from brdfdb.tables import error_measurement
 from brdfdb.tables.albedo import largest_albedo
@@ -93,7 +94,8 @@ def formula_error_of(source: Source, wavelength_nm: NDArray[np.float64] | None) 
             against="highest rung", rung=source.spec.highest_rung, directions=0, overall=exact, worst=None
         )
     drawn = error_measurement.draw(source, some, DIRECTIONS, SEED)
-    truth = source.brdf_at(some, rung.vectors, rung.degree)(drawn.wi, drawn.wr)
+    with sharing():  # materials of one model are measured at the same directions
+        truth = source.brdf_at(some, rung.vectors, rung.degree)(drawn.wi, drawn.wr)
     values = error_measurement.model_values(source, some, drawn.wi, drawn.wr)
     floor, above = error_measurement.floor_of(truth, drawn), drawn.above
     relative = error_measurement.relative(values, truth, floor)[above]

@@ -22,9 +22,9 @@ from brdfdb.tables.error_measurement import measure
 from brdfdb.tables.grids import Grid
 from brdfdb.tables.layout import Layout
 from brdfdb.tables.tabulation import tabulate
+from brdfdb_api import server
 from brdfdb_api.http.app import create_app
 from brdfdb_api.http.connection import Connection
-from brdfdb_api.server import Server
 from brdfdb_api.serving.log import flush
 from brdfdb_api.serving.settings import Settings
 
@@ -38,6 +38,8 @@ THETA = [0, 30, 60, 85]
 GREY = Grid({"theta_i": THETA, "theta_r": THETA, "delta_phi": [0, 90, 180]})
 TURNED = Grid({"theta_i": THETA, "phi_i": [0, 45, 90], "theta_r": THETA, "phi_r": np.arange(0, 361, 45)})
 VISIBLE_NM = np.arange(400.0, 701.0, 20.0)
+
+server.LAST_S = 0.0  # of services in this process: nobody asks them once their test is over
 
 
 def publish(root: Path, name: str, model: str, grid: Grid = GREY, *, error: bool = False, **entries: Any) -> str:
@@ -99,13 +101,13 @@ def serving(root: Path, **settings: Any) -> Iterator[str]:
     app = create_app(Settings(store=root, log_level="error", **settings))
     with socket.create_server(("127.0.0.1", 0)) as listener:
         config = uvicorn.Config(app, http=Connection, log_level="error", timeout_graceful_shutdown=1, lifespan="off")
-        server = Server(config)
-        thread = threading.Thread(target=server.run, kwargs={"sockets": [listener]})
+        service = server.Server(config)
+        thread = threading.Thread(target=service.run, kwargs={"sockets": [listener]})
         thread.start()
         try:
             yield f"http://127.0.0.1:{listener.getsockname()[1]}"
         finally:
-            server.should_exit = True
+            service.should_exit = True
             thread.join()
 
 

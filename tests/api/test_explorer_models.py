@@ -37,9 +37,8 @@ def test_a_slider_changes_the_picture_to_that_of_the_model(chromium: Chromium, a
     assert not np.array_equal(before, curve(chromium, 0))
     link = unquote(chromium.until("location.hash.includes('rho_d') && location.hash"))
     value = float(link.split("rho_d=")[1].split(")")[0])
-    parameters = {
-        each["name"]: each["value"] for each in httpx.get(f"{address}v1/materials/rolled-brass").json()["parameters"]
-    }
+    known = httpx.get(f"{address}v1/materials/rolled-brass", timeout=SECONDS).json()
+    parameters = {each["name"]: each["value"] for each in known["parameters"]}
     body = {"parameters": parameters | {"rho_d": value}}
     answer = httpx.post(f"{address}v1/models/ward/lobe?view=cut&theta_i=45&phi_i=0", json=body, timeout=SECONDS).json()
     theta, f_r = np.array(answer["axes_deg"]["theta_r"]), np.array(answer["brdf"])
@@ -136,4 +135,22 @@ def test_the_way_back_is_over_materials_and_not_over_parameters(chromium: Chromi
     shown(chromium, "material=foam")
     chromium.evaluate("history.back()")
     shown(chromium, "rolled-brass(rho_s=")
-    assert math.isfinite(float(chromium.evaluate("document.querySelector('#parameters [name=rho_s]').value")))
+    assert math.isfinite(float(chromium.until("document.querySelector('#parameters [name=rho_s]')?.value")))
+
+
+def test_sliders_are_those_of_the_last_material_whichever_model_arrives_last(chromium: Chromium, address: str) -> None:
+    opened(chromium, f"{address}#material=rolled-brass&view=cut")
+    chromium.evaluate(
+        "(was => { fetch = async (...all) => {"
+        "  if (/v1.models/.test(all[0])) await new Promise(go => release = go);"
+        "  return was(...all);"
+        "}; })(fetch)"
+    )
+    for name in ("foam", "rolled-brass"):
+        chromium.evaluate(f"location.hash = 'material={name}&view=cut'")
+        shown(chromium, f"material={name}")
+    chromium.evaluate("release(), new Promise(go => setTimeout(go, 500))")
+    assert chromium.evaluate("[...parameters.querySelectorAll('input')].map(each => each.name)") == [
+        *("rho_d", "rho_s", "alpha_x", "alpha_y")
+    ]
+    assert chromium.errors == []

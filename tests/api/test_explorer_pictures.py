@@ -150,9 +150,10 @@ def test_a_slice_has_half_angles_across_and_a_click_picks_directions(chromium: C
     assert brightness[45, 0] > brightness[45, 30] > brightness[45, 80]  # away from the half vector
     left, top, width, height = box(chromium, "#slice canvas")
     x, y = left + width * 20.5 / 90.0, top + height * (1.0 - 60.5 / 90.0)
-    for kind in ("mouseMoved", "mousePressed", "mouseReleased"):
+    chromium.send("Input.dispatchMouseEvent", type="mouseMoved", x=x, y=y)
+    assert chromium.evaluate(READ).startswith("θh 20.5°, θd 60.5°: ")  # before the click: it draws anew
+    for kind in ("mousePressed", "mouseReleased"):
         chromium.send("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", clickCount=1)
-    assert chromium.evaluate(READ).startswith("θh 20.5°, θd 60.5°: ")
     shown(chromium, "theta_r=")
     names = ("theta_i", "phi_i", "theta_r", "turn")
     theta_i, phi_i, theta_r, turn = np.deg2rad(

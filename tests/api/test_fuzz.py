@@ -16,7 +16,7 @@ from schemathesis.specs.openapi.checks import (
     status_code_conformance,
 )
 
-from tests.api.test_hostile import Server, running
+from tests.api.test_hostile import WAIT_S, Server, running
 
 SCHEMA = schemathesis.openapi.from_path(Path(__file__).parents[2] / "api" / "openapi.json")
 CHECKS = [not_a_server_error, status_code_conformance, content_type_conformance, response_schema_conformance]
@@ -47,7 +47,7 @@ def test_answers_are_as_documented_whatever_is_asked(case: schemathesis.Case, se
         if known:
             case.path_parameters.update({"name": "white"} if "name" in case.path_parameters else {})
             case.path_parameters.update({"revision": "r000001"} if "revision" in case.path_parameters else {})
-        answer = case.call(base_url=f"http://127.0.0.1:{server.port}")
+        answer = case.call(base_url=f"http://127.0.0.1:{server.port}", timeout=WAIT_S)
         case.validate_response(answer, checks=CHECKS)
         if answer.status_code >= 400:
             assert answer.headers["content-type"] == ["application/problem+json"]

@@ -12,7 +12,6 @@ import struct
 import subprocess
 import sys
 import time
-import urllib.request
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
@@ -32,6 +31,7 @@ GRID = Grid({"theta_i": [0, 30, 60, 85], "theta_r": [0, 30, 60, 85], "delta_phi"
 LOOKUP = "/v1/materials/white/lookup"
 GONE = "499"
 JSON, NPY = "application/json", "application/x-npy"
+WAIT_S = 300.0  # for what takes a second or two where the machine has nothing else to do
 MEMORY_MB = 700.0  # of the server: 240 before, 390 after the bodies of 64 MiB that it may take
 HEAD_MB = 2.0  # more after a head of 50 MB: 0.3 measured, 70 to 160 where it is kept
 
@@ -44,7 +44,7 @@ class Server:
 
     def ask(self, method: str, path: str, body: Any = None, **headers: str) -> tuple[int, str, bytes]:
         """Status, media type and body of an answer."""
-        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=60)
+        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=WAIT_S)
         try:
             named = {key.replace("_", "-"): value for key, value in headers.items()}
             chunked = not isinstance(body, bytes | str | None)
@@ -71,7 +71,7 @@ class Server:
 
     def raw(self, data: bytes, silent_s: float) -> bytes:
         """Send bytes as they are; what comes back until the server closes, resets or is silent for some seconds."""
-        with socket.create_connection(("127.0.0.1", self.port), timeout=60) as connection:
+        with socket.create_connection(("127.0.0.1", self.port), timeout=WAIT_S) as connection:
             connection.settimeout(silent_s)
             found = b""
             # refused before all was sent, or never answered
@@ -88,12 +88,22 @@ class Server:
 
     @property
     def settled_mb(self) -> float:
-        """Its memory once it grows no more: what pictures share is loaded beside the first requests."""
-        before = -1.0
-        while (now := self.resident_mb) > before + 0.1:
-            before = now
-            time.sleep(0.5)
-        return now
+        """Its memory once no thread beside the first one works: one loads what pictures share."""
+        idle, deadline = 0, time.monotonic() + WAIT_S
+        while idle < 20:
+            assert time.monotonic() < deadline
+            idle = 0 if self._works() else idle + 1
+            time.sleep(0.02)
+        return self.resident_mb
+
+    def _works(self) -> bool:
+        """Whether a thread beside the first one runs, waits for the processor or for the disk."""
+        states = set()
+        for thread in Path(f"/proc/{self.process.pid}/task").iterdir():
+            with contextlib.suppress(OSError):  # one that has ended meanwhile
+                if int(thread.name) != self.process.pid:
+                    states.add((thread / "stat").read_text().rpartition(")")[2].split()[0])
+        return not {"R", "D"}.isdisjoint(states)
 
     @property
     def resident_mb(self) -> float:
@@ -126,12 +136,11 @@ def running(folder: Path) -> Iterator[Server]:
     ):
         assert process.stdout is not None
         port = int(process.stdout.readline().rsplit(":", 1)[1].strip(" /\n"))
-        for _ in range(200):
-            with contextlib.suppress(OSError):
-                urllib.request.urlopen(f"http://127.0.0.1:{port}/readyz", timeout=5).close()
-                break
+        server, deadline = Server(process, port), time.monotonic() + WAIT_S
+        while server.ask("GET", "/readyz")[0] != 200:  # kernels are loaded, or compiled
+            assert time.monotonic() < deadline
             time.sleep(0.05)
-        yield Server(process, port)
+        yield server
         process.terminate()
 
 
@@ -346,7 +355,7 @@ def test_what_is_no_http_is_answered_with_4xx_or_not_at_all(server: Server, data
 def test_a_head_of_50_mb_is_refused_while_it_arrives(server: Server, start: bytes) -> None:
     before = server.settled_mb
     taken = 0
-    with socket.create_connection(("127.0.0.1", server.port), timeout=60) as connection:
+    with socket.create_connection(("127.0.0.1", server.port), timeout=WAIT_S) as connection:
         connection.sendall(start)
         with contextlib.suppress(BrokenPipeError, ConnectionResetError):
             while taken < 50 * 10**6:
@@ -358,14 +367,14 @@ def test_a_head_of_50_mb_is_refused_while_it_arrives(server: Server, start: byte
 @pytest.mark.parametrize("start", [b"GET /no/such/address HTTP/1.1\r\nHost: x\r\nA: ", b"GET /"])
 def test_a_head_longer_than_may_be_is_answered_with_400(server: Server, start: bytes) -> None:
     # one byte too many: where more is under way, the connection may be reset before the answer is read
-    found = server.raw(start.ljust(HEAD_BYTES + 1, b"b"), 60.0)
+    found = server.raw(start.ljust(HEAD_BYTES + 1, b"b"), WAIT_S)
     assert found.startswith(b"HTTP/1.1 400 ")
     assert json.loads(found.partition(b"\r\n\r\n")[2])["detail"] == "Address and headers are longer than 65536 bytes."
 
 
 def test_an_offer_of_http_2_is_ignored(server: Server) -> None:
     headers = {"Connection": "Upgrade, HTTP2-Settings", "Upgrade": "h2c", "HTTP2-Settings": "AAMAAABkAAQAAP__"}
-    connection = http.client.HTTPConnection("127.0.0.1", server.port, timeout=60)
+    connection = http.client.HTTPConnection("127.0.0.1", server.port, timeout=WAIT_S)
     for _ in range(2):
         connection.request("POST", LOOKUP, b'{"theta_i": 10, "theta_r": 20}', headers)
         answer = connection.getresponse()
@@ -377,7 +386,7 @@ def test_fields_behind_a_body_are_no_headers(server: Server) -> None:
     head = f"POST {LOOKUP} HTTP/1.1\r\nHost: x\r\nConnection: close\r\nTransfer-Encoding: chunked\r\n\r\n"
     body = b'{"theta_i":45,"theta_r":30}'
     fields = b"Accept: application/x-npy\r\nContent-Encoding: gzip\r\nX-Request-ID: mine\r\n\r\n"
-    with socket.create_connection(("127.0.0.1", server.port), timeout=60) as connection:
+    with socket.create_connection(("127.0.0.1", server.port), timeout=WAIT_S) as connection:
         connection.sendall(head.encode() + b"%x\r\n%b\r\n0\r\n" % (len(body), body) + fields)
         answer = b"".join(iter(lambda: connection.recv(65536), b""))
     assert answer.startswith(b"HTTP/1.1 200 ")
@@ -387,7 +396,7 @@ def test_fields_behind_a_body_are_no_headers(server: Server) -> None:
 
 def test_heads_are_counted_one_by_one(server: Server) -> None:
     # more than a head may have in all, of heads and bodies on one connection
-    connection = http.client.HTTPConnection("127.0.0.1", server.port, timeout=60)
+    connection = http.client.HTTPConnection("127.0.0.1", server.port, timeout=WAIT_S)
     body = json.dumps({"theta_i": [10] * 20_000, "theta_r": 20})
     for _ in range(5):
         connection.request("GET", f"{LOOKUP}?theta_i=10&theta_r=20", headers={"A": "b" * 20_000})
@@ -403,11 +412,11 @@ def test_a_client_that_goes_away_leaves_nothing_behind(server: Server) -> None:
     earlier = server.counted
     before = earlier[GONE]
     for _ in range(20):
-        with socket.create_connection(("127.0.0.1", server.port), timeout=60) as connection:
+        with socket.create_connection(("127.0.0.1", server.port), timeout=WAIT_S) as connection:
             connection.sendall(
                 b"POST " + LOOKUP.encode() + b" HTTP/1.1\r\nHost: x\r\nContent-Length: 1000\r\n\r\n" + b"x" * 10
             )
-    deadline = time.monotonic() + 60
+    deadline = time.monotonic() + WAIT_S
     while (found := server.counted)[GONE] < before + 20 and time.monotonic() < deadline:
         time.sleep(0.05)
     assert found[GONE] == before + 20

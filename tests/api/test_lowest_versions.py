@@ -18,6 +18,7 @@ from packaging.requirements import Requirement
 from packaging.version import Version
 
 from tests.api.a_store import client_of
+from tests.api.chromium import SECONDS
 
 PROJECT = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 FOLDER = os.environ.get("BRDFDB_LOWEST", "")
@@ -80,7 +81,7 @@ def test_the_folder_holds_what_the_project_states() -> None:
 @pytest.mark.parametrize("path", ASKED)
 def test_an_address_answers_as_with_the_present_versions(address: str, root: Path, path: str) -> None:
     present = client_of(root).get(path)
-    answer = httpx.get(f"{address}{path}", timeout=60)
+    answer = httpx.get(f"{address}{path}", timeout=SECONDS)
     assert (answer.status_code, answer.headers["content-type"]) == (
         present.status_code,
         present.headers["content-type"],
@@ -91,5 +92,5 @@ def test_an_address_answers_as_with_the_present_versions(address: str, root: Pat
 @pytest.mark.parametrize("path", POSTED)
 def test_a_body_is_answered_as_with_the_present_versions(address: str, root: Path, path: str) -> None:
     present = client_of(root).post(path, json=POSTED[path])
-    answer = httpx.post(f"{address}{path}", json=POSTED[path], timeout=60)
+    answer = httpx.post(f"{address}{path}", json=POSTED[path], timeout=SECONDS)
     assert (answer.status_code, answer.content) == (present.status_code, present.content)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import time
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -269,24 +270,29 @@ def test_beckmanns_limit_is_that_of_very_rough_surfaces() -> None:
     np.testing.assert_allclose(forms["beckmann"].evaluate(wi, wr)[:, 0], expected, rtol=LIMIT_OF_VERY_ROUGH)
 
 
-def cpu_seconds(form: Form, wi: Any, wr: Any) -> float:
-    """The least time of a few calls, on the processor: other programs do not count."""
-    wi, wr = np.resize(wi, (20_000, 3)), np.resize(wr, (20_000, 3))
-    form.evaluate(wi, wr)
+def cpu_seconds(*calls: Callable[[], Any]) -> list[float]:
+    """The least time of each call, on the processor and in turn: other programs slow all of them down, or none."""
     taken = []
-    for _ in range(5):
-        start = time.process_time()
-        form.evaluate(wi, wr)
-        taken.append(time.process_time() - start)
-    return min(taken)
+    for _ in range(20):
+        for call in calls:
+            start = time.process_time()
+            call()
+            taken.append(time.process_time() - start)
+    return [min(taken[number :: len(calls)]) for number in range(len(calls))]
+
+
+def many(form: Form, drawn: error_measurement.Draw) -> Callable[[], Any]:
+    """A call of a form at many of the directions that were drawn; what it compiles is there."""
+    wi, wr = np.resize(drawn.wi, (20_000, 3)), np.resize(drawn.wr, (20_000, 3))
+    form.evaluate(wi, wr)
+    return lambda: form.evaluate(wi, wr)
 
 
 def test_an_approximation_is_as_compiled_as_the_sum_that_it_shortens() -> None:
     # the sum takes 190 ns, the limit 45, ten terms 70; in NumPy they took 450 and 600
     forms, drawn = of(presets()["magnesium-oxide-ceramic"])
-    whole, limit, corrected, ten = (
-        cpu_seconds(forms[key], drawn.wi, drawn.wr) for key in ("sum", "beckmann", "beckmann-corrected", "ten-terms")
-    )
+    keys = ("sum", "beckmann", "beckmann-corrected", "ten-terms")
+    whole, limit, corrected, ten = cpu_seconds(*(many(forms[key], drawn) for key in keys))
     assert max(limit, corrected) < 0.6 * whole
     assert ten < 0.8 * whole
 
@@ -294,9 +300,8 @@ def test_an_approximation_is_as_compiled_as_the_sum_that_it_shortens() -> None:
 def test_closed_forms_of_all_slopes_are_one_compiled_loop() -> None:
     # 0.65 us for 24 slopes, and 3.0 us for facets with two nodes; slope by slope in NumPy they took 3.3
     forms, drawn = of(presets()["clay-vase"])
-    assert cpu_seconds(forms["closed-forms"], drawn.wi, drawn.wr) < 0.5 * cpu_seconds(
-        forms["facets-2"], drawn.wi, drawn.wr
-    )
+    closed, facets = cpu_seconds(*(many(forms[key], drawn) for key in ("closed-forms", "facets-2")))
+    assert closed < 0.5 * facets
 
 
 @pytest.mark.parametrize(
@@ -315,22 +320,18 @@ def test_rungs_cost_less_the_coarser_they_are() -> None:
     for name in ("clay-vase", "magnesium-oxide-ceramic"):
         forms, drawn = of(presets()[name])
         truth, *rungs = (forms[key] for key in forms if forms[key].kind in ("exact", "quadrature") if key[-1] != "2")
-        finest, coarsest = (cpu_seconds(form, drawn.wi, drawn.wr) for form in (truth, rungs[-1]))
+        finest, coarsest = cpu_seconds(*(many(form, drawn) for form in (truth, rungs[-1])))
         assert coarsest < 0.8 * finest, name
 
 
 def test_a_few_directions_of_one_wavelength_take_the_loop_of_many() -> None:
     # 256 directions took 2.5 times as long as they do now, each of them a row of its own
     forms, drawn = of(presets()["magnesium-oxide-ceramic"])
-    few, many = drawn.wi[:256], np.resize(drawn.wi, (2560, 3))
-    np.testing.assert_allclose(forms["sum"].evaluate(many, many)[:256], forms["sum"].evaluate(few, few), rtol=SUM)
-    calls = []
-    for wi in (few, few[:1]):
-        start = time.process_time()
-        for _ in range(30):
-            forms["sum"].evaluate(wi, wi)
-        calls.append(time.process_time() - start)
-    assert calls[0] < 4.0 * calls[1]
+    evaluate = forms["sum"].evaluate
+    few, more = drawn.wi[:256], np.resize(drawn.wi, (2560, 3))
+    np.testing.assert_allclose(evaluate(more, more)[:256], evaluate(few, few), rtol=SUM)
+    of_few, of_one = cpu_seconds(lambda: evaluate(few, few), lambda: evaluate(few[:1], few[:1]))
+    assert of_few < 4.0 * of_one
 
 
 def test_the_half_vector_form_is_exact_at_the_peak_only() -> None:

@@ -83,7 +83,7 @@ def browse(browser: str, directory: Path, content: str, *options: str) -> str:
     flags = ["--headless", "--no-sandbox", "--no-first-run", "--hide-scrollbars", "--virtual-time-budget=4000"]
     flags += [f"--user-data-dir={directory / 'profile'}", *(f"--disable-{each}" for each in quiet), *options]
     run = [browser, *flags, path.as_uri()]
-    return subprocess.run(run, capture_output=True, text=True, check=True, timeout=120).stdout
+    return subprocess.run(run, capture_output=True, text=True, check=True, timeout=300).stdout
 
 
 def frame(width: int) -> str:

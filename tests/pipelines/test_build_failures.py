@@ -27,6 +27,8 @@ from brdfdb_pipelines.recipe_file import Recipe, load
 from brdfdb_pipelines.recipe_grids import RecipeError
 from tests.pipelines.a_build import Captured, OneByOne, changed, failing, staged, states
 
+WAIT_S = 300.0  # for what takes a second or two where the machine has nothing else to do
+
 # What cannot be built
 
 
@@ -157,13 +159,13 @@ def test_a_second_build_of_a_material_waits_and_then_has_nothing_to_do(
         computed.append(layout.source.name)
         if layout.source.name == "foam":
             began.set()
-            assert go.wait(30)
+            assert go.wait(WAIT_S)
         return block(layout, rows)
 
     monkeypatch.setattr(tabulation, "block", slow)
     with ThreadPoolExecutor(2) as executor, ThreadPoolExecutor(1) as other:
         first = other.submit(build, load(recipe), tmp_path, executor)
-        assert began.wait(30)
+        assert began.wait(WAIT_S)
         events: list[dict[str, Any]] = []
 
         def report(event: dict[str, Any]) -> None:
@@ -172,7 +174,7 @@ def test_a_second_build_of_a_material_waits_and_then_has_nothing_to_do(
                 go.set()
 
         second = build(load(recipe), tmp_path, executor, report)
-        assert {state for state, _, _ in states(first.result(30)).values()} <= {"published", "unchanged"}
+        assert {state for state, _, _ in states(first.result(WAIT_S)).values()} <= {"published", "unchanged"}
     assert sorted(computed) == sorted(names)
     assert states(second)["foam"] == ("unchanged", "r000001", "")
     assert [event["material"] for event in events if event["event"] == "waiting"].count("foam") == 1
@@ -185,11 +187,11 @@ def test_a_build_waits_for_whoever_holds_the_lock(recipe: Path, built: Path, tmp
     other = changed(recipe, tmp_path / "other.toml")
     with ThreadPoolExecutor(1) as executor, Lock(root, "foam"):
         done = executor.submit(build, load(other), root, OneByOne())
-        deadline = time.monotonic() + 20
+        deadline = time.monotonic() + WAIT_S
         while brdfdb.open(root).head("blue-plastic") != "r000002":
             assert time.monotonic() < deadline
             time.sleep(0.01)
         assert not done.done()
         assert cli.main(["gc", "--keep", "1", "--store", str(root)]) == 0
         assert "left foam alone: a build is at work on it" in capsys.readouterr().out
-    assert states(done.result(30))["foam"] == ("published", "r000002", "grid changed")
+    assert states(done.result(WAIT_S))["foam"] == ("published", "r000002", "grid changed")

@@ -24,7 +24,7 @@ from tests.pipelines.recipes import anisotropic, isotropic, material
 
 KILLS = 50
 SEED = 20261121
-WAIT_S = 60.0
+WAIT_S = 300.0
 PAUSE_S = 0.005  # between reads: the builds need the processor, too
 
 
@@ -196,6 +196,8 @@ def test_killed_at_fifty_random_moments_nothing_is_lost_and_every_read_is_whole(
                     break
                 kills += 1
                 left = marked(root)
+                if not left:  # other programs may have come since the last whole build
+                    whole_s *= 1.1
             store = brdfdb.open(root)
             assert {store.metadata(name).parameters["rho"] for name in store} == {number / 128}
             if number % 8 == 0:

@@ -73,10 +73,25 @@ def test_the_same_seed_draws_the_same_set(tmp_path: Path) -> None:
     assert not np.array_equal(a["rho"], c["rho"])
 
 
+# Writes a set; from the second chunk on each takes a quarter of a second
+SLOW = """
+import sys, time
+from brdfdb_pipelines import cli, sample
+values = sample.TrainingSet.values
+
+def slow(made, chunk):
+    time.sleep(0.25 * (chunk > 1))
+    return values(made, chunk)
+
+sample.TrainingSet.values = slow
+sys.exit(cli.main(sys.argv[1:]))
+"""
+
+
 def test_a_killed_set_does_not_look_complete_and_goes_on(tmp_path: Path) -> None:
     whole, out = tmp_path / "whole.zarr", tmp_path / "set.zarr"
     arguments = ("sample", "ward", "--count", "12000", "--directions", "2000", "--jobs", "1")
-    command = [sys.executable, "-m", "brdfdb_pipelines.cli", *arguments, "--out", str(out)]
+    command = [sys.executable, "-c", SLOW, *arguments, "--out", str(out)]
     partial = tmp_path / "set.zarr.partial"
     process = subprocess.Popen(command, stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
     while process.poll() is None and len([*partial.glob("f_r/c/*/0")]) < 2:

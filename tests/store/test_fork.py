@@ -15,7 +15,7 @@ from brdfdb.tables.layout import Layout
 from brdfdb.tables.tabulation import tabulate
 
 GRID = Grid({"theta_i": [0, 30, 60, 80], "theta_r": [0, 40, 80], "delta_phi": [0, 90, 180]})
-WAIT_S = 120.0
+WAIT_S = 600.0
 
 FORKING = """
 import os, signal, sys, threading, time, warnings
@@ -37,7 +37,7 @@ for thread in threads:
 for number in range(int(sys.argv[2])):
     time.sleep(0.003 * (number % 4))
     if (child := os.fork()) == 0:
-        signal.alarm(20)  # a child that hangs dies of it
+        signal.alarm(100)  # a child that hangs dies of it
         os._exit(0 if store["white"].brdf[0, 0, 0] > store["black"].brdf[0, 0, 0] == 0.0 else 1)
     status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
     if status != 0:

@@ -107,7 +107,7 @@ def test_two_processes_write_into_one_new_store_and_none_loses_a_revision(tmp_pa
         )
         for me in ("1", "2")
     ]
-    outputs = [process.communicate(timeout=60) for process in processes]
+    outputs = [process.communicate(timeout=300) for process in processes]
     assert [process.returncode for process in processes] == [0, 0], outputs
     published = [(me, name) for me, (out, _) in zip("12", outputs, strict=True) for name in out.split()]
     assert sorted(name for _, name in published) == [f"r{number:06d}" for number in range(1, 11)]

@@ -316,9 +316,9 @@ copy.listen(
     },
   say,
 );
+addEventListener("popstate", () => clearTimeout(linked)); // it would write its link over the one that is gone to
 addEventListener("hashchange", () => {
   // a link, or the way back
-  clearTimeout(linked);
   const held = fromHash(location.hash, VIEWS);
   change({ ...held.state, material: held.state.material || state.material });
   wrong = held.wrong;

@@ -34,6 +34,7 @@ const INDEX = [
 /** @type {Map<string, Promise<any>>} */
 const documents = new Map(); // what the service says of models and of materials that they begin with, which stays
 let shown = ""; // whose sliders there are
+let calls = 0; // of show and forget: the last one decides, whichever document arrives last
 
 /** @param {string} path
  * @returns {Promise<any>} */
@@ -121,6 +122,7 @@ export const changed = ({ base, changes }) =>
 
 /** No sliders. */
 export function forget() {
+  calls += 1;
   panel.hidden = true;
   shown = "";
 }
@@ -130,10 +132,14 @@ export function forget() {
  * @param {State} state */
 export async function show({ info, name, source }, { nm }) {
   if (source === "table") documents.set(address(name), Promise.resolve(info));
-  const changes = source === "parameters" ? info.changes : {},
+  calls += 1;
+  const call = calls,
+    changes = source === "parameters" ? info.changes : {},
     found = info.model && !info.measured ? await begun(name).catch(() => null) : null;
-  if (!found) return forget();
-  const { recipe } = await described(name, changes),
+  const made = found && (await described(name, changes));
+  if (call !== calls) return undefined;
+  if (!found || !made) return forget();
+  const { recipe } = made,
     index = indexOf(N in changes || K in changes ? { attributes: recipe } : found.material, nm);
   /** @type {Record<string, any>} */
   const values = { ...recipe.parameters, [N]: index.n, [K]: index.k };
