@@ -179,18 +179,22 @@ def _add_azimuths(
     )
     reach = math.asinh(0.5 * width / distance)
     panels = min(1 + int(reach / _PANEL), _PANELS)
+    size = x.shape[0]
     for panel in range(panels):
-        for node in range(x.shape[0]):
+        lows, highs = rays[0, count : count + size], rays[1, count : count + size]
+        first, second = rays[2, count : count + size], rays[3, count : count + size]
+        weights = rays[4, count : count + size]
+        for node in range(size):
             e_y = exp((panel + x[node]) * (reach / panels))
             step = distance * 0.5 * (e_y - 1.0 / e_y)
             from_low = width - step if at_tie else step
             from_high = beyond + step if at_tie else beyond + (width - step)
             low = t_low * _sin_cos(min(from_low, rest + from_high))[0]
             high = max(low, t_high * _sin_cos(min(from_high, rest + from_low))[0])
-            rays[0, count], rays[1, count] = low, high
-            rays[2, count], rays[3, count] = _critical(high, sigma, x_max), _critical(low, sigma, x_max)
-            rays[4, count] = w[node] * (reach / panels) * distance * 0.5 * (e_y + 1.0 / e_y)
-            count += 1
+            lows[node], highs[node] = low, high
+            first[node], second[node] = _critical(high, sigma, x_max), _critical(low, sigma, x_max)
+            weights[node] = w[node] * (reach / panels) * distance * 0.5 * (e_y + 1.0 / e_y)
+        count += size
     return count
 
 
