@@ -259,7 +259,9 @@ def _table_kinds(task: _Task, hopeless: float = _HOPELESS) -> Iterator[_TableKin
         if source.grazing_pole:  # over light and viewer it takes many nodes: where a lobe takes few, it is soon dropped
             kinds = kinds[::-1]
     fewest = float(MOST_VALUES)
+    known: dict[tuple[str, bool, bool], axis_needs.Lines] = {}  # of a kind of grid, where f_r is the same
     for names in kinds:
+        known.clear()
         for power in (0.5, 1.0, 0.0) if source.grazing_pole else (0.0,):
             # what goes on beyond the horizon may fall below 0, which a logarithm does not
             for logarithm in (True,) if "theta_h" in names else (True, False):
@@ -278,7 +280,10 @@ def _table_kinds(task: _Task, hopeless: float = _HOPELESS) -> Iterator[_TableKin
                             needs[name] = needs["theta_i"]
                         else:
                             if name not in lines:
-                                lines[name] = axis_needs.lines(layout, axis, task.drawn, floor)
+                                same = name, power == 0.0, layout.plain
+                                if same not in known:
+                                    known[same] = axis_needs.lines(layout, axis, task.drawn)
+                                lines[name] = axis_needs.numbers_along(layout, known[same], floor)
                             needs[name] = Need(chosen, axis, *lines[name])
                         size *= needs[name].count(task.tolerance)
                         if name == "theta_h" and power == 0.0:
