@@ -136,8 +136,8 @@ class Lines(NamedTuple):
     """f_r along lines of one axis through directions of a draw, the same for all interpolations.
 
     `values` and `inside` are f_r [1/sr] of the shape (lines, points, L) with cos theta_i cos theta_r; `inside` and
-    `share` are those of `tabulation.held`, on grids of half and difference vectors. `lowest` is the lower of the cosines
-    of light and viewer, `mu` their product, both below the horizon, too.
+    `share` are those of `tabulation.held`, on grids of half and difference vectors. `lowest` is the lower of the
+    cosines of light and viewer, `mu` their product, both below the horizon, too.
     """
 
     values: tuple[Floats, Floats]

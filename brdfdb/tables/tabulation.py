@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -73,21 +73,31 @@ def tabulate(layout: Layout, values: NDArray[np.float32] | None = None) -> xr.Da
 def block(layout: Layout, rows: slice) -> NDArray[np.float32]:
     """Return the values of some rows of the first axis of a table: float32, over its other axes, too."""
     values = np.empty((rows.stop - rows.start, *layout.shape[1:]), dtype=np.float32)
-    step = max(1, _SLAB // int(np.prod(layout.grid.shape[1:])))
-    for start in range(rows.start, rows.stop, step):
-        some = slice(start, min(start + step, rows.stop))
+    for some in slabs(layout, rows):
         at = slice(some.start - rows.start, some.stop - rows.start)
         if layout.plain and not layout.grid.half_difference:
             for number, wavelength in enumerate(_node_wavelengths(layout)):
                 index: tuple[Any, ...] = (at, ...) if wavelength is None else (at, ..., number)
                 values[index] = _evaluated(layout, some, wavelength)
         else:
-            numbers = node_numbers(layout, some)
-            if layout.spectra is not None and layout.part_nm is None:
-                # a BLAS sums in an order that depends on where a row stands: what was symmetric would not stay it
-                numbers = np.einsum("...w,pw->...p", numbers, layout.spectra)
+            numbers = stored(layout, node_numbers(layout, some))
             values[at] = numbers.reshape(some.stop - some.start, *layout.shape[1:])
     return rounded(values, layout.bits)
+
+
+def slabs(layout: Layout, rows: slice) -> Iterator[slice]:
+    """Yield rows of the first axis of a table that are evaluated at a time."""
+    step = max(1, _SLAB // int(np.prod(layout.grid.shape[1:])))
+    for start in range(rows.start, rows.stop, step):
+        yield slice(start, min(start + step, rows.stop))
+
+
+def stored(layout: Layout, numbers: Floats) -> Floats:
+    """Return what a table stores of `node_numbers`: the coefficients of a factored spectrum, or the numbers."""
+    if layout.spectra is None or layout.part_nm is not None:
+        return numbers
+    # a BLAS sums in an order that depends on where a row stands: what was symmetric would not stay it
+    return np.asarray(np.einsum("...w,pw->...p", numbers, layout.spectra))
 
 
 def rounded(values: NDArray[np.float32], bits: int) -> NDArray[np.float32]:
