@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb._elementary import arcsin, exp, summand_exp
-from brdfdb._numba import elementwise, kernel
+from brdfdb._numba import elementwise, kernel, loop
 from brdfdb.models.shared_integrals import shared
 from brdfdb.parameters import Floats
 
@@ -328,7 +328,7 @@ def _gaussian(
     return direct, bounced
 
 
-@kernel
+@loop
 def _gaussian_loop(
     features: NDArray[np.float64],
     quadrature: NDArray[np.float64],

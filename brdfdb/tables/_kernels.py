@@ -316,7 +316,7 @@ def _held(theta: float) -> float:
     return np.float64(theta) if theta < HALF_PI else HALF_PI
 
 
-@kernel
+@loop
 def by_angles(
     rule: Rule,
     axes: Axes,
@@ -374,7 +374,7 @@ def _outside(direction: float, below: bool, point: int, wavelengths: int, out: A
             out[point * wavelengths + m] = np.nan if direction != direction else 0.0
 
 
-@kernel
+@loop
 def by_vectors(
     rule: Rule,
     axes: Axes,
@@ -409,7 +409,7 @@ def by_vectors(
                 _outside(direction, ui[3 * j + 2] < 0.0 or ur[3 * j + 2] < 0.0, j, wavelengths, f_r)
 
 
-@kernel
+@loop
 def specular(
     theta_nodes: Array,
     rows: NDArray[np.float32],
