@@ -13,7 +13,7 @@ import hashlib
 import inspect
 import os
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
@@ -45,7 +45,10 @@ def kernel(function: F) -> F:
 
 
 def loop(function: F) -> F:
-    """Compile a loop over arrays that several kernels call once, not inside each of them as `kernel` does."""
+    """Compile a loop over arrays that Python or several kernels call once, not inside each of them as `kernel` does.
+
+    Python calls a function through a wrapper, which is one of them.
+    """
     return _compiled(function, forceinline=False)
 
 
@@ -55,6 +58,7 @@ def _compiled(function: F, *, forceinline: bool) -> F:
     import numba
 
     options: Any = {"nogil": True, "error_model": "numpy", "fastmath": {"contract"}, "forceinline": forceinline}
+    options["no_cfunc_wrapper"] = True  # nothing calls a kernel by address, and its code would be compiled once more
     try:
         compiled: Any = numba.njit(cache=True, **options)(function)
     except RuntimeError:  # neither beside the sources nor at home can anything be written: nothing is stored
@@ -142,6 +146,35 @@ def is_cached(kernel: Any) -> bool:
     if INTERPRETED or not hasattr(kernel._cache, "_cache_file"):
         return True
     return bool(kernel._cache._cache_file._load_index())
+
+
+@contextlib.contextmanager
+def when_compiling(tell: Callable[[], None]) -> Iterator[None]:
+    """Call a function when the first kernel is compiled in this context; never if all are stored."""
+    if INTERPRETED:
+        yield
+        return
+    from numba.core import event
+
+    events: Any = event  # numba leaves it untyped
+
+    class First(event.Listener):
+        announced = False
+
+        def on_start(self, _: Any) -> None:
+            if not self.announced:  # numba's lock is held
+                self.announced = True
+                tell()
+
+        def on_end(self, _: Any) -> None:
+            pass
+
+    listener = First()
+    events.register("numba:compile", listener)
+    try:
+        yield
+    finally:
+        events.unregister("numba:compile", listener)
 
 
 def elementwise(function: F) -> Callable[..., Any]:

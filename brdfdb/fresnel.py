@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from brdfdb._numba import elementwise, kernel
+from brdfdb._numba import elementwise, kernel, loop
 
 Array = NDArray[np.float64]
 
@@ -125,7 +125,7 @@ def reflectance_slopes(cos_theta: float, n: float, k: float) -> tuple[float, flo
     return both.real, -both.imag
 
 
-@kernel
+@loop
 def _fill(
     halves: bool, cos_theta: Array, n: Array, k: Array, first: NDArray[np.complex128], second: NDArray[np.complex128]
 ) -> None:

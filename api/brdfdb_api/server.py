@@ -19,6 +19,7 @@ from typing import Any
 import uvicorn
 
 import brdfdb
+from brdfdb._numba import when_compiling
 from brdfdb.errors import BrdfdbError, ParameterError
 from brdfdb_api.http.connection import Connection
 from brdfdb_api.serving import log
@@ -78,12 +79,17 @@ def serve(store_dir: Path, host: str, port: int, workers: int = 1, snapshot: str
         print(f"serving {store_dir} at http://{f'[{host}]' if ':' in host else host}:{port}/", flush=True)
         stack.enter_context(_ended_by_signals())
         if workers == 1:
-            Server(_config()).run(sockets=[listener])
+            with when_compiling(_tell_of_compilation):
+                Server(_config()).run(sockets=[listener])
         else:
             # directory where workers write their counts, so that each can report all of them
             place = tempfile.TemporaryDirectory(prefix="brdfdb-metrics-", ignore_cleanup_errors=True)
             counts = stack.enter_context(place)
             asyncio.run(_keep(workers, listener, counts))
+
+
+def _tell_of_compilation() -> None:
+    print("compiling kernels, once after an installation: the first answers wait", file=sys.stderr, flush=True)
 
 
 class Server(uvicorn.Server):
@@ -213,7 +219,7 @@ def _work(descriptor: int) -> None:
         server.should_exit = True
 
     threading.Thread(target=wait, daemon=True).start()
-    with _ended_by_signals():
+    with _ended_by_signals(), when_compiling(_tell_of_compilation):
         server.run(sockets=[socket.socket(fileno=descriptor)])
 
 

@@ -190,7 +190,7 @@ def _evaluate(
         f_r[j] += uniform[j]
 
 
-@kernel
+@loop
 def specular_rows(scalars: Array, rho_s: Array) -> None:
     for row in range(rho_s.shape[0]):
         sin_i, cos_i, wave, slope = scalars[0, row], scalars[1, row], scalars[2, row], scalars[3, row]
@@ -201,7 +201,7 @@ def specular_rows(scalars: Array, rho_s: Array) -> None:
         rho_s[row] = reflectance(cos_i, scalars[4, row], scalars[5, row]) * exp(-g) * (S_over_cos * cos_i) ** 2
 
 
-@kernel
+@loop
 def scattered(features: Array, surface: Array, series: int, reach: float, f_r: Array) -> None:
     """Evaluate f_r [1/sr] of scattered pairs of directions.
 
@@ -259,7 +259,7 @@ def _vectors(w_i: Floats, w_r: Floats, surface: Array, series: int, reach: float
             f[j] = values[j] * (0.0 if i[3 * j + 2] < 0.0 or r[3 * j + 2] < 0.0 else 1.0)  # nan stays nan
 
 
-@kernel
+@loop
 def vector_rows(w_i: Floats, w_r: Floats, series: int, reach: float, scalars: Array, f_r: Floats) -> None:
     """Evaluate rows of f_r [1/sr]. Rows of one value, each with a surface of its own, are one long row."""
     if f_r.shape[1] == 1:
@@ -319,7 +319,7 @@ def _gradient(geometry: Array, surface: Array, values: Array, work: Array, index
         values[4, j] = of_mirror * F2_by_k
 
 
-@kernel
+@loop
 def gradient_rows(w_i: Floats, w_r: Floats, scalars: Array, values: Floats) -> None:
     """Fill in f_r [1/sr] and its derivatives by sigma_0, tau, n, k and a, values of shape (6, rows, length).
 
@@ -349,7 +349,7 @@ def gradient_rows(w_i: Floats, w_r: Floats, scalars: Array, values: Floats) -> N
                 of_row[5, j] = above / np.pi + 0.0 * f_r
 
 
-@kernel
+@loop
 def angle_rows(one_plus_cos: Array, table: Array, scalars: Array, f_r: Floats) -> None:
     """Evaluate rows of f_r [1/sr] along the azimuth. A row shares polar angles and surface."""
     length = f_r.shape[1]

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from brdfdb._elementary import cosine, erfcx, exp
-from brdfdb._numba import kernel
+from brdfdb._numba import kernel, loop
 from brdfdb.fresnel import reflectance_quotient
 from brdfdb.geometry import Angles, checked_angles, checked_vectors, finished
 from brdfdb.lobes import Lobe, SlopeDistribution
@@ -118,7 +118,7 @@ def _lobe(
     return _reflected(fresnel, u, sin2, index[0], index[1], above * (length2 * length2), below)
 
 
-@kernel
+@loop
 def _angle_rows(
     distribution: int, shadowing: int, fresnel: int, cos_phi: Rows, sin_phi: Rows, scalars: Rows, f_r: Rows
 ) -> None:
@@ -136,7 +136,7 @@ def _angle_rows(
             f[j] = uniform + _lobe(distribution, shadowing, fresnel, i, r, (reach_i, reach_r), slopes, (first, second))
 
 
-@kernel
+@loop
 def _vector_rows(
     distribution: int, shadowing: int, fresnel: int, w_i: Floats, w_r: Floats, scalars: Rows, f_r: Floats
 ) -> None:
@@ -160,62 +160,62 @@ def _vector_rows(
 # when it is first called.
 
 
-@kernel
+@loop
 def _ggx_angles(cos_phi: Rows, sin_phi: Rows, scalars: Rows, f_r: Rows) -> None:
     _angle_rows(GGX, CORRELATED, EXACT, cos_phi, sin_phi, scalars, f_r)
 
 
-@kernel
+@loop
 def _ggx_vectors(w_i: Floats, w_r: Floats, scalars: Rows, f_r: Floats) -> None:
     _vector_rows(GGX, CORRELATED, EXACT, w_i, w_r, scalars, f_r)
 
 
-@kernel
+@loop
 def _ggx_schlick_angles(cos_phi: Rows, sin_phi: Rows, scalars: Rows, f_r: Rows) -> None:
     _angle_rows(GGX, CORRELATED, SCHLICK, cos_phi, sin_phi, scalars, f_r)
 
 
-@kernel
+@loop
 def _ggx_schlick_vectors(w_i: Floats, w_r: Floats, scalars: Rows, f_r: Floats) -> None:
     _vector_rows(GGX, CORRELATED, SCHLICK, w_i, w_r, scalars, f_r)
 
 
-@kernel
+@loop
 def _beckmann_angles(cos_phi: Rows, sin_phi: Rows, scalars: Rows, f_r: Rows) -> None:
     _angle_rows(BECKMANN, CORRELATED, EXACT, cos_phi, sin_phi, scalars, f_r)
 
 
-@kernel
+@loop
 def _beckmann_vectors(w_i: Floats, w_r: Floats, scalars: Rows, f_r: Floats) -> None:
     _vector_rows(BECKMANN, CORRELATED, EXACT, w_i, w_r, scalars, f_r)
 
 
-@kernel
+@loop
 def _beckmann_schlick_angles(cos_phi: Rows, sin_phi: Rows, scalars: Rows, f_r: Rows) -> None:
     _angle_rows(BECKMANN, CORRELATED, SCHLICK, cos_phi, sin_phi, scalars, f_r)
 
 
-@kernel
+@loop
 def _beckmann_schlick_vectors(w_i: Floats, w_r: Floats, scalars: Rows, f_r: Floats) -> None:
     _vector_rows(BECKMANN, CORRELATED, SCHLICK, w_i, w_r, scalars, f_r)
 
 
-@kernel
+@loop
 def _ggx_separable_angles(cos_phi: Rows, sin_phi: Rows, scalars: Rows, f_r: Rows) -> None:
     _angle_rows(GGX, SEPARABLE, EXACT, cos_phi, sin_phi, scalars, f_r)
 
 
-@kernel
+@loop
 def _ggx_separable_vectors(w_i: Floats, w_r: Floats, scalars: Rows, f_r: Floats) -> None:
     _vector_rows(GGX, SEPARABLE, EXACT, w_i, w_r, scalars, f_r)
 
 
-@kernel
+@loop
 def _beckmann_separable_angles(cos_phi: Rows, sin_phi: Rows, scalars: Rows, f_r: Rows) -> None:
     _angle_rows(BECKMANN, SEPARABLE, EXACT, cos_phi, sin_phi, scalars, f_r)
 
 
-@kernel
+@loop
 def _beckmann_separable_vectors(w_i: Floats, w_r: Floats, scalars: Rows, f_r: Floats) -> None:
     _vector_rows(BECKMANN, SEPARABLE, EXACT, w_i, w_r, scalars, f_r)
 

@@ -15,12 +15,13 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from brdfdb._elementary import arcsin, exp
-from brdfdb._numba import elementwise, kernel
+from brdfdb._elementary import arcsin, exp, summand_exp
+from brdfdb._numba import elementwise, kernel, loop
 from brdfdb.models.shared_integrals import shared
 from brdfdb.parameters import Floats
 
 _TINY = 1e-300  # guard against 0 / 0 only: the numbers that it is added to or compared with are 0 or above 1e-40
+_SMALL = 1e-100  # guard as `_TINY`, of a factor of products that must not underflow
 _SMOOTH = 1e-30  # deviation of the slope [rad] below which f_r does not change, not even at 90 degrees
 _X_MAX = 6.0  # largest theta_a / sigma; the weight exp(-x^2 / 2) x beyond it is 1.5e-8 of the whole
 
@@ -63,7 +64,8 @@ def _bounce_open(p: float, q: float, S: float, C: float) -> float:
 @kernel
 def _bounce_one_hidden(p: float, q: float, S: float, C: float) -> float:
     """Return the second bounce [1] where one facet is partly hidden, p > C >= q."""
-    return S * S * (C + q) * (1.0 / (p + math.sqrt(p * p + S * S)) + 1.0 / (1.0 + C))
+    d = p + math.sqrt(p * p + S * S)
+    return S * S * (C + q) * (d + (1.0 + C)) / (d * (1.0 + C))
 
 
 @kernel
@@ -73,8 +75,10 @@ def _bounce_both_hidden(p: float, q: float, S: float, C: float) -> float:
     along, across = p * q - C * C, p - q
     # d(m_s, m_v)
     R = math.sqrt(along * along + S * S * across * across)
-    bracket = 2.0 * p + C - q - C * (C + p) / (q + R_q) - C * across * across / (along + R + _TINY)
-    return S * S * (C + q) * (bracket / ((C + p) * R_q + R) + 1.0 / (p + R_p))
+    # The bracket of eq. (19) is above / below, with one division for all: a division takes as long as ten products
+    one, two, three, four = q + R_q, along + R + _SMALL, (C + p) * R_q + R, p + R_p
+    above, below = (2.0 * p + C - q) * one * two - C * ((C + p) * two + across * across * one), one * two * three
+    return S * S * (C + q) * (above * four + below) / (below * four)
 
 
 @kernel
@@ -114,28 +118,26 @@ def _sin_cos(x: float) -> tuple[float, float]:
 
     The absolute error is at most 3e-16, and so is the relative error of the sine.
     """
-    u = x * x
-    s = u / 51090942171709440000.0 - 1.0 / 121645100408832000.0
-    s = s * u + 1.0 / 355687428096000.0
-    s = s * u - 1.0 / 1307674368000.0
+    half = 0.5 * x
+    u = half * half
+    s = u / 355687428096000.0 - 1.0 / 1307674368000.0
     s = s * u + 1.0 / 6227020800.0
     s = s * u - 1.0 / 39916800.0
     s = s * u + 1.0 / 362880.0
     s = s * u - 1.0 / 5040.0
     s = s * u + 1.0 / 120.0
     s = s * u - 1.0 / 6.0
-    c = 1.0 / 2432902008176640000.0 - u / 1124000727777607680000.0
-    c = c * u - 1.0 / 6402373705728000.0
-    c = c * u + 1.0 / 20922789888000.0
-    c = c * u - 1.0 / 87178291200.0
+    c = u / 20922789888000.0 - 1.0 / 87178291200.0
     c = c * u + 1.0 / 479001600.0
     c = c * u - 1.0 / 3628800.0
     c = c * u + 1.0 / 40320.0
     c = c * u - 1.0 / 720.0
     c = c * u + 1.0 / 24.0
     c = c * u - 0.5
-    cos = c * u + 1.0
-    return x + x * u * s, _TINY if cos < _TINY else cos
+    # Of the whole angle
+    sine = half + half * u * s
+    cos = 1.0 - 2.0 * sine * sine
+    return 2.0 * sine * (1.0 + c * u), _TINY if cos < _TINY else cos
 
 
 @kernel
@@ -179,25 +181,29 @@ def _add_azimuths(
     )
     reach = math.asinh(0.5 * width / distance)
     panels = min(1 + int(reach / _PANEL), _PANELS)
+    size = x.shape[0]
     for panel in range(panels):
-        for node in range(x.shape[0]):
+        lows, highs = rays[0, count : count + size], rays[1, count : count + size]
+        first, second = rays[2, count : count + size], rays[3, count : count + size]
+        weights = rays[4, count : count + size]
+        for node in range(size):
             e_y = exp((panel + x[node]) * (reach / panels))
             step = distance * 0.5 * (e_y - 1.0 / e_y)
             from_low = width - step if at_tie else step
             from_high = beyond + step if at_tie else beyond + (width - step)
             low = t_low * _sin_cos(min(from_low, rest + from_high))[0]
             high = max(low, t_high * _sin_cos(min(from_high, rest + from_low))[0])
-            rays[0, count], rays[1, count] = low, high
-            rays[2, count], rays[3, count] = _critical(high, sigma, x_max), _critical(low, sigma, x_max)
-            rays[4, count] = w[node] * (reach / panels) * distance * 0.5 * (e_y + 1.0 / e_y)
-            count += 1
+            lows[node], highs[node] = low, high
+            first[node], second[node] = _critical(high, sigma, x_max), _critical(low, sigma, x_max)
+            weights[node] = w[node] * (reach / panels) * distance * 0.5 * (e_y + 1.0 / e_y)
+        count += size
     return count
 
 
 @kernel
 def _weight(x: float, S: float) -> float:
     """Return the weight [1] of eq. (26) times the sine of eq. (8), for x = theta_a / sigma, not normalised."""
-    return exp(-0.5 * x * x) * S
+    return summand_exp(-0.5 * x * x) * S
 
 
 @kernel
@@ -231,10 +237,11 @@ def _add_slopes(
             S, C = _sin_cos(sigma * x)
             weight = _weight(x, S) * w * first[j]
             p, q = S * high[j], sign * S * low[j]
+            weight *= 2.0 / (C * (1.0 + C))
             if lit:
-                direct[j] += weight * 2.0 * (C + p * q / C)
+                direct[j] += weight * (C * C + p * q) * (1.0 + C)
             if bounce:
-                bounced[j] += weight * (_bounce_open(-p, q, S, C) + _bounce_open(p, -q, S, C))
+                bounced[j] += weight * (C * C - p * q) * S * S
         # Second piece: light or viewer, the one with the larger slope, reaches one facet in part and the other not
         for j in range(count):
             x = first[j] + g * (second[j] - first[j])
@@ -321,7 +328,7 @@ def _gaussian(
     return direct, bounced
 
 
-@kernel
+@loop
 def _gaussian_loop(
     features: NDArray[np.float64],
     quadrature: NDArray[np.float64],

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb._elementary import BLOCK, cosine, twice_arctan
-from brdfdb._numba import elementwise, kernel
+from brdfdb._numba import elementwise, kernel, loop
 from brdfdb.geometry import HALF_PI
 from brdfdb.parameters import Floats
 
@@ -124,7 +124,7 @@ def _polar(
     return alpha, beta, beta_rest, sin_alpha, versine_rest, tan_beta, tan_mean
 
 
-@kernel
+@loop
 def functional_angle_rows(
     cos_dphi: NDArray[np.float64], one_less_cos: NDArray[np.float64], scalars: NDArray[np.float64], f_r: Floats
 ) -> None:
@@ -184,7 +184,7 @@ def _functional_value(pair: _Pair, scale: float, C1: float, ratio: float, bounce
     return c_0 + (backward if pair[7] >= 0.0 else forward) * pair[7] + c_2 * pair[8]
 
 
-@kernel
+@loop
 def functional_vector_rows(w_i: Floats, w_r: Floats, scalars: NDArray[np.float64], f_r: Floats) -> None:
     for row in range(f_r.shape[0]):
         f, scale = f_r[row], scalars[row, 0] / np.pi
@@ -197,7 +197,7 @@ def functional_vector_rows(w_i: Floats, w_r: Floats, scalars: NDArray[np.float64
             f[j] = value * (0.0 if i[z] < 0.0 or r[z] < 0.0 else 1.0)  # nan stays nan
 
 
-@kernel
+@loop
 def functional_gradient_rows(w_i: Floats, w_r: Floats, scalars: NDArray[np.float64], values: Floats) -> None:
     """Fill in f_r [1/sr] and its derivatives by rho and sigma, values of shape (3, rows, length)."""
     for row in range(values.shape[1]):
@@ -228,7 +228,7 @@ def _qualitative(sin_alpha: float, tan_beta: float, rho: float, sigma: float, of
     return rho / np.pi * A, rho / np.pi * B * sin_alpha * tan_beta
 
 
-@kernel
+@loop
 def qualitative_angle_rows(cos_dphi: NDArray[np.float64], scalars: NDArray[np.float64], f_r: Floats) -> None:
     for row in range(f_r.shape[0]):
         s, f = scalars[:, row], f_r[row]
@@ -238,7 +238,7 @@ def qualitative_angle_rows(cos_dphi: NDArray[np.float64], scalars: NDArray[np.fl
             f[j] = c_0 + c_1 * max(0.0, cos[j])
 
 
-@kernel
+@loop
 def qualitative_vector_rows(w_i: Floats, w_r: Floats, scalars: NDArray[np.float64], f_r: Floats) -> None:
     for row in range(f_r.shape[0]):
         f = f_r[row]
@@ -252,7 +252,7 @@ def qualitative_vector_rows(w_i: Floats, w_r: Floats, scalars: NDArray[np.float6
             f[j] = value if z_i >= 0.0 and z_r >= 0.0 else 0.0 * (z_i + z_r + along)  # 0, or nan
 
 
-@kernel
+@loop
 def qualitative_gradient_rows(w_i: Floats, w_r: Floats, scalars: NDArray[np.float64], values: Floats) -> None:
     """Fill in f_r [1/sr] and its derivatives by rho, sigma and the offset, values of shape (4, rows, length)."""
     for row in range(values.shape[1]):

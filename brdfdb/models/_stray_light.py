@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from brdfdb._elementary import exp, log
-from brdfdb._numba import kernel
+from brdfdb._numba import kernel, loop
 from brdfdb.geometry import checked_angles, checked_vectors, finished
 from brdfdb.lobes import GGX, Lobe
 from brdfdb.models._rows import by_rows, by_rows_of_vectors
@@ -34,7 +34,7 @@ def _profile(form: int, x2: float, first: float, second: float, third: float) ->
     return first * exp(0.5 * third * log(1.0 + x2 / (second * second)))
 
 
-@kernel
+@loop
 def _angle_rows(form: int, x_r: Rows, y_r: Rows, scalars: Rows, f_r: Rows) -> None:
     for row in range(f_r.shape[0]):
         s, f = scalars[:, row], f_r[row]
@@ -47,7 +47,7 @@ def _angle_rows(form: int, x_r: Rows, y_r: Rows, scalars: Rows, f_r: Rows) -> No
             f[j] = _profile(form, x * x + y * y, first, second, third)
 
 
-@kernel
+@loop
 def _vector_rows(form: int, w_i: Floats, w_r: Floats, scalars: Rows, f_r: Floats) -> None:
     for row in range(f_r.shape[0]):
         s, f = scalars[row], f_r[row]

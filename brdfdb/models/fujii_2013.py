@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from brdfdb._elementary import cosine
-from brdfdb._numba import elementwise, kernel
+from brdfdb._numba import elementwise, kernel, loop
 from brdfdb.geometry import checked_angles, checked_vectors, finished
 from brdfdb.models._rows import by_rows_of_vectors
 from brdfdb.models.large_calls import for_large_calls
@@ -29,7 +29,7 @@ def _fujii(cos_i: float, cos_r: float, s: float, rho: float, sigma: float) -> fl
 _evaluate = elementwise(_fujii)
 
 
-@kernel
+@loop
 def _vector_rows(w_i: Floats, w_r: Floats, scalars: NDArray[np.float64], f_r: Floats) -> None:
     for row in range(f_r.shape[0]):
         f, rho, sigma = f_r[row], scalars[row, 0], scalars[row, 1]

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from brdfdb._elementary import arcsin, cosine, exp, log
-from brdfdb._numba import kernel
+from brdfdb._numba import kernel, loop
 from brdfdb.geometry import checked_angles, checked_vectors, finished
 from brdfdb.models._rows import by_rows, by_rows_of_vectors
 from brdfdb.models.large_calls import for_large_calls
@@ -112,7 +112,7 @@ def _half_azimuth(c_i: float, s_i: float, c_r: float, s_r: float) -> tuple[float
     return 0.5 * math.sqrt((c_i - c_r) ** 2 + (s_i - s_r) ** 2), 0.5 * math.sqrt((c_i + c_r) ** 2 + (s_i + s_r) ** 2)
 
 
-@kernel
+@loop
 def _angle_rows(cos_phi: Rows, sin_phi: Rows, scalars: Rows, f_r: Rows) -> None:
     for row in range(f_r.shape[0]):
         s, f = scalars[:, row], f_r[row]
@@ -133,7 +133,7 @@ def _horizontal(x: float, y: float) -> Three:
     return length, 1.0 if length < _TINY else x * inverse, y * inverse
 
 
-@kernel
+@loop
 def _vector_rows(w_i: Floats, w_r: Floats, scalars: Rows, f_r: Floats) -> None:
     for row in range(f_r.shape[0]):
         s, f = scalars[row], f_r[row]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from brdfdb._numba import kernel
+from brdfdb._numba import loop
 from brdfdb.geometry import checked_angles, checked_vectors, finished
 from brdfdb.models._rows import by_rows_of_vectors
 from brdfdb.models.large_calls import for_large_calls
@@ -14,7 +14,7 @@ from brdfdb.parameters import Floats, ModelSpec, Parameter, white
 RHO = Parameter("rho", "ρ", "1", 0.0, 1.0, "albedo", reflectance=True)
 
 
-@kernel
+@loop
 def _vector_rows(w_i: Floats, w_r: Floats, scalars: NDArray[np.float64], f_r: Floats) -> None:
     for row in range(f_r.shape[0]):
         f, value = f_r[row], scalars[row, 0] / np.pi

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from brdfdb._elementary import arcsin, cosine
-from brdfdb._numba import kernel
+from brdfdb._numba import kernel, loop
 from brdfdb.geometry import checked_angles, checked_vectors, finished
 from brdfdb.models._rows import by_rows, by_rows_of_vectors
 from brdfdb.models.large_calls import for_large_calls
@@ -49,7 +49,7 @@ def _f_r(i: tuple[float, float, float], r: tuple[float, float, float], f: tuple[
     return 0.0 if value < 0.0 else value
 
 
-@kernel
+@loop
 def _angle_rows(cos_phi: Rows, sin_phi: Rows, scalars: Rows, f_r: Rows) -> None:
     for row in range(f_r.shape[0]):
         s, values = scalars[:, row], f_r[row]
@@ -59,7 +59,7 @@ def _angle_rows(cos_phi: Rows, sin_phi: Rows, scalars: Rows, f_r: Rows) -> None:
             values[j] = _f_r(i, (sin_r * c_phi[j], sin_r * s_phi[j], cos_r), f)
 
 
-@kernel
+@loop
 def _vector_rows(w_i: Floats, w_r: Floats, scalars: Rows, f_r: Floats) -> None:
     for row in range(f_r.shape[0]):
         s, values = scalars[row], f_r[row]

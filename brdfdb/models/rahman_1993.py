@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from brdfdb._elementary import cosine, exp, log
-from brdfdb._numba import kernel
+from brdfdb._numba import kernel, loop
 from brdfdb.geometry import checked_angles, checked_vectors, finished
 from brdfdb.models._rows import by_rows, by_rows_of_vectors
 from brdfdb.models.large_calls import for_large_calls
@@ -57,7 +57,7 @@ def _f_r(
     return _LARGEST if value > _LARGEST else value
 
 
-@kernel
+@loop
 def _angle_rows(cos_phi: Rows, sin_phi: Rows, scalars: Rows, f_r: Rows) -> None:
     for row in range(f_r.shape[0]):
         s, f = scalars[:, row], f_r[row]
@@ -68,7 +68,7 @@ def _angle_rows(cos_phi: Rows, sin_phi: Rows, scalars: Rows, f_r: Rows) -> None:
             f[j] = _f_r(i, (sin_r * c_phi[j], sin_r * s_phi[j], cos_r), constants)
 
 
-@kernel
+@loop
 def _vector_rows(w_i: Floats, w_r: Floats, scalars: Rows, f_r: Floats) -> None:
     for row in range(f_r.shape[0]):
         s, f = scalars[row], f_r[row]

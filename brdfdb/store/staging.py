@@ -107,7 +107,7 @@ def _layout(text: str) -> Layout:
     return layout
 
 
-def write_block(staging: str, layout: str, number: int) -> Block:
+def write_block(staging: str, layout: str, number: int, values: NDArray[np.float32] | None = None) -> Block:
     """Compute a block and write it, unless it is there already: the task that a build gives to its workers.
 
     Parameters
@@ -118,6 +118,8 @@ def write_block(staging: str, layout: str, number: int) -> Block:
         Of the table, as JSON.
     number : int
         Of the block.
+    values : float32 array, optional
+        The values of the block, if they are known.
 
     Raises
     ------
@@ -133,7 +135,8 @@ def write_block(staging: str, layout: str, number: int) -> Block:
     marker = directory / "blocks" / f"{number:06d}.json"
     if (entry := _kept(marker, path, layout)) is not None:
         return {"name": name, "entry": entry, "kept": True}
-    data = chunk_bytes(tabulation.block(table, table.blocks[number]), table.block_rows)
+    values = tabulation.block(table, table.blocks[number]) if values is None else values
+    data = chunk_bytes(values, table.block_rows)
     with writing(store_of_staged(directory), table.source.name):
         entry = write_file(path, data, directory)
         # `_kept` reads the block, and notices what a power cut left of the marker

@@ -109,7 +109,7 @@ def finished(
             out[j * wavelengths + m] = value * mu[j] + apart
 
 
-@kernel
+@loop
 def by_angles(
     rule: Rule,
     axes: Axes,
@@ -167,7 +167,7 @@ def _outside(direction: float, below: bool, point: int, wavelengths: int, out: A
             out[point * wavelengths + m] = np.nan if direction != direction else 0.0
 
 
-@kernel
+@loop
 def by_vectors(
     rule: Rule,
     axes: Axes,
@@ -202,7 +202,7 @@ def by_vectors(
                 _outside(direction, ui[3 * j + 2] < 0.0 or ur[3 * j + 2] < 0.0, j, wavelengths, f_r)
 
 
-@kernel
+@loop
 def specular(
     theta_nodes: Array,
     rows: NDArray[np.float32],

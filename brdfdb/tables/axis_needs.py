@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bisect
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,7 @@ _POINTS = 145  # of a line
 _COUNTS = (2, 3, 4, 5, 6, 8, 10, 12, 15, 18, 22, 27, 33, 41, 50, 61, 75, 92, 112, 137)  # nodes of an axis
 _MOST_NODES = 400  # of an axis
 _SMOOTHED = 9  # points of a line that the density of nodes is averaged over
+_PERCENTILE = 99.0  # of the errors on lines that counts
 _EASED = 0.15  # of the mean density of nodes is what the emptiest part of an axis gets
 
 # Where the points of a line lie, s in [0, 1]: (end [degree], power); a power p > 0 crowds them at 0 as s**p, p < 0 at
@@ -47,7 +49,8 @@ class Need:
         self.layout, self.axis, self.order = layout, axis, order
         self.rows = np.moveaxis(numbers, 2, 1).reshape(count * wavelengths, size)
         self.weights = np.moveaxis(weight, 2, 1).reshape(count * wavelengths, size)
-        self.known: dict[int, float] = {}
+        self.known: dict[int, tuple[float, float]] = {}  # a bound that the error is above, and one that it keeps
+        self.counted = int(np.count_nonzero(self.weights > 0.0))
         left = np.abs(np.diff(self.rows, order, axis=1)) * self.weights[:, order // 2 : size - order // 2]
         peak = np.pad(np.percentile(left, 98, axis=0) ** (1.0 / order), order // 2, mode="edge")
         smooth = np.convolve(
@@ -59,21 +62,48 @@ class Need:
         self.counts = [*self.points]
 
     def left(self, count: int) -> float:
-        """Return the error that a number of nodes leaves."""
-        if count not in self.known:
-            self.known[count] = _left(self.layout, self.axis, self.points[count], self.rows, self.weights)
-        return self.known[count]
+        """Return the error that a number of nodes leaves: the 99th percentile on the lines."""
+        error = self._errors(count)[self.weights > 0.0]
+        return float(np.percentile(error, _PERCENTILE)) if error.size else 0.0
+
+    def keeps(self, count: int, error: float) -> bool:
+        """Return True if a number of nodes leaves no more than an error.
+
+        The number of larger errors decides, unless the percentile lies between two errors next to the limit.
+        """
+        above, kept = self.known.get(count, (-math.inf, math.inf))
+        if above < error < kept:
+            beyond = np.count_nonzero(self._errors(count) > error)
+            rank = math.floor((self.counted - 1) * (_PERCENTILE / 100.0))
+            larger = self.counted - 1 - rank  # errors above the one below the percentile
+            keeps = beyond < larger if abs(beyond - larger) > 1 else self.left(count) <= error
+            self.known[count] = above, kept = (above, error) if keeps else (error, kept)
+        return error >= kept
 
     def count(self, error: float) -> float:
         """Return the smallest number of nodes that leaves no more than an error; infinite if no sensible one does.
 
         More nodes than lines have points are guessed, from the order of the interpolation.
         """
-        at = bisect.bisect_left(self.counts, True, key=lambda count: self.left(count) <= error)
+        at = bisect.bisect_left(self.counts, True, key=lambda count: self.keeps(count, error))
         if at < len(self.counts):
             return self.counts[at]
         guessed = math.ceil(self.counts[-1] * (self.left(self.counts[-1]) / error) ** (1.0 / self.order))
         return guessed if guessed <= _MOST_NODES else math.inf
+
+    def _errors(self, count: int) -> Floats:
+        """Return the errors on lines that are interpolated between so many of their points."""
+        grid, at = self.layout.grid, self.points[count]
+        name = grid.names[self.axis]
+        x = _points(name, grid.axes[name][-1], np.linspace(0.0, 1.0, self.rows.shape[1]))
+        nodes = x[at]
+        index, weight = weights_of_nodes(nodes, x, grid.ends[self.axis], cubic=self.layout.interpolation.cubic)
+        matrix = np.zeros((x.size, nodes.size))
+        for column, share in zip(index.T, weight.T, strict=True):
+            matrix[np.arange(x.size), column] += share
+        error = self.rows[:, at] @ matrix.T
+        error -= self.rows
+        return np.multiply(np.abs(error, out=error), self.weights, out=error)
 
     def more(self, count: float, steps: int) -> float:
         """Return the number of nodes some steps of the ladder above a number; infinite if it is not sensible."""
@@ -102,12 +132,23 @@ def _quotient(above: Floats, below: Floats) -> Floats:
     return np.divide(above, below, out=np.zeros(shape), where=np.broadcast_to(below > 0.0, shape))
 
 
-def lines(layout: Layout, axis: int, drawn: error_measurement.Draw, floor: Floats) -> tuple[Floats, Floats]:
-    """Return numbers along lines of one axis through directions of a draw, and what an error in them makes of f_r.
+class Lines(NamedTuple):
+    """f_r along lines of one axis through directions of a draw, the same for all interpolations.
 
-    Both have the shape (lines, points, L). The second is the error of f_r that an error of one makes, relative to f_r
-    or to its floor [1/sr]; it is 0 below the horizon. Of a mixture, there are parts in place of wavelengths.
+    `values` and `inside` are f_r [1/sr] of the shape (lines, points, L) with cos theta_i cos theta_r; `inside` and
+    `share` are those of `tabulation.held`, on grids of half and difference vectors. `lowest` is the lower of the
+    cosines of light and viewer, `mu` their product, both below the horizon, too.
     """
+
+    values: tuple[Floats, Floats]
+    inside: tuple[Floats, Floats] | None
+    share: Floats
+    lowest: Floats
+    mu: Floats
+
+
+def lines(layout: Layout, axis: int, drawn: error_measurement.Draw) -> Lines:
+    """Evaluate a source along lines of one axis of a layout through directions of a draw."""
     grid = layout.grid
     above = np.flatnonzero(drawn.above)
     chosen = above[:: max(1, above.size // _LINES)][:_LINES]
@@ -119,16 +160,26 @@ def lines(layout: Layout, axis: int, drawn: error_measurement.Draw, floor: Float
     if grid.half_difference:
         theta_h, *others = coordinates
         phi_h, theta_d, phi_d = others if grid.anisotropic else (np.zeros_like(theta_h), *others)
-        numbers = tabulation.continued(layout, theta_h, phi_h, theta_d, phi_d)
+        values = tabulation.held(layout, theta_h, phi_h, theta_d, phi_d, tabulation.values_at)
         cos_h, sin_h = np.cos(theta_h) * np.cos(theta_d), np.sin(theta_h) * np.sin(theta_d) * np.cos(phi_d)
-        lowest, mu = cos_h - np.abs(sin_h), (cos_h + sin_h) * (cos_h - sin_h)
-    else:
-        theta_i, *others = coordinates
-        phi_i, theta_r, phi_r = others if grid.anisotropic else (np.zeros_like(theta_i), *others)
-        numbers = tabulation.numbers(layout, unit_vector(theta_i, phi_i), unit_vector(theta_r, phi_r))
-        lowest, mu = np.minimum(np.cos(theta_i), np.cos(theta_r)), np.cos(theta_i) * np.cos(theta_r)
+        return Lines(*values, cos_h - np.abs(sin_h), (cos_h + sin_h) * (cos_h - sin_h))
+    theta_i, *others = coordinates
+    phi_i, theta_r, phi_r = others if grid.anisotropic else (np.zeros_like(theta_i), *others)
+    at = tabulation.values_at(layout, unit_vector(theta_i, phi_i), unit_vector(theta_r, phi_r))
+    cos_i, cos_r = np.cos(theta_i), np.cos(theta_r)
+    return Lines(at, None, np.zeros(()), np.minimum(cos_i, cos_r), cos_i * cos_r)
+
+
+def numbers_along(layout: Layout, along: Lines, floor: Floats) -> tuple[Floats, Floats]:
+    """Return the numbers of a layout along lines of one axis, and what an error in them makes of f_r.
+
+    Both have the shape (lines, points, L). The second is the error of f_r that an error of one makes, relative to f_r
+    or to its floor [1/sr]; it is 0 below the horizon. Of a mixture, there are parts in place of wavelengths.
+    """
     how = layout.interpolation
-    factor = np.maximum(mu, 1e-12)[..., np.newaxis] ** -how.power
+    inside = None if along.inside is None else how.numbers(*along.inside)
+    numbers = tabulation.joined(layout.source, how.numbers(*along.values), inside, along.share)
+    factor = np.maximum(along.mu, 1e-12)[..., np.newaxis] ** -how.power
     uniform = 0.0 if layout.uniform is None else layout.uniform
     if how.logarithm:
         shifted = np.exp(numbers)
@@ -141,7 +192,7 @@ def lines(layout: Layout, axis: int, drawn: error_measurement.Draw, floor: Float
         mixed = np.maximum(f_r @ layout.spectra + uniform, floor)
         counts = [np.max(_quotient(np.abs(row), mixed), axis=-1) for row in layout.spectra]
         share = slope * np.stack(counts, axis=-1)
-    weight = np.where((lowest > 1e-3)[..., np.newaxis], share, 0.0)
+    weight = np.where((along.lowest > 1e-3)[..., np.newaxis], share, 0.0)
     return numbers, weight
 
 
@@ -172,17 +223,3 @@ def _places(density: Floats, fractions: tuple[Floats, ...]) -> Floats:
     number, last = fractions
     at = np.where(number == last, total[-1], number * (total[-1] / last))
     return np.asarray(np.interp(at, total, np.linspace(0.0, 1.0, density.size)))
-
-
-def _left(layout: Layout, axis: int, at: NDArray[np.int64], rows: Floats, weights: Floats) -> float:
-    """Return the 99th percentile of the error on lines that are interpolated between some of their points."""
-    grid = layout.grid
-    name = grid.names[axis]
-    x = _points(name, grid.axes[name][-1], np.linspace(0.0, 1.0, rows.shape[1]))
-    nodes = x[at]
-    index, weight = weights_of_nodes(nodes, x, grid.ends[axis], cubic=layout.interpolation.cubic)
-    matrix = np.zeros((x.size, nodes.size))
-    np.add.at(matrix, (np.arange(x.size)[:, np.newaxis], index), weight)
-    error = np.abs(rows[:, at] @ matrix.T - rows) * weights
-    counted = error[weights > 0.0]
-    return float(np.percentile(counted, 99)) if counted.size else 0.0

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from brdfdb.errors import ParameterError, counted
 from brdfdb.materials import Source
 from brdfdb.parameters import Floats
-from brdfdb.tables import axis_needs, error_measurement, tabulation
+from brdfdb.tables import axis_needs, error_measurement, plan_trials
 from brdfdb.tables.axis_needs import LINE, Need
 from brdfdb.tables.grids import (
     ANISOTROPIC_AXES,
@@ -25,7 +25,7 @@ from brdfdb.tables.grids import (
 )
 from brdfdb.tables.layout import Interpolation, Layout
 from brdfdb.tables.mixture import Mixture, mixture_of
-from brdfdb.tables.table import Table
+from brdfdb.tables.plan_trials import MARGIN, SEED, Final
 from brdfdb.tables.tabulation import POLE_END_DEG
 
 PLAN_VERSION = 1
@@ -36,17 +36,11 @@ _ROUNDS = 8  # of finer and coarser axes
 _STALLED = 0.95  # share of its error that a finer table keeps if lines misjudge an axis
 _PATIENCE = 2  # such rounds, after which each axis is tried alone
 _STEPS = 2  # of the ladder of numbers of nodes, of an axis that lines misjudge
-_MARGIN = 0.88  # of the tolerance: other directions than the planner's find other errors
 _STRICTER = (1.0, 0.8, 0.65, 0.5, 0.4, 0.3, 0.2)  # tolerances at a few wavelengths, of that at all of them
-_OF_A_BAND = 30.0  # times the tolerance is what the 99th percentile of a band of theta_i may be
 _WAVELENGTHS = 4  # that the axes are chosen for; the finished table is measured at all
-_DRAWS, _FINAL_DRAWS = 700, 2000  # directions of a band of theta_i, for the axes and for the finished table
-_SOME = 8  # one of so many directions is measured first
-_SEED = 1994
+_DRAWS = 700  # directions of a band of theta_i, for the axes
 _BEYOND = 4.0  # safety factor on the node count where the grid extends below the horizon
 _HOPELESS = 8.0  # times the fewest values of another kind: a kind that takes so many is not looked into
-_BITS = range(9, 24)
-_WORTH_ROUNDING = 4096  # values: of smaller tables nothing is rounded
 
 
 # Likely number of values, layout at a coarse grid, needs of its axes: none where the number is only a bound
@@ -65,13 +59,6 @@ class _Task(NamedTuple):
     truth: Floats
     tolerance: float
     mixture: Mixture | None
-
-
-class _Final(NamedTuple):
-    """Directions at which finished tables are measured, and f_r there, at all wavelengths."""
-
-    drawn: error_measurement.Draw
-    truth: Floats
 
 
 def check_tolerance(tolerance: float) -> None:
@@ -116,13 +103,24 @@ def plan(
     interpolation, leave of an error; the numbers of nodes are those that leave the same error on each axis. The kinds
     that promise the fewest values are tabulated, measured, and made coarser or finer until they keep to the tolerance.
     """
+    return planned(source, wavelength_nm, tolerance, alike=alike)[0]
+
+
+def planned(
+    source: Source, wavelength_nm: NDArray[np.float64] | None, tolerance: float, *, alike: Source | None = None
+) -> tuple[Layout, NDArray[np.float32] | None]:
+    """Return the layout that `plan` describes, and the values of its table, which the plan was measured with.
+
+    The values are those of `tabulation.block`; None where nothing was tabulated.
+    """
     check_tolerance(tolerance)
     mixture = mixture_of(source, wavelength_nm)
     planned_on = source if alike is None else alike
     task = _task(planned_on, wavelength_nm, tolerance, mixture)
     if not task.truth.any():
-        return Layout(source, coarsest(source), wavelength_nm, reason="f_r is 0: all light is in the specular part")
-    final: _Final | None = None
+        reason = "f_r is 0: all light is in the specular part"
+        return Layout(source, coarsest(source), wavelength_nm, reason=reason), None
+    final: Final | None = None
     for hopeless in (_HOPELESS, math.inf):  # kinds that promised too many values are looked into if the others fail
         table_kinds = left = list(_table_kinds(task, hopeless))
         while left:
@@ -132,10 +130,12 @@ def plan(
                 if layout is None:
                     break
                 tried = [kind for kind in left if _kind(kind[1]) == _kind(layout)]
-                final = final or _final(source, wavelength_nm)
-                finished = _finished(replace(layout, source=source), final, wavelength_nm, tolerance, mixture)
+                final = final or plan_trials.final_of(source, wavelength_nm)
+                layout = replace(layout, source=source)
+                finished = plan_trials.finished(layout, final, wavelength_nm, tolerance, mixture)
                 if finished is not None:
-                    return replace(finished, reason=_reason(finished, tolerance, table_kinds))
+                    layout, values = finished
+                    return replace(layout, reason=_reason(layout, tolerance, table_kinds)), values
             left = [kind for kind in left if all(kind is not other for other in tried)]
     raise ParameterError(
         "tolerance",
@@ -204,7 +204,7 @@ def _task(
             chosen = np.union1d(chosen, mixture.extremes)
             mixture = mixture._replace(spectra=mixture.spectra[:, chosen])
         some = wavelength_nm[chosen]
-    drawn = error_measurement.draw(source, some, _DRAWS, _SEED)
+    drawn = error_measurement.draw(source, some, _DRAWS, SEED)
     truth = error_measurement.model_values(source, some, drawn.wi, drawn.wr)
     return _Task(source, some, drawn, truth, tolerance, mixture)
 
@@ -259,7 +259,9 @@ def _table_kinds(task: _Task, hopeless: float = _HOPELESS) -> Iterator[_TableKin
         if source.grazing_pole:  # over light and viewer it takes many nodes: where a lobe takes few, it is soon dropped
             kinds = kinds[::-1]
     fewest = float(MOST_VALUES)
+    known: dict[tuple[str, bool, bool], axis_needs.Lines] = {}  # of a kind of grid, where f_r is the same
     for names in kinds:
+        known.clear()
         for power in (0.5, 1.0, 0.0) if source.grazing_pole else (0.0,):
             # what goes on beyond the horizon may fall below 0, which a logarithm does not
             for logarithm in (True,) if "theta_h" in names else (True, False):
@@ -278,7 +280,10 @@ def _table_kinds(task: _Task, hopeless: float = _HOPELESS) -> Iterator[_TableKin
                             needs[name] = needs["theta_i"]
                         else:
                             if name not in lines:
-                                lines[name] = axis_needs.lines(layout, axis, task.drawn, floor)
+                                same = name, power == 0.0, layout.plain
+                                if same not in known:
+                                    known[same] = axis_needs.lines(layout, axis, task.drawn)
+                                lines[name] = axis_needs.numbers_along(layout, known[same], floor)
                             needs[name] = Need(chosen, axis, *lines[name])
                         size *= needs[name].count(task.tolerance)
                         if name == "theta_h" and power == 0.0:
@@ -301,53 +306,20 @@ def _with_axes(layout: Layout, needs: dict[str, Need], error: float, finer: Mapp
     return replace(layout, grid=Grid(axes))
 
 
-def _error(layout: Layout, values: NDArray[np.float32], drawn: error_measurement.Draw, truth: Floats) -> float:
-    """Return the largest of the errors that are held to the tolerance.
-
-    They are the 99th percentile of the relative error at the worst wavelength, the l1 error, as a few values that are
-    off by orders of magnitude next to a pole escape any percentile, and the 99th percentile of each band of theta_i
-    over `_OF_A_BAND`: grazing light is a ninth of the directions.
-    """
-    looked_up = Table.of(layout, values).lookup_vectors(drawn.wi, drawn.wr).reshape(truth.shape)
-    error = error_measurement.relative(looked_up, truth, error_measurement.floor_of(truth, drawn))
-    wrong = drawn.weight @ np.abs(looked_up - truth)
-    l1 = np.divide(wrong, drawn.weight @ truth, out=np.zeros_like(wrong), where=wrong > 0.0)
-    above = drawn.above
-    counted, band = np.ascontiguousarray(error[above].T), drawn.band[above]
-    worst = max(np.percentile(counted, 99, axis=1).max(), l1.max())
-    if counted.max() > _OF_A_BAND * worst:  # else no band can be worse
-        for row in np.unique(band):
-            worst = max(worst, np.percentile(counted[:, band == row], 99, axis=1).max() / _OF_A_BAND)
-    return float(worst)
-
-
-def _keeps(layout: Layout, values: NDArray[np.float32], final: _Final, goal: float) -> bool:
-    """Return True if the errors of a table are within a goal; most that are not are known from a few directions."""
-    drawn, truth = final
-    few = slice(None, None, _SOME)
-    looked_up = Table.of(layout, values).lookup_vectors(drawn.wi[few], drawn.wr[few]).reshape(truth[few].shape)
-    error = error_measurement.relative(looked_up, truth[few], error_measurement.floor_of(truth, drawn))
-    beyond = np.count_nonzero((error > goal) & drawn.above[few, np.newaxis], axis=0).max()
-    most = 0.01 * np.count_nonzero(drawn.above) + 2.0  # with more the 99th percentile of all is beyond the goal
-    return bool(beyond <= most) and _error(layout, values, drawn, truth) <= goal
-
-
-def _values(layout: Layout) -> NDArray[np.float32]:
-    return np.concatenate([tabulation.block(layout, rows) for rows in layout.blocks])
-
-
 def _refined(task: _Task, layout: Layout, needs: dict[str, Need], most: float, *, probing: bool) -> Layout | None:
     """Return the coarsest axes of those tried that keep to the tolerance with fewer than `most` values; or None.
 
     If `probing` and finer axes leave the error as it is, lines misjudge one of them: the one that helps most gets more.
     """
-    goal, error, best = _MARGIN * task.tolerance, task.tolerance, None
+    goal, error, best = MARGIN * task.tolerance, task.tolerance, None
     finer: dict[str, int] = {}  # steps on some axes beyond what lines tell
     known: dict[tuple[int, ...], float] = {}
 
     def measured(trial: Layout) -> float:
         if trial.grid.shape not in known:
-            known[trial.grid.shape] = _error(trial, _values(trial), task.drawn, task.truth) / goal
+            known[trial.grid.shape] = (
+                plan_trials.error_of(trial, plan_trials.values_of(trial), task.drawn, task.truth) / goal
+            )
         return known[trial.grid.shape]
 
     last, stalled, rounds = math.inf, 0, _ROUNDS
@@ -382,41 +354,3 @@ def _alike(needs: dict[str, Need]) -> list[tuple[str, ...]]:
 def _finer(finer: Mapping[str, int], axes: tuple[str, ...]) -> dict[str, int]:
     """Return the steps beyond what lines tell, with more of them on some axes."""
     return {**finer, **{name: finer.get(name, 0) + _STEPS for name in axes}}
-
-
-def _final(source: Source, wavelength_nm: NDArray[np.float64] | None) -> _Final:
-    drawn = error_measurement.draw(source, wavelength_nm, _FINAL_DRAWS, _SEED + 1)
-    return _Final(drawn, error_measurement.model_values(source, wavelength_nm, drawn.wi, drawn.wr))
-
-
-def _finished(
-    layout: Layout, final: _Final, wavelength_nm: NDArray[np.float64] | None, tolerance: float, mixture: Mixture | None
-) -> Layout | None:
-    """Return the layout at all wavelengths, with as few coefficients and bits as the error allows; None if none do."""
-    drawn, truth = final
-    goal = _MARGIN * tolerance
-    reason = f"the smallest of those tried that keep 99 of 100 values within {tolerance:g} of the model, relative"
-    spectra = None if mixture is None else mixture.spectra
-    if mixture is None and wavelength_nm is not None and layout.wavelength_nm is not None:
-        few = np.isin(wavelength_nm, layout.wavelength_nm)  # a table that fails at these fails at all of them
-        if not few.all() and not _keeps(layout, _values(layout), _Final(drawn, truth[:, few]), goal):
-            return None
-    layout = replace(layout, wavelength_nm=wavelength_nm, reason=reason, spectra=spectra)
-    whole = _values(layout)
-    if mixture is None and layout.interpolation.logarithm and wavelength_nm is not None and wavelength_nm.size > 2:
-        rows = whole.reshape(-1, wavelength_nm.size).astype(np.float64)
-        floor = error_measurement.floor_of(truth, drawn)
-        significance = np.max(np.minimum(np.exp(rows) / floor, 1.0), axis=1, keepdims=True)
-        seen = rows * significance
-        basis = np.linalg.eigh(seen.T @ seen).eigenvectors[:, ::-1].T  # the spectra that say most come first
-        for parts in range(1, wavelength_nm.size // 2 + 1):
-            factored = replace(layout, spectra=basis[:parts])
-            values = (rows @ basis[:parts].T).astype(np.float32).reshape(factored.shape)
-            if _keeps(factored, values, final, goal):
-                layout, whole = factored, values
-                break
-    for bits in _BITS if layout.size > _WORTH_ROUNDING else (23,):
-        rounded = replace(layout, bits=bits)
-        if _keeps(rounded, tabulation.rounded(whole, bits), final, goal):
-            return rounded
-    return None

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any, NamedTuple
+from collections.abc import Callable, Iterator, Mapping
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb._elementary import COS_HORIZON
 from brdfdb.geometry import HALF_PI, directions_from_half_difference, radians, unit_vector
+from brdfdb.materials import Source
 from brdfdb.measurements import MeasuredSource
 from brdfdb.parameters import Floats
 from brdfdb.tables.grids import RECIPROCITY, Axis, Grid
@@ -72,21 +73,31 @@ def tabulate(layout: Layout, values: NDArray[np.float32] | None = None) -> xr.Da
 def block(layout: Layout, rows: slice) -> NDArray[np.float32]:
     """Return the values of some rows of the first axis of a table: float32, over its other axes, too."""
     values = np.empty((rows.stop - rows.start, *layout.shape[1:]), dtype=np.float32)
-    step = max(1, _SLAB // int(np.prod(layout.grid.shape[1:])))
-    for start in range(rows.start, rows.stop, step):
-        some = slice(start, min(start + step, rows.stop))
+    for some in slabs(layout, rows):
         at = slice(some.start - rows.start, some.stop - rows.start)
         if layout.plain and not layout.grid.half_difference:
             for number, wavelength in enumerate(_node_wavelengths(layout)):
                 index: tuple[Any, ...] = (at, ...) if wavelength is None else (at, ..., number)
                 values[index] = _evaluated(layout, some, wavelength)
         else:
-            numbers = node_numbers(layout, some)
-            if layout.spectra is not None and layout.part_nm is None:
-                # a BLAS sums in an order that depends on where a row stands: what was symmetric would not stay it
-                numbers = np.einsum("...w,pw->...p", numbers, layout.spectra)
+            numbers = stored(layout, node_numbers(layout, some))
             values[at] = numbers.reshape(some.stop - some.start, *layout.shape[1:])
     return rounded(values, layout.bits)
+
+
+def slabs(layout: Layout, rows: slice) -> Iterator[slice]:
+    """Yield rows of the first axis of a table that are evaluated at a time."""
+    step = max(1, _SLAB // int(np.prod(layout.grid.shape[1:])))
+    for start in range(rows.start, rows.stop, step):
+        yield slice(start, min(start + step, rows.stop))
+
+
+def stored(layout: Layout, numbers: Floats) -> Floats:
+    """Return what a table stores of `node_numbers`: the coefficients of a factored spectrum, or the numbers."""
+    if layout.spectra is None or layout.part_nm is not None:
+        return numbers
+    # a BLAS sums in an order that depends on where a row stands: what was symmetric would not stay it
+    return np.asarray(np.einsum("...w,pw->...p", numbers, layout.spectra))
 
 
 def rounded(values: NDArray[np.float32], bits: int) -> NDArray[np.float32]:
@@ -136,14 +147,21 @@ def numbers(layout: Layout, wi: Floats, wr: Floats) -> Floats:
     wi, wr : arrays of shape (..., 3)
         Unit vectors, at the horizon or above.
     """
+    return layout.interpolation.numbers(*values_at(layout, wi, wr))
+
+
+def values_at(layout: Layout, wi: Floats, wr: Floats) -> tuple[Floats, Floats]:
+    """Return f_r [1/sr] to tabulate at directions as `numbers` takes them, shape (..., L), and cos theta_i cos theta_r.
+
+    The stored numbers are made of both.
+    """
     mu = np.maximum(wi[..., 2], COS_HORIZON) * np.maximum(wr[..., 2], COS_HORIZON)
-    return _numbers(layout, lambda wavelength: layout.tabulated.lookup_vectors(wi, wr, wavelength), mu)
+    return _spectrum(layout, lambda wavelength: layout.tabulated.lookup_vectors(wi, wr, wavelength)), mu
 
 
-def _numbers(layout: Layout, evaluate: Callable[[float | None], Floats], mu: Floats) -> Floats:
-    """Return numbers from f_r at the wavelengths of a layout, mu = cos theta_i cos theta_r."""
-    f_r = [evaluate(wavelength) for wavelength in _node_wavelengths(layout)]
-    return layout.interpolation.numbers(np.stack(f_r, axis=-1).astype(np.float64), mu)
+def _spectrum(layout: Layout, evaluate: Callable[[float | None], Floats]) -> Floats:
+    """Return f_r [1/sr] at the wavelengths of a layout, shape (..., L)."""
+    return np.stack([evaluate(wavelength) for wavelength in _node_wavelengths(layout)], axis=-1).astype(np.float64)
 
 
 def node_numbers(layout: Layout, rows: slice) -> Floats:
@@ -156,7 +174,9 @@ def node_numbers(layout: Layout, rows: slice) -> Floats:
     if not grid.half_difference:
         angles = grid.directions(rows)
         mu = np.maximum(np.cos(angles[0]), COS_HORIZON) * np.maximum(np.cos(angles[2]), COS_HORIZON)
-        return _numbers(layout, lambda wavelength: _evaluated(layout, rows, wavelength), mu)
+        return layout.interpolation.numbers(
+            _spectrum(layout, lambda wavelength: _evaluated(layout, rows, wavelength)), mu
+        )
     axes = [radians(nodes) for nodes in grid.axes.values()]
     axes[0] = axes[0][rows]
     nodes = np.ix_(*axes)
@@ -166,6 +186,27 @@ def node_numbers(layout: Layout, rows: slice) -> Floats:
 
 def continued(layout: Layout, theta_h: Floats, phi_h: Floats, theta_d: Floats, phi_d: Floats) -> Floats:
     """`numbers` at half and difference angles [rad], and beyond the horizon what `node_numbers` says."""
+    return joined(layout.source, *held(layout, theta_h, phi_h, theta_d, phi_d, numbers))
+
+
+Evaluated = TypeVar("Evaluated")
+
+
+def held(
+    layout: Layout,
+    theta_h: Floats,
+    phi_h: Floats,
+    theta_d: Floats,
+    phi_d: Floats,
+    evaluate: Callable[[Layout, Floats, Floats], Evaluated],
+) -> tuple[Evaluated, Evaluated | None, Floats]:
+    """Evaluate a layout at half and difference angles [rad], theta_d held at its largest value.
+
+    Returns
+    -------
+    tuple
+        The values; those a step before, None if no angle is beyond the horizon; the number of steps beyond it.
+    """
     lowest = 0.0  # cosine of light and viewer
     if layout.source.grazing_pole and layout.interpolation.power == 0.0:
         end = radians(POLE_END_DEG)
@@ -174,15 +215,21 @@ def continued(layout: Layout, theta_h: Floats, phi_h: Floats, theta_d: Floats, p
     along, across = np.cos(theta_h), np.sin(theta_h) * np.abs(np.cos(phi_d))
     largest = np.arccos(np.minimum(lowest / np.hypot(along, across), 1.0)) - np.arctan2(across, along)
     largest = np.maximum(largest * (1.0 - 1e-12), 0.0)
-    held = np.minimum(theta_d, largest)
-    values = numbers(layout, *_half_vectors(theta_h, phi_h, held, phi_d))
-    beyond = np.broadcast_to(theta_d - held, values.shape[:-1])
+    within = np.minimum(theta_d, largest)
+    values = evaluate(layout, *_half_vectors(theta_h, phi_h, within, phi_d))
+    beyond = theta_d - within
+    step = np.minimum(_SLOPE_STEP, 0.5 * largest)
+    inside = None
     if np.any(beyond > 0.0):
-        step = np.minimum(_SLOPE_STEP, 0.5 * largest)
-        inside = numbers(layout, *_half_vectors(theta_h, phi_h, np.maximum(held - step, 0.0), phi_d))
-        share = np.minimum(beyond / np.broadcast_to(np.maximum(step, 1e-9), beyond.shape), _CONTINUED)
+        inside = evaluate(layout, *_half_vectors(theta_h, phi_h, np.maximum(within - step, 0.0), phi_d))
+    return values, inside, np.minimum(beyond / np.maximum(step, 1e-9), _CONTINUED)
+
+
+def joined(source: Source, values: Floats, inside: Floats | None, share: Floats) -> Floats:
+    """Return the numbers of a table, continued with their slope: `held` says what they are made of."""
+    if inside is not None:
         change = share[..., np.newaxis] * (values - inside)
-        values += np.minimum(change, _RISE) if isinstance(layout.source, MeasuredSource) else change
+        values += np.minimum(change, _RISE) if isinstance(source, MeasuredSource) else change
     return values
 
 

@@ -345,6 +345,7 @@ class _Builder:
             self._close(table)
             return
         table.files[block["name"]] = block["entry"]
+        kept = block["kept"] and not table.survey.tabulated  # from an earlier build
         values = table.survey.block_values
         self.report(
             {
@@ -352,16 +353,15 @@ class _Builder:
                 "material": table.name,
                 "block": number,
                 "blocks": len(values),
-                "kept": block["kept"],
-                **self.tally.add(values[number], kept=block["kept"]),
+                "kept": kept,
+                **self.tally.add(values[number], kept=kept),
             }
         )
         if len(table.files) == len(values):
             self.ready.append(table)
 
     def _framed(self, table: _Table, future: Future[dict[str, Entry]]) -> None:
-        files = self._result(table.name, future)
-        if files is None:
+        if (files := self._result(table.name, future)) is None:
             self._close(table)
             return
         staged = (self.root, table.name, table.staging, {**table.files, **files})

@@ -74,6 +74,8 @@ class Bars:
     def __call__(self, event: Event) -> None:
         """Show an event."""
         match event["event"]:
+            case "compiling" if event["kernels"] == 0:
+                self._progress.console.print("compiling kernels, once after an installation")
             case "compiling":
                 self._kernels = self._begun("compiling, once after an installation", event["kernels"], "kernels")
             case "compiled" if self._kernels is not None:

@@ -13,7 +13,7 @@ from brdfdb.geometry import unit_vector
 from brdfdb.store.lock import Lock
 from brdfdb.store.paths import material_path, pointer_path, request_path
 from brdfdb.store.revisions import Standing, standing
-from brdfdb.store.staging import planned, prepare
+from brdfdb.store.staging import planned, prepare, write_block
 from brdfdb.tables.layout import Layout, digest
 from brdfdb_pipelines import build_resources
 from brdfdb_pipelines.recipe_file import Job
@@ -24,7 +24,7 @@ _PHI_DEG = (0.0, 90.0, 180.0)
 
 @dataclass(frozen=True)
 class Survey:
-    """The state of a job in the store, and the layout of a missing table."""
+    """The state of a job in the store, and the layout of a missing table; `tabulated` if its blocks are staged now."""
 
     standing: Standing
     head: str
@@ -34,6 +34,7 @@ class Survey:
     block_values: tuple[int, ...] = ()
     task_bytes: int = 0  # memory of one task
     disk_bytes: int = 0  # disk space still to be written, at most
+    tabulated: bool = False
 
     @property
     def size(self) -> int:
@@ -42,28 +43,37 @@ class Survey:
 
 
 def survey(root: str, job: Job) -> Survey:
-    """Return the survey of a job: a task for a worker, because it plans the layout of a missing table."""
+    """Return the survey of a job: a task for a worker, because it plans the layout of a missing table.
+
+    The values that a plan has computed are staged as the blocks of the table.
+    """
     store, name, request = Path(root), job.material.name, job.request
     head = head_of(store, name)
     status = standing(store, name, request)
     if status.state != "missing":
         return Survey(status, head)
-    text = planned(store, name, request)
+    text, tabulated = planned(store, name, request), False
     if text is None:
         check_values(job)
-        text = json.dumps(job.layout().document())
+        layout, values = job.planned()
+        text = json.dumps(layout.document())
         try:
             with Lock(store, name, wait=False):
-                prepare(store, name, request, text)
+                staging = prepare(store, name, request, text)
+                if values is not None:
+                    for number, rows in enumerate(layout.blocks):
+                        write_block(str(staging), text, number, values[rows])
+                    tabulated = True
         except BusyError:
             pass  # another build has the lock and most likely builds this table
     layout = Layout.from_document(json.loads(text))
     rest = layout.size // layout.shape[0]
-    values = tuple((rows.stop - rows.start) * rest for rows in layout.blocks)
+    block_values = tuple((rows.stop - rows.start) * rest for rows in layout.blocks)
     staged = build_resources.stored_bytes([request_path(store, name, digest(request)) / "table"])
     disk = max(0, build_resources.table_bytes(layout) - staged)
     shape, wavelengths = tuple(layout.shape), 0 if layout.wavelength_nm is None else layout.wavelength_nm.size
-    return Survey(status, head, text, shape, wavelengths, values, build_resources.task_bytes(layout), disk)
+    task_bytes = build_resources.task_bytes(layout)
+    return Survey(status, head, text, shape, wavelengths, block_values, task_bytes, disk, tabulated)
 
 
 def check_values(job: Job) -> None:

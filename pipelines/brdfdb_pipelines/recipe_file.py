@@ -29,7 +29,7 @@ from brdfdb.store.family import Sweep
 from brdfdb.store.paths import NAME
 from brdfdb.tables.grids import Axis, Grid, check_wavelengths
 from brdfdb.tables.layout import TABLE_VERSION, Interpolation, Layout, digest
-from brdfdb.tables.planner import PLAN_VERSION, coarsest, offset_of, plan
+from brdfdb.tables.planner import PLAN_VERSION, coarsest, offset_of, planned
 from brdfdb.tables.polarisation import GRID_TOLERANCE, planned_theta_d
 from brdfdb.tables.polarisation_record import POLARISATION_VERSION
 from brdfdb_pipelines import preset_names, toml_file
@@ -60,22 +60,26 @@ class Job:
 
     def layout(self) -> Layout:
         """Return the layout of the table; to a tolerance, this takes the planner a second or more."""
-        layout = self._unpolarised()
+        return self.planned()[0]
+
+    def planned(self) -> tuple[Layout, NDArray[np.float32] | None]:
+        """Return the layout of the table, and its values if a plan has computed them."""
+        layout, values = self._unpolarised()
         if not self.polarised:
-            return layout
+            return layout, values
         assert self.wavelength_nm is not None  # of all models with Mueller matrices
         within = GRID_TOLERANCE if self.tolerance is None else self.tolerance
         nodes = planned_theta_d(self.material, self.wavelength_nm, within)
-        return replace(layout, facet_theta_d_deg=nodes)
+        return replace(layout, facet_theta_d_deg=nodes), values
 
-    def _unpolarised(self) -> Layout:
+    def _unpolarised(self) -> tuple[Layout, NDArray[np.float32] | None]:
         if self.grid is not None:
             method, logarithm = self.interpolation.removeprefix("log-"), self.interpolation.startswith("log-")
             offset = offset_of(self.material, self.wavelength_nm) if logarithm else 0.0
             how = Interpolation(method, logarithm, offset)
-            return Layout(self.material, self.grid, self.wavelength_nm, interpolation=how)
+            return Layout(self.material, self.grid, self.wavelength_nm, interpolation=how), None
         assert self.tolerance is not None
-        return plan(self.material, self.wavelength_nm, self.tolerance, alike=self.planned_on)
+        return planned(self.material, self.wavelength_nm, self.tolerance, alike=self.planned_on)
 
     def check(self) -> None:
         """Raise the ParameterError that `layout` would raise for what does not suit the material."""

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
+from numpy.typing import NDArray
 
 import brdfdb
 from brdfdb.errors import StoreError
@@ -136,16 +137,16 @@ def test_the_largest_table_comes_first_and_the_number_of_workers_changes_nothing
 def test_a_layout_is_planned_on_a_worker_and_at_most_once(
     recipe: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    plan, planned, layout = load(recipe), [], Job.layout
+    plan, planned, plan_of = load(recipe), [], Job.planned
     jobs = plan.jobs()
     monkeypatch.setattr(Recipe, "jobs", lambda _: jobs)
     monkeypatch.setattr(Job, "request", property(lambda job: {"material": job.material.name}))
 
-    def plan_it(job: Job) -> Layout:
+    def plan_it(job: Job) -> tuple[Layout, NDArray[np.float32] | None]:
         planned.append((job.material.name, threading.current_thread().name))
-        return layout(job)
+        return plan_of(job)
 
-    monkeypatch.setattr(Job, "layout", plan_it)
+    monkeypatch.setattr(Job, "planned", plan_it)
     failing(monkeypatch, "foam", StoreError("no space"))
     with ThreadPoolExecutor(2, thread_name_prefix="worker") as executor, pytest.raises(StoreError):
         build(plan, tmp_path, executor)
@@ -154,7 +155,7 @@ def test_a_layout_is_planned_on_a_worker_and_at_most_once(
     monkeypatch.undo()
     monkeypatch.setattr(Recipe, "jobs", lambda _: jobs)
     monkeypatch.setattr(Job, "request", property(lambda job: {"material": job.material.name}))
-    monkeypatch.setattr(Job, "layout", lambda _: pytest.fail("planned again"))
+    monkeypatch.setattr(Job, "planned", lambda _: pytest.fail("planned again"))
     assert {state for state, _, _ in states(build(plan, tmp_path, OneByOne())).values()} <= {"published", "unchanged"}
 
 

@@ -30,6 +30,7 @@ def test_lines_are_json_and_bars_are_on_stderr(capsys: pytest.CaptureFixture[str
     assert (json.loads(out), err) == ({"event": "unchanged", "material": "Größe", "revision": "r000001"}, "")
     block = {"event": "block", "blocks": 2, "kept": False, "values_total": 4, "values_per_s": 2e6, "seconds_left": 0.0}
     with Bars() as bars:
+        bars({"event": "compiling", "kernels": 0})
         bars({"event": "compiling", "kernels": 2})
         bars({"event": "compiled"})
         (compiling,) = bars._progress.tasks
@@ -51,6 +52,7 @@ def test_lines_are_json_and_bars_are_on_stderr(capsys: pytest.CaptureFixture[str
         bars({"event": "done"})
     out, err = capsys.readouterr()
     assert out == ""
+    assert "compiling kernels, once after an installation" in err
     assert "waiting for grey: another build is at work on it" in err
     assert "grey failed: [no] idea" in err
 

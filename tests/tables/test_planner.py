@@ -11,7 +11,7 @@ import pytest
 from numpy.typing import NDArray
 
 from brdfdb.materials import Material, exact_material, presets
-from brdfdb.tables import error_measurement, planner, tabulation
+from brdfdb.tables import error_measurement, plan_trials, planner, tabulation
 from brdfdb.tables.grids import ANISOTROPIC_HALF_DIFFERENCE_AXES, HALF_DIFFERENCE_AXES, ISOTROPIC_AXES, Grid
 from brdfdb.tables.layout import Layout
 from brdfdb.tables.planner import plan
@@ -167,11 +167,11 @@ def test_the_last_digit_of_a_parameter_decides_not_whether_a_table_is_found(tole
 
 
 def test_a_kind_that_fails_at_all_directions_leaves_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
-    material, finished = presets()["glossy-grey-paper"], planner._finished
+    material, finished = presets()["glossy-grey-paper"], plan_trials.finished
     first = plan(material, None, TOLERANCE)
     monkeypatch.setattr(
-        planner,
-        "_finished",
+        plan_trials,
+        "finished",
         lambda layout, *others: None if layout.interpolation == first.interpolation else finished(layout, *others),
     )
     other = plan(material, None, TOLERANCE)
@@ -203,17 +203,25 @@ def test_no_table_of_an_exhaustive_search_has_half_the_values_of_a_plan(name: st
             if math.prod(number[need] for need in needs.values()) < most:
                 axes = {axis: need.nodes(number[need]) for axis, need in needs.items()}
                 trial = dataclasses.replace(layout, grid=Grid(axes))
-                error = planner._error(trial, planner._values(trial), task.drawn, task.truth)
-                assert error > planner._MARGIN * tolerance, trial.grid.shape
+                error = plan_trials.error_of(trial, plan_trials.values_of(trial), task.drawn, task.truth)
+                assert error > plan_trials.MARGIN * tolerance, trial.grid.shape
+
+
+@pytest.mark.parametrize("name", ["glossy-grey-paper", "blue-plastic"])
+def test_the_values_of_a_plan_are_those_of_its_blocks(name: str) -> None:
+    material = presets()[name]
+    layout, values = planner.planned(material, np.array([450.0, 500.0, 600.0]) if material.spectral else None, 0.05)
+    assert values is not None
+    np.testing.assert_array_equal(values, np.concatenate([tabulation.block(layout, rows) for rows in layout.blocks]))
 
 
 def test_few_directions_rule_out_only_what_all_of_them_do() -> None:
     material = presets()["wall-plaster"]
-    final = planner._final(material, None)
+    final = plan_trials.final_of(material, None)
     for nodes in (3, 6, 9, 18):
         theta = np.append(np.linspace(0.0, 88.0, nodes), 89.9)
         layout = Layout(material, Grid({"theta_i": theta, "theta_r": theta, "delta_phi": np.linspace(0.0, 180.0, 8)}))
-        values = planner._values(layout)
-        error = planner._error(layout, values, *final)
+        values = plan_trials.values_of(layout)
+        error = plan_trials.error_of(layout, values, *final)
         for goal in (0.5 * error, 0.99 * error, 1.01 * error, 2.0 * error):
-            assert planner._keeps(layout, values, final, goal) == (error <= goal)
+            assert plan_trials.keeps(layout, values, final, goal) == (error <= goal)

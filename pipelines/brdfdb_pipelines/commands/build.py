@@ -61,6 +61,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _build(options: argparse.Namespace) -> None:
+    from brdfdb._numba import when_compiling
     from brdfdb.errors import ParameterError
     from brdfdb.materials import PAPERS
     from brdfdb_pipelines import build_resources, recipe_file, workers
@@ -82,7 +83,8 @@ def _build(options: argparse.Namespace) -> None:
     with at as opened, Lines() if options.json else Bars() as report:
         if not options.scheduler:
             compile_kernels(recipe, options.store, options.jobs, report)
-        built = build(recipe, options.store, opened, report, memory=memory)
+        with when_compiling(lambda: report({"event": "compiling", "kernels": 0})):
+            built = build(recipe, options.store, opened, report, memory=memory)
     if not options.json:
         _print(built, options.store, time.perf_counter() - start)
 

@@ -1,0 +1,146 @@
+"""Trials of a plan: tables that are tabulated and measured, and the finished one with its values."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brdfdb.materials import Source
+from brdfdb.parameters import Floats
+from brdfdb.tables import error_measurement, tabulation
+from brdfdb.tables.layout import Layout
+from brdfdb.tables.mixture import Mixture
+from brdfdb.tables.table import Table
+
+MARGIN = 0.88  # of the tolerance: other directions than the planner's find other errors
+SEED = 1994
+_DRAWS = 2000  # directions of a band of theta_i, for the finished table
+_OF_A_BAND = 30.0  # times the tolerance is what the 99th percentile of a band of theta_i may be
+_SOME = 8  # one of so many directions is measured first
+_BITS = range(9, 24)
+_WORTH_ROUNDING = 4096  # values: of smaller tables nothing is rounded
+
+
+class Final(NamedTuple):
+    """Directions at which finished tables are measured, and f_r there, at all wavelengths."""
+
+    drawn: error_measurement.Draw
+    truth: Floats
+
+
+def error_of(layout: Layout, values: NDArray[np.float32], drawn: error_measurement.Draw, truth: Floats) -> float:
+    """Return the largest of the errors that are held to the tolerance.
+
+    They are the 99th percentile of the relative error at the worst wavelength, the l1 error, as a few values that are
+    off by orders of magnitude next to a pole escape any percentile, and the 99th percentile of each band of theta_i
+    over `_OF_A_BAND`: grazing light is a ninth of the directions.
+    """
+    looked_up = Table.of(layout, values).lookup_vectors(drawn.wi, drawn.wr).reshape(truth.shape)
+    error = error_measurement.relative(looked_up, truth, error_measurement.floor_of(truth, drawn))
+    wrong = drawn.weight @ np.abs(looked_up - truth)
+    l1 = np.divide(wrong, drawn.weight @ truth, out=np.zeros_like(wrong), where=wrong > 0.0)
+    above = drawn.above
+    counted, band = np.ascontiguousarray(error[above].T), drawn.band[above]
+    worst = max(np.percentile(counted, 99, axis=1).max(), l1.max())
+    if counted.max() > _OF_A_BAND * worst:  # else no band can be worse
+        for row in np.unique(band):
+            worst = max(worst, np.percentile(counted[:, band == row], 99, axis=1).max() / _OF_A_BAND)
+    return float(worst)
+
+
+def keeps(layout: Layout, values: NDArray[np.float32], final: Final, goal: float) -> bool:
+    """Return True if the errors of a table are within a goal; most that are not are known from a few directions."""
+    drawn, truth = final
+    few = slice(None, None, _SOME)
+    looked_up = Table.of(layout, values).lookup_vectors(drawn.wi[few], drawn.wr[few]).reshape(truth[few].shape)
+    error = error_measurement.relative(looked_up, truth[few], error_measurement.floor_of(truth, drawn))
+    beyond = np.count_nonzero((error > goal) & drawn.above[few, np.newaxis], axis=0).max()
+    most = 0.01 * np.count_nonzero(drawn.above) + 2.0  # with more the 99th percentile of all is beyond the goal
+    return bool(beyond <= most) and error_of(layout, values, drawn, truth) <= goal
+
+
+def values_of(layout: Layout) -> NDArray[np.float32]:
+    return np.concatenate([tabulation.block(layout, rows) for rows in layout.blocks])
+
+
+def final_of(source: Source, wavelength_nm: NDArray[np.float64] | None) -> Final:
+    drawn = error_measurement.draw(source, wavelength_nm, _DRAWS, SEED + 1)
+    return Final(drawn, error_measurement.model_values(source, wavelength_nm, drawn.wi, drawn.wr))
+
+
+def finished(
+    layout: Layout, final: Final, wavelength_nm: NDArray[np.float64] | None, tolerance: float, mixture: Mixture | None
+) -> tuple[Layout, NDArray[np.float32]] | None:
+    """Return the layout at all wavelengths, with as few coefficients and bits as the error allows, and its values.
+
+    None if no number of coefficients and bits keeps to the tolerance.
+    """
+    drawn, truth = final
+    goal = MARGIN * tolerance
+    reason = f"the smallest of those tried that keep 99 of 100 values within {tolerance:g} of the model, relative"
+    if mixture is not None or wavelength_nm is None or not layout.interpolation.logarithm:
+        spectra = None if mixture is None else mixture.spectra
+        if mixture is None and wavelength_nm is not None and layout.wavelength_nm is not None:
+            few = np.isin(wavelength_nm, layout.wavelength_nm)  # a table that fails at these fails at all of them
+            if not few.all() and not keeps(layout, values_of(layout), Final(drawn, truth[:, few]), goal):
+                return None
+        layout = replace(layout, wavelength_nm=wavelength_nm, reason=reason, spectra=spectra)
+        return _rounded(layout, values_of(layout), None, final, goal)
+    assert layout.wavelength_nm is not None
+    numbers = _numbers(layout)
+    few = np.isin(wavelength_nm, layout.wavelength_nm)
+    if not few.all():
+        if not keeps(layout, _as_values(layout, numbers), Final(drawn, truth[:, few]), goal):
+            return None
+        known = numbers
+        numbers = np.empty((*layout.grid.shape, wavelength_nm.size))
+        numbers[..., few], numbers[..., ~few] = known, _numbers(replace(layout, wavelength_nm=wavelength_nm[~few]))
+    layout = replace(layout, wavelength_nm=wavelength_nm, reason=reason)
+    whole = _as_values(layout, numbers)
+    if wavelength_nm.size > 2:
+        rows = whole.reshape(-1, wavelength_nm.size).astype(np.float64)
+        floor = error_measurement.floor_of(truth, drawn)
+        significance = np.max(np.minimum(np.exp(rows) / floor, 1.0), axis=1, keepdims=True)
+        seen = rows * significance
+        basis = np.linalg.eigh(seen.T @ seen).eigenvectors[:, ::-1].T  # the spectra that say most come first
+        for parts in range(1, wavelength_nm.size // 2 + 1):
+            factored = replace(layout, spectra=basis[:parts])
+            values = (rows @ basis[:parts].T).astype(np.float32).reshape(factored.shape)
+            if keeps(factored, values, final, goal):
+                layout, whole = factored, values
+                break
+    return _rounded(layout, whole, numbers, final, goal)
+
+
+def _rounded(
+    layout: Layout, whole: NDArray[np.float32], numbers: Floats | None, final: Final, goal: float
+) -> tuple[Layout, NDArray[np.float32]] | None:
+    """Return the layout with as few bits as the error allows, and its values; None if no number of bits does.
+
+    `numbers` are those of the nodes of a spectrum that may be factored: `whole` has the coefficients to the last digits
+    only, because a BLAS sums them.
+    """
+    for bits in _BITS if layout.size > _WORTH_ROUNDING else (23,):
+        values = tabulation.rounded(whole, bits)
+        if keeps(replace(layout, bits=bits), values, final, goal):
+            if layout.spectra is not None and numbers is not None:
+                stored = [
+                    _as_values(layout, numbers[rows]) for rows in tabulation.slabs(layout, slice(0, len(numbers)))
+                ]
+                values = tabulation.rounded(np.concatenate(stored), bits)
+            return replace(layout, bits=bits), values
+    return None
+
+
+def _numbers(layout: Layout) -> Floats:
+    """Return the numbers of all nodes at all wavelengths."""
+    rows = slice(0, layout.grid.shape[0])
+    return np.concatenate([tabulation.node_numbers(layout, some) for some in tabulation.slabs(layout, rows)])
+
+
+def _as_values(layout: Layout, numbers: Floats) -> NDArray[np.float32]:
+    """Return the values of a table that some rows of numbers make."""
+    return tabulation.stored(layout, numbers).astype(np.float32).reshape(len(numbers), *layout.shape[1:])
