@@ -34,6 +34,7 @@ HALTED_S = 15.0  # time without one after which a worker is replaced [s]
 COUNTS_BYTES = 2**20  # room for the counts of one kind of a worker; all addresses and statuses take a tenth
 LOADED_S = 120.0  # time until the first one: packages are loaded [s]
 
+COMPILES: dict[str, object] = {"compiles": "kernels, once after an installation: the first answers wait"}
 OTHERS = ("uvicorn", "py.warnings")  # loggers of other packages
 
 
@@ -79,17 +80,13 @@ def serve(store_dir: Path, host: str, port: int, workers: int = 1, snapshot: str
         print(f"serving {store_dir} at http://{f'[{host}]' if ':' in host else host}:{port}/", flush=True)
         stack.enter_context(_ended_by_signals())
         if workers == 1:
-            with when_compiling(_tell_of_compilation):
-                Server(_config()).run(sockets=[listener])
+            stack.enter_context(when_compiling(lambda: log.write(COMPILES)))
+            Server(_config()).run(sockets=[listener])
         else:
             # directory where workers write their counts, so that each can report all of them
             place = tempfile.TemporaryDirectory(prefix="brdfdb-metrics-", ignore_cleanup_errors=True)
             counts = stack.enter_context(place)
             asyncio.run(_keep(workers, listener, counts))
-
-
-def _tell_of_compilation() -> None:
-    print("compiling kernels, once after an installation: the first answers wait", file=sys.stderr, flush=True)
 
 
 class Server(uvicorn.Server):
@@ -219,7 +216,7 @@ def _work(descriptor: int) -> None:
         server.should_exit = True
 
     threading.Thread(target=wait, daemon=True).start()
-    with _ended_by_signals(), when_compiling(_tell_of_compilation):
+    with _ended_by_signals(), when_compiling(lambda: log.write(COMPILES)):
         server.run(sockets=[socket.socket(fileno=descriptor)])
 
 
