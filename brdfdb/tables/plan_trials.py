@@ -63,10 +63,12 @@ def keeps(layout: Layout, values: NDArray[np.float32], final: Final, goal: float
 
 
 def values_of(layout: Layout) -> NDArray[np.float32]:
+    """Return the values of a whole table as they are stored, of the shape of the layout."""
     return np.concatenate([tabulation.block(layout, rows) for rows in layout.blocks])
 
 
 def final_of(source: Source, wavelength_nm: NDArray[np.float64] | None) -> Final:
+    """Return directions drawn for finished tables of a source, and its f_r [1/sr] there at all wavelengths [nm]."""
     drawn = error_measurement.draw(source, wavelength_nm, _DRAWS, SEED + 1)
     return Final(drawn, error_measurement.model_values(source, wavelength_nm, drawn.wi, drawn.wr))
 
