@@ -1,13 +1,15 @@
-"""Figures as data: curves, maps and pictures, and statements of a paper about them."""
+"""Figures as data: curves, maps and pictures, and statements of a paper about them; pixels as a PNG file."""
 
 from __future__ import annotations
 
 import math
+import struct
+import zlib
 from collections.abc import Iterable
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
 Numbers = list[float | None]
@@ -140,3 +142,23 @@ def number(value: float | None, digits: int = 3) -> str:
 def superscript(exponent: int) -> str:
     """Return an integer in raised digits."""
     return str(exponent).translate(_SUPERSCRIPT)
+
+
+def png_of(pixels: NDArray[np.uint8], level: int) -> bytes:
+    """Return a PNG file of pixels (rows, columns, 4): red, green, blue in sRGB, and opacity.
+
+    Parameters
+    ----------
+    pixels : uint8 array (rows, columns, 4)
+        The pixels, the top row first.
+    level : int
+        Effort of the compression, from 1 to 9. 1 is fast, 9 makes small files.
+    """
+    rows, columns, _ = pixels.shape
+    lines = np.pad(pixels.reshape(rows, -1), ((0, 0), (1, 0)))  # each row begins with its filter: none
+    header = struct.pack(">2I5B", columns, rows, 8, 6, 0, 0, 0)
+    chunks = (
+        struct.pack(">I", len(content)) + kind + content + struct.pack(">I", zlib.crc32(kind + content))
+        for kind, content in ((b"IHDR", header), (b"IDAT", zlib.compress(lines.tobytes(), level)), (b"IEND", b""))
+    )
+    return b"\x89PNG\r\n\x1a\n" + b"".join(chunks)

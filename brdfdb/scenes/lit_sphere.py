@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import functools
-import struct
 import threading
-import zlib
 from collections.abc import Callable
 from typing import NamedTuple
 from weakref import WeakKeyDictionary
@@ -14,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.errors import ParameterError
+from brdfdb.figure import png_of
 from brdfdb.geometry import radians, spherical_angles, unit_vector
 from brdfdb.integrals.sampling import directions, mixture_density
 from brdfdb.materials import FunctionRecord, Source
@@ -121,13 +120,7 @@ def sphere_png(surface: Source | BaseTable, size: int = SIZE, detail: Detail = F
         If `size` is out of range.
     """
     pixels = np.rint(255.0 * lit_sphere(surface, size, detail=detail)).astype(np.uint8)
-    rows = np.pad(pixels.reshape(size, -1), ((0, 0), (1, 0)))  # each row begins with its filter: none
-    header, data = struct.pack(">2I5B", size, size, 8, 6, 0, 0, 0), zlib.compress(rows.tobytes(), 1)
-    chunks = (
-        struct.pack(">I", len(content)) + kind + content + struct.pack(">I", zlib.crc32(kind + content))
-        for kind, content in ((b"IHDR", header), (b"IDAT", data), (b"IEND", b""))
-    )
-    return b"\x89PNG\r\n\x1a\n" + b"".join(chunks)
+    return png_of(pixels, level=1)
 
 
 def thumbnail_png(table: BaseTable, size: int) -> bytes:

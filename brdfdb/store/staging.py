@@ -46,8 +46,8 @@ class Block(TypedDict):
 
 
 def remove_begun(root: Path) -> None:
-    """Remove a store in which nothing was built: plans and empty directories; anything else makes it stay."""
-    if any(staging_path(root).glob("*/*/blocks/*")) or any(materials_path(root).glob("*")):
+    """Remove a store that was made a moment ago, with what is staged; a material or another build makes it stay."""
+    if any(materials_path(root).glob("*")):
         return
     with suppress(OSError, BusyError, StoreError):
         for staged in list(staging_path(root).iterdir()):

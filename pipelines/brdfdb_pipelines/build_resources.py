@@ -67,12 +67,17 @@ def check_memory(what: str, need: int, memory: int | None) -> None:
 
 def check_disk(need: int, directory: Path) -> None:
     """Raise ParameterError if the file system of a directory has less than `need` [byte] free; it need not exist."""
-    there = next(path for path in (directory, *directory.absolute().parents) if path.exists())
-    free = shutil.disk_usage(there).free
+    free = free_bytes(directory)
     if need > free:
         raise ParameterError(
             "disk", f"the tables take up to {terminal.size(need)}, {directory} has {terminal.size(free)} free"
         )
+
+
+def free_bytes(directory: Path) -> int:
+    """Return the space [byte] that is free on the file system of a directory, which need not exist."""
+    there = next(path for path in (directory, *directory.absolute().parents) if path.exists())
+    return shutil.disk_usage(there).free
 
 
 def stored_bytes(directories: Sequence[Path]) -> int:

@@ -45,7 +45,7 @@ class Survey:
 def survey(root: str, job: Job) -> Survey:
     """Return the survey of a job: a task for a worker, because it plans the layout of a missing table.
 
-    The values that a plan has computed are staged as the blocks of the table.
+    The values that a plan has computed are staged as the blocks of the table, if the disk has room for them.
     """
     store, name, request = Path(root), job.material.name, job.request
     head = head_of(store, name)
@@ -60,7 +60,7 @@ def survey(root: str, job: Job) -> Survey:
         try:
             with Lock(store, name, wait=False):
                 staging = prepare(store, name, request, text)
-                if values is not None:
+                if values is not None and build_resources.table_bytes(layout) <= build_resources.free_bytes(store):
                     for number, rows in enumerate(layout.blocks):
                         write_block(str(staging), text, number, values[rows])
                     tabulated = True
@@ -70,7 +70,7 @@ def survey(root: str, job: Job) -> Survey:
     rest = layout.size // layout.shape[0]
     block_values = tuple((rows.stop - rows.start) * rest for rows in layout.blocks)
     staged = build_resources.stored_bytes([request_path(store, name, digest(request)) / "table"])
-    disk = max(0, build_resources.table_bytes(layout) - staged)
+    disk = 0 if tabulated else max(0, build_resources.table_bytes(layout) - staged)
     shape, wavelengths = tuple(layout.shape), 0 if layout.wavelength_nm is None else layout.wavelength_nm.size
     task_bytes = build_resources.task_bytes(layout)
     return Survey(status, head, text, shape, wavelengths, block_values, task_bytes, disk, tabulated)

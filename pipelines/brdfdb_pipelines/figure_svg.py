@@ -8,15 +8,13 @@ from __future__ import annotations
 import base64
 import html
 import math
-import struct
-import zlib
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from brdfdb.figure import Curve, Map, Panel, Picture
+from brdfdb.figure import Curve, Map, Panel, Picture, png_of
 from brdfdb_pipelines.figure_look import (
     DOT,
     FRAME_WIDTH,
@@ -371,19 +369,8 @@ def _image(pixels: NDArray[np.uint8], box: _Box) -> str:
 
 
 def _png(pixels: NDArray[np.uint8]) -> str:
-    """Return pixels (rows, columns, RGBA) as the text of a PNG."""
-    rows, columns, _ = pixels.shape
-    lines = np.zeros((rows, 1 + 4 * columns), dtype=np.uint8)  # a line begins with its filter, here none
-    lines[:, 1:] = pixels.reshape(rows, -1)
-    chunks = (
-        (b"IHDR", struct.pack(">IIBBBBB", columns, rows, 8, 6, 0, 0, 0)),
-        (b"IDAT", zlib.compress(lines.tobytes(), 9)),
-        (b"IEND", b""),
-    )
-    image = b"\x89PNG\r\n\x1a\n" + b"".join(
-        struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data)) for name, data in chunks
-    )
-    return base64.b64encode(image).decode("ascii")
+    """Return pixels (rows, columns, 4) as the text of a PNG."""
+    return base64.b64encode(png_of(pixels, level=9)).decode("ascii")
 
 
 def _ticks_below(ticks: Iterable[tuple[float, str]], bottom: float) -> str:

@@ -97,7 +97,7 @@ class Server:
         return self.resident_mb
 
     def _works(self) -> bool:
-        """Whether a thread beside the first one runs, waits for the processor or for the disk."""
+        """Return True if a thread beside the first one runs, waits for the processor or for the disk."""
         states = set()
         for thread in Path(f"/proc/{self.process.pid}/task").iterdir():
             with contextlib.suppress(OSError):  # one that has ended meanwhile

@@ -6,6 +6,7 @@ import json
 import tracemalloc
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from brdfdb.materials import presets
 from brdfdb.store import marker, staging
 from brdfdb.tables.grids import Grid
 from brdfdb.tables.layout import Interpolation, Layout
-from brdfdb_pipelines import build_resources, cli
+from brdfdb_pipelines import build_resources, build_survey, cli
 
 LOG = Interpolation("cubic", True, 1e-4)
 WAVELENGTHS = np.linspace(400.0, 700.0, 31)
@@ -69,6 +70,27 @@ def test_a_disk_that_is_too_small_is_one_sentence_before_anything_is_written(
     assert said.startswith("brdfdb: disk: the tables take up to ")
     assert said.endswith(f" kB, {root} has 10 kB free")
     assert not root.exists()
+
+
+@pytest.mark.parametrize(("free", "staged"), [(100, []), (10_000, ["rolled-brass"])])
+def test_a_disk_too_small_for_planned_tables_leaves_nothing(
+    free: int, staged: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    planned = tmp_path / "planned.toml"
+    planned.write_text('materials = ["foam", "rolled-brass"]\ntolerance = 0.01\n', encoding="utf-8")
+    monkeypatch.setattr(build_resources.shutil, "disk_usage", lambda _: SimpleNamespace(free=free))
+    names: list[str] = []
+
+    def write_block(directory: str, *given: Any) -> staging.Block:
+        names.append(Path(directory).parent.name)
+        return staging.write_block(directory, *given)
+
+    monkeypatch.setattr(build_survey, "write_block", write_block)
+    root = tmp_path / "store"
+    assert cli.main(["build", str(planned), "--store", str(root), "--jobs", "1"]) == 2
+    assert capsys.readouterr().err.splitlines()[-1].startswith("brdfdb: disk: the tables take up to ")
+    assert not root.exists()
+    assert names == staged
 
 
 def test_what_is_staged_already_needs_no_disk_again(

@@ -232,7 +232,7 @@ def test_an_azimuth_without_meaning_is_refused_in_degrees(built: Path, capsys: p
 
 
 def test_n_and_k_of_a_table_take_the_place_of_their_entry(planned: Path) -> None:
-    """What `show` computes is the same with the n and k that the table holds."""
+    """Compare what `show` computes with the n and k of the table, and with those of their entry."""
     table = brdfdb.open(planned)["scene-copper-sphere"]
     source = show._source_of(table)
     assert isinstance(source, Material)
