@@ -31,7 +31,7 @@ CAPPED = ("numba", "uvicorn")
 
 
 def _numba_is_used_inside() -> None:
-    compiled = _numba.kernel(_square)
+    compiled = _numba.loop(_square)
     file = compiled._cache._cache_file  # type: ignore[attr-defined]
     assert file._source_stamp.endswith(_numba._shared_digest())
     assert "_source_stamp" in inspect.getsource(_numba)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb._elementary import BLOCK, exp, log, summand_exp
-from brdfdb._numba import kernel, loop
+from brdfdb._numba import inner_loop, kernel, loop
 from brdfdb.parameters import Floats
 
 Array = NDArray[np.float64]
@@ -80,7 +80,7 @@ def _exponent_at_peak(u: float) -> float:
     return p * u if u < 0.25 else exp(0.5 * u) * (1.0 - u) - 1.0
 
 
-@loop
+@inner_loop
 def log_series(g: Array, V: Array, reach: float, log_sum: Array, work: Array, index: Indices) -> None:
     """Fill log_sum with the logarithm of `diffraction_series` for at most BLOCK values of g and V.
 
@@ -91,7 +91,7 @@ def log_series(g: Array, V: Array, reach: float, log_sum: Array, work: Array, in
     _log_series(False, g, V, reach, log_sum, log_sum, log_sum, work, index)
 
 
-@loop
+@inner_loop
 def log_series_and_slopes(
     g: Array, V: Array, log_sum: Array, by_g: Array, by_V: Array, work: Array, index: Indices
 ) -> None:
@@ -363,7 +363,7 @@ def series_table(terms: int) -> Array:
     return np.ascontiguousarray(series @ np.array([np.pad(row, (0, terms - row.size)) for row in powers]))
 
 
-@loop
+@inner_loop
 def log_series_of_row(
     table: Array, g: float, V: Array, V_low: float, V_high: float, log_sum: Array, row: Array
 ) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb._elementary import BLOCK, cosine, erfcx, exp, log
-from brdfdb._numba import elementwise, kernel, loop
+from brdfdb._numba import elementwise, inner_loop, kernel, loop
 from brdfdb.fresnel import reflectance, reflectance_slopes
 from brdfdb.models._diffraction_series import (
     G_HIGH,
@@ -106,7 +106,7 @@ variance = elementwise(_effective_variance)
 difference_of_sines = elementwise(_difference_of_sines)
 
 
-@loop
+@inner_loop
 def _roughness(geometry: Array, surface: Array, g_over_vz2: Array, shadow: Array) -> None:
     """Fill in g / v_z^2 [1] and S / (cos theta_i cos theta_r) [1], the factors of eq. 71 set by the polar angles."""
     sin_i, cos_i, sin_r, cos_r = geometry[0], geometry[1], geometry[2], geometry[3]
@@ -123,7 +123,7 @@ def _roughness(geometry: Array, surface: Array, g_over_vz2: Array, shadow: Array
         g_over_vz2[j] = wave[j] * _effective_variance(g_over_vz2[j])
 
 
-@loop
+@inner_loop
 def _first_terms(terms: int, g: Array, V: Array, total: Array, power: Array) -> None:
     """Add the first terms of the sum of eq. 78 divided by g. power is overwritten."""
     count = total.shape[0]
@@ -137,7 +137,7 @@ def _first_terms(terms: int, g: Array, V: Array, total: Array, power: Array) -> 
             power[j] *= g[j] * following
 
 
-@loop
+@inner_loop
 def _limit(corrected: bool, g: Array, V: Array, total: Array) -> None:
     """Fill in the limit of the sum of eq. 78 divided by g for g -> infinity, e^-b / g^2 with b = V / g.
 
@@ -151,7 +151,7 @@ def _limit(corrected: bool, g: Array, V: Array, total: Array) -> None:
         total[j] = exp(-b) * inverse * inverse * (beyond if beyond > 0.0 else 0.0)
 
 
-@loop
+@inner_loop
 def _evaluate(
     geometry: Array, surface: Array, series: int, reach: float, f_r: Array, work: Array, index: Indices
 ) -> None:
@@ -220,7 +220,7 @@ def scattered(features: Array, surface: Array, series: int, reach: float, f_r: A
         _evaluate(geometry, lanes, series, reach, f_r[start : start + count], work, index)
 
 
-@loop
+@inner_loop
 def _geometry_of(i: Floats, r: Floats, geometry: Array) -> None:
     """Fill in the rows of geometry that `_evaluate` reads, for at most BLOCK pairs of unit vectors in flat arrays."""
     count = i.shape[0] // 3
@@ -236,7 +236,7 @@ def _geometry_of(i: Floats, r: Floats, geometry: Array) -> None:
         geometry[4, j] = v_x * v_x + v_y * v_y
 
 
-@loop
+@inner_loop
 def _vectors(w_i: Floats, w_r: Floats, surface: Array, series: int, reach: float, f_r: Floats) -> None:
     """Evaluate f_r [1/sr] as `scattered` does, for unit vectors in flat arrays and a surface of shape (1 or N, 6)."""
     work, index = np.empty((4 + ROWS_OF_WORK, BLOCK)), np.empty((GROUPS, BLOCK), np.int64)
@@ -270,7 +270,7 @@ def vector_rows(w_i: Floats, w_r: Floats, series: int, reach: float, scalars: Ar
         _vectors(i, r, scalars[row : row + 1], series, reach, f_r[row])
 
 
-@loop
+@inner_loop
 def _gradient(geometry: Array, surface: Array, values: Array, work: Array, index: Indices) -> None:
     """Evaluate the directional diffuse part and its derivatives at no more than BLOCK pairs of directions.
 
