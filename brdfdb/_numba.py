@@ -46,7 +46,7 @@ def kernel(function: F) -> F:
 
 
 def inner_loop(function: F) -> F:
-    """Compile a loop over arrays that kernels call, and that is not inlined as `kernel` is. Python runs it as Python."""
+    """Compile a loop over arrays that kernels call, without inlining it. Python runs it as Python."""
     return _part(function, forceinline=False)
 
 
