@@ -64,9 +64,10 @@ def _part(function: F, *, forceinline: bool) -> F:
         return function
     import numba
 
+    typeof: Any = numba.typeof  # numba leaves it untyped
     part: Any = function
     part.dispatcher = _compiled(function, forceinline=forceinline, no_cpython_wrapper=True)
-    part._numba_type_ = numba.typeof(part.dispatcher)  # it does not keep the dispatcher alive
+    part._numba_type_ = typeof(part.dispatcher)  # it does not keep the dispatcher alive
     return function
 
 
