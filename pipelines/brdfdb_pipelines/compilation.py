@@ -61,12 +61,12 @@ def compile_kernels(recipe: Recipe, root: Path, jobs: int, report: Callable[[Eve
                     report({"event": "compiled"})
 
     with ThreadPoolExecutor(others) as threads, workers.processes(others, patient=False) as pool:
-        asked = [
+        helpers = [
             threads.submit(work, lambda task: pool.executor.submit(_compiled, task).result()) for _ in range(others)
         ]
         try:
             work(_compiled)
-            wait(asked)
+            wait(helpers)
         finally:
             tasks.clear()  # no other task begins after Ctrl-C
 
