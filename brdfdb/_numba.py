@@ -24,6 +24,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 # Kernels stay functions of Python, and numba is not imported. numba reads the same variable
 INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
 SHARED = (
+    "_numba.py",  # its options decide what is compiled
     "_elementary.py",
     "tables/_vectors.py",
     "fresnel.py",
@@ -34,30 +35,48 @@ SHARED = (
 
 
 def kernel(function: F) -> F:
-    """Compile a function of scalars, or a loop over arrays, when it is first called.
+    """Compile a function of scalars, or a part of a loop, into the kernels that call it. Python runs it as Python.
 
     nogil: the batch layer runs kernels on threads. error_model="numpy": the Python model checks every division,
     which costs a factor of 5 to 7 on Ward's model, and limits need inf from 1/0. fastmath has only "contract", fused
     multiply-add, which rounds less; nan and inf keep their meaning. cache: the next process starts in 0.04 s instead of
     seconds. forceinline: a loop vectorises only if all functions that it calls are inlined.
     """
-    return _compiled(function, forceinline=True)
+    return _part(function, forceinline=True)
+
+
+def inner_loop(function: F) -> F:
+    """Compile a loop over arrays that kernels call, without inlining it. Python runs it as Python."""
+    return _part(function, forceinline=False)
 
 
 def loop(function: F) -> F:
-    """Compile a loop over arrays that Python or several kernels call once, not inside each of them as `kernel` does.
+    """Compile a loop over arrays that Python calls, and kernels where they need it.
 
-    Python calls a function through a wrapper, which is one of them.
+    Python calls a function through a wrapper, for which LLVM compiles another copy.
     """
     return _compiled(function, forceinline=False)
 
 
-def _compiled(function: F, *, forceinline: bool) -> F:
+def _part(function: F, *, forceinline: bool) -> F:
+    """Show numba the compiled function in place of the function: without a wrapper, Python could not call it."""
     if INTERPRETED:
         return function
     import numba
 
-    options: Any = {"nogil": True, "error_model": "numpy", "fastmath": {"contract"}, "forceinline": forceinline}
+    typeof: Any = numba.typeof  # numba leaves it untyped
+    part: Any = function
+    part.dispatcher = _compiled(function, forceinline=forceinline, no_cpython_wrapper=True)
+    part._numba_type_ = typeof(part.dispatcher)  # it does not keep the dispatcher alive
+    return function
+
+
+def _compiled(function: F, **more: bool) -> F:
+    if INTERPRETED:
+        return function
+    import numba
+
+    options: Any = {"nogil": True, "error_model": "numpy", "fastmath": {"contract"}, **more}
     options["no_cfunc_wrapper"] = True  # nothing calls a kernel by address, and its code would be compiled once more
     try:
         compiled: Any = numba.njit(cache=True, **options)(function)

@@ -11,7 +11,9 @@ import tomllib
 import venv
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
+import numba
 import numpy as np
 import pytest
 import xarray as xr
@@ -31,10 +33,13 @@ CAPPED = ("numba", "uvicorn")
 
 
 def _numba_is_used_inside() -> None:
-    compiled = _numba.kernel(_square)
+    compiled = _numba.loop(_square)
     file = compiled._cache._cache_file  # type: ignore[attr-defined]
     assert file._source_stamp.endswith(_numba._shared_digest())
     assert "_source_stamp" in inspect.getsource(_numba)
+    part: Any = _numba.kernel(_square)
+    assert part is _square  # for Python; numba asks for the attribute `_numba_type_`
+    assert numba.typeof(part) == numba.typeof(part.dispatcher)
 
 
 def _square(x: float) -> float:

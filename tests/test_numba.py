@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from brdfdb import _numba
-from brdfdb._numba import elementwise, kernel
+from brdfdb._numba import elementwise, kernel, loop
 
 COMPILED_AGAINST_PYTHON = 1e-13  # worst measured: 2.2e-16; a kernel may fuse a product and a sum, Python never does
 
@@ -188,18 +188,30 @@ def test_elementwise_broadcasts_and_raises_no_floating_point_flags() -> None:
 
 
 @pytest.mark.skipif(numba.config.DISABLE_JIT, reason="Python divides by zero in its own way")
-def test_kernels_divide_as_numpy_does_and_keep_nan_and_infinity() -> None:
-    compiled = kernel(square)
+def test_loops_divide_as_numpy_does_and_keep_nan_and_infinity() -> None:
+    compiled = loop(square)
     assert compiled(1.0, 0.0) == np.inf
     assert math.isnan(compiled(0.0, 0.0))
     assert math.isnan(compiled(math.nan, 1.0))
     assert compiled(math.inf, 1.0) == math.inf
 
 
+@pytest.mark.skipif(numba.config.DISABLE_JIT, reason="Python divides by zero in its own way")
+def test_python_runs_a_kernel_as_python_and_a_loop_runs_it_compiled() -> None:
+    @kernel
+    def ratio(x: float, y: float) -> float:
+        return x / y
+
+    assert loop(lambda x, y: ratio(x, y))(1.0, 0.0) == np.inf
+    assert ratio(1.0, 4.0) == 0.25
+    with pytest.raises(ZeroDivisionError):
+        ratio(1.0, 0.0)
+
+
 @pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is cached")
 def test_compiled_code_is_old_when_a_shared_file_has_changed(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     def stamp() -> bytes:
-        compiled: Any = kernel(square)
+        compiled: Any = loop(square)
         result: bytes = compiled._cache._cache_file._source_stamp
         return result
 
@@ -223,7 +235,7 @@ def test_kernels_work_where_no_cache_can_be_written() -> None:
         "from numba.core import caching\n"
         "caching.CacheImpl._locator_classes = []\n"
         "from brdfdb import _numba\n"
-        "double = _numba.kernel(lambda x: 2.0 * x)\n"
+        "double = _numba.loop(lambda x: 2.0 * x)\n"
         "print(double(3.0), _numba.elementwise(lambda x: x + 1.0)(2.0), _numba.is_cached(double))\n"
     )
     ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)

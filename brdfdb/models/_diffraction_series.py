@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb._elementary import BLOCK, exp, log, summand_exp
-from brdfdb._numba import kernel, loop
+from brdfdb._numba import inner_loop, kernel, loop
 from brdfdb.parameters import Floats
 
 Array = NDArray[np.float64]
@@ -80,30 +80,8 @@ def _exponent_at_peak(u: float) -> float:
     return p * u if u < 0.25 else exp(0.5 * u) * (1.0 - u) - 1.0
 
 
-@loop
-def log_series(g: Array, V: Array, reach: float, log_sum: Array, work: Array, index: Indices) -> None:
-    """Fill log_sum with the logarithm of `diffraction_series` for at most BLOCK values of g and V.
-
-    reach, in (0, 1], is the share of the distance from the peak up to which terms are summed; 1 is the model. The steps
-    of the trapezoid rule grow as 1 / reach, so that its number of nodes falls as the square of reach. work, of shape
-    (ROWS_OF_WORK, BLOCK), and index, of shape (GROUPS, BLOCK), are overwritten.
-    """
-    _log_series(False, g, V, reach, log_sum, log_sum, log_sum, work, index)
-
-
-@loop
-def log_series_and_slopes(
-    g: Array, V: Array, log_sum: Array, by_g: Array, by_V: Array, work: Array, index: Indices
-) -> None:
-    """Fill log_sum as `log_series` does, and its derivatives by ln(g), increased by 1, and by ln(V).
-
-    They are means over the terms: <m> - g, and -V <1/m>.
-    """
-    _log_series(True, g, V, 1.0, log_sum, by_g, by_V, work, index)
-
-
-@kernel
-def _log_series(
+@inner_loop
+def log_series(
     slopes: bool,
     g: Array,
     V: Array,
@@ -114,7 +92,14 @@ def _log_series(
     work: Array,
     index: Indices,
 ) -> None:
-    """Sum, and where `slopes` is true fill in the derivatives, too: the callers know it, and LLVM drops the rest."""
+    """Fill log_sum with the logarithm of `diffraction_series` for at most BLOCK values of g and V.
+
+    `slopes` is a constant of each caller, so that LLVM drops the rest. With it, by_g and by_V are filled with the
+    derivatives by ln(g), increased by 1, and by ln(V): means over the terms, <m> - g, and -V <1/m>. Without it they
+    are not used. reach, in (0, 1], is the share of the distance from the peak up to which terms are summed; 1 is the
+    model. The steps of the trapezoid rule grow as 1 / reach, so that its number of nodes falls as the square of reach.
+    work, of shape (ROWS_OF_WORK, BLOCK), and index, of shape (GROUPS, BLOCK), are overwritten.
+    """
     count = log_sum.shape[0]
     log_g, u, m_star = work[0], work[1], work[2]
     for i in range(count):
@@ -293,7 +278,8 @@ def _series(g: Array, V: Array, log_sum: Array) -> None:
     work, index = np.empty((ROWS_OF_WORK, BLOCK)), np.empty((GROUPS, BLOCK), np.int64)
     for start in range(0, log_sum.shape[0], BLOCK):
         stop = min(start + BLOCK, log_sum.shape[0])
-        log_series(g[start:stop], V[start:stop], 1.0, log_sum[start:stop], work, index)
+        sums = log_sum[start:stop]
+        log_series(False, g[start:stop], V[start:stop], 1.0, sums, sums, sums, work, index)
 
 
 def diffraction_series(g: Floats, V: Floats) -> Floats:
@@ -363,7 +349,7 @@ def series_table(terms: int) -> Array:
     return np.ascontiguousarray(series @ np.array([np.pad(row, (0, terms - row.size)) for row in powers]))
 
 
-@loop
+@inner_loop
 def log_series_of_row(
     table: Array, g: float, V: Array, V_low: float, V_high: float, log_sum: Array, row: Array
 ) -> None:

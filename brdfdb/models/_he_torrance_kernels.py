@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb._elementary import BLOCK, cosine, erfcx, exp, log
-from brdfdb._numba import elementwise, kernel, loop
+from brdfdb._numba import elementwise, inner_loop, kernel, loop
 from brdfdb.fresnel import reflectance, reflectance_slopes
 from brdfdb.models._diffraction_series import (
     G_HIGH,
@@ -17,7 +17,6 @@ from brdfdb.models._diffraction_series import (
     Q_PATCHES,
     ROWS_OF_WORK,
     log_series,
-    log_series_and_slopes,
     log_series_of_row,
     nearer_lambert_w,
     roughly_lambert_w,
@@ -106,7 +105,7 @@ variance = elementwise(_effective_variance)
 difference_of_sines = elementwise(_difference_of_sines)
 
 
-@loop
+@inner_loop
 def _roughness(geometry: Array, surface: Array, g_over_vz2: Array, shadow: Array) -> None:
     """Fill in g / v_z^2 [1] and S / (cos theta_i cos theta_r) [1], the factors of eq. 71 set by the polar angles."""
     sin_i, cos_i, sin_r, cos_r = geometry[0], geometry[1], geometry[2], geometry[3]
@@ -123,7 +122,7 @@ def _roughness(geometry: Array, surface: Array, g_over_vz2: Array, shadow: Array
         g_over_vz2[j] = wave[j] * _effective_variance(g_over_vz2[j])
 
 
-@loop
+@inner_loop
 def _first_terms(terms: int, g: Array, V: Array, total: Array, power: Array) -> None:
     """Add the first terms of the sum of eq. 78 divided by g. power is overwritten."""
     count = total.shape[0]
@@ -137,7 +136,7 @@ def _first_terms(terms: int, g: Array, V: Array, total: Array, power: Array) -> 
             power[j] *= g[j] * following
 
 
-@loop
+@inner_loop
 def _limit(corrected: bool, g: Array, V: Array, total: Array) -> None:
     """Fill in the limit of the sum of eq. 78 divided by g for g -> infinity, e^-b / g^2 with b = V / g.
 
@@ -151,7 +150,7 @@ def _limit(corrected: bool, g: Array, V: Array, total: Array) -> None:
         total[j] = exp(-b) * inverse * inverse * (beyond if beyond > 0.0 else 0.0)
 
 
-@loop
+@inner_loop
 def _evaluate(
     geometry: Array, surface: Array, series: int, reach: float, f_r: Array, work: Array, index: Indices
 ) -> None:
@@ -169,7 +168,7 @@ def _evaluate(
         V[j] = correlation[j] * v_xy2[j]
     # Eq. (78)
     if series == WHOLE:
-        log_series(g, V, reach, f_r, work[4:], index)
+        log_series(False, g, V, reach, f_r, f_r, f_r, work[4:], index)
         for j in range(count):
             f_r[j] = exp(f_r[j])
     elif series > 0:
@@ -220,7 +219,7 @@ def scattered(features: Array, surface: Array, series: int, reach: float, f_r: A
         _evaluate(geometry, lanes, series, reach, f_r[start : start + count], work, index)
 
 
-@loop
+@inner_loop
 def _geometry_of(i: Floats, r: Floats, geometry: Array) -> None:
     """Fill in the rows of geometry that `_evaluate` reads, for at most BLOCK pairs of unit vectors in flat arrays."""
     count = i.shape[0] // 3
@@ -237,40 +236,39 @@ def _geometry_of(i: Floats, r: Floats, geometry: Array) -> None:
 
 
 @loop
-def _vectors(w_i: Floats, w_r: Floats, surface: Array, series: int, reach: float, f_r: Floats) -> None:
-    """Evaluate f_r [1/sr] as `scattered` does, for unit vectors in flat arrays and a surface of shape (1 or N, 6)."""
+def vector_rows(w_i: Floats, w_r: Floats, series: int, reach: float, scalars: Array, f_r: Floats) -> None:
+    """Evaluate rows of f_r [1/sr] as `scattered` does, for unit vectors and surfaces of shape (rows, 6).
+
+    Rows of one value, each with a surface of its own, are one long row.
+    """
     work, index = np.empty((4 + ROWS_OF_WORK, BLOCK)), np.empty((GROUPS, BLOCK), np.int64)
     lanes, values, geometry = np.empty((6, BLOCK)), np.empty(BLOCK), np.empty((5, BLOCK))
-    for column in range(6):
-        for j in range(BLOCK):
-            lanes[column, j] = surface[0, column]
-    for start in range(0, f_r.shape[0], BLOCK):
-        count = min(BLOCK, f_r.shape[0] - start)
-        i, r = w_i[3 * start : 3 * (start + count)], w_r[3 * start : 3 * (start + count)]
-        f = f_r[start : start + count]
-        if surface.shape[0] > 1:
-            own = surface[start : start + count].reshape(-1)
+    scattered_surfaces = f_r.shape[1] == 1
+    for row in range(1 if scattered_surfaces else f_r.shape[0]):
+        if scattered_surfaces:
+            row_i, row_r, row_f = w_i.reshape(-1), w_r.reshape(-1), f_r.reshape(-1)
+        else:
+            row_i, row_r = w_i[min(row, w_i.shape[0] - 1)].reshape(-1), w_r[min(row, w_r.shape[0] - 1)].reshape(-1)
+            row_f = f_r[row]
             for column in range(6):
-                for j in range(count):
-                    lanes[column, j] = own[6 * j + column]
-        _geometry_of(i, r, geometry)
-        _evaluate(geometry, lanes, series, reach, values[:count], work, index)
-        for j in range(count):
-            f[j] = values[j] * (0.0 if i[3 * j + 2] < 0.0 or r[3 * j + 2] < 0.0 else 1.0)  # nan stays nan
+                for j in range(BLOCK):
+                    lanes[column, j] = scalars[row, column]
+        for start in range(0, row_f.shape[0], BLOCK):
+            count = min(BLOCK, row_f.shape[0] - start)
+            i, r = row_i[3 * start : 3 * (start + count)], row_r[3 * start : 3 * (start + count)]
+            f = row_f[start : start + count]
+            if scattered_surfaces:
+                own = scalars[start : start + count].reshape(-1)
+                for column in range(6):
+                    for j in range(count):
+                        lanes[column, j] = own[6 * j + column]
+            _geometry_of(i, r, geometry)
+            _evaluate(geometry, lanes, series, reach, values[:count], work, index)
+            for j in range(count):
+                f[j] = values[j] * (0.0 if i[3 * j + 2] < 0.0 or r[3 * j + 2] < 0.0 else 1.0)  # nan stays nan
 
 
-@loop
-def vector_rows(w_i: Floats, w_r: Floats, series: int, reach: float, scalars: Array, f_r: Floats) -> None:
-    """Evaluate rows of f_r [1/sr]. Rows of one value, each with a surface of its own, are one long row."""
-    if f_r.shape[1] == 1:
-        _vectors(w_i.reshape(-1), w_r.reshape(-1), scalars, series, reach, f_r.reshape(-1))
-        return
-    for row in range(f_r.shape[0]):
-        i, r = w_i[min(row, w_i.shape[0] - 1)].reshape(-1), w_r[min(row, w_r.shape[0] - 1)].reshape(-1)
-        _vectors(i, r, scalars[row : row + 1], series, reach, f_r[row])
-
-
-@loop
+@inner_loop
 def _gradient(geometry: Array, surface: Array, values: Array, work: Array, index: Indices) -> None:
     """Evaluate the directional diffuse part and its derivatives at no more than BLOCK pairs of directions.
 
@@ -301,7 +299,7 @@ def _gradient(geometry: Array, surface: Array, values: Array, work: Array, index
         # Eqs (71) and (76)
         factor[j] = correlation * (0.25 / np.pi) * light * viewer * wave * variance * v2 * v2
     # Eq. (78)
-    log_series_and_slopes(g, V, log_sum, by_g, by_V, work[8:], index)
+    log_series(True, g, V, 1.0, log_sum, by_g, by_V, work[8:], index)
     for j in range(count):
         half = 0.5 * math.sqrt(geometry[4, j] + (geometry[1, j] + geometry[3, j]) ** 2)
         half = 1.0 if half > 1.0 else half
@@ -394,7 +392,8 @@ def angle_rows(one_plus_cos: Array, table: Array, scalars: Array, f_r: Floats) -
                 g_row[i] = g
             for start in range(0, length, BLOCK):
                 stop = min(start + BLOCK, length)
-                log_series(g_row[: stop - start], V[start:stop], 1.0, log_D[start:stop], work, index)
+                sums = log_D[start:stop]
+                log_series(False, g_row[: stop - start], V[start:stop], 1.0, sums, sums, sums, work, index)
         # Eqs (71) and (76)
         pair = correlation * (0.25 / np.pi) * shadow[lane] * g_over_vz2[lane]
         for j in range(length):

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from brdfdb._elementary import cosine, erfcx, exp
-from brdfdb._numba import kernel, loop
+from brdfdb._numba import inner_loop, kernel, loop
 from brdfdb.fresnel import reflectance_quotient
 from brdfdb.geometry import Angles, checked_angles, checked_vectors, finished
 from brdfdb.lobes import Lobe, SlopeDistribution
@@ -118,7 +118,7 @@ def _lobe(
     return _reflected(fresnel, u, sin2, index[0], index[1], above * (length2 * length2), below)
 
 
-@loop
+@inner_loop
 def _angle_rows(
     distribution: int, shadowing: int, fresnel: int, cos_phi: Rows, sin_phi: Rows, scalars: Rows, f_r: Rows
 ) -> None:
@@ -136,7 +136,7 @@ def _angle_rows(
             f[j] = uniform + _lobe(distribution, shadowing, fresnel, i, r, (reach_i, reach_r), slopes, (first, second))
 
 
-@loop
+@inner_loop
 def _vector_rows(
     distribution: int, shadowing: int, fresnel: int, w_i: Floats, w_r: Floats, scalars: Rows, f_r: Floats
 ) -> None:

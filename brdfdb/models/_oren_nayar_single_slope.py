@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb._elementary import BLOCK, arcsin, sine
-from brdfdb._numba import elementwise, kernel
+from brdfdb._numba import elementwise, kernel, loop
 from brdfdb.parameters import Floats
 
 _TINY = 1e-300  # guard against 0 / 0 only
@@ -91,7 +91,7 @@ def _bounce_of_slope(tan_i: float, tan_r: float, cos_dphi: float, one_less_cos: 
 direct_of_slope, bounce_of_slope = elementwise(_direct_of_slope), elementwise(_bounce_of_slope)
 
 
-@kernel
+@loop
 def _over_slopes(
     features: NDArray[np.float64],
     slopes: NDArray[np.float64],

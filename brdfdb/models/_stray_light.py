@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from brdfdb._elementary import exp, log
-from brdfdb._numba import kernel, loop
+from brdfdb._numba import inner_loop, kernel, loop
 from brdfdb.geometry import checked_angles, checked_vectors, finished
 from brdfdb.lobes import GGX, Lobe
 from brdfdb.models._rows import by_rows, by_rows_of_vectors
@@ -34,7 +34,7 @@ def _profile(form: int, x2: float, first: float, second: float, third: float) ->
     return first * exp(0.5 * third * log(1.0 + x2 / (second * second)))
 
 
-@loop
+@inner_loop
 def _angle_rows(form: int, x_r: Rows, y_r: Rows, scalars: Rows, f_r: Rows) -> None:
     for row in range(f_r.shape[0]):
         s, f = scalars[:, row], f_r[row]
@@ -47,7 +47,7 @@ def _angle_rows(form: int, x_r: Rows, y_r: Rows, scalars: Rows, f_r: Rows) -> No
             f[j] = _profile(form, x * x + y * y, first, second, third)
 
 
-@loop
+@inner_loop
 def _vector_rows(form: int, w_i: Floats, w_r: Floats, scalars: Rows, f_r: Floats) -> None:
     for row in range(f_r.shape[0]):
         s, f = scalars[row], f_r[row]
@@ -65,22 +65,22 @@ def _vector_rows(form: int, w_i: Floats, w_r: Floats, scalars: Rows, f_r: Floats
 # Each form has loops of its own: where the form is known there is no branch, and the loop vectorises
 
 
-@kernel
+@loop
 def _abg_angles(x_r: Rows, y_r: Rows, scalars: Rows, f_r: Rows) -> None:
     _angle_rows(ABG, x_r, y_r, scalars, f_r)
 
 
-@kernel
+@loop
 def _abg_vectors(w_i: Floats, w_r: Floats, scalars: Rows, f_r: Floats) -> None:
     _vector_rows(ABG, w_i, w_r, scalars, f_r)
 
 
-@kernel
+@loop
 def _harvey_angles(x_r: Rows, y_r: Rows, scalars: Rows, f_r: Rows) -> None:
     _angle_rows(HARVEY, x_r, y_r, scalars, f_r)
 
 
-@kernel
+@loop
 def _harvey_vectors(w_i: Floats, w_r: Floats, scalars: Rows, f_r: Floats) -> None:
     _vector_rows(HARVEY, w_i, w_r, scalars, f_r)
 

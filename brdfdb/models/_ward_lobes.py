@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from brdfdb._elementary import cosine, exp
-from brdfdb._numba import kernel, loop
+from brdfdb._numba import inner_loop, kernel, loop
 from brdfdb.geometry import checked_angles, checked_vectors, finished
 from brdfdb.lobes import Lobe
 from brdfdb.models._rows import by_rows, by_rows_of_vectors
@@ -78,7 +78,7 @@ def _lobe(form: int, h_x: float, h_y: float, h_z: float, cos_cos: float, peak: f
     return _LARGEST if value > _LARGEST else value
 
 
-@loop
+@inner_loop
 def _angle_rows(form: int, cos_phi: Rows, sin_phi: Rows, scalars: Rows, f_r: Floats) -> None:
     for row in range(f_r.shape[0]):
         s, f = scalars[:, row], f_r[row]
@@ -91,7 +91,7 @@ def _angle_rows(form: int, cos_phi: Rows, sin_phi: Rows, scalars: Rows, f_r: Flo
             f[j] = uniform + _lobe(form, h_x, h_y, h_z, cos_cos, peak, u_x, u_y)
 
 
-@loop
+@inner_loop
 def _vector_rows(form: int, w_i: Floats, w_r: Floats, scalars: Rows, f_r: Floats) -> None:
     for row in range(f_r.shape[0]):
         s, f = scalars[row], f_r[row]
@@ -105,7 +105,7 @@ def _vector_rows(form: int, w_i: Floats, w_r: Floats, scalars: Rows, f_r: Floats
             f[j] = (uniform + lobe) * (0.0 if z_i < 0.0 or z_r < 0.0 else 1.0)  # nan stays nan
 
 
-@loop
+@inner_loop
 def _gradient_rows(form: int, w_i: Floats, w_r: Floats, scalars: Rows, values: Floats) -> None:
     """Fill in f_r [1/sr] and its derivatives by rho_d, rho_s, alpha_x, alpha_y, values of shape (5, rows, length)."""
     for row in range(values.shape[1]):
@@ -157,47 +157,47 @@ def _elliptical_gradient(w_i: Floats, w_r: Floats, scalars: Rows, values: Floats
     _gradient_rows(ELLIPTICAL, w_i, w_r, scalars, values)
 
 
-@kernel
+@loop
 def _half_vector_angles(cos_phi: Rows, sin_phi: Rows, scalars: Rows, f_r: Floats) -> None:
     _angle_rows(HALF_VECTOR, cos_phi, sin_phi, scalars, f_r)
 
 
-@kernel
+@loop
 def _half_vector_vectors(w_i: Floats, w_r: Floats, scalars: Rows, f_r: Floats) -> None:
     _vector_rows(HALF_VECTOR, w_i, w_r, scalars, f_r)
 
 
-@kernel
+@loop
 def _half_vector_gradient(w_i: Floats, w_r: Floats, scalars: Rows, values: Floats) -> None:
     _gradient_rows(HALF_VECTOR, w_i, w_r, scalars, values)
 
 
-@kernel
+@loop
 def _duer_angles(cos_phi: Rows, sin_phi: Rows, scalars: Rows, f_r: Floats) -> None:
     _angle_rows(DUER, cos_phi, sin_phi, scalars, f_r)
 
 
-@kernel
+@loop
 def _duer_vectors(w_i: Floats, w_r: Floats, scalars: Rows, f_r: Floats) -> None:
     _vector_rows(DUER, w_i, w_r, scalars, f_r)
 
 
-@kernel
+@loop
 def _duer_gradient(w_i: Floats, w_r: Floats, scalars: Rows, values: Floats) -> None:
     _gradient_rows(DUER, w_i, w_r, scalars, values)
 
 
-@kernel
+@loop
 def _bounded_angles(cos_phi: Rows, sin_phi: Rows, scalars: Rows, f_r: Floats) -> None:
     _angle_rows(BOUNDED, cos_phi, sin_phi, scalars, f_r)
 
 
-@kernel
+@loop
 def _bounded_vectors(w_i: Floats, w_r: Floats, scalars: Rows, f_r: Floats) -> None:
     _vector_rows(BOUNDED, w_i, w_r, scalars, f_r)
 
 
-@kernel
+@loop
 def _bounded_gradient(w_i: Floats, w_r: Floats, scalars: Rows, values: Floats) -> None:
     _gradient_rows(BOUNDED, w_i, w_r, scalars, values)
 

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
+import gc
+from collections import deque
 from collections.abc import Callable
-from concurrent.futures import as_completed
+from concurrent.futures import ThreadPoolExecutor, wait
 from functools import partial
 from pathlib import Path
-from typing import Any
+from threading import Lock
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,12 +28,14 @@ from brdfdb_pipelines.build_progress import Event
 from brdfdb_pipelines.recipe_file import Recipe
 
 _UP = np.array([[0.0, 0.0, 1.0], [0.6, 0.0, 0.8], [0.0, 0.6, 0.8]])  # three directions: any will do
+_AZIMUTHS = np.linspace(0.0, np.pi, 16)  # a row for which He-Torrance sums its table of the series
 
 
 def compile_kernels(recipe: Recipe, root: Path, jobs: int, report: Callable[[Event], None]) -> None:
     """Compile the kernels of a build into numba's cache, where tables are missing and nothing was compiled yet.
 
-    A build compiles what is missing anyway, one kernel after the other; this takes less time and reports it.
+    A build compiles what is missing anyway, one kernel after the other; this takes less time and reports it. This
+    process compiles, too: it has imported already what each process imports.
     """
     missing = [job for job in recipe.jobs() if not pointer_path(material_path(root, job.material.name)).exists()]
     if jobs == 1 or not missing or is_cached(_kernels.by_vectors):
@@ -38,15 +43,43 @@ def compile_kernels(recipe: Recipe, root: Path, jobs: int, report: Callable[[Eve
     models: dict[str, Callable[[], None]] = {}
     for job in missing:
         models.setdefault(job.material.model, partial(_compile_model, job.material, job.wavelength_nm))
-    # the longest first: kernels of a spectral model take as long as all others together
-    tasks = sorted(models, key=lambda name: not MODELS[name].spectral)
-    report({"event": "compiling", "kernels": 1 + len(tasks)})
-    with workers.processes(min(jobs, 1 + len(tasks)), patient=False) as pool:  # a kernel takes up to half a minute
-        futures: list[Any] = [pool.executor.submit(models[name]) for name in tasks[:1]]
-        futures.append(pool.executor.submit(_compile_tables))
-        futures += [pool.executor.submit(models[name]) for name in tasks[1:]]
-        for _ in as_completed(futures):  # the build meets an error of a task again, and reports it
-            report({"event": "compiled"})
+    # the longest first: lookups, and kernels of spectral models
+    tasks = deque(
+        [_compile_tables, *(models[name] for name in sorted(models, key=lambda name: not MODELS[name].spectral))]
+    )
+    others = min(jobs, len(tasks)) - 1
+    lock = Lock()
+    report({"event": "compiling", "kernels": len(tasks)})
+
+    def work(run: Callable[[Callable[[], None]], None]) -> None:
+        with contextlib.suppress(IndexError):  # no task is left
+            while True:
+                task = tasks.popleft()
+                with contextlib.suppress(Exception):  # the build meets the error again, and reports it
+                    run(task)
+                with lock:
+                    report({"event": "compiled"})
+
+    with ThreadPoolExecutor(others) as threads, workers.processes(others, patient=False) as pool:
+        helpers = [
+            threads.submit(work, lambda task: pool.executor.submit(_compiled, task).result()) for _ in range(others)
+        ]
+        try:
+            work(_compiled)
+            wait(helpers)
+        finally:
+            tasks.clear()  # no other task begins after Ctrl-C
+
+
+def _compiled(task: Callable[[], None]) -> None:
+    """Run a task without the collector of garbage, which takes a tenth of the time: what numba makes stays in use."""
+    enabled = gc.isenabled()
+    gc.disable()
+    try:
+        task()
+    finally:
+        if enabled:
+            gc.enable()
 
 
 def _compile_tables() -> None:
@@ -62,4 +95,5 @@ def _compile_model(material: Material, wavelength_nm: NDArray[np.float64] | None
     at = None if wavelength_nm is None else wavelength_nm[:2]
     material.lookup_vectors(_UP, _UP[::-1], at)
     block(Layout(material, coarsest(material), at), slice(0, 1))
+    material.lookup(0.5, 0.0, 0.5, _AZIMUTHS, at)
     material.specular_reflectance(0.5, at)
