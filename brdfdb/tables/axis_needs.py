@@ -135,14 +135,13 @@ def _quotient(above: Floats, below: Floats) -> Floats:
 class Lines(NamedTuple):
     """f_r along lines of one axis through directions of a draw, the same for all interpolations.
 
-    `values` and `inside` are f_r [1/sr] of the shape (lines, points, L) with cos theta_i cos theta_r; `inside` and
-    `share` are those of `tabulation.held`, on grids of half and difference vectors. `lowest` is the lower of the
+    `values` are f_r [1/sr] of the shape (lines, points, L) with cos theta_i cos theta_r. `before` is what
+    `tabulation.held` returns beside them, on grids of half and difference vectors alone. `lowest` is the lower of the
     cosines of light and viewer, `mu` their product, both below the horizon, too.
     """
 
     values: tuple[Floats, Floats]
-    inside: tuple[Floats, Floats] | None
-    share: Floats
+    before: tuple[tuple[Floats, Floats], tabulation.Beyond] | None
     lowest: Floats
     mu: Floats
 
@@ -160,14 +159,14 @@ def lines(layout: Layout, axis: int, drawn: error_measurement.Draw) -> Lines:
     if grid.half_difference:
         theta_h, *others = coordinates
         phi_h, theta_d, phi_d = others if grid.anisotropic else (np.zeros_like(theta_h), *others)
-        values = tabulation.held(layout, theta_h, phi_h, theta_d, phi_d, tabulation.values_at)
+        values, before = tabulation.held(layout, theta_h, phi_h, theta_d, phi_d, tabulation.values_at)
         cos_h, sin_h = np.cos(theta_h) * np.cos(theta_d), np.sin(theta_h) * np.sin(theta_d) * np.cos(phi_d)
-        return Lines(*values, cos_h - np.abs(sin_h), (cos_h + sin_h) * (cos_h - sin_h))
+        return Lines(values, before, cos_h - np.abs(sin_h), (cos_h + sin_h) * (cos_h - sin_h))
     theta_i, *others = coordinates
     phi_i, theta_r, phi_r = others if grid.anisotropic else (np.zeros_like(theta_i), *others)
     at = tabulation.values_at(layout, unit_vector(theta_i, phi_i), unit_vector(theta_r, phi_r))
     cos_i, cos_r = np.cos(theta_i), np.cos(theta_r)
-    return Lines(at, None, np.zeros(()), np.minimum(cos_i, cos_r), cos_i * cos_r)
+    return Lines(at, None, np.minimum(cos_i, cos_r), cos_i * cos_r)
 
 
 def numbers_along(layout: Layout, along: Lines, floor: Floats) -> tuple[Floats, Floats]:
@@ -177,8 +176,8 @@ def numbers_along(layout: Layout, along: Lines, floor: Floats) -> tuple[Floats, 
     or to its floor [1/sr]; it is 0 below the horizon. Of a mixture, there are parts in place of wavelengths.
     """
     how = layout.interpolation
-    inside = None if along.inside is None else how.numbers(*along.inside)
-    numbers = tabulation.joined(layout.source, how.numbers(*along.values), inside, along.share)
+    before = None if along.before is None else (how.numbers(*along.before[0]), along.before[1])
+    numbers = tabulation.joined(layout.source, how.numbers(*along.values), before)
     factor = np.maximum(along.mu, 1e-12)[..., np.newaxis] ** -how.power
     uniform = 0.0 if layout.uniform is None else layout.uniform
     if how.logarithm:

@@ -189,6 +189,13 @@ def continued(layout: Layout, theta_h: Floats, phi_h: Floats, theta_d: Floats, p
     return joined(layout.source, *held(layout, theta_h, phi_h, theta_d, phi_d, numbers))
 
 
+class Beyond(NamedTuple):
+    """Which half and difference angles are beyond the horizon, and the number of steps [1] that each of these is."""
+
+    mask: NDArray[np.bool_]
+    steps: Floats
+
+
 Evaluated = TypeVar("Evaluated")
 
 
@@ -199,13 +206,14 @@ def held(
     theta_d: Floats,
     phi_d: Floats,
     evaluate: Callable[[Layout, Floats, Floats], Evaluated],
-) -> tuple[Evaluated, Evaluated | None, Floats]:
+) -> tuple[Evaluated, tuple[Evaluated, Beyond] | None]:
     """Evaluate a layout at half and difference angles [rad], theta_d held at its largest value.
 
     Returns
     -------
     tuple
-        The values; those a step before, None if no angle is beyond the horizon; the number of steps beyond it.
+        The values; and of the angles beyond the horizon alone, those a step before and which they are. None stands for
+        the second if no angle is beyond.
     """
     lowest = 0.0  # cosine of light and viewer
     if layout.source.grazing_pole and layout.interpolation.power == 0.0:
@@ -217,19 +225,23 @@ def held(
     largest = np.maximum(largest * (1.0 - 1e-12), 0.0)
     within = np.minimum(theta_d, largest)
     values = evaluate(layout, *_half_vectors(theta_h, phi_h, within, phi_d))
-    beyond = theta_d - within
     step = np.minimum(_SLOPE_STEP, 0.5 * largest)
-    inside = None
-    if np.any(beyond > 0.0):
-        inside = evaluate(layout, *_half_vectors(theta_h, phi_h, np.maximum(within - step, 0.0), phi_d))
-    return values, inside, np.minimum(beyond / np.maximum(step, 1e-9), _CONTINUED)
+    before = np.maximum(within - step, 0.0)
+    steps = np.minimum((theta_d - within) / np.maximum(step, 1e-9), _CONTINUED)
+    *angles, steps = np.broadcast_arrays(theta_h, phi_h, before, phi_d, steps)
+    some = steps > 0.0
+    if not some.any():
+        return values, None
+    return values, (evaluate(layout, *_half_vectors(*(angle[some] for angle in angles))), Beyond(some, steps[some]))
 
 
-def joined(source: Source, values: Floats, inside: Floats | None, share: Floats) -> Floats:
+def joined(source: Source, values: Floats, before: tuple[Floats, Beyond] | None) -> Floats:
     """Return the numbers of a table, continued with their slope: `held` says what they are made of."""
-    if inside is not None:
-        change = share[..., np.newaxis] * (values - inside)
-        values += np.minimum(change, _RISE) if isinstance(source, MeasuredSource) else change
+    if before is None:
+        return values
+    inside, beyond = before
+    change = beyond.steps[:, np.newaxis] * (values[beyond.mask] - inside)
+    values[beyond.mask] += np.minimum(change, _RISE) if isinstance(source, MeasuredSource) else change
     return values
 
 

@@ -23,7 +23,7 @@ from brdfdb.store.publication import publish_staged
 from brdfdb.store.staging import Block, discard, prepare, remove_begun, write_block, write_frame
 from brdfdb_pipelines import build_resources, workers
 from brdfdb_pipelines.build_progress import Event, Tally
-from brdfdb_pipelines.build_survey import Survey, head_of, survey
+from brdfdb_pipelines.build_survey import Survey, cost_of_plan, cost_of_table, head_of, survey
 from brdfdb_pipelines.measured_job import MeasuredJob, Tabulated, build_measured
 from brdfdb_pipelines.recipe_file import Job, Recipe
 from brdfdb_pipelines.workers import Workers, WorkersError
@@ -226,7 +226,7 @@ class _Builder:
             if job.tolerance is not None:
                 wavelengths = 1 if job.wavelength_nm is None else job.wavelength_nm.size
                 self._claim(f"planning {job.material.name}", build_resources.plan_bytes(wavelengths, job.tolerance))
-        jobs = deque(self.jobs)
+        jobs = deque(sorted(self.jobs, key=cost_of_plan, reverse=True))
         while jobs or self.running:
             while jobs and self._room:
                 job = jobs.popleft()
@@ -237,7 +237,7 @@ class _Builder:
 
                 self._submit(then, survey, str(self.root), job)
             self._wait()
-        missing = sorted(self.waiting, key=lambda table: table.survey.size, reverse=True)  # the largest first
+        missing = sorted(self.waiting, key=lambda table: cost_of_table(table.job, table.survey), reverse=True)
         self.waiting = deque(missing)
         self.task_bytes = 1
         for table in missing:

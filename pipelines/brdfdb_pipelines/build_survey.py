@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -74,6 +75,16 @@ def survey(root: str, job: Job) -> Survey:
     shape, wavelengths = tuple(layout.shape), 0 if layout.wavelength_nm is None else layout.wavelength_nm.size
     task_bytes = build_resources.task_bytes(layout)
     return Survey(status, head, text, shape, wavelengths, block_values, task_bytes, disk, tabulated)
+
+
+def cost_of_plan(job: Job) -> int:
+    """Return a sorting key of plans, the longest last: the number of wavelengths."""
+    return 1 if job.wavelength_nm is None else job.wavelength_nm.size
+
+
+def cost_of_table(job: Job, survey: Survey) -> float:
+    """Return a sorting key of tables, the longest last: by size, and then integrals, at thousands of directions."""
+    return survey.size if job.planned_on is None else math.inf
 
 
 def check_values(job: Job) -> None:

@@ -5,6 +5,7 @@ the fastest pass of all, "spread" that of the rounds; a ratio is the median over
 Seconds are those of the processor: others on the machine count less.
 "public" is the function as a user calls it, checks and new arrays and all; "loop" is its compiled loop alone, on the
 arrays that the public function hands it. A floor is a goal, not a test. Values are compared before they are timed.
+``NUMBA_CPU_NAME=haswell`` compiles both for a processor with AVX2 and without AVX-512.
 """
 
 from __future__ import annotations
@@ -35,7 +36,8 @@ from brdfdb.materials import Material, presets
 from brdfdb.models import MODELS
 from tests.benchmarks.recording import Column, Run, Table
 
-FLAGS = ["-std=c++17", "-O3", "-march=native", "-ffast-math"]
+PROCESSOR = os.environ.get("NUMBA_CPU_NAME", "native")  # that both compile for
+FLAGS = ["-std=c++17", "-O3", f"-march={PROCESSOR}", "-ffast-math"]
 FLOAT32 = ["-DREAL=float", "-fsingle-precision-constant"]
 SEED = 1994
 # Share of values that agree, and their largest relative difference; values below TINY are 0
