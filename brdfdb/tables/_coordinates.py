@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb._elementary import cos, cosine, sine, twice_arctan
-from brdfdb._numba import kernel, loop
+from brdfdb._numba import inner_loop, kernel, loop
 
 Array = NDArray[np.float64]
 
@@ -94,7 +94,7 @@ def _halved(phi_h: float, phi_d: float, rule: Rule) -> tuple[float, float]:
     return phi_h, _folded(phi_d, PI if rule.reciprocal else TURN)
 
 
-@loop
+@inner_loop
 def points_of_angles(
     rule: Rule, theta_i: Array, phi_i: Array, theta_r: Array, phi_r: Array, count: int, x: Array, mu: Array
 ) -> None:
@@ -222,7 +222,7 @@ def _light_and_viewer(
         delta_phi[j] = PI - turn if dot[j] < 0.0 else turn
 
 
-@loop
+@inner_loop
 def vectors_of_angles(theta: Array, phi: Array, count: int, w: Array) -> None:
     """Write unit vectors, three numbers each, of directions by angles [rad]; those below the horizon lie on it.
 

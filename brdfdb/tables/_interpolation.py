@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brdfdb._numba import kernel, loop
+from brdfdb._numba import inner_loop, kernel
 from brdfdb.tables._vectors import CUBIC_COLUMNS, LANES, tricubic_cell, trilinear_cells
 
 Array = NDArray[np.float64]
@@ -374,7 +374,7 @@ def weighted(
                                 out[j * channels + channel] += factor * table[base + np.uint64(channel)]
 
 
-@loop
+@inner_loop
 def interpolated(
     axes: Axes,
     table: NDArray[np.float32],

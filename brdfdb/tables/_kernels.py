@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb._elementary import exp
-from brdfdb._numba import kernel, loop
+from brdfdb._numba import inner_loop, kernel, loop
 from brdfdb.tables._coordinates import PI, Rule, points_of_angles, points_of_vectors, vectors_of_angles
 from brdfdb.tables._interpolation import POINTS, Axes, interpolated, room
 
@@ -32,7 +32,7 @@ def _invert(power: float, mu: Array, count: int) -> None:
             mu[j] = 1.0
 
 
-@loop
+@inner_loop
 def finished(
     rule: Rule,
     numbers: Array,
