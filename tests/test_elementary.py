@@ -3,19 +3,13 @@
 from collections.abc import Callable
 from typing import Any
 
-import numba
 import numpy as np
 import pytest
 
 from brdfdb import _elementary
 from brdfdb._elementary import COS_HORIZON
 from brdfdb.reference import mp
-
-
-def compiled(kernel: Callable[[float], float]) -> Any:
-    """Return a function that calls a kernel as kernels do: one that Python calls itself stays Python."""
-    return numba.njit(lambda x: kernel(x))
-
+from tests.compiled import compiled
 
 arcsin, cos, cosine, erfcx = map(compiled, (_elementary.arcsin, _elementary.cos, _elementary.cosine, _elementary.erfcx))
 exp, log, sine = map(compiled, (_elementary.exp, _elementary.log, _elementary.sine))

@@ -17,13 +17,12 @@ from brdfdb.store.files import regular_bytes, sync_directory, write_file
 _SEAL = re.compile(rb'\{"sha256": "([0-9a-f]{64})",\n')
 
 
-def sealed(content: Mapping[str, Any], *, one_line: bool = False) -> bytes:
+def sealed(content: Mapping[str, Any]) -> bytes:
     """Return a JSON object as bytes whose first line holds the sha256 of all lines below it.
 
-    ``tail -n +2 FILE | sha256sum`` prints the digest that the first line must hold. Below it is a value a line, or all
-    on `one_line`, which takes less than half of the time.
+    ``tail -n +2 FILE | sha256sum`` prints the digest that the first line must hold.
     """
-    body = json.dumps(content).encode()[1:] if one_line else json.dumps(content, indent=1).encode()[2:]
+    body = json.dumps(content, indent=1).encode()[2:]
     return b'{"sha256": "%s",\n' % hashlib.sha256(body).hexdigest().encode() + body
 
 

@@ -66,7 +66,7 @@ def prepare(root: Path, name: str, request: Mapping[str, Any], layout: str) -> P
     staging = request_path(root, name, digest(request))
     with writing(root, name):
         (staging / "blocks").mkdir(parents=True, exist_ok=True)
-        texts = sealed(dict(request), one_line=True), sealed(json.loads(layout), one_line=True)
+        texts = sealed(dict(request)), sealed(json.loads(layout))
         for file, text in zip(("request.json", "layout.json"), texts, strict=True):
             if not (staging / file).is_file() or (staging / file).read_bytes() != text:
                 write_file(staging / file, text, staging, sync=False)  # the digest in its first line is checked

@@ -78,12 +78,12 @@ def survey(root: str, job: Job) -> Survey:
 
 
 def cost_of_plan(job: Job) -> int:
-    """Return a sorting key of plans, the longest last: the number of wavelengths."""
+    """Return a number that grows with the time of a plan: that of its wavelengths."""
     return 1 if job.wavelength_nm is None else job.wavelength_nm.size
 
 
 def cost_of_table(job: Job, survey: Survey) -> float:
-    """Return a sorting key of tables, the longest last: by size, and then integrals, at thousands of directions."""
+    """Return a number that grows with the time of a table: its size, or infinity if it is measured on an integral."""
     return survey.size if job.planned_on is None else math.inf
 
 

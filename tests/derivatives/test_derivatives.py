@@ -15,6 +15,7 @@ from brdfdb.models import MODELS
 from brdfdb.models import _diffraction_series as series
 from brdfdb.parameters import ModelSpec
 from brdfdb.reference import mp
+from tests.compiled import compiled
 from tests.models.draws import drawn, drawn_angles
 from tests.models.hazard_directions import EXACT
 from tests.models.hazard_twins import direction_of, exact_parameters, point_of
@@ -146,8 +147,7 @@ def test_the_sum_of_he_torrance_has_the_slopes_of_its_limit(g: float) -> None:
     b = np.array([1e-6, 0.1, 1.0, 10.0])
     log_sum, by_g, by_V = np.empty((3, b.size))
     work, index = np.empty((series.ROWS_OF_WORK, series.BLOCK)), np.empty((series.GROUPS, series.BLOCK), np.int64)
-    series_and_slopes = numba.njit(lambda *arguments: series.log_series(True, *arguments))
-    series_and_slopes(np.full(b.size, g), g * b, 1.0, log_sum, by_g, by_V, work, index)
+    compiled(series.log_series)(True, np.full(b.size, g), g * b, 1.0, log_sum, by_g, by_V, work, index)
     # The limit is e^-b / g^2
     bound = LARGE_G + 2.0 * (1.0 + b * b) / g
     assert np.all(np.abs(by_g - (b - 1.0)) <= bound)

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator
 
-import numba
 import numpy as np
 import pytest
 
@@ -10,8 +9,9 @@ from brdfdb import models
 from brdfdb.models import _diffraction_series as series
 from brdfdb.models._diffraction_series import diffraction_series
 from brdfdb.reference import he_torrance_1991, mp
+from tests.compiled import compiled
 
-log_series_of_row = numba.njit(lambda *arguments: series.log_series_of_row(*arguments))  # as kernels call it
+log_series_of_row = compiled(series.log_series_of_row)
 TINY = 1e-280
 # Relative errors, each just above the worst measured, which stands behind it
 WHOLE_SUM = 1e-12  # 3.6e-13; 9.3e-13 in 1200 other draws, of the terms left out of a short sum

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
-import numba
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -14,13 +12,7 @@ from scipy.interpolate import CubicHermiteSpline, RegularGridInterpolator
 from brdfdb._elementary import BLOCK
 from brdfdb.tables import _interpolation
 from brdfdb.tables._interpolation import Axes, prepared, room, weights_of_nodes
-
-
-def compiled(kernel: Callable[..., None]) -> Callable[..., None]:
-    """Return a function that calls a kernel as kernels do: one that Python calls itself stays Python."""
-    call: Callable[..., None] = numba.njit(lambda *arguments: kernel(*arguments))
-    return call
-
+from tests.compiled import compiled
 
 locate, weighted = compiled(_interpolation.locate), compiled(_interpolation.weighted)
 trilinear, tricubic = compiled(_interpolation.trilinear), compiled(_interpolation.tricubic)
