@@ -31,6 +31,7 @@ SHARED = (
     "tables/_interpolation.py",
     "tables/_coordinates.py",
     "models/_diffraction_series.py",
+    "models/_gaussian_slopes.py",
 )
 
 

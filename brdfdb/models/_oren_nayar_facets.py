@@ -16,7 +16,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb._elementary import arcsin, exp, summand_exp
-from brdfdb._numba import elementwise, kernel, loop
+from brdfdb._numba import elementwise, inner_loop, kernel, loop
+from brdfdb.models._gaussian_slopes import (
+    INTEGRALS,
+    OF_C,
+    OF_OPEN,
+    OF_S,
+    OF_SC,
+    OF_SLANT,
+    OF_SS,
+    OF_STEEP,
+    RAYS,
+    Series,
+    integrate,
+    series_of,
+    sin_cos,
+)
 from brdfdb.models.shared_integrals import shared
 from brdfdb.parameters import Floats
 
@@ -29,6 +44,13 @@ NODES = 16  # largest number of Gauss-Legendre nodes in a piece of a ray of slop
 _PANEL = 1.6  # width of a panel, in units of arsinh(azimuth / distance to the nearest singularity)
 _PANELS = 24  # largest number of panels in a piece of azimuths: enough for tan(theta) = 1.6e16
 _RAYS = 4 * _PANELS * NODES
+
+
+# Arrays that are overwritten for every value
+#   of each ray its two slopes, the smaller first, the two theta_a / sigma where facets begin to be hidden, its weight
+#   the integrals up to the first of these, and those up to the second, (INTEGRALS, RAYS)
+#   others, (4, RAYS)
+Work = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
 
 
 @functools.cache
@@ -113,34 +135,6 @@ bounce_of_cavity = elementwise(_bounce_of_cavity)
 
 
 @kernel
-def _sin_cos(x: float) -> tuple[float, float]:
-    """Return sine and cosine [1] on [0, pi/2] by series without branches.
-
-    The absolute error is at most 3e-16, and so is the relative error of the sine.
-    """
-    half = 0.5 * x
-    u = half * half
-    s = u / 355687428096000.0 - 1.0 / 1307674368000.0
-    s = s * u + 1.0 / 6227020800.0
-    s = s * u - 1.0 / 39916800.0
-    s = s * u + 1.0 / 362880.0
-    s = s * u - 1.0 / 5040.0
-    s = s * u + 1.0 / 120.0
-    s = s * u - 1.0 / 6.0
-    c = u / 20922789888000.0 - 1.0 / 87178291200.0
-    c = c * u + 1.0 / 479001600.0
-    c = c * u - 1.0 / 3628800.0
-    c = c * u + 1.0 / 40320.0
-    c = c * u - 1.0 / 720.0
-    c = c * u + 1.0 / 24.0
-    c = c * u - 0.5
-    # Of the whole angle
-    sine = half + half * u * s
-    cos = 1.0 - 2.0 * sine * sine
-    return 2.0 * sine * (1.0 + c * u), _TINY if cos < _TINY else cos
-
-
-@kernel
 def _critical(slope: float, sigma: float, x_max: float) -> float:
     """Return theta_a / sigma [1] above which facets are partly hidden, eq. (39) with cot(theta_a) = slope."""
     hypotenuse = 1.0 / math.sqrt(1.0 + slope * slope)
@@ -149,7 +143,7 @@ def _critical(slope: float, sigma: float, x_max: float) -> float:
     return min((angle if steep else np.pi / 2 - angle) / sigma, x_max)
 
 
-@kernel
+@inner_loop
 def _add_azimuths(
     t_low: float,
     t_high: float,
@@ -191,8 +185,8 @@ def _add_azimuths(
             step = distance * 0.5 * (e_y - 1.0 / e_y)
             from_low = width - step if at_tie else step
             from_high = beyond + step if at_tie else beyond + (width - step)
-            low = t_low * _sin_cos(min(from_low, rest + from_high))[0]
-            high = max(low, t_high * _sin_cos(min(from_high, rest + from_low))[0])
+            low = t_low * sin_cos(min(from_low, rest + from_high))[0]
+            high = max(low, t_high * sin_cos(min(from_high, rest + from_low))[0])
             lows[node], highs[node] = low, high
             first[node], second[node] = _critical(high, sigma, x_max), _critical(low, sigma, x_max)
             weights[node] = w[node] * (reach / panels) * distance * 0.5 * (e_y + 1.0 / e_y)
@@ -200,104 +194,94 @@ def _add_azimuths(
     return count
 
 
-@kernel
-def _weight(x: float, S: float) -> float:
-    """Return the weight [1] of eq. (26) times the sine of eq. (8), for x = theta_a / sigma, not normalised."""
-    return summand_exp(-0.5 * x * x) * S
-
-
-@kernel
+@inner_loop
 def _add_slopes(
     sign: float,
-    sigma: float,
-    x_max: float,
+    series: Series,
     nodes: NDArray[np.float64],
     weights: NDArray[np.float64],
     lit: bool,
     bounce: bool,
-    rays: NDArray[np.float64],
     count: int,
+    work: Work,
 ) -> tuple[float, float]:
-    """Return the weighted direct and twice reflected light [1] of all slopes along the first `count` of `rays`.
+    """Return the weighted direct and twice reflected light [1] of all slopes along the first `count` of the rays.
 
     The direct light is 0 without `lit`, and the other 0 without `bounce`. A ray holds both facets of every cavity at
     one azimuth. It is cut where one facet begins to be hidden, and again where both are. `sign` is the sign of
-    slope_i slope_r: it is positive if the facet that faces the light also faces the viewer. The loop over rays is
-    innermost, so that it vectorises.
+    slope_i slope_r: it is positive if the facet that faces the light also faces the viewer.
+
+    In the first piece nothing is hidden. In the second one light or viewer, the one with the larger slope, reaches one
+    facet in part and the other not. In the third one, if `sign` is positive, one facet is partly lit and partly seen,
+    and the other is dark. These are sums of the integrals of `_gaussian_slopes`. If `sign` is negative, one facet is
+    partly lit there, and the other is partly seen: the second bounce has a quadrature, whose nodes crowd as g^2 towards
+    the end where R of eq. (19) may be 0. Loops over rays are innermost, so that they vectorise.
     """
-    low, high, first, second = rays[0], rays[1], rays[2], rays[3]
-    direct, bounced = rays[5], rays[6]
-    direct[:count] = 0.0
-    bounced[:count] = 0.0
-    for node in range(nodes.shape[0]):
-        g, w = nodes[node], weights[node]
-        # First piece: nothing is hidden, and each facet is lit and seen whole
-        for j in range(count):
-            x = g * first[j]
-            S, C = _sin_cos(sigma * x)
-            weight = _weight(x, S) * w * first[j]
-            p, q = S * high[j], sign * S * low[j]
-            weight *= 2.0 / (C * (1.0 + C))
-            if lit:
-                direct[j] += weight * (C * C + p * q) * (1.0 + C)
-            if bounce:
-                bounced[j] += weight * (C * C - p * q) * S * S
-        # Second piece: light or viewer, the one with the larger slope, reaches one facet in part and the other not
-        for j in range(count):
-            x = first[j] + g * (second[j] - first[j])
-            S, C = _sin_cos(sigma * x)
-            weight = _weight(x, S) * w * (second[j] - first[j])
-            p, q = S * high[j], sign * S * low[j]
-            if lit:
-                direct[j] += weight * 2.0 * (C + q)
-            if bounce:
-                bounced[j] += weight * _bounce_one_hidden(p, -q, S, C)
-        if sign > 0.0 and lit:
-            # Third piece, same side: one facet is partly lit and partly seen, and the other is dark
-            for j in range(count):
-                x = second[j] + g * (x_max - second[j])
-                S, C = _sin_cos(sigma * x)
-                weight = _weight(x, S) * w * (x_max - second[j])
-                direct[j] += weight * 2.0 * (C + S * low[j])
-        if sign < 0.0 and bounce:
-            # Third piece, opposite sides: one facet is partly lit, and the other is partly seen. Nodes crowd as g^2
-            # towards the end where R of eq. (19) may be 0
-            for j in range(count):
-                x = second[j] + g * g * (x_max - second[j])
-                S, C = _sin_cos(sigma * x)
-                weight = _weight(x, S) * 2.0 * g * w * (x_max - second[j])
-                bounced[j] += weight * _bounce_both_hidden(S * high[j], S * low[j], S, C)
-    direct_sum = bounced_sum = 0.0
-    for j in range(count):
-        direct_sum += rays[4, j] * direct[j]
-        bounced_sum += rays[4, j] * bounced[j]
-    return direct_sum, bounced_sum
+    direct = bounced = 0.0
+    rays, to_first, to_second, others = work
+    sigma, x_max, whole_cos, whole_sin = series[0], series[1], series[5], series[6]
+    for start in range(0, count, RAYS):
+        size = min(RAYS, count - start)
+        low, high = rays[0, start : start + size], rays[1, start : start + size]
+        first, second = rays[2, start : start + size], rays[3, start : start + size]
+        weight = rays[4, start : start + size]
+        integrate(OF_S, INTEGRALS, first, series, others, to_first)
+        begin, end = OF_C if sign < 0.0 else OF_SC, OF_STEEP if bounce else OF_SC
+        integrate(begin, end, second, series, others, to_second)
+        lights, bounces = others[0], others[1]
+        for j in range(size):
+            lights[j] = bounces[j] = 0.0
+        if lit and sign > 0.0:
+            for j in range(size):
+                of_S = high[j] * (to_first[OF_STEEP, j] + to_first[OF_SS, j]) - to_first[OF_S, j]
+                lights[j] = 2.0 * (whole_cos + low[j] * (of_S + whole_sin))
+        elif lit:
+            for j in range(size):
+                of_S = high[j] * (to_first[OF_STEEP, j] + to_first[OF_SS, j]) - to_first[OF_S, j]
+                lights[j] = 2.0 * (to_second[OF_C, j] - low[j] * (of_S + to_second[OF_S, j]))
+        if bounce:
+            for j in range(size):
+                p, q = high[j], sign * low[j]
+                far = to_second[OF_SC, j] - to_first[OF_SC, j] - q * (to_second[OF_SS, j] - to_first[OF_SS, j])
+                near = to_second[OF_OPEN, j] + to_first[OF_OPEN, j]
+                near -= q * (to_second[OF_SLANT, j] - to_first[OF_SLANT, j] + 2.0 * p * to_first[OF_STEEP, j])
+                bounces[j] = near + far / (p + math.sqrt(p * p + 1.0))
+        for j in range(size):
+            direct += weight[j] * lights[j]
+            bounced += weight[j] * bounces[j]
+        if bounce and sign < 0.0:
+            hidden = int(np.int64(0))  # as in `_gaussian`
+            for j in range(size):
+                if second[j] < x_max:
+                    low[hidden], high[hidden], second[hidden] = low[j], high[j], second[j]
+                    weight[hidden] = 2.0 * weight[j] * (x_max - second[j])
+                    hidden += 1
+            for j in range(hidden):
+                bounces[j] = 0.0
+            for node in range(nodes.shape[0]):
+                g, w = nodes[node], nodes[node] * weights[node]
+                for j in range(hidden):
+                    x = second[j] + g * g * (x_max - second[j])
+                    S, C = sin_cos(sigma * x)
+                    W = summand_exp(-0.5 * x * x) * S
+                    bounces[j] += w * W * _bounce_both_hidden(S * high[j], S * low[j], S, C)
+            for j in range(hidden):
+                bounced += weight[j] * bounces[j]
+    return direct, bounced
 
 
-@kernel
-def _normalisation(sigma: float, x_max: float, nodes: NDArray[np.float64], weights: NDArray[np.float64]) -> float:
-    """Return 1 / c [1] of eq. (26), integrated over the slope alone."""
-    total = 0.0
-    for panel in range(2):
-        for node in range(nodes.shape[0]):
-            x = 0.5 * (panel + nodes[node]) * x_max
-            total += 0.5 * x_max * weights[node] * _weight(x, _sin_cos(sigma * x)[0])
-    return total
-
-
-@kernel
+@inner_loop
 def _gaussian(
     t_small: float,
     t_large: float,
     cos_dphi: float,
     sin_dphi: float,
-    sigma: float,
-    x_max: float,
+    series: Series,
     x: NDArray[np.float64],
     w: NDArray[np.float64],
     lit: bool,
     bounce: bool,
-    rays: NDArray[np.float64],
+    work: Work,
 ) -> tuple[float, float]:
     """Return direct and twice reflected light [1] of eq. (8) with eqs (10) to (20), from the tangents of polar angles.
 
@@ -319,10 +303,14 @@ def _gaussian(
         count = int(np.int64(0))  # a literal 0 has a type of its own, for which numba would compile callees once more
         for at_tie in (False, True):
             if far > 0.0:
-                count = _add_azimuths(t_small, t_large, far, near, rest, at_tie, sigma, x_max, x, w, rays, count)
+                count = _add_azimuths(
+                    t_small, t_large, far, near, rest, at_tie, series[0], series[1], x, w, work[0], count
+                )
             if near > 0.0:
-                count = _add_azimuths(t_large, t_small, near, far, rest, at_tie, sigma, x_max, x, w, rays, count)
-        one, two = _add_slopes(sign, sigma, x_max, x, w, lit, bounce, rays, count)
+                count = _add_azimuths(
+                    t_large, t_small, near, far, rest, at_tie, series[0], series[1], x, w, work[0], count
+                )
+        one, two = _add_slopes(sign, series, x, w, lit, bounce, count, work)
         direct += one
         bounced += two
     return direct, bounced
@@ -332,26 +320,24 @@ def _gaussian(
 def _gaussian_loop(
     features: NDArray[np.float64],
     quadrature: NDArray[np.float64],
-    finest: NDArray[np.float64],
     lit: bool,
     bounce: bool,
     direct: NDArray[np.float64],
     bounced: NDArray[np.float64],
 ) -> None:
-    rays = np.empty((7, _RAYS))
-    last = x_max = scale = math.nan
+    work = np.empty((5, _RAYS)), np.empty((INTEGRALS, RAYS)), np.empty((INTEGRALS, RAYS)), np.empty((4, RAYS))
+    series = series_of(1.0, 0.5 * np.pi)
     for j in range(direct.size):
         f = features[:, j]
         sigma = f[4]
-        if sigma != last:
-            x_max = min(0.5 * np.pi / sigma, _X_MAX)
-            scale = 0.5 / (np.pi * _normalisation(sigma, x_max, finest[0], finest[1]))
-            last = sigma
         if sigma < _SMOOTH:
             nothing = 0.0 * (f[0] + f[1] + f[2] + f[3])  # 0, or nan if a feature is nan
             direct[j], bounced[j] = 1.0 + nothing, nothing
             continue
-        one, two = _gaussian(f[0], f[1], f[2], f[3], sigma, x_max, quadrature[0], quadrature[1], lit, bounce, rays)
+        if sigma != series[0]:
+            series = series_of(sigma, min(0.5 * np.pi / sigma, _X_MAX))
+        one, two = _gaussian(f[0], f[1], f[2], f[3], series, quadrature[0], quadrature[1], lit, bounce, work)
+        scale = 0.5 / (np.pi * series[4])
         direct[j], bounced[j] = scale * one, scale * two
 
 
@@ -393,5 +379,5 @@ def _integrated(
     """Return both parts [1] of values whose features are columns of an array of shape (5, N)."""
     direct, bounced = np.empty(columns.shape[1]), np.empty(columns.shape[1])
     with np.errstate(all="ignore"):  # as in `elementwise`, nan is passed on
-        _gaussian_loop(columns, _gauss_legendre(nodes), _gauss_legendre(NODES), lit, bounce, direct, bounced)
+        _gaussian_loop(columns, _gauss_legendre(nodes), lit, bounce, direct, bounced)
     return direct, bounced

@@ -9,6 +9,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from brdfdb.errors import counted
 from brdfdb.models._oren_nayar_facets import NODES
 from brdfdb.models.fujii_2013 import oren_nayar_fujii_vectors
 from brdfdb.models.lambert import lambert_vectors
@@ -18,7 +19,7 @@ from brdfdb.models.portsmouth_2025 import oren_nayar_energy_preserving_vectors
 from brdfdb.models.torrance_sparrow_1967 import torrance_sparrow_vectors
 from brdfdb.parameters import Arguments, Floats, FormKind, ModelForm
 
-_NODES = (8, 6, 4, 3, 2)  # nodes of the coarser quadratures of the facets; the exact form has 16
+_NODES = (8, 6, 4, 3, 2, 1)  # nodes of the coarser quadratures of the facets; the exact form has 16
 # Slopes of eq. 25 over the closed forms. 2000 slopes change the mean of f_r by 3e-5 and no value by more than 1e-3
 _SLOPES = 24
 _WIDEST = 6.0  # range of the integral over slopes, in standard deviations
@@ -58,7 +59,10 @@ def forms(arguments: Arguments) -> Iterator[ModelForm]:
     title = "facets integrated, eqs 8-20 and 47"
     yield form("facets", title, "exact", "oren_nayar_gaussian", facets, 2 * NODES, single=True)
     for nodes in _NODES:
-        rung, title = functools.partial(gaussian_rung, nodes=nodes, bounce=bounces), f"facets, {nodes} nodes of {NODES}"
+        rung, title = (
+            functools.partial(gaussian_rung, nodes=nodes, bounce=bounces),
+            f"facets, {counted(nodes, 'node')} of {NODES}",
+        )
         python = "oren_nayar_1994_surfaces.gaussian_rung"
         yield form(f"facets-{nodes}", title, "quadrature", python, rung, 2 * (NODES + nodes))
     averaged = "oren_nayar_1994_surfaces.single_slope_mean"

@@ -175,7 +175,7 @@ SINGLE_SLOPE_SPEC = ModelSpec(
 )
 GAUSSIAN_SPEC = ModelSpec(
     name="oren_nayar_gaussian",
-    version=1,
+    version=2,
     title="Oren-Nayar, Gaussian slopes, integrated",
     equation="eqs 8, 10-20, 47",
     reference="orennayar1994",

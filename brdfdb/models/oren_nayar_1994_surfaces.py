@@ -329,7 +329,7 @@ def oren_nayar_gaussian(
     Notes
     -----
     Eqs (8) and (26) with eqs (10) to (20) for every facet, and eq. (47), without the approximations (44) and (48). The
-    weight is normalised to one over the slope. A value takes about 20 us. The error, measured against a refined
+    weight is normalised to one over the slope. A value takes about 10 us. The error, measured against a refined
     integration, is below 1.1e-6 of the value for any arguments, the horizon included. It is below 3e-8 of the value for
     sigma from 10 to 40 degrees and random directions. f_r grows as 1 / cos towards exact backscatter at grazing. At 90
     degrees it is the finite value at the float64 nearest pi/2.
