@@ -53,7 +53,7 @@ def _write_pages(app: Sphinx, _: Any) -> None:
 
 
 def _free_last_page(*_: object) -> None:
-    """Free the tree of the page before, whose nodes refer to one another; what outlives a page is not searched again."""
+    """Free the tree of the page before, whose nodes refer to one another. What lives longer is not searched again."""
     gc.collect(0)
 
 
