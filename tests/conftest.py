@@ -19,7 +19,9 @@ settings.load_profile("brdfdb")
 # one another, and take time of the processor while they wait
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-_LONG = {"site", "test_house.py", "test_numba.py"}  # the site, the static checks and cold kernels take minutes
+# Files that begin, in this order: they take minutes. Workers take them in turn: while one builds the site, the other
+# compiles the kernels of all models, which both would compile otherwise
+_FIRST = ("test_site.py", "test_every_model_vectors.py", "test_house.py", "test_every_model.py", "test_numba.py")
 
 
 @pytest.hookimpl(wrapper=True)
@@ -35,7 +37,7 @@ def pytest_collection() -> Generator[None, object, object]:
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Begin with the long files: a worker that comes to them last keeps all others waiting."""
-    items.sort(key=lambda item: _LONG.isdisjoint(item.path.parts))
+    items.sort(key=lambda item: _FIRST.index(item.path.name) if item.path.name in _FIRST else len(_FIRST))
 
 
 @pytest.fixture(scope="session")
