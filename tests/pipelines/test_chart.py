@@ -175,7 +175,11 @@ def test_a_mistake_is_one_sentence_and_writes_nothing(
 
 
 @pytest.mark.usefixtures("quick")
-def test_another_run_leaves_the_charts_of_others_as_they_were(tmp_path: Path, capsys: Captured) -> None:
+def test_another_run_leaves_the_charts_of_others_as_they_were(
+    tmp_path: Path, capsys: Captured, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tradeoff_plot, "svg", lambda chart: f"a picture of {chart.material}")
+    monkeypatch.setattr(tradeoff_plot, "png", lambda chart: f"a picture of {chart.material}".encode())
     given = ("--store", tmp_path / "none", "--out", tmp_path, "--tolerance", 0.2)
     assert run("rolled-brass", *given) == 0
     before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}

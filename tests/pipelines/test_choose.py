@@ -13,7 +13,6 @@ import pytest
 from matplotlib.image import imread
 
 import brdfdb
-from brdfdb.forms import timing
 from brdfdb.models import oren_nayar_gaussian_vectors
 from brdfdb.scenes.choice_document import Choice, Price
 from brdfdb.scenes.offered_forms import OfferedForm
@@ -154,7 +153,7 @@ def test_the_comparison_is_a_picture_of_truth_choice_next_cheaper_and_their_diff
 def test_without_a_chosen_table_there_is_nothing_to_build(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(timing, "ROUNDS", 1)
+    monkeypatch.setattr(choose, "ROUNDS", 1)
     choice = choose.run(written(tmp_path), tmp_path / "out", width=16, store=tmp_path / "store", tolerances=[])
     assert [one.revision for one in choice.materials] == [None]
     assert "nothing to build: no table was chosen" in capsys.readouterr().out.splitlines()
