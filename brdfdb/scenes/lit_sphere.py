@@ -10,6 +10,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array, vstack
 
 from brdfdb.errors import ParameterError
 from brdfdb.figure import png_of
@@ -37,6 +38,7 @@ _ROWS, _COLUMNS, _COARSE = 385, 768, 8
 _BLURS_DEG = np.array([3.5, 7.0])
 _BLURS_FROM = radians(np.array([1.2, 2.4]))
 _TABULATION = threading.Lock()  # threads that begin together wait for one table: each would take 0.4 s of its own
+_KEPT_SIZE = 512  # pixels across a picture whose matrices are kept: 50 MB
 _BLOCK_SIZE = 2**17  # directions of light of a block of normals of anisotropic surfaces: arrays stay in the cache
 
 
@@ -157,17 +159,10 @@ def linear_sphere(surface: Source | BaseTable, size: int = SIZE, light: Light = 
     """
     if not 1 <= size <= MOST_SIZE:
         raise ParameterError("size", f"{size} is not a number of pixels from 1 to {MOST_SIZE}", size, (1, MOST_SIZE))
-    across = detail.across
-    fine = (np.arange(size * across) + 0.5) / across - size / 2.0
-    radius = np.hypot(fine, fine[:, np.newaxis]) / (size / 2.0)
-    covered = np.clip((1.0 - radius) * size / 2.0 + 0.5, 0.0, 1.0) if across == 1 else (radius <= 1.0).astype(float)
-    theta, phi = np.arcsin(np.minimum(radius, 1.0)), np.arctan2(-fine[:, np.newaxis], fine)
-    seen = covered > 0.0
-    radiance = np.zeros((*covered.shape, 3))
-    radiance[seen] = covered[seen, np.newaxis] * sphere_radiance(surface, theta[seen], phi[seen], light, detail)
-    total, coverage = _averaged(radiance, across), _averaged(covered, across)
-    linear = WHITE / _tabulated(light).brightest * total / np.maximum(coverage, 1e-9)[..., np.newaxis]
-    return np.concatenate([linear, coverage[..., np.newaxis]], axis=-1)
+    pixels = (_kept_pixels if size <= _KEPT_SIZE else _pixels)(size, light, detail)
+    total = _radiance(surface, pixels.weights, light, detail).reshape(size, size, 3)
+    linear = WHITE / _tabulated(light).brightest * total / np.maximum(pixels.coverage, 1e-9)[..., np.newaxis]
+    return np.concatenate([linear, pixels.coverage[..., np.newaxis]], axis=-1)
 
 
 def sphere_radiance(
@@ -186,20 +181,79 @@ def sphere_radiance(
     light, detail
         As of `lit_sphere`.
     """
+    theta, phi = np.broadcast_arrays(theta, phi)
+    weights = _weights_at(theta.ravel(), phi.ravel(), light, detail)
+    return _radiance(surface, weights, light, detail).reshape(*theta.shape, 3)
+
+
+class _Weights(NamedTuple):
+    """Matrices that make the radiance of N points, or pixels, of what the grid of normals reflects.
+
+    `normals` (N, thetas phis) multiplies the light that is reflected at the normals of the grid, `mirrors` (N, thetas)
+    the specular reflectance at its angles to the viewer.
+    """
+
+    normals: csr_array
+    mirrors: csr_array
+
+
+def _weights_at(theta: Array, phi: Array, light: Light, detail: Detail) -> _Weights:
+    """Return the weights of points (N,), linear between the normals of the grid."""
+    turn = phi / (2.0 * np.pi)
+    down = np.minimum(theta / radians(_LAST_DEG), 1.0) * (detail.thetas - 1)
+    places = np.stack([2.0 * theta / np.pi * (_ROWS - 1), turn * _COLUMNS])
+    mirrored = _between(_ROWS, _COLUMNS, places) @ _tabulated(light).sharp.ravel()
+    along = _between(detail.thetas, 1, np.stack([down, np.zeros(down.shape)]))
+    return _Weights(
+        _between(detail.thetas, detail.phis, np.stack([down, turn * detail.phis])),
+        csr_array(along.multiply(mirrored[:, np.newaxis])),
+    )
+
+
+def _radiance(surface: Source | BaseTable, weights: _Weights, light: Light, detail: Detail) -> Array:
+    """Return the radiance (N, 3) of a surface at points, or of pixels."""
     shown = _shown(surface)
     nodes = radians(np.linspace(0.0, _LAST_DEG, detail.thetas))
     sky = _tabulated(light)
     lights = len(nodes) * detail.phis * detail.samples_anisotropic
     blocks = np.array_split(nodes, max(lights // _BLOCK_SIZE, 1) if shown.surface.anisotropic else 1)
-    grid, turn = np.concatenate([_reflected(shown, block, sky, detail) for block in blocks]), phi / (2.0 * np.pi)
-    places = np.stack([np.minimum(theta / nodes[-1], 1.0) * (detail.thetas - 1), turn * detail.phis])
-    values = _interpolated(grid, places)
+    grid = np.concatenate([_reflected(shown, block, sky, detail) for block in blocks])
+    values = weights.normals @ grid.reshape(detail.thetas * detail.phis, -1)
     mirror = shown.specular(nodes)
     if np.any(mirror):
-        seen = _interpolated(sky.sharp, np.stack([2.0 * theta / np.pi * (_ROWS - 1), turn * _COLUMNS]))
-        reflectance = np.stack([np.interp(theta, nodes, channel) for channel in mirror.T], axis=-1)
-        values = values + seen[..., np.newaxis] * reflectance
-    return np.broadcast_to(values, (*theta.shape, 3))
+        values = values + weights.mirrors @ mirror
+    return np.broadcast_to(values, (len(values), 3))
+
+
+class _Pixels(NamedTuple):
+    """The pixels of a picture: the weights of each, times its coverage, and the coverage (size, size)."""
+
+    weights: _Weights
+    coverage: Array
+
+
+def _pixels(size: int, light: Light, detail: Detail) -> _Pixels:
+    """Return the pixels of a picture, which all surfaces share."""
+    across = detail.across
+    fine = (np.arange(size * across) + 0.5) / across - size / 2.0
+    normals, mirrors, coverage = [], [], []
+    for y in np.array_split(-fine.reshape(size, across), -(-fine.size * fine.size // _BLOCK_SIZE)):
+        radius = np.hypot(fine, y.reshape(-1, 1)) / (size / 2.0)
+        covered = np.clip((1.0 - radius) * size / 2.0 + 0.5, 0.0, 1.0) if across == 1 else (radius <= 1.0).astype(float)
+        coverage.append(covered.reshape(len(y), across, size, across).mean(axis=(1, 3)))
+        seen = covered > 0.0
+        theta, phi = np.arcsin(np.minimum(radius[seen], 1.0)), np.arctan2(y.reshape(-1, 1), fine)[seen]
+        weights = _weights_at(theta, phi, light, detail)
+        pixel = np.arange(coverage[-1].size).reshape(len(y), 1, size, 1)
+        pixel = np.broadcast_to(pixel, (len(y), across, size, across)).reshape(seen.shape)[seen]
+        at = pixel, np.arange(len(pixel))
+        mean = csr_array((covered[seen] / across**2, at), shape=(coverage[-1].size, len(pixel)))
+        normals.append(mean @ weights.normals)
+        mirrors.append(mean @ weights.mirrors)
+    return _Pixels(_Weights(csr_array(vstack(normals)), csr_array(vstack(mirrors))), np.concatenate(coverage))
+
+
+_kept_pixels = functools.lru_cache(maxsize=4)(_pixels)
 
 
 class _Shown(NamedTuple):
@@ -255,20 +309,20 @@ def _reflected(shown: _Shown, nodes: Array, sky: _Sky, detail: Detail) -> Array:
     density = samples * mixture_density(widest, wr, wi)
     share = np.divide(wi[..., 2], density, where=wi[..., 2] > 0.0, out=np.zeros(density.shape))
     weight = shown.brdf(wi, np.broadcast_to(wr, wi.shape)) * share[..., np.newaxis]
-    towards = np.einsum("npi,pij->npj", wi, frame)
+    towards = np.moveaxis(wi, 0, 1) @ frame
     across = (*theta.shape, samples)
     weight = np.moveaxis(weight, 0, -1).reshape(*theta.shape, -1, samples)
-    from_viewer, around = (angle.T.reshape(across) for angle in spherical_angles(towards))
+    from_viewer, around = (angle.reshape(across) for angle in spherical_angles(towards))
     rows = np.rint(from_viewer / np.pi * (_ROWS - 1)).astype(np.int64)
     radius = np.sqrt(1.0 / (np.pi * np.maximum(density, 1e-9)))  # of a cone with the solid angle of a sample
     rows += _ROWS * np.searchsorted(_BLURS_FROM, radius).T.reshape(across)
-    start = rows * _COLUMNS
-    columns = np.rint(around / (2.0 * np.pi) * _COLUMNS).astype(np.int64)
+    columns = np.rint(around / (2.0 * np.pi) * _COLUMNS).astype(np.int64) % _COLUMNS
+    start = 2 * _COLUMNS * rows
+    places = {1: start + columns, -1: start + _COLUMNS - columns}  # by the sign of columns
     radiance = np.empty((len(nodes), detail.phis, weight.shape[2]))
-    flat = np.concatenate([sky.sharp, *sky.blurred]).reshape(-1)
     for number_of_phi in range(detail.phis):
         same, sign, turn = _same_as(number_of_phi, theta.shape[1], detail.phis)
-        incoming = flat[start[:, same] + (sign * columns[:, same] + turn) % _COLUMNS]
+        incoming = sky.twice_around[turn:].take(places[sign][:, same])
         radiance[:, number_of_phi] = (weight[:, same] @ incoming[..., np.newaxis])[..., 0]
     return radiance
 
@@ -315,11 +369,12 @@ def _frames(theta: Array, phi: Array) -> Array:
 class _Sky(NamedTuple):
     """The light over the angle to the viewer and the azimuth: (385, 768), about half a degree apart.
 
-    `brightest` is the largest radiance of a white Lambertian sphere, of normals that the viewer sees.
+    `twice_around` has the rows of the light, sharp and more and more blurred, from 0 to 720 degrees, one after the
+    other. `brightest` is the largest radiance of a white Lambertian sphere, of normals that the viewer sees.
     """
 
     sharp: Array
-    blurred: list[Array]
+    twice_around: Array
     brightest: float
 
 
@@ -346,31 +401,27 @@ def _table_of(light: Light) -> _Sky:
         return np.asarray(np.tensordot(weight * area, turned, axes=2))
 
     places = np.stack(np.meshgrid(np.arange(_ROWS) / _COARSE, np.arange(_COLUMNS) / _COARSE, indexing="ij"))
-    blurred = []
+    levels = [sharp]
     for width in radians(_BLURS_DEG):
         spread = np.exp((cosine - 1.0) / width**2)
         mean = summed(spread) / (spread * area).sum(axis=(1, 2))[:, np.newaxis]
-        blurred.append(_interpolated(mean, places))
+        levels.append(
+            (_between(mean.shape[0], mean.shape[1], places.reshape(2, -1)) @ mean.ravel()).reshape(sharp.shape)
+        )
     seen = np.maximum(cosine[towards[:, 0, 2] >= 0.0], 0.0)
     brightest = np.max(summed(seen)) / (area.sum() * coarse.shape[1] / 4.0)
-    return _Sky(sharp, blurred, float(brightest))
+    return _Sky(sharp, np.tile(np.concatenate(levels), 2).ravel(), float(brightest))
 
 
-def _interpolated(values: Array, at: Array) -> Array:
-    """Return values (rows, columns, ...) at places (2, ...), linear between them; columns are periodic."""
-    rows, columns = values.shape[:2]
-    row, column = np.minimum(at[0].astype(np.int64), rows - 2), np.floor(at[1]).astype(np.int64)
-    shape = (*row.shape, *[1] * (values.ndim - 2))
-    down, along = (at[0] - row).reshape(shape), (at[1] - column).reshape(shape)
-    flat, left, right = values.reshape(-1, *values.shape[2:]), column % columns, (column + 1) % columns
-    above, below = (
-        (1.0 - along) * flat[start + left] + along * flat[start + right]
-        for start in (row * columns, (row + 1) * columns)
-    )
-    return np.asarray((1.0 - down) * above + down * below)
+def _between(rows: int, columns: int, at: Array) -> csr_array:
+    """Return the matrix (N, rows columns) from values of a grid to those at places (2, N), linear between them.
 
-
-def _averaged(fine: Array, across: int) -> Array:
-    """Return means over the points of each pixel."""
-    size = len(fine) // across
-    return np.asarray(fine.reshape(size, across, size, across, *fine.shape[2:]).mean(axis=(1, 3)))
+    Columns are periodic.
+    """
+    row, column = np.minimum(at[0].astype(np.int32), rows - 2), np.floor(at[1]).astype(np.int32)
+    down, along = at[0] - row, at[1] - column
+    left, right = row * columns + column % columns, row * columns + (column + 1) % columns
+    node = np.stack([left, right, left + columns, right + columns], axis=1)
+    weight = np.stack([(1.0 - down) * (1.0 - along), (1.0 - down) * along, down * (1.0 - along), down * along], axis=1)
+    ends = np.arange(0, node.size + 1, 4, dtype=np.int32)
+    return csr_array((weight.ravel(), node.ravel(), ends), shape=(len(node), rows * columns))
