@@ -1,10 +1,11 @@
-"""The integrals over Gaussian slopes against quadratures with many nodes."""
+"""The integrals over Gaussian slopes against quadratures with many nodes, and where all slopes of rays are 0."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
+from brdfdb import models
 from brdfdb.models import _gaussian_slopes as slopes
 from tests.compiled import compiled
 
@@ -38,3 +39,13 @@ def test_every_integral_from_next_to_nothing_to_its_end(sigma_deg: float) -> Non
     np.testing.assert_allclose(values[slopes.OF_STEEP], expected[slopes.OF_STEEP, :-1], rtol=STEEP)
     whole = [np.sum(W[-1]), expected[slopes.OF_C, -1], expected[slopes.OF_S, -1]]
     np.testing.assert_allclose(series[4:], whole, rtol=SERIES)
+
+
+def test_at_the_normal_no_azimuth_matters() -> None:
+    # the slopes of light and viewer are 0 in all azimuths, and second bounces of some sigmas were nan
+    sigma = np.linspace(0.0, np.pi / 2, 2000)
+    straight = models.oren_nayar_gaussian(0.0, 0.0, 0.0, 0.0, rho=0.5, sigma=sigma)
+    assert np.isfinite(straight).all()
+    for azimuth in (1.0, np.pi / 2, 3.0):
+        turned = models.oren_nayar_gaussian(0.0, 0.0, 0.0, azimuth, rho=0.5, sigma=sigma)
+        np.testing.assert_allclose(turned, straight, rtol=1e-13)
