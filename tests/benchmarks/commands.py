@@ -21,10 +21,13 @@ QUICK = 'materials = ["rolled-brass"]\ntolerance = 0.05\n'
 MEASURED = "The seconds of the clock and of the processors that whole commands take, on the materials of the papers."
 
 
-def timed(arguments: Sequence[str], cache: Path, rounds: int) -> tuple[float, float]:
-    """Return the least seconds of the clock and of the processors that a command takes."""
+def timed(arguments: Sequence[str], cache: Path | None, rounds: int) -> tuple[float, float]:
+    """Return the least seconds of the clock and of the processors that a command takes.
+
+    `cache` is the folder of compiled code; None: that of the installation.
+    """
     clock, used = [], []
-    environment = os.environ | {"NUMBA_CACHE_DIR": str(cache)}
+    environment = os.environ | ({} if cache is None else {"NUMBA_CACHE_DIR": str(cache)})
     environment.pop("PYTHONDONTWRITEBYTECODE", None)  # as users have it: modules are compiled once
     for _ in range(rounds):
         before, start = os.times(), time.perf_counter()
@@ -75,7 +78,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             ("list", ["list", *first], rounds),
             ("--help", ["--help"], rounds),
         ):
-            table.add(name, *timed(command, folder / "cache", repeated), None if options.quick else WANTED_S.get(name))
+            cache, wanted = (None, None) if options.quick else (folder / "cache", WANTED_S.get(name))
+            table.add(name, *timed(command, cache, repeated), wanted)
     run.end()
     return 0
 
