@@ -405,7 +405,11 @@ def _parsed(name: str) -> list[str]:
 
 def _is_simple(name: str) -> bool:
     """Return True if a term of a sum with this model has a shape of few numbers."""
-    term = Term(MODELS[name], "", alone=False, beside_flat=True, turned=False)
+    spec = MODELS[name]
+    out = {*switches(spec), spec.uniform, *(spec.lobe_axes or ())[1:]}
+    if sum(p.name not in out for p in spec.parameters) <= _MOST_SHAPE:
+        return True  # whatever f_r is a polynomial in: a term finds that by evaluating the model, which compiles it
+    term = Term(spec, "", alone=False, beside_flat=True, turned=False)
     return len(term.free) <= _MOST_SHAPE
 
 
