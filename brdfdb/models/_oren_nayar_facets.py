@@ -219,7 +219,7 @@ def _add_slopes(
     """
     direct = bounced = 0.0
     rays, to_first, to_second, others = work
-    sigma, x_max, whole_cos, whole_sin = series[0], series[1], series[5], series[6]
+    sigma, x_max, _, _, _, whole_cos, whole_sin = series
     for start in range(0, count, RAYS):
         size = min(RAYS, count - start)
         low, high = rays[0, start : start + size], rays[1, start : start + size]
@@ -291,6 +291,7 @@ def _gaussian(
     if math.isnan(t_small + t_large + cos_dphi + sin_dphi):
         return math.nan, math.nan
     direct = bounced = 0.0
+    sigma, x_max, rays = series[0], series[1], work[0]
     # Half a turn of azimuths is enough, since a cavity has two facets. It is split into the azimuths where the two
     # slopes have the same sign and those where they have opposite signs. The slopes are t sin(azimuth from one end) and
     # t sin(azimuth from the other end)
@@ -303,13 +304,9 @@ def _gaussian(
         count = int(np.int64(0))  # a literal 0 has a type of its own, for which numba would compile callees once more
         for at_tie in (False, True):
             if far > 0.0:
-                count = _add_azimuths(
-                    t_small, t_large, far, near, rest, at_tie, series[0], series[1], x, w, work[0], count
-                )
+                count = _add_azimuths(t_small, t_large, far, near, rest, at_tie, sigma, x_max, x, w, rays, count)
             if near > 0.0:
-                count = _add_azimuths(
-                    t_large, t_small, near, far, rest, at_tie, series[0], series[1], x, w, work[0], count
-                )
+                count = _add_azimuths(t_large, t_small, near, far, rest, at_tie, sigma, x_max, x, w, rays, count)
         one, two = _add_slopes(sign, series, x, w, lit, bounce, count, work)
         direct += one
         bounced += two

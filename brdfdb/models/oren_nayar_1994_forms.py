@@ -59,10 +59,8 @@ def forms(arguments: Arguments) -> Iterator[ModelForm]:
     title = "facets integrated, eqs 8-20 and 47"
     yield form("facets", title, "exact", "oren_nayar_gaussian", facets, 2 * NODES, single=True)
     for nodes in _NODES:
-        rung, title = (
-            functools.partial(gaussian_rung, nodes=nodes, bounce=bounces),
-            f"facets, {counted(nodes, 'node')} of {NODES}",
-        )
+        rung = functools.partial(gaussian_rung, nodes=nodes, bounce=bounces)
+        title = f"facets, {counted(nodes, 'node')} of {NODES}"
         python = "oren_nayar_1994_surfaces.gaussian_rung"
         yield form(f"facets-{nodes}", title, "quadrature", python, rung, 2 * (NODES + nodes))
     averaged = "oren_nayar_1994_surfaces.single_slope_mean"

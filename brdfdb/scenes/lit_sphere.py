@@ -38,8 +38,8 @@ _ROWS, _COLUMNS, _COARSE = 385, 768, 8
 _BLURS_DEG = np.array([3.5, 7.0])
 _BLURS_FROM = radians(np.array([1.2, 2.4]))
 _TABULATION = threading.Lock()  # threads that begin together wait for one table: each would take 0.4 s of its own
-_KEPT_SIZE = 512  # pixels across a picture whose matrices are kept: 50 MB
-_BLOCK_SIZE = 2**17  # directions of light of a block of normals of anisotropic surfaces: arrays stay in the cache
+_KEPT_SIZE = 512  # largest picture [pixels across] whose weights are kept: 30 MB
+_BLOCK_SIZE = 2**17  # directions of light, or points of pixels, of a block: its arrays stay in the cache
 
 
 class Detail(NamedTuple):
