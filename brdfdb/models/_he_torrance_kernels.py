@@ -106,20 +106,19 @@ difference_of_sines = elementwise(_difference_of_sines)
 
 
 @inner_loop
-def _roughness(geometry: Array, surface: Array, g_over_vz2: Array, shadow: Array) -> None:
-    """Fill in g / v_z^2 [1] and S / (cos theta_i cos theta_r) [1], the factors of eq. 71 set by the polar angles."""
+def _roughness(geometry: Array, slope: Array, relief: Array, shadow: Array) -> None:
+    """Fill in (sigma / sigma_0)^2 [1] and S / (cos theta_i cos theta_r) [1], which the polar angles and slopes set."""
     sin_i, cos_i, sin_r, cos_r = geometry[0], geometry[1], geometry[2], geometry[3]
-    wave, slope = surface[0], surface[2]
     count = shadow.shape[0]
     for j in range(count):
         # Eqs (23)-(25)
         light, K_i = _shadowing_and_hidden(sin_i[j], cos_i[j], slope[j])
         viewer, K_r = _shadowing_and_hidden(sin_r[j], cos_r[j], slope[j])
         shadow[j] = light * viewer
-        g_over_vz2[j] = K_i + K_r
+        relief[j] = K_i + K_r
     for j in range(count):
-        # Eqs (79)-(83)
-        g_over_vz2[j] = wave[j] * _effective_variance(g_over_vz2[j])
+        # Eqs (80)-(83)
+        relief[j] = _effective_variance(relief[j])
 
 
 @inner_loop
@@ -152,27 +151,32 @@ def _limit(corrected: bool, g: Array, V: Array, total: Array) -> None:
 
 @inner_loop
 def _evaluate(
-    geometry: Array, surface: Array, series: int, reach: float, f_r: Array, work: Array, index: Indices
+    geometry: Array, surface: Array, series: int, reach: float, f_r: Array, work: Array, index: Indices, same: bool
 ) -> None:
     """Evaluate f_r [1/sr] at no more than BLOCK pairs of directions, with the sum of eq. 78 that `series` selects.
 
-    reach is that of `log_series`, for the whole sum. geometry and surface hold the rows named below.
+    reach is that of `log_series`, for the whole sum. geometry and surface hold the rows named below. If they have the
+    `same` directions and slope as in the last call, work still holds what these alone decide.
     """
     cos_i, cos_r, v_xy2 = geometry[1], geometry[3], geometry[4]
-    correlation, n, k, uniform = surface[1], surface[3], surface[4], surface[5]
+    wave, correlation, n, k, uniform = surface[0], surface[1], surface[3], surface[4], surface[5]
     count = f_r.shape[0]
-    g_over_vz2, g, V, shadow = work[0, :count], work[1, :count], work[2, :count], work[3, :count]
-    _roughness(geometry, surface, g_over_vz2, shadow)
+    relief, shadow, g_over_vz2 = work[0, :count], work[1, :count], work[2, :count]
+    g, V = work[3, :count], work[4, :count]
+    if not same:
+        _roughness(geometry, surface[2], relief, shadow)
     for j in range(count):
+        # Eq. (79)
+        g_over_vz2[j] = wave[j] * relief[j]
         g[j] = g_over_vz2[j] * (cos_i[j] + cos_r[j]) ** 2
         V[j] = correlation[j] * v_xy2[j]
     # Eq. (78)
     if series == WHOLE:
-        log_series(False, g, V, reach, f_r, f_r, f_r, work[4:], index)
+        log_series(False, g, V, reach, f_r, f_r, f_r, work[5:], index)
         for j in range(count):
             f_r[j] = exp(f_r[j])
     elif series > 0:
-        _first_terms(series, g, V, f_r, work[4, :count])
+        _first_terms(series, g, V, f_r, work[5, :count])
     else:
         _limit(series == CORRECTED_LIMIT, g, V, f_r)
     for j in range(count):
@@ -206,7 +210,7 @@ def scattered(features: Array, surface: Array, series: int, reach: float, f_r: A
 
     features has the shape (5, N) and the rows of `_evaluate`, surface the shape (6, 1) or (6, N).
     """
-    work, index = np.empty((4 + ROWS_OF_WORK, BLOCK)), np.empty((GROUPS, BLOCK), np.int64)
+    work, index = np.empty((5 + ROWS_OF_WORK, BLOCK)), np.empty((GROUPS, BLOCK), np.int64)
     lanes, geometry, width = np.empty((6, BLOCK)), np.empty((5, BLOCK)), surface.shape[1]
     for start in range(0, f_r.shape[0], BLOCK):
         count = min(BLOCK, f_r.shape[0] - start)
@@ -216,7 +220,7 @@ def scattered(features: Array, surface: Array, series: int, reach: float, f_r: A
         for column in range(6):
             for j in range(count):
                 lanes[column, j] = surface[column, min(start + j, width - 1)]
-        _evaluate(geometry, lanes, series, reach, f_r[start : start + count], work, index)
+        _evaluate(geometry, lanes, series, reach, f_r[start : start + count], work, index, False)
 
 
 @inner_loop
@@ -241,29 +245,33 @@ def vector_rows(w_i: Floats, w_r: Floats, series: int, reach: float, scalars: Ar
 
     Rows of one value, each with a surface of its own, are one long row.
     """
-    work, index = np.empty((4 + ROWS_OF_WORK, BLOCK)), np.empty((GROUPS, BLOCK), np.int64)
+    work, index = np.empty((5 + ROWS_OF_WORK, BLOCK)), np.empty((GROUPS, BLOCK), np.int64)
     lanes, values, geometry = np.empty((6, BLOCK)), np.empty(BLOCK), np.empty((5, BLOCK))
     scattered_surfaces = f_r.shape[1] == 1
-    for row in range(1 if scattered_surfaces else f_r.shape[0]):
-        if scattered_surfaces:
-            row_i, row_r, row_f = w_i.reshape(-1), w_r.reshape(-1), f_r.reshape(-1)
-        else:
-            row_i, row_r = w_i[min(row, w_i.shape[0] - 1)].reshape(-1), w_r[min(row, w_r.shape[0] - 1)].reshape(-1)
-            row_f = f_r[row]
-            for column in range(6):
-                for j in range(BLOCK):
-                    lanes[column, j] = scalars[row, column]
-        for start in range(0, row_f.shape[0], BLOCK):
-            count = min(BLOCK, row_f.shape[0] - start)
-            i, r = row_i[3 * start : 3 * (start + count)], row_r[3 * start : 3 * (start + count)]
-            f = row_f[start : start + count]
+    rows, length = (1, f_r.shape[0]) if scattered_surfaces else f_r.shape
+    flat_i, flat_r, flat_f = w_i.reshape(-1), w_r.reshape(-1), f_r.reshape(-1)
+    shared = w_i.shape[0] == w_r.shape[0] == 1  # by all rows
+    for start in range(0, length, BLOCK):
+        count = min(BLOCK, length - start)
+        for row in range(rows):
             if scattered_surfaces:
                 own = scalars[start : start + count].reshape(-1)
                 for column in range(6):
                     for j in range(count):
                         lanes[column, j] = own[6 * j + column]
-            _geometry_of(i, r, geometry)
-            _evaluate(geometry, lanes, series, reach, values[:count], work, index)
+            elif rows > 1 or start == 0:
+                for column in range(6):
+                    for j in range(BLOCK):
+                        lanes[column, j] = scalars[row, column]
+            first_i = 3 * (start + (0 if w_i.shape[0] == 1 else row * length))
+            first_r = 3 * (start + (0 if w_r.shape[0] == 1 else row * length))
+            i, r = flat_i[first_i : first_i + 3 * count], flat_r[first_r : first_r + 3 * count]
+            repeated = shared and row > 0
+            if not repeated:
+                _geometry_of(i, r, geometry)
+            same = repeated and scalars[row, 2] == scalars[row - 1, 2]
+            _evaluate(geometry, lanes, series, reach, values[:count], work, index, same)
+            f = flat_f[row * length + start : row * length + start + count]
             for j in range(count):
                 f[j] = values[j] * (0.0 if i[3 * j + 2] < 0.0 or r[3 * j + 2] < 0.0 else 1.0)  # nan stays nan
 
@@ -352,7 +360,7 @@ def angle_rows(one_plus_cos: Array, table: Array, scalars: Array, f_r: Floats) -
     """Evaluate rows of f_r [1/sr] along the azimuth. A row shares polar angles and surface."""
     length = f_r.shape[1]
     work, index = np.empty((ROWS_OF_WORK, BLOCK)), np.empty((GROUPS, BLOCK), np.int64)
-    lanes, g_over_vz2, shadow = np.empty((10, BLOCK)), np.empty(BLOCK), np.empty(BLOCK)
+    lanes, relief, shadow = np.empty((10, BLOCK)), np.empty(BLOCK), np.empty(BLOCK)
     g_row, v2, V, log_D = np.empty(BLOCK), np.empty(length), np.empty(length), np.empty(length)
     polynomials = np.empty((Q_PATCHES, table.shape[3]))
     least, most = 0.0, 2.0
@@ -368,11 +376,12 @@ def angle_rows(one_plus_cos: Array, table: Array, scalars: Array, f_r: Floats) -
             for i in range(rows):
                 for column in range(10):
                     lanes[column, i] = scalars[column, row + i]
-            _roughness(lanes[:4], lanes[4:], g_over_vz2[:rows], shadow[:rows])
+            _roughness(lanes[:4], lanes[6], relief[:rows], shadow[:rows])
         s, f, turned = scalars[:, row], f_r[row], one_plus_cos[min(row, one_plus_cos.shape[0] - 1)]
         correlation, n, k, uniform = s[5], s[7], s[8], s[9]
         v_z2 = (s[1] + s[3]) ** 2
-        g = g_over_vz2[lane] * v_z2
+        g_over_vz2 = s[4] * relief[lane]  # eq. (79)
+        g = g_over_vz2 * v_z2
         if g == 0.0:
             for j in range(length):
                 f[j] = uniform
@@ -395,7 +404,7 @@ def angle_rows(one_plus_cos: Array, table: Array, scalars: Array, f_r: Floats) -
                 sums = log_D[start:stop]
                 log_series(False, g_row[: stop - start], V[start:stop], 1.0, sums, sums, sums, work, index)
         # Eqs (71) and (76)
-        pair = correlation * (0.25 / np.pi) * shadow[lane] * g_over_vz2[lane]
+        pair = correlation * (0.25 / np.pi) * shadow[lane] * g_over_vz2
         for j in range(length):
             # Eq. (75), at the bisecting angle
             cos = 0.5 * math.sqrt(v2[j])
