@@ -275,6 +275,25 @@ def spherical_angles(w: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.floa
     return np.arctan2(np.hypot(x, y), z), np.arctan2(y, x)
 
 
+def vectors_from_half_difference(
+    theta_h: ArrayLike, phi_h: ArrayLike, theta_d: ArrayLike, phi_d: ArrayLike
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return unit vectors, shape (..., 3), of the directions that `directions_from_half_difference` returns."""
+    sin_h, cos_h, sin_d, cos_d = np.sin(theta_h), np.cos(theta_h), np.sin(theta_d), np.cos(theta_d)
+    turned = bool(np.any(phi_h))
+    sin_phi, cos_phi = np.sin(phi_h), np.cos(phi_h)
+    d_x, d_y = sin_d * np.cos(phi_d), sin_d * np.sin(phi_d)
+    shape = np.broadcast_shapes(*(np.shape(angle) for angle in (theta_h, phi_h, theta_d, phi_d)))
+    light, viewer = np.empty((*shape, 3)), np.empty((*shape, 3))
+    # the viewer is the light turned by pi about the half vector
+    for w, sign in ((light, 1.0), (viewer, -1.0)):
+        x, y = sign * d_x * cos_h + cos_d * sin_h, sign * d_y
+        w[..., 0] = x * cos_phi - y * sin_phi if turned else x
+        w[..., 1] = x * sin_phi + y * cos_phi if turned else y
+        w[..., 2] = cos_d * cos_h - sign * d_x * sin_h
+    return light, viewer
+
+
 def directions_from_half_difference(
     theta_h: ArrayLike, phi_h: ArrayLike, theta_d: ArrayLike, phi_d: ArrayLike
 ) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any], NDArray[Any]]:
@@ -292,18 +311,9 @@ def directions_from_half_difference(
     theta_i, phi_i, theta_r, phi_r : arrays [rad]
         Broadcast; either theta may pass pi/2, where that direction is below the horizon.
     """
-    sin_h, cos_h = np.sin(theta_h), np.cos(theta_h)
-    d = unit_vector(theta_d, phi_d)
-    d_x, d_y, d_z = np.moveaxis(d, -1, 0)
-    angles: list[NDArray[Any]] = []
-    for sign in (1.0, -1.0):  # the viewer is the light turned by pi about the half vector
-        x = sign * d_x * cos_h + d_z * sin_h
-        z = d_z * cos_h - sign * d_x * sin_h
-        y = sign * d_y
-        theta, phi = spherical_angles(np.stack(np.broadcast_arrays(x, y, z), axis=-1))
-        angles += [theta, phi + np.asarray(phi_h)]
-    theta_i, phi_i, theta_r, phi_r = angles
-    return theta_i, phi_i, theta_r, phi_r
+    light, viewer = vectors_from_half_difference(theta_h, 0.0, theta_d, phi_d)
+    (theta_i, phi_i), (theta_r, phi_r) = spherical_angles(light), spherical_angles(viewer)
+    return theta_i, phi_i + np.asarray(phi_h), theta_r, phi_r + np.asarray(phi_h)
 
 
 def versine(angle: Floats) -> Floats:

@@ -21,6 +21,7 @@ from brdfdb.geometry import (
     radians,
     spherical_angles,
     unit_vector,
+    vectors_from_half_difference,
 )
 
 ANGLES = ("theta_i", "phi_i", "theta_r", "phi_r")
@@ -213,6 +214,23 @@ def test_half_difference_frame_is_that_of_rusinkiewicz() -> None:
         x, y, z = unit_vector(theta_i, phi_i - phi_h)
         turned = [x * np.cos(theta_h) - z * np.sin(theta_h), y, x * np.sin(theta_h) + z * np.cos(theta_h)]
         np.testing.assert_allclose(turned, unit_vector(theta_d, phi_d), atol=2e-15)
+
+
+def test_vectors_from_half_difference_are_the_unit_vectors_of_its_angles() -> None:
+    rng = np.random.default_rng(5)
+    theta_h, theta_d = rng.uniform(0.0, HALF_PI, (2, 500))
+    phi_h, phi_d = rng.uniform(-np.pi, np.pi, (2, 500))
+    for turned in (phi_h, 0.0):
+        theta_i, phi_i, theta_r, phi_r = directions_from_half_difference(theta_h, turned, theta_d, phi_d)
+        light, viewer = vectors_from_half_difference(theta_h, turned, theta_d, phi_d)
+        np.testing.assert_allclose(light, unit_vector(theta_i, phi_i), atol=1e-15)
+        np.testing.assert_allclose(viewer, unit_vector(theta_r, phi_r), atol=1e-15)
+    assert vectors_from_half_difference(np.zeros((4, 1)), 0.0, np.zeros(5), np.zeros((3, 1, 1)))[1].shape == (
+        3,
+        4,
+        5,
+        3,
+    )
 
 
 def test_half_a_turn_of_phi_d_exchanges_light_and_viewer() -> None:

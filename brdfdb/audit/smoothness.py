@@ -13,7 +13,7 @@ from pydantic import BaseModel, Field
 from brdfdb.audit.finding import STRICT, Cell, Finding, NumberTable, Sentence, Subject, Verdict
 from brdfdb.audit.pairs import Pairs
 from brdfdb.figure import number
-from brdfdb.geometry import degrees, directions_from_half_difference, radians, spherical_angles, unit_vector
+from brdfdb.geometry import degrees, radians, spherical_angles, unit_vector, vectors_from_half_difference
 from brdfdb.materials import Source
 from brdfdb.parameters import Floats
 from brdfdb.tables import error_measurement
@@ -219,7 +219,7 @@ def _directions(angles: Array, half_difference: bool) -> tuple[Array, Array]:
     """Return unit vectors of light and viewer."""
     t_i, p_i, t_r, p_r = np.moveaxis(angles, -1, 0)
     if half_difference:
-        t_i, p_i, t_r, p_r = directions_from_half_difference(t_i, p_i, t_r, p_r)
+        return vectors_from_half_difference(t_i, p_i, t_r, p_r)
     return unit_vector(t_i, p_i), unit_vector(t_r, p_r)
 
 

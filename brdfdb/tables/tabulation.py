@@ -6,10 +6,10 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from brdfdb._elementary import COS_HORIZON
-from brdfdb.geometry import HALF_PI, directions_from_half_difference, radians, unit_vector
+from brdfdb.geometry import HALF_PI, radians, unit_vector, vectors_from_half_difference
 from brdfdb.materials import Source
 from brdfdb.measurements import MeasuredSource
 from brdfdb.parameters import Floats
@@ -76,7 +76,8 @@ def block(layout: Layout, rows: slice) -> NDArray[np.float32]:
     for some in slabs(layout, rows):
         at = slice(some.start - rows.start, some.stop - rows.start)
         if layout.plain and not layout.grid.half_difference:
-            for number, wavelength in enumerate(_node_wavelengths(layout)):
+            nodes_nm = _node_wavelengths(layout)
+            for number, wavelength in enumerate([None] if nodes_nm is None else nodes_nm.tolist()):
                 index: tuple[Any, ...] = (at, ...) if wavelength is None else (at, ..., number)
                 values[index] = _evaluated(layout, some, wavelength)
         else:
@@ -109,13 +110,12 @@ def rounded(values: NDArray[np.float32], bits: int) -> NDArray[np.float32]:
     return ((whole + np.uint32(1 << (drop - 1))) >> np.uint32(drop) << np.uint32(drop)).view(np.float32)
 
 
-def _node_wavelengths(layout: Layout) -> list[float | None]:
-    """Return the wavelengths [nm] at which nodes are evaluated, one by one; None stands for those of a grey table."""
-    at = layout.wavelength_nm if layout.part_nm is None else layout.part_nm
-    return [None] if at is None else list(at)
+def _node_wavelengths(layout: Layout) -> NDArray[np.float64] | None:
+    """Return the wavelengths [nm] at which nodes are evaluated; None for a grey table."""
+    return layout.wavelength_nm if layout.part_nm is None else layout.part_nm
 
 
-def _evaluated(layout: Layout, rows: slice, wavelength_nm: float | None) -> Floats:
+def _evaluated(layout: Layout, rows: slice, wavelength_nm: ArrayLike | None) -> Floats:
     """Return f_r [1/sr] at some rows of the first axis; on a reciprocal grid with the smaller theta always the light's.
 
     There a table is its own transpose to the last bit, in whatever pieces it is computed.
@@ -132,7 +132,7 @@ def _evaluated(layout: Layout, rows: slice, wavelength_nm: float | None) -> Floa
     pairs, pair = np.unique(smaller * theta.size + larger, return_inverse=True)  # of which each is evaluated once
     light, viewer = theta[pairs // theta.size], theta[pairs % theta.size]
     values = evaluate(light[:, np.newaxis], np.zeros(()), viewer[:, np.newaxis], delta_phi)
-    return values[pair].reshape(-1, theta.size, delta_phi.size)
+    return values[pair].reshape(-1, theta.size, *values.shape[1:])
 
 
 def numbers(layout: Layout, wi: Floats, wr: Floats) -> Floats:
@@ -156,12 +156,8 @@ def values_at(layout: Layout, wi: Floats, wr: Floats) -> tuple[Floats, Floats]:
     The stored numbers are made of both.
     """
     mu = np.maximum(wi[..., 2], COS_HORIZON) * np.maximum(wr[..., 2], COS_HORIZON)
-    return _spectrum(layout, lambda wavelength: layout.tabulated.lookup_vectors(wi, wr, wavelength)), mu
-
-
-def _spectrum(layout: Layout, evaluate: Callable[[float | None], Floats]) -> Floats:
-    """Return f_r [1/sr] at the wavelengths of a layout, shape (..., L)."""
-    return np.stack([evaluate(wavelength) for wavelength in _node_wavelengths(layout)], axis=-1).astype(np.float64)
+    f_r = layout.tabulated.brdf_at(_node_wavelengths(layout))(wi.reshape(-1, 3), wr.reshape(-1, 3))
+    return f_r.reshape(*mu.shape, -1), mu
 
 
 def node_numbers(layout: Layout, rows: slice) -> Floats:
@@ -174,9 +170,9 @@ def node_numbers(layout: Layout, rows: slice) -> Floats:
     if not grid.half_difference:
         angles = grid.directions(rows)
         mu = np.maximum(np.cos(angles[0]), COS_HORIZON) * np.maximum(np.cos(angles[2]), COS_HORIZON)
-        return layout.interpolation.numbers(
-            _spectrum(layout, lambda wavelength: _evaluated(layout, rows, wavelength)), mu
-        )
+        nodes_nm = _node_wavelengths(layout)
+        f_r = _evaluated(layout, rows, nodes_nm)
+        return layout.interpolation.numbers(f_r[..., np.newaxis] if nodes_nm is None else f_r, mu)
     axes = [radians(nodes) for nodes in grid.axes.values()]
     axes[0] = axes[0][rows]
     nodes = np.ix_(*axes)
@@ -246,8 +242,7 @@ def joined(source: Source, values: Floats, before: tuple[Floats, Beyond] | None)
 
 
 def _half_vectors(theta_h: Floats, phi_h: Floats, theta_d: Floats, phi_d: Floats) -> tuple[Floats, Floats]:
-    theta_i, phi_i, theta_r, phi_r = directions_from_half_difference(theta_h, phi_h, theta_d, phi_d)
-    light, viewer = unit_vector(theta_i, phi_i), unit_vector(theta_r, phi_r)
+    light, viewer = vectors_from_half_difference(theta_h, phi_h, theta_d, phi_d)
     for w in (light, viewer):
         w[..., 2] = np.maximum(w[..., 2], 0.0)  # rounding at the horizon
     return light, viewer

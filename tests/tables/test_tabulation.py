@@ -17,7 +17,7 @@ from brdfdb.spectra import refractive_index
 from brdfdb.tables import layout as layout_module
 from brdfdb.tables import tabulation as module
 from brdfdb.tables.grids import Grid
-from brdfdb.tables.layout import Layout
+from brdfdb.tables.layout import Interpolation, Layout
 from brdfdb.tables.tabulation import tabulate
 
 ISOTROPIC = Grid({"theta_i": [0, 30, 60, 89.5], "theta_r": [0, 30, 45, 60, 85], "delta_phi": [0, 50, 90, 180]})
@@ -130,6 +130,18 @@ def test_a_table_does_not_depend_on_the_pieces_that_it_is_made_in(
     monkeypatch.setattr(layout_module, "_BLOCK_VALUES", 2 * rows * int(np.prod(layout.shape[1:])))
     assert len(layout.blocks) == -(-grid.shape[0] // (2 * rows))
     xr.testing.assert_identical(tabulate(layout), whole)
+
+
+def test_numbers_with_light_and_viewer_at_the_horizon_go_on_from_those_above_it() -> None:
+    glossy = material("ward", rho_d=0.3, rho_s=0.05, alpha_x=0.1, alpha_y=0.1)
+    grid = Grid({"theta_h": [0, 90], "theta_d": [0, 90], "phi_d": [0, 90]})
+    layout = Layout(glossy, grid, None, Interpolation("cubic", True, 1e-4, 0.5))
+    theta_h = np.deg2rad(np.linspace(1.0, 30.0, 200))
+    at, above = (
+        module.continued(layout, theta_h, np.zeros(()), np.full((), theta_d), np.full((), np.pi / 2))
+        for theta_d in (np.pi / 2, np.pi / 2 - 1e-8)
+    )
+    np.testing.assert_allclose(at, above, atol=1e-6)  # with cosines of rounded angles they were 1e-3 apart
 
 
 @pytest.mark.parametrize("made_up", [*GREY[:5], rough_copper()], ids=lambda m: m.model)
