@@ -23,6 +23,8 @@ _COUNTS = (2, 3, 4, 5, 6, 8, 10, 12, 15, 18, 22, 27, 33, 41, 50, 61, 75, 92, 112
 _MOST_NODES = 400  # of an axis
 _SMOOTHED = 9  # points of a line that the density of nodes is averaged over
 _PERCENTILE = 99.0  # of the errors on lines that counts
+# Least difference that counts: rounding would decide where the nodes of an axis lie along which numbers hardly change
+_LEAST = 1e-10
 _EASED = 0.15  # of the mean density of nodes is what the emptiest part of an axis gets
 
 # Where the points of a line lie, s in [0, 1]: (end [degree], power); a power p > 0 crowds them at 0 as s**p, p < 0 at
@@ -52,7 +54,8 @@ class Need:
         self.known: dict[int, tuple[float, float]] = {}  # a bound that the error is above, and one that it keeps
         self.counted = int(np.count_nonzero(self.weights > 0.0))
         left = np.abs(np.diff(self.rows, order, axis=1)) * self.weights[:, order // 2 : size - order // 2]
-        peak = np.pad(np.percentile(left, 98, axis=0) ** (1.0 / order), order // 2, mode="edge")
+        steepest = np.maximum(np.percentile(left, 98, axis=0), _LEAST)
+        peak = np.pad(steepest ** (1.0 / order), order // 2, mode="edge")
         smooth = np.convolve(
             np.pad(peak, _SMOOTHED // 2, mode="edge"), np.full(_SMOOTHED, 1.0 / _SMOOTHED), mode="valid"
         )

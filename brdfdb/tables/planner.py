@@ -28,7 +28,7 @@ from brdfdb.tables.mixture import Mixture, mixture_of
 from brdfdb.tables.plan_trials import MARGIN, SEED, Final
 from brdfdb.tables.tabulation import POLE_END_DEG
 
-PLAN_VERSION = 1
+PLAN_VERSION = 2
 
 MOST_VALUES = 10_000_000  # of a table: a tolerance that takes more is refused
 _TRIED = 2  # ways to interpolate on each kind of grid, those that promise to be smallest
@@ -124,19 +124,19 @@ def planned(
     for hopeless in (_HOPELESS, math.inf):  # kinds that promised too many values are looked into if the others fail
         table_kinds = left = list(_table_kinds(task, hopeless))
         while left:
-            tried = left
+            failed = set()
             for stricter in _STRICTER:
-                layout = _smallest(task._replace(tolerance=stricter * tolerance), tried)
+                layout = _smallest(task._replace(tolerance=stricter * tolerance), left)
                 if layout is None:
                     break
-                tried = [kind for kind in left if _kind(kind[1]) == _kind(layout)]
+                failed.add(_kind(layout))
                 final = final or plan_trials.final_of(source, wavelength_nm)
                 layout = replace(layout, source=source)
                 finished = plan_trials.finished(layout, final, wavelength_nm, tolerance, mixture)
                 if finished is not None:
                     layout, values = finished
                     return replace(layout, reason=_reason(layout, tolerance, table_kinds)), values
-            left = [kind for kind in left if all(kind is not other for other in tried)]
+            left = [kind for kind in left if failed and _kind(kind[1]) not in failed]
     raise ParameterError(
         "tolerance",
         f"{tolerance:g} takes more than {MOST_VALUES} values of {source.name}; ask for another error, "

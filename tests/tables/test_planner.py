@@ -145,7 +145,7 @@ def test_grooves_are_planned_over_light_and_viewer() -> None:
 
 # Values of a plan relative to the smallest table of an exhaustive search: worst 1.92, rendered-sphere-10deg at 0.05
 TIMES_THE_SMALLEST = 2.0
-# The lobe of this one bends along phi_d where lines hardly see it; its table at 0.02 has 39600 values
+# The lobe of this one bends along phi_d where lines hardly see it; its table at 0.02 has 26400 values
 BOUNDED = {"rho_d": 0.2, "rho_s": 0.3, "alpha_x": 0.3, "alpha_y": 0.45}
 
 
@@ -161,7 +161,7 @@ def test_the_last_digit_of_a_parameter_decides_not_whether_a_table_is_found(tole
     """A kind of table that kept to 0.02 at few directions alone was the only one that was tried then."""
     layouts = [plan(ward_bounded(change), None, tolerance) for change in (0.0, 1e-15, -3e-15, 1e-12)]
     sizes = [layout.size for layout in layouts]
-    assert max(sizes) <= 3.0 * min(sizes)  # at 0.02 they are the same, at 0.005 their ladders part
+    assert max(sizes) <= 1.3 * min(sizes)  # a step of one axis; they are the same
     for layout in layouts[:2]:
         assert measured(layout).overall.p99 <= tolerance
 
