@@ -49,6 +49,8 @@ class Need:
         order = 4 if layout.interpolation.cubic else 2
         count, size, wavelengths = numbers.shape
         self.layout, self.axis, self.order = layout, axis, order
+        name = layout.grid.names[axis]
+        self.x = _points(name, layout.grid.axes[name][-1], np.linspace(0.0, 1.0, size))
         self.rows = np.moveaxis(numbers, 2, 1).reshape(count * wavelengths, size)
         self.weights = np.moveaxis(weight, 2, 1).reshape(count * wavelengths, size)
         self.known: dict[int, tuple[float, float]] = {}  # a bound that the error is above, and one that it keeps
@@ -96,12 +98,9 @@ class Need:
 
     def _errors(self, count: int) -> Floats:
         """Return the errors on lines that are interpolated between so many of their points."""
-        grid, at = self.layout.grid, self.points[count]
-        name = grid.names[self.axis]
-        x = _points(name, grid.axes[name][-1], np.linspace(0.0, 1.0, self.rows.shape[1]))
-        nodes = x[at]
-        index, weight = weights_of_nodes(nodes, x, grid.ends[self.axis], cubic=self.layout.interpolation.cubic)
-        matrix = np.zeros((x.size, nodes.size))
+        layout, x, at = self.layout, self.x, self.points[count]
+        index, weight = weights_of_nodes(x[at], x, layout.grid.ends[self.axis], cubic=layout.interpolation.cubic)
+        matrix = np.zeros((x.size, at.size))
         for column, share in zip(index.T, weight.T, strict=True):
             matrix[np.arange(x.size), column] += share
         error = self.rows[:, at] @ matrix.T
@@ -157,16 +156,16 @@ def lines(layout: Layout, axis: int, drawn: error_measurement.Draw) -> Lines:
     wi, wr = drawn.wi[chosen], drawn.wr[chosen]
     x = points(grid, wi, wr)
     name = grid.names[axis]
-    coordinates = [np.repeat(column[:, np.newaxis], _POINTS, axis=1) for column in x]
-    coordinates[axis][:] = radians(_points(name, grid.axes[name][-1], np.linspace(0.0, 1.0, _POINTS)))
+    coordinates = [column[:, np.newaxis] for column in x]
+    coordinates[axis] = radians(_points(name, grid.axes[name][-1], np.linspace(0.0, 1.0, _POINTS)))
     if grid.half_difference:
         theta_h, *others = coordinates
-        phi_h, theta_d, phi_d = others if grid.anisotropic else (np.zeros_like(theta_h), *others)
+        phi_h, theta_d, phi_d = others if grid.anisotropic else (np.zeros(()), *others)
         values, before = tabulation.held(layout, theta_h, phi_h, theta_d, phi_d, tabulation.values_at)
         cos_h, sin_h = np.cos(theta_h) * np.cos(theta_d), np.sin(theta_h) * np.sin(theta_d) * np.cos(phi_d)
         return Lines(values, before, cos_h - np.abs(sin_h), (cos_h + sin_h) * (cos_h - sin_h))
     theta_i, *others = coordinates
-    phi_i, theta_r, phi_r = others if grid.anisotropic else (np.zeros_like(theta_i), *others)
+    phi_i, theta_r, phi_r = others if grid.anisotropic else (np.zeros(()), *others)
     at = tabulation.values_at(layout, unit_vector(theta_i, phi_i), unit_vector(theta_r, phi_r))
     cos_i, cos_r = np.cos(theta_i), np.cos(theta_r)
     return Lines(at, None, np.minimum(cos_i, cos_r), cos_i * cos_r)
@@ -201,7 +200,12 @@ def numbers_along(layout: Layout, along: Lines, floor: Floats) -> tuple[Floats, 
 def _spread(density: Floats) -> dict[int, NDArray[np.int64]]:
     """Return the points of a line that are nodes of an axis, by their number; without numbers that repeat a point."""
     at = np.round(_places(density, _FRACTIONS) * (density.size - 1)).astype(np.int64)
-    return {points.size: points for points in np.split(at, _SPLITS) if np.all(np.diff(points) > 0)}
+    repeated = np.append(at[1:] <= at[:-1], False)
+    repeated[_ENDS - 1] = False  # there the points for the next number begin
+    usable = ~np.logical_or.reduceat(repeated, _ENDS - _COUNTS)
+    return {
+        count: at[end - count : end] for count, end, is_usable in zip(_COUNTS, _ENDS, usable, strict=True) if is_usable
+    }
 
 
 def _quantiles(density: Floats, count: int) -> Floats:
@@ -215,7 +219,7 @@ def _fractions(count: int) -> tuple[Floats, Floats]:
 
 
 _FRACTIONS = tuple(np.concatenate(parts) for parts in zip(*map(_fractions, _COUNTS), strict=True))
-_SPLITS = np.cumsum(_COUNTS)[:-1]
+_ENDS: NDArray[np.int64] = np.cumsum(_COUNTS)
 
 
 def _places(density: Floats, fractions: tuple[Floats, ...]) -> Floats:

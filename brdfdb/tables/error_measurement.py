@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from brdfdb._elementary import COS_HORIZON
 from brdfdb.geometry import radians, unit_vector
 from brdfdb.integrals.sampling import mirrored_in_lobe, mixture_density
+from brdfdb.lobes import Lobe
 from brdfdb.materials import FunctionRecord, Source
 from brdfdb.measurements import MeasuredSource
 from brdfdb.measurements.extent import Extent
@@ -62,6 +63,12 @@ class Draw(NamedTuple):
         """Mask of the pairs that count: the viewer is above the horizon, and f_r is not extrapolated."""
         return np.asarray((self.weight > 0.0) & self.measured)
 
+    def above_the_horizon(self) -> Draw:
+        """Return the pairs whose viewer is above the horizon. Means that are weighed stay as they are."""
+        kept = self.weight > 0.0
+        weight = self.weight[kept] * np.mean(kept)
+        return Draw(self.wi[kept], self.wr[kept], self.band[kept], weight, self.in_lobe[kept], self.measured[kept])
+
 
 def draw(
     source: Source | FunctionRecord | None, wavelength_nm: NDArray[np.float64] | None, count: int, seed: int
@@ -97,18 +104,19 @@ def _over_all(
     if lobe is None:
         none = np.zeros(band.size, dtype=bool)
         return Draw(wi, over, band, over[:, 2] * (2.0 * np.pi), none, _measured(source, wi, over))
-    lobes = [
-        lobe._replace(share=np.ones(1), alpha_x=width * lobe.alpha_x, alpha_y=width * lobe.alpha_y, visible=False)
-        for width in WIDTHS
-    ]
-    which = among * 2 * len(lobes)  # one half over the hemisphere, the other among the lobes
-    wr = over
-    for number, drawn in enumerate(lobes):
-        chosen = (which >= number) & (which < number + 1)
-        wr = np.where(chosen[:, np.newaxis], mirrored_in_lobe(u, angle, wi, drawn), wr)
-    density = 0.5 / (2.0 * np.pi) + 0.5 * np.mean([mixture_density(drawn, wi, wr) for drawn in lobes], axis=0)
+
+    def wider(width: float | Floats) -> Lobe:
+        return lobe._replace(
+            share=np.ones(1), alpha_x=width * lobe.alpha_x, alpha_y=width * lobe.alpha_y, visible=False
+        )
+
+    which = among * 2 * len(WIDTHS)  # one half over the hemisphere, the other among the lobes
+    in_lobe = which < len(WIDTHS)
+    own = np.array(WIDTHS)[np.where(in_lobe, which, 0.0).astype(np.int64)]
+    wr = np.where(in_lobe[:, np.newaxis], mirrored_in_lobe(u, angle, wi, wider(own)), over)
+    density = 0.5 / (2.0 * np.pi) + 0.5 * np.mean([mixture_density(wider(width), wi, wr) for width in WIDTHS], axis=0)
     weight = np.where(wr[:, 2] > 0.0, wr[:, 2], 0.0) / density
-    return Draw(wi, wr, band, weight, which < len(lobes), _measured(source, wi, wr))
+    return Draw(wi, wr, band, weight, in_lobe, _measured(source, wi, wr))
 
 
 @functools.lru_cache(maxsize=4)
@@ -158,6 +166,8 @@ def relative(values: Floats, truth: Floats, floor: Floats) -> Floats:
     """Return the relative error [1], abs(values - truth) / max(truth, floor); 0 where both are 0."""
     scale = np.maximum(truth, floor)
     error = np.abs(values - truth)
+    if np.min(floor) > 0.0:
+        return error / scale  # in a third of the time
     return np.divide(error, scale, out=np.where(error > 0.0, np.inf, 0.0), where=scale > 0.0)
 
 

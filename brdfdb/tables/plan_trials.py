@@ -25,23 +25,35 @@ _BITS = range(9, 24)
 _WORTH_ROUNDING = 4096  # values: of smaller tables nothing is rounded
 
 
-class Final(NamedTuple):
-    """Directions at which finished tables are measured, and f_r there, at all wavelengths."""
+class Sample(NamedTuple):
+    """Pairs of directions above the horizon, f_r [1/sr] there, shape (N, L), and the floor of relative errors, (L,)."""
 
     drawn: error_measurement.Draw
     truth: Floats
+    floor: Floats
+
+    def at(self, wavelengths: NDArray[np.bool_]) -> Sample:
+        """Return the sample at some of its wavelengths."""
+        return self._replace(truth=self.truth[:, wavelengths], floor=self.floor[wavelengths])
 
 
-def error_of(layout: Layout, values: NDArray[np.float32], drawn: error_measurement.Draw, truth: Floats) -> float:
+def sample_of(source: Source, wavelength_nm: NDArray[np.float64] | None, count: int, seed: int) -> Sample:
+    """Draw a sample of a source at wavelengths [nm], of `count` pairs a band, and leave out those below the horizon."""
+    drawn = error_measurement.draw(source, wavelength_nm, count, seed).above_the_horizon()
+    truth = error_measurement.model_values(source, wavelength_nm, drawn.wi, drawn.wr)
+    return Sample(drawn, truth, error_measurement.floor_of(truth, drawn))
+
+
+def error_of(layout: Layout, values: NDArray[np.float32], sample: Sample) -> float:
     """Return the largest of the errors that are held to the tolerance.
 
     They are the 99th percentile of the relative error at the worst wavelength, the l1 error, as a few values that are
     off by orders of magnitude next to a pole escape any percentile, and the 99th percentile of each band of theta_i
     over `_OF_A_BAND`: grazing light is a ninth of the directions.
     """
-    error, l1 = _errors(layout, values, drawn, truth)
-    above = drawn.above
-    counted, band = np.ascontiguousarray(error[above].T), drawn.band[above]
+    error, l1 = _errors(layout, values, sample)
+    counts = sample.drawn.above
+    counted, band = np.ascontiguousarray(error[counts].T), sample.drawn.band[counts]
     worst = max(np.percentile(counted, 99, axis=1).max(), l1.max())
     if counted.max() > _OF_A_BAND * worst:  # else no band can be worse
         for row in np.unique(band):
@@ -49,29 +61,28 @@ def error_of(layout: Layout, values: NDArray[np.float32], drawn: error_measureme
     return float(worst)
 
 
-def _errors(
-    layout: Layout, values: NDArray[np.float32], drawn: error_measurement.Draw, truth: Floats
-) -> tuple[Floats, Floats]:
+def _errors(layout: Layout, values: NDArray[np.float32], sample: Sample) -> tuple[Floats, Floats]:
     """Return the relative errors of a table, of the shape of the truth, and its l1 errors, of shape (L,)."""
+    drawn, truth, floor = sample
     looked_up = Table.of(layout, values).lookup_vectors(drawn.wi, drawn.wr).reshape(truth.shape)
-    error = error_measurement.relative(looked_up, truth, error_measurement.floor_of(truth, drawn))
+    error = error_measurement.relative(looked_up, truth, floor)
     return error, error_measurement.mean_error(looked_up, truth, drawn.weight)
 
 
-def keeps(layout: Layout, values: NDArray[np.float32], final: Final, goal: float) -> bool:
+def keeps(layout: Layout, values: NDArray[np.float32], sample: Sample, goal: float) -> bool:
     """Return True if `error_of` a table is within a goal. Most tables fail at a few directions.
 
     Errors are counted where `error_of` sorts them, in a tenth of the time.
     """
-    drawn, truth = final
+    drawn, truth, floor = sample
     few = slice(None, None, _SOME)
     looked_up = Table.of(layout, values).lookup_vectors(drawn.wi[few], drawn.wr[few]).reshape(truth[few].shape)
-    error = error_measurement.relative(looked_up, truth[few], error_measurement.floor_of(truth, drawn))
+    error = error_measurement.relative(looked_up, truth[few], floor)
     beyond = np.count_nonzero((error > goal) & drawn.above[few, np.newaxis], axis=0).max()
     most = 0.01 * np.count_nonzero(drawn.above) + 2.0  # with more the 99th percentile of all is beyond the goal
     if beyond > most:
         return False
-    error, l1 = _errors(layout, values, drawn, truth)
+    error, l1 = _errors(layout, values, sample)
     counted = error[drawn.above]
     if not (l1.max() <= goal and _within(counted, goal)):
         return False
@@ -94,27 +105,25 @@ def values_of(layout: Layout) -> NDArray[np.float32]:
     return np.concatenate([tabulation.block(layout, rows) for rows in layout.blocks])
 
 
-def final_of(source: Source, wavelength_nm: NDArray[np.float64] | None) -> Final:
-    """Return directions drawn for finished tables of a source, and its f_r [1/sr] there at all wavelengths [nm]."""
-    drawn = error_measurement.draw(source, wavelength_nm, _DRAWS, SEED + 1)
-    return Final(drawn, error_measurement.model_values(source, wavelength_nm, drawn.wi, drawn.wr))
+def final_of(source: Source, wavelength_nm: NDArray[np.float64] | None) -> Sample:
+    """Return the sample that finished tables of a source are measured at, at all wavelengths [nm]."""
+    return sample_of(source, wavelength_nm, _DRAWS, SEED + 1)
 
 
 def finished(
-    layout: Layout, final: Final, wavelength_nm: NDArray[np.float64] | None, tolerance: float, mixture: Mixture | None
+    layout: Layout, final: Sample, wavelength_nm: NDArray[np.float64] | None, tolerance: float, mixture: Mixture | None
 ) -> tuple[Layout, NDArray[np.float32]] | None:
     """Return the layout at all wavelengths, with as few coefficients and bits as the error allows, and its values.
 
     None if no number of coefficients and bits keeps to the tolerance.
     """
-    drawn, truth = final
     goal = MARGIN * tolerance
     reason = f"the smallest of those tried that keep 99 of 100 values within {tolerance:g} of the model, relative"
     if mixture is not None or wavelength_nm is None or not layout.interpolation.logarithm:
         spectra = None if mixture is None else mixture.spectra
         if mixture is None and wavelength_nm is not None and layout.wavelength_nm is not None:
             few = np.isin(wavelength_nm, layout.wavelength_nm)  # a table that fails at these fails at all of them
-            if not few.all() and not keeps(layout, values_of(layout), Final(drawn, truth[:, few]), goal):
+            if not few.all() and not keeps(layout, values_of(layout), final.at(few), goal):
                 return None
         layout = replace(layout, wavelength_nm=wavelength_nm, reason=reason, spectra=spectra)
         return _rounded(layout, values_of(layout), None, final, goal)
@@ -122,7 +131,7 @@ def finished(
     numbers = _numbers(layout)
     few = np.isin(wavelength_nm, layout.wavelength_nm)
     if not few.all():
-        if not keeps(layout, _as_values(layout, numbers), Final(drawn, truth[:, few]), goal):
+        if not keeps(layout, _as_values(layout, numbers), final.at(few), goal):
             return None
         known = numbers
         numbers = np.empty((*layout.grid.shape, wavelength_nm.size))
@@ -131,8 +140,7 @@ def finished(
     whole = _as_values(layout, numbers)
     if wavelength_nm.size > 2:
         rows = whole.reshape(-1, wavelength_nm.size).astype(np.float64)
-        floor = error_measurement.floor_of(truth, drawn)
-        significance = np.exp(np.minimum(np.max(rows - np.log(floor), axis=1, keepdims=True), 0.0))
+        significance = np.exp(np.minimum(np.max(rows - np.log(final.floor), axis=1, keepdims=True), 0.0))
         seen = rows * significance
         basis = np.linalg.eigh(seen.T @ seen).eigenvectors[:, ::-1].T  # the spectra that say most come first
         for parts in range(1, wavelength_nm.size // 2 + 1):
@@ -145,7 +153,7 @@ def finished(
 
 
 def _rounded(
-    layout: Layout, whole: NDArray[np.float32], numbers: Floats | None, final: Final, goal: float
+    layout: Layout, whole: NDArray[np.float32], numbers: Floats | None, final: Sample, goal: float
 ) -> tuple[Layout, NDArray[np.float32]] | None:
     """Return the layout with as few bits as the error allows, and its values; None if no number of bits does.
 

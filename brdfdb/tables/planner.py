@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from brdfdb.errors import ParameterError, counted
 from brdfdb.materials import Source
 from brdfdb.parameters import Floats
-from brdfdb.tables import axis_needs, error_measurement, plan_trials
+from brdfdb.tables import axis_needs, plan_trials
 from brdfdb.tables.axis_needs import LINE, Need
 from brdfdb.tables.grids import (
     ANISOTROPIC_AXES,
@@ -25,7 +25,7 @@ from brdfdb.tables.grids import (
 )
 from brdfdb.tables.layout import Interpolation, Layout
 from brdfdb.tables.mixture import Mixture, mixture_of
-from brdfdb.tables.plan_trials import MARGIN, SEED, Final
+from brdfdb.tables.plan_trials import MARGIN, SEED, Sample
 from brdfdb.tables.tabulation import POLE_END_DEG
 
 PLAN_VERSION = 2
@@ -48,15 +48,14 @@ _TableKind = tuple[float, Layout, dict[str, Need]]
 
 
 class _Task(NamedTuple):
-    """A plan to make: a source at a few wavelengths, directions, f_r there, and the tolerance.
+    """A plan to make: a source at a few wavelengths, a sample of it there, and the tolerance.
 
     `mixture` says how a few wavelengths make f_r at these, if they do; None: each is tabulated.
     """
 
     source: Source
     wavelength_nm: NDArray[np.float64] | None
-    drawn: error_measurement.Draw
-    truth: Floats
+    sample: Sample
     tolerance: float
     mixture: Mixture | None
 
@@ -117,10 +116,10 @@ def planned(
     mixture = mixture_of(source, wavelength_nm)
     planned_on = source if alike is None else alike
     task = _task(planned_on, wavelength_nm, tolerance, mixture)
-    if not task.truth.any():
+    if not task.sample.truth.any():
         reason = "f_r is 0: all light is in the specular part"
         return Layout(source, coarsest(source), wavelength_nm, reason=reason), None
-    final: Final | None = None
+    final: Sample | None = None
     for hopeless in (_HOPELESS, math.inf):  # kinds that promised too many values are looked into if the others fail
         table_kinds = left = list(_table_kinds(task, hopeless))
         while left:
@@ -204,9 +203,7 @@ def _task(
             chosen = np.union1d(chosen, mixture.extremes)
             mixture = mixture._replace(spectra=mixture.spectra[:, chosen])
         some = wavelength_nm[chosen]
-    drawn = error_measurement.draw(source, some, _DRAWS, SEED)
-    truth = error_measurement.model_values(source, some, drawn.wi, drawn.wr)
-    return _Task(source, some, drawn, truth, tolerance, mixture)
+    return _Task(source, some, plan_trials.sample_of(source, some, _DRAWS, SEED), tolerance, mixture)
 
 
 def offset_of(source: Source, wavelength_nm: NDArray[np.float64] | None) -> float:
@@ -215,7 +212,7 @@ def offset_of(source: Source, wavelength_nm: NDArray[np.float64] | None) -> floa
 
 
 def _offset(task: _Task) -> float:
-    floor = error_measurement.floor_of(task.truth, task.drawn)
+    floor = task.sample.floor
     if task.mixture is not None:  # an error of a part counts as much as its weight
         floor = floor / np.maximum(np.abs(task.mixture.spectra).max(axis=0), 1e-12)
     return float(max(0.5 * floor.min(), 1e-12))
@@ -250,7 +247,7 @@ def _table_kinds(task: _Task, hopeless: float = _HOPELESS) -> Iterator[_TableKin
     A kind that takes `hopeless` times the fewest values is dropped as soon as some of its axes show it.
     """
     source = task.source
-    offset, floor = _offset(task), error_measurement.floor_of(task.truth, task.drawn)
+    offset, floor = _offset(task), task.sample.floor
     kinds: list[tuple[str, ...]]
     if source.anisotropic:
         kinds = [ANISOTROPIC_HALF_DIFFERENCE_AXES] if source.elliptical else [ANISOTROPIC_AXES]
@@ -282,7 +279,7 @@ def _table_kinds(task: _Task, hopeless: float = _HOPELESS) -> Iterator[_TableKin
                             if name not in lines:
                                 same = name, power == 0.0, layout.plain
                                 if same not in known:
-                                    known[same] = axis_needs.lines(layout, axis, task.drawn)
+                                    known[same] = axis_needs.lines(layout, axis, task.sample.drawn)
                                 lines[name] = axis_needs.numbers_along(layout, known[same], floor)
                             needs[name] = Need(chosen, axis, *lines[name])
                         size *= needs[name].count(task.tolerance)
@@ -317,9 +314,7 @@ def _refined(task: _Task, layout: Layout, needs: dict[str, Need], most: float, *
 
     def measured(trial: Layout) -> float:
         if trial.grid.shape not in known:
-            known[trial.grid.shape] = (
-                plan_trials.error_of(trial, plan_trials.values_of(trial), task.drawn, task.truth) / goal
-            )
+            known[trial.grid.shape] = plan_trials.error_of(trial, plan_trials.values_of(trial), task.sample) / goal
         return known[trial.grid.shape]
 
     last, stalled, rounds = math.inf, 0, _ROUNDS

@@ -155,6 +155,7 @@ def values_at(layout: Layout, wi: Floats, wr: Floats) -> tuple[Floats, Floats]:
 
     The stored numbers are made of both.
     """
+    wi, wr = np.broadcast_arrays(wi, wr)
     mu = np.maximum(wi[..., 2], COS_HORIZON) * np.maximum(wr[..., 2], COS_HORIZON)
     f_r = layout.tabulated.brdf_at(_node_wavelengths(layout))(wi.reshape(-1, 3), wr.reshape(-1, 3))
     return f_r.reshape(*mu.shape, -1), mu

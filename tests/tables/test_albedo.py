@@ -13,6 +13,7 @@ from brdfdb.integrals import quadrature
 from brdfdb.materials import Material
 from brdfdb.tables import albedo, error_measurement
 from brdfdb.tables.albedo import QUADRATURE_TOLERANCE, THETA_I_DEG, directional_albedo
+from brdfdb.tables.layout import Layout
 from brdfdb.tables.planner import plan
 from brdfdb.tables.table import Table, table_from
 from brdfdb.tables.tabulation import tabulate
@@ -34,10 +35,14 @@ MODEL_TOLERANCE = 1.5e-3
 
 
 def planned(model: str, parameters: dict[str, float], wavelength_nm: Any = None, tolerance: float = 0.02) -> Table:
-    """A table as a store holds it, its error measured."""
+    """A planned table as a store holds it."""
     spectral = {} if wavelength_nm is None else {"refractive_index": "main/Cu/Johnson"}
     written = {"title": "Made up", "model": model, "source": "no paper", "parameters": parameters, **spectral}
-    layout = plan(Material.from_table("made-up", written), wavelength_nm, tolerance)
+    return measured(plan(Material.from_table("made-up", written), wavelength_nm, tolerance))
+
+
+def measured(layout: Layout) -> Table:
+    """The table of a layout as a store holds it, its error measured."""
     dataset = tabulate(layout)
     values = dataset[layout.variable].values
     error = error_measurement.measure(layout, lambda rows: values[rows], count=1500)

@@ -203,7 +203,7 @@ def test_no_table_of_an_exhaustive_search_has_half_the_values_of_a_plan(name: st
             if math.prod(number[need] for need in needs.values()) < most:
                 axes = {axis: need.nodes(number[need]) for axis, need in needs.items()}
                 trial = dataclasses.replace(layout, grid=Grid(axes))
-                error = plan_trials.error_of(trial, plan_trials.values_of(trial), task.drawn, task.truth)
+                error = plan_trials.error_of(trial, plan_trials.values_of(trial), task.sample)
                 assert error > plan_trials.MARGIN * tolerance, trial.grid.shape
 
 
@@ -222,6 +222,6 @@ def test_few_directions_rule_out_only_what_all_of_them_do() -> None:
         theta = np.append(np.linspace(0.0, 88.0, nodes), 89.9)
         layout = Layout(material, Grid({"theta_i": theta, "theta_r": theta, "delta_phi": np.linspace(0.0, 180.0, 8)}))
         values = plan_trials.values_of(layout)
-        error = plan_trials.error_of(layout, values, *final)
+        error = plan_trials.error_of(layout, values, final)
         for goal in (0.5 * error, 0.99 * error, 1.01 * error, 2.0 * error):
             assert plan_trials.keeps(layout, values, final, goal) == (error <= goal)
