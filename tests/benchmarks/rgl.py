@@ -170,7 +170,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = run.parser(__doc__)
     parser.add_argument("--store", metavar="DIR", help="tables of this store; by default they are made here")
     options = run.parse(parser, arguments)
-    count, grid = (500, 16) if options.quick else (10_000, 40)
+    count, grid = (500, 32) if options.quick else (10_000, 40)
     columns = [Column(name="kB", digits=4), Column(name="seconds"), *(Column(name=n, unit="%") for n in _SHARES)]
     rows = run.table("Files for spectral renderers", Column(name="material", width=36), "nodes", *columns, _LIGHTS)
     bad = []
