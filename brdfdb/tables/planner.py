@@ -138,7 +138,7 @@ def planned(
             left = [kind for kind in left if failed and _kind(kind[1]) not in failed]
     raise ParameterError(
         "tolerance",
-        f"{tolerance:g} takes more than {MOST_VALUES} values of {source.name}; ask for another error, "
+        f"{tolerance:g} takes more than {MOST_VALUES} values of {source.name}; ask for a larger one, "
         "or say grazing_pole if f_r has a pole or a root at the horizon",
         tolerance,
     )

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import brdfdb
+from brdfdb._numba import is_cached
 from brdfdb.audit import FINDINGS, AuditReport, audit, report
 from brdfdb.audit.answers import NO_PAPER
 from brdfdb.errors import BrdfdbError, ParameterError, StoreError
@@ -22,6 +23,7 @@ from brdfdb.materials import presets
 from brdfdb.models import MODELS
 from brdfdb.store.reader import Store
 from brdfdb.store.summary_words import REPORT_OF_SOME
+from brdfdb.tables import _kernels
 from brdfdb_pipelines import audit_page, former_audit, terminal, workers
 from brdfdb_pipelines.former_audit import Former
 
@@ -137,6 +139,8 @@ def _done(
     tasks |= {(name,): partial(_sections, subject) for name, subject in known.items()}
     done: dict[str, Any] = {}
     with terminal.progress() as bar:
+        if tasks and not is_cached(_kernels.by_vectors):
+            bar.console.print("compiling kernels, once after an installation")
         task = bar.add_task("auditing tables, computing figures" if figures else "auditing tables", total=len(order))
         for names, outcomes in _outcomes(tasks, jobs):
             done |= zip(names, outcomes, strict=True)

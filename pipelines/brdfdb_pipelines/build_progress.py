@@ -9,6 +9,7 @@ from typing import Any
 
 from rich.progress import TaskID
 
+from brdfdb.errors import counted
 from brdfdb_pipelines import terminal
 
 Event = dict[str, Any]
@@ -77,16 +78,20 @@ class Bars:
             case "compiling" if event["kernels"] == 0:
                 self._progress.console.print("compiling kernels, once after an installation")
             case "compiling":
+                self._log("compiling kernels, once after an installation")
                 self._kernels = self._begun("compiling, once after an installation", event["kernels"], "kernels")
             case "compiled" if self._kernels is not None:
                 self._advance(self._kernels)
             case "start":
                 if self._kernels is not None:
                     self._progress.remove_task(self._kernels)
+                self._log(f"planning {counted(event['tables'], 'table')}")
                 self._overall = self._begun("planning", event["tables"], "tables")
             case "surveyed" if self._overall is not None:
                 self._advance(self._overall)
             case "planned" if self._overall is not None:
+                if event["tables"]:
+                    self._log(f"tabulating {counted(event['tables'], 'table')}")
                 self._progress.reset(
                     self._overall, description="tabulating", total=event["values"], completed=0, rate=""
                 )
@@ -121,6 +126,11 @@ class Bars:
             self._measuring.remove(name)
             if made:
                 self._advance(self._measured)
+
+    def _log(self, text: str) -> None:
+        """Print what begins now where nobody sees the bar move, as in a file."""
+        if not self._progress.console.is_terminal:
+            self._progress.console.print(text)
 
     def _begun(self, description: str, total: int, unit: str) -> TaskID:
         return self._progress.add_task(description, total=total, unit=unit, rate=f"0/{total} {unit}")

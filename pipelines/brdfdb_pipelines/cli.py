@@ -31,6 +31,7 @@ _MACHINE = {
 }
 # Commands that evaluate no model, or one value: importing numba and loading compiled kernels takes longer
 _WITHOUT_KERNELS = {"gc", "history", "list", "lookup", "rollback", "snapshot", "verify"}
+_TELL = {"audit", "build", "serve"}  # commands that say in their own way that kernels compile
 # Allocations between two searches for garbage: a command allocates modules and tables, which stay. Python's 700 cost it
 # up to a tenth of the time
 _ALLOCATIONS = 50_000
@@ -95,13 +96,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
         atexit.register(gc.freeze)  # at exit Python would search all modules for garbage: a fifth of a short command
         gc.set_threshold(_ALLOCATIONS)
         arguments = sys.argv[1:]
-        command = next((text for text in arguments if not text.startswith("-")), "")
-        if command in _WITHOUT_KERNELS and "BRDFDB_MODELS" not in os.environ:
+        if _command(arguments) in _WITHOUT_KERNELS and "BRDFDB_MODELS" not in os.environ:
             os.environ.setdefault("NUMBA_DISABLE_JIT", "1")
     options = _parser(arguments).parse_args(arguments, argparse.Namespace(arguments=arguments))
     with _sigterm_as_ctrl_c() as received:
         code = _run(options, arguments)
     return TERMINATED if received and code == INTERRUPTED else code
+
+
+def _command(arguments: Sequence[str]) -> str:
+    """Return the name of the command among the arguments; empty if there is none."""
+    return next((text for text in arguments if not text.startswith("-")), "")
 
 
 @contextlib.contextmanager
@@ -128,7 +133,8 @@ def _run(options: argparse.Namespace, arguments: Sequence[str]) -> int:
     """Run the command and return its exit code; errors become sentences."""
     try:
         _add_models(options)
-        code: int = options.run(options)
+        with _telling_of_compilation(_command(arguments)):
+            code: int = options.run(options)
         sys.stdout.flush()  # a reader that left shows here, not at exit
         return code
     except KeyboardInterrupt:
@@ -148,6 +154,16 @@ def _run(options: argparse.Namespace, arguments: Sequence[str]) -> int:
             return BUG
         say(sentence)
         return REFUSED
+
+
+def _telling_of_compilation(command: str) -> contextlib.AbstractContextManager[None]:
+    """Say once when a command compiles a kernel, which takes seconds; not of commands that do so, or compile none."""
+    if command in _WITHOUT_KERNELS | _TELL:
+        return contextlib.nullcontext()
+    from brdfdb._numba import when_compiling
+    from brdfdb_pipelines.terminal import say
+
+    return when_compiling(lambda: say("compiling kernels, once after an installation"))
 
 
 def _parser(arguments: Sequence[str] | None = None) -> argparse.ArgumentParser:

@@ -6,13 +6,16 @@ import json
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
+import numba
 import numpy as np
 import pytest
 
 import brdfdb
 from brdfdb.materials import presets
 from brdfdb_pipelines import terminal
+from brdfdb_pipelines.commands import commands
 from brdfdb_pipelines.commands.build import shape_in_words
 from brdfdb_pipelines.exit_codes import INTERRUPTED
 from tests.pipelines.command import Captured, run
@@ -122,6 +125,16 @@ def test_a_command_loads_only_what_it_uses(command: list[str], heavy: set[str], 
 
 
 # Build, list, show
+
+
+@pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing compiles")
+def test_a_command_says_once_that_kernels_compile(built: Path, capsys: Captured, monkeypatch: Any) -> None:
+    def compiled(*_: Any) -> int:
+        return int(numba.njit(lambda: 0)() + numba.njit(lambda: 0)())
+
+    monkeypatch.setattr(commands()["show"], "run", compiled)
+    assert run("show", "rolled-brass", "--store", str(built)) == 0
+    assert capsys.readouterr().err == "brdfdb: compiling kernels, once after an installation\n"
 
 
 def test_build_shows_progress_on_stderr_and_a_table_on_stdout(
