@@ -123,19 +123,21 @@ def planned(
     for hopeless in (_HOPELESS, math.inf):  # kinds that promised too many values are looked into if the others fail
         table_kinds = left = list(_table_kinds(task, hopeless))
         while left:
-            failed = set()
+            failed: Counter[str] = Counter()
             for stricter in _STRICTER:
                 layout = _smallest(task._replace(tolerance=stricter * tolerance), left)
                 if layout is None:
                     break
-                failed.add(_kind(layout))
+                failed[_kind(layout)] += 1
                 final = final or plan_trials.final_of(source, wavelength_nm)
                 layout = replace(layout, source=source)
                 finished = plan_trials.finished(layout, final, wavelength_nm, tolerance, mixture)
                 if finished is not None:
                     layout, values = finished
                     return replace(layout, reason=_reason(layout, tolerance, table_kinds)), values
-            left = [kind for kind in left if failed and _kind(kind[1]) not in failed]
+            # the one that failed most hid the others, which may keep to the tolerance with more nodes
+            most = [kind for kind, _ in failed.most_common(1)]
+            left = [kind for kind in left if most and _kind(kind[1]) not in most]
     raise ParameterError(
         "tolerance",
         f"{tolerance:g} takes more than {MOST_VALUES} values of {source.name}; ask for a larger one, "
@@ -293,13 +295,18 @@ def _table_kinds(task: _Task, hopeless: float = _HOPELESS) -> Iterator[_TableKin
 
 
 def _with_axes(layout: Layout, needs: dict[str, Need], error: float, finer: Mapping[str, int]) -> Layout | None:
-    """Return the layout whose axes leave the same error each, some of them finer; None if no known number does."""
+    """Return the layout whose axes leave the same error each, some of them finer.
+
+    None if no known number does, or if so many nodes are the same as they are rounded.
+    """
     axes = {}
     for name, need in needs.items():
         count = need.more(need.count(error), finer.get(name, 0))
         if count == math.inf:
             return None
         axes[name] = need.nodes(int(count))
+        if np.any(np.diff(axes[name]) <= 0.0):
+            return None
     return replace(layout, grid=Grid(axes))
 
 

@@ -166,6 +166,26 @@ def test_the_last_digit_of_a_parameter_decides_not_whether_a_table_is_found(tole
         assert measured(layout).overall.p99 <= tolerance
 
 
+def moon(k: float, rho: float) -> Material:
+    written = {"title": "Moon", "model": "minnaert", "source": "no paper", "parameters": {"k": k, "rho": rho}}
+    return Material.from_table("moon", written)
+
+
+@pytest.mark.parametrize(("k", "rho"), [(0.47658484, 0.81669623), (0.44454535, 0.50307130)])
+def test_a_kind_that_fails_hides_none_that_keeps_to_the_tolerance(k: float, rho: float) -> None:
+    """Two kinds fail in turn at stricter tolerances, and the second keeps to 0.01 at those where it is not tried."""
+    layout = plan(moon(k, rho), None, TOLERANCE)
+    assert measured(layout).overall.p99 <= TOLERANCE
+
+
+def test_finer_axes_end_where_nodes_are_rounded_to_the_same() -> None:
+    task = planner._task(moon(0.47658484, 0.81669623), None, TOLERANCE, None)
+    kinds = [(layout, needs) for _, layout, needs in planner._table_kinds(task) if needs]
+    finest = [planner._with_axes(*kind, TOLERANCE, {"theta_i": 11, "theta_r": 11}) for kind in kinds]
+    assert None in finest
+    assert any(finest)
+
+
 def test_a_kind_that_fails_at_all_directions_leaves_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
     material, finished = presets()["glossy-grey-paper"], plan_trials.finished
     first = plan(material, None, TOLERANCE)
