@@ -261,7 +261,7 @@ def vector_rows(w_i: Floats, w_r: Floats, series: int, reach: float, scalars: Ar
                         lanes[column, j] = own[6 * j + column]
             elif rows > 1 or start == 0:
                 for column in range(6):
-                    for j in range(BLOCK):
+                    for j in range(count):
                         lanes[column, j] = scalars[row, column]
             first_i = 3 * (start + (0 if w_i.shape[0] == 1 else row * length))
             first_r = 3 * (start + (0 if w_r.shape[0] == 1 else row * length))
