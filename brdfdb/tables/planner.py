@@ -162,11 +162,12 @@ def _smallest(task: _Task, table_kinds: list[_TableKind]) -> Layout | None:
         best: Layout | None = None
         tried: Counter[tuple[str, ...]] = Counter()
         for size, layout, needs in ranked:
-            tried[layout.grid.names] += 1
-            if tried[layout.grid.names] <= _TRIED and (best is None or size < math.prod(best.grid.shape)):
+            if tried[layout.grid.names] < _TRIED and (best is None or size < math.prod(best.grid.shape)):
                 values = min(MOST_VALUES, most * layout.size / math.prod(layout.grid.shape))
                 smaller = _refined(task, layout, needs, values if best is None else best.size, probing=most == math.inf)
                 best = smaller or best
+                # where few nodes are allowed, kinds that fail leave their turn to the next, which may take fewest
+                tried[layout.grid.names] += int(smaller is not None or most == math.inf)
         if best is not None:
             return best
     return None

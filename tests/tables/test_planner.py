@@ -178,6 +178,13 @@ def test_a_kind_that_fails_hides_none_that_keeps_to_the_tolerance(k: float, rho:
     assert measured(layout).overall.p99 <= TOLERANCE
 
 
+def test_kinds_that_promise_too_much_leave_their_turn_to_the_next() -> None:
+    """Two kinds promise fewer nodes than they take, 700425; the third takes some hundreds."""
+    parameters = {"rho_d": 0.17984396, "rho_s": 0.04964861, "alpha_x": 0.05635773, "alpha_y": 0.05635773}
+    written = {"title": "Bounded", "model": "ward_bounded", "source": "no paper", "parameters": parameters}
+    assert plan(Material.from_table("bounded", written), None, TOLERANCE).size < 1000
+
+
 def test_finer_axes_end_where_nodes_are_rounded_to_the_same() -> None:
     task = planner._task(moon(0.47658484, 0.81669623), None, TOLERANCE, None)
     kinds = [(layout, needs) for _, layout, needs in planner._table_kinds(task) if needs]
