@@ -166,8 +166,8 @@ def _smallest(task: _Task, table_kinds: list[_TableKind]) -> Layout | None:
                 values = min(MOST_VALUES, most * layout.size / math.prod(layout.grid.shape))
                 smaller = _refined(task, layout, needs, values if best is None else best.size, probing=most == math.inf)
                 best = smaller or best
-                # where few nodes are allowed, kinds that fail leave their turn to the next, which may take fewest
-                tried[layout.grid.names] += int(smaller is not None or most == math.inf)
+                # a kind that fails leaves its turn to the next
+                tried[layout.grid.names] += int(smaller is not None)
         if best is not None:
             return best
     return None
