@@ -332,7 +332,7 @@ class Material(BaseModel, Lookups):
             sets, weights = evaluations(self.spec, together, wavelength_nm.size, of)
             return summed(f_r, sets, weights)
         # one row of the kernel a wavelength, because rows share what directions alone decide
-        rows = {name: np.reshape(value, (-1, 1)) for name, value in together.items()}
+        rows = {name: value[:, np.newaxis] if np.ndim(value) else value for name, value in together.items()}
         return lambda wi, wr: np.moveaxis(f_r(wi, wr, **rows), 0, -1)
 
     def _at_angles(self, angles: FourAngles, wavelength_nm: ArrayLike | None) -> Floats:

@@ -31,7 +31,7 @@ from brdfdb.tables.tabulation import POLE_END_DEG
 PLAN_VERSION = 2
 
 MOST_VALUES = 10_000_000  # of a table: a tolerance that takes more is refused
-_TRIED = 2  # ways to interpolate on each kind of grid, those that promise to be smallest
+_TRIED = 2  # ways to interpolate on each kind of grid that keep to the tolerance, of those that promise to be smallest
 _ROUNDS = 8  # of finer and coarser axes
 _STALLED = 0.95  # share of its error that a finer table keeps if lines misjudge an axis
 _PATIENCE = 2  # such rounds, after which each axis is tried alone
@@ -135,9 +135,11 @@ def planned(
                 if finished is not None:
                     layout, values = finished
                     return replace(layout, reason=_reason(layout, tolerance, table_kinds)), values
-            # the one that failed most hid the others, which may keep to the tolerance with more nodes
-            most = [kind for kind, _ in failed.most_common(1)]
-            left = [kind for kind in left if most and _kind(kind[1]) not in most]
+            if not failed:
+                break
+            # the kind that failed most often hid the others, which may keep to the tolerance with more nodes
+            ((hiding, _),) = failed.most_common(1)
+            left = [kind for kind in left if _kind(kind[1]) != hiding]
     raise ParameterError(
         "tolerance",
         f"{tolerance:g} takes more than {MOST_VALUES} values of {source.name}; ask for a larger one, "
