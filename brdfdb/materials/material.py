@@ -332,7 +332,7 @@ class Material(BaseModel, Lookups):
             sets, weights = evaluations(self.spec, together, wavelength_nm.size, of)
             return summed(f_r, sets, weights)
         # one row of the kernel a wavelength, because rows share what directions alone decide
-        rows = {name: value[:, np.newaxis] if np.ndim(value) else value for name, value in together.items()}
+        rows = {name: np.broadcast_to(value, wavelength_nm.shape)[:, np.newaxis] for name, value in together.items()}
         return lambda wi, wr: np.moveaxis(f_r(wi, wr, **rows), 0, -1)
 
     def _at_angles(self, angles: FourAngles, wavelength_nm: ArrayLike | None) -> Floats:
@@ -429,7 +429,10 @@ class Material(BaseModel, Lookups):
 
     def document(self) -> dict[str, Any]:
         """Return the material as JSON, parameters in the units of the model; `brdfdb.materials.source_of` reads it."""
-        return {"model_version": self.spec.version, "material": self.model_dump(mode="json")}
+        material = self.model_dump(mode="json")
+        spectra = {name: value.record() for name, value in self.parameters.items() if isinstance(value, Spectrum)}
+        material["parameters"] |= spectra
+        return {"model_version": self.spec.version, "material": material}
 
 
 def _field_and_sentence(error: ErrorDetails) -> tuple[str, str]:

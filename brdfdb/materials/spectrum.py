@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, field_serializer, model_validator
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from brdfdb.errors import ParameterError
 from brdfdb.materials.provenance import Text
@@ -44,10 +44,10 @@ class Spectrum(BaseModel):
     values: Values
     origin: Text
 
-    @field_serializer("wavelengths_nm", when_used="json")
-    def _shortest(self, wavelengths_nm: Values) -> list[Any]:
-        """Return whole numbers without their fraction: spectra are half of the bytes of a small table."""
-        return [int(wavelength) if wavelength.is_integer() else wavelength for wavelength in wavelengths_nm]
+    def record(self) -> dict[str, Any]:
+        """Return the spectrum for JSON, whole wavelengths without a fraction: it is half of a small table."""
+        whole = [int(wavelength) if wavelength.is_integer() else wavelength for wavelength in self.wavelengths_nm]
+        return {**self.model_dump(mode="json"), "wavelengths_nm": whole}
 
     @model_validator(mode="after")
     def _check_lengths(self) -> Spectrum:

@@ -223,14 +223,14 @@ def test_a_scheduler_that_dies_is_one_sentence(recipe: Path, tmp_path: Path) -> 
         command = [sys.executable, "-m", "brdfdb_pipelines.cli", "build", recipe, "--store", tmp_path / "store"]
         with subprocess.Popen([*command, "--scheduler", address], stderr=subprocess.PIPE, text=True) as builder:
             assert builder.stderr is not None
-            lines = [builder.stderr.readline()]
+            lines = [builder.stderr.readline(), builder.stderr.readline()]
             scheduler.kill()
             lines += builder.stderr.read().splitlines()
     finally:
         scheduler.kill()
         scheduler.wait()
     assert builder.returncode == 2
-    assert lines[0].startswith("the cluster has no workers; waiting for one")
+    assert lines[1].startswith("the cluster has no workers; waiting for one")
     # whichever is noticed first: its tasks are lost, or it does not answer
     assert re.fullmatch("brdfdb: the (dask scheduler at .*|workers) (is|are) gone.*; build again to resume", lines[-1])
     assert not [line for line in lines if "Traceback" in line or "distributed" in line]
