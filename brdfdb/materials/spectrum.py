@@ -45,7 +45,7 @@ class Spectrum(BaseModel):
     origin: Text
 
     def record(self) -> dict[str, Any]:
-        """Return the spectrum for JSON, whole wavelengths without a fraction: it is half of a small table."""
+        """Return the spectrum for JSON. Whole wavelengths have no fraction: spectra fill half of a small table."""
         whole = [int(wavelength) if wavelength.is_integer() else wavelength for wavelength in self.wavelengths_nm]
         return {**self.model_dump(mode="json"), "wavelengths_nm": whole}
 

@@ -106,7 +106,7 @@ difference_of_sines = elementwise(_difference_of_sines)
 
 
 @inner_loop
-def _roughness(geometry: Array, slope: Array, relief: Array, shadow: Array) -> None:
+def _roughness(geometry: Array, slope: Array, variance: Array, shadow: Array) -> None:
     """Fill in (sigma / sigma_0)^2 [1] and S / (cos theta_i cos theta_r) [1], which the polar angles and slopes set."""
     sin_i, cos_i, sin_r, cos_r = geometry[0], geometry[1], geometry[2], geometry[3]
     count = shadow.shape[0]
@@ -115,10 +115,10 @@ def _roughness(geometry: Array, slope: Array, relief: Array, shadow: Array) -> N
         light, K_i = _shadowing_and_hidden(sin_i[j], cos_i[j], slope[j])
         viewer, K_r = _shadowing_and_hidden(sin_r[j], cos_r[j], slope[j])
         shadow[j] = light * viewer
-        relief[j] = K_i + K_r
+        variance[j] = K_i + K_r
     for j in range(count):
         # Eqs (80)-(83)
-        relief[j] = _effective_variance(relief[j])
+        variance[j] = _effective_variance(variance[j])
 
 
 @inner_loop
@@ -161,13 +161,13 @@ def _evaluate(
     cos_i, cos_r, v_xy2 = geometry[1], geometry[3], geometry[4]
     wave, correlation, n, k, uniform = surface[0], surface[1], surface[3], surface[4], surface[5]
     count = f_r.shape[0]
-    relief, shadow, g_over_vz2 = work[0, :count], work[1, :count], work[2, :count]
+    variance, shadow, g_over_vz2 = work[0, :count], work[1, :count], work[2, :count]
     g, V = work[3, :count], work[4, :count]
     if not same:
-        _roughness(geometry, surface[2], relief, shadow)
+        _roughness(geometry, surface[2], variance, shadow)
     for j in range(count):
         # Eq. (79)
-        g_over_vz2[j] = wave[j] * relief[j]
+        g_over_vz2[j] = wave[j] * variance[j]
         g[j] = g_over_vz2[j] * (cos_i[j] + cos_r[j]) ** 2
         V[j] = correlation[j] * v_xy2[j]
     # Eq. (78)
@@ -360,7 +360,7 @@ def angle_rows(one_plus_cos: Array, table: Array, scalars: Array, f_r: Floats) -
     """Evaluate rows of f_r [1/sr] along the azimuth. A row shares polar angles and surface."""
     length = f_r.shape[1]
     work, index = np.empty((ROWS_OF_WORK, BLOCK)), np.empty((GROUPS, BLOCK), np.int64)
-    lanes, relief, shadow = np.empty((10, BLOCK)), np.empty(BLOCK), np.empty(BLOCK)
+    lanes, variance, shadow = np.empty((10, BLOCK)), np.empty(BLOCK), np.empty(BLOCK)
     g_row, v2, V, log_D = np.empty(BLOCK), np.empty(length), np.empty(length), np.empty(length)
     polynomials = np.empty((Q_PATCHES, table.shape[3]))
     least, most = 0.0, 2.0
@@ -376,11 +376,11 @@ def angle_rows(one_plus_cos: Array, table: Array, scalars: Array, f_r: Floats) -
             for i in range(rows):
                 for column in range(10):
                     lanes[column, i] = scalars[column, row + i]
-            _roughness(lanes[:4], lanes[6], relief[:rows], shadow[:rows])
+            _roughness(lanes[:4], lanes[6], variance[:rows], shadow[:rows])
         s, f, turned = scalars[:, row], f_r[row], one_plus_cos[min(row, one_plus_cos.shape[0] - 1)]
         correlation, n, k, uniform = s[5], s[7], s[8], s[9]
         v_z2 = (s[1] + s[3]) ** 2
-        g_over_vz2 = s[4] * relief[lane]  # eq. (79)
+        g_over_vz2 = s[4] * variance[lane]  # eq. (79)
         g = g_over_vz2 * v_z2
         if g == 0.0:
             for j in range(length):

@@ -13,6 +13,8 @@ import pytest
 from matplotlib.image import imread
 
 import brdfdb
+from brdfdb.audit.pairs import pairs_of
+from brdfdb.audit.table_error import table_error_of
 from brdfdb.models import oren_nayar_gaussian_vectors
 from brdfdb.scenes.choice_document import Choice, Price
 from brdfdb.scenes.offered_forms import OfferedForm
@@ -114,7 +116,12 @@ def test_the_chosen_table_is_built(done: tuple[Choice, Path]) -> None:
     store.verify(one.material)
     stated = store[one.material].error
     assert stated is not None
-    assert 0.0 < stated.overall.l1 < 0.001  # planned on the fit, with values of the facets: their p99 is 1.21e-3
+    # planned on the fit, with values of the facets: 2.2e-4 and 1.21e-3 measured; an audit finds it at other directions
+    assert 0.0 < stated.overall.l1 < 3e-4
+    assert stated.overall.p99 < 1.3e-3
+    table = store[one.material]
+    assert table.source is not None
+    assert table_error_of(table, table.source, pairs_of(table, table.source)).verdict == "passes"
     assert store.summary(one.material)["error_p99"] == stated.overall.p99
     said = (
         "table, planned for 0.1 %, truth from 85°, chosen for scene, within 0.5 (CIEDE2000); for a tolerance of 0.001"
