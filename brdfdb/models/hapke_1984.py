@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from brdfdb._elementary import arcsin, cosine, exp, log
 from brdfdb._numba import kernel, loop
-from brdfdb.geometry import checked_angles, checked_vectors, finished
+from brdfdb.geometry import checked_angles, checked_vectors, cosines, finished, sines
 from brdfdb.models._rows import by_rows, by_rows_of_vectors
 from brdfdb.models.large_calls import for_large_calls
 from brdfdb.parameters import Floats, ModelSpec, Parameter
@@ -30,6 +30,7 @@ Three = tuple[float, float, float]
 
 _FLAT = 700.0  # x from which on 1 - e**-x is 1 to the last bit
 _TINY = 1e-300  # guard against 0 / 0 on a smooth surface and at the normal
+_POLE = 1e-150  # length of a horizontal vector below which its square underflows: the azimuth is lost
 _LEAST = 1e-150  # the same where the quotient is squared
 
 
@@ -130,7 +131,7 @@ def _horizontal(x: float, y: float) -> Three:
     """Return the length of a horizontal vector and its direction, which is x where there is none."""
     length = math.sqrt(x * x + y * y)
     inverse = 1.0 / (length + _TINY)
-    return length, 1.0 if length < _TINY else x * inverse, y * inverse
+    return length, 1.0 if length < _POLE else x * inverse, 0.0 if length < _POLE else y * inverse
 
 
 @loop
@@ -210,9 +211,12 @@ def hapke(
     0.07781
     """
     checked = checked_angles(theta_i, phi_i, theta_r, phi_r)
-    columns = (np.cos(checked.phi_r), np.sin(checked.phi_r))
-    light = (np.cos(checked.phi_i), np.sin(checked.phi_i), checked.sin_i, checked.cos_i)
-    scalars = (*light, checked.sin_r, checked.cos_r, *_checked(w, b, c, b_0, h, theta_bar))
+    parameters = _checked(w, b, c, b_0, h, theta_bar)
+    if not checked.in_rows:
+        return finished(by_rows_of_vectors(_vector_rows, checked.vectors, parameters), checked)
+    columns = (cosines(checked.phi_r), sines(checked.phi_r))
+    light = (cosines(checked.phi_i), sines(checked.phi_i), checked.sin_i, checked.cos_i)
+    scalars = (*light, checked.sin_r, checked.cos_r, *parameters)
     return finished(by_rows(_angle_rows, columns, scalars), checked)
 
 

@@ -89,10 +89,12 @@ def oren_nayar(
     0.2639
     """
     angles = checked_angles(theta_i, phi_i, theta_r, phi_r)
+    parameters = RHO.check(rho), SIGMA.check(sigma), INTERREFLECTION.check(interreflection)
+    if not angles.in_rows:
+        return finished(by_rows_of_vectors(functional_vector_rows, angles.vectors, parameters), angles)
     polar = angles.theta_i, angles.sin_i, angles.cos_i, angles.theta_r, angles.sin_r, angles.cos_r
     cos_dphi = angles.cos_dphi
     one_less_cos = angles.sin_dphi**2 / (1.0 + np.abs(cos_dphi))  # 1 - |cos|, which tan_mean magnifies near grazing
-    parameters = RHO.check(rho), SIGMA.check(sigma), INTERREFLECTION.check(interreflection)
     columns, scalars = (cos_dphi, one_less_cos), (*polar, *parameters)
     return finished(by_rows(functional_angle_rows, columns, scalars, angles.dtype), angles)
 
@@ -217,8 +219,10 @@ def oren_nayar_qualitative(
     0.2362
     """
     angles = checked_angles(theta_i, phi_i, theta_r, phi_r)
-    pair = np.maximum(angles.sin_i, angles.sin_r), np.minimum(np.tan(angles.theta_i), np.tan(angles.theta_r))
     parameters = RHO.check(rho), SIGMA.check(sigma), OFFSET.check(offset)
+    if not angles.in_rows:
+        return finished(by_rows_of_vectors(qualitative_vector_rows, angles.vectors, parameters), angles)
+    pair = np.maximum(angles.sin_i, angles.sin_r), np.minimum(np.tan(angles.theta_i), np.tan(angles.theta_r))
     scalars = (*pair, *parameters)
     return finished(by_rows(qualitative_angle_rows, (angles.cos_dphi,), scalars, angles.dtype), angles)
 

@@ -31,7 +31,7 @@ from numpy.typing import NDArray
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
-from brdfdb.geometry import unit_vector
+from brdfdb.geometry import spherical_angles, unit_vector
 from brdfdb.materials import Material, presets
 from brdfdb.models import MODELS
 from tests.benchmarks.recording import Column, Run, Table
@@ -184,7 +184,9 @@ def baseline(wi: NDArray[Any], wr: NDArray[Any], size: Size) -> Iterator[Cpp]:
         flags = FLAGS if wi.dtype == np.float64 else [*FLAGS, *FLOAT32]
         subprocess.run([compiler, *flags, "-o", program, Path(__file__).with_name("baseline.cpp")], check=True)
         theta, phi = size.axes
-        for array, file in ((wi, "w_i"), (wr, "w_r"), (theta, "theta"), (phi, "phi")):
+        angles = np.stack([*spherical_angles(wi), *spherical_angles(wr)])
+        named = {"w_i": wi, "w_r": wr, "angles": angles, "theta": theta, "phi": phi}
+        for file, array in named.items():
             array.astype(wi.dtype).tofile(folder / file)
         with subprocess.Popen([program, folder], text=True, stdin=PIPE, stdout=PIPE) as process:
             yield Cpp(process, folder)
@@ -265,15 +267,16 @@ def analytic(model: str, cpp: Cpp, directions: Vectors, size: Size) -> Iterator[
     parameters = ANALYTIC[model]
     values = list(parameters.values())
     contestants: dict[str, tuple[int, Clock]] = {}
+    angles = [angle.astype(dtype) for w in directions for angle in spherical_angles(w)]
     layouts: dict[str, Call] = {
         "": partial(MODELS[model].vectors, *directions, **parameters),
+        "_angles": partial(MODELS[model].evaluate, *angles, **parameters),
         "_grid": partial(grid, model, *(axis.astype(dtype) for axis in size.axes), **parameters),
     }
     for layout, public in layouts.items():
         ours = public()
         cpp.check(model + layout, values, ours)
-        loop = compiled_loop(public)
-        kinds = ["public"] if loop is None else ["loop", "public"]
+        loop = None if layout == "_angles" else compiled_loop(public)  # it takes vectors, which are computed before
         contestants[f"cpp{layout}"] = ours.size, cpp.clock(model + layout, values, size.seconds)
         if loop is not None:
             contestants[f"loop{layout}"] = ours.size, clock(loop, size.seconds)
@@ -284,10 +287,11 @@ def analytic(model: str, cpp: Cpp, directions: Vectors, size: Size) -> Iterator[
     for case, ours, theirs, floor in (
         ("random / C++", "", "cpp", OVER_CPP),
         ("random / C++ on six arrays", "", "cpp_six", None),
+        ("random angles / C++", "_angles", "cpp_angles", None),
         ("grid / C++", "_grid", "cpp_grid", OVER_CPP),
         ("grid / our random", "_grid", "", OVER_RANDOM),
     ):
-        for kind in kinds:
+        for kind in [kind for kind in ("loop", "public") if kind + ours in rates]:
             yield Row(f"{model} {dtype}, {case}", kind, rates[kind + ours], rates[theirs or kind], floor)
 
 

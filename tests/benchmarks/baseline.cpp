@@ -241,11 +241,12 @@ Real he_torrance(const Real* wi, const Real* wr, const Parameters& p) {
 // ---- Loops
 
 struct Inputs {
-    Array w_i, w_r, theta, phi;
-    std::vector<Array> parts;  // x_i y_i z_i x_r y_r z_r
+    Array w_i, w_r, angles, theta, phi;  // angles: all of theta_i, then of phi_i, theta_r and phi_r
+    std::vector<Array> parts;            // x_i y_i z_i x_r y_r z_r
     explicit Inputs(const std::string& folder)
         : w_i(read(folder + "/w_i")),
           w_r(read(folder + "/w_r")),
+          angles(read(folder + "/angles")),
           theta(read(folder + "/theta")),
           phi(read(folder + "/phi")) {
         for (const Array* w : {&w_i, &w_r})
@@ -271,6 +272,18 @@ void six(const Inputs& in, const Surface& s, Real* __restrict f, F value) {
                              *__restrict yr = in.parts[4].data, *__restrict zr = in.parts[5].data;
     const std::size_t count = in.w_i.size / 3;
     for (std::size_t j = 0; j < count; ++j) f[j] = value(xi[j], yi[j], zi[j], xr[j], yr[j], zr[j], s);
+}
+
+template <class Surface, class F>
+void by_angles(const Inputs& in, const Surface& s, Real* __restrict f, F value) {
+    const std::size_t count = in.w_i.size / 3;
+    const Real *__restrict ti = in.angles.data, *__restrict pi = ti + count, *__restrict tr = pi + count,
+                             *__restrict pr = tr + count;
+    for (std::size_t j = 0; j < count; ++j) {
+        const Real si = std::sin(ti[j]), sr = std::sin(tr[j]);
+        f[j] = value(si * std::cos(pi[j]), si * std::sin(pi[j]), std::cos(ti[j]), sr * std::cos(pr[j]),
+                     sr * std::sin(pr[j]), std::cos(tr[j]), s);
+    }
 }
 
 const auto ward_value = [](Real xi, Real yi, Real zi, Real xr, Real yr, Real zr, const WardSurface& s) {
@@ -392,49 +405,38 @@ double processor_seconds() {
 
 using Kernel = std::function<void(const Inputs&, const Parameters&, Real*)>;
 
-const std::map<std::string, Kernel> kernels = {
-    {"ward", [](const Inputs& in, const Parameters& p, Real* f) { interleaved(in, WardSurface(p), f, ward_value); }},
-    {"ward_six", [](const Inputs& in, const Parameters& p, Real* f) { six(in, WardSurface(p), f, ward_value); }},
-    {"ward_grid", ward_grid},
-    {"ggx",
-     [](const Inputs& in, const Parameters& p, Real* f) { interleaved(in, FacetSurface(p, false), f, metal_value); }},
-    {"ggx_six", [](const Inputs& in, const Parameters& p, Real* f) { six(in, FacetSurface(p, false), f, metal_value); }},
-    {"ggx_grid", facets_grid<false>},
-    {"ggx_schlick",
-     [](const Inputs& in, const Parameters& p, Real* f) { interleaved(in, FacetSurface(p, true), f, schlick_value); }},
-    {"ggx_schlick_six",
-     [](const Inputs& in, const Parameters& p, Real* f) { six(in, FacetSurface(p, true), f, schlick_value); }},
-    {"ggx_schlick_grid", facets_grid<true>},
-    {"oren_nayar",
-     [](const Inputs& in, const Parameters& p, Real* f) {
-         interleaved(in, OrenNayarSurface(p), f, oren_nayar_value);
-     }},
-    {"oren_nayar_six",
-     [](const Inputs& in, const Parameters& p, Real* f) { six(in, OrenNayarSurface(p), f, oren_nayar_value); }},
-    {"oren_nayar_grid", oren_nayar_grid},
-    {"oren_nayar_qualitative",
-     [](const Inputs& in, const Parameters& p, Real* f) {
-         interleaved(in, QualitativeSurface(p), f, qualitative_value);
-     }},
-    {"oren_nayar_qualitative_six",
-     [](const Inputs& in, const Parameters& p, Real* f) { six(in, QualitativeSurface(p), f, qualitative_value); }},
-    {"oren_nayar_qualitative_grid", qualitative_grid},
-    {"rpv", [](const Inputs& in, const Parameters& p, Real* f) { interleaved(in, RpvSurface(p), f, rpv_value); }},
-    {"rpv_six", [](const Inputs& in, const Parameters& p, Real* f) { six(in, RpvSurface(p), f, rpv_value); }},
-    {"rpv_grid", rpv_grid},
+// Random directions of one model, as they are laid out, and its grid
+template <class Surface, class F>
+void add(std::map<std::string, Kernel>& all, const std::string& name, Surface surface, F value, Kernel grid) {
+    all[name] = [=](const Inputs& in, const Parameters& p, Real* f) { interleaved(in, surface(p), f, value); };
+    all[name + "_six"] = [=](const Inputs& in, const Parameters& p, Real* f) { six(in, surface(p), f, value); };
+    all[name + "_angles"] = [=](const Inputs& in, const Parameters& p, Real* f) { by_angles(in, surface(p), f, value); };
+    all[name + "_grid"] = grid;
+}
+
+std::map<std::string, Kernel> kernels() {
+    std::map<std::string, Kernel> all;
+    add(all, "ward", [](const Parameters& p) { return WardSurface(p); }, ward_value, ward_grid);
+    add(all, "ggx", [](const Parameters& p) { return FacetSurface(p, false); }, metal_value, facets_grid<false>);
+    add(all, "ggx_schlick", [](const Parameters& p) { return FacetSurface(p, true); }, schlick_value, facets_grid<true>);
+    add(all, "oren_nayar", [](const Parameters& p) { return OrenNayarSurface(p); }, oren_nayar_value, oren_nayar_grid);
+    add(all, "oren_nayar_qualitative", [](const Parameters& p) { return QualitativeSurface(p); }, qualitative_value,
+        qualitative_grid);
+    add(all, "rpv", [](const Parameters& p) { return RpvSurface(p); }, rpv_value, rpv_grid);
     // the first p.back() directions only
-    {"he_torrance",
-     [](const Inputs& in, const Parameters& p, Real* f) {
-         for (std::size_t j = 0; j < std::size_t(p.back()); ++j)
-             f[j] = he_torrance(in.w_i.data + 3 * j, in.w_r.data + 3 * j, p);
-     }},
-};
+    all["he_torrance"] = [](const Inputs& in, const Parameters& p, Real* f) {
+        for (std::size_t j = 0; j < std::size_t(p.back()); ++j)
+            f[j] = he_torrance(in.w_i.data + 3 * j, in.w_r.data + 3 * j, p);
+    };
+    return all;
+}
 
 }  // namespace
 
 int main(int, char** arguments) {
     using Clock = std::chrono::steady_clock;
     const Inputs inputs(arguments[1]);
+    const std::map<std::string, Kernel> all = kernels();
     Array values(std::max(inputs.w_i.size / 3, inputs.theta.size * inputs.theta.size * inputs.phi.size));
     for (std::string line; std::getline(std::cin, line);) {
         std::istringstream words(line);
@@ -442,7 +444,7 @@ int main(int, char** arguments) {
         words >> verb >> name >> argument;
         Parameters p;
         for (double value; words >> value;) p.push_back(value);
-        const Kernel& kernel = kernels.at(name);
+        const Kernel& kernel = all.at(name);
         kernel(inputs, p, values.data);  // the first pass warms the caches
         if (verb == "dump") {
             std::ofstream(argument, std::ios::binary)

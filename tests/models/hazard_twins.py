@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from brdfdb import models
 from brdfdb.geometry import unit_vector
+from brdfdb.models import MODELS
 from brdfdb.reference import mp
 from tests.models.hazard_directions import HALF_PI, Directions
 from tests.models.hazards import BY_NAME, COS_HORIZON, MATRICES, SUBJECTS, Arguments, Subject
@@ -117,9 +118,16 @@ def given_as(form: str, directions: list[Directions], dtype: type) -> NDArray[An
     return vectors_of(directions, dtype) if form == "vectors" else angles_of(directions, dtype)
 
 
-def evaluated(subject: Subject, given: NDArray[Any], parameters: Arguments) -> NDArray[Any]:
-    """Values of shape (N, values) of angles (N, 4), or of vectors (N, 2, 3)."""
-    name = f"{subject.name}_vectors" if given.ndim == 3 else subject.name
+def evaluated(subject: Subject, form: str, given: NDArray[Any], parameters: Arguments) -> NDArray[Any]:
+    """Values of shape (N, values) of angles (N, 4), or of vectors (N, 2, 3).
+
+    In the form "rows" each pair of directions begins a row of two azimuths: rows have loops of their own.
+    """
+    if form == "rows":
+        *others, phi_r = np.moveaxis(given, 0, -1)[..., np.newaxis]
+        turned = np.concatenate([phi_r, phi_r + 1], axis=-1)
+        return flat(getattr(models, subject.name)(*others, turned, **parameters)[:, 0])
+    name = f"{subject.name}_vectors" if form == "vectors" else subject.name
     directions = np.moveaxis(given, 0, -1) if given.ndim == 2 else np.moveaxis(given, 0, 1)
     return flat(getattr(models, name)(*directions[: 1 if subject.of_one_direction else None], **parameters))
 
@@ -127,7 +135,9 @@ def evaluated(subject: Subject, given: NDArray[Any], parameters: Arguments) -> N
 FORMS = [
     pytest.param(subject, form, id=f"{subject.name}-{form}")
     for subject in SUBJECTS
-    for form in ("angles", "vectors")
-    if form == "angles" or hasattr(models, f"{subject.name}_vectors")
+    for form in ("angles", "rows", "vectors")
+    if form == "angles"
+    or (form == "rows" and subject.name in MODELS and not subject.integrated)
+    or (form == "vectors" and hasattr(models, f"{subject.name}_vectors"))
 ]
 every_dtype = pytest.mark.parametrize("dtype", [np.float64, np.float32], ids=["float64", "float32"])

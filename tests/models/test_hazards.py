@@ -74,7 +74,7 @@ def disagreement(
 def hazards(subject: Subject, form: str, dtype: type) -> list[tuple[Arguments, NDArray[Any], NDArray[Any]]]:
     """Parameters, directions and values of the whole table."""
     rows = [(parameters, given_as(form, directions, dtype)) for parameters, directions in subject.table()]
-    return [(parameters, given, evaluated(subject, given, parameters)) for parameters, given in rows]
+    return [(parameters, given, evaluated(subject, form, given, parameters)) for parameters, given in rows]
 
 
 every_form = pytest.mark.parametrize(("subject", "form"), FORMS)
@@ -142,7 +142,7 @@ def test_is_reciprocal(subject: Subject, form: str, dtype: type) -> None:
         return
     for parameters, given, values in hazards(subject, form, dtype):
         swap = given[:, ::-1] if form == "vectors" else given[:, [2, 3, 0, 1]]
-        values, other = values.astype(np.float64), exchanged(subject, evaluated(subject, swap, parameters))
+        values, other = values.astype(np.float64), exchanged(subject, evaluated(subject, form, swap, parameters))
         scale = np.max(np.abs(values), axis=-1, keepdims=True) if subject.name in MATRICES else np.abs(values)
         limit = RECIPROCITY[dtype] * scale + TINY[dtype]
         assert (np.abs(values - other) <= limit).all(), parameters
@@ -211,6 +211,6 @@ def test_narrow_lobes_beside_the_mirror_direction_at_grazing(name: str, paramete
         Directions(x, 0.0, x - width, PI) for x in (1.57, 1.5707, 1.57079) for width in (3.1e-4, 2.3e-4, 1.7e-4)
     ]
     given = given_as("angles", directions, np.float64)
-    for each, value in zip(given, evaluated(subject, given, row), strict=True):
+    for each, value in zip(given, evaluated(subject, "angles", given, row), strict=True):
         error = disagreement(subject, "angles", value, each, np.float64, row)
         assert error <= AGREEMENT[np.float64], f"off by {error:.3g} at {each}"

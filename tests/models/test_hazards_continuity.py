@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from brdfdb import models
 from brdfdb.reference import mp
 from tests.models.hazard_branches import BRANCHES
 from tests.models.hazard_directions import EXACT, HALF_PI, Directions
@@ -105,7 +104,7 @@ def check_continuity(
     """Return the steps from each pair of directions to those near it."""
     for at, beside in zip(directions, near, strict=True):
         given = given_as(form, [at, *beside], dtype)
-        values = evaluated(subject, given, row)
+        values = evaluated(subject, form, given, row)
         for each, value in zip(given[1:], values[1:], strict=True):
             size = jump(subject, (given[0], row, values[0]), (each, row, value), dtype)
             assert size <= JUMP[dtype], f"jumps by {size:.3g} from {values[0]} to {value} at {at}, {row}"
@@ -142,10 +141,10 @@ def test_is_continuous_in_its_parameters(subject: Subject, dtype: type) -> None:
     directions = [EXACT[name] for name in ("ordinary", "mirror, turned", "backscatter", "light at 90")]
     given = given_as("angles", directions[: 1 if subject.integrated else None], dtype)
     for row in subject.parameters:
-        values = evaluated(subject, given, row)
+        values = evaluated(subject, "angles", given, row)
         for name, x in row.items():
             other = row | {name: nudged(name, x)}
-            for each, a, b in zip(given, values, evaluated(subject, given, other), strict=True):
+            for each, a, b in zip(given, values, evaluated(subject, "angles", given, other), strict=True):
                 size = jump(subject, (each, row, a), (each, other, b), dtype)
                 assert size <= JUMP[dtype], f"jumps by {size:.3g} from {a} to {b} at {each}, {row}, {other}"
 
@@ -163,6 +162,6 @@ def test_is_continuous_across_its_branches(
         for i in moving
         for each in steps(at[i], dtype, 0.0 if i % 2 == 0 else -np.inf, np.inf)
     ]
-    for form in ("angles", "vectors"):
-        if form == "angles" or (dtype == np.float64 and hasattr(models, f"{name}_vectors")):
+    for form in [each.values[1] for each in FORMS if each.values[0].name == name]:
+        if form != "vectors" or dtype == np.float64:
             check_continuity(BY_NAME[name], form, [at], [near], dtype, table(parameters)[0])
