@@ -208,8 +208,9 @@ def stated(error: Error, directions: Directions, brdf: Floats, column: NDArray[n
     -------
     array (..., M) [1/sr]
         The largest of what is stated for the band of theta_i and for the places that a pair is in; nan where a value is
-        nan, or nothing is stated.
+        nan, or nothing is stated. 0 below the horizon, where f_r is exactly 0.
     """
     limits, floor = error.limits[:, column], error.floors[column]
     relative = functools.reduce(np.maximum, (limits[row] for row in places.rows_of(directions)))
-    return np.asarray(relative * np.maximum(brdf, floor) + 0.0 * brdf)
+    above = np.where(directions.below, 0.0, 1.0)[..., np.newaxis]
+    return np.asarray(above * relative * np.maximum(brdf, floor) + 0.0 * brdf)

@@ -131,6 +131,10 @@ def test_the_stated_error_has_the_shape_of_the_values(kind: str) -> None:
     assert found.error.shape == found.brdf.shape
     assert (found.error > 0.0).all()
     np.testing.assert_array_equal(found.brdf, table.lookup(*ANGLES))
+    above, under = table.lookup_vectors_with_error([[0.0, 0.0, 1.0], [0.6, 0.0, -0.8]], [0.0, 0.6, 0.8]).error
+    assert np.all(above > 0.0)
+    assert np.all(under == 0.0)
+    assert np.all(table.lookup_with_error(2.0, 0.0, 0.5, 1.0).error == 0.0)
 
 
 @KINDS
