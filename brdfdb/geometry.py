@@ -135,10 +135,10 @@ def checked_angles(theta_i: ArrayLike, phi_i: ArrayLike, theta_r: ArrayLike, phi
     p_i, p_r = check_phi("phi_i", phi_i), check_phi("phi_r", phi_r)
     shape_of_angles(t_i, p_i, t_r, p_r)
     return Angles(
-        np.minimum(t_i.astype(np.float64), HALF_PI),
-        p_i.astype(np.float64),
-        np.minimum(t_r.astype(np.float64), HALF_PI),
-        p_r.astype(np.float64),
+        np.minimum(t_i, HALF_PI, dtype=np.float64),
+        p_i.astype(np.float64, copy=False),
+        np.minimum(t_r, HALF_PI, dtype=np.float64),
+        p_r.astype(np.float64, copy=False),
         (t_i > t_i.dtype.type(HALF_PI)) | (t_r > t_r.dtype.type(HALF_PI)),
         asked_for(theta_i, phi_i, theta_r, phi_r),
     )

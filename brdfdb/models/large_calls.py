@@ -24,6 +24,7 @@ from brdfdb.parameters import Floats
 P = ParamSpec("P")
 
 PART = 1 << 21  # values of a part: the checks of each take 0.1 ms, 5 % of the time of the fastest kernel
+PART_BY_ANGLES = 1 << 16  # of a call by scattered angles: new memory for their vectors takes as long as the call
 STEP = 1024  # a multiple of every block of a kernel
 _VECTORS = ("wi", "wr")
 _DIRECTIONS = ("theta_i", "phi_i", "theta_r", "phi_r", *_VECTORS)
@@ -60,11 +61,12 @@ def for_large_calls(function: Callable[P, Floats], together: str = "") -> LargeC
 
     @functools.wraps(function)
     def call(*directions: Any, out: Floats | None = None, threads: int = 1, **parameters: Any) -> Floats:
-        if out is None and type(threads) is int and threads == 1:
+        scattered = len(directions) > len(_VECTORS) and max(map(np.size, directions)) > PART_BY_ANGLES
+        if out is None and type(threads) is int and threads == 1 and not scattered:
             return function(*directions, **parameters)
         given = signature.bind(*directions, **parameters).arguments
         whole = np.size(given.get(together, ())) > 1
-        return _in_parts(function, given, out, threads, whole=whole)
+        return _in_parts(function, given, out, threads, PART_BY_ANGLES if scattered else PART, whole=whole)
 
     if call.__doc__ and "\n\n    Returns\n" in call.__doc__:
         call.__doc__ = call.__doc__.replace("\n\n    Returns\n", f"{_DOCUMENTED}\n    Returns\n", 1)
@@ -77,7 +79,13 @@ def for_large_calls_of_one(together: str) -> Callable[[Callable[P, Floats]], Lar
 
 
 def _in_parts(
-    function: Callable[..., Floats], given: dict[str, Any], out: Floats | None, threads: int, *, whole: bool
+    function: Callable[..., Floats],
+    given: dict[str, Any],
+    out: Floats | None,
+    threads: int,
+    part_size: int,
+    *,
+    whole: bool,
 ) -> Floats:
     threads = checked_threads(threads)
     try:
@@ -103,7 +111,7 @@ def _in_parts(
         if not np.may_share_memory(values, target):
             target[...] = values
 
-    on_threads(evaluate, cut(shape[axis], result.size, STEP if back == 1 else 2, threads), threads)
+    on_threads(evaluate, cut(shape[axis], result.size, STEP if back == 1 else 2, threads, part_size), threads)
     return result
 
 
@@ -157,9 +165,9 @@ def array_for_result(
     return out
 
 
-def cut(length: int, values: int, step: int, threads: int) -> list[slice]:
-    """Return the parts of an axis: as many for each thread, of about PART values or fewer, at multiples of `step`."""
-    wanted = -(-values // (PART * threads)) * threads
+def cut(length: int, values: int, step: int, threads: int, part_size: int = PART) -> list[slice]:
+    """Return the parts of an axis: as many for each thread, of about `part_size` values, at multiples of `step`."""
+    wanted = -(-values // (part_size * threads)) * threads
     units = max(1, length // step)
     parts = max(1, min(wanted, units))
     edges = [units * part // parts * step for part in range(parts)]
