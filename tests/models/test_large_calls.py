@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from brdfdb.errors import ParameterError
 from brdfdb.geometry import unit_vector
 from brdfdb.models import MODELS, ggx_scaled_vectors, he_torrance_very_rough, lambert, lambert_vectors, ward_vectors
-from brdfdb.models.large_calls import STEP, cut
+from brdfdb.models.large_calls import PART_BY_ANGLES, STEP, cut
 from brdfdb.parameters import ModelSpec
 from tests.models.draws import drawn, every_model
 from tests.tables.made_up import KINDS, WAVELENGTHS, made_up
@@ -63,6 +63,19 @@ def test_grids_are_cut_along_their_first_axis(spec: ModelSpec) -> None:
     out = np.empty((1, *whole.shape), np.float32)
     assert spec.evaluate(axes[0][np.newaxis], *axes[1:], **parameters, out=out, threads=2) is out
     assert np.array_equal(out[0], whole)
+
+
+@pytest.mark.parametrize("name", WITHOUT_COPY)
+@DTYPES
+def test_long_calls_by_angles_take_the_memory_of_a_part(name: str, dtype: Any) -> None:
+    count = 4 * PART_BY_ANGLES + 7
+    spec, directions = MODELS[name], angles(count, dtype)
+    parameters = drawn(spec, np.random.default_rng(5))
+    whole = spec.evaluate(*directions, **parameters)
+    some = slice(2 * PART_BY_ANGLES, 2 * PART_BY_ANGLES + STEP)
+    assert np.array_equal(whole[some], spec.evaluate(*(angle[some] for angle in directions), **parameters))
+    held = allocated(spec.evaluate, *directions, **parameters)
+    assert held < whole.nbytes + 20 * 8 * PART_BY_ANGLES  # angles, vectors and values of a part, in float64
 
 
 def test_parts_begin_at_blocks_of_kernels_and_cover_the_axis() -> None:
