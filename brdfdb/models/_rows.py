@@ -61,7 +61,9 @@ def by_rows_of_vectors(
     rows, length, leading = _split(shape, scalars)
     values: Floats = new_result((*several, *shape), directions.dtype).reshape(*several, rows, length)
     if values.size:
-        loop(*(_vectors(w, shape, rows, length) for w in (w_i, w_r)), _packed(scalars, leading, rows), values)
+        common = np.result_type(w_i, w_r)  # loops would be compiled anew for float32 beside float64
+        both = (_vectors(w.astype(common, copy=False), shape, rows, length) for w in (w_i, w_r))
+        loop(*both, _packed(scalars, leading, rows), values)
     return values.reshape((*several, *shape))[()]
 
 
