@@ -8,7 +8,6 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-import jsonschema
 import numpy as np
 from numpy.typing import NDArray
 
@@ -28,6 +27,7 @@ from brdfdb.tables.grids import Grid
 from brdfdb.tables.layout import Layout
 from brdfdb.tables.table import Table
 from brdfdb.tables.tabulation import tabulate
+from tests.json_schema import validate
 from tests.models.draws import middle
 
 SCHEMA = json.loads((Path(__file__).parents[2] / "schemas" / "audit.schema.json").read_text(encoding="utf-8"))
@@ -107,7 +107,7 @@ ABOUT: dict[str, Any] = {"store": "a store", "when": datetime(2026, 11, 21, tzin
 def written(audits: list[MaterialAudit]) -> dict[str, Any]:
     """The report as a file holds it, valid by the schema in the repository."""
     document = json.loads(report(audits, **ABOUT).model_dump_json())
-    jsonschema.validate(document, SCHEMA)
+    validate(document, SCHEMA)
     assert isinstance(document, dict)
     return document
 

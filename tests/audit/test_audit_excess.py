@@ -34,6 +34,7 @@ from tests.audit.a_table import (
     verdicts,
     written,
 )
+from tests.json_schema import validate
 
 pytestmark = [
     pytest.mark.skipif(numba.config.DISABLE_JIT, reason="minutes without compilation"),
@@ -198,4 +199,4 @@ def test_the_schema_refuses_what_is_no_report(spoil: Callable[[dict[str, Any]], 
     document = written([audit(lambert(0.5))])
     spoil(document)
     with pytest.raises(jsonschema.ValidationError):
-        jsonschema.validate(document, SCHEMA)
+        validate(document, SCHEMA)

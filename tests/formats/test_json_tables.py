@@ -6,7 +6,6 @@ import json
 from pathlib import Path
 from typing import Any
 
-import jsonschema
 import numpy as np
 import pytest
 
@@ -18,6 +17,7 @@ from brdfdb.formats._stated_error import Comparison
 from brdfdb.geometry import radians
 from brdfdb.measurements.samples import Samples
 from tests.formats.small_tables import ANISOTROPIC, DIFFUSE, GREY, KINDS, SPECTRAL, SPECULAR, small_table
+from tests.json_schema import validate
 
 TEXT = {"type": "string", "minLength": 1}
 
@@ -117,7 +117,7 @@ def test_files_keep_to_the_schema_and_to_their_error(name: str, kind: str, tmp_p
     # a regular grid is enough for a schema, and faster
     resolution = {"resolution": 30.0} if kind in (ANISOTROPIC, GREY, SPECTRAL) else {"tolerance": 0.4}
     written = EXPORTERS[name].write(table, path, verdict="passes", **resolution)
-    jsonschema.validate(json.loads(path.read_text(encoding="utf-8")), SCHEMAS[name])
+    validate(json.loads(path.read_text(encoding="utf-8")), SCHEMAS[name])
     back = formats.read(path)
     assert isinstance(back, FileTable)
     assert written.error is not None

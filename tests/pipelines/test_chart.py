@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
-import jsonschema
 import pytest
 
 from brdfdb.forms import catalogue, timing
@@ -32,6 +31,7 @@ from brdfdb.materials import presets
 from brdfdb.store import family_records
 from brdfdb_pipelines import cli, family_plot, plot_panels, terminal, tradeoff_plot
 from brdfdb_pipelines.recipe_file import load
+from tests.json_schema import validate
 from tests.pipelines.recipes import material
 
 Captured = pytest.CaptureFixture[str]
@@ -45,7 +45,7 @@ def run(*arguments: object) -> int:
 
 def read(folder: Path, name: str) -> Charts:
     document = json.loads((folder / f"{name}.json").read_text(encoding="utf-8"))
-    jsonschema.validate(document, json.loads(SCHEMA.read_text(encoding="utf-8")))
+    validate(document, json.loads(SCHEMA.read_text(encoding="utf-8")))
     return Charts.model_validate(document)
 
 

@@ -8,7 +8,6 @@ import shutil
 from collections.abc import Callable
 from pathlib import Path
 
-import jsonschema
 import numpy as np
 import pytest
 import xarray as xr
@@ -19,6 +18,7 @@ from brdfdb.store.publication import publish_dataset
 from brdfdb.tables.grids import Grid
 from brdfdb.tables.layout import Layout
 from brdfdb.tables.tabulation import tabulate
+from tests.json_schema import validate
 from tests.pipelines.command import Captured, run
 from tests.pipelines.recipes import material
 
@@ -43,7 +43,7 @@ def test_audit_of_some_materials_reports_those(built: Path, tmp_path: Path, caps
     assert lines[-1] == (f"2 audited: passes 2, known published excess 0, violates 0; page {written}, data {report}")
     assert written.read_text(encoding="utf-8").startswith("<!doctype html>")
     document = json.loads(report.read_bytes())
-    jsonschema.validate(document, json.loads(SCHEMA.read_bytes()))
+    validate(document, json.loads(SCHEMA.read_bytes()))
     assert [entry["material"] for entry in document["materials"]] == ["mirror", "foam"]
     assert document["violations"] == []
 
@@ -81,7 +81,7 @@ def test_a_violation_is_exit_code_1_and_stands_in_the_report(
     assert "2 audited: passes 1, known published excess 0, violates 1" in out
     assert "Traceback" not in err
     document = json.loads((tmp_path / "audit.json").read_text(encoding="utf-8"))
-    jsonschema.validate(document, json.loads(SCHEMA.read_bytes()))
+    validate(document, json.loads(SCHEMA.read_bytes()))
     assert document["violations"] == ["bad"]
     assert run("audit", "good", "--jobs", "1", "--store", tmp_path) == 0
 

@@ -6,7 +6,6 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
-import jsonschema
 import numpy as np
 import pytest
 
@@ -16,6 +15,7 @@ from brdfdb.tables.layout import Interpolation, Layout
 from brdfdb.tables.metadata import REQUIRED, TableMetadata
 from brdfdb.tables.table import table_from
 from brdfdb.tables.tabulation import metadata_of, tabulate
+from tests.json_schema import validate
 
 SCHEMA = json.loads((Path(__file__).parents[2] / "schemas" / "table.schema.json").read_text(encoding="utf-8"))
 GRID = Grid({"theta_i": [0, 45, 85], "theta_r": [0, 45, 85], "delta_phi": [0, 90, 180]})
@@ -31,7 +31,7 @@ def layout(name: str) -> Layout:
 def test_what_is_written_is_read_back_and_fits_the_schema(name: str) -> None:
     written = metadata_of(layout(name))
     attributes = json.loads(json.dumps(written.attributes(), allow_nan=False))
-    jsonschema.validate(attributes, SCHEMA)
+    validate(attributes, SCHEMA)
     read = TableMetadata.read(attributes)
     assert (read, read.gaps) == (written, "")
     assert read.attributes() == attributes
