@@ -223,8 +223,8 @@ def _check_path(report_path: Path) -> None:
 
 
 def _outcomes(tasks: dict[tuple[str, ...], Task], jobs: int) -> Iterator[tuple[tuple[str, ...], list[Any]]]:
-    """Yield the names and the results of each task as it is done."""
-    if jobs == 1:
+    """Yield the names and the results of each task as it is done; a process of its own for one would only take time."""
+    if min(jobs, len(tasks)) <= 1:
         for names, task in tasks.items():
             yield names, task()
         return
