@@ -42,6 +42,7 @@ myst_heading_anchors = 3
 autodoc_default_options = {"members": True, "show-inheritance": True, "member-order": "bysource"}
 suppress_warnings = ["ref.python"]  # types of fields are words; some are names of several classes, too
 autodoc_typehints = "none"  # the docstrings state types, units and ranges
+autodoc_use_type_comments = False  # there are none
 napoleon_google_docstring = False
 napoleon_use_ivar = True
 napoleon_use_param = napoleon_use_rtype = False  # types are words such as "array (N, 3)", not names to link
