@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from brdfdb._elementary import cosine, erfcx, exp
 from brdfdb._numba import inner_loop, kernel, loop
 from brdfdb.fresnel import reflectance_quotient
-from brdfdb.geometry import Angles, checked_angles, checked_vectors, cosines, finished, sines
+from brdfdb.geometry import Angles, checked_angles, checked_vectors, finished
 from brdfdb.lobes import Lobe, SlopeDistribution
 from brdfdb.models._rows import by_rows, by_rows_of_vectors
 from brdfdb.models.he_torrance_1991 import WAVELENGTH_NM, K, N
@@ -253,14 +253,14 @@ def painted(rho_d: ArrayLike, f_0: ArrayLike, alpha_x: ArrayLike, alpha_y: Array
 def by_angles(form: Form, angles: tuple[ArrayLike, ArrayLike, ArrayLike, ArrayLike], facets: Facets) -> Floats:
     """Return f_r [1/sr] of one form for angles (theta_i, phi_i, theta_r, phi_r) [rad]."""
     checked = checked_angles(*angles)
-    if not checked.in_rows:
+    if checked.scattered:
         return finished(by_rows_of_vectors(_LOOPS[form][1], checked.vectors, facets), checked)
     return finished(by_checked_angles(form, checked, facets), checked)
 
 
 def by_checked_angles(form: Form, checked: Angles, facets: Facets) -> Floats:
     """Return f_r [1/sr] of one form in float64, with any value below the horizon."""
-    columns = (cosines(checked.phi_r), sines(checked.phi_r))
+    columns = (checked.cosine(checked.phi_r), checked.sine(checked.phi_r))
     scalars = (checked.x_i, checked.y_i, checked.cos_i, checked.sin_r, checked.cos_r, *facets)
     return by_rows(_LOOPS[form][0], columns, scalars)
 

@@ -94,7 +94,7 @@ Profile = tuple[Floats, Floats, Floats]  # A, B, g or b_0, L, s
 def by_angles(form: int, angles: tuple[ArrayLike, ArrayLike, ArrayLike, ArrayLike], profile: Profile) -> Floats:
     """Return f_r [1/sr] of one form for angles (theta_i, phi_i, theta_r, phi_r) [rad]."""
     checked = checked_angles(*angles)
-    if not checked.in_rows:
+    if checked.lights_scattered:
         return finished(by_rows_of_vectors(_VECTOR_LOOPS[form], checked.vectors, profile), checked)
     columns, scalars = (checked.x_r, checked.y_r), (checked.x_i, checked.y_i, *profile)
     return finished(by_rows(_ANGLE_LOOPS[form], columns, scalars), checked)

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from brdfdb._elementary import cosine, exp
 from brdfdb._numba import inner_loop, kernel, loop
-from brdfdb.geometry import checked_angles, checked_vectors, cosines, finished, sines
+from brdfdb.geometry import checked_angles, checked_vectors, finished
 from brdfdb.lobes import Lobe
 from brdfdb.models._rows import by_rows, by_rows_of_vectors
 from brdfdb.parameters import Draw, Floats, Gradient, Parameter
@@ -218,10 +218,10 @@ def by_angles(
     """Return f_r [1/sr] of one form for angles (theta_i, phi_i, theta_r, phi_r) [rad]. All arguments are checked."""
     checked = checked_angles(*angles)
     parameters = _checked(rho_d, rho_s, alpha_x, alpha_y)
-    if not checked.in_rows:
+    if checked.scattered:
         return finished(by_rows_of_vectors(_VECTOR_LOOPS[form], checked.vectors, parameters), checked)
     light = (checked.x_i, checked.y_i, checked.cos_i)
-    columns = (cosines(checked.phi_r), sines(checked.phi_r))
+    columns = (np.cos(checked.phi_r), np.sin(checked.phi_r))
     scalars = (*light, checked.sin_r, checked.cos_r, *parameters)
     return finished(by_rows(_ANGLE_LOOPS[form], columns, scalars, checked.dtype), checked)
 

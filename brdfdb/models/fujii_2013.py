@@ -90,11 +90,8 @@ def oren_nayar_fujii(
     0.2655
     """
     angles = checked_angles(theta_i, phi_i, theta_r, phi_r)
-    parameters = RHO.check(rho), SIGMA.check(sigma)
-    if not angles.in_rows:
-        return finished(by_rows_of_vectors(_vector_rows, angles.vectors, parameters), angles)
     s = angles.sin_i * angles.sin_r * angles.cos_dphi
-    return finished(_evaluate(angles.cos_i, angles.cos_r, s, *parameters), angles)
+    return finished(_evaluate(angles.cos_i, angles.cos_r, s, RHO.check(rho), SIGMA.check(sigma)), angles)
 
 
 @for_large_calls

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from brdfdb._elementary import arcsin, cosine, exp, log
 from brdfdb._numba import kernel, loop
-from brdfdb.geometry import checked_angles, checked_vectors, cosines, finished, sines
+from brdfdb.geometry import checked_angles, checked_vectors, finished
 from brdfdb.models._rows import by_rows, by_rows_of_vectors
 from brdfdb.models.large_calls import for_large_calls
 from brdfdb.parameters import Floats, ModelSpec, Parameter
@@ -212,10 +212,10 @@ def hapke(
     """
     checked = checked_angles(theta_i, phi_i, theta_r, phi_r)
     parameters = _checked(w, b, c, b_0, h, theta_bar)
-    if not checked.in_rows:
+    if checked.scattered:
         return finished(by_rows_of_vectors(_vector_rows, checked.vectors, parameters), checked)
-    columns = (cosines(checked.phi_r), sines(checked.phi_r))
-    light = (cosines(checked.phi_i), sines(checked.phi_i), checked.sin_i, checked.cos_i)
+    columns = (np.cos(checked.phi_r), np.sin(checked.phi_r))
+    light = (np.cos(checked.phi_i), np.sin(checked.phi_i), checked.sin_i, checked.cos_i)
     scalars = (*light, checked.sin_r, checked.cos_r, *parameters)
     return finished(by_rows(_angle_rows, columns, scalars), checked)
 

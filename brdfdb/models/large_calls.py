@@ -1,7 +1,7 @@
 """Large calls: an array that takes the result, and parts of a call on threads.
 
-A part computes its values as the whole call does, bit for bit. It begins at a multiple of `STEP` along the last axis,
-because kernels work in blocks, or of two rows along another one, because an axis of length 1 may be treated apart.
+A part computes its values as the whole call does, bit for bit. It begins at a multiple of `STEP` rows, because kernels
+work in blocks, or of two rows if they are long, because an axis of length 1 may be treated apart.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from __future__ import annotations
 import functools
 import inspect
 import itertools
+import math
 import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -61,7 +62,10 @@ def for_large_calls(function: Callable[P, Floats], together: str = "") -> LargeC
 
     @functools.wraps(function)
     def call(*directions: Any, out: Floats | None = None, threads: int = 1, **parameters: Any) -> Floats:
-        scattered = len(directions) > len(_VECTORS) and max(map(np.size, directions)) > PART_BY_ANGLES
+        # theta_i, phi_i, theta_r: a row of azimuths is not scattered
+        scattered = len(directions) > len(_VECTORS) and any(
+            isinstance(angle, np.ndarray) and angle.size > PART_BY_ANGLES for angle in directions[:3]
+        )
         if out is None and type(threads) is int and threads == 1 and not scattered:
             return function(*directions, **parameters)
         given = signature.bind(*directions, **parameters).arguments
@@ -95,11 +99,13 @@ def _in_parts(
     except ValueError:
         return function(**given)  # it says what is wrong
     result = array_for_result(out, shape, asked_for(*(given[name] for name in _DIRECTIONS if name in given)), given)
+    given = {name: np.asarray(value) if isinstance(value, list | tuple) else value for name, value in given.items()}
     axis = next((axis for axis, length in enumerate(shape) if length > 1), None)
     if axis is None or whole:
         result[...] = function(**given)
         return result[()] if out is None else result
     back = len(shape) - axis
+    step = STEP if math.prod(shape[axis + 1 :]) < STEP else 2
 
     def evaluate(part: slice) -> None:
         target = result[(*[slice(None)] * axis, part)]
@@ -111,7 +117,7 @@ def _in_parts(
         if not np.may_share_memory(values, target):
             target[...] = values
 
-    on_threads(evaluate, cut(shape[axis], result.size, STEP if back == 1 else 2, threads, part_size), threads)
+    on_threads(evaluate, cut(shape[axis], result.size, step, threads, part_size), threads)
     return result
 
 

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from brdfdb._elementary import arcsin, cosine
 from brdfdb._numba import kernel, loop
-from brdfdb.geometry import checked_angles, checked_vectors, cosines, finished, sines
+from brdfdb.geometry import checked_angles, checked_vectors, finished
 from brdfdb.models._rows import by_rows, by_rows_of_vectors
 from brdfdb.models.large_calls import for_large_calls
 from brdfdb.parameters import Floats, ModelSpec, Parameter
@@ -122,9 +122,9 @@ def ross_li(
     """
     checked = checked_angles(theta_i, phi_i, theta_r, phi_r)
     weights = _checked(f_iso, f_vol, f_geo)
-    if not checked.in_rows:
+    if checked.scattered:
         return finished(by_rows_of_vectors(_vector_rows, checked.vectors, weights), checked)
-    columns = (cosines(checked.phi_r), sines(checked.phi_r))
+    columns = (np.cos(checked.phi_r), np.sin(checked.phi_r))
     scalars = (checked.x_i, checked.y_i, checked.cos_i, checked.sin_r, checked.cos_r, *weights)
     return finished(by_rows(_angle_rows, columns, scalars), checked)
 

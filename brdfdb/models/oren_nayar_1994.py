@@ -90,7 +90,7 @@ def oren_nayar(
     """
     angles = checked_angles(theta_i, phi_i, theta_r, phi_r)
     parameters = RHO.check(rho), SIGMA.check(sigma), INTERREFLECTION.check(interreflection)
-    if not angles.in_rows:
+    if angles.lights_scattered:
         return finished(by_rows_of_vectors(functional_vector_rows, angles.vectors, parameters), angles)
     polar = angles.theta_i, angles.sin_i, angles.cos_i, angles.theta_r, angles.sin_r, angles.cos_r
     cos_dphi = angles.cos_dphi
@@ -220,7 +220,7 @@ def oren_nayar_qualitative(
     """
     angles = checked_angles(theta_i, phi_i, theta_r, phi_r)
     parameters = RHO.check(rho), SIGMA.check(sigma), OFFSET.check(offset)
-    if not angles.in_rows:
+    if angles.lights_scattered:
         return finished(by_rows_of_vectors(qualitative_vector_rows, angles.vectors, parameters), angles)
     pair = np.maximum(angles.sin_i, angles.sin_r), np.minimum(np.tan(angles.theta_i), np.tan(angles.theta_r))
     scalars = (*pair, *parameters)

@@ -212,5 +212,5 @@ def stated(error: Error, directions: Directions, brdf: Floats, column: NDArray[n
     """
     limits, floor = error.limits[:, column], error.floors[column]
     relative = functools.reduce(np.maximum, (limits[row] for row in places.rows_of(directions)))
-    above = np.where(directions.below, 0.0, 1.0)[..., np.newaxis]
-    return np.asarray(above * relative * np.maximum(brdf, floor) + 0.0 * brdf)
+    errors = relative * np.maximum(brdf, floor) + 0.0 * brdf
+    return np.where(directions.below[..., np.newaxis], 0.0 * brdf, errors)

@@ -65,26 +65,27 @@ def check(values: Any, expected: Any, tolerance: float, arguments: object) -> No
     assert error <= tolerance, f"off by {error:.3g} from {mp.nstr(mp.mpf(expected), 17)} at {arguments}"
 
 
-def both(model: Model, *directions: float, **parameters: Any) -> tuple[Any, Any]:
-    """The value of a pair of directions by itself, and in a row of azimuths: the loops differ."""
+def each_way(model: Model, *directions: float, **parameters: Any) -> tuple[Any, ...]:
+    """The value of a pair of directions by itself, in a row of azimuths, and among scattered pairs: loops differ."""
     *others, phi_r = directions
-    return model(*directions, **parameters), model(*others, [phi_r, phi_r + 1.0], **parameters)[0]
+    in_row = model(*others, [phi_r, phi_r + 1.0], **parameters)[0]
+    return model(*directions, **parameters), in_row, model(*([x, 0.5 * x] for x in directions), **parameters)[0]
 
 
 def oren_nayar(row: Row, model: Model, **choice: Any) -> Any:
     theta_i, theta_r, delta_phi, rho, sigma = numbers(row, "theta_i theta_r delta_phi rho sigma")
-    return both(model, theta_i, 0.0, theta_r, delta_phi, rho=rho, sigma=sigma, **choice)
+    return each_way(model, theta_i, 0.0, theta_r, delta_phi, rho=rho, sigma=sigma, **choice)
 
 
 def minnaert_k07(row: Row) -> Any:
     theta_i, theta_r, delta_phi = numbers(row, "theta_i theta_r delta_phi")
-    return both(models.minnaert, theta_i, 0.0, theta_r, delta_phi, k=0.7)
+    return each_way(models.minnaert, theta_i, 0.0, theta_r, delta_phi, k=0.7)
 
 
 def ward(row: Row) -> Any:
     rho_d, rho_s, alpha_x, alpha_y = numbers(row, "rho_d rho_s alpha_x alpha_y")
     angles = numbers(row, "theta_i phi_i theta_r phi_r")
-    return both(models.ward, *angles, rho_d=rho_d, rho_s=rho_s, alpha_x=alpha_x, alpha_y=alpha_y)
+    return each_way(models.ward, *angles, rho_d=rho_d, rho_s=rho_s, alpha_x=alpha_x, alpha_y=alpha_y)
 
 
 def surface(row: Row) -> dict[str, float]:
@@ -94,7 +95,7 @@ def surface(row: Row) -> dict[str, float]:
 
 def directional_diffuse(row: Row) -> Any:
     theta_i, theta_r, delta_phi = numbers(row, "theta_i theta_r delta_phi")
-    return both(models.he_torrance, theta_i, 0.0, theta_r, delta_phi, **surface(row))
+    return each_way(models.he_torrance, theta_i, 0.0, theta_r, delta_phi, **surface(row))
 
 
 def specular_reflectance(row: Row) -> Any:
@@ -166,7 +167,7 @@ def test_oren_nayar_against_the_reference() -> None:
         rho, sigma = float(rng.uniform()), float(rng.choice([0.0, 1e-3, rng.uniform(0.0, HALF_PI), HALF_PI]))
         expected = oren_nayar_1994.functional(theta_i, theta_r, delta_phi, rho, sigma)
         for interreflection, total in ((False, expected[0]), (True, sum(expected))):
-            values = both(
+            values = each_way(
                 models.oren_nayar,
                 theta_i,
                 0.0,
@@ -185,7 +186,7 @@ def test_oren_nayar_qualitative_against_the_reference() -> None:
         rho, offset = float(rng.uniform()), float(rng.choice([0.33, 0.57, rng.uniform(0.0, 10.0)]))
         sigma = float(rng.choice([1e-3, rng.uniform(0.0, HALF_PI), HALF_PI]))
         expected = oren_nayar_1994.qualitative(theta_i, theta_r, delta_phi, rho, sigma, offset)
-        values = both(
+        values = each_way(
             models.oren_nayar_qualitative, theta_i, 0.0, theta_r, delta_phi, rho=rho, sigma=sigma, offset=offset
         )
         check(values, expected, QUALITATIVE, (theta_i, theta_r, delta_phi, rho, sigma))
@@ -196,7 +197,7 @@ def test_minnaert_against_the_reference() -> None:
     for theta_i, theta_r, delta_phi in directions(rng, 600):
         k, rho = float(rng.choice([0.0, rng.uniform(), 1.0])), float(rng.uniform())
         expected = minnaert.minnaert(theta_i, theta_r, k, rho)
-        values = both(models.minnaert, theta_i, 0.0, theta_r, delta_phi, k=k, rho=rho)
+        values = each_way(models.minnaert, theta_i, 0.0, theta_r, delta_phi, k=k, rho=rho)
         check(values, expected, MINNAERT, (theta_i, theta_r, k))
 
 
@@ -226,7 +227,7 @@ def test_ward_against_the_reference_in_units_of_the_rounding_of_its_arguments() 
         alpha_x, alpha_y = 10.0 ** rng.uniform(-2.0, 0.3, 2)
         arguments = (*angles, float(rho_d), float(rho_s), float(alpha_x), float(alpha_y))
         expected = ward_1992.elliptical(*arguments)
-        values = both(models.ward, *angles, rho_d=rho_d, rho_s=rho_s, alpha_x=alpha_x, alpha_y=alpha_y)
+        values = each_way(models.ward, *angles, rho_d=rho_d, rho_s=rho_s, alpha_x=alpha_x, alpha_y=alpha_y)
         error = max(relative_error(value, expected) for value in values)
         roundings = error / (2.0**-52 * (1.0 + conditioning(ward_1992.elliptical, arguments)))
         assert roundings <= WARD_ROUNDINGS, f"off by {roundings:.3g} roundings at {arguments}"
@@ -251,7 +252,7 @@ def test_he_torrance_against_the_reference() -> None:
         g_max = 1e6 if case % 40 == 0 else 10.0 ** rng.uniform(-8.0, 4.5)
         light = rough_surface(rng, g_max, g_max * 10.0 ** rng.uniform(-1.0, 3.0))
         expected = he_torrance_1991.directional_diffuse(theta_i, theta_r, delta_phi, *light.values())
-        values = both(models.he_torrance, theta_i, 0.0, theta_r, delta_phi, **light)
+        values = each_way(models.he_torrance, theta_i, 0.0, theta_r, delta_phi, **light)
         check(values, expected, HE_TORRANCE, (theta_i, theta_r, delta_phi, light))
         compared += expected > TINY
     assert compared > 100
