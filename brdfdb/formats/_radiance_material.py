@@ -10,6 +10,21 @@ if TYPE_CHECKING:
     from brdfdb.tables.table import Table
 
 _PARAMETERS = ("rho_d", "rho_s", "alpha_x", "alpha_y")
+# The up vector in the surface normal, never along it: +z of walls, +y of floors and ceilings
+_UP = "0 if(Nz*Nz-.5,1,0) if(Nz*Nz-.5,0,1)"
+_ISOTROPIC = (
+    "The three expressions after the file are the up vector, which is never along the normal Nx, Ny, Nz. This material",
+    "is isotropic: any such vector gives the same picture.",
+)
+_FRAME = (
+    "The three expressions after the file are the up vector, the y axis of the table, for the normal Nx, Ny, Nz:",
+    "+z on surfaces steeper than 45 degrees (walls), +y on all others (floors and ceilings). The x axis is up x normal:",
+    "to the right on a wall that one faces, +x on a floor, -x on a ceiling. To turn the table on walls, floors and",
+    "ceilings, 30 degrees counter-clockwise as one faces them, write instead",
+    "if(Nz*Nz-.5,-.5*Nz,.5*Ny) if(Nz*Nz-.5,.866,-.5*Nx) if(Nz*Nz-.5,.5*Nx,.866)",
+    "The frame jumps where a curved surface passes 45 degrees. Three numbers, such as 0 0 1, give one without a jump;",
+    "a surface whose normal is along them is black.",
+)
 
 
 def material_text(table: Table, xml: str, record: dict[str, Any]) -> str:
@@ -30,13 +45,9 @@ def material_text(table: Table, xml: str, record: dict[str, Any]) -> str:
         "",
         "# Radiance looks for the XML file in the directories of RAYPATH; the working directory is one by default.",
         "# Only the front of a surface reflects, the side its normal points to. From behind it is black.",
-        "# The three numbers after the file are the up vector, the y axis of the table. Its x axis is up x normal.",
-        "# For surfaces that lie in the xy plane, facing +z, 0 1 0 leaves x and y as they are. Any other vector that",
-        "# is not along the normal turns the material: for 30 degrees counter-clockwise write -0.5 0.866 0, or keep",
-        "# 0 1 0 and write `8 0 FILE 0 1 0 . -rz 30` for the line of strings. For walls use 0 0 1.",
-        *(["# This material is isotropic: the up vector does not matter."] if not table.anisotropic else []),
+        *(f"# {line}" for line in (_FRAME if table.anisotropic else _ISOTROPIC)),
         f"void BSDF {name}",
-        f"6 0 {xml} 0 1 0 .",
+        f"6 0 {xml} {_UP} .",
         "0",
         "0",
     ]
@@ -57,7 +68,7 @@ def _plastic(table: Table, name: str) -> list[str]:
     colour, metal = rho_d / (1.0 - rho_s), rho_d + rho_s
     share = rho_s / metal if metal > 0.0 else 0.0
     isotropic = alpha_x == alpha_y
-    kind, strings = ("", "0") if isotropic else ("2", "4 0 1 0 .")
+    kind, strings = ("", "0") if isotropic else ("2", f"4 {_UP} .")
     widths = f"{alpha_x:.6g}" if isotropic else f"{alpha_y:.6g} {alpha_x:.6g}"
     count = 5 if isotropic else 6
     rotation = "# Its vector is the up vector above, the y axis of the table: alpha_y comes first, then alpha_x."

@@ -105,8 +105,10 @@ def picture(folder: Path, table: Table) -> Picture:
         traced(f"{light}{text}\n{name} sphere ball\n0\n0\n4 0 0 0 1\n", rays, folder, *options)
         for name, options in ((table.name, ("-ss", "64")), (f"{table.name}_plastic", ()))
     ]
-    # The frame of the table at each point: its y axis is the up vector, less what is along the normal
-    y_axis = np.array([0.0, 1.0, 0.0]) - normal[:, 1:2] * normal
+    # The frame of the table at each point: its y axis is the up vector, less what is along the normal. As the file
+    # states, the up vector is +y where the surface is less steep than 45 degrees, and +z elsewhere
+    up = np.where(normal[:, 2:] ** 2 > 0.5, [0.0, 1.0, 0.0], [0.0, 0.0, 1.0])
+    y_axis = up - np.sum(up * normal, axis=1, keepdims=True) * normal
     y_axis /= np.linalg.norm(y_axis, axis=1, keepdims=True)
     frame = np.stack([np.cross(y_axis, normal), y_axis, normal], axis=1)
     solid_angle = 2.0 * np.pi * (1.0 - np.cos(np.radians(0.25)))
