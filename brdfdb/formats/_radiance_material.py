@@ -18,8 +18,8 @@ _ISOTROPIC = (
 )
 _FRAME = (
     "The three expressions after the file are the up vector, the y axis of the table, for the normal Nx, Ny, Nz:",
-    "+z on surfaces steeper than 45 degrees (walls), +y on all others (floors and ceilings). The x axis is up x normal:",
-    "to the right on a wall that one faces, +x on a floor, -x on a ceiling. To turn the table on walls, floors and",
+    "+z on surfaces steeper than 45 degrees (walls), +y on others (floors and ceilings). The x axis is up x normal: to",
+    "the right on a wall that one faces, +x on a floor, -x on a ceiling. To turn the table on walls, floors and",
     "ceilings, 30 degrees counter-clockwise as one faces them, write instead",
     "if(Nz*Nz-.5,-.5*Nz,.5*Ny) if(Nz*Nz-.5,.866,-.5*Nx) if(Nz*Nz-.5,.5*Nx,.866)",
     "The frame jumps where a curved surface passes 45 degrees. Three numbers, such as 0 0 1, give one without a jump;",
