@@ -13,7 +13,7 @@ import functools
 import itertools
 import os
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -43,24 +43,31 @@ kinds = tuple(BASES)
 options = (
     FIXED,
     Option("colour", False, "blocks of colour for Radiance; pyWinCalc refuses files that have them"),
+    *(
+        Option(
+            f"emissivity_{side}",
+            0.0,
+            f"emissivity of the {side} [1]; 0: that of the table if it covers 5 to 40 um, or else 0.9, as assumed",
+            low=0.0,
+            high=1.0,
+        )
+        for side in ("front", "back")
+    ),
 )
 
 SOLAR, CIE_X, CIE_Z = "Solar", "CIE-X", "CIE-Z"
-_ONE_SHEET = "both sides reflect alike and nothing is transmitted; thickness and thermal properties are placeholders"
+_ONE_SHEET = "both sides reflect alike and nothing is transmitted; thickness and conductivity are placeholders"
 _SOLAR = "the block of solar light repeats that of visible light"
 _HOLDS = (
     "f_r [1/sr] without the cosine, as averages over patches of light and viewer with projected solid angles as "
     "weights; Visible is CIE Y under equal energy"
 )
-# WINDOW needs these, and an empty <Thickness> stops its reader
-_MATERIAL = (
-    '<Thickness unit="Millimeter">1</Thickness>',
-    "<DeviceType>Other</DeviceType>",
-    "<ThermalConductivity>1</ThermalConductivity>",
-    "<EmissivityFront>0.9</EmissivityFront>",
-    "<EmissivityBack>0.9</EmissivityBack>",
-    "<TIR>0</TIR>",
+_ASSUMED = 0.9  # emissivity of paints, glass and most other surfaces but bare metals
+_EFFECT = (
+    "WINDOW demands a value; U of one sheet is 6.18 W/(m2 K) with 0.9 on both sides, 6.02 with 0.05 on the front, 3.34 "
+    "with 0.05 on the back, which faces the room, and 3.29 with 0.05 on both"
 )
+_INFRARED_UM, _KELVIN, _C2 = (5.0, 40.0), 300.0, 14387.769  # C2: second radiation constant [um K]
 _MOST_RINGS, _MOST_PATCHES = 46, 100_000  # of a basis that a file defines; Radiance has room for so many rings
 
 
@@ -71,6 +78,8 @@ def write(
     kind: str = "full",
     tolerance: float = 0.02,
     colour: bool = False,
+    emissivity_front: float = 0.0,
+    emissivity_back: float = 0.0,
     verdict: str | None = None,
 ) -> Written:
     """Write a table as a Klems matrix: whole, or not at all.
@@ -87,6 +96,10 @@ def write(
         Largest p99. The patches are fixed: a larger error is stated.
     colour : bool
         Add the blocks CIE-X and CIE-Z of a spectral table, which Radiance reads. WINDOW's engine refuses such files.
+    emissivity_front, emissivity_back : float [1]
+        Emissivities of the two sides, in (0, 1]. By default they are those of the table, 1 minus its hemispherical
+        albedo weighted by Planck's law at 300 K, if its wavelengths reach from 5 to 40 um; or else 0.9, which a remark
+        names as assumed, with its effect on U.
     verdict : str, optional
         Verdict of the audit of this revision.
 
@@ -113,13 +126,45 @@ def write(
     texts = [_text(matrix[..., channel]) for channel in range(matrix.shape[-1])]
     read_back = np.stack([_numbers(text) for text in texts], axis=-1).reshape(matrix.shape)
     error = Comparison(table, channels).error_of(functools.partial(evaluated, read_back, basis, basis))
-    remarks = (*channels.remarks, *specular_remark(table), _ONE_SHEET, _SOLAR)
+    emissivity = {"front": emissivity_front, "back": emissivity_back}
+    thermal = _completed(table, emissivity)
+    remarks = (*channels.remarks, *specular_remark(table), _ONE_SHEET, _SOLAR, *thermal)
     document = record(table, error, verdict, holds=_HOLDS, remarks=remarks, tolerance=tolerance)
     definition = ["<IncidentDataStructure>Columns</IncidentDataStructure>", *_definition(basis)]
     with whole(path) as (half,), half.open("w", encoding="utf-8") as file:
         title = table.metadata.title or ""
-        file.writelines(_bsdf_xml.text_of(table.name, title, _MATERIAL, definition, _blocks(basis, texts), document))
+        file.writelines(
+            _bsdf_xml.text_of(table.name, title, _material(emissivity), definition, _blocks(basis, texts), document)
+        )
     return Written((Path(path),), error, tolerance, remarks)
+
+
+def _completed(table: Table, emissivity: dict[str, float]) -> tuple[str, ...]:
+    """Fill in the emissivities that were not given, 0, and return a remark on where they come from."""
+    sides = [side for side, value in emissivity.items() if value == 0.0]
+    if not sides:
+        return ()
+    of_table, at = _ASSUMED, table.wavelength_nm
+    reason = f"is assumed: {_EFFECT}"
+    if at is not None and at[0] <= 1e3 * _INFRARED_UM[0] and at[-1] >= 1e3 * _INFRARED_UM[1]:
+        from brdfdb.tables.albedo import reflected
+
+        um = np.linspace(*_INFRARED_UM, 1401)
+        planck = um**-5 / np.expm1(_C2 / (um * _KELVIN))
+        absorbed = 1.0 - np.interp(1e3 * um, at, reflected(table).hemispherical)
+        of_table = float(np.clip(np.trapezoid(planck * absorbed, um) / np.trapezoid(planck, um), 0.0, 1.0))
+        reason = "is that of the table from 5 to 40 um, weighted by Planck's law at 300 K"
+    emissivity.update(dict.fromkeys(sides, of_table))
+    return (f"emissivity {of_table:.4g} of the {' and the '.join(sides)} {reason}",)
+
+
+def _material(emissivity: Mapping[str, float]) -> Iterator[str]:
+    """Yield the lines of XML on the material. WINDOW needs them all, and an empty <Thickness> stops its reader."""
+    yield '<Thickness unit="Millimeter">1</Thickness>'
+    yield "<DeviceType>Other</DeviceType>\n<ThermalConductivity>1</ThermalConductivity>"
+    for side, value in emissivity.items():
+        yield f"<Emissivity{side.title()}>{value:.4g}</Emissivity{side.title()}>"
+    yield "<TIR>0</TIR>"
 
 
 def _blocks(basis: Basis, texts: list[str]) -> Iterator[Block]:

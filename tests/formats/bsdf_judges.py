@@ -47,11 +47,34 @@ if sys.argv[2] == "full":
         shares += [side.reflectance.direct_hemispherical for side in (sides.front, sides.back)]
 print(json.dumps(shares))
 """
+_THERMAL = """
+import json
+import re
+import sys
+import pywincalc
+text = open(sys.argv[1], encoding="utf-8").read()
+standard = pywincalc.load_standard(str(pywincalc.standard_path / "W5_NFRC_2003.std"))
+basis = pywincalc.BSDFHemisphere.create(pywincalc.BSDFBasisType.FULL)
+answer = []
+for front, back in json.loads(sys.argv[2]):
+    for side, value in (("Front", front), ("Back", back)):
+        text = re.sub(f"<Emissivity{side}>[^<]*", f"<Emissivity{side}>{value}", text) if value else text
+    product = pywincalc.parse_bsdf_xml_string(text)
+    system = pywincalc.GlazingSystem(solid_layers=[product], optical_standard=standard, bsdf_hemisphere=basis)
+    answer.append([product.emissivity_front, product.emissivity_back, system.u()])
+print(json.dumps(answer))
+"""
 
 
-def made(model: str, parameters: dict[str, Any], wavelength_nm: Any = None, tolerance: float = 0.02) -> Table:
+def made(
+    model: str,
+    parameters: dict[str, Any],
+    wavelength_nm: Any = None,
+    tolerance: float = 0.02,
+    index: str | None = "main/Cu/Johnson",
+) -> Table:
     """Return the table of a model, as a store holds it."""
-    spectral = {} if wavelength_nm is None else {"refractive_index": "main/Cu/Johnson"}
+    spectral = {} if wavelength_nm is None or index is None else {"refractive_index": index}
     written = {"title": "Made <up> & down", "model": model, "source": "no paper", "parameters": parameters, **spectral}
     dataset = tabulate(plan(Material.from_table("made-up", written), wavelength_nm, tolerance))
     arrays = {str(name): np.asarray(variable.values) for name, variable in dataset.variables.items()}
@@ -107,6 +130,16 @@ def in_window(path: Path, kind: str, *methods: str) -> list[float]:
     pytest.importorskip("pywincalc")
     answer = _run([sys.executable, "-c", _WINDOW, str(path), kind, *methods], path.parent)
     return [float(share) for share in json.loads(answer)]
+
+
+def thermal(path: Path, *emissivities: tuple[float, float]) -> list[list[float]]:
+    """Return the emissivities of front and back, and U [W/(m2 K)] of one sheet, that WINDOW's engine finds in a file.
+
+    A row for each pair of emissivities, which replace those of the file; 0 leaves that of the file.
+    """
+    pytest.importorskip("pywincalc")
+    asked = json.dumps(emissivities or [(0.0, 0.0)])
+    return list(json.loads(_run([sys.executable, "-c", _THERMAL, str(path), asked], path.parent)))
 
 
 def traced(scene: str, rays: Floats, folder: Path, *options: str) -> Floats:

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import functools
+import math
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.integrate import quad
 
 from brdfdb import formats
 from brdfdb.errors import FileFormatError, ParameterError
@@ -16,9 +19,14 @@ from brdfdb.formats._klems_basis import BASES, Basis, averages
 from brdfdb.geometry import unit_vector
 from brdfdb.measurements.statement import statement
 from brdfdb.parameters import Floats
+from brdfdb.store.publication import publish_dataset
+from brdfdb.tables.layout import Layout
 from brdfdb.tables.table import Table
-from tests.formats.bsdf_judges import check_bsdf, in_window, klems_total, made, queried
+from brdfdb.tables.tabulation import tabulate
+from tests.api.a_store import client_of
+from tests.formats.bsdf_judges import check_bsdf, in_window, klems_total, made, queried, thermal
 from tests.formats.small_tables import ANISOTROPIC, DIFFUSE, GREY, small_table
+from tests.pipelines.command import run
 
 WRITTEN = [(GREY, "full"), (GREY, "half"), (GREY, "quarter"), (ANISOTROPIC, "half"), ("spectral", "quarter")]
 FILES = pytest.mark.parametrize(("material", "kind"), WRITTEN)
@@ -207,3 +215,48 @@ def test_the_statement_has_the_totals_of_windows_engine(files: dict[tuple[str, s
     assert front.incidences[0].albedo[0] == pytest.approx(2.0 * known.incidences[0].albedo[0], rel=1e-4)
     with pytest.raises(ParameterError, match="side: 'left' is not one of back, front"):
         formats.samples(other, side="left")
+
+
+def test_windows_engine_finds_the_emissivity_that_was_given_and_the_effect_of_an_assumed_one(tmp_path: Path) -> None:
+    path = tmp_path / "a.xml"
+    written = klems.write(table_of(DIFFUSE), path, kind="full", emissivity_front=0.05, emissivity_back=0.05)
+    assert not any("emissivity" in remark for remark in written.remarks)
+    # Without the options the file stated 0.9 for aluminium, and no remark said that it was made up
+    ((front, back, u), assumed, of_front, of_back) = thermal(path, (0.0, 0.0), (0.9, 0.9), (0.05, 0.9), (0.9, 0.05))
+    assert (front, back) == (0.05, 0.05)
+    assert (round(u, 2), round(assumed[2], 2)) == (3.29, 6.18)
+    (remark,) = [text for text in klems.write(table_of(DIFFUSE), path).remarks if "emissivity" in text]
+    assert remark.startswith("emissivity 0.9 of the front and the back is assumed")
+    numbers = [float(text) for text in re.findall(r"\b[1-9]\.\d\d\b", remark)]
+    assert numbers == [round(some, 2) for some in (assumed[2], of_front[2], of_back[2], u)]
+
+
+def test_the_emissivity_of_a_table_in_the_infrared_is_one_minus_its_albedo(tmp_path: Path) -> None:
+    at = np.array([*range(400, 701, 20), 1000.0, 5000.0, 10000.0, 20000.0, 40000.0])
+    rho = {"wavelengths_nm": [400, 5000, 40000], "values": [0.5, 0.9, 0.2]}
+
+    def planck(um: float) -> float:
+        return um**-5 / math.expm1(14387.769 / (um * 300.0))
+
+    reflected = quad(lambda um: planck(um) * (0.9 - 0.02 * (um - 5.0)), 5.0, 40.0)[0]
+    expected = 1.0 - reflected / quad(planck, 5.0, 40.0)[0]
+    for most, stated in ((at, f"{expected:.4g}"), (at[:-1], "0.9")):  # to 20 um alone
+        written = klems.write(made("lambert", {"rho": rho}, most, index=None), tmp_path / "a.xml", kind="quarter")
+        text = (tmp_path / "a.xml").read_text(encoding="utf-8")
+        assert re.findall(r"<Emissivity(?:Front|Back)>([^<]*)", text) == [stated, stated]
+        (remark,) = [some for some in written.remarks if "emissivity" in some]
+        assert remark.startswith(f"emissivity {stated} of the front and the back")
+        assert ("assumed" in remark) == (most is not at)
+
+
+def test_the_command_and_the_service_take_an_emissivity(tmp_path: Path) -> None:
+    store = tmp_path / "store"
+    publish_dataset(store, "grey", tabulate(Layout(table_of(DIFFUSE).source, table_of(DIFFUSE).grid)))
+    given = ("--emissivity-back", "0.05")
+    assert run("export", "klems", "grey", "--kind", "quarter", *given, "--store", store, "--out", tmp_path) == 0
+    of_command = (tmp_path / "grey_quarter.xml").read_text(encoding="utf-8")
+    address = "/v1/materials/grey/export/klems?kind=quarter&emissivity_back="
+    for text in (of_command, client_of(store).get(f"{address}0.05").text):
+        assert re.findall(r"<Emissivity(?:Front|Back)>([^<]*)", text) == ["0.9", "0.05"]
+        assert "emissivity 0.9 of the front is assumed" in text
+    assert client_of(store).problem("GET", f"{address}1.2", 422)["parameter"] == "emissivity_back"
