@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
 NOT_STATED = "not stated"
 CONVENTION = "f_r [1/sr], the BRDF without the cosine; unit vectors of light and viewer point away from the surface"
+U_AXIS = "that along which the texture coordinate u grows, dp/du; a mesh needs texture coordinates"
 _MEASURED = "refractive index and extinction: refractiveindex.info, CC0 1.0"
 
 
@@ -79,6 +80,11 @@ def specular_remark(table: Table) -> tuple[str, ...]:
         return ()
     share = f"up to {table.specular.max():.4g} of the light"
     return (f"not in the file: the specular part, {share} in the exact mirror direction",)
+
+
+def frame_remark(table: Table, x_axis: str) -> tuple[str, ...]:
+    """Return a sentence on the x axis that programs give an anisotropic table; none for an isotropic table."""
+    return (f"anisotropic: the x axis of the table is {x_axis}",) if table.anisotropic else ()
 
 
 def extrapolated_remark(table: Table) -> tuple[str, ...]:

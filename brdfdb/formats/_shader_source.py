@@ -13,7 +13,7 @@ import numpy as np
 
 from brdfdb.errors import CannotHoldError
 from brdfdb.formats._channels import RGB, channels_of, has_spectrum
-from brdfdb.formats._record import CONVENTION, lines, record, specular_remark
+from brdfdb.formats._record import CONVENTION, frame_remark, lines, record, specular_remark
 from brdfdb.formats._written import Written, whole
 from brdfdb.parameters import Floats
 
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from brdfdb.tables.table import Table
 
 _FIT = "the functional fit of the paper, eqs 27 to 29, in place of the integrals over facets that the table holds"
+_X = "the x axis of wi and wr, which the caller chooses, such as the tangent of the geometry"
 _INDEX = "n", "k"  # of models with a refractive index
 _FRAME = "wi and wr are unit vectors towards light and viewer in the frame of the surface: x, y, and z its normal"
 
@@ -81,7 +82,7 @@ def write_source(
         return np.stack(values, axis=-1)
 
     error = Comparison(table, channels).error_of(evaluate)
-    remarks = (*remarks, *channels.remarks, *specular_remark(table))
+    remarks = (*remarks, *channels.remarks, *specular_remark(table), *frame_remark(table, _X))
     document = record(table, error, verdict, holds=CONVENTION, remarks=remarks)
     comments = [*lines(document), f"f_r [1/sr] of the model {model}, {channels.meaning}", _FRAME]
     text = "".join(f"// {_plain(line)}\n" for line in comments) + "\n" + source(model, parameters, language, table.name)

@@ -21,7 +21,7 @@ from brdfdb.errors import FileFormatError
 from brdfdb.formats._channels import RGB, channels_of, has_spectrum
 from brdfdb.formats._interface import TOLERANCE
 from brdfdb.formats._materialx_closures import OPEN_PBR, STANDARD, Surface
-from brdfdb.formats._record import document_of, record, specular_remark
+from brdfdb.formats._record import document_of, frame_remark, record, specular_remark
 from brdfdb.formats._written import Written, whole
 
 if TYPE_CHECKING:
@@ -111,7 +111,8 @@ def write(
     channels = channels_of(table, "rgb" if has_spectrum(table) else "grey")
     surface = _rounded(fitted(kind, table, channels))
     error = Comparison(table, channels).error_of(surface.brdf)
-    remarks = (_FITTED, *channels.remarks, *((_SMOOTH,) if surface.smooth else specular_remark(table)))
+    left_out = (_SMOOTH,) if surface.smooth else specular_remark(table)
+    remarks = (_FITTED, *channels.remarks, *left_out, *frame_remark(table, "the tangent of the geometry"))
     document = record(table, error, verdict, holds=HOLDS, remarks=remarks, tolerance=tolerance)
     text = _document(table.name, surface, json.dumps(document))
     with whole(path) as (temporary,):

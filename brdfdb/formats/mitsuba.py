@@ -21,7 +21,7 @@ import numpy as np
 
 from brdfdb.formats._beside import beside
 from brdfdb.formats._interface import Option
-from brdfdb.formats._record import record
+from brdfdb.formats._record import U_AXIS, frame_remark, record
 from brdfdb.formats._written import Written, whole
 
 if TYPE_CHECKING:
@@ -72,6 +72,7 @@ def write(table: Table, path: str | os.PathLike[str], *, plugin: str = MODEL, ve
         document = _of_model(table, source)
     elif plugin == MODEL:
         remarks = ("Mitsuba has no plugin of its model, and reads the table from the store that BRDFDB_STORE names",)
+    remarks = (*remarks, *frame_remark(table, U_AXIS))
     known = record(table, None, verdict, holds=HOLDS, remarks=remarks)
     text, dictionary = _xml(table.name, document, known), json.dumps({"id": table.name, **document}, indent=1)
     with whole(path, beside(Path(path))) as (first, second):

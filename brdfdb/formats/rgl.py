@@ -94,16 +94,18 @@ def write(
     WriteError
         If the file cannot be written.
     """
-    from brdfdb.formats._record import record, specular_remark
+    from brdfdb.formats._record import U_AXIS, frame_remark, record, specular_remark
     from brdfdb.formats._rgl_search import smallest
     from brdfdb.formats._rgl_tensor import write_tensors
     from brdfdb.formats._written import Written, whole
 
     path = Path(path)
     wavelengths = 0 if table.wavelength_nm is None else table.wavelength_nm.size
-    about = len(json.dumps(record(table, None, verdict, holds=HOLDS))) + _BESIDE + _BESIDE_EACH * wavelengths
+    frame = frame_remark(table, U_AXIS)
+    known = record(table, None, verdict, holds=HOLDS, remarks=frame)
+    about = len(json.dumps(known)) + _BESIDE + _BESIDE_EACH * wavelengths
     fit = smallest(table, kind, tolerance, 1e6 * megabytes - about, azimuth == "full")
-    remarks = (*fit.remarks, *specular_remark(table))
+    remarks = (*fit.remarks, *specular_remark(table), *frame)
     document = record(table, fit.error, verdict, holds=HOLDS, remarks=remarks, tolerance=tolerance)
     document["channels"] = list(fit.channels)
     fields = replace(fit.fields, description=json.dumps(document))

@@ -22,6 +22,7 @@ from brdfdb.tables.layout import Layout
 from brdfdb.tables.tabulation import tabulate
 from brdfdb_api.http.views import EXPORT_OPTIONS
 from tests.api.a_store import client_of
+from tests.formats.small_tables import ANISOTROPIC, GREY, small_table
 from tests.pipelines.command import Captured, run
 
 
@@ -143,3 +144,13 @@ def test_options_are_parsed_to_the_types_of_their_defaults() -> None:
     texts = {"kind": "lobe", "theta_i": "30", "half": "true"}
     assert parsed_options(EXPORTERS["exr"], texts) == {"kind": "lobe", "theta_i": 30.0, "half": True}
     assert [type(each.default) for each in options_of(EXPORTERS["exr"]).values()] == [str, float, float, bool]
+
+
+@pytest.mark.parametrize("file_format", ["glsl", "materialx", "mitsuba", "osl", "radiance", "rgl", "slang"])
+def test_files_for_renderers_state_the_frame_of_an_anisotropic_table_alone(tmp_path: Path, file_format: str) -> None:
+    path = tmp_path / f"a{EXPORTERS[file_format].suffix}"
+    coarse = {"tolerance": 1.0} if "tolerance" in options_of(EXPORTERS[file_format]) else {}
+    for kind in (ANISOTROPIC, GREY):
+        written = formats.write(small_table(kind), path, file_format, **coarse)
+        text = b"".join(part.read_bytes() for part in written.paths)
+        assert (b" x axis " in text) == (kind == ANISOTROPIC)

@@ -154,7 +154,7 @@ def test_files_with_all_azimuths_are_for_other_readers(tmp_path: Path) -> None:
     files = rgl.write(table, path, azimuth="full", tolerance=0.5, megabytes=MEGABYTES)
     phi_i = read_tensors(path)["phi_i"]
     assert (phi_i[0], phi_i[-1]) == (np.float32(-np.pi), np.float32(np.pi))  # what pbrt-v4 and RGL's loader ask for
-    assert files.remarks == ()
+    assert not any("azimuths" in remark for remark in files.remarks)
     assert files.error is not None
     read_back = formats.read(path)
     assert isinstance(read_back, FileTable)
