@@ -54,9 +54,10 @@ def write_slice(
     Notes
     -----
     Channels: R, G, B for viewers, and one a wavelength in the reflective layout of Fichet et al. (2021,
-    ``fichet2021``), ``T.550,0nm``. The pixels are f_r itself [1/sr], which can exceed 1; the specular part of a
-    mirror-like material is no part of f_r and not in the file. R, G, B are linear sRGB under D65 where the wavelengths
-    cover the visible range, else all three are the value, averaged over the wavelengths.
+    ``fichet2021``), ``T.550,0nm``; zeros in front, ``T.0550,0nm``, if others reach 1000 nm. The pixels are f_r itself
+    [1/sr], which can exceed 1; the specular part of a mirror-like material is no part of f_r and not in the file. R, G,
+    B are linear sRGB under D65 where the wavelengths cover the visible range, else all three are the value, averaged
+    over the wavelengths.
 
     The attributes begin with ``brdf:``. Angles and wavelengths are strings, as OpenEXR rounds a number to 32 bits; the
     pixel centres are a pair of 64 bit floats. ``brdf:error_p99`` is the relative error against the model that 99 of
@@ -122,8 +123,13 @@ def _decimals(wavelength_nm: NDArray[Any]) -> list[str]:
 
 
 def _spectral_channels(wavelength_nm: NDArray[Any]) -> list[str]:
-    """Return channel names such as ``T.550,0nm``; ValueError where two wavelengths would share one."""
-    names = [f"T.{text.replace('.', ',')}nm" for text in _decimals(wavelength_nm)]
+    """Return channel names such as ``T.550,0nm``; ValueError where two wavelengths would share one.
+
+    OpenEXR sorts channels by name: zeros in front, as in ``T.0950,0nm``, make that the order of wavelengths.
+    """
+    texts = _decimals(wavelength_nm)
+    longest = max(map(len, texts))
+    names = [f"T.{text.zfill(longest).replace('.', ',')}nm" for text in texts]
     repeated = sorted({name for name in names if names.count(name) > 1})
     if repeated:
         raise ParameterError("wavelength_nm", f"the wavelength of channel {repeated[0]} occurs twice")

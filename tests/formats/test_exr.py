@@ -174,8 +174,8 @@ def test_half_clips_to_the_largest_half_and_counts(tmp_path: Path) -> None:
     ("wavelength_nm", "names"),
     [
         ([550.0], ["T.550,0nm"]),
-        ([500.0, 632.8, 2000.0], ["T.500,0nm", "T.632,8nm", "T.2000,0nm"]),
-        ([550.0, 550.25, 1e5], ["T.550,00nm", "T.550,25nm", "T.100000,00nm"]),
+        ([500.0, 632.8, 2000.0], ["T.0500,0nm", "T.0632,8nm", "T.2000,0nm"]),
+        ([550.0, 550.25, 1e5], ["T.000550,00nm", "T.000550,25nm", "T.100000,00nm"]),
     ],
 )
 def test_channel_names_follow_the_spectral_layout(tmp_path: Path, wavelength_nm: list[float], names: list[str]) -> None:
@@ -186,6 +186,25 @@ def test_channel_names_follow_the_spectral_layout(tmp_path: Path, wavelength_nm:
     assert all(re.fullmatch(r"T\.\d+,\d+nm", name) for name in names)
     assert header["spectralLayoutVersion"] == "1.0"
     assert [float(text) for text in header["brdf:wavelength_nm"].split()] == wavelength_nm
+
+
+def test_channels_of_the_file_and_the_attribute_have_the_same_order(tmp_path: Path) -> None:
+    """OpenEXR lists channels by name: T.1000 stood before T.950, while the attribute began with 950."""
+    at = [402.5, 950.0, 1000.0, 1050.0]
+    source = table(ward_like, np.array(at), np.array([0.1, 0.2, 0.3, 0.4]))
+    image = slices.in_plane_slice(source)
+    _exr_file.write_slice(tmp_path / "slice.exr", image, source)
+    with OpenEXR.File(str(tmp_path / "slice.exr"), separate_channels=True) as file:
+        listed = [channel.name for channel in file.header()["channels"]]
+        pixels = {name: channel.pixels.copy() for name, channel in file.channels().items()}
+        stated = [float(text) for text in file.header()["brdf:wavelength_nm"].split()]
+    # Names as the reference implementation of the layout takes them apart
+    layout = re.compile(r"^T\.(\d*,?\d*([Ee][+-]?\d+)?)(Y|Z|E|P|T|G|M|k|h|da|d|c|m|u|n|p)?(m|Hz)$")
+    matches = [match for name in listed if (match := layout.match(name))]
+    assert [float(match[1].replace(",", ".")) for match in matches] == stated == at
+    assert all(match[3] + match[4] == "nm" for match in matches)
+    for index, match in enumerate(matches):
+        np.testing.assert_array_equal(pixels[match[0]], image.values[..., index])
 
 
 def test_equal_wavelengths_are_refused(tmp_path: Path) -> None:
