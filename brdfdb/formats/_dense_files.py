@@ -18,7 +18,7 @@ from brdfdb.errors import FileFormatError, ParameterError
 from brdfdb.formats._interface import TOLERANCE, Option
 from brdfdb.formats._json_tables import degrees_of
 from brdfdb.formats._nodes import samples_at_angles
-from brdfdb.formats._record import CONVENTION, record, specular_remark
+from brdfdb.formats._record import CONVENTION, history_of, record, specular_remark
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -70,7 +70,7 @@ def dataset(table: Table, dense: DenseTable, verdict: str | None) -> xr.Dataset:
     """Return a dense table as a Dataset: ``brdf``, the specular part, units and the record as attributes."""
     import xarray as xr
 
-    from brdfdb.tables.xarray_view import plain_attributes
+    from brdfdb.tables.xarray_view import plain_attributes, without_missing_coordinates
 
     at = dense.channels.wavelength_nm
     spectral = () if at is None else ("wavelength",)
@@ -89,7 +89,8 @@ def dataset(table: Table, dense: DenseTable, verdict: str | None) -> xr.Dataset:
         share = {"long_name": "reflectance of the specular part, in the exact mirror direction", "units": "1"}
         variables["specular_reflectance"] = (("specular_theta_i", *spectral), table.specular, share)
     known = dense_record(table, dense, verdict, specular=True)
-    return xr.Dataset(variables, coordinates, plain_attributes(known))
+    attributes = plain_attributes({**known, "history": history_of(known)})
+    return without_missing_coordinates(xr.Dataset(variables, coordinates, attributes))
 
 
 def record_of_attributes(attributes: Mapping[str, Any]) -> dict[str, Any]:

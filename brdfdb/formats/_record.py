@@ -82,6 +82,11 @@ def specular_remark(table: Table) -> tuple[str, ...]:
     return (f"not in the file: the specular part, {share} in the exact mirror direction",)
 
 
+def history_of(document: Mapping[str, Any]) -> str:
+    """Return the history of a file with a record, which netCDF files have by the CF conventions."""
+    return f"{document['program']}: exported from revision {document['revision']}"
+
+
 def frame_remark(table: Table, x_axis: str) -> tuple[str, ...]:
     """Return a sentence on the x axis that programs give an anisotropic table; none for an isotropic table."""
     return (f"anisotropic: the x axis of the table is {x_axis}",) if table.anisotropic else ()

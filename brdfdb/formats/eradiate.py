@@ -27,7 +27,7 @@ from brdfdb.formats._channels import at_wavelength
 from brdfdb.formats._dense_files import record_of_attributes
 from brdfdb.formats._interface import TOLERANCE, WAVELENGTH, Option
 from brdfdb.formats._nodes import samples_at_angles
-from brdfdb.formats._record import record, specular_remark
+from brdfdb.formats._record import history_of, record, specular_remark
 from brdfdb.formats._written import Written, whole
 from brdfdb.parameters import Floats
 
@@ -245,20 +245,22 @@ def _evaluated(values: NDArray[Any], wi: Floats, wr: Floats) -> Floats:
 def _coordinates(shape: tuple[int, ...]) -> dict[str, tuple[str, NDArray[np.float64], dict[str, str]]]:
     """Return the coordinates that Eradiate checks."""
     viewer, azimuths, light = shape
-    return {
-        "cos_theta_o": ("cos_theta_o", np.linspace(0.0, 1.0, viewer), {"units": "dimensionless"}),
-        "phi_d": ("phi_d", np.linspace(0.0, 2.0 * np.pi, azimuths, endpoint=False), {"units": "rad"}),
-        "cos_theta_i": ("cos_theta_i", np.linspace(0.0, 1.0, light), {"units": "dimensionless"}),
+    nodes = {
+        "cos_theta_o": (np.linspace(0.0, 1.0, viewer), "1", "cosine of the polar angle of the viewer"),
+        "phi_d": (np.linspace(0.0, 2.0 * np.pi, azimuths, endpoint=False), "rad", "azimuth between light and viewer"),
+        "cos_theta_i": (np.linspace(0.0, 1.0, light), "1", "cosine of the polar angle of the light"),
     }
+    return {name: (name, at, {"units": unit, "long_name": text}) for name, (at, unit, text) in nodes.items()}
 
 
 def _dataset(values: NDArray[np.float32], known: dict[str, Any]) -> xr.Dataset:
     import xarray as xr
 
-    from brdfdb.tables.xarray_view import plain_attributes
+    from brdfdb.tables.xarray_view import plain_attributes, without_missing_coordinates
 
     brdf = (_DIMS, values, {"units": "sr-1", "long_name": "bidirectional reflectance f_r", "comment": HOLDS})
-    return xr.Dataset({"brdf": brdf}, _coordinates(values.shape), plain_attributes(known))
+    attributes = plain_attributes({**known, "history": history_of(known)})
+    return without_missing_coordinates(xr.Dataset({"brdf": brdf}, _coordinates(values.shape), attributes))
 
 
 def _checked(opened: xr.Dataset, path: Path) -> NDArray[Any]:

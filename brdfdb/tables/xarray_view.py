@@ -39,6 +39,13 @@ def opened(store: Any) -> xr.Dataset:
     dataset.attrs = plain_attributes(dataset.attrs)
     if "wavelength" in dataset.coords:  # tables built earlier do not have the name
         dataset["wavelength"].attrs.setdefault("standard_name", "radiation_wavelength")
+    return without_missing_coordinates(dataset)
+
+
+def without_missing_coordinates(dataset: xr.Dataset) -> xr.Dataset:
+    """Return a dataset whose coordinates are written without ``_FillValue``, which CF forbids there (section 2.5.1)."""
+    for coordinate in dataset.coords.values():
+        coordinate.encoding["_FillValue"] = None
     return dataset
 
 

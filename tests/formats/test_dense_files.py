@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import io
+import json
+import os
+import subprocess
 import zipfile
 from pathlib import Path
 from typing import Any
@@ -10,15 +13,19 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
+from scipy.io import netcdf_file
 
+import brdfdb
 from brdfdb import formats
 from brdfdb.errors import FileFormatError, ParameterError, WriteError
-from brdfdb.formats import EXPORTERS, IMPORTERS
+from brdfdb.formats import EXPORTERS, IMPORTERS, eradiate, netcdf
 from brdfdb.formats._dense_grid import dense_table, rounded
 from brdfdb.formats._readings import FileTable
 from brdfdb.formats._stated_error import Comparison
 from brdfdb.geometry import radians
+from brdfdb.materials import Material
 from brdfdb.measurements.samples import Samples
+from brdfdb.store.publication import publish_dataset
 from brdfdb.tables.grids import (
     ANISOTROPIC_AXES,
     ANISOTROPIC_HALF_DIFFERENCE_AXES,
@@ -26,8 +33,11 @@ from brdfdb.tables.grids import (
     ISOTROPIC_AXES,
     directions,
 )
+from brdfdb.tables.layout import Layout
+from brdfdb.tables.tabulation import tabulate
 from tests.formats.small_tables import ANISOTROPIC, DIFFUSE, GREY, SMOOTH, SPECTRAL, SPECULAR, small_table
 
+CF_CHECKER = os.environ.get("BRDFDB_CF")  # the program compliance-checker
 FORMATS = ("netcdf", "zarr", "numpy", "csv")
 TRIPS = [
     (GREY, "netcdf"),
@@ -206,3 +216,40 @@ def test_what_cannot_be_written_is_refused(tmp_path: Path) -> None:
                 small_table(DIFFUSE), tmp_path / "file" / f"x{EXPORTERS[name].suffix}", resolution=45.0
             )
     assert [path.name for path in tmp_path.iterdir()] == ["file"]
+
+
+def netcdf_files(folder: Path) -> list[Path]:
+    """Write all that becomes netCDF and names the CF conventions: two kinds of export, and a table of a store."""
+    paths = [folder / f"{kind}.nc" for kind in (ANISOTROPIC, SPECTRAL)]
+    for kind, path in zip((ANISOTROPIC, SPECTRAL), paths, strict=True):
+        netcdf.write(small_table(kind), path, resolution=30.0)
+    eradiate.write(small_table(DIFFUSE), folder / "eradiate.nc", nodes=9)
+    table = small_table(SPECTRAL)
+    assert isinstance(table.source, Material)
+    publish_dataset(folder / "store", "copper", tabulate(Layout(table.source, table.grid, table.wavelength_nm)))
+    brdfdb.open(folder / "store").dataset("copper").to_netcdf(folder / "store.nc", engine="scipy")
+    return [*paths, folder / "eradiate.nc", folder / "store.nc"]
+
+
+def test_coordinates_of_netcdf_files_have_no_fill_value(tmp_path: Path) -> None:
+    for path in netcdf_files(tmp_path):
+        with netcdf_file(path, mmap=False) as file:
+            coordinates = [name for name in file.dimensions if name in file.variables]
+            assert len(coordinates) >= 3
+            assert not any(hasattr(file.variables[name], "_FillValue") for name in coordinates)
+
+
+@pytest.mark.skipif(CF_CHECKER is None, reason="BRDFDB_CF names no compliance-checker")
+def test_the_checker_of_the_cf_conventions_finds_no_fault(tmp_path: Path) -> None:
+    assert CF_CHECKER is not None
+    paths = netcdf_files(tmp_path)
+    command = [CF_CHECKER, "--test", "cf:1.11", "--format", "json_new", "--output", str(tmp_path / "faults.json")]
+    subprocess.run([*command, *map(str, paths)], capture_output=True, check=False)
+    found = json.loads((tmp_path / "faults.json").read_text(encoding="utf-8"))
+    assert len(found) == len(paths)
+    for path in paths:
+        entries = found[str(path)]["cf:1.11"]
+        assert entries["scored_points"] > 50
+        recommended = ["medium_priorities"] if path.name != "store.nc" else []  # it has no history yet
+        some = [part for key in ("high_priorities", *recommended) for part in entries[key]]
+        assert [text for part in some for text in part["msgs"]] == [], path

@@ -51,7 +51,7 @@ def test_each_node_has_its_place_in_the_file(tmp_path: Path) -> None:
         assert brdf.dims == ("cos_theta_o", "phi_d", "cos_theta_i")
         assert brdf.shape == (5, 6, 5)
         assert np.allclose(opened["phi_d"], 2.0 * np.pi * np.arange(6) / 6)
-        assert [opened[name].attrs["units"] for name in brdf.dims] == ["dimensionless", "rad", "dimensionless"]
+        assert [opened[name].attrs["units"] for name in brdf.dims] == ["1", "rad", "1"]
         expected = table.lookup(np.arccos(0.25), 0.0, np.arccos(0.75), np.pi / 3)
         assert brdf[3, 1, 1].item() == brdf[3, 5, 1].item() == pytest.approx(float(expected), rel=1e-6)
 
