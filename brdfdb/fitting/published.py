@@ -23,6 +23,7 @@ from brdfdb.materials.provenance import MOST_NAME
 from brdfdb.materials.recipe_text import toml_of
 from brdfdb.measurements.measured_source import slug
 from brdfdb.models import MODELS
+from brdfdb.place import path_of
 
 SUFFIX = ".fit"
 CHANNELS = ("R", "G", "B")
@@ -85,7 +86,7 @@ def read_published(path: str | os.PathLike[str]) -> PublishedFits:
     OSError
         If it cannot be read.
     """
-    path = Path(path)
+    path = path_of(path)
     if path.stat().st_size > _MOST_BYTES:
         raise FileFormatError(f"{path}: it has more than {_MOST_BYTES} bytes, too many for a list of fits")
     try:

@@ -21,6 +21,7 @@ from brdfdb.errors import FileFormatError, ParameterError
 from brdfdb.formats._input import check_file
 from brdfdb.formats._interface import Exporter, Importer, Option, options_of, parsed_options, schema_of
 from brdfdb.formats._stated import AZIMUTHS, at_wavelength, from_forward
+from brdfdb.place import path_of
 
 if TYPE_CHECKING:
     from brdfdb.formats._readings import FileTable
@@ -107,7 +108,7 @@ def write(
         )
     exporter = EXPORTERS[file_format]
     parsed = parsed_options(exporter, {name: _text(value) for name, value in options.items()})
-    return exporter.write(table, Path(path), verdict=verdict, **parsed)
+    return exporter.write(table, path_of(path), verdict=verdict, **parsed)
 
 
 def served_options(file_format: str) -> dict[str, Option]:
@@ -191,7 +192,7 @@ def read(
     """
     if azimuth not in AZIMUTHS:
         raise ParameterError("azimuth", f"{azimuth!r} is not one of {', '.join(AZIMUTHS)}", azimuth, AZIMUTHS)
-    path = Path(path)
+    path = path_of(path)
     importer = _importer(path, file_format, keywords)
     try:
         reading: FileTable | Samples = importer.read(path, **keywords)
@@ -259,7 +260,7 @@ def members(path: str | os.PathLike[str], file_format: str = "", **keywords: Any
 
     Parameters and errors are those of `read`.
     """
-    path = Path(path)
+    path = path_of(path)
     keywords = {name: value for name, value in keywords.items() if name not in ("azimuth", "wavelength_nm")}
     importer = _importer(path, file_format, keywords)
     return importer.members(path) if hasattr(importer, "members") else []

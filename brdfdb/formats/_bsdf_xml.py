@@ -13,6 +13,7 @@ from xml.sax.saxutils import escape
 from brdfdb.errors import FileFormatError
 from brdfdb.formats._input import check_size
 from brdfdb.formats._record import lines, of_lines
+from brdfdb.place import path_of
 
 # Names of the sides in these files are those of WINDOW, whose front is outdoors. Radiance's front is the back
 FRONT_OF_RADIANCE = "Reflection Back"
@@ -161,6 +162,7 @@ def read(path: str | os.PathLike[str], side: str = FRONT_OF_RADIANCE) -> BsdfFil
     OSError
         If it cannot be read.
     """
+    path = path_of(path)
     try:
         root = _root(path)
     except FileFormatError:
@@ -182,7 +184,7 @@ def read(path: str | os.PathLike[str], side: str = FRONT_OF_RADIANCE) -> BsdfFil
         of_radiance = ", which is Radiance's front" if side == FRONT_OF_RADIANCE else ""
         raise FileFormatError(f"{path}: it has no {VISIBLE} block of {side}{of_radiance}")
     return BsdfFile(
-        _text(layer, "Material/{*}Name") or Path(path).stem,
+        _text(layer, "Material/{*}Name") or path.stem,
         _text(definition, "IncidentDataStructure"),
         definition,
         of_lines(_text(definition, "Comments").splitlines()),
@@ -190,11 +192,11 @@ def read(path: str | os.PathLike[str], side: str = FRONT_OF_RADIANCE) -> BsdfFil
     )
 
 
-def _root(path: str | os.PathLike[str]) -> ElementTree.Element:
+def _root(path: Path) -> ElementTree.Element:
     """Return the root of a document, which is parsed in pieces: the first one that is no XML ends it."""
-    check_size(Path(path), _MOST_BYTES)
+    check_size(path, _MOST_BYTES)
     parser, end = ElementTree.XMLParser(), b""
-    with open(path, "rb") as file:
+    with path.open("rb") as file:
         if not is_window_element(file.read(_HEAD_BYTES)):
             raise FileFormatError(f"{path}: line 1: it does not begin with a WindowElement")
         file.seek(0)

@@ -19,6 +19,7 @@ from brdfdb.formats._interface import TOLERANCE, Option
 from brdfdb.formats._json_tables import degrees_of
 from brdfdb.formats._nodes import samples_at_angles
 from brdfdb.formats._record import CONVENTION, history_of, record, specular_remark
+from brdfdb.place import path_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -203,7 +204,7 @@ def file_table(
             f"{path}: brdf holds holes alone, or values that are not finite, or above those of 32 bits"
         )
     channels = ("grey",) if at is None else tuple(f"{value:g}nm" for value in at)
-    name = str(known.get("name") or Path(path).stem)
+    name = str(known.get("name") or path_of(path).stem)
 
     def nodes() -> Samples:
         angles = np.stack(np.broadcast_arrays(*grid.directions()), axis=-1).reshape(-1, 4)

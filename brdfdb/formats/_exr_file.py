@@ -15,6 +15,7 @@ from brdfdb.errors import ParameterError, WriteError
 from brdfdb.formats._pictures import rgb_of
 from brdfdb.formats._record import record, specular_remark
 from brdfdb.formats._written import Written, whole
+from brdfdb.place import path_of
 from brdfdb.tables.slices import Slice
 from brdfdb.tables.table import Table
 
@@ -63,7 +64,7 @@ def write_slice(
     pixel centres are a pair of 64 bit floats. ``brdf:error_p99`` is the relative error against the model that 99 of
     100 values of the table stay within, as the table states it.
     """
-    path = Path(path)
+    path = path_of(path)
     rgb, rgb_meaning = rgb_of(image)
     pixels = {name: rgb[..., index] for index, name in enumerate("RGB")}
     header = _attributes(image, table)
@@ -153,4 +154,4 @@ def write_sphere(path: str | os.PathLike[str], table: Table, half: bool = False,
     linear[..., :3] *= linear[..., 3:]
     linear = np.minimum(linear, HALF_MAX).astype(np.float16 if half else np.float32)
     header = {"brdf:material": str(table.name), "brdf:record": json.dumps(record(table, None, verdict, holds=LIT))}
-    return _write(Path(path), header, {name: linear[..., index] for index, name in enumerate("RGBA")})
+    return _write(path_of(path), header, {name: linear[..., index] for index, name in enumerate("RGBA")})

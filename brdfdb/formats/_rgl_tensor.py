@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.errors import FileFormatError
+from brdfdb.place import path_of
 
 MAGIC = b"tensor_file\0"
 _VERSION = bytes((1, 0))
@@ -54,7 +55,7 @@ def read_tensors(path: str | os.PathLike[str]) -> dict[str, NDArray[Any]]:
     OSError
         If it cannot be read.
     """
-    with Path(path).open("rb") as file:
+    with path_of(path).open("rb") as file:
         if not file.read(1):
             raise FileFormatError(f"{path}: it is no tensor file")
         content = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)  # files of Mueller matrices have a gigabyte

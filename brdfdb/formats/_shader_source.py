@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from string import Template
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +15,7 @@ from brdfdb.formats._channels import RGB, channels_of, has_spectrum
 from brdfdb.formats._record import CONVENTION, frame_remark, lines, record, specular_remark
 from brdfdb.formats._written import Written, whole
 from brdfdb.parameters import Floats
+from brdfdb.place import path_of
 
 if TYPE_CHECKING:
     from brdfdb.formats._channels import Channels
@@ -88,7 +88,7 @@ def write_source(
     text = "".join(f"// {_plain(line)}\n" for line in comments) + "\n" + source(model, parameters, language, table.name)
     with whole(path) as (temporary,):
         temporary.write_text(text, encoding="utf-8")
-    return Written((Path(path),), error, remarks=remarks)
+    return Written((path_of(path),), error, remarks=remarks)
 
 
 def source(model: str, parameters: Mapping[str, Any], language: Language, name: str) -> str:

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from brdfdb.errors import WriteError
+from brdfdb.place import path_of
 
 if TYPE_CHECKING:
     from brdfdb.formats._stated_error import FileError
@@ -71,7 +72,7 @@ def whole(*paths: str | os.PathLike[str]) -> Iterator[tuple[Path, ...]]:
         If one of them cannot be written: the directory is missing or a file, the disk is full, the name is that of a
         directory. A zarr group, a directory, is replaced by another one only, and not if it holds other files.
     """
-    final = tuple(Path(path) for path in paths)
+    final = tuple(path_of(path) for path in paths)
     mark = uuid.uuid4().hex
     halves = tuple(path.with_name(f".{mark}{path.suffix}") for path in final)
     try:

@@ -27,6 +27,7 @@ from brdfdb.formats._nodes import samples_at_angles
 from brdfdb.formats._record import lines, of_lines, record, specular_remark
 from brdfdb.formats._text_file import lines_of
 from brdfdb.formats._written import Written, whole
+from brdfdb.place import path_of
 
 if TYPE_CHECKING:
     from brdfdb.formats._readings import FileTable
@@ -108,7 +109,7 @@ def write(
     )
     with whole(path) as (file,), file.open("wb") as stream:
         write_all(stream, grid, error)
-    return Written((Path(path),), error, tolerance, remarks)
+    return Written((path_of(path),), error, tolerance, remarks)
 
 
 def recognises(head: bytes) -> bool:
@@ -128,7 +129,7 @@ def read(path: str | os.PathLike[str]) -> FileTable | Samples:
     """
     from brdfdb.formats._readings import FileTable
 
-    path = Path(path)
+    path = path_of(path)
     comments, names, rows = _parsed(path)
     document = of_lines(comments)
     at = _wavelengths(names)

@@ -27,6 +27,7 @@ from brdfdb.formats._interface import TOLERANCE, Option
 from brdfdb.formats._json_tables import MOST_BYTES, column, degrees_of, parsed, title_of
 from brdfdb.formats._record import specular_remark
 from brdfdb.formats._written import Written, whole
+from brdfdb.place import path_of
 
 if TYPE_CHECKING:
     from brdfdb.formats._readings import FileTable
@@ -117,7 +118,7 @@ def write(
     document = {"metadata": _metadata(table, known), "data": data}
     with whole(path) as (half,):
         half.write_text(json.dumps(document, ensure_ascii=False, separators=(",", ":")), encoding="utf-8")
-    return Written((Path(path),), dense.error, dense.tolerance, specular_remark(table))
+    return Written((path_of(path),), dense.error, dense.tolerance, specular_remark(table))
 
 
 def recognises(head: bytes) -> bool:
@@ -133,7 +134,7 @@ def read(path: str | os.PathLike[str]) -> FileTable | Samples:
     FileFormatError
         If the file is no JSON, or lacks a list, or lists of different lengths stand in it.
     """
-    path = Path(path)
+    path = path_of(path)
     document = parsed(path)
     data, metadata = document.get("data"), document.get("metadata")
     lists = _lists(path, data if isinstance(data, dict) else {})

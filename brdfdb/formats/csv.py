@@ -26,6 +26,7 @@ from brdfdb.formats._dense_files import OPTIONS, dense_record, reading_of_rows
 from brdfdb.formats._record import lines, of_lines, specular_remark
 from brdfdb.formats._text_file import lines_of
 from brdfdb.formats._written import Written, whole
+from brdfdb.place import path_of
 
 if TYPE_CHECKING:
     from brdfdb.formats._readings import FileTable
@@ -100,7 +101,7 @@ def write(
             file.writelines(
                 f"{start},{last},{','.join(map(repr, row))}\n" for last, row in zip(columns[-1], numbers, strict=True)
             )
-    return Written((Path(path),), dense.error, dense.tolerance, specular_remark(table))
+    return Written((path_of(path),), dense.error, dense.tolerance, specular_remark(table))
 
 
 def recognises(head: bytes) -> bool:
@@ -129,7 +130,7 @@ def read(path: str | os.PathLike[str]) -> FileTable | Samples:
     """
     from brdfdb.measurements.samples import Samples
 
-    path = Path(path)
+    path = path_of(path)
     comments: list[str] = []
     numbered = lines_of(path)
     first, line = 0, ""

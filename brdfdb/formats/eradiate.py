@@ -30,6 +30,7 @@ from brdfdb.formats._nodes import samples_at_angles
 from brdfdb.formats._record import history_of, record, specular_remark
 from brdfdb.formats._written import Written, whole
 from brdfdb.parameters import Floats
+from brdfdb.place import path_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -126,7 +127,7 @@ def write(
     known["wavelength_nm"] = None if channels.wavelength_nm is None else float(channels.wavelength_nm[0])
     with whole(path) as (half,):
         _dataset(values, known).to_netcdf(half, engine="scipy", format="NETCDF3_64BIT")
-    return Written((Path(path),), error, wanted, remarks)
+    return Written((path_of(path),), error, wanted, remarks)
 
 
 def recognises(head: bytes) -> bool:
@@ -147,15 +148,16 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     from brdfdb.formats._readings import FileTable
 
     import_extra("scipy.io")
+    path = path_of(path)
     try:
         with xr.open_dataset(path, engine="scipy") as opened:
-            values, known = _checked(opened, Path(path)), record_of_attributes(opened.attrs)
+            values, known = _checked(opened, path), record_of_attributes(opened.attrs)
     except (FileFormatError, FileNotFoundError):
         raise
     except Exception as error:  # SciPy raises what its parser comes to
         first = str(error).partition("\n")[0]
         raise FileFormatError(f"{path}: it is no netCDF 3 file, or is damaged ({first})") from error
-    name, nm = str(known.get("name") or Path(path).stem), known.get("wavelength_nm")
+    name, nm = str(known.get("name") or path.stem), known.get("wavelength_nm")
     at = np.array([float(nm)]) if isinstance(nm, int | float) else None
     channels = ("grey",) if at is None else (f"{at[0]:g}nm",)
     nodes = functools.partial(_samples, values, name, channels, at, known)

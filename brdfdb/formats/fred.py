@@ -33,6 +33,7 @@ from brdfdb.formats._record import record, specular_remark
 from brdfdb.formats._text_end import check_last_number, doubt_end, has_open_end
 from brdfdb.formats._text_file import lines_of
 from brdfdb.formats._written import Written, whole
+from brdfdb.place import path_of
 
 if TYPE_CHECKING:
     from brdfdb.formats._readings import FileTable
@@ -95,7 +96,7 @@ def write(
     if table.anisotropic:
         raise CannotHoldError(f"{table.name}: is anisotropic, and this format is written for isotropic tables only")
     comparison = Comparison(table, at_wavelength(table, wavelength))
-    path = Path(path)
+    path = path_of(path)
     remarks = (*specular_remark(table), *comparison.channels.remarks)
     at = comparison.channels.wavelength_nm
 
@@ -140,7 +141,7 @@ def read(path: str | os.PathLike[str]) -> FileTable | Samples:
     """
     from brdfdb.formats._readings import FileTable
 
-    path = Path(path)
+    path = path_of(path)
     rows = _rows(path)
     known = record_beside(path)
     if known.get("rows", len(rows)) != len(rows):

@@ -11,13 +11,13 @@ from __future__ import annotations
 
 import json
 import os
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from brdfdb.errors import FileFormatError, ParameterError, WriteError
 from brdfdb.formats._written import whole
+from brdfdb.place import path_of
 
 if TYPE_CHECKING:
     from brdfdb.measurements.gonioreflectometer import Picture
@@ -50,6 +50,7 @@ def write_picture(picture: Picture, path: str | os.PathLike[str]) -> None:
 
     from brdfdb.geometry import degrees
 
+    path = path_of(path)
     document = {
         "name": picture.name,
         "provenance": picture.provenance,
@@ -90,7 +91,7 @@ def read_picture(path: str | os.PathLike[str]) -> Picture:
     from brdfdb.geometry import radians
     from brdfdb.measurements.gonioreflectometer import Gonioreflectometer, Picture
 
-    path = Path(path)
+    path = path_of(path)
     if path.stat().st_size > _MOST_BYTES:
         raise FileFormatError(f"{path}: it is larger than {_MOST_BYTES >> 20} MiB")
     try:

@@ -16,7 +16,6 @@ from __future__ import annotations
 
 import json
 import os
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -30,6 +29,7 @@ from brdfdb.formats._nodes import samples_of_grid
 from brdfdb.formats._record import document_of, record, specular_remark
 from brdfdb.formats._rgl_tensor import MAGIC, read_tensors, write_tensors
 from brdfdb.formats._written import Written, whole
+from brdfdb.place import path_of
 
 if TYPE_CHECKING:
     from brdfdb.formats._mueller_grid import MuellerGrid
@@ -100,7 +100,7 @@ def write(
     document["error_of_elements"] = {"p99": float(f"{1.005 * made.element_p99:.3g}")}
     with whole(path) as (temporary,):
         write_tensors(temporary, _tensors(made, json.dumps(document)))
-    return Written((Path(path),), made.error, tolerance, remarks)
+    return Written((path_of(path),), made.error, tolerance, remarks)
 
 
 def _channels(table: Table) -> Channels:
@@ -159,7 +159,7 @@ def read(path: str | os.PathLike[str]) -> Samples:
     Names, shapes and directions as in Mitsuba's ``measured_polarized``: the axes of M are phi_d, theta_d, theta_h, the
     wavelength, and those of the Mueller matrix.
     """
-    path = Path(path)
+    path = path_of(path)
     tensors = read_tensors(path)
     for name in (*_AXES, "wvls", "M"):
         if name not in tensors:

@@ -14,7 +14,6 @@ import itertools
 import os
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator, Mapping
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -28,6 +27,7 @@ from brdfdb.formats._klems_basis import BASES, FLIPPED, Basis, averages
 from brdfdb.formats._nodes import samples_at_vectors
 from brdfdb.formats._written import Written, whole
 from brdfdb.parameters import Floats
+from brdfdb.place import path_of
 
 if TYPE_CHECKING:
     from brdfdb.formats._readings import FileTable
@@ -136,7 +136,7 @@ def write(
         file.writelines(
             _bsdf_xml.text_of(table.name, title, _material(emissivity), definition, _blocks(basis, texts), document)
         )
-    return Written((Path(path),), error, tolerance, remarks)
+    return Written((path_of(path),), error, tolerance, remarks)
 
 
 def _completed(table: Table, emissivity: dict[str, float]) -> tuple[str, ...]:

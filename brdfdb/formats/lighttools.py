@@ -8,7 +8,6 @@ degrees (libbsdf, ``LightToolsBsdfReader.cpp``). Blocks of the front with the ty
 from __future__ import annotations
 
 import os
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,6 +18,7 @@ from brdfdb.formats._channels import XYZ
 from brdfdb.formats._nodes import samples_of_grid
 from brdfdb.formats._record import of_lines
 from brdfdb.formats._words import Words
+from brdfdb.place import path_of
 
 if TYPE_CHECKING:
     from brdfdb.measurements.samples import Samples
@@ -50,7 +50,7 @@ def read(path: str | os.PathLike[str]) -> Samples:
     """
     from brdfdb.formats._angles import Spherical
 
-    path = Path(path)
+    path = path_of(path)
     words = Words(path)
     lists = _lists(words)
     blocks = _blocks(words, lists["ScatterAzimuth"].size * lists["ScatterRadial"].size)

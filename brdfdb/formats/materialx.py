@@ -23,6 +23,7 @@ from brdfdb.formats._interface import TOLERANCE
 from brdfdb.formats._materialx_closures import OPEN_PBR, STANDARD, Surface
 from brdfdb.formats._record import document_of, frame_remark, record, specular_remark
 from brdfdb.formats._written import Written, whole
+from brdfdb.place import path_of
 
 if TYPE_CHECKING:
     from brdfdb.formats._readings import FileTable
@@ -117,7 +118,7 @@ def write(
     text = _document(table.name, surface, json.dumps(document))
     with whole(path) as (temporary,):
         temporary.write_text(text, encoding="utf-8")
-    return Written((Path(path),), error, tolerance, remarks)
+    return Written((path_of(path),), error, tolerance, remarks)
 
 
 def recognises(head: bytes) -> bool:
@@ -138,7 +139,7 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     """
     from brdfdb.formats._readings import FileTable
 
-    path = Path(path)
+    path = path_of(path)
     with path.open("rb") as file:
         text = file.read(_LARGEST + 1)
     if len(text) > _LARGEST:

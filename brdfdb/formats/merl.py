@@ -12,7 +12,6 @@ from __future__ import annotations
 import functools
 import json
 import os
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -28,6 +27,7 @@ from brdfdb.formats._nodes import samples_of_grid
 from brdfdb.formats._record import record, specular_remark
 from brdfdb.formats._written import Written, whole
 from brdfdb.parameters import Floats
+from brdfdb.place import path_of
 
 if TYPE_CHECKING:
     from brdfdb.formats._readings import FileTable
@@ -115,7 +115,7 @@ def write(
     remarks = (*channels.remarks, *specular_remark(table))
     holds = _HOLDS + ("centres of bins" if samples == "centres" else "lower edges of bins")
     document = record(table, error, verdict, holds=holds, remarks=remarks, tolerance=tolerance)
-    paths = Path(path), beside(Path(path))
+    paths = path_of(path), beside(path_of(path))
     with whole(*paths) as (file, beside_it):
         file.write_bytes(_HEADER + planes.astype("<f8").tobytes())
         beside_it.write_text(json.dumps(document | {"samples": samples}, indent=1) + "\n", encoding="utf-8")
@@ -139,7 +139,7 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     """
     from brdfdb.formats._readings import FileTable
 
-    path = Path(path)
+    path = path_of(path)
     with path.open("rb") as file:
         size = os.fstat(file.fileno()).st_size
         if file.read(len(_HEADER)) != _HEADER or size != _BYTES:

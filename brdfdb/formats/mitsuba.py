@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import json
 import os
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree
 
@@ -23,6 +22,7 @@ from brdfdb.formats._beside import beside
 from brdfdb.formats._interface import Option
 from brdfdb.formats._record import U_AXIS, frame_remark, record
 from brdfdb.formats._written import Written, whole
+from brdfdb.place import path_of
 
 if TYPE_CHECKING:
     from brdfdb.materials import Material
@@ -75,10 +75,10 @@ def write(table: Table, path: str | os.PathLike[str], *, plugin: str = MODEL, ve
     remarks = (*remarks, *frame_remark(table, U_AXIS))
     known = record(table, None, verdict, holds=HOLDS, remarks=remarks)
     text, dictionary = _xml(table.name, document, known), json.dumps({"id": table.name, **document}, indent=1)
-    with whole(path, beside(Path(path))) as (first, second):
+    with whole(path, beside(path_of(path))) as (first, second):
         first.write_text(text, encoding="utf-8")
         second.write_text(dictionary + "\n", encoding="utf-8")
-    return Written((Path(path), beside(Path(path))), remarks=remarks)
+    return Written((path_of(path), beside(path_of(path))), remarks=remarks)
 
 
 def recognises(head: bytes) -> bool:

@@ -10,12 +10,12 @@ take 100 MB at most: a table that needs more is written with the error it has.
 from __future__ import annotations
 
 import os
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from brdfdb.errors import FileFormatError, import_extra
 from brdfdb.formats._dense_files import OPTIONS, dataset, read_dataset
 from brdfdb.formats._written import Written, whole
+from brdfdb.place import path_of
 
 if TYPE_CHECKING:
     from brdfdb.formats._readings import FileTable
@@ -73,7 +73,7 @@ def write(
     dense = dense_table(table, tolerance, axes=axes, resolution=resolution)
     with whole(path) as (half,):
         dataset(table, dense, verdict).to_netcdf(half, engine="scipy", format="NETCDF3_64BIT")
-    return Written((Path(path),), dense.error, dense.tolerance)
+    return Written((path_of(path),), dense.error, dense.tolerance)
 
 
 def recognises(head: bytes) -> bool:
@@ -92,9 +92,10 @@ def read(path: str | os.PathLike[str]) -> FileTable | Samples:
     import xarray as xr
 
     import_extra("scipy.io")
+    path = path_of(path)
     try:
         with xr.open_dataset(path, engine="scipy") as opened:
-            return read_dataset(Path(path), opened)
+            return read_dataset(path, opened)
     except (FileFormatError, FileNotFoundError):
         raise
     except Exception as error:  # SciPy raises what its parser comes to

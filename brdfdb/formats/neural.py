@@ -24,6 +24,7 @@ from brdfdb.formats._angles import HalfDifference, Spherical
 from brdfdb.formats._channels import RGB
 from brdfdb.formats._nodes import samples_of_grid
 from brdfdb.parameters import Floats
+from brdfdb.place import path_of
 
 if TYPE_CHECKING:
     from brdfdb.formats._readings import FileTable
@@ -79,7 +80,7 @@ def read(path: str | os.PathLike[str], member: str = "") -> FileTable:
     """
     from brdfdb.formats._readings import FileTable
 
-    path = Path(path)
+    path = path_of(path)
     name, content = _content(path, member)
     layers = _layers(f"{path}: {name}" if name != path.stem else f"{path}", content)
     evaluate = functools.partial(_evaluated, layers)
@@ -131,7 +132,7 @@ def members(path: str | os.PathLike[str]) -> list[str]:
     FileFormatError
         If the archive is damaged, or holds no network.
     """
-    path = Path(path)
+    path = path_of(path)
     with path.open("rb") as file:
         if file.read(len(_ZIP)) != _ZIP:
             return []

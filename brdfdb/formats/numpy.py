@@ -13,7 +13,6 @@ import io
 import json
 import os
 import zipfile
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -23,6 +22,7 @@ from brdfdb.errors import FileFormatError
 from brdfdb.formats._dense_files import OPTIONS, dense_record, file_table
 from brdfdb.formats._record import document_of, specular_remark
 from brdfdb.formats._written import Written, whole
+from brdfdb.place import path_of
 
 if TYPE_CHECKING:
     from brdfdb.formats._readings import FileTable
@@ -88,7 +88,7 @@ def write(
     arrays["brdf"] = dense.values[..., 0] if at is None else dense.values
     with whole(path) as (half,), half.open("wb") as file:
         np.savez(file, allow_pickle=False, **arrays)
-    return Written((Path(path),), dense.error, dense.tolerance)
+    return Written((path_of(path),), dense.error, dense.tolerance)
 
 
 def recognises(head: bytes) -> bool:
@@ -106,7 +106,7 @@ def read(path: str | os.PathLike[str]) -> FileTable | Samples:
     FileFormatError
         If the file is damaged, lacks an array, or holds more than 512 MiB of values.
     """
-    path = Path(path)
+    path = path_of(path)
     try:
         with zipfile.ZipFile(path) as archive:
             names = [str(name) for name in _array(archive, "axes", _MOST_OTHER)]

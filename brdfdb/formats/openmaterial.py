@@ -15,7 +15,6 @@ import math
 import os
 import re
 import uuid
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -27,6 +26,7 @@ from brdfdb.formats._interface import TOLERANCE, Option
 from brdfdb.formats._json_tables import MOST_BYTES, degrees_of, parsed, title_of
 from brdfdb.formats._record import specular_remark
 from brdfdb.formats._written import Written, whole
+from brdfdb.place import path_of
 
 if TYPE_CHECKING:
     from brdfdb.formats._readings import FileTable
@@ -118,7 +118,7 @@ def write(
                     file.write(separator + ",\n".join(f"{start}{a}{f!r}]" for a, f in zip(azimuths, row, strict=True)))
                     separator = ",\n"
         file.write("]}}\n")
-    return Written((Path(path),), dense.error, dense.tolerance, remarks)
+    return Written((path_of(path),), dense.error, dense.tolerance, remarks)
 
 
 def recognises(head: bytes) -> bool:
@@ -136,7 +136,7 @@ def read(path: str | os.PathLike[str]) -> FileTable | Samples:
     """
     from brdfdb.measurements.samples import Instrument
 
-    path = Path(path)
+    path = path_of(path)
     document = parsed(path)
     brdf, metadata = document.get("brdf"), document.get("metadata")
     metadata = metadata if isinstance(metadata, dict) else {}

@@ -17,6 +17,7 @@ from brdfdb.errors import FileFormatError
 from brdfdb.formats._channels import LUMINOUS, XYZ
 from brdfdb.formats._nodes import samples_at_angles
 from brdfdb.formats._text_file import lines_of
+from brdfdb.place import path_of
 
 if TYPE_CHECKING:
     from brdfdb.measurements.samples import Samples
@@ -45,7 +46,7 @@ def read(path: str | os.PathLike[str]) -> Samples:
     -----
     The lines of the header are those that ``pabopto2bsdf`` of Radiance knows. The side of the light is the front.
     """
-    path = Path(path)
+    path = path_of(path)
     header: dict[str, str] = {}
     numbers, count = array("d"), 0
     for line_number, line in lines_of(path):

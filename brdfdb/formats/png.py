@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import json
 import os
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,6 +19,7 @@ from brdfdb.errors import import_extra
 from brdfdb.formats._interface import Option
 from brdfdb.formats._record import record
 from brdfdb.formats._written import Written, whole
+from brdfdb.place import path_of
 
 if TYPE_CHECKING:
     from brdfdb.tables.table import Table
@@ -101,4 +101,4 @@ def write(
     }
     with whole(path) as (temporary,):
         imsave(temporary, np.round(255.0 * pixels).astype(np.uint8), format="png", metadata=texts)
-    return Written((Path(path),))
+    return Written((path_of(path),))

@@ -14,7 +14,6 @@ import functools
 import os
 from collections.abc import Mapping
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -31,6 +30,7 @@ from brdfdb.formats._tensor_growth import Growth
 from brdfdb.formats._tensor_tree import Tree, parsed, rounded
 from brdfdb.formats._written import Written, whole
 from brdfdb.parameters import Floats
+from brdfdb.place import path_of
 
 if TYPE_CHECKING:
     from brdfdb.formats._channels import Channels
@@ -114,7 +114,7 @@ def write(
     from brdfdb.formats._record import record, specular_remark
     from brdfdb.formats._stated_error import FLOOR, Comparison
 
-    path = Path(path)
+    path = path_of(path)
     channels = channels_of(table, "auto")
     comparison = Comparison(table, channels)
     trees, error = _grown(table, channels, comparison, tolerance, cells)

@@ -14,13 +14,13 @@ import functools
 import json
 import os
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.formats._interface import MEGABYTES, TOLERANCE, Option
+from brdfdb.place import path_of
 
 if TYPE_CHECKING:
     from brdfdb.formats._readings import FileTable
@@ -99,7 +99,7 @@ def write(
     from brdfdb.formats._rgl_tensor import write_tensors
     from brdfdb.formats._written import Written, whole
 
-    path = Path(path)
+    path = path_of(path)
     wavelengths = 0 if table.wavelength_nm is None else table.wavelength_nm.size
     frame = frame_remark(table, U_AXIS)
     known = record(table, None, verdict, holds=HOLDS, remarks=frame)
@@ -137,9 +137,10 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     from brdfdb.formats._rgl_fields import fields_of
     from brdfdb.formats._rgl_tensor import read_tensors
 
+    path = path_of(path)
     fields = fields_of(path, read_tensors(path))
     document = document_of(fields.description)
-    name = str(document.get("name") or Path(path).stem)
+    name = str(document.get("name") or path.stem)
     at = None if fields.wavelength_nm is None else fields.wavelength_nm.astype(np.float64)
     channels = RGB if at is None else tuple(f"{value:g}nm" for value in at)
     if document.get("channels") == ["grey"] and at is not None and at.size == 1:

@@ -26,6 +26,7 @@ from brdfdb.formats._interface import TOLERANCE, Option
 from brdfdb.formats._nodes import samples_of_grid
 from brdfdb.formats._record import lines, of_lines, record
 from brdfdb.formats._written import Written, whole
+from brdfdb.place import path_of
 
 if TYPE_CHECKING:
     from brdfdb.formats._readings import FileTable
@@ -105,7 +106,7 @@ def write(
     grid, error = chosen(table, comparison, _systems(table, comparison), tolerance, size, write_all)
     with whole(path) as (file,), file.open("wb") as stream:
         write_all(stream, grid, error)
-    return Written((Path(path),), error, tolerance)
+    return Written((path_of(path),), error, tolerance)
 
 
 def recognises(head: bytes) -> bool:
@@ -128,7 +129,7 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     """
     from brdfdb.formats._readings import FileTable
 
-    path = Path(path)
+    path = path_of(path)
     comments, blocks = _ssdd_file.parsed(path)
     by_type = {block.entries["DATA_TYPE"]: block for block in blocks}
     if "brdf" not in by_type:

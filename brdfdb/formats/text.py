@@ -39,6 +39,7 @@ from brdfdb.formats._text_file import check_text, lines_of
 from brdfdb.formats._text_rows import line_of_row, rows_of
 from brdfdb.formats._text_uncertainties import uncertainty_of
 from brdfdb.formats._value_units import PERCENT, is_logarithm, scale_of, units_in
+from brdfdb.place import path_of
 
 if TYPE_CHECKING:
     from brdfdb.measurements.samples import Samples
@@ -121,7 +122,7 @@ def read(
     """
     from brdfdb.measurements.joining import contradiction_within
 
-    path = Path(path)
+    path = path_of(path)
     check_text(path, _MOST_BYTES)
     for name, value, allowed in (("quantity", quantity, ("auto", *QUANTITIES)), ("angles", angles, _UNITS)):
         if value not in allowed:

@@ -12,7 +12,6 @@ from __future__ import annotations
 import functools
 import json
 import os
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -27,6 +26,7 @@ from brdfdb.formats._nodes import samples_of_grid
 from brdfdb.formats._record import record, specular_remark
 from brdfdb.formats._written import Written, whole
 from brdfdb.parameters import Floats
+from brdfdb.place import path_of
 
 if TYPE_CHECKING:
     from brdfdb.formats._readings import FileTable
@@ -106,7 +106,7 @@ def write(
     remarks = (*channels.remarks, *specular_remark(table))
     holds = _LINEAR if encoding == "linear" else _DJ
     document = record(table, error, verdict, holds=holds, remarks=remarks, tolerance=tolerance)
-    paths = Path(path), beside(Path(path))
+    paths = path_of(path), beside(path_of(path))
     with whole(*paths) as (file, beside_it):
         file.write_bytes(np.moveaxis(numbers[:, :-1, :, :-1], -1, 0).astype("<f8").tobytes())
         beside_it.write_text(json.dumps(document | {"encoding": encoding}, indent=1) + "\n", encoding="utf-8")
@@ -135,7 +135,7 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     """
     from brdfdb.formats._readings import FileTable
 
-    path = Path(path)
+    path = path_of(path)
     size = path.stat().st_size
     if size != _BYTES:
         raise FileFormatError(f"{path}: {size} bytes are not the {_BYTES} of a UTIA file")

@@ -10,12 +10,12 @@ take 100 MB at most, before compression: a table that needs more is written with
 from __future__ import annotations
 
 import os
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from brdfdb.errors import FileFormatError
 from brdfdb.formats._dense_files import OPTIONS, check_sizes, dataset, read_dataset
 from brdfdb.formats._written import Written, whole
+from brdfdb.place import path_of
 
 if TYPE_CHECKING:
     from brdfdb.formats._readings import FileTable
@@ -68,7 +68,7 @@ def write(
     dense = dense_table(table, tolerance, axes=axes, resolution=resolution)
     with whole(path) as (half,):
         dataset(table, dense, verdict).to_zarr(half, mode="w", zarr_format=3, consolidated=False)
-    return Written((Path(path),), dense.error, dense.tolerance)
+    return Written((path_of(path),), dense.error, dense.tolerance)
 
 
 def recognises(head: bytes) -> bool:
@@ -87,14 +87,15 @@ def read(path: str | os.PathLike[str]) -> FileTable | Samples:
     import xarray as xr
     import zarr
 
+    path = path_of(path)
     try:
         group = zarr.open_group(os.fspath(path), mode="r", zarr_format=3)
-        check_sizes(Path(path), {name: array.shape for name, array in group.arrays()})  # xarray reads axes at once
+        check_sizes(path, {name: array.shape for name, array in group.arrays()})  # xarray reads axes at once
         with xr.open_zarr(os.fspath(path), chunks=None, consolidated=False) as opened:
-            return read_dataset(Path(path), opened)
+            return read_dataset(path, opened)
     except FileFormatError:
         raise
     except Exception as error:  # codecs and parsers raise what they come to
-        if not Path(path).exists():
+        if not path.exists():
             raise FileNotFoundError(f"no directory {path}") from None
         raise FileFormatError(f"{path}: it is no zarr group, or is damaged ({error})") from error

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import functools
 import os
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -27,6 +26,7 @@ from brdfdb.formats._interface import TOLERANCE, Option
 from brdfdb.formats._nodes import samples_of_grid
 from brdfdb.formats._record import CONVENTION, lines, note, of_comments, of_lines, record, specular_remark
 from brdfdb.formats._written import Written, whole
+from brdfdb.place import path_of
 
 if TYPE_CHECKING:
     from brdfdb.formats._channels import Channels
@@ -117,7 +117,7 @@ def write(
     )
     with whole(path) as (file,), file.open("wb") as stream:
         write_all(stream, grid, error)
-    return Written((Path(path),), error, tolerance, remarks)
+    return Written((path_of(path),), error, tolerance, remarks)
 
 
 def _text(
@@ -163,7 +163,7 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     """
     from brdfdb.formats._readings import FileTable
 
-    path = Path(path)
+    path = path_of(path)
     text = _zemax_file.parsed(path)
     if text.scatter != "BRDF":
         raise FileFormatError(f"{path}: its ScatterType is {text.scatter!r}; only BRDF is read")

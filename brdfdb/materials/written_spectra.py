@@ -13,6 +13,7 @@ from pydantic import ValidationError
 from brdfdb.errors import ParameterError, sentence_of
 from brdfdb.materials.spectrum import MOST_VALUES, UPSAMPLED, Spectrum
 from brdfdb.parameters import closest
+from brdfdb.place import path_of
 from brdfdb.spectra import ILLUMINANT, OBSERVER, colour_science
 
 WAYS = "wavelengths_nm and values, csv, srgb, or measured"
@@ -86,7 +87,7 @@ def _spectrum(name: str, wavelengths_nm: Any, values: Any, origin: Any) -> Spect
 def _of_csv(name: str, path: Any, folder: Path | None) -> Spectrum:
     if not isinstance(path, str):
         raise ParameterError(name, f"csv: {path!r} is not the path of a file", path)
-    file = (folder or Path()) / path
+    file = (folder or Path()) / path_of(path, name)
     try:
         if file.stat().st_size > _MOST_BYTES:
             raise ParameterError(name, f"{path} has more than {_MOST_BYTES} bytes", path)

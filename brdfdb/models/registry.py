@@ -14,6 +14,7 @@ from typing import Any
 
 from brdfdb.errors import BrdfdbError, ParameterError
 from brdfdb.parameters import ModelSpec, Parameter
+from brdfdb.place import path_of
 
 GROUP = "brdfdb.models"  # group of entry points, each of which gives a ModelSpec or an iterable of them
 VARIABLE = "BRDFDB_MODELS"  # environment variable with paths of Python files, separated as in PATH
@@ -95,7 +96,7 @@ class Registry(dict[str, ModelSpec]):
             If a file does not exist, raises an error or defines no model, or if the name of a model is taken.
         """
         for path in paths:
-            file = Path(path).absolute()
+            file = path_of(path, "paths").absolute()
             if os.pathsep in str(file):
                 raise BrdfdbError(f"{file}: the path of a file of models has no {os.pathsep!r}, which separates paths")
             self._add_file(file)

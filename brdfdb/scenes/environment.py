@@ -16,6 +16,7 @@ from brdfdb.errors import ParameterError
 from brdfdb.integrals.sampling import DIFFUSE, directions, mixture_density
 from brdfdb.lobes import Lobe
 from brdfdb.materials import Source
+from brdfdb.place import path_of
 from brdfdb.scenes.shapes import STRICT, Array
 from brdfdb.tables.table_source import TableSource
 
@@ -66,7 +67,9 @@ class Environment(BaseModel):
 
     def resolved(self, folder: Path) -> Environment:
         """Return the environment with its file, if it has one, named relative to a folder."""
-        return self if self.file is None else self.model_copy(update={"file": str(folder / self.file)})
+        if self.file is None:
+            return self
+        return self.model_copy(update={"file": str(folder / path_of(self.file, "environment.file"))})
 
     @property
     def picture(self) -> Array:
@@ -80,7 +83,7 @@ class Environment(BaseModel):
         """
         if self.file is None:
             return np.array(self.rows, dtype=np.float64)
-        path = Path(self.file)
+        path = path_of(self.file, "environment.file")
         if not path.is_file():
             raise ParameterError("environment.file", f"{path}: there is no such file")
         return _read(path, path.stat().st_mtime_ns)

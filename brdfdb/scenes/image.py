@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from brdfdb.errors import WriteError
+from brdfdb.place import path_of
 from brdfdb.scenes.scene import Scene
 from brdfdb.spectra import colour_science, illuminant_spectrum, srgb_weights, xyz_weights
 
@@ -51,7 +51,7 @@ def write_png(path: str | os.PathLike[str], scene: Scene, radiance: ArrayLike) -
     """Write a picture (height, width, L) as a PNG of 8 bits; OSError if that fails."""
     from matplotlib.image import imsave
 
-    imsave(Path(path), np.round(255.0 * srgb(scene, radiance)).astype(np.uint8))
+    imsave(path_of(path), np.round(255.0 * srgb(scene, radiance)).astype(np.uint8))
 
 
 def write_exr(path: str | os.PathLike[str], scene: Scene, radiance: ArrayLike) -> None:
@@ -104,7 +104,7 @@ def write_channels(
     # OpenEXR reads a strided array as if it were contiguous, which gives wrong pixels and no error
     arrays = {name: np.ascontiguousarray(array, dtype=np.float32) for name, array in channels.items()}
     try:
-        OpenEXR.File(whole, arrays).write(str(path))
+        OpenEXR.File(whole, arrays).write(str(path_of(path)))
     except RuntimeError as error:
         raise WriteError(f"cannot write {path}: {error}") from error
 

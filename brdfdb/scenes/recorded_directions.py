@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, Field
 
 from brdfdb.errors import ParameterError
+from brdfdb.place import path_of
 from brdfdb.scenes.shapes import STRICT, Array
 
 WANTED = "neither `normal`, nor `wr` and `wi`, of shape (height, width, 3)"
@@ -36,7 +37,7 @@ class Recorded(BaseModel):
 
     def resolved(self, folder: Path) -> Recorded:
         """Return the shape with its file named relative to a folder."""
-        return self.model_copy(update={"file": str(folder / self.file)})
+        return self.model_copy(update={"file": str(folder / path_of(self.file, "file"))})
 
     def read(self) -> dict[str, Array]:
         """Return the arrays of the file, float64, by name; ``wi`` with its axis of lights.
@@ -46,7 +47,7 @@ class Recorded(BaseModel):
         ParameterError
             If the file does not exist, is not readable, or holds no directions.
         """
-        path = Path(self.file)
+        path = path_of(self.file, "file")
         if not path.is_file():
             raise ParameterError(str(path), "there is no such file")
         arrays = _from_exr(path) if path.suffix == ".exr" else _from_npz(path)

@@ -15,6 +15,7 @@ from brdfdb.geometry import radians
 from brdfdb.materials import Material, Source, presets
 from brdfdb.materials.provenance import Text
 from brdfdb.parameters import closest
+from brdfdb.place import path_of
 from brdfdb.scenes.environment import Environment
 from brdfdb.scenes.recorded_directions import Recorded
 from brdfdb.scenes.shapes import STRICT, AnyShape, Array, Vector, check_direction, unit
@@ -264,7 +265,7 @@ class Scene(BaseModel):
             for item in self.objects
         ]
         environment = None if self.environment is None else self.environment.resolved(folder)
-        store = None if self.store is None else str(folder / self.store)
+        store = None if self.store is None else str(folder / path_of(self.store, "store"))
         return self.model_copy(update={"objects": objects, "environment": environment, "store": store})
 
 

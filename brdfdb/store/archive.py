@@ -12,7 +12,7 @@ from pydantic import BaseModel
 
 from brdfdb.errors import StoreError, UnknownMaterialError
 from brdfdb.store.manifest import check_manifest
-from brdfdb.store.paths import METADATA
+from brdfdb.store.paths import METADATA, pinned
 from brdfdb.store.reader import Store
 from brdfdb.store.sealed_json import read_json
 
@@ -42,7 +42,7 @@ def zipped(contents: Iterable[tuple[str, bytes]], compression: int = zipfile.ZIP
 
 
 def root_group(store: Store) -> dict[str, Any]:
-    """Return the fields of `Group` for one that holds all current revisions as materials/NAME/REVISION.
+    """Return the fields of `Group` for one that holds all current revisions as materials/NAME/REVISION, with digests.
 
     A material that is damaged is left out.
     """
@@ -53,8 +53,9 @@ def root_group(store: Store) -> dict[str, Any]:
             check_manifest(group, digest, contents=False)
             whole = read_json(group / METADATA)
             arrays = whole.pop("consolidated_metadata", {}).get("metadata", {})
-            place = f"materials/{name}/{group.name}"
-            metadata |= {f"materials/{name}": _group(revision=group.name), place: whole}
+            revision = pinned(group.name, digest)
+            place = f"materials/{name}/{revision}"
+            metadata |= {f"materials/{name}": _group(revision=revision), place: whole}
             metadata |= {f"{place}/{key}": array for key, array in arrays.items()}
     consolidated = {"kind": "inline", "must_understand": False, "metadata": metadata}
     return {**_group(), "consolidated_metadata": consolidated}

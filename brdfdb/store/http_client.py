@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib.util import find_spec
@@ -26,8 +28,8 @@ from brdfdb.geometry import (
 )
 from brdfdb.materials.source import FourAngles
 from brdfdb.parameters import Floats
-from brdfdb.store.http_service import TIMEOUT_S, Service, TooLargeError
-from brdfdb.store.paths import NAME
+from brdfdb.store.http_service import JSON, TIMEOUT_S, Service, TooLargeError
+from brdfdb.store.paths import NAME, pinned
 from brdfdb.tables.grids import Axis
 from brdfdb.tables.metadata import TableMetadata
 from brdfdb.tables.table_base import BaseTable
@@ -47,13 +49,14 @@ _WAVELENGTHS = 200  # stand in the address, 33 bytes each; nginx cuts it at 8 kB
 class RemoteTable(BaseTable):
     """The table of one revision of one material, looked up by a service; methods as of `Table`.
 
-    Answers are those of the revision that it was opened with, also when the service has a newer one. A lookup raises
-    StoreError if the service is gone, and UnknownRevisionError if that revision is.
+    Answers are those of the revision that it was opened with, also when the service has a newer one, or another store
+    with the same numbers of revisions. A lookup raises StoreError if the service is gone, and UnknownRevisionError if
+    that revision is.
 
     Attributes
     ----------
-    name, revision : str
-        Name of the material, and its revision.
+    name, revision, digest : str
+        Name of the material, its revision, and the sha256 of its manifest, by which the service is asked.
     attrs : dict
         The attributes as stored, without the request of the build; `metadata` is the typed record of them.
     wavelength_nm : array (L,) [nm] or None
@@ -62,6 +65,7 @@ class RemoteTable(BaseTable):
 
     name: str
     revision: str
+    digest: str
     attrs: Mapping[str, Any] = field(repr=False)
     wavelength_nm: Axis | None = field(repr=False)
     _axes_deg: Mapping[str, Axis] = field(repr=False)
@@ -117,7 +121,7 @@ class RemoteTable(BaseTable):
 
     @property
     def _path(self) -> str:
-        return f"/v1/materials/{self.name}/revisions/{self.revision}/lookup"
+        return f"/v1/materials/{self.name}/revisions/{pinned(self.revision, self.digest)}/lookup"
 
     def _asked(self, wavelength_nm: ArrayLike | None) -> tuple[int, tuple[int, ...]]:
         """Return the number of wavelengths of a request, and the shape that they add."""
@@ -231,11 +235,21 @@ class RemoteStore(Mapping[str, RemoteTable]):
     def dataset(self, name: str, revision: str | None = None) -> xr.Dataset:
         """Return a revision, by default the current one, as a lazy Dataset that is read over HTTP as far as needed.
 
-        Errors are those of `Store.dataset`. StoreError, too, if fsspec and aiohttp, which read zarr over HTTP, are not
-        installed.
+        Each file is checked against the manifest of the revision. Errors are those of `Store.dataset`. StoreError, too,
+        if fsspec and aiohttp, which read zarr over HTTP, are not installed.
         """
         document = self._material(name, "" if revision is None else f"/revisions/{quote(revision, safe='')}")
-        return remote_dataset(f"{self.url}/v1/store/materials/{name}/{document['revision']}")
+        if find_spec("fsspec") is None or find_spec("aiohttp") is None:
+            raise StoreError("a dataset over HTTP needs fsspec and aiohttp: pip install 'brdfdb[http]'")
+        from brdfdb.store.zarr_store import WholeRemote
+        from brdfdb.tables.xarray_view import opened
+
+        where = f"{name} {document['revision']} of {self.url}"
+        path = f"/v1/store/materials/{name}/{pinned(document['revision'], document['digest'])}"
+        content = self._service.content(f"{path}.MANIFEST.json", None, JSON)
+        if hashlib.sha256(content).hexdigest() != document["digest"]:
+            raise StoreError(f"{where}: its manifest is another one, as of a cache between here and the service")
+        return opened(WholeRemote(f"{self.url}{path}", where, json.loads(content)["files"]))
 
     def families(self) -> NoReturn:
         """Raise StoreError: a service has no families."""
@@ -263,6 +277,7 @@ class RemoteStore(Mapping[str, RemoteTable]):
         return RemoteTable(
             name=document["name"],
             revision=document["revision"],
+            digest=document["digest"],
             attrs=document["attributes"] if error is None else {**document["attributes"], "error": error},
             _axes_deg={axis: np.array(nodes) for axis, nodes in document["axes_deg"].items()},
             wavelength_nm=None if wavelengths is None else np.array(wavelengths),
@@ -270,18 +285,6 @@ class RemoteStore(Mapping[str, RemoteTable]):
             _specular=document["specular"],
             _service=self._service,
         )
-
-
-def remote_dataset(url: str) -> xr.Dataset:
-    """Return the lazy Dataset of a revision at the address of its files; StoreError if an extra is not installed."""
-    if find_spec("fsspec") is None or find_spec("aiohttp") is None:
-        raise StoreError("a dataset over HTTP needs fsspec and aiohttp: pip install 'brdfdb[http]'")
-    from brdfdb.tables.xarray_view import opened
-
-    try:
-        return opened(url)
-    except FileNotFoundError:
-        raise StoreError(f"no revision at {url}") from None
 
 
 def _sendable(angle: NDArray[Any]) -> NDArray[np.float64]:

@@ -9,8 +9,9 @@ from pathlib import Path
 from brdfdb.errors import (
     StoreError,
 )
+from brdfdb.place import path_of
 from brdfdb.store.files import sync_directory
-from brdfdb.store.paths import manifest_path, marker_path, materials_path, staging_path
+from brdfdb.store.paths import manifest_path, marker_path, materials_path, staging_path, store_around
 from brdfdb.store.sealed_json import read_sealed, swap_sealed, unsealed
 
 FORMAT = "brdfdb"
@@ -29,6 +30,8 @@ def check_marker(root: Path) -> None:
     try:
         data = marker.read_bytes()
     except (FileNotFoundError, NotADirectoryError):
+        if (around := store_around(root)) is not None:
+            raise StoreError(f"{root} lies in the store at {around}; name that directory") from None
         raise StoreError(f"no store at {root}: brdfdb.json is missing there; `brdfdb build` makes one") from None
     except OSError as error:
         raise StoreError(f"cannot read {marker}: {error.strerror}") from error
@@ -53,10 +56,12 @@ def make_store(root: Path) -> bool:
     Raises
     ------
     StoreError
-        If `root` cannot be written, or is something other than a store.
+        If `root` cannot be written, lies in a store, or is something other than a store.
     """
-    marker, made = marker_path(root), False
+    marker, made = marker_path(path_of(root, "root")), False
     try:
+        if not marker.exists() and (around := store_around(root)) is not None:
+            raise StoreError(f"{root} lies in the store at {around}; name that directory, or one outside")
         root.mkdir(parents=True, exist_ok=True)
         strangers = [path for path in root.iterdir() if not path.name.startswith(f".{marker.name}.")]
         if marker.exists():  # asked after the look around: another build may be making the store right now

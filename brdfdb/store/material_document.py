@@ -51,6 +51,7 @@ class MaterialDocument(BaseModel):
 
     name: str
     revision: str
+    digest: str = Field(description="sha256 of the manifest of the revision, which names all bytes of the table")
     title: str
     model: str | None = Field(description="name of the model; null: measured, or a function")
     parameters: list[ParameterDocument]
@@ -78,6 +79,7 @@ def material_document(table: Table, verdict: Verdict | None) -> dict[str, Any]:
     return {
         "name": table.name,
         "revision": table.revision,
+        "digest": table.digest,
         "title": metadata.title or "",
         "model": metadata.model,
         "parameters": _parameters(metadata),

@@ -6,6 +6,7 @@ import os
 from typing import TYPE_CHECKING, overload
 
 from brdfdb.errors import ParameterError
+from brdfdb.place import is_service, path_of
 
 if TYPE_CHECKING:
     from brdfdb.store.http_client import RemoteStore
@@ -27,8 +28,9 @@ def open(root: str | os.PathLike[str] | None = None, *, snapshot: str | None = N
     Parameters
     ----------
     root : path or address, optional
-        The directory that ``brdfdb build --store`` wrote, or the address of a service (``brdfdb serve``), such as
-        ``http://127.0.0.1:8000``. By default that of the environment variable ``BRDFDB_STORE``, or ``brdf-store``.
+        The directory that ``brdfdb build --store`` wrote, also as ``file:///data/store``, or the address of a service
+        (``brdfdb serve``), such as ``http://127.0.0.1:8000``. By default that of the environment variable
+        ``BRDFDB_STORE``, or ``brdf-store``.
     snapshot : str, optional
         Name of a snapshot of a directory (``brdfdb snapshot NAME``): the store is then what it names, for good.
 
@@ -42,11 +44,14 @@ def open(root: str | os.PathLike[str] | None = None, *, snapshot: str | None = N
     brdfdb.errors.StoreError
         If there is no store at `root`, or one of another format version; if it has no such snapshot; if no service
         answers there.
+    ParameterError
+        If `root` is neither a path nor such an address, as ``s3://bucket/store``.
     ValueError
         If a snapshot is named beside an address: a service serves the one that it was started with.
     """
+    parameter = "root" if root is not None else "BRDFDB_STORE"
     root = default_root() if root is None else root
-    if isinstance(root, str) and root.startswith(("http://", "https://")):
+    if is_service(root):
         from brdfdb.store.http_client import RemoteStore
 
         if snapshot is not None:
@@ -56,4 +61,4 @@ def open(root: str | os.PathLike[str] | None = None, *, snapshot: str | None = N
         return RemoteStore(root)
     from brdfdb.store.reader import Store
 
-    return Store(root, snapshot=snapshot)
+    return Store(path_of(root, parameter), snapshot=snapshot)

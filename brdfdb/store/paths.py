@@ -54,10 +54,20 @@ def number_of(revision: str) -> int:
     return int(revision[1:]) if revision[:1] == "r" and revision[1:].isdecimal() else 0
 
 
+def pinned(revision: str, digest: str) -> str:
+    """Return the name of a revision that no other store has: with the first 16 digits of its manifest's sha256."""
+    return f"{revision}-{digest[:16]}"
+
+
 def store_of(group: Path) -> Path | None:
     """Return the root of the store that a directory of a revision lies in; None if it lies in none."""
     materials = group.parent.parent
     return materials.parent if materials.name == "materials" and marker_path(materials.parent).is_file() else None
+
+
+def store_around(path: Path) -> Path | None:
+    """Return the root of the store that a path lies in, at any depth; None if it lies in none, or is the root."""
+    return next((folder for folder in path.resolve().parents if marker_path(folder).is_file()), None)
 
 
 def families_path(root: Path) -> Path:

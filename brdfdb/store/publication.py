@@ -17,6 +17,7 @@ from brdfdb.errors import (
 )
 from brdfdb.materials import Source
 from brdfdb.measurements import MeasuredSource
+from brdfdb.place import path_of
 from brdfdb.store.decoding import read_metadata, table_of
 from brdfdb.store.files import Entry, sync_directory, write_files
 from brdfdb.store.lock import Lock, writing
@@ -74,7 +75,8 @@ def publish(
     Raises
     ------
     ParameterError
-        If the tolerance is outside its range or takes too many values, or the wavelengths do not suit the source.
+        If `root` is no path, the tolerance is outside its range or takes too many values, or the wavelengths do not
+        suit the source.
     StoreError
         If the store cannot be written.
 
@@ -90,6 +92,7 @@ def publish(
     >>> published.revision, published.error.overall.p99 <= 0.01
     ('r000001', True)
     """
+    root = path_of(root, "root")
     given = source.wavelengths_nm if wavelengths_nm is None else np.atleast_1d(np.asarray(wavelengths_nm))
     at = None if given is None else check_wavelengths(given)
     if isinstance(source, MeasuredSource):
@@ -111,6 +114,7 @@ def publish_layout(
     The table keeps the request of a build, if it is given, so that the same request is not built again. `values` are
     those of all blocks of the layout, where they are known.
     """
+    root = path_of(root, "root")
     dataset = tabulate(layout, values)
     values = dataset[layout.variable].to_numpy()
     error = error_measurement.measure(layout, lambda rows: values[rows])
@@ -133,7 +137,8 @@ def publish_dataset(root: str | os.PathLike[str], name: str, dataset: xr.Dataset
     dataset : Dataset
         The table, as `brdfdb.tables.tabulation.tabulate` makes it: ``brdf`` [1/sr] over the axes of a
         `brdfdb.tables.grids.Grid` [degree], in their order, and last, if it is spectral, ``wavelength`` [nm]. Values
-        are float32; float64 is converted. Attributes may be missing.
+        are float32; float64 is converted. Attributes may be missing. What `Store.dataset` gives is stored as it was:
+        ``parts`` take the place of the ``brdf`` that is rebuilt of them.
 
     Returns
     -------
@@ -143,7 +148,8 @@ def publish_dataset(root: str | os.PathLike[str], name: str, dataset: xr.Dataset
     Raises
     ------
     ParameterError
-        If the name is none of a material, or the dataset is no table that can be looked up.
+        If the name is none of a material, or the dataset is no table that can be looked up: also if ``brdf`` was
+        changed and ``parts`` were not.
     StoreError
         If the store cannot be written.
     """
@@ -152,7 +158,7 @@ def publish_dataset(root: str | os.PathLike[str], name: str, dataset: xr.Dataset
     if not NAME.fullmatch(name):
         raise ParameterError("name", f"{name!r} is not made of lower-case letters, digits and single hyphens", name)
     files = dataset_files(checked_dataset(name, dataset))
-    store = Path(root)
+    store = path_of(root, "root")
     make_store(store)
     with Lock(store, name):
         staging = staged_path(store, name) / "dataset"
@@ -166,7 +172,16 @@ def publish_dataset(root: str | os.PathLike[str], name: str, dataset: xr.Dataset
 
 
 def checked_dataset(name: str, dataset: xr.Dataset) -> xr.Dataset:
-    """Return a table with values in float32; ParameterError if no lookup could read it."""
+    """Return a table as a store keeps it, with values in float32; ParameterError if no lookup could read it."""
+    from brdfdb.tables.xarray_view import stored_attributes, with_brdf  # xarray is slow to import
+
+    dataset = dataset.copy()
+    dataset.attrs = stored_attributes(dataset.attrs)
+    if "brdf" in dataset and "parts" in dataset:
+        rebuilt = with_brdf(dataset.drop_vars("brdf"))["brdf"]
+        if not np.array_equal(rebuilt.values, dataset["brdf"].values, equal_nan=True):
+            raise ParameterError("brdf", "it is not what parts make, of which it is rebuilt; leave out one of the two")
+        dataset = dataset.drop_vars("brdf")
     variable = "brdf" if "brdf" in dataset else "parts"
     if variable in dataset and dataset[variable].dtype == np.float64:
         dataset = dataset.assign({variable: dataset[variable].astype(np.float32)})

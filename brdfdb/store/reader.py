@@ -30,6 +30,7 @@ from brdfdb.errors import (
     UnknownRevisionError,
 )
 from brdfdb.notebook import listing, percent
+from brdfdb.place import path_of
 from brdfdb.store.files import regular_bytes
 from brdfdb.store.manifest import check_manifest, read_manifest, whole_revisions
 from brdfdb.store.marker import check_marker
@@ -41,6 +42,7 @@ from brdfdb.store.paths import (
     material_path,
     materials_path,
     number_of,
+    pinned,
     pointer_path,
     revision_path,
     staged_path,
@@ -86,7 +88,7 @@ class Store(Mapping[str, "Table"]):
     def __init__(
         self, root: str | os.PathLike[str], cache_bytes: int = CACHE_BYTES, *, snapshot: str | None = None
     ) -> None:
-        self.root = Path(root).absolute()
+        self.root = path_of(root, "root").absolute()
         check_marker(self.root)
         self.snapshot: Snapshot | None = None if snapshot is None else read_snapshot(self.root, snapshot)
         self._cache_bytes = cache_bytes
@@ -162,7 +164,9 @@ class Store(Mapping[str, "Table"]):
                 # a newer revision was published, and the one we were reading removed: read the newer one
 
     def table(self, name: str, revision: str) -> Table:
-        """Return the decoded table of a revision, current or not.
+        """Return the decoded table of a revision, current or not: ``r000003``, or ``r000003-0123456789abcdef``.
+
+        The second name has the first 16 digits of `Table.digest`, and means the same table in any store.
 
         Raises
         ------
@@ -175,14 +179,17 @@ class Store(Mapping[str, "Table"]):
 
     def located(self, name: str, revision: str) -> tuple[Path, str]:
         """Return the directory of a revision, current or not, and the digest of its manifest; errors as by `table`."""
+        number, dash, _ = revision.partition("-")
         group, digest, head = self.current(name)
-        if revision == group.name:
-            return group, digest
-        if revision not in self.revisions(name):
-            raise UnknownRevisionError(f"{name} has no revision {revision[:40]!r}; the current one is {group.name}")
-        group = group.with_name(revision)
-        # one that no pointer knows was left by a crash: it is known by the digest in its first line
-        return group, read_manifest(group, head["manifests"].get(revision))[1]
+        if number != group.name:
+            if number not in self.revisions(name):
+                raise UnknownRevisionError(f"{name} has no revision {revision[:40]!r}; the current one is {group.name}")
+            group = group.with_name(number)
+            # one that no pointer knows was left by a crash: it is known by the digest in its first line
+            digest = read_manifest(group, head["manifests"].get(number))[1]
+        if dash and revision != pinned(number, digest):
+            raise UnknownRevisionError(f"{name} has no revision {revision[:40]!r}; here it is {pinned(number, digest)}")
+        return group, digest
 
     def revisions(self, name: str) -> list[str]:
         """Return the revisions of a material that are whole, oldest first; of a snapshot the one it names."""

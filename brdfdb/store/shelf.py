@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -25,8 +25,8 @@ class Shelf:
     ----------
     root, cache_bytes, snapshot
         As of `Store`. It is opened when it is first needed, so that there may be none yet.
-    audit_file : Path
-        What ``brdfdb audit`` wrote as JSON; it may be missing.
+    audit_files : sequence of Path
+        What ``brdfdb audit`` wrote as JSON, such as the reports on all materials and on some; each may be missing.
     store : Store, optional
         An open one in place of `root`.
     """
@@ -34,7 +34,7 @@ class Shelf:
     def __init__(
         self,
         root: Path,
-        audit_file: Path,
+        audit_files: Sequence[Path],
         cache_bytes: int = CACHE_BYTES,
         snapshot: str | None = None,
         store: Store | None = None,
@@ -43,7 +43,7 @@ class Shelf:
         self._cache_bytes, self._snapshot, self._store = cache_bytes, snapshot, store
         self._seen: set[str] = set()
         self._summaries: dict[str, tuple[str, dict[str, Any]]] = {}
-        self._audit = AuditFile(audit_file)
+        self._audits = [AuditFile(path) for path in audit_files]
         self.warming = False  # kernels are being loaded, or compiled for half a minute
 
     @property
@@ -132,7 +132,11 @@ class Shelf:
             self.warming = False
 
     def verdict(self, name: str) -> Verdict | None:
-        """Return the last audit of a material; None if there is none, or its report cannot be read."""
-        when, by_name = self._audit.read()
-        audited = by_name.get(name)
-        return None if audited is None else Verdict(audited, when, audited.revision == self.head(name))
+        """Return the last audit of a material, of its current revision if there is one; None without a report on it."""
+        reports = [audit.read() for audit in self._audits]
+        found = [(report.by_name[name], report.when) for report in reports if name in report.by_name]
+        if not found:
+            return None
+        head = self.head(name)
+        verdicts = [Verdict(audited, when, audited.revision == head) for audited, when in found]
+        return max(verdicts, key=lambda verdict: (verdict.current, verdict.when))

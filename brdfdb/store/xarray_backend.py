@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 from collections.abc import Iterable
 from pathlib import Path
@@ -11,8 +12,9 @@ import xarray as xr
 from xarray.backends import BackendEntrypoint
 
 from brdfdb.errors import ParameterError, StoreError
+from brdfdb.place import is_service, path_of
 from brdfdb.store import opening
-from brdfdb.store.http_client import remote_dataset
+from brdfdb.store.http_client import RemoteStore
 from brdfdb.store.paths import METADATA, marker_path, number_of, store_of
 from brdfdb.store.reader import Store
 from brdfdb.tables.xarray_view import opened
@@ -62,21 +64,25 @@ class BrdfdbBackend(BackendEntrypoint):
         StoreError, UnknownMaterialError, UnknownRevisionError
             If there is no such table, or it is damaged.
         """
-        place = os.fspath(filename_or_obj)
+        place = filename_or_obj
         if material is not None:
             dataset = opening.open(place, snapshot=snapshot).dataset(material, revision)
-        elif place.startswith(("http://", "https://")):
-            if not number_of(place.rstrip("/").rpartition("/")[2]):
+        elif is_service(place):
+            service, _, named = place.rstrip("/").partition("/v1/store/materials/")
+            material, _, revision = named.partition("/")
+            if not number_of(revision.partition("-")[0]):
                 raise ParameterError("material", f"{place} is not the address of a revision; name one of its materials")
-            dataset = remote_dataset(place.rstrip("/"))
+            dataset = RemoteStore(service).dataset(material, revision)
         else:
-            dataset = _local(Path(place).absolute(), revision, snapshot)
+            dataset = _local(path_of(place, "filename_or_obj").absolute(), revision, snapshot)
         dropped = [drop_variables] if isinstance(drop_variables, str) else list(drop_variables or ())
         return dataset.drop_vars(dropped, errors="ignore")
 
     def guess_can_open(self, filename_or_obj: Any) -> bool:
         """Return True for the directory of a store; revisions are zarr groups, which others read, too."""
-        return isinstance(filename_or_obj, str | os.PathLike) and marker_path(Path(filename_or_obj)).is_file()
+        with contextlib.suppress(ParameterError):
+            return isinstance(filename_or_obj, str | os.PathLike) and marker_path(path_of(filename_or_obj)).is_file()
+        return False
 
 
 def _local(path: Path, revision: str | None, snapshot: str | None) -> xr.Dataset:

@@ -1,13 +1,14 @@
-"""A revision as zarr reads it: chunks that went missing or changed are errors, not nan."""
+"""A revision as zarr reads it, here or behind a service: chunks that went missing or changed are errors, not nan."""
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Mapping
 from pathlib import Path
 
 from zarr.abc.store import ByteRequest
 from zarr.core.buffer import Buffer, BufferPrototype
-from zarr.storage import LocalStore
+from zarr.storage import FsspecStore, LocalStore
 
 from brdfdb.errors import StoreError
 from brdfdb.store.chunks import check_file
@@ -40,4 +41,35 @@ class Whole(LocalStore):
             raise StoreError(f"{where} is damaged: {key} cannot be read: {error.strerror}") from error
         content = None if value is None or key not in self._files else value.to_bytes()
         check_file(self.root, key, content, self._files, whole=byte_range is None)
+        return value
+
+
+class WholeRemote(FsspecStore):
+    """A revision at an address: a file that is missing, or not the one of the manifest, is an error with its name.
+
+    Parameters
+    ----------
+    url : str
+        Address of the files of the revision.
+    where : str
+        Name of the revision in errors.
+    files : mapping
+        Size and sha256 of each file that belongs there, by its path.
+    """
+
+    def __init__(self, url: str, where: str, files: Mapping[str, Entry]) -> None:
+        from fsspec.implementations.http import HTTPFileSystem
+
+        super().__init__(HTTPFileSystem(asynchronous=True), read_only=True, path=url)
+        self._where, self._files = where, dict(files)
+
+    async def get(self, key: str, prototype: BufferPrototype, byte_range: ByteRequest | None = None) -> Buffer | None:
+        """Return a file, as `FsspecStore.get` does; StoreError for one that should be there, or is another one."""
+        value, entry = await super().get(key, prototype, byte_range), self._files.get(key)
+        if entry is None:
+            return None
+        if value is None:
+            raise StoreError(f"{self._where} was removed or replaced while it was read ({key}); open the material anew")
+        if byte_range is None and hashlib.sha256(value.to_bytes()).hexdigest() != entry["sha256"]:
+            raise StoreError(f"{self._where}: {key} is another one than its manifest names, as of a cache on the way")
         return value

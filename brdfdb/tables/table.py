@@ -403,6 +403,8 @@ def table_from(name: str, revision: str, arrays: Mapping[str, NDArray[Any]], att
         raise ParameterError(basis, f"shape {spectra.shape} is not {(*channels, *spectrum)}, of parts and wavelengths")
     if (part_nm is not None) != ("mixture" in arrays) or (part_nm is not None and part_nm.shape != channels):
         raise ParameterError("part_wavelengths_nm", "it goes with mixture, one wavelength for each part")
+    if variable == "brdf" and not (interpolation.plain and spectra is uniform is None):
+        raise ParameterError("brdf", "it is f_r itself, and the table says that f_r is rebuilt; name the array parts")
     if uniform is not None and uniform.size not in (1, *spectrum):
         raise ParameterError("uniform", f"{uniform.size} values are neither one nor one for each wavelength")
     return Table(

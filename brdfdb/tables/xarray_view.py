@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 from collections.abc import Mapping
 from typing import Any
@@ -64,6 +65,31 @@ def plain_attributes(attributes: Mapping[str, Any]) -> dict[str, Any]:
         else:
             plain[key] = value
     return {key: value for key, value in plain.items() if value not in (None, "", [], "{}")}
+
+
+def stored_attributes(attributes: Mapping[str, Any]) -> dict[str, Any]:
+    """Return attributes as a store keeps them: the inverse of `plain_attributes`, for those of `TableMetadata`.
+
+    JSON text becomes objects and lists. What `plain_attributes` leaves out of a table of this program is filled in.
+    """
+    stored: dict[str, Any] = {}
+    for key, given in attributes.items():
+        value = given.tolist() if isinstance(given, np.ndarray | np.generic) else given
+        known = TableMetadata.model_fields.get(key)
+        if known is not None and isinstance(value, str) and known.annotation not in (str, str | None):
+            with contextlib.suppress(ValueError):  # other text is stored as it is: readers say what is wrong
+                value = json.loads(value)
+        elif known is not None and known.annotation == list[float] and not isinstance(value, list):
+            value = [value]  # netCDF has no lists of one number
+        stored[key] = value
+    if stored.get("Conventions") != CF_VERSION:
+        return stored
+    del stored["Conventions"]
+    if "table_version" not in stored:  # written by another program
+        return stored
+    metadata = TableMetadata.read(stored)
+    sound = {key: value for key, value in metadata.attributes().items() if key not in metadata.strange}
+    return sound | {key: value for key, value in stored.items() if key not in sound}
 
 
 def _is_number(value: Any) -> bool:

@@ -22,7 +22,7 @@ from brdfdb.figure import Figure
 from brdfdb.materials import presets
 from brdfdb.models import MODELS
 from brdfdb.store.reader import Store
-from brdfdb.store.summary_words import REPORT_OF_SOME
+from brdfdb.store.summary_words import REPORT_OF_ALL, REPORT_OF_SOME
 from brdfdb.tables import _kernels
 from brdfdb_pipelines import audit_page, former_audit, terminal, workers
 from brdfdb_pipelines.former_audit import Former
@@ -192,18 +192,24 @@ def _written(
         page_path.write_text(audit_page.render(audit_report, plots), encoding="utf-8")
     page = {"page_subjects": subjects, "page_sha256": hashlib.sha256(page_path.read_bytes()).hexdigest()}
     audit_report = audit_report.model_copy(update={"program": former_audit.program(), **page})
-    of_some = report_path == store.root / REPORT_OF_SOME
+    of_some = report_path.resolve() == (store.root / REPORT_OF_SOME).resolve()
     whole = _with_former(audit_report, report_path, store) if of_some else audit_report
     report_path.write_bytes(former_audit.sealed(whole))
     return audit_report
 
 
 def _with_former(audit_report: AuditReport, path: Path, store: Store) -> AuditReport:
-    """Return a report with the audits of an earlier one at `path` that are of other tables, and of current ones."""
+    """Return a report with the audits of an earlier one at `path` that are of other tables, and of current ones.
+
+    Audits that the report on all materials has repeated since are left to that report.
+    """
     former = former_audit.read_former(path)
     if former is None:
         return audit_report
-    audits = {audited.material: audited for audited in former.materials if audited.material in store}
+    of_all = former_audit.read_former(store.root / REPORT_OF_ALL)
+    newer = {audited.material for audited in of_all.materials} if of_all and of_all.when > former.when else set()
+    others = [audited for audited in former.materials if audited.material not in newer]
+    audits = {audited.material: audited for audited in others if audited.material in store}
     audits = {name: audited for name, audited in audits.items() if audited.revision == store.head(name)}
     audits |= {audited.material: audited for audited in audit_report.materials}
     violations = [name for name, audited in audits.items() if audited.verdict == "violates"]

@@ -22,6 +22,7 @@ from typing import Any
 
 from brdfdb.errors import BrdfdbError, UnknownMaterialError, missing_extra
 from brdfdb_pipelines.commands import commands
+from brdfdb_pipelines.commands._arguments import place
 from brdfdb_pipelines.exit_codes import BUG, INTERRUPTED, REFUSED, TERMINATED, VIOLATED
 
 # Errors of the operating system that concern the machine, also where they name no file
@@ -60,6 +61,7 @@ class _Parser(argparse.ArgumentParser):
         group.add_argument(
             "--models",
             action="append",
+            type=place,
             dest=f"{_MODELS} of {self.prog}",
             default=argparse.SUPPRESS,
             metavar="FILE",

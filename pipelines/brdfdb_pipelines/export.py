@@ -14,6 +14,7 @@ from brdfdb.errors import CannotHoldError, ParameterError, WriteError, counted
 from brdfdb.formats import EXPORTERS
 from brdfdb.formats._record import extrapolated_remark
 from brdfdb.formats._written import Written
+from brdfdb.place import path_of
 from brdfdb.store.summary_words import NOT_AUDITED, audited_materials
 from brdfdb_pipelines import terminal, workers
 
@@ -59,6 +60,7 @@ def run(
     WriteError
         If a file cannot be written.
     """
+    directory = path_of(directory, "directory")
     store = brdfdb.open(root)
     revisions = {name: store.head(name) for name in names or store}
     verdicts = _verdicts(root, audit, revisions)

@@ -18,6 +18,7 @@ from brdfdb.formats._input import check_file
 from brdfdb.materials.provenance import Text
 from brdfdb.measurements import MeasuredSource, Samples, joined
 from brdfdb.measurements.measured_source import MARGIN
+from brdfdb.place import path_of
 from brdfdb.store.lock import Lock, writing
 from brdfdb.store.manifest import read_manifest
 from brdfdb.store.paths import material_path, revision_path
@@ -172,7 +173,7 @@ def measured_job(name: str, fields: Mapping[str, Any], folder: Path | None, tole
     if tolerance is None:
         raise RecipeError("tolerance", f"is missing; {name} is measured, and grids are for models")
     table = measured_table(name, fields)
-    paths = tuple((folder or Path()) / sample for sample in table.samples)
+    paths = tuple((folder or Path()) / path_of(sample, "samples") for sample in table.samples)
     digests = []
     for path in paths:
         try:

@@ -22,6 +22,7 @@ from brdfdb.geometry import radians, unit_vector
 from brdfdb.materials.hypercube import Axis, axes_of, in_units, materials, pairs
 from brdfdb.models import MODELS
 from brdfdb.parameters import Floats, ModelSpec
+from brdfdb.place import path_of
 from brdfdb.store.codec import array_files, chunk_bytes, group_files
 from brdfdb.store.files import write_file
 from brdfdb.store.paths import METADATA
@@ -154,6 +155,7 @@ def run(
     SampleError
         If the group is there already, another process writes it, or another set is half written under its name.
     """
+    out = path_of(out, "out")
     spec = MODELS[model]
     if seed < 0:
         raise ParameterError("--seed", f"{seed} is not at least 0", seed)

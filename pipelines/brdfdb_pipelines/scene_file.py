@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from importlib import resources
-from pathlib import Path
 
 from pydantic import ValidationError
 
 from brdfdb.errors import ParameterError, sentence_of
 from brdfdb.parameters import closest
+from brdfdb.place import path_of
 from brdfdb.scenes.scene import Scene
 from brdfdb_pipelines import toml_file
 
@@ -53,7 +53,7 @@ def load(name: str) -> Scene:
     if not name.endswith(".toml") and name not in shipped():
         sentence = f"is no scene{closest(name, shipped())}; give a path that ends in .toml or one of "
         raise SceneError(name, "", sentence + ", ".join(shipped()))
-    path = Path(name)
+    path = path_of(name, "scene")
     source = path if name.endswith(".toml") else _SHIPPED / f"{name}.toml"
     try:
         scene = Scene.model_validate(toml_file.read(source))
@@ -63,7 +63,10 @@ def load(name: str) -> Scene:
         raise SceneError(name, *_field_and_sentence(error)) from None
     except toml_file.TomlError as error:
         raise SceneError(name, "", str(error)) from None
-    return scene.resolved(path.parent)
+    try:
+        return scene.resolved(path.parent)
+    except ParameterError as error:  # a file of it is no path
+        raise SceneError(name, error.parameter, error.sentence) from None
 
 
 def _field_and_sentence(error: ValidationError) -> tuple[str, str]:

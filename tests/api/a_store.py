@@ -96,10 +96,10 @@ def client_of(root: Path, **settings: Any) -> Client:
 
 
 @contextmanager
-def serving(root: Path, **settings: Any) -> Iterator[str]:
-    """The address of a service in a thread of this process."""
+def serving(root: Path, port: int = 0, **settings: Any) -> Iterator[str]:
+    """The address of a service in a thread of this process, at any free port or the one that is given."""
     app = create_app(Settings(store=root, log_level="error", **settings))
-    with socket.create_server(("127.0.0.1", 0)) as listener:
+    with socket.create_server(("127.0.0.1", port)) as listener:
         config = uvicorn.Config(app, http=Connection, log_level="error", timeout_graceful_shutdown=1, lifespan="off")
         service = server.Server(config)
         thread = threading.Thread(target=service.run, kwargs={"sockets": [listener]})
@@ -120,6 +120,11 @@ def npy(array: Any) -> bytes:
     buffer = io.BytesIO()
     np.save(buffer, array)
     return buffer.getvalue()
+
+
+def pinned_of(store: Store, name: str, revision: str = "r000001") -> str:
+    """The name of a revision with its digest, as addresses have it."""
+    return f"{revision}-{store.located(name, revision)[1][:16]}"
 
 
 def degrees(store: Store, name: str, *angles_deg: Any, **keywords: Any) -> Any:

@@ -42,15 +42,15 @@ def test_settings_of_the_environment(monkeypatch: pytest.MonkeyPatch, tmp_path: 
     for variable, value in told.items():
         monkeypatch.setenv(variable, value)
     settings = create_app().state.settings
-    assert (settings.store, settings.audit_file, settings.snapshot) == (tmp_path, Path("other.json"), "paper")
+    assert (settings.store, settings.audit_files, settings.snapshot) == (tmp_path, (Path("other.json"),), "paper")
     assert (settings.max_points, settings.max_body_bytes, settings.cache_bytes) == (7, 99, 1000)
     assert settings.cors_origins == ("https://a.example", "https://b.example")
     assert settings.log_level == "warning"
 
 
 def test_the_audit_lies_in_the_store_unless_it_is_named(tmp_path: Path) -> None:
-    assert Settings(store=tmp_path).audit_file == tmp_path / "audit.json"
-    assert Settings(store=tmp_path, audit=Path("other.json")).audit_file == Path("other.json")
+    assert Settings(store=tmp_path).audit_files == (tmp_path / "audit.json", tmp_path / "audit-part.json")
+    assert Settings(store=tmp_path, audit=Path("other.json")).audit_files == (Path("other.json"),)
 
 
 @pytest.mark.parametrize("variable", ["BRDFDB_MAX_POINTS", "BRDFDB_MAX_BODY_BYTES", "BRDFDB_CACHE_BYTES"])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import io
 import zipfile
 from pathlib import Path
@@ -17,12 +18,13 @@ from zarr.storage import ZipStore
 from brdfdb.store import snapshots
 from brdfdb.store.reader import Store
 from brdfdb.store.revisions import collect, rollback
-from tests.api.a_store import Client, client_of, publish, serving
+from tests.api.a_store import Client, client_of, pinned_of, publish, serving
 from tests.api.chromium import SECONDS
 
 FOIL = "/v1/materials/copper-foil"
 STORED = "/v1/store/materials/copper-foil/r000001"
 CHUNK = "brdf/c/0/0/0/0"
+FOREVER = "public, max-age=31536000, immutable"
 
 
 def files(directory: Path) -> dict[str, bytes]:
@@ -37,7 +39,20 @@ def test_each_file_is_served_as_it_is(client: Client, store: Store) -> None:
         assert (answer.status_code, answer.content) == (200, content)
         kind = "application/json" if name.endswith(".json") else "application/octet-stream"
         assert answer.headers["content-type"] == kind
-        assert answer.headers["cache-control"] == "public, max-age=31536000, immutable"
+        assert answer.headers["cache-control"] == "no-cache"  # another store has an r000001, too
+        address = f"/v1/store/materials/copper-foil/{pinned_of(store, 'copper-foil')}/{name}"
+        same = client.get(address)
+        assert (same.status_code, same.content, same.headers["cache-control"]) == (200, content, FOREVER)
+
+
+def test_the_manifest_is_served_as_it_is_and_names_all_files(client: Client, store: Store) -> None:
+    answer = client.get(f"/v1/store/materials/copper-foil/{pinned_of(store, 'copper-foil')}.MANIFEST.json")
+    assert hashlib.sha256(answer.content).hexdigest() == store["copper-foil"].digest
+    assert answer.headers["cache-control"] == FOREVER
+    assert set(answer.json()["files"]) == set(files(store.path("copper-foil")))
+    short = client.get(f"{STORED}.MANIFEST.json")
+    assert (short.content, short.headers["cache-control"]) == (answer.content, "no-cache")
+    assert client.get(f"{STORED}.MANIFEST.json", headers={"If-None-Match": short.headers["etag"]}).status_code == 304
 
 
 def test_a_part_of_a_file(client: Client, store: Store) -> None:
@@ -59,7 +74,6 @@ def test_a_file_that_is_held_is_not_sent_again(client: Client) -> None:
         f"{STORED}/",
         f"{STORED}/brdf",
         f"{STORED}/stranger.txt",
-        f"{STORED}/../r000001.MANIFEST.json",
         f"{STORED}/%2e%2e/r000001.MANIFEST.json",
         f"{STORED}/..%2fHEAD.json",
         f"{STORED}/%2e%2e%2f%2e%2e%2f%2e%2e%2fbrdfdb.json",
@@ -124,10 +138,12 @@ def test_a_zip_that_xarray_opens(client: Client, store: Store, tmp_path: Path) -
 
 def test_a_zip_of_a_revision_is_kept_for_good(own: Path) -> None:
     client = client_of(own)
-    first = client.get(f"{FOIL}/revisions/r000001/download.zarr")
-    assert first.headers["cache-control"] == "public, max-age=31536000, immutable"
+    address = f"{FOIL}/revisions/{pinned_of(Store(own), 'copper-foil')}/download.zarr"
+    first = client.get(address)
+    assert first.headers["cache-control"] == FOREVER
+    assert client.get(f"{FOIL}/revisions/r000001/download.zarr").headers["cache-control"] == "no-cache"
     publish(own, "copper-foil", "lambert", rho=0.5)
-    again = client.get(f"{FOIL}/revisions/r000001/download.zarr", headers={"If-None-Match": first.headers["etag"]})
+    again = client.get(address, headers={"If-None-Match": first.headers["etag"]})
     assert again.status_code == 304
     current = client.get(f"{FOIL}/download.zarr", headers={"If-None-Match": first.headers["etag"]})
     assert (current.status_code, current.headers["cache-control"]) == (200, "no-cache")
@@ -137,7 +153,7 @@ def test_xarray_reads_over_http(root: Path, store: Store) -> None:
     pytest.importorskip("aiohttp")
     with serving(root) as url:
         stored = httpx.get(f"{url}{FOIL}", timeout=SECONDS).json()["links"]["store"]
-        assert stored == STORED
+        assert stored == f"/v1/store/materials/copper-foil/{pinned_of(store, 'copper-foil')}"
         with xr.open_zarr(f"{url}{stored}") as found, xr.open_zarr(store.path("copper-foil")) as expected:
             assert found.load().identical(expected.load())
 
@@ -177,12 +193,13 @@ def test_zarr_walks_the_store(own: Path, store: Store) -> None:
         group = zarr.open_group(f"{url}/v1/store", mode="r")
         assert sorted(group["materials"].group_keys()) == ["brushed-metal", "copper-foil", "white-tile"]
         revisions = {name: list(group[f"materials/{name}"].group_keys()) for name in ("copper-foil", "white-tile")}
-        assert revisions == {"copper-foil": ["r000001"], "white-tile": ["r000002"]}
-        table = group["materials/copper-foil/r000001"]
+        foil, tile = pinned_of(Store(own), "copper-foil"), pinned_of(Store(own), "white-tile", "r000002")
+        assert revisions == {"copper-foil": [foil], "white-tile": [tile]}
+        table = group[f"materials/copper-foil/{foil}"]
         assert table.attrs["title"] == "Test copper-foil"
         local = zarr.open_group(store.path("copper-foil"), mode="r")
         np.testing.assert_array_equal(table["brdf"][:2], local["brdf"][:2])
-        place = "materials/copper-foil/r000001"
+        place = f"materials/copper-foil/{foil}"
         with xr.open_zarr(f"{url}/v1/store", group=place) as found, xr.open_zarr(store.path("copper-foil")) as expected:
             assert found.load().identical(expected.load())
 

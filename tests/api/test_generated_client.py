@@ -46,6 +46,7 @@ CALLS: dict[str, dict[str, Any]] = {
     "thumbnail": {**TILE, "size": 16},
     "download": TILE,
     "root": {},
+    "manifest": {**TILE, "revision": "r000001"},
     "stored_file": {**TILE, "revision": "r000001", "file": "zarr.json"},
     "model_list": {},
     "model_document": {"model": "lambert"},

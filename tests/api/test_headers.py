@@ -11,11 +11,12 @@ import pytest
 
 from brdfdb import __version__
 from brdfdb.models import MODELS
+from brdfdb.store.reader import Store
 from brdfdb_api.http import responses
 from brdfdb_api.http.app import create_app
 from brdfdb_api.http.responses import preferred
 from brdfdb_api.serving.settings import Settings
-from tests.api.a_store import NPY, PROBLEM, Client, client_of, read_npy
+from tests.api.a_store import NPY, PROBLEM, Client, client_of, pinned_of, read_npy
 
 FOIL = "/v1/materials/copper-foil"
 POINT = "lookup?theta_i=10&theta_r=20"
@@ -130,13 +131,16 @@ def test_the_tag_of_a_model_names_its_version(client: Client) -> None:
         "export/csv?resolution=45",
     ],
 )
-def test_what_is_computed_of_a_revision_is_not_kept_for_good(client: Client, rest: str) -> None:
-    assert client.get(f"{FOIL}/revisions/r000001/{rest}").headers["cache-control"] == "no-cache"
+def test_what_is_computed_of_a_revision_is_not_kept_for_good(client: Client, store: Store, rest: str) -> None:
+    for revision in ("r000001", pinned_of(store, "copper-foil")):
+        assert client.get(f"{FOIL}/revisions/{revision}/{rest}").headers["cache-control"] == "no-cache"
 
 
-def test_what_a_revision_stores_is_kept_for_good(client: Client) -> None:
+def test_what_a_revision_stores_is_kept_for_good_under_its_digest(client: Client, store: Store) -> None:
+    pinned = pinned_of(store, "copper-foil")
     for address in (f"{FOIL}/revisions/r000001/{POINT}", CHUNK, f"{FOIL}/revisions/r000001/download.zarr"):
-        assert client.get(address).headers["cache-control"] == FOREVER
+        assert client.get(address).headers["cache-control"] == "no-cache"
+        assert client.get(address.replace("r000001", pinned)).headers["cache-control"] == FOREVER
 
 
 # ranges

@@ -17,7 +17,7 @@ from brdfdb.store.reader import Store
 from brdfdb.store.shelf import Shelf
 from brdfdb_api.http.app import create_app
 from brdfdb_api.serving.settings import Settings
-from tests.api.a_store import VISIBLE_NM, Client, client_of, publish
+from tests.api.a_store import VISIBLE_NM, Client, client_of, pinned_of, publish
 
 FOIL = "/v1/materials/copper-foil"
 FOIL_POINT = f"{FOIL}/lookup?theta_i=10&theta_r=20"
@@ -197,7 +197,9 @@ def test_material(client: Client, store: Store) -> None:
     assert (sigma["value"], sigma["source"], sigma["assumed"]) == (0.1, "no paper, copper-foil", False)
     links = material["links"]
     assert client.get(links["self"]).json() == material
-    assert client.get(links["revision"]).json()["links"]["lookup"] == f"{FOIL}/revisions/r000001/lookup"
+    pinned = pinned_of(store, "copper-foil")
+    assert material["digest"] == store["copper-foil"].digest
+    assert client.get(links["revision"]).json()["links"]["lookup"] == f"{FOIL}/revisions/{pinned}/lookup"
     for name in ("materials", "albedo", "lobe", "export/exr", "download.zarr"):
         assert client.get(links[name]).status_code == 200
     assert client.get(links["lookup"], params={"theta_i": 1, "theta_r": 2}).status_code == 200
@@ -342,9 +344,12 @@ def test_etag_does_not_hide_an_error(client: Client) -> None:
 
 def test_an_answer_of_a_revision_is_kept_for_good(own: Path) -> None:
     client = client_of(own)
-    address = "/v1/materials/white-tile/revisions/r000001/lookup?theta_i=10&theta_r=20"
+    address = f"{TILE}/revisions/{pinned_of(Store(own), 'white-tile')}/lookup?theta_i=10&theta_r=20"
     first = client.get(address)
     assert first.headers["cache-control"] == "public, max-age=31536000, immutable"
+    short = client.get(f"{TILE}/revisions/r000001/lookup?theta_i=10&theta_r=20")
+    assert (short.headers["cache-control"], short.headers["etag"]) == ("no-cache", first.headers["etag"])
+    assert short.json() == first.json()
     publish(own, "white-tile", "lambert", rho=0.25)
     assert client.get(address).json() == first.json()
     current = client.get("/v1/materials/white-tile/lookup?theta_i=10&theta_r=20").json()
@@ -354,7 +359,13 @@ def test_an_answer_of_a_revision_is_kept_for_good(own: Path) -> None:
     assert posted.json() == first.json()
 
 
-@pytest.mark.parametrize("revision", ["r000002", "r1", "latest", "%2e%2e", "..%2fr000001"])
+DIGITS = "0123456789abcdef"
+
+
+@pytest.mark.parametrize(
+    "revision",
+    ["r000002", "r1", "latest", "%2e%2e", "..%2fr000001", "r000001-", f"r000001-{DIGITS}", f"r000001-{DIGITS}01"],
+)
 @pytest.mark.parametrize(
     "rest", ["", "/lookup?theta_i=1&theta_r=2", "/albedo", "/lobe", "/export/exr", "/download.zarr"]
 )

@@ -6,6 +6,7 @@ import json
 import re
 import tomllib
 import zipfile
+from datetime import timedelta
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,10 @@ from brdfdb.geometry import degrees, unit_vector
 from brdfdb.materials import presets
 from brdfdb.measurements import Samples
 from brdfdb.store.summary_words import audited_materials
-from brdfdb_pipelines import recipe_file
+from brdfdb_api.http.app import create_app
+from brdfdb_api.serving.settings import Settings
+from brdfdb_pipelines import former_audit, recipe_file
+from tests.api.a_store import Client
 from tests.formats.test_neural import network
 from tests.measurements.made_up import scattered
 from tests.pipelines.command import Captured, run
@@ -107,6 +111,43 @@ def test_audits_of_earlier_imports_are_kept_as_long_as_their_tables_are_current(
     report = json.loads((store / "audit-part.json").read_text(encoding="utf-8"))
     assert {one["material"] for one in report["materials"]} == {"clay", "dark-grey", "too-bright"}
     assert report["violations"] == []
+    capsys.readouterr()
+
+
+def test_a_second_import_into_a_relative_store_keeps_the_audit_of_the_first(
+    tmp_path: Path, clay: Samples, monkeypatch: pytest.MonkeyPatch, capsys: Captured
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    clay.to_xarray().to_netcdf("clay.nc")
+    for name in ("first", "second", "third"):
+        assert run("import", "clay.nc", "--store", "store", "--name", name, *ONE_JOB) == 0
+    assert run("audit", "third", "--store", "./store") == 0
+    capsys.readouterr()
+    assert run("list", "--store", "store") == 0
+    assert "not audited" not in capsys.readouterr().out
+    verdicts = [(one["material"], one["verdict"]) for one in audited_materials(Path("store"))]
+    assert sorted(verdicts) == [("first", "passes"), ("second", "passes"), ("third", "passes")]
+    client = Client(create_app(Settings(store=Path("store"))))
+    assert client.get("/v1/materials/first/audit").json()["finding"]["verdict"] == "passes"
+
+
+def test_an_audit_of_some_does_not_bring_back_what_the_audit_of_all_has_repeated(
+    tmp_path: Path, clay: Samples, monkeypatch: pytest.MonkeyPatch, capsys: Captured
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    clay.to_xarray().to_netcdf("clay.nc")
+    for name in ("first", "second"):
+        assert run("import", "clay.nc", "--store", "store", "--name", name, *ONE_JOB) == 0
+    part = Path("store/audit-part.json")
+    former = former_audit.read_former(part)
+    assert former is not None
+    wrong = [audited.model_copy(update={"verdict": "violates"}) for audited in former.materials]
+    older = {"materials": wrong, "when": former.when - timedelta(hours=1)}
+    part.write_bytes(former_audit.sealed(former.model_copy(update=older)))
+    assert run("audit", "--store", "store", "--no-figures") == 0
+    assert run("audit", "second", "--store", "store", "--all") == 0
+    last = {one["material"]: one["verdict"] for one in audited_materials(Path("store"))}
+    assert last == {"first": "passes", "second": "passes"}
     capsys.readouterr()
 
 

@@ -27,6 +27,7 @@ from brdfdb.store.sealed_json import sealed
 from brdfdb.tables.layout import Layout
 from brdfdb.tables.tabulation import tabulate
 from brdfdb.tables.xarray_view import plain_attributes
+from brdfdb_pipelines import cli
 from tests.store.a_store import GRID, contents, lambert
 from tests.store.published import pointer, publish, rho
 
@@ -290,6 +291,33 @@ def test_no_store_is_one_sentence(tmp_path: Path) -> None:
     for missing in (tmp_path / "none", tmp_path):
         with pytest.raises(StoreError, match=f"^no store at {missing}: brdfdb.json is missing there; `brdfdb build`"):
             brdfdb.open(missing)
+
+
+INSIDE = ("materials", "materials/white", "materials/white/r000001", "materials/white/r000001/brdf", "new", ".staging")
+
+
+@pytest.mark.parametrize("inside", [*INSIDE, "materials/white/HEAD.json"])
+def test_a_place_inside_a_store_is_recognised_and_no_store_is_made_in_it(
+    root: Path, inside: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    before = contents(root)
+    sentence = f"{root / inside} lies in the store at {root}; name that directory"
+    with pytest.raises(StoreError) as raised:
+        brdfdb.open(root / inside)
+    assert str(raised.value) == sentence
+    with pytest.raises(StoreError) as raised:
+        publish(root / inside, white=lambert(0.5))
+    assert str(raised.value).startswith(sentence)
+    assert contents(root) == before
+    monkeypatch.chdir(root)
+    assert cli.main(["list", "--store", inside]) == 2
+    assert f"{inside} lies in the store at {root}" in capsys.readouterr().err
+
+
+def test_a_path_that_leaves_a_store_again_is_beside_it(root: Path) -> None:
+    assert brdfdb.open(root / "materials" / "..").root.samefile(root)
+    publish(root / ".." / "other", white=lambert(0.5))
+    assert list(brdfdb.open(root.parent / "other")) == ["white"]
 
 
 @pytest.mark.parametrize(

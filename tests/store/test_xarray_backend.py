@@ -84,8 +84,11 @@ def test_a_service_is_read_as_far_as_needed(root: Path) -> None:
             opened(url)
         with pytest.raises(UnknownMaterialError, match=r"^no material 'cooper' in the store; closest: copper"):
             opened(url, material="cooper")
-        with pytest.raises(StoreError, match=r"^no revision at http"):
-            opened(f"{url}/v1/store/materials/copper/r000009")
+        pinned = f"r000001-{copper.digest[:16]}"
+        np.testing.assert_array_equal(opened(url, material="copper", revision=pinned)["brdf"][1], copper.brdf[1])
+        for revision in ("r000009", "r000001-0123456789abcdef"):
+            with pytest.raises(UnknownRevisionError, match=rf"^copper has no revision '{revision}'"):
+                opened(f"{url}/v1/store/materials/copper/{revision}")
 
 
 @pytest.mark.parametrize("name", LAYOUTS)

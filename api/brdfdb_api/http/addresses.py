@@ -22,7 +22,10 @@ from brdfdb_api.http.responses import JSON, NPY, REVISION, Problem, unchanged
 
 T = TypeVar("T")
 
-Revision = Annotated[str | None, WithJsonSchema({"type": "string", "description": "such as r000001"})]
+Revision = Annotated[
+    str | None,
+    WithJsonSchema({"type": "string", "description": "such as r000001, or r000001-0123456789abcdef with its digest"}),
+]
 NPY_ANSWER = {NPY: "brdf alone, or brdf and error on a first axis, as a .npy file"}
 NPY_BODY = (
     "Or .npy of shape (..., 4), float32 or float64: theta_i, phi_i, theta_r, phi_r. Other media are read as JSON."
@@ -46,6 +49,11 @@ _HEADERS = {
     "Content-Disposition": "name of the file",
     "Retry-After": "seconds after which the same request may succeed",
 }
+
+
+def is_pinned(revision: str | None) -> bool:
+    """Return True if a revision that was found is named with its digest, so that its numbers hold in any store."""
+    return revision is not None and "-" in revision
 
 
 def shelf_of(request: Request) -> Shelf:
@@ -108,7 +116,7 @@ def addresses() -> APIRouter:
 def both(
     router: APIRouter, path: str, *, method: str = "GET", **keywords: Any
 ) -> Callable[[Callable[..., T]], Callable[..., T]]:
-    """Serve an address of the current revision, and the same of any revision, which never changes."""
+    """Serve an address of the current revision, and the same of any revision, named with its digest or without."""
 
     def add(function: Callable[..., T]) -> Callable[..., T]:
         signature = inspect.signature(function, eval_str=True)

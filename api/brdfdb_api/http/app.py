@@ -92,7 +92,7 @@ def create_app(settings: Settings | None = None, store: Store | None = None) -> 
     )
     given = app.state.settings = settings or Settings.from_environment()
     app.state.failed = functools.partial(problem_of, root=given.store.absolute())
-    app.state.shelf = Shelf(given.store, given.audit_file, given.cache_bytes, given.snapshot, store)
+    app.state.shelf = Shelf(given.store, given.audit_files, given.cache_bytes, given.snapshot, store)
     app.state.large = asyncio.Semaphore(LARGE_AT_ONCE)
     app.state.exports = asyncio.Semaphore(EXPORTS_AT_ONCE)
     app.state.routes = []

@@ -12,10 +12,11 @@ from starlette.responses import Response, StreamingResponse
 from brdfdb import __version__
 from brdfdb.store.archive import ZIP, Group, root_group, zipped
 from brdfdb.store.chunks import checked_bytes
-from brdfdb.store.manifest import check_manifest
-from brdfdb_api.http.addresses import Revision, addresses, answers, both, shelf_of
+from brdfdb.store.manifest import check_manifest, read_manifest
+from brdfdb.store.paths import manifest_path, pinned
+from brdfdb_api.http.addresses import Revision, addresses, answers, both, is_pinned, shelf_of
 from brdfdb_api.http.errors import RequestError
-from brdfdb_api.http.responses import Document, cache_headers, tagged
+from brdfdb_api.http.responses import JSON, Document, cache_headers, tagged
 
 BYTES = "application/octet-stream"
 
@@ -37,7 +38,7 @@ files = addresses()
 def download(request: Request, name: str, revision: Revision = None) -> Response:
     """Return a revision as one uncompressed zip file: xarray.open_zarr(zarr.storage.ZipStore(path, mode="r"))."""
     group, digest = shelf_of(request).located(name, revision)
-    headers = cache_headers(f"{name}-{group.name}-{digest[:16]}-{__version__}", "zip", immutable=revision is not None)
+    headers = cache_headers(f"{name}-{pinned(group.name, digest)}-{__version__}", "zip", immutable=is_pinned(revision))
     headers["Content-Disposition"] = f'attachment; filename="{name}-{group.name}.zarr.zip"'
     listed = check_manifest(group, digest, contents=False)["files"]
     contents = ((name, checked_bytes(group, name, listed)) for name in sorted(listed))
@@ -52,16 +53,32 @@ def download(request: Request, name: str, revision: Revision = None) -> Response
     responses=answers(None, 304, 404, 416, 503, media={BYTES: "a file of the zarr group"}),
 )
 def stored_file(request: Request, name: str, revision: str, file: str) -> Response:
-    """Return a file of a revision: ``xarray.open_zarr(".../v1/store/materials/NAME/REVISION")`` reads these."""
+    """Return a file of a revision: ``xarray.open_zarr(".../v1/store/materials/NAME/REVISION")`` reads these.
+
+    REVISION is that of ``links.store`` of the material, with its digest: what is read is then of one table.
+    """
     group, digest = shelf_of(request).located(name, revision)
     listed = check_manifest(group, digest, contents=False)["files"]
     if file not in listed:
         raise RequestError(404, f"{name} {revision} has no such file")
     content = checked_bytes(group, file, listed)  # a cache would keep damaged ones forever
     is_json = file.endswith(".json")  # JSON may be compressed on its way
-    tag = f"{name}-{revision}-{listed[file]['sha256'][:16]}"
-    headers = cache_headers(tag, "json" if is_json else "file", immutable=True)
+    tag = f"{name}-{group.name}-{listed[file]['sha256'][:16]}"
+    headers = cache_headers(tag, "json" if is_json else "file", immutable=is_pinned(revision))
     return Document(content, headers) if is_json else _ranged(request, content, headers)
+
+
+@files.get(
+    "/v1/store/materials/{name}/{revision}.MANIFEST.json",
+    tags=["files"],
+    responses=answers(None, 304, 404, 503, media={JSON: "the manifest as it is stored: its sha256 is the digest"}),
+)
+def manifest(request: Request, name: str, revision: str) -> Response:
+    """Return the manifest of a revision: sizes and sha256 of its files."""
+    group, digest = shelf_of(request).located(name, revision)
+    read_manifest(group, digest)
+    headers = cache_headers(f"{name}-{pinned(group.name, digest)}", immutable=is_pinned(revision))
+    return Document(manifest_path(group).read_bytes(), headers)
 
 
 def _ranged(request: Request, content: bytes, headers: dict[str, str]) -> Response:

@@ -17,13 +17,25 @@ from starlette.requests import Request
 from starlette.responses import Response
 
 from brdfdb.errors import ParameterError
+from brdfdb.store.paths import pinned
 from brdfdb.store.shelf import Shelf
 from brdfdb.tables.evaluation import Surface, Values, surface_of
 from brdfdb.tables.points import ANGLES, Points, PointsBody
 from brdfdb.tables.table import Table
 from brdfdb.tables.values_document import Lookup, Lookups, arrays_of, npy_bytes, values_document
 from brdfdb_api.http import queries, responses
-from brdfdb_api.http.addresses import NPY_ANSWER, Content, Quick, Revision, addresses, answers, body, both, shelf_of
+from brdfdb_api.http.addresses import (
+    NPY_ANSWER,
+    Content,
+    Quick,
+    Revision,
+    addresses,
+    answers,
+    body,
+    both,
+    is_pinned,
+    shelf_of,
+)
 from brdfdb_api.http.errors import RequestError, refused
 from brdfdb_api.http.middleware import POINTS
 
@@ -196,7 +208,7 @@ async def lookup_point(
     table = await _table(state.shelf, name, revision)
     surface = surface_in(table, query)
     computed = query.source == "model" or query.output != "spectrum" or query.stokes is not None
-    tag, immutable = tag_in(table, surface), revision is not None and not computed
+    tag, immutable = tag_in(table, surface), is_pinned(revision) and not computed
     headers = responses.value_headers(kind, tag, table.revision, immutable=immutable)
     about = {"material": table.name, "revision": table.revision}
     answer = await answered(state, points, query, surface, kind, headers, about)
@@ -206,7 +218,7 @@ async def lookup_point(
 async def _table(shelf: Shelf, name: str, revision: str | None) -> Table:
     """Return a table at once if it is decoded, else from a thread."""
     table = shelf.held(name)
-    if table is not None and revision in (None, table.revision):
+    if table is not None and (revision is None or revision in (table.revision, pinned(table.revision, table.digest))):
         return table
     return await run_in_threadpool(shelf.table, name, revision)
 

@@ -15,6 +15,7 @@ from starlette.responses import Response
 from brdfdb.formats import EXPORTERS
 from brdfdb.store.catalogue import Choice
 from brdfdb.store.material_document import material_document
+from brdfdb.store.paths import pinned
 from brdfdb_api.http import middleware
 from brdfdb_api.http.addresses import Revision, addresses, answers, both, shelf_of
 from brdfdb_api.http.errors import RequestError, refused
@@ -110,8 +111,8 @@ def material(request: Request, name: str, revision: Revision = None) -> Response
     links = {
         "self": address,
         **{key: f"{address}/{key}" for key in (*PARTS, *(f"export/{file_format}" for file_format in EXPORTERS))},
-        "store": f"/v1/store/materials/{name}/{table.revision}",
-        "revision": f"/v1/materials/{name}/revisions/{table.revision}",
+        "store": f"/v1/store/materials/{name}/{pinned(table.revision, table.digest)}",
+        "revision": f"/v1/materials/{name}/revisions/{pinned(table.revision, table.digest)}",
         "materials": "/v1/materials",
     }
     return Document(material_document(table, verdict) | {"revisions": revisions, "links": links}, headers)

@@ -9,6 +9,8 @@ from pydantic import AfterValidator, BeforeValidator, Field, ValidationError
 from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
 from brdfdb.errors import ParameterError, sentence_of
+from brdfdb.place import path_of
+from brdfdb.store.summary_words import REPORT_OF_ALL, REPORT_OF_SOME
 
 LogLevel = Literal["info", "warning", "error"]
 
@@ -17,6 +19,7 @@ def _origins(value: Any) -> Any:
     return tuple(filter(None, map(str.strip, value.split(",")))) if isinstance(value, str) else value
 
 
+Place = Annotated[Path, BeforeValidator(path_of)]
 Positive = Annotated[int, Field(gt=0)]
 Origin = Annotated[str, Field(pattern=r"^(\*|https?://[^/]+)$")]
 
@@ -26,8 +29,8 @@ class Settings(BaseSettings):
 
     model_config = SettingsConfigDict(env_prefix="BRDFDB_", frozen=True)
 
-    store: Path = Field(default=Path("brdf-store"), description="directory that ``brdfdb build --store`` wrote")
-    audit: Path | None = Field(default=None, description="what ``brdfdb audit`` wrote as JSON; None: where it puts it")
+    store: Place = Field(default=Path("brdf-store"), description="directory that ``brdfdb build --store`` wrote")
+    audit: Place | None = Field(default=None, description="what ``brdfdb audit`` wrote as JSON; None: where it puts it")
     max_points: Positive = Field(default=10_000, description="points in one JSON answer; .npy holds 100 times as many")
     max_body_bytes: Positive = Field(default=64 * 2**20, description="largest body [bytes]: a million points as .npy")
     cache_bytes: Positive = Field(default=256 * 2**20, description="decoded tables that each worker keeps [bytes]")
@@ -42,9 +45,10 @@ class Settings(BaseSettings):
     )
 
     @property
-    def audit_file(self) -> Path:
-        """Path of the audit report."""
-        return self.store / "audit.json" if self.audit is None else self.audit
+    def audit_files(self) -> tuple[Path, ...]:
+        """Paths of the audit reports: the one that was named, or those on all materials and on some in the store."""
+        in_store = (self.store / REPORT_OF_ALL, self.store / REPORT_OF_SOME)
+        return in_store if self.audit is None else (self.audit,)
 
     @classmethod
     def from_environment(cls) -> Self:

@@ -7,6 +7,8 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 
+from brdfdb.errors import ParameterError
+from brdfdb.place import path_of
 from brdfdb.store.opening import default_root
 
 MOST_JOBS = 1024  # threads or processes
@@ -15,12 +17,20 @@ MOST_WIDTH = 4096  # pixels across a picture: a wider one takes tens of gigabyte
 _UNITS = {"": 1, "B": 1, "kB": 10**3, "MB": 10**6, "GB": 10**9, "TB": 10**12}
 
 
+def place(text: str) -> Path:
+    """Return the path that an option names: every place on the command line is read here."""
+    try:
+        return path_of(text)
+    except ParameterError as error:
+        raise argparse.ArgumentTypeError(error.sentence) from None
+
+
 def add_store(parser: argparse.ArgumentParser) -> None:
     """Add the option --store DIR."""
     parser.add_argument(
         "--store",
-        type=Path,
-        default=Path(default_root()),
+        type=place,
+        default=default_root(),
         metavar="DIR",
         help="directory of the store (default: $BRDFDB_STORE or %(default)s)",
     )
@@ -59,8 +69,8 @@ def add_out(parser: argparse.ArgumentParser, directory: str) -> None:
     """Add the option --out DIR with its default."""
     parser.add_argument(
         "--out",
-        type=Path,
-        default=Path(directory),
+        type=place,
+        default=directory,
         metavar="DIR",
         help="directory to write to (default: %(default)s)",
     )
@@ -99,7 +109,7 @@ def sheet_file(text: str) -> Path:
 
 
 def _file_to_write(text: str, *suffixes: str) -> Path:
-    path = Path(text)
+    path = place(text)
     if path.is_dir():
         raise argparse.ArgumentTypeError(f"{text!r} is a directory; name a file in it")
     if path.suffix.lower() not in suffixes:

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import argparse
 import sys
-from pathlib import Path
 
-from brdfdb_pipelines.commands._arguments import add_jobs, add_store, share_cores
+from brdfdb_pipelines.commands._arguments import add_jobs, add_store, place, share_cores
 from brdfdb_pipelines.exit_codes import INTERRUPTED, VIOLATED
 
 HELP = "Audit the energy, reciprocity, smoothness and error of tables and their models; exit 1 on a violation."
@@ -18,7 +17,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_store(parser)
     parser.add_argument(
         "--report",
-        type=Path,
+        type=place,
         metavar="FILE",
         help="JSON report, which ends in .json (default: DIR/audit.json, or DIR/audit-part.json with names)",
     )

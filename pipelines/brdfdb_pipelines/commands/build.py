@@ -11,7 +11,7 @@ from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from brdfdb_pipelines.commands._arguments import add_jobs, add_store, byte_count, share_cores
+from brdfdb_pipelines.commands._arguments import add_jobs, add_store, byte_count, place, share_cores
 from brdfdb_pipelines.exit_codes import INTERRUPTED
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ HELP = "Tabulate the materials of a recipe that the store does not have yet."
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the recipe, the store, and where the work is done."""
-    parser.add_argument("recipe", type=Path, nargs="?", help="a TOML file (default: every material of the papers)")
+    parser.add_argument("recipe", type=place, nargs="?", help="a TOML file (default: every material of the papers)")
     parser.add_argument(
         "--library", metavar="NAME", help="in place of a file: the recipe of a library of presets, such as metals"
     )

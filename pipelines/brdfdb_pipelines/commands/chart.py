@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
-from brdfdb_pipelines.commands._arguments import add_out, add_store
+from brdfdb_pipelines.commands._arguments import add_out, add_store, place
 
 HELP = "Chart the cost of every form of a material or family against its error: pictures and JSON."
 
@@ -21,7 +20,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_store(parser)
     add_out(parser, "brdf-chart")
     parser.add_argument(
-        "--recipe", type=Path, metavar="FILE", help="a TOML file that defines materials, families and wavelengths"
+        "--recipe", type=place, metavar="FILE", help="a TOML file that defines materials, families and wavelengths"
     )
     parser.add_argument(
         "--tolerance",

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import argparse
 import sys
-from pathlib import Path
 
-from brdfdb_pipelines.commands._arguments import MOST_WIDTH, add_out, add_scene, share_cores, whole_number
+from brdfdb_pipelines.commands._arguments import MOST_WIDTH, add_out, add_scene, place, share_cores, whole_number
 from brdfdb_pipelines.exit_codes import INTERRUPTED
 
 HELP = "Choose the cheapest form of each material that a scene cannot tell from the model."
@@ -29,7 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default="time",
         help="cost to minimise; both is the product of time and bytes (default: %(default)s)",
     )
-    parser.add_argument("--build", type=Path, metavar="STORE", help="publish the chosen tables in this store")
+    parser.add_argument("--build", type=place, metavar="STORE", help="publish the chosen tables in this store")
 
 
 def run(options: argparse.Namespace) -> int:

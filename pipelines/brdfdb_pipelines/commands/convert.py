@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
-from brdfdb_pipelines.commands._arguments import add_store, picture_file, share_cores
+from brdfdb_pipelines.commands._arguments import add_store, picture_file, place, share_cores
 
 HELP = "Convert a material to another model: its closest parameters, and the error that is left."
 
@@ -16,7 +15,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--to", required=True, metavar="MODEL", help="the model to convert to")
     add_store(parser)
     parser.add_argument(
-        "--recipe", type=Path, metavar="FILE", help="a TOML file that defines materials and their wavelengths"
+        "--recipe", type=place, metavar="FILE", help="a TOML file that defines materials and their wavelengths"
     )
     parser.add_argument(
         "--wavelength-nm", type=float, nargs="+", metavar="NM", help="wavelengths (default: those of the material)"

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from brdfdb.errors import ParameterError
-from brdfdb_pipelines.commands._arguments import add_jobs, add_out, add_store
+from brdfdb_pipelines.commands._arguments import add_jobs, add_out, add_store, place
 from brdfdb_pipelines.exit_codes import VIOLATED
 
 if TYPE_CHECKING:
@@ -34,7 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         add_out(command, f"brdf-{name}")
         command.add_argument(
             "--audit",
-            type=Path,
+            type=place,
             metavar="FILE",
             help="report of `brdfdb audit` whose verdicts go into the files (default: those in the store)",
         )

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import argparse
 import sys
-from pathlib import Path
 
-from brdfdb_pipelines.commands._arguments import share_cores
+from brdfdb_pipelines.commands._arguments import place, share_cores
 from brdfdb_pipelines.commands._reading import add_reading, reading_keys
 from brdfdb_pipelines.exit_codes import INTERRUPTED
 
@@ -18,7 +17,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "data",
         nargs="+",
-        type=Path,
+        type=place,
         metavar="DATA",
         help="a file of samples, or several of one surface; a table of another program; or published fits (NAME.fit)",
     )
@@ -49,9 +48,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="full angle of the receiver, as the sample sees it: lobes are averaged over it (default: as DATA states)",
     )
     parser.add_argument("--source-deg", type=float, metavar="DEG", help="the same of the light")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write all fits as JSON")
-    parser.add_argument("--page", type=Path, metavar="FILE", help="write a page with figures, FILE.html")
-    parser.add_argument("--recipe", type=Path, metavar="FILE", help="write the best model as a recipe, FILE.toml")
+    parser.add_argument("--json", type=place, metavar="FILE", help="write all fits as JSON")
+    parser.add_argument("--page", type=place, metavar="FILE", help="write a page with figures, FILE.html")
+    parser.add_argument("--recipe", type=place, metavar="FILE", help="write the best model as a recipe, FILE.toml")
 
 
 def run(options: argparse.Namespace) -> int:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
 from brdfdb_pipelines.commands._arguments import add_jobs, add_store, sheet_file
 
@@ -18,7 +17,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--out",
         type=sheet_file,
-        default=Path("brdf-gallery.png"),
+        default="brdf-gallery.png",
         metavar="FILE",
         help="the PNG, or EXR in linear light, to write (default: %(default)s)",
     )

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
-from brdfdb_pipelines.commands._arguments import add_jobs, share_cores
+from brdfdb_pipelines.commands._arguments import add_jobs, place, share_cores
 from brdfdb_pipelines.commands._reading import add_reading, reading_keys
 from brdfdb_pipelines.exit_codes import REFUSED, VIOLATED
 
@@ -14,18 +13,18 @@ HELP = "Import measurements: state what files of others cover, integrate to and 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the files, what their columns are, and the forms of the answer."""
-    parser.add_argument("files", nargs="+", type=Path, metavar="FILE", help="a file of measurements, or a zarr group")
+    parser.add_argument("files", nargs="+", type=place, metavar="FILE", help="a file of measurements, or a zarr group")
     add_reading(parser)
     parser.add_argument("--join", action="store_true", help="take all files as one set of samples, of one surface")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
-    parser.add_argument("--out", type=Path, metavar="FILE.nc", help="write the samples of one file as netCDF")
+    parser.add_argument("--out", type=place, metavar="FILE.nc", help="write the samples of one file as netCDF")
     tables = parser.add_argument_group("tables")
     tables.add_argument(
-        "--store", type=Path, metavar="DIR", help="tabulate the samples in this store, and audit the tables"
+        "--store", type=place, metavar="DIR", help="tabulate the samples in this store, and audit the tables"
     )
     tables.add_argument(
         "--recipe",
-        type=Path,
+        type=place,
         metavar="FILE.toml",
         help="write the recipe with which brdfdb build makes the same tables",
     )

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
-from brdfdb_pipelines.commands._arguments import add_out, add_store, whole_number
+from brdfdb_pipelines.commands._arguments import add_out, add_store, place, whole_number
 
 HELP = "Simulate Ward's gonioreflectometer: pictures of a material as EXR, which `brdfdb import` and `fit` read."
 
@@ -14,7 +13,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the material, the lights, and the instrument."""
     parser.add_argument("name", metavar="NAME", help="a preset, or a material of the recipe or the store")
     add_store(parser)
-    parser.add_argument("--recipe", type=Path, metavar="FILE", help="a TOML file that defines materials")
+    parser.add_argument("--recipe", type=place, metavar="FILE", help="a TOML file that defines materials")
     parser.add_argument(
         "--light",
         action="append",

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
-from pathlib import Path
 
-from brdfdb_pipelines.commands._arguments import add_jobs, whole_number
+from brdfdb_pipelines.commands._arguments import add_jobs, place, whole_number
 
 HELP = "Write a training set: materials drawn over the ranges of a model, times directions, as one zarr group."
 _MATERIALS, _DIRECTIONS = 10_000_000, 1_000_000
@@ -26,7 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="number of pairs of directions, which all materials share",
     )
     parser.add_argument(
-        "--out", type=Path, required=True, metavar="SET.zarr", help="the group to write; the same command resumes it"
+        "--out", type=place, required=True, metavar="SET.zarr", help="the group to write; the same command resumes it"
     )
     parser.add_argument(
         "--range",

@@ -1,0 +1,180 @@
+"""A cache between service and client: nginx keeps what it may, and no answer is that of another store."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import socket
+import subprocess
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import httpx
+import numpy as np
+import pytest
+
+import brdfdb
+from brdfdb.errors import StoreError, UnknownRevisionError
+from brdfdb.store.reader import Store
+from tests.api.a_store import pinned_of, publish, serving
+from tests.api.chromium import SECONDS
+
+NGINX = shutil.which("nginx", path=f"{os.environ.get('PATH', '')}:/usr/sbin:/usr/local/sbin")
+pytestmark = pytest.mark.skipif(NGINX is None, reason="nginx is not installed: apt-get install nginx-light")
+
+# `proxy_cache_valid` is left out: what is kept, and for how long, is what the service says
+CONFIGURATION = """\
+daemon off;
+master_process off;
+pid {folder}/nginx.pid;
+error_log {folder}/error.log;
+events {{}}
+http {{
+  access_log off;
+  client_body_temp_path {folder}/body;
+  proxy_temp_path {folder}/temp;
+  fastcgi_temp_path {folder}/fastcgi;
+  uwsgi_temp_path {folder}/uwsgi;
+  scgi_temp_path {folder}/scgi;
+  proxy_cache_path {folder}/cache keys_zone=all:1m;
+  server {{
+    listen 127.0.0.1:{port};
+    location / {{
+      proxy_pass http://127.0.0.1:{upstream};
+      proxy_http_version 1.1;
+      proxy_cache all;
+      add_header X-Cache $upstream_cache_status;
+    }}
+  }}
+}}
+"""
+ANGLES = np.array([[0.1, 0.4, 0.9], [0.0, 0.1, 0.2], [0.2, 0.5, 1.0], [1.0, 2.0, 3.0]])
+LOOKUP = "lookup?theta_i=10&theta_r=20"
+
+
+def _free_port() -> int:
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        port: int = listener.getsockname()[1]
+        return port
+
+
+def _answers(port: int) -> bool:
+    with socket.socket() as one:
+        return one.connect_ex(("127.0.0.1", port)) == 0
+
+
+@pytest.fixture
+def upstream() -> int:
+    """The port at which the stores are served, one after the other."""
+    return _free_port()
+
+
+@pytest.fixture
+def proxy(tmp_path: Path, upstream: int) -> Iterator[str]:
+    """The address of an nginx that caches."""
+    folder, port = tmp_path / "nginx", _free_port()
+    folder.mkdir()
+    (folder / "nginx.conf").write_text(CONFIGURATION.format(folder=folder, port=port, upstream=upstream))
+    assert NGINX is not None
+    command = [NGINX, "-p", str(folder), "-c", str(folder / "nginx.conf"), "-e", str(folder / "error.log")]
+    with subprocess.Popen(command) as process:
+        try:
+            end = time.monotonic() + SECONDS
+            while not _answers(port):
+                assert process.poll() is None, (folder / "error.log").read_text()
+                assert time.monotonic() < end
+                time.sleep(0.02)
+            yield f"http://127.0.0.1:{port}"
+        finally:
+            process.send_signal(signal.SIGTERM)
+
+
+@pytest.fixture
+def stores(tmp_path: Path) -> tuple[Path, Path]:
+    """Two stores whose tables have the same names and numbers of revisions, and other values."""
+    for folder, rho in (("first", 0.2), ("second", 0.8)):
+        publish(tmp_path / folder, "tile", "oren_nayar", rho=rho, sigma_deg=20.0)
+    return tmp_path / "first", tmp_path / "second"
+
+
+@contextmanager
+def _served(root: Path, upstream: int) -> Iterator[None]:
+    with serving(root, port=upstream):
+        yield
+
+
+def _state(proxy: str, path: str) -> str:
+    return httpx.get(f"{proxy}{path}", timeout=SECONDS).headers["x-cache"]
+
+
+def test_the_cache_keeps_what_has_a_digest_and_asks_for_the_rest(
+    proxy: str, upstream: int, stores: tuple[Path, Path]
+) -> None:
+    pinned = pinned_of(Store(stores[0]), "tile")
+    with _served(stores[0], upstream):
+        for path in (f"materials/tile/revisions/{{}}/{LOOKUP}", "store/materials/tile/{}/brdf/c/0/0/0"):
+            for _ in range(2):
+                assert _state(proxy, f"/v1/{path.format('r000001')}") == "MISS"
+            states = [_state(proxy, f"/v1/{path.format(pinned)}") for _ in range(2)]
+            assert states == ["MISS", "HIT"]
+
+
+def test_lookups_are_those_of_the_store_that_is_served(proxy: str, upstream: int, stores: tuple[Path, Path]) -> None:
+    one_point = (0.3, 0.0, 0.4, 2.0)
+    tables = []
+    for root in stores:
+        here = brdfdb.open(root)["tile"]
+        with _served(root, upstream):
+            table = brdfdb.open(proxy)["tile"]
+            tables.append(table)
+            for _ in range(2):
+                assert table.lookup(*one_point) == pytest.approx(float(here.lookup(*one_point)), rel=1e-12)
+                np.testing.assert_allclose(table.lookup(*ANGLES), here.lookup(*ANGLES), rtol=1e-12)
+                assert dict(table.attrs) == {key: value for key, value in here.attrs.items() if key != "request"}
+            answer = httpx.get(f"{proxy}/v1/materials/tile/revisions/r000001/{LOOKUP}", timeout=SECONDS).json()
+            expected = here.lookup(*np.deg2rad([10.0, 0.0, 20.0, 0.0]))
+            assert answer["brdf"] == pytest.approx(float(expected), rel=1e-12)
+    with _served(stores[1], upstream):  # the table of the store before: what the cache has, or no answer
+        first = float(brdfdb.open(stores[0])["tile"].lookup(*one_point))
+        assert tables[0].lookup(*one_point) == pytest.approx(first, rel=1e-12)
+        with pytest.raises(UnknownRevisionError, match=r"^tile has no revision 'r000001-"):
+            tables[0].lookup(*ANGLES)
+
+
+def test_a_dataset_is_of_one_store(proxy: str, upstream: int, stores: tuple[Path, Path]) -> None:
+    pytest.importorskip("aiohttp")
+    for root in stores:
+        with _served(root, upstream):
+            for there in (brdfdb.open(proxy).dataset("tile"), brdfdb.open(proxy).dataset("tile", "r000001")):
+                assert there.load().identical(brdfdb.open(root).dataset("tile").load())
+    with _served(stores[0], upstream):
+        cached = brdfdb.open(proxy).dataset("tile")
+        direct = brdfdb.open(f"http://127.0.0.1:{upstream}").dataset("tile")
+    with _served(stores[1], upstream):  # what was opened before: the same table, or no answer
+        assert cached.load().identical(brdfdb.open(stores[0]).dataset("tile").load())
+        with pytest.raises(StoreError, match=r"^tile r000001 of http.* was removed or replaced while it was read"):
+            direct["brdf"].load()
+
+
+def test_a_cache_that_mixes_two_stores_all_the_same_is_noticed(
+    proxy: str, upstream: int, stores: tuple[Path, Path], tmp_path: Path
+) -> None:
+    pytest.importorskip("aiohttp")
+    with _served(stores[0], upstream):
+        brdfdb.open(proxy).dataset("tile").load()
+    kept = [path for path in (tmp_path / "nginx" / "cache").rglob("*") if b"/brdf/c/0/0/0" in path.read_bytes()]
+    (chunk,) = kept
+    content = chunk.read_bytes()
+    second = (stores[1] / "materials" / "tile" / "r000001" / "brdf" / "c" / "0" / "0" / "0").read_bytes()
+    first = (stores[0] / "materials" / "tile" / "r000001" / "brdf" / "c" / "0" / "0" / "0").read_bytes()
+    assert content.endswith(first)
+    padded = (second + bytes(len(first)))[: len(first)]
+    chunk.write_bytes(content.replace(first, padded))
+    with (
+        _served(stores[0], upstream),
+        pytest.raises(StoreError, match=r"brdf/c/0/0/0 is another one than its manifest names"),
+    ):
+        brdfdb.open(proxy).dataset("tile")["brdf"].load()
