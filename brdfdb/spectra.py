@@ -158,6 +158,16 @@ def picture_wavelengths(stored_nm: ArrayLike) -> NDArray[np.float64] | None:
     return PICTURE_NM
 
 
+def colour_wavelengths(stored_nm: ArrayLike) -> NDArray[np.float64] | None:
+    """Return the wavelengths [nm] of which a colour of a table is summed; None if they do not reach over the visible.
+
+    They are the wavelengths of the table, `stored_nm` in increasing order, where these are close enough, else those of
+    `picture_wavelengths`.
+    """
+    stored = np.asarray(stored_nm, dtype=np.float64).reshape(-1)
+    return stored if covers_visible(stored) else picture_wavelengths(stored)
+
+
 @cache
 def colour_science() -> Any:
     """Return the package `colour`, imported when colours are first needed: a second or more."""

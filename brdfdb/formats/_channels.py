@@ -96,7 +96,7 @@ def channels_of(table: Table, colour: str = "") -> Channels:
     if not has_spectrum(table):
         meaning = f"{'all channels are ' if len(names) > 1 else ''}f_r at {at[0]:g} nm"
         return Channels(names, at, np.ones((1, len(names))), meaning, (meaning,))
-    wavelengths = at if spectra.covers_visible(at) else spectra.picture_wavelengths(at)
+    wavelengths = spectra.colour_wavelengths(at)
     if wavelengths is None:
         raise CannotHoldError(
             f"{table.name}: wavelengths of {at[0]:g} to {at[-1]:g} nm give no colour; the format needs "

@@ -14,6 +14,16 @@ _SEVERAL = {"Float": "ArrayXf", "Float64": "ArrayXf64"}
 _LINE = 64  # bytes: an address that is a multiple of it lets Dr.Jit load several numbers at once
 
 
+def whole(place: Any, count: int) -> Any:
+    """Return the number of the cell, of `count` cells of length 1, that holds a place: the first or last one beyond.
+
+    All indices of gathers are made of these numbers. A place that is nan is in the first cell, so that nothing is read
+    outside a buffer.
+    """
+    place = dr.detach(place)
+    return mi.UInt32(dr.select(place > 0.0, dr.minimum(place, count - 1.0), 0.0))
+
+
 class Buffer:
     """A flat array of numbers, loaded once into each variant that reads it."""
 
@@ -22,7 +32,7 @@ class Buffer:
         self._arrays: dict[str | None, Any] = {}
 
     def at(self, index: Any) -> Any:
-        """Return the numbers at an index, which is a whole number in a variable of floats."""
+        """Return the numbers at an index."""
         if not dr.is_jit_v(index):
             return float(self.numbers[int(index)])
         return dr.gather(mi.Float, self.loaded(), mi.UInt32(index))

@@ -9,7 +9,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from brdfdb.mitsuba._buffers import Buffer
+from brdfdb.mitsuba._buffers import Buffer, whole
 from brdfdb.mitsuba._grid_axis import GridAxis
 from brdfdb.tables._interpolation import prepared
 from brdfdb.tables.sampler import LOBE_SHARE, Cells
@@ -42,12 +42,12 @@ class _Alias:
     def draw(self, row: Any, u: Any) -> tuple[Any, Any]:
         """Return the cell of a row that a random number chooses, and the place in it in [0, 1]."""
         scaled = u * self._count
-        own = dr.minimum(dr.floor(scaled), self._count - 1.0)
+        own = whole(scaled, self._count)
         rest = scaled - own
-        begin, alias = self._rows.row(row * self._count + mi.UInt32(own), 2)
+        begin, alias = self._rows.row(row * self._count + own, 2)
         kept = rest < begin
         place = dr.select(kept, rest, rest - begin) / dr.maximum(dr.select(kept, begin, 1.0 - begin), _LEAST)
-        return mi.UInt32(dr.select(kept, own, alias)), dr.clip(place, 0.0, 1.0)
+        return dr.select(kept, own, mi.UInt32(alias)), dr.clip(place, 0.0, 1.0)
 
 
 class CellsLobe:
@@ -93,7 +93,7 @@ class CellsLobe:
         local = self._turned(h * inverse, wi, -1.0)
         versine = (dr.square(local.x) + dr.square(local.y)) / (1.0 + local.z)
         ring, _ = self._log_edges.place(dr.log(dr.maximum(versine, _LEAST)))
-        column = mi.UInt32(dr.minimum(_turns(local, self._columns), self._columns - 1.0))
+        column = whole(_turns(local, self._columns), self._columns)
         light, weight = self._light(wi)
         rows: list[tuple[Any, Any]] = [(1.0, mi.UInt32(0))]
         if self._turns > 1:
@@ -113,9 +113,9 @@ class CellsLobe:
     def _turn(self, wi: Any) -> tuple[Any, Any, Any]:
         """Return the numbers of the azimuths of lights before and behind `wi`, and the weight of the second."""
         turn = _turns(wi, self._turns)
-        whole = dr.minimum(dr.floor(turn), self._turns - 1.0)
-        following = dr.select(whole >= self._turns - 1.0, 0.0, whole + 1.0)
-        return mi.UInt32(whole), mi.UInt32(following), dr.clip(turn - whole, 0.0, 1.0)
+        before = whole(turn, self._turns)
+        following = dr.select(before >= self._turns - 1, mi.UInt32(0), before + 1)
+        return before, following, dr.clip(turn - before, 0.0, 1.0)
 
     def _turned(self, h: Any, wi: Any, sign: float) -> Any:
         """Return half vectors of an isotropic table turned by the azimuth of the light; others stay."""

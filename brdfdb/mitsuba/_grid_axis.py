@@ -9,7 +9,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from brdfdb.mitsuba._buffers import Buffer, polynomial
+from brdfdb.mitsuba._buffers import Buffer, polynomial, whole
 from brdfdb.tables._interpolation import Axes
 
 Array = NDArray[np.float64]
@@ -32,8 +32,9 @@ class GridAxis:
     def __init__(self, axes: Axes, number: int) -> None:
         first, count = int(axes.first[number]), int(axes.counts[number])
         rows = slice(first, first + count - 1)
-        nodes = axes.nodes[first : first + count]
-        self._low, self._high, self._last = float(nodes[0]), float(nodes[-1]), count - 2
+        # Those that buffers hold: no place is before the first one, whatever the precision of the variant
+        nodes = axes.nodes[first : first + count].astype(np.float32).astype(np.float64)
+        self._low, self._high = float(nodes[0]), float(nodes[-1])
         self._uniform, self._scale = bool(axes.uniform[number]), float(axes.scale[number])
         if axes.width[number] == 4:
             slopes = axes.slopes[rows].reshape(-1, 2, 4)
@@ -60,25 +61,24 @@ class GridAxis:
             return None
         self._scale = pieces / (self._high - self._low)
         ends = self._low + (np.arange(pieces) + 1.0) / self._scale
-        number = np.clip(np.searchsorted(nodes, ends, side="left") - 1, 0, self._last)
+        number = np.clip(np.searchsorted(nodes, ends, side="left") - 1, 0, self.cells - 1)
         return Buffer(np.stack([nodes[number], 1.0 / steps[np.maximum(number - 1, 0)], 1.0 / steps[number], number], 1))
 
     def place(self, x: Any) -> tuple[Any, Any]:
         """Return the number of the cell, and the place in it in [0, 1]. Beyond the ends, the ends."""
         if self._uniform:
             scaled = (x - self._low) * self._scale
-            cell = dr.floor(dr.clip(dr.detach(scaled), 0.0, float(self._last)))
-            return mi.UInt32(cell), dr.clip(scaled - cell, 0.0, 1.0)
+            cell = whole(scaled, self.cells)
+            return cell, dr.clip(scaled - cell, 0.0, 1.0)
         inside = dr.clip(x, self._low, self._high)
         if self._buckets is None:
             cell = self._nodes.cell(dr.detach(inside), self.cells)
-            return mi.UInt32(cell), dr.clip((inside - self._nodes.at(cell)) * self._inverse.at(cell), 0.0, 1.0)
-        pieces = self._buckets.numbers.size // 4 - 1.0
-        piece = dr.minimum((dr.detach(inside) - self._low) * self._scale, pieces)
-        node, before, after, number = self._buckets.row(mi.UInt32(piece), 4)
+            return cell, dr.clip((inside - self._nodes.at(cell)) * self._inverse.at(cell), 0.0, 1.0)
+        piece = whole((inside - self._low) * self._scale, self._buckets.numbers.size // 4)
+        node, before, after, number = self._buckets.row(piece, 4)
         beyond, lower = inside - node, dr.detach(inside) < node
         t = beyond * dr.select(lower, before, after) + dr.select(lower, 1.0, 0.0)
-        return mi.UInt32(number - dr.select(lower, 1.0, 0.0)), dr.clip(t, 0.0, 1.0)
+        return whole(number - dr.select(lower, 1.0, 0.0), self.cells), dr.clip(t, 0.0, 1.0)
 
     def nodes_of(self, cell: Any) -> list[Any]:
         """Return the numbers of the nodes that count in a cell."""

@@ -9,7 +9,7 @@ import drjit as dr
 import numpy as np
 from numpy.typing import NDArray
 
-from brdfdb.mitsuba._buffers import Buffer, polynomial
+from brdfdb.mitsuba._buffers import Buffer, polynomial, whole
 
 Array = NDArray[np.float64]
 
@@ -34,7 +34,7 @@ class Axis(NamedTuple):
     def place(self, x: Any) -> tuple[Any, Any]:
         """Return the number of the patch that holds x, and the place in it, in [0, 1]. Beyond the ends, the ends."""
         size = (self.high - self.low) / self.patches
-        number = dr.floor(dr.clip((dr.detach(x) - self.low) * (1.0 / size), 0.0, self.patches - 1.0))
+        number = whole((x - self.low) * (1.0 / size), self.patches)
         return number, dr.clip((x - (self.low + size * number)) * (1.0 / size), 0.0, 1.0)
 
 

@@ -60,7 +60,10 @@ class Formula:
         return [f"{name} = {texture}" for name, texture in self.parameters.textures.items()]
 
     def parts(self, values: Values, wi: Any, wo: Any) -> dict[str, Any]:
-        """Return f_r [1/sr] of each part but the specular one, no cosine, for directions above the horizon."""
+        """Return f_r [1/sr] of each part but the specular one, no cosine, for directions above the horizon.
+
+        A part may be negative in linear sRGB. Where the sum of the parts is, 0 takes its place.
+        """
         raise NotImplementedError
 
     def facet(self, values: Values, wi: Any, wo: Any) -> Facet | None:  # noqa: ARG002  # of a model without polarisation
@@ -124,17 +127,20 @@ class _Methods:
         return self.eval_pdf(ctx, si, wo, active)[1]
 
     def eval_pdf(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
-        above = active & (si.wi.z > 0.0) & (wo.z > 0.0)
+        above = active & _finite(si.wi) & _finite(wo) & (si.wi.z > 0.0) & (wo.z > 0.0)
         values = self._formula.at(si, above)
+        known = _finite(si.wi) & _finite(wo) & _without_nan(values)
         light, viewer = _or_normal(above, si.wi), _or_normal(above, wo)
         lobe = self._formula.lobe(values, light)
         pdf = _density(self._shares(ctx, values, lobe, light), lobe, light, viewer)
         factor = dr.select(above, viewer.z, 0.0)
-        return self._reflected(ctx, values, light, viewer, factor), dr.select(above, pdf, 0.0)
+        value = self._reflected(ctx, values, light, viewer, factor)
+        return _or_nan(known, active, value), _or_nan(known, active, dr.select(above, pdf, 0.0))
 
     def sample(self, ctx: Any, si: Any, sample1: Any, sample2: Any, active: Any = True) -> Any:
-        above = active & (si.wi.z > 0.0)
+        above = active & _finite(si.wi) & (si.wi.z > 0.0)
         values = self._formula.at(si, above)
+        known = _finite(si.wi) & dr.isfinite(sample1) & _finite(sample2) & _without_nan(values)
         light = _or_normal(above, si.wi)
         lobe = self._formula.lobe(values, light)
         shares = self._shares(ctx, values, lobe, light)
@@ -160,14 +166,16 @@ class _Methods:
             factor = dr.select(is_specular, 0.0, factor)
             viewer = dr.select(is_specular, wo, viewer)
         record = dr.zeros(mi.BSDFSample3f)
-        record.wo, record.pdf, record.eta = wo, dr.select(above, pdf, 0.0), 1.0
+        record.wo, record.pdf = (_or_nan(known, active, x) for x in (wo, dr.select(above, pdf, 0.0)))
+        record.eta = 1.0
         record.sampled_type, record.sampled_component = self._kind(ctx, is_specular, in_lobe)
-        return record, self._reflected(ctx, values, light, viewer, factor, specular)
+        return record, _or_nan(known, active, self._reflected(ctx, values, light, viewer, factor, specular))
 
     def eval_diffuse_reflectance(self, si: Any, active: Any = True) -> Any:
         straight = mi.Vector3f(0.0, 0.0, 1.0)
         values = self._formula.at(si, active)
-        return self._formula.parts(values, straight, straight)[self._formula.components[-1]] * dr.pi
+        parts = self._formula.parts(values, straight, straight)
+        return parts.get(DIFFUSE, parts.get(GLOSSY)) * dr.pi
 
     def to_string(self) -> str:
         lines = (f"  {line}," for line in self._formula.description)
@@ -181,7 +189,8 @@ class _Methods:
         glossy, diffuse = of_each.get(GLOSSY, zero), of_each.get(DIFFUSE, zero)
         facet = self._formula.facet(values, wi, wo) if mi.is_polarized else None
         if facet is None:
-            value = (glossy + diffuse) * factor
+            # Parts of a colour outside sRGB may be negative, their sum is not
+            value = dr.maximum(glossy + diffuse, 0.0) * factor
             return mi.depolarizer(value if specular is None else value + specular)
         hidden = dr.minimum(glossy, self._formula.depolarised(values))
         mirrored = (glossy - hidden) * factor
@@ -233,6 +242,28 @@ def _flag(part: str) -> Any:
 def _or_normal(above: Any, w: Any) -> Any:
     """Return `w`, and the normal where it lies below the horizon, so that derivatives there are 0 and not nan."""
     return dr.select(above, w, mi.Vector3f(0.0, 0.0, 1.0))
+
+
+def _finite(vector: Any) -> Any:
+    return dr.all(dr.isfinite(vector))
+
+
+def _without_nan(values: Values) -> Any:
+    """Return whether no parameter is nan, nor a wavelength."""
+    known: Any = True
+    for value in values.values():
+        for leaf in value if isinstance(value, list | tuple) else (value,):
+            number = dr.isnan(leaf)
+            known &= dr.none(number) if dr.depth_v(leaf) > dr.depth_v(mi.Float) else number ^ True
+    return known
+
+
+def _or_nan(known: Any, active: Any, value: Any) -> Any:
+    """Return a value where all that it depends on is known; elsewhere nan, and 0 where a ray is masked out."""
+    unknown = dr.select(active, dr.nan, 0.0)
+    if dr.is_matrix_v(value):
+        return dr.select(known, value, mi.Spectrum(*[mi.UnpolarizedSpectrum(unknown)] * 16))
+    return dr.select(known, value, unknown)
 
 
 def _density(shares: _Shares, lobe: Lobe | None, wi: Any, wo: Any) -> Any:

@@ -105,17 +105,17 @@ def _rough(wi: Any, wo: Any, tan_slope: Any) -> tuple[Any, Any, Any]:
     # The same for an azimuth of 0, of each direction alone
     eta_n = cos_n + sin_n * tan_slope * (1.0 - m2_n) / (1.0 + m1_n)
     eta_f = cos_f + sin_f * tan_slope * (1.0 - m2_f) / (1.0 + m1_f)
-    hidden = _one_less_exp(2.0 * c_h / s_h)
+    hidden = one_less_exp(2.0 * c_h / s_h)
     return mu_n, mu_f, 1.0 / (eta_n * (hidden + (1.0 - hidden) * cos_n / eta_n)) / eta_f
 
 
 def _leaning(cos: Any, sin: Any, tan_slope: Any) -> tuple[Any, Any]:
     """Return 1 - E_1 and 1 - E_2 [1] of a direction: what is missing from its share of slopes that lean away."""
     q = dr.minimum(cos / dr.maximum(sin * tan_slope, _LEAST), 1e4)
-    return _one_less_exp((2.0 * dr.inv_pi) * q), _one_less_exp(dr.square(q) * dr.inv_pi)
+    return one_less_exp((2.0 * dr.inv_pi) * q), one_less_exp(dr.square(q) * dr.inv_pi)
 
 
-def _one_less_exp(x: Any) -> Any:
+def one_less_exp(x: Any) -> Any:
     """Return 1 - e^-x [1] for x >= 0, with all digits of small x."""
     series = x * (1.0 - x * (1 / 2 - x * (1 / 6 - x * (1 / 24 - x * (1 / 120 - x * (1 / 720))))))
     return dr.select(x < 0.3, series, 1.0 - dr.exp(-x))

@@ -2,25 +2,34 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import drjit as dr
 import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
 
+from brdfdb.errors import ParameterError
 from brdfdb.mitsuba._diffraction_series import diffraction_series, effective_variance
 from brdfdb.mitsuba._gaussian_lobe import GaussianLobe
 from brdfdb.mitsuba._mueller import Facet
-from brdfdb.mitsuba._parameters import Parameters
+from brdfdb.mitsuba._parameters import Parameters, spectrum_of
 from brdfdb.mitsuba._surface import DIFFUSE, GLOSSY, SPECULAR, Formula, Values
-from brdfdb.mitsuba._wavelengths import channels_nm
+from brdfdb.mitsuba._wavelengths import SRGB, channels_nm, projection
+from brdfdb.mitsuba.diffuse import one_less_exp
 from brdfdb.models import MODELS
 from brdfdb.models.he_torrance_1991 import WAVELENGTH_NM, K, N
+from brdfdb.spectra import PICTURE_NM, picture_wavelengths
 
 _LEAST_COS = 6.1e-17  # cosine of the horizon: the model is finite there
 _LEAST = 1e-30
 _X_MAX = 9.0  # largest x; erfc(x) and exp(-x^2) are 0 in float32 well below it
 _LARGEST = 1e38  # f_r [1/sr] stays below
 _STEEPEST, _ALPHA_RANGE = 1e-3, (1e-6, 2.0)  # least cosine and range of alpha in the lobe of samples
+
+
+Array = NDArray[np.float64]
 
 
 class _Surface(NamedTuple):
@@ -126,29 +135,50 @@ def directional_diffuse(wi: Any, wo: Any, surface: _Surface) -> Any:
     return dr.minimum(value, _LARGEST)
 
 
+class _View(NamedTuple):
+    """Three wavelengths [nm] of a projection, those of n and k [1] that are spectra, and weights [1] (3, channels)."""
+
+    wavelength_nm: list[float]
+    indices: dict[str, list[float]]
+    weights: list[list[float]]
+
+
 class HeTorrance(Formula):
     """The plugin ``brdfdb_he_torrance``. Its parameters are those of the model; n and k are spectra.
 
-    `wavelength_nm` sets one wavelength for all channels. Without it, those of a variant without a spectrum have
-    `WAVELENGTHS_NM`.
+    `wavelength_nm` sets one wavelength for all channels. Without it, RGB variants project the spectrum of f_r at
+    `PICTURE_NM` on linear sRGB. If `channels` is "wavelengths", or n or k is a colour or a texture, their channels have
+    `WAVELENGTHS_NM`, as mono has.
     """
 
     components = (GLOSSY, DIFFUSE, SPECULAR)
 
     def __init__(self, props: Any) -> None:
-        self.parameters = Parameters(props, MODELS["he_torrance"], coloured=(N, K))
         self._wavelength_nm = props.get("wavelength_nm", 0.0)
+        at_nm = None if mi.is_spectral else channels_nm()
         if self._wavelength_nm:
             WAVELENGTH_NM.check(self._wavelength_nm)
+            at_nm = (self._wavelength_nm,)
+        self._views = [] if self._wavelength_nm else _views_of(props)
+        self.parameters = Parameters(props, MODELS["he_torrance"], (N, K), at_nm)
 
     def at(self, interaction: Any, active: Any) -> Values:
         """Return the parameters and the surface as the light of each channel sees it."""
         values = self.parameters.at(interaction, active)
-        wavelength_um = self._wavelengths_nm(interaction) / 1000.0
-        sigma_0, tau = values["sigma_0_um"], values["tau_um"]
-        wave, correlation = dr.square(2.0 * dr.pi * sigma_0 / wavelength_um), dr.square(dr.pi * tau / wavelength_um)
-        values["surface"] = _Surface(wave, correlation, sigma_0 / tau, values["n"], values["k"])
+        values["surface"] = _surface_of(values, self._wavelengths_nm(interaction))
         return values
+
+    def _seen(self, values: Values, function: Callable[[_Surface], Any]) -> Any:
+        """Return a function of the surface as each channel sees it, projected on sRGB if the channels are colours."""
+        if not self._views:
+            return function(values["surface"])
+        total: list[Any] = [0.0, 0.0, 0.0]
+        for view in self._views:
+            indices = {name: mi.UnpolarizedSpectrum(numbers) for name, numbers in view.indices.items()}
+            spectrum = function(_surface_of(values | indices, mi.UnpolarizedSpectrum(view.wavelength_nm)))
+            for value, weights in zip(spectrum, view.weights, strict=True):
+                total = [number + value * weight for number, weight in zip(total, weights, strict=True)]
+        return mi.UnpolarizedSpectrum(total)
 
     def _wavelengths_nm(self, interaction: Any) -> Any:
         if mi.is_spectral and not self._wavelength_nm:
@@ -157,7 +187,8 @@ class HeTorrance(Formula):
 
     def parts(self, values: Values, wi: Any, wo: Any) -> dict[str, Any]:
         """Return f_r [1/sr] of the directional diffuse and of the uniform diffuse part."""
-        return {GLOSSY: directional_diffuse(wi, wo, values["surface"]), DIFFUSE: values["a"] * dr.inv_pi}
+        glossy = self._seen(values, lambda surface: directional_diffuse(wi, wo, surface))
+        return {GLOSSY: glossy, DIFFUSE: values["a"] * dr.inv_pi}
 
     def facet(self, values: Values, wi: Any, wo: Any) -> Facet:
         """Return the Mueller matrix at the bisecting angle, which for the specular part is that of incidence."""
@@ -166,10 +197,13 @@ class HeTorrance(Formula):
 
     def specular(self, values: Values, wi: Any) -> Any:
         """Return the specular reflectance [1], eq. 73."""
-        surface = values["surface"]
-        over_cos, K_i = shadowing_and_hidden(wi, surface.slope)
-        g = 4.0 * dr.square(wi.z) * surface.wave * effective_variance(2.0 * K_i)
-        return reflectance(wi.z, surface.n, surface.k) * dr.exp(-g) * dr.square(over_cos * wi.z)
+
+        def of_surface(surface: _Surface) -> Any:
+            over_cos, K_i = shadowing_and_hidden(wi, surface.slope)
+            g = 4.0 * dr.square(wi.z) * surface.wave * effective_variance(2.0 * K_i)
+            return reflectance(wi.z, surface.n, surface.k) * dr.exp(-g) * dr.square(over_cos * wi.z)
+
+        return dr.maximum(self._seen(values, of_surface), 0.0)
 
     def specular_share(self, values: Values, wi: Any) -> Any:
         """Return the share [1] of samples in the mirror direction: that of the light, roughly."""
@@ -191,5 +225,38 @@ class HeTorrance(Formula):
     def _diffuse_albedos(self, values: Values, wi: Any) -> tuple[Any, Any]:
         """Return rough albedos [1] of both diffuse parts, the mean over the channels."""
         surface = values["surface"]
-        scattered = 1.0 - dr.exp(-4.0 * surface.wave * dr.square(wi.z))
-        return dr.mean(reflectance(wi.z, surface.n, surface.k) * scattered), dr.mean(values["a"])
+        cos = dr.maximum(wi.z, _STEEPEST)
+        scattered = one_less_exp(4.0 * surface.wave * dr.square(cos))
+        return dr.mean(reflectance(cos, surface.n, surface.k) * scattered), dr.mean(values["a"])
+
+
+def _surface_of(values: Values, wavelength_nm: Any) -> _Surface:
+    wavelength_um = wavelength_nm / 1000.0
+    sigma_0, tau = values["sigma_0_um"], values["tau_um"]
+    wave, correlation = dr.square(2.0 * dr.pi * sigma_0 / wavelength_um), dr.square(dr.pi * tau / wavelength_um)
+    return _Surface(wave, correlation, sigma_0 / tau, values["n"], values["k"])
+
+
+def _views_of(props: Any) -> list[_View]:
+    """Return the wavelengths of a projection, three at a time; none if each channel has its own."""
+    spectra = {name: spectrum for name in ("n", "k") if (spectrum := spectrum_of(props, name)) is not None}
+    ends = [PICTURE_NM[[0, -1]], *(nm[[0, -1]] for nm, _ in spectra.values())]
+    shared: Array | None = np.array([max(low for low, _ in ends), min(high for _, high in ends)])
+    for name in ("n", "k"):
+        if name in props and not (isinstance(props[name], int | float) or hasattr(props[name], "wavelengths")):
+            if props.get("channels", "") == SRGB:
+                raise ParameterError(name, f"a colour or a texture has no spectrum, which channels = {SRGB} needs")
+            shared = None
+    at_nm = None if shared is None else picture_wavelengths(shared)
+    chosen = projection(props, shared if at_nm is None else at_nm)
+    if chosen is None:
+        return []
+    # Wavelengths that fill the last three have no weight
+    lacking = -chosen.wavelength_nm.size % 3
+    nm = np.append(chosen.wavelength_nm, np.repeat(chosen.wavelength_nm[-1], lacking))
+    weights = np.concatenate([chosen.weights, np.zeros((lacking, 3))])
+    index = {name: np.interp(nm, *spectrum) for name, spectrum in spectra.items()}
+    return [
+        _View(nm[part].tolist(), {name: x[part].tolist() for name, x in index.items()}, weights[part].tolist())
+        for part in (slice(first, first + 3) for first in range(0, nm.size, 3))
+    ]

@@ -18,7 +18,7 @@ from brdfdb.mitsuba._grid_points import points
 from brdfdb.mitsuba._grid_values import GridValues
 from brdfdb.mitsuba._mueller import Facet
 from brdfdb.mitsuba._surface import DIFFUSE, GLOSSY, SPECULAR, Formula, Values
-from brdfdb.mitsuba._wavelengths import Columns
+from brdfdb.mitsuba._wavelengths import Columns, projection
 from brdfdb.store.opening import open as open_store
 from brdfdb.tables._interpolation import prepared, weights_of_nodes
 from brdfdb.tables.polarisation import Facets
@@ -48,7 +48,10 @@ class TableFormula(Formula):
     """The plugin ``brdfdb_table``: the table of a `material` in a `store`, a directory or the address of a service.
 
     Without `store` it is that of the environment variable ``BRDFDB_STORE``. Its parts are the tabulated one, the
-    uniform one and the specular one. Variants without a spectrum look up `WAVELENGTHS_NM`.
+    uniform one and the specular one.
+
+    RGB variants project the spectrum on linear sRGB, as ``export rgl --kind rgb`` does. If `channels` is "wavelengths",
+    their channels have `WAVELENGTHS_NM`, as mono has. `wavelength_nm` sets one wavelength for all channels.
     """
 
     def __init__(self, props: Any) -> None:
@@ -57,13 +60,21 @@ class TableFormula(Formula):
         table = loaded(props["material"], props.get("store", None))
         self.name, self.anisotropic = table.name, table.anisotropic
         self._grid, self._how, self._mixed = table.grid, table.interpolation, table.part_nm is not None
-        self._columns = Columns(table.wavelength_nm)
+        single_nm = props.get("wavelength_nm", 0.0)
+        self._projection = projection(props, None if single_nm else table.wavelength_nm)
+        self._least = 0.0 if self._projection is None else -_LARGEST  # of a part in a channel [1/sr]
+        self._columns = Columns(table.wavelength_nm, single_nm)
         axes = prepared([radians(nodes) for nodes in table.axes_deg.values()], table.grid.ends, cubic=self._how.cubic)
         numbers = table.values.reshape(*table.grid.shape, -1)
         weights = self._weights(table)
         mixing = weights.T if table.spectra is None else table.spectra @ weights.T
+        self._spectrum: Array | None = None  # numbers that are logarithms, at the wavelengths of a projection
+        if self._projection is not None:
+            weights = self._projection.weights.T @ weights
+            self._spectrum = None if self._mixed or not self._how.logarithm else mixing
+            mixing = mixing @ self._projection.weights
         # Linear in the numbers: the channels of the variant take the place of those of the table
-        self._whole = not mi.is_spectral and not self._mixed
+        self._whole = not mi.is_spectral and not self._mixed and self._spectrum is None
         self._values = GridValues(axes, np.asarray(numbers @ mixing, np.float32) if self._whole else numbers)
         self._rows = Buffer(mixing)
         self._facets = _Facets(table.facets, table, self._columns) if mi.is_polarized and table.facets else None
@@ -71,25 +82,32 @@ class TableFormula(Formula):
         self.components = (GLOSSY,)
         if table.uniform is not None and np.any(table.uniform > 0.0):
             self.components = (*self.components, DIFFUSE)
-            self._uniform = Buffer(np.maximum(weights @ np.broadcast_to(table.uniform, weights.shape[1]), 0.0))
+            uniform = weights @ np.broadcast_to(table.uniform, weights.shape[1])
+            self._uniform = Buffer(np.maximum(uniform, self._least))
         if table.specular is not None and np.any(table.specular > 0.0):
             self.components = (*self.components, SPECULAR)
             self._read_specular(table)
 
     def _weights(self, table: Table) -> Array:
-        """Return the weights (columns, L) of the wavelengths of the table."""
-        if table.wavelength_nm is None or self._columns.at_nm is None:
+        """Return the weights (columns, L) of the wavelengths of the table, or (M, L) at those of the projection."""
+        at_nm = self._columns.at_nm if self._projection is None else self._projection.wavelength_nm
+        if table.wavelength_nm is None or at_nm is None:
             return np.ones((1, 1))
-        index, weight = weights_of_nodes(table.wavelength_nm, self._columns.at_nm)
-        matrix = np.zeros((self._columns.count, table.wavelength_nm.size))
-        np.add.at(matrix, (np.arange(self._columns.count)[:, np.newaxis], index), weight)
+        index, weight = weights_of_nodes(table.wavelength_nm, at_nm)
+        matrix = np.zeros((at_nm.size, table.wavelength_nm.size))
+        np.add.at(matrix, (np.arange(at_nm.size)[:, np.newaxis], index), weight)
         return matrix
 
     def _read_specular(self, table: Table) -> None:
         nodes = table.specular_theta_deg
         theta = radians(table.axes_deg["theta_i"] if nodes is None else nodes)
         self._specular_axis = GridAxis(prepared([theta], [("open", "open")], cubic=False), 0)
-        self._specular = Buffer(table.specular_reflectance(theta, self._columns.at_nm))
+        if self._projection is None:
+            reflectance = table.specular_reflectance(theta, self._columns.at_nm)
+        else:
+            spectra = table.specular_reflectance(theta, self._projection.wavelength_nm)
+            reflectance = np.maximum(spectra @ self._projection.weights, 0.0)
+        self._specular = Buffer(reflectance)
         number = np.arange(_DRAWN)
         wi = unit_vector(theta, np.zeros(theta.size))[:, np.newaxis]
         drawn = table.sample((number + 0.5) / _DRAWN, number * _TURN % 1.0, wi)
@@ -105,10 +123,13 @@ class TableFormula(Formula):
         if self._mixed:
             numbers = [self._f_r(number) for number in numbers]
         places = values["places"]
-        totals = [numbers[int(place)] if self._whole else self._total(numbers, place) for place in places]
-        if not self._mixed:
-            totals = [self._f_r(total) for total in totals]
-        glossy = dr.maximum(mi.UnpolarizedSpectrum(totals), 0.0) * self._off_the_pole(wi, wo)
+        if self._spectrum is not None:
+            totals = self._projected(numbers, self._spectrum)
+        else:
+            totals = [numbers[int(place)] if self._whole else self._total(numbers, place) for place in places]
+            if not self._mixed:
+                totals = [self._f_r(total) for total in totals]
+        glossy = dr.maximum(mi.UnpolarizedSpectrum(totals), self._least) * self._off_the_pole(wi, wo)
         parts = {GLOSSY: dr.minimum(glossy, _LARGEST)}
         if DIFFUSE in self.components:
             uniform = [self._columns.read(self._uniform, 0, place) for place in places]
@@ -119,6 +140,12 @@ class TableFormula(Formula):
         """Return the number at a wavelength, from those of the channels of the table."""
         rows = (self._columns.read(self._rows, channel, place) for channel in range(len(numbers)))
         return sum(number * row for number, row in zip(numbers, rows, strict=True))
+
+    def _projected(self, numbers: list[Any], spectrum: Array) -> list[Any]:
+        """Return linear sRGB of f_r at the wavelengths of the projection."""
+        assert self._projection is not None
+        values = [self._f_r(_combined(numbers, mixing)) for mixing in spectrum.T]
+        return [_combined(values, weights) for weights in self._projection.weights.T]
 
     def _f_r(self, number: Any) -> Any:
         return dr.maximum(dr.exp(number) - self._how.offset, 0.0) if self._how.logarithm else number
@@ -174,6 +201,10 @@ class TableFormula(Formula):
     def description(self) -> list[str]:
         """The lines of a text about the plugin."""
         return [f"material = {self.name}"]
+
+
+def _combined(numbers: list[Any], weights: Array) -> Any:
+    return sum(number * float(weight) for number, weight in zip(numbers, weights, strict=True) if weight)
 
 
 class _Facets:

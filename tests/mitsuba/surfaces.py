@@ -27,8 +27,12 @@ def variant(name: str) -> Any:
         pytest.skip(f"mitsuba without {name}")
     if name.startswith("llvm") and "DRJIT_LIBLLVM_PATH" not in os.environ:  # Dr.Jit aborts with the LLVM 14 to 16
         pytest.skip("DRJIT_LIBLLVM_PATH names no LLVM 19 for mitsuba's llvm variants")
+    import drjit
+
     import brdfdb.mitsuba
 
+    if name.startswith("cuda") and not drjit.has_backend(drjit.JitBackend.CUDA):
+        pytest.skip("no GPU for mitsuba's cuda variants")
     assert brdfdb.mitsuba.PLUGINS
     mitsuba.set_variant(name)
     return mitsuba
