@@ -5,6 +5,8 @@ from __future__ import annotations
 import bisect
 import difflib
 import importlib
+import sys
+import warnings
 from collections.abc import Iterable, Mapping
 from types import ModuleType
 from typing import Any
@@ -37,6 +39,22 @@ class ParameterError(BrdfdbError, ValueError):
 
     def __str__(self) -> str:
         return f"{self.parameter}: {self.sentence}"
+
+
+class DegreesWarning(UserWarning):
+    """An azimuth of more than two turns [rad], which is likely to be in degrees; unwrapped scans may filter it."""
+
+
+def warn_of_degrees(name: str, phi: float) -> None:
+    """Warn that an azimuth [rad] looks like degrees, at the line that called this package."""
+    level, frame = 1, sys._getframe()
+    while frame.f_back is not None and frame.f_globals.get("__name__", "").partition(".")[0] == "brdfdb":
+        level, frame = level + 1, frame.f_back
+    warnings.warn(
+        f"{name}: {phi:.9g} rad is more than two turns; angles are radians, and np.deg2rad converts degrees",
+        DegreesWarning,
+        stacklevel=level,
+    )
 
 
 class MaterialError(ParameterError):

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from brdfdb._numba import elementwise, kernel, loop
+from brdfdb.arrays import array_function
 
 Array = NDArray[np.float64]
 
@@ -141,6 +142,7 @@ unpolarised = elementwise(reflectance)
 Complexes = NDArray[np.complexfloating]
 
 
+@array_function
 def amplitudes(cos_theta: ArrayLike, n: ArrayLike, k: ArrayLike) -> tuple[Complexes, Complexes]:
     """Return complex F_s and F_p [1], the ratios of reflected to incident field, for the index n + ik.
 
@@ -150,6 +152,7 @@ def amplitudes(cos_theta: ArrayLike, n: ArrayLike, k: ArrayLike) -> tuple[Comple
     return _pair(False, cos_theta, n, k)
 
 
+@array_function
 def half_sum_and_difference(cos_theta: ArrayLike, n: ArrayLike, k: ArrayLike) -> tuple[Complexes, Complexes]:
     """Return (F_s + F_p) / 2 and (F_s - F_p) / 2 [1] of `amplitudes`, with all digits where one of them is nearly 0."""
     return _pair(True, cos_theta, n, k)

@@ -17,10 +17,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from brdfdb._elementary import COS_HORIZON, cos, sine
 from brdfdb._numba import elementwise, loop
-from brdfdb.errors import ParameterError
+from brdfdb.arrays import PLAIN, array_function, plain, unlabelled
+from brdfdb.errors import ParameterError, warn_of_degrees
 from brdfdb.parameters import Floats
 
 HALF_PI = np.pi / 2
+AZIMUTH_MOST_DEG = 720.0
+PHI_USUAL = 4.0 * np.pi  # azimuths of more turns are likely to be degrees
 PHI_MAX = 1e15  # largest azimuth: neighbouring float64 beyond it are more than a tenth of a radian apart
 NO_AZIMUTH = 1e-290  # product of two sines below which an azimuth carries too few digits
 UNIT_LENGTH = 1e-5  # largest difference of the length of a unit vector from 1; that of float32 is 1e-7
@@ -28,11 +31,13 @@ UNIT_LENGTH = 1e-5  # largest difference of the length of a unit vector from 1; 
 _sines, _cosines = elementwise(sine), elementwise(cos)  # 1 ns a value in place of 10, but 2 us more a call
 
 
+@array_function
 def radians(angle_deg: ArrayLike) -> NDArray[np.float64]:
     """Return degrees in radians (90 degrees gives exactly the float64 nearest pi/2)."""
     return np.deg2rad(np.asarray(angle_deg, dtype=np.float64))
 
 
+@array_function
 def degrees(angle: ArrayLike) -> NDArray[np.float64]:
     """Return radians in degrees."""
     return np.rad2deg(np.asarray(angle, dtype=np.float64))
@@ -48,9 +53,10 @@ def check_theta(name: str, theta: ArrayLike) -> Floats:
     bad = (array < 0.0) | (array > array.dtype.type(np.pi))
     if bad.any():
         first = np.atleast_1d(array)[np.atleast_1d(bad)][0]
+        meant = f"; {first:.9g} degrees are {radians(first):.6g} rad" if 3.2 < first <= 180.0 else ""
         raise ParameterError(
             name,
-            f"{first:.9g} rad ({degrees(first):.6g} degrees) is outside [0, pi] rad",
+            f"{first:.9g} rad ({degrees(first):.6g} degrees) is outside [0, pi] rad{meant}",
             float(first),
             (0.0, float(np.pi)),
         )
@@ -58,19 +64,37 @@ def check_theta(name: str, theta: ArrayLike) -> Floats:
 
 
 def check_phi(name: str, phi: ArrayLike) -> Floats:
-    """Return an azimuth [rad] as a float array; nan passes through, values outside [-1e15, 1e15] raise."""
+    """Return an azimuth [rad] as a float array; nan passes through, values outside [-1e15, 1e15] raise.
+
+    Azimuths of more than two turns give a `DegreesWarning`.
+    """
     array = _float_array(name, phi)
-    bad = np.abs(array) > PHI_MAX
-    if bad.any():
-        first = np.atleast_1d(array)[np.atleast_1d(bad)][0]
-        raise ParameterError(
-            name, f"{first:.9g} rad is outside [-{PHI_MAX:g}, {PHI_MAX:g}] rad", float(first), (-PHI_MAX, PHI_MAX)
-        )
+    wide = np.abs(array) > PHI_USUAL
+    if wide.any():
+        beyond = array[wide]
+        largest = beyond[np.argmax(np.abs(beyond))]
+        if abs(largest) > PHI_MAX:
+            raise ParameterError(
+                name,
+                f"{largest:.9g} rad is outside [-{PHI_MAX:g}, {PHI_MAX:g}] rad",
+                float(largest),
+                (-PHI_MAX, PHI_MAX),
+            )
+        warn_of_degrees(name, float(largest))
     return array
 
 
+def check_azimuth_deg(name: str, phi_deg: ArrayLike) -> None:
+    """Raise a ParameterError if an azimuth [degree] is not a finite number of at most two turns."""
+    array = np.asarray(phi_deg)
+    bad = ~(np.abs(array) <= AZIMUTH_MOST_DEG)  # True for nan, too
+    if bad.any():
+        first, most = float(array[bad].flat[0]), AZIMUTH_MOST_DEG
+        raise ParameterError(name, f"{first:g} is outside [{-most:g}, {most:g}] degrees", first, (-most, most))
+
+
 def _float_array(name: str, angle: ArrayLike) -> Floats:
-    array = np.asarray(angle)
+    array = np.asarray(plain(name, unlabelled(name, angle)))
     if array.dtype.kind not in "iuf":
         raise ParameterError(name, f"{angle!r} is not a number of radians")
     return array if array.dtype in (np.float32, np.float64) else array.astype(np.float64)
@@ -143,8 +167,12 @@ def checked_angles(theta_i: ArrayLike, phi_i: ArrayLike, theta_r: ArrayLike, phi
     read as the horizon itself, where every model returns its limit from below. ParameterError if the shapes do not
     broadcast.
     """
-    t_i, t_r = check_theta("theta_i", theta_i), check_theta("theta_r", theta_r)
-    p_i, p_r = check_phi("phi_i", phi_i), check_phi("phi_r", phi_r)
+    given = (theta_i, phi_i, theta_r, phi_r)
+    if not PLAIN.issuperset(map(type, given)):
+        names = ("theta_i", "phi_i", "theta_r", "phi_r")
+        given = tuple(plain(name, unlabelled(name, angle)) for name, angle in zip(names, given, strict=True))
+    t_i, t_r = check_theta("theta_i", given[0]), check_theta("theta_r", given[2])
+    p_i, p_r = check_phi("phi_i", given[1]), check_phi("phi_r", given[3])
     shape_of_angles(t_i, p_i, t_r, p_r)
     return Angles(
         np.minimum(t_i, HALF_PI, dtype=np.float64),
@@ -152,7 +180,7 @@ def checked_angles(theta_i: ArrayLike, phi_i: ArrayLike, theta_r: ArrayLike, phi
         np.minimum(t_r, HALF_PI, dtype=np.float64),
         p_r.astype(np.float64, copy=False),
         (t_i > t_i.dtype.type(HALF_PI)) | (t_r > t_r.dtype.type(HALF_PI)),
-        asked_for(theta_i, phi_i, theta_r, phi_r),
+        asked_for(*given),
     )
 
 
@@ -223,6 +251,7 @@ def checked_vectors(wi: ArrayLike, wr: ArrayLike) -> Vectors:
         If an array has no last axis of 3, does not hold numbers, or holds vectors that are not of length 1, or if the
         shapes do not broadcast.
     """
+    wi, wr = plain("wi", unlabelled("wi", wi)), plain("wr", unlabelled("wr", wr))
     w_i, w_r = _unit_vectors("wi", wi), _unit_vectors("wr", wr)
     common_shape("wi, wr", w_i, w_r)
     return Vectors(w_i, w_r, asked_for(wi, wr))
@@ -293,6 +322,7 @@ def finished(values: Floats, directions: Directions, *, trailing: int = 0) -> Fl
     return result[()]
 
 
+@array_function
 def unit_vector(theta: ArrayLike, phi: ArrayLike) -> NDArray[np.float64]:
     """Return the unit vectors, shape (..., 3), of directions (theta, phi) [rad]."""
     angles = np.broadcast_arrays(theta, phi)
@@ -313,9 +343,10 @@ def _fill(theta: NDArray[np.float64], phi: NDArray[np.float64], vectors: NDArray
         vectors[3 * j + 2] = cos(theta[j])
 
 
-def spherical_angles(w: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+@array_function
+def spherical_angles(vectors: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the angles (theta, phi) [rad] of vectors of shape (..., 3); phi in (-pi, pi], 0 at the pole."""
-    x, y, z = np.moveaxis(np.asarray(w, dtype=np.float64), -1, 0)
+    x, y, z = np.moveaxis(np.asarray(vectors, dtype=np.float64), -1, 0)
     return np.arctan2(np.hypot(x, y), z), np.arctan2(y, x)
 
 

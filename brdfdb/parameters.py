@@ -10,11 +10,14 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from brdfdb.arrays import plain, unlabelled
 from brdfdb.errors import ParameterError
 from brdfdb.lobes import Lobe
 
 Floats = NDArray[np.floating[Any]]
 Arguments = Mapping[str, Any]  # of a model call, directions apart; a spectral model's include wavelength_nm, n and k
+
+LEAST_NM = 1.0  # least wavelength: smaller numbers are micrometres, and shorter ones are no light
 
 FormKind = Literal["exact", "quadrature", "closed form", "approximation", "customary", "printed", "other model"]
 Standing = Literal["inside", "at the edge", "outside", "unknown"]
@@ -44,7 +47,7 @@ class Parameter:
 
     def check(self, value: ArrayLike) -> Floats:
         """Return `value` as float64, or raise a ValueError that names the parameter, the value and the range."""
-        given = np.asarray(value)
+        given = np.asarray(plain(self.name, unlabelled(self.name, value)))
         if given.dtype.kind not in "biuf":
             raise ParameterError(
                 self.name, f"{value!r} is not a number in {self.interval}", value, (self.low, self.high)
@@ -57,8 +60,30 @@ class Parameter:
             if f"{first:g}" in (f"{self.low:g}", f"{self.high:g}"):  # next to an end: all digits, or they look alike
                 value = repr(float(first))
                 interval = interval.replace(f"{self.low:g}, {self.high:g}", f"{self.low!r}, {self.high!r}")
+            if self.unit == "nm" and 0.0 < first < self.low:
+                interval += "; is it in micrometres?"
             raise ParameterError(self.name, f"{value} is outside {interval}", float(first), (self.low, self.high))
         return array
+
+
+def check_nanometres(name: str, wavelength_nm: ArrayLike) -> NDArray[np.float64]:
+    """Return wavelengths [nm] as float64; ParameterError if one is not finite, or below `LEAST_NM`."""
+    given = np.asarray(plain(name, wavelength_nm))
+    if given.size and given.dtype.kind not in "iuf":
+        raise ParameterError(name, f"{wavelength_nm!r} is not a number of nanometres", wavelength_nm)
+    wanted = given.astype(np.float64)
+    bad = ~((wanted >= LEAST_NM) & (wanted < np.inf))  # True for nan, too
+    if bad.any():
+        first = float(wanted[bad].flat[0])
+        raise ParameterError(name, f"{first:g} {not_nanometres(first)}", first, (LEAST_NM, np.inf))
+    return wanted
+
+
+def not_nanometres(wavelength: float) -> str:
+    """Return the end of a sentence on a number that is refused as a wavelength [nm]."""
+    if 0.0 < wavelength < LEAST_NM:
+        return f"is below {LEAST_NM:g} nm; is it in micrometres?"
+    return "is not a positive number of nanometres"
 
 
 def white(_: Mapping[str, Any]) -> dict[str, float]:

@@ -33,6 +33,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from brdfdb.arrays import array_function
 from brdfdb.parameters import Floats, Parameter
 
 _SQRT_2 = float(np.sqrt(2.0))
@@ -46,6 +47,7 @@ TAU_UM = Parameter("tau_um", "τ", "µm", 1e-6, 1e6, "autocorrelation length")
 ROUGHNESS = Parameter("roughness", "r", "1", 0.0, 1e6, "of a specular lobe; a shader's slider ends at 1")
 
 
+@array_function
 def alpha_from_slope(slope: ArrayLike) -> Floats:
     """Return alpha [1] of Ward and Beckmann, sqrt(2) times the rms slope along one axis [1], in [0, 1e12].
 
@@ -55,6 +57,7 @@ def alpha_from_slope(slope: ArrayLike) -> Floats:
     return _SQRT_2 * SLOPE.check(slope)
 
 
+@array_function
 def slope_from_alpha(alpha: ArrayLike) -> Floats:
     """Return the rms slope along one axis [1] of a surface with Ward's and Beckmann's alpha [1], in [0, 1e12].
 
@@ -64,6 +67,7 @@ def slope_from_alpha(alpha: ArrayLike) -> Floats:
     return ALPHA.check(alpha) / _SQRT_2
 
 
+@array_function
 def alpha_from_angle(sigma: ArrayLike) -> Floats:
     """Return alpha [1], sqrt(2) sigma, of facets whose slope angle has the standard deviation sigma [rad] in [0, pi/2].
 
@@ -77,6 +81,7 @@ def alpha_from_angle(sigma: ArrayLike) -> Floats:
     return _SQRT_2 * SIGMA.check(sigma)
 
 
+@array_function
 def angle_from_alpha(alpha: ArrayLike) -> Floats:
     """Return the standard deviation of the slope angle [rad] with the same peak as alpha [1], alpha / sqrt(2).
 
@@ -88,6 +93,7 @@ def angle_from_alpha(alpha: ArrayLike) -> Floats:
     return ALPHA.check(alpha) / _SQRT_2
 
 
+@array_function
 def alpha_from_degrees(sigma_deg: ArrayLike) -> Floats:
     """Return alpha [1] by `alpha_from_angle` for a standard deviation [degree] in [0, 90].
 
@@ -97,6 +103,7 @@ def alpha_from_degrees(sigma_deg: ArrayLike) -> Floats:
     return _SQRT_2 * np.deg2rad(SIGMA_DEG.check(sigma_deg))
 
 
+@array_function
 def degrees_from_alpha(alpha: ArrayLike) -> Floats:
     """Return the standard deviation of the slope angle [degree] by `angle_from_alpha`.
 
@@ -106,6 +113,7 @@ def degrees_from_alpha(alpha: ArrayLike) -> Floats:
     return np.asarray(np.rad2deg(angle_from_alpha(alpha)))
 
 
+@array_function
 def alpha_from_roughness(roughness: ArrayLike) -> Floats:
     """Return alpha [1], roughness^2, of a specular lobe with the roughness [1] of a shading language, in [0, 1e6].
 
@@ -119,6 +127,7 @@ def alpha_from_roughness(roughness: ArrayLike) -> Floats:
     return ROUGHNESS.check(roughness) ** 2
 
 
+@array_function
 def roughness_from_alpha(alpha: ArrayLike) -> Floats:
     """Return the roughness [1] of a shading language, the square root of alpha [1] in [0, 1e12].
 
@@ -128,6 +137,7 @@ def roughness_from_alpha(alpha: ArrayLike) -> Floats:
     return np.asarray(np.sqrt(ALPHA.check(alpha)))
 
 
+@array_function
 def slope_from_heights(sigma_0_um: ArrayLike, tau_um: ArrayLike) -> Floats:
     """Return the rms slope along one axis [1] of He-Torrance's surface, sqrt(2) sigma_0 / tau.
 
@@ -140,6 +150,7 @@ def slope_from_heights(sigma_0_um: ArrayLike, tau_um: ArrayLike) -> Floats:
     return _SQRT_2 * SIGMA_0_UM.check(sigma_0_um) / TAU_UM.check(tau_um)
 
 
+@array_function
 def alpha_from_heights(sigma_0_um: ArrayLike, tau_um: ArrayLike) -> Floats:
     """Return alpha [1] of He-Torrance's surface, 2 sigma_0 / tau, the width of its lobe for g >> 1.
 
@@ -152,6 +163,7 @@ def alpha_from_heights(sigma_0_um: ArrayLike, tau_um: ArrayLike) -> Floats:
     return _SQRT_2 * slope_from_heights(sigma_0_um, tau_um)
 
 
+@array_function
 def heights_from_alpha(alpha: ArrayLike, tau_um: ArrayLike) -> Floats:
     """Return the rms roughness sigma_0 [um] of He-Torrance's surface with an alpha [1] and a length tau [um].
 

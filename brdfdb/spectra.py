@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from brdfdb.errors import ParameterError
-from brdfdb.parameters import closest
+from brdfdb.parameters import check_nanometres, closest
 
 ILLUMINANT, OBSERVER = "D65", "CIE 1931 2 Degree Standard Observer"
 VISIBLE_FROM_NM, VISIBLE_TO_NM, VISIBLE_STEP_NM = 420.0, 680.0, 20.0
@@ -92,7 +92,7 @@ def refractive_index(entry: str, wavelength_nm: ArrayLike) -> tuple[NDArray[np.f
     >>> k.round(1).tolist()
     [6.0, 20.3]
     """
-    wavelength = np.asarray(wavelength_nm, dtype=np.float64)
+    wavelength = check_nanometres("wavelength_nm", wavelength_nm)
     if wavelength.ndim:
         return _interpolated(entry, wavelength)
     n, k = _at_one(entry, float(wavelength))

@@ -77,17 +77,32 @@ def test_float32_nearest_pi_lies_above_pi_and_is_allowed() -> None:
         check_theta("theta", np.nextafter(np.float32(np.pi), np.float32(4.0)))
 
 
-@pytest.mark.parametrize("inside", [0.0, -PHI_MAX, PHI_MAX, np.nan, [1e6, np.nan]], ids=repr)
-def test_phi_of_any_turn_is_allowed(inside: Any) -> None:
+@pytest.mark.parametrize("inside", [0.0, -4.0 * np.pi, 4.0 * np.pi, np.nan, [6.0, np.nan]], ids=repr)
+def test_phi_of_two_turns_is_usual(inside: Any) -> None:
     np.testing.assert_array_equal(check_phi("phi", inside), inside)
+
+
+@pytest.mark.parametrize("wide", [12.5664, -PHI_MAX, PHI_MAX, [1e6, np.nan]], ids=repr)
+def test_phi_of_more_turns_is_allowed_with_a_warning(wide: Any) -> None:
+    with pytest.warns(DegreesWarning, match="^phi: .* rad is more than two turns; angles are radians") as caught:
+        np.testing.assert_array_equal(check_phi("phi", wide), wide)
+    assert caught[0].filename == __file__
+
+
+@pytest.mark.parametrize("good", [0, -720, [720.0, 1.5]], ids=repr)
+@pytest.mark.parametrize("bad", [720.5, -1e300, np.nan, [0.0, np.inf]], ids=repr)
+def test_an_azimuth_in_degrees_has_two_turns_at_most(good: Any, bad: Any) -> None:
+    check_azimuth_deg("phi_i", good)
+    with pytest.raises(ParameterError, match=r"^phi_i: .* is outside \[-720, 720\] degrees$"):
+        check_azimuth_deg("phi_i", bad)
 
 
 @pytest.mark.parametrize(
     ("check", "wrong", "message"),
     [
         (check_theta, -0.1, "theta: -0.1 rad (-5.72958 degrees) is outside [0, pi] rad"),
-        (check_theta, 90, "theta: 90 rad (5156.62 degrees) is outside [0, pi] rad"),
-        (check_theta, [[0.1, 4.0], [-1.0, 0.0]], "theta: 4 rad (229.183 degrees) is outside [0, pi] rad"),
+        (check_theta, 90, "theta: 90 rad (5156.62 degrees) is outside [0, pi] rad; 90 degrees are 1.5708 rad"),
+        (check_theta, [[0.1, 4.0], [-1.0, 0.0]], "theta: 4 rad (229.183 degrees) is outside [0, pi] rad; 4 degrees are 0.0698132 rad"),
         (check_theta, np.inf, "theta: inf rad (inf degrees) is outside [0, pi] rad"),
         (check_theta, True, "theta: True is not a number of radians"),
         (check_theta, "0.1", "theta: '0.1' is not a number of radians"),

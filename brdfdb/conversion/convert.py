@@ -33,7 +33,7 @@ from brdfdb.materials.provenance import MOST_NAME
 from brdfdb.materials.recipe_text import rounded, toml_of
 from brdfdb.measurements import MeasuredSource
 from brdfdb.models import MODELS
-from brdfdb.parameters import ModelSpec, closest
+from brdfdb.parameters import ModelSpec, check_nanometres, closest
 from brdfdb.tables.table_source import TableSource
 
 Array = NDArray[np.float64]
@@ -229,8 +229,8 @@ def _request(
 def _wavelengths(source: Source, other: ModelSpec | Material, wavelength_nm: ArrayLike | None) -> Array | None:
     """Return the wavelengths of the comparison; None where source and model are grey."""
     if wavelength_nm is not None:
-        at = np.atleast_1d(np.asarray(wavelength_nm, dtype=np.float64))
-        if at.ndim != 1 or not at.size or not np.all(at > 0.0) or not np.all(np.diff(at) > 0.0):
+        at = np.atleast_1d(check_nanometres("wavelength_nm", wavelength_nm))
+        if at.ndim != 1 or not at.size or not np.all(np.diff(at) > 0.0):
             raise ParameterError("wavelength_nm", "they must be positive and increasing", wavelength_nm)
     elif source.spectral and source.wavelengths_nm is not None:
         at = np.array(source.wavelengths_nm, dtype=np.float64)

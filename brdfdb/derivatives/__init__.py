@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from brdfdb.arrays import array_function
 from brdfdb.errors import ParameterError
 from brdfdb.geometry import checked_angles, finished
 from brdfdb.models import MODELS
@@ -13,6 +14,7 @@ from brdfdb.parameters import Gradient, ModelSpec
 __all__ = ["Gradient", "gradient", "gradient_vectors"]
 
 
+@array_function
 def gradient(
     model: str, theta_i: ArrayLike, phi_i: ArrayLike, theta_r: ArrayLike, phi_r: ArrayLike, **parameters: ArrayLike
 ) -> Gradient:
@@ -59,6 +61,7 @@ def gradient(
     return Gradient(finished(f_r, angles), {name: finished(values, angles) for name, values in derivatives.items()})
 
 
+@array_function
 def gradient_vectors(model: str, wi: ArrayLike, wr: ArrayLike, **parameters: ArrayLike) -> Gradient:
     """Return `gradient` for unit vectors `wi` (light) and `wr` (viewer) of shape (..., 3)."""
     spec: ModelSpec = MODELS[model]

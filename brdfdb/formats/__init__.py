@@ -15,12 +15,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from brdfdb.errors import FileFormatError, ParameterError
 from brdfdb.formats._input import check_file
 from brdfdb.formats._interface import Exporter, Importer, Option, options_of, parsed_options, schema_of
 from brdfdb.formats._stated import AZIMUTHS, at_wavelength, from_forward
+from brdfdb.parameters import check_nanometres
 from brdfdb.place import path_of
 
 if TYPE_CHECKING:
@@ -196,16 +195,14 @@ def read(
     importer = _importer(path, file_format, keywords)
     try:
         reading: FileTable | Samples = importer.read(path, **keywords)
+        if reading.wavelength_nm is not None:
+            check_nanometres("wavelength_nm", reading.wavelength_nm)
     except FileFormatError:
         raise
     except ParameterError as error:  # of samples that are none
         if error.parameter in getattr(importer, "keywords", ()):
             raise
         raise FileFormatError(f"{path}: {error}") from error
-    at = reading.wavelength_nm
-    if at is not None and not np.all((at > 0.0) & (at < np.inf)):
-        wrong = at[~((at > 0.0) & (at < np.inf))][0]
-        raise FileFormatError(f"{path}: a wavelength is {wrong:g} nm; allowed are positive numbers")
     reading = reading if wavelength_nm is None else at_wavelength(reading, wavelength_nm)
     return from_forward(reading) if azimuth == "forward" else reading
 

@@ -10,6 +10,7 @@ of some formats here, and no lines that continue beyond the last node. Halving i
 
 from __future__ import annotations
 
+import functools
 import itertools
 import math
 from collections.abc import Callable, Sequence
@@ -22,6 +23,7 @@ from numpy.typing import NDArray
 from brdfdb.errors import ParameterError
 from brdfdb.formats._angles import HalfDifference, System
 from brdfdb.formats._interface import Option
+from brdfdb.formats._nodes import weighted
 from brdfdb.parameters import Floats
 
 if TYPE_CHECKING:
@@ -93,8 +95,15 @@ class AngularGrid:
         """The number of nodes."""
         return math.prod(self.values.shape[:-1])
 
+    @functools.cached_property
+    def _has_holes(self) -> bool:
+        return bool(np.any(np.isnan(self.values)))
+
     def evaluate(self, wi: Floats, wr: Floats) -> Floats:
-        """Return f_r [1/sr], shape (N, C), at unit vectors (N, 3). Lines continue beyond the first and last node."""
+        """Return f_r [1/sr], shape (N, C), at unit vectors (N, 3). Lines continue beyond the first and last node.
+
+        A hole, nan, makes all f_r nan that it has a part in.
+        """
         channels = self.values.shape[-1]
         values = np.empty((len(wi), channels))
         step = max(1, _AT_ONCE // (channels << len(self.nodes)))
@@ -117,7 +126,7 @@ class AngularGrid:
         for corner in itertools.product(*corners):
             index = np.ravel_multi_index(tuple(at for at, _ in corner), self.values.shape[:-1])
             weight = np.prod([share for _, share in corner], axis=0)
-            total += weight[:, np.newaxis] * flat[index]
+            total += weighted(weight, flat[index]) if self._has_holes else weight[:, np.newaxis] * flat[index]
         return total
 
 

@@ -116,7 +116,8 @@ def read_dataset(path: Path, opened: xr.Dataset) -> FileTable | Samples:
         raise FileFormatError(
             f"{path}: it has no variable brdf, only {', '.join(map(str, opened.data_vars)) or 'none'}"
         )
-    brdf = opened["brdf"]
+    brdf = _valid(opened["brdf"])
+    opened = opened.assign(brdf=brdf)
     if "sample" in brdf.dims:
         try:
             return Samples.from_xarray(opened)
@@ -138,6 +139,13 @@ def read_dataset(path: Path, opened: xr.Dataset) -> FileTable | Samples:
     at = _in_nm(path, opened["wavelength"]) if spectral else None
     axes = {name: _in_degrees(path, opened[name]) for name in names}
     return file_table(path, axes, values, at, record_of_attributes(opened.attrs))
+
+
+def _valid(brdf: xr.DataArray) -> xr.DataArray:
+    """Return values with nan outside of the range that the attributes of CF declare valid."""
+    known = brdf.attrs
+    low, high = known.get("valid_range", (known.get("valid_min", -np.inf), known.get("valid_max", np.inf)))
+    return brdf if low == -high == -np.inf else brdf.where((brdf >= low) & (brdf <= high))
 
 
 def check_sizes(path: Path, shapes: Mapping[Any, tuple[int, ...]]) -> None:
@@ -178,7 +186,7 @@ def file_table(
     wavelength_nm: NDArray[Any] | None,
     known: Mapping[str, Any],
 ) -> FileTable | Samples:
-    """Return f_r that is interpolated linearly on the grid of a file; its samples where the grid has holes, nan.
+    """Return f_r that is interpolated linearly on the grid of a file; its samples if it has holes, or negative values.
 
     Raises
     ------
@@ -211,7 +219,8 @@ def file_table(
         flat = values.reshape(-1, len(channels)).astype(np.float64)
         return samples_at_angles(angles, flat, name, channels, at, known)
 
-    if np.any(np.isnan(values)):
+    continued = grid.half_difference  # below the horizon, where a negative number serves the interpolation
+    if np.any(np.isnan(values)) or (np.any(values < 0.0) and not continued):
         return nodes()
     table = interpolated(grid, stored, at)
     return FileTable(

@@ -17,7 +17,24 @@ if TYPE_CHECKING:
 
 _HORIZON = 0.5 * np.pi * (1.0 + 1e-9)  # largest polar angle [rad], with rounding
 _SAME = 1e-6  # difference of coordinates within which directions are the same: angles of files may have 32 bits
+FILL_VALUES = (-99.0, -999.0, -9999.0, -99999.0, -32768.0, 9.969209968386869e36)  # the last is that of netCDF
 _MIXED = np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], dtype=np.uint64)  # odd: a hash of rows
+
+
+def without_holes(f_r: NDArray[Any]) -> NDArray[Any]:
+    """Return f_r of a file with nan for numbers below 0: what was not measured, or what no lookup can tell from it."""
+    return np.where(f_r < 0.0, np.asarray(np.nan, f_r.dtype), f_r) if np.any(f_r < 0.0) else f_r
+
+
+def without_fill_values(numbers: Floats) -> Floats:
+    """Return numbers of a file with nan for those that tables write where there is no value."""
+    missing = np.isin(numbers, FILL_VALUES)
+    return np.where(missing, np.nan, numbers) if missing.any() else numbers
+
+
+def weighted(weight: Floats, values: NDArray[Any]) -> NDArray[Any]:
+    """Return weight (N,) times values (N, C), where a hole that has no weight does not count."""
+    return np.where(weight[:, np.newaxis] == 0.0, 0.0, weight[:, np.newaxis] * values)
 
 
 def samples_at_vectors(wi: Floats, wr: Floats, values: Floats, *arguments: Any, **keywords: Any) -> Samples:
@@ -44,7 +61,7 @@ def samples_at_angles(
     angles : array (N, 4) [rad]
         theta_i, phi_i, theta_r, phi_r. Polar angles above pi/2 are below the horizon.
     values : array (N, C) [1/sr]
-        f_r; nan where there is none.
+        f_r; nan, or one of `FILL_VALUES`, where there is none.
     name, channels, wavelength_nm, record, uncertainty, instrument, provenance
         As of `Samples`.
 
@@ -68,6 +85,7 @@ def samples_at_angles(
         (check_theta if axis.startswith("theta") else check_phi)(axis, column)
         if np.any(np.isnan(column)):
             raise ParameterError(axis, "nan is not an angle", np.nan)
+    values = without_fill_values(values)
     above = np.flatnonzero((angles[:, 0] <= _HORIZON) & (angles[:, 2] <= _HORIZON))
     kept = above[_first_of_each(angles[above], values[above])]
     if not len(kept):

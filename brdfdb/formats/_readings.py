@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from brdfdb.arrays import array_lookup
 from brdfdb.errors import ParameterError
-from brdfdb.geometry import checked_angles, checked_vectors, unit_vector
+from brdfdb.geometry import checked_angles, checked_vectors, finished, unit_vector
 from brdfdb.materials.source import FourAngles, Lookups
-from brdfdb.parameters import Floats
+from brdfdb.parameters import Floats, check_nanometres
 
 if TYPE_CHECKING:
     from brdfdb.measurements.samples import Samples
@@ -48,28 +49,31 @@ class FileTable(Lookups):
     nodes: Callable[[], Samples] | None = field(default=None, repr=False)
     listed: bool = False
 
+    @array_lookup
     def lookup_vectors(self, wi: ArrayLike, wr: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:
         """Return f_r [1/sr] for unit vectors: a last axis for the channels, or for the wavelengths that are given."""
         vectors = checked_vectors(wi, wr)
         shape = np.broadcast_shapes(vectors.w_i.shape, vectors.w_r.shape)
         flat = [np.broadcast_to(w, shape).reshape(-1, 3).astype(np.float64) for w in (vectors.w_i, vectors.w_r)]
         above = (flat[0][:, 2] > 0.0) & (flat[1][:, 2] > 0.0)
-        values = np.zeros((len(above), len(self.channels)))
+        values: Floats = np.zeros((len(above), len(self.channels)))
         values[above] = self.evaluate(flat[0][above], flat[1][above])
         values = values.reshape(*shape[:-1], len(self.channels))
-        if self.wavelength_nm is None:
-            return np.asarray(values[..., 0] if len(self.channels) == 1 else values)[()]
-        return values if wavelength_nm is None else self._between(values, wavelength_nm)
+        if self.wavelength_nm is None and len(self.channels) == 1:
+            values = values[..., 0]
+        elif self.wavelength_nm is not None and wavelength_nm is not None:
+            values = self._between(values, wavelength_nm)
+        return finished(values, vectors, trailing=values.ndim - len(shape) + 1)
 
     def _at_angles(self, angles: FourAngles, wavelength_nm: ArrayLike | None) -> Floats:
-        checked_angles(*angles)
-        shape = np.broadcast_shapes(*(np.shape(angle) for angle in angles))
-        theta_i, phi_i, theta_r, phi_r = (np.broadcast_to(np.asarray(angle, np.float64), shape) for angle in angles)
-        return self.lookup_vectors(unit_vector(theta_i, phi_i), unit_vector(theta_r, phi_r), wavelength_nm)
+        given = checked_angles(*angles)
+        wi, wr = unit_vector(given.theta_i, given.phi_i), unit_vector(given.theta_r, given.phi_r)
+        values = np.asarray(self.lookup_vectors(wi, wr, wavelength_nm))
+        return finished(values, given, trailing=values.ndim - np.broadcast(*given.given).ndim)
 
     def _between(self, values: Floats, wavelength_nm: ArrayLike) -> Floats:
         """Return values at wavelengths [nm] by straight lines between those of the file."""
-        stored, wanted = self.wavelength_nm, np.asarray(wavelength_nm, dtype=np.float64)
+        stored, wanted = self.wavelength_nm, check_nanometres("wavelength_nm", wavelength_nm)
         assert stored is not None
         if not np.all((wanted >= stored[0]) & (wanted <= stored[-1])):
             raise ParameterError(

@@ -102,7 +102,7 @@ class Comparison:
     def error_of(self, evaluate: Callable[[Floats, Floats], Floats]) -> FileError:
         """Return the error of a file, whose reader gives f_r [1/sr], shape (N, C), at unit vectors (N, 3)."""
         values = evaluate(self.wi, self.wr)
-        wrong = np.abs(values - self.truth)
+        wrong = np.where(self._above[:, np.newaxis], np.abs(values - self.truth), 0.0)  # below, files may have holes
         scale = np.maximum(self.truth, self.floor)
         relative = np.divide(wrong, scale, out=np.where(wrong > 0.0, np.inf, 0.0), where=scale > 0.0)
         whole = self._weight @ np.abs(self.truth)

@@ -23,7 +23,7 @@ from brdfdb.errors import FileFormatError
 from brdfdb.formats._angles import Spherical
 from brdfdb.formats._angular_grid import SIZE, AngularGrid, Sink, chosen, rounded
 from brdfdb.formats._interface import TOLERANCE
-from brdfdb.formats._nodes import samples_at_angles
+from brdfdb.formats._nodes import samples_at_angles, without_holes
 from brdfdb.formats._record import lines, of_lines, record, specular_remark
 from brdfdb.formats._text_file import lines_of
 from brdfdb.formats._written import Written, whole
@@ -120,6 +120,8 @@ def recognises(head: bytes) -> bool:
 def read(path: str | os.PathLike[str]) -> FileTable | Samples:
     """Return f_r of an ASTM E1392 file as libbsdf sees it if its rows are a grid, else its rows.
 
+    f_r is nan next to negative numbers, which libbsdf takes for 0.
+
     Raises
     ------
     FileFormatError
@@ -142,13 +144,8 @@ def read(path: str | os.PathLike[str]) -> FileTable | Samples:
     if count != len(rows) or (nodes[1].size == 1 and nodes[1][0] != 0.0) or np.any(np.isnan(rows[:, 4:])):
         return listed()
     order = np.lexsort(rows[:, 3::-1].T)
-    values = (
-        np.maximum(rows[order, 4:], 0.0)
-        .reshape(  # as libbsdf
-            *(axis.size for axis in nodes), len(names)
-        )
-        .astype(np.float32)
-    )
+    shape = (*(axis.size for axis in nodes), len(names))
+    values = without_holes(rows[order, 4:]).reshape(shape).astype(np.float32)
     anisotropic = nodes[1].size > 1
     one_side = not anisotropic and not np.any((nodes[3] > np.pi + 1e-6) & (nodes[3] < 2.0 * np.pi - 1e-6))
     if not anisotropic:

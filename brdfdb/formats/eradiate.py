@@ -26,7 +26,7 @@ from brdfdb.errors import CannotHoldError, FileFormatError, import_extra
 from brdfdb.formats._channels import at_wavelength
 from brdfdb.formats._dense_files import record_of_attributes
 from brdfdb.formats._interface import TOLERANCE, WAVELENGTH, Option
-from brdfdb.formats._nodes import samples_at_angles
+from brdfdb.formats._nodes import samples_at_angles, weighted, without_holes
 from brdfdb.formats._record import history_of, record, specular_remark
 from brdfdb.formats._written import Written, whole
 from brdfdb.parameters import Floats
@@ -235,7 +235,7 @@ def _interpolated(
         side = np.array(corner)[:, np.newaxis]
         weight = np.prod(np.where(side == 1, share, 1.0 - share), axis=0)
         viewer, azimuth, light = first + side
-        total = total + weight[:, np.newaxis] * node(viewer, azimuth % shape[1], light)
+        total = total + weighted(weight, node(viewer, azimuth % shape[1], light))
     return np.where(wr[:, 2:] > 0.0, total, 0.0)
 
 
@@ -278,4 +278,4 @@ def _checked(opened: xr.Dataset, path: Path) -> NDArray[Any]:
     values = brdf.values
     if values.dtype.kind not in "iuf" or not np.all(np.isfinite(values)):
         raise FileFormatError(f"{path}: brdf holds values that are not finite numbers")
-    return np.asarray(values, np.float32)
+    return without_holes(np.asarray(values, np.float32))

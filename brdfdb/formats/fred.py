@@ -28,7 +28,7 @@ from brdfdb.formats._angular_grid import SIZE, AngularGrid, Sink, chosen, rounde
 from brdfdb.formats._beside import beside, record_beside
 from brdfdb.formats._channels import at_wavelength
 from brdfdb.formats._interface import TOLERANCE, WAVELENGTH
-from brdfdb.formats._nodes import samples_at_angles
+from brdfdb.formats._nodes import samples_at_angles, without_holes
 from brdfdb.formats._record import record, specular_remark
 from brdfdb.formats._text_end import check_last_number, doubt_end, has_open_end
 from brdfdb.formats._text_file import lines_of
@@ -242,5 +242,5 @@ def _grid(rows: NDArray[np.float64]) -> AngularGrid | None:
         theta_r = np.append(0.0, theta_r)
     nodes = (theta_i, theta_r, 180.0 - forward[::-1])
     system = Spherical(anisotropic=False, mirrored=True)
-    kept = values[..., ::-1, np.newaxis].astype(np.float32)
+    kept = without_holes(values[..., ::-1, np.newaxis]).astype(np.float32)
     return AngularGrid(system, tuple(np.deg2rad(axis) for axis in nodes), kept)

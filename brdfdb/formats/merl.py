@@ -23,7 +23,7 @@ from brdfdb.formats._angular_grid import AngularGrid, reciprocal
 from brdfdb.formats._beside import beside, record_beside
 from brdfdb.formats._channels import RGB, channels_of
 from brdfdb.formats._interface import FIXED, Option
-from brdfdb.formats._nodes import samples_of_grid
+from brdfdb.formats._nodes import samples_of_grid, without_holes
 from brdfdb.formats._record import record, specular_remark
 from brdfdb.formats._written import Written, whole
 from brdfdb.parameters import Floats
@@ -130,6 +130,8 @@ def recognises(head: bytes) -> bool:
 def read(path: str | os.PathLike[str]) -> FileTable:
     """Return f_r of a MERL file as its readers see it: one bin looked up, or interpolated if its record says edges.
 
+    A negative number is a hole: f_r is nan there.
+
     Raises
     ------
     FileFormatError
@@ -159,8 +161,8 @@ def _samples(planes: Floats, samples: str, name: str, known: dict[str, Any]) -> 
     offset = 0.5 if samples == "centres" else 0.0
     at = [np.arange(count) + offset for count in SHAPE]
     nodes = [np.deg2rad(axis) for axis in (_degrees_h(at[0]), at[1], at[2])]
-    values = np.where(planes < 0.0, np.nan, planes) * SCALE[:, np.newaxis, np.newaxis, np.newaxis]
-    return samples_of_grid(_SYSTEM, nodes, np.moveaxis(values, 0, -1), name, RGB, None, known)
+    values = np.moveaxis(without_holes(planes), 0, -1) * SCALE
+    return samples_of_grid(_SYSTEM, nodes, values, name, RGB, None, known)
 
 
 def _nodes(samples: str) -> tuple[NDArray[np.bool_], Floats]:
@@ -189,7 +191,7 @@ class _Reader:
     """f_r [1/sr], shape (N, 3), at unit vectors (N, 3), of planes of numbers (3, theta_h, theta_d, phi_d)."""
 
     def __init__(self, planes: Floats, samples: str) -> None:
-        f_r = np.moveaxis(np.maximum(planes, 0.0), 0, -1) * SCALE
+        f_r = np.moveaxis(without_holes(planes), 0, -1) * SCALE
         self._f_r = f_r
         self._grid: AngularGrid | None = None
         if samples == "edges":

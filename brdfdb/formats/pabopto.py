@@ -15,7 +15,7 @@ import numpy as np
 
 from brdfdb.errors import FileFormatError
 from brdfdb.formats._channels import LUMINOUS, XYZ
-from brdfdb.formats._nodes import samples_at_angles
+from brdfdb.formats._nodes import samples_at_angles, without_fill_values
 from brdfdb.formats._text_file import lines_of
 from brdfdb.place import path_of
 
@@ -80,7 +80,7 @@ def read(path: str | os.PathLike[str]) -> Samples:
     back = light[0] > 90.0
     if back:
         angles = np.array([180.0, 360.0, 180.0, 360.0]) - angles
-    values = rows[:, 2:].copy()
+    values = without_fill_values(rows[:, 2:].copy())
     if quantity == "dsf":
         cosine = np.abs(np.cos(np.deg2rad(angles[:, 2:3])))
         values = np.where(cosine > _GRAZING, values / np.maximum(cosine, _GRAZING), np.nan)

@@ -23,7 +23,7 @@ from brdfdb.formats import _ssdd_file
 from brdfdb.formats._angles import HalfDifference, Specular, Spherical, System
 from brdfdb.formats._angular_grid import SIZE, AngularGrid, Sink, chosen, mirrored, reciprocal
 from brdfdb.formats._interface import TOLERANCE, Option
-from brdfdb.formats._nodes import samples_of_grid
+from brdfdb.formats._nodes import samples_of_grid, without_holes
 from brdfdb.formats._record import lines, of_lines, record
 from brdfdb.formats._written import Written, whole
 from brdfdb.place import path_of
@@ -218,7 +218,7 @@ def _grid(path: Path, block: _ssdd_file.Block) -> AngularGrid:
     if kind not in systems or "PARAM4_LIST" in block.entries:
         raise FileFormatError(f"{path}: PARAM_TYPE is {kind}; {', '.join(systems)} are read, without PARAM4_LIST")
     nodes = tuple(np.deg2rad(axis) for axis in block.angles)
-    values = block.values
+    values = without_holes(block.values)
     if not anisotropic:
         nodes, values = (nodes[0], *nodes[2:]), values[:, 0]
     return AngularGrid(systems[kind], nodes, values)

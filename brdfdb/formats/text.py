@@ -31,7 +31,7 @@ from brdfdb.formats._columns import (
     roles_of,
     wavelength_of,
 )
-from brdfdb.formats._nodes import samples_at_angles
+from brdfdb.formats._nodes import samples_at_angles, without_fill_values
 from brdfdb.formats._record import note, of_comments
 from brdfdb.formats._text_angles import angles_of_rows
 from brdfdb.formats._text_end import doubt_end
@@ -285,7 +285,7 @@ def _values(
         shown = " and ".join(f"{factor:g}" for factor in sorted(set(factors)))
         note(record, f"Values were multiplied by {shown}, as their unit says.")
     of_values = np.array(factors) * scale
-    values: Array = rows[:, roles["values"]] * of_values
+    values: Array = without_fill_values(rows[:, roles["values"]]) * of_values
     if "uncertainty" not in roles:
         return values, None
     given = rows[:, roles["uncertainty"]]

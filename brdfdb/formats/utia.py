@@ -22,7 +22,7 @@ from brdfdb.formats._angular_grid import AngularGrid, filled
 from brdfdb.formats._beside import beside, record_beside
 from brdfdb.formats._channels import RGB, channels_of
 from brdfdb.formats._interface import FIXED, Option
-from brdfdb.formats._nodes import samples_of_grid
+from brdfdb.formats._nodes import samples_of_grid, without_holes
 from brdfdb.formats._record import record, specular_remark
 from brdfdb.formats._written import Written, whole
 from brdfdb.parameters import Floats
@@ -147,7 +147,7 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     encoding = "dj_brdf" if known.get("encoding") == "dj_brdf" else "linear"
     name = str(known.get("name") or path.stem)
     nodes = functools.partial(_samples, planes, encoding, name, known)
-    return FileTable(name, RGB, None, _Reader(numbers, encoding), known, nodes, listed=True)
+    return FileTable(name, RGB, None, _Reader(without_holes(numbers), encoding), known, nodes, listed=True)
 
 
 def _samples(planes: Floats, encoding: str, name: str, known: dict[str, Any]) -> Samples:

@@ -23,7 +23,7 @@ from brdfdb.formats._angles import Specular
 from brdfdb.formats._angular_grid import SIZE, AngularGrid, Sink, chosen, rounded
 from brdfdb.formats._channels import LUMINOUS, XYZ, channels_of
 from brdfdb.formats._interface import TOLERANCE, Option
-from brdfdb.formats._nodes import samples_of_grid
+from brdfdb.formats._nodes import samples_of_grid, without_holes
 from brdfdb.formats._record import CONVENTION, lines, note, of_comments, of_lines, record, specular_remark
 from brdfdb.formats._written import Written, whole
 from brdfdb.place import path_of
@@ -168,7 +168,7 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     if text.scatter != "BRDF":
         raise FileFormatError(f"{path}: its ScatterType is {text.scatter!r}; only BRDF is read")
     turns, incidences, azimuths, radials = (np.deg2rad(axis) for axis in text.angles)
-    values = text.values.transpose(2, 1, 4, 3, 0).astype(np.float32)
+    values = without_holes(text.values.transpose(2, 1, 4, 3, 0)).astype(np.float32)
     both_sides = text.symmetry == "PlaneSymmetrical"
     if both_sides and azimuths[-1] < np.pi:  # the interval around 180 degrees has its mirror image at the other end
         azimuths, values = np.append(azimuths, np.pi), np.concatenate([values, values[..., -1:, :]], axis=3)

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from brdfdb.arrays import array_function
 from brdfdb.errors import ParameterError
 from brdfdb.geometry import HALF_PI, check_phi, check_theta, unit_vector
 from brdfdb.integrals.panels import Indices, Integrand, integrated, rectangles
@@ -29,6 +30,7 @@ class Albedo(NamedTuple):
     error: Floats
 
 
+@array_function
 def directional_albedo(
     model: ModelSpec | str,
     theta_i: ArrayLike,

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from brdfdb.arrays import array_function
 from brdfdb.errors import ParameterError
 from brdfdb.geometry import checked_vectors
 from brdfdb.integrals.quadrature import named, spec_of
@@ -33,6 +34,7 @@ class Sample(NamedTuple):
     weight: Array
 
 
+@array_function
 def sample(model: ModelSpec | str, u1: ArrayLike, u2: ArrayLike, wi: ArrayLike, **parameters: ArrayLike) -> Sample:
     """Draw a viewer for each light `wi`. By reciprocity it is also the next light of a path.
 
@@ -95,6 +97,7 @@ def sample(model: ModelSpec | str, u1: ArrayLike, u2: ArrayLike, wi: ArrayLike, 
     return Sample(wr, density[()], weight[()])
 
 
+@array_function
 def pdf(model: ModelSpec | str, wi: ArrayLike, wr: ArrayLike, **parameters: ArrayLike) -> Floats:
     """Return the density [1/sr] with which `sample` draws `wr` for the light `wi`.
 

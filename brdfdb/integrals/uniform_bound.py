@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from brdfdb.arrays import array_function
 from brdfdb.errors import ParameterError
 from brdfdb.geometry import HALF_PI
 from brdfdb.integrals.quadrature import named, spec_of, spectral_albedo
@@ -20,6 +21,7 @@ _ANGLES = 40
 _ROUNDS = 12  # rounds of the search around the largest value; each halves the step, and four are often enough
 
 
+@array_function
 def largest_uniform(model: ModelSpec | str, *, tolerance: float = 1e-6, **parameters: ArrayLike) -> Floats:
     """Return the largest albedo [1] of the uniform part with which a model reflects no more than it receives.
 

@@ -10,12 +10,13 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, field_validator, model_validator
 
 from brdfdb._elementary import COS_HORIZON
+from brdfdb.arrays import array_lookup
 from brdfdb.errors import ParameterError, sentence_of
 from brdfdb.geometry import Directions, checked_angles, checked_vectors, finished, radians, unit_vector
 from brdfdb.lobes import Lobe
 from brdfdb.materials.provenance import MOST_NAME, NAME_PATTERN, Text
-from brdfdb.materials.source import Evaluate, FourAngles, Lookups, Lossless, check_wavelengths
-from brdfdb.parameters import Floats
+from brdfdb.materials.source import Evaluate, FourAngles, Lookups, Lossless, check_wavelengths, no_specular_part
+from brdfdb.parameters import Floats, check_nanometres
 
 # (wi, wr, wavelength_nm) of shapes (N, 3), (N, 3) and (L,) -> f_r [1/sr] of shape (N, L). A grey function gets None for
 # the wavelengths, and its result may have the shape (N,)
@@ -184,14 +185,15 @@ class FunctionSource(FunctionRecord, Lookups):
         light, viewer = unit_vector(given.theta_i, given.phi_i), unit_vector(given.theta_r, given.phi_r)
         return self._shaped(given, light, viewer, wavelength_nm)
 
+    @array_lookup
     def lookup_vectors(self, wi: ArrayLike, wr: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:
         vectors = checked_vectors(wi, wr)
         return self._shaped(vectors, vectors.w_i, vectors.w_r, wavelength_nm)
 
+    @array_lookup
     def specular_reflectance(self, theta_i: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:
         """Return 0, shaped as by `lookup`."""
-        wavelengths = () if wavelength_nm is None else np.shape(wavelength_nm)
-        return np.zeros((*np.shape(theta_i), *wavelengths))[()]
+        return no_specular_part(theta_i, wavelength_nm)
 
     def refractive_indices(self, _wavelength_nm: NDArray[np.float64] | None) -> None:
         """Return None: the function is not made from refractive indices."""
@@ -203,9 +205,10 @@ class FunctionSource(FunctionRecord, Lookups):
 
     def _wavelengths(self, wavelength_nm: ArrayLike | None) -> NDArray[np.float64] | None:
         """Return wavelengths [nm] as an array (L,), or None; ParameterError if one is outside the function's range."""
+        at = None if wavelength_nm is None else check_nanometres("wavelength_nm", wavelength_nm).reshape(-1)
         if self.wavelengths_nm is None:
             return None
-        at = np.asarray(self.wavelengths_nm if wavelength_nm is None else wavelength_nm, dtype=np.float64).reshape(-1)
+        at = np.array(self.wavelengths_nm) if at is None else at
         low, high = self.wavelengths_nm[0], self.wavelengths_nm[-1]
         bad = ~((at >= low) & (at <= high))
         if np.any(bad):

@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from brdfdb.errors import ParameterError, import_extra
 from brdfdb.geometry import degrees
 from brdfdb.materials.written_parameters import as_written
-from brdfdb.parameters import Arguments, ModelSpec, Parameter
+from brdfdb.parameters import LEAST_NM, Arguments, ModelSpec, Parameter
 
 Array = NDArray[np.float64]
 
 # That a spectral model takes beside its parameters
 _LIGHT = (
-    Parameter("wavelength_nm", "λ", "nm", 1e-3, 1e7, "wavelength in vacuum"),
+    Parameter("wavelength_nm", "λ", "nm", LEAST_NM, 1e7, "wavelength in vacuum"),
     Parameter("n", "n", "1", 1e-3, 100.0, "refractive index"),
     Parameter("k", "k", "1", 0.0, 1e4, "extinction coefficient"),
 )

@@ -20,17 +20,18 @@ from pydantic import (
 )
 from pydantic_core import ErrorDetails
 
+from brdfdb.arrays import array_lookup
 from brdfdb.errors import MaterialError, ParameterError, sentence_of
 from brdfdb.geometry import degrees
 from brdfdb.lobes import Lobe
 from brdfdb.materials.evaluation import each, evaluations, summed
 from brdfdb.materials.provenance import MOST_NAME, NAME_PATTERN, Assumption, KnownExcess, Number, Text, Words
-from brdfdb.materials.source import Evaluate, FourAngles, Lookups, Lossless, check_wavelengths
+from brdfdb.materials.source import Evaluate, FourAngles, Lookups, Lossless, check_wavelengths, no_specular_part
 from brdfdb.materials.spectrum import Spectrum, assumptions, made_lossless
 from brdfdb.materials.written_parameters import completed, from_file, written_name
 from brdfdb.models import MODELS
 from brdfdb.notebook import card, listed, spectrum
-from brdfdb.parameters import Floats, ModelSpec
+from brdfdb.parameters import Floats, ModelSpec, check_nanometres
 from brdfdb.spectra import refractive_index
 
 _SOURCED = ("refractive_index", "wavelengths_nm")  # fields besides parameters that may have an entry in `sources`
@@ -286,7 +287,7 @@ class Material(BaseModel, Lookups):
         if wavelength_nm is None:
             reason = f"its model {self.model} is spectral" if self.spec.spectral else "a parameter is a spectrum"
             raise ParameterError("wavelength_nm", f"{self.name} needs wavelengths, {reason}")
-        wavelength = np.asarray(wavelength_nm, dtype=np.float64)
+        wavelength = check_nanometres("wavelength_nm", wavelength_nm)
         arguments: dict[str, Any] = {
             name: value.at(name, wavelength) if isinstance(value, Spectrum) else value for name, value in given.items()
         }
@@ -338,14 +339,15 @@ class Material(BaseModel, Lookups):
     def _at_angles(self, angles: FourAngles, wavelength_nm: ArrayLike | None) -> Floats:
         return self._spectrum(self.spec.evaluate, angles, wavelength_nm, None)
 
+    @array_lookup
     def lookup_vectors(self, wi: ArrayLike, wr: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:
         return self._spectrum(self.spec.vectors, (wi, wr), wavelength_nm, None)
 
+    @array_lookup
     def specular_reflectance(self, theta_i: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:
         """Return the reflectance [1] of the specular part at theta_i [rad], 0 without one; shaped as by `lookup`."""
         if self.spec.specular is None:
-            wavelengths = () if wavelength_nm is None else np.shape(wavelength_nm)
-            return np.zeros((*np.shape(theta_i), *wavelengths))[()]
+            return no_specular_part(theta_i, wavelength_nm)
         return self._spectrum(self.spec.specular, (theta_i,), wavelength_nm, self.spec.specular_parameters)
 
     def _spectrum(
@@ -356,6 +358,7 @@ class Material(BaseModel, Lookups):
         names: tuple[str, ...] | None,
     ) -> Floats:
         """Evaluate a function of angles and parameters (all, or those in `names`). Wavelengths are the last axis."""
+        wavelength_nm = None if wavelength_nm is None else check_nanometres("wavelength_nm", wavelength_nm)
         if not self.spectral:
             value = function(*angles, **self.arguments())
             if wavelength_nm is None or np.ndim(wavelength_nm) == 0:

@@ -9,10 +9,12 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from brdfdb.arrays import array_lookup
 from brdfdb.errors import ParameterError
+from brdfdb.geometry import checked_angles, finished
 from brdfdb.lobes import Lobe
 from brdfdb.materials.spectrum import Spectrum
-from brdfdb.parameters import Floats
+from brdfdb.parameters import Floats, check_nanometres
 
 # Function of unit vectors (N, 3) of light and viewer that gives f_r [1/sr] of shape (N, L)
 Evaluate = Callable[[Floats, Floats], Floats]
@@ -23,16 +25,22 @@ FourAngles = tuple[ArrayLike, ArrayLike, ArrayLike, ArrayLike]
 
 def check_wavelengths(wavelengths_nm: tuple[float, ...] | None) -> tuple[float, ...] | None:
     """Return the wavelengths [nm] of a source; ParameterError if they are not positive and increasing."""
-    if wavelengths_nm is not None and not (wavelengths_nm[0] > 0.0 and np.all(np.diff(wavelengths_nm) > 0.0)):
-        raise ParameterError(
-            "wavelengths_nm", f"{list(wavelengths_nm)} must be positive and increasing", wavelengths_nm
-        )
+    if wavelengths_nm is not None and np.any(np.diff(check_nanometres("wavelengths_nm", wavelengths_nm)) <= 0.0):
+        raise ParameterError("wavelengths_nm", f"{[*wavelengths_nm]} must be positive and increasing", wavelengths_nm)
     return wavelengths_nm
+
+
+def no_specular_part(theta_i: ArrayLike, wavelength_nm: ArrayLike | None) -> Floats:
+    """Return a specular reflectance [1] of 0, nan where theta_i [rad] is nan, shaped as by `Lookups.lookup`."""
+    wavelengths = () if wavelength_nm is None else check_nanometres("wavelength_nm", wavelength_nm).shape
+    given = checked_angles(theta_i, 0.0, 0.0, 0.0)
+    return finished(np.zeros((*given.theta_i.shape, *wavelengths)), given, trailing=len(wavelengths))
 
 
 class Lookups(ABC):
     """The base of sources and tables: f_r at angles, over one method that takes the four of them together."""
 
+    @array_lookup
     def lookup(
         self,
         theta_i: ArrayLike,

@@ -11,6 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from brdfdb.errors import ParameterError
 from brdfdb.materials.provenance import Text
+from brdfdb.parameters import check_nanometres
 
 MOST_VALUES = 10_000  # of a spectrum
 _LEAST_NM = 20.0  # below it, the wavelengths of a spectrum are likely to be micrometres
@@ -51,8 +52,7 @@ class Spectrum(BaseModel):
 
     @model_validator(mode="after")
     def _check_lengths(self) -> Spectrum:
-        wavelengths = np.array(self.wavelengths_nm)
-        if wavelengths[0] <= 0.0 or np.any(np.diff(wavelengths) <= 0.0):
+        if np.any(np.diff(check_nanometres("wavelengths_nm", self.wavelengths_nm)) <= 0.0):
             raise ParameterError("wavelengths_nm", "those of a spectrum must be positive and increase strictly")
         if len(self.values) != len(self.wavelengths_nm):
             raise ParameterError(

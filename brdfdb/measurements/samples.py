@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from brdfdb.arrays import check_rows, plain
 from brdfdb.errors import ParameterError
 from brdfdb.geometry import check_phi, degrees, radians, unit_vector
-from brdfdb.parameters import Floats
+from brdfdb.parameters import Floats, check_nanometres
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -114,6 +115,7 @@ class Samples:
     record: Mapping[str, Any] = field(default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:
+        check_rows({name: getattr(self, name) for name in (*ANGLES, "values", "uncertainty")})
         for name in (*ANGLES, "values", "uncertainty", "wavelength_nm", "bandwidth_nm"):
             object.__setattr__(self, name, _floats(name, getattr(self, name), optional=name in _OPTIONAL))
         count = self.theta_i.size
@@ -133,6 +135,8 @@ class Samples:
                 where = "is below the horizon" if beyond[0] > 0.0 else "is no polar angle"
                 text = f"{degrees(beyond[0]):.6g} degrees {where}; allowed are 0 to 90 degrees"
                 raise ParameterError(name, text, float(beyond[0]), (0.0, _HORIZON))
+        if self.wavelength_nm is not None:
+            check_nanometres("wavelength_nm", self.wavelength_nm)
         if np.any(np.isinf(self.values)):
             raise ParameterError("values", "a value is infinite; a hole is nan", np.inf)
         if self.uncertainty is not None and np.any(self.uncertainty < 0.0):
@@ -290,6 +294,7 @@ def _floats(name: str, array: Any, *, optional: bool) -> Floats | None:
         if optional:
             return None
         raise ParameterError(name, "it is missing; an array of numbers is needed", None)
+    array = plain(name, array)
     try:
         return np.asarray(array, dtype=np.float64)
     except (TypeError, ValueError):

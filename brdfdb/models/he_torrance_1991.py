@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from brdfdb import fresnel
+from brdfdb.arrays import array_function
 from brdfdb.geometry import Directions, Vectors, checked_angles, checked_vectors, finished
 from brdfdb.lobes import Lobe
 from brdfdb.models._diffraction_series import CONSTANTS_BYTES, TERMS, TERMS_OF_FLOAT32, series_table
@@ -27,9 +28,9 @@ from brdfdb.models._he_torrance_kernels import (
 )
 from brdfdb.models._rows import by_rows, by_rows_of_vectors
 from brdfdb.models.large_calls import for_large_calls
-from brdfdb.parameters import Arguments, Floats, FormKind, Gradient, ModelForm, Parameter, bytes_of
+from brdfdb.parameters import LEAST_NM, Arguments, Floats, FormKind, Gradient, ModelForm, Parameter, bytes_of
 
-WAVELENGTH_NM = Parameter("wavelength_nm", "λ", "nm", 1e-3, 1e7, "wavelength in vacuum")
+WAVELENGTH_NM = Parameter("wavelength_nm", "λ", "nm", LEAST_NM, 1e7, "wavelength in vacuum")
 SIGMA_0_UM = Parameter("sigma_0_um", "σ_0", "µm", 0.0, 1e4, "rms roughness; 0 is a mirror")
 TAU_UM = Parameter("tau_um", "τ", "µm", 1e-6, 1e6, "autocorrelation length")
 N = Parameter("n", "n", "1", 1e-3, 100.0, "refractive index")
@@ -103,7 +104,7 @@ def he_torrance(
     theta_i, phi_i, theta_r, phi_r : array_like [rad]
         Directions of light (i) and viewer (r), pointing away from the surface; theta in [0, pi].
     wavelength_nm : array_like [nm]
-        Wavelength in vacuum, in [1e-3, 1e7].
+        Wavelength in vacuum, in [1, 1e7].
     sigma_0_um, tau_um : array_like [um]
         rms roughness, in [0, 1e4], and autocorrelation length, in [1e-6, 1e6].
     n, k : array_like [1]
@@ -165,6 +166,7 @@ def he_torrance_vectors(
     return _f_r(checked_vectors(wi, wr), surface, A.check(a))
 
 
+@array_function
 def he_torrance_gradient(
     wi: ArrayLike,
     wr: ArrayLike,
@@ -266,6 +268,7 @@ def v_squared(directions: Directions) -> tuple[Floats, Floats]:
     return across**2 + (2.0 * directions.sin_i * directions.sin_r) * directions.one_plus_cos_dphi, v_z**2
 
 
+@array_function
 def he_torrance_specular(
     theta_i: ArrayLike,
     *,
@@ -312,6 +315,7 @@ def he_torrance_specular(
     return finished(rho_s(angles, checked_surface(wavelength_nm, sigma_0_um, tau_um, n, k)), angles)
 
 
+@array_function
 def he_torrance_specular_vectors(
     wi: ArrayLike, *, wavelength_nm: ArrayLike, sigma_0_um: ArrayLike, tau_um: ArrayLike, n: ArrayLike, k: ArrayLike
 ) -> Floats:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from brdfdb import fresnel
+from brdfdb.arrays import array_function
 from brdfdb.errors import ParameterError
 from brdfdb.geometry import (
     Directions,
@@ -100,6 +101,7 @@ def he_torrance_very_rough_vectors(
     )
 
 
+@array_function
 def he_torrance_smooth(theta_i: ArrayLike, *, n: ArrayLike, k: ArrayLike) -> Floats:
     """Return the specular reflectance [1] of a smooth surface: `he_torrance_specular` as sigma_0 / wavelength -> 0.
 
@@ -137,6 +139,7 @@ def he_torrance_smooth(theta_i: ArrayLike, *, n: ArrayLike, k: ArrayLike) -> Flo
     return _smooth(checked_angles(theta_i, 0.0, 0.0, 0.0), full.N.check(n), full.K.check(k))
 
 
+@array_function
 def he_torrance_smooth_vectors(wi: ArrayLike, *, n: ArrayLike, k: ArrayLike) -> Floats:
     """Return `he_torrance_smooth` [1] for unit vectors `wi` (light) of shape (..., 3)."""
     return _smooth(checked_vectors(wi, wi), full.N.check(n), full.K.check(k))
@@ -149,6 +152,7 @@ class HeTorranceParts(NamedTuple):
     uniform_diffuse: Floats
 
 
+@array_function
 def he_torrance_parts(
     theta_i: ArrayLike,
     phi_i: ArrayLike,
@@ -203,6 +207,7 @@ def he_torrance_parts(
     return _parts(checked_angles(theta_i, phi_i, theta_r, phi_r), surface, full.A.check(a))
 
 
+@array_function
 def he_torrance_parts_vectors(
     wi: ArrayLike,
     wr: ArrayLike,
@@ -219,6 +224,7 @@ def he_torrance_parts_vectors(
     return _parts(checked_vectors(wi, wr), surface, full.A.check(a))
 
 
+@array_function
 def he_torrance_aperture(
     theta_i: ArrayLike,
     phi_i: ArrayLike,
@@ -294,6 +300,7 @@ def he_torrance_aperture(
     return _aperture(checked_angles(theta_i, phi_i, theta_r, phi_r), apertures, surface, full.A.check(a))
 
 
+@array_function
 def he_torrance_aperture_vectors(
     wi: ArrayLike,
     wr: ArrayLike,

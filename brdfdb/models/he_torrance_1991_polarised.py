@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from brdfdb import fresnel
+from brdfdb.arrays import array_function
 from brdfdb.geometry import Directions, Vectors, checked_angles, checked_vectors, finished
 from brdfdb.models import he_torrance_1991 as unpolarised
 from brdfdb.parameters import Floats
@@ -28,6 +29,7 @@ from brdfdb.parameters import Floats
 Complexes = NDArray[np.complexfloating[Any, Any]]
 
 
+@array_function
 def he_torrance_jones(
     theta_i: ArrayLike,
     phi_i: ArrayLike,
@@ -86,6 +88,7 @@ def he_torrance_jones(
     return _finished_jones(directions, unpolarised.N.check(n), unpolarised.K.check(k))
 
 
+@array_function
 def he_torrance_jones_vectors(wi: ArrayLike, wr: ArrayLike, *, n: ArrayLike, k: ArrayLike) -> Complexes:
     """Return `he_torrance_jones` [1] for unit vectors `wi` (light) and `wr` (viewer) of shape (..., 3).
 
@@ -94,6 +97,7 @@ def he_torrance_jones_vectors(wi: ArrayLike, wr: ArrayLike, *, n: ArrayLike, k: 
     return _finished_jones(checked_vectors(wi, wr), unpolarised.N.check(n), unpolarised.K.check(k))
 
 
+@array_function
 def he_torrance_mueller(
     theta_i: ArrayLike,
     phi_i: ArrayLike,
@@ -149,6 +153,7 @@ def he_torrance_mueller(
     return _finished_mueller(checked_angles(theta_i, phi_i, theta_r, phi_r), surface, unpolarised.A.check(a))
 
 
+@array_function
 def he_torrance_mueller_vectors(
     wi: ArrayLike,
     wr: ArrayLike,
@@ -168,6 +173,7 @@ def he_torrance_mueller_vectors(
     return _finished_mueller(checked_vectors(wi, wr), surface, unpolarised.A.check(a))
 
 
+@array_function
 def he_torrance_specular_mueller(
     theta_i: ArrayLike,
     *,
@@ -216,6 +222,7 @@ def he_torrance_specular_mueller(
     return _finished_specular(checked_angles(theta_i, 0.0, 0.0, 0.0), surface)
 
 
+@array_function
 def he_torrance_specular_mueller_vectors(
     wi: ArrayLike, *, wavelength_nm: ArrayLike, sigma_0_um: ArrayLike, tau_um: ArrayLike, n: ArrayLike, k: ArrayLike
 ) -> Floats:
@@ -224,6 +231,7 @@ def he_torrance_specular_mueller_vectors(
     return _finished_specular(checked_vectors(wi, wi), surface)
 
 
+@array_function
 def he_torrance_facet_mueller(theta_d: ArrayLike, *, n: ArrayLike, k: ArrayLike) -> Floats:
     """Return the Mueller matrix [1] of the facet over its first element, between s and p of the plane of the light.
 

@@ -60,7 +60,7 @@ def ggx(
     n, k : array_like [1]
         Refractive index n + ik of the facets, n in [1e-3, 100] and k in [0, 1e4].
     wavelength_nm : array_like [nm], optional
-        Wavelength of n and k, in [1e-3, 1e7]. The formula does not read it.
+        Wavelength of n and k, in [1, 1e7]. The formula does not read it.
 
     Returns
     -------

@@ -18,6 +18,7 @@ from typing import Any, ParamSpec, Protocol, cast, overload
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
+from brdfdb.arrays import array_function
 from brdfdb.errors import ParameterError
 from brdfdb.geometry import asked_for
 from brdfdb.parameters import Floats
@@ -74,7 +75,7 @@ def for_large_calls(function: Callable[P, Floats], together: str = "") -> LargeC
 
     if call.__doc__ and "\n\n    Returns\n" in call.__doc__:
         call.__doc__ = call.__doc__.replace("\n\n    Returns\n", f"{_DOCUMENTED}\n    Returns\n", 1)
-    return cast(LargeCall[P], call)
+    return cast(LargeCall[P], array_function(call))
 
 
 def for_large_calls_of_one(together: str) -> Callable[[Callable[P, Floats]], LargeCall[P]]:
@@ -158,7 +159,7 @@ def array_for_result(
     if out is None:
         return np.empty(shape, dtype)
     allowed = f"allowed is a writable, C-contiguous array of {dtype} and shape {shape}, as the result"
-    if not isinstance(out, np.ndarray):
+    if not isinstance(out, np.ndarray) or isinstance(out, np.ma.MaskedArray):
         raise ParameterError("out", f"it is of type {type(out).__name__}; {allowed}", out)
     if out.dtype != dtype or out.shape != shape:
         raise ParameterError("out", f"{out.dtype} of shape {out.shape}; {allowed}", out.shape)

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from brdfdb.arrays import array_function
 from brdfdb.geometry import Directions, checked_angles, checked_vectors, finished
 from brdfdb.models._oren_nayar_kernels import (
     functional_angle_rows,
@@ -108,6 +109,7 @@ def oren_nayar_vectors(
     return by_rows_of_vectors(functional_vector_rows, checked_vectors(wi, wr), parameters)
 
 
+@array_function
 def oren_nayar_parts(
     theta_i: ArrayLike,
     phi_i: ArrayLike,
@@ -151,6 +153,7 @@ def oren_nayar_parts(
     return _apart(angles, direct, total, **parameters)
 
 
+@array_function
 def oren_nayar_parts_vectors(wi: ArrayLike, wr: ArrayLike, *, rho: ArrayLike, sigma: ArrayLike) -> Parts:
     """Return `oren_nayar_parts` [1/sr] for unit vectors `wi` (light) and `wr` (viewer) of shape (..., 3)."""
     vectors = checked_vectors(wi, wr)
@@ -236,6 +239,7 @@ def oren_nayar_qualitative_vectors(
     return by_rows_of_vectors(qualitative_vector_rows, checked_vectors(wi, wr), parameters)
 
 
+@array_function
 def oren_nayar_gradient(
     wi: ArrayLike, wr: ArrayLike, *, rho: ArrayLike, sigma: ArrayLike, interreflection: ArrayLike = True
 ) -> Gradient:
@@ -245,6 +249,7 @@ def oren_nayar_gradient(
     return Gradient(values[0], {RHO.name: values[1], SIGMA.name: values[2]})
 
 
+@array_function
 def oren_nayar_qualitative_gradient(
     wi: ArrayLike, wr: ArrayLike, *, rho: ArrayLike, sigma: ArrayLike, offset: ArrayLike = 0.33
 ) -> Gradient:

@@ -7,6 +7,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from brdfdb.arrays import array_function
 from brdfdb.geometry import Directions, checked_angles, checked_vectors, finished
 from brdfdb.models._oren_nayar_facets import NODES, bounce_of_cavity, direct_of_cavity, gaussian
 from brdfdb.models._oren_nayar_single_slope import bounce_of_slope, direct_of_slope, over_slopes
@@ -85,6 +86,7 @@ def oren_nayar_unidirectional_vectors(
     return _total(*_unidirectional(checked_vectors(wi, wr), rho, theta_a, phi_a))
 
 
+@array_function
 def oren_nayar_unidirectional_parts(
     theta_i: ArrayLike,
     phi_i: ArrayLike,
@@ -125,6 +127,7 @@ def oren_nayar_unidirectional_parts(
     return _parts(*_unidirectional(checked_angles(theta_i, phi_i, theta_r, phi_r), rho, theta_a, phi_a))
 
 
+@array_function
 def oren_nayar_unidirectional_parts_vectors(
     wi: ArrayLike, wr: ArrayLike, *, rho: ArrayLike, theta_a: ArrayLike, phi_a: ArrayLike
 ) -> Parts:
@@ -217,6 +220,7 @@ def oren_nayar_single_slope_vectors(wi: ArrayLike, wr: ArrayLike, *, rho: ArrayL
     return _total(*_single_slope(checked_vectors(wi, wr), rho, theta_a))
 
 
+@array_function
 def oren_nayar_single_slope_parts(
     theta_i: ArrayLike,
     phi_i: ArrayLike,
@@ -256,6 +260,7 @@ def oren_nayar_single_slope_parts(
     return _parts(*_single_slope(checked_angles(theta_i, phi_i, theta_r, phi_r), rho, theta_a))
 
 
+@array_function
 def oren_nayar_single_slope_parts_vectors(wi: ArrayLike, wr: ArrayLike, *, rho: ArrayLike, theta_a: ArrayLike) -> Parts:
     """Return `oren_nayar_single_slope_parts` for unit vectors `wi` (light) and `wr` (viewer) of shape (..., 3)."""
     return _parts(*_single_slope(checked_vectors(wi, wr), rho, theta_a))
@@ -354,6 +359,7 @@ def oren_nayar_gaussian_vectors(wi: ArrayLike, wr: ArrayLike, *, rho: ArrayLike,
     return _total(*_gaussian(checked_vectors(wi, wr), rho, sigma))
 
 
+@array_function
 def oren_nayar_gaussian_parts(
     theta_i: ArrayLike,
     phi_i: ArrayLike,
@@ -393,6 +399,7 @@ def oren_nayar_gaussian_parts(
     return _parts(*_gaussian(checked_angles(theta_i, phi_i, theta_r, phi_r), rho, sigma))
 
 
+@array_function
 def oren_nayar_gaussian_parts_vectors(wi: ArrayLike, wr: ArrayLike, *, rho: ArrayLike, sigma: ArrayLike) -> Parts:
     """Return `oren_nayar_gaussian_parts` [1/sr] for unit vectors `wi` (light) and `wr` (viewer) of shape (..., 3)."""
     return _parts(*_gaussian(checked_vectors(wi, wr), rho, sigma))

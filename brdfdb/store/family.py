@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from brdfdb.arrays import array_lookup
 from brdfdb.errors import ParameterError, StoreError, sentence_of
 from brdfdb.geometry import checked_angles, checked_vectors, radians
 from brdfdb.materials import written_name
@@ -290,6 +291,7 @@ class Family:
         """Return the family at parameters as files write them; a lookup raises what `lookup` does."""
         return Surface(_AtParameters(self, self.record.in_model_units(written)), "family", self.wavelength_nm)
 
+    @array_lookup
     def lookup(
         self,
         theta_i: ArrayLike,
@@ -324,12 +326,14 @@ class Family:
         given = (theta_i, phi_i, theta_r, phi_r, wavelength_nm)
         return self._blended(self._parts(parameters), lambda table: table.lookup(*given))
 
+    @array_lookup
     def lookup_vectors(
         self, wi: ArrayLike, wr: ArrayLike, wavelength_nm: ArrayLike | None = None, **parameters: float
     ) -> Floats:
         """Interpolate f_r [1/sr] for unit vectors `wi` of the light and `wr` of the viewer, each of shape (..., 3)."""
         return self._blended(self._parts(parameters), lambda table: table.lookup_vectors(wi, wr, wavelength_nm))
 
+    @array_lookup
     def lookup_with_error(
         self,
         theta_i: ArrayLike,
@@ -351,6 +355,7 @@ class Family:
         directions = checked_angles(theta_i, phi_i, theta_r, phi_r)
         return Stated(brdf, parts[0].table.stated_by(self.error, directions, brdf, wavelength_nm))
 
+    @array_lookup
     def lookup_vectors_with_error(
         self, wi: ArrayLike, wr: ArrayLike, wavelength_nm: ArrayLike | None = None, **parameters: float
     ) -> Stated:
@@ -361,6 +366,7 @@ class Family:
         brdf = self._blended(parts, lambda table: table.lookup_vectors(wi, wr, wavelength_nm))
         return Stated(brdf, parts[0].table.stated_by(self.error, checked_vectors(wi, wr), brdf, wavelength_nm))
 
+    @array_lookup
     def specular_reflectance(
         self, theta_i: ArrayLike, wavelength_nm: ArrayLike | None = None, **parameters: float
     ) -> Floats:

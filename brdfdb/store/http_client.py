@@ -13,6 +13,7 @@ from urllib.parse import quote, urlencode
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from brdfdb.arrays import array_lookup
 from brdfdb.errors import (
     StoreError,
     UnknownMaterialError,
@@ -89,12 +90,14 @@ class RemoteTable(BaseTable):
         given = checked_angles(*angles)
         return self._looked_up((given.theta_i, given.phi_i, given.theta_r, given.phi_r), given, wavelength_nm)
 
+    @array_lookup
     def lookup_vectors(self, wi: ArrayLike, wr: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:
         self._wavelengths(wavelength_nm)
         given = checked_vectors(wi, wr)
         (theta_i, phi_i), (theta_r, phi_r) = spherical_angles(given.w_i), spherical_angles(given.w_r)
         return self._looked_up((theta_i, phi_i, theta_r, phi_r), given, wavelength_nm)
 
+    @array_lookup
     def specular_reflectance(self, theta_i: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:
         count, tail = self._asked(wavelength_nm)
         given = checked_angles(theta_i, 0.0, 0.0, 0.0)

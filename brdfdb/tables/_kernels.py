@@ -15,7 +15,7 @@ from brdfdb.tables._interpolation import POINTS, Axes, interpolated, room
 
 Array = NDArray[np.float64]
 
-PHI_MAX = 1e15
+PHI_USUAL = 4.0 * PI
 
 
 @kernel
@@ -126,7 +126,10 @@ def by_angles(
     horizon: float,
     out: Array,
 ) -> bool:
-    """Write f_r [1/sr] of directions by angles [rad]. Return False if any angle is out of range."""
+    """Write f_r [1/sr] of directions by angles [rad].
+
+    Return False if a polar angle is out of range, or an azimuth has more than two turns.
+    """
     most = room(theta_i.size)
     x, mu, scratch = np.empty((axes.counts.size, most)), np.empty(most), np.empty((6, most))
     wi, wr = np.empty(3 * most), np.empty(3 * most)
@@ -149,11 +152,11 @@ def by_angles(
         odd = 0
         for j in range(count):
             usual = (t_i[j] >= 0.0) & (t_i[j] <= horizon) & (t_r[j] >= 0.0) & (t_r[j] <= horizon)
-            odd += int(not (usual & (abs(p_i[j]) <= PHI_MAX) & (abs(p_r[j]) <= PHI_MAX)))
+            odd += int(not (usual & (abs(p_i[j]) <= PHI_USUAL) & (abs(p_r[j]) <= PHI_USUAL)))
         if odd > 0:
             for j in range(count):
                 bad = t_i[j] < 0.0 or t_i[j] > PI or t_r[j] < 0.0 or t_r[j] > PI
-                good = good and not (bad or abs(p_i[j]) > PHI_MAX or abs(p_r[j]) > PHI_MAX)
+                good = good and not (bad or abs(p_i[j]) > PHI_USUAL or abs(p_r[j]) > PHI_USUAL)
                 below = t_i[j] > horizon or t_r[j] > horizon
                 _outside(t_i[j] + t_r[j] + p_i[j] + p_r[j], below, j, wavelengths, f_r)
     return good

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from brdfdb.errors import ParameterError, import_extra
-from brdfdb.geometry import radians
+from brdfdb.geometry import check_azimuth_deg, radians
 from brdfdb.integrals.quadrature import reflected_share
 from brdfdb.lobes import around_mirror, narrowest
 from brdfdb.materials import FunctionRecord, Material
@@ -187,6 +187,7 @@ class Plot:
             As of `lobe`.
         """
         wavelength = self._wavelength(wavelength_nm)
+        check_azimuth_deg("phi_i_deg", phi_i_deg)
         axes = _axes(ax, (6.4, 3.9))
         shares = albedo_shares(self.table, float(radians(phi_i_deg)), wavelength)
         kept = {label: share for label, share in shares.items() if np.max(share) > 0.0} or {"reflected": np.zeros(21)}
@@ -289,6 +290,7 @@ class Plot:
         if phi_i_deg is None:
             phi_i_deg = (0.0, 90.0) if self.table.anisotropic else 0.0
         lights, azimuths = _numbers("theta_i_deg", theta_i_deg), _numbers("phi_i_deg", phi_i_deg)
+        check_azimuth_deg("phi_i_deg", azimuths)
         wavelengths = self._wavelengths(wavelength_nm)
         for theta in lights:
             if not 0.0 <= theta <= 90.0:

@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, PlainValidator, WithJsonSchema, model_validator
 
 from brdfdb.errors import ParameterError
-from brdfdb.geometry import radians
+from brdfdb.geometry import check_azimuth_deg, radians
+from brdfdb.parameters import check_nanometres
 
 ANGLES = ("theta_i", "phi_i", "theta_r", "phi_r")
 Angles = tuple[Any, Any, Any, Any]  # theta_i, phi_i, theta_r, phi_r [rad]
-TURN = 360.0  # degrees; fmod is exact, while radians have no digits left at 1e15
+TURN = 360.0  # degrees; fmod is exact
 
 _MOST_AXES = 32  # axes that numpy broadcasts
 _HEADER_BYTES = 4096  # limit on the header of a .npy file, which usually takes a hundred
@@ -96,8 +97,7 @@ def _polars(value: Any) -> NDArray[Any]:
 def _azimuths(value: Any) -> NDArray[Any]:
     """Return azimuths [rad]."""
     degrees = value if isinstance(value, np.ndarray) else _numbers(value)
-    if not np.all(finite := np.isfinite(degrees)):
-        raise ValueError(f"{degrees[~finite].flat[0]} is not a finite number")
+    check_azimuth_deg("azimuth", degrees)
     return radians(np.fmod(degrees, TURN))
 
 
@@ -107,8 +107,7 @@ def _wavelengths(value: Any) -> float | NDArray[np.float64] | None:
     array = _numbers(value)
     if array.ndim > 1:
         raise ValueError("not a number or a flat list of numbers")
-    if np.any(bad := ~(np.isfinite(array) & (array > 0.0))):
-        raise ValueError(f"{array[bad].flat[0]:g} is not a positive number of nanometres")
+    array = check_nanometres("wavelength_nm", array)
     return array if array.ndim else array.item()
 
 
@@ -126,9 +125,13 @@ class PointsBody(BaseModel):
     )
 
     theta_i: _Polars = Field(description="polar angle of the light [degrees], 0 to 180")
-    phi_i: _Azimuths = Field(default=0.0, validate_default=True, description="azimuth of the light [degrees]")
+    phi_i: _Azimuths = Field(
+        default=0.0, validate_default=True, description="azimuth of the light [degrees], -720 to 720"
+    )
     theta_r: _Polars = Field(description="polar angle of the viewer [degrees], 0 to 180")
-    phi_r: _Azimuths = Field(default=0.0, validate_default=True, description="azimuth of the viewer [degrees]")
+    phi_r: _Azimuths = Field(
+        default=0.0, validate_default=True, description="azimuth of the viewer [degrees], -720 to 720"
+    )
     wavelength_nm: Annotated[Any, PlainValidator(_wavelengths), WithJsonSchema({"anyOf": _OF_LIGHT})] = Field(
         default=None, description="wavelengths [nm]; missing or null: every wavelength of the table"
     )

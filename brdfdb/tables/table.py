@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
+from brdfdb.arrays import FLOATS, array_lookup
 from brdfdb.errors import ParameterError
 from brdfdb.geometry import (
     HALF_PI,
@@ -152,6 +153,7 @@ class Table(BaseTable):
         """True if the stored numbers are f_r itself."""
         return self.spectra is None and self.uniform is None and self.interpolation.plain
 
+    @array_lookup
     def lookup(
         self,
         theta_i: ArrayLike,
@@ -195,7 +197,7 @@ class Table(BaseTable):
     ) -> Floats:
         at = self._wavelengths(wavelength_nm)
         shape: tuple[int, ...] = ()
-        if all(isinstance(angle, float) for angle in angles):  # broadcasting takes longer than the lookup of one point
+        if FLOATS.issuperset(map(type, angles)):  # broadcasting takes longer than the lookup of one point
             numbers = np.array(angles).reshape(4, 1)
             numbers.flags.writeable = False  # as by `_flat`
             dtype, flat = numbers.dtype, list(numbers)
@@ -207,18 +209,22 @@ class Table(BaseTable):
             shape = shape_of_angles(*arrays)
             flat = [_flat(angle, shape, dtype) for angle in arrays]
         horizon = float(dtype.type(HALF_PI))
+        unusual = []
 
         def write(part: slice, values: NDArray[Any]) -> None:
             given = [angle[part] for angle in flat]
             if not _kernels.by_angles(
                 *self._kernel, at.nodes, at.weight, given[0], given[1], given[2], given[3], horizon, values
             ):
-                checked_angles(*angles)
+                unusual.append(part)
 
         arguments = dict(zip(("theta_i", "phi_i", "theta_r", "phi_r"), angles, strict=True))
         values = filled(write, array_for_result(out, shape + at.tail, dtype, arguments), at.size, threads)
+        if unusual:
+            checked_angles(*angles)  # raises an error or warns
         return values[()] if out is None else values
 
+    @array_lookup
     def lookup_vectors(
         self,
         wi: ArrayLike,
@@ -268,6 +274,7 @@ class Table(BaseTable):
         uniform = np.zeros(count) if self.uniform is None else np.broadcast_to(self.uniform, (count,)).copy()
         return rule, axes, self.values.reshape(-1), channels, spectra, uniform
 
+    @array_lookup
     def specular_reflectance(self, theta_i: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:
         at = self._wavelengths(wavelength_nm)
         given = np.asarray(theta_i)
@@ -290,6 +297,7 @@ class Table(BaseTable):
         matrix = np.where(values == 0.0, 0.0, values)[..., np.newaxis, np.newaxis] * normalised
         return np.asarray(matrix if at.tail else matrix[..., 0, :, :], dtype=np.asarray(f_r).dtype)
 
+    @array_lookup
     def mueller_vectors(self, wi: ArrayLike, wr: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:
         """Interpolate the Mueller BRDF [1/sr] for unit vectors (..., 3), as `mueller`. The azimuth of a pole is 0."""
         vectors = checked_vectors(wi, wr)
@@ -297,6 +305,7 @@ class Table(BaseTable):
         matrix = self.mueller(*angles, wavelength_nm)
         return matrix.astype(vectors.dtype)
 
+    @array_lookup
     def mueller_in_plane(self, wi: ArrayLike, wr: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:
         """Interpolate the Mueller BRDF [1/sr] between bases of the plane of light and viewer; as `mueller_vectors`."""
         facets, at = self._polarised, self._wavelengths(wavelength_nm)
@@ -307,6 +316,7 @@ class Table(BaseTable):
         matrix = values[..., np.newaxis, np.newaxis] * facets.in_plane(theta_d, values, at)
         return np.asarray(matrix if at.tail else matrix[..., 0, :, :], dtype=vectors.dtype)
 
+    @array_lookup
     def facet_mueller(self, theta_d: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:
         """Interpolate the Mueller matrix [1] of a facet over its first element, between bases of the plane.
 
@@ -331,6 +341,7 @@ class Table(BaseTable):
         at = self._wavelengths(wavelength_nm)
         return self._polarised.depolarised_at(at).reshape(at.tail)
 
+    @array_lookup
     def specular_mueller(self, theta_i: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:
         """Interpolate the Mueller matrix [1] of the specular part, towards the mirror direction at phi_i + pi.
 

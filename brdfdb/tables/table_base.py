@@ -10,12 +10,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from brdfdb.arrays import array_lookup
 from brdfdb.errors import BrdfdbError, ParameterError
 from brdfdb.geometry import Directions, checked_angles, checked_vectors, common_shape
 from brdfdb.materials import FunctionRecord, Material, source_of
 from brdfdb.materials.source import FourAngles, Lookups
 from brdfdb.notebook import card, listed, percent, spectrum
-from brdfdb.parameters import Floats
+from brdfdb.parameters import Floats, check_nanometres
 from brdfdb.tables._interpolation import weights_of_nodes
 from brdfdb.tables.grids import Axis
 from brdfdb.tables.metadata import TableMetadata
@@ -101,6 +102,7 @@ class BaseTable(Lookups):
         """Plots of the table with matplotlib: `Plot.lobe`, `Plot.cuts`, `Plot.albedo` and `Plot.slices`."""
         return Plot(self)
 
+    @array_lookup
     def sample(self, u1: ArrayLike, u2: ArrayLike, wi: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Sample:
         """Draw a viewer for each light `wi` from the table alone. By reciprocity it is also the next light of a path.
 
@@ -145,6 +147,7 @@ class BaseTable(Lookups):
         pdf = np.broadcast_to(density.reshape(density.shape + tail), np.shape(f_r))
         return Sample(wr, density[()], np.divide(f_r * cosine, pdf, out=np.zeros(pdf.shape), where=pdf != 0.0)[()])
 
+    @array_lookup
     def pdf(self, wi: ArrayLike, wr: ArrayLike) -> Floats:
         """Return the density [1/sr] with which `sample` draws `wr` for the light `wi`; unit vectors (..., 3)."""
         vectors = checked_vectors(wi, wr)
@@ -184,6 +187,7 @@ class BaseTable(Lookups):
             As by `lookup`.
         """
 
+    @array_lookup
     def mueller(
         self,
         theta_i: ArrayLike,
@@ -209,6 +213,7 @@ class BaseTable(Lookups):
     def _mueller_at(self, angles: FourAngles, wavelength_nm: ArrayLike | None) -> Floats:
         """Return the Mueller BRDF [1/sr] as by `mueller`; the angles are not checked yet."""
 
+    @array_lookup
     def lookup_with_error(
         self,
         theta_i: ArrayLike,
@@ -225,11 +230,13 @@ class BaseTable(Lookups):
         brdf = self.lookup(theta_i, phi_i, theta_r, phi_r, wavelength_nm)
         return Stated(brdf, self._stated(checked_angles(theta_i, phi_i, theta_r, phi_r), brdf, wavelength_nm))
 
+    @array_lookup
     def lookup_vectors_with_error(self, wi: ArrayLike, wr: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Stated:
         """Interpolate f_r [1/sr] for unit vectors, and give the stated error [1/sr]; as `lookup_with_error`."""
         brdf = self.lookup_vectors(wi, wr, wavelength_nm)
         return Stated(brdf, self._stated(checked_vectors(wi, wr), brdf, wavelength_nm))
 
+    @array_lookup
     def extrapolated(
         self, theta_i: ArrayLike, phi_i: ArrayLike, theta_r: ArrayLike, phi_r: ArrayLike
     ) -> NDArray[np.bool_]:
@@ -356,18 +363,10 @@ class BaseTable(Lookups):
 
     def _located(self, wavelength_nm: ArrayLike) -> Located:
         stored = self.wavelength_nm
-        given = np.asarray(wavelength_nm)
-        if given.size and given.dtype.kind not in "iuf":
-            raise ParameterError("wavelength_nm", f"{wavelength_nm!r} is not a number of nanometres", wavelength_nm)
-        wanted = given.astype(np.float64)
+        wanted = check_nanometres("wavelength_nm", wavelength_nm)
         if wanted.ndim > 1:
             raise ParameterError("wavelength_nm", f"{wanted.ndim} axes; allowed are a number and a list of numbers")
         flat = wanted.reshape(-1)
-        good = (flat > 0.0) & np.isfinite(flat)
-        if not np.all(good):
-            raise ParameterError(
-                "wavelength_nm", f"{flat[~good][0]:g} is not a positive number of nanometres", float(flat[~good][0])
-            )
         if stored is None:
             return _on_axis(np.zeros(1), np.zeros(flat.size), wanted.shape)
         outside = (flat < stored[0]) | (flat > stored[-1])

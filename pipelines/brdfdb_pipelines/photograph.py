@@ -11,7 +11,7 @@ import numpy as np
 
 from brdfdb.errors import ParameterError, WriteError
 from brdfdb.formats.gonioreflectometer import write_picture
-from brdfdb.geometry import radians
+from brdfdb.geometry import check_azimuth_deg, radians
 from brdfdb.measurements.gonioreflectometer import Gonioreflectometer, photograph
 from brdfdb_pipelines import terminal
 from brdfdb_pipelines.named_source import named_source
@@ -60,7 +60,8 @@ def run(
     source, _ = named_source(name, store, recipe_path)
     instrument = instrument_of(settings)
     brdf = source.brdf_at(np.array([wavelength_nm]) if source.spectral else None)
-    for theta, _phi in lights:
+    for theta, phi in lights:
+        check_azimuth_deg("--light", phi)
         if not 0.0 <= theta < 90.0:
             raise ParameterError("--light", f"{theta:g} degrees is not in [0, 90)", theta, (0.0, 90.0))
     try:

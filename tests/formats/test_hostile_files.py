@@ -139,7 +139,7 @@ def test_a_field_of_no_size_has_no_shape_beyond_all_arrays(tmp_path: Path) -> No
     [
         ({"brdf": np.full((2, 2, 2), 1e300)}, "not finite, or above those of 32 bits"),
         ({"theta_i": np.zeros(3_000_000)}, "has 24000128 bytes"),
-        ({"record": np.array(NESTED[:1000]), "axes": [*AXES, "wavelength"], "wavelength": [np.inf]}, "shape"),
+        ({"record": np.array(NESTED[:1000]), "axes": [*AXES, "wavelength"], "wavelength": [np.inf]}, "positive number"),
     ],
 )
 def test_numbers_of_an_archive_are_in_range(arrays: dict[str, Any], words: str, tmp_path: Path) -> None:

@@ -197,7 +197,8 @@ def test_refuses_an_angle_that_is_not_a_real_number(spec: ModelSpec, position: i
 @pytest.mark.parametrize("wrong", [-1e-300, -0.1, np.nextafter(np.pi, 4.0), 90.0, np.inf, -np.inf])
 def test_refuses_a_theta_outside_the_sphere(spec: ModelSpec, position: int, wrong: float) -> None:
     parameters = drawn(spec, np.random.default_rng(17))
-    message = rf"^{ANGLES[position]}: {re.escape(f'{wrong:.9g}')} rad .* is outside \[0, pi\] rad$"
+    meant = r"; 90 degrees are 1\.5708 rad" if wrong == 90.0 else ""
+    message = rf"^{ANGLES[position]}: {re.escape(f'{wrong:.9g}')} rad .* is outside \[0, pi\] rad{meant}$"
     for given_as in (wrong, [0.1, wrong], np.array([[np.nan], [wrong]])):
         angles: list[Any] = [0.1, 0.2, 0.3, 0.4]
         angles[position] = given_as
@@ -225,7 +226,8 @@ def test_refuses_a_phi_that_float64_does_not_resolve(spec: ModelSpec, position: 
 def test_refuses_a_parameter_outside_its_range(spec: ModelSpec, parameter: Parameter) -> None:
     assert parameter.interval.startswith(f"[{parameter.low:g}, {parameter.high:g}]")
     for wrong in (parameter.low - 0.125, beyond(parameter), np.inf, -np.inf, np.nan):
-        expected = f"{parameter.name}: {wrong:.16g} is outside {parameter.interval}"
+        micrometres = "; is it in micrometres?" if parameter.unit == "nm" and 0.0 < wrong < 1.0 else ""
+        expected = f"{parameter.name}: {wrong:.16g} is outside {parameter.interval}{micrometres}"
         assert refused(spec, parameter, wrong) == expected
         assert refused(spec, parameter, [parameter.low, wrong, parameter.high]) == expected
         assert refused(spec, parameter, np.array([[parameter.high], [wrong]])) == expected

@@ -18,6 +18,8 @@ from tests.tables.made_up import (
     scipys_cubic,
 )
 
+pytestmark = pytest.mark.filterwarnings("ignore::brdfdb.errors.DegreesWarning")  # full turns are meant
+
 # A node of delta_phi passes through the folding, which moves it by an ulp of pi; measured 2e-16 of the largest value
 NODE_TOLERANCE = 1e-15
 STEP = 1e-9  # [rad] to either side of a seam

@@ -23,6 +23,7 @@ from pydantic import (
 )
 from starlette.requests import Request
 
+from brdfdb.geometry import AZIMUTH_MOST_DEG
 from brdfdb.tables.evaluation import Output
 from brdfdb.tables.lobe_views import View
 from brdfdb.tables.points import TURN, Points, PointsBody, fields_of_npy, listed
@@ -44,6 +45,7 @@ def _digits(value: object) -> object:
 
 Finite = Annotated[float, Field(allow_inf_nan=False), BeforeValidator(_digits)]
 Polar = Annotated[Finite, Field(ge=0.0, le=180.0)]
+Azimuth = Annotated[Finite, Field(ge=-AZIMUTH_MOST_DEG, le=AZIMUTH_MOST_DEG)]
 Flag = Annotated[bool, BeforeValidator(lambda text: {"true": True, "false": False}.get(text, text)), Strict()]
 Stokes = Annotated[Any, PlainValidator(read_stokes), WithJsonSchema({"anyOf": [{"type": "string"}, {"type": "null"}]})]
 Wavelengths = Annotated[tuple[Finite, ...], Field(description="wavelength [nm], repeatable; missing: all of the table")]
@@ -136,9 +138,11 @@ class PointQuery(OfTable):
 
     wavelength_nm: Wavelengths = ()
     theta_i: Polar = Field(description="polar angle of the light [degrees]")
-    phi_i: Finite = Field(default=0.0, description="azimuth of the light [degrees], any finite number")
+    phi_i: Azimuth = Field(default=0.0, description="azimuth of the light [degrees]")
     theta_r: Polar = Field(description="polar angle of the viewer [degrees]")
-    phi_r: Finite = Field(default=0.0, description="azimuth of the viewer [degrees]; phi_r - phi_i = 180 is the mirror")
+    phi_r: Azimuth = Field(
+        default=0.0, description="azimuth of the viewer [degrees]; phi_r - phi_i = 180 is the mirror"
+    )
 
     @property
     def points(self) -> Points:
@@ -154,7 +158,7 @@ class Light(Query):
 
     view: View = Field(default="cut", description="the plane of incidence, all viewers, or theta_h and theta_d")
     theta_i: Finite = Field(default=45.0, ge=0.0, le=90.0, description="polar angle of the light [degrees]")
-    phi_i: Finite = Field(default=0.0, ge=-720.0, le=720.0, description="azimuth of the light [degrees]")
+    phi_i: Azimuth = Field(default=0.0, description="azimuth of the light [degrees]")
     wavelength_nm: Wavelengths = ()
 
 

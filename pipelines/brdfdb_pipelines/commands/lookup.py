@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import math
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 HELP = "Print f_r [1/sr] of a material, or a family, at one pair of directions."
 
 _STOKES = ("reflected", "specular")
+_LIKE_RADIANS = 3.2  # angles below it, with a fraction among them, may be radians
 _ANGLES = ("theta_i", "phi_i", "theta_r", "phi_r")
 
 
@@ -43,18 +45,20 @@ def run(options: argparse.Namespace) -> int:
     """Print f_r [1/sr] at the directions [degree], and the specular reflectance [1] where there is a specular part."""
     import numpy as np
 
-    from brdfdb.geometry import PHI_MAX, degrees, radians
+    from brdfdb.geometry import check_azimuth_deg, radians
     from brdfdb.tables.table import Table
 
-    most_deg = float(degrees(PHI_MAX))
     angles_deg = [getattr(options, angle) for angle in _ANGLES]
     for angle, value in zip(_ANGLES, angles_deg, strict=True):
         if not math.isfinite(value):
             raise ParameterError(angle, f"{value} is not a number of degrees", value)
         if angle.startswith("theta") and not 0.0 <= value <= 180.0:
             raise ParameterError(angle, f"{value:g} is outside [0, 180] degrees", value, (0.0, 180.0))
-        if abs(value) > most_deg:
-            raise ParameterError(angle, f"{value:g} is outside [{-most_deg:g}, {most_deg:g}] degrees", value)
+        if angle.startswith("phi"):
+            check_azimuth_deg(angle, value)
+    if all(abs(value) < _LIKE_RADIANS for value in angles_deg) and not all(map(float.is_integer, angles_deg)):
+        shown = " ".join(f"{value:g}" for value in angles_deg)
+        print(f"brdfdb: angles are degrees; these look like radians: {shown}", file=sys.stderr)
     root: Path = options.store
     store = brdfdb.open(root, snapshot=options.snapshot)
     source: Table | Family
