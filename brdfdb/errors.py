@@ -5,6 +5,7 @@ from __future__ import annotations
 import bisect
 import difflib
 import importlib
+import math
 import sys
 import warnings
 from collections.abc import Iterable, Mapping
@@ -247,6 +248,11 @@ def sentence_of(error: Mapping[str, Any]) -> str:
     if kind == "string_pattern_mismatch" and context["pattern"] in _PATTERNS:
         return f"{value} is not {_PATTERNS[context['pattern']]}"
     return f"{value} is not allowed: {error['msg']}"
+
+
+def near_90(theta_deg: float) -> str:
+    """Return an angle [degree] below 90 as text, with two digits of its distance from 90."""
+    return f"{theta_deg:.{max(1, 1 - math.floor(math.log10(max(90.0 - theta_deg, 1e-12))))}f}"
 
 
 def counted(number: int, noun: str) -> str:

@@ -91,6 +91,11 @@ def white(_: Mapping[str, Any]) -> dict[str, float]:
     return {"rho": 1.0}
 
 
+def grows_with(weight: str, power: float) -> Callable[[Arguments], float]:
+    """Return a `ModelSpec.grazing_power`: a power where the parameter `weight` is above 0, else 0."""
+    return lambda arguments: power if np.any(np.asarray(arguments[weight]) > 0.0) else 0.0
+
+
 def bytes_of(arguments: Arguments) -> int:
     """Return the size [byte] of the arguments of a model call in float64."""
     return 8 * sum(int(np.size(value)) for value in arguments.values())
@@ -198,7 +203,9 @@ class ModelSpec:
     shape ``f(theta_i, phi_i, theta_r, phi_r, *, parameters)``, `vectors`, its twin, ``f(wi, wr, *, parameters)``;
     `specular`, where there is a specular part, is ``f(theta_i, *, parameters)`` of the parameters named in
     `specular_parameters`. `spectral` models take ``wavelength_nm, n, k`` beside their own parameters.
-    `grazing_pole` marks a model that grows without bound as a direction reaches 90 degrees.
+    `grazing_pole` marks a model that grows without bound as a direction reaches 90 degrees. `grazing_power` declares
+    how its directional albedo grows there: as cos theta_i to the power -p, where p is 0 if it is bounded. It is p, or a
+    function of the parameters that returns p. None: not declared, so that audits measure it.
     `excess` explains, for a model whose published equations can reflect more than they receive, the reason, the amount
     and the directions. Audits quote it, and it excuses nothing.
     `lobe_axes` names the two parameters that make the model anisotropic if they differ. Models that are anisotropic in
@@ -236,6 +243,7 @@ class ModelSpec:
     specular_parameters: tuple[str, ...] = ()
     spectral: bool = False
     grazing_pole: bool = False
+    grazing_power: float | Callable[[Arguments], float] | None = None
     lobe_axes: tuple[str, str] | None = None
     anisotropic: Callable[[Mapping[str, Any]], bool] | None = None
     lobe: Callable[..., Lobe] | None = None

@@ -97,12 +97,15 @@ def _short(model: ModelEnergy) -> str:
     where = f"{most} at {model.max_at_theta_i_deg:.3g}°"
     if model.max_at_wavelength_nm is not None:
         where += f", {model.max_at_wavelength_nm:g} nm"
+    bounded = model.grazing is None or (model.grazing.power == 0.0 and model.grazing.passes_1_at_theta_i_deg is None)
+    up_to = "" if bounded else f" for lights up to {model.judged_up_to_theta_i_deg:g}°"
     if model.verdict == "conserves":
-        return "yes" if model.furnace is not None else "yes, no lossless form to judge"
+        return f"yes{up_to}" if model.furnace is not None else f"yes{up_to}, no lossless form to judge"
     if model.verdict == "loses":
-        return f"creates none, loses up to {_percent(_loss(model.furnace))}"
+        loss, at = _loss(model.furnace)
+        return f"conserves energy{up_to} {'up to' if bounded else 'but for'} a loss of {_percent(loss)} at {at:.3g}°"
     if model.verdict == "gains":
-        return f"creates none; would create {_percent(_gain(model.furnace))} if nothing were absorbed"
+        return f"conserves energy{up_to}; would create {_percent(_gain(model.furnace))} if nothing were absorbed"
     return {
         "known published excess": f"no, as published: {where}",
         "accepted excess": f"no, as accepted: {where}",
@@ -110,11 +113,12 @@ def _short(model: ModelEnergy) -> str:
     }[model.verdict]
 
 
-def _loss(furnace: Furnace | None) -> float:
-    """Return the largest loss [1] of a lossless model up to the last angle that is judged."""
+def _loss(furnace: Furnace | None) -> tuple[float, float]:
+    """Return the largest loss [1] of a lossless model up to the last angle that is judged, and its angle [degree]."""
     assert furnace is not None
-    judged = [row for at, row in zip(furnace.theta_i_deg, furnace.albedo, strict=True) if at <= LOSS_UP_TO_DEG]
-    return 1.0 - min(value for row in judged for value in row if value is not None)
+    judged = zip(furnace.theta_i_deg, furnace.albedo, strict=True)
+    least = [(min(value for value in row if value is not None), at) for at, row in judged if at <= LOSS_UP_TO_DEG]
+    return 1.0 - min(least)[0], min(least)[1]
 
 
 def _gain(furnace: Furnace | None) -> float:

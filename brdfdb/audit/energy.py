@@ -24,6 +24,7 @@ from brdfdb.errors import counted
 from brdfdb.figure import Map, Panel, number
 from brdfdb.materials import Material, Source
 from brdfdb.materials.provenance import KnownExcess
+from brdfdb.tables.largest_albedo import grazing_of_table
 from brdfdb.tables.table import Table
 
 _SEVERITY: tuple[EnergyVerdict, ...] = (
@@ -49,8 +50,10 @@ class Energy(Finding):
     explanation = (
         "Directional albedo is the share of the light from one direction that leaves the surface in any direction, "
         "specular part included: the integral of f_r cos theta_r over the hemisphere. An albedo above 1 creates "
-        "energy. Lights up to 90° are examined, or up to 89.9° for models that grow without bound at the horizon. The "
-        "largest albedo of a model is searched between these lights, that of a table is the largest at fixed ones. The "
+        "energy. The verdict is for lights up to 90°, or up to 89.9° if f_r grows without bound at the horizon. The "
+        "largest albedo of a model is searched between these lights, that of a table is the largest at fixed ones. "
+        "Beyond the last light the albedo is bounded, or grows as a power of 1 / cos theta_i, which the model declares "
+        "or which is measured: the report says where it passes 1. The "
         "white furnace is the surface in uniform light, with its parameters set so that nothing is absorbed. An ideal "
         "model then shows 1 at every angle. Less than 1 is light that single scattering loses, more than 1 is energy "
         "that the model creates. The table of all materials shows the mean over angles, which counts as a loss or a "
@@ -72,8 +75,11 @@ class Energy(Finding):
     def sentences(self) -> list[Sentence]:
         """Return sentences on model, table, white furnace and uniform diffuse part."""
         model, table = self.model, self.table
-        most = f"reflects at most {_albedo(table.max_albedo)} at {table.max_at_theta_i_deg:.4g}°"
+        up_to = f"for lights up to {table.theta_i_deg[-1]:g}°"
+        most = f"reflects at most {_albedo(table.max_albedo)} {up_to}, at {table.max_at_theta_i_deg:.4g}°"
         of_table = table.reason or most
+        if table.grazing is not None and table.max_albedo is not None:
+            of_table += f"; {table.grazing.in_words(table.max_albedo)}"
         if model is None:
             return [
                 self.sentence("not judged", "no model of this table can be evaluated", title="Energy of the model"),
@@ -179,6 +185,9 @@ def energy_of(table: Table, source: Source | None, *, accept_excess: bool = Fals
     """Return the energy of a model and its table. With `accept_excess` both may exceed 1 by the excess of the model."""
     if source is None:
         stored = table_energy_of(table, None)
+        if stored.max_albedo is not None:
+            grazing = grazing_of_table(table, stored.max_albedo, stored.theta_i_deg[-1])
+            stored = stored.model_copy(update={"grazing": grazing})
         verdict: EnergyVerdict = "conserves" if stored.verdict == "passes" else stored.verdict
         return Energy(model=None, table=stored, verdict=verdict, reason=stored.reason)
     known = published_excess(source, table.wavelength_nm) if isinstance(source, Material) else None

@@ -21,7 +21,9 @@ from brdfdb.materials.provenance import KnownExcess
 from brdfdb.materials.source import Lossless
 from brdfdb.models.shared_integrals import sharing
 from brdfdb.parameters import Floats
+from brdfdb.tables.first_numbers import Grazing
 from brdfdb.tables.grids import Axis
+from brdfdb.tables.largest_albedo import LAST_LIGHT_DEG, grazing_of_source, last_light
 
 EnergyVerdict = Literal["conserves", "loses", "gains", "known published excess", "accepted excess", "violates"]
 
@@ -32,7 +34,7 @@ MOST_PANELS = 1000  # number of panels at which the quadrature of one light stop
 BOUND_TOLERANCE = 2e-5  # absolute tolerance of the largest a(lambda) [1]
 # Lights at round angles [degree]. Gauss's nodes in theta_i are added to them, so that the mean over uniform light,
 # 2 int albedo cos theta_i sin theta_i dtheta_i, is a sum over lights that are computed anyway
-THETA_I_DEG = (0.0, 10.0, 30.0, 45.0, 60.0, 75.0, 80.0, 85.0, 87.5, 89.0, 89.5, 89.9)
+THETA_I_DEG = (0.0, 10.0, 30.0, 45.0, 60.0, 75.0, 80.0, 85.0, 87.5, 89.0, 89.5, LAST_LIGHT_DEG)
 NODES = 16  # number of Gauss nodes: the mean differs by less than 2e-4 from that of 48 nodes, for all presets
 # Lights are added next to the largest albedo in at most ROUNDS rounds: until it differs by less than FLAT from its
 # neighbours, or, after LEAST_ROUNDS, from the top of the parabola through them
@@ -93,6 +95,8 @@ class ModelEnergy(BaseModel):
     max_at_theta_i_deg: float
     max_at_wavelength_nm: float | None
     exceeds_1_from_theta_i_deg: float | None = Field(description="to 0.001 degrees")
+    judged_up_to_theta_i_deg: float = Field(description="largest angle of the lights: the verdict is for these")
+    grazing: Grazing | None = Field(description="albedo of lights beyond; null: not finite")
     furnace: Furnace | None = Field(description="null: the model has no lossless parameters")
     bound_on_a: UniformBound | None = Field(description="null: the model has no such part")
     verdict: EnergyVerdict
@@ -155,8 +159,10 @@ def model_energy_of(
         furnace = None if model.white is None or white is None else _furnace(model.white, lights, white)
         lights, reflected = _refined(model, lights, reflected)
         first = _first_above_1(model, lights, reflected)
+        grazing = grazing_of_source(source, wavelength_nm, float(reflected.largest.max()))
     theta, wavelength = _worst(reflected.largest)
-    verdict, reason = _verdict(lights, wavelength_nm, reflected, furnace, known)
+    growth = "" if grazing is None else f"; {grazing.in_words(float(reflected.largest.max()))}"
+    verdict, reason = _verdict(lights, wavelength_nm, reflected, furnace, known, growth)
     if verdict == "violates" and first is not None:
         reason += _explained(source, wavelength_nm, reflected, first, known, claim)
         verdict = "accepted excess" if accept_excess and np.isfinite(reflected.largest).all() else verdict
@@ -171,6 +177,8 @@ def model_energy_of(
         max_at_theta_i_deg=float(lights.theta_i_deg[theta]),
         max_at_wavelength_nm=None if wavelength_nm is None else float(wavelength_nm[wavelength]),
         exceeds_1_from_theta_i_deg=first,
+        judged_up_to_theta_i_deg=float(lights.theta_i_deg[-1]),
+        grazing=grazing,
         furnace=furnace,
         bound_on_a=_bound(source, wavelength_nm, lights, reflected),
         verdict=verdict,
@@ -251,8 +259,9 @@ def _verdict(
     reflected: _Reflected,
     furnace: Furnace | None,
     known: KnownExcess | None,
+    growth: str,
 ) -> tuple[EnergyVerdict, str]:
-    """Return the verdict on a model, and its reason with the angle and the wavelength."""
+    """Return the verdict on a model, and its reason with angle and wavelength, and the growth for lights beyond."""
     theta_i_deg, certain = lights.theta_i_deg, reflected.largest - reflected.error
     if not np.isfinite(certain).all():
         broken, wavelength = np.argwhere(~np.isfinite(certain))[0]
@@ -266,12 +275,13 @@ def _verdict(
             worst = int(np.argmax(beyond))
             wavelength = int(np.argmax(reflected.largest[worst]))
         at = place(theta_i_deg[worst], _nm(wavelength_nm, wavelength))
-        share = f"{reflected.largest[worst].max():.4g} of what arrives at {at}"
+        share = f"{reflected.largest[worst].max():.4g} of what arrives at {at}{growth}"
         if known is not None and published:
             return "known published excess", f"reflects {share}: {known.citation}"
         return "violates", f"the model reflects {share}"
     at = place(theta_i_deg[worst], _nm(wavelength_nm, wavelength))
-    largest = f"reflects at most {np.max(reflected.largest):.4g} of what arrives, at {at}"
+    up_to = f"for lights up to {theta_i_deg[-1]:g} degrees"
+    largest = f"reflects at most {np.max(reflected.largest):.4g} of what arrives, {up_to}, at {at}{growth}"
     if furnace is None:
         return "conserves", f"{largest}; no parameters make the model lossless"
     return _where_nothing_absorbs(furnace, largest)
@@ -288,7 +298,7 @@ def _where_nothing_absorbs(furnace: Furnace, largest: str) -> tuple[EnergyVerdic
         more = f"{furnace.largest:.5g} of what arrives at {at}" + (f", and {least}" if least else "")
         return "gains", f"{largest}; lossless ({furnace.lossless}), the model would reflect {more}"
     if least:
-        return "loses", f"lossless ({furnace.lossless}), the model reflects {least}"
+        return "loses", f"lossless ({furnace.lossless}), the model reflects {least}; as it is, it {largest}"
     return "conserves", largest
 
 
@@ -300,7 +310,7 @@ def _lights(source: Source) -> _Lights:
     """Return the lights of a source, 90 degrees included unless f_r has a pole at grazing."""
     x, weight = np.polynomial.legendre.leggauss(NODES)
     nodes, weights = np.round(45.0 * (1.0 + x), 4), weight * (np.pi / 4.0)  # rounded for the report
-    others = np.array(THETA_I_DEG if source.grazing_pole else (*THETA_I_DEG, 90.0))
+    others = np.unique([*THETA_I_DEG, last_light(source)])
     theta_i_deg = np.concatenate([nodes, others])
     weights = np.concatenate([weights * np.sin(2.0 * radians(nodes)), np.zeros(others.size)])
     order = np.argsort(theta_i_deg)

@@ -114,7 +114,7 @@ class AuditReport(BaseModel):
     model_config = STRICT
 
     format: Literal["brdfdb-audit"] = "brdfdb-audit"
-    version: Literal[7] = 7
+    version: Literal[8] = 8
     store: str = Field(description="directory of the store")
     brdfdb: str = Field(description="version of the library")
     when: datetime = Field(description="of the last run; audits that a report of some materials keeps may be older")

@@ -15,6 +15,7 @@ from brdfdb.geometry import radians
 from brdfdb.materials.provenance import KnownExcess
 from brdfdb.parameters import Floats
 from brdfdb.tables.albedo import directional_albedo, hemispherical_albedo, tolerance_of
+from brdfdb.tables.first_numbers import Grazing
 from brdfdb.tables.grids import Axis
 from brdfdb.tables.stated_error import Error
 from brdfdb.tables.table import Table
@@ -76,6 +77,9 @@ class TableEnergy(BaseModel):
     )
     verdict: Verdict
     reason: str = Field(description="also if a table passes because of its stated error")
+    grazing: Grazing | None = Field(
+        default=None, description="measured albedo of lights beyond the last; null: not finite, or the model is known"
+    )
 
     @property
     def uncertainty(self) -> float | None:

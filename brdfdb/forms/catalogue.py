@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from pydantic import BaseModel, ConfigDict, Field
 
+from brdfdb.errors import ParameterError
 from brdfdb.materials import Material, Source, exact_material
 from brdfdb.measurements import MeasuredSource
 from brdfdb.parameters import Floats, FormKind, ModelForm, bytes_of
@@ -23,7 +25,7 @@ from brdfdb.tables.grids import (
 )
 from brdfdb.tables.layout import Layout
 from brdfdb.tables.measured_layout import tabulated
-from brdfdb.tables.planner import plan
+from brdfdb.tables.planner import check_tolerance, plan
 from brdfdb.tables.table import Table
 from brdfdb.tables.table_source import TableSource
 from brdfdb.tables.tabulation import POLE_END_DEG
@@ -83,7 +85,30 @@ class Form:
     copied: Callable[[], Evaluate] | None = None
 
 
-def forms(source: Source, wavelength_nm: ArrayLike | None, tolerances: Sequence[float] | None = None) -> list[Form]:
+class LeftOut(BaseModel):
+    """A form that cannot be made."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    key: str
+    title: str
+    reason: str = Field(description="why it cannot be made, in a sentence")
+
+
+F = TypeVar("F")
+
+
+class Candidates(list[F]):
+    """Forms of a source, the exact form first. `left_out` names the forms that cannot be made."""
+
+    def __init__(self, forms: Iterable[F], left_out: Iterable[LeftOut]) -> None:
+        super().__init__(forms)
+        self.left_out = list(left_out)
+
+
+def forms(
+    source: Source, wavelength_nm: ArrayLike | None, tolerances: Sequence[float] | None = None
+) -> Candidates[Form]:
     """Return all forms of a source, the exact form first.
 
     Parameters
@@ -98,17 +123,19 @@ def forms(source: Source, wavelength_nm: ArrayLike | None, tolerances: Sequence[
 
     Returns
     -------
-    list of Form
+    Candidates of Form
         The forms that the model of a material names (`ModelSpec.forms`), or the source itself, then tables. Coarser
         rungs follow the exact form: approximations are compared with this ladder. Tables hold the exact form if it is a
         model of the registry (`ModelSpec.exact_model`). They are planned for the model of the material, which is as
-        smooth.
+        smooth. A table that cannot be made, such as one that takes too many values, is among `left_out`.
 
     Raises
     ------
     ParameterError
-        If a tolerance is outside its range or takes too many values, or the wavelengths do not suit the source.
+        If a tolerance is outside its range, or the wavelengths do not suit the source.
     """
+    for tolerance in tolerances or ():
+        check_tolerance(tolerance)
     if tolerances is None:
         tolerances = SPECTRAL_TOLERANCES if source.spectral else TOLERANCES
     at = None if wavelength_nm is None else np.atleast_1d(np.asarray(wavelength_nm, dtype=np.float64))
@@ -119,11 +146,19 @@ def forms(source: Source, wavelength_nm: ArrayLike | None, tolerances: Sequence[
         elif isinstance(source, MeasuredSource):
             key, title = "data", f"{source.title}: the data, interpolated"
         itself = Form(key, title, "exact", f"source {source.name}", source.brdf_at(at), 0)
-        return [itself, *_tables(source, source, at, tolerances, "table")]
+        return _candidates([itself], _tables(source, source, at, tolerances, "table"))
     listed = list(_of_model(source, at))
     tabulated = exact_material(source)
     title = "table" if listed[0].python == f"models.{tabulated.model}" else "table of the fit"
-    return [*listed, *_tables(source, tabulated, at, tolerances, title)]
+    return _candidates(listed, _tables(source, tabulated, at, tolerances, title))
+
+
+def _candidates(listed: Sequence[Form], tables: Iterator[Form | LeftOut]) -> Candidates[Form]:
+    made = list(tables)
+    return Candidates(
+        [*listed, *(form for form in made if isinstance(form, Form))],
+        [form for form in made if isinstance(form, LeftOut)],
+    )
 
 
 def _of_model(material: Material, wavelength_nm: NDArray[np.float64] | None) -> Iterator[Form]:
@@ -171,7 +206,7 @@ def _tables(
     wavelength_nm: NDArray[np.float64] | None,
     tolerances: Sequence[float],
     table: str,
-) -> Iterator[Form]:
+) -> Iterator[Form | LeftOut]:
     """Yield planned tables, one of them also without a factored spectrum, and tables on two plain grids.
 
     They are planned for one source and hold the values of another, which is as smooth. Without tolerances there are no
@@ -181,12 +216,18 @@ def _tables(
         return
     for tolerance in dict.fromkeys(tolerances):
         percent = f"{100.0 * tolerance:g}"
-        key = f"table-{percent.replace('.', '-')}"
-        if isinstance(planned, MeasuredSource) or (isinstance(planned, TableSource) and planned.measured is not None):
-            layout, _ = tabulated(planned, wavelength_nm, tolerance)
-        else:
-            layout = replace(plan(planned, wavelength_nm, tolerance), source=held)
-        yield _table(layout, key, f"{table}, planned for {percent} %")
+        key, title = f"table-{percent.replace('.', '-')}", f"{table}, planned for {percent} %"
+        try:
+            if isinstance(planned, MeasuredSource) or (
+                isinstance(planned, TableSource) and planned.measured is not None
+            ):
+                layout, _ = tabulated(planned, wavelength_nm, tolerance)
+            else:
+                layout = replace(plan(planned, wavelength_nm, tolerance), source=held)
+        except ParameterError as error:
+            yield LeftOut(key=key, title=title, reason=str(error))
+            continue
+        yield _table(layout, key, title)
         if layout.spectra is not None and tolerance == _UNFACTORED:
             whole = replace(layout, spectra=None, part_nm=None)
             yield _table(whole, f"{key}-unfactored", f"the {percent} % table, spectra whole")
@@ -198,8 +239,11 @@ def _tables(
         yield _table(layout, key, f"{table}, {title}, linear")
 
 
-def _table(layout: Layout, key: str, title: str) -> Form:
-    values = np.concatenate([tabulation.block(layout, rows) for rows in layout.blocks])
+def _table(layout: Layout, key: str, title: str) -> Form | LeftOut:
+    try:
+        values = np.concatenate([tabulation.block(layout, rows) for rows in layout.blocks])
+    except ParameterError as error:
+        return LeftOut(key=key, title=title, reason=str(error))
     return replace(of_table(Table.of(layout, values), key, title), layout=layout, values=values)
 
 

@@ -18,6 +18,7 @@ from brdfdb.forms.tradeoff_document import (
     Diagnostic,
     FamilyChart,
     Fronts,
+    LeftOutOfMember,
     Point,
     Sampler,
     Saving,
@@ -68,9 +69,10 @@ def chart(
     Raises
     ------
     ParameterError
-        If a tolerance is outside its range or takes too many values, or the wavelengths do not suit the material.
+        If a tolerance is outside its range, or the wavelengths do not suit the material.
     """
-    forms = [*catalogue.forms(source, wavelength_nm, tolerances), *also]
+    candidates = catalogue.forms(source, wavelength_nm, tolerances)
+    forms = [*candidates, *also]
     tick()
     drawn = error_measurement.draw(source, wavelength_nm, DIRECTIONS, SEED)
     errors = _errors(forms, drawn)
@@ -114,6 +116,7 @@ def chart(
             bytes=front(np.array([[form.bytes for form in forms]], dtype=np.float64)),
         ),
         samplers=samplers,
+        left_out=candidates.left_out,
     )
 
 
@@ -175,12 +178,12 @@ def chart_family(
     Raises
     ------
     ParameterError
-        If a tolerance is outside its range or takes too many values, or the wavelengths do not suit the materials.
+        If a tolerance is outside its range, or the wavelengths do not suit the materials.
     StoreError
         If a member of `family` was built again since it was recorded.
     """
     tolerances = SPECTRAL_TOLERANCES if tolerances is None else tolerances
-    kept, errors = _forms_of_members(materials, wavelength_nm, tolerances, tick)
+    kept, errors, left_out = _forms_of_members(materials, wavelength_nm, tolerances, tick)
     timed = [form for _, form in kept.values()]
     between = None if family is None else of_family(family)
     drawn = error_measurement.draw(materials[len(materials) // 2], wavelength_nm, DIRECTIONS, SEED)
@@ -217,6 +220,7 @@ def chart_family(
             p99=family.error.overall.p99,
         ),
         fronts=fronts,
+        left_out=left_out,
     )
 
 
@@ -225,20 +229,25 @@ def _forms_of_members(
     wavelength_nm: NDArray[np.float64] | None,
     tolerances: Sequence[float],
     tick: Callable[[], None],
-) -> tuple[dict[str, tuple[int, Form]], list[dict[str, dict[str, Any]]]]:
-    """Return by key the form of the member nearest the middle and its number, and by key the errors of all members."""
+) -> tuple[dict[str, tuple[int, Form]], list[dict[str, dict[str, Any]]], list[LeftOutOfMember]]:
+    """Return by key the form of the member nearest the middle and its number, and by key the errors of all members.
+
+    The forms that cannot be made of a member come last.
+    """
     middle = len(materials) // 2
+    left_out: list[LeftOutOfMember] = []
     kept: dict[str, tuple[int, Form]] = {}
     errors: list[dict[str, dict[str, Any]]] = []
     for number, material in enumerate(materials):
         forms = catalogue.forms(material, wavelength_nm, tolerances)
         drawn = error_measurement.draw(material, wavelength_nm, DIRECTIONS, SEED)
+        left_out += [LeftOutOfMember(member=material.name, **out.model_dump()) for out in forms.left_out]
         errors.append(dict(zip((form.key for form in forms), _errors(forms, drawn), strict=True)))
         for form in forms:
             if form.key not in kept or abs(number - middle) <= abs(kept[form.key][0] - middle):
                 kept[form.key] = number, form
         tick()
-    return kept, errors
+    return kept, errors, left_out
 
 
 def _diagnostic(materials: Sequence[Material], wavelength_nm: NDArray[np.float64] | None) -> Diagnostic | None:

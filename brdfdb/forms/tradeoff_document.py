@@ -7,7 +7,7 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from brdfdb.forms.catalogue import Kind
+from brdfdb.forms.catalogue import Kind, LeftOut
 from brdfdb.materials.provenance import Number
 from brdfdb.materials.spectrum import Spectrum
 
@@ -112,6 +112,7 @@ class Chart(_Record):
     ladder: list[str] = Field(description="keys of the truth and of its rungs, the most accurate (l1) first")
     fronts: Fronts
     samplers: list[Sampler]
+    left_out: list[LeftOut] = Field(default=[], description="forms that cannot be made, such as a table too large")
 
 
 class Curve(Form):
@@ -137,6 +138,12 @@ class Diagnostic(_Record):
     values: list[float] = Field(description="value of each member")
 
 
+class LeftOutOfMember(LeftOut):
+    """A form that cannot be made of a member of a family."""
+
+    member: str
+
+
 class FamilyChart(_Record):
     """A family: the forms worth having at each of its members."""
 
@@ -153,6 +160,7 @@ class FamilyChart(_Record):
     fronts: list[list[str]] = Field(
         description="for each member, keys of the curves worth having in bulk, as in a chart, with the costs above"
     )
+    left_out: list[LeftOutOfMember] = Field(default=[], description="forms that cannot be made of a member")
 
 
 class Charts(_Record):

@@ -142,6 +142,10 @@ class FunctionSource(FunctionRecord, Lookups):
             raise _refusal(error) from None
         self._check_function()
 
+    def grazing_power(self, _wavelength_nm: NDArray[np.float64] | None) -> None:
+        """Return None, because the growth of a function is measured."""
+        return
+
     @property
     def has_lobe(self) -> bool:
         """Return True if the widths of a lobe are known."""

@@ -215,6 +215,11 @@ class Material(BaseModel, Lookups):
         """Return True if f_r grows without bound as a direction reaches 90 degrees."""
         return self.spec.grazing_pole
 
+    def grazing_power(self, wavelength_nm: NDArray[np.float64] | None) -> float | None:
+        """Return the power that the model declares, at least 0, or None: see `ModelSpec.grazing_power`."""
+        declared = self.spec.grazing_power
+        return float(declared(self.arguments(wavelength_nm))) if callable(declared) else declared
+
     @property
     def has_lobe(self) -> bool:
         """Return True if the model has a lobe around the mirror direction."""

@@ -143,6 +143,12 @@ class Source(Protocol):
     def grazing_pole(self) -> bool:
         """Return True if f_r grows without bound as a direction reaches 90 degrees."""
 
+    def grazing_power(self, wavelength_nm: NDArray[np.float64] | None) -> float | None:
+        """Return p if the directional albedo grows as cos theta_i to the power -p at grazing light; None if unknown.
+
+        It is at least 0, and 0 where the albedo is bounded.
+        """
+
     @property
     def has_lobe(self) -> bool:
         """Return True if `lobe` gives a lobe around the mirror direction; a diffuse source has none."""

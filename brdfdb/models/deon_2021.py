@@ -190,5 +190,6 @@ SPEC = ModelSpec(
     evaluate=lambert_sphere,
     vectors=lambert_sphere_vectors,
     grazing_pole=True,
+    grazing_power=0.0,
     lossless=white,
 )

@@ -239,6 +239,7 @@ SPEC = ModelSpec(
     evaluate=vmf_diffuse,
     vectors=vmf_diffuse_vectors,
     grazing_pole=True,
+    grazing_power=0.0,
     excess="d'Eon and Weidlich 2024: the scatterings are fitted one by one; measured 1.14 at 89.9 degrees for rho = 1 "
     "and a roughness of 0.98",
     lossless=white,

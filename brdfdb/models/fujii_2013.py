@@ -112,5 +112,6 @@ SPEC = ModelSpec(
     vectors=oren_nayar_fujii_vectors,
     degree=1,
     grazing_pole=True,
+    grazing_power=0.0,
     lossless=white,
 )

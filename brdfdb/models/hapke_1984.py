@@ -264,6 +264,7 @@ SPEC = ModelSpec(
     evaluate=hapke,
     vectors=hapke_vectors,
     grazing_pole=True,
+    grazing_power=0.0,
     excess=_EXCESS,
     lossless=lossless,
 )

@@ -93,6 +93,7 @@ SPEC = ModelSpec(
     parameters=(B_0, KNEE, SLOPE),
     evaluate=harvey_shack,
     vectors=harvey_shack_vectors,
+    grazing_power=0.0,
     lobe=lobe,
     excess="Harvey 1976: a fit to measured scatter, not normalised; b_0 may be so large that more light is scattered "
     "than arrives",

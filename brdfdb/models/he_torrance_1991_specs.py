@@ -27,6 +27,7 @@ SPEC = ModelSpec(
     parameters=(SIGMA_0_UM, TAU_UM, A),
     evaluate=he_torrance,
     vectors=he_torrance_vectors,
+    grazing_power=0.0,
     specular=he_torrance_specular,
     specular_parameters=("wavelength_nm", "sigma_0_um", "tau_um", "n", "k"),
     spectral=True,

@@ -141,6 +141,7 @@ SPEC = ModelSpec(
     evaluate=ggx_compensated,
     vectors=ggx_compensated_vectors,
     grazing_pole=True,
+    grazing_power=0.0,
     lobe=_lobe,
     lossless=_lossless,
     forms=_forms,

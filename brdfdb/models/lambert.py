@@ -75,6 +75,7 @@ SPEC = ModelSpec(
     parameters=(RHO,),
     evaluate=lambert,
     vectors=lambert_vectors,
+    grazing_power=0.0,
     degree=1,
     lossless=white,
 )

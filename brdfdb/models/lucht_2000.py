@@ -12,7 +12,7 @@ from brdfdb._numba import kernel, loop
 from brdfdb.geometry import checked_angles, checked_vectors, finished
 from brdfdb.models._rows import by_rows, by_rows_of_vectors
 from brdfdb.models.large_calls import for_large_calls
-from brdfdb.parameters import Floats, ModelSpec, Parameter
+from brdfdb.parameters import Floats, ModelSpec, Parameter, grows_with
 
 F_ISO = Parameter("f_iso", "f_iso", "1", 0.0, 1.0, "weight of the uniform kernel", reflectance=True)
 F_VOL = Parameter("f_vol", "f_vol", "1", 0.0, 1.0, "weight of the Ross-Thick kernel, leaves", reflectance=True)
@@ -156,5 +156,6 @@ SPEC = ModelSpec(
     evaluate=ross_li,
     vectors=ross_li_vectors,
     grazing_pole=True,
+    grazing_power=grows_with("f_geo", 1.0),
     excess=_EXCESS,
 )

@@ -99,6 +99,7 @@ SPEC = ModelSpec(
     vectors=minnaert_vectors,
     degree=1,
     grazing_pole=True,
+    grazing_power=lambda arguments: 1.0 - arguments["k"] if np.any(arguments["rho"]) else 0.0,
     excess=_EXCESS,
     lossless=white,
 )

@@ -94,6 +94,7 @@ SPEC = ModelSpec(
     parameters=(A, B, G),
     evaluate=abg,
     vectors=abg_vectors,
+    grazing_power=0.0,
     lobe=lobe,
     excess="Pfisterer 2011: a fit to measured scatter, not normalised; a may be so large that more light is scattered "
     "than arrives",

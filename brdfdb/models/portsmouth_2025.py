@@ -121,5 +121,6 @@ SPEC = ModelSpec(
     evaluate=oren_nayar_energy_preserving,
     vectors=oren_nayar_energy_preserving_vectors,
     grazing_pole=True,
+    grazing_power=0.0,
     lossless=white,
 )

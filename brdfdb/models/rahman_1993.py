@@ -176,5 +176,6 @@ SPEC = ModelSpec(
     vectors=rpv_vectors,
     degree=2,
     grazing_pole=True,
+    grazing_power=lambda arguments: max(1.0 - arguments["k"], 0.0) if np.any(arguments["rho_0"]) else 0.0,
     excess=_EXCESS,
 )

@@ -154,6 +154,7 @@ SPEC = ModelSpec(
     evaluate=torrance_sparrow,
     vectors=torrance_sparrow_vectors,
     grazing_pole=True,
+    grazing_power=0.0,
     lobe=lobe,
     excess=_EXCESS,
 )

@@ -9,7 +9,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
-from brdfdb.forms.catalogue import Kind
+from brdfdb.forms.catalogue import Candidates, Kind, LeftOut
 from brdfdb.parameters import Floats
 from brdfdb.scenes.choice import CONFIDENCE, GRAZING_DEG, Decision, Left, Sample
 from brdfdb.scenes.offered_forms import OfferedForm
@@ -90,6 +90,7 @@ class Material(_Record):
     )
     reason: str
     revision: str | None = Field(description="revision of the table, if a store was named and a table chosen")
+    left_out: list[LeftOut] = Field(default=[], description="forms that cannot be made, such as a table too large")
 
 
 class Choice(_Record):
@@ -143,7 +144,7 @@ def statement(tolerance: Tolerance, picture: tuple[int, int], materials: Sequenc
 def describe(
     scene: Scene,
     chosen: Mapping[str, Decision],
-    offered: Mapping[str, Sequence[OfferedForm]],
+    offered: Mapping[str, Candidates[OfferedForm]],
     prices: Mapping[str, Sequence[Price]],
     pixels: Mapping[str, int],
     revisions: Mapping[str, str],
@@ -187,6 +188,7 @@ def describe(
                 edges=_sampled(decision.edges),
                 reason=_reason(choice, cheaper, decision, scene.tolerance.value),
                 revision=revisions.get(name),
+                left_out=offered[name].left_out,
             )
         )
     return materials

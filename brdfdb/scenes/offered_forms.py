@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.forms import catalogue
-from brdfdb.forms.catalogue import Form
+from brdfdb.forms.catalogue import Candidates, Form, LeftOut
 from brdfdb.geometry import radians
 from brdfdb.materials import Source
 from brdfdb.parameters import Floats
@@ -42,7 +42,7 @@ class OfferedForm:
 
 def offered_forms(
     source: Source, wavelength_nm: NDArray[np.float64] | None, tolerances: Sequence[float] | None = None
-) -> list[OfferedForm]:
+) -> Candidates[OfferedForm]:
     """Return the forms to choose from, the truth first, at all wavelengths and for spectral sources also at fewer.
 
     Parameters
@@ -56,8 +56,9 @@ def offered_forms(
 
     Returns
     -------
-    list of OfferedForm
-        The forms, without models that are meant to differ and without forms that differ only in rounding.
+    Candidates of OfferedForm
+        The forms, without models that are meant to differ and without forms that differ only in rounding. A table that
+        cannot be made is among `left_out`.
 
     Raises
     ------
@@ -66,23 +67,31 @@ def offered_forms(
     """
     if tolerances is None and wavelength_nm is None:
         tolerances = GREY_TOLERANCES
-    offered = [OfferedForm(form, wavelength_nm) for form in _offered(source, wavelength_nm, tolerances)]
+    whole = _offered(source, wavelength_nm, tolerances)
+    offered, left_out = [OfferedForm(form, wavelength_nm) for form in whole], whole.left_out
     for count in SAMPLINGS if wavelength_nm is not None else ():
         assert wavelength_nm is not None
         if count < wavelength_nm.size:
             few = wavelength_nm[np.round(np.linspace(0, wavelength_nm.size - 1, count)).astype(np.int64)]
-            offered += [
-                OfferedForm(_between(form, few, wavelength_nm), few) for form in _offered(source, few, tolerances)
+            forms = _offered(source, few, tolerances)
+            offered += [OfferedForm(_between(form, few, wavelength_nm), few) for form in forms]
+            left_out += [
+                LeftOut(
+                    key=f"{out.key}-{count}-wavelengths", title=f"{out.title}, {count} wavelengths", reason=out.reason
+                )
+                for out in forms.left_out
             ]
-    return [one for one in offered if one.form.kind != "other model" and not one.form.rounded]
+    kept = [one for one in offered if one.form.kind != "other model" and not one.form.rounded]
+    return Candidates(kept, left_out)
 
 
 def _offered(
     source: Source, wavelength_nm: NDArray[np.float64] | None, tolerances: Sequence[float] | None
-) -> list[Form]:
+) -> Candidates[Form]:
     """Return all forms of a material, and its tables a second time, with the truth at limbs."""
     forms = catalogue.forms(source, wavelength_nm, tolerances)
-    return [*forms, *(_with_true_limbs(form, forms[0]) for form in forms if form.kind == "table")]
+    with_limbs = [_with_true_limbs(form, forms[0]) for form in forms if form.kind == "table"]
+    return Candidates([*forms, *with_limbs], forms.left_out)
 
 
 def _with_true_limbs(form: Form, truth: Form) -> Form:

@@ -67,7 +67,7 @@ class MaterialDocument(BaseModel):
         description="origin, symmetries and errors of measured data; null: the values are a model's or a function's"
     )
     formula_error: FormulaError | None = Field(description="of the model against the highest rung; null: not measured")
-    largest_albedo: LargestAlbedo | None = Field(description="of the table, specular part included; null: not measured")
+    largest_albedo: LargestAlbedo | None = Field(description="specular part included; null: not measured")
     incomplete: str | None = Field(description="what the table does not state of itself; null: nothing")
     audit: ShownAudit | None = Field(description="null: none")
     attributes: Attributes = Field(description="all that the table records of itself")

@@ -7,6 +7,8 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from brdfdb.errors import near_90
+
 NOT_MEASURED = "not measured"
 NOT_AUDITED = "not audited"
 # What the two errors of a list are, for the line below it
@@ -86,8 +88,18 @@ def energy(head: Mapping[str, Any], audited: Audited | None) -> str:
     """Return the answer of the audit on energy; without one, that it is missing and an albedo above 1."""
     if audited is not None:
         return audited.conserves_energy
-    above = excess(head)
+    above = excess(head) or _beyond(head["largest_albedo"]) if head.get("largest_albedo") else ""
     return f"{NOT_AUDITED}: {above}" if above else NOT_AUDITED
+
+
+def _beyond(largest: Mapping[str, Any]) -> str:
+    """Return the angle beyond those judged where an albedo passes 1, in words; empty if there is none."""
+    passes = (largest.get("grazing") or {}).get("passes_1_at_theta_i_deg")
+    return "" if passes is None else f"albedo of the {_whose(largest)} passes 1 at {near_90(passes)}°"
+
+
+def _whose(largest: Mapping[str, Any]) -> str:
+    return "model" if largest.get("of") == "source" else "table"
 
 
 def excess(head: Mapping[str, Any]) -> str:
@@ -100,4 +112,4 @@ def excess(head: Mapping[str, Any]) -> str:
         return ""
     at = f"{largest['theta_i_deg']:g}°"
     at += "" if largest["wavelength_nm"] is None else f", {largest['wavelength_nm']:g} nm"
-    return f"albedo of the table {'not finite' if value is None else f'{value:.3g}'} at {at}"
+    return f"albedo of the {_whose(largest)} {'not finite' if value is None else f'{value:.3g}'} at {at}"

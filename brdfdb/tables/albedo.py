@@ -14,7 +14,6 @@ from brdfdb.integrals.quadrature import MOST_PANELS, Albedo, reflected_share
 from brdfdb.lobes import narrowest
 from brdfdb.materials import FunctionRecord, Source
 from brdfdb.parameters import Floats
-from brdfdb.tables.first_numbers import LargestAlbedo
 from brdfdb.tables.grids import Axis
 from brdfdb.tables.table import Table
 
@@ -120,23 +119,6 @@ def tolerance_of(table: Table) -> float:
     return QUADRATURE_TOLERANCE if table.metadata.measured is None else MEASURED_TOLERANCE
 
 
-def largest_albedo(table: Table, source: Source) -> LargestAlbedo:
-    """Return the largest directional albedo [1] of a table with the specular part of its source."""
-    integrated = directional_albedo(table, tolerance=LARGEST_TOLERANCE)
-    whole = integrated.albedo.max(axis=1)
-    if source.has_specular:
-        specular = source.specular_reflectance(radians(integrated.theta_i_deg), table.wavelength_nm)
-        whole = whole + np.reshape(specular, whole.shape)
-    row, column = np.unravel_index(int(np.argmax(np.where(np.isfinite(whole), whole, np.inf))), whole.shape)
-    largest = float(whole[row, column])
-    return LargestAlbedo(
-        albedo=float(f"{largest:.4g}") if np.isfinite(largest) else None,
-        theta_i_deg=float(integrated.theta_i_deg[row]),
-        wavelength_nm=None if table.wavelength_nm is None else float(table.wavelength_nm[column]),
-        tolerance=LARGEST_TOLERANCE,
-    )
-
-
 def hemispherical_albedo(theta_i_deg: Axis, albedo: Floats) -> Floats:
     """Return the share [1] that is reflected of light that is the same from everywhere.
 
@@ -209,11 +191,16 @@ def reflected_by(source: Source, wavelength_nm: Axis | None) -> Reflected:
     ParameterError
         If the source does not hold at one of the wavelengths.
     """
-    phi_i_deg = np.arange(0.0, 91.0 if source.elliptical else 361.0, _PHI_I_STEP_DEG)
-    phi_i_deg = phi_i_deg if source.anisotropic else phi_i_deg[:1]
+    phi_i_deg = azimuths_deg(source)
     angles = radians(THETA_I_DEG)[:, np.newaxis], radians(phi_i_deg)
     albedo, error = source_albedo(source, *angles, wavelength_nm, tolerance=LARGEST_TOLERANCE)
     return _reflected(TableAlbedo(THETA_I_DEG, phi_i_deg, albedo, error.max(axis=1)), source, wavelength_nm)
+
+
+def azimuths_deg(source: Source) -> Axis:
+    """Return the azimuths of lights [degree] up to where the symmetry of a source begins anew."""
+    phi_i_deg = np.arange(0.0, 91.0 if source.elliptical else 361.0, _PHI_I_STEP_DEG)
+    return phi_i_deg if source.anisotropic else phi_i_deg[:1]
 
 
 def _reflected(albedo: TableAlbedo, surface: Table | Source, wavelength_nm: Axis | None) -> Reflected:

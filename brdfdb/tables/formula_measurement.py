@@ -12,8 +12,8 @@ from brdfdb.materials import Material, Source
 from brdfdb.models.shared_integrals import sharing
 from brdfdb.parameters import ModelForm
 from brdfdb.tables import error_measurement
-from brdfdb.tables.albedo import largest_albedo
 from brdfdb.tables.first_numbers import FormulaError
+from brdfdb.tables.largest_albedo import largest_albedo
 from brdfdb.tables.layout import Layout
 from brdfdb.tables.polarisation_measurement import element_error
 from brdfdb.tables.polarisation_record import record

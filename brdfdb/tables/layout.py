@@ -22,7 +22,7 @@ from brdfdb.materials.polarised import polarised_source
 from brdfdb.parameters import Floats
 from brdfdb.tables.grids import Grid, check_wavelengths
 
-TABLE_VERSION = 5  # of the variables, dimensions and attributes of a table
+TABLE_VERSION = 6  # of the variables, dimensions and attributes of a table
 
 _METHODS = ("linear", "cubic")
 

@@ -106,7 +106,9 @@ class TableMetadata(BaseModel):
         default=None, description="error of the model against the highest rung of its surface; null: not measured"
     )
     largest_albedo: LargestAlbedo | None = Field(
-        default=None, description="largest directional albedo, specular part included; null: not measured"
+        default=None,
+        description="largest directional albedo of the model, or of a table without one, specular part included, and "
+        "its growth at grazing light; null: not measured",
     )
 
     _strange: dict[str, str] = PrivateAttr(default_factory=dict)

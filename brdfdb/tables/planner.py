@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.errors import ParameterError, counted
-from brdfdb.materials import Source
+from brdfdb.materials import Material, Source
 from brdfdb.parameters import Floats
 from brdfdb.tables import axis_needs, plan_trials
 from brdfdb.tables.axis_needs import LINE, Need
@@ -140,10 +140,10 @@ def planned(
             # the kind that failed most often hid the others, which may keep to the tolerance with more nodes
             ((hiding, _),) = failed.most_common(1)
             left = [kind for kind in left if _kind(kind[1]) != hiding]
+    hint = "" if isinstance(source, Material) else ", or say grazing_pole if f_r has a pole or a root at the horizon"
     raise ParameterError(
         "tolerance",
-        f"{tolerance:g} takes more than {MOST_VALUES} values of {source.name}; ask for a larger one, "
-        "or say grazing_pole if f_r has a pole or a root at the horizon",
+        f"{tolerance:g} takes more than {MOST_VALUES} values of {source.name}; ask for a larger one{hint}",
         tolerance,
     )
 

@@ -70,14 +70,17 @@ def _card(material: Material, judged: MaterialAudit) -> Card:
 
 def _page(material: Material, stored: Table, judged: MaterialAudit, plots: list[audit.Plot]) -> str:
     """Return the page of a material."""
-    energy = judged.of(Energy).table
+    energy = judged.of(Energy).model or judged.of(Energy).table
     spec = material.spec
-    largest = f"It reflects at most {number(energy.max_albedo, 4)} of the light, at {energy.max_at_theta_i_deg:g}°."
+    largest = f"It reflects at most {number(energy.max_albedo, 4)} of the light up to {energy.theta_i_deg[-1]:g}°, at "
+    largest += f"{energy.max_at_theta_i_deg:g}°"
+    if energy.grazing is not None and energy.max_albedo is not None:
+        largest += f"; {energy.grazing.in_words(energy.max_albedo, '°')}"
     name = material.name
     parts = [
         WIDE,
         f"# {plain(material.title)}\n",
-        raw(f'<p class="under"><code>{name}</code> {largest}</p>'),
+        raw(f'<p class="under"><code>{name}</code> {largest}.</p>'),
         raw(_answers(judged)),
         material_files.pictures(name, material.title),
         f"Model: {{py:obj}}`{spec.title} <brdfdb.models.{spec.name}>`, {plain(spec.equation)}, of "

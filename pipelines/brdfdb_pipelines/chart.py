@@ -221,6 +221,8 @@ def _print(one: Chart) -> None:
     errors = ("mean error", "p99 (95 % interval)", "forward", "back", "grazing")
     numbers = (*errors, "ns a value", "ns, 256", "ns, one", "ns, in turn", "times as fast as its rung", "bytes")
     terminal.print_table(f"{one.material}: {one.title}", ("", "key", "form", *numbers), rows, numbers=numbers)
+    for out in one.left_out:
+        print(f"  left out: {out.title}: {out.reason}")
     points = {point.key: point for point in one.points}
     print("  worth having: " + "; ".join(_said(points[key]) for key in one.fronts.batch))
     heads = ("variance", "ns a sample", "ms to 1 %")
@@ -253,6 +255,8 @@ def _print_family(whole: FamilyChart) -> None:
             rows.insert(0, ("", whole.diagnostic.title, "", *map(terminal.count, whole.diagnostic.values)))
         title = f"{whole.family}: {whole.title}. Mean error along {axis}; * is worth having"
         terminal.print_table(title, ("key", "form", "ns a value", *columns), rows, numbers=("ns a value", *columns))
+    for out in whole.left_out:
+        print(f"  left out of {out.member}: {out.title}: {out.reason}")
     print(f"  times are those of one member, {whole.curves[0].timed} for most")
     for curve in whole.curves:
         if where := [index for index, front in enumerate(whole.fronts) if curve.key in front]:

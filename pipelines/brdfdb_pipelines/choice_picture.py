@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Sequence
 from typing import Any
 
 import matplotlib as mpl
@@ -24,7 +25,7 @@ _DPI = 128  # a power of two: sizes in inches are whole pixels again
 _TEXT: dict[str, Any] = {"fontsize": 7}
 
 
-def png(seen: Seen, choice: Array, cheaper: Array | None) -> bytes:
+def png(seen: Seen, choice: Array, cheaper: Array | None, left_out: Sequence[str] = ()) -> bytes:
     """Draw five panels: truth, choice and next cheaper, and below a bar of colours and the differences of the two.
 
     Parameters
@@ -33,6 +34,8 @@ def png(seen: Seen, choice: Array, cheaper: Array | None) -> bytes:
         The scene, with the truth and the measure of differences.
     choice, cheaper : array (height, width, L)
         Spectral radiance. `cheaper` is None if nothing is cheaper.
+    left_out : sequence of str
+        Material and title of each form that could not be made. They are listed below the bar.
     """
     height, width = seen.truth.shape[:2]
     times = max(1, round(_PANEL / width))
@@ -74,6 +77,16 @@ def png(seen: Seen, choice: Array, cheaper: Array | None) -> bytes:
     bar.ax.axvline(tolerance.value, color="white", linewidth=2.0)
     beside: dict[str, Any] = {"xycoords": "axes fraction", "textcoords": "offset pixels", "va": "center"}
     bar.ax.annotate("more", (1.0, 0.5), (_MORE / 2.0, 0.0), **beside, **_TEXT)
+    if left_out:
+        bar.ax.annotate(
+            "\n".join(["cannot be made:", *left_out]),
+            (0.0, 0.0),
+            (0.0, -3.0 * BAR),
+            xycoords="axes fraction",
+            textcoords="offset pixels",
+            va="top",
+            **_TEXT,
+        )
     data = io.BytesIO()
     canvas.savefig(data, format="png", dpi=_DPI, metadata={"Software": None})
     return data.getvalue()

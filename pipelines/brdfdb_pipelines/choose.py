@@ -146,7 +146,8 @@ def _run(
     )
     out.mkdir(parents=True, exist_ok=True)
     (out / "choice.json").write_text(choice.model_dump_json(indent=1) + "\n", encoding="utf-8")
-    _draw(out / Path(name).stem, planned.even, offered, chosen)
+    left_out = [f"{one.material}: {out.title}" for one in described for out in one.left_out]
+    _draw(out / Path(name).stem, planned.even, offered, chosen, left_out)
     _print(choice, built)
     if store is not None and not built:
         print("nothing to build: no table was chosen")
@@ -206,7 +207,13 @@ def _prices(forms: Sequence[OfferedForm], wi: Array, wr: Array, weigh: Weigh) ->
     return prices
 
 
-def _draw(stem: Path, seen: Seen, offered: Mapping[str, Sequence[OfferedForm]], chosen: Mapping[str, Decision]) -> None:
+def _draw(
+    stem: Path,
+    seen: Seen,
+    offered: Mapping[str, Sequence[OfferedForm]],
+    chosen: Mapping[str, Decision],
+    left_out: Sequence[str],
+) -> None:
     """Write the comparison as a picture, and the exact and the chosen one as spectral EXR."""
     from brdfdb_pipelines import choice_picture
 
@@ -217,7 +224,7 @@ def _draw(stem: Path, seen: Seen, offered: Mapping[str, Sequence[OfferedForm]], 
     for picture, suffix in ((seen.truth, "truth"), (choice, "choice")):
         image.write_exr(stem.with_name(f"{stem.name}-{suffix}.exr"), seen.scene, picture)
     cheaper = seen.picture({**best, **lesser}) if lesser else None
-    stem.with_name(f"{stem.name}.png").write_bytes(choice_picture.png(seen, choice, cheaper))
+    stem.with_name(f"{stem.name}.png").write_bytes(choice_picture.png(seen, choice, cheaper, left_out))
 
 
 def _print(choice: Choice, built: Mapping[str, Built]) -> None:
@@ -240,6 +247,8 @@ def _print(choice: Choice, built: Mapping[str, Built]) -> None:
     terminal.print_table(title, ("material", "choice", *numbers), rows, numbers=numbers)
     for one in choice.materials:
         print(f"  {one.material}: {one.choice.title} {one.reason}")
+        for out in one.left_out:
+            print(f"    left out: {out.title}: {out.reason}")
         if one.material in built:
             print(f"    {built[one.material].sentence}")
     print(choice.statement)

@@ -74,7 +74,7 @@ def _canvas(chart: Chart | FamilyChart) -> Canvas:
 
 def _drawn(chart: Chart) -> Canvas:
     table = ABOVE + PLOT + BELOW
-    samplers = table + ROW * (len(chart.points) + 3)
+    samplers = table + ROW * (len(chart.points) + len(chart.left_out) + 3)
     height = samplers + ROW * (len(chart.samplers) + 3) + _BARS + 44.0
     subtitle = "Lines go up from the mean error to the 99th percentile, thick over its 95 % confidence interval."
     times = "Bars are quartiles of the time."
@@ -119,6 +119,9 @@ def _drawn(chart: Chart) -> Canvas:
     table_of(
         canvas, COLUMNS, (*heads, "256", "one", "in turn", "times as fast as its rung", "bytes"), rows, table, height
     )
+    for number, out in enumerate(chart.left_out, len(rows) + 1):
+        cells = ("–", f"{out.title}: cannot be made. {out.reason}")
+        row_of(canvas, COLUMNS[:2], number, cells, table, height, color=figure_look.MUTED)
     _samplers(canvas, chart, samplers, height)
     return canvas
 

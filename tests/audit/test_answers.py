@@ -27,8 +27,8 @@ def model_of(name: str, verdict: Any, **more: Any) -> ModelEnergy:
     [
         ("conserves", "yes", "good"),
         # The furnace of `a_report` is its albedo over its strength: 1 at the normal, 1 + (89/90)^3 / 5 at 89 degrees
-        ("loses", "creates none, loses up to 0 %", "calm"),
-        ("gains", "creates none; would create 20 % if nothing were absorbed", "note"),
+        ("loses", "conserves energy up to a loss of 0 % at 0°", "calm"),
+        ("gains", "conserves energy; would create 20 % if nothing were absorbed", "note"),
         ("known published excess", "no, as published: albedo 0.835 at 89°", "note"),
         ("accepted excess", "no, as accepted: albedo 0.835 at 89°", "note"),
         ("violates", "no: albedo 0.835 at 89°", "bad"),
@@ -39,6 +39,24 @@ def test_each_verdict_on_a_model_is_an_answer_of_its_own(verdict: Any, text: str
     answer = conserves_energy(judged.findings)
     assert (answer.text, LEVELS[answer.word]) == (text, level)
     assert answer.reason == judged.of(Energy).reason
+
+
+@pytest.mark.parametrize(
+    ("verdict", "text"),
+    [
+        ("conserves", "yes for lights up to 90°"),
+        ("loses", "conserves energy for lights up to 90° but for a loss of 0 % at 0°"),
+        ("gains", "conserves energy for lights up to 90°; would create 20 % if nothing were absorbed"),
+    ],
+)
+def test_the_answer_on_a_model_that_grows_beyond_the_last_light_says_where_it_ends(verdict: Any, text: str) -> None:
+    judged = material("paint", verdict)
+    energy = judged.of(Energy)
+    assert energy.model is not None
+    assert energy.model.grazing is not None
+    grows = energy.model.grazing.model_copy(update={"power": 0.5, "max_albedo": None})
+    model = energy.model.model_copy(update={"grazing": grows})
+    assert conserves_energy(judged.findings | {"energy": energy.model_copy(update={"model": model})}).text == text
 
 
 def test_the_answer_names_the_wavelength_of_a_spectral_model() -> None:

@@ -166,7 +166,7 @@ def test_the_report_names_the_violations_and_nothing_else() -> None:
     named = {"good": good, "bad": bad, "excused": excused}
     audits = [audit(replace(table, name=name)) for name, table in named.items()]
     document = written(audits)
-    assert (document["format"], document["version"], document["violations"]) == ("brdfdb-audit", 7, ["bad"])
+    assert (document["format"], document["version"], document["violations"]) == ("brdfdb-audit", 8, ["bad"])
     assert [entry["verdict"] for entry in document["materials"]] == ["passes", "violates", "known published excess"]
     answers = [[entry[key]["text"] for key in ("as_published", "conserves_energy")] for entry in document["materials"]]
     assert answers[0] == ["yes", "yes"]
@@ -182,7 +182,7 @@ def test_an_empty_report_is_a_report() -> None:
     document = written([])
     sealed = document["sha256"]
     assert [each["key"] for each in document.pop("explanations")] == list(FINDINGS)
-    assert document == {"format": "brdfdb-audit", "version": 7, **about, **empty, **former, "sha256": sealed}
+    assert document == {"format": "brdfdb-audit", "version": 8, **about, **empty, **former, "sha256": sealed}
 
 
 @pytest.mark.parametrize(

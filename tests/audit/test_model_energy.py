@@ -201,7 +201,7 @@ def test_minnaerts_law_exceeds_1_as_it_is_printed() -> None:
     found = energy(material("minnaert", {"k": 0.6, "rho": 1.0}))
     assert found.verdict == "violates"
     assert found.reason.startswith(
-        "the model reflects 12.68 of what arrives at 89.9 degrees; this model does so by itself"
+        "the model reflects 12.68 of what arrives at 89.9 degrees; grows as cos^-0.4; this model does so by itself"
     )
     assert "(Oren and Nayar 1994, section 1" in found.reason
 

@@ -23,6 +23,7 @@ from brdfdb.audit.table_error import TableError
 from brdfdb.audit.validity import Limit, Validity
 from brdfdb.audit.values import Values
 from brdfdb.figure import Curve, Figure, Map, Panel, Picture, Statement, numbers
+from brdfdb.tables.first_numbers import Grazing
 
 THETA = np.linspace(0.0, 89.0, 60)
 ODD = '<b>&"it\'s" $größe$'
@@ -110,6 +111,10 @@ def energy(verdict: EnergyVerdict, strength: float, spectral: bool) -> Energy:
         hemispherical=numbers(0.7 * scale),
         furnace=furnace,
         bound_on_a=bound if spectral else None,
+        judged_up_to_theta_i_deg=90.0,
+        grazing=Grazing(
+            power=0.0, origin="declared", factor=0.5, max_albedo=float(rows.max()), passes_1_at_theta_i_deg=None
+        ),
         verdict=verdict,
     )
     table = TableEnergy(

@@ -146,7 +146,7 @@ def test_the_two_questions_have_answers_on_every_material(document: Document, re
     for question in audit_page.QUESTIONS:
         assert words.count(question.capitalize()) == 1 + len(report.materials)  # in the words, and in each section
     for text in (
-        "creates none, loses up to 0 %",
+        "conserves energy up to a loss of 0 % at 0°",
         "no, as published: albedo 1.07 at 89°, 700 nm",
         "no: albedo 1.55 at 89°",
     ):

@@ -60,7 +60,7 @@ def test_all_audits_everything(store: Path) -> None:
     [
         lambda text: text.replace('"passes"', '"violates"', 1),
         lambda text: text[: len(text) // 2],
-        lambda text: text.replace('"version":7', '"version":6', 1),
+        lambda text: text.replace('"version":8', '"version":7', 1),
         lambda _: "{}",
     ],
     ids=["changed", "cut", "older", "foreign"],

@@ -196,7 +196,7 @@ def test_attributes_say_where_every_number_comes_from() -> None:
     attributes = tabulate(Layout(made_up, ISOTROPIC)).attrs
     assert attributes["title"] == "Made up"
     assert attributes["material"] == "made-up"
-    assert attributes["table_version"] == 5
+    assert attributes["table_version"] == 6
     assert (attributes["model"], attributes["model_reference"]) == ("oren_nayar", "orennayar1994")
     assert attributes["model_version"] == models.MODELS["oren_nayar"].version
     assert attributes["parameters"] == {"rho": 0.8, "sigma_deg": 30.0, "interreflection": True}

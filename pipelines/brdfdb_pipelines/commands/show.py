@@ -303,12 +303,11 @@ def _print_albedo(table: Table, material: Material | None) -> None:
         + "  (theta_i; with the specular part)"
     )
     largest = table.metadata.largest_albedo
-    if largest is not None and largest.above_1:
-        where = "" if largest.wavelength_nm is None else f", {largest.wavelength_nm:g} nm"
-        value = "not finite" if largest.albedo is None else f"{largest.albedo:.3g}"
-        known = table.metadata.known_excess
+    if largest is not None:
+        known = table.metadata.known_excess if largest.above_1 else None
         cited = "" if known is None else f": {known.citation}"
-        print(f"    above 1     the table {value} at {largest.theta_i_deg:g}°{where}{cited}")
+        label, whose = "above 1" if largest.above_1 else "largest", "model" if largest.of == "source" else "table"
+        print(f"    {label:<12}the {whose} reflects {largest.in_words()}{cited}")
     for w in columns:
         at = None if wavelength is None else float(wavelength[w])
         specular = table.specular_reflectance(radians(ALBEDO_ANGLES_DEG), at)
