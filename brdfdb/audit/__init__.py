@@ -7,7 +7,7 @@ from datetime import datetime
 from importlib.metadata import version
 
 from brdfdb.audit.answers import as_published, conserves_energy
-from brdfdb.audit.finding import DECISIVE, Finding, NotJudged, Sentence, Subject, Verdict
+from brdfdb.audit.finding import DECISIVE, Finding, NotJudged, Sentence, Subject, TableVerdict
 from brdfdb.audit.registry import FINDINGS
 from brdfdb.audit.report import AuditReport, MaterialAudit, explanations
 from brdfdb.errors import ParameterError
@@ -35,12 +35,14 @@ def audit(table: Table, *, source: Source | None = None, accept_excess: bool = F
     Returns
     -------
     MaterialAudit
-        The findings. The verdict on energy is "known published excess" if the albedo of the model exceeds 1, its
-        parameters are those of a preset, and the albedos of model and table are within the excess that is recorded
-        for the preset. It is "accepted excess" if the caller accepts the excess of the model, and "violates" if either
-        albedo exceeds 1 otherwise. A table may exceed these limits by as much as its stated error explains. A model
-        that "loses" or "gains" light where nothing absorbs is reported, and passes. `as_published` and
-        `conserves_energy` answer the two questions that a reader has, of the table and of its model.
+        The findings. The verdict is "not judged" if nothing says what the values of the table are of; a table of
+        measured data or of a function is judged as far as that goes without them. The verdict on energy is "known
+        published excess" if the albedo of the model exceeds 1, its parameters are those of a preset, and the albedos of
+        model and table are within the excess that is recorded for the preset. It is "accepted excess" if the caller
+        accepts the excess of the model, and "violates" if either albedo exceeds 1 otherwise. A table may exceed these
+        limits by as much as its stated error explains. A model that "loses" or "gains" light where nothing absorbs is
+        reported, and passes. `as_published` and `conserves_energy` answer the two questions that a reader has, of the
+        table and of its model.
 
     Raises
     ------
@@ -61,7 +63,8 @@ def audit(table: Table, *, source: Source | None = None, accept_excess: bool = F
             else:
                 sentences += finding.sentences()
     words = {finding.verdict for finding in subject.findings.values()}
-    verdict: Verdict = next((word for word in DECISIVE if word in words), "passes")
+    otherwise: TableVerdict = "not judged" if subject.unrecorded else "passes"
+    verdict: TableVerdict = next((word for word in DECISIVE if word in words), otherwise)
     return MaterialAudit(
         material=table.name,
         revision=table.revision,
@@ -95,4 +98,5 @@ def report(
         gallery=list(gallery),
         damaged=list(damaged),
         violations=[a.material for a in audits if a.verdict == "violates"],
+        not_judged=[a.material for a in audits if a.verdict == "not judged"],
     )

@@ -191,7 +191,8 @@ def energy_of(table: Table, source: Source | None, *, accept_excess: bool = Fals
         verdict: EnergyVerdict = "conserves" if stored.verdict == "passes" else stored.verdict
         return Energy(model=None, table=stored, verdict=verdict, reason=stored.reason)
     known = published_excess(source, table.wavelength_nm) if isinstance(source, Material) else None
-    claim = str(table.attrs.get("known_excess", {}).get("citation", ""))
+    stated = table.metadata.known_excess
+    claim = "" if stated is None else stated.citation
     model = model_energy_of(source, table.wavelength_nm, known, claim, accept_excess=accept_excess)
     # The excess that is published or accepted is that of the model. An excess of the table alone is excused by neither
     excess = known if model.verdict == "known published excess" else _of_model(model)

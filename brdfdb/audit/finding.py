@@ -13,12 +13,15 @@ from pydantic import BaseModel, ConfigDict, Field
 from brdfdb.audit.pairs import Pairs, pairs_of
 from brdfdb.figure import Map, Panel
 from brdfdb.materials import FunctionRecord, Source
+from brdfdb.tables.metadata import TableMetadata
+from brdfdb.tables.statements import stated_metadata
 from brdfdb.tables.table import Table
 
 STRICT = ConfigDict(frozen=True, extra="forbid")
 
 Level = Literal["good", "calm", "note", "bad"]
 Verdict = Literal["passes", "known published excess", "accepted excess", "violates"]
+TableVerdict = Verdict | Literal["not judged"]  # nothing says what the values of the table are of
 # Words that a finding may use, the worst first. Tables are sorted in this order
 Word = Literal[
     "violates",
@@ -206,6 +209,20 @@ class Subject:
     def pairs(self) -> Pairs:
         """Return f_r [1/sr] of table and source at the directions that several findings share."""
         return pairs_of(self.table, self.source)
+
+    @cached_property
+    def restated(self) -> TableMetadata | None:
+        """Return what a build would state of the table, measured anew; None if its source is not known."""
+        if self.source is None:
+            return None
+        values = self.table.values
+        return stated_metadata(self.table.laid_out(self.source), lambda rows: values[rows])
+
+    @property
+    def unrecorded(self) -> bool:
+        """Return whether nothing says where the values come from: no source, and no record of data or a function."""
+        known = self.table.metadata.measured is not None or isinstance(self.table.source, FunctionRecord)
+        return self.source is None and not known
 
     def not_judged(self, needs: str) -> NotJudged:
         """Return `NotJudged`; `needs` is what the finding needs of the source, in a few words."""

@@ -78,17 +78,7 @@ def nodes_of(table: Table, source: Source) -> Nodes:
     ValueError
         If no layout of the source has the shape of the table.
     """
-    bits = int(table.attrs.get("bits", 23))
-    layout = Layout(
-        source,
-        table.grid,
-        table.wavelength_nm,
-        table.interpolation,
-        table.spectra,
-        bits,
-        table.attrs.get("reason", ""),
-        table.part_nm,
-    )
+    bits, layout = table.metadata.bits, table.laid_out(source)
     if layout.shape != table.values.shape:
         raise ParameterError(
             layout.variable,
@@ -184,7 +174,7 @@ def _specular(table: Table, layout: Layout) -> Iterator[str]:
 
 def _unstated(table: Table) -> Iterator[str]:
     """Yield a sentence on an error that is not stated, though the table was asked for to a tolerance."""
-    tolerance = (table.attrs.get("request") or {}).get("tolerance")
+    tolerance = (table.metadata.request or {}).get("tolerance")
     if table.error is None and tolerance is not None:
         yield f"no error is stated, though a tolerance of {tolerance:g} was asked for"
 

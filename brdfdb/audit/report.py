@@ -10,7 +10,8 @@ from pydantic import BaseModel, BeforeValidator, Field, GetJsonSchemaHandler, Se
 from pydantic_core import CoreSchema, core_schema
 
 from brdfdb.audit.answers import AS_PUBLISHED, CONSERVES_ENERGY, Answer
-from brdfdb.audit.finding import STRICT, F, Finding, NotJudged, Sentence, Verdict
+from brdfdb.audit.finding import STRICT, F, Finding, NotJudged, Sentence, TableVerdict, Verdict
+from brdfdb.audit.record import Difference
 from brdfdb.audit.registry import FINDINGS
 from brdfdb.errors import ParameterError
 from brdfdb.figure import Figure
@@ -66,8 +67,9 @@ class MaterialAudit(BaseModel):
     sentences: list[Sentence] = Field(description="all findings in words, for programs without this library")
     as_published: Answer = Field(description=f"{AS_PUBLISHED} Of the table, within the error that it states")
     conserves_energy: Answer = Field(description=f"{CONSERVES_ENERGY} Of the model alone")
-    verdict: Verdict = Field(
-        description="worst of the findings. Validity, and findings that are not judged, do not count"
+    verdict: TableVerdict = Field(
+        description="worst of the findings. Validity, and findings that are not judged, do not count; not judged: "
+        "nothing says what the values of the table are of"
     )
 
     def of(self, kind: type[F]) -> F:
@@ -91,6 +93,27 @@ class MaterialAudit(BaseModel):
     def not_judged(self) -> list[str]:
         """Return the titles of the findings that are not judged."""
         return [FINDINGS[key].title for key, finding in self.findings.items() if isinstance(finding, NotJudged)]
+
+
+class FamilyAudit(BaseModel):
+    """The record of a family, compared with its members and with a new measurement."""
+
+    model_config = STRICT
+
+    family: str
+    snapshot: str = Field(default="", description="snapshot that holds the record; empty: the store itself")
+    subject_sha256: str = Field(description="of the record and of the manifests of the members")
+    compared: int = Field(description="number of leaves of the record that were compared")
+    wrong: list[Difference] = Field(description="leaves that differ")
+    damage: str = Field(default="", description="what is wrong with its files; empty: nothing")
+    verdict: Verdict
+
+    @property
+    def text(self) -> str:
+        """The verdict in a sentence."""
+        if self.verdict == "passes":
+            return f"all {self.compared} numbers and words of its record are those of a new measurement"
+        return self.damage or "; ".join(difference.text for difference in self.wrong)
 
 
 class Explanation(BaseModel):
@@ -128,6 +151,10 @@ class AuditReport(BaseModel):
     violations: list[str] = Field(
         description="names of the materials with a violation that is neither known as published nor accepted"
     )
+    not_judged: list[str] = Field(
+        default=[], description="names of the tables that do not say what their values are of, or of an unknown model"
+    )
+    families: list[FamilyAudit] = Field(default=[], description="of a report on all materials")
     program: str = Field(default="", description="digest of the program of the last run: models, audits and materials")
     taken_over: list[str] = Field(
         default=[], description="materials of the last run whose audits an earlier report had, of the same bytes"
@@ -135,3 +162,8 @@ class AuditReport(BaseModel):
     page_subjects: list[str] = Field(default=[], description="keys of the materials and figures on the page")
     page_sha256: str = Field(default="", description="of the page; empty: not recorded")
     sha256: str = Field(default="", description="of this document, one line, with this last field empty")
+
+    @property
+    def families_wrong(self) -> list[str]:
+        """Return the names of the families whose records are not those of a new measurement."""
+        return [each.family for each in self.families if each.verdict != "passes"]

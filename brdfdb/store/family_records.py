@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Mapping
 from pathlib import Path
@@ -334,7 +335,7 @@ def write_family(root: str, sweep: Sweep) -> FamilyRecord:
 
 
 def verify_family(root: Path, name: str) -> int:
-    """Check the record of a family: that it is one, and its members are those it was made of; returns its bytes.
+    """Check the record of a family: that it is one, and its members are those that it names; returns its bytes.
 
     Raises
     ------
@@ -345,10 +346,16 @@ def verify_family(root: Path, name: str) -> int:
     record = read_record(path)
     if not len(record.members) == len(record.request_sha256) == math.prod(map(len, record.axes.values())):
         raise StoreError(f"the family {name} is damaged: its axes do not make {len(record.members)} members")
-    for member, request_sha256 in zip(record.members, record.request_sha256, strict=True):
+    for member, request_sha256, values in zip(
+        record.members, record.request_sha256, itertools.product(*record.axes.values()), strict=True
+    ):
         try:
-            if store.summary(member)["request_sha256"] != request_sha256:
-                raise StoreError(stale(name, member))
+            known = store.metadata(member)
         except UnknownMaterialError:
             raise StoreError(f"the family {name} is out of date: the store has no {member}") from None
+        if known.request_sha256 != request_sha256:
+            raise StoreError(stale(name, member))
+        at = dict(zip(record.axes, values, strict=True))
+        if known.model != record.model or any(known.parameters.get(x) != value for x, value in at.items()):
+            raise StoreError(f"the family {name} is damaged: {member} is not of {record.model} at {at}")
     return path.stat().st_size

@@ -7,14 +7,18 @@ import os
 from collections.abc import Mapping
 from pathlib import Path
 from types import NoneType
-from typing import Any, NotRequired, TypedDict, cast
+from typing import TYPE_CHECKING, Any, NotRequired, TypedDict, cast
 
 from brdfdb.errors import (
     StoreError,
 )
+from brdfdb.store.decoding import read_metadata
 from brdfdb.store.files import Entry, sha256_of
 from brdfdb.store.paths import METADATA, manifest_path, number_of
 from brdfdb.store.sealed_json import bytes_of, check_fields, unsealed
+
+if TYPE_CHECKING:
+    from brdfdb.tables.metadata import TableMetadata
 
 
 class Summary(TypedDict):
@@ -65,6 +69,24 @@ def summary_fields(content: Mapping[str, Any]) -> dict[str, Any]:
     return SUMMARY_FIELDS | {key: kind for key, kind in _LATER.items() if key in content}
 
 
+def summary_of(metadata: TableMetadata, stored: int, created: str) -> Summary:
+    """Return the facts of a table that lists show, of its metadata, its size [byte] and the date of its publication."""
+    largest = metadata.largest_albedo
+    return {
+        "title": metadata.title or "",
+        "model": metadata.model or "",
+        "model_version": metadata.model_version or 0,
+        "request_sha256": metadata.request_sha256 or "",
+        "error_p99": None if metadata.error is None else metadata.error.overall.p99,
+        "created": created,
+        "bytes": stored,
+        "wavelength_range_nm": metadata.wavelength_range_nm,
+        "formula_error": None if metadata.formula_error is None else metadata.formula_error.in_lists(),
+        "largest_albedo": None if largest is None else largest.model_dump(mode="json"),
+        "measured": metadata.measured is not None,
+    }
+
+
 def whole_revisions(material: Path) -> list[Path]:
     """Return the revisions of a material that have a directory and a manifest, oldest first."""
     try:
@@ -108,7 +130,8 @@ def read_manifest(group: Path, digest: str | None) -> tuple[Manifest, str]:
 def check_manifest(group: Path, digest: str | None, *, contents: bool) -> Manifest:
     """Check the files of a revision against its manifest: that they are there and their sizes.
 
-    Also their contents, where no checksum of a chunk tells: of the metadata, and with `contents` of every file.
+    Also their contents, where no checksum of a chunk tells: of the metadata, and with `contents` of every file, and
+    what the manifest says of the table.
 
     Parameters
     ----------
@@ -136,4 +159,25 @@ def check_manifest(group: Path, digest: str | None, *, contents: bool) -> Manife
             raise StoreError(f"{where} is damaged: {name} is missing") from None
         except OSError as error:
             raise StoreError(f"{where} is damaged: {name} cannot be read: {error.strerror}") from None
+    if contents:
+        _check_summary(group, manifest)
     return manifest
+
+
+def _check_summary(group: Path, manifest: Manifest) -> None:
+    """Raise StoreError unless a manifest says of a table what the table says; older ones may say less."""
+    said = manifest["summary"]
+    stored = sum(entry["size"] for entry in manifest["files"].values())
+    for key, value in summary_of(read_metadata(group), stored, said["created"]).items():
+        if key in said and not _agrees(stated := cast(Mapping[str, Any], said)[key], value):
+            raise StoreError(
+                f"{group.parent.name} {group.name} is damaged: {manifest_path(group).name} says {key} {stated!r}, "
+                f"where the table has {value!r}"
+            )
+
+
+def _agrees(said: Any, value: Any) -> bool:
+    """Return True if every part of what is said is that of a value."""
+    if isinstance(said, dict) and isinstance(value, dict):
+        return all(_agrees(part, value.get(key)) for key, part in said.items())
+    return bool(said == value)

@@ -97,7 +97,9 @@ def material_document(table: Table, verdict: Verdict | None) -> dict[str, Any]:
         "incomplete": metadata.gaps or None,
         "audit": None if verdict is None else _audited(verdict, table.revision),
         "attributes": {
-            key: value for key, value in attributes.items() if key not in ("error", "request", *metadata.strange)
+            key: value
+            for key, value in attributes.items()
+            if key not in ("error", "request", *metadata.strange, *metadata.uncited)
         },
     }
 

@@ -21,18 +21,17 @@ from brdfdb.place import path_of
 from brdfdb.store.decoding import read_metadata, table_of
 from brdfdb.store.files import Entry, sync_directory, write_files
 from brdfdb.store.lock import Lock, writing
-from brdfdb.store.manifest import Manifest, Summary
+from brdfdb.store.manifest import Manifest, summary_of
 from brdfdb.store.marker import make_store
 from brdfdb.store.paths import NAME, manifest_path, material_path, staged_path
 from brdfdb.store.pointer import newest, point_to
 from brdfdb.store.sealed_json import write_sealed
-from brdfdb.tables import error_measurement
-from brdfdb.tables.formula_measurement import first_numbers
 from brdfdb.tables.grids import check_wavelengths
-from brdfdb.tables.layout import Layout, digest
+from brdfdb.tables.layout import Layout
 from brdfdb.tables.measured_layout import tabulated
 from brdfdb.tables.planner import plan
 from brdfdb.tables.stated_error import Error
+from brdfdb.tables.statements import stated_metadata
 from brdfdb.tables.tabulation import tabulate
 
 if TYPE_CHECKING:
@@ -117,12 +116,9 @@ def publish_layout(
     root = path_of(root, "root")
     dataset = tabulate(layout, values)
     values = dataset[layout.variable].to_numpy()
-    error = error_measurement.measure(layout, lambda rows: values[rows])
-    stated = {"error": error, **first_numbers(layout, lambda rows: values[rows])}
-    written = {key: value.model_dump(mode="json") for key, value in stated.items()}
-    if request is not None:
-        written |= {"request": dict(request), "request_sha256": digest(request)}
-    return Published(*publish_dataset(root, name, dataset.assign_attrs(written)), error)
+    metadata = stated_metadata(layout, lambda rows: values[rows], request)
+    assert metadata.error is not None
+    return Published(*publish_dataset(root, name, dataset.assign_attrs(metadata.attributes())), metadata.error)
 
 
 def publish_dataset(root: str | os.PathLike[str], name: str, dataset: xr.Dataset) -> tuple[str, int]:
@@ -217,21 +213,7 @@ def publish_staged(root: Path, name: str, staging: Path, files: Mapping[str, Ent
                 path.unlink()
         metadata = read_metadata(table)
         stored = sum(entry["size"] for entry in files.values())
-        summary: Summary = {
-            "title": metadata.title or "",
-            "model": metadata.model or "",
-            "model_version": metadata.model_version or 0,
-            "request_sha256": metadata.request_sha256 or "",
-            "error_p99": None if metadata.error is None else metadata.error.overall.p99,
-            "created": datetime.now(UTC).isoformat(timespec="seconds"),
-            "bytes": stored,
-            "wavelength_range_nm": metadata.wavelength_range_nm,
-            "formula_error": None if metadata.formula_error is None else metadata.formula_error.in_lists(),
-            "largest_albedo": None
-            if metadata.largest_albedo is None
-            else metadata.largest_albedo.model_dump(mode="json"),
-            "measured": metadata.measured is not None,
-        }
+        summary = summary_of(metadata, stored, datetime.now(UTC).isoformat(timespec="seconds"))
         for directory, _, _ in os.walk(table, topdown=False):
             sync_directory(Path(directory))
         material.mkdir(exist_ok=True)

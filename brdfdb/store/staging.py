@@ -172,20 +172,12 @@ def write_frame(staging: str, layout: str) -> dict[str, Entry]:
         If they cannot be written.
     """
     from brdfdb.store.codec import frame_files
-    from brdfdb.tables.error_measurement import measure
-    from brdfdb.tables.formula_measurement import first_numbers
+    from brdfdb.tables.statements import stated_metadata
 
     directory = Path(staging)
     table = _layout(layout)
     request = read_sealed(directory / "request.json", table.source.name)
-    read = _reader(table, directory / "table")
-    known = tabulation.metadata_of(table)
-    measured = {
-        "request": known.without_source(request),
-        "request_sha256": digest(request),
-        "error": measure(table, read),
-    }
-    metadata = known.model_copy(update=measured | first_numbers(table, read))
+    metadata = stated_metadata(table, _reader(table, directory / "table"), request)
     frame = tabulation.frame(table)
     attributes = {**frame.attrs, **metadata.attributes()}
     with writing(store_of_staged(directory), table.source.name):

@@ -21,6 +21,17 @@ MANTISSA_BITS = 23  # of a float32 value
 # Attributes without which a table cannot be interpreted
 REQUIRED = ("title", "material", "table_version", "model", "model_version", "parameters", "source", "conventions")
 _OF_MODELS = ("model", "model_version", "parameters")
+# Attributes that cite: without a record of the source nobody can say whether the table is of what they name
+_CITING = (
+    "model_title",
+    "model_equation",
+    "model_reference",
+    "parameter_sources",
+    "source",
+    "assumed",
+    "note",
+    "known_excess",
+)
 
 
 def _assumptions(value: Any) -> Any:
@@ -112,17 +123,28 @@ class TableMetadata(BaseModel):
     )
 
     _strange: dict[str, str] = PrivateAttr(default_factory=dict)
+    _uncited: tuple[str, ...] = PrivateAttr(default=())
 
     @classmethod
     def read(cls, attributes: Mapping[str, Any]) -> TableMetadata:
-        """Return the metadata that attributes hold; an attribute that is not what it must be is left out."""
+        """Return the metadata that attributes hold; an attribute that is not what it must be is left out.
+
+        What a table cites is left out, too, unless it keeps a record of its source, or of measured data.
+        """
         known = {key: attributes[key] for key in cls.model_fields if key in attributes}
+        records = [attributes.get(key) for key in ("source_record", "request")]  # tables kept the source in the request
+        of_source = any(isinstance(record, Mapping) and {"material", "function"} & record.keys() for record in records)
+        uncited = (
+            () if of_source or attributes.get("measured") else tuple(key for key in _CITING if known.pop(key, None))
+        )
+        strange: dict[str, str] = {}
         try:
-            return cls.model_validate(known)
+            metadata = cls.model_validate(known)
         except ValidationError as error:
             strange = {str(item["loc"][0]): sentence_of(item) for item in error.errors(include_url=False)}
-        metadata = cls.model_validate({key: value for key, value in known.items() if key not in strange})
+            metadata = cls.model_validate({key: value for key, value in known.items() if key not in strange})
         metadata._strange.update(strange)
+        metadata._uncited = uncited
         return metadata
 
     def attributes(self) -> dict[str, Any]:
@@ -135,6 +157,11 @@ class TableMetadata(BaseModel):
         return self._strange
 
     @property
+    def uncited(self) -> tuple[str, ...]:
+        """The attributes that cite, and that no record of the source supports: they are left out."""
+        return self._uncited
+
+    @property
     def of_function(self) -> bool:
         """Return True if the table was tabulated from a function, which has no model."""
         return "function" in (self.source_record or {})
@@ -143,7 +170,8 @@ class TableMetadata(BaseModel):
     def missing(self) -> list[str]:
         """The required attributes that the table does not have."""
         needed = [key for key in REQUIRED if key not in _OF_MODELS] if self.of_function else REQUIRED
-        return [key for key in needed if key not in self.model_fields_set and key not in self.strange]
+        known = {*self.model_fields_set, *self.strange, *self.uncited}
+        return [key for key in needed if key not in known]
 
     def without_source(self, request: Mapping[str, Any]) -> dict[str, Any]:
         """Return a request but for what the source record says, as a table keeps it."""
@@ -172,6 +200,7 @@ class TableMetadata(BaseModel):
     def gaps(self) -> str:
         """A phrase that names the attributes that are missing or not what they must be; empty for a whole record."""
         phrases = [f"does not state its {', '.join(map(_words, self.missing))}"] if self.missing else []
+        phrases += ["keeps no record of its source, so that what it cites is not shown"] if self.uncited else []
         phrases += [f"states its {_words(key)} wrongly ({why})" for key, why in self.strange.items()]
         return ", and ".join(phrases)
 

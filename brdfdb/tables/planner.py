@@ -6,7 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +27,9 @@ from brdfdb.tables.layout import Interpolation, Layout
 from brdfdb.tables.mixture import Mixture, mixture_of
 from brdfdb.tables.plan_trials import MARGIN, SEED, Sample
 from brdfdb.tables.tabulation import POLE_END_DEG
+
+if TYPE_CHECKING:
+    from brdfdb.tables.table import Table
 
 PLAN_VERSION = 2
 
@@ -177,8 +180,7 @@ def _smallest(task: _Task, table_kinds: list[_TableKind]) -> Layout | None:
 
 def _reason(layout: Layout, tolerance: float, table_kinds: list[_TableKind]) -> str:
     """Return the reason for a layout: its number of nodes, and those of the other grid and of the simplest table."""
-    chosen, nodes = _kind(layout), math.prod(layout.grid.shape)
-    clauses = [f"for a tolerance of {tolerance:g}, {chosen} takes {nodes} nodes"]
+    chosen, clauses = _kind(layout), [first_reason(layout, tolerance)]
     ranked = sorted(table_kinds, key=_order)
     simplest = [c for c in ranked if c[1].interpolation.plain and not c[1].interpolation.cubic]
     others = [c for c in ranked if c[1].grid.names != layout.grid.names][:1] + simplest[:1]
@@ -191,7 +193,12 @@ def _reason(layout: Layout, tolerance: float, table_kinds: list[_TableKind]) -> 
     return "; ".join(clauses)
 
 
-def _kind(layout: Layout) -> str:
+def first_reason(layout: Layout | Table, tolerance: float) -> str:
+    """Return the first clause of the reason for a planned layout: its kind, and its number of nodes."""
+    return f"for a tolerance of {tolerance:g}, {_kind(layout)} takes {math.prod(layout.grid.shape)} nodes"
+
+
+def _kind(layout: Layout | Table) -> str:
     how = layout.interpolation
     what = "logarithms" if how.logarithm else "f_r"
     weight = {0.0: "", 0.5: " times the root of cos cos", 1.0: " times cos cos"}[how.power]

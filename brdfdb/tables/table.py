@@ -21,7 +21,7 @@ from brdfdb.geometry import (
     shape_of_angles,
     spherical_angles,
 )
-from brdfdb.materials.source import FourAngles
+from brdfdb.materials.source import FourAngles, Source
 from brdfdb.models.large_calls import array_for_result, filled
 from brdfdb.notebook import polar_sketch
 from brdfdb.parameters import Floats
@@ -110,6 +110,20 @@ class Table(BaseTable):
             uniform=layout.uniform,
             part_nm=layout.part_nm,
             facets=facets_of(layout),
+        )
+
+    def laid_out(self, source: Source) -> Layout:
+        """Return the layout of the table, as a tabulation of a source; errors are those of `Layout`."""
+        return Layout(
+            source,
+            self.grid,
+            self.wavelength_nm,
+            self.interpolation,
+            self.spectra,
+            self.metadata.bits,
+            self.metadata.reason,
+            self.part_nm,
+            None if self.facets is None else self.facets.theta_d_deg,
         )
 
     @property

@@ -8,6 +8,7 @@ import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import as_completed
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import suppress
 from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
@@ -17,13 +18,19 @@ import brdfdb
 from brdfdb._numba import is_cached
 from brdfdb.audit import FINDINGS, AuditReport, audit, report
 from brdfdb.audit.answers import NO_PAPER
-from brdfdb.errors import BrdfdbError, ParameterError, StoreError
+from brdfdb.audit.record import differences, leaves
+from brdfdb.audit.report import FamilyAudit
+from brdfdb.errors import BrdfdbError, ParameterError, StoreError, UnknownMaterialError
 from brdfdb.figure import Figure
 from brdfdb.materials import presets
 from brdfdb.models import MODELS
+from brdfdb.store.family import Sweep
+from brdfdb.store.family_records import measure, verify_family
 from brdfdb.store.reader import Store
+from brdfdb.store.snapshot_record import snapshot_names
 from brdfdb.store.summary_words import REPORT_OF_ALL, REPORT_OF_SOME
 from brdfdb.tables import _kernels
+from brdfdb.tables.layout import digest
 from brdfdb_pipelines import audit_page, former_audit, terminal, workers
 from brdfdb_pipelines.former_audit import Former
 
@@ -106,7 +113,8 @@ def run(
     )
     sections = [section for section in done.values() if isinstance(section, Section)]
     taken_over = [name for name in materials if name in before.audits]
-    audit_report = audit_report.model_copy(update={"taken_over": taken_over})
+    families = [] if names else _families(root, before, jobs)
+    audit_report = audit_report.model_copy(update={"taken_over": taken_over, "families": families})
     audit_report = _written(audit_report, sections, before, report_path, store)
     if shown:
         _print(root, audit_report, report_path)
@@ -212,8 +220,11 @@ def _with_former(audit_report: AuditReport, path: Path, store: Store) -> AuditRe
     audits = {audited.material: audited for audited in others if audited.material in store}
     audits = {name: audited for name, audited in audits.items() if audited.revision == store.head(name)}
     audits |= {audited.material: audited for audited in audit_report.materials}
-    violations = [name for name, audited in audits.items() if audited.verdict == "violates"]
-    return audit_report.model_copy(update={"materials": [*audits.values()], "violations": violations})
+    named = {
+        field: [name for name, audited in audits.items() if audited.verdict == verdict]
+        for field, verdict in (("violations", "violates"), ("not_judged", "not judged"))
+    }
+    return audit_report.model_copy(update={"materials": [*audits.values()], **named})
 
 
 def _check_path(report_path: Path) -> None:
@@ -260,6 +271,54 @@ def _audited(root: Path, names: Sequence[str], allow: Sequence[str]) -> list[Sec
         except BrdfdbError as error:  # undamaged files that do not hold a table
             outcomes.append(StoreError(f"{name} cannot be audited: {error}"))
     return outcomes
+
+
+def _families(root: Path, before: Former, jobs: int) -> list[FamilyAudit]:
+    """Return the audits of the families of a store and of its snapshots, of which those of the same record are one."""
+    store = brdfdb.open(root)
+    subjects = {("", name): store for name in store.families()}
+    for snapshot in snapshot_names(root):
+        pinned = brdfdb.open(root, snapshot=snapshot)
+        subjects |= {(snapshot, name): pinned for name in pinned.families()}
+    known = {each.subject_sha256: each for each in before.families}
+    tasks: dict[tuple[str, ...], Task] = {}
+    audits: dict[str, FamilyAudit] = {}
+    for (snapshot, name), opened in subjects.items():
+        sha256 = _family_sha256(opened, name)
+        if sha256 in known:
+            audits[sha256] = known[sha256]
+        elif (sha256,) not in tasks:
+            tasks[(sha256,)] = partial(_family_audited, root, name, snapshot, sha256)
+    for (sha256,), (audited,) in _outcomes(tasks, jobs):
+        audits[sha256] = audited
+    return [*audits.values()]
+
+
+def _family_sha256(store: Store, name: str) -> str:
+    """Return the digest of a record of a family and of its members."""
+    content: dict[str, Any] = {"name": name}
+    with suppress(StoreError, UnknownMaterialError):
+        content["record"] = store.family_content(name)
+        content["members"] = {member: store.location(member)[1] for member in content["record"]["members"]}
+    return digest(content)
+
+
+def _family_audited(root: Path, name: str, snapshot: str, sha256: str) -> list[FamilyAudit]:
+    """Measure a family anew, and compare its record."""
+    store = brdfdb.open(root, snapshot=snapshot or None)
+    about = {"family": name, "snapshot": snapshot, "subject_sha256": sha256}
+    try:
+        if not snapshot:
+            verify_family(root, name)
+        record = store.family(name).record
+        sweep = Sweep(**record.model_dump(include=set(Sweep.model_fields)))
+        expected = measure(sweep, store).model_dump(mode="json")
+    except (StoreError, UnknownMaterialError) as error:
+        return [FamilyAudit(**about, compared=0, wrong=[], damage=str(error), verdict="violates")]
+    stated = store.family_content(name)
+    wrong = [*differences(stated, expected, "", measured=True)]
+    compared = sum(1 for _ in leaves(stated))
+    return [FamilyAudit(**about, compared=compared, wrong=wrong, verdict="violates" if wrong else "passes")]
 
 
 def _figures() -> tuple[Figures, Figures]:
@@ -309,18 +368,22 @@ def _print(root: Path, audit_report: AuditReport, report_path: Path) -> None:
     for key, kind in FINDINGS.items():
         for sentence in kind.overview([a.findings[key] for a in audits]):
             print(sentence)
+    for each in audit_report.families:
+        where = f" of the snapshot {each.snapshot}" if each.snapshot else ""
+        print(f"family {each.family}{where}: {each.text}")
     known = sum(a.verdict == "known published excess" for a in audits)
     accepted = sum(a.verdict == "accepted excess" for a in audits)
-    violating = len(audit_report.violations)
+    violating, unjudged = len(audit_report.violations), len(audit_report.not_judged)
     partly = sum(bool(a.not_judged) for a in audits)
     not_whole = f"{partly} only in part, for lack of a source; " if partly else ""
     allowed = f"accepted excess {accepted}, " if accepted else ""
+    without = f"not judged {unjudged}, " if unjudged else ""
     remarks = audit_page.remarked(audit_report)
     remarked = f", {remarks} of them with a remark on the model" if remarks else ""
     if any(a.material not in presets() for a in audits):
         print(NO_PAPER)
     page_path = report_path.with_suffix(".html")
     print(
-        f"{len(audits)} audited: {not_whole}passes {len(audits) - known - accepted - violating}{remarked}, "
-        f"known published excess {known}, {allowed}violates {violating}; page {page_path}, data {report_path}"
+        f"{len(audits)} audited: {not_whole}passes {len(audits) - known - accepted - violating - unjudged}{remarked}, "
+        f"known published excess {known}, {allowed}{without}violates {violating}; page {page_path}, data {report_path}"
     )

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import brdfdb
 import brdfdb_pipelines
 from brdfdb.audit import AuditReport, MaterialAudit
+from brdfdb.audit.report import FamilyAudit
 from brdfdb.errors import StoreError
 from brdfdb.figure import Figure
 from brdfdb.models import MODELS
@@ -35,12 +36,15 @@ class Former(NamedTuple):
         The date of that report; None: nothing is taken from it.
     page : tuple of str
         Subjects of its page, if the page is still the one that was written with it; else empty.
+    families : tuple of FamilyAudit
+        Audits of families by the same program.
     """
 
     audits: dict[str, MaterialAudit]
     figures: dict[str, Figure]
     when: datetime | None
     page: tuple[str, ...]
+    families: tuple[FamilyAudit, ...] = ()
 
 
 NOTHING = Former({}, {}, None, ())
@@ -109,9 +113,10 @@ def former_of(path: Path, store: Store, materials: Sequence[str], allowed: Seque
     }
     same = report.program == program()
     figures = {figure.key: figure for figure in (*report.atlas, *report.gallery)} if same else {}
+    families = tuple(report.families) if same else ()
     page = path.with_suffix(".html")
     kept = same and page.is_file() and hashlib.sha256(page.read_bytes()).hexdigest() == report.page_sha256
-    return Former(audits, figures, report.when, tuple(report.page_subjects) if kept else ())
+    return Former(audits, figures, report.when, tuple(report.page_subjects) if kept else (), families)
 
 
 def _holds(audited: MaterialAudit, store: Store) -> bool:

@@ -8,7 +8,9 @@ import sys
 from brdfdb_pipelines.commands._arguments import add_jobs, add_store, place, share_cores
 from brdfdb_pipelines.exit_codes import INTERRUPTED, VIOLATED
 
-HELP = "Audit the energy, reciprocity, smoothness and error of tables and their models; exit 1 on a violation."
+HELP = (
+    "Audit tables and their models, and all that tables state; exit 1 on a violation, or where nothing can be judged."
+)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -39,7 +41,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Audit the materials; return `VIOLATED` if there is a new violation."""
+    """Audit the materials; return `VIOLATED` if there is a new violation, or a table that nothing can judge."""
     share_cores()
     from brdfdb.store.summary_words import REPORT_OF_ALL, REPORT_OF_SOME
     from brdfdb_pipelines import audit
@@ -58,4 +60,4 @@ def run(options: argparse.Namespace) -> int:
     except KeyboardInterrupt:
         print("brdfdb: interrupted; no report was written, an earlier one is unchanged", file=sys.stderr)
         return INTERRUPTED
-    return VIOLATED if report.violations else 0
+    return VIOLATED if report.violations or report.not_judged or report.families_wrong else 0

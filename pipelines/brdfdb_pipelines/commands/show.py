@@ -62,7 +62,7 @@ def _print_material(table: Table, path: Path, audited: Audited | None) -> None:
     _print_error(table.error, truth, measured=metadata.measured is not None)
     if metadata.measured is None:
         _print_formula_error(metadata.formula_error)
-    _print_answers(audited, table.name, measured=metadata.measured is not None)
+    _print_answers(audited, _says(metadata))
     source = _source_of(table)
     _print_validity(source, table.wavelength_nm)
     _print_albedo(table, source)
@@ -250,14 +250,21 @@ def _print_formula_error(error: FormulaError | None) -> None:
         _print_worst(error.worst)
 
 
-def _print_answers(audited: Audited | None, name: str, *, measured: bool) -> None:
-    """Print the answers of the last audit of this revision to its two questions."""
+def _says(metadata: TableMetadata) -> str:
+    """Return what an audit holds a table against."""
     from brdfdb.materials import presets
+
+    if metadata.measured is not None:
+        return "its source"
+    return "the paper" if metadata.material in presets() and metadata.source_record else "its model"
+
+
+def _print_answers(audited: Audited | None, says: str) -> None:
+    """Print the answers of the last audit of this revision to its two questions."""
     from brdfdb.store.summary_words import NOT_AUDITED
 
     both = (NOT_AUDITED, NOT_AUDITED) if audited is None else audited
-    says = "the paper" if name in presets() else "its source" if measured else "its model"
-    whose = "do the data" if measured else "does the published model"
+    whose = "do the data" if says == "its source" else "does the published model"
     print(f"  audit       is it what {says} says? {both[0]}")
     print(f"              {whose} conserve energy? {both[1]}")
 

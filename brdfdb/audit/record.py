@@ -1,0 +1,271 @@
+"""All that a table states of itself, compared leaf by leaf with its record and with a new measurement."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+from pydantic import BaseModel, Field
+
+from brdfdb.audit.finding import STRICT, Cell, Finding, Sentence, Subject, Verdict
+from brdfdb.errors import counted
+from brdfdb.materials import FunctionRecord, Material, exact_material, libraries, presets
+from brdfdb.tables.albedo import directional_albedo
+from brdfdb.tables.formula_measurement import first_numbers
+from brdfdb.tables.grids import Axis
+from brdfdb.tables.layout import digest
+from brdfdb.tables.metadata import TableMetadata
+from brdfdb.tables.planner import first_reason
+from brdfdb.tables.table import Table
+from brdfdb.tables.table_source import TableSource
+from brdfdb.tables.tabulation import metadata_of
+
+MEASURED = ("error", "formula_error", "largest_albedo", "polarisation")  # attributes that hold measured numbers
+# Numbers are repeated but for rounding. Measured ones have three digits, of which the last may differ; errors below the
+# second number are those of float64 sums. Places have two decimals
+_SAME, _NOTHING, _SAME_PLACE = 1e-9, 1e-9, 0.011
+_TIE = 1e-9  # albedos [1] that are so close are equally large
+_ROUNDING = "it is rounding"  # why the error of a table is largest where it is, if it is not
+_SHOWN = 3  # differences that a sentence names
+# Of tables whose source is not at hand: attributes that arrays and other attributes decide
+_OF_ARRAYS = (
+    "table_version",
+    "conventions",
+    "anisotropic",
+    "symmetries",
+    "wavelength_range_nm",
+    "interpolation",
+    "part_wavelengths_nm",
+    "bits",
+    "reconstruction",
+)
+
+
+class Unchecked(NamedTuple):
+    """Leaves that no audit can check: where they stand, their path with * for any number or name, and why."""
+
+    where: str
+    leaf: str
+    why: str
+
+
+UNCHECKED = (
+    Unchecked("HEAD and manifest", "created", "no clock is stored beside it"),
+    Unchecked("HEAD", "last", "a revision that was collected leaves nothing; it is not below the revisions that exist"),
+    Unchecked("table", "reason", "what other kinds of tables were expected to take; its first clause is compared"),
+    Unchecked("table of measured data", "error.*", "the store does not hold the data; it must not contradict itself"),
+    Unchecked("table of measured data", "measured.*", "the store does not hold the data"),
+    Unchecked("table of a function", "error.*", "the store does not hold the function, which an audit can be given"),
+    Unchecked("family", "title", "words of a recipe, which the members repeat"),
+)
+
+
+class Difference(BaseModel):
+    """A leaf of the attributes of a table that is not what it must be."""
+
+    model_config = STRICT
+
+    leaf: str = Field(description="path in the attributes, with dots; numbers count elements of lists from 0")
+    stated: str = Field(description="what the table states, as JSON has it; empty: nothing")
+    expected: str = Field(description="what its record, or a new measurement, gives; empty: nothing")
+
+    @property
+    def text(self) -> str:
+        """The difference in words."""
+        return f"{self.leaf} is {self.stated or 'not stated'}, where {self.expected or 'nothing'} is right"
+
+
+class Record(Finding):
+    """The attributes of a table, compared with what its record and a new measurement give."""
+
+    key = "record"
+    order = 9
+    explanation = (
+        "All that a table states of itself is made again, by the functions of a build: title, parameters and "
+        "citations from the record of the source, which a digest covers; the stated error, also in places and between "
+        "wavelengths, the error of the formula and the largest albedo by measurements at the same directions. Each "
+        "number and each word is compared: numbers to rounding. Materials that have the name of a preset, or cite what "
+        "a preset cites, have the parameters of a preset. Of tables of functions and measured data, what their arrays "
+        "decide is compared."
+    )
+
+    compared: int = Field(description="number of leaves of the attributes that were compared")
+    wrong: int = Field(description="number of them that differ")
+    worst: list[Difference] = Field(description="the first of these")
+    verdict: Verdict
+
+    @classmethod
+    def judge(cls, subject: Subject) -> Finding:
+        """Compare the attributes of a table; a table without a record is not judged."""
+        if subject.unrecorded:
+            return subject.not_judged("statements are compared with the record of the source")
+        return record_of(subject.table, expected_of(subject))
+
+    def sentences(self) -> list[Sentence]:
+        """Return a sentence on the number of leaves, or on those that differ."""
+        text = f"all {self.compared} numbers and words that were compared are those of its record and of a measurement"
+        if self.wrong:
+            named = "; ".join(difference.text for difference in self.worst[:_SHOWN])
+            text = f"{counted(self.wrong, 'statement')} of {self.compared} wrong: {named}"
+        return [self.sentence(self.verdict, text)]
+
+    def cells(self) -> list[Cell]:
+        """Return the number of wrong statements."""
+        return [Cell(self.verdict, f"{self.wrong} wrong" if self.wrong else "all good", self.wrong)]
+
+
+def record_of(table: Table, expected: Mapping[str, Any]) -> Record:
+    """Return how the attributes of a table differ from those `expected`, and from the presets."""
+    stated = {key: table.attrs[key] for key in expected if key in table.attrs}
+    found = [
+        difference
+        for key, value in stated.items()
+        for difference in differences(value, expected[key], key, measured=key in MEASURED)
+        if not _tied(table, difference, value, expected[key])
+    ]
+    found += [
+        Difference(leaf=key, stated=why, expected="what it must be") for key, why in table.metadata.strange.items()
+    ]
+    found += [*_of_request(table.metadata), *_of_presets(table), *_of_reason(table)]
+    compared = sum(1 for value in stated.values() for _ in leaves(value))
+    return Record(compared=compared, wrong=len(found), worst=found[:10], verdict="violates" if found else "passes")
+
+
+def expected_of(subject: Subject) -> dict[str, Any]:
+    """Return the attributes that a table must have, as far as they can be made again."""
+    table = subject.table
+    if subject.restated is not None:
+        expected = subject.restated.attributes()
+        absent = dict.fromkeys(key for key in TableMetadata.model_fields if key in table.attrs)
+        request = {key: table.attrs[key] for key in ("request", "request_sha256") if key in table.attrs}
+        return {**absent, **expected, **request}
+    source = TableSource(table)
+    layout = table.laid_out(source)
+    known, numbers = metadata_of(layout).attributes(), first_numbers(layout, lambda rows: table.values[rows])
+    expected = {key: known[key] for key in _OF_ARRAYS}
+    expected |= {key: value.model_dump(mode="json") for key, value in numbers.items()}
+    if isinstance(record := table.source, FunctionRecord):
+        expected |= {"title": record.title, "material": record.name, "source": record.provenance}
+    return expected
+
+
+def leaves(value: Any, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Any]]:
+    """Yield each leaf of a document with its path; empty lists and objects are leaves, too."""
+    if isinstance(value, Mapping) and value:
+        for key, part in value.items():
+            yield from leaves(part, (*path, str(key)))
+    elif isinstance(value, list | tuple) and value:
+        for number, part in enumerate(value):
+            yield from leaves(part, (*path, str(number)))
+    else:
+        yield path, value
+
+
+def differences(stated: Any, expected: Any, leaf: str, *, measured: bool) -> Iterator[Difference]:
+    """Yield the leaves of two documents that differ; `measured` numbers may differ in their third digit."""
+    one, other = dict(leaves(stated)), dict(leaves(expected))
+    for path in {**one, **other}:
+        a, b = one.get(path), other.get(path)
+        if not _same(a, b, _allowed(a, b, path) if measured else _SAME):
+            yield Difference(leaf=".".join(filter(None, (leaf, *path))), stated=_written(a), expected=_written(b))
+
+
+def _allowed(stated: Any, expected: Any, path: tuple[str, ...]) -> float:
+    """Return the largest relative difference of two measured numbers, or of places [degree, nm] that were met."""
+    words = [part for part in path if not part.isdigit()]
+    numbers = [abs(value) for value in (stated, expected) if isinstance(value, float)]
+    largest = max(numbers, default=0.0)
+    if largest == 0.0 or not math.isfinite(largest):
+        return _SAME
+    if words and words[-1].endswith(("_deg", "_nm")):
+        return _SAME_PLACE / largest
+    return (_NOTHING + 1.5 * 10.0 ** (math.floor(math.log10(largest)) - 2)) / largest
+
+
+def _same(stated: Any, expected: Any, allowed: float) -> bool:
+    numbers = [value for value in (stated, expected) if isinstance(value, int | float) and not isinstance(value, bool)]
+    if len(numbers) < 2:
+        return type(stated) is type(expected) and bool(stated == expected)
+    off, largest = abs(stated - expected), max(map(abs, numbers))
+    return bool(off <= allowed * largest) or stated == expected or all(map(math.isnan, numbers))
+
+
+def _written(value: Any) -> str:
+    return "" if value is None else repr(value)
+
+
+def _tied(table: Table, difference: Difference, stated: Any, expected: Any) -> bool:
+    """Return whether a place is one of several where what is largest is equally large: rounding decides among them."""
+    path = difference.leaf.split(".")
+    if "worst" in path and path[-1] != "why":
+        return _is_rounding(stated) and _is_rounding(expected)
+    if path[:3] == ["error", "between", "wavelength_nm"]:
+        return _is_rounding(stated) and _is_rounding(expected) and _within(table.wavelength_nm, difference.stated)
+    if path in (["largest_albedo", "theta_i_deg"], ["largest_albedo", "wavelength_nm"]):
+        return bool(abs(_albedo_at(table, stated) - _albedo_at(table, expected)) <= _TIE)
+    return False
+
+
+def _within(wavelength_nm: Axis | None, stated: str) -> bool:
+    """Return whether a wavelength [nm] is in the range of a table."""
+    return wavelength_nm is not None and wavelength_nm[0] <= float(stated or 0.0) <= wavelength_nm[-1]
+
+
+def _albedo_at(table: Table, place: Mapping[str, Any]) -> float:
+    """Return the directional albedo [1] at the place of a largest one; nan where there is no such place."""
+    at, nm = place["theta_i_deg"], place["wavelength_nm"]
+    nodes = [None] if table.wavelength_nm is None else table.wavelength_nm.tolist()
+    if not (isinstance(at, float) and 0.0 <= at <= 90.0 and nm in nodes):
+        return math.nan
+    return float(directional_albedo(table, np.array([at])).albedo.max(axis=1)[0, nodes.index(nm)])
+
+
+def _is_rounding(error: Any) -> bool:
+    """Return whether the largest of a stated error is rounding, which any place has."""
+    return isinstance(error, Mapping) and (error.get("worst") or {}).get("why") == _ROUNDING
+
+
+def _of_request(metadata: TableMetadata) -> Iterator[Difference]:
+    """Yield the digest of the request if it is another one, and what the request says other than the attributes."""
+    expected = None if metadata.request is None else digest(metadata.whole_request)
+    if metadata.request_sha256 != expected:
+        yield Difference(leaf="request_sha256", stated=_written(metadata.request_sha256), expected=_written(expected))
+    known = metadata.measured
+    if (
+        known is not None
+        and (file := (metadata.request or {}).get("file_sha256", known.file_sha256)) != known.file_sha256
+    ):
+        yield Difference(leaf="measured.file_sha256", stated=_written(known.file_sha256), expected=_written(file))
+
+
+def _of_presets(table: Table) -> Iterator[Difference]:
+    """Yield how a material differs from the preset of its name, or from all those that cite the same."""
+    material = table.source
+    if not isinstance(material, Material):
+        return
+    known = {name: preset for library in libraries() for name, preset in presets(library).items()}
+    same_name = known.get(material.name)
+    cited = [preset for preset in known.values() if preset.source == material.source]
+    if same_name is not None:
+        one = min((same_name, exact_material(same_name)), key=lambda other: other.model != material.model)
+        stated, expected = (each.document()["material"] for each in (material, one))
+        yield from differences(stated, expected, "source_record.material", measured=False)
+    elif cited and not any(_numbers(material) in (_numbers(each), _numbers(exact_material(each))) for each in cited):
+        none = "one of these parameters, which no preset takes from there,"
+        yield Difference(leaf="source_record.material.source", stated=_written(material.source), expected=none)
+
+
+def _numbers(material: Material) -> tuple[Any, ...]:
+    return material.model, material.file_parameters(), material.refractive_index
+
+
+def _of_reason(table: Table) -> Iterator[Difference]:
+    """Yield what the reason for a layout says of its table if it is not so."""
+    request = table.metadata.request or {}
+    tolerance, reason = request.get("tolerance"), table.metadata.reason
+    if isinstance(tolerance, float) and isinstance(table.source, Material):
+        expected = first_reason(table, tolerance)
+        if "takes" in reason and expected not in reason:
+            yield Difference(leaf="reason", stated=_written(reason), expected=_written(expected))
