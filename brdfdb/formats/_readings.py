@@ -14,6 +14,7 @@ from brdfdb.errors import ParameterError
 from brdfdb.geometry import checked_angles, checked_vectors, finished, unit_vector
 from brdfdb.materials.source import FourAngles, Lookups
 from brdfdb.parameters import Floats, check_nanometres
+from brdfdb.tables.table_base import Stated
 
 if TYPE_CHECKING:
     from brdfdb.measurements.samples import Samples
@@ -65,6 +66,28 @@ class FileTable(Lookups):
             values = self._between(values, wavelength_nm)
         return finished(values, vectors, trailing=values.ndim - len(shape) + 1)
 
+    def lookup_vectors_with_error(self, wi: ArrayLike, wr: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Stated:
+        """Return f_r [1/sr] as `lookup_vectors`, and the error [1/sr] that the file states for each value.
+
+        Raises
+        ------
+        ParameterError
+            If the file states no error, or none between its wavelengths.
+        """
+        from brdfdb.formats._file_statement import FileStatement
+
+        statement = FileStatement.read(self.record, self.name)
+        brdf, at = self.lookup_vectors(wi, wr, wavelength_nm), self.wavelength_nm
+        directions = checked_vectors(wi, wr)
+        shape = np.broadcast_shapes(np.shape(wi), np.shape(wr))[:-1]
+        values = np.asarray(brdf).reshape(*shape, -1)
+        if at is None or wavelength_nm is None:
+            error = statement.error(directions, values)
+        else:
+            nodes, share = self._around(wavelength_nm)
+            error = statement.error(directions, values, nodes.reshape(-1, 2), np.ravel((share == 0.0) | (share == 1.0)))
+        return Stated(brdf, error.reshape(np.shape(brdf))[()])
+
     def _at_angles(self, angles: FourAngles, wavelength_nm: ArrayLike | None) -> Floats:
         given = checked_angles(*angles)
         wi, wr = unit_vector(given.theta_i, given.phi_i), unit_vector(given.theta_r, given.phi_r)
@@ -73,6 +96,11 @@ class FileTable(Lookups):
 
     def _between(self, values: Floats, wavelength_nm: ArrayLike) -> Floats:
         """Return values at wavelengths [nm] by straight lines between those of the file."""
+        nodes, share = self._around(wavelength_nm)
+        return np.asarray(values[..., nodes[..., 0]] * (1.0 - share) + values[..., nodes[..., 1]] * share)
+
+    def _around(self, wavelength_nm: ArrayLike) -> tuple[NDArray[np.int64], Floats]:
+        """Return the two channels next to wavelengths [nm], shape (..., 2), and the place between them in [0, 1]."""
         stored, wanted = self.wavelength_nm, check_nanometres("wavelength_nm", wavelength_nm)
         assert stored is not None
         if not np.all((wanted >= stored[0]) & (wanted <= stored[-1])):
@@ -82,5 +110,4 @@ class FileTable(Lookups):
         below = np.clip(np.searchsorted(stored, wanted, side="right") - 1, 0, max(stored.size - 2, 0))
         above = np.minimum(below + 1, stored.size - 1)
         width = np.where(above > below, stored[above] - stored[below], 1.0)
-        share = (wanted - stored[below]) / width
-        return np.asarray(values[..., below] * (1.0 - share) + values[..., above] * share)
+        return np.stack([below, above], axis=-1), (wanted - stored[below]) / width

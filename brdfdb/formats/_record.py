@@ -35,7 +35,7 @@ def record(
     table : Table
         Table that is exported.
     error : FileError or None
-        Error of the file against the table.
+        Error of the file against the table; None if the file holds values of the table as they are.
     verdict : str or None
         Verdict of the audit of this revision; None: not stated.
     holds : str
@@ -45,7 +45,9 @@ def record(
     tolerance : float or None [1]
         Largest p99 that was asked for.
     """
-    known = table.metadata
+    from brdfdb.formats._file_statement import of_table
+
+    known, statement = table.metadata, of_table(table) if error is None else error.statement
     document = known.model_dump(mode="json", include={"model", "model_version", "parameters", "refractive_index"})
     origin = known.source or "a source that is not stated"
     licence = f"measured: {origin}" if known.measured else f"computed from parameters published in {origin}"
@@ -62,12 +64,7 @@ def record(
         "holds": holds,
         "error_of_file": None if error is None else {"against": "the table", **error.document()},
         "tolerance": tolerance,
-        "error_of_table": None
-        if table.error is None
-        else {
-            "against": "the data" if known.measured else "the model",
-            **table.error.overall.model_dump(include={"p99", "l1"}),
-        },
+        "error": None if statement is None else statement.model_dump(mode="json"),
         "remarks": [*remarks, *extrapolated_remark(table)],
         "licence": f"{licence}; {_MEASURED}" if known.refractive_index else licence,
         "program": f"brdfdb {version('brdfdb')}",

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import functools
-import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.formats._channels import Channels, channels_of
+from brdfdb.formats._file_statement import FileStatement, of_file, up
 from brdfdb.geometry import unit_vector
 from brdfdb.integrals.sampling import mirrored_in_lobe, mixture_density
 from brdfdb.parameters import Floats
@@ -44,6 +44,8 @@ class FileError:
         Mean of abs(file - table) over that of the table, cosine-weighted.
     largest : float [1]
         Largest error of all pairs.
+    measure : callable or None
+        Gives `statement`.
     """
 
     p99: float
@@ -51,18 +53,16 @@ class FileError:
     p99_lobe: float
     l1: float
     largest: float
+    measure: Callable[[], FileStatement | None] | None = field(default=None, repr=False, compare=False)
 
     def document(self) -> dict[str, float]:
         """Return the numbers by name, to three digits and rounded up."""
-        return {name: _up(getattr(self, name)) for name in self.__dataclass_fields__}
+        return {name: up(getattr(self, name)) for name in ("p99", "p99_hemisphere", "p99_lobe", "l1", "largest")}
 
-
-def _up(value: float) -> float:
-    """Return the next number of three digits that is not below a value."""
-    if not 0.0 < value < math.inf:
-        return value
-    unit = 10.0 ** (math.floor(math.log10(value)) - 2)
-    return float(f"{math.ceil(value / unit) * unit:.3g}")
+    @functools.cached_property
+    def statement(self) -> FileStatement | None:
+        """What the file states against the model; None if its table states no error. It is measured at first use."""
+        return None if self.measure is None else self.measure()
 
 
 class Comparison:
@@ -84,6 +84,7 @@ class Comparison:
     """
 
     def __init__(self, table: Table, channels: Channels | None = None) -> None:
+        self.table = table
         self.channels = channels_of(table) if channels is None else channels
         self.wi, self.wr, self._weight, lobe = _drawn(table)
         self._above = self._weight > 0.0
@@ -114,6 +115,7 @@ class Comparison:
             p99_lobe=lobe,
             l1=float(l1.max()),
             largest=float(relative[self._above].max()),
+            measure=functools.partial(of_file, self.table, self.channels, self.floor, evaluate),
         )
 
     def _p99(self, relative: Floats, draw: slice) -> float:

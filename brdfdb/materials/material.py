@@ -154,9 +154,9 @@ class Material(BaseModel, Lookups):
             raise ParameterError(
                 "wavelengths_nm", f"the model {self.model} is grey, and no parameter is a spectrum; leave them out"
             )
-        for name, value in self.parameters.items():
-            if isinstance(value, Spectrum) and self.wavelengths_nm is not None:
-                value.at(name, np.array(self.wavelengths_nm))
+        for name, spectrum_of_it in self.spectra.items():
+            if self.wavelengths_nm is not None:
+                spectrum_of_it.at(name, np.array(self.wavelengths_nm))
         values = (*self.parameters, *_SOURCED)
         alternatives = (
             name
@@ -189,6 +189,11 @@ class Material(BaseModel, Lookups):
         return {name: value for name, value in self.parameters.items() if not isinstance(value, Spectrum)}
 
     @property
+    def spectra(self) -> dict[str, Spectrum]:
+        """Return the parameters that are spectra."""
+        return {name: value for name, value in self.parameters.items() if isinstance(value, Spectrum)}
+
+    @property
     def provenance(self) -> str:
         """Return the paper and table, figure or section of the values."""
         return self.source
@@ -196,7 +201,7 @@ class Material(BaseModel, Lookups):
     @property
     def spectral(self) -> bool:
         """Return True if f_r depends on the wavelength."""
-        return self.spec.spectral or any(isinstance(value, Spectrum) for value in self.parameters.values())
+        return self.spec.spectral or bool(self.spectra)
 
     @property
     def anisotropic(self) -> bool:
@@ -438,7 +443,7 @@ class Material(BaseModel, Lookups):
     def document(self) -> dict[str, Any]:
         """Return the material as JSON, parameters in the units of the model; `brdfdb.materials.source_of` reads it."""
         material = self.model_dump(mode="json")
-        spectra = {name: value.record() for name, value in self.parameters.items() if isinstance(value, Spectrum)}
+        spectra = {name: value.record() for name, value in self.spectra.items()}
         material["parameters"] |= spectra
         return {"model_version": self.spec.version, "material": material}
 

@@ -59,7 +59,8 @@ class TableFormula(Formula):
             raise ParameterError("material", "the name of a material in the store is missing")
         table = loaded(props["material"], props.get("store", None))
         self.name, self.anisotropic = table.name, table.anisotropic
-        self._grid, self._how, self._mixed = table.grid, table.interpolation, table.part_nm is not None
+        self._grid, self._how = table.grid, table.interpolation
+        self._mixed = table.part_nm is not None or table.straight  # f_r is interpolated between wavelengths
         single_nm = props.get("wavelength_nm", 0.0)
         self._projection = projection(props, None if single_nm else table.wavelength_nm)
         self._least = 0.0 if self._projection is None else -_LARGEST  # of a part in a channel [1/sr]
@@ -67,7 +68,10 @@ class TableFormula(Formula):
         axes = prepared([radians(nodes) for nodes in table.axes_deg.values()], table.grid.ends, cubic=self._how.cubic)
         numbers = table.values.reshape(*table.grid.shape, -1)
         weights = self._weights(table)
-        mixing = weights.T if table.spectra is None else table.spectra @ weights.T
+        basis = table.spectra
+        if table.straight and basis is not None and table.part_nm is None:
+            numbers, basis = numbers @ basis, None
+        mixing = weights.T if basis is None else basis @ weights.T
         self._spectrum: Array | None = None  # numbers that are logarithms, at the wavelengths of a projection
         if self._projection is not None:
             weights = self._projection.weights.T @ weights
@@ -93,7 +97,7 @@ class TableFormula(Formula):
         at_nm = self._columns.at_nm if self._projection is None else self._projection.wavelength_nm
         if table.wavelength_nm is None or at_nm is None:
             return np.ones((1, 1))
-        index, weight = weights_of_nodes(table.wavelength_nm, at_nm)
+        index, weight = weights_of_nodes(table.wavelength_nm, at_nm, cubic=not table.straight)
         matrix = np.zeros((at_nm.size, table.wavelength_nm.size))
         np.add.at(matrix, (np.arange(at_nm.size)[:, np.newaxis], index), weight)
         return matrix
@@ -215,6 +219,8 @@ class _Facets:
         assert table.wavelength_nm is not None
         nodes = [radians(facets.theta_d_deg), *([table.wavelength_nm] if table.wavelength_nm.size > 1 else [])]
         axes = prepared(nodes, [("open", "open")] * len(nodes), cubic=True)
+        if table.straight and axes.width.size > 1:
+            axes.width[1] = 2
         self._elements = GridValues(axes, facets.elements.reshape(*(axis.size for axis in nodes), -1))
         self._columns = columns
         beside = 0.0 if table.uniform is None else table.uniform

@@ -32,7 +32,7 @@ from brdfdb.tables.table import Table
 from brdfdb.tables.table_base import Stated
 
 FORMAT = "brdfdb-family"
-FORMAT_VERSION: Literal[1] = 1
+FORMAT_VERSION: Literal[2] = 2  # 1: without an error near the light and at the horizon
 _STRICT = ConfigDict(frozen=True, extra="forbid")
 _SAME = 1e-12  # relative tolerance for treating a parameter as equal to a member's value
 
@@ -117,12 +117,12 @@ class FamilyRecord(Sweep):
     """A family as the store records it."""
 
     format: Literal["brdfdb-family"] = "brdfdb-family"
-    version: Literal[1] = FORMAT_VERSION
+    version: Literal[2] = FORMAT_VERSION
     interpolation: Blend
     error: Error = Field(
         description="of interpolated f_r against the model, over directions and parameters: all points pooled, as many "
         "in each cell between members, spread evenly in it; of more than 256 cells one point in each of 256 drawn at "
-        "random. 99 of 100 values of the family are within p99"
+        "random. 99 of 100 values of the family are within p99; places are measured at the same points"
     )
     points: int = Field(description="parameters at which the error was measured")
     worst: WorstPoint

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Literal, NamedTuple
 
@@ -31,10 +32,10 @@ from brdfdb.store.lock import Lock, writing
 from brdfdb.store.paths import family_path
 from brdfdb.store.reader import Store
 from brdfdb.store.sealed_json import write_sealed
-from brdfdb.tables import error_measurement
+from brdfdb.tables import error_measurement, places
 from brdfdb.tables.layout import PLAIN
 from brdfdb.tables.places import BANDS
-from brdfdb.tables.stated_error import Between
+from brdfdb.tables.stated_error import Between, Places
 from brdfdb.tables.table import Table
 
 Power = Literal[-2, -1, 0, 1, 2]
@@ -44,6 +45,7 @@ POINTS = 256  # parameters at which a family is measured, at least
 _DIRECTIONS = 50  # of a band of theta_i at each of them
 _DIRECTIONS_BETWEEN, _SEARCHED = 10, 40  # between wavelengths; and of one member, to find out where
 _FEWEST_DIRECTIONS = 10
+_OF_A_SAMPLE = 2  # pairs of each sample in a place, at each of the points
 _CORNER_VALUES = 10_000_000  # that are held at a time: of more, fewer directions are drawn
 _THETA_I = radians(np.arange(0.0, 90.0, 5.0))  # where the specular part is measured
 _SPECULAR_OFFSET = 1e-6
@@ -128,6 +130,7 @@ def measure(sweep: Sweep, tables: Mapping[str, Table], seed: int = SEED) -> Fami
     floor = error_measurement.floor_of(truth, drawn)
     ways = _ways(sweep, measured, drawn, floor)
     best = min(ways, key=lambda way: ways[way])
+    pairs = places.draw(_OF_A_SAMPLE * len(measured.points), seed)
     value = blended(*_weighted(sweep, measured, measured.corners, best), best.offset)
     specular_offset, specular_error = _specular(sweep, measured, best)
     between = _between(sweep, tables, seed, best, floor) if floor.size > 1 else None
@@ -148,7 +151,10 @@ def measure(sweep: Sweep, tables: Mapping[str, Table], seed: int = SEED) -> Fami
             ),
         ),
         error=error_measurement.compare(value.reshape(truth.shape), truth, drawn, seed).model_copy(
-            update={"between": between}
+            update={
+                "between": between,
+                "places": _in_places(sweep, best, _look(sweep, tables, seed, pairs=pairs), pairs, floor),
+            }
         ),
         points=len(measured.points),
         worst=WorstPoint(parameters=_written(sweep, measured.parameters[worst]), p99=float(f"{p99[worst]:.3g}")),
@@ -163,14 +169,37 @@ def _between(sweep: Sweep, tables: Mapping[str, Table], seed: int, way: _Way, fl
     assert stored is not None
     pairs = error_measurement.draw(material, stored, _SEARCHED, seed)
     wi, wr = pairs.wi[pairs.above], pairs.wr[pairs.above]
-    at = error_measurement.worst_wavelengths(material, stored, PLAIN, wi, wr, floor)
+    how = replace(PLAIN, wavelengths=first.interpolation.wavelengths)
+    at = error_measurement.worst_wavelengths(material, stored, how, wi, wr, floor)
     measured = _look(sweep, tables, seed, at)
     drawn = error_measurement.Draw(*(np.concatenate(parts) for parts in zip(*measured.drawn, strict=True)))
     truth = measured.truth.reshape(-1, at.size)
     value = blended(*_weighted(sweep, measured, measured.corners, way), way.offset).reshape(truth.shape)
-    error = error_measurement.relative(truth, value, np.maximum(floor[1:], floor[:-1]))  # to what a lookup knows
-    bands = error_measurement.limits_of_bands(error[drawn.above], drawn.band[drawn.above])
-    return Between(wavelength_nm=at.tolist(), bands=bands)
+    larger = np.maximum(floor[1:], floor[:-1])
+    error = error_measurement.relative(truth, value, larger)[drawn.above]  # to what a lookup knows
+    elsewhere = ~places.anywhere(drawn.wi[drawn.above], drawn.wr[drawn.above])
+    few = places.draw(len(measured.points), seed)
+    return Between(
+        wavelength_nm=at.tolist(),
+        bands=error_measurement.limits_of_bands(error[elsewhere], drawn.band[drawn.above][elsewhere]),
+        places=_in_places(sweep, way, _look(sweep, tables, seed, at, few), few, larger),
+        overall=error_measurement.not_less(error_measurement.limit_of(error)),
+    )
+
+
+def _in_places(sweep: Sweep, way: _Way, measured: _Measured, pairs: places.Pairs, floor: Floats) -> Places:
+    """Return the limits of the error near the light and at the horizon, over all points."""
+    error = np.empty((len(pairs.wi), measured.truth.shape[-1]))
+    value = blended(*_weighted(sweep, measured, measured.corners, way), way.offset)
+    for point, rows in enumerate(_shared_out(pairs, len(measured.points))):
+        error[rows] = error_measurement.relative(measured.truth[point], value[point], floor)
+    return error_measurement.limits_in_places(error, pairs, np.ones(len(error), dtype=bool))
+
+
+def _shared_out(pairs: places.Pairs, points: int) -> NDArray[np.int64]:
+    """Return the pairs of each point, shape (points, N): as many of each sample."""
+    rows = np.arange(len(pairs.wi)).reshape(pairs.sample[-1] + 1, -1, points)
+    return np.moveaxis(rows, -1, 0).reshape(points, -1)
 
 
 def _material(member: Table) -> Material:
@@ -180,10 +209,17 @@ def _material(member: Table) -> Material:
     return member.source
 
 
-def _look(sweep: Sweep, tables: Mapping[str, Table], seed: int, at_nm: NDArray[np.float64] | None = None) -> _Measured:
+def _look(
+    sweep: Sweep,
+    tables: Mapping[str, Table],
+    seed: int,
+    at_nm: NDArray[np.float64] | None = None,
+    pairs: places.Pairs | None = None,
+) -> _Measured:
     """Return the model and the members around, at directions of their own at each point.
 
-    By default they are looked at at the wavelengths of the members, else at those given and fewer directions.
+    By default they are looked at at the wavelengths of the members, else at those given and fewer directions. `pairs`
+    in places are shared out among the points and take the place of directions over the hemisphere and in the lobe.
     """
     nodes = sweep.nodes
     shape = tuple(values.size for values in nodes.values())
@@ -205,12 +241,16 @@ def _look(sweep: Sweep, tables: Mapping[str, Table], seed: int, at_nm: NDArray[n
         material = base.model_copy(update={"parameters": {**base.parameters, **at}})
         first = [stencil(axis, at[name], 1, cubic=_width(shape) == 4)[0] for name, axis in nodes.items()]
         around = [member(int(np.ravel_multi_index(np.add(first, corner), shape))) for corner in np.ndindex(*stencils)]
-        drawn = error_measurement.draw(material, wavelength_nm, count, seed + 1 + number)
         parameters.append(at)
-        draws.append(drawn)
-        truth.append(error_measurement.model_values(material, wavelength_nm, drawn.wi, drawn.wr))
-        corners.append([table.lookup_vectors(drawn.wi, drawn.wr, at_nm).reshape(truth[-1].shape) for table in around])
-        if base.has_specular and at_nm is None:
+        if pairs is None:
+            draws.append(error_measurement.draw(material, wavelength_nm, count, seed + 1 + number))
+            wi, wr = draws[-1].wi, draws[-1].wr
+        else:
+            rows = _shared_out(pairs, len(points))[number]
+            wi, wr = pairs.wi[rows], pairs.wr[rows]
+        truth.append(error_measurement.model_values(material, wavelength_nm, wi, wr))
+        corners.append([table.lookup_vectors(wi, wr, at_nm).reshape(truth[-1].shape) for table in around])
+        if base.has_specular and at_nm is None and pairs is None:
             specular_corners.append(
                 [table.specular_reflectance(_THETA_I).reshape(_THETA_I.size, -1) for table in around]
             )

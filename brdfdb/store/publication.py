@@ -47,7 +47,12 @@ class Published(NamedTuple):
 
 
 def publish(
-    root: str | os.PathLike[str], source: Source, *, tolerance: float, wavelengths_nm: ArrayLike | None = None
+    root: str | os.PathLike[str],
+    source: Source,
+    *,
+    tolerance: float,
+    wavelengths_nm: ArrayLike | None = None,
+    hot_spot_tolerance: float | None = None,
 ) -> Published:
     """Tabulate a source to a tolerance and publish the table in a store.
 
@@ -65,6 +70,8 @@ def publish(
         99th percentile of the relative error of f_r, in [1e-4, 0.5]: see `brdfdb.tables.planner.plan`.
     wavelengths_nm : array_like of shape (L,) [nm], optional
         For spectral sources; by default those that the source is stated for.
+    hot_spot_tolerance : float, optional
+        Largest error near the light, as of `plan`; not of measured data.
 
     Returns
     -------
@@ -95,9 +102,11 @@ def publish(
     given = source.wavelengths_nm if wavelengths_nm is None else np.atleast_1d(np.asarray(wavelengths_nm))
     at = None if given is None else check_wavelengths(given)
     if isinstance(source, MeasuredSource):
+        if hot_spot_tolerance is not None:
+            raise ParameterError("hot_spot_tolerance", f"{source.name} is measured; it is for models and functions")
         layout, values = tabulated(source, at, tolerance)
         return publish_layout(root, source.name, layout, values=values)
-    return publish_layout(root, source.name, plan(source, at, tolerance))
+    return publish_layout(root, source.name, plan(source, at, tolerance, hot_spot_tolerance=hot_spot_tolerance))
 
 
 def publish_layout(

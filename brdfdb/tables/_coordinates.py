@@ -26,7 +26,7 @@ class Rule(NamedTuple):
     azimuth of an anisotropic grid goes into a full turn: 1, 2 or 4. Numbers are logarithms if `logarithm` is True;
     `offset` was added to values before, which had been multiplied by cos theta_i cos theta_r to the `power`.
     Interpolated values below 0 are set to 0 if `overshoots` is True. Spectra mix f_r of the channels if `mixed` is
-    True, else numbers.
+    True, else numbers. Between wavelengths f_r is interpolated if `straight` is True, else numbers.
     """
 
     half_difference: bool
@@ -37,6 +37,7 @@ class Rule(NamedTuple):
     power: float
     overshoots: bool
     mixed: bool
+    straight: bool
 
 
 @kernel

@@ -49,7 +49,7 @@ def finished(
 
     `spectra` of shape (channels, L) says how the channels make up L wavelengths: as numbers, or as f_r if the rule is
     mixed. If it is empty, the channels are the wavelengths. `nodes` and `weight`, of shape (wavelengths, 4), say which
-    of the L count: between them the numbers that are stored are interpolated, not f_r.
+    of the L count: between them the numbers that are stored are interpolated, or f_r if the rule is straight.
     """
     wavelengths = nodes.shape[0]
     single = channels == 1 and wavelengths == 1 and spectra.size == 0
@@ -87,7 +87,20 @@ def finished(
         overshoots = overshoots or rule.overshoots or rule.mixed
         for j in range(count):
             total[j] = 0.0
-        if spectra.size > 0:
+        if rule.straight and not rule.mixed:
+            for side in range(4):
+                part, w = weight[m, side], nodes[m, side]
+                if part != 0.0:
+                    for j in range(count):
+                        value = 0.0
+                        if spectra.size > 0:
+                            for channel in range(channels):
+                                value += numbers[j * channels + channel] * spectra[channel, w]
+                        else:
+                            value = numbers[j * channels + w]
+                        value = exp(value) - rule.offset if rule.logarithm else value
+                        total[j] += part * (0.0 if rule.overshoots and value < 0.0 else value)  # nan stays nan
+        elif spectra.size > 0:
             for channel in range(channels):
                 column[channel] = 0.0
                 for side in range(4):
@@ -101,7 +114,7 @@ def finished(
                 if part != 0.0:  # what does not count may be nan
                     for j in range(count):
                         total[j] += part * numbers[j * channels + w]
-        if rule.logarithm and not rule.mixed:
+        if rule.logarithm and not rule.mixed and not rule.straight:
             for j in range(count):
                 total[j] = exp(total[j]) - rule.offset
         for j in range(count):

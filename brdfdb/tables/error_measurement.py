@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,7 +15,7 @@ from brdfdb._elementary import COS_HORIZON
 from brdfdb.geometry import radians, unit_vector
 from brdfdb.integrals.sampling import mirrored_in_lobe, mixture_density
 from brdfdb.lobes import Lobe
-from brdfdb.materials import FunctionRecord, Source
+from brdfdb.materials import FunctionRecord, Material, Source
 from brdfdb.measurements import MeasuredSource
 from brdfdb.measurements.extent import Extent
 from brdfdb.models.shared_integrals import sharing
@@ -236,7 +237,7 @@ def measure(
     measured = error.model_copy(
         update={
             "worst": worst,
-            "places": _in_places(relative(truth[own:], values[own:], floor), pairs, inside),
+            "places": limits_in_places(relative(truth[own:], values[own:], floor), pairs, inside),
             "between": None if floor.size < 2 else _between(layout, read, drawn, pairs, floor, count),
         }
     )
@@ -254,7 +255,9 @@ def _between(
     """Measure the error between wavelengths, at some of the directions that it was measured at on them."""
     assert layout.wavelength_nm is not None
     few = _some(drawn, min(count, _SEARCHED_AT))
-    how = layout.interpolation if layout.part_nm is None else PLAIN  # a mixture interpolates f_r itself
+    how = layout.interpolation
+    if layout.part_nm is not None or how.straight:  # f_r itself is interpolated
+        how = replace(PLAIN, wavelengths=how.wavelengths)
     at = worst_wavelengths(layout.source, layout.wavelength_nm, how, drawn.wi[few], drawn.wr[few], floor)
     some = _some(drawn, math.ceil(count * _BETWEEN))
     fewer = pairs.some(_first(pairs.sample, math.ceil(count * _BETWEEN_IN_PLACES)))
@@ -262,10 +265,12 @@ def _between(
     values, truth = _looked_up(layout, read, wi, wr, at), model_values(layout.source, at, wi, wr)
     error = relative(truth, values, np.maximum(floor[1:], floor[:-1]))  # to what a lookup knows
     own = np.count_nonzero(some)
+    elsewhere = ~places.anywhere(wi[:own], wr[:own])
     return Between(
         wavelength_nm=at.tolist(),
-        bands=limits_of_bands(error[:own], drawn.band[some]),
-        places=_in_places(error[own:], fewer, _measured(layout.source, fewer.wi, fewer.wr)),
+        bands=limits_of_bands(error[:own][elsewhere], drawn.band[some][elsewhere]),
+        places=limits_in_places(error[own:], fewer, _measured(layout.source, fewer.wi, fewer.wr)),
+        overall=not_less(limit_of(error[:own])),
     )
 
 
@@ -275,27 +280,51 @@ def worst_wavelengths(
     """Return the wavelength [nm] inside each interval where interpolation of the source itself is worst.
 
     Nine or more wavelengths of an interval are tried, at a few pairs of directions `wi`, `wr`. `floor` is that of the
-    `stored` wavelengths, `how` the interpolation of the table.
+    `stored` wavelengths, `how` the interpolation of the table. The nodes of spectra are tried, too.
     """
+    return np.array([worst.wavelength_nm for worst in worst_between(source, stored, how, wi, wr, floor)])
+
+
+class WorstBetween(NamedTuple):
+    """The wavelength [nm] of an interval at which interpolation of a source is worst, and its error there [1]."""
+
+    wavelength_nm: float
+    error: float
+
+
+def worst_between(
+    source: Source, stored: NDArray[np.float64], how: Interpolation, wi: Floats, wr: Floats, floor: Floats
+) -> list[WorstBetween]:
+    """Return where `worst_wavelengths` finds the largest 95th percentile of the error, and that, for each interval."""
     intervals = stored.size - 1
     within = max(_SEARCHED[0], _SEARCHED[1] // intervals)
     share = np.arange(1, within + 1) / (within + 1)
     at = (stored[:-1, np.newaxis] + np.diff(stored)[:, np.newaxis] * share).reshape(-1)
+    if isinstance(source, Material) and source.spectra:
+        kinks = np.unique(np.concatenate([spectrum.wavelengths_nm for spectrum in source.spectra.values()]))
+        kinks = kinks[(kinks > stored[0]) & (kinks < stored[-1])]
+        at = np.union1d(at, kinks[~np.isin(kinks, stored)])
     mu = np.maximum(wi[:, 2], COS_HORIZON) * np.maximum(wr[:, 2], COS_HORIZON)
     numbers = how.numbers(model_values(source, stored, wi, wr), mu)
-    nodes, weight = weights_of_nodes(stored, at)
+    nodes, weight = weights_of_nodes(stored, at, cubic=not how.straight)
+    interval = np.searchsorted(stored, at) - 1
     error = relative(  # to what a lookup knows
         model_values(source, at, wi, wr),
         np.maximum(how.f_r(np.sum(numbers[:, nodes] * weight, axis=-1), mu), 0.0),
-        np.repeat(np.maximum(floor[1:], floor[:-1]), within),
+        np.maximum(floor[1:], floor[:-1])[interval],
     )
-    worst = np.percentile(error, 95.0, axis=0).reshape(intervals, within).argmax(axis=1)
-    return np.asarray(at.reshape(intervals, within)[np.arange(intervals), worst])
+    of_each = np.percentile(error, 95.0, axis=0)
+    worst = []
+    for number in range(intervals):
+        inside = np.flatnonzero(interval == number)
+        most = inside[np.argmax(of_each[inside])]
+        worst.append(WorstBetween(float(at[most]), float(of_each[most])))
+    return worst
 
 
 def limits_of_bands(error: Floats, band: NDArray[np.int64]) -> list[list[float]]:
     """Return the limit of errors (N, columns) in each band of theta_i."""
-    return [_not_less(_limit(error[band == row])) for row in range(places.BANDS)]
+    return [not_less(limit_of(error[band == row])) for row in range(places.BANDS)]
 
 
 def _some(drawn: Draw, count: int) -> NDArray[np.bool_]:
@@ -309,7 +338,7 @@ def _first(sample: NDArray[np.int64], count: int) -> NDArray[np.bool_]:
     return np.asarray(np.arange(sample.size) - np.searchsorted(sample, sample) < count)
 
 
-def _in_places(error: Floats, pairs: places.Pairs, inside: NDArray[np.bool_]) -> Places:
+def limits_in_places(error: Floats, pairs: places.Pairs, inside: NDArray[np.bool_]) -> Places:
     """Return limits of errors (N, columns) at pairs drawn in places: the largest of the samples of each place.
 
     `inside` says which pairs count. The limit of a place without any is 0.
@@ -318,9 +347,9 @@ def _in_places(error: Floats, pairs: places.Pairs, inside: NDArray[np.bool_]) ->
     ends = np.searchsorted(pairs.sample, np.arange(pairs.sample[-1] + 2))  # those of a sample stand together
     for members in map(slice, ends[:-1], ends[1:]):
         row = int(pairs.row[members][0])
-        rows[row] = np.maximum(rows.get(row, 0.0), _limit(error[members][inside[members]]))
+        rows[row] = np.maximum(rows.get(row, 0.0), limit_of(error[members][inside[members]]))
 
-    limits = {row: _not_less(limit) for row, limit in rows.items()}
+    limits = {row: not_less(limit) for row, limit in rows.items()}
     return Places(
         alongside=[limits[row] for row in range(places.ALONGSIDE, places.ONE_GRAZING)],
         one_grazing=[limits[row] for row in range(places.ONE_GRAZING, places.BOTH_GRAZING)],
@@ -328,7 +357,7 @@ def _in_places(error: Floats, pairs: places.Pairs, inside: NDArray[np.bool_]) ->
     )
 
 
-def _limit(error: Floats) -> Floats:
+def limit_of(error: Floats) -> Floats:
     """Return the limit that `_WITHIN` of all errors are within, with `_CONFIDENCE`, of a sample (N, columns)."""
     if len(error) == 0:
         return np.zeros(error.shape[1])
@@ -404,7 +433,7 @@ def _looked_up(
     return values
 
 
-def _not_less(values: Floats) -> list[float]:
+def not_less(values: Floats) -> list[float]:
     """Return numbers to three digits, rounded up: errors that are all alike would exceed a smaller limit."""
     return [float(f"{1.00501 * value:.3g}") for value in values.tolist()]
 

@@ -25,6 +25,7 @@ from brdfdb.tables.grids import Grid, check_wavelengths
 TABLE_VERSION = 6  # of the variables, dimensions and attributes of a table
 
 _METHODS = ("linear", "cubic")
+LINEAR = "linear"
 
 _BLOCK_VALUES = 1 << 20  # values of a block, 4 MB
 
@@ -44,6 +45,9 @@ class Interpolation:
     power : float
         f_r is tabulated times (cos theta_i cos theta_r) to this power, in {0, 1/2, 1}: without the pole that a source
         may have at the horizon.
+    wavelengths : str
+        Between wavelengths, "cubic": Catmull-Rom of the numbers of the table; or "linear": straight lines of f_r, as
+        parameters are joined that a recipe gives at a few wavelengths.
     """
 
     __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(extra="forbid")  # where attributes of tables are read
@@ -52,12 +56,14 @@ class Interpolation:
     logarithm: bool = False
     offset: float = 0.0
     power: float = 0.0
+    wavelengths: str = "cubic"
 
     def __post_init__(self) -> None:
-        if self.method not in _METHODS:
-            raise ParameterError(
-                "interpolation", f"{self.method!r} is not one of {', '.join(_METHODS)}", self.method, tuple(_METHODS)
-            )
+        for method in (self.method, self.wavelengths):
+            if method not in _METHODS:
+                raise ParameterError(
+                    "interpolation", f"{method!r} is not one of {', '.join(_METHODS)}", method, tuple(_METHODS)
+                )
         if self.power not in (0.0, 0.5, 1.0):
             raise ParameterError("power", f"{self.power!r} is not 0, 0.5 or 1", self.power, (0.0, 0.5, 1.0))
 
@@ -65,6 +71,11 @@ class Interpolation:
     def cubic(self) -> bool:
         """True if four nodes of an axis count, not two."""
         return self.method == "cubic"
+
+    @property
+    def straight(self) -> bool:
+        """True if f_r itself is joined between wavelengths, by straight lines; else the numbers are, by cubics."""
+        return self.wavelengths == LINEAR
 
     @property
     def plain(self) -> bool:
@@ -83,6 +94,11 @@ class Interpolation:
 
 
 PLAIN = Interpolation()
+
+
+def over_wavelengths(source: Source) -> str:
+    """Return the interpolation of a source between wavelengths: "linear" if a parameter is a spectrum, else "cubic"."""
+    return LINEAR if isinstance(source, Material) and source.spectra else "cubic"
 
 
 @dataclass(frozen=True, eq=False)

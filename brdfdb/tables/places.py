@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brdfdb.geometry import Directions, degrees, radians, unit_vector
+from brdfdb.geometry import Directions, checked_vectors, degrees, radians, unit_vector
 from brdfdb.parameters import Floats
 
 BANDS_DEG = np.linspace(0.0, 90.0, 10)  # of theta_i
@@ -62,6 +62,12 @@ def rows_of(directions: Directions) -> NDArray[np.int64]:
     grazing = np.where(higher >= RINGS_DEG[0], BOTH_GRAZING, ONE_GRAZING) + ring
     rows = (band, np.where(alongside, ALONGSIDE + band, band), np.where(lower >= RINGS_DEG[0], grazing, band))
     return np.stack(np.broadcast_arrays(*rows))
+
+
+def anywhere(wi: Floats, wr: Floats) -> NDArray[np.bool_]:
+    """Return which pairs of unit vectors (N, 3) are in a place of its own; elsewhere the band alone counts."""
+    rows = rows_of(checked_vectors(wi, wr))
+    return np.any(rows[1:] != rows[:1], axis=0)
 
 
 @functools.lru_cache(maxsize=4)

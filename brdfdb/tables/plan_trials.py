@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from brdfdb.materials import Source
 from brdfdb.parameters import Floats
-from brdfdb.tables import error_measurement, tabulation
+from brdfdb.tables import error_measurement, places, tabulation
 from brdfdb.tables.layout import Layout
 from brdfdb.tables.mixture import Mixture
 from brdfdb.tables.table import Table
@@ -20,50 +20,97 @@ MARGIN = 0.88  # of the tolerance: other directions than the planner's find othe
 SEED = 1994
 _DRAWS = 2000  # directions of a band of theta_i, for the finished table
 _OF_A_BAND = 30.0  # times the tolerance is what the 99th percentile of a band of theta_i may be
+_NEAR_THE_LIGHT = 200  # pairs of each sample near the light
 _SOME = 8  # one of so many directions is measured first
 _BITS = range(9, 24)
 _WORTH_ROUNDING = 4096  # values: of smaller tables nothing is rounded
 
 
+class HotSpot(NamedTuple):
+    """Pairs near the light, f_r [1/sr] there, and the tolerance over that near the light."""
+
+    pairs: places.Pairs
+    truth: Floats
+    scale: float
+
+
 class Sample(NamedTuple):
-    """Pairs of directions above the horizon, f_r [1/sr] there, shape (N, L), and the floor of relative errors, (L,)."""
+    """Pairs of directions above the horizon, f_r [1/sr] there, shape (N, L), and the floor of relative errors, (L,).
+
+    `hot_spot` has pairs near the light if their error has a tolerance of its own.
+    """
 
     drawn: error_measurement.Draw
     truth: Floats
     floor: Floats
+    hot_spot: HotSpot | None = None
 
     def at(self, wavelengths: NDArray[np.bool_]) -> Sample:
         """Return the sample at some of its wavelengths."""
-        return self._replace(truth=self.truth[:, wavelengths], floor=self.floor[wavelengths])
+        spot = self.hot_spot and self.hot_spot._replace(truth=self.hot_spot.truth[:, wavelengths])
+        return self._replace(truth=self.truth[:, wavelengths], floor=self.floor[wavelengths], hot_spot=spot)
+
+    @property
+    def for_lines(self) -> error_measurement.Draw:
+        """The pairs that lines are drawn through: those near the light, too, if their error has a tolerance."""
+        if self.hot_spot is None:
+            return self.drawn
+        pairs = self.hot_spot.pairs
+        wi, wr = np.concatenate([self.drawn.wi, pairs.wi]), np.concatenate([self.drawn.wr, pairs.wr])
+        order = np.random.default_rng(SEED).permutation(len(wi))
+        ones, none = np.ones(len(wi)), np.zeros(len(wi), dtype=bool)
+        return error_measurement.Draw(wi[order], wr[order], np.zeros(len(wi), np.int64), ones, none, ~none)
 
 
-def sample_of(source: Source, wavelength_nm: NDArray[np.float64] | None, count: int, seed: int) -> Sample:
-    """Draw a sample of a source at wavelengths [nm], of `count` pairs a band, and leave out those below the horizon."""
+def sample_of(
+    source: Source, wavelength_nm: NDArray[np.float64] | None, count: int, seed: int, hot_spot: float | None = None
+) -> Sample:
+    """Draw a sample of a source at wavelengths [nm], of `count` pairs a band, and leave out those below the horizon.
+
+    `hot_spot` is the tolerance over that near the light; None: there is none near the light.
+    """
     drawn = error_measurement.draw(source, wavelength_nm, count, seed).above_the_horizon()
     truth = error_measurement.model_values(source, wavelength_nm, drawn.wi, drawn.wr)
-    return Sample(drawn, truth, error_measurement.floor_of(truth, drawn))
+    sample = Sample(drawn, truth, error_measurement.floor_of(truth, drawn))
+    if hot_spot is None:
+        return sample
+    pairs = places.draw(_NEAR_THE_LIGHT, seed)
+    pairs = pairs.some(pairs.row < places.ONE_GRAZING)
+    there = error_measurement.model_values(source, wavelength_nm, pairs.wi, pairs.wr)
+    return sample._replace(hot_spot=HotSpot(pairs, there, hot_spot))
 
 
 def error_of(layout: Layout, values: NDArray[np.float32], sample: Sample) -> float:
     """Return the largest of the errors that are held to the tolerance.
 
     They are the 99th percentile of the relative error at the worst wavelength, the l1 error, as a few values that are
-    off by orders of magnitude next to a pole escape any percentile, and the 99th percentile of each band of theta_i
-    over `_OF_A_BAND`: grazing light is a ninth of the directions.
+    off by orders of magnitude next to a pole escape any percentile, `hot_spot_error`, and the 99th percentile of each
+    band of theta_i over `_OF_A_BAND`: grazing light is a ninth of the directions.
     """
     error, l1 = _errors(layout, values, sample)
     counts = sample.drawn.above
     counted, band = np.ascontiguousarray(error[counts].T), sample.drawn.band[counts]
-    worst = max(np.percentile(counted, 99, axis=1).max(), l1.max())
+    worst = max(np.percentile(counted, 99, axis=1).max(), l1.max(), hot_spot_error(layout, values, sample))
     if counted.max() > _OF_A_BAND * worst:  # else no band can be worse
         for row in np.unique(band):
             worst = max(worst, np.percentile(counted[:, band == row], 99, axis=1).max() / _OF_A_BAND)
     return float(worst)
 
 
+def hot_spot_error(layout: Layout, values: NDArray[np.float32], sample: Sample) -> float:
+    """Return the limit of the error near the light, in its worst band, in units of the tolerance; 0 without one."""
+    if sample.hot_spot is None:
+        return 0.0
+    pairs, truth, scale = sample.hot_spot
+    looked_up = Table.of(layout, values).lookup_vectors(pairs.wi, pairs.wr).reshape(truth.shape)
+    error = error_measurement.relative(truth, looked_up, sample.floor).max(axis=1)
+    of_samples = error.reshape(pairs.sample[-1] + 1, -1)
+    return scale * float(error_measurement.limit_of(of_samples.T).max())
+
+
 def _errors(layout: Layout, values: NDArray[np.float32], sample: Sample) -> tuple[Floats, Floats]:
     """Return the relative errors of a table, of the shape of the truth, and its l1 errors, of shape (L,)."""
-    drawn, truth, floor = sample
+    drawn, truth, floor, _ = sample
     looked_up = Table.of(layout, values).lookup_vectors(drawn.wi, drawn.wr).reshape(truth.shape)
     error = error_measurement.relative(looked_up, truth, floor)
     return error, error_measurement.mean_error(looked_up, truth, drawn.weight)
@@ -74,7 +121,7 @@ def keeps(layout: Layout, values: NDArray[np.float32], sample: Sample, goal: flo
 
     Errors are counted where `error_of` sorts them, in a tenth of the time.
     """
-    drawn, truth, floor = sample
+    drawn, truth, floor, _ = sample
     few = slice(None, None, _SOME)
     looked_up = Table.of(layout, values).lookup_vectors(drawn.wi[few], drawn.wr[few]).reshape(truth[few].shape)
     error = error_measurement.relative(looked_up, truth[few], floor)
@@ -84,7 +131,7 @@ def keeps(layout: Layout, values: NDArray[np.float32], sample: Sample, goal: flo
         return False
     error, l1 = _errors(layout, values, sample)
     counted = error[drawn.above]
-    if not (l1.max() <= goal and _within(counted, goal)):
+    if not (l1.max() <= goal and _within(counted, goal) and hot_spot_error(layout, values, sample) <= goal):
         return False
     band, limit = drawn.band[drawn.above], _OF_A_BAND * goal
     return counted.max() <= limit or all(_within(counted[band == row], limit) for row in np.unique(band))
@@ -105,9 +152,9 @@ def values_of(layout: Layout) -> NDArray[np.float32]:
     return np.concatenate([tabulation.block(layout, rows) for rows in layout.blocks])
 
 
-def final_of(source: Source, wavelength_nm: NDArray[np.float64] | None) -> Sample:
+def final_of(source: Source, wavelength_nm: NDArray[np.float64] | None, hot_spot: float | None = None) -> Sample:
     """Return the sample that finished tables of a source are measured at, at all wavelengths [nm]."""
-    return sample_of(source, wavelength_nm, _DRAWS, SEED + 1)
+    return sample_of(source, wavelength_nm, _DRAWS, SEED + 1, hot_spot)
 
 
 def finished(

@@ -23,7 +23,7 @@ from brdfdb.tables.grids import (
     ISOTROPIC_AXES,
     Grid,
 )
-from brdfdb.tables.layout import Interpolation, Layout
+from brdfdb.tables.layout import Interpolation, Layout, over_wavelengths
 from brdfdb.tables.mixture import Mixture, mixture_of
 from brdfdb.tables.plan_trials import MARGIN, SEED, Sample
 from brdfdb.tables.tabulation import POLE_END_DEG
@@ -31,7 +31,7 @@ from brdfdb.tables.tabulation import POLE_END_DEG
 if TYPE_CHECKING:
     from brdfdb.tables.table import Table
 
-PLAN_VERSION = 2
+PLAN_VERSION = 3
 
 MOST_VALUES = 10_000_000  # of a table: a tolerance that takes more is refused
 _TRIED = 2  # ways to interpolate on each kind of grid that keep to the tolerance, of those that promise to be smallest
@@ -63,14 +63,19 @@ class _Task(NamedTuple):
     mixture: Mixture | None
 
 
-def check_tolerance(tolerance: float) -> None:
+def check_tolerance(tolerance: float, name: str = "tolerance") -> None:
     """Raise a ParameterError if no table is planned for a tolerance."""
     if not 1e-4 <= tolerance <= 0.5:
-        raise ParameterError("tolerance", f"{tolerance:g} is outside [0.0001, 0.5]", tolerance, (1e-4, 0.5))
+        raise ParameterError(name, f"{tolerance:g} is outside [0.0001, 0.5]", tolerance, (1e-4, 0.5))
 
 
 def plan(
-    source: Source, wavelength_nm: NDArray[np.float64] | None, tolerance: float, *, alike: Source | None = None
+    source: Source,
+    wavelength_nm: NDArray[np.float64] | None,
+    tolerance: float,
+    *,
+    alike: Source | None = None,
+    hot_spot_tolerance: float | None = None,
 ) -> Layout:
     """Return the layout of the smallest table that keeps to a tolerance.
 
@@ -87,6 +92,9 @@ def plan(
     alike : Source, optional
         A source that is about as smooth and faster to evaluate, such as a fit of an integral. Its axes are tried, and
         the finished table is measured against `source`.
+    hot_spot_tolerance : float, optional
+        Largest error near the light, in [1e-4, 0.5]: theta_r within 10 degrees of theta_i and delta_phi within 90, as
+        `brdfdb.tables.stated_error.Places` states it. By default there is no limit.
 
     Returns
     -------
@@ -105,20 +113,29 @@ def plan(
     interpolation, leave of an error; the numbers of nodes are those that leave the same error on each axis. The kinds
     that promise the fewest values are tabulated, measured, and made coarser or finer until they keep to the tolerance.
     """
-    return planned(source, wavelength_nm, tolerance, alike=alike)[0]
+    return planned(source, wavelength_nm, tolerance, alike=alike, hot_spot_tolerance=hot_spot_tolerance)[0]
 
 
 def planned(
-    source: Source, wavelength_nm: NDArray[np.float64] | None, tolerance: float, *, alike: Source | None = None
+    source: Source,
+    wavelength_nm: NDArray[np.float64] | None,
+    tolerance: float,
+    *,
+    alike: Source | None = None,
+    hot_spot_tolerance: float | None = None,
 ) -> tuple[Layout, NDArray[np.float32] | None]:
     """Return the layout that `plan` describes, and the values of its table, which the plan was measured with.
 
     The values are those of `tabulation.block`; None where nothing was tabulated.
     """
     check_tolerance(tolerance)
+    hot_spot = None
+    if hot_spot_tolerance is not None:
+        check_tolerance(hot_spot_tolerance, "hot_spot_tolerance")
+        hot_spot = tolerance / hot_spot_tolerance
     mixture = mixture_of(source, wavelength_nm)
     planned_on = source if alike is None else alike
-    task = _task(planned_on, wavelength_nm, tolerance, mixture)
+    task = _task(planned_on, wavelength_nm, tolerance, mixture, hot_spot)
     if not task.sample.truth.any():
         reason = "f_r is 0: all light is in the specular part"
         return Layout(source, coarsest(source), wavelength_nm, reason=reason), None
@@ -132,7 +149,7 @@ def planned(
                 if layout is None:
                     break
                 failed[_kind(layout)] += 1
-                final = final or plan_trials.final_of(source, wavelength_nm)
+                final = final or plan_trials.final_of(source, wavelength_nm, hot_spot)
                 layout = replace(layout, source=source)
                 finished = plan_trials.finished(layout, final, wavelength_nm, tolerance, mixture)
                 if finished is not None:
@@ -143,6 +160,13 @@ def planned(
             # the kind that failed most often hid the others, which may keep to the tolerance with more nodes
             ((hiding, _),) = failed.most_common(1)
             left = [kind for kind in left if _kind(kind[1]) != hiding]
+    if hot_spot_tolerance is not None:
+        raise ParameterError(
+            "hot_spot_tolerance",
+            f"{hot_spot_tolerance:g} near the light, with {tolerance:g} elsewhere, takes more than {MOST_VALUES} "
+            f"values of {source.name}; ask for a larger one",
+            hot_spot_tolerance,
+        )
     hint = "" if isinstance(source, Material) else ", or say grazing_pole if f_r has a pole or a root at the horizon"
     raise ParameterError(
         "tolerance",
@@ -206,7 +230,11 @@ def _kind(layout: Layout | Table) -> str:
 
 
 def _task(
-    source: Source, wavelength_nm: NDArray[np.float64] | None, tolerance: float, mixture: Mixture | None
+    source: Source,
+    wavelength_nm: NDArray[np.float64] | None,
+    tolerance: float,
+    mixture: Mixture | None,
+    hot_spot: float | None = None,
 ) -> _Task:
     some = wavelength_nm
     if wavelength_nm is not None and wavelength_nm.size > _WAVELENGTHS:
@@ -215,7 +243,7 @@ def _task(
             chosen = np.union1d(chosen, mixture.extremes)
             mixture = mixture._replace(spectra=mixture.spectra[:, chosen])
         some = wavelength_nm[chosen]
-    return _Task(source, some, plan_trials.sample_of(source, some, _DRAWS, SEED), tolerance, mixture)
+    return _Task(source, some, plan_trials.sample_of(source, some, _DRAWS, SEED, hot_spot), tolerance, mixture)
 
 
 def offset_of(source: Source, wavelength_nm: NDArray[np.float64] | None) -> float:
@@ -264,7 +292,8 @@ def _table_kinds(task: _Task, hopeless: float = _HOPELESS) -> Iterator[_TableKin
     if source.anisotropic:
         kinds = [ANISOTROPIC_HALF_DIFFERENCE_AXES] if source.elliptical else [ANISOTROPIC_AXES]
     else:
-        kinds = [ISOTROPIC_AXES, HALF_DIFFERENCE_AXES] if source.has_lobe else [ISOTROPIC_AXES]
+        of_halves = source.has_lobe or task.sample.hot_spot is not None
+        kinds = [ISOTROPIC_AXES, HALF_DIFFERENCE_AXES] if of_halves else [ISOTROPIC_AXES]
         if source.grazing_pole:  # over light and viewer it takes many nodes: where a lobe takes few, it is soon dropped
             kinds = kinds[::-1]
     fewest = float(MOST_VALUES)
@@ -275,7 +304,7 @@ def _table_kinds(task: _Task, hopeless: float = _HOPELESS) -> Iterator[_TableKin
             # what goes on beyond the horizon may fall below 0, which a logarithm does not
             for logarithm in (True,) if "theta_h" in names else (True, False):
                 grid = _grid(source, names, pole=source.grazing_pole and power == 0.0)
-                how = Interpolation("linear", logarithm, offset if logarithm else 0.0, power)
+                how = Interpolation("linear", logarithm, offset if logarithm else 0.0, power, over_wavelengths(source))
                 layout = Layout(source, grid, task.wavelength_nm, how)
                 if task.mixture is not None:
                     layout = replace(layout, spectra=task.mixture.spectra, part_nm=task.mixture.part_nm)
@@ -291,7 +320,7 @@ def _table_kinds(task: _Task, hopeless: float = _HOPELESS) -> Iterator[_TableKin
                             if name not in lines:
                                 same = name, power == 0.0, layout.plain
                                 if same not in known:
-                                    known[same] = axis_needs.lines(layout, axis, task.sample.drawn)
+                                    known[same] = axis_needs.lines(layout, axis, task.sample.for_lines)
                                 lines[name] = axis_needs.numbers_along(layout, known[same], floor)
                             needs[name] = Need(chosen, axis, *lines[name])
                         size *= needs[name].count(task.tolerance)

@@ -70,9 +70,14 @@ class Between(BaseModel):
         description="where each interval was measured: where interpolation of the model itself is worst, of nine or "
         "more places in it"
     )
-    bands: Numbers = Field(description="[band][interval]; one row, of the worst band, of a mixture")
+    bands: Numbers = Field(
+        description="[band][interval], outside of the places; one row, of the worst band, of a mixture"
+    )
     places: Places | None = Field(
-        default=None, description="[band or ring][interval]; none of a family; one row of each kind of a mixture"
+        default=None, description="[band or ring][interval]; one row of each kind of a mixture"
+    )
+    overall: list[float] | None = Field(
+        default=None, description="[interval], of all bands together; none of a table of before version 6"
     )
 
     def of_worst_row(self) -> Between:
@@ -124,7 +129,7 @@ class Error(BaseModel):
     worst: WorstPair | None = Field(
         default=None, description="where the largest was met; none of a family, and of a table of before version 4"
     )
-    places: Places | None = Field(default=None, description="none of a family, and of a table of before version 3")
+    places: Places | None = Field(default=None, description="none of a table of before version 3")
     between: Between | None = Field(default=None, description="none without two wavelengths, and before version 3")
 
     @functools.cached_property
@@ -159,6 +164,16 @@ class Error(BaseModel):
             update["between"] = self.between.of_worst_row()
         return self.model_copy(update=update)
 
+    def of_all_bands(self, column: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Return the limit of 98 of 100 values over all bands, relative to a value of the table, shape (M,).
+
+        `column` has those of `limits`. Where none was measured of all bands, it is the limit of the worst band.
+        """
+        p99 = self.overall.p99 / (1.0 - min(self.overall.p99, 0.5))
+        known = None if self.between is None else self.between.overall
+        between = self.limits[: places.BANDS, len(self.floor) :].max(axis=0) if known is None else np.array(known)
+        return np.concatenate([np.full(len(self.floor), p99), np.maximum(between, p99)])[column]
+
     @functools.cached_property
     def floors(self) -> NDArray[np.float64]:
         """The floor [1/sr] of each column of `limits`."""
@@ -190,19 +205,19 @@ def _rows(bands: Numbers | NDArray[np.float64], some: Places | None) -> NDArray[
     return np.concatenate([bands, some.alongside, some.one_grazing, some.both_grazing])
 
 
-def stated(error: Error, directions: Directions, brdf: Floats, column: NDArray[np.int64]) -> Floats:
-    """Return the error [1/sr] that a table states for values of f_r.
+def stated(limits: Floats, floor: Floats, directions: Directions, brdf: Floats) -> Floats:
+    """Return the error [1/sr] that a table, a family or a file states for values of f_r.
 
     Parameters
     ----------
-    error : Error
-        Of the table.
+    limits : array (rows, M)
+        Limits of relative errors by row of `places`, for each wavelength, such as columns of `Error.limits`.
+    floor : array (M,) [1/sr]
+        Their floors.
     directions : Angles or Vectors
         Checked directions, which broadcast to the shape of `brdf` without its last axis.
     brdf : array (..., M) [1/sr]
         Values that were looked up.
-    column : int array (M,)
-        The column of `Error.limits` for each wavelength.
 
     Returns
     -------
@@ -210,7 +225,6 @@ def stated(error: Error, directions: Directions, brdf: Floats, column: NDArray[n
         The largest of what is stated for the band of theta_i and for the places that a pair is in; nan where a value is
         nan, or nothing is stated. 0 below the horizon, where f_r is exactly 0.
     """
-    limits, floor = error.limits[:, column], error.floors[column]
     relative = functools.reduce(np.maximum, (limits[row] for row in places.rows_of(directions)))
     errors = relative * np.maximum(brdf, floor) + 0.0 * brdf
     return np.where(directions.below[..., np.newaxis], 0.0 * brdf, errors)

@@ -136,6 +136,11 @@ class Table(BaseTable):
         """True if the table has an axis for the azimuth of the surface."""
         return self.grid.anisotropic
 
+    @property
+    def straight(self) -> bool:
+        """True if f_r is joined by straight lines between the wavelengths of the table."""
+        return self.interpolation.straight
+
     @functools.cached_property
     def brdf(self) -> NDArray[np.float32]:
         """f_r [1/sr] at the nodes: over the angular axes and, last, the wavelengths; 0 below the horizon."""
@@ -280,6 +285,7 @@ class Table(BaseTable):
             float(how.power),
             overshoots,
             self.part_nm is not None,
+            how.straight,
         )
         axes = prepared([radians(nodes) for nodes in grid.axes.values()], grid.ends, cubic=how.cubic)
         channels = self.values.size // int(np.prod(grid.shape))
@@ -400,7 +406,7 @@ def _flat(array: NDArray[Any], shape: tuple[int, ...], dtype: DTypeLike) -> NDAr
 def points(grid: Grid, wi: Floats, wr: Floats) -> NDArray[np.float64]:
     """Return the coordinates [rad] on a grid, of shape (axes, N), of unit vectors of shape (N, 3)."""
     x, mu, scratch = np.empty((len(grid.axes), len(wi))), np.empty(len(wi)), np.empty((6, len(wi)))
-    rule = _coordinates.Rule(grid.half_difference, grid.reciprocal, grid.copies, False, 0.0, 0.0, False, False)
+    rule = _coordinates.Rule(grid.half_difference, grid.reciprocal, grid.copies, False, 0.0, 0.0, False, False, False)
     flat = [_flat(w, np.shape(w), np.float64) for w in (wi, wr)]
     _coordinates.points_of_vectors(rule, flat[0], flat[1], len(wi), x, mu, scratch)
     return x

@@ -79,7 +79,8 @@ class BaseTable(Lookups):
     """A table of one revision of a material, in memory or behind a service: lookups, metadata and stated error.
 
     Beyond the last theta node of its grid f_r is that of the node. Between the wavelengths of the table the numbers
-    that are stored are interpolated, cubic (Catmull-Rom) in nanometres.
+    that are stored are interpolated, cubic (Catmull-Rom) in nanometres; or f_r itself, by straight lines, if the
+    parameters are spectra.
     """
 
     name: str
@@ -279,6 +280,11 @@ class BaseTable(Lookups):
             return None
 
     @property
+    def straight(self) -> bool:
+        """True if f_r is joined by straight lines between the wavelengths of the table."""
+        return self.metadata.interpolation.straight
+
+    @property
     def error(self) -> Error | None:
         """The error that the table states; None if none was measured."""
         return self.metadata.error
@@ -329,7 +335,7 @@ class BaseTable(Lookups):
                 f"{self.wavelength_nm[below]:g} and {self.wavelength_nm[below + 1]:g} nm; build it anew",
             )
         values = brdf if at.tail else np.asarray(brdf)[..., np.newaxis]
-        errors = stated(error, directions, values, at.column)
+        errors = stated(error.limits[:, at.column], error.floors[at.column], directions, values)
         measured = self.metadata.known_measured()
         if measured is not None and measured.uncertainty is not None:
             errors = errors + measured.uncertainty * np.maximum(values, error.floors[at.column])
@@ -337,10 +343,14 @@ class BaseTable(Lookups):
             errors = np.where(self._extrapolated(directions)[..., np.newaxis], np.nan, errors)
         return np.asarray(errors if at.tail else errors[..., 0])[()]
 
+    def columns_of(self, wavelength_nm: ArrayLike | None) -> NDArray[np.int64]:
+        """Return the columns of `Error.limits` for wavelengths [nm], by default those of the table."""
+        return self._wavelengths(wavelength_nm).column
+
     @functools.cached_property
     def _all_wavelengths(self) -> Located:
         stored = np.zeros(1) if self.wavelength_nm is None else self.wavelength_nm
-        return _on_axis(stored, stored, () if self.wavelength_nm is None else (stored.size,))
+        return self._on_axis(stored, stored, () if self.wavelength_nm is None else (stored.size,))
 
     @functools.cached_property
     def _known_wavelengths(self) -> dict[float, Located]:
@@ -368,17 +378,16 @@ class BaseTable(Lookups):
             raise ParameterError("wavelength_nm", f"{wanted.ndim} axes; allowed are a number and a list of numbers")
         flat = wanted.reshape(-1)
         if stored is None:
-            return _on_axis(np.zeros(1), np.zeros(flat.size), wanted.shape)
+            return self._on_axis(np.zeros(1), np.zeros(flat.size), wanted.shape)
         outside = (flat < stored[0]) | (flat > stored[-1])
         if np.any(outside):
             wrong, low, high = float(flat[outside][0]), float(stored[0]), float(stored[-1])
             range_nm = f"outside [{low:g}, {high:g}] nm of" if low < high else f"not {low:g} nm, the one wavelength of"
             raise ParameterError("wavelength_nm", f"{wrong:.9g} is {range_nm} {self.name}", wrong, (low, high))
-        return _on_axis(stored, flat, wanted.shape)
+        return self._on_axis(stored, flat, wanted.shape)
 
-
-def _on_axis(stored: NDArray[np.float64], wanted: NDArray[np.float64], tail: tuple[int, ...]) -> Located:
-    """Locate wavelengths [nm] among those of a table."""
-    below = np.searchsorted(stored, wanted, side="right") - 1
-    column = np.where(stored[below] == wanted, below, stored.size + below)
-    return Located(*weights_of_nodes(stored, wanted), column, tail)
+    def _on_axis(self, stored: NDArray[np.float64], wanted: NDArray[np.float64], tail: tuple[int, ...]) -> Located:
+        """Locate wavelengths [nm] among those of the table."""
+        below = np.searchsorted(stored, wanted, side="right") - 1
+        column = np.where(stored[below] == wanted, below, stored.size + below)
+        return Located(*weights_of_nodes(stored, wanted, cubic=not self.straight), column, tail)

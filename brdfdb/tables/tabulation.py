@@ -312,7 +312,8 @@ def _coordinate(name: str, nodes: Axis) -> Variable:
 
 def _reconstruction(layout: Layout) -> str:
     """Return the formula for f_r from the arrays of a table, in one line."""
-    spectrum = "" if layout.wavelength_nm is None else "; over wavelengths cubic"
+    over = "brdf is linear" if layout.interpolation.straight else "cubic"
+    spectrum = "" if layout.wavelength_nm is None else f"; over wavelengths {over}"
     if layout.plain:
         return f"brdf is f_r; between nodes {layout.interpolation.method}{spectrum}"
     how = layout.interpolation

@@ -128,6 +128,15 @@ def _report(exports: list[_Export], directory: Path, file_format: str) -> bool:
     if stated:
         worst, file = max(stated)
         print(f"error against the table: 99 of 100 values within {_share(worst)} ({file}), each file states its own")
+    known = [(files.error.statement, files.paths[0].name) for _, files in written if files.error is not None]
+    if statements := [(statement, name) for statement, name in known if statement is not None]:
+        whole, file = max(statements, key=lambda item: item[0].p98)
+        rows = whole.places
+        light, horizon = max(rows.alongside), max(rows.one_grazing + rows.both_grazing)
+        print(
+            f"error against {whole.against}, with that of the table: 98 of 100 values within {_share(whole.p98)} "
+            f"({file}), near the light {_share(light)}, next to the horizon {_share(horizon)}"
+        )
     beyond = [files for _, files in written if not files.within]
     for files in beyond:
         assert files.error is not None

@@ -28,10 +28,11 @@ from brdfdb.models import MODELS
 from brdfdb.store.family import Sweep
 from brdfdb.store.paths import NAME
 from brdfdb.tables.grids import Axis, Grid, check_wavelengths
-from brdfdb.tables.layout import TABLE_VERSION, Interpolation, Layout, digest
+from brdfdb.tables.layout import TABLE_VERSION, Interpolation, Layout, digest, over_wavelengths
 from brdfdb.tables.planner import PLAN_VERSION, coarsest, offset_of, planned
 from brdfdb.tables.polarisation import GRID_TOLERANCE, planned_theta_d
 from brdfdb.tables.polarisation_record import POLARISATION_VERSION
+from brdfdb.tables.wavelengths import refined
 from brdfdb_pipelines import preset_names, toml_file
 from brdfdb_pipelines.measured_job import MeasuredJob, measured_job
 from brdfdb_pipelines.recipe_grids import LIST, STRICT, Grids, Nodes, Range, RecipeError, nodes_of
@@ -57,6 +58,7 @@ class Job:
     planned_on: Material | None = None
     family: Mapping[str, Any] | None = None
     polarised: bool = False
+    hot_spot_tolerance: float | None = None
 
     def layout(self) -> Layout:
         """Return the layout of the table; to a tolerance, this takes the planner a second or more."""
@@ -67,19 +69,28 @@ class Job:
         layout, values = self._unpolarised()
         if not self.polarised:
             return layout, values
-        assert self.wavelength_nm is not None  # of all models with Mueller matrices
+        assert layout.wavelength_nm is not None  # of all models with Mueller matrices
         within = GRID_TOLERANCE if self.tolerance is None else self.tolerance
-        nodes = planned_theta_d(self.material, self.wavelength_nm, within)
+        nodes = planned_theta_d(self.material, layout.wavelength_nm, within)
         return replace(layout, facet_theta_d_deg=nodes), values
 
     def _unpolarised(self) -> tuple[Layout, NDArray[np.float32] | None]:
         if self.grid is not None:
             method, logarithm = self.interpolation.removeprefix("log-"), self.interpolation.startswith("log-")
             offset = offset_of(self.material, self.wavelength_nm) if logarithm else 0.0
-            how = Interpolation(method, logarithm, offset)
+            how = Interpolation(method, logarithm, offset, wavelengths=over_wavelengths(self.material))
             return Layout(self.material, self.grid, self.wavelength_nm, interpolation=how), None
         assert self.tolerance is not None
-        return planned(self.material, self.wavelength_nm, self.tolerance, alike=self.planned_on)
+        given = self.wavelength_nm
+        # the members of a family share their wavelengths
+        more = given if self.family is not None else refined(self.material, given, self.tolerance)
+        keywords = {"alike": self.planned_on, "hot_spot_tolerance": self.hot_spot_tolerance}
+        try:
+            return planned(self.material, more, self.tolerance, **keywords)
+        except ParameterError:
+            if more is given or more is None or given is None or more.size == given.size:
+                raise
+        return planned(self.material, given, self.tolerance, **keywords)
 
     def check(self) -> None:
         """Raise the ParameterError that `layout` would raise for what does not suit the material."""
@@ -107,10 +118,12 @@ class Job:
         member = {} if self.family is None else {"family": dict(self.family)}
         alike = {} if self.planned_on is None else {"planned_on": self.planned_on.document()}
         polarised = {"polarised": POLARISATION_VERSION} if self.polarised else {}
+        hot_spot = {} if self.hot_spot_tolerance is None else {"hot_spot_tolerance": self.hot_spot_tolerance}
         return {
             **member,
             **alike,
             **polarised,
+            **hot_spot,
             "table_version": TABLE_VERSION,
             **self.material.document(),
             "wavelength_nm": None if self.wavelength_nm is None else self.wavelength_nm.tolist(),
@@ -136,6 +149,13 @@ class Recipe(BaseModel):
     wavelengths_nm: Nodes = Field(default=[], description="of spectral materials that state none themselves")
     tolerance: float | None = Field(
         default=None, ge=1e-4, le=0.5, description="99th percentile of the relative error, instead of grids"
+    )
+    hot_spot_tolerance: float | None = Field(
+        default=None,
+        ge=1e-4,
+        le=0.5,
+        description="largest error of 98 of 100 values near the light: theta_r within 10 degrees of theta_i, delta_phi "
+        "within 90; goes with tolerance",
     )
     grids: Grids | None = None
     interpolation: Literal["linear", "cubic", "log-linear", "log-cubic"] | None = Field(
@@ -183,6 +203,8 @@ class Recipe(BaseModel):
             raise RecipeError("tolerance, grids", "give one of the two")
         if self.interpolation is not None and self.grids is None:
             raise RecipeError("interpolation", "goes with grids; to a tolerance, the planner chooses")
+        if self.hot_spot_tolerance is not None and self.tolerance is None:
+            raise RecipeError("hot_spot_tolerance", "goes with tolerance; on grids, an error is only stated")
         given = {} if self.grids is None else {name: grid for name, grid in self.grids if grid is not None}
         grids = {name: self._grid(grid, name) for name, grid in given.items()}
         wavelengths = self._wavelengths()
@@ -190,6 +212,8 @@ class Recipe(BaseModel):
         selected = self._selected()
         if self.polarised and self._measured:
             raise RecipeError("polarised", f"{self._measured[0].name} is measured, and f_r alone is known of it")
+        if self.hot_spot_tolerance is not None and self._measured:
+            raise RecipeError("hot_spot_tolerance", f"{self._measured[0].name} is measured; it is for models")
         for named, family in selected:
             material = exact_material(named) if self.forms == "exact" and family is None else named
             wavelength_nm = None
@@ -207,6 +231,7 @@ class Recipe(BaseModel):
                 planned_on=None if material is named or self.tolerance is None else named,
                 family=family,
                 polarised=self.polarised,
+                hot_spot_tolerance=self.hot_spot_tolerance,
             )
             try:
                 job.check()

@@ -19,6 +19,7 @@ from tests.mitsuba.surfaces import directions, interaction, variant
 from tests.store.a_store import lambert
 from tests.tables.made_up import WAVELENGTHS, made_up
 from tests.tables.test_mixture import NM, PAINTED
+from tests.tables.test_wavelengths import TABLES as STRAIGHT
 
 PAIRS = 20_000
 # Of f_r and of densities: angles of float32 in tables whose logarithm is steep. The largest measured is 2e-4, and
@@ -44,6 +45,8 @@ TABLES: dict[str, Any] = {
     "linear": lambda: made_up("isotropic", WAVELENGTHS, dirac=True),
     "linear-anisotropic": lambda: made_up("anisotropic"),
     "mixture": painted,
+    "straight": STRAIGHT["logarithms"],
+    "straight-factored": STRAIGHT["factored-logarithms"],
 }
 
 

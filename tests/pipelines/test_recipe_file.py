@@ -300,3 +300,56 @@ def test_the_request_in_a_table_is_that_of_the_recipe(recipe: Path, built: Path)
         written = brdfdb.open(built).metadata(job.material.name).whole_request
         assert written == json.loads(json.dumps(job.request))
         assert Material.model_validate(written["material"]) == job.material
+
+
+# Wavelengths of spectra
+
+MOON = """
+title = "Moon"
+model = "hapke"
+source = "a test"
+[{table}.parameters]
+w = {{ wavelengths_nm = [415, 689], values = [0.21, 0.5] }}
+b = 0.24
+c = 0.6
+b_0 = 1.0
+h = {h}
+theta_bar_deg = 20
+"""
+
+
+def moon(kind: str, h: str, how: str) -> str:
+    return f'materials = ["moon"]\nwavelengths_nm = [415, 689]\n{how}\n[{kind}.moon]' + MOON.format(
+        table=f"{kind}.moon", h=h
+    )
+
+
+def test_a_tolerance_adds_wavelengths_between_those_of_spectra(tmp_path: Path) -> None:
+    (job,) = load(recipe_of(tmp_path, moon("define", "0.07", "tolerance = 0.05"))).jobs()
+    assert job.request["wavelength_nm"] == [415.0, 689.0]
+    layout = job.layout()
+    assert layout.wavelength_nm is not None
+    assert {415.0, 689.0} < set(layout.wavelength_nm.tolist())
+    assert layout.interpolation.wavelengths == "linear"
+
+
+def test_grids_and_families_keep_the_wavelengths_of_the_recipe(tmp_path: Path) -> None:
+    (on_grid,) = load(recipe_of(tmp_path, moon("define", "0.07", isotropic(kind="spectral")))).jobs()
+    members = load(recipe_of(tmp_path, moon("sweep", "[0.07, 0.1]", "tolerance = 0.05"))).jobs()
+    assert len(members) == 2
+    for job in (on_grid, *members):
+        layout = job.layout()
+        assert layout.wavelength_nm is not None
+        assert layout.wavelength_nm.tolist() == [415.0, 689.0]
+        assert layout.interpolation.wavelengths == "linear"
+
+
+def test_a_tolerance_near_the_light_is_part_of_the_request(tmp_path: Path) -> None:
+    text = moon("define", "0.07", "tolerance = 0.05")
+    (plain,) = load(recipe_of(tmp_path, text)).jobs()
+    (spot,) = load(recipe_of(tmp_path, text.replace("0.05", "0.05\nhot_spot_tolerance = 0.1", 1))).jobs()
+    assert "hot_spot_tolerance" not in plain.request
+    assert spot.request == plain.request | {"hot_spot_tolerance": 0.1}
+    on_grid = moon("define", "0.07", "hot_spot_tolerance = 0.1\n" + isotropic(kind="spectral"))
+    with pytest.raises(RecipeError, match="hot_spot_tolerance: goes with tolerance"):
+        load(recipe_of(tmp_path, on_grid))

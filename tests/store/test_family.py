@@ -13,6 +13,7 @@ import pytest
 from brdfdb import models
 from brdfdb.errors import StoreError
 from brdfdb.forms.catalogue import of_family, of_table
+from brdfdb.geometry import unit_vector
 from brdfdb.materials import Material
 from brdfdb.store.family import Family, FamilyRecord, Sweep, blended, read_record, stencil
 from brdfdb.store.family_records import POINTS, measure, parameter_points
@@ -24,6 +25,7 @@ from brdfdb.tables.layout import Interpolation, Layout
 from brdfdb.tables.table import Table, table_from
 from brdfdb.tables.tabulation import tabulate
 
+MADE = {"title": "t", "model": "hapke", "source": "no paper"}
 AGREEMENT = 0.2  # promised, between a stated p99 and one measured afresh; measured: 0.03 at most
 FLOAT32 = 2e-7  # relative, of tables that are float32; measured: 6e-8
 ROUNDING = 2e-12  # of weights that are differences of powers; measured: 3e-13
@@ -70,6 +72,12 @@ FAMILIES: dict[str, dict[str, Any]] = {
         "fixed": {},
         "axes": {"rho": [0.0, 0.5, 1.0]},
         "layout": (ISOTROPIC, None, Interpolation()),
+    },
+    "moon": {
+        "model": "hapke",
+        "fixed": {"b": 0.24, "c": 0.6, "b_0": 1.0, "theta_bar_deg": 20.0},
+        "axes": {"w": [0.15, 0.25, 0.35, 0.45], "h": [0.05, 0.1]},
+        "layout": (ISOTROPIC, None, LOGARITHMS),
     },
 }
 
@@ -345,7 +353,7 @@ def test_a_record_comes_back_and_a_damaged_one_is_named(tmp_path: Path, families
     path.write_bytes(sealed(content))
     assert read_record(path) == record == FamilyRecord.model_validate(content)
     for change, said in (
-        ({"version": 2}, r"is of format brdfdb-family version 2, this program reads brdfdb-family version 1$"),
+        ({"version": 1}, r"is of format brdfdb-family version 1, this program reads brdfdb-family version 2$"),
         ({"points": "many"}, r"is damaged: points: "),
         ({"name": "gold"}, r"is damaged: its record is that of gold$"),
     ):
@@ -367,3 +375,25 @@ def test_a_lookup_is_made_of_the_members_around_and_a_form_of_the_middle_ones(fa
     wi = wr = np.array([[0.0, 0.6, 0.8]])
     np.testing.assert_allclose(form.evaluate(wi, wr), [[0.25 / np.pi]], rtol=FLOAT32)  # between rho of 0 and 0.5
     assert form.bytes == sum(of_table(tables[f"grey-00{number}"], "", "").bytes for number in (1, 2))
+
+
+@pytest.mark.parametrize("away_deg", [0.0, 1.0, 3.0])
+def test_lookups_near_the_light_are_within_what_a_family_states(away_deg: float, families: Families) -> None:
+    """A tenth of a degree decides whether a table sees the hot spot; bands alone would state a sixth of the error."""
+    family, _ = families["moon"]
+    rng = np.random.default_rng(12)
+    theta, phi = rng.uniform(0.0, 1.4, 200), rng.uniform(0.0, 6.0, 200)
+    wi, aside = unit_vector(theta, phi), unit_vector(np.full(200, np.pi / 2), phi + np.pi / 2)
+    away = np.deg2rad(away_deg)
+    wr = np.cos(away) * wi + np.sin(away) * aside
+    within, bands = [], []
+    for _ in range(25):
+        at = {name: float(rng.uniform(nodes[0], nodes[-1])) for name, nodes in family.axes.items()}
+        material = Material.from_table("moon", {**MADE, "parameters": {**FAMILIES["moon"]["fixed"], **at}})
+        brdf, error = family.lookup_vectors_with_error(wi, wr, **at)
+        off = np.abs(brdf - material.lookup_vectors(wi, wr))
+        within.append(off <= error)
+        bands.append(off <= np.max(family.error.p99) * brdf)
+    assert np.mean(within) >= 0.98
+    if away_deg == 0.0:
+        assert np.mean(bands) < 0.9

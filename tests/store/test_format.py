@@ -153,10 +153,11 @@ class Reader:
         opened = zarr.open_group(group, mode="r")
         self.arrays = {name: np.asarray(array[...]) for name, array in opened.arrays()}
         how: dict[str, Any] = dict(opened.attrs).get("interpolation", {})  # type: ignore[assignment]
-        assert set(how) <= {"method", "logarithm", "offset", "power"}
+        assert set(how) <= {"method", "logarithm", "offset", "power", "wavelengths"}
         assert how.get("method", "linear") in ("linear", "cubic")
         self.cubic, self.logarithm = how.get("method") == "cubic", how.get("logarithm", False)
         self.offset, self.power = how.get("offset", 0.0), how.get("power", 0.0)
+        self.straight = how.get("wavelengths", "cubic") == "linear"
         self.names = next(kind for kind in KINDS if set(kind) <= set(self.arrays))
         self.nodes = [self.arrays[name] for name in self.names]
         stored = self.arrays["brdf"] if "brdf" in self.arrays else self.arrays["parts"]
@@ -166,7 +167,7 @@ class Reader:
     def over_wavelengths(self, wavelength: float) -> tuple[Any, bool]:
         if self.wavelengths is None:
             return np.ones(1), True
-        w = weights(self.wavelengths, wavelength, ("open", "open"), True)
+        w = weights(self.wavelengths, wavelength, ("open", "open"), not self.straight)
         return w, wavelength in self.wavelengths
 
     def lookup(self, wi: Any, wr: Any, wavelength: float) -> Any:
@@ -176,6 +177,8 @@ class Reader:
         mixture = self.arrays.get("mixture")
         if mixture is not None:
             basis = np.eye(len(mixture))
+        elif self.straight:
+            basis = self.arrays.get("spectra", np.eye(spectrum.size))
         else:
             basis = (self.arrays["spectra"] @ spectrum if "spectra" in self.arrays else spectrum)[:, np.newaxis]
         numbers = np.empty((len(wi), basis.shape[1]))
@@ -187,7 +190,10 @@ class Reader:
         value = np.exp(numbers) - self.offset if self.logarithm else numbers
         if self.logarithm or self.cubic or self.names in KINDS[:2] or not on_node:
             value = np.maximum(value, 0.0)
-        value = value[:, 0] if mixture is None else np.maximum(value @ (mixture @ spectrum), 0.0)
+        if mixture is not None:
+            value = np.maximum(value @ (mixture @ spectrum), 0.0)
+        else:
+            value = value @ spectrum if self.straight else value[:, 0]
         mu = np.maximum(wi[:, 2], C) * np.maximum(wr[:, 2], C)
         uniform = np.ravel(self.arrays.get("uniform", 0.0))
         apart = uniform[0] if uniform.size == 1 else uniform @ spectrum
@@ -215,7 +221,9 @@ TURNED = {"theta_i": [0, 30, 60, 85], "phi_i": [0, 30, 90], "theta_r": [0, 30, 8
 HALF = {"theta_h": [0, 3, 10, 40, 85], "theta_d": [0, 45, 79], "phi_d": [0, 45, 90]}
 HALF_TURNED = {"theta_h": [0, 3, 10, 60], "phi_h": [0, 45, 90], "theta_d": [0, 45, 79], "phi_d": [0, 50, 90, 180]}
 HALF_TURN = {**HALF_TURNED, "phi_h": [0, 45, 120, 180]}
-ROOT = Interpolation("cubic", True, 1e-3, 0.5)
+ROOT_OF = ("cubic", True, 1e-3, 0.5)
+ROOT = Interpolation(*ROOT_OF)
+TURN = np.linalg.qr(np.random.default_rng(1).normal(size=(5, 5)))[0]
 COPPER, BRASS = presets()["scene-copper-sphere"], presets()["rolled-brass"]
 PAPER = presets()["glossy-grey-paper"]
 PAINTED = PAPER.model_copy(update={"parameters": PAPER.parameters | {"rho_d": GREEN, "rho_s": GREEN}})
@@ -232,6 +240,9 @@ LAYOUTS = {
     "mixed": lambda: plan(CLAY, VISIBLE, 0.2),
     "mixed-lobe": lambda: plan(PAINTED, VISIBLE, 0.2),
     "planned-factored": lambda: plan(COPPER, VISIBLE, 0.2),
+    "straight": lambda: Layout(CLAY, Grid(POLAR), VISIBLE, Interpolation(wavelengths="linear")),
+    "straight-logarithms": lambda: Layout(CLAY, Grid(POLAR), VISIBLE, Interpolation(*ROOT_OF, "linear")),
+    "straight-factored": lambda: Layout(CLAY, Grid(POLAR), VISIBLE, Interpolation(*ROOT_OF, "linear"), TURN),
 }
 
 

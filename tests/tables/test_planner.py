@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from brdfdb.errors import ParameterError
 from brdfdb.materials import Material, exact_material, presets
 from brdfdb.tables import error_measurement, plan_trials, planner, tabulation
 from brdfdb.tables.grids import ANISOTROPIC_HALF_DIFFERENCE_AXES, HALF_DIFFERENCE_AXES, ISOTROPIC_AXES, Grid
@@ -252,3 +253,35 @@ def test_few_directions_rule_out_only_what_all_of_them_do() -> None:
         error = plan_trials.error_of(layout, values, final)
         for goal in (0.5 * error, 0.99 * error, 1.01 * error, 2.0 * error):
             assert plan_trials.keeps(layout, values, final, goal) == (error <= goal)
+
+
+# The hot spot
+
+MOON = Material(
+    name="moon",
+    title="Moon",
+    model="hapke",
+    source="a test",
+    parameters={"w": 0.3, "b": 0.24, "c": 0.6, "b_0": 1.0, "h": 0.05, "theta_bar": 0.35},
+)
+
+
+def near_the_light(layout: Layout) -> float:
+    places = measured(layout).places
+    assert places is not None
+    return float(np.max(places.alongside))
+
+
+def test_a_tolerance_near_the_light_is_kept_there() -> None:
+    assert near_the_light(plan(MOON, None, 0.02)) > 0.06
+    layout = plan(MOON, None, 0.02, hot_spot_tolerance=0.03)
+    assert near_the_light(layout) <= 0.03
+    assert layout.grid.names == HALF_DIFFERENCE_AXES
+
+
+def test_a_tolerance_near_the_light_that_takes_too_much_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(planner, "MOST_VALUES", 3000)
+    with pytest.raises(ParameterError, match=r"^hot_spot_tolerance: 0.01 near the light, with 0.02 elsewhere, takes"):
+        plan(MOON, None, 0.02, hot_spot_tolerance=0.01)
+    with pytest.raises(ParameterError, match=r"^hot_spot_tolerance: 0.6 is outside \[0.0001, 0.5\]$"):
+        plan(MOON, None, 0.02, hot_spot_tolerance=0.6)

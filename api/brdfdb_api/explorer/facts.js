@@ -193,7 +193,7 @@ function assumed(parameter, attributes) {
 /** Know nothing. */
 export const forget = () => aside.replaceChildren();
 
-/** Say the error at the light that is looked at: between two wavelengths the larger of theirs, else the one stated.
+/** Say the error at the light that is looked at: between two wavelengths the one stated there, no less than theirs.
  * @param {any} info
  * @param {{ theta_i: number, nm: number | null }} state */
 export function band({ error, wavelength_nm: wavelengths }, { theta_i, nm }) {
@@ -205,14 +205,16 @@ export function band({ error, wavelength_nm: wavelengths }, { theta_i, nm }) {
   );
   const row = error.p99[Math.min(at, error.p99.length - 1)];
   const wanted = wavelengths && nm !== null ? nearest({ wavelength_nm: wavelengths }, nm) : null;
-  const around =
-    wanted === null || row.length === 1
-      ? row
-      : row.slice(
-          wavelengths.findLastIndex((/** @type {number} */ each) => each <= wanted),
-          wavelengths.findIndex((/** @type {number} */ each) => each >= wanted) + 1,
-        );
-  into.textContent = `within ${percent(Math.max(...around))}`;
+  if (wanted === null) {
+    into.textContent = `within ${percent(Math.max(...row))}`;
+    return;
+  }
+  const below = wavelengths.findLastIndex((/** @type {number} */ each) => each <= wanted),
+    above = wavelengths.findIndex((/** @type {number} */ each) => each >= wanted),
+    around = row.length === 1 ? row : row.slice(below, above + 1);
+  const between = below < above ? error.between?.bands : null; // a mixture has one row
+  const there = between ? [between[Math.min(at, between.length - 1)][below]] : [];
+  into.textContent = `within ${percent(Math.max(...around, ...there))}`;
 }
 
 /** Every finding of the audit, in words where it is no plain pass; the report has the words of the papers.
