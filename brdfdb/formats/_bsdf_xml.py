@@ -12,7 +12,7 @@ from xml.sax.saxutils import escape
 
 from brdfdb.errors import FileFormatError
 from brdfdb.formats._input import check_size
-from brdfdb.formats._record import lines, of_lines
+from brdfdb.formats._record import lines, of_lines, one_line
 from brdfdb.place import path_of
 
 # Names of the sides in these files are those of WINDOW, whose front is outdoors. Radiance's front is the back
@@ -107,8 +107,8 @@ def text_of(
         The record; it goes into the comments of the definition.
     """
     yield _HEAD
-    product = f"<ProductName>{escape(title)}</ProductName>\n" if title else ""
-    yield f"<Material>\n<Name>{escape(name)}</Name>\n{product}<Manufacturer>brdfdb</Manufacturer>\n"
+    product = f"<ProductName>{escape(one_line(title))}</ProductName>\n" if title else ""
+    yield f"<Material>\n<Name>{escape(one_line(name))}</Name>\n{product}<Manufacturer>brdfdb</Manufacturer>\n"
     yield "".join(f"{line}\n" for line in (*material, "</Material>", "<DataDefinition>", *definition))
     yield f"<Comments>\n{escape(chr(10).join(lines(record)))}\n</Comments>\n</DataDefinition>\n"
     for block in blocks:

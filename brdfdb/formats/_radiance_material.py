@@ -40,6 +40,7 @@ def material_text(table: Table, xml: str, record: dict[str, Any]) -> str:
         The record of the export.
     """
     name = "".join(c if c.isalnum() or c in "-_." else "_" for c in table.name) or "material"
+    file = f'"{xml}"' if any(letter.isspace() for letter in xml) else xml
     header = [f"# {line}" for line in lines(record)]
     bsdf = [
         "",
@@ -47,7 +48,7 @@ def material_text(table: Table, xml: str, record: dict[str, Any]) -> str:
         "# Only the front of a surface reflects, the side its normal points to. From behind it is black.",
         *(f"# {line}" for line in (_FRAME if table.anisotropic else _ISOTROPIC)),
         f"void BSDF {name}",
-        f"6 0 {xml} {_UP} .",
+        f"6 0 {file} {_UP} .",
         "0",
         "0",
     ]

@@ -14,6 +14,8 @@ if TYPE_CHECKING:
     from brdfdb.tables.table import Table
 
 NOT_STATED = "not stated"
+_LITERAL = re.compile(r'"(?:[^"\\]|\\.)*"')  # a string in JSON
+_FORMULA = re.compile(r'(?<=[,;"])(\s*)([=+@-])')  # where a spreadsheet may cut, and the sign
 CONVENTION = "f_r [1/sr], the BRDF without the cosine; unit vectors of light and viewer point away from the surface"
 U_AXIS = "that along which the texture coordinate u grows, dp/du; a mesh needs texture coordinates"
 _MEASURED = "refractive index and extinction: refractiveindex.info, CC0 1.0"
@@ -99,9 +101,26 @@ def extrapolated_remark(table: Table) -> tuple[str, ...]:
 
 
 def lines(document: dict[str, Any]) -> list[str]:
-    """Return a record as lines of text, "key: value", for headers that hold text; values are JSON but for strings."""
-    pairs = ((key, value if isinstance(value, str) else json.dumps(value)) for key, value in document.items())
-    return [f"{key}: {' '.join(value.split())}" for key, value in pairs]
+    """Return a record as printable lines of text, "key: value", which `of_lines` reads back exactly.
+
+    Values are JSON; strings stand as they are if they are read back so. A spreadsheet cuts such lines into cells: signs
+    with which formulas begin are escaped where a cell begins.
+    """
+    return [f"{key}: {_line(value)}" for key, value in document.items()]
+
+
+def _line(value: Any) -> str:
+    plain = isinstance(value, str) and value.isprintable() and value == value.strip() != ""
+    if plain and '"' not in value and not _FORMULA.search(value) and of_lines([f"key: {value}"]) == {"key": value}:
+        return str(value)
+    return _LITERAL.sub(
+        lambda literal: _FORMULA.sub(lambda sign: f"{sign[1]}\\u{ord(sign[2]):04x}", literal[0]), json.dumps(value)
+    )
+
+
+def one_line(text: str) -> str:
+    """Return a text in one printable line: other characters and runs of spaces are a space."""
+    return " ".join("".join(letter if letter.isprintable() else " " for letter in text).split())
 
 
 def document_of(text: str | bytes) -> dict[str, Any]:

@@ -48,7 +48,7 @@ options = (
             f"emissivity_{side}",
             0.0,
             f"emissivity of the {side} [1]; 0: that of the table if it covers 5 to 40 um, or else 0.9, as assumed",
-            low=0.0,
+            low=0.001,
             high=1.0,
         )
         for side in ("front", "back")
@@ -97,7 +97,7 @@ def write(
     colour : bool
         Add the blocks CIE-X and CIE-Z of a spectral table, which Radiance reads. WINDOW's engine refuses such files.
     emissivity_front, emissivity_back : float [1]
-        Emissivities of the two sides, in (0, 1]. By default they are those of the table, 1 minus its hemispherical
+        Emissivities of the two sides, in [0.001, 1]. By default they are those of the table, 1 minus its hemispherical
         albedo weighted by Planck's law at 300 K, if its wavelengths reach from 5 to 40 um; or else 0.9, which a remark
         names as assumed, with its effect on U.
     verdict : str, optional

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree
 
@@ -118,7 +119,8 @@ def _spectrum(wavelengths_nm: Any, values: Any) -> float | dict[str, Any]:
 
 def _xml(name: str, document: dict[str, Any], known: dict[str, Any]) -> str:
     scene = ElementTree.Element("scene", version=VERSION)
-    scene.append(ElementTree.Comment(f" {json.dumps(known).replace('--', '- -')} "))
+    comment = re.sub("(?<=-)-", r"\\u002d", json.dumps(known))  # XML allows no -- in comments
+    scene.append(ElementTree.Comment(f" {comment} "))
     bsdf = ElementTree.SubElement(scene, "bsdf", type=document["type"], id=name)
     for key, value in document.items():
         if key == "type":

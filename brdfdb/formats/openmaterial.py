@@ -212,6 +212,6 @@ def _metadata(table: Table, known: dict[str, Any]) -> dict[str, Any]:
         "copyrights": ["not stated"],
         "license": known["licence"],
         "authors": [known["program"]],
-        "sources": f"simulation, {known['source'] or 'source not stated'}",
+        "sources": f"{'measurement' if known['measured'] else 'simulation'}, {known['source'] or 'source not stated'}",
         "brdfdb": known,
     }

@@ -174,7 +174,7 @@ def _entries(table: Table, grid: AngularGrid) -> dict[str, str]:
         "REDUCTION_TYPE": " ".join(reductions),
         **{name: _listed(np.rad2deg(axis)) for name, axis in zip(names, grid.nodes, strict=True)},
         "NAME": table.name,
-        "SOURCE_TYPE": "generated",
+        "SOURCE_TYPE": "measured" if table.metadata.measured else "generated",
     }
 
 
@@ -200,7 +200,7 @@ def _specular(table: Table, binary: bool) -> bytes:
         "DATA_TYPE": "specular_reflectance",
         **_colour(table),
         "PARAM0_LIST": _listed(at_deg),
-        "SOURCE_TYPE": "generated",
+        "SOURCE_TYPE": "measured" if table.metadata.measured else "generated",
     }
     return _ssdd_file.block(entries, table.specular.reshape(at_deg.size, 1, 1, 1, -1), binary)
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 import numpy as np
@@ -16,6 +16,22 @@ from brdfdb.integrals.quadrature import reflected_share
 from brdfdb.lobes import around_mirror, narrowest
 from brdfdb.materials import FunctionRecord, Material
 from brdfdb.parameters import Floats
+from brdfdb.tables.shared_axes import (
+    COLOURS,
+    DASHES,
+    GRID,
+    INK,
+    MUTED,
+    Curve,
+    Drawn,
+    add,
+    axes_for,
+    drawn_on,
+    only,
+    polar_grid,
+    remember,
+    without_only,
+)
 from brdfdb.tables.slices import Slice, Sliced, half_difference_slice, in_plane_slice
 
 if TYPE_CHECKING:
@@ -23,10 +39,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-# Colours that are told apart with any kind of colour blindness (after Okabe and Ito); the first for the first curve
-COLOURS = ("#0b5fc0", "#c8401e", "#00806b", "#8c4aa6", "#b47400", "#3e97cf")
-_INK, _MUTED, _GRID = "#1b2028", "#5a6470", "#dde2e8"
-_DASHES = ("-", (0, (5, 2)), (0, (1.5, 1.5)))
 _SHOWN_NM = 550.0  # wavelength of a plot by default
 _UNIT = "$f_r$ [1/sr]"
 _SPECTRUM_NM = (400.0, 450.0, 500.0, 550.0, 600.0, 650.0, 750.0)
@@ -69,6 +81,9 @@ class Plotted(Sliced, Protocol):
 class Plot:
     """Plots of one table. Each draws on `ax`, or on new axes, and returns the axes.
 
+    Axes that show a plot of the same kind are extended: all plots have one scale, each has a colour, its curves differ
+    by their dashes, and the legend names them. Axes with a plot of another kind, and images, are refused.
+
     matplotlib is imported by the first call. MissingExtraError names the command that installs it.
     """
 
@@ -108,23 +123,19 @@ class Plot:
         MissingExtraError
             If matplotlib is not installed.
         """
-        curves = self._curves(theta_i_deg, phi_i_deg, wavelength_nm)
-        axes = _axes(ax, (6.4, 3.9))
-        largest = max((float(np.nanmax(curve.brdf)) for curve in curves), default=1.0) or 1.0
-        ticker = import_extra("matplotlib.ticker")
-        rings = [r for r in ticker.MaxNLocator(4, steps=[1, 2, 2.5, 5, 10]).tick_values(0.0, largest) if r > 0.0]
-        edge = rings[-1]
-        _polar_grid(axes, rings)
+        curves, name = self._curves(theta_i_deg, phi_i_deg, wavelength_nm)
+        axes = axes_for("lobe", ax, (6.4, 3.9))
+        turned = []
         for curve in curves:
-            theta, radius = radians(curve.theta_r_deg), curve.brdf / edge
-            axes.plot(
-                radius * np.sin(theta), radius * np.cos(theta), color=curve.colour, linestyle=curve.dashes, lw=1.8
-            )
-        _legend(axes, curves)
-        axes.set(xlim=(-1.13, 1.13), ylim=(-0.1, 1.13), aspect="equal", xticks=[], yticks=[])
+            theta = radians(curve.x)
+            turned.append(replace(curve, x=curve.y * np.sin(theta), y=curve.y * np.cos(theta)))
+        edge = polar_grid(axes, turned)
+        add(axes, "lobe", name, turned)
+        axes.set(
+            xlim=(-1.13 * edge, 1.13 * edge), ylim=(-0.1 * edge, 1.13 * edge), aspect="equal", xticks=[], yticks=[]
+        )
         axes.spines[:].set_visible(False)
-        axes.set_xlabel(f"← towards the light    {_UNIT} over $\\theta_r$    mirror side →", color=_MUTED)
-        axes.set_title(self._title(curves), loc="left")
+        axes.set_xlabel(f"← towards the light    {_UNIT} over $\\theta_r$    mirror side →", color=MUTED)
         return axes
 
     def cuts(
@@ -141,27 +152,24 @@ class Plot:
         Parameters and errors are those of `lobe`. `log` chooses a logarithmic axis. The default is one where the
         largest value is more than 50 times the median.
         """
-        curves = self._curves(theta_i_deg, phi_i_deg, wavelength_nm)
-        axes = _axes(ax, (6.4, 3.9))
-        values = np.concatenate([curve.brdf for curve in curves])
+        curves, name = self._curves(theta_i_deg, phi_i_deg, wavelength_nm)
+        axes = axes_for("cuts", ax, (6.4, 3.9))
+        was_log = bool(drawn_on(axes)) and axes.get_yscale() == "log"
+        add(axes, "cuts", name, curves)
+        values = np.concatenate([np.asarray(line.get_ydata(), dtype=np.float64) for line in axes.lines])
+        largest = float(np.nanmax(values))
         if log is None:
-            log = bool(np.max(values) > 50.0 * max(float(np.median(values)), 1e-30))
-        for curve in curves:
-            axes.plot(curve.theta_r_deg, curve.brdf, color=curve.colour, linestyle=curve.dashes, lw=1.8)
-        if log:
-            axes.set_yscale("log")
-            positive = values[values > 0.0]
-            if positive.size:
-                top = 2.0 * float(positive.max())
-                axes.set_ylim(max(float(positive.min()) / 1.5, top * 1e-7), top)
-        else:
-            axes.set_ylim(0.0, 1.12 * float(np.max(values)) or 1.0)
+            log = was_log or largest > 50.0 * max(float(np.nanmedian(values)), 1e-30)
+        axes.set_yscale("log" if log else "linear")
+        positive = values[values > 0.0]
+        if log and positive.size:
+            axes.set_ylim(max(float(positive.min()) / 1.5, 2e-7 * largest), 2.0 * largest)
+        elif not log:
+            axes.set_ylim(0.0, 1.12 * largest or 1.0)
         axes.set(xlim=(-90.0, 90.0), xticks=range(-90, 91, 30))
-        axes.set_xlabel("$\\theta_r$ [°]: negative towards the light, positive on the mirror side", color=_MUTED)
-        axes.set_ylabel(_UNIT, color=_MUTED)
-        axes.grid(color=_GRID, lw=0.7)
-        _legend(axes, curves)
-        axes.set_title(self._title(curves), loc="left")
+        axes.set_xlabel("$\\theta_r$ [°]: negative towards the light, positive on the mirror side", color=MUTED)
+        axes.set_ylabel(_UNIT, color=MUTED)
+        axes.grid(color=GRID, lw=0.7)
         return axes
 
     def albedo(self, phi_i_deg: float = 0.0, wavelength_nm: float | None = None, *, ax: Axes | None = None) -> Axes:
@@ -188,31 +196,25 @@ class Plot:
         """
         wavelength = self._wavelength(wavelength_nm)
         check_azimuth_deg("phi_i_deg", phi_i_deg)
-        axes = _axes(ax, (6.4, 3.9))
+        axes = axes_for("albedo", ax, (6.4, 3.9))
         shares = albedo_shares(self.table, float(radians(phi_i_deg)), wavelength)
         kept = {label: share for label, share in shares.items() if np.max(share) > 0.0} or {"reflected": np.zeros(21)}
+        tops = np.cumsum(list(kept.values()), axis=0)
         colours = [COLOURS[list(shares).index(label) % len(COLOURS)] for label in kept]
-        axes.stackplot(ALBEDO_DEG, *kept.values(), colors=colours, alpha=0.85, lw=0)
-        below = np.zeros(ALBEDO_DEG.size)
-        for label, share in kept.items():
-            at = int(np.argmax(share[:-3]))
-            thick = share[at] > 0.07
-            axes.text(
-                np.clip(ALBEDO_DEG[at], 12.0, 66.0),
-                below[at] + share[at] / 2.0 if thick else below[at] + share[at] + 0.015,
-                label,
-                ha="center",
-                va="center" if thick else "bottom",
-                color="white" if thick else _INK,
-            )
-            below = below + share
-        axes.axhline(1.0, color=_INK, lw=1.2)
-        axes.text(1.0, 1.01, "1: everything is reflected", color=_INK, va="bottom", fontsize="small")
-        axes.set(xlim=(0.0, 90.0), ylim=(0.0, max(1.1, 1.05 * float(below.max()))), xticks=range(0, 91, 15))
-        axes.set_xlabel("$\\theta_i$ [°]", color=_MUTED)
-        axes.set_ylabel("directional albedo [1]", color=_MUTED)
+        labels = [*itertools.islice(itertools.accumulate(kept, "{} + {}".format), len(kept) - 1), ""]
+        curves = [Curve(labels[at], ALBEDO_DEG, tops[at], colours[at], "-") for at in reversed(range(len(kept)))]
+        without_only(axes)
+        if not drawn_on(axes):
+            axes.axhline(1.0, color=INK, lw=1.2)
+            axes.text(1.0, 1.01, "1: everything is reflected", color=INK, va="bottom", fontsize="small")
         azimuth = f", $\\phi_i$ = {phi_i_deg:g}°" if self.table.anisotropic else ""
-        axes.set_title(f"{self.table.name}{_at(wavelength)}{azimuth}", loc="left")
+        plots = add(axes, "albedo", f"{self.table.name}{_at(wavelength)}{azimuth}", curves, legend=False)
+        if len(plots) == 1:
+            _stack(axes, kept, colours)
+        highest = max(float(curve.y.max()) for plot in plots for curve in plot.curves)
+        axes.set(xlim=(0.0, 90.0), ylim=(0.0, max(1.1, 1.05 * highest)), xticks=range(0, 91, 15))
+        axes.set_xlabel("$\\theta_i$ [°]", color=MUTED)
+        axes.set_ylabel("directional albedo [1]", color=MUTED)
         return axes
 
     def slices(
@@ -252,7 +254,7 @@ class Plot:
         if kind not in ways:
             raise ParameterError("kind", f"{kind!r} is not one of {', '.join(ways)}", kind, tuple(ways))
         wanted = self._wavelength(wavelength_nm)
-        axes = _axes(ax, (6.4, 3.6))
+        axes = axes_for("slices", ax, (6.4, 3.6))
         picture = _SLICES[kind](self.table)
         values, stored = picture.values, self.table.wavelength_nm
         at = None
@@ -267,17 +269,19 @@ class Plot:
         extent = (picture.x.first - 0.5, picture.x.last + 0.5, picture.y.first - 0.5, picture.y.last + 0.5)
         look: dict[str, Any] = {"norm": norm, "cmap": "viridis", "aspect": "auto", "interpolation": "nearest"}
         image = axes.imshow(np.maximum(values, low), extent=extent, **look)
+        name = f"{self.table.name}{_at(at)}"
+        remember(axes, Drawn("slices", name, (), (image,)))
         bar = axes.figure.colorbar(image, ax=axes, pad=0.02)
-        bar.set_label(_UNIT, color=_MUTED)
+        bar.set_label(_UNIT, color=MUTED)
         bar.outline.set_visible(False)
         labels = {
             "in_plane": ("$\\theta_r$ [°]: negative towards the light", "$\\theta_i$ [°]"),
             "half_difference": ("$\\theta_h$ [°]", "$\\theta_d$ [°]"),
         }
-        axes.set_xlabel(labels[kind][0], color=_MUTED)
-        axes.set_ylabel(labels[kind][1], color=_MUTED)
+        axes.set_xlabel(labels[kind][0], color=MUTED)
+        axes.set_ylabel(labels[kind][1], color=MUTED)
         axes.set(xticks=range(-90 if kind == "in_plane" else 0, 91, 30), yticks=range(0, 91, 30))
-        axes.set_title(f"{self.table.name}{_at(at)}", loc="left")
+        axes.set_title(name, loc="left")
         return axes
 
     def _curves(
@@ -285,8 +289,11 @@ class Plot:
         theta_i_deg: float | Sequence[float],
         phi_i_deg: float | Sequence[float] | None,
         wavelength_nm: float | Sequence[float] | None,
-    ) -> list[_Curve]:
-        """Return cuts in the plane of incidence: one for each light, azimuth and wavelength."""
+    ) -> tuple[list[Curve], str]:
+        """Return cuts in the plane of incidence, f_r over theta_r [degree], and the name of the plot.
+
+        There is one for each light, azimuth and wavelength. Angles are negative towards the light.
+        """
         if phi_i_deg is None:
             phi_i_deg = (0.0, 90.0) if self.table.anisotropic else 0.0
         lights, azimuths = _numbers("theta_i_deg", theta_i_deg), _numbers("phi_i_deg", phi_i_deg)
@@ -310,11 +317,11 @@ class Plot:
             parts += [f"{wavelength:g} nm"] if len(wavelengths) > 1 else []
             colour: str | tuple[float, ...]
             if wavelength is None or len(wavelengths) == 1:
-                colour, dashes = COLOURS[number % len(COLOURS)], _DASHES[row % len(_DASHES)]
+                colour, dashes = COLOURS[number % len(COLOURS)], DASHES[row % len(DASHES)]
             else:
-                colour, dashes = _spectral_colour(wavelength), _DASHES[number % len(_DASHES)]
-            curves.append(_Curve(", ".join(parts), signed, brdf, colour, dashes, wavelength))
-        return curves
+                colour, dashes = _spectral_colour(wavelength), DASHES[number % len(DASHES)]
+            curves.append(Curve(", ".join(parts), signed, brdf, colour, dashes))
+        return curves, f"{self.table.name}{_at(wavelengths[0]) if len(wavelengths) == 1 else ''}"
 
     def _views(self, theta: float, wavelength: float | None) -> Array:
         """Return angles of viewers [degree] of a cut, with more around the mirror direction, most in a narrow lobe."""
@@ -338,22 +345,6 @@ class Plot:
         if len(wavelengths) > 1:
             raise ParameterError("wavelength_nm", f"{len(wavelengths)} numbers; one is shown at a time", wavelength_nm)
         return wavelengths[0]
-
-    def _title(self, curves: list[_Curve]) -> str:
-        wavelengths = {curve.wavelength_nm for curve in curves}
-        return f"{self.table.name}{_at(wavelengths.pop()) if len(wavelengths) == 1 else ''}"
-
-
-@dataclass(frozen=True)
-class _Curve:
-    """A cut and its look; angles are negative towards the light."""
-
-    label: str
-    theta_r_deg: Array
-    brdf: Array
-    colour: str | tuple[float, ...]
-    dashes: Any
-    wavelength_nm: float | None
 
 
 def albedo_shares(table: Plotted, phi_i: float, wavelength_nm: float | None) -> dict[str, Array]:
@@ -410,35 +401,15 @@ def _spectral_colour(wavelength_nm: float) -> tuple[float, ...]:
     return tuple(float(np.interp(wavelength_nm, _SPECTRUM_NM, channel)) for channel in zip(*_SPECTRUM, strict=True))
 
 
-def _axes(ax: Axes | None, size: tuple[float, float]) -> Axes:
-    """Return the axes to draw on, in the look of all plots."""
-    axes = ax
-    if axes is None:
-        axes = import_extra("matplotlib.pyplot").subplots(figsize=size, layout="constrained")[1]
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.spines[["left", "bottom"]].set_color(_GRID)
-    axes.tick_params(colors=_MUTED, length=0)
-    axes.set_axisbelow(True)
-    return axes
-
-
-def _polar_grid(axes: Axes, rings: Sequence[float]) -> None:
-    """Draw half circles at values of f_r [1/sr], the last of radius 1, and spokes every 30 degrees."""
-    turn = np.linspace(-np.pi / 2.0, np.pi / 2.0, 181)
-    for ring in rings:
-        radius = ring / rings[-1]
-        axes.plot(radius * np.sin(turn), radius * np.cos(turn), color=_GRID, lw=0.8, zorder=0)
-        axes.text(radius, -0.02, f"{ring:g}", ha="center", va="top", color=_MUTED, fontsize="small")
-    for angle_deg in range(-90, 91, 30):
-        x, y = float(np.sin(radians(angle_deg))), float(np.cos(radians(angle_deg)))
-        axes.plot([0.0, x], [0.0, y], color=_GRID, lw=0.8, zorder=0)
-        if abs(angle_deg) < 90:
-            text = f"{abs(angle_deg)}°"
-            axes.text(1.06 * x, 1.05 * y, text, ha="center", va="center", color=_MUTED, fontsize="small")
-
-
-def _legend(axes: Axes, curves: Sequence[_Curve]) -> None:
-    """Label curves in their own colours, beside the axes."""
-    lines = import_extra("matplotlib.lines")
-    handles = [lines.Line2D([], [], color=c.colour, linestyle=c.dashes, lw=1.8, label=c.label) for c in curves]
-    axes.legend(handles=handles, frameon=False, labelcolor="linecolor", loc="upper left", bbox_to_anchor=(1.0, 1.02))
+def _stack(axes: Axes, shares: Mapping[str, Array], colours: Sequence[str]) -> None:
+    """Fill the shares of the only albedo on the axes, one above the other, and name them."""
+    only(*axes.stackplot(ALBEDO_DEG, *shares.values(), colors=colours, alpha=0.85, lw=0))
+    below = np.zeros(ALBEDO_DEG.size)
+    for label, share in shares.items():
+        at = int(np.argmax(share[:-3]))
+        thick = share[at] > 0.07
+        x = float(np.clip(ALBEDO_DEG[at], 12.0, 66.0))
+        y = below[at] + (share[at] / 2.0 if thick else share[at] + 0.015)
+        colour, va = ("white", "center") if thick else (INK, "bottom")
+        only(axes.text(x, y, label, ha="center", va=va, color=colour))
+        below = below + share

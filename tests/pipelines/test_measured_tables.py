@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -120,6 +121,22 @@ def test_record_of_an_exported_file_says_measured(folder: Path) -> None:
     for words in (*stated, of_extent):
         assert words in text
     assert "computed from parameters" not in text
+
+
+@pytest.mark.parametrize(
+    ("file_format", "wanted"),
+    [
+        ("bird", '"method": ?"measurement"'),
+        ("openmaterial", '"sources": ?"measurement, '),
+        ("ssdd", "SOURCE_TYPE measured"),
+    ],
+)
+def test_fields_of_a_format_say_measured_as_the_record_does(folder: Path, file_format: str, wanted: str) -> None:
+    path = folder / f"clay.{file_format}"
+    formats.write(brdfdb.open(folder / "store")[NAME], path, file_format, tolerance=0.3)
+    text = path.read_bytes().decode("utf-8", "replace")
+    assert re.search(wanted, text)
+    assert not re.search('simulation, |SOURCE_TYPE generated|"method": ?"simulation|"virtual"', text)
 
 
 def test_export_says_that_some_values_were_not_measured(folder: Path, capsys: Captured) -> None:

@@ -9,7 +9,9 @@ from pathlib import Path
 import matplotlib as mpl
 import numpy as np
 import pytest
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from brdfdb.errors import MissingExtraError, ParameterError
 from brdfdb.geometry import radians
@@ -184,3 +186,112 @@ def test_every_plot_refuses_wavelengths_that_lookups_refuse(kind: str, wavelengt
 def test_a_cut_without_a_light_is_refused(grey: Table) -> None:
     with pytest.raises(ParameterError, match="theta_i_deg: is an empty list"):
         grey.plot.cuts([])
+
+
+def scaled(factor: float, name: str) -> Table:
+    """Return a table of f_r = factor / pi."""
+    table = made_up("isotropic")
+    values = np.full(table.values.shape, factor / np.pi, np.float32)
+    return Table(name, "r000001", {}, table.grid, None, values, None)
+
+
+def labels(axes: Axes) -> list[str]:
+    legend = axes.get_legend()
+    assert legend is not None
+    return [text.get_text() for text in legend.get_texts()]
+
+
+def curves(axes: Axes) -> dict[str, Line2D]:
+    """Return the lines with a label by it."""
+    return {str(line.get_label()): line for line in axes.lines if not str(line.get_label()).startswith("_")}
+
+
+@pytest.mark.parametrize("order", [(0.1, 0.8), (0.8, 0.1)])
+@pytest.mark.parametrize("kind", ["lobe", "cuts"])
+def test_two_tables_on_the_same_axes_have_one_scale_a_colour_each_and_a_legend(
+    kind: str, order: tuple[float, float]
+) -> None:
+    """Each was drawn to its own scale as a lobe, and the taller of two cuts was cut off by the second."""
+    axes = Figure().add_subplot()
+    for factor in order:
+        assert getattr(scaled(factor, f"of {factor:g}").plot, kind)([0.0, 45.0], ax=axes) is axes
+    assert labels(axes) == [f"of {factor:g}, $\\theta_i$ = {angle}°" for factor in order for angle in (0, 45)]
+    assert axes.get_title(loc="left") == ", ".join(f"of {factor:g}" for factor in order)
+    shown = curves(axes)
+    for label, line in shown.items():
+        x, y = (np.asarray(data) for data in line.get_data())
+        f_r = np.hypot(x, y) if kind == "lobe" else y
+        np.testing.assert_allclose(f_r, float(label.split(",")[0].removeprefix("of ")) / np.pi, rtol=1e-6)
+        (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
+        assert left < x.min() <= x.max() < right
+        assert bottom < y.min() <= y.max() < top
+    colours = [line.get_color() for line in shown.values()]
+    assert colours[0] == colours[1] != colours[2] == colours[3]
+    styles = [line.get_linestyle() for line in shown.values()]
+    assert styles[0] == styles[2] != styles[1] == styles[3]
+    if kind == "lobe":
+        rings = [float(text.get_text()) for text in axes.texts if "°" not in text.get_text()]
+        assert rings == sorted(set(rings))
+        assert rings[-1] == pytest.approx(axes.get_xlim()[1] / 1.13)
+        assert [text.get_position()[0] for text in axes.texts if "°" not in text.get_text()] == pytest.approx(rings)
+
+
+def test_cuts_of_a_peak_and_a_flat_table_share_a_logarithmic_axis() -> None:
+    axes = Figure().add_subplot()
+    scaled(200.0, "bright").plot.cuts(0.0, ax=axes)
+    scaled(0.5, "dim").plot.cuts(0.0, ax=axes)
+    assert axes.get_yscale() == "linear"  # the median is of both
+    scaled(0.5, "dimmer").plot.cuts(0.0, ax=axes)
+    assert axes.get_yscale() == "log"
+    bottom, top = axes.get_ylim()
+    assert bottom < 0.5 / np.pi < 200.0 / np.pi < top
+    scaled(0.5, "dim again").plot.cuts(0.0, ax=axes, log=False)
+    assert axes.get_yscale() == "linear"
+    assert axes.get_ylim()[0] == 0.0
+
+
+def test_albedos_of_two_tables_are_lines_where_one_is_stacked(grey: Table) -> None:
+    axes = Figure().add_subplot()
+    scaled(0.3, "dim").plot.albedo(ax=axes)
+    assert len(axes.collections) == 1
+    grey.plot.albedo(ax=axes)
+    assert len(axes.collections) == 0
+    assert {text.get_text() for text in axes.texts} == {"1: everything is reflected"}
+    assert labels(axes) == ["dim", "random"]
+    shown = curves(axes)
+    np.testing.assert_allclose(np.asarray(shown["dim"].get_ydata()), 0.3, atol=1e-3)
+    np.testing.assert_allclose(np.asarray(shown["random"].get_ydata()), albedo_shares(grey, 0.0, None)["reflected"])
+    assert axes.get_ylim()[1] > np.max(np.asarray(shown["random"].get_ydata()))
+    assert shown["dim"].get_color() != shown["random"].get_color()
+
+
+@pytest.mark.parametrize("kind", ["lobe", "cuts"])
+def test_what_the_caller_has_drawn_is_not_cut_off(grey: Table, kind: str) -> None:
+    axes = Figure().add_subplot()
+    axes.plot([-30.0, 30.0] if kind == "cuts" else [0.0, 0.0], [0.0, 40.0], label="measured")
+    getattr(grey.plot, kind)(0.0, ax=axes)
+    assert labels(axes)[0] == "measured"
+    assert axes.get_ylim()[1] > 40.0
+
+
+def test_many_tables_have_colours_of_their_own_and_cleared_axes_begin_anew(grey: Table) -> None:
+    axes = Figure().add_subplot()
+    for number in range(12):
+        scaled(0.1, f"{number}").plot.cuts(0.0, ax=axes)
+    assert len({str(line.get_color()) for line in curves(axes).values()}) == 12
+    axes.clear()
+    grey.plot.lobe(30.0, ax=axes)
+    assert labels(axes) == [r"$\theta_i$ = 30°"]
+    assert axes.get_title(loc="left") == "random"
+
+
+def test_axes_that_cannot_be_shared_are_refused(grey: Table) -> None:
+    axes = Figure().add_subplot()
+    grey.plot.slices(ax=axes)
+    with pytest.raises(ParameterError, match="ax: shows slices of random; slices need axes of their own"):
+        grey.plot.slices(ax=axes)
+    with pytest.raises(ParameterError, match="ax: shows slices of random; cuts need axes of their own"):
+        grey.plot.cuts(ax=axes)
+    for wrong in (Figure().add_subplot(projection="polar"), Figure(), Figure().subplots(2)):
+        with pytest.raises(ParameterError, match="ax: is not Axes with straight x and y axes"):
+            grey.plot.lobe(ax=wrong)
