@@ -16,7 +16,7 @@ from brdfdb.tables.sampler import LOBE_SHARE, Cells
 
 Array = NDArray[np.float64]
 
-_FLAT = 1e-10  # z of a half vector up to which the density counts as 0
+_FLAT = 1e-30  # z of a half vector up to which the density counts as 0
 _LEAST = 1e-20
 
 

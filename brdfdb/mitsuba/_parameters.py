@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import Any
 
 import drjit as dr
@@ -67,10 +68,10 @@ class Parameters:
                     values[name] = dr.select(dr.isnan(value), value, dr.clip(value, *self._ranges[name]))
         return values
 
-    def traverse(self, callback: Any) -> None:
-        """Show all textures to the scene as differentiable parameters."""
-        for name, texture in self.textures.items():
-            callback.put(name, texture, mi.ParamFlags.Differentiable)
+    def traverse(self, callback: Any, constants: Collection[str] = ()) -> None:
+        """Show the textures to the scene as differentiable parameters, but for those of given names."""
+        for name in (name for name in self.textures if name not in constants):
+            callback.put(name, self.textures[name], mi.ParamFlags.Differentiable)
 
 
 def spectrum_of(props: Any, name: str) -> tuple[Array, Array] | None:
@@ -90,6 +91,8 @@ def _texture(props: Any, name: str, parameter: Parameter, at_nm: tuple[float, ..
         raise ParameterError(parameter.name, f"a number in {parameter.interval} or a texture is missing")
     spectrum = spectrum_of(props, name)
     if spectrum is not None:
+        for value in spectrum[1]:
+            parameter.check(float(value))
         props[name] = _readable(*spectrum, type(props[name]), None if parameter.reflectance else at_nm)
     read = props.get_texture if parameter.reflectance else props.get_unbounded_texture
     return read(name) if name in props else read(name, float(parameter.default or 0.0))

@@ -118,7 +118,7 @@ class Columns:
 
 
 def within(at_nm: Array, stored_nm: Array) -> Array:
-    """Return wavelengths [nm] at which a table is looked up, if they lie within those of the table."""
+    """Return wavelengths [nm] if they lie within those at which a table or a spectrum is known."""
     for nm in at_nm[(at_nm < stored_nm[0]) | (at_nm > stored_nm[-1])]:
         low, high = float(stored_nm[0]), float(stored_nm[-1])
         sentence = f"{nm:g} is outside [{low:g}, {high:g}] nm, the wavelengths that are known"

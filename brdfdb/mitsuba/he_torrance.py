@@ -22,14 +22,13 @@ from brdfdb.models import MODELS
 from brdfdb.models.he_torrance_1991 import WAVELENGTH_NM, K, N
 from brdfdb.spectra import PICTURE_NM, picture_wavelengths
 
+Array = NDArray[np.float64]
+
 _LEAST_COS = 6.1e-17  # cosine of the horizon: the model is finite there
 _LEAST = 1e-30
 _X_MAX = 9.0  # largest x; erfc(x) and exp(-x^2) are 0 in float32 well below it
 _LARGEST = 1e38  # f_r [1/sr] stays below
 _STEEPEST, _ALPHA_RANGE = 1e-3, (1e-6, 2.0)  # least cosine and range of alpha in the lobe of samples
-
-
-Array = NDArray[np.float64]
 
 
 class _Surface(NamedTuple):
@@ -168,6 +167,10 @@ class HeTorrance(Formula):
         values["surface"] = _surface_of(values, self._wavelengths_nm(interaction))
         return values
 
+    def traverse(self, callback: Any) -> None:
+        """Show the parameters to the scene, but for the spectra of a projection, which are constants."""
+        self.parameters.traverse(callback, constants=self._views[0].indices if self._views else ())
+
     def _seen(self, values: Values, function: Callable[[_Surface], Any]) -> Any:
         """Return a function of the surface as each channel sees it, projected on sRGB if the channels are colours."""
         if not self._views:
@@ -240,7 +243,7 @@ def _surface_of(values: Values, wavelength_nm: Any) -> _Surface:
 def _views_of(props: Any) -> list[_View]:
     """Return the wavelengths of a projection, three at a time; none if each channel has its own."""
     spectra = {name: spectrum for name in ("n", "k") if (spectrum := spectrum_of(props, name)) is not None}
-    ends = [PICTURE_NM[[0, -1]], *(nm[[0, -1]] for nm, _ in spectra.values())]
+    ends = [nm[[0, -1]] for nm, _ in spectra.values()] or [PICTURE_NM[[0, -1]]]
     shared: Array | None = np.array([max(low for low, _ in ends), min(high for _, high in ends)])
     for name in ("n", "k"):
         if name in props and not (isinstance(props[name], int | float) or hasattr(props[name], "wavelengths")):
@@ -255,8 +258,8 @@ def _views_of(props: Any) -> list[_View]:
     lacking = -chosen.wavelength_nm.size % 3
     nm = np.append(chosen.wavelength_nm, np.repeat(chosen.wavelength_nm[-1], lacking))
     weights = np.concatenate([chosen.weights, np.zeros((lacking, 3))])
-    index = {name: np.interp(nm, *spectrum) for name, spectrum in spectra.items()}
+    indices = {name: np.interp(nm, *spectrum) for name, spectrum in spectra.items()}
     return [
-        _View(nm[part].tolist(), {name: x[part].tolist() for name, x in index.items()}, weights[part].tolist())
+        _View(nm[part].tolist(), {name: x[part].tolist() for name, x in indices.items()}, weights[part].tolist())
         for part in (slice(first, first + 3) for first in range(0, nm.size, 3))
     ]

@@ -180,6 +180,12 @@ def factored() -> Table:
     return table_from("factored", "r000001", arrays, dataset.attrs)
 
 
+def black() -> Table:
+    """Return a table whose f_r is 0, as that of a mirror: its samples are even over half vectors."""
+    grid = made_up("isotropic").grid
+    return Table("black", "r000001", {}, grid, None, np.zeros(grid.shape, np.float32), None)
+
+
 # A surface of each model, rough if there are two; a table of each kind
 MODELS_JUDGED = {subject.model: subject for subject in SUBJECTS}
 CASES: dict[str, Callable[[], Case]] = {
@@ -189,6 +195,7 @@ CASES: dict[str, Callable[[], Case]] = {
     "table-anisotropic": lambda: of_table("anisotropic", small_table(ANISOTROPIC)),
     "table-diffuse": lambda: of_table("diffuse", small_table(DIFFUSE)),
     "table-spectral": lambda: of_table("spectral", small_table(SPECTRAL)),
+    "table-black": lambda: of_table("black", black()),
     "table-factored": lambda: of_table("factored", factored()),
     "table-mixture": lambda: of_table("mixture", painted()),
     "table-four-axes": lambda: of_table("four-axes", made_up("anisotropic")),
@@ -213,9 +220,8 @@ def measure(mitsuba: Any, case: Case) -> Measured:
     """Return what a plugin is off by in the variant of Mitsuba that is set."""
     surface = mitsuba.load_dict(case.document)
     wi, wr = case.pairs()
-    call = _one_by_one if mitsuba.variant().startswith("scalar") else _at_once
     nm = case.wavelengths_nm(mitsuba)
-    value, density = call(mitsuba, nm, lambda ctx, si, wo: surface.eval_pdf(ctx, si, wo), wi, wr)
+    value, density = results_of(mitsuba, nm, surface.eval_pdf, wi, wr)
     expected = case.expected(mitsuba, wi, wr)
     above = (wi[:, 2] > 0.0) & (wr[:, 2] > 0.0)
     assert np.all(value[~above] == 0.0)
@@ -227,7 +233,7 @@ def measure(mitsuba: Any, case: Case) -> Measured:
     off = np.maximum(np.maximum(low - density, density - high), 0.0) / np.maximum(high, LEAST_DENSITY)
 
     rng = np.random.default_rng(41)
-    count = DRAWN_ONE_BY_ONE if call is _one_by_one else DRAWN
+    count = DRAWN_ONE_BY_ONE if mitsuba.variant().startswith("scalar") else DRAWN
     u = rng.random((count, 3)).astype(np.float32)
     lights = np.tile(LIGHT, (count, 1))
 
@@ -236,7 +242,7 @@ def measure(mitsuba: Any, case: Case) -> Measured:
         again, at = surface.eval_pdf(ctx, si, record.wo)
         return weight, record.pdf, record.wo, again, at
 
-    weight, of_sample, wo, again, at = call(mitsuba, nm, drawn, lights, u)
+    weight, of_sample, wo, again, at = results_of(mitsuba, nm, drawn, lights, u)
     accepted = of_sample[:, 0] > 0.0
     assert np.all(np.isfinite(weight))
     assert np.all(weight[~accepted] == 0.0)
@@ -334,8 +340,12 @@ def _p_value(case: Case, mitsuba: Any, wo: Array, count: int) -> float:
     return float(stats.chi2.sf(statistic, np.count_nonzero(enough) - 1))
 
 
+def results_of(mitsuba: Any, nm: Array, function: Callable[..., Any], wi: Array, other: Array) -> list[Array]:
+    """Return numbers (N, channels) of the results of a function of a context, a place with a light, and a vector."""
+    return (_one_by_one if mitsuba.variant().startswith("scalar") else _at_once)(mitsuba, nm, function, wi, other)
+
+
 def _at_once(mitsuba: Any, nm: Array, function: Callable[..., Any], wi: Array, other: Array) -> list[Array]:
-    """Return numbers (N, channels) of a function of a context, lights and other vectors, all at once."""
     place = interaction(mitsuba, wi)
     if mitsuba.is_spectral:
         place.wavelengths = nm.tolist()

@@ -91,6 +91,7 @@ def test_channels_of_rgb_have_wavelengths_of_their_own() -> None:
 
     subject = SUBJECTS[-1]
     document = {name: value for name, value in subject.document.items() if name != "wavelength_nm"}
+    document["channels"] = "wavelengths"
     wi, wr = np.array([[0.6, 0.0, 0.8]], np.float32), np.array([[-0.8, 0.0, 0.6]], np.float32)
     place = mitsuba.SurfaceInteraction3f()
     place.wi = mitsuba.Vector3f(wi[0].tolist())
