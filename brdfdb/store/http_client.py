@@ -187,7 +187,13 @@ class RemoteStore(Mapping[str, RemoteTable]):
     def __init__(self, url: str, timeout_s: float = TIMEOUT_S) -> None:
         self._service = Service(url, timeout_s)
         self.url = self._service.url
-        len(self)
+        try:
+            len(self)
+        except (StoreError, UnknownMaterialError):
+            service, inside, _ = f"{self.url}/".partition("/v1/")
+            if inside:
+                raise StoreError(f"{self.url} lies in the service at {service}; name that address") from None
+            raise
 
     def __iter__(self) -> Iterator[str]:
         return iter([line["name"] for line in self._lines()])

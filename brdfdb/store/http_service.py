@@ -132,7 +132,7 @@ class Service:
         except (ValueError, TypeError, KeyError):  # the page of a proxy
             problem, detail = {}, ""
         if status == 404 and "closest" in problem:
-            raise UnknownMaterialError(path.partition("/materials/")[2].partition("/")[0], problem["closest"])
+            raise UnknownMaterialError(path.partition("/materials/")[2].partition("/")[0] or path, problem["closest"])
         if status == 404 and problem.get("parameter") == "revision":
             raise UnknownRevisionError(detail)
         if status == 422 and isinstance(parameter := problem.get("parameter"), str):

@@ -48,6 +48,11 @@ class Audited(AuditSummary):
     model_config = ConfigDict(extra="allow")
 
     material: str
+    manifest_sha256: str = Field(default="", description="of the revision; empty in reports of older programs")
+
+    def is_of(self, revision: str, digest: str) -> bool:
+        """Return True if the audit is about the table with the number of a revision, and the digest of its manifest."""
+        return self.revision == revision and self.manifest_sha256 in ("", digest)
 
 
 class Verdict(NamedTuple):

@@ -95,7 +95,7 @@ def material_document(table: Table, verdict: Verdict | None) -> dict[str, Any]:
         "formula_error": attributes.get("formula_error"),
         "largest_albedo": attributes.get("largest_albedo"),
         "incomplete": metadata.gaps or None,
-        "audit": None if verdict is None else _audited(verdict, table.revision),
+        "audit": None if verdict is None else _audited(verdict, table),
         "attributes": {
             key: value
             for key, value in attributes.items()
@@ -121,7 +121,7 @@ def _parameters(metadata: TableMetadata) -> list[dict[str, Any]]:
     ]
 
 
-def _audited(verdict: Verdict, revision: str) -> dict[str, Any]:
+def _audited(verdict: Verdict, table: Table) -> dict[str, Any]:
     """Return the fields of `ShownAudit`, as far as the report has them."""
     finding = verdict.finding.model_dump(include={*AuditSummary.model_fields}, exclude_unset=True)
-    return {**finding, "current": verdict.finding.revision == revision, "when": verdict.when}
+    return {**finding, "current": verdict.finding.is_of(table.revision, table.digest), "when": verdict.when}

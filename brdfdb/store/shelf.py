@@ -134,9 +134,12 @@ class Shelf:
     def verdict(self, name: str) -> Verdict | None:
         """Return the last audit of a material, of its current revision if there is one; None without a report on it."""
         reports = [audit.read() for audit in self._audits]
-        found = [(report.by_name[name], report.when) for report in reports if name in report.by_name]
-        if not found:
+        audits = [(report.by_name[name], report.when) for report in reports if name in report.by_name]
+        if not audits:
             return None
-        head = self.head(name)
-        verdicts = [Verdict(audited, when, audited.revision == head) for audited, when in found]
-        return max(verdicts, key=lambda verdict: (verdict.current, verdict.when))
+        with self._named(name):
+            group, digest = self.store.location(name)
+        verdicts = [Verdict(audited, when, audited.is_of(group.name, digest)) for audited, when in audits]
+        # of another table with the number of the current revision, as of a store that was built anew, nothing is said
+        known = [verdict for verdict in verdicts if verdict.current or verdict.finding.revision != group.name]
+        return max(known, key=lambda verdict: (verdict.current, verdict.when), default=None)

@@ -8,6 +8,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from brdfdb.errors import near_90
+from brdfdb.store.files import sha256_of
+from brdfdb.store.paths import NAME, manifest_path, number_of, revision_path
 
 NOT_MEASURED = "not measured"
 NOT_AUDITED = "not audited"
@@ -39,16 +41,33 @@ def last_audit(root: Path) -> dict[tuple[str, str], Audited]:
 
 
 def audited_materials(root: Path) -> list[dict[str, Any]]:
-    """Return the entries of the reports that lie in a store: of all materials and of some, the newer report last."""
+    """Return the entries of the reports that lie in a store: of all materials and of some, the newer report last.
+
+    Entries of other tables are left out, as of a store that was built anew: see `is_of_store`.
+    """
     entries: list[dict[str, Any]] = []
     paths = [path for name in (REPORT_OF_ALL, REPORT_OF_SOME) if (path := root / name).exists()]
     for path in sorted(paths, key=lambda path: path.stat().st_mtime_ns):
         try:
             of_report = json.loads(path.read_bytes())["materials"]
-            entries += [one for one in of_report if {"material", "revision", "verdict"} <= one.keys()]
+            known = [one for one in of_report if {"material", "revision", "verdict"} <= one.keys()]
+            entries += [one for one in known if is_of_store(root, one)]
         except (OSError, ValueError, KeyError, TypeError, AttributeError):
             continue
     return entries
+
+
+def is_of_store(root: Path, entry: Mapping[str, Any]) -> bool:
+    """Return True if the entry of a report is of a table of this store; by its revision alone if it has no digest."""
+    if not entry.get("manifest_sha256"):
+        return True
+    if not (NAME.fullmatch(entry["material"]) and number_of(entry["revision"])):
+        return False
+    try:
+        manifest = manifest_path(revision_path(root, entry["material"], entry["revision"]))
+        return sha256_of(manifest) == str(entry["manifest_sha256"])
+    except OSError:
+        return False
 
 
 def _answers(one: Mapping[str, Any]) -> Audited:

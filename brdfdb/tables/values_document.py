@@ -14,6 +14,7 @@ from brdfdb.tables.albedo import AlbedoDocument
 from brdfdb.tables.evaluation import Output, Values
 from brdfdb.tables.lobe_views import View as ViewName
 from brdfdb.tables.stokes_document import StokesDocument
+from brdfdb.tables.table import Table
 
 
 class Evaluated(BaseModel):
@@ -53,11 +54,17 @@ class View(BaseModel):
     )
 
 
-class Lookup(Evaluated):
-    """Values of a material."""
+class OfTable(BaseModel):
+    """The table of a material that an answer is made of."""
 
     material: str
     revision: str
+    digest: str = Field(description="sha256 of the manifest of the revision: stores number their revisions alike")
+
+
+class Lookup(Evaluated, OfTable):
+    """Values of a material."""
+
     stokes: StokesDocument | None = Field(
         default=None, description="reflected light of a polarised table; missing: not asked for"
     )
@@ -73,11 +80,8 @@ class Lobe(Lookup, View):
     """f_r of a material for one light over viewers, or over half and difference angles."""
 
 
-class Albedo(AlbedoDocument):
+class Albedo(AlbedoDocument, OfTable):
     """Directional albedo of a table."""
-
-    material: str
-    revision: str
 
 
 class OfModel(BaseModel):
@@ -105,6 +109,11 @@ class FamilyLookup(Evaluated):
 
     family: str
     parameters: dict[str, float]
+
+
+def of_table(table: Table) -> dict[str, Any]:
+    """Return the fields of `OfTable`."""
+    return {"material": table.name, "revision": table.revision, "digest": table.digest}
 
 
 def values_document(values: Values) -> dict[str, Any]:

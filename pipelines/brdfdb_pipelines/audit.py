@@ -216,9 +216,13 @@ def _with_former(audit_report: AuditReport, path: Path, store: Store) -> AuditRe
         return audit_report
     of_all = former_audit.read_former(store.root / REPORT_OF_ALL)
     newer = {audited.material for audited in of_all.materials} if of_all and of_all.when > former.when else set()
-    others = [audited for audited in former.materials if audited.material not in newer]
-    audits = {audited.material: audited for audited in others if audited.material in store}
-    audits = {name: audited for name, audited in audits.items() if audited.revision == store.head(name)}
+    audits = {}
+    for audited in former.materials:
+        name = audited.material
+        if name not in newer and name in store:
+            group, digest = store.location(name)
+            if (audited.revision, audited.manifest_sha256) == (group.name, digest):
+                audits[name] = audited
     audits |= {audited.material: audited for audited in audit_report.materials}
     named = {
         field: [name for name, audited in audits.items() if audited.verdict == verdict]

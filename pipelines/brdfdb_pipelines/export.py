@@ -15,7 +15,7 @@ from brdfdb.formats import EXPORTERS
 from brdfdb.formats._record import extrapolated_remark
 from brdfdb.formats._written import Written
 from brdfdb.place import path_of
-from brdfdb.store.summary_words import NOT_AUDITED, audited_materials
+from brdfdb.store.summary_words import NOT_AUDITED, audited_materials, is_of_store
 from brdfdb_pipelines import terminal, workers
 
 _FEW = 3  # materials that are written before other processes would have started
@@ -111,8 +111,9 @@ def _verdicts(root: Path, audit: Path | None, revisions: Mapping[str, str]) -> d
     """Return the verdicts of an audit report on these revisions by name; none if the store has no report."""
     try:
         materials = audited_materials(root) if audit is None else json.loads(audit.read_bytes())["materials"]
-        given = {(entry["material"], entry["revision"]): entry["verdict"] for entry in materials}
-    except (OSError, ValueError, KeyError, TypeError) as error:
+        ours = [entry for entry in materials if is_of_store(root, entry)]
+        given = {(entry["material"], entry["revision"]): entry["verdict"] for entry in ours}
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         reason = error.strerror if isinstance(error, OSError) else "it is no report of `brdfdb audit`"
         raise ParameterError("audit", f"{audit} cannot be read: {reason}", str(audit)) from None
     return {key[0]: given[key] for key in revisions.items() if key in given}

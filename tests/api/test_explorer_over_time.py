@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import shutil
 from pathlib import Path
 
 import pytest
@@ -54,6 +55,21 @@ def test_facts_and_the_line_of_the_list_are_of_the_revision_of_the_picture(
         assert f"within {100.0 * error.overall.p99:.3g} %" in known
         assert chromium.evaluate(LINE) == ""
         assert chromium.evaluate("[...verdict.options].map(each => each.value)") == ["", "not audited", "violates"]
+        assert chromium.errors == []
+
+
+def test_facts_follow_a_store_that_is_built_anew_with_the_same_numbers(chromium: Chromium, own: Path) -> None:
+    with serving(own) as address:
+        chromium.open(f"{address}/#material=grey-felt&view=cut")
+        shown(chromium, "material=grey-felt")
+        assert "Test grey-felt" in chromium.evaluate("document.title")
+        shutil.rmtree(own / "materials" / "grey-felt")
+        assert publish(own, "grey-felt", "oren_nayar", rho=0.25, sigma_deg=41.0) == "r000001"
+        move(chromium, "theta_i", 20)
+        shown(chromium, "theta_i=20")
+        known = chromium.evaluate("facts.textContent")
+        assert "revision r000001" in known
+        assert "41" in known
         assert chromium.errors == []
 
 

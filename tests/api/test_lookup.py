@@ -33,6 +33,7 @@ def test_one_point_in_degrees(client: Client, store: Store) -> None:
     assert answer.json() == {
         "material": "grey-felt",
         "revision": "r000001",
+        "digest": store["grey-felt"].digest,
         "source": "table",
         "unit": "1/sr",
         "output": "spectrum",

@@ -326,6 +326,7 @@ def test_numbers_say_which_revision_they_are_of(own: Path) -> None:
     client = client_of(own)
     posted = client.post(f"{TILE}/lookup", json={"theta_i": 1, "theta_r": 2}, headers={"Accept": "application/x-npy"})
     assert posted.headers["brdfdb-revision"] == client.get(TILE_POINT).headers["brdfdb-revision"] == "r000002"
+    assert posted.headers["brdfdb-digest"] == Store(own)["white-tile"].digest
     assert posted.headers["cache-control"] == "no-store"
     assert "etag" not in posted.headers
 

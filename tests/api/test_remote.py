@@ -176,6 +176,16 @@ def test_errors_are_stated_as_by_a_table(root: Path, address: str, name: str, wa
         same(found.error[some] * (expected.brdf[some] / expected.error[some]), expected.brdf[some])
 
 
+@pytest.mark.parametrize(
+    "inside", ["v1", "v1/materials", "v1/store/materials/grey-felt/r000001", "v1/materials/grey-felt/"]
+)
+def test_an_address_inside_a_service_is_recognised(address: str, inside: str) -> None:
+    service = address.rstrip("/")
+    with pytest.raises(StoreError) as raised:
+        brdfdb.open(f"{service}/{inside}")
+    assert str(raised.value) == f"{service}/{inside.rstrip('/')} lies in the service at {service}; name that address"
+
+
 def test_a_dataset_is_that_of_the_directory(root: Path, address: str) -> None:
     pytest.importorskip("aiohttp")
     there, here = brdfdb.open(address).dataset("copper-foil"), brdfdb.open(root).dataset("copper-foil")

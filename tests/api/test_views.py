@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import math
+import shutil
 import zipfile
 from pathlib import Path
 from typing import Any
@@ -19,9 +20,11 @@ from brdfdb.geometry import directions_from_half_difference
 from brdfdb.scenes import lit_sphere
 from brdfdb.spectra import srgb_weights
 from brdfdb.store.reader import Store
+from brdfdb.store.summary_words import last_audit
 from brdfdb.tables import slices
 from brdfdb.tables.albedo import directional_albedo
-from tests.api.a_store import NPY, VISIBLE_NM, Client, client_of, degrees, publish, read_npy
+from brdfdb_pipelines import cli
+from tests.api.a_store import NPY, VISIBLE_NM, Client, client_of, degrees, pinned_of, publish, read_npy
 
 FOIL, FELT, TILE, METAL = (
     f"/v1/materials/{name}" for name in ("copper-foil", "grey-felt", "white-tile", "brushed-metal")
@@ -277,6 +280,32 @@ def test_the_verdict_of_the_last_audit(own: Path) -> None:
     line = next(line for line in client.get("/v1/materials?q=white").json()["materials"])
     assert {key: line[key] for key in ANSWERS} == ANSWERS
     client.problem("GET", f"{FELT}/audit", 404)
+
+
+def test_a_verdict_of_another_store_with_the_same_number_is_not_shown(own: Path, tmp_path: Path) -> None:
+    finding = report(own)
+    document = {
+        "when": "2026-11-21T12:00:00Z",
+        "materials": [finding | {"manifest_sha256": Store(own)["white-tile"].digest}],
+    }
+    (own / "audit.json").write_text(json.dumps(document), encoding="utf-8")
+    client = client_of(own)
+    pinned = pinned_of(Store(own), "white-tile")
+    assert client.get(f"{TILE}/revisions/{pinned}/audit").json()["finding"]["verdict"] == "passes"
+    written = "passes" in client.get(f"{TILE}/export/csv?resolution=45").text
+    assert (last_audit(own)["white-tile", "r000001"].as_published, written) == ("yes", True)
+    shutil.rmtree(own / "materials" / "white-tile")
+    assert publish(own, "white-tile", "lambert", rho=0.5) == "r000001"
+    client.problem("GET", f"{TILE}/audit", 404)
+    assert client.get(TILE).json()["audit"] is None
+    assert "passes" not in client.get(f"{TILE}/export/csv?resolution=45").text
+    line = next(line for line in client.get("/v1/materials?q=white").json()["materials"])
+    assert line["verdict"] is None
+    assert last_audit(own) == {}
+    (own / "audit.json").rename(tmp_path / "other.json")
+    out = ("--store", str(own), "--out", str(tmp_path / "out"), "--resolution", "45")
+    assert cli.main(["export", "csv", "white-tile", "--audit", str(tmp_path / "other.json"), *out]) == 0
+    assert "not audited" in (tmp_path / "out" / "white-tile.csv").read_text()
 
 
 def test_an_audit_that_lacks_an_answer_is_none(own: Path) -> None:

@@ -42,15 +42,15 @@ export async function json(question, signal) {
   return (await answer(typeof question === "string" ? { path: question } : question, {}, signal)).json();
 }
 
-/** Values at the directions of a question, how many each, and of which revision they are.
+/** Values at the directions of a question, how many each, and the digest of the table that they are of.
  * @param {Question} question
  * @param {number} count
  * @param {AbortSignal} [signal]
- * @returns {Promise<{ revision: string | null, values: Float32Array | Float64Array, channels: number }>} */
+ * @returns {Promise<{ digest: string | null, values: Float32Array | Float64Array, channels: number }>} */
 export async function values(question, count, signal) {
   const response = await answer(question, { Accept: NPY }, signal);
   const found = fromNpy(await response.arrayBuffer());
-  return { revision: response.headers.get("Brdfdb-Revision"), values: found, channels: found.length / count };
+  return { digest: response.headers.get("Brdfdb-Digest"), values: found, channels: found.length / count };
 }
 
 /** @param {Question} question

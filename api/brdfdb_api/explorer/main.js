@@ -256,7 +256,7 @@ async function answersTo(view, now, signal, lastTry = false) {
   // what does not change answers is 0
   const asked = { ...now, quick: 0, exposure: 0, scale: 0, axes: 0, view: 0, compare: 0 };
   const key = JSON.stringify([
-    known.map(({ text, source, info }) => [text, source, info.revision]),
+    known.map(({ text, source, info }) => [text, source, info.digest]),
     all.some(({ info }) => info.anisotropic),
     asked,
   ]);
@@ -278,12 +278,12 @@ async function answersTo(view, now, signal, lastTry = false) {
   return answersTo(view, now, signal, true);
 }
 
-/** Whether an answer is of another revision than what is known; what an audit found may be of an old one.
+/** Whether an answer is of another table than what is known; what an audit found may be of an old revision.
  * @param {any} answer
  * @param {Series} each */
-const outdates = ({ revision, current, finding }, { info, source }) =>
+const outdates = ({ digest, revision, current, finding }, { info, source }) =>
   source !== "parameters" &&
-  (finding ? revision !== info.audit.revision || current !== info.audit.current : revision !== info.revision);
+  (finding ? revision !== info.audit.revision || current !== info.audit.current : digest !== info.digest);
 
 /** Tell people: what failed, or in another colour what worked; the names of materials that come closest are links.
  * @param {string} sentence */

@@ -73,7 +73,7 @@ async function answer(each, state, _, signal) {
  * @param {AbortSignal} signal
  * @returns {Promise<Around>} */
 function aroundOf(each, query, quick, signal) {
-  const key = (/** @type {boolean} */ hurried) => JSON.stringify([each.text, each.info.revision, query, hurried]);
+  const key = (/** @type {boolean} */ hurried) => JSON.stringify([each.text, each.info.digest, query, hurried]);
   return known.get(key(false)) ?? known.get(key(quick)) ?? kept(key(quick), summed(each, query, quick, signal));
 }
 

@@ -18,7 +18,7 @@ from starlette.types import Receive, Scope, Send
 from brdfdb.store.shelf import Shelf
 from brdfdb_api.http.errors import PROBLEM_JSON, RequestError
 from brdfdb_api.http.queries import names_of, parsed, shortened
-from brdfdb_api.http.responses import JSON, NPY, REVISION, Problem, unchanged
+from brdfdb_api.http.responses import DIGEST, JSON, NPY, REVISION, Problem, unchanged
 
 T = TypeVar("T")
 
@@ -46,6 +46,7 @@ _HEADERS = {
     "ETag": "changes with the answer",
     "Cache-Control": "how long the answer holds: what a revision stores for good",
     REVISION: "revision of the values",
+    DIGEST: "sha256 of the manifest of the revision",
     "Content-Disposition": "name of the file",
     "Retry-After": "seconds after which the same request may succeed",
 }

@@ -25,7 +25,7 @@ from brdfdb_api.http.lookups import LARGE_AT_ONCE, lookups
 from brdfdb_api.http.middleware import Edge
 from brdfdb_api.http.models import models
 from brdfdb_api.http.pages import pages
-from brdfdb_api.http.responses import REVISION
+from brdfdb_api.http.responses import DIGEST, REVISION
 from brdfdb_api.http.routes import router
 from brdfdb_api.http.views import EXPORTS_AT_ONCE, views
 from brdfdb_api.serving.settings import Settings
@@ -55,7 +55,7 @@ class Application(FastAPI):
             allow_origins=given.cors_origins,
             allow_methods=["GET", "POST"],
             allow_headers=["*"],
-            expose_headers=["ETag", "Retry-After", "X-Request-ID", REVISION],
+            expose_headers=["ETag", "Retry-After", "X-Request-ID", REVISION, DIGEST],
         )
 
     def openapi(self) -> dict[str, Any]:

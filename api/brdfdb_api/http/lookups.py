@@ -22,7 +22,7 @@ from brdfdb.store.shelf import Shelf
 from brdfdb.tables.evaluation import Surface, Values, surface_of
 from brdfdb.tables.points import ANGLES, Points, PointsBody
 from brdfdb.tables.table import Table
-from brdfdb.tables.values_document import Lookup, Lookups, arrays_of, npy_bytes, values_document
+from brdfdb.tables.values_document import Lookup, Lookups, arrays_of, npy_bytes, of_table, values_document
 from brdfdb_api.http import queries, responses
 from brdfdb_api.http.addresses import (
     NPY_ANSWER,
@@ -146,7 +146,7 @@ async def looked_up(
     """Answer a body of `size` bytes: read it, in a thread unless it is `quick`, and look its points up."""
     state, kind = request.app.state, options.kind(queries.accept_of(request), binary=binary)
     surface, points, about = read() if quick else await in_thread(state, read, large=size > LARGE_BYTES)
-    headers = responses.value_headers(kind, None, about.get("revision"))
+    headers = responses.value_headers(kind, None, about.get("revision"), about.get("digest"))
     return await answered(state, points, options, surface, kind, headers, about)
 
 
@@ -182,7 +182,7 @@ _OF_POINTS = queries.names_of(queries.PointQuery)
     lookups,
     "/lookup",
     tags=["lookup"],
-    responses=answers(Lookup, 304, 404, 413, 503, media=NPY_ANSWER, headers=(responses.REVISION,)),
+    responses=answers(Lookup, 304, 404, 413, 503, media=NPY_ANSWER, headers=(responses.REVISION, responses.DIGEST)),
     route_class_override=Quick,
 )
 async def lookup_point(
@@ -209,8 +209,8 @@ async def lookup_point(
     surface = surface_in(table, query)
     computed = query.source == "model" or query.output != "spectrum" or query.stokes is not None
     tag, immutable = tag_in(table, surface), is_pinned(revision) and not computed
-    headers = responses.value_headers(kind, tag, table.revision, immutable=immutable)
-    about = {"material": table.name, "revision": table.revision}
+    headers = responses.value_headers(kind, tag, table.revision, table.digest, immutable=immutable)
+    about = of_table(table)
     answer = await answered(state, points, query, surface, kind, headers, about)
     return responses.unchanged(answer, held) if held else answer
 
@@ -228,7 +228,7 @@ async def _table(shelf: Shelf, name: str, revision: str | None) -> Table:
     "/lookup",
     method="POST",
     tags=["lookup"],
-    responses=answers(Lookup, 404, 413, 415, 503, media=NPY_ANSWER, headers=(responses.REVISION,)),
+    responses=answers(Lookup, 404, 413, 415, 503, media=NPY_ANSWER, headers=(responses.REVISION, responses.DIGEST)),
     openapi_extra=body(PointsBody, npy=True),
 )
 async def lookup_points(
@@ -244,7 +244,7 @@ async def lookup_points(
         raise RequestError(422, "wavelength_nm: a JSON body holds it, not the query", "wavelength_nm")
     table = await _table(shelf_of(request), name, revision)
     surface, content = surface_in(table, query), await request.body()
-    about = {"material": table.name, "revision": table.revision}
+    about = of_table(table)
 
     def read() -> Asked:
         if binary:
@@ -274,14 +274,11 @@ def lookup_many(request: Request, query: Annotated[queries.ManyQuery, InQuery()]
         total += checked_size(max_points, points, query, surface, kind)
         if total > (most := LIMITS[kind][1] * max_points):
             raise RequestError(413, f"the values of all materials are more than the {most} that one answer may hold")
-        results[name] = table.revision, evaluate(points, query, surface)
+        results[name] = table, evaluate(points, query, surface)
     if kind == "npy":
         data = io.BytesIO()
         arrays: dict[str, Any] = arrays_of({name: values for name, (_, values) in results.items()})
         np.savez(data, **arrays)
         return Response(data.getvalue(), media_type=NPZ, headers=responses.NO_STORE)
-    documents = [
-        {"material": name, "revision": revision, **values_document(values)}
-        for name, (revision, values) in results.items()
-    ]
+    documents = [of_table(table) | values_document(values) for table, values in results.values()]
     return responses.Answer(responses.json_bytes({"materials": documents}), responses.value_headers("json"))

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 JSON = "application/json"
 NPY = "application/x-npy"
 REVISION = "Brdfdb-Revision"  # header that names the revision of the values of a lookup
+DIGEST = "Brdfdb-Digest"  # header with the sha256 of its manifest
 NO_STORE = {"Cache-Control": "no-store"}
 Encoded = list[tuple[bytes, bytes]]  # headers
 COMPRESSED_FROM = 1024  # length of a document [byte]
@@ -169,12 +170,17 @@ class Answer(Response):
 
 @functools.lru_cache(maxsize=1024)
 def value_headers(
-    kind: str, tag: str | None = None, revision: str | None = None, *, immutable: bool = False
+    kind: str,
+    tag: str | None = None,
+    revision: str | None = None,
+    digest: str | None = None,
+    *,
+    immutable: bool = False,
 ) -> Encoded:
     """Return the headers of values of a `kind`: of a tag (None: not to be cached), and a revision if there is one."""
     named = NO_STORE if tag is None else cache_headers(tag, kind, immutable=immutable)
-    if revision is not None:
-        named = named | {REVISION: revision}
+    if revision is not None and digest is not None:
+        named = named | {REVISION: revision, DIGEST: digest}
     named = named | {"Content-Type": NPY if kind == "npy" else JSON}
     return [(name.lower().encode(), value.encode()) for name, value in named.items()]
 

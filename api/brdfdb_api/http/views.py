@@ -22,7 +22,7 @@ from brdfdb.tables.albedo import reflected
 from brdfdb.tables.evaluation import Surface
 from brdfdb.tables.lobe_views import MOST_POINTS, view_directions
 from brdfdb.tables.points import Points, listed
-from brdfdb.tables.values_document import Albedo, Lobe, lobe_document, npy_bytes
+from brdfdb.tables.values_document import Albedo, Lobe, lobe_document, npy_bytes, of_table
 from brdfdb_api.http.addresses import NPY_ANSWER, Revision, addresses, answers, both, shelf_of
 from brdfdb_api.http.errors import RequestError, refused
 from brdfdb_api.http.lookups import LARGE, checked_size, evaluate, surface_in, tag_in, turn
@@ -59,7 +59,7 @@ class ThumbnailQuery(Query):
 def albedo(request: Request, name: str, revision: Revision = None) -> Response:
     """Return the directional and the hemispherical albedo [1] of the table."""
     table = shelf_of(request).table(name, revision)
-    about = {"material": table.name, "revision": table.revision}
+    about = of_table(table)
     return Document(about | reflected(table).document(table.wavelength_nm), cache_headers(tag_of(table)))
 
 
@@ -77,7 +77,7 @@ def lobe(request: Request, name: str, query: Annotated[LobeQuery, InQuery()], re
     table = shelf_of(request).table(name, revision)
     surface = surface_in(table, query)
     headers = cache_headers(tag_in(table, surface), query.kind(accept_of(request)))
-    about = {"material": table.name, "revision": table.revision}
+    about = of_table(table)
     return lobe_answer(request, surface, query, query, about, headers)
 
 
@@ -122,7 +122,7 @@ async def export(
         options = {option: allowed[option].parse(text) for option, text in query.items()}
     shelf = shelf_of(request)
     table, known = await run_in_threadpool(lambda: (shelf.table(name, revision), shelf.verdict(name)))
-    verdict = known.finding.verdict if known and known.finding.revision == table.revision else None
+    verdict = known.finding.verdict if known and known.finding.is_of(table.revision, table.digest) else None
     # The file states the verdict, which a later audit may change, and the program. A weak tag: some state the time
     headers = cache_headers(tag_of(table, verdict), file_format)
     headers["ETag"] = f"W/{headers['ETag']}"
@@ -141,9 +141,8 @@ def audit(request: Request, name: str, revision: Revision = None) -> Response:
     """Return the findings of the last `brdfdb audit` on a material: energy, reciprocity, error and more."""
     shelf = shelf_of(request)
     verdict, current = shelf.verdict(name), shelf.head(name)
-    if verdict is None or revision not in (None, verdict.finding.revision):
-        if revision not in (None, current):
-            shelf.table(name, revision)  # raises if there is no such revision
+    table = None if revision is None else shelf.table(name, revision)  # raises if there is no such revision
+    if verdict is None or not (table is None or verdict.finding.is_of(table.revision, table.digest)):
         raise RequestError(404, f"{name}: no audit of it is here; `brdfdb audit` makes one")
     audited = verdict.finding.revision
     document = {"material": name, "revision": audited, "current": audited == current, "when": verdict.when}
