@@ -98,7 +98,7 @@ class LeftOut(BaseModel):
 F = TypeVar("F")
 
 
-class Candidates(list[F]):
+class Forms(list[F]):
     """Forms of a source, the exact form first. `left_out` names the forms that cannot be made."""
 
     def __init__(self, forms: Iterable[F], left_out: Iterable[LeftOut]) -> None:
@@ -106,9 +106,7 @@ class Candidates(list[F]):
         self.left_out = list(left_out)
 
 
-def forms(
-    source: Source, wavelength_nm: ArrayLike | None, tolerances: Sequence[float] | None = None
-) -> Candidates[Form]:
+def forms(source: Source, wavelength_nm: ArrayLike | None, tolerances: Sequence[float] | None = None) -> Forms[Form]:
     """Return all forms of a source, the exact form first.
 
     Parameters
@@ -123,7 +121,7 @@ def forms(
 
     Returns
     -------
-    Candidates of Form
+    Forms of Form
         The forms that the model of a material names (`ModelSpec.forms`), or the source itself, then tables. Coarser
         rungs follow the exact form: approximations are compared with this ladder. Tables hold the exact form if it is a
         model of the registry (`ModelSpec.exact_model`). They are planned for the model of the material, which is as
@@ -146,16 +144,16 @@ def forms(
         elif isinstance(source, MeasuredSource):
             key, title = "data", f"{source.title}: the data, interpolated"
         itself = Form(key, title, "exact", f"source {source.name}", source.brdf_at(at), 0)
-        return _candidates([itself], _tables(source, source, at, tolerances, "table"))
+        return _offered([itself], _tables(source, source, at, tolerances, "table"))
     listed = list(_of_model(source, at))
     tabulated = exact_material(source)
     title = "table" if listed[0].python == f"models.{tabulated.model}" else "table of the fit"
-    return _candidates(listed, _tables(source, tabulated, at, tolerances, title))
+    return _offered(listed, _tables(source, tabulated, at, tolerances, title))
 
 
-def _candidates(listed: Sequence[Form], tables: Iterator[Form | LeftOut]) -> Candidates[Form]:
+def _offered(listed: Sequence[Form], tables: Iterator[Form | LeftOut]) -> Forms[Form]:
     made = list(tables)
-    return Candidates(
+    return Forms(
         [*listed, *(form for form in made if isinstance(form, Form))],
         [form for form in made if isinstance(form, LeftOut)],
     )

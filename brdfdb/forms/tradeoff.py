@@ -71,8 +71,8 @@ def chart(
     ParameterError
         If a tolerance is outside its range, or the wavelengths do not suit the material.
     """
-    candidates = catalogue.forms(source, wavelength_nm, tolerances)
-    forms = [*candidates, *also]
+    offered = catalogue.forms(source, wavelength_nm, tolerances)
+    forms = [*offered, *also]
     tick()
     drawn = error_measurement.draw(source, wavelength_nm, DIRECTIONS, SEED)
     errors = _errors(forms, drawn)
@@ -116,7 +116,7 @@ def chart(
             bytes=front(np.array([[form.bytes for form in forms]], dtype=np.float64)),
         ),
         samplers=samplers,
-        left_out=candidates.left_out,
+        left_out=offered.left_out,
     )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import importlib.metadata
 import importlib.util
+import math
 import os
 import re
 import sys
@@ -152,6 +153,10 @@ def _check(spec: ModelSpec, origin: str) -> None:
         if not callable(given) and (given is not None or field in _FUNCTIONS):
             allowed = "a function" if field in _FUNCTIONS else "a function or None"
             raise BrdfdbError(f"{origin}: {spec.name}: {field}: {given!r:.80} is not {allowed}")
+    power = spec.grazing_power
+    if not (power is None or callable(power) or (isinstance(power, int | float) and 0.0 <= power < math.inf)):
+        allowed = "a number of at least 0, a function or None"
+        raise BrdfdbError(f"{origin}: {spec.name}: grazing_power: {power!r:.80} is not {allowed}")
 
 
 def _message(error: BaseException) -> str:

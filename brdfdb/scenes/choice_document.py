@@ -9,7 +9,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
-from brdfdb.forms.catalogue import Candidates, Kind, LeftOut
+from brdfdb.forms.catalogue import Forms, Kind, LeftOut
 from brdfdb.parameters import Floats
 from brdfdb.scenes.choice import CONFIDENCE, GRAZING_DEG, Decision, Left, Sample
 from brdfdb.scenes.offered_forms import OfferedForm
@@ -144,7 +144,7 @@ def statement(tolerance: Tolerance, picture: tuple[int, int], materials: Sequenc
 def describe(
     scene: Scene,
     chosen: Mapping[str, Decision],
-    offered: Mapping[str, Candidates[OfferedForm]],
+    offered: Mapping[str, Forms[OfferedForm]],
     prices: Mapping[str, Sequence[Price]],
     pixels: Mapping[str, int],
     revisions: Mapping[str, str],

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.forms import catalogue
-from brdfdb.forms.catalogue import Candidates, Form, LeftOut
+from brdfdb.forms.catalogue import Form, Forms, LeftOut
 from brdfdb.geometry import radians
 from brdfdb.materials import Source
 from brdfdb.parameters import Floats
@@ -42,7 +42,7 @@ class OfferedForm:
 
 def offered_forms(
     source: Source, wavelength_nm: NDArray[np.float64] | None, tolerances: Sequence[float] | None = None
-) -> Candidates[OfferedForm]:
+) -> Forms[OfferedForm]:
     """Return the forms to choose from, the truth first, at all wavelengths and for spectral sources also at fewer.
 
     Parameters
@@ -56,7 +56,7 @@ def offered_forms(
 
     Returns
     -------
-    Candidates of OfferedForm
+    Forms of OfferedForm
         The forms, without models that are meant to differ and without forms that differ only in rounding. A table that
         cannot be made is among `left_out`.
 
@@ -82,16 +82,16 @@ def offered_forms(
                 for out in forms.left_out
             ]
     kept = [one for one in offered if one.form.kind != "other model" and not one.form.rounded]
-    return Candidates(kept, left_out)
+    return Forms(kept, left_out)
 
 
 def _offered(
     source: Source, wavelength_nm: NDArray[np.float64] | None, tolerances: Sequence[float] | None
-) -> Candidates[Form]:
+) -> Forms[Form]:
     """Return all forms of a material, and its tables a second time, with the truth at limbs."""
     forms = catalogue.forms(source, wavelength_nm, tolerances)
     with_limbs = [_with_true_limbs(form, forms[0]) for form in forms if form.kind == "table"]
-    return Candidates([*forms, *with_limbs], forms.left_out)
+    return Forms([*forms, *with_limbs], forms.left_out)
 
 
 def _with_true_limbs(form: Form, truth: Form) -> Form:

@@ -107,12 +107,13 @@ def energy(head: Mapping[str, Any], audited: Audited | None) -> str:
     """Return the answer of the audit on energy; without one, that it is missing and an albedo above 1."""
     if audited is not None:
         return audited.conserves_energy
-    above = excess(head) or _beyond(head["largest_albedo"]) if head.get("largest_albedo") else ""
+    above = excess(head) or _beyond(head)
     return f"{NOT_AUDITED}: {above}" if above else NOT_AUDITED
 
 
-def _beyond(largest: Mapping[str, Any]) -> str:
+def _beyond(head: Mapping[str, Any]) -> str:
     """Return the angle beyond those judged where an albedo passes 1, in words; empty if there is none."""
+    largest = head.get("largest_albedo") or {}
     passes = (largest.get("grazing") or {}).get("passes_1_at_theta_i_deg")
     return "" if passes is None else f"albedo of the {_whose(largest)} passes 1 at {near_90(passes)}°"
 

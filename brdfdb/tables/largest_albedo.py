@@ -7,7 +7,8 @@ from collections.abc import Callable
 import numpy as np
 
 from brdfdb.geometry import degrees, radians
-from brdfdb.materials import FunctionSource, Source
+from brdfdb.materials import Source
+from brdfdb.measurements import MeasuredSource
 from brdfdb.parameters import Floats
 from brdfdb.tables.albedo import (
     LARGEST_TOLERANCE,
@@ -19,6 +20,7 @@ from brdfdb.tables.albedo import (
 from brdfdb.tables.first_numbers import Grazing, LargestAlbedo
 from brdfdb.tables.grids import Axis
 from brdfdb.tables.table import Table
+from brdfdb.tables.table_source import TableSource
 
 LAST_LIGHT_DEG = 89.9  # largest angle at which the albedo of a source with a pole at the horizon is judged
 _MOST_PANELS = 1000  # of a light
@@ -49,10 +51,10 @@ def largest_albedo(table: Table, source: Source | None) -> LargestAlbedo:
         For lights up to `last_light` of a source, or up to the last light of `directional_albedo` of a table.
     """
     nm = table.wavelength_nm
-    if source is None or (isinstance(source, FunctionSource) and type(source) is not FunctionSource):
-        lights = directional_albedo(table, tolerance=LARGEST_TOLERANCE).theta_i_deg
+    if source is None or isinstance(source, MeasuredSource | TableSource):
         albedo_at, of_source, power = _of_table(table), False, None
-        whole = albedo_at(lights, LARGEST_TOLERANCE)
+        integrated = directional_albedo(table, tolerance=LARGEST_TOLERANCE)
+        lights, whole = integrated.theta_i_deg, _whole(table, integrated.theta_i_deg, nm, integrated.albedo)
     else:
         albedo_at, of_source, power = _of_source(source, nm), True, source.grazing_power(nm)
         lights = np.append(THETA_I_DEG, np.unique([LAST_LIGHT_DEG, last_light(source)]))
@@ -153,20 +155,21 @@ def _grazing(albedo_at: _AlbedoAt, declared: float | None, largest: float, up_to
     if power > 0.0:  # of an albedo of rest + factor cos^-power
         factor = max((nearest - nearer) / (_NEAREST**-power - _NEARER**-power), 0.0)
         rest = nearest - factor * _NEAREST**-power
-    most = max(largest, near, nearer, nearest)
-    passes = None
-    if largest <= 1.0 and (most > 1.0 + LARGEST_TOLERANCE or (power > 0.0 and factor > 0.0)):
-        above, below = np.log(_LEAST), float(np.log(np.cos(radians(up_to_theta_i_deg))))
-        if at(_LEAST, nearest) <= 1.0:  # beyond what quadrature reaches: by that formula
-            cos_i = (factor / (1.0 - rest)) ** (1.0 / power)
-        else:
-            while below - above > _PASSING:
-                between = (below + above) / 2.0
-                below, above = (below, between) if at(np.exp(between), 1.0) > 1.0 else (between, above)
-            cos_i = np.exp(above)
-        passes = 90.0 - float(degrees(np.arcsin(cos_i)))
+    most, passes = max(largest, near, nearer, nearest), None
+    if largest <= 1.0 and (power > 0.0 or most > 1.0 + LARGEST_TOLERANCE):
+        tried = {_NEAR: near, _NEARER: nearer, _NEAREST: nearest, _LEAST: at(_LEAST, nearest)}
+        above = next((cos_i for cos_i, albedo in tried.items() if albedo > 1.0), None)
+        if above is not None:
+            below = float(np.cos(radians(min(up_to_theta_i_deg, LAST_LIGHT_DEG))))
+            while below > above * (1.0 + _PASSING):
+                between = float(np.sqrt(below * above))
+                below, above = (below, between) if at(between, 1.0) > 1.0 else (between, above)
+        elif factor > 0.0 and rest < 1.0:  # closer than quadrature reaches, by the formula
+            above = (factor / (1.0 - rest)) ** (1.0 / power)
+        if above is not None:
+            passes = 90.0 - float(f"{degrees(np.arcsin(above)):.3g}")
     return Grazing(
-        power=power,
+        power=float(f"{power:.6g}"),
         origin="measured" if declared is None else "declared",
         factor=float(f"{factor:.4g}"),
         max_albedo=float(f"{most:.4g}") if power == 0.0 else None,

@@ -15,6 +15,7 @@ from matplotlib.lines import Line2D
 from matplotlib.text import OffsetFrom
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
+from brdfdb.errors import counted
 from brdfdb.forms.tradeoff_document import Between, Curve, Diagnostic, FamilyChart, Form
 from brdfdb_pipelines import figure_look, terminal
 from brdfdb_pipelines.plot_panels import (
@@ -73,6 +74,8 @@ def drawn(whole: FamilyChart) -> Canvas:
     height = bottom + BELOW + ROW * (count_of + 2)
     several = "; lines are medians, bands all members of a value" if len(whole.axes) > 1 else ""
     subtitle = f"{whole.family}, {whole.model}, {wavelengths(whole)}, {len(whole.members)} members{several}."
+    if whole.left_out:
+        subtitle += f" {counted(len(whole.left_out), 'table')} of members cannot be made."
     canvas = titled(height, whole.title, f"{subtitle} Large: worth having there. Times are those of one member.")
 
     def box(left: float, top: float, width: float) -> tuple[float, float, float, float]:

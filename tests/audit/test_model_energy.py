@@ -197,6 +197,23 @@ def test_duers_normalisation_exceeds_1_without_bound() -> None:
     assert (found.verdict, found.max_at_theta_i_deg) == ("violates", 89.9)
 
 
+def test_the_verdict_says_up_to_which_light_it_holds_and_how_the_albedo_goes_on() -> None:
+    brass = energy(presets()["rolled-brass"])
+    assert brass.judged_up_to_theta_i_deg == 89.9
+    assert brass.grazing is not None
+    assert (brass.grazing.power, brass.grazing.origin) == (0.5, "declared")
+    assert brass.reason.endswith(
+        "; as it is, it reflects at most 0.417 of what arrives, for lights up to 89.9 degrees, at 0 degrees; "
+        "grows as cos^-1/2 and passes 1 at 89.9965 degrees"
+    )
+    wide = {"rho_d": 0.3, "rho_s": 0.1, "alpha_x": 0.12, "alpha_y": 0.25}
+    bounded = energy(material("ward_bounded", wide))
+    assert bounded.reason.endswith("for lights up to 89.9 degrees, at 89.9 degrees; bounded, at most 0.4")
+    assert energy(material("ward_duer", wide)).reason.startswith(
+        "the model reflects 3.911 of what arrives at 89.9 degrees; grows as cos^-1; this model does so"
+    )
+
+
 def test_minnaerts_law_exceeds_1_as_it_is_printed() -> None:
     found = energy(material("minnaert", {"k": 0.6, "rho": 1.0}))
     assert found.verdict == "violates"

@@ -93,7 +93,7 @@ def test_minnaerts_law_grows_by_its_closed_form() -> None:
     found = grazing(material("minnaert", k=0.99, rho=0.9), 0.9 * np.cos(np.deg2rad(89.9)) ** -0.01)
     assert (found.power, found.origin, found.max_albedo) == (pytest.approx(0.01), "declared", None)
     assert found.factor == pytest.approx(0.9, rel=1e-3)
-    assert found.passes_1_at_theta_i_deg == pytest.approx(np.degrees(np.arccos(0.9**100)), abs=1e-6)
+    assert found.passes_1_at_theta_i_deg == pytest.approx(np.degrees(np.arccos(0.9**100)), abs=5e-6)
 
 
 def test_rolled_brass_passes_1_where_another_quadrature_says() -> None:

@@ -171,6 +171,7 @@ def test_a_file_that_is_wrong_is_refused_in_a_sentence(
         ("vectors", None, "lambert: vectors: None is not a function"),
         ("lobe", "wide", "lambert: lobe: 'wide' is not a function or None"),
         ("specular", 0.5, "lambert: specular: 0.5 is not a function or None"),
+        ("grazing_power", -1.0, "lambert: grazing_power: -1.0 is not a number of at least 0, a function or None"),
         ("version", 0, "lambert: version: 0 is not an integer of at least 1"),
         ("parameters", ["rho"], "lambert: parameters: ['rho'] is not a tuple of brdfdb.parameters.Parameter"),
         ("name", "my model", "name: 'my model' is not letters, digits, _ and -, a letter first"),

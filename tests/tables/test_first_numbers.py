@@ -15,9 +15,10 @@ from brdfdb.materials import FunctionSource, Material, presets
 from brdfdb.tables import error_measurement
 from brdfdb.tables.first_numbers import LargestAlbedo
 from brdfdb.tables.formula_measurement import DIRECTIONS, SEED, first_numbers, formula_error_of, highest_rung
+from brdfdb.tables.largest_albedo import largest_albedo
 from brdfdb.tables.layout import Layout
 from brdfdb.tables.planner import coarsest, plan
-from brdfdb.tables.table import table_from
+from brdfdb.tables.table import Table, table_from
 from brdfdb.tables.tabulation import tabulate
 from brdfdb.tables.worst_pair import worst_pair
 
@@ -86,6 +87,40 @@ def test_the_largest_albedo_of_a_build_is_that_of_the_audit_of_the_table_and_of_
     audited = table_energy_of(stored, None)
     assert (audited.max_albedo, audited.max_at_theta_i_deg) == (pytest.approx(largest, abs=1e-6), 90.0)
     assert (stated.albedo, stated.theta_i_deg) == (pytest.approx(largest, abs=1e-4), 90.0)
+
+
+def test_the_largest_albedo_is_that_of_the_model_at_each_tolerance() -> None:
+    """Minnaert's law has the albedo rho cos^(k - 1): 1.0306 at 89.9 degrees, where tables stated 0.901 and 1.036."""
+    parameters = {"k": 0.92, "rho": 0.62}
+    made = Material.from_table("m", {"title": "M", "model": "minnaert", "source": "x", "parameters": parameters})
+    stated = []
+    for tolerance in (0.01, 0.05):
+        layout = plan(made, None, tolerance)
+        values = tabulate(layout)[layout.variable].to_numpy()
+        stated.append(first_numbers(layout, lambda rows, values=values: values[rows])["largest_albedo"])
+    assert stated[0] == stated[1]
+    assert stated[0].albedo == pytest.approx(0.62 * np.cos(np.deg2rad(89.9)) ** -0.08, abs=1e-3)
+    assert (stated[0].theta_i_deg, stated[0].up_to_theta_i_deg, stated[0].of) == (89.9, 89.9, "source")
+    assert stated[0].grazing.power == pytest.approx(0.08)
+    assert stated[0].above_1
+
+
+def test_the_largest_albedo_of_a_function_is_its_own_and_that_of_its_table_is_of_the_lookups() -> None:
+    def rising(wi: Any, wr: Any, _: Any) -> Any:
+        return (wi[:, 2] * wr[:, 2]) ** -0.08 * 0.62 * 1.92 / (2.0 * np.pi)
+
+    source = FunctionSource(brdf=rising, name="m", title="M", provenance="made up", grazing_pole=True)
+    layout = plan(source, None, 0.05)
+    values = tabulate(layout)[layout.variable].to_numpy()
+    table = Table.of(layout, values)
+    stated = largest_albedo(table, source)
+    assert stated.albedo == pytest.approx(1.0306, abs=1e-3)
+    assert stated.grazing is not None
+    assert (stated.of, stated.grazing.origin, stated.grazing.power) == ("source", "measured", 0.08)
+    of_table = largest_albedo(table, None)
+    assert of_table.grazing is not None
+    assert (of_table.of, of_table.grazing.origin) == ("table", "measured")
+    assert of_table.albedo == pytest.approx(table_energy_of(table, None).max_albedo, abs=1e-3)
 
 
 def test_the_largest_albedo_has_the_specular_part() -> None:
