@@ -11,7 +11,7 @@ from brdfdb.errors import (
 )
 from brdfdb.place import path_of
 from brdfdb.store.files import sync_directory
-from brdfdb.store.paths import manifest_path, marker_path, materials_path, staging_path, store_around
+from brdfdb.store.paths import DIRECTORIES, manifest_path, marker_path, materials_path, staging_path, store_around
 from brdfdb.store.sealed_json import read_sealed, swap_sealed, unsealed
 
 FORMAT = "brdfdb"
@@ -56,11 +56,12 @@ def make_store(root: Path) -> bool:
     Raises
     ------
     StoreError
-        If `root` cannot be written, lies in a store, or is something other than a store.
+        If `root` cannot be written, is a directory of a store such as its materials, or is something else.
     """
     marker, made = marker_path(path_of(root, "root")), False
     try:
-        if not marker.exists() and (around := store_around(root)) is not None:
+        around = None if marker.exists() else store_around(root)
+        if around is not None and root.resolve().relative_to(around).parts[0] in DIRECTORIES:
             raise StoreError(f"{root} lies in the store at {around}; name that directory, or one outside")
         root.mkdir(parents=True, exist_ok=True)
         strangers = [path for path in root.iterdir() if not path.name.startswith(f".{marker.name}.")]

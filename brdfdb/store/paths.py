@@ -12,6 +12,7 @@ NAME = re.compile(r"(?!.{129})[a-z0-9]+(-[a-z0-9]+)*")
 HEAD = "HEAD.json"
 METADATA = "zarr.json"  # of a zarr group or array
 _MANIFEST = ".MANIFEST.json"
+DIRECTORIES = ("materials", "families", "snapshots", ".staging")  # of a store
 
 
 def marker_path(root: Path) -> Path:
