@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from brdfdb._elementary import COS_HORIZON, cos, sine
 from brdfdb._numba import elementwise, loop
-from brdfdb.arrays import PLAIN, array_function, plain, unlabelled
+from brdfdb.arrays import PLAIN_TYPES, array_function, plain, unlabelled
 from brdfdb.errors import ParameterError, warn_of_degrees
 from brdfdb.parameters import Floats
 
@@ -168,7 +168,7 @@ def checked_angles(theta_i: ArrayLike, phi_i: ArrayLike, theta_r: ArrayLike, phi
     broadcast.
     """
     given = (theta_i, phi_i, theta_r, phi_r)
-    if not PLAIN.issuperset(map(type, given)):
+    if not PLAIN_TYPES.issuperset(map(type, given)):
         names = ("theta_i", "phi_i", "theta_r", "phi_r")
         given = tuple(plain(name, unlabelled(name, angle)) for name, angle in zip(names, given, strict=True))
     t_i, t_r = check_theta("theta_i", given[0]), check_theta("theta_r", given[2])

@@ -251,9 +251,9 @@ def test_an_array_for_the_result_is_plain() -> None:
 
 
 def gated(function: Callable[..., Any]) -> bool:
-    """True if a labelled first array argument of a function passes the gate."""
+    """True if the code of a function, or of one that it wraps, goes through the gate."""
     while function is not None:
-        if function.__code__.co_filename.endswith("arrays.py"):
+        if "entered" in function.__code__.co_names or "_of_arrays" in function.__code__.co_names:
             return True
         function = getattr(function, "__wrapped__", None)  # type: ignore[assignment]
     return False

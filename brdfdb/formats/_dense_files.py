@@ -241,7 +241,7 @@ def reading_of_rows(
     known: Mapping[str, Any],
     nodes: Callable[[], Samples] | None = None,
 ) -> FileTable | Samples:
-    """Return f_r of rows of angles [degree]: interpolated linearly if the rows are those of a grid, else as samples.
+    """Return f_r of rows of angles [degree]: interpolated linearly if they are a grid without holes, else as samples.
 
     Parameters
     ----------
@@ -272,6 +272,8 @@ def reading_of_rows(
     of_vectors = {"theta_i", "theta_r"} <= set(angles)
     if of_vectors and nodes is None:
         nodes = functools.partial(samples_of_rows, path, angles, values, wavelength_nm, known)
+    if nodes is not None and not np.all(values >= 0.0):  # holes, and what no interpolation can tell from them
+        return nodes()
     if np.prod(shape, dtype=object) == len(values) and _is_grid(angles, of_axes):
         ordered = values.reshape(*shape, -1)
         table = file_table(path, of_axes, ordered[..., 0] if wavelength_nm is None else ordered, wavelength_nm, known)

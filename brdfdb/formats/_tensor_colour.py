@@ -30,6 +30,6 @@ def trees_of(tree: Tree, xyz: Floats) -> tuple[Tree, Tree, Tree]:
 
 def xyz_of(y: Floats, u: Floats, v: Floats) -> Floats:
     """Return X, Y and Z, shape (N, 3), from luminance and chromaticities (N,)."""
-    safe = np.where(v == 0.0, _WHITE[1], v)
+    safe = np.where(v > 0.0, v, _WHITE[1])
     x, z = y * 9.0 * u / (4.0 * safe), y * (12.0 - 3.0 * u - 20.0 * safe) / (4.0 * safe)
     return np.stack([x, y, np.maximum(z, 0.0)], axis=-1)

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from brdfdb.formats._nodes import without_holes
 from brdfdb.formats._square_disk import positions
 from brdfdb.parameters import Floats
 
@@ -38,7 +37,7 @@ class Tree:
     halvings : int array (leaves,)
         Each axis of the grid of a leaf has 2^halvings cells.
     values : array (N,)
-        Values of all leaves; a negative one is a hole.
+        Values of all leaves; negative ones stand for 0.
     """
 
     rank: int
@@ -48,7 +47,7 @@ class Tree:
     values: Floats
 
     def at(self, place: Floats) -> Floats:
-        """Return the values (N,) at positions (N, rank) in the unit cube; nan for negative ones, for Radiance 0."""
+        """Return the values (N,) at positions (N, rank) in the unit cube; negative ones are 0, as for Radiance."""
         rest = place.copy()
         node = np.full(len(place), 0 if len(self.children) else -1, dtype=np.int64)
         bits = 1 << np.arange(self.rank)
@@ -65,7 +64,7 @@ class Tree:
         offset = np.zeros(len(place), dtype=np.int64)
         for j in range(self.rank):
             offset = (offset << halvings) + cell[:, j]
-        return without_holes(self.values[self.start[leaf] + offset])
+        return np.asarray(np.maximum(self.values[self.start[leaf] + offset], 0.0))
 
     def middles(self) -> Floats:
         """Return the positions (N, rank) of the middles of all cells, in the order of the values."""

@@ -156,8 +156,9 @@ def read(path: str | os.PathLike[str]) -> FileTable | Samples:
     if at is not None and np.unique(at).size != at.size:
         raise FileFormatError(f"{path}: line {first}: a wavelength stands twice")
     columns = {name: numbers[:, index] for index, name in enumerate(angles)}
-    reading = reading_of_rows(path, columns, numbers[:, len(angles) :], at, known)
-    if isinstance(reading, Samples) and _COLUMNS in comments:
+    values = numbers[:, len(angles) :]
+    reading = reading_of_rows(path, columns, values, at, known)
+    if isinstance(reading, Samples) and _COLUMNS in comments and np.all(values >= 0.0):
         raise FileFormatError(f"{path}: rows of the grid are missing")
     return reading
 

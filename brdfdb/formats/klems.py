@@ -24,7 +24,7 @@ from brdfdb.formats._bsdf_xml import FRONT_OF_RADIANCE, VISIBLE, Block, BsdfFile
 from brdfdb.formats._channels import LUMINOUS, XYZ, channels_of
 from brdfdb.formats._interface import FIXED, Option
 from brdfdb.formats._klems_basis import BASES, FLIPPED, Basis, averages
-from brdfdb.formats._nodes import samples_at_vectors, without_holes
+from brdfdb.formats._nodes import samples_at_vectors
 from brdfdb.formats._written import Written, whole
 from brdfdb.parameters import Floats
 from brdfdb.place import path_of
@@ -237,7 +237,7 @@ def read(path: str | os.PathLike[str], side: str = "back") -> FileTable:
     Notes
     -----
     Radiance varies the values by up to 3e-4 from pair to pair, and keeps 8 bits of each chromaticity; both is left out.
-    f_r is nan where a number is negative, which Radiance takes for 0.
+    The format has no holes: a negative number is 0, as for Radiance.
     """
     from brdfdb.formats._readings import FileTable
 
@@ -258,7 +258,7 @@ def read(path: str | os.PathLike[str], side: str = "back") -> FileTable:
     lights, viewers = bases[visible.basis.lower()], bases[visible.row_basis.lower()]
     matrix = np.stack([_matrix(path, file, name, viewers, lights) for name in names], axis=-1)
     of_colour = XYZ if len(names) > 1 else LUMINOUS
-    evaluate = functools.partial(evaluated, without_holes(matrix), viewers, lights)
+    evaluate = functools.partial(evaluated, np.maximum(matrix, 0.0), viewers, lights)
     nodes = functools.partial(_samples, path, file, viewers, lights)
     return FileTable(file.name, of_colour, None, evaluate, file.record, nodes)
 

@@ -18,7 +18,7 @@ from typing import Any, ParamSpec, Protocol, cast, overload
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from brdfdb.arrays import array_function
+from brdfdb.arrays import PLAIN_TYPES, entered
 from brdfdb.errors import ParameterError
 from brdfdb.geometry import asked_for
 from brdfdb.parameters import Floats
@@ -60,9 +60,16 @@ def for_large_calls(function: Callable[P, Floats], together: str = "") -> LargeC
     A call with several values of the parameter `together` is whole, because together they decide how each is computed.
     """
     signature = inspect.signature(function)
+    names = tuple(signature.parameters)
 
     @functools.wraps(function)
     def call(*directions: Any, out: Floats | None = None, threads: int = 1, **parameters: Any) -> Floats:
+        if PLAIN_TYPES.issuperset(map(type, directions)) and PLAIN_TYPES.issuperset(map(type, parameters.values())):
+            return computed(directions, parameters, out, threads)
+        ready = entered(names, directions, parameters)
+        return cast(Floats, ready.finish(computed(ready.args, ready.keywords, out, threads)))
+
+    def computed(directions: tuple[Any, ...], parameters: dict[str, Any], out: Floats | None, threads: int) -> Floats:
         # theta_i, phi_i, theta_r: a row of azimuths is not scattered
         scattered = len(directions) > len(_VECTORS) and any(
             isinstance(angle, np.ndarray) and angle.size > PART_BY_ANGLES for angle in directions[:3]
@@ -75,7 +82,7 @@ def for_large_calls(function: Callable[P, Floats], together: str = "") -> LargeC
 
     if call.__doc__ and "\n\n    Returns\n" in call.__doc__:
         call.__doc__ = call.__doc__.replace("\n\n    Returns\n", f"{_DOCUMENTED}\n    Returns\n", 1)
-    return cast(LargeCall[P], array_function(call))
+    return cast(LargeCall[P], call)
 
 
 def for_large_calls_of_one(together: str) -> Callable[[Callable[P, Floats]], LargeCall[P]]:

@@ -416,22 +416,14 @@ class Family:
         names = list(self.axes)
         for name in parameters:
             if name not in names:
-                raise ParameterError(
-                    name,
-                    f"{parameters[name]!r} given, but the parameters of the family {self.name} are {', '.join(names)}",
-                    parameters[name],
-                    tuple(names),
-                )
+                known = f"the parameters of the family {self.name} are {', '.join(names)}"
+                raise ParameterError(name, f"{parameters[name]!r} given, but {known}", parameters[name], tuple(names))
         around = []
         cubic = self.record.interpolation.method == "cubic"
         for limits, nodes, power in zip(self._limits, self.axes.values(), self._powers, strict=True):
             if limits.name not in parameters:
-                raise ParameterError(
-                    limits.name,
-                    f"missing, {self.name} needs a value in {limits.interval}",
-                    None,
-                    (limits.low, limits.high),
-                )
+                needed = f"missing, {self.name} needs a value in {limits.interval}"
+                raise ParameterError(limits.name, needed, None, (limits.low, limits.high))
             first, weights = stencil(nodes, _checked(limits, nodes, parameters[limits.name]), power, cubic=cubic)
             around.append([(first + k, w) for k, w in enumerate(weights) if w != 0.0])
         shape = [nodes.size for nodes in self.axes.values()]

@@ -216,7 +216,7 @@ def _checked(names: tuple[str, ...], name: str, nodes: Any) -> Axis:
 
 def check_wavelengths(nodes: Any) -> Axis:
     """Return wavelengths [nm] as float64, or raise a ValueError saying what is wrong with them."""
-    axis = check_nanometres("wavelengths_nm", nodes)
-    if axis.ndim != 1 or axis.size == 0 or not np.all(np.diff(axis) > 0.0):
+    axis = np.array(nodes, dtype=np.float64)
+    if axis.ndim != 1 or axis.size == 0 or not (axis[0] > 0.0 and np.all(np.diff(axis) > 0.0)):
         raise ParameterError("wavelengths_nm", "must be positive and increase strictly")
-    return axis
+    return check_nanometres("wavelengths_nm", axis)

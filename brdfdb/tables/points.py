@@ -9,7 +9,7 @@ from typing import Annotated, Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, PlainValidator, WithJsonSchema, model_validator
+from pydantic import BaseModel, ConfigDict, Field, PlainValidator, ValidationInfo, WithJsonSchema, model_validator
 
 from brdfdb.errors import ParameterError
 from brdfdb.geometry import check_azimuth_deg, radians
@@ -94,10 +94,10 @@ def _polars(value: Any) -> NDArray[Any]:
     return radians(degrees)
 
 
-def _azimuths(value: Any) -> NDArray[Any]:
+def _azimuths(value: Any, info: ValidationInfo) -> NDArray[Any]:
     """Return azimuths [rad]."""
     degrees = value if isinstance(value, np.ndarray) else _numbers(value)
-    check_azimuth_deg("azimuth", degrees)
+    check_azimuth_deg(str(info.field_name), degrees)
     return radians(np.fmod(degrees, TURN))
 
 

@@ -234,9 +234,33 @@ def test_a_title_of_a_strange_store_cannot_write_on_the_terminal(tmp_path: Path,
     assert "\u202e" not in out
 
 
+@pytest.mark.parametrize("angles", [(0.52, 0, 0.52, 3.14), (0.5, -1.57, 0, 0)], ids=repr)
+def test_angles_like_radians_are_told_and_answered(
+    angles: tuple[float, ...], built: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run("lookup", "foam", *angles, "--store", built) == 0
+    printed = capsys.readouterr()
+    assert float(printed.out.split()[0]) > 0.0
+    shown = " ".join(f"{angle:g}" for angle in angles)
+    assert printed.err == f"brdfdb: angles are degrees; these look like radians: {shown}\n"
+
+
+@pytest.mark.parametrize("angles", [(1, 0, 3, 2), (0.5, 0, 0.5, 3.3), (0, 0, 0, 0), (3.2, 0, 0.1, 0)], ids=repr)
+def test_other_angles_are_answered_without_a_word(
+    angles: tuple[float, ...], built: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run("lookup", "foam", *angles, "--store", built) == 0
+    assert capsys.readouterr().err == ""
+
+
 def test_an_azimuth_without_meaning_is_refused_in_degrees(built: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run("lookup", "foam", 30, 1e300, 40, 0, "--store", built) == 2
-    assert capsys.readouterr().err == "brdfdb: phi_i: 1e+300 is outside [-720, 720] degrees\n"
+    for azimuth in (1e300, -720.5):
+        assert run("lookup", "foam", 30, azimuth, 40, 0, "--store", built) == 2
+        assert capsys.readouterr().err == f"brdfdb: phi_i: {azimuth:g} is outside [-720, 720] degrees\n"
+    assert run("photograph", "foam", "--light", 30, 721, "--out", built / "pictures", "--store", built) == 2
+    assert capsys.readouterr().err == "brdfdb: --light: 721 is outside [-720, 720] degrees\n"
+    assert run("lookup", "foam", 30, -720, 40, 720, "--store", built, "--wavelength-nm", 0.55) == 2
+    assert capsys.readouterr().err == "brdfdb: wavelength_nm: 0.55 is below 1 nm; is it in micrometres?\n"
 
 
 def test_n_and_k_of_a_table_take_the_place_of_their_entry(planned: Path) -> None:

@@ -11,7 +11,7 @@ import functools
 import inspect
 import operator
 from collections.abc import Callable, Iterable, Mapping
-from typing import Any, ParamSpec, TypeVar, cast
+from typing import Any, NamedTuple, ParamSpec, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,10 +22,10 @@ P = ParamSpec("P")
 R = TypeVar("R")
 
 # Types that pass unchanged. Lists pass if their elements do
-PLAIN: frozenset[type] = frozenset(
+PLAIN_TYPES: frozenset[type] = frozenset(
     (float, int, bool, complex, str, type(None), np.ndarray, np.float64, np.float32, np.int64, np.int32, np.bool_)
 )
-FLOATS: frozenset[type] = frozenset((float, np.float64))
+FLOAT_TYPES: frozenset[type] = frozenset((float, np.float64))
 
 _VECTORS = ("wi", "wr", "vectors")
 _OWN_CHECKS = ("self", "out", "model")  # arguments that are no array of numbers, or that may not be another array
@@ -47,10 +47,10 @@ def plain(name: str, value: Any) -> Any:
     ParameterError
         If the array is lazy, requires a gradient, lies on another device, bears a unit, or cannot become an array.
     """
-    if type(value) in PLAIN:
+    if type(value) in PLAIN_TYPES:
         return value
     if isinstance(value, list | tuple):
-        if PLAIN.issuperset(map(type, value)):
+        if PLAIN_TYPES.issuperset(map(type, value)):
             return value
         parts = [plain(name, unlabelled(name, element)) for element in value]
         try:
@@ -77,7 +77,7 @@ def plain(name: str, value: Any) -> Any:
 
 def unlabelled(name: str, value: Any) -> Any:
     """Return a value; ParameterError if it has dimensions with names, which the caller cannot compare."""
-    if type(value) not in PLAIN and is_labelled(value) and len(value.dims):
+    if type(value) not in PLAIN_TYPES and is_labelled(value) and len(value.dims):
         raise ParameterError(
             name, f"its dimensions {_listed(value.dims)} would lose their names here; give a NumPy array (.values)"
         )
@@ -86,7 +86,7 @@ def unlabelled(name: str, value: Any) -> Any:
 
 def is_labelled(value: Any) -> bool:
     """Return True for an array whose dimensions have names."""
-    return type(value) not in PLAIN and isinstance(getattr(value, "dims", None), tuple) and hasattr(value, "data")
+    return type(value) not in PLAIN_TYPES and isinstance(getattr(value, "dims", None), tuple) and hasattr(value, "data")
 
 
 def array_function(function: Callable[P, R]) -> Callable[P, R]:
@@ -98,9 +98,10 @@ def array_function(function: Callable[P, R]) -> Callable[P, R]:
 
     @functools.wraps(function)
     def call(*args: Any, **given: Any) -> Any:
-        if PLAIN.issuperset(map(type, args)) and PLAIN.issuperset(map(type, given.values())):
+        if PLAIN_TYPES.issuperset(map(type, args)) and (not given or PLAIN_TYPES.issuperset(map(type, given.values()))):
             return function(*args, **given)
-        return _passed(function, names, args, given)
+        ready = entered(names, args, given)
+        return ready.finish(function(*ready.args, **ready.keywords))
 
     return cast(Callable[P, R], call)
 
@@ -111,37 +112,48 @@ def array_lookup(method: Callable[P, R]) -> Callable[P, R]:
 
     @functools.wraps(method)
     def call(owner: Any, *args: Any, **given: Any) -> Any:
-        if PLAIN.issuperset(map(type, args)) and PLAIN.issuperset(map(type, given.values())):
+        if PLAIN_TYPES.issuperset(map(type, args)) and (not given or PLAIN_TYPES.issuperset(map(type, given.values()))):
             return method(owner, *args, **given)
-        return _passed(method, names, (owner, *args), given, added=functools.partial(_added, owner))
+        ready = entered(names, (owner, *args), given, added=functools.partial(_added, owner))
+        return ready.finish(method(*ready.args, **ready.keywords))
 
     return cast(Callable[P, R], call)
 
 
-def _passed(
-    function: Callable[..., Any],
+class Entered(NamedTuple):
+    """Arguments that passed the gate, and what gives the labels of the arguments to the result."""
+
+    args: tuple[Any, ...]
+    keywords: dict[str, Any]
+    finish: Callable[[Any], Any]
+
+
+def entered(
     names: tuple[str, ...],
     args: tuple[Any, ...],
     keywords: dict[str, Any],
     added: Callable[[Any], dict[str, Any]] | None = None,
-) -> Any:
-    """Call a function with arguments of any kind; `added` gives the axes that the result adds to the directions."""
+) -> Entered:
+    """Return arguments of any kind as NumPy reads them; `added` gives the axes that a result adds to the directions."""
     positional = dict(zip(names, args, strict=False))
     if len(args) > len(positional) or not positional.keys().isdisjoint(keywords):
-        return function(*args, **keywords)  # a TypeError of Python
+        return Entered(args, keywords, _unchanged)  # the call raises a TypeError
     given = {name: value for name, value in (positional | keywords).items() if name not in _OWN_CHECKS}
     _check_tables(given)
     apart = {"wavelength_nm": given.pop("wavelength_nm")} if added and "wavelength_nm" in given else {}
     labels = _Labels.of(given)
     ready = given if labels is None else {name: labels.aligned(name, value) for name, value in given.items()}
     ready = {name: plain(name, value) for name, value in (ready | apart).items()}
-    result = function(
-        *(ready.get(name, value) for name, value in positional.items()),
-        **{name: ready.get(name, value) for name, value in keywords.items()},
+    axes = added(apart.get("wavelength_nm")) if added and labels is not None else {}
+    return Entered(
+        tuple(ready.get(name, value) for name, value in positional.items()),
+        {name: ready.get(name, value) for name, value in keywords.items()},
+        _unchanged if labels is None else functools.partial(labels.attached, added=axes),
     )
-    if labels is None:
-        return result
-    return labels.attached(result, added(apart.get("wavelength_nm")) if added else {})
+
+
+def _unchanged(result: Any) -> Any:
+    return result
 
 
 class _Labels:
