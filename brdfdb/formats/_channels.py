@@ -54,22 +54,16 @@ class Channels:
             values[some] = self.of_spectra(np.asarray(table.lookup_vectors(wi[some], wr[some], self.wavelength_nm)))
         return values.reshape(*shape, len(self.names))
 
-    def of_spectra_or_grey(self, brdf: Floats, *, absolute: bool = False) -> Floats:
-        """Return values in the channels, shape (N, C), from those of lookups, shape (N, L), L = 1 of a grey table.
+    def of_spectra(self, brdf: Floats, *, absolute: bool = False) -> Floats:
+        """Return values in the channels, shape (..., C), from lookups at the wavelengths, shape (..., L), or grey.
 
         `absolute` takes errors in place of values: they add up whatever the sign of a weight is.
         """
         if self.wavelength_nm is None:
-            return np.repeat(brdf, len(self.names), axis=-1)
+            return np.repeat(brdf[..., np.newaxis], len(self.names), axis=-1)
         if self.weights is None:
             return brdf
         return np.asarray(brdf @ (np.abs(self.weights) if absolute else self.weights))
-
-    def of_spectra(self, brdf: Floats) -> Floats:
-        """Return values in the channels, shape (..., C), from lookups at the wavelengths, shape (..., L), or grey."""
-        if self.wavelength_nm is None:
-            return np.repeat(brdf[..., np.newaxis], len(self.names), axis=-1)
-        return brdf if self.weights is None else np.asarray(brdf @ self.weights)
 
 
 def has_spectrum(table: Table) -> bool:

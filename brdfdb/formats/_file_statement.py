@@ -20,7 +20,7 @@ from brdfdb.tables.stated_error import stated
 if TYPE_CHECKING:
     from brdfdb.tables.table import Table
 
-OF_A_BAND, IN_PLACES, _SEED = 220, 100, 2026  # pairs of each band of theta_i, and of each sample in a place
+OF_A_BAND, IN_PLACES, _SEED = 600, 200, 2026  # pairs of each band of theta_i, and of each sample in a place
 _MOST = 1e9  # largest limit that is written: JSON has no infinity
 _ENDS = places.BANDS, places.ONE_GRAZING, places.BOTH_GRAZING
 
@@ -134,18 +134,20 @@ def of_file(table: Table, channels: Channels, floor: Floats, evaluate: Evaluate)
     def rows(known: Floats, errors: Floats, of_file: Floats, least: Floats) -> Rows:
         """Return the limits of what a file is off by against lookups, shape (N, M), and of what these are off by."""
         relative = _quotient(np.abs(of_file - known) + errors, np.maximum(of_file, least))
-        counted = np.isfinite(errors).all(axis=1)  # not where measured data are extrapolated
+        counted = np.asarray(np.isfinite(errors).all(axis=1))  # not where measured data are extrapolated
         some = counted[:own] & inside
-        bands = error_measurement.limits_of_bands(relative[:own][some], drawn.band[some])
+        bands = np.array(error_measurement.limits_of_bands(relative[:own][some], drawn.band[some]))
+        unseen = np.bincount(drawn.band[some], minlength=places.BANDS) == 0  # of measured data
+        bands[unseen] = bands.max(axis=0)
         there = error_measurement.limits_in_places(relative[own:], pairs, counted[own:])
         return Rows.of(np.concatenate([bands, there.alongside, there.one_grazing, there.both_grazing]))
 
     at = channels.wavelength_nm
-    brdf, errors = (_columns(values) for values in table.lookup_vectors_with_error(wi, wr, at))
-    known, wrong = channels.of_spectra_or_grey(brdf), channels.of_spectra_or_grey(errors, absolute=True)
+    brdf, errors = table.lookup_vectors_with_error(wi, wr, at)
+    known, wrong = channels.of_spectra(brdf), channels.of_spectra(errors, absolute=True)
     column = table.columns_of(at)
     typical = (error.of_all_bands(column) + _uncertainty(table)) * np.maximum(brdf, error.floors[column])
-    off = np.abs(file - known) + channels.of_spectra_or_grey(typical, absolute=True)
+    off = np.abs(file - known) + channels.of_spectra(typical, absolute=True)
     of_all = _quotient(off, np.maximum(known, floor))[:own][np.isfinite(wrong[:own]).all(axis=1)]
     between = None
     if at is not None and at.size > 1 and channels.weights is None and error.between is not None:
@@ -174,11 +176,6 @@ def _uncertainty(table: Table) -> float:
     """Return the relative uncertainty of measured data, which their error adds to; 0 of a model."""
     measured = table.metadata.known_measured()
     return 0.0 if measured is None or measured.uncertainty is None else measured.uncertainty
-
-
-def _columns(values: Any) -> Floats:
-    """Return values (N, L), L = 1 of a grey table."""
-    return np.asarray(values, np.float64).reshape(len(values), -1)
 
 
 def _quotient(wrong: Floats, scale: Floats) -> Floats:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,6 +58,10 @@ class FileError:
     def document(self) -> dict[str, float]:
         """Return the numbers by name, to three digits and rounded up."""
         return {name: up(getattr(self, name)) for name in ("p99", "p99_hemisphere", "p99_lobe", "l1", "largest")}
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return the error for another process, with the statement measured: its closures stay in this one."""
+        return {**self.__dict__, "measure": None, "statement": self.statement}
 
     @functools.cached_property
     def statement(self) -> FileStatement | None:

@@ -66,7 +66,7 @@ class TableFormula(Formula):
         self._least = 0.0 if self._projection is None else -_LARGEST  # of a part in a channel [1/sr]
         self._columns = Columns(table.wavelength_nm, single_nm)
         axes = prepared([radians(nodes) for nodes in table.axes_deg.values()], table.grid.ends, cubic=self._how.cubic)
-        numbers = table.values.reshape(*table.grid.shape, -1)
+        numbers: NDArray[Any] = table.values.reshape(*table.grid.shape, -1)
         weights = self._weights(table)
         basis = table.spectra
         if table.straight and basis is not None and table.part_nm is None:

@@ -32,6 +32,22 @@ def _invert(power: float, mu: Array, count: int) -> None:
             mu[j] = 1.0
 
 
+@kernel
+def _add_f_r(
+    rule: Rule, numbers: Array, channels: int, spectra: Array, wavelength: int, weight: float, count: int, total: Array
+) -> None:
+    """Add f_r at one of the wavelengths of the table, times its weight, to the total of each point."""
+    for j in range(count):
+        value = 0.0
+        if spectra.size > 0:
+            for channel in range(channels):
+                value += numbers[j * channels + channel] * spectra[channel, wavelength]
+        else:
+            value = numbers[j * channels + wavelength]
+        value = exp(value) - rule.offset if rule.logarithm else value
+        total[j] += weight * (0.0 if rule.overshoots and value < 0.0 else value)  # nan stays nan
+
+
 @inner_loop
 def finished(
     rule: Rule,
@@ -89,17 +105,8 @@ def finished(
             total[j] = 0.0
         if rule.straight and not rule.mixed:
             for side in range(4):
-                part, w = weight[m, side], nodes[m, side]
-                if part != 0.0:
-                    for j in range(count):
-                        value = 0.0
-                        if spectra.size > 0:
-                            for channel in range(channels):
-                                value += numbers[j * channels + channel] * spectra[channel, w]
-                        else:
-                            value = numbers[j * channels + w]
-                        value = exp(value) - rule.offset if rule.logarithm else value
-                        total[j] += part * (0.0 if rule.overshoots and value < 0.0 else value)  # nan stays nan
+                if weight[m, side] != 0.0:
+                    _add_f_r(rule, numbers, channels, spectra, nodes[m, side], weight[m, side], count, total)
         elif spectra.size > 0:
             for channel in range(channels):
                 column[channel] = 0.0

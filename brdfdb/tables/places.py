@@ -67,7 +67,7 @@ def rows_of(directions: Directions) -> NDArray[np.int64]:
 def anywhere(wi: Floats, wr: Floats) -> NDArray[np.bool_]:
     """Return which pairs of unit vectors (N, 3) are in a place of its own; elsewhere the band alone counts."""
     rows = rows_of(checked_vectors(wi, wr))
-    return np.any(rows[1:] != rows[:1], axis=0)
+    return np.asarray(np.any(rows[1:] != rows[:1], axis=0))
 
 
 @functools.lru_cache(maxsize=4)

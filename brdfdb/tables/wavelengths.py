@@ -11,6 +11,7 @@ from brdfdb.tables.layout import LINEAR, PLAIN, Interpolation, over_wavelengths
 
 MOST = 400  # wavelengths of a table, if some are added
 _SHARE = 0.12  # of the tolerance that lines between wavelengths may take; the error over the angles takes the rest
+_DECIMALS = 2  # of wavelengths that are added
 _DRAWS, _SEED = 40, 1995  # directions of a band of theta_i
 _STRAIGHT = Interpolation(PLAIN.method, wavelengths=LINEAR)
 
@@ -29,8 +30,9 @@ def refined(source: Source, wavelength_nm: NDArray[np.float64] | None, tolerance
     while nodes.size < MOST:
         floor = error_measurement.floor_of(error_measurement.model_values(source, nodes, drawn.wi, drawn.wr), drawn)
         worst = error_measurement.worst_between(source, nodes, _STRAIGHT, drawn.wi, drawn.wr, floor)
-        wrong = sorted((each for each in worst if each.error > _SHARE * tolerance), key=lambda each: -each.error)
-        if not wrong:
+        wrong = sorted((place for place in worst if place.error > _SHARE * tolerance), key=lambda place: -place.error)
+        finer = np.union1d(nodes, np.round([place.wavelength_nm for place in wrong[: MOST - nodes.size]], _DECIMALS))
+        if finer.size == nodes.size:
             break
-        nodes = np.union1d(nodes, [each.wavelength_nm for each in wrong[: MOST - nodes.size]])
+        nodes = finer
     return nodes

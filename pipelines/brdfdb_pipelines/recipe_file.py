@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import fnmatch
+import functools
 import itertools
 import math
 from collections.abc import Mapping, Sequence
@@ -84,13 +85,13 @@ class Job:
         given = self.wavelength_nm
         # the members of a family share their wavelengths
         more = given if self.family is not None else refined(self.material, given, self.tolerance)
-        keywords = {"alike": self.planned_on, "hot_spot_tolerance": self.hot_spot_tolerance}
+        plan = functools.partial(planned, alike=self.planned_on, hot_spot_tolerance=self.hot_spot_tolerance)
         try:
-            return planned(self.material, more, self.tolerance, **keywords)
+            return plan(self.material, more, self.tolerance)
         except ParameterError:
             if more is given or more is None or given is None or more.size == given.size:
                 raise
-        return planned(self.material, given, self.tolerance, **keywords)
+        return plan(self.material, given, self.tolerance)
 
     def check(self) -> None:
         """Raise the ParameterError that `layout` would raise for what does not suit the material."""

@@ -20,6 +20,7 @@ from brdfdb.formats import _exr_file, exr
 from brdfdb.geometry import unit_vector
 from brdfdb.tables import slices
 from brdfdb.tables.metadata import TableMetadata
+from brdfdb.tables.places import BANDS_DEG
 from brdfdb.tables.stated_error import Error, Overall
 
 if TYPE_CHECKING:
@@ -306,11 +307,11 @@ def test_an_image_says_what_it_leaves_out_of_a_table_with_a_dirac_part(tmp_path:
 
 
 def test_an_image_says_the_error_that_its_table_states(tmp_path: Path) -> None:
-    numbers = [[0.01, 0.02]]
+    numbers = [[0.01]] * 9
     overall = {"l1": 0.003, "median": 0.001, "p95": 0.006, "p99": 0.0123, "max": 0.4}
     source = table(ward_like)
     cast(Any, source).error = Error(
-        theta_i_deg=[0.0, 90.0],
+        theta_i_deg=BANDS_DEG.tolist(),
         directions=10,
         seed=1,
         floor=[1e-4],
@@ -320,6 +321,9 @@ def test_an_image_says_the_error_that_its_table_states(tmp_path: Path) -> None:
     _exr_file.write_slice(tmp_path / "lobe.exr", slices.lobe_map(source), source)
     header, _ = read(tmp_path / "lobe.exr")
     assert header["brdf:error_p99"] == "0.0123"
+    stated = json.loads(header["brdf:record"])["error"]
+    assert (stated["against"], stated["p98"]) == ("the model", 0.0125)  # 0.0123 / (1 - 0.0123)
+    assert stated["places"]["bands"] == [0.0102] * 9
 
 
 def test_export_in_half_replaces_the_files(tmp_path: Path) -> None:

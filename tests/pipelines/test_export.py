@@ -13,6 +13,7 @@ import pytest
 
 from brdfdb.errors import CannotHoldError, ParameterError
 from brdfdb.formats import EXPORTERS
+from brdfdb.formats._file_statement import FileStatement
 from brdfdb.formats._interface import TOLERANCE
 from brdfdb.formats._stated_error import FileError
 from brdfdb.formats._written import Written, whole
@@ -32,7 +33,10 @@ def write(table: Any, path: Path, *, tolerance: float = 0.02, verdict: str | Non
         raise CannotHoldError("strange: this format holds nothing strange")
     with whole(path) as (half,):
         half.write_text(str(verdict))
-    error = FileError(P99[table.name], P99[table.name], P99[table.name], 0.0, 0.0)
+    p99, rows = P99[table.name], {"bands": [0.1] * 9, "one_grazing": [0.3] * 3, "both_grazing": [0.4] * 3}
+    stated = {"against": "the model", "p98": 2.0 * p99, "floor": [1e-4], "between": None}
+    statement = FileStatement.model_validate(stated | {"places": rows | {"alongside": [0.2] * 9}})
+    error = FileError(p99, p99, p99, 0.0, 0.0, lambda: statement)
     remarks = ("a specular part is not in the file",) if table.name == "dark" else ()
     return Written((path,), error, tolerance, remarks)
 
@@ -80,6 +84,7 @@ def test_all_leaves_out_what_the_format_cannot_hold(store: Path, tmp_path: Path,
     text = capsys.readouterr().out
     assert text.startswith("2 LIST files, ")
     assert "99 of 100 values within 3.01% (dark.list)" in text  # rounded up as in the file
+    assert "98 of 100 values within 6% (dark.list), near the light 20%, next to the horizon 40%\n" in text
     assert "dark.list: 3.01%, beyond the tolerance of 2%\n" in text
     assert "dark: a specular part is not in the file\n" in text
     assert text.endswith("strange: this format holds nothing strange; left out\n")

@@ -138,14 +138,16 @@ def test_a_value_is_given_the_error_of_its_band_and_wavelength() -> None:
     truth = np.ones((drawn.band.size, 3))
     error = compare(truth * (1.0 + 0.01 * (drawn.band[:, np.newaxis] + [0, 10, 20])), truth, drawn)
     pairs = checked_angles(radians([5.0, 45.0, 90.0]), 0.0, 0.5, 3.0)
-    found = stated(error, pairs, np.full((3, 2), 2.0), np.array([0, 2]))
+    some = [0, 2]
+    found = stated(error.limits[:, some], error.floors[some], pairs, np.full((3, 2), 2.0))
     p99 = np.array([[0.0, 0.2], [0.04, 0.24], [0.08, 0.28]])  # of the model, which the table may be low by
     np.testing.assert_allclose(found, 2.0 * p99 / (1.0 - p99), atol=1e-3)
     floor = np.array(error.floor)[0]
     one = checked_angles(radians([45.0]), 0.0, 0.5, 3.0)
-    assert stated(error, one, np.zeros((1, 1)), np.array([0]))[0, 0] == pytest.approx(0.04 / 0.96 * floor, rel=1e-2)
+    first = error.limits[:, :1], error.floors[:1]
+    assert stated(*first, one, np.zeros((1, 1)))[0, 0] == pytest.approx(0.04 / 0.96 * floor, rel=1e-2)
     unknown = checked_angles(np.array([np.nan]), 0.0, 0.5, 3.0)
-    assert np.isnan(stated(error, unknown, np.full((1, 1), np.nan), np.array([0])))
+    assert np.isnan(stated(*first, unknown, np.full((1, 1), np.nan)))
 
 
 # Places of their own, and wavelengths between
@@ -240,4 +242,6 @@ def test_a_limit_is_too_low_once_in_fifty_times(count: int) -> None:
         20_000 - 2.05 * math.sqrt(1e6 * 0.02 * 0.98), abs=3
     )
     samples = np.random.default_rng(count).random((count, 4000))
-    assert np.mean(error_measurement._limit(samples) < 0.98) == pytest.approx(below, abs=4.0 * math.sqrt(below / 4000))
+    assert np.mean(error_measurement.limit_of(samples) < 0.98) == pytest.approx(
+        below, abs=4.0 * math.sqrt(below / 4000)
+    )
