@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from datetime import datetime
 from importlib.metadata import version
 
+import numpy as np
+
 from brdfdb.audit.answers import as_published, conserves_energy
 from brdfdb.audit.finding import DECISIVE, Finding, NotJudged, Sentence, Subject, TableVerdict
 from brdfdb.audit.registry import FINDINGS
@@ -55,7 +57,11 @@ def audit(table: Table, *, source: Source | None = None, accept_excess: bool = F
         source = table.source
     subject = Subject(table, source, accept_excess)
     sentences: list[Sentence] = []
-    with sharing():  # albedo, furnace and errors of a model integrate at the same directions
+    # What is not finite is counted, not flagged
+    with (
+        np.errstate(divide="ignore", invalid="ignore", over="ignore"),
+        sharing(),
+    ):  # albedo, furnace and errors of a model integrate at the same directions
         for key, kind in FINDINGS.items():
             finding = subject.findings[key] = kind.judge(subject)
             if isinstance(finding, NotJudged):

@@ -14,8 +14,9 @@ from brdfdb.audit.pairs import Pairs, pairs_of
 from brdfdb.figure import Map, Panel
 from brdfdb.materials import FunctionRecord, Source
 from brdfdb.tables.metadata import TableMetadata
-from brdfdb.tables.statements import stated_metadata
+from brdfdb.tables.statements import MEASURED, stated_metadata
 from brdfdb.tables.table import Table
+from brdfdb.tables.tabulation import metadata_of
 
 STRICT = ConfigDict(frozen=True, extra="forbid")
 
@@ -212,11 +213,16 @@ class Subject:
 
     @cached_property
     def restated(self) -> TableMetadata | None:
-        """Return what a build would state of the table, measured anew; None if its source is not known."""
+        """Return what a build would state of the table, None if its source is not known.
+
+        It is measured anew, unless the table states nothing that is measured.
+        """
         if self.source is None:
             return None
-        values = self.table.values
-        return stated_metadata(self.table.laid_out(self.source), lambda rows: values[rows])
+        layout, values = self.table.laid_out(self.source), self.table.values
+        if not set(MEASURED) & self.table.attrs.keys():
+            return metadata_of(layout)
+        return stated_metadata(layout, lambda rows: values[rows])
 
     @property
     def unrecorded(self) -> bool:

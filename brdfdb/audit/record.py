@@ -10,37 +10,31 @@ import numpy as np
 from pydantic import BaseModel, Field
 
 from brdfdb.audit.finding import STRICT, Cell, Finding, Sentence, Subject, Verdict
+from brdfdb.audit.statement import contradictions
 from brdfdb.errors import counted
-from brdfdb.materials import FunctionRecord, Material, exact_material, libraries, presets
-from brdfdb.tables.albedo import directional_albedo
+from brdfdb.materials import FunctionRecord, Material, Source, exact_material, libraries, presets
+from brdfdb.tables.albedo import directional_albedo, wavelengths_of
+from brdfdb.tables.error_measurement import SEED, directions_of_a_band, draw
 from brdfdb.tables.formula_measurement import first_numbers
 from brdfdb.tables.grids import Axis
 from brdfdb.tables.layout import digest
 from brdfdb.tables.metadata import TableMetadata
+from brdfdb.tables.places import BANDS_DEG
 from brdfdb.tables.planner import first_reason
+from brdfdb.tables.statements import MEASURED
 from brdfdb.tables.table import Table
 from brdfdb.tables.table_source import TableSource
-from brdfdb.tables.tabulation import metadata_of
+from brdfdb.tables.tabulation import metadata_of, rounded
 
-MEASURED = ("error", "formula_error", "largest_albedo", "polarisation")  # attributes that hold measured numbers
 # Numbers are repeated but for rounding. Measured ones have three digits, of which the last may differ; errors below the
 # second number are those of float64 sums. Places have two decimals
 _SAME, _NOTHING, _SAME_PLACE = 1e-9, 1e-9, 0.011
 _TIE = 1e-9  # albedos [1] that are so close are equally large
 _ROUNDING = "it is rounding"  # why the error of a table is largest where it is, if it is not
 _SHOWN = 3  # differences that a sentence names
-# Of tables whose source is not at hand: attributes that arrays and other attributes decide
-_OF_ARRAYS = (
-    "table_version",
-    "conventions",
-    "anisotropic",
-    "symmetries",
-    "wavelength_range_nm",
-    "interpolation",
-    "part_wavelengths_nm",
-    "bits",
-    "reconstruction",
-)
+# Attributes that a source decides, and no array
+_OF_SOURCE = ("title", "material", "source", "source_record", "measured", "reason")
+_DISTINCT = 64  # so many values have the last of the bits that are kept, but for a chance of 2^-64
 
 
 class Unchecked(NamedTuple):
@@ -51,14 +45,18 @@ class Unchecked(NamedTuple):
     why: str
 
 
+_NO_DATA = "the store does not hold the data"
+_NO_FUNCTION = "the store does not hold the function, which an audit can be given"
 UNCHECKED = (
-    Unchecked("HEAD and manifest", "created", "no clock is stored beside it"),
-    Unchecked("HEAD", "last", "a revision that was collected leaves nothing; it is not below the revisions that exist"),
+    Unchecked("pointer and manifest", "created", "no clock is stored beside it"),
+    Unchecked("pointer", "last", "it may be higher than any revision: those that were collected leave nothing"),
     Unchecked("table", "reason", "what other kinds of tables were expected to take; its first clause is compared"),
-    Unchecked("table of measured data", "error.*", "the store does not hold the data; it must not contradict itself"),
-    Unchecked("table of measured data", "measured.*", "the store does not hold the data"),
-    Unchecked("table of a function", "error.*", "the store does not hold the function, which an audit can be given"),
-    Unchecked("family", "title", "words of a recipe, which the members repeat"),
+    Unchecked("table", "error.worst.*", "where all errors are rounding, the largest has no place"),
+    Unchecked("table of a function", "error.*", f"{_NO_FUNCTION}; it must not contradict itself"),
+    Unchecked("table of a function", "source_record.function.*", "its author says so"),
+    Unchecked("table of measured data", "error.*", f"{_NO_DATA}; it must not contradict itself"),
+    Unchecked("table of measured data", "measured.*", _NO_DATA),
+    Unchecked("table of measured data", "source_record.function.*", "what an import read in the data"),
 )
 
 
@@ -118,7 +116,7 @@ class Record(Finding):
 
 def record_of(table: Table, expected: Mapping[str, Any]) -> Record:
     """Return how the attributes of a table differ from those `expected`, and from the presets."""
-    stated = {key: table.attrs[key] for key in expected if key in table.attrs}
+    stated = {key: table.attrs[key] for key in expected if key in table.attrs and key not in table.metadata.strange}
     found = [
         difference
         for key, value in stated.items()
@@ -128,7 +126,12 @@ def record_of(table: Table, expected: Mapping[str, Any]) -> Record:
     found += [
         Difference(leaf=key, stated=why, expected="what it must be") for key, why in table.metadata.strange.items()
     ]
-    found += [*_of_request(table.metadata), *_of_presets(table), *_of_reason(table)]
+    if table.error is not None:
+        wrong = contradictions(table.error, wavelengths_of(table))
+        found += [Difference(leaf="error", stated=why, expected="a statement without contradictions") for why in wrong]
+    found += [*_of_request(table.metadata), *_of_presets(table), *_of_reason(table), *_of_bits(table)]
+    if table.metadata.source_record is not None and table.source is None:
+        found.append(Difference(leaf="source_record", stated="no source", expected="a material or a function"))
     compared = sum(1 for value in stated.values() for _ in leaves(value))
     return Record(compared=compared, wrong=len(found), worst=found[:10], verdict="violates" if found else "passes")
 
@@ -137,18 +140,32 @@ def expected_of(subject: Subject) -> dict[str, Any]:
     """Return the attributes that a table must have, as far as they can be made again."""
     table = subject.table
     if subject.restated is not None:
-        expected = subject.restated.attributes()
+        expected = _plain(subject.restated.attributes())
         absent = dict.fromkeys(key for key in TableMetadata.model_fields if key in table.attrs)
         request = {key: table.attrs[key] for key in ("request", "request_sha256") if key in table.attrs}
         return {**absent, **expected, **request}
     source = TableSource(table)
     layout = table.laid_out(source)
     known, numbers = metadata_of(layout).attributes(), first_numbers(layout, lambda rows: table.values[rows])
-    expected = {key: known[key] for key in _OF_ARRAYS}
-    expected |= {key: value.model_dump(mode="json") for key, value in numbers.items()}
+    expected = {key: value for key, value in known.items() if key not in _OF_SOURCE}
+    expected = _plain(expected) | {key: value.model_dump(mode="json") for key, value in numbers.items()}
+    if table.error is not None:
+        expected["error"] = {**table.attrs["error"], **_drawn(source, table.wavelength_nm)}
     if isinstance(record := table.source, FunctionRecord):
         expected |= {"title": record.title, "material": record.name, "source": record.provenance}
     return expected
+
+
+def _plain(expected: dict[str, Any]) -> dict[str, Any]:
+    """Return attributes in which the offset of logarithms is 0 where there are none."""
+    how = expected["interpolation"]
+    return expected if how["logarithm"] else {**expected, "interpolation": {**how, "offset": 0.0}}
+
+
+def _drawn(source: Source, wavelength_nm: Axis | None) -> dict[str, Any]:
+    """Return what the stated error of a table says of the directions of a build."""
+    drawn = draw(source, wavelength_nm, directions_of_a_band(wavelength_nm), SEED)
+    return {"theta_i_deg": BANDS_DEG.tolist(), "directions": int(np.count_nonzero(drawn.above)), "seed": SEED}
 
 
 def leaves(value: Any, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Any]]:
@@ -180,7 +197,7 @@ def _allowed(stated: Any, expected: Any, path: tuple[str, ...]) -> float:
     if largest == 0.0 or not math.isfinite(largest):
         return _SAME
     if words and words[-1].endswith(("_deg", "_nm")):
-        return _SAME_PLACE / largest
+        return _SAME_PLACE / largest if "worst" in words else _SAME
     return (_NOTHING + 1.5 * 10.0 ** (math.floor(math.log10(largest)) - 2)) / largest
 
 
@@ -269,3 +286,12 @@ def _of_reason(table: Table) -> Iterator[Difference]:
         expected = first_reason(table, tolerance)
         if "takes" in reason and expected not in reason:
             yield Difference(leaf="reason", stated=_written(reason), expected=_written(expected))
+
+
+def _of_bits(table: Table) -> Iterator[Difference]:
+    """Yield the number of bits that are kept if the stored values have others."""
+    bits, values = table.metadata.bits, table.values
+    kept = np.array_equal(rounded(values, bits), values, equal_nan=True)
+    fewer = bits > 1 and np.array_equal(rounded(values, bits - 1), values, equal_nan=True)
+    if not kept or (fewer and np.unique(values).size > _DISTINCT):
+        yield Difference(leaf="bits", stated=_written(bits), expected="another number, that of the stored values,")

@@ -142,15 +142,15 @@ def _whole(error: Error, at: int, between: int, *, mixed: bool) -> bool:
     )
 
 
-def disagreements(error: Error, pairs: Pairs, wavelength_nm: Axis | None, directions: int) -> list[Disagreement]:
+def disagreements(error: Error, pairs: Pairs, wavelength_nm: Axis | None) -> list[Disagreement]:
     """Return the numbers of a consistent statement that fresh directions contradict, the worst first.
 
-    `directions` is the number with which a build measures: what a statement says of that is itself under test.
+    The statement is taken as one of as many directions as builds draw. What it says of that is itself under test.
     """
-    return sorted(_disagreements(error, pairs, wavelength_nm, directions), key=_severity, reverse=True)
+    return sorted(_disagreements(error, pairs, wavelength_nm), key=_severity, reverse=True)
 
 
-def _disagreements(error: Error, pairs: Pairs, wavelength_nm: Axis | None, directions: int) -> Iterator[Disagreement]:
+def _disagreements(error: Error, pairs: Pairs, wavelength_nm: Axis | None) -> Iterator[Disagreement]:
     drawn, floor = (
         pairs.drawn,
         np.array(error.floor),
@@ -158,7 +158,7 @@ def _disagreements(error: Error, pairs: Pairs, wavelength_nm: Axis | None, direc
     with np.errstate(invalid="ignore"):
         relative = error_measurement.relative(pairs.table, pairs.model, floor)
     nm = [None] * floor.size if wavelength_nm is None else wavelength_nm.tolist()
-    bands = list(_bands(directions, drawn))
+    bands = list(_bands(drawn, wavelength_nm))
     of_worst = error.columns < floor.size
     for number, band in enumerate(bands):
         whole = number == len(bands) - 1
@@ -207,15 +207,16 @@ def _of_floor(stated: Floats, pairs: Pairs, band: _Band, nm: list[float | None])
         yield _disagreement("floor", band, nm[w], float(stated[w]), float(fresh[w]))
 
 
-def _bands(directions: int, drawn: Draw) -> Iterator[_Band]:
+def _bands(drawn: Draw, wavelength_nm: Axis | None) -> Iterator[_Band]:
     """Yield each band of theta_i, then all directions. Every draw has the same share of directions in a band."""
-    share = directions / max(int(np.count_nonzero(drawn.above)), 1)
+    share = error_measurement.directions_of_a_band(wavelength_nm) * BANDS / len(drawn.band)
     for number, name in enumerate(zip(BANDS_DEG[:-1].tolist(), BANDS_DEG[1:].tolist(), strict=True)):
         in_band = drawn.band == number
         chosen = drawn.above & in_band
         stated = max(int(share * np.count_nonzero(chosen)), LEAST_DIRECTIONS)
         yield _Band(name, chosen, int(np.count_nonzero(in_band)), stated)
-    yield _Band((0.0, 90.0), drawn.above, len(drawn.band), max(directions, LEAST_DIRECTIONS))
+    whole = int(share * np.count_nonzero(drawn.above))
+    yield _Band((0.0, 90.0), drawn.above, len(drawn.band), max(whole, LEAST_DIRECTIONS))
 
 
 def limits(stated: int, fresh: int, quantile: float) -> tuple[int, int]:

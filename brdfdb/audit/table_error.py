@@ -62,10 +62,9 @@ class TableError(Finding):
     @classmethod
     def judge(cls, subject: Subject) -> Finding:
         """Compare the error of a table with its stated error."""
-        if subject.source is None or subject.restated is None or subject.restated.error is None:
+        if subject.source is None:
             return subject.not_judged("the error of a table is measured against its source")
-        directions, nodes = subject.restated.error.directions, subject.findings[Nodes.key].verdict
-        return table_error_of(subject.table, subject.source, subject.pairs, directions, nodes)
+        return table_error_of(subject.table, subject.source, subject.pairs, subject.findings[Nodes.key].verdict)
 
     def sentences(self) -> list[Sentence]:
         """Return a sentence on the error, and on each fault of the stated error."""
@@ -101,11 +100,10 @@ class TableError(Finding):
         return list(self.maps)
 
 
-def table_error_of(table: Table, source: Source, pairs: Pairs, directions: int, nodes: Word = "passes") -> TableError:
+def table_error_of(table: Table, source: Source, pairs: Pairs, nodes: Word = "passes") -> TableError:
     """Return the error of a table compared with its stated error, and maps of it at the middle wavelength.
 
-    `directions` is the number with which a build measures the error. `nodes` is the verdict on the nodes of the table.
-    If it or the error violates, the fault of the table is searched for.
+    `nodes` is the verdict on its nodes. If it or the error violates, the fault of the table is searched for.
     """
     with np.errstate(invalid="ignore"):  # values that are not finite
         fresh = error_measurement.compare(pairs.table, pairs.model, pairs.drawn, SEED).overall.p99
@@ -113,7 +111,7 @@ def table_error_of(table: Table, source: Source, pairs: Pairs, directions: int, 
     disagreeing: list[Disagreement] = []
     if table.error is not None:
         contradicting = contradictions(table.error, wavelengths_of(table))
-        disagreeing = [] if contradicting else disagreements(table.error, pairs, table.wavelength_nm, directions)
+        disagreeing = [] if contradicting else disagreements(table.error, pairs, table.wavelength_nm)
     specular = _specular_error(table, source)
     mirrors = specular is None or specular <= SPECULAR_TOLERANCE  # False for nan
     good = mirrors and not contradicting and not disagreeing

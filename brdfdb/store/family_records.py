@@ -398,4 +398,6 @@ def verify_family(root: Path, name: str) -> int:
         at = dict(zip(record.axes, values, strict=True))
         if known.model != record.model or any(known.parameters.get(x) != value for x, value in at.items()):
             raise StoreError(f"the family {name} is damaged: {member} is not of {record.model} at {at}")
+        if not (known.title or "").startswith(record.title):
+            raise StoreError(f"the family {name} is damaged: {record.title!r} is not the title of {member}")
     return path.stat().st_size

@@ -40,6 +40,8 @@ def head_from(path: Path, data: bytes) -> Head:
         raise StoreError(f"{name} is damaged: {path.name} is that of {content['material']}")
     if not (number_of(content["revision"]) and isinstance(content["manifests"].get(content["revision"]), str)):
         raise StoreError(f"{name} is damaged: {path.name} does not name a revision and its manifest")
+    if content["last"] < max(map(number_of, content["manifests"])):
+        raise StoreError(f"{name} is damaged: {path.name} says that the last revision was {content['last']}")
     return cast(Head, content)
 
 

@@ -198,7 +198,7 @@ def _current(name: str, group: Path, digest: str, head: Head) -> int:
     for key, array in arrays.items():
         _check_array(where, key, array, sizes)
     for dimension in sizes:
-        if dimension not in arrays and dimension != "part":  # parts have no coordinate, only an order
+        if dimension not in arrays and dimension not in ("part", "element"):  # these have only an order
             raise WrongTableError(f"{where} is not a table: it lacks the coordinate {dimension}")
     return sum(entry["size"] for entry in files.values())
 

@@ -212,9 +212,7 @@ def measure(
         For each band and wavelength, and overall, to three digits; and limits in places and between wavelengths. Of a
         mixture, at its worst wavelength alone.
     """
-    if count is None:
-        several = layout.wavelength_nm is not None and layout.wavelength_nm.size > _FEW
-        count = _FEWER_DIRECTIONS if several else DIRECTIONS
+    count = directions_of_a_band(layout.wavelength_nm) if count is None else count
     drawn = draw(layout.source, layout.wavelength_nm, count, seed)
     pairs = places.draw(math.ceil(count * _IN_PLACES), seed)
     wi, wr = np.concatenate([drawn.wi, pairs.wi]), np.concatenate([drawn.wr, pairs.wr])
@@ -242,6 +240,11 @@ def measure(
         }
     )
     return measured if layout.part_nm is None else measured.of_worst_wavelength()
+
+
+def directions_of_a_band(wavelength_nm: NDArray[np.float64] | None) -> int:
+    """Return how many directions of each band of theta_i the error of a table is measured at: those of every build."""
+    return DIRECTIONS if wavelength_nm is None or wavelength_nm.size <= _FEW else _FEWER_DIRECTIONS
 
 
 def _between(

@@ -14,6 +14,8 @@ from brdfdb.tables.layout import Layout, digest
 from brdfdb.tables.metadata import TableMetadata
 from brdfdb.tables.tabulation import metadata_of
 
+MEASURED = ("error", "formula_error", "largest_albedo", "polarisation")  # attributes that hold measured numbers
+
 
 def stated_metadata(
     layout: Layout, read: Callable[[slice], NDArray[np.float32]], request: Mapping[str, Any] | None = None

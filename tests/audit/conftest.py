@@ -5,8 +5,9 @@ from __future__ import annotations
 import pytest
 
 from tests.audit.model_energies import coarse_model_energy, each_model_once
+from tests.pipelines.conftest import no_plots
 
-__all__ = ["coarse_model_energy", "each_model_once", "few_samples"]
+__all__ = ["coarse_model_energy", "each_model_once", "few_samples", "no_plots"]
 
 
 @pytest.fixture

@@ -178,6 +178,7 @@ def test_the_report_names_the_violations_and_nothing_else() -> None:
 def test_an_empty_report_is_a_report() -> None:
     about = {"store": "a store", "brdfdb": version("brdfdb"), "when": "2026-11-21T00:00:00Z"}
     empty: dict[str, list[Any]] = {"materials": [], "atlas": [], "gallery": [], "damaged": [], "violations": []}
+    empty |= {"not_judged": [], "families": []}
     former = {"program": "", "taken_over": [], "page_subjects": [], "page_sha256": ""}  # of no use again
     document = written([])
     sealed = document["sha256"]

@@ -21,7 +21,9 @@ from tests.tables.test_albedo import KINDS, planned, table_of
 # Of a Lambertian table, which is float32; half an ulp is 6e-8
 FLOAT32 = 1e-7
 # p99 at fresh directions, of the stated; the worst of the five tables is 0.17 below
-STATED = 0.2
+STATED = (
+    0.3  # two 99th percentiles of a heavy tail: over seeds they spread by 11 % at 3000 directions a band, 7 % at 4000
+)
 # p99 of a table that is half as bright again, whose own error is 0.02: measured 0.51
 SCALED = 0.02
 

@@ -14,6 +14,7 @@ from brdfdb.audit.model_energy import EnergyVerdict, Furnace, ModelEnergy, Unifo
 from brdfdb.audit.nodes import Nodes
 from brdfdb.audit.polarisation import PolarisationFinding
 from brdfdb.audit.reciprocity import Asymmetry, Reciprocity
+from brdfdb.audit.record import Record
 from brdfdb.audit.registry import FINDINGS
 from brdfdb.audit.report import AuditReport, MaterialAudit, explanations
 from brdfdb.audit.sampling import Sampling
@@ -196,6 +197,7 @@ def others() -> tuple[Finding, ...]:
             verdict="passes",
         ),
         Validity(limits=limits, verdict="at the edge"),
+        Record(compared=1234, wrong=0, worst=[], verdict="passes"),
     )
 
 

@@ -53,6 +53,7 @@ def test_the_modules_of_the_room_are_the_registry_in_their_order() -> None:
             "polarisation",
             "sampling",
             "validity",
+            "record",
         )
     ]
     for key, kind in FINDINGS.items():

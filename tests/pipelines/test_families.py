@@ -14,17 +14,21 @@ import numpy as np
 import pytest
 
 import brdfdb
-from brdfdb.errors import UnknownFamilyError
+from brdfdb.audit.record import differences
+from brdfdb.errors import StoreError, UnknownFamilyError
 from brdfdb.materials import Material
 from brdfdb.store import family_records
+from brdfdb.store.family import Sweep
 from brdfdb.store.family_records import measure
 from brdfdb.store.reader import Store
+from brdfdb.store.sealed_json import write_sealed
 from brdfdb.tables import error_measurement, tabulation
 from brdfdb.tables.layout import Layout
 from brdfdb_pipelines import build as module
 from brdfdb_pipelines import cli, terminal
 from brdfdb_pipelines.build import build
 from brdfdb_pipelines.recipe_file import load
+from tests.benchmarks.forged_stores import changed, leaves
 from tests.pipelines.recipes import COARSE, material
 
 AGREEMENT = 0.2  # promised, between a stated p99 and one measured afresh; measured: 0.05
@@ -223,6 +227,34 @@ def test_a_build_that_was_killed_before_the_record_goes_on_there(
     assert events[-1]["unchanged"] == 5
     assert tree(root / "materials") == members
     assert brdfdb.open(root).family("grey").record == brdfdb.open(first).family("grey").record
+
+
+@pytest.mark.usefixtures("no_plots")
+def test_every_leaf_of_a_family_that_is_forged_is_noticed(grey: Path, capsys: Captured) -> None:
+    root = grey
+    path = root / "families" / "grey.json"
+    record = brdfdb.open(root).family_content("grey")
+    measured = family_records.measure(Sweep(**{name: record[name] for name in Sweep.model_fields}), brdfdb.open(root))
+    assert [*differences(record, measured.model_dump(mode="json"), "", measured=True)] == []
+    unnoticed = []
+    for leaf in leaves(record):
+        forged = changed(record, leaf)
+        write_sealed(path, forged)
+        try:
+            family_records.verify_family(root, "grey")
+        except StoreError:
+            continue
+        if not [*differences(forged, measured.model_dump(mode="json"), "", measured=True)]:
+            unnoticed.append(leaf)
+    assert unnoticed == []
+    write_sealed(path, changed(record, ("error", "p99", 3, 0)))
+    arguments = ["audit", "--no-figures", "--jobs", "1", "--store", str(root)]
+    assert cli.main(arguments) == 1
+    assert "family grey: error.p99.3.0 is " in capsys.readouterr().out
+    write_sealed(path, record)
+    assert cli.main(arguments) == 0
+    said = f"family grey: all {len(leaves(record))} numbers and words of its record are those of a new measurement"
+    assert said in capsys.readouterr().out
 
 
 def test_a_changed_sweep_makes_the_record_anew(grey: Path) -> None:

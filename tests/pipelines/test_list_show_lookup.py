@@ -12,6 +12,8 @@ import pytest
 
 import brdfdb
 from brdfdb.materials import Material, presets
+from brdfdb.store.catalogue import line_of
+from brdfdb.store.material_document import material_document
 from brdfdb.store.publication import publish_dataset
 from brdfdb.tables.albedo import directional_albedo
 from brdfdb.tables.grids import Grid
@@ -118,6 +120,31 @@ def test_a_table_of_another_program_is_shown_with_a_sentence_on_what_it_lacks(tm
     captured = capsys.readouterr()
     assert f"brdfdb: bare r000001 {gaps}\n" in captured.err
     assert captured.out.endswith(": none damaged\n")
+
+
+def test_no_paper_is_cited_for_a_table_without_a_record_of_its_source(tmp_path: Path, capsys: Captured) -> None:
+    """The attributes cite He et al. 1991; nothing says that the values are of them."""
+    grid = Grid({"theta_i": [0, 45, 85], "theta_r": [0, 45, 85], "delta_phi": [0, 90, 180]})
+    whole = tabulate(Layout(presets()["blue-plastic"], grid, np.array([460.0])))
+    claimed = {key: value for key, value in whole.attrs.items() if key != "source_record"}
+    publish_dataset(tmp_path, "whole", whole)
+    publish_dataset(tmp_path, "claimed", whole.drop_attrs(deep=False).assign_attrs(claimed))
+    said = {}
+    for name in ("whole", "claimed"):
+        assert run("show", name, "--store", tmp_path) == 0
+        shown = capsys.readouterr().out
+        assert run("export", "csv", name, "--store", tmp_path, "--out", tmp_path / name) == 0
+        capsys.readouterr()
+        exported = "".join(path.read_text(encoding="utf-8") for path in (tmp_path / name).iterdir() if path.is_file())
+        store = brdfdb.open(tmp_path)
+        document = json.dumps(material_document(store[name], None), default=str)
+        line = json.dumps(line_of(name, store.path(name), store.summary(name)))
+        said[name] = [any(word in text for word in ("He et al.", "he1991")) for text in (shown, exported, document, line)]
+    assert said == {"whole": [True] * 4, "claimed": [False] * 4}
+    assert run("list", "--store", tmp_path) == 0
+    gap = "claimed r000001 keeps no record of its source, so that what it cites is not shown"
+    assert gap in capsys.readouterr().out
+    assert run("audit", "claimed", "--store", tmp_path, "--jobs", "1") == 1
 
 
 def test_list_goes_on_past_what_is_damaged_and_fails(planned: Path, tmp_path: Path, capsys: Captured) -> None:

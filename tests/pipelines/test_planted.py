@@ -174,18 +174,20 @@ def test_a_mirror_part_that_is_too_weak_is_named(
     assert entry_of(report)["findings"]["table_error"]["specular"] == pytest.approx(0.02 * 0.2, abs=0.02)
 
 
-def test_a_table_that_does_not_name_its_source_is_audited_alone(
+def test_a_table_that_does_not_name_its_source_is_not_judged_and_is_exit_code_1(
     sound: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     report, root = tmp_path / "report.json", tmp_path / "store"
     dataset = xr.open_zarr(brdfdb.open(sound).path("dark")).load()
     dataset.attrs = {key: value for key, value in dataset.attrs.items() if key not in ("source_record", "request")}
     publish_dataset(root, "other", dataset)
-    assert audited(root, "other", report) == 0
-    line = "other: its source cannot be evaluated; not judged: nodes, table error, sampling, validity\n"
-    assert line in capsys.readouterr().out
+    assert audited(root, "other", report) == 1
+    line = "other: its source cannot be evaluated; not judged: nodes, table error, sampling, validity, record\n"
+    assert line in (out := capsys.readouterr().out)
+    assert "passes 0, known published excess 0, not judged 1, violates 0" in out
     entry = entry_of(report)
-    assert (entry["model"], entry["verdict"], entry["findings"]["energy"]["model"]) == ("", "passes", None)
+    assert (entry["model"], entry["verdict"], entry["findings"]["energy"]["model"]) == ("", "not judged", None)
+    assert json.loads(report.read_text(encoding="utf-8"))["not_judged"] == ["other"]
     publish_dataset(root, "other", negative(dataset))
     assert audited(root, "other", report) == 1
 

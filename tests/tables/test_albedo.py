@@ -45,7 +45,7 @@ def measured(layout: Layout) -> Table:
     """The table of a layout as a store holds it, its error measured."""
     dataset = tabulate(layout)
     values = dataset[layout.variable].values
-    error = error_measurement.measure(layout, lambda rows: values[rows], count=1500)
+    error = error_measurement.measure(layout, lambda rows: values[rows])
     arrays = {str(name): np.asarray(variable.values) for name, variable in dataset.variables.items()}
     return table_from("made-up", "r000001", arrays, {**dataset.attrs, "error": error.model_dump(mode="json")})
 
