@@ -53,10 +53,9 @@ def check_theta(name: str, theta: ArrayLike) -> Floats:
     bad = (array < 0.0) | (array > array.dtype.type(np.pi))
     if bad.any():
         first = np.atleast_1d(array)[np.atleast_1d(bad)][0]
-        meant = f"; {first:.9g} degrees are {radians(first):.6g} rad" if 3.2 < first <= 180.0 else ""
         raise ParameterError(
             name,
-            f"{first:.9g} rad ({degrees(first):.6g} degrees) is outside [0, pi] rad{meant}",
+            f"{first:.9g} rad ({degrees(first):.6g} degrees) is outside [0, pi] rad",
             float(first),
             (0.0, float(np.pi)),
         )

@@ -18,6 +18,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from brdfdb.arrays import plain
 from brdfdb.errors import ParameterError
 from brdfdb.parameters import check_nanometres, closest
 
@@ -92,7 +93,8 @@ def refractive_index(entry: str, wavelength_nm: ArrayLike) -> tuple[NDArray[np.f
     >>> k.round(1).tolist()
     [6.0, 20.3]
     """
-    wavelength = check_nanometres("wavelength_nm", wavelength_nm)
+    wavelength = np.asarray(plain("wavelength_nm", wavelength_nm), dtype=np.float64)
+    check_nanometres("wavelength_nm", wavelength[~np.isnan(wavelength)])  # the sentence on nan names the entry
     if wavelength.ndim:
         return _interpolated(entry, wavelength)
     n, k = _at_one(entry, float(wavelength))

@@ -102,12 +102,8 @@ def test_an_azimuth_in_degrees_has_two_turns_at_most(good: Any, bad: Any) -> Non
     ("check", "wrong", "message"),
     [
         (check_theta, -0.1, "theta: -0.1 rad (-5.72958 degrees) is outside [0, pi] rad"),
-        (check_theta, 90, "theta: 90 rad (5156.62 degrees) is outside [0, pi] rad; 90 degrees are 1.5708 rad"),
-        (
-            check_theta,
-            [[0.1, 4.0], [-1.0, 0.0]],
-            "theta: 4 rad (229.183 degrees) is outside [0, pi] rad; 4 degrees are 0.0698132 rad",
-        ),
+        (check_theta, 90, "theta: 90 rad (5156.62 degrees) is outside [0, pi] rad"),
+        (check_theta, [[0.1, 4.0], [-1.0, 0.0]], "theta: 4 rad (229.183 degrees) is outside [0, pi] rad"),
         (check_theta, np.inf, "theta: inf rad (inf degrees) is outside [0, pi] rad"),
         (check_theta, True, "theta: True is not a number of radians"),
         (check_theta, "0.1", "theta: '0.1' is not a number of radians"),

@@ -84,9 +84,9 @@ def test_an_unwrapped_scan_may_filter_the_warning() -> None:
     assert LOOKUPS["table"](0.5, 0.0, 0.6, 4.0 * np.pi) > 0.0  # two turns are usual: pytest makes a warning an error
 
 
-def test_polar_angles_in_degrees_are_refused_with_their_radians() -> None:
+def test_polar_angles_in_degrees_are_refused() -> None:
     for look in (*LOOKUPS.values(), lambda *angles: models.lambert(*angles, rho=0.5)):
-        with pytest.raises(ParameterError, match=r"^theta_i: 30 rad .* rad; 30 degrees are 0\.523599 rad$"):
+        with pytest.raises(ParameterError, match=r"^theta_i: 30 rad \(1718\.87 degrees\) is outside \[0, pi\] rad$"):
             look(30, 0, 30, 180)
 
 

@@ -117,23 +117,25 @@ class Record(Finding):
 def record_of(table: Table, expected: Mapping[str, Any]) -> Record:
     """Return how the attributes of a table differ from those `expected`, and from the presets."""
     stated = {key: table.attrs[key] for key in expected if key in table.attrs and key not in table.metadata.strange}
-    found = [
+    wrong = [
         difference
         for key, value in stated.items()
         for difference in differences(value, expected[key], key, measured=key in MEASURED)
         if not _tied(table, difference, value, expected[key])
     ]
-    found += [
+    wrong += [
         Difference(leaf=key, stated=why, expected="what it must be") for key, why in table.metadata.strange.items()
     ]
     if table.error is not None:
-        wrong = contradictions(table.error, wavelengths_of(table))
-        found += [Difference(leaf="error", stated=why, expected="a statement without contradictions") for why in wrong]
-    found += [*_of_request(table.metadata), *_of_presets(table), *_of_reason(table), *_of_bits(table)]
+        sentences = contradictions(table.error, wavelengths_of(table))
+        wrong += [
+            Difference(leaf="error", stated=why, expected="a statement without contradictions") for why in sentences
+        ]
+    wrong += [*_of_request(table.metadata), *_of_presets(table), *_of_reason(table), *_of_bits(table)]
     if table.metadata.source_record is not None and table.source is None:
-        found.append(Difference(leaf="source_record", stated="no source", expected="a material or a function"))
+        wrong.append(Difference(leaf="source_record", stated="no source", expected="a material or a function"))
     compared = sum(1 for value in stated.values() for _ in leaves(value))
-    return Record(compared=compared, wrong=len(found), worst=found[:10], verdict="violates" if found else "passes")
+    return Record(compared=compared, wrong=len(wrong), worst=wrong[:10], verdict="violates" if wrong else "passes")
 
 
 def expected_of(subject: Subject) -> dict[str, Any]:
@@ -267,9 +269,9 @@ def _of_presets(table: Table) -> Iterator[Difference]:
     cited = [preset for preset in known.values() if preset.source == material.source]
     if same_name is not None:
         one = min((same_name, exact_material(same_name)), key=lambda other: other.model != material.model)
-        stated, expected = (each.document()["material"] for each in (material, one))
+        stated, expected = (either.document()["material"] for either in (material, one))
         yield from differences(stated, expected, "source_record.material", measured=False)
-    elif cited and not any(_numbers(material) in (_numbers(each), _numbers(exact_material(each))) for each in cited):
+    elif cited and not any(_numbers(material) in (_numbers(other), _numbers(exact_material(other))) for other in cited):
         none = "one of these parameters, which no preset takes from there,"
         yield Difference(leaf="source_record.material.source", stated=_written(material.source), expected=none)
 

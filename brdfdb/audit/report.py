@@ -166,4 +166,4 @@ class AuditReport(BaseModel):
     @property
     def families_wrong(self) -> list[str]:
         """Return the names of the families whose records are not those of a new measurement."""
-        return [each.family for each in self.families if each.verdict != "passes"]
+        return [audited.family for audited in self.families if audited.verdict != "passes"]

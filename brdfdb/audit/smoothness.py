@@ -18,6 +18,7 @@ from brdfdb.materials import Source
 from brdfdb.parameters import Floats
 from brdfdb.tables import error_measurement
 from brdfdb.tables.albedo import wavelengths_of
+from brdfdb.tables.places import RINGS, RINGS_DEG
 from brdfdb.tables.stated_error import Error
 from brdfdb.tables.table import Table
 
@@ -70,7 +71,7 @@ class Jump(BaseModel):
     crossings: int
     largest: float
     where: str = Field(description="directions [degree] and wavelength of the largest jump")
-    tolerance: float = Field(description="allowed jump there; for a table the stated error of the band of theta_i")
+    tolerance: float = Field(description="allowed jump there; for a table the error that it states there")
 
 
 class Smoothness(Finding):
@@ -166,8 +167,13 @@ def _stated(error: Error | None, wi: Array, wr: Array) -> Floats:
         return np.full((1, 1), TABLE_TOLERANCE)
     theta, _ = spherical_angles(np.stack([wi, wr]))
     band = np.searchsorted(error.theta_i_deg, degrees(np.max(theta, axis=0)), side="right") - 1
-    p99 = np.array(error.p99)[np.clip(band, 0, len(error.p99) - 1)]
-    return np.asarray(np.clip(p99, TABLE_TOLERANCE, _MOST_ERROR))
+    allowed = np.array(error.p99)[np.clip(band, 0, len(error.p99) - 1)]
+    if error.places is not None:  # the band pools all viewers: both directions at the horizon have a limit of their own
+        lower = np.searchsorted(RINGS_DEG, degrees(np.max(theta, axis=0)), side="right") - 1
+        rings = np.array(error.places.both_grazing)[np.clip(lower, 0, RINGS - 1)]
+        both = degrees(np.min(theta, axis=0)) >= RINGS_DEG[0]
+        allowed = np.where(both[:, np.newaxis], np.maximum(allowed, rings), allowed)
+    return np.asarray(np.clip(allowed, TABLE_TOLERANCE, _MOST_ERROR))
 
 
 def _of_model() -> Iterator[_Seam]:

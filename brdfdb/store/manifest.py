@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any, NotRequired, TypedDict, cast
 from brdfdb.errors import (
     StoreError,
 )
-from brdfdb.store.decoding import read_metadata
 from brdfdb.store.files import Entry, sha256_of
 from brdfdb.store.paths import METADATA, manifest_path, number_of
 from brdfdb.store.sealed_json import bytes_of, check_fields, unsealed
@@ -166,18 +165,20 @@ def check_manifest(group: Path, digest: str | None, *, contents: bool) -> Manife
 
 def _check_summary(group: Path, manifest: Manifest) -> None:
     """Raise StoreError unless a manifest says of a table what the table says; older ones may say less."""
-    said = manifest["summary"]
+    from brdfdb.store.decoding import read_metadata  # it loads numpy, which a list does not need
+
+    summary = manifest["summary"]
     stored = sum(entry["size"] for entry in manifest["files"].values())
-    for key, value in summary_of(read_metadata(group), stored, said["created"]).items():
-        if key in said and not _agrees(stated := cast(Mapping[str, Any], said)[key], value):
+    for key, value in summary_of(read_metadata(group), stored, summary["created"]).items():
+        if key in summary and not _agrees(stated := cast(Mapping[str, Any], summary)[key], value):
             raise StoreError(
                 f"{group.parent.name} {group.name} is damaged: {manifest_path(group).name} says {key} {stated!r}, "
                 f"where the table has {value!r}"
             )
 
 
-def _agrees(said: Any, value: Any) -> bool:
-    """Return True if every part of what is said is that of a value."""
-    if isinstance(said, dict) and isinstance(value, dict):
-        return all(_agrees(part, value.get(key)) for key, part in said.items())
-    return bool(said == value)
+def _agrees(stated: Any, value: Any) -> bool:
+    """Return True if every part of a statement is that of a value."""
+    if isinstance(stated, dict) and isinstance(value, dict):
+        return all(_agrees(part, value.get(key)) for key, part in stated.items())
+    return bool(stated == value)

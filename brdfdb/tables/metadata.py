@@ -200,7 +200,6 @@ class TableMetadata(BaseModel):
     def gaps(self) -> str:
         """A phrase that names the attributes that are missing or not what they must be; empty for a whole record."""
         phrases = [f"does not state its {', '.join(map(_words, self.missing))}"] if self.missing else []
-        phrases += ["keeps no record of its source, so that what it cites is not shown"] if self.uncited else []
         phrases += [f"states its {_words(key)} wrongly ({why})" for key, why in self.strange.items()]
         return ", and ".join(phrases)
 

@@ -284,7 +284,7 @@ def _families(root: Path, before: Former, jobs: int) -> list[FamilyAudit]:
     for snapshot in snapshot_names(root):
         pinned = brdfdb.open(root, snapshot=snapshot)
         subjects |= {(snapshot, name): pinned for name in pinned.families()}
-    known = {each.subject_sha256: each for each in before.families}
+    known = {audited.subject_sha256: audited for audited in before.families}
     tasks: dict[tuple[str, ...], Task] = {}
     audits: dict[str, FamilyAudit] = {}
     for (snapshot, name), opened in subjects.items():
@@ -372,9 +372,9 @@ def _print(root: Path, audit_report: AuditReport, report_path: Path) -> None:
     for key, kind in FINDINGS.items():
         for sentence in kind.overview([a.findings[key] for a in audits]):
             print(sentence)
-    for each in audit_report.families:
-        where = f" of the snapshot {each.snapshot}" if each.snapshot else ""
-        print(f"family {each.family}{where}: {each.text}")
+    for family in audit_report.families:
+        where = f" of the snapshot {family.snapshot}" if family.snapshot else ""
+        print(f"family {family.family}{where}: {family.text}")
     known = sum(a.verdict == "known published excess" for a in audits)
     accepted = sum(a.verdict == "accepted excess" for a in audits)
     violating, unjudged = len(audit_report.violations), len(audit_report.not_judged)

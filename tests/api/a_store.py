@@ -136,7 +136,7 @@ def angles(count: int = 400) -> list[np.ndarray]:
     """Light and viewer [rad] everywhere, also below the horizon, and every other viewer near the mirror direction."""
     rng = np.random.default_rng(7)
     theta_i, theta_r = rng.uniform(0.0, 1.7, (2, count))
-    phi_i, phi_r = rng.uniform(-20.0, 20.0, (2, count))
+    phi_i, phi_r = rng.uniform(-9.0, 9.0, (2, count))
     theta_r[::2], phi_r[::2] = np.abs(theta_i[::2] + rng.normal(0.0, 0.05, count // 2)), phi_i[::2] + np.pi
     return [theta_i, phi_i, theta_r, phi_r]
 

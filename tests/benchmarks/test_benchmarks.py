@@ -16,7 +16,15 @@ from tests.benchmarks import explorer, recording
 from tests.benchmarks.recording import Record, Table
 
 FOLDER = Path(__file__).parent
-HELPERS = {"forged_stores", "picture_judge", "plain", "planted_tables", "recording", "sound_materials", "test_benchmarks"}
+HELPERS = {
+    "forged_stores",
+    "picture_judge",
+    "plain",
+    "planted_tables",
+    "recording",
+    "sound_materials",
+    "test_benchmarks",
+}
 SCRIPTS = sorted({path.stem for path in FOLDER.glob("*.py")} - HELPERS)
 SIGNED = {"difference"}  # columns whose numbers may be negative
 

@@ -27,6 +27,8 @@ from tests.models.draws import (
 )
 
 # Relative differences, each just above the worst measured, which stands behind it
+pytestmark = pytest.mark.filterwarnings("ignore::brdfdb.errors.DegreesWarning")  # azimuths of many turns are meant
+
 RECIPROCITY = 1e-12  # 0: each formula is symmetric to the last bit; the rest is room for other vector units
 AZIMUTH = 1e-13  # 8.6e-14 (parallel cavities): what the rounding of phi + 2 pi does
 # Of a lobe without a uniform part the exponent multiplies that rounding: 5.3e-12, where the lobe is down to 1e-142

@@ -197,8 +197,7 @@ def test_refuses_an_angle_that_is_not_a_real_number(spec: ModelSpec, position: i
 @pytest.mark.parametrize("wrong", [-1e-300, -0.1, np.nextafter(np.pi, 4.0), 90.0, np.inf, -np.inf])
 def test_refuses_a_theta_outside_the_sphere(spec: ModelSpec, position: int, wrong: float) -> None:
     parameters = drawn(spec, np.random.default_rng(17))
-    meant = r"; 90 degrees are 1\.5708 rad" if wrong == 90.0 else ""
-    message = rf"^{ANGLES[position]}: {re.escape(f'{wrong:.9g}')} rad .* is outside \[0, pi\] rad{meant}$"
+    message = rf"^{ANGLES[position]}: {re.escape(f'{wrong:.9g}')} rad .* is outside \[0, pi\] rad$"
     for given_as in (wrong, [0.1, wrong], np.array([[np.nan], [wrong]])):
         angles: list[Any] = [0.1, 0.2, 0.3, 0.4]
         angles[position] = given_as

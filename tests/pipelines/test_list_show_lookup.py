@@ -139,12 +139,11 @@ def test_no_paper_is_cited_for_a_table_without_a_record_of_its_source(tmp_path: 
         store = brdfdb.open(tmp_path)
         document = json.dumps(material_document(store[name], None), default=str)
         line = json.dumps(line_of(name, store.path(name), store.summary(name)))
-        said[name] = [any(word in text for word in ("He et al.", "he1991")) for text in (shown, exported, document, line)]
+        said[name] = [
+            any(word in text for word in ("He et al.", "he1991")) for text in (shown, exported, document, line)
+        ]
     assert said == {"whole": [True] * 4, "claimed": [False] * 4}
-    assert run("list", "--store", tmp_path) == 0
-    gap = "claimed r000001 keeps no record of its source, so that what it cites is not shown"
-    assert gap in capsys.readouterr().out
-    assert run("audit", "claimed", "--store", tmp_path, "--jobs", "1") == 1
+    assert "  source      not recorded, so that what the table cites is not shown" in shown
 
 
 def test_list_goes_on_past_what_is_damaged_and_fails(planned: Path, tmp_path: Path, capsys: Captured) -> None:

@@ -45,7 +45,7 @@ def random_directions(count: int, seed: int = 7) -> tuple[Any, ...]:
     """Directions above and, as azimuths go, far around the horizon."""
     rng = np.random.default_rng(seed)
     theta_i, theta_r = rng.uniform(0.0, np.pi / 2, (2, count))
-    phi_i, phi_r = rng.uniform(-20.0, 20.0, (2, count))
+    phi_i, phi_r = rng.uniform(-12.0, 12.0, (2, count))
     return theta_i, phi_i, theta_r, phi_r
 
 

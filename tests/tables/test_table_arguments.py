@@ -261,7 +261,6 @@ def test_a_model_without_a_dirac_part_reflects_nothing_there() -> None:
     assert made_up("anisotropic").specular_reflectance(0.1) == 0.0
 
 
-@pytest.mark.filterwarnings("ignore::brdfdb.errors.DegreesWarning")  # unwrapped azimuths are meant
 def test_the_two_kinds_of_table_of_one_material_agree() -> None:
     turning = np.arange(0.0, 361.0, 20.0)
     theta = {"theta_i": [0, 25, 50, 75], "theta_r": [0, 30, 60, 80]}

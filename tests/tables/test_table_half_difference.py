@@ -59,6 +59,7 @@ def test_a_table_of_nan_gives_nan(kind: str) -> None:
 
 
 @KINDS
+@pytest.mark.filterwarnings("ignore::brdfdb.errors.DegreesWarning")  # full turns are meant
 def test_vectors_and_angles_agree_and_turns_change_nothing(kind: str) -> None:
     table = table_of(kind)
     once = table.lookup(*ANGLES)

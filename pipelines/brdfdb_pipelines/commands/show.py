@@ -109,6 +109,8 @@ def _origin(metadata: TableMetadata) -> list[str]:
         lines.append(f"    {parameter:<16}{text:<{_VALUE_WIDTH}}{note}".rstrip())
     if metadata.source is not None:
         lines.append(f"  source      {metadata.source}")
+    if metadata.uncited:
+        lines.append("  source      not recorded, so that what the table cites is not shown; no audit can judge it")
     if metadata.measured is not None:
         lines += [f"  {'measured' if not n else '':<12}{line}" for n, line in enumerate(metadata.measured.in_words())]
     if metadata.refractive_index:
