@@ -248,7 +248,8 @@ def _is_rounding(error: Any) -> bool:
 
 def _of_request(metadata: TableMetadata) -> Iterator[Difference]:
     """Yield the digest of the request if it is another one, and what the request says other than the attributes."""
-    expected = None if metadata.request is None else digest(metadata.whole_request)
+    whole = metadata.request if metadata.measured is not None else metadata.whole_request  # of data there is a file
+    expected = None if metadata.request is None or whole is None else digest(whole)
     if metadata.request_sha256 != expected:
         yield Difference(leaf="request_sha256", stated=_written(metadata.request_sha256), expected=_written(expected))
     known = metadata.measured
