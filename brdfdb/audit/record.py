@@ -13,10 +13,12 @@ from brdfdb.audit.finding import STRICT, Cell, Finding, Sentence, Subject, Verdi
 from brdfdb.audit.statement import contradictions
 from brdfdb.errors import counted
 from brdfdb.materials import FunctionRecord, Material, Source, exact_material, libraries, presets
-from brdfdb.tables.albedo import directional_albedo, wavelengths_of
+from brdfdb.tables.albedo import LARGEST_TOLERANCE, wavelengths_of
 from brdfdb.tables.error_measurement import SEED, directions_of_a_band, draw
+from brdfdb.tables.first_numbers import LargestAlbedo
 from brdfdb.tables.formula_measurement import first_numbers
 from brdfdb.tables.grids import Axis
+from brdfdb.tables.largest_albedo import AlbedoAt, albedo_of
 from brdfdb.tables.layout import digest
 from brdfdb.tables.metadata import TableMetadata
 from brdfdb.tables.places import BANDS_DEG
@@ -53,6 +55,7 @@ UNCHECKED = (
     Unchecked("table", "reason", "what other kinds of tables were expected to take; its first clause is compared"),
     Unchecked("table", "error.worst.*", "where all errors are rounding, the largest has no place"),
     Unchecked("table of a function", "error.*", f"{_NO_FUNCTION}; it must not contradict itself"),
+    Unchecked("table of a function", "largest_albedo.*", f"{_NO_FUNCTION}; the albedo is near that of the lookups"),
     Unchecked("table of a function", "source_record.function.*", "its author says so"),
     Unchecked("table of measured data", "error.*", f"{_NO_DATA}; it must not contradict itself"),
     Unchecked("table of measured data", "measured.*", _NO_DATA),
@@ -99,7 +102,7 @@ class Record(Finding):
         """Compare the attributes of a table; a table without a record is not judged."""
         if subject.unrecorded:
             return subject.not_judged("statements are compared with the record of the source")
-        return record_of(subject.table, expected_of(subject))
+        return record_of(subject.table, expected_of(subject), subject.source)
 
     def sentences(self) -> list[Sentence]:
         """Return a sentence on the number of leaves, or on those that differ."""
@@ -114,14 +117,15 @@ class Record(Finding):
         return [Cell(self.verdict, f"{self.wrong} wrong" if self.wrong else "all good", self.wrong)]
 
 
-def record_of(table: Table, expected: Mapping[str, Any]) -> Record:
+def record_of(table: Table, expected: Mapping[str, Any], source: Source | None) -> Record:
     """Return how the attributes of a table differ from those `expected`, and from the presets."""
+    albedo_at = albedo_of(table, source)
     stated = {key: table.attrs[key] for key in expected if key in table.attrs and key not in table.metadata.strange}
     wrong = [
         difference
         for key, value in stated.items()
         for difference in differences(value, expected[key], key, measured=key in MEASURED)
-        if not _tied(table, difference, value, expected[key])
+        if not _tied(table, albedo_at, difference, value, expected[key])
     ]
     wrong += [
         Difference(leaf=key, stated=why, expected="what it must be") for key, why in table.metadata.strange.items()
@@ -131,7 +135,13 @@ def record_of(table: Table, expected: Mapping[str, Any]) -> Record:
         wrong += [
             Difference(leaf="error", stated=why, expected="a statement without contradictions") for why in sentences
         ]
-    wrong += [*_of_request(table.metadata), *_of_presets(table), *_of_reason(table), *_of_bits(table)]
+    wrong += [
+        *_of_request(table.metadata),
+        *_of_presets(table),
+        *_of_reason(table),
+        *_of_bits(table),
+        *_of_function(table),
+    ]
     if table.metadata.source_record is not None and table.source is None:
         wrong.append(Difference(leaf="source_record", stated="no source", expected="a material or a function"))
     compared = sum(1 for value in stated.values() for _ in leaves(value))
@@ -154,6 +164,8 @@ def expected_of(subject: Subject) -> dict[str, Any]:
     if table.error is not None:
         expected["error"] = {**table.attrs["error"], **_drawn(source, table.wavelength_nm)}
     if isinstance(record := table.source, FunctionRecord):
+        if _of_source(table.metadata.largest_albedo):
+            del expected["largest_albedo"]  # that of the function, as a user has it
         expected |= {"title": record.title, "material": record.name, "source": record.provenance}
     return expected
 
@@ -215,7 +227,7 @@ def _written(value: Any) -> str:
     return "" if value is None else repr(value)
 
 
-def _tied(table: Table, difference: Difference, stated: Any, expected: Any) -> bool:
+def _tied(table: Table, albedo_at: AlbedoAt, difference: Difference, stated: Any, expected: Any) -> bool:
     """Return whether a place is one of several where what is largest is equally large: rounding decides among them."""
     path = difference.leaf.split(".")
     if "worst" in path and path[-1] != "why":
@@ -223,7 +235,7 @@ def _tied(table: Table, difference: Difference, stated: Any, expected: Any) -> b
     if path[:3] == ["error", "between", "wavelength_nm"]:
         return _is_rounding(stated) and _is_rounding(expected) and _within(table.wavelength_nm, difference.stated)
     if path in (["largest_albedo", "theta_i_deg"], ["largest_albedo", "wavelength_nm"]):
-        return bool(abs(_albedo_at(table, stated) - _albedo_at(table, expected)) <= _TIE)
+        return bool(abs(_albedo(table, albedo_at, stated) - _albedo(table, albedo_at, expected)) <= _TIE)
     return False
 
 
@@ -232,13 +244,13 @@ def _within(wavelength_nm: Axis | None, stated: str) -> bool:
     return wavelength_nm is not None and wavelength_nm[0] <= float(stated or 0.0) <= wavelength_nm[-1]
 
 
-def _albedo_at(table: Table, place: Mapping[str, Any]) -> float:
+def _albedo(table: Table, albedo_at: AlbedoAt, place: Mapping[str, Any]) -> float:
     """Return the directional albedo [1] at the place of a largest one; nan where there is no such place."""
     at, nm = place["theta_i_deg"], place["wavelength_nm"]
     nodes = [None] if table.wavelength_nm is None else table.wavelength_nm.tolist()
     if not (isinstance(at, float) and 0.0 <= at <= 90.0 and nm in nodes):
         return math.nan
-    return float(directional_albedo(table, np.array([at])).albedo.max(axis=1)[0, nodes.index(nm)])
+    return float(albedo_at(np.array([at]), LARGEST_TOLERANCE)[0, nodes.index(nm)])
 
 
 def _is_rounding(error: Any) -> bool:
@@ -289,6 +301,21 @@ def _of_reason(table: Table) -> Iterator[Difference]:
         expected = first_reason(table, tolerance)
         if "takes" in reason and expected not in reason:
             yield Difference(leaf="reason", stated=_written(reason), expected=_written(expected))
+
+
+def _of_source(largest: LargestAlbedo | None) -> bool:
+    return largest is not None and largest.of == "source"
+
+
+def _of_function(table: Table) -> Iterator[Difference]:
+    """Yield the largest albedo that a table states of its function, if its lookups have another, beyond its error."""
+    stated = table.metadata.largest_albedo
+    if stated is None or stated.albedo is None or table.error is None or not isinstance(table.source, FunctionRecord):
+        return
+    place = {"theta_i_deg": stated.theta_i_deg, "wavelength_nm": stated.wavelength_nm}
+    looked_up = _albedo(table, albedo_of(table, None), place)
+    if not abs(stated.albedo - looked_up) <= max(map(max, table.error.p99)) * stated.albedo + stated.tolerance:
+        yield Difference(leaf="largest_albedo.albedo", stated=_written(stated.albedo), expected=f"{looked_up:.4g}")
 
 
 def _of_bits(table: Table) -> Iterator[Difference]:

@@ -66,6 +66,7 @@ class FileTable(Lookups):
             values = self._between(values, wavelength_nm)
         return finished(values, vectors, trailing=values.ndim - len(shape) + 1)
 
+    @array_lookup
     def lookup_vectors_with_error(self, wi: ArrayLike, wr: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Stated:
         """Return f_r [1/sr] as `lookup_vectors`, and the error [1/sr] that the file states for each value.
 

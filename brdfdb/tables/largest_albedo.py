@@ -31,7 +31,7 @@ _GRAZING_TOLERANCE = 1e-5  # of those albedos, relative to the albedo at the lig
 _PASSING = 1e-3  # relative tolerance of the cosine from which on an albedo exceeds 1
 _FLAT = 1e-4  # rise from light to light, relative to the albedo, up to which it is bounded
 
-_AlbedoAt = Callable[[Axis, float], Floats]  # of lights [degree] and a tolerance: albedos (theta_i, wavelengths) [1]
+AlbedoAt = Callable[[Axis, float], Floats]  # of lights [degree] and a tolerance: albedos (theta_i, wavelengths) [1]
 
 
 def largest_albedo(table: Table, source: Source | None) -> LargestAlbedo:
@@ -50,13 +50,14 @@ def largest_albedo(table: Table, source: Source | None) -> LargestAlbedo:
     LargestAlbedo
         For lights up to `last_light` of a source, or up to the last light of `directional_albedo` of a table.
     """
-    nm = table.wavelength_nm
-    if source is None or isinstance(source, MeasuredSource | TableSource):
-        albedo_at, of_source, power = _of_table(table), False, None
+    nm, albedo_at = table.wavelength_nm, albedo_of(table, source)
+    if _looked_up(source):
+        of_source, power = False, None
         integrated = directional_albedo(table, tolerance=LARGEST_TOLERANCE)
         lights, whole = integrated.theta_i_deg, _whole(table, integrated.theta_i_deg, nm, integrated.albedo)
     else:
-        albedo_at, of_source, power = _of_source(source, nm), True, source.grazing_power(nm)
+        assert source is not None
+        of_source, power = True, source.grazing_power(nm)
         lights = np.append(THETA_I_DEG, np.unique([LAST_LIGHT_DEG, last_light(source)]))
         lights, whole = _searched(albedo_at, lights)
     row, column = np.unravel_index(int(np.argmax(np.where(np.isfinite(whole), whole, np.inf))), whole.shape)
@@ -70,6 +71,17 @@ def largest_albedo(table: Table, source: Source | None) -> LargestAlbedo:
         up_to_theta_i_deg=float(lights[-1]),
         grazing=_grazing(albedo_at, power, largest, float(lights[-1])),
     )
+
+
+def albedo_of(table: Table, source: Source | None) -> AlbedoAt:
+    """Return the albedo of which `largest_albedo` finds the largest: that of the source, or of the lookups."""
+    if source is None or _looked_up(source):
+        return _of_table(table)
+    return _of_source(source, table.wavelength_nm)
+
+
+def _looked_up(source: Source | None) -> bool:
+    return source is None or isinstance(source, MeasuredSource | TableSource)
 
 
 def last_light(source: Source) -> float:
@@ -91,7 +103,7 @@ def grazing_of_table(table: Table, largest: float, up_to_theta_i_deg: float) -> 
     return _grazing(_of_table(table), None, largest, up_to_theta_i_deg)
 
 
-def _of_source(source: Source, wavelength_nm: Axis | None) -> _AlbedoAt:
+def _of_source(source: Source, wavelength_nm: Axis | None) -> AlbedoAt:
     """Return the albedo of a source with its specular part, largest over the azimuths of the light."""
     phi_i = radians(azimuths_deg(source))
 
@@ -103,7 +115,7 @@ def _of_source(source: Source, wavelength_nm: Axis | None) -> _AlbedoAt:
     return albedo_at
 
 
-def _of_table(table: Table) -> _AlbedoAt:
+def _of_table(table: Table) -> AlbedoAt:
     """Return the albedo of the lookups of a table with its specular part, largest over the azimuths of the light."""
     return lambda theta_i_deg, tolerance: _whole(
         table, theta_i_deg, table.wavelength_nm, directional_albedo(table, theta_i_deg, tolerance).albedo
@@ -116,7 +128,7 @@ def _whole(surface: Table | Source, theta_i_deg: Axis, wavelength_nm: Axis | Non
     return np.asarray(albedo.max(axis=1) + specular.reshape(theta_i_deg.size, -1))
 
 
-def _searched(albedo_at: _AlbedoAt, lights: Axis) -> tuple[Axis, Floats]:
+def _searched(albedo_at: AlbedoAt, lights: Axis) -> tuple[Axis, Floats]:
     """Return lights [degree] with more of them around the largest albedo, and the albedos."""
     whole = albedo_at(lights, LARGEST_TOLERANCE)
     for _ in range(_ROUNDS):
@@ -132,7 +144,7 @@ def _searched(albedo_at: _AlbedoAt, lights: Axis) -> tuple[Axis, Floats]:
     return lights, whole
 
 
-def _grazing(albedo_at: _AlbedoAt, declared: float | None, largest: float, up_to_theta_i_deg: float) -> Grazing | None:
+def _grazing(albedo_at: AlbedoAt, declared: float | None, largest: float, up_to_theta_i_deg: float) -> Grazing | None:
     """Return the growth of an albedo beyond an angle, by quadrature next to 90 degrees; None if it is not finite."""
 
     def at(cos_i: float, before: float) -> float:

@@ -74,8 +74,9 @@ def passes(store: Path, name: str, attributes: dict[str, Any], expected: dict[st
     """Whether an audit lets a table with other attributes pass; what is `expected` may be known."""
     try:
         table = forged(store, name, attributes)
-        expected = expected_of(Subject(table, of_store(table))) if expected is None else expected
-        if record_of(table, expected).verdict != "passes":
+        source = of_store(table)
+        expected = expected_of(Subject(table, source)) if expected is None else expected
+        if record_of(table, expected, source).verdict != "passes":
             return False
         return audit(table).verdict in ("passes", "known published excess")
     except BrdfdbError:  # it is no table
@@ -178,7 +179,8 @@ def test_what_cites_a_paper_has_the_parameters_of_the_paper(changes: dict[str, A
 def test_no_sound_table_of_any_model_is_accused() -> None:
     """`tests/benchmarks/audit_leaves.py` takes 60; here is a table of each of some models."""
     for words, table in materials(4, seed=41):
-        assert record_of(table, expected_of(Subject(table, of_store(table)))).verdict == "passes", words
+        source = of_store(table)
+        assert record_of(table, expected_of(Subject(table, source)), source).verdict == "passes", words
 
 
 def of_store(table: Table) -> Material | None:

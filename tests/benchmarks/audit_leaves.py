@@ -36,7 +36,7 @@ MEASURED = "Attributes of tables forged one by one, manifests made good again: w
 def noticed(table: Table) -> bool:
     """Return whether an audit lets no such table pass."""
     source = table.source if isinstance(table.source, Material) else None
-    if record_of(table, expected_of(Subject(table, source))).verdict == "violates":
+    if record_of(table, expected_of(Subject(table, source)), source).verdict == "violates":
         return True
     return audit(table).verdict not in ("passes", "known published excess")
 

@@ -149,6 +149,7 @@ def test_vectors_give_what_angles_give(name: str) -> None:
     assert np.isnan(twin([0.0, 0.0, 1.0], [np.nan, 0.0, 1.0], **CASES[name])).all()
 
 
+@pytest.mark.filterwarnings("ignore::brdfdb.errors.DegreesWarning")  # azimuths of many turns are meant
 @pytest.mark.parametrize("name", CASES)
 def test_nan_horizon_shape_type_and_corners(name: str) -> None:
     function, arguments = getattr(models, name), CASES[name]

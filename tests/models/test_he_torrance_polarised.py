@@ -399,6 +399,7 @@ def test_specular_vectors_give_what_angles_give() -> None:
         twin([0, 0, 2], **metal)
 
 
+@pytest.mark.filterwarnings("ignore::brdfdb.errors.DegreesWarning")  # azimuths of many turns are meant
 @pytest.mark.parametrize("n", [1e-3, 1.0, 1.5, 100.0])
 @pytest.mark.parametrize("k", [0.0, 1e-3, 1e4])
 def test_is_finite_in_every_corner(n: float, k: float) -> None:

@@ -19,6 +19,7 @@ from tests.json_schema import validate
 
 SCHEMA = json.loads((Path(__file__).parents[2] / "schemas" / "table.schema.json").read_text(encoding="utf-8"))
 GRID = Grid({"theta_i": [0, 45, 85], "theta_r": [0, 45, 85], "delta_phi": [0, 90, 180]})
+RECORDED = {"source_record": {"material": {}}}  # without a record of its source a table cites nothing
 ISOTROPIC = [material for material in presets().values() if not material.anisotropic]
 
 
@@ -51,7 +52,7 @@ def test_no_attributes_are_no_error_but_a_phrase() -> None:
 
 
 def test_a_strange_attribute_is_named_and_leaves_the_others() -> None:
-    read = TableMetadata.read({"title": ["White"], "model": "lambert", "note": None, "colour": "white"})
+    read = TableMetadata.read({"title": ["White"], "model": "lambert", "note": None, "colour": "white", **RECORDED})
     assert (read.title, read.model, read.note) == (None, "lambert", "")
     assert set(read.strange) == {"title", "note"}
     assert "title" not in read.missing
@@ -59,7 +60,7 @@ def test_a_strange_attribute_is_named_and_leaves_the_others() -> None:
 
 
 def test_assumptions_of_earlier_tables_are_names_alone() -> None:
-    assert TableMetadata.read({"assumed": ["rho"]}).assumed == {"rho": None}
+    assert TableMetadata.read({"assumed": ["rho"], **RECORDED}).assumed == {"rho": None}
 
 
 @pytest.mark.parametrize(

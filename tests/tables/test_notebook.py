@@ -37,6 +37,7 @@ def test_nothing_is_downloaded() -> None:
 
 def test_table_shows_its_metadata() -> None:
     attrs = {"title": HOSTILE, "model": "ward", "parameters": {"rho_d": 0.125}, "source": "a paper"}
+    attrs |= {"source_record": {"material": {}}}  # without a record no paper is cited
     whole = made_up("isotropic", WAVELENGTHS)
     table = Table("random", "r000007", attrs, whole.grid, WAVELENGTHS, whole.values, None)
     found = texts(table._repr_html_())
