@@ -94,9 +94,9 @@ class Choice(BaseModel):
     model: str = Field(default="", description="only of this model; measured: only of measured data")
     paper: str = Field(default="", description="only with this in the key of the paper or in the source")
     q: str = Field(default="", description="only with all of these words in name, title, model or source")
-    verdict: Literal["passes", "known published excess", "accepted excess", "violates", "not audited"] | None = Field(
-        default=None, description="only with this verdict of the audit of the current revision"
-    )
+    verdict: (
+        Literal["passes", "known published excess", "accepted excess", "violates", "not judged", "not audited"] | None
+    ) = Field(default=None, description="only with this verdict of the audit of the current revision")
     anisotropic: bool | None = Field(default=None, description="only anisotropic, or only isotropic ones")
     wavelength_nm: tuple[float, ...] = Field(
         default=(), description="only with tables at this wavelength [nm], repeatable; grey ones hold at all"
