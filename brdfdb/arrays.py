@@ -16,7 +16,7 @@ from typing import Any, NamedTuple, ParamSpec, TypeVar, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from brdfdb.errors import ParameterError
+from brdfdb.errors import ParameterError, warn_of_degrees
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -173,6 +173,9 @@ class _Labels:
             if not hasattr(value, "coords"):
                 raise ParameterError(name, f"{type(value).__name__} has no coordinates; give a DataArray")
             _check_at_hand(name, value)
+            units = str(getattr(value, "attrs", {}).get("units", ""))
+            if name.startswith(("theta", "phi")) and units.lower().startswith(("deg", "°")):
+                warn_of_degrees(name, f"its units are {units!r}, but angles are radians; convert it and set its units")
             whole = value.isel({value.dims[-1]: 0}, drop=True) if name in _VECTORS and value.dims else value
             for other, part in parts.items():
                 _check_same_labels(other, part, name, whole)
@@ -210,6 +213,8 @@ class _Labels:
         if added and last[:1] == tuple(map(len, added.values())):
             new, last = dict(added), last[1:]
         names = _TRAILING.get(last, tuple(f"axis_{axis}" for axis in range(len(last))))
+        if taken := {*new, *names} & set(self.dims):
+            raise ParameterError(taken.pop(), "the result adds this dimension, which an argument has; rename it")
         new |= dict(zip(names, last, strict=True))
         whole = self.template.expand_dims(new, axis=list(range(len(self.dims), values.ndim))) if new else self.template
         return whole.copy(data=values)

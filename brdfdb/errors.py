@@ -43,19 +43,15 @@ class ParameterError(BrdfdbError, ValueError):
 
 
 class DegreesWarning(UserWarning):
-    """An azimuth of more than two turns [rad], which is likely to be in degrees; unwrapped scans may filter it."""
+    """An angle [rad] that is likely to be in degrees: of more than two turns, or so labelled; scans may filter it."""
 
 
-def warn_of_degrees(name: str, phi: float) -> None:
-    """Warn that an azimuth [rad] looks like degrees, at the line that called this package."""
+def warn_of_degrees(name: str, sentence: str) -> None:
+    """Warn that an angle [rad] looks like degrees, at the line that called this package."""
     level, frame = 1, sys._getframe()
     while frame.f_back is not None and frame.f_globals.get("__name__", "").partition(".")[0] == "brdfdb":
         level, frame = level + 1, frame.f_back
-    warnings.warn(
-        f"{name}: {phi:.9g} rad is more than two turns; angles are radians, and np.deg2rad converts degrees",
-        DegreesWarning,
-        stacklevel=level,
-    )
+    warnings.warn(f"{name}: {sentence}", DegreesWarning, stacklevel=level)
 
 
 class MaterialError(ParameterError):

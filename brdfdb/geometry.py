@@ -79,7 +79,9 @@ def check_phi(name: str, phi: ArrayLike) -> Floats:
                 float(largest),
                 (-PHI_MAX, PHI_MAX),
             )
-        warn_of_degrees(name, float(largest))
+        warn_of_degrees(
+            name, f"{largest:.9g} rad is more than two turns; angles are radians, and np.deg2rad converts degrees"
+        )
     return array
 
 

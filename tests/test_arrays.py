@@ -16,7 +16,7 @@ import pytest
 import xarray as xr
 
 from brdfdb import derivatives, fresnel, integrals, models, roughness
-from brdfdb.errors import ParameterError
+from brdfdb.errors import DegreesWarning, ParameterError
 from brdfdb.formats._readings import FileTable
 from brdfdb.geometry import radians, spherical_angles, unit_vector
 from brdfdb.integrals.sampling import pdf, sample
@@ -194,6 +194,15 @@ def test_labels_that_do_not_fit_are_refused() -> None:
     with pytest.raises(ParameterError, match="theta_i, theta_r: their rows have different labels"):
         look(pd.Series(THETA), pd.Series(THETA, index=[2, 1, 0]))
     assert np.isnan(look(pd.Series([0.1, None], dtype="Float64"), 0.3)).tolist() == [False, True]
+
+
+def test_a_label_of_degrees_gives_a_warning_and_a_dimension_that_is_added_is_refused() -> None:
+    table = made_up("isotropic", np.array([400.0, 700.0]))
+    labelled = LIGHTS.assign_attrs(units="degree")
+    with pytest.warns(DegreesWarning, match=r"^theta_i: its units are 'degree', but angles are radians"):
+        np.testing.assert_array_equal(table.lookup(labelled, 0.0, 0.3, 1.0), table.lookup(LIGHTS, 0.0, 0.3, 1.0))
+    with pytest.raises(ParameterError, match=r"^wavelength: the result adds this dimension"):
+        table.lookup(LIGHTS.rename(light="wavelength"), 0.0, 0.3, 1.0)
 
 
 def test_wavelengths_are_the_last_dimension_of_a_lookup() -> None:

@@ -189,6 +189,12 @@ def energy_of(table: Table, source: Source | None, *, accept_excess: bool = Fals
             grazing = grazing_of_table(table, stored.max_albedo, stored.theta_i_deg[-1])
             stored = stored.model_copy(update={"grazing": grazing})
         verdict: EnergyVerdict = "conserves" if stored.verdict == "passes" else stored.verdict
+        largest = table.metadata.largest_albedo
+        if verdict == "conserves" and largest is not None and largest.of == "source" and largest.above_1:
+            reason = f"the table states of its function: {largest.in_words()}"
+            return Energy(
+                model=None, table=stored, verdict="accepted excess" if accept_excess else "violates", reason=reason
+            )
         return Energy(model=None, table=stored, verdict=verdict, reason=stored.reason)
     known = published_excess(source, table.wavelength_nm) if isinstance(source, Material) else None
     stated = table.metadata.known_excess

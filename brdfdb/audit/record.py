@@ -128,7 +128,8 @@ def record_of(table: Table, expected: Mapping[str, Any], source: Source | None) 
         if not _tied(table, albedo_at, difference, value, expected[key])
     ]
     wrong += [
-        Difference(leaf=key, stated=why, expected="what it must be") for key, why in table.metadata.strange.items()
+        Difference(leaf=key, stated=f"not valid ({why})", expected="a valid value")
+        for key, why in table.metadata.strange.items()
     ]
     if table.error is not None:
         sentences = contradictions(table.error, wavelengths_of(table))
@@ -142,6 +143,9 @@ def record_of(table: Table, expected: Mapping[str, Any], source: Source | None) 
         *_of_bits(table),
         *_of_function(table),
     ]
+    named = table.metadata.material
+    if named is not None and named != table.name:
+        wrong.append(Difference(leaf="material", stated=_written(named), expected=repr(table.name)))
     if table.metadata.source_record is not None and table.source is None:
         wrong.append(Difference(leaf="source_record", stated="no source", expected="a material or a function"))
     compared = sum(1 for value in stated.values() for _ in leaves(value))
@@ -316,6 +320,12 @@ def _of_function(table: Table) -> Iterator[Difference]:
     looked_up = _albedo(table, albedo_of(table, None), place)
     if not abs(stated.albedo - looked_up) <= max(map(max, table.error.p99)) * stated.albedo + stated.tolerance:
         yield Difference(leaf="largest_albedo.albedo", stated=_written(stated.albedo), expected=f"{looked_up:.4g}")
+    grazing = stated.grazing
+    if grazing is not None and grazing.max_albedo is not None and grazing.max_albedo < stated.albedo - stated.tolerance:
+        expected = f"at least {stated.albedo:.4g}"
+        yield Difference(
+            leaf="largest_albedo.grazing.max_albedo", stated=_written(grazing.max_albedo), expected=expected
+        )
 
 
 def _of_bits(table: Table) -> Iterator[Difference]:

@@ -19,6 +19,7 @@ from brdfdb.spectra import ILLUMINANT, OBSERVER, colour_science
 WAYS = "wavelengths_nm and values, csv, srgb, or measured"
 
 _HEX = re.compile(r"#[0-9a-fA-F]{6}")
+_OTHER_UNITS = re.compile(r"%|percent|cm\^?-1|1/cm|wavenumber|[uµμ]m\b|micro\w*|angstrom|[TG]Hz|\beV\b", re.IGNORECASE)
 _SHAPE_NM = (360.0, 780.0, 5.0)  # wavelengths of the spectrum of a colour
 _MOST_BYTES = 1 << 20  # of a CSV file
 
@@ -108,6 +109,9 @@ def _of_csv(name: str, path: Any, folder: Path | None) -> Spectrum:
                 raise ParameterError(
                     name, f"{path}, line {number}: {line[:40]!r} is not a wavelength [nm] and a value", line
                 ) from None
+            if unit := _OTHER_UNITS.search(line):
+                sentence = f"{path}, line {number}: {unit[0]!r} in the header; give nm and fractions"
+                raise ParameterError(name, sentence, line) from None
             continue
         rows.append((wavelength, value))
     if not 2 <= len(rows) <= MOST_VALUES:

@@ -261,11 +261,11 @@ class RemoteStore(Mapping[str, RemoteTable]):
         return opened(WholeRemote(f"{self.url}{path}", where, json.loads(content)["files"]))
 
     def families(self) -> NoReturn:
-        """Raise StoreError: a service has no families."""
-        raise StoreError(f"{self.url} serves materials, no families; open the directory of the store for those")
+        """Raise StoreError: families of a service are not read in Python."""
+        raise StoreError(f"{self.url} has families for POST requests alone; open the directory of the store for those")
 
     def family(self, name: str) -> NoReturn:  # noqa: ARG002  # as a Store is asked
-        """Raise StoreError: a service has no families."""
+        """Raise StoreError: families of a service are not read in Python."""
         self.families()
 
     def _lines(self, words: str = "") -> Iterator[dict[str, Any]]:

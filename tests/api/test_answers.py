@@ -223,7 +223,7 @@ WHOLE = npy(points(4))
         (npy(np.float64(3.0)), "its shape () is not (..., 4)"),
         (npy(points(0)), "an empty array"),
         (npy(np.full((2, 4), np.nan)), "theta_i: nan is outside [0, 180] degrees"),
-        (npy(np.full((2, 4), [0.0, np.inf, 0.0, 0.0])), "phi_i: inf is not a finite number"),
+        (npy(np.full((2, 4), [0.0, np.inf, 0.0, 0.0])), "phi_i: inf is outside [-720, 720] degrees"),
         (npy(np.full((2, 4), 181.0)), "theta_i: 181.0 is outside [0, 180] degrees"),
     ],
 )

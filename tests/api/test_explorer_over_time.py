@@ -63,8 +63,10 @@ def test_facts_follow_a_store_that_is_built_anew_with_the_same_numbers(chromium:
         chromium.open(f"{address}/#material=grey-felt&view=cut")
         shown(chromium, "material=grey-felt")
         assert "Test grey-felt" in chromium.evaluate("document.title")
+        anew = own.with_name("anew")
+        assert publish(anew, "grey-felt", "oren_nayar", rho=0.25, sigma_deg=41.0) == "r000001"
         shutil.rmtree(own / "materials" / "grey-felt")
-        assert publish(own, "grey-felt", "oren_nayar", rho=0.25, sigma_deg=41.0) == "r000001"
+        (anew / "materials" / "grey-felt").rename(own / "materials" / "grey-felt")
         move(chromium, "theta_i", 20)
         shown(chromium, "theta_i=20")
         known = chromium.evaluate("facts.textContent")

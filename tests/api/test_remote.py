@@ -246,7 +246,7 @@ def test_a_damaged_material_is_an_error_of_the_store(own: Path) -> None:
 
 def test_families_are_not_served(address: str) -> None:
     for ask in (brdfdb.open(address).families, lambda: brdfdb.open(address).family("copper")):
-        with pytest.raises(StoreError, match=r"^http://.* serves materials, no families; open the directory"):
+        with pytest.raises(StoreError, match=r"^http://.* has families for POST requests alone; open the directory"):
             ask()
 
 

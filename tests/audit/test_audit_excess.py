@@ -164,7 +164,7 @@ def test_the_report_names_the_violations_and_nothing_else() -> None:
     good, bad = lambert(0.5), node(lambert(0.5), -1.0)
     excused = tabulated(presets()["blue-plastic"], ISOTROPIC, np.array([460.0]))
     named = {"good": good, "bad": bad, "excused": excused}
-    audits = [audit(replace(table, name=name)) for name, table in named.items()]
+    audits = [audit(table).model_copy(update={"material": name}) for name, table in named.items()]
     document = written(audits)
     assert (document["format"], document["version"], document["violations"]) == ("brdfdb-audit", 8, ["bad"])
     assert [entry["verdict"] for entry in document["materials"]] == ["passes", "violates", "known published excess"]

@@ -42,6 +42,7 @@ MEASURED = "Totals and f_r as Radiance and pyWinCalc see the files, against the 
 # The lobe that Radiance's own plastic2 evaluates; wide, because cells blur narrow ones
 BOUNDED = {"rho_d": 0.2, "rho_s": 0.3, "alpha_x": 0.3, "alpha_y": 0.45}
 SUN = (0.4, 0.2, 0.9)  # direction of the sun in the picture
+VIEW = (0.3, 0.4, 0.9)  # from the camera; from above, all viewers would lie on a border of cells of a tree
 WIDTH = 64  # pixels along the picture
 # Columns of the pictures: sums of all pixels and the median pixel
 OF_PICTURE = tuple(
@@ -95,10 +96,12 @@ def picture(folder: Path, table: Table) -> Picture:
     grid = (np.arange(WIDTH) + 0.5) / WIDTH * 2.0 - 1.0
     x, y = (axis.reshape(-1) for axis in np.meshgrid(grid, grid))
     normal = np.stack([x, y, np.sqrt(np.maximum(0.0, 1.0 - x * x - y * y))], axis=-1)
-    sun = np.array(SUN) / np.linalg.norm(SUN)
-    seen = (normal[:, 2] > 0.1) & (normal @ sun > 0.1)
-    normal = normal[seen]
-    rays = np.concatenate([normal * [1, 1, 0] + [0, 0, 5], np.tile([0.0, 0.0, -1.0], (len(normal), 1))], axis=1)
+    sun, view = np.array(SUN) / np.linalg.norm(SUN), np.array(VIEW) / np.linalg.norm(VIEW)
+    across = np.cross([0.0, 1.0, 0.0], view) / np.linalg.norm(np.cross([0.0, 1.0, 0.0], view))
+    camera = np.stack([across, np.cross(view, across), view])
+    seen = (normal[:, 2] > 0.1) & (normal @ camera @ sun > 0.1)
+    origin, normal = (normal[seen] * [1, 1, 0] + [0, 0, 5]) @ camera, normal[seen] @ camera
+    rays = np.concatenate([origin, np.tile(-view, (len(normal), 1))], axis=1)
     text = (folder / "ball.rad").read_text(encoding="utf-8")
     light = f"void light sun\n0\n0\n3 1e5 1e5 1e5\nsun source disk\n0\n0\n4 {sun[0]} {sun[1]} {sun[2]} 0.5\n"
     pictures = [
@@ -112,7 +115,7 @@ def picture(folder: Path, table: Table) -> Picture:
     y_axis /= np.linalg.norm(y_axis, axis=1, keepdims=True)
     frame = np.stack([np.cross(y_axis, normal), y_axis, normal], axis=1)
     solid_angle = 2.0 * np.pi * (1.0 - np.cos(np.radians(0.25)))
-    wi, wr = frame @ sun, frame @ np.array([0.0, 0.0, 1.0])
+    wi, wr = frame @ sun, frame @ view
     expected = np.asarray(table.lookup_vectors(wi, wr)) * wi[:, 2] * 1e5 * solid_angle
     of_file, plastic = pictures
     return Picture(*differences(of_file, plastic), *differences(of_file, expected), *differences(plastic, expected))

@@ -101,6 +101,9 @@ def test_a_spectrum_that_is_none_is_refused(changes: dict[str, Any], sentence: s
         ("400,0.1,0.3\n500,0.1,0.3\n", "line 1"),
         ("wavelength,rho\n400,0.1\n", "1 lines of values; allowed are 2 to"),
         ("", "0 lines of values"),
+        ("wavelength_nm,reflectance %\n400,40\n500,50\n", "line 1: '%' in the header; give nm and fractions"),
+        ("wavenumber_cm-1,rho\n400,0.1\n500,0.2\n", "line 1: 'wavenumber' in the header"),
+        ("wavelength [um],rho\n0.4,0.1\n0.5,0.2\n", "line 1: 'um' in the header"),
         ("400,0.1\n400,0.2\n", "must be positive and increase strictly"),
     ],
 )
