@@ -24,6 +24,7 @@ from brdfdb.errors import counted
 from brdfdb.figure import Map, Panel, number
 from brdfdb.materials import Material, Source
 from brdfdb.materials.provenance import KnownExcess
+from brdfdb.tables.first_numbers import Grazing
 from brdfdb.tables.largest_albedo import grazing_of_table
 from brdfdb.tables.table import Table
 
@@ -70,7 +71,9 @@ class Energy(Finding):
     @classmethod
     def judge(cls, subject: Subject) -> Energy:
         """Judge the energy of a table and its source, or of the table alone if the source is not known."""
-        return energy_of(subject.table, subject.source, accept_excess=subject.accept_excess)
+        known = None if subject.restated is None else subject.restated.largest_albedo
+        grazing = None if known is None or known.of == "table" else known.grazing
+        return energy_of(subject.table, subject.source, accept_excess=subject.accept_excess, grazing=grazing)
 
     def sentences(self) -> list[Sentence]:
         """Return sentences on model, table, white furnace and uniform diffuse part."""
@@ -181,13 +184,18 @@ def _of_bound(bound: UniformBound) -> Sentence:
     return Energy.sentence("inside" if bound.keeps else "outside", text, title="Uniform diffuse part")
 
 
-def energy_of(table: Table, source: Source | None, *, accept_excess: bool = False) -> Energy:
-    """Return the energy of a model and its table. With `accept_excess` both may exceed 1 by the excess of the model."""
+def energy_of(
+    table: Table, source: Source | None, *, accept_excess: bool = False, grazing: Grazing | None = None
+) -> Energy:
+    """Return the energy of a model and its table. With `accept_excess` both may exceed 1 by the excess of the model.
+
+    `grazing` is the albedo of the source for lights beyond the last; by default it is measured.
+    """
     if source is None:
         stored = table_energy_of(table, None)
         if stored.max_albedo is not None:
-            grazing = grazing_of_table(table, stored.max_albedo, stored.theta_i_deg[-1])
-            stored = stored.model_copy(update={"grazing": grazing})
+            beyond = grazing_of_table(table, stored.max_albedo, stored.theta_i_deg[-1])
+            stored = stored.model_copy(update={"grazing": beyond})
         verdict: EnergyVerdict = "conserves" if stored.verdict == "passes" else stored.verdict
         largest = table.metadata.largest_albedo
         if verdict == "conserves" and largest is not None and largest.of == "source" and largest.above_1:
@@ -199,7 +207,7 @@ def energy_of(table: Table, source: Source | None, *, accept_excess: bool = Fals
     known = published_excess(source, table.wavelength_nm) if isinstance(source, Material) else None
     stated = table.metadata.known_excess
     claim = "" if stated is None else stated.citation
-    model = model_energy_of(source, table.wavelength_nm, known, claim, accept_excess=accept_excess)
+    model = model_energy_of(source, table.wavelength_nm, known, claim, accept_excess=accept_excess, grazing=grazing)
     # The excess that is published or accepted is that of the model. An excess of the table alone is excused by neither
     excess = known if model.verdict == "known published excess" else _of_model(model)
     excused = model.verdict if model.verdict in ("accepted excess", "violates") else "known published excess"

@@ -145,11 +145,13 @@ def model_energy_of(
     claim: str = "",
     *,
     accept_excess: bool = False,
+    grazing: Grazing | None = None,
 ) -> ModelEnergy:
     """Return the energy of a material or a function, at wavelengths [nm] if it is spectral.
 
     `known` is the excess that is known as published. `claim` is the sentence of a recipe on an excess: the reason
-    quotes it, and it excuses nothing. With `accept_excess` an excess that is not known is accepted.
+    quotes it, and it excuses nothing. With `accept_excess` an excess that is not known is accepted. `grazing`
+    is the albedo for lights beyond the last; by default it is measured.
     """
     limits = LIMITS if known is None else (*LIMITS, known.max_albedo)
     model = _Model(source, wavelength_nm, _white_of(source, wavelength_nm), limits)
@@ -159,7 +161,12 @@ def model_energy_of(
         furnace = None if model.white is None or white is None else _furnace(model.white, lights, white)
         lights, reflected = _refined(model, lights, reflected)
         first = _first_above_1(model, lights, reflected)
-        grazing = grazing_of_source(source, wavelength_nm, float(reflected.largest.max()))
+        largest = float(reflected.largest.max())
+        if grazing is None:
+            grazing = grazing_of_source(source, wavelength_nm, largest)
+        elif grazing.max_albedo is not None:  # more lights were looked at
+            most = max(grazing.max_albedo, float(f"{largest:.4g}"))
+            grazing = grazing.model_copy(update={"max_albedo": most})
     theta, wavelength = _worst(reflected.largest)
     growth = "" if grazing is None else f"; {grazing.in_words(float(reflected.largest.max()))}"
     verdict, reason = _verdict(lights, wavelength_nm, reflected, furnace, known, growth)

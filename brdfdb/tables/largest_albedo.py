@@ -129,18 +129,23 @@ def _whole(surface: Table | Source, theta_i_deg: Axis, wavelength_nm: Axis | Non
 
 
 def _searched(albedo_at: AlbedoAt, lights: Axis) -> tuple[Axis, Floats]:
-    """Return lights [degree] with more of them around the largest albedo, and the albedos."""
+    """Return lights [degree] with more of them around each maximum that may be the largest albedo, and the albedos."""
     whole = albedo_at(lights, LARGEST_TOLERANCE)
     for _ in range(_ROUNDS):
         of_lights = whole.max(axis=1)
-        worst = int(np.argmax(of_lights))
-        around = slice(max(worst - 1, 0), worst + 2)
-        if not np.ptp(of_lights[around]) > LARGEST_TOLERANCE / 2.0:  # nan is not
+        between: set[float] = set()
+        for at, albedo in enumerate(of_lights):
+            around = slice(max(at - 1, 0), at + 2)
+            drop = np.ptp(of_lights[around])
+            # between lights the albedo rises by no more than it drops to the next, or the lights are too far apart
+            if albedo == of_lights[around].max() and drop > LARGEST_TOLERANCE / 2.0 and albedo + drop > of_lights.max():
+                between.update((lights[around][1:] + lights[around][:-1]) / 2.0)
+        if not between:
             break
-        between = (lights[around][1:] + lights[around][:-1]) / 2.0
-        order = np.argsort(np.append(lights, between))
-        whole = np.concatenate([whole, albedo_at(between, LARGEST_TOLERANCE)])[order]
-        lights = np.append(lights, between)[order]
+        added = np.array(sorted(between))
+        order = np.argsort(np.append(lights, added))
+        whole = np.concatenate([whole, albedo_at(added, LARGEST_TOLERANCE)])[order]
+        lights = np.append(lights, added)[order]
     return lights, whole
 
 
