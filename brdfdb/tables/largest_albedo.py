@@ -178,6 +178,11 @@ def _grazing(albedo_at: AlbedoAt, declared: float | None, largest: float, up_to_
         above = next((cos_i for cos_i, albedo in tried.items() if albedo > 1.0), None)
         if above is not None:
             below = float(np.cos(radians(min(up_to_theta_i_deg, LAST_LIGHT_DEG))))
+            if power > 0.0 and factor > 0.0 and rest < 1.0:  # the law of growth is close
+                guess = (factor / (1.0 - rest)) ** (1.0 / power)
+                for tried_cos in (guess * (1.0 + _PASSING), guess * (1.0 - _PASSING)):
+                    if above < tried_cos < below:
+                        below, above = (below, tried_cos) if at(tried_cos, 1.0) > 1.0 else (tried_cos, above)
             while below > above * (1.0 + _PASSING):
                 between = float(np.sqrt(below * above))
                 below, above = (below, between) if at(between, 1.0) > 1.0 else (between, above)
