@@ -65,7 +65,7 @@ class FileError:
 
     @functools.cached_property
     def statement(self) -> FileStatement | None:
-        """What the file states against the model; None if its table states no error. It is measured at first use."""
+        """The error of the file against the model, measured at first use; None if its table states no error."""
         return None if self.measure is None else self.measure()
 
 

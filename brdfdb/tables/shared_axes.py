@@ -66,7 +66,7 @@ def axes_for(kind: str, ax: Axes | None, size: tuple[float, float]) -> Axes:
     elif getattr(ax, "name", "") != "rectilinear":
         raise ParameterError("ax", "is not Axes with straight x and y axes, as pyplot.subplots() makes", ax)
     shown = {plot.kind: plot.name for plot in drawn_on(ax)}
-    if other := [one for one in shown if one != kind or kind == "slices"]:
+    if other := [drawn_kind for drawn_kind in shown if drawn_kind != kind or kind == "slices"]:
         raise ParameterError("ax", f"shows {other[0]} of {shown[other[0]]}; {kind} need axes of their own", ax)
     ax.spines[["top", "right"]].set_visible(False)
     ax.spines[["left", "bottom"]].set_color(GRID)

@@ -73,7 +73,7 @@ def forged(store: Path, name: str, attributes: dict[str, Any]) -> Table:
 
 
 def passes(store: Path, name: str, attributes: dict[str, Any], expected: dict[str, Any] | None) -> bool:
-    """Whether an audit lets a table with other attributes pass; what is `expected` may be known."""
+    """Return True if an audit passes a table with other attributes; `expected` may be known."""
     try:
         table = forged(store, name, attributes)
         source = of_store(table)

@@ -84,7 +84,7 @@ def missing(tolerances: tuple[float, ...], made: list[str], left_out: list[str])
 
 
 class Walk(NamedTuple):
-    """What came of a material: numbers of tables made and left out, seconds, and faults in words."""
+    """Outcome for a material: numbers of tables made and left out, seconds, and faults in words."""
 
     tables: int
     left_out: int

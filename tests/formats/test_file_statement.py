@@ -1,4 +1,4 @@
-"""What a file states against the model: between wavelengths, near the light, at the horizon, and what it adds."""
+"""Stated errors of files against the model: between wavelengths, near the light and at the horizon."""
 
 from __future__ import annotations
 

@@ -97,7 +97,7 @@ class Case:
 
 
 class Measured(NamedTuple):
-    """What a plugin is off by in one variant, relative, and the probability of its samples in a chi-square test."""
+    """Relative errors of a plugin in a variant, and the probability of its samples in a chi-square test."""
 
     pairs: int
     value: float
