@@ -297,7 +297,6 @@ def _named(names: tuple[str, ...], values: Floats) -> dict[str, float]:
 
 def _brdf_of(f_r: Evaluate, channels: tuple[str, ...], wavelength_nm: NDArray[np.float64] | None) -> Callable[..., Any]:
     """Return f_r at wavelengths as `FunctionSource` takes it: straight lines between those of the data."""
-
     last: list[tuple[Floats, Floats, Floats]] = []  # tables evaluate wavelength after wavelength at the same directions
 
     def evaluated(wi: Floats, wr: Floats) -> Floats:

@@ -24,7 +24,7 @@ class Lobe(Protocol):
 
     @property
     def alone(self) -> float:
-        """This share if the glossy part is alone."""
+        """The share [1] if the glossy part is alone."""
 
     def draw(self, wi: Any, choice: Any, sample: Any) -> Any:
         """Return directions for a random number and a point in the unit square."""

@@ -62,7 +62,7 @@ class Light(BaseModel):
         return self.intensity / self.solid_angle_sr if self.solid_angle_sr else 0.0
 
     def towards(self) -> Array:
-        """Unit vectors (samples, 3) towards the disc, of equal solid angles."""
+        """Return unit vectors (samples, 3) towards the disc, of equal solid angles."""
         z = unit(np.asarray(self.direction))
         if self.solid_angle_sr == 0.0:
             return z[np.newaxis]

@@ -120,11 +120,10 @@ def points_of_angles(
 
 @loop
 def points_of_vectors(rule: Rule, ui: Array, ur: Array, count: int, x: Array, mu: Array, scratch: Array) -> None:
-    """Write points on either kind of grid, of unit vectors in flat arrays, and mu = cos theta_i cos theta_r if the rule
-    has a power.
+    """Write points of unit vectors in flat arrays on either kind of grid, and mu if the rule has a power.
 
-    `scratch` holds six rows; the last gets the lower z, nan where a number of the vectors is nan or infinite. One loop
-    for the products and one for each angle: all in one would not vectorise.
+    mu is cos theta_i cos theta_r. `scratch` holds six rows; the last gets the lower z, nan where a number of the
+    vectors is nan or infinite. One loop for the products and one for each angle: all in one would not vectorise.
     """
     if rule.half_difference:
         theta_h, theta_d, phi_d = x[0], x[x.shape[0] - 2], x[x.shape[0] - 1]

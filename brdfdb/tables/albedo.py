@@ -240,7 +240,6 @@ def source_albedo(
         Albedo of shape (..., L), or (..., 1) of a grey source, without the specular part; and an estimate of the error
         for each light.
     """
-
     f_r = source.brdf_at(wavelength_nm)
 
     def brdf(wi: Floats, wr: Floats) -> Floats:

@@ -66,7 +66,7 @@ class Grid:
 
     @classmethod
     def part(cls, whole: Grid, rows: slice) -> Grid:
-        """Some rows of the first axis of a grid, which need not begin at 0."""
+        """Return rows of the first axis of a grid, which need not begin at 0."""
         part = object.__new__(cls)
         first, *others = whole.axes
         axes = {first: whole.axes[first][rows], **{name: whole.axes[name] for name in others}}

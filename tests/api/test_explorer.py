@@ -107,6 +107,7 @@ def test_modules_import_and_export_as_the_script_joins_them(name: str) -> None:
     assert len(imports) + len(exports) == len(re.findall(r"^(?:import|export)\b", text, re.MULTILINE))
 
 
+@pytest.mark.judge
 def test_the_script_runs_where_node_reads_it(tmp_path: Path) -> None:
     node = shutil.which("node")
     if node is None:
@@ -115,6 +116,7 @@ def test_the_script_runs_where_node_reads_it(tmp_path: Path) -> None:
     assert subprocess.run([node, "--check", tmp_path / "explorer.mjs"]).returncode == 0
 
 
+@pytest.mark.judge
 def test_types_are_what_their_comments_say(tmp_path: Path) -> None:
     tsc = shutil.which("tsc", path=os.pathsep.join([os.environ.get("BRDFDB_NODE", ""), os.environ["PATH"]]))
     if tsc is None:

@@ -7,8 +7,11 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-import schemathesis
 from hypothesis import HealthCheck, Phase, settings
+
+pytest.importorskip("schemathesis")
+
+import schemathesis
 from schemathesis.checks import not_a_server_error
 from schemathesis.specs.openapi.checks import (
     content_type_conformance,
@@ -23,7 +26,7 @@ CHECKS = [not_a_server_error, status_code_conformance, content_type_conformance,
 
 
 @schemathesis.serializer("application/x-npy")
-def as_it_is(_: schemathesis.SerializationContext, value: object) -> bytes:
+def as_it_is(_: object, value: object) -> bytes:
     """Bytes made up for a .npy body."""
     return value if isinstance(value, bytes) else str(value).encode()
 

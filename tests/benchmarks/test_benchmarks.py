@@ -59,6 +59,7 @@ def test_records_of_the_site_are_valid_and_name_no_machine(name: str) -> None:
     assert not re.search(r'[" ](/[\w.-]+){2}', text)
 
 
+@pytest.mark.judge
 @pytest.mark.parametrize("name", [pytest.param(name, marks=needs.get(name, ())) for name in SCRIPTS])
 def test_a_quick_run_ends_well(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]

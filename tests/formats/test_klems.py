@@ -167,6 +167,7 @@ def test_damaged_files_are_refused_with_a_sentence(
     assert sentence in str(refusal.value)
 
 
+@pytest.mark.judge
 @pytest.mark.parametrize(("material", "kind"), [(GREY, "full"), (ANISOTROPIC, "half")])
 def test_radiance_sees_the_values_that_are_read(files: dict[tuple[str, str], Path], material: str, kind: str) -> None:
     path = files[material, kind]
@@ -174,6 +175,7 @@ def test_radiance_sees_the_values_that_are_read(files: dict[tuple[str, str], Pat
     assert queried(path, wi, wr)[:, 1] == pytest.approx(klems.read(path).lookup_vectors(wi, wr), rel=AS_RADIANCE)
 
 
+@pytest.mark.judge
 def test_radiance_sees_the_colour(tmp_path: Path) -> None:
     path = tmp_path / "a.xml"
     klems.write(table_of("spectral"), path, kind="quarter", colour=True)
@@ -184,6 +186,7 @@ def test_radiance_sees_the_colour(tmp_path: Path) -> None:
     assert np.max(np.abs(queried(path, wi, wr) - values) / values[:, 1:2]) < AS_RADIANCE_COLOURED
 
 
+@pytest.mark.judge
 @FILES
 def test_the_totals_are_the_albedo(files: dict[tuple[str, str], Path], material: str, kind: str) -> None:
     largest, normal = klems_total(table_of(material), BASES[kind])
@@ -197,6 +200,7 @@ def test_the_totals_are_the_albedo(files: dict[tuple[str, str], Path], material:
         assert in_window(files[material, kind], kind) == []
 
 
+@pytest.mark.judge
 def test_the_statement_has_the_totals_of_windows_engine(files: dict[tuple[str, str], Path], tmp_path: Path) -> None:
     path = files[GREY, "full"]
     (window, _) = in_window(path, "full", "PHOTOPIC")
@@ -217,6 +221,7 @@ def test_the_statement_has_the_totals_of_windows_engine(files: dict[tuple[str, s
         formats.samples(other, side="left")
 
 
+@pytest.mark.judge
 def test_windows_engine_finds_the_emissivity_that_was_given_and_the_effect_of_an_assumed_one(tmp_path: Path) -> None:
     path = tmp_path / "a.xml"
     written = klems.write(table_of(DIFFUSE), path, kind="full", emissivity_front=0.05, emissivity_back=0.05)

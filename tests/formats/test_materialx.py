@@ -119,6 +119,7 @@ def pairs(count: int = 4096) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     return unit_vector(theta[0], phi[0]), unit_vector(theta[1], phi[1])
 
 
+@pytest.mark.judge
 @pytest.mark.parametrize("name", SURFACES)
 def test_the_reader_sees_what_the_shader_of_materialx_computes(name: str, tmp_path: Path) -> None:
     pytest.importorskip("MaterialX")
@@ -154,6 +155,7 @@ def test_a_table_comes_back_with_the_error_that_is_stated(name: str, kind: str, 
     validated(path)
 
 
+@pytest.mark.judge
 def test_every_language_of_materialx_takes_a_document(tmp_path: Path) -> None:
     path = tmp_path / "a.mtlx"
     path.write_text(materialx._document("a", SURFACES["mixed"], ""), encoding="utf-8")

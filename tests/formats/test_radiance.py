@@ -183,6 +183,7 @@ def test_no_half_file_is_left(tmp_path: Path) -> None:
     assert [path.name for path in tmp_path.iterdir()] == ["a.rad"]
 
 
+@pytest.mark.judge
 @KINDS
 def test_radiance_sees_the_values_that_are_read(files: dict[str, Path], kind: str) -> None:
     wi, wr = drawn(1000)
@@ -195,6 +196,7 @@ def test_radiance_sees_the_values_that_are_read(files: dict[str, Path], kind: st
         assert seen[:, 1] == pytest.approx(values, rel=AS_RADIANCE)
 
 
+@pytest.mark.judge
 @KINDS
 def test_the_total_of_check_bsdf_is_the_albedo(files: dict[str, Path], kind: str) -> None:
     name, total = check_bsdf(files[kind])
@@ -202,6 +204,7 @@ def test_the_total_of_check_bsdf_is_the_albedo(files: dict[str, Path], kind: str
     assert total == pytest.approx(tree_total(table_of(kind)), rel=TOTAL, abs=5e-4)
 
 
+@pytest.mark.judge
 def test_a_picture_is_that_of_radiances_own_bounded_ward(tmp_path: Path) -> None:
     """Both materials of the file beside the tree stand in a scene, on a surface that is turned about its normal."""
     table = made("ward_bounded", BRUSHED)
@@ -285,6 +288,7 @@ def seen_on(surface: Placed, material: str, name: str, wr: Floats, folder: Path)
     return traced(scene, np.concatenate([5.0 * viewer, -viewer], axis=1), folder, "-ss", "64")
 
 
+@pytest.mark.judge
 @pytest.mark.parametrize("parameters", [SMOOTH, BRUSHED], ids=["isotropic", "anisotropic"])
 def test_six_walls_a_floor_and_a_ceiling_are_as_bright_as_the_table(
     tmp_path: Path, parameters: dict[str, float]
@@ -302,6 +306,7 @@ def test_six_walls_a_floor_and_a_ceiling_are_as_bright_as_the_table(
         assert of_tree.sum() == pytest.approx(expected.sum(), rel=OF_TREE), place
 
 
+@pytest.mark.judge
 @pytest.mark.parametrize("place", ["wall facing -y", "wall facing +x", "floor", "ceiling"])
 @pytest.mark.parametrize("turn_deg", [0.0, 30.0])
 def test_the_highlight_of_an_anisotropic_wall_lies_where_the_file_states(

@@ -109,6 +109,7 @@ def test_no_cell_of_a_csv_is_a_formula_from_command_and_service(tmp_path: Path) 
         assert reading.record["title"] == FORMULA
 
 
+@pytest.mark.judge
 def test_radiance_reads_a_material_whose_file_has_a_space_in_its_name(tmp_path: Path) -> None:
     from tests.formats.bsdf_judges import traced
 

@@ -15,7 +15,6 @@ from pathlib import Path
 
 import pytest
 from numba.core.dispatcher import Dispatcher
-from sphinx.util.inventory import InventoryFile
 
 import brdfdb
 from brdfdb.atlas import ATLAS
@@ -75,6 +74,8 @@ def test_a_broken_link_is_noticed(tmp_path: Path) -> None:
 
 
 def test_every_public_name_is_on_the_site(site: Path, pages: dict[Path, Page]) -> None:
+    from sphinx.util.inventory import InventoryFile
+
     inventory = InventoryFile.loads((site / "objects.inv").read_bytes(), uri="")
     documented = {}
     for kind, items in inventory.data.items():
