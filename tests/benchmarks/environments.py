@@ -167,7 +167,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         Column(name="environment", width=11),
         *(Column(name=name, unit="%") for name in ("cosine", "lobe", "table")),
         "ratio",
-        "ratio in the same time",
+        Column(name="ratio in the same time", recorded=False),
     )
     times, far = [], []
     for title, table, source in given(options.quick):

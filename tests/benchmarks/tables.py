@@ -38,6 +38,7 @@ MEASURED = (
     "that they state, the same at other directions, and the size of a uniform grid that is as good."
 )
 Array = NDArray[np.float64]
+SIZES = ("numbers", "numbers stored", "all stored")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -51,13 +52,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     table = run.table(
         f"Tables for a tolerance of {100 * options.tolerance:g} %",
         Column(name="material", width=32),
-        *("nodes", "parts"),
-        *(Column(name=name, unit="kB") for name in ("numbers", "numbers stored", "all stored")),
+        "nodes",
+        Column(name="parts", recorded=False),
+        *(Column(name=name, unit="kB", recorded=name == "all stored") for name in SIZES),
         *(Column(name=name, unit="%") for name in ("stated p99", "fresh p99")),
         Column(name="planning", unit="s"),
         Column(name="nodes of a uniform grid / nodes", digits=2),
-        Column(name="grid", width=34),
-        Column(name="promises"),
+        Column(name="grid", width=34, recorded=False),
+        Column(name="promises", recorded=False),
     )
     broken = 0
     for job in load().jobs():

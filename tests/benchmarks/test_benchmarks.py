@@ -78,17 +78,6 @@ def test_a_quick_run_ends_well(
             assert all(column.cell(value) in printed for column, value in zip(table.columns, row, strict=True))
 
 
-@pytest.mark.parametrize("name", SCRIPTS)
-def test_help_names_the_arguments(name: str, capsys: pytest.CaptureFixture[str]) -> None:
-    script = importlib.import_module(f"tests.benchmarks.{name}")
-    with pytest.raises(SystemExit) as ended:
-        script.main(["--help"])
-    assert ended.value.code == 0
-    printed = capsys.readouterr().out
-    assert "--quick" in printed
-    assert "--record" in printed
-
-
 def check(record: Record, name: str) -> None:
     """Check a record: tables of the same width throughout, with numbers that are not negative."""
     assert record.name == name
@@ -126,6 +115,21 @@ def test_a_record_holds_numbers_of_numpy_and_leaves_out_what_is_not_finite() -> 
         "0.25",
         "-",
     ]
+
+
+def test_a_record_has_the_worst_row_of_each_group_and_no_column_that_is_only_printed() -> None:
+    columns = [
+        recording.Column(name="name"),
+        recording.Column(name="error"),
+        recording.Column(name="seconds", recorded=False),
+    ]
+    table = Table(title="A table", columns=columns)
+    for row in (["ab", 1.0, 5.0], ["ac", 3.0, 4.0], ["b", None, 3.0], ["ad", 2.0, 2.0]):
+        table.add(*row)
+    table.keep_worst("error", lambda row: str(row[0])[0])
+    assert table.recorded().rows == [["ac", 3.0], ["b", None]]
+    table.keep_worst("error", lambda _: None, smallest=True)
+    assert table.rows == [["ac", 3.0, 4.0]]
 
 
 @pytest.mark.parametrize(

@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+pytest.importorskip("mitsuba")
+
 import brdfdb.mitsuba.table
 from brdfdb.formats import mitsuba as exporter
 from brdfdb.models import MODELS

@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+pytest.importorskip("mitsuba")
+
 import brdfdb.mitsuba.table
 from tests.mitsuba.every_variant import CASES, PAIRS, case_of, measure, tabulated
 from tests.mitsuba.surfaces import variant
