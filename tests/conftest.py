@@ -36,7 +36,7 @@ _JUDGES = (
     "api/test_caching_proxy.py",
     "api/test_lowest_versions.py",
 )
-_FIXTURES_OF_JUDGES = {"chromium"}
+_FIXTURES_OF_JUDGES = {"chromium", "browser"}
 
 
 # Allocations between two searches for garbage, as in the commands: Python's 700 cost 3 % of the time of all tests
