@@ -444,7 +444,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             for row in runs[section]:
                 row.add_to(table)
     run.say(
-        "The page has public functions: of the tables of He-Torrance, the slowest material of each way to fill them."
+        "The page shows public functions, and for tables of He-Torrance the slowest material of each way to fill them."
     )
     table.rows = [row for row in table.rows if row[1] == "public"]
     table.keep_worst("ours", _way, smallest=True)

@@ -196,7 +196,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                     wavelengths = ", ".join(f"{value:.0f}" for value in nm[:3]) or "-"
                     table_of_shares.add(file_format, name, wavelengths, 100.0 * stated, 100.0 * within)
                     least = min(least, within)
-    run.say(f"The least share is {least:.2%}. Of each format, the page has the file with the least share.")
+    run.say(f"The least share is {least:.2%}. For each format, the page shows the file with the smallest share.")
     table_of_shares.keep_worst("within", lambda row: row[0], smallest=True)
     run.end()
     return int(least < PROMISED)

@@ -123,7 +123,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     far = [row.far for some in rows.values() for row in some if row is not None and row.far]
     for sentence in far:
         run.say(sentence)
-    run.say("Of each format and number of wavelengths, the page has the kind of material with the largest p99.")
+    run.say("For each format and number of wavelengths, the page shows the kind of material with the largest p99.")
     run.say(f"{len(formats)} formats; {'NOT every' if far else 'every'} file is as near to its table as it states.")
     run.end()
     return 1 if far else 0

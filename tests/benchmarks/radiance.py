@@ -195,7 +195,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     far = max(abs(float(row[2] or 0.0)) for row in balls.rows)
     run.say(f"{len(balls.rows)} pictures of a file differ from plastic2 by {far:.2%} at most in the median pixel.")
     run.say(f"Where both have one formula, bounded Ward, all light together differs by {bounded.whole:.2%}.")
-    run.say("Of each model, the page has the material with the largest error.")
+    run.say("For each model, the page shows the material with the largest error.")
     trees.keep_worst("p99 of Radiance", model_of)
     matrices.keep_worst("difference", lambda row: (model_of(row), row[1]))
     balls.keep_worst("file to plastic2, median", model_of)

@@ -188,7 +188,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             median.add(name, 100.0 * (off := sphere(table, path, 24 if options.quick else 128)))
             bad += [name] * (off > REQUIRED)
     run.say(f"Beyond what was stated or required: {', '.join(bad) or 'none'}.")
-    run.say("Of each model, the page has the material with the largest difference from Mitsuba.")
+    run.say("For each model, the page shows the material with the largest difference from Mitsuba.")
     rows.keep_worst("p99 by Mitsuba", model_of)
     run.end()
     return int(bool(bad))

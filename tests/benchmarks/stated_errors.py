@@ -60,7 +60,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     least = [(min(row[2:]), row) for row in table.rows]
     share, row = min(least, key=lambda pair: pair[0])
     run.say(f"The least share is {share:.4f}, of {row[0]}. Promised are {PROMISED}.")
-    run.say("Of each model and kind of wavelengths, the page has the material with the least share of a hemisphere.")
+    run.say(
+        "For each model and kind of wavelengths, the page shows the material with the smallest share over a hemisphere."
+    )
     table.keep_worst("hemisphere", lambda row: (model_of(row), row[1]), smallest=True)
     run.end()
     return int(share < PROMISED)
