@@ -34,6 +34,7 @@ _JUDGES = (
     "api/test_fuzz.py",
     "api/test_generated_client.py",
     "api/test_caching_proxy.py",
+    "api/test_proxies.py",
     "api/test_lowest_versions.py",
 )
 _FIXTURES_OF_JUDGES = {"chromium", "browser"}
