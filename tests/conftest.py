@@ -36,6 +36,7 @@ _JUDGES = (
     "api/test_caching_proxy.py",
     "api/test_proxies.py",
     "api/test_lowest_versions.py",
+    "api/test_server.py",
 )
 _FIXTURES_OF_JUDGES = {"chromium", "browser"}
 

@@ -85,6 +85,7 @@ def passes(store: Path, name: str, attributes: dict[str, Any], expected: dict[st
         return False
 
 
+@pytest.mark.judge
 @pytest.mark.parametrize("name", KINDS)
 def test_every_attribute_that_is_forged_is_noticed_or_listed(store: Path, name: str) -> None:
     table = brdfdb.open(store)[name]
@@ -99,6 +100,7 @@ def test_every_attribute_that_is_forged_is_noticed_or_listed(store: Path, name: 
     SILENT.setdefault(KINDS[name], set()).update(unnoticed)
 
 
+@pytest.mark.judge
 def test_every_leaf_that_the_page_lists_was_forged_and_not_noticed() -> None:
     """The list has nothing that could be checked: the tests above leave here what they did not notice."""
     if SILENT.keys() < set(KINDS.values()):

@@ -41,6 +41,7 @@ def _small_tables(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(choose, "EDGES", 20)
 
 
+@pytest.mark.judge
 @pytest.mark.parametrize("model", MODELS)
 def test_every_model_has_forms_a_chart_and_a_choice(
     model: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
