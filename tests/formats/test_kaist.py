@@ -56,6 +56,7 @@ def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+@pytest.mark.judge
 def test_matrices_are_those_of_mitsuba(path: Path) -> None:
     mitsuba = mitsuba_of(VARIANT)
     surface = mitsuba.load_dict({"type": "measured_polarized", "filename": str(path)})
@@ -74,6 +75,7 @@ def test_matrices_are_those_of_mitsuba(path: Path) -> None:
     assert np.abs(ours[:, 1:, 1:] / ours[:, :1, :1]).max() > 0.5  # the light is polarised
 
 
+@pytest.mark.judge
 def test_the_stokes_picture_of_a_sphere_is_that_of_mitsuba(path: Path) -> None:
     surface = {"type": "measured_polarized", "filename": str(path), "wavelength": NM}
     theirs = picture_of_mitsuba(mitsuba_of(VARIANT), surface)

@@ -122,6 +122,7 @@ def test_fixed_patches_report_a_tolerance_that_is_out_of_reach(tmp_path: Path) -
         assert klems.read(tmp_path / "a.xml").record["tolerance"] == tolerance
 
 
+@pytest.mark.judge
 def test_rows_and_bases_of_others_are_read(tmp_path: Path, files: dict[tuple[str, str], Path]) -> None:
     own = Basis("Two rings", (0.0, 45.0, 90.0), (1, 4))
     numbers = np.arange(25.0).reshape(5, 5)

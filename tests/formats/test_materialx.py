@@ -152,7 +152,15 @@ def test_a_table_comes_back_with_the_error_that_is_stated(name: str, kind: str, 
     assert measured == written.error
     assert measured.l1 < MOST_L1[name]
     assert ("its facets mirror" in " ".join(written.remarks)) == (name == SMOOTH)
-    validated(path)
+
+
+@pytest.mark.judge
+@pytest.mark.parametrize("kind", materialx.kinds)
+@pytest.mark.parametrize("name", KINDS)
+def test_materialx_says_that_a_document_is_valid(name: str, kind: str, tmp_path: Path) -> None:
+    materialx.write(small_table(name), tmp_path / "a.mtlx", kind=kind)
+    document, _ = validated(tmp_path / "a.mtlx")
+    assert document.getMaterialNodes()
 
 
 @pytest.mark.judge
