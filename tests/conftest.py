@@ -37,6 +37,7 @@ _JUDGES = (
     "api/test_proxies.py",
     "api/test_lowest_versions.py",
     "api/test_server.py",
+    "pipelines/test_workers.py",
 )
 _FIXTURES_OF_JUDGES = {"chromium", "browser"}
 
