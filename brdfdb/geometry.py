@@ -148,13 +148,24 @@ class Angles:
     cos_i = functools.cached_property(lambda self: self.cosine(self.theta_i))
     sin_r = functools.cached_property(lambda self: self.sine(self.theta_r))
     cos_r = functools.cached_property(lambda self: self.cosine(self.theta_r))
-    x_i = functools.cached_property(lambda self: self.sin_i * self.cosine(self.phi_i))
-    y_i = functools.cached_property(lambda self: self.sin_i * self.sine(self.phi_i))
-    x_r = functools.cached_property(lambda self: self.sin_r * self.cosine(self.phi_r))
-    y_r = functools.cached_property(lambda self: self.sin_r * self.sine(self.phi_r))
+    x_i = functools.cached_property(lambda self: self.sin_i * self.cos_phi_i)
+    y_i = functools.cached_property(lambda self: self.sin_i * self.sin_phi_i)
+    x_r = functools.cached_property(lambda self: self.sin_r * self.cos_phi_r)
+    y_r = functools.cached_property(lambda self: self.sin_r * self.sin_phi_r)
+    cos_phi_i = functools.cached_property(lambda self: self.cosine(self.phi_i))
+    sin_phi_i = functools.cached_property(lambda self: self.sine(self.phi_i))
+    cos_phi_r = functools.cached_property(lambda self: self.cosine(self.phi_r))
+    sin_phi_r = functools.cached_property(lambda self: self.sine(self.phi_r))
     cos_dphi = functools.cached_property(lambda self: self.cosine(self.phi_r - self.phi_i))
     sin_dphi = functools.cached_property(lambda self: self.sine(self.phi_r - self.phi_i))
     one_plus_cos_dphi = functools.cached_property(lambda self: 2.0 * self.cosine((self.phi_r - self.phi_i) / 2.0) ** 2)
+    one_less_abs_cos_dphi = functools.cached_property(lambda self: _one_less_abs_cos(self.sin_dphi, self.cos_dphi))
+
+
+def _one_less_abs_cos(sin: Floats, cos: Floats) -> Floats:
+    """Return 1 - abs(cos) [1] with all its digits where abs(cos) is near 1."""
+    result: Floats = sin**2 / (1.0 + np.abs(cos))
+    return result
 
 
 def _changes(angle: NDArray[np.float64]) -> bool:
@@ -238,6 +249,8 @@ class Vectors:
         across = self.x_i * self.y_r - self.y_i * self.x_r
         sin: NDArray[np.float64] = np.divide(across, product, where=product > NO_AZIMUTH, out=np.zeros_like(across))
         return np.clip(sin, -1.0, 1.0)
+
+    one_less_abs_cos_dphi = functools.cached_property(lambda self: _one_less_abs_cos(self.sin_dphi, self.cos_dphi))
 
 
 def checked_vectors(wi: ArrayLike, wr: ArrayLike) -> Vectors:

@@ -19,7 +19,7 @@ from brdfdb.mitsuba._surface import DIFFUSE, GLOSSY, SPECULAR, Formula, Values
 from brdfdb.mitsuba._wavelengths import SRGB, channels_nm, projection
 from brdfdb.mitsuba.diffuse import one_less_exp
 from brdfdb.models import MODELS
-from brdfdb.models.he_torrance_1991 import WAVELENGTH_NM, K, N
+from brdfdb.parameters import WAVELENGTH_NM, K, N
 from brdfdb.spectra import PICTURE_NM, picture_wavelengths
 
 Array = NDArray[np.float64]

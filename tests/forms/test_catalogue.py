@@ -17,7 +17,7 @@ from brdfdb.geometry import radians, unit_vector
 from brdfdb.materials import Material, presets
 from brdfdb.materials.provenance import Assumption
 from brdfdb.misprints import MISPRINTS
-from brdfdb.models import oren_nayar_1994_surfaces
+from brdfdb.models import oren_nayar_1994 as model
 from brdfdb.models._oren_nayar_facets import NODES
 from brdfdb.reference import he_torrance_1991, oren_nayar_1994, ward_1992
 from brdfdb.tables import error_measurement
@@ -208,13 +208,13 @@ def test_a_form_computes_what_it_shows_and_nothing_else(
     found = set()
 
     def spy(kernel: str, what: Any) -> None:
-        original = getattr(oren_nayar_1994_surfaces, kernel)
+        original = getattr(model, kernel)
 
         def called(*features: Any, **parts: bool) -> Any:
             found.update(what(**parts))
             return original(*features, **parts)
 
-        monkeypatch.setattr(oren_nayar_1994_surfaces, kernel, called)
+        monkeypatch.setattr(model, kernel, called)
 
     def of_facets(lit: bool, bounce: bool, nodes: int) -> list[str]:
         assert nodes == NODES
