@@ -10,7 +10,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from brdfdb.arrays import plain, unlabelled
+from brdfdb.arrays import PLAIN_TYPES, plain, unlabelled
 from brdfdb.errors import ParameterError
 from brdfdb.lobes import Lobe
 
@@ -49,7 +49,8 @@ class Parameter:
 
     def check(self, value: ArrayLike) -> Floats:
         """Return `value` as float64, or raise a ValueError that names the parameter, the value and the range."""
-        given = np.asarray(plain(self.name, unlabelled(self.name, value)))
+        usual = type(value) in PLAIN_TYPES
+        given = np.asarray(value if usual else plain(self.name, unlabelled(self.name, value)))
         if given.dtype.kind not in "biuf":
             raise ParameterError(
                 self.name, f"{value!r} is not a number in {self.interval}", value, (self.low, self.high)

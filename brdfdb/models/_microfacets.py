@@ -229,7 +229,7 @@ BECKMANN_SEPARABLE_LOOPS = RowLoops(_beckmann_separable_angles, _beckmann_separa
 _NONE = np.zeros(())
 
 
-class Facets(NamedTuple):
+class FacetParameters(NamedTuple):
     """The parameters [1] that the loops read: the uniform part, f_0 or n and k, and the widths of the slopes."""
 
     rho_d: Floats
@@ -239,14 +239,14 @@ class Facets(NamedTuple):
     alpha_y: Floats
 
 
-def metal(alpha_x: Floats, alpha_y: Floats, n: Floats, k: Floats, _: Floats | None = None) -> Facets:
+def metal(alpha_x: Floats, alpha_y: Floats, n: Floats, k: Floats, _: Floats | None = None) -> FacetParameters:
     """Return facets of a material with the index n + ik. The formulas do not read its wavelength, the last argument."""
-    return Facets(_NONE, n, k, alpha_x, alpha_y)
+    return FacetParameters(_NONE, n, k, alpha_x, alpha_y)
 
 
-def painted(rho_d: Floats, f_0: Floats, alpha_x: Floats, alpha_y: Floats) -> Facets:
+def painted(rho_d: Floats, f_0: Floats, alpha_x: Floats, alpha_y: Floats) -> FacetParameters:
     """Return facets with Schlick's reflectance over a uniform part."""
-    return Facets(rho_d, f_0, _NONE, alpha_x, alpha_y)
+    return FacetParameters(rho_d, f_0, _NONE, alpha_x, alpha_y)
 
 
 def single_scattering(directions: Directions, f_0: Floats, alpha: Floats) -> Floats:

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from brdfdb.geometry import Directions, Vectors, finished
+from brdfdb.geometry import Angles, Directions, Vectors, finished
 from brdfdb.parameters import Floats
 
 Loop = Callable[..., None]
@@ -27,8 +27,8 @@ class RowLoops(NamedTuple):
         the parameters.
     by_vectors : loop
         Called as `by_rows_of_vectors` says, with the parameters as scalars.
-    columns, polar : tuple of str
-        Names of properties of `brdfdb.geometry.Angles`.
+    columns, polar : callable
+        Functions of `brdfdb.geometry.Angles` that return several of its properties.
     of_viewers : bool
         True if a row may run along any viewers. False if it runs along azimuths only.
     single : bool
@@ -37,8 +37,8 @@ class RowLoops(NamedTuple):
 
     by_angles: Loop
     by_vectors: Loop
-    columns: tuple[str, ...] = ("cos_phi_r", "sin_phi_r")
-    polar: tuple[str, ...] = ("x_i", "y_i", "cos_i", "sin_r", "cos_r")
+    columns: Callable[[Angles], tuple[Floats, ...]] = attrgetter("cos_phi_r", "sin_phi_r")
+    polar: Callable[[Angles], tuple[Floats, ...]] = attrgetter("x_i", "y_i", "cos_i", "sin_r", "cos_r")
     of_viewers: bool = False
     single: bool = False
 
@@ -48,10 +48,9 @@ class RowLoops(NamedTuple):
             return by_rows_of_vectors(self.by_vectors, directions, parameters, out)
         if directions.lights_scattered if self.of_viewers else directions.scattered:
             return finished(by_rows_of_vectors(self.by_vectors, directions.vectors, parameters, out), directions)
-        columns = [getattr(directions, name) for name in self.columns]
-        scalars = (*attrgetter(*self.polar)(directions), *parameters)
+        scalars = (*self.polar(directions), *parameters)
         dtype = directions.dtype if self.single else np.float64
-        return finished(by_rows(self.by_angles, columns, scalars, dtype, out), directions)
+        return finished(by_rows(self.by_angles, self.columns(directions), scalars, dtype, out), directions)
 
 
 def by_rows(

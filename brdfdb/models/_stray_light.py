@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from operator import attrgetter
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -82,8 +84,9 @@ def _harvey_vectors(w_i: Floats, w_r: Floats, scalars: Rows, f_r: Floats) -> Non
     _vector_rows(_HARVEY, w_i, w_r, scalars, f_r)
 
 
-ABG_LOOPS = RowLoops(_abg_angles, _abg_vectors, ("x_r", "y_r"), ("x_i", "y_i"), of_viewers=True)
-HARVEY_LOOPS = RowLoops(_harvey_angles, _harvey_vectors, ("x_r", "y_r"), ("x_i", "y_i"), of_viewers=True)
+_LIGHT, _VIEWER = attrgetter("x_i", "y_i"), attrgetter("x_r", "y_r")
+ABG_LOOPS = RowLoops(_abg_angles, _abg_vectors, _VIEWER, _LIGHT, of_viewers=True)
+HARVEY_LOOPS = RowLoops(_harvey_angles, _harvey_vectors, _VIEWER, _LIGHT, of_viewers=True)
 
 
 def lobe(cos_i: Floats, knee: ArrayLike) -> Lobe:

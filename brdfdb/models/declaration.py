@@ -16,10 +16,10 @@ from __future__ import annotations
 
 import functools
 import inspect
+import operator
 import textwrap
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from operator import attrgetter
 from types import ModuleType
 from typing import Any, NamedTuple, NoReturn, Protocol, TypeVar, cast
 
@@ -35,7 +35,12 @@ from brdfdb.parameters import Floats, Gradient, ModelSpec, Parameter
 
 R = TypeVar("R")
 
-FEATURES = frozenset(vars(Vectors)) & ({*vars(Angles)} | {"theta_i", "theta_r"})  # of directions of both kinds
+# Properties of directions of both kinds
+FEATURES = frozenset(
+    name
+    for name, value in vars(Vectors).items()
+    if isinstance(value, property | functools.cached_property) and name not in ("below", "given")
+)
 
 _OUT_AND_THREADS = """\
 out : array, optional
@@ -226,7 +231,7 @@ class _Declared:
         if self.takes_out:
             return function
         if self.features:
-            kernel, features = elementwise(function), attrgetter(*self.features)
+            kernel, features = elementwise(function), operator.attrgetter(*self.features)
             one = len(self.features) == 1
 
             def formula(directions: Directions, _: Floats | None, *values: Floats) -> Floats:
@@ -242,17 +247,15 @@ class _Declared:
         """Return a function of one kind of directions: with the gate of arrays, and with the checks."""
         signature = self._signature(kind)
         names, count, check = tuple(signature.parameters), len(kind.names), kind.check
-        wanted = frozenset(names[count:])
-        defaults = {name: signature.parameters[name].default for name in wanted}
-        defaults = {name: value for name, value in defaults.items() if value is not inspect.Parameter.empty}
-        checks = tuple((parameter.name, self._check(parameter)) for parameter in self.parameters)
-
-        def value(directions: tuple[Any, ...], given: dict[str, Any], out: Floats | None) -> Any:
-            checked = check(*directions)
-            return evaluate(checked, out, *[check_one(given[name]) for name, check_one in checks])
+        order = tuple(parameter.name for parameter in self.parameters)
+        wanted, most = frozenset(order), len(order)
+        read = operator.itemgetter(*order) if len(order) > 1 else lambda given: tuple(given[name] for name in order)
+        checks = tuple(self._check(parameter) for parameter in self.parameters)
+        all_defaults = {name: signature.parameters[name].default for name in order}
+        defaults = {name: value for name, value in all_defaults.items() if value is not inspect.Parameter.empty}
 
         def bound(directions: tuple[Any, ...], given: dict[str, Any]) -> tuple[tuple[Any, ...], dict[str, Any]]:
-            """Return arguments that were given in an unusual way, as usual; TypeError if one is missing or unknown."""
+            """Return arguments as directions and parameters; TypeError if one is missing or unknown."""
             try:
                 arguments = signature.bind(*directions, **given)
             except TypeError as error:
@@ -260,17 +263,20 @@ class _Declared:
             arguments.apply_defaults()
             return arguments.args, arguments.kwargs
 
+        def value(directions: tuple[Any, ...], given: dict[str, Any], out: Floats | None) -> Any:
+            return evaluate(check(*directions), out, *map(operator.call, checks, read(given)))
+
         def computed(directions: tuple[Any, ...], given: dict[str, Any], out: Floats | None, threads: int) -> Any:
-            if defaults:
+            if len(given) < most:
                 given = defaults | given
             if len(directions) != count or given.keys() != wanted:
                 directions, given = bound(directions, given)
             # theta_i, phi_i, theta_r: a row of azimuths is not scattered
-            scattered = count > len(_BY_VECTORS.names) and any(
+            scattered = count == len(_BY_ANGLES.names) and any(
                 isinstance(angle, np.ndarray) and angle.size > PART_BY_ANGLES for angle in directions[:3]
             )
             if out is None and type(threads) is int and threads == 1 and not scattered:
-                return value(directions, given, None)
+                return evaluate(check(*directions), None, *map(operator.call, checks, read(given)))
 
             def evaluate_part(arguments: dict[str, Any], part: Floats | None) -> Floats:
                 return cast(Floats, value(tuple(arguments[name] for name in kind.names), arguments, part))
@@ -286,11 +292,7 @@ class _Declared:
             return ready.finish(computed(ready.args, ready.keywords, out, threads))
 
         def call_whole(*directions: Any, **given: Any) -> Any:
-            if defaults:
-                given = defaults | given
-            if len(directions) != count or given.keys() != wanted:
-                directions, given = bound(directions, given)
-            return value(directions, given, None)
+            return value(*bound(directions, given), None)
 
         plain: Any = call if large else call_whole
         functools.update_wrapper(plain, self.function)

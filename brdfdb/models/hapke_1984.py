@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -150,7 +151,7 @@ def _vector_rows(w_i: Floats, w_r: Floats, scalars: Rows, f_r: Floats) -> None:
             f[j] = value * (0.0 if z_i < 0.0 or z_r < 0.0 else 1.0)  # nan stays nan
 
 
-_POLAR = ("cos_phi_i", "sin_phi_i", "sin_i", "cos_i", "sin_r", "cos_r")
+_POLAR = attrgetter("cos_phi_i", "sin_phi_i", "sin_i", "cos_i", "sin_r", "cos_r")
 _LOOPS = RowLoops(_angle_rows, _vector_rows, polar=_POLAR)
 
 

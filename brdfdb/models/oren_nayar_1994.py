@@ -11,6 +11,7 @@ import functools
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
+from operator import attrgetter
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -32,7 +33,7 @@ from brdfdb.models._oren_nayar_kernels import (
 )
 from brdfdb.models._oren_nayar_single_slope import bounce_of_slope, direct_of_slope, over_slopes
 from brdfdb.models._rows import Out, RowLoops, by_rows, by_rows_of_vectors
-from brdfdb.models.declaration import DeclaredModel, ModelFunction, Slopes, of_directions
+from brdfdb.models.declaration import DeclaredModel, Slopes, of_directions
 from brdfdb.models.fujii_2013 import oren_nayar_fujii
 from brdfdb.models.lambert import lambert
 from brdfdb.models.portsmouth_2025 import oren_nayar_energy_preserving
@@ -245,8 +246,8 @@ def _slopes(sigma: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 _FUNCTIONAL = RowLoops(
     functional_angle_rows,
     functional_vector_rows,
-    columns=("cos_dphi", "one_less_abs_cos_dphi"),  # the latter is magnified by tan_mean near grazing
-    polar=("theta_i", "sin_i", "cos_i", "theta_r", "sin_r", "cos_r"),
+    columns=attrgetter("cos_dphi", "one_less_abs_cos_dphi"),  # the latter is magnified by tan_mean near grazing
+    polar=attrgetter("theta_i", "sin_i", "cos_i", "theta_r", "sin_r", "cos_r"),
     of_viewers=True,
     single=True,
 )
@@ -282,6 +283,10 @@ def oren_nayar(directions: Directions, out: Out, *parameters: Floats) -> Floats:
     >>> round(float(oren_nayar(0.3, 0.0, 0.4, 0.0, rho=0.9, sigma=0.5)), 4)
     0.2639
     """
+    return _functional(directions, out, *parameters)
+
+
+def _functional(directions: Directions, out: Out, *parameters: Floats) -> Floats:
     return _FUNCTIONAL.evaluated(directions, out, parameters)
 
 
@@ -310,6 +315,10 @@ def oren_nayar_qualitative(directions: Directions, out: Out, *parameters: Floats
     >>> round(float(oren_nayar_qualitative(0.3, 0.0, 0.4, 0.0, rho=0.9, sigma=0.5)), 4)
     0.2362
     """
+    return _qualitative(directions, out, *parameters)
+
+
+def _qualitative(directions: Directions, out: Out, *parameters: Floats) -> Floats:
     if isinstance(directions, Vectors):
         return by_rows_of_vectors(qualitative_vector_rows, directions, parameters, out)
     if directions.lights_scattered:
@@ -337,8 +346,9 @@ def oren_nayar_parts(directions: Directions, rho: Floats, sigma: Floats) -> Part
     >>> round(float(parts.direct), 4), round(float(parts.interreflected), 4)
     (0.2362, 0.0278)
     """
-    direct = _in_float64(oren_nayar, directions, rho=rho, sigma=sigma, interreflection=False)
-    total = _in_float64(oren_nayar, directions, rho=rho, sigma=sigma, interreflection=True)
+    in_float64 = _in_float64(directions)
+    direct = _functional(in_float64, None, rho, sigma, np.zeros(()))
+    total = _functional(in_float64, None, rho, sigma, np.ones(()))
     variance = sigma**2
     cos_dphi = directions.cos_dphi
     # 1 - cos(dphi) x^2 with x = 2 beta / pi, without a difference where both are near 1
@@ -351,11 +361,11 @@ def oren_nayar_parts(directions: Directions, rho: Floats, sigma: Floats) -> Part
     return Parts(finished(direct, directions), finished(np.where(direct > 0.0, bounce, total), directions))
 
 
-def _in_float64(model: ModelFunction, directions: Directions, **parameters: Any) -> Floats:
-    """Return f_r [1/sr] of a model at checked directions, in float64 whatever their dtype."""
+def _in_float64(directions: Directions) -> Directions:
+    """Return the directions for values in float64, whatever their dtype."""
     if isinstance(directions, Vectors):
-        return model.vectors(directions.w_i.astype(np.float64), directions.w_r.astype(np.float64), **parameters)
-    return model(*directions.given, **parameters)
+        return Vectors(directions.w_i.astype(np.float64), directions.w_r.astype(np.float64), np.dtype(np.float64))
+    return replace(directions, dtype=np.dtype(np.float64))
 
 
 # Facets of one slope
@@ -647,7 +657,8 @@ def oren_nayar_body_surface(directions: Directions, *parameters: Floats) -> Floa
     0.2338
     """
     p = _BodySurface(*parameters)
-    body = _in_float64(oren_nayar, directions, rho=p.rho, sigma=p.sigma, interreflection=p.interreflection)
-    surface = _in_float64(torrance_sparrow, directions, sigma=p.sigma, n=p.n, k=p.k)
+    in_float64 = _in_float64(directions)
+    body = _functional(in_float64, None, p.rho, p.sigma, p.interreflection)
+    surface = torrance_sparrow_1967.facets(in_float64, p.sigma, p.n, p.k)
     # Eq. (32)
     return p.k_b * body + p.k_s / p.e_0 * surface

@@ -92,10 +92,11 @@ def torrance_sparrow(directions: Directions, sigma: Floats, n: Floats | None, k:
     >>> round(float(torrance_sparrow(0.3, 0.0, 0.4, np.pi, sigma=0.3, n=1.5)), 4)
     0.0452
     """
-    return _f_r(directions, sigma, n, k)
+    return facets(directions, sigma, n, k)
 
 
-def _f_r(directions: Directions, sigma: Floats, n: Floats | None, k: Floats | None) -> Floats:
+def facets(directions: Directions, sigma: Floats, n: Floats | None, k: Floats | None) -> Floats:
+    """Return f_r [1/sr] of `torrance_sparrow` at checked directions, with any value below the horizon."""
     pair = directions.cos_i, directions.sin_i, directions.cos_r, directions.sin_r, directions.one_plus_cos_dphi
     f_r: Floats = _evaluate(*pair, sigma)
     if n is not None:

@@ -9,8 +9,8 @@ import pytest
 
 from brdfdb.figure import Curve, Figure, Panel
 from brdfdb.gallery.he_torrance_1991 import FIGURES
+from brdfdb.reference import he_torrance_1991
 from brdfdb.reference import he_torrance_1991 as reference
-from brdfdb.reference import he_torrance_1991_aperture
 from tests.gallery.figures import curve_of, optics, panel_of, statement_of, value_at
 
 pytestmark = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="minutes without compilation")
@@ -134,8 +134,8 @@ def test_curves_are_over_their_value_in_the_mirror_direction(number: int) -> Non
 def through_apertures(theta_i: float, x: float, surface: dict[str, float], a: float) -> float:
     arguments = np.deg2rad(theta_i), np.deg2rad(abs(x)), np.pi if x > 0.0 else 0.0, CONE, CONE
     return (
-        float(he_torrance_1991_aperture.aperture_specular(*arguments, **surface))
-        + he_torrance_1991_aperture.aperture_diffuse(*arguments, **surface)
+        float(he_torrance_1991.aperture_specular(*arguments, **surface))
+        + he_torrance_1991.aperture_diffuse(*arguments, **surface)
         + a / np.pi
     )
 
@@ -187,7 +187,7 @@ def test_blue_plastic_is_in_absolute_values() -> None:
         assert value_at(drawn, -30.0) == pytest.approx(0.15 / np.pi, rel=DIGITS)
         for x in (theta_i, theta_i + 2.0):
             arguments = np.deg2rad(theta_i), np.deg2rad(x), np.pi, CONE, CONE
-            expected = float(he_torrance_1991_aperture.aperture_specular(*arguments, **smooth)) + 0.15 / np.pi
+            expected = float(he_torrance_1991.aperture_specular(*arguments, **smooth)) + 0.15 / np.pi
             assert value_at(drawn, x) == pytest.approx(expected, rel=DIGITS)
 
 

@@ -8,15 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from brdfdb.geometry import checked_angles, checked_vectors
-from brdfdb.models import (
-    oren_nayar,
-    oren_nayar_qualitative,
-    oren_nayar_qualitative_vectors,
-    oren_nayar_single_slope_parts,
-    oren_nayar_vectors,
-)
+from brdfdb.geometry import checked_angles
 from brdfdb.models import oren_nayar_1994 as surfaces
+from brdfdb.models import (
+    oren_nayar_single_slope_parts,
+)
 from brdfdb.models import torrance_sparrow_1967 as surface_part
 from tests.gallery.mutants import added_figures
 from tests.gallery.mutants.mutation import Mutant
@@ -30,7 +26,7 @@ SLOPES, AZIMUTHS = 96, 96  # nodes of the facets
 HORIZON = 6.123233995736766e-17  # cosine of the float64 nearest pi/2
 
 right_facets = surfaces._gaussian
-right_lobe = surface_part._f_r
+right_lobe = surface_part.facets
 
 
 @dataclass(frozen=True)
@@ -144,17 +140,9 @@ class Fit:
 
     def functions(self) -> dict[Function, Function]:
         return {
-            oren_nayar: lambda *angles, rho, sigma, interreflection=True: self.fit(
-                checked_angles(*angles), rho, sigma, interreflection
-            ),
-            oren_nayar_vectors: lambda *vectors, rho, sigma, interreflection=True: self.fit(
-                checked_vectors(*vectors), rho, sigma, interreflection
-            ),
-            oren_nayar_qualitative: lambda *angles, rho, sigma, offset=self.offset: self.qualitative(
-                checked_angles(*angles), rho, sigma, offset
-            ),
-            oren_nayar_qualitative_vectors: lambda *vectors, rho, sigma, offset=self.offset: self.qualitative(
-                checked_vectors(*vectors), rho, sigma, offset
+            surfaces._functional: lambda d, out, *parameters: self.fit(d, *parameters),
+            surfaces._qualitative: lambda d, out, rho, sigma, offset: self.qualitative(
+                d, rho, sigma, np.where(offset == 0.33, self.offset, offset)
             ),
         }
 
@@ -223,8 +211,7 @@ def flat() -> dict[Function, Function]:
         return surfaces.finished(rho / np.pi + 0.0 * d.cos_i * d.cos_r * d.cos_dphi, d)
 
     return {
-        oren_nayar: lambda *angles, rho, **_: fit(checked_angles(*angles), rho),
-        oren_nayar_vectors: lambda *vectors, rho, **_: fit(checked_vectors(*vectors), rho),
+        surfaces._functional: lambda d, out, rho, *_: fit(d, rho),
         right_facets: lambda d, rho, sigma, only=None: Parts(fit(d, rho), 0.0 * fit(d, rho)),
     }
 
