@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import importlib.metadata
 import importlib.util
+import inspect
 import math
 import os
 import re
@@ -140,7 +141,7 @@ class Registry(dict[str, ModelSpec]):
 
 def _spec_of(model: Any) -> ModelSpec | None:
     """Return the specification of a declared model, or the specification itself; None of anything else."""
-    spec = model if isinstance(model, ModelSpec) else getattr(model, "spec", None)
+    spec = getattr(model, "spec", None) if inspect.isfunction(model) else model
     return spec if isinstance(spec, ModelSpec) else None
 
 
