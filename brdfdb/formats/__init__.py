@@ -18,7 +18,6 @@ from typing import TYPE_CHECKING, Any
 from brdfdb.errors import FileFormatError, ParameterError
 from brdfdb.formats._input import check_file
 from brdfdb.formats._interface import Exporter, Importer, Option, options_of, parsed_options, schema_of
-from brdfdb.formats._stated import AZIMUTHS, at_wavelength, from_forward
 from brdfdb.parameters import check_nanometres
 from brdfdb.place import path_of
 
@@ -45,6 +44,7 @@ __all__ = [
     "write",
 ]
 
+AZIMUTHS = ("light", "forward")
 _TEXT = "text"
 _SHOWN = 200  # characters of names of columns that a refusal repeats
 _HEAD = 4096  # bytes of a file that tell its format
@@ -189,6 +189,8 @@ def read(
     Traceback (most recent call last):
     FileNotFoundError: [Errno 2] No such file or directory: 'brass.exr'
     """
+    from brdfdb.formats._readings import at_wavelength, from_forward
+
     if azimuth not in AZIMUTHS:
         raise ParameterError("azimuth", f"{azimuth!r} is not one of {', '.join(AZIMUTHS)}", azimuth, AZIMUTHS)
     path = path_of(path)

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.errors import FileFormatError, ParameterError
+from brdfdb.formats._input import check_text
 from brdfdb.formats._interface import TOLERANCE, Option
-from brdfdb.formats._json_tables import degrees_of
 from brdfdb.formats._nodes import samples_at_angles
 from brdfdb.formats._record import CONVENTION, history_of, record, specular_remark
 from brdfdb.place import path_of
@@ -57,6 +57,9 @@ _TURNED = {
 _MOST_VALUES = 1 << 27  # of a file that is read
 _MOST_NODES = 1 << 22  # of an axis that is read
 _DEGREES, _RADIANS = ("", "degree", "degrees", "deg", "°"), ("rad", "radian", "radians")
+MOST_BYTES = 40_000_000  # size of a file that is written, about
+_MOST_READ = 1 << 29  # of a file that is read
+_DECIMALS = 4  # of angles [degree]: radians in files have six
 
 
 def dense_record(table: Table, dense: DenseTable, verdict: str | None, *, specular: bool) -> dict[str, Any]:
@@ -322,3 +325,38 @@ def _is_grid(angles: Mapping[str, NDArray[np.float64]], nodes: Mapping[str, NDAr
         return False
     expected = np.meshgrid(*nodes.values(), indexing="ij")
     return all(np.array_equal(grid.reshape(-1), angles[name]) for grid, name in zip(expected, nodes, strict=True))
+
+
+def parsed(path: Path) -> dict[str, Any]:
+    """Return the object in a JSON file; FileFormatError if it holds none, or more than 512 MiB."""
+    check_text(path, _MOST_READ)
+    try:
+        document = json.loads(path.read_bytes())
+    except (ValueError, RecursionError) as error:
+        raise FileFormatError(f"{path}: it is no JSON, or is damaged ({error})") from error
+    if not isinstance(document, dict):
+        raise FileFormatError(f"{path}: it holds no object")
+    return document
+
+
+def column(path: Path, name: str, values: Any, *, holes: bool = False) -> NDArray[np.float64]:
+    """Return a list of numbers, with nan for null if it may have holes; FileFormatError if it holds anything else."""
+    try:
+        numbers = np.array(values, dtype=np.float64)
+    except (ValueError, TypeError, OverflowError):
+        numbers = np.empty((0, 0))
+    if numbers.ndim != 1 or not numbers.size or np.any(np.isinf(numbers) | (np.isnan(numbers) & ~holes)):
+        raise FileFormatError(f"{path}: {name} is not a list of numbers")
+    return numbers
+
+
+def degrees_of(values: NDArray[np.float64], unit: str) -> NDArray[np.float64]:
+    """Return angles [degree] to four decimals; `unit` is "rad" or another word for degrees."""
+    return np.round(np.rad2deg(values) if unit == "rad" else values, _DECIMALS)
+
+
+def title_of(known: Mapping[str, Any]) -> str:
+    """Return what a record says of a file, its error and the audit, in one line."""
+    error = known["error_of_file"]["p99"]
+    text = f"{known['title'] or known['name']}; model {known['model']}; {known['holds']}; audit: {known['audit']}; "
+    return text + f"99 of 100 values are within {error:.3g} of the table, relative, with linear interpolation"

@@ -22,10 +22,10 @@ from numpy.typing import NDArray
 from brdfdb.errors import FileFormatError
 from brdfdb.formats._angles import Spherical
 from brdfdb.formats._angular_grid import SIZE, AngularGrid, Sink, chosen, rounded
+from brdfdb.formats._input import lines_of
 from brdfdb.formats._interface import TOLERANCE
 from brdfdb.formats._nodes import samples_at_angles, without_holes
 from brdfdb.formats._record import lines, of_lines, record, specular_remark
-from brdfdb.formats._text_file import lines_of
 from brdfdb.formats._written import Written, whole
 from brdfdb.place import path_of
 

@@ -22,9 +22,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.errors import FileFormatError
-from brdfdb.formats._dense_files import dense_record, reading_of_rows, samples_of_rows
+from brdfdb.formats._dense_files import (
+    MOST_BYTES,
+    column,
+    degrees_of,
+    dense_record,
+    parsed,
+    reading_of_rows,
+    samples_of_rows,
+    title_of,
+)
 from brdfdb.formats._interface import TOLERANCE, Option
-from brdfdb.formats._json_tables import MOST_BYTES, column, degrees_of, parsed, title_of
 from brdfdb.formats._record import specular_remark
 from brdfdb.formats._written import Written, whole
 from brdfdb.place import path_of

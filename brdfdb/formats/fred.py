@@ -25,14 +25,13 @@ from numpy.typing import NDArray
 from brdfdb.errors import CannotHoldError, FileFormatError, counted
 from brdfdb.formats._angles import Spherical
 from brdfdb.formats._angular_grid import SIZE, AngularGrid, Sink, chosen, rounded
-from brdfdb.formats._beside import beside, record_beside
 from brdfdb.formats._channels import at_wavelength
+from brdfdb.formats._input import lines_of
 from brdfdb.formats._interface import TOLERANCE, WAVELENGTH
 from brdfdb.formats._nodes import samples_at_angles, without_holes
-from brdfdb.formats._record import record, specular_remark
-from brdfdb.formats._text_end import check_last_number, doubt_end, has_open_end
-from brdfdb.formats._text_file import lines_of
+from brdfdb.formats._record import beside, record, record_beside, specular_remark
 from brdfdb.formats._written import Written, whole
+from brdfdb.formats.text.rows import check_last_number, doubt_end, has_open_end
 from brdfdb.place import path_of
 
 if TYPE_CHECKING:

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from brdfdb.errors import FileFormatError
 from brdfdb.formats._channels import XYZ
+from brdfdb.formats._input import Words
 from brdfdb.formats._nodes import samples_of_grid
 from brdfdb.formats._record import of_lines
-from brdfdb.formats._words import Words
 from brdfdb.place import path_of
 
 if TYPE_CHECKING:

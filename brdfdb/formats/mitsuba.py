@@ -19,9 +19,8 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from brdfdb.formats._beside import beside
 from brdfdb.formats._interface import Option
-from brdfdb.formats._record import U_AXIS, frame_remark, record
+from brdfdb.formats._record import U_AXIS, beside, frame_remark, record
 from brdfdb.formats._written import Written, whole
 from brdfdb.place import path_of
 

@@ -15,8 +15,8 @@ import numpy as np
 
 from brdfdb.errors import FileFormatError
 from brdfdb.formats._channels import LUMINOUS, XYZ
+from brdfdb.formats._input import lines_of
 from brdfdb.formats._nodes import samples_at_angles, without_fill_values
-from brdfdb.formats._text_file import lines_of
 from brdfdb.place import path_of
 
 if TYPE_CHECKING:

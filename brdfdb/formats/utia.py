@@ -19,11 +19,10 @@ import numpy as np
 from brdfdb.errors import FileFormatError
 from brdfdb.formats._angles import Spherical
 from brdfdb.formats._angular_grid import AngularGrid, filled
-from brdfdb.formats._beside import beside, record_beside
 from brdfdb.formats._channels import RGB, channels_of
 from brdfdb.formats._interface import FIXED, Option
 from brdfdb.formats._nodes import samples_of_grid, without_holes
-from brdfdb.formats._record import record, specular_remark
+from brdfdb.formats._record import beside, record, record_beside, specular_remark
 from brdfdb.formats._written import Written, whole
 from brdfdb.parameters import Floats
 from brdfdb.place import path_of

@@ -15,7 +15,7 @@ import OpenEXR
 import pytest
 
 from brdfdb import formats
-from brdfdb.formats._exr_file import write_slice
+from brdfdb.formats.exr import write_slice
 from brdfdb.geometry import directions_from_half_difference
 from brdfdb.scenes import lit_sphere
 from brdfdb.spectra import srgb_weights

@@ -21,8 +21,8 @@ import brdfdb
 from brdfdb import formats
 from brdfdb.errors import CannotHoldError
 from brdfdb.formats._channels import channels_of
-from brdfdb.formats._file_statement import FileStatement
 from brdfdb.formats._readings import FileTable
+from brdfdb.formats._stated_error import FileStatement
 from brdfdb.geometry import unit_vector
 from brdfdb.materials import Material
 from brdfdb.parameters import Floats

@@ -23,9 +23,9 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 import brdfdb
 from brdfdb.formats import klems, radiance
 from brdfdb.formats._channels import channels_of
-from brdfdb.formats._klems_basis import BASES
 from brdfdb.formats._stated_error import Comparison
 from brdfdb.formats._written import Written
+from brdfdb.formats.klems import BASES
 from brdfdb.geometry import unit_vector
 from brdfdb.tables.table import Table
 from tests.benchmarks.formats import tables

@@ -14,8 +14,8 @@ import pytest
 
 from brdfdb import formats
 from brdfdb.errors import FileFormatError
-from brdfdb.formats import _text_file
-from brdfdb.formats._rgl_tensor import read_tensors, write_tensors
+from brdfdb.formats import _input
+from brdfdb.formats.rgl.tensors import read_tensors, write_tensors
 from tests.formats.small_tables import DIFFUSE, GREY, SPECTRAL, small_table
 
 NESTED = "[" * 200_000
@@ -322,7 +322,7 @@ def test_a_group_that_claims_many_nodes_is_refused_before_they_are_read(
 def test_a_text_ends_at_the_first_zero_byte(
     name: str, kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(_text_file, "_LONGEST", 1 << 16)
+    monkeypatch.setattr(_input, "_LONGEST", 1 << 16)
     path = written(tmp_path, name, kind, **(REGULAR if name == "csv" else {"tolerance": 1.0}))
     with path.open("r+b") as file:
         file.truncate(int(0.7 * path.stat().st_size))

@@ -15,7 +15,7 @@ from brdfdb import formats
 from brdfdb.errors import FileFormatError, ParameterError
 from brdfdb.formats import klems
 from brdfdb.formats._channels import channels_of
-from brdfdb.formats._klems_basis import BASES, Basis, averages
+from brdfdb.formats.klems import BASES, Basis, averages
 from brdfdb.geometry import unit_vector
 from brdfdb.measurements.statement import statement
 from brdfdb.parameters import Floats

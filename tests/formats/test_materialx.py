@@ -15,9 +15,10 @@ from brdfdb import formats
 from brdfdb.errors import FileFormatError
 from brdfdb.formats import materialx
 from brdfdb.formats._channels import channels_of
-from brdfdb.formats._materialx_closures import OPEN_PBR, STANDARD, Surface, darkest_edge
-from brdfdb.formats._materialx_fit import fitted, of_alphas
 from brdfdb.formats._stated_error import Comparison
+from brdfdb.formats.materialx.fit import fitted, of_alphas
+from brdfdb.formats.materialx.surface import OPEN_PBR, STANDARD, darkest_edge
+from brdfdb.formats.materialx.surface import MaterialXSurface as Surface
 from brdfdb.geometry import radians, unit_vector
 from brdfdb.materials import FunctionSource, Material
 from brdfdb.tables.grids import Grid

@@ -10,10 +10,10 @@ import pytest
 
 from brdfdb import formats
 from brdfdb.errors import FileFormatError, ParameterError
-from brdfdb.formats import _zemax_file
+from brdfdb.formats import zemax
 from brdfdb.formats._readings import FileTable
-from brdfdb.formats._rgl_tensor import write_tensors
 from brdfdb.formats.netcdf import write_samples
+from brdfdb.formats.rgl.tensors import write_tensors
 from brdfdb.measurements import Instrument, Samples
 from tests.formats.small_tables import ANISOTROPIC, DIFFUSE, SPECTRAL, small_table
 
@@ -53,11 +53,11 @@ def test_values_of_a_grid_are_those_that_its_tools_see_at_the_nodes(name: str, k
     np.testing.assert_allclose(samples.values[np.ix_(some, channels)], seen, rtol=2e-3, atol=1e-6)
 
 
-def text_of(values: np.ndarray[Any, Any], symmetry: str = "PlaneSymmetrical") -> _zemax_file.Text:
+def text_of(values: np.ndarray[Any, Any], symmetry: str = "PlaneSymmetrical") -> zemax.ZemaxText:
     """A Zemax file with one incidence of 60 degrees and an azimuth step of 90."""
     angles = np.zeros(1), np.array([60.0]), np.array([0.0, 90.0, 180.0]), np.array([0.0, 40.0])
     comments = ("Sample: paint", "Scatterometer: bench", "Light source: laser (650 nm, 3.5mm spot diam.)")
-    return _zemax_file.Text(
+    return zemax.ZemaxText(
         comments, symmetry, "Monochrome", "BRDF", angles, np.full((1, 1, 1), 0.1), values.reshape(1, 1, 1, 3, 2)
     )
 
@@ -65,7 +65,7 @@ def text_of(values: np.ndarray[Any, Any], symmetry: str = "PlaneSymmetrical") ->
 def test_a_grid_about_the_specular_direction_is_turned_and_loses_what_is_below_the_horizon(tmp_path: Path) -> None:
     path = tmp_path / "paint.bsdf"
     with path.open("wb") as stream:
-        _zemax_file.write(stream, text_of(np.array([1.0, 2.0, 1.0, -3.0, 1.0, 4.0])))
+        zemax.write_text(stream, text_of(np.array([1.0, 2.0, 1.0, -3.0, 1.0, 4.0])))
     samples = formats.samples(path)
     # The mirror direction stands in the file three times; 40 degrees beyond it, at azimuth 180, is below the horizon
     assert samples.record["repeated"] == 2
@@ -108,7 +108,7 @@ def test_a_dense_grid_with_holes_gives_samples(tmp_path: Path) -> None:
 def test_samples_come_back_from_the_netcdf_that_was_written_of_them(tmp_path: Path) -> None:
     path = tmp_path / "paint.bsdf"
     with path.open("wb") as stream:
-        _zemax_file.write(stream, text_of(np.arange(1.0, 7.0)))
+        zemax.write_text(stream, text_of(np.arange(1.0, 7.0)))
     samples = formats.samples(path)
     write_samples(samples, tmp_path / "paint.nc")
     again = formats.samples(tmp_path / "paint.nc")

@@ -9,7 +9,7 @@ import pytest
 
 from brdfdb import formats
 from brdfdb.errors import FileFormatError
-from brdfdb.formats import _ssdd_file, ssdd
+from brdfdb.formats import ssdd
 from brdfdb.formats._readings import FileTable
 from brdfdb.formats._stated_error import Comparison
 from tests.formats.small_tables import KINDS, SPECTRAL, small_table
@@ -110,7 +110,7 @@ def test_symmetries_are_filled_in(tmp_path: Path) -> None:
 
 def test_binary_values_never_look_like_a_comment() -> None:
     hashes = np.frombuffer(b"\n #\x3e" + b"\0\0\x80\x3f" * 7, "<f4").reshape(2, 1, 2, 2, 1)
-    data = _ssdd_file.block({"DATA_TYPE": "brdf"}, hashes, binary=True)
+    data = ssdd.encoded_block({"DATA_TYPE": "brdf"}, hashes, binary=True)
     values = data[data.index(b"binary\n") + 7 :]
     assert not values.lstrip().startswith(b"#")
     np.testing.assert_allclose(np.frombuffer(values[:32], "<f4"), hashes.reshape(-1), rtol=1e-4)
@@ -121,9 +121,9 @@ def test_values_of_a_block_are_read_back_where_they_were(tmp_path: Path) -> None
     lists = {"PARAM0_LIST": "0 1", "PARAM1_LIST": "0 1 2", "PARAM2_LIST": "0 1", "PARAM3_LIST": "0 1 2 3"}
     entries = {"DATA_TYPE": "brdf", "COLOR_MODEL": "xyz", **lists}
     for binary in (True, False):
-        data = _ssdd_file.header("test", ["a comment"]) + _ssdd_file.block(entries, values, binary) * 2
+        data = ssdd.encoded_header("test", ["a comment"]) + ssdd.encoded_block(entries, values, binary) * 2
         (tmp_path / "a.ssdd").write_bytes(data)
-        comments, blocks = _ssdd_file.parsed(tmp_path / "a.ssdd")
+        comments, blocks = ssdd.parsed(tmp_path / "a.ssdd")
         assert comments == ["a comment"]
         for block in blocks:
             np.testing.assert_allclose(block.values, values, rtol=1e-6, atol=1e-40)

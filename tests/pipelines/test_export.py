@@ -13,9 +13,8 @@ import pytest
 
 from brdfdb.errors import CannotHoldError, ParameterError
 from brdfdb.formats import EXPORTERS
-from brdfdb.formats._file_statement import FileStatement
 from brdfdb.formats._interface import TOLERANCE
-from brdfdb.formats._stated_error import FileError
+from brdfdb.formats._stated_error import FileError, FileStatement
 from brdfdb.formats._written import Written, whole
 from brdfdb.materials import Material
 from brdfdb.store.publication import publish_dataset

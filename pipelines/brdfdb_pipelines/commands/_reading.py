@@ -54,7 +54,7 @@ def reading_keys(options: argparse.Namespace) -> dict[str, Any]:
     ParameterError
         If the wavelength is out of range, or a column is not written NAME=HEADER.
     """
-    from brdfdb.formats._stated import check_wavelength
+    from brdfdb.formats._readings import check_wavelength
 
     keys: dict[str, Any] = {name: getattr(options, name) or "" for name in _KEYS}
     if options.wavelength_nm is not None:

@@ -24,8 +24,8 @@ from brdfdb.place import path_of
 
 if TYPE_CHECKING:
     from brdfdb.formats._readings import FileTable
-    from brdfdb.formats._rgl_fields import Fields
     from brdfdb.formats._written import Written
+    from brdfdb.formats.rgl.fields import Fields
     from brdfdb.measurements.samples import Samples
     from brdfdb.tables.table import Table
 
@@ -95,9 +95,9 @@ def write(
         If the file cannot be written.
     """
     from brdfdb.formats._record import U_AXIS, frame_remark, record, specular_remark
-    from brdfdb.formats._rgl_search import smallest
-    from brdfdb.formats._rgl_tensor import write_tensors
     from brdfdb.formats._written import Written, whole
+    from brdfdb.formats.rgl.search import smallest
+    from brdfdb.formats.rgl.tensors import write_tensors
 
     path = path_of(path)
     wavelengths = 0 if table.wavelength_nm is None else table.wavelength_nm.size
@@ -116,7 +116,7 @@ def write(
 
 def recognises(head: bytes) -> bool:
     """Return True if the first bytes of a file are those of a tensor file with a material of RGL."""
-    from brdfdb.formats._rgl_tensor import MAGIC
+    from brdfdb.formats.rgl.tensors import MAGIC
 
     return head.startswith(MAGIC) and b"vndf" in head
 
@@ -134,8 +134,8 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     from brdfdb.formats._channels import RGB
     from brdfdb.formats._readings import FileTable
     from brdfdb.formats._record import document_of
-    from brdfdb.formats._rgl_fields import fields_of
-    from brdfdb.formats._rgl_tensor import read_tensors
+    from brdfdb.formats.rgl.fields import fields_of
+    from brdfdb.formats.rgl.tensors import read_tensors
 
     path = path_of(path)
     fields = fields_of(path, read_tensors(path))

@@ -41,7 +41,7 @@ _ALBEDO = np.array(
 
 
 @dataclass(frozen=True)
-class Surface:
+class MaterialXSurface:
     """A surface without coat, fuzz, transmission and subsurface. Names are those of OpenPBR, all numbers are [1].
 
     Attributes

@@ -20,9 +20,9 @@ from xml.etree import ElementTree
 from brdfdb.errors import FileFormatError
 from brdfdb.formats._channels import RGB, channels_of, has_spectrum
 from brdfdb.formats._interface import TOLERANCE
-from brdfdb.formats._materialx_closures import OPEN_PBR, STANDARD, Surface
 from brdfdb.formats._record import document_of, frame_remark, record, specular_remark
 from brdfdb.formats._written import Written, whole
+from brdfdb.formats.materialx.surface import OPEN_PBR, STANDARD, MaterialXSurface
 from brdfdb.place import path_of
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ _LARGEST = 1 << 22  # bytes of a document that are read
 _MOST = 1000.0  # largest number of a parameter, far above those that mean anything
 _NOT_EVALUATED = "this input is not evaluated here"
 
-# Names of the parameters: of `Surface`, OpenPBR and Standard Surface, and the type
+# Names of the parameters: of `MaterialXSurface`, OpenPBR and Standard MaterialXSurface, and the type
 _INPUTS = (
     ("base_weight", "base_weight", "base", "float"),
     ("base_color", "base_color", "base_color", "color3"),
@@ -60,7 +60,10 @@ _INPUTS = (
     ("specular_ior", "specular_ior", "specular_IOR", "float"),
     ("specular_anisotropy", "specular_roughness_anisotropy", "specular_anisotropy", "float"),
 )
-_DEFAULTS = {STANDARD: Surface(STANDARD, (0.8,), specular_roughness=0.2), OPEN_PBR: Surface(OPEN_PBR, (0.8,))}
+_DEFAULTS = {
+    STANDARD: MaterialXSurface(STANDARD, (0.8,), specular_roughness=0.2),
+    OPEN_PBR: MaterialXSurface(OPEN_PBR, (0.8,)),
+}
 _ROTATION = "specular_rotation"  # of a standard surface [turn]
 _TANGENT = "geometry_tangent"  # of OpenPBR, which has no rotation
 
@@ -106,8 +109,8 @@ def write(
     f_r, is far beyond a few hundredths for most materials with a highlight. l1 is the share of the light that is in a
     wrong place. The x axis of the table is the tangent of the geometry. The record is the `doc` of the material.
     """
-    from brdfdb.formats._materialx_fit import fitted
     from brdfdb.formats._stated_error import Comparison
+    from brdfdb.formats.materialx.fit import fitted
 
     channels = channels_of(table, "rgb" if has_spectrum(table) else "grey")
     surface = _rounded(fitted(kind, table, channels))
@@ -162,7 +165,7 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     return FileTable(str(name), ("grey",) if grey else RGB, None, surface.brdf, document)
 
 
-def _rounded(surface: Surface) -> Surface:
+def _rounded(surface: MaterialXSurface) -> MaterialXSurface:
     """Return a surface with the digits of single precision, which a file has and shaders compute with."""
 
     def digits(value: Any) -> Any:
@@ -170,7 +173,7 @@ def _rounded(surface: Surface) -> Surface:
             return tuple(digits(part) for part in value)
         return float(f"{value:.6g}") if isinstance(value, float) else value
 
-    return Surface(**{name: digits(value) for name, value in asdict(surface).items()})
+    return MaterialXSurface(**{name: digits(value) for name, value in asdict(surface).items()})
 
 
 def _colors(color: tuple[float, ...]) -> tuple[float, ...]:
@@ -178,7 +181,7 @@ def _colors(color: tuple[float, ...]) -> tuple[float, ...]:
     return color if len(color) == len(RGB) else color[:1] * len(RGB)
 
 
-def _document(name: str, surface: Surface, doc: str) -> str:
+def _document(name: str, surface: MaterialXSurface, doc: str) -> str:
     """Return the text of a document with one surface and one material."""
     root = ElementTree.Element("materialx", version=VERSION, colorspace="lin_rec709")
     shader = f"SR_{_identifier(name)}"
@@ -215,7 +218,7 @@ def _identifier(name: str) -> str:
     return "".join(letter if letter.isascii() and letter.isalnum() else "_" for letter in name)
 
 
-def _surface(path: Path, node: ElementTree.Element) -> Surface:
+def _surface(path: Path, node: ElementTree.Element) -> MaterialXSurface:
     """Return the surface of a node."""
     column = 1 if node.tag == OPEN_PBR else 2
     names = {entry[column]: (entry[0], entry[3]) for entry in _INPUTS}

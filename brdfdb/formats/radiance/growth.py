@@ -6,8 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from brdfdb.formats._square_disk import ISOTROPIC, lights, viewers
-from brdfdb.formats._tensor_tree import Index, Tree
+from brdfdb.formats.radiance.tree import ISOTROPIC, Index, Tree, lights, viewers
 from brdfdb.parameters import Floats
 
 Evaluate = Callable[[Floats, Floats], Floats]  # f_r (..., C) at unit vectors (..., 3) of light and viewer

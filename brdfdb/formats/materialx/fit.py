@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from brdfdb.conversion.nodes import COARSE, Nodes
 from brdfdb.errors import import_extra
 from brdfdb.formats._channels import Channels
-from brdfdb.formats._materialx_closures import OPEN_PBR, Surface, darkest_edge
+from brdfdb.formats.materialx.surface import OPEN_PBR, MaterialXSurface, darkest_edge
 from brdfdb.integrals.pairs import Symmetry
 from brdfdb.lobes import Lobe
 from brdfdb.parameters import Floats
@@ -29,7 +29,7 @@ _METALS = 0.1, 0.9  # shares of metal at which descents begin: one ends in a pai
 _FLOOR = 1e-4  # share of the mean f_r below which cube roots are those of this share: their slope has a pole at 0
 
 
-def fitted(kind: str, table: Table, channels: Channels) -> Surface:
+def fitted(kind: str, table: Table, channels: Channels) -> MaterialXSurface:
     """Return the surface whose f_r is closest to that of a table.
 
     Parameters
@@ -44,7 +44,7 @@ def fitted(kind: str, table: Table, channels: Channels) -> Surface:
 
     Returns
     -------
-    Surface
+    MaterialXSurface
         Colours with a number for each channel.
 
     Notes
@@ -72,7 +72,7 @@ def fitted(kind: str, table: Table, channels: Channels) -> Surface:
     nodes = Nodes(lobe, COARSE, symmetry, truth, mirror if smooth else None, "lightness")
     if not np.any(nodes.truth) and not (smooth and np.any(nodes.specular)):
         black = (0.0,) * nodes.truth.shape[1]
-        return Surface(kind, black, black, specular_weight=0.0)
+        return MaterialXSurface(kind, black, black, specular_weight=0.0)
     search = _Search(kind, nodes, normal, smooth, table.anisotropic)
     return _tidied(min((search.descent(metal) for metal in search.metals), key=search.distance))
 
@@ -98,14 +98,14 @@ class _Search:
         self._truth = np.maximum(np.cbrt(truth), self._floor)
         self._weight = np.sqrt(weight[:, np.newaxis] / (weight @ self._truth**2))
 
-    def surface(self, numbers: Array) -> Surface:
+    def surface(self, numbers: Array) -> MaterialXSurface:
         """Return the surface of the numbers that are searched."""
         colors = self._truth.shape[1]
         roughness, base = float(numbers[0]), tuple(numbers[1 : 1 + colors].tolist())
         if self.diffuse:
             # OpenPBR takes the light of a black highlight from the body, at grazing: least of a rough one
             rough = 1.0 if self.kind == OPEN_PBR else 0.3
-            return Surface(
+            return MaterialXSurface(
                 self.kind, base, base_diffuse_roughness=roughness, specular_weight=0.0, specular_roughness=rough
             )
         edge, rest = numbers[1 + colors : 1 + 2 * colors], numbers[1 + 2 * colors :]
@@ -115,7 +115,7 @@ class _Search:
         facets: dict[str, Any] = {"specular_roughness": 0.0}
         if self.widths.size:
             facets = of_alphas(self.kind, float(np.exp(rest[3])), float(np.exp(rest[-1])))
-        return Surface(
+        return MaterialXSurface(
             self.kind,
             base,
             tuple(edge.tolist()),
@@ -126,7 +126,7 @@ class _Search:
             **facets,
         )
 
-    def descent(self, metal: float) -> Surface:
+    def descent(self, metal: float) -> MaterialXSurface:
         """Return the surface at the end of a descent that begins with a share of metal."""
         least_squares = import_extra("scipy.optimize").least_squares
         colors = self._truth.shape[1]
@@ -140,14 +140,14 @@ class _Search:
         )
         return self.surface(end.x)
 
-    def distance(self, surface: Surface) -> float:
+    def distance(self, surface: MaterialXSurface) -> float:
         """Return the squared distance of a surface, which is made least."""
         return float(np.sum(self._residuals(surface) ** 2))
 
     def _left(self, numbers: Array) -> Array:
         return self._residuals(self.surface(numbers)).ravel()
 
-    def _residuals(self, surface: Surface) -> Array:
+    def _residuals(self, surface: MaterialXSurface) -> Array:
         values = surface.brdf(self.nodes.wi, self.nodes.wr)
         if self.smooth:
             values = np.concatenate([values, surface.specular_reflectance(self.nodes.theta)])
@@ -165,7 +165,7 @@ def of_alphas(kind: str, alpha_x: float, alpha_y: float) -> dict[str, Any]:
     }
 
 
-def _tidied(surface: Surface) -> Surface:
+def _tidied(surface: MaterialXSurface) -> MaterialXSurface:
     """Return a surface that is all metal, or no metal, if it nearly is, without the parameters that then do nothing."""
     if surface.base_metalness > 1.0 - _PURE:
         return replace(surface, base_metalness=1.0, specular_ior=1.5, base_diffuse_roughness=0.0)

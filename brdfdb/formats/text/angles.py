@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.errors import FileFormatError
-from brdfdb.formats._columns import ANGLE_UNITS, ANGLES, AZIMUTHS, Layout, angle_unit, plain_name
 from brdfdb.formats._record import note
-from brdfdb.formats._text_rows import line_of_row
+from brdfdb.formats.text.columns import ANGLE_UNITS, ANGLES, AZIMUTHS, Layout, angle_unit, plain_name
+from brdfdb.formats.text.rows import line_of_row
 
 Array = NDArray[np.float64]
 
