@@ -132,7 +132,7 @@ WAVELENGTH = Option("wavelength", 550.0, "wavelength of a spectral table that is
 
 
 class Exporter(Protocol):
-    """A format that tables are written to: a module of `brdfdb.formats`, or another object with these names.
+    """A format that tables are written to: a module or folder of `brdfdb.formats`, or another object with these names.
 
     It imports packages other than NumPy, and the tables, only when it writes.
 
@@ -152,10 +152,13 @@ class Exporter(Protocol):
     options : tuple of Option
         All other keyword arguments.
     write : callable
-        ``write(table, path, verdict=None, **options)`` writes the file, and those that stand beside it: whole, or not
-        at all. `verdict` is that of the audit of this revision, or None where the caller knows none. It raises
-        CannotHoldError for a table that the format has no place for. A module without `read` may have `recognises`, as
-        importers do: files with its suffix are then of this format only if it recognises them.
+        ``write(table, path, verdict=None, **options)`` writes the file, and those beside it, completely or not at all;
+        files that exist are replaced. Its options are `options` and `kind`, whose `help` says what they mean. `verdict`
+        is that of the audit of this revision, or None if the caller does not know it. It raises CannotHoldError for a
+        table that the format has no place for (anisotropic, or of wavelengths that give no colour), ParameterError if
+        an option cannot be met (no file is so small, no such wavelength), and WriteError if a file cannot be written.
+        A module without `read` may have `recognises`, as importers do: files with its suffix are then of this format
+        only if it recognises them.
     """
 
     suffix: str
@@ -168,7 +171,7 @@ class Exporter(Protocol):
 
 
 class Importer(Protocol):
-    """A format that is read: a module of `brdfdb.formats`, or another object with these names.
+    """A format that is read: a module or folder of `brdfdb.formats`, or another object with these names.
 
     Attributes
     ----------
@@ -177,8 +180,9 @@ class Importer(Protocol):
     recognises : callable
         ``recognises(head)`` is true if the first bytes of a file, 4096 of them or all, are those of this format.
     read : callable
-        ``read(path)`` gives f_r as the tools of the format see it, or the samples that the file lists. A module whose
-        `read` takes more has a tuple ``keywords`` with their names. One whose files may hold several materials has
+        ``read(path)`` gives f_r as the tools of the format see it, or the samples that the file lists. It raises
+        FileFormatError if the file is damaged or of another format, and OSError if it cannot be read. A module whose
+        `read` takes more has a tuple ``keywords`` with their names. A module whose files may hold several materials has
         ``members(path)``, which gives the names that its keyword ``member`` takes, none of a file with one material.
     """
 

@@ -58,34 +58,11 @@ def write(
     size: float = 16.0,
     verdict: str | None = None,
 ) -> Written:
-    """Write a table as an ASTM E1392 file: whole, or not at all. The record is in its header.
+    """Write a table as an ASTM E1392 file with the record in its header.
 
-    Parameters
-    ----------
-    table : Table
-        Any.
-    path : path
-        The file; one that is there is replaced.
-    tolerance : float [1]
-        Largest p99.
-    size : float [MB]
-        Largest file.
-    verdict : str, optional
-        Verdict of the audit of this revision.
-
-    Raises
-    ------
-    ParameterError
-        If no file of this table is so small.
-    WriteError
-        If the file cannot be written.
-
-    Notes
-    -----
-    After libbsdf's ``AstmReader.cpp``: polar angles and azimuths [rad] of light and viewer, the channels behind them.
-    The rows form a grid, because libbsdf interpolates linearly over each angle and fills what is missing with the
-    nearest row. Isotropic tables have the viewers of one side, from 0 to pi, and those at 2 pi, which libbsdf would
-    look for.
+    After libbsdf's ``AstmReader.cpp``: polar angles and azimuths [rad] of light and viewer, then the channels. The rows
+    form a grid, because libbsdf interpolates linearly over each angle and fills what is missing with the nearest row.
+    Isotropic tables have the viewers of one side, from 0 to pi, and those at 2 pi, which libbsdf would look for.
     """
     from brdfdb.formats._stated_error import Comparison
 
@@ -121,13 +98,6 @@ def read(path: str | os.PathLike[str]) -> FileTable | Samples:
     """Return f_r of an ASTM E1392 file as libbsdf sees it if its rows are a grid, else its rows.
 
     f_r is nan next to negative numbers, which libbsdf takes for 0.
-
-    Raises
-    ------
-    FileFormatError
-        If the file is not such a file, or damaged.
-    OSError
-        If it cannot be read.
     """
     from brdfdb.formats._readings import FileTable
 

@@ -72,31 +72,12 @@ def write(
     resolution: float = 0.0,
     verdict: str | None = None,
 ) -> Written:
-    """Write f_r on a grid of light and viewer as universal BRDF JSON: whole, or not at all.
+    """Write f_r on a grid of light and viewer as universal BRDF JSON.
 
-    Parameters
-    ----------
-    table : Table
-        Table in memory.
-    path : path
-        The file; one that is there is replaced.
-    tolerance, resolution
-        As of `brdfdb.formats._dense_grid.dense_table`. The file has 40 MB at most, about.
-    verdict : str, optional
-        Verdict of the audit of this revision.
-
-    Raises
-    ------
-    ParameterError
-        If a grid of the resolution is too large.
-    WriteError
-        If the file cannot be written.
-
-    Notes
-    -----
     The lists theta_i, phi_i, theta_r, phi_r [degree], BRDF [1/sr] and, of spectral tables, wavelength_i [nm] have one
-    entry for each direction and wavelength, the wavelength fastest. Isotropic tables have phi_i = 0 and phi_r up to
-    180: the other half is its mirror image. The record is the section adhoc_section.
+    entry for each direction and wavelength; the wavelength changes fastest. Isotropic tables have phi_i = 0 and phi_r
+    up to 180: the other half is its mirror image. The record is the section adhoc_section. The file has about 40 MB at
+    most.
     """
     from brdfdb.formats._dense_grid import dense_table, rounded
 
@@ -135,13 +116,7 @@ def recognises(head: bytes) -> bool:
 
 
 def read(path: str | os.PathLike[str]) -> FileTable | Samples:
-    """Return f_r of a universal BRDF file: interpolated linearly on a grid of light and viewer, else its samples.
-
-    Raises
-    ------
-    FileFormatError
-        If the file is no JSON, or lacks a list, or lists of different lengths stand in it.
-    """
+    """Return f_r of a universal BRDF file: interpolated linearly on a grid of light and viewer, else its samples."""
     path = path_of(path)
     document = parsed(path)
     data, metadata = document.get("data"), document.get("metadata")

@@ -78,38 +78,12 @@ def write(
     nodes: int = 0,
     verdict: str | None = None,
 ) -> Written:
-    """Write f_r at one wavelength for Eradiate's ``mqdiffuse``: whole, or not at all.
+    """Write f_r at one wavelength for Eradiate's ``mqdiffuse``.
 
-    Parameters
-    ----------
-    table : Table
-        Isotropic table in memory.
-    path : path
-        The file; one that is there is replaced.
-    tolerance : float [1]
-        Largest p99 of the error against the table. If a grid of 38 MB is not within it, the nearest one is written.
-    wavelength : float [nm]
-        Wavelength of a table of several.
-    nodes : int
-        Number of cosines of light and viewer, 3 to 513. The azimuths are as many, or one more if that is odd: 513 take
-        541 MB. 0: the smallest grid within the tolerance.
-    verdict : str, optional
-        Verdict of the audit of this revision.
-
-    Raises
-    ------
-    CannotHoldError
-        If the table is anisotropic.
-    ParameterError
-        If the table does not reach the wavelength.
-    WriteError
-        If the file cannot be written.
-
-    Notes
-    -----
     The dimensions are cos_theta_o, phi_d and cos_theta_i: cosines from 0 to 1, and azimuths 2 pi d / N, both in equal
     steps. Eradiate's ``MQDiffuseBSDF`` appends the values of phi_d = 0 at 2 pi before it calls the kernel, whose plugin
-    alone would read node d of N at 2 pi d / (N - 1).
+    alone would read node d of N at 2 pi d / (N - 1). If no grid of 38 MB is within the tolerance, the nearest is
+    written. With `nodes` cosines there are as many azimuths, or one more if the number is odd: 513 take 541 MB.
     """
     from brdfdb.formats._stated_error import Comparison
 
@@ -136,13 +110,7 @@ def recognises(head: bytes) -> bool:
 
 
 def read(path: str | os.PathLike[str]) -> FileTable:
-    """Return f_r of a table of ``mqdiffuse`` as Eradiate's kernel interpolates it.
-
-    Raises
-    ------
-    FileFormatError
-        If the file is damaged, or ``brdf`` is not over the three dimensions in equal steps.
-    """
+    """Return f_r of a table of ``mqdiffuse`` as Eradiate's kernel interpolates it."""
     import xarray as xr
 
     from brdfdb.formats._readings import FileTable

@@ -56,31 +56,10 @@ def write(
     half: bool = False,
     verdict: str | None = None,
 ) -> Written:
-    """Write a slice, or the lit sphere, of a table as an OpenEXR file: whole, or not at all.
+    """Write a slice of `brdfdb.tables.slices`, or the lit sphere of `brdfdb.scenes.lit_sphere` in linear light.
 
-    Parameters
-    ----------
-    table : Table
-        Table in memory.
-    path : path
-        The file; one that is there is replaced.
-    kind : str
-        "half_difference", "in_plane" or "lobe", as in `brdfdb.tables.slices`; or "sphere", the picture of
-        `brdfdb.scenes.lit_sphere` in linear light.
-    theta_i, phi_i : float [degree]
-        Direction of the light. theta_i matters for a lobe only, phi_i for anisotropic tables only; it is the azimuth of
-        the half vector in a half/difference slice.
-    half : bool
-        Write 16-bit floats, for viewing, instead of 32-bit floats, for computing.
-    verdict : str, optional
-        Verdict of the audit of this revision.
-
-    Raises
-    ------
-    ParameterError
-        If an angle is outside its range, or two wavelengths are equal.
-    WriteError
-        If the file cannot be written.
+    theta_i matters for a lobe only, phi_i for anisotropic tables only. In a half/difference slice it is the azimuth of
+    the half vector.
     """
     from brdfdb.formats._pictures import slice_of
 
@@ -92,31 +71,8 @@ def write(
 def write_slice(
     path: str | os.PathLike[str], image: Slice, table: Table, half: bool = False, verdict: str | None = None
 ) -> Written:
-    """Write a slice as an OpenEXR file, ZIP compressed: whole, or not at all.
+    """Write a slice as an OpenEXR file, ZIP compressed.
 
-    Parameters
-    ----------
-    path : path
-        The file; one that is there is replaced.
-    image : Slice
-        Pixels and axes.
-    table : Table
-        Table of the slice: its name, revision and model go into the header.
-    half : bool
-        Write 16-bit floats, for viewing, instead of 32-bit floats, for computing. Values above 65504, the largest
-        16-bit float, are written as 65504, and the attribute ``brdf:half`` counts them.
-    verdict : str, optional
-        Verdict of the audit of this revision.
-
-    Raises
-    ------
-    WriteError
-        If the file cannot be written.
-    ParameterError
-        If two wavelengths are equal.
-
-    Notes
-    -----
     Channels: R, G, B for viewers, and one a wavelength in the reflective layout of Fichet et al. (2021,
     ``fichet2021``), ``T.550,0nm``; zeros in front, ``T.0550,0nm``, if others reach 1000 nm. The pixels are f_r itself
     [1/sr], which can exceed 1; the specular part of a mirror-like material is no part of f_r and not in the file. R, G,
@@ -124,8 +80,14 @@ def write_slice(
     over the wavelengths.
 
     The attributes begin with ``brdf:``. Angles and wavelengths are strings, as OpenEXR rounds a number to 32 bits; the
-    pixel centres are a pair of 64 bit floats. ``brdf:error_p99`` is the relative error against the model that 99 of
-    100 values of the table stay within, as the table states it.
+    pixel centres are a pair of 64 bit floats. ``brdf:error_p99`` is the relative error against the model that 99 of 100
+    values of the table stay within, as the table states it. With `half`, values above 65504, the largest 16-bit float,
+    are written as 65504, and the attribute ``brdf:half`` counts them.
+
+    Raises
+    ------
+    ParameterError
+        If two wavelengths are equal.
     """
     from brdfdb.formats._pictures import rgb_of
 
@@ -205,15 +167,10 @@ def _spectral_channels(wavelength_nm: NDArray[Any]) -> list[str]:
 
 
 def write_sphere(path: str | os.PathLike[str], table: Table, half: bool = False, verdict: str | None = None) -> Written:
-    """Write the lit sphere of a table as an OpenEXR file, ZIP compressed: whole, or not at all.
+    """Write the lit sphere of a table as an OpenEXR file, ZIP compressed.
 
     The channels are linear sRGB, in which a white Lambertian sphere has 0.8 where it is brightest, and A, the coverage,
     by which the others are multiplied.
-
-    Raises
-    ------
-    WriteError
-        If the file cannot be written.
     """
     from brdfdb.scenes.lit_sphere import linear_sphere
 

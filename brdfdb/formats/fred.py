@@ -64,31 +64,9 @@ def write(
     size: float = 16.0,
     verdict: str | None = None,
 ) -> Written:
-    """Write an isotropic table as tabulated scatter of FRED, and its record beside it: whole, or not at all.
+    """Write an isotropic table as tabulated scatter of FRED, and its record as JSON beside it.
 
-    Parameters
-    ----------
-    table : Table
-        Isotropic.
-    path : path
-        The file; one that is there is replaced.
-    tolerance : float [1]
-        Largest p99.
-    wavelength : float [nm]
-        The wavelength of a spectral table that is written.
-    size : float [MB]
-        Largest size of the file and its record.
-    verdict : str, optional
-        Verdict of the audit of this revision.
-
-    Raises
-    ------
-    CannotHoldError
-        If the table is anisotropic: what the azimuth of the light counts from is not published.
-    ParameterError
-        If the wavelength is outside those of the table, or no file of it is so small.
-    WriteError
-        If a file cannot be written.
+    Anisotropic tables are refused: what the azimuth of the light counts from is not published.
     """
     from brdfdb.formats._stated_error import Comparison
 
@@ -129,15 +107,7 @@ def recognises(head: bytes) -> bool:
 
 
 def read(path: str | os.PathLike[str]) -> FileTable | Samples:
-    """Return f_r of tabulated scatter: linear over each angle if the viewers of all lights are one grid, else samples.
-
-    Raises
-    ------
-    FileFormatError
-        If the file is not such a file, is damaged, or has other units than degrees and f_r.
-    OSError
-        If it cannot be read.
-    """
+    """Return f_r of tabulated scatter: linear over each angle if all lights have one grid of viewers, else samples."""
     from brdfdb.formats._readings import FileTable
 
     path = path_of(path)

@@ -32,20 +32,7 @@ _MOST_BYTES = 2**30
 
 
 def write_picture(picture: Picture, path: str | os.PathLike[str]) -> None:
-    """Write a picture of the instrument, ZIP compressed: whole, or not at all.
-
-    Parameters
-    ----------
-    picture : Picture
-        A picture, simulated or measured.
-    path : path
-        The file; one that is there is replaced.
-
-    Raises
-    ------
-    WriteError
-        If the file cannot be written.
-    """
+    """Write a simulated or measured picture of the instrument, ZIP compressed; WriteError if it cannot be written."""
     import OpenEXR
 
     from brdfdb.geometry import degrees
@@ -77,15 +64,7 @@ def recognises(head: bytes) -> bool:
 
 
 def read_picture(path: str | os.PathLike[str]) -> Picture:
-    """Return the picture of a file.
-
-    Raises
-    ------
-    FileFormatError
-        If the file is no such picture, or damaged.
-    OSError
-        If it cannot be read.
-    """
+    """Return the picture of a file; FileFormatError if it is no such picture, or damaged."""
     import OpenEXR
 
     from brdfdb.geometry import radians
@@ -117,17 +96,7 @@ def read_picture(path: str | os.PathLike[str]) -> Picture:
 
 
 def read(path: str | os.PathLike[str]) -> Samples:
-    """Return the samples of a picture, as `brdfdb.measurements.gonioreflectometer.reduced` gives them.
-
-    Raises
-    ------
-    FileFormatError
-        If the file is no such picture, or is damaged.
-    ParameterError
-        If no pixel of it can be used.
-    OSError
-        If it cannot be read.
-    """
+    """Return the samples of a picture, as `brdfdb.measurements.gonioreflectometer.reduced` gives them."""
     from brdfdb.measurements.gonioreflectometer import reduced
 
     return reduced(read_picture(path))

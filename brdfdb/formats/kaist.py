@@ -74,29 +74,10 @@ def write(
     megabytes: float = 64.0,
     verdict: str | None = None,
 ) -> Written:
-    """Write the Mueller matrices of a polarised table: whole, or not at all.
+    """Write the Mueller matrices of a polarised table.
 
-    Parameters
-    ----------
-    table : Table
-        Polarised isotropic table in memory.
-    path : path
-        The file; one that is there is replaced.
-    tolerance : float [1]
-        Largest error against the table that 99 of 100 values of f_r, and of the normalised elements, may have.
-    megabytes : float [1e6 byte]
-        Largest size of the file.
-    verdict : str, optional
-        Verdict of the audit of this revision.
-
-    Raises
-    ------
-    CannotHoldError
-        If the table is unpolarised, or its wavelengths are above 65535 nm.
-    ParameterError
-        If no file of this table is so small.
-    WriteError
-        If the file cannot be written.
+    The tolerance is that of f_r, and of the normalised elements. Unpolarised tables are refused, and wavelengths above
+    65535 nm.
     """
 
     if table.facets is None:
@@ -155,15 +136,6 @@ def recognises(head: bytes) -> bool:
 def read(path: str | os.PathLike[str]) -> Samples:
     """Return f_r of a file at its own directions above the horizon.
 
-    Raises
-    ------
-    FileFormatError
-        If the file is damaged, or an array is missing or of another shape.
-    OSError
-        If it cannot be read.
-
-    Notes
-    -----
     Names, shapes and directions as in Mitsuba's ``measured_polarized``: the axes of M are phi_d, theta_d, theta_h, the
     wavelength, and those of the Mueller matrix.
     """

@@ -166,37 +166,12 @@ def write(
     emissivity_back: float = 0.0,
     verdict: str | None = None,
 ) -> Written:
-    """Write a table as a Klems matrix: whole, or not at all.
+    """Write a table as a Klems matrix.
 
-    Parameters
-    ----------
-    table : Table
-        Table in memory.
-    path : path
-        The file; one that is there is replaced.
-    kind : str
-        "full" with 145 patches, "half" with 77, or "quarter" with 41.
-    tolerance : float [1]
-        Largest p99. The patches are fixed: a larger error is stated.
-    colour : bool
-        Add the blocks CIE-X and CIE-Z of a spectral table, which Radiance reads. WINDOW's engine refuses such files.
-    emissivity_front, emissivity_back : float [1]
-        Emissivities of the two sides, in [0.001, 1]. By default they are those of the table, 1 minus its hemispherical
-        albedo weighted by Planck's law at 300 K, if its wavelengths reach from 5 to 40 um; or else 0.9, which a remark
-        names as assumed, with its effect on U.
-    verdict : str, optional
-        Verdict of the audit of this revision.
-
-    Raises
-    ------
-    CannotHoldError
-        If the table has several wavelengths that do not reach over the visible ones.
-    WriteError
-        If the file cannot be written.
-
-    Notes
-    -----
-    WINDOW's front is outdoors and Radiance's indoors: the block Reflection Back is Radiance's front.
+    WINDOW's front is outdoors and Radiance's indoors: the block Reflection Back is Radiance's front. The blocks CIE-X
+    and CIE-Z of `colour` are for Radiance alone: WINDOW's engine refuses such files. By default, 0, the emissivities
+    are those of the table, 1 minus its hemispherical albedo weighted by Planck's law at 300 K, if its wavelengths reach
+    from 5 to 40 um; or else 0.9, which a remark names as assumed, with its effect on U.
     """
     from brdfdb.formats._record import record, specular_remark
     from brdfdb.formats._stated_error import Comparison
@@ -302,26 +277,15 @@ def recognises(head: bytes) -> bool:
 def read(path: str | os.PathLike[str], side: str = "back") -> FileTable:
     """Return f_r of one side, evaluated as Radiance does: the value of the pair of patches.
 
+    Radiance varies the values by up to 3e-4 from pair to pair, and keeps 8 bits of each chromaticity; both is left out.
+    The format has no holes: a negative number is 0, as for Radiance.
+
     Parameters
     ----------
     path : path
         File of this package, or of others: in bases of Klems or in one that it defines itself.
     side : {"back", "front"}
         Side of reflection as the file names it. The back is Radiance's front.
-
-    Raises
-    ------
-    ParameterError
-        If there is no such side.
-    FileFormatError
-        If the file is damaged or holds no matrix.
-    OSError
-        If it cannot be read.
-
-    Notes
-    -----
-    Radiance varies the values by up to 3e-4 from pair to pair, and keeps 8 bits of each chromaticity; both is left out.
-    The format has no holes: a negative number is 0, as for Radiance.
     """
     from brdfdb.formats._readings import FileTable
 

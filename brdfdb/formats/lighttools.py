@@ -38,15 +38,8 @@ def recognises(head: bytes) -> bool:
 def read(path: str | os.PathLike[str]) -> Samples:
     """Return the samples of the front of a LightTools file.
 
-    The record has the total integrated scatter as "tis", with its angles of incidence as "theta_i_deg".
-
-    Raises
-    ------
-    FileFormatError
-        If the file is damaged, has no block of the front with the type BRDF, or has planes of incidence that differ:
-        what POI counts from is not published.
-    OSError
-        If it cannot be read.
+    The record has the total integrated scatter as "tis", with its angles of incidence as "theta_i_deg". Planes of
+    incidence that differ are refused: what POI counts from is not published.
     """
     from brdfdb.formats._angles import Spherical
 

@@ -66,34 +66,12 @@ def write(
     samples: str = "centres",
     verdict: str | None = None,
 ) -> Written:
-    """Write an isotropic table as a MERL file, with its record as JSON beside it: both whole, or none.
+    """Write an isotropic table as a MERL file, with its record as JSON beside it.
 
-    Parameters
-    ----------
-    table : Table
-        Isotropic; spectral ones become linear sRGB.
-    path : path
-        The file; one that is there is replaced.
-    tolerance : float [1]
-        Largest p99. The grid is fixed: a larger error is stated.
-    samples : str
-        "centres" or "edges" of the bins. The error is that of readers of the kind.
-    verdict : str, optional
-        Verdict of the audit of this revision.
-
-    Raises
-    ------
-    CannotHoldError
-        If the table is anisotropic, or its wavelengths give no colour.
-    WriteError
-        If a file cannot be written.
-
-    Notes
-    -----
     Bins and scales as in BRDF Explorer (``BRDFMeasuredMERL.cpp``, ``measured.func``), which looks one bin up; libbsdf
     (``MerlBinaryReader.cpp``) takes the numbers for samples at lower edges of bins, interpolates linearly, and takes
     negative ones for 0. So nodes below the horizon have the value at the horizon where a cell beside them reaches above
-    it, and are negative elsewhere. Colours below 0, outside of sRGB, are 0.
+    it, and are negative elsewhere. Colours below 0, outside of sRGB, are 0. The error is that of readers of the kind.
     """
     from brdfdb.formats._stated_error import Comparison
 
@@ -130,13 +108,6 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     """Return f_r of a MERL file as its readers see it: one bin looked up, or interpolated if its record says edges.
 
     A negative number is a hole: f_r is nan there.
-
-    Raises
-    ------
-    FileFormatError
-        If the file is not a MERL file, or damaged.
-    OSError
-        If it cannot be read.
     """
     from brdfdb.formats._readings import FileTable
 

@@ -44,24 +44,7 @@ _DIGITS = 9  # of numbers of a spectrum: float32 has fewer
 
 
 def write(table: Table, path: str | os.PathLike[str], *, plugin: str = MODEL, verdict: str | None = None) -> Written:
-    """Write the plugin of a material for Mitsuba 3: both files whole, or none.
-
-    Parameters
-    ----------
-    table : Table
-        Table in memory.
-    path : path
-        The XML file; the dictionary is beside it. Files that are there are replaced.
-    plugin : str
-        "model" or "table".
-    verdict : str, optional
-        Verdict of the audit of this revision.
-
-    Raises
-    ------
-    WriteError
-        If a file cannot be written.
-    """
+    """Write the plugin of a material for Mitsuba 3 as XML, and as a dictionary beside it."""
     from brdfdb.materials import Material
     from brdfdb.models.mitsuba_plugins import OF_MITSUBA
 

@@ -40,32 +40,16 @@ def write(
     resolution: float = 0.0,
     verdict: str | None = None,
 ) -> Written:
-    """Write f_r on a plain grid of angles as netCDF 3 (64-bit offset): whole, or not at all.
+    """Write f_r on a plain grid of angles as netCDF 3 (64-bit offset).
 
-    Parameters
-    ----------
-    table : Table
-        Table in memory.
-    path : path
-        The file; one that is there is replaced.
-    tolerance, axes, resolution
-        As of `brdfdb.formats._dense_grid.dense_table`. The values take 100 MB at most.
-    verdict : str, optional
-        Verdict of the audit of this revision.
+    ``brdf`` [1/sr] is float32 over the angles [degree] and, last, the wavelengths [nm]. ``specular_reflectance`` is the
+    specular part. Units and names follow the CF conventions. The record is in the attributes. The values take 100 MB at
+    most.
 
     Raises
     ------
-    ParameterError
-        If a grid of the resolution is too large.
     MissingExtraError
         If SciPy, which writes netCDF, is not installed.
-    WriteError
-        If the file cannot be written.
-
-    Notes
-    -----
-    ``brdf`` [1/sr] is float32 over the angles [degree] and, last, the wavelengths [nm]. ``specular_reflectance`` is
-    the specular part. Units and names follow the CF conventions. The record is in the attributes.
     """
     from brdfdb.formats._dense_grid import dense_table
 
@@ -82,13 +66,7 @@ def recognises(head: bytes) -> bool:
 
 
 def read(path: str | os.PathLike[str]) -> FileTable | Samples:
-    """Return f_r of a netCDF file with ``brdf`` over angles [degree], interpolated linearly; or samples.
-
-    Raises
-    ------
-    FileFormatError
-        If the file is damaged, or ``brdf`` is not over the axes of a grid.
-    """
+    """Return f_r of a netCDF file with ``brdf`` over angles [degree], interpolated linearly; or samples."""
     import xarray as xr
 
     import_extra("scipy.io")
@@ -104,15 +82,7 @@ def read(path: str | os.PathLike[str]) -> FileTable | Samples:
 
 
 def write_samples(samples: Samples, path: str | os.PathLike[str]) -> None:
-    """Write samples as netCDF, which `read` gives back: whole, or not at all.
-
-    Raises
-    ------
-    MissingExtraError
-        If SciPy, which writes netCDF, is not installed.
-    WriteError
-        If the file cannot be written.
-    """
+    """Write samples as netCDF, which `read` gives back; errors are those of `write`."""
     import_extra("scipy.io")
     with whole(path) as (half,):
         samples.to_xarray().to_netcdf(half, engine="scipy", format="NETCDF3_64BIT")

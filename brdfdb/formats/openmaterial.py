@@ -68,32 +68,12 @@ def write(
     resolution: float = 0.0,
     verdict: str | None = None,
 ) -> Written:
-    """Write f_r as a lookup table of OpenMATERIAL 3D 1.0: whole, or not at all.
+    """Write f_r as a lookup table of OpenMATERIAL 3D 1.0.
 
-    Parameters
-    ----------
-    table : Table
-        Isotropic table in memory.
-    path : path
-        The file; one that is there is replaced.
-    tolerance, resolution
-        As of `brdfdb.formats._dense_grid.dense_table`. The file has 40 MB at most, about.
-    verdict : str, optional
-        Verdict of the audit of this revision, on positive values, reciprocity and energy, which the schema demands.
-
-    Raises
-    ------
-    CannotHoldError
-        If the table is anisotropic.
-    ParameterError
-        If a grid of the resolution is too large.
-    WriteError
-        If the file cannot be written.
-
-    Notes
-    -----
-    Rows are wavelength [m], theta_i, theta_r and phi_r [rad], and f_r [1/sr], sorted. phi_r is counted from the light:
-    0 looks back towards it. Both halves of the azimuth are written. The record is ``metadata.brdfdb``.
+    Rows are wavelength [m], theta_i, theta_r and phi_r [rad], and f_r [1/sr], sorted. phi_r counts from the light: 0
+    looks back towards it. Both halves of the azimuth are written. The record is ``metadata.brdfdb``; the schema demands
+    positive values, reciprocity and energy conservation, on which its verdict of the audit speaks. The file has about
+    40 MB at most.
     """
     from brdfdb.formats._dense_grid import dense_table, rounded
 
@@ -134,13 +114,7 @@ def recognises(head: bytes) -> bool:
 
 
 def read(path: str | os.PathLike[str]) -> FileTable | Samples:
-    """Return f_r of a lookup table: interpolated linearly if it is over the whole hemisphere, else its samples.
-
-    Raises
-    ------
-    FileFormatError
-        If the file is no JSON, or its rows are not five numbers each, or its wavelengths have different directions.
-    """
+    """Return f_r of a lookup table: interpolated linearly if it is over the whole hemisphere, else its samples."""
     from brdfdb.measurements.samples import Instrument
 
     path = path_of(path)

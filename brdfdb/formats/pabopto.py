@@ -35,15 +35,6 @@ def recognises(head: bytes) -> bool:
 def read(path: str | os.PathLike[str]) -> Samples:
     """Return the samples of a file of pab-opto.
 
-    Raises
-    ------
-    FileFormatError
-        If the header lacks the format or the direction of the light, or a row is damaged.
-    OSError
-        If it cannot be read.
-
-    Notes
-    -----
     The lines of the header are those that ``pabopto2bsdf`` of Radiance knows. The side of the light is the front.
     """
     path = path_of(path)

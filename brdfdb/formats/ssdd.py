@@ -74,32 +74,8 @@ def write(
     size: float = 16.0,
     verdict: str | None = None,
 ) -> Written:
-    """Write a table as an SSDD file: whole, or not at all. The record is in its comments.
+    """Write a table as an SSDD file with the record in its comments.
 
-    Parameters
-    ----------
-    table : Table
-        Any.
-    path : path
-        The file; one that is there is replaced.
-    tolerance : float [1]
-        Largest p99.
-    data : str
-        "binary" or "ascii".
-    size : float [MB]
-        Largest file.
-    verdict : str, optional
-        Verdict of the audit of this revision.
-
-    Raises
-    ------
-    ParameterError
-        If no file of this table is so small.
-    WriteError
-        If the file cannot be written.
-
-    Notes
-    -----
     After the specification of the format, version 0.3, and libbsdf's ``SsddReader.cpp``. libbsdf interpolates linearly
     over each angle (``LinearInterpolator.cpp``). The angles are those of half and difference vectors, of the viewer
     about the specular direction, or of light and viewer: the ones that need the fewest nodes.
@@ -128,17 +104,10 @@ def recognises(head: bytes) -> bool:
 
 
 def read(path: str | os.PathLike[str]) -> FileTable:
-    """Return f_r of an SSDD file as libbsdf sees it.
+    """Return f_r of an SSDD file as libbsdf sees it; angles with offsets and distorted ones are refused.
 
     The record has a specular part that the file holds as "specular_reflectance", with its angles as
     "specular_theta_i_deg".
-
-    Raises
-    ------
-    FileFormatError
-        If the file is not an SSDD file with a BRDF, is damaged, or has angles with offsets or distorted ones.
-    OSError
-        If it cannot be read.
     """
     from brdfdb.formats._readings import FileTable
 
@@ -283,15 +252,7 @@ def encoded_block(entries: Mapping[str, str], values: Floats, binary: bool) -> b
 
 
 def parsed(path: Path) -> tuple[list[str], list[SsddBlock]]:
-    """Return the comments and the blocks of a file.
-
-    Raises
-    ------
-    FileFormatError
-        If it is not an SSDD file, or damaged.
-    OSError
-        If it cannot be read.
-    """
+    """Return the comments and the blocks of a file; FileFormatError if it is no SSDD file, or damaged."""
     check_size(path, MOST_TEXT)
     with path.open("rb") as file:
         if not file.read(1):

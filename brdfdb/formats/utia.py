@@ -66,30 +66,8 @@ def write(
     encoding: str = "linear",
     verdict: str | None = None,
 ) -> Written:
-    """Write a table as a UTIA file, with its record as JSON beside it: both whole, or none.
+    """Write a table as a UTIA file, with its record as JSON beside it.
 
-    Parameters
-    ----------
-    table : Table
-        Any; spectral ones become linear sRGB.
-    path : path
-        The file; one that is there is replaced.
-    tolerance : float [1]
-        Largest p99. The grid is fixed: a larger error is stated.
-    encoding : str
-        "linear" or "dj_brdf".
-    verdict : str, optional
-        Verdict of the audit of this revision.
-
-    Raises
-    ------
-    CannotHoldError
-        If the wavelengths of the table give no colour.
-    WriteError
-        If a file cannot be written.
-
-    Notes
-    -----
     Three planes (R, G, B) of 64 bit floats: 6 polar angles of the light in steps of 15 degrees, 48 azimuths in steps of
     7.5, then those of the viewer. UTIA's own reader (``TBDRF.cpp`` of J. Filip) interpolates linearly over the four
     angles and continues the last interval of a polar angle to 90 degrees; it neither scales nor decodes. dj_brdf takes
@@ -123,15 +101,7 @@ def recognises(head: bytes) -> bool:
 
 
 def read(path: str | os.PathLike[str]) -> FileTable:
-    """Return f_r of a UTIA file as UTIA's own reader sees it, or dj_brdf if its record says so.
-
-    Raises
-    ------
-    FileFormatError
-        If the file does not have the size of a UTIA file, or a number is not finite.
-    OSError
-        If it cannot be read.
-    """
+    """Return f_r of a UTIA file as UTIA's own reader sees it, or dj_brdf if its record says so."""
     from brdfdb.formats._readings import FileTable
 
     path = path_of(path)

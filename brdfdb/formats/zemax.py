@@ -69,38 +69,13 @@ def write(
     size: float = 16.0,
     verdict: str | None = None,
 ) -> Written:
-    """Write a table as a Zemax BSDF file: whole, or not at all. The record is in its comments.
+    """Write a table as a Zemax BSDF file with the record in its comments.
 
-    Parameters
-    ----------
-    table : Table
-        Isotropic ones are written as PlaneSymmetrical, anisotropic ones as ASymmetrical4D.
-    path : path
-        The file; one that is there is replaced.
-    tolerance : float [1]
-        Largest p99.
-    colour : str
-        "xyz", "grey" (Y of it), or "auto": CIE XYZ of spectral tables, else one value.
-    size : float [MB]
-        Largest file.
-    verdict : str, optional
-        Verdict of the audit of this revision.
-
-    Raises
-    ------
-    CannotHoldError
-        If the wavelengths of the table give no colour.
-    ParameterError
-        If no file of this table is so small.
-    WriteError
-        If the file cannot be written.
-
-    Notes
-    -----
     After Zemax's article on the format (1500005486801) and libbsdf's ``ZemaxBsdfReader.cpp``: polar angles from the
     specular direction, azimuths from there towards the normal, counter-clockwise from above. The error is that of
     linear interpolation over each angle, as libbsdf does it. TIS is the directional albedo of the table, without its
-    specular part. OpticStudio's own model and libbsdf read files of one rotation only, those of isotropic tables.
+    specular part. Isotropic tables are PlaneSymmetrical, others ASymmetrical4D, of which OpticStudio's model and
+    libbsdf read one rotation only.
     """
     from brdfdb.formats._stated_error import Comparison
     from brdfdb.tables.albedo import directional_albedo
@@ -162,13 +137,6 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     """Return f_r of a Zemax BSDF file as libbsdf sees it; an anisotropic one in the same way.
 
     The record has the total integrated scatter as "tis", with its angles of incidence as "theta_i_deg".
-
-    Raises
-    ------
-    FileFormatError
-        If the file is not a Zemax BSDF file of a BRDF, or is damaged.
-    OSError
-        If it cannot be read.
     """
     from brdfdb.formats._readings import FileTable
 
@@ -292,15 +260,7 @@ def write_text(stream: Sink, text: ZemaxText) -> None:
 
 
 def parsed(path: Path) -> ZemaxText:
-    """Return what a file says.
-
-    Raises
-    ------
-    FileFormatError
-        If it is not such a file, or damaged.
-    OSError
-        If it cannot be read.
-    """
+    """Return the content of a file; FileFormatError if it is no Zemax BSDF file, or damaged."""
     words = Words(path)
     entries = {"Source": "", "Symmetry": "", "SpectralContent": "", "ScatterType": ""}
     angles: dict[str, NDArray[np.float64]] = {}

@@ -76,35 +76,8 @@ def write(
     tolerance: float = 0.02,
     verdict: str | None = None,
 ) -> Written:
-    """Write the surface of MaterialX that comes closest to a table: whole, or not at all.
+    """Write the surface of MaterialX that comes closest to a table.
 
-    Parameters
-    ----------
-    table : Table
-        Table in memory.
-    path : path
-        The file; one that is there is replaced.
-    kind : str
-        "open_pbr_surface" or "standard_surface".
-    tolerance : float [1]
-        Largest p99 that is not reported.
-    verdict : str, optional
-        Verdict of the audit of this revision.
-
-    Returns
-    -------
-    Written
-        The file, with the error of f_r as MaterialX evaluates it.
-
-    Raises
-    ------
-    CannotHoldError
-        If the table has several wavelengths that give no colour.
-    WriteError
-        If the file cannot be written.
-
-    Notes
-    -----
     GGX has other tails than a Gaussian, and its facets are bright at grazing: p99, which is relative to each value of
     f_r, is far beyond a few hundredths for most materials with a highlight. l1 is the share of the light that is in a
     wrong place. The x axis of the table is the tangent of the geometry. The record is the `doc` of the material.
@@ -132,13 +105,7 @@ def recognises(head: bytes) -> bool:
 def read(path: str | os.PathLike[str]) -> FileTable:
     """Return f_r of the first OpenPBR or Standard Surface of a MaterialX document, as its GLSL evaluates it.
 
-    Raises
-    ------
-    FileFormatError
-        If there is none, a parameter is no number, or an input is one that is not evaluated: a texture, a coat, fuzz,
-        transmission, a subsurface or a thin film.
-    OSError
-        If the file cannot be read.
+    Inputs that are not evaluated are refused: a texture, a coat, fuzz, transmission, a subsurface or a thin film.
     """
     from brdfdb.formats._readings import FileTable
 

@@ -107,33 +107,12 @@ def write(
     cells: float = 600_000.0,
     verdict: str | None = None,
 ) -> Written:
-    """Write a table as a tensor tree and a material of Radiance: whole, or not at all.
+    """Write a table as a tensor tree, and the material of Radiance beside it, which ends in ``.rad``.
 
-    Parameters
-    ----------
-    table : Table
-        Table in memory.
-    path : path
-        The XML file; the material beside it ends in ``.rad``. Files that are there are replaced.
-    tolerance : float [1]
-        Largest p99 of the error; the smallest tree within it is written.
-    cells : float
-        Most cells of a tree, of about 7 bytes each. Narrow lobes would need more than any scene can load: where the
-        tolerance is out of reach, a third of these cells is spent, and the file states the error it has.
-    verdict : str, optional
-        Verdict of the audit of this revision.
-
-    Raises
-    ------
-    CannotHoldError
-        If the table has several wavelengths that do not reach over the visible ones.
-    WriteError
-        If a file cannot be written.
-
-    Notes
-    -----
     Isotropic tables become trees of rank 3, others of rank 4. Colour is written as CIE-u and CIE-v blocks, which are
-    what Radiance reads in trees. A table of one wavelength is written as the Visible block.
+    what Radiance reads in trees. A table of one wavelength is written as the Visible block. Narrow lobes would need
+    more cells than any scene can load: where the tolerance is out of reach, a third of `cells` is spent, and the file
+    states the error it has.
     """
     from brdfdb.formats._record import record, specular_remark
     from brdfdb.formats._stated_error import FLOOR, Comparison
@@ -213,20 +192,6 @@ def recognises(head: bytes) -> bool:
 def read(path: str | os.PathLike[str]) -> FileTable:
     """Return f_r of the front of a tensor tree, evaluated as Radiance does: the value of the cell.
 
-    Parameters
-    ----------
-    path : path
-        File of this package, or of others.
-
-    Raises
-    ------
-    FileFormatError
-        If the file is damaged or is no tensor tree.
-    OSError
-        If it cannot be read.
-
-    Notes
-    -----
     Radiance varies the values by up to 2e-4 from cell to cell, so that it can tell cells apart; this is left out.
     """
     from brdfdb.formats._readings import FileTable

@@ -65,34 +65,10 @@ def write(
 ) -> Written:
     """Write a table as a tensor file.
 
-    Parameters
-    ----------
-    table : Table
-        Table in memory.
-    path : path
-        The file; one that is there is replaced.
-    kind : str
-        "spectral" for spectral renderers: all wavelengths of the table. "rgb" for others: linear sRGB under D65. They
-        are files of their own, because no reader takes the other kind.
-    tolerance : float [1]
-        Largest error against the table that 99 of 100 values may have: the smallest file within it is written.
-    megabytes : float [1e6 byte]
-        Largest size of the file; where it is not enough, the file with the least error of that size is written.
-    azimuth : str
-        "reduced" leaves out azimuths of the light that follow from the symmetry of an anisotropic table, as only
-        Mitsuba 3 knows it. "full" is also for pbrt-v4 and RGL's loader: within the same error, the file is up to four
-        times as large.
-    verdict : str, optional
-        Verdict of the audit of this revision.
-
-    Raises
-    ------
-    CannotHoldError
-        If the kind is "rgb", and the table has several wavelengths that do not reach over the visible ones.
-    ParameterError
-        If no file of this table is so small.
-    WriteError
-        If the file cannot be written.
+    The kind "spectral" is for spectral renderers and has all wavelengths of the table. "rgb" is for others: linear sRGB
+    under D65. No reader takes the other kind. `azimuth` "reduced" leaves out azimuths of the light that follow from the
+    symmetry of an anisotropic table, as only Mitsuba 3 knows it. "full" is also for pbrt-v4 and RGL's loader: within
+    the same error, the file is up to four times as large.
     """
     from brdfdb.formats._record import U_AXIS, frame_remark, record, specular_remark
     from brdfdb.formats._written import Written, whole
@@ -122,15 +98,7 @@ def recognises(head: bytes) -> bool:
 
 
 def read(path: str | os.PathLike[str]) -> FileTable:
-    """Return f_r of a tensor file as Mitsuba's `measured` evaluates it.
-
-    Raises
-    ------
-    FileFormatError
-        If the file is damaged, or no measured material of RGL.
-    OSError
-        If it cannot be read.
-    """
+    """Return f_r of a tensor file as Mitsuba's `measured` evaluates it."""
     from brdfdb.formats._channels import RGB
     from brdfdb.formats._readings import FileTable
     from brdfdb.formats._record import document_of

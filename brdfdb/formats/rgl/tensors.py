@@ -46,15 +46,7 @@ def write_tensors(path: Path, arrays: Mapping[str, NDArray[Any]]) -> None:
 
 
 def read_tensors(path: str | os.PathLike[str]) -> dict[str, NDArray[Any]]:
-    """Return the arrays of a tensor file by name.
-
-    Raises
-    ------
-    FileFormatError
-        If it is no tensor file, or a field does not lie in it.
-    OSError
-        If it cannot be read.
-    """
+    """Return the arrays of a tensor file by name; FileFormatError if it is no tensor file or is damaged."""
     with path_of(path).open("rb") as file:
         if not file.read(1):
             raise FileFormatError(f"{path}: it is no tensor file")
