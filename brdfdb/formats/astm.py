@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from brdfdb.errors import FileFormatError
 from brdfdb.formats._angles import Spherical
-from brdfdb.formats._angular_grid import SIZE, AngularGrid, Sink, chosen, rounded
+from brdfdb.formats._angular_grid import SIZE, AngularGrid, Sink, chosen
 from brdfdb.formats._input import lines_of
 from brdfdb.formats._interface import TOLERANCE
 from brdfdb.formats._nodes import samples_at_angles, without_holes
@@ -82,7 +82,7 @@ def write(
         tolerance,
         size,
         write_all,
-        lambda some: AngularGrid(some.system, some.nodes, rounded(some.values)),
+        as_text=True,
     )
     with whole(path) as (file,), file.open("wb") as stream:
         write_all(stream, grid, error)

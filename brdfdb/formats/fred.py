@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from brdfdb.errors import CannotHoldError, FileFormatError, counted
 from brdfdb.formats._angles import Spherical
-from brdfdb.formats._angular_grid import SIZE, AngularGrid, Sink, chosen, rounded
+from brdfdb.formats._angular_grid import SIZE, AngularGrid, Sink, chosen
 from brdfdb.formats._channels import at_wavelength
 from brdfdb.formats._input import lines_of
 from brdfdb.formats._interface import TOLERANCE, WAVELENGTH
@@ -92,7 +92,7 @@ def write(
         tolerance,
         size,
         write_all,
-        lambda some: AngularGrid(some.system, some.nodes, rounded(some.values)),
+        as_text=True,
     )
     with whole(path, beside(path)) as (file, there):
         with file.open("wb") as stream:

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from brdfdb.errors import FileFormatError
 from brdfdb.formats._angles import Specular
-from brdfdb.formats._angular_grid import SIZE, AngularGrid, Sink, chosen, rounded
+from brdfdb.formats._angular_grid import SIZE, AngularGrid, Sink, chosen
 from brdfdb.formats._channels import LUMINOUS, XYZ, channels_of
 from brdfdb.formats._input import Words
 from brdfdb.formats._interface import TOLERANCE, Option
@@ -97,7 +97,7 @@ def write(
         tolerance,
         size,
         write_all,
-        lambda some: AngularGrid(some.system, some.nodes, rounded(some.values)),
+        as_text=True,
     )
     with whole(path) as (file,), file.open("wb") as stream:
         write_all(stream, grid, error)
