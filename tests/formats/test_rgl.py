@@ -18,7 +18,7 @@ from brdfdb.errors import FileFormatError, ParameterError, WriteError
 from brdfdb.formats import rgl
 from brdfdb.formats._readings import FileTable
 from brdfdb.formats._stated_error import Comparison
-from brdfdb.formats.rgl.fields import Mixture, Warp, fields_of
+from brdfdb.formats.rgl.fields import MixedSlices, Warp, fields_of
 from brdfdb.formats.rgl.tensors import read_tensors, write_tensors
 from brdfdb.geometry import unit_vector
 from brdfdb.tables.albedo import directional_albedo
@@ -261,13 +261,13 @@ def test_a_warp_and_its_inverse() -> None:
     x, y = warp.forward(9)
     s = np.linspace(0.0, 1.0, 9)
     for number in range(3):
-        alone = Mixture(np.full((1, 81), number), np.ones((1, 81)))
+        alone = MixedSlices(np.full((1, 81), number), np.ones((1, 81)))
         s_x, s_y = warp.inverse(alone, x[number].reshape(-1), y[number].reshape(-1))
         np.testing.assert_allclose(s_x.reshape(9, 9), np.tile(s, (9, 1)), atol=1e-12)
         np.testing.assert_allclose(s_y.reshape(9, 9), np.tile(s, (9, 1)).T, atol=1e-12)
     fine = (np.arange(400) + 0.5) / 400
     everywhere = [axis.reshape(-1) for axis in np.meshgrid(fine, fine)]
-    mixed = Mixture(np.tile([[0], [2]], 160000), np.tile([[0.25], [0.75]], 160000))
+    mixed = MixedSlices(np.tile([[0], [2]], 160000), np.tile([[0.25], [0.75]], 160000))
     assert np.mean(warp.density(mixed, *everywhere)) == pytest.approx(1.0, abs=1e-4)
 
 

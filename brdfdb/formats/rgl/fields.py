@@ -6,7 +6,7 @@ import functools
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -103,14 +103,14 @@ class Fields:
 
     def evaluate(self, wi: Floats, wr: Floats) -> Floats:
         """Return f_r [1/sr], shape (M, W), at unit vectors (M, 3) above the horizon."""
-        return self.at(Places.of(wi, wr, self.isotropic, self.reduction))
+        return self.at(SquarePlaces.of(wi, wr, self.isotropic, self.reduction))
 
-    def at(self, places: Places) -> Array:
+    def at(self, places: SquarePlaces) -> Array:
         """Return f_r [1/sr], shape (M, W), at places."""
         mixture = self.mixture(places)
         s_x, s_y = self.warp.inverse(mixture, places.u_m[0], places.u_m[1])
         size = self.spectra.shape[-1]
-        (i, u), (j, v) = cell(s_x, size), cell(s_y, size)
+        (i, u), (j, v) = Interval.even(s_x, size), Interval.even(s_y, size)
         values = np.zeros((len(i), self.spectra.shape[2]))
         for di, dj, weight in ((0, 0, (1 - u) * (1 - v)), (1, 0, u * (1 - v)), (0, 1, (1 - u) * v), (1, 1, u * v)):
             values += weight[:, np.newaxis] * mixture.of(self._last_channels, j + dj, i + di)
@@ -118,8 +118,8 @@ class Fields:
             values *= (bilinear(self.ndf, *places.u_m) / (4.0 * bilinear(self.sigma, *places.u_i)))[:, np.newaxis]
         return np.asarray(values / places.cosine[:, np.newaxis])
 
-    def at_nodes(self) -> tuple[Array, Array, Array]:
-        """Return light and viewer (M, 3) of all values, and f_r (M, W) [1/sr]; viewers may be below the horizon."""
+    def at_nodes(self) -> LightsAndViewers:
+        """Return all values with their light and viewer."""
         phi_i, theta_i = np.meshgrid(self.phi_i.astype(np.float64), self.theta_i.astype(np.float64), indexing="ij")
         wi = np.stack([np.sin(theta_i) * np.cos(phi_i), np.sin(theta_i) * np.sin(phi_i), np.cos(theta_i)], axis=-1)
         size = self.spectra.shape[-1]
@@ -136,22 +136,22 @@ class Fields:
             values = values * (bilinear(self.ndf, u_x.reshape(-1), u_y.reshape(-1)) / (4.0 * sigma))[:, np.newaxis]
         above = wr[:, 2] > 0.0
         cosine = np.where(above, wr[:, 2], 1.0)
-        return wi, wr, values / cosine[:, np.newaxis]
+        return LightsAndViewers(wi, wr, values / cosine[:, np.newaxis])
 
-    def mixture(self, places: Places) -> Mixture:
+    def mixture(self, places: SquarePlaces) -> MixedSlices:
         """Return the slices that are mixed at places."""
-        j, v = _between(self.theta_i, places.theta_i)
+        j, v = Interval.between(self.theta_i, places.theta_i)
         if self.phi_i.size == 1:
             step = min(1, self.theta_i.size - 1)
-            return Mixture(np.stack([j, j + step]), np.stack([1.0 - v, v]))
-        i, u = _between(self.phi_i, places.phi_i)
+            return MixedSlices(np.stack([j, j + step]), np.stack([1.0 - v, v]))
+        i, u = Interval.between(self.phi_i, places.phi_i)
         step, count = min(1, self.theta_i.size - 1), self.theta_i.size
         numbers = [i * count + j, i * count + j + step, (i + 1) * count + j, (i + 1) * count + j + step]
-        return Mixture(np.stack(numbers), np.stack([(1 - u) * (1 - v), (1 - u) * v, u * (1 - v), u * v]))
+        return MixedSlices(np.stack(numbers), np.stack([(1 - u) * (1 - v), (1 - u) * v, u * (1 - v), u * v]))
 
 
 @dataclass(frozen=True, eq=False)
-class Places:
+class SquarePlaces:
     """Pairs of directions in the coordinates of a file.
 
     Attributes
@@ -171,18 +171,22 @@ class Places:
     cosine: Array
 
     @classmethod
-    def of(cls, wi: Floats, wr: Floats, isotropic: bool, reduction: int = 1) -> Places:
+    def of(cls, wi: Floats, wr: Floats, isotropic: bool, reduction: int = 1) -> SquarePlaces:
         """Return the places of unit vectors (M, 3) of light and viewer."""
-        light, viewer = wi.astype(np.float64), wr.astype(np.float64)
+        light = wi.astype(np.float64)
+        viewer = wr.astype(np.float64)
         if reduction >= 2:  # the light is mirrored, or turned, into the part of the circle from -pi on
             flip_y = np.where(light[:, 1] > 0.0, -1.0, 1.0)
             flip_x = np.where(light[:, 0] > 0.0, -1.0, 1.0) if reduction == 4 else flip_y
             flips = np.stack([flip_x, flip_y, np.ones_like(flip_x)], axis=-1)
-            light, viewer = light * flips, viewer * flips
+            light = light * flips
+            viewer = viewer * flips
         m = light + viewer
         m = m / np.linalg.norm(m, axis=-1, keepdims=True)
-        theta_i, theta_m = _polar_angle(light), _polar_angle(m)
-        phi_i, phi_m = np.arctan2(light[:, 1], light[:, 0]), np.arctan2(m[:, 1], m[:, 0])
+        theta_i = _polar_angle(light)
+        theta_m = _polar_angle(m)
+        phi_i = np.arctan2(light[:, 1], light[:, 0])
+        phi_m = np.arctan2(m[:, 1], m[:, 0])
         u_y = of_azimuth(phi_m - phi_i if isotropic else phi_m)
         u_m = np.stack([of_polar_angle(theta_m), u_y - np.floor(u_y)])
         return cls(theta_i, phi_i, np.stack([of_polar_angle(theta_i), of_azimuth(phi_i)]), u_m, viewer[:, 2])
@@ -265,25 +269,16 @@ def of_azimuth(phi: Array) -> Array:
     return np.asarray((phi + np.pi) / (2.0 * np.pi))
 
 
-def _between(nodes: Floats32, wanted: Array) -> tuple[NDArray[np.int64], Array]:
-    """Return the interval of ascending nodes that holds numbers, and the place in it, in [0, 1]."""
-    if nodes.size == 1:
-        return np.zeros(wanted.shape, np.int64), np.zeros(wanted.shape)
-    exact = nodes.astype(np.float64)
-    index = np.clip(np.searchsorted(exact, wanted) - 1, 0, nodes.size - 2)
-    return index, np.clip((wanted - exact[index]) / (exact[index + 1] - exact[index]), 0.0, 1.0)
-
-
 def bilinear(values: Floats32, x: Array, y: Array) -> Array:
     """Return values (rows, columns) at points of the unit square."""
-    (i, u), (j, v) = cell(x, values.shape[1]), cell(y, values.shape[0])
+    (i, u), (j, v) = Interval.even(x, values.shape[1]), Interval.even(y, values.shape[0])
     exact = values.astype(np.float64)
     low = (1.0 - u) * exact[j, i] + u * exact[j, i + 1]
     return np.asarray((1.0 - v) * low + v * ((1.0 - u) * exact[j + 1, i] + u * exact[j + 1, i + 1]))
 
 
 @dataclass(frozen=True, eq=False)
-class Mixture:
+class MixedSlices:
     """Slices that are mixed for each of M points: their numbers and weights, both of shape (K, M)."""
 
     numbers: NDArray[np.int64]
@@ -297,11 +292,49 @@ class Mixture:
         return np.asarray(mixed)
 
 
-def cell(x: Array, size: int) -> tuple[NDArray[np.int64], Array]:
-    """Return the cell, of `size` nodes over [0, 1], and the place within it, in [0, 1], of points."""
-    scaled = np.clip(x, 0.0, 1.0) * (size - 1)
-    index = np.minimum(scaled.astype(np.int64), size - 2)
-    return index, scaled - index
+class Interval(NamedTuple):
+    """Intervals between ascending nodes that hold numbers, and the shares of them, in [0, 1], below the numbers."""
+
+    number: NDArray[np.int64]
+    share: Array
+
+    @classmethod
+    def even(cls, x: Array, size: int) -> Interval:
+        """Return the intervals of points of [0, 1] between `size` nodes at equal distances."""
+        scaled = np.clip(x, 0.0, 1.0) * (size - 1)
+        index = np.minimum(scaled.astype(np.int64), size - 2)
+        return cls(index, scaled - index)
+
+    @classmethod
+    def between(cls, nodes: Floats32, wanted: Array) -> Interval:
+        """Return the intervals of numbers between nodes; of one node there is none, and the share is 0."""
+        if nodes.size == 1:
+            return cls(np.zeros(wanted.shape, np.int64), np.zeros(wanted.shape))
+        exact = nodes.astype(np.float64)
+        index = np.clip(np.searchsorted(exact, wanted) - 1, 0, nodes.size - 2)
+        return cls(index, np.clip((wanted - exact[index]) / (exact[index + 1] - exact[index]), 0.0, 1.0))
+
+
+class SquarePoints(NamedTuple):
+    """Points of the unit square."""
+
+    x: Array
+    y: Array
+
+
+class LightsAndViewers(NamedTuple):
+    """Unit vectors (M, 3) of light and viewer, and f_r (M, W) [1/sr]; viewers may be below the horizon."""
+
+    wi: Array
+    wr: Array
+    values: Array
+
+
+class Edges(NamedTuple):
+    """Values on the left and on the right edge of cells."""
+
+    left: Array
+    right: Array
 
 
 class Warp:
@@ -322,21 +355,19 @@ class Warp:
         rows = np.zeros(ends.shape)
         np.cumsum(0.5 * (ends[:, :-1] + ends[:, 1:]), axis=-1, out=rows[:, 1:])
         scale = 1.0 / rows[:, -1:]
-        self._density, self._columns, self._rows = (
-            exact * scale[..., np.newaxis],
-            columns * scale[..., np.newaxis],
-            rows * scale,
-        )
+        self._density = exact * scale[..., np.newaxis]
+        self._columns = columns * scale[..., np.newaxis]
+        self._rows = rows * scale
 
-    def density(self, mixture: Mixture, x: Array, y: Array) -> Array:
+    def density(self, mixture: MixedSlices, x: Array, y: Array) -> Array:
         """Return the density at points (M,) of the unit square."""
-        (i, u), (j, v) = cell(x, self.columns), cell(y, self.rows)
+        (i, u), (j, v) = Interval.even(x, self.columns), Interval.even(y, self.rows)
         low, high = self._edges(mixture, i, j, v)
         return np.asarray(((1.0 - u) * low + u * high) * (self.rows - 1) * (self.columns - 1))
 
-    def inverse(self, mixture: Mixture, x: Array, y: Array) -> tuple[Array, Array]:
+    def inverse(self, mixture: MixedSlices, x: Array, y: Array) -> SquarePoints:
         """Return the uniform numbers that the warp takes to points (M,) of the unit square."""
-        (i, u), (j, v) = cell(x, self.columns), cell(y, self.rows)
+        (i, u), (j, v) = Interval.even(x, self.columns), Interval.even(y, self.rows)
         low, high = self._edges(mixture, i, j, v)
         last = np.full_like(i, self.columns - 1)
         below = (1.0 - v) * mixture.of(self._columns, j, i) + v * mixture.of(self._columns, j + 1, i)
@@ -345,13 +376,13 @@ class Warp:
         part = below + u * (low + 0.5 * u * (high - low))
         s_x = np.divide(part, whole, out=np.zeros_like(part), where=whole > 0.0)  # no density on the line
         s_y = mixture.of(self._rows, j) + v * (row + 0.5 * v * (above - row))
-        return s_x, s_y
+        return SquarePoints(s_x, s_y)
 
-    def forward(self, size: int) -> tuple[Array, Array]:
+    def forward(self, size: int) -> SquarePoints:
         """Return the points x, y, shape (slices, size, size), that the warps take a grid of uniform numbers to."""
         s = np.linspace(0.0, 1.0, size)
         slices = np.arange(len(self._rows))[:, np.newaxis]
-        j = _interval(self._rows, np.broadcast_to(s, (len(slices), size)))
+        j = _interval_of_lines(self._rows, np.broadcast_to(s, (len(slices), size)))
         ends = self._columns[..., -1]
         row, above = ends[slices, j], ends[slices, j + 1]
         v = _root(s - self._rows[slices, j], row, above)
@@ -359,22 +390,22 @@ class Warp:
         columns = (1.0 - part) * self._columns[slices, j] + part * self._columns[slices, j + 1]
         density = (1.0 - part) * self._density[slices, j] + part * self._density[slices, j + 1]
         flat, wanted = columns.reshape(-1, self.columns), s * columns[..., -1:].reshape(-1, 1)
-        i = _interval(flat, wanted)
+        i = _interval_of_lines(flat, wanted)
         lines = np.arange(len(flat))[:, np.newaxis]
         dense = density.reshape(-1, self.columns)
         u = _root(wanted - flat[lines, i], dense[lines, i], dense[lines, i + 1])
         x = ((i + u) / (self.columns - 1)).reshape(len(slices), size, size)
         y = ((j + v) / (self.rows - 1))[..., np.newaxis]
-        return x, np.broadcast_to(y, x.shape)
+        return SquarePoints(x, np.broadcast_to(y, x.shape))
 
-    def _edges(self, mixture: Mixture, i: NDArray[np.int64], j: NDArray[np.int64], v: Array) -> tuple[Array, Array]:
+    def _edges(self, mixture: MixedSlices, i: NDArray[np.int64], j: NDArray[np.int64], v: Array) -> Edges:
         """Return the values on the left and on the right edge of cells at the height v."""
         low = (1.0 - v) * mixture.of(self._density, j, i) + v * mixture.of(self._density, j + 1, i)
         high = (1.0 - v) * mixture.of(self._density, j, i + 1) + v * mixture.of(self._density, j + 1, i + 1)
-        return low, high
+        return Edges(low, high)
 
 
-def _interval(nodes: Array, wanted: Array) -> NDArray[np.int64]:
+def _interval_of_lines(nodes: Array, wanted: Array) -> NDArray[np.int64]:
     """Return the interval of each line of ascending nodes (lines, n) that holds wanted numbers (lines, m)."""
     scale = nodes[:, -1:]
     lines = np.arange(len(nodes))[:, np.newaxis] * 2.0

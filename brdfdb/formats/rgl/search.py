@@ -5,15 +5,15 @@ from __future__ import annotations
 import functools
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.errors import ParameterError
 from brdfdb.formats._channels import RGB, Channels, channels_of
-from brdfdb.formats.rgl.fields import Array, Fields, Floats32, Mixture, Warp, bilinear, of_azimuth, of_polar_angle
-from brdfdb.formats.rgl.surface import LAST_THETA, Surface, densities, lights
+from brdfdb.formats.rgl.fields import Array, Fields, Floats32, MixedSlices, Warp, bilinear, of_azimuth, of_polar_angle
+from brdfdb.formats.rgl.surface import LAST_THETA, HalfVectorSurface, densities, lights
 from brdfdb.parameters import Floats
 
 if TYPE_CHECKING:
@@ -22,22 +22,12 @@ if TYPE_CHECKING:
 
 GREY_NM = 550.0  # the wavelength of grey tables; readers continue a single one to all
 _HORIZON = 0.94  # share of rows above the horizon, of warps that end there
-# Rungs from small to large: size, lights, and azimuths of a quarter
-_ISOTROPIC = (
-    *((10, 8), (14, 11), (20, 15), (28, 22), (36, 28), (44, 34), (52, 40), (58, 45)),
-    *((64, 50), (72, 56), (80, 62), (88, 69), (96, 76), (106, 84), (116, 92)),
-)
-_ANISOTROPIC = (
-    (16, 8, 5),
-    (24, 12, 7),
-    (32, 16, 9),
-    (40, 19, 11),
-    (48, 23, 13),
-    (56, 26, 15),
-    (64, 30, 17),
-    (74, 35, 19),
-    (84, 40, 22),
-)
+# Rungs from small to large: rows and columns, lights, and azimuths of a quarter of anisotropic tables
+_SIZES = (10, 14, 20, 28, 36, 44, 52, 58, 64, 72, 80, 88, 96, 106, 116)
+_LIGHTS = (8, 11, 15, 22, 28, 34, 40, 45, 50, 56, 62, 69, 76, 84, 92)
+_ANISOTROPIC_SIZES = (16, 24, 32, 40, 48, 56, 64, 74, 84)
+_ANISOTROPIC_LIGHTS = (8, 12, 16, 19, 23, 26, 30, 35, 40)
+_AZIMUTHS = (5, 7, 9, 11, 13, 15, 17, 19, 22)
 _FIRST = 5  # rung that is tried first
 _STEP = 1.4  # factor by which the error falls, about, from rung to rung
 _COARSE = 30  # size below which densities have half of the nodes
@@ -51,13 +41,13 @@ _LEAST_LUMINANCE = 1e-6  # share of the mean density of samples that each place 
 # Readers join values by straight lines, which lie above a bend by h**2/8 f''. Values that are lower by a part of that
 # leave half of it on either side
 _LOWERED = 1.0 / 20.0
-# Mitsuba reads a light in the plane y = 0 as one at +pi, and continues the last azimuth to it. In files of a quarter it
-# is one more, with the values of -pi, which no other light reads; the quarter is still one [rad]
+# Mitsuba reads a light in the plane y = 0 at the azimuth +pi, and continues the last azimuth to it. Files of a
+# quarter therefore have one azimuth more, this far beyond the quarter [rad], with the values of -pi
 _BEYOND = 0.2
 
 
 @dataclass(frozen=True, eq=False)
-class Fit:
+class RglFit:
     """The fields of a file, its error, the names of its channels, and remarks."""
 
     fields: Fields
@@ -66,7 +56,7 @@ class Fit:
     remarks: tuple[str, ...]
 
 
-def smallest(table: Table, kind: str, tolerance: float, most_bytes: float, full: bool = False) -> Fit:
+def smallest(table: Table, kind: str, tolerance: float, most_bytes: float, full: bool = False) -> RglFit:
     """Return the smallest file within a tolerance, or the best one of at most so many bytes.
 
     Parameters
@@ -100,7 +90,7 @@ def smallest(table: Table, kind: str, tolerance: float, most_bytes: float, full:
 
 
 @functools.lru_cache(maxsize=2)
-def _smallest_grey(table: Table, tolerance: float, most_bytes: float, full: bool, copies: int = 1) -> Fit:
+def _smallest_grey(table: Table, tolerance: float, most_bytes: float, full: bool, copies: int = 1) -> RglFit:
     """Return the file of a grey table, which holds its values so many times.
 
     Those for both kinds of renderers have the same values, if both are small enough.
@@ -108,12 +98,12 @@ def _smallest_grey(table: Table, tolerance: float, most_bytes: float, full: bool
     return _smallest(table, "spectral", tolerance, most_bytes, full, copies)
 
 
-def _smallest(table: Table, kind: str, tolerance: float, most_bytes: float, full: bool, copies: int = 1) -> Fit:
+def _smallest(table: Table, kind: str, tolerance: float, most_bytes: float, full: bool, copies: int = 1) -> RglFit:
     from brdfdb.formats._stated_error import Comparison
 
     channels = channels_of(table, "" if kind == "spectral" else "rgb")
     remarks = channels.remarks
-    search = _Search(table, Comparison(table, channels), kind, tolerance, full)
+    search = _RglSearch(table, Comparison(table, channels), kind, tolerance, full)
     if search.surface.reduction > 1:
         remarks += (
             f"the file holds {_PART[search.surface.reduction]} of the azimuths of the light, which Mitsuba 3 mirrors; "
@@ -121,12 +111,19 @@ def _smallest(table: Table, kind: str, tolerance: float, most_bytes: float, full
         )
     ladders = search.ladders(most_bytes, copies)
     first = [search.p99(plans[min(_FIRST, len(plans) - 1)]) for plans in ladders]
-    fields, error = search.best(ladders[int(np.argmin(first))])
+    best = search.best(ladders[int(np.argmin(first))])
     names = channels.names if search.nodes is None else tuple(f"{value:g}nm" for value in search.nodes)
-    return Fit(fields, error, names, remarks)
+    return RglFit(best.fields, best.error, names, remarks)
 
 
-class _Search:
+class FittedFields(NamedTuple):
+    """The fields of a file, and its error against the table."""
+
+    fields: Fields
+    error: FileError
+
+
+class _RglSearch:
     """Files of one table, compared with it."""
 
     def __init__(self, table: Table, comparison: Comparison, kind: str, tolerance: float, full: bool) -> None:
@@ -136,30 +133,32 @@ class _Search:
         self._kept = np.arange(len(channels.names)) if at is None else _thinned(comparison, at, tolerance)
         self.nodes = None if at is None else at[self._kept]
         self._mixing = None if at is None else _lines(at, at[self._kept])
-        self._known: dict[Plan, float] = {}
-        self._files: dict[Plan, Fields] = {}
+        self._known: dict[RglPlan, float] = {}
+        self._files: dict[RglPlan, Fields] = {}
         self._of_file: Floats32 | None = None
         if kind == "spectral":
             self._of_file = np.array([GREY_NM] if self.nodes is None else self.nodes, np.float32)
-        self.surface = Surface(table, _some(channels, self._kept), full)
+        self.surface = HalfVectorSurface(table, _some(channels, self._kept), full)
         few = np.unique(np.linspace(0, self._kept.size - 1, _FEW).astype(np.int64))
         self._few, self._sample = few, self.surface
         if few.size < self._kept.size:
-            self._sample = Surface(table, _some(channels, self._kept[few]), full)
+            self._sample = HalfVectorSurface(table, _some(channels, self._kept[few]), full)
 
-    def ladders(self, most_bytes: float, copies: int = 1) -> list[list[Plan]]:
+    def ladders(self, most_bytes: float, copies: int = 1) -> list[list[RglPlan]]:
         """Return plans from small to large: of isotropic tables with both kinds of warps.
 
         The values are held so many times. ParameterError if there is none of at most so many bytes.
         """
         if self.surface.isotropic:
-            soft = [Plan(s, n, 1, *((33, 65) if s > _COARSE else (17, 33))) for s, n in _ISOTROPIC]
-            hard = [Plan(s, n, 1, *((65, 65) if s > _COARSE else (33, 33)), _HORIZON) for s, n in _ISOTROPIC]
+            rungs = list(zip(_SIZES, _LIGHTS, strict=True))
+            soft = [RglPlan(s, n, 1, *((33, 65) if s > _COARSE else (17, 33))) for s, n in rungs]
+            hard = [RglPlan(s, n, 1, *((65, 65) if s > _COARSE else (33, 33)), _HORIZON) for s, n in rungs]
             ladders = [soft, hard]
         else:
             parts = 4 // self.surface.reduction
+            quarters = zip(_ANISOTROPIC_SIZES, _ANISOTROPIC_LIGHTS, _AZIMUTHS, strict=True)
             ladders = [
-                [Plan(s, n, parts * (p - 1) + 1, *((33, 33) if s > _COARSE else (17, 17))) for s, n, p in _ANISOTROPIC]
+                [RglPlan(s, n, parts * (p - 1) + 1, *((33, 33) if s > _COARSE else (17, 17))) for s, n, p in quarters]
             ]
         fitting = [[plan for plan in ladder if self._nbytes(plan, copies) <= most_bytes] for ladder in ladders]
         if not any(fitting):
@@ -172,7 +171,7 @@ class _Search:
             )
         return [ladder for ladder in fitting if ladder]
 
-    def best(self, ladder: list[Plan]) -> tuple[Fields, FileError]:
+    def best(self, ladder: list[RglPlan]) -> FittedFields:
         """Return the first of a ladder within the tolerance, else the last."""
         low, high, rung = 0, len(ladder) - 1, min(_FIRST, len(ladder) - 1)
         while low < high:
@@ -185,9 +184,9 @@ class _Search:
             error = self._comparison.error_of(functools.partial(self._evaluated, fields))
             if error.p99 <= self._tolerance:
                 break
-        return fields, error
+        return FittedFields(fields, error)
 
-    def _built(self, plan: Plan) -> Fields:
+    def _built(self, plan: RglPlan) -> Fields:
         """Return the fields of a plan with all channels; those of the last few plans are kept."""
         if plan not in self._files:
             if len(self._files) >= _REMEMBERED:
@@ -195,7 +194,7 @@ class _Search:
             self._files[plan] = build(self.surface, plan, self._of_file)
         return self._files[plan]
 
-    def p99(self, plan: Plan) -> float:
+    def p99(self, plan: RglPlan) -> float:
         """Return p99 of a plan over a few channels."""
         if plan not in self._known:
             whole = self._sample is self.surface
@@ -214,7 +213,7 @@ class _Search:
         values = fields.evaluate(wi, wr)
         return values if self._mixing is None else np.asarray(values @ self._mixing)
 
-    def _nbytes(self, plan: Plan, copies: int) -> int:
+    def _nbytes(self, plan: RglPlan, copies: int) -> int:
         """Return the size of the values of a plan [byte]."""
         texels = (copies * self._kept.size + 1) * plan.size**2 + plan.rows * plan.columns
         azimuths = plan.azimuths + (1 if self.surface.reduction == 4 else 0)  # as `build` adds one
@@ -252,7 +251,7 @@ def _lines(at: Floats, nodes: Floats) -> Floats:
 
 
 @dataclass(frozen=True)
-class Plan:
+class RglPlan:
     """Numbers of nodes of a file.
 
     Attributes
@@ -277,7 +276,7 @@ class Plan:
     horizon: float = 0.0
 
 
-def build(surface: Surface, plan: Plan, wavelength_nm: Floats32 | None) -> Fields:
+def build(surface: HalfVectorSurface, plan: RglPlan, wavelength_nm: Floats32 | None) -> Fields:
     """Return the fields of a table, whose channels have these wavelengths, or are R, G, B."""
     part = np.linspace(0.0, 1.0, plan.lights)
     theta_i = (LAST_THETA * (1.0 - (1.0 - part) ** _TOWARDS_GRAZING)).astype(np.float32)
@@ -291,7 +290,11 @@ def build(surface: Surface, plan: Plan, wavelength_nm: Floats32 | None) -> Field
     warp = Warp(vndf)
     x, y = warp.forward(plan.size)
     values = surface.values(wi, x, y)
-    luminance = np.maximum(values.brdf.mean(axis=-1) * values.solid_angle, 0.0) / _of_each(warp, x, y)
+    # The density of each slice at its own points
+    numbers = np.repeat(np.arange(len(x)), plan.size**2)
+    slices = MixedSlices(numbers[np.newaxis], np.ones((1, numbers.size)))
+    density = warp.density(slices, x.reshape(-1), y.reshape(-1)).reshape(x.shape)
+    luminance = np.maximum(values.brdf.mean(axis=-1) * values.solid_angle, 0.0) / density
     mean = luminance.mean(axis=(1, 2), keepdims=True)
     luminance = np.maximum(luminance, _LEAST_LUMINANCE * mean) + 1e-30
     u_i = of_polar_angle(np.tile(theta_i.astype(np.float64), phi_i.size)), of_azimuth(np.repeat(phi_i, theta_i.size))
@@ -318,13 +321,6 @@ def build(surface: Surface, plan: Plan, wavelength_nm: Floats32 | None) -> Field
         spectra=np.maximum(spectra, 0.0).astype(np.float32),
         wavelength_nm=wavelength_nm,
     )
-
-
-def _of_each(warp: Warp, x: Array, y: Array) -> Array:
-    """Return the density of each slice at its own points (slices, n, n)."""
-    numbers = np.repeat(np.arange(len(x)), x.shape[1] * x.shape[2])
-    alone = Mixture(numbers[np.newaxis], np.ones((1, numbers.size)))
-    return warp.density(alone, x.reshape(-1), y.reshape(-1)).reshape(x.shape)
 
 
 def _bend(values: Array, axis: int, nodes: NDArray[Any]) -> Array:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -35,7 +35,7 @@ _CENTRE = 0.15  # place up to which densities grow from 0 along rows: theta_m th
 
 
 @dataclass(frozen=True, eq=False)
-class Values:
+class HalfVectorValues:
     """Values at half vectors: f_r cos(theta_r), and what belongs to it.
 
     Attributes
@@ -53,7 +53,21 @@ class Values:
     solid_angle: Array
 
 
-class Surface:
+class Factors(NamedTuple):
+    """The factor over half vectors, shape (h, w), and the divisor over the light."""
+
+    ndf: Floats32
+    sigma: Floats32
+
+
+class Bends(NamedTuple):
+    """Densities along rows (slices, rows, columns) and over the rows (slices, rows) from second derivatives."""
+
+    along: Array
+    across: Array
+
+
+class HalfVectorSurface:
     """The values of a table.
 
     Parameters
@@ -71,7 +85,7 @@ class Surface:
         self.isotropic = not table.anisotropic
         self.reduction = 1 if full or self.isotropic else _reduction(table, channels)
 
-    def values(self, wi: Array, x: Array, y: Array) -> Values:
+    def values(self, wi: Array, x: Array, y: Array) -> HalfVectorValues:
         """Return the values at lights (slices, 1, 1, 3) and half vectors x, y (slices, rows, columns).
 
         The rows are those of the unit square from 0 to 1. Of isotropic tables only half of them are looked up.
@@ -80,9 +94,11 @@ class Surface:
         if not self.isotropic:
             return self._looked_up(wi, x, y)
         half = self._looked_up(wi, x[:, : (rows + 1) // 2], y[:, : (rows + 1) // 2])
-        return Values(*(_mirrored(part, rows // 2) for part in (half.brdf, half.cosine, half.solid_angle)))
+        # The other side of the plane of incidence has the same rows in reverse order
+        parts = (half.brdf, half.cosine, half.solid_angle)
+        return HalfVectorValues(*(np.concatenate([part, part[:, : rows // 2][:, ::-1]], axis=1) for part in parts))
 
-    def _looked_up(self, wi: Array, x: Array, y: Array) -> Values:
+    def _looked_up(self, wi: Array, x: Array, y: Array) -> HalfVectorValues:
         m = directions(x, y)
         along = np.sum(wi * m, axis=-1)
         wr = 2.0 * along[..., np.newaxis] * m - wi
@@ -93,11 +109,11 @@ class Surface:
         above = np.concatenate([flat, np.minimum(height, 1.0)[..., np.newaxis]], axis=-1)
         f_r = self._channels.values(self._table, np.broadcast_to(wi, above.shape), above)
         solid_angle = 8.0 * np.pi**2 * x * np.sin(x**2 * (np.pi / 2.0)) * np.maximum(along, 0.0)
-        return Values(f_r * cosine[..., np.newaxis], cosine, solid_angle)
+        return HalfVectorValues(f_r * cosine[..., np.newaxis], cosine, solid_angle)
 
     @functools.cached_property
-    def factors(self) -> tuple[Floats32, Floats32]:
-        """The factor over half vectors, shape (h, w), and the divisor over the light, both of the mean channel.
+    def factors(self) -> Factors:
+        """The factors of the mean channel.
 
         ln f_r is taken as a sum of a function of the half vector and one of theta_i, as near as least squares come.
         """
@@ -129,12 +145,7 @@ class Surface:
         u = np.linspace(0.0, 1.0, 128)
         of_theta = np.interp(u**2 * (np.pi / 2.0), theta_i, of_light.reshape(phi_i.size, -1).mean(axis=0))
         sigma = 0.25 * np.exp(-of_theta)
-        return ndf.astype(np.float32), np.stack([sigma, sigma]).astype(np.float32)
-
-
-def _mirrored(values: Array, count: int) -> Array:
-    """Return rows with as many of them again, in reverse order: the other side of the plane of incidence."""
-    return np.concatenate([values, values[:, :count][:, ::-1]], axis=1)
+        return Factors(ndf.astype(np.float32), np.stack([sigma, sigma]).astype(np.float32))
 
 
 def lights(theta_i: Floats, phi_i: Floats) -> Array:
@@ -158,12 +169,14 @@ def _reduction(table: Table, channels: Channels) -> int:
     return 1
 
 
-def densities(surface: Surface, wi: Array, ndf: Floats32, rows: int, columns: int, horizon: float) -> Floats32:
+def densities(
+    surface: HalfVectorSurface, wi: Array, ndf: Floats32, rows: int, columns: int, horizon: float
+) -> Floats32:
     """Return densities over half vectors, shape (slices, rows, columns), for lights (slices, 1, 1, 3).
 
     Parameters
     ----------
-    surface : Surface
+    surface : HalfVectorSurface
         Values of the table.
     wi : array (slices, 1, 1, 3)
         Unit vectors of the light.
@@ -196,8 +209,8 @@ def densities(surface: Surface, wi: Array, ndf: Floats32, rows: int, columns: in
     return np.asarray(density).astype(np.float32)
 
 
-def _bends(values: Values, factor: Array, area: Array, ramp: Array) -> tuple[Array, Array]:
-    """Return densities along rows (slices, rows, columns) and over the rows (slices, rows) from second derivatives."""
+def _bends(values: HalfVectorValues, factor: Array, area: Array, ramp: Array) -> Bends:
+    """Return the densities that follow the bends of values."""
     stored = values.brdf / factor[..., np.newaxis]
     scale = np.abs(stored) + _FLOOR * np.abs(stored).mean(axis=(1, 2), keepdims=True) + 1e-30
     rows, columns = factor.shape
@@ -215,7 +228,7 @@ def _bends(values: Values, factor: Array, area: Array, ramp: Array) -> tuple[Arr
     for _ in range(_SMOOTHINGS):
         dense[:, :, 1:-1] = 0.25 * (dense[:, :, 2:] + 2.0 * dense[:, :, 1:-1] + dense[:, :, :-2])
         dense, over_rows = _smooth(dense), _smooth(over_rows)
-    return dense, over_rows
+    return Bends(dense, over_rows)
 
 
 def _up_to_horizon(dense: Array, u: Array, horizon: Array, share: float) -> Array:
