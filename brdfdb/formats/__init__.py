@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from brdfdb.errors import FileFormatError, ParameterError
 from brdfdb.formats._input import check_file
-from brdfdb.formats._interface import Exporter, Importer, Option, options_of, parsed_options, schema_of
+from brdfdb.formats._interface import Exporter, FormatOption, Importer, options_of, parsed_options, schema_of
 from brdfdb.parameters import check_nanometres
 from brdfdb.place import path_of
 
@@ -31,8 +31,8 @@ __all__ = [
     "EXPORTERS",
     "IMPORTERS",
     "Exporter",
+    "FormatOption",
     "Importer",
-    "Option",
     "members",
     "options_of",
     "packed",
@@ -110,7 +110,7 @@ def write(
     return exporter.write(table, path_of(path), verdict=verdict, **parsed)
 
 
-def served_options(file_format: str) -> dict[str, Option]:
+def served_options(file_format: str) -> dict[str, FormatOption]:
     """Return the options of a format by name, with the ranges that a service allows."""
     return {name: option.served for name, option in options_of(EXPORTERS[file_format]).items()}
 
@@ -125,7 +125,7 @@ def served_schemas() -> dict[str, tuple[dict[str, Any], str]]:
 def packed(table: Table, file_format: str, *, verdict: str, **options: Any) -> tuple[str, str, bytes]:
     """Return the name, the media type and the bytes of a file of another format; several files as a zip archive.
 
-    `options` are values that `Option.parse` returned. Errors are those of `write`.
+    `options` are values that `FormatOption.parse` returned. Errors are those of `write`.
     """
     from brdfdb.store.archive import ZIP, zipped  # the parser of the command line loads no store
 

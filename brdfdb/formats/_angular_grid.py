@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from brdfdb.errors import ParameterError
 from brdfdb.formats._angles import HalfDifference, System
-from brdfdb.formats._interface import Option
+from brdfdb.formats._interface import FormatOption
 from brdfdb.formats._node_search import Pace, Trial, finest, smallest, unevenness
 from brdfdb.formats._nodes import weighted
 from brdfdb.parameters import Floats
@@ -48,7 +48,7 @@ _SAME = 1e-3  # largest p99 between a table and its image under a symmetry
 _SAMPLE = 20_000  # nodes of the grid that the size of a node in the file is taken from
 _SHRUNK = 0.99  # share of the nodes that should fit, when a file was too large
 
-SIZE = Option(
+SIZE = FormatOption(
     "size",
     16.0,
     "largest file [MB]: a table that needs more is written with the error it has",

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from brdfdb.errors import FileFormatError, ParameterError
 from brdfdb.formats._input import check_text
-from brdfdb.formats._interface import TOLERANCE, Option
+from brdfdb.formats._interface import TOLERANCE, FormatOption
 from brdfdb.formats._nodes import samples_at_angles
 from brdfdb.formats._record import CONVENTION, history_of, record, specular_remark
 from brdfdb.place import path_of
@@ -29,17 +29,18 @@ if TYPE_CHECKING:
     from brdfdb.measurements.samples import Samples
     from brdfdb.tables.table import Table
 
+RESOLUTION = FormatOption(
+    "resolution", 0.0, "distance of nodes on all axes [degrees]; 0: few nodes, where f_r bends", low=0.0, high=45.0
+)
 OPTIONS = (
     TOLERANCE,
-    Option(
+    FormatOption(
         "axes",
         "smallest",
         "angles of the grid: light and viewer, half and difference vector, or those that take fewer values",
         choices=("smallest", "light_viewer", "half_difference"),
     ),
-    Option(
-        "resolution", 0.0, "distance of nodes on all axes [degrees]; 0: few nodes, where f_r bends", low=0.0, high=45.0
-    ),
+    RESOLUTION,
 )
 INTERPOLATION = "linear along all axes; at angles beyond the last node f_r is that of the node; 0 below the horizon"
 _CONTINUED = "where light or viewer is below the horizon f_r is 0; values of such nodes only serve interpolation"

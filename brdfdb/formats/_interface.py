@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Option:
+class FormatOption:
     """An option of a format.
 
     Attributes
@@ -44,7 +44,7 @@ class Option:
     most_served: float = math.inf
 
     @property
-    def served(self) -> Option:
+    def served(self) -> FormatOption:
         """The option with the range that a service allows."""
         return replace(self, high=min(self.high, self.most_served))
 
@@ -88,7 +88,7 @@ class Option:
 _KINDS = ((bool, "boolean"), (str, "string"), (object, "number"))
 
 
-def schema_of(of: Mapping[str, Option]) -> tuple[dict[str, Any], str]:
+def schema_of(of: Mapping[str, FormatOption]) -> tuple[dict[str, Any], str]:
     """Return the JSON Schema of an option of one or more formats, with the values that any allows, and its help.
 
     It has no default: generated clients send defaults, and a format refuses options of others.
@@ -106,7 +106,7 @@ def schema_of(of: Mapping[str, Option]) -> tuple[dict[str, Any], str]:
     return schema, ". ".join(f"{', '.join(keys)}: {sentence}" for sentence, keys in words.items())
 
 
-TOLERANCE = Option(
+TOLERANCE = FormatOption(
     "tolerance",
     0.02,
     "largest error against the table that 99 of 100 values may have: the smallest file within it is written",
@@ -119,7 +119,7 @@ FIXED = replace(
     help="largest error against the table that 99 of 100 values may have: a larger one is reported, the grid is fixed",
 )
 
-MEGABYTES = Option(
+MEGABYTES = FormatOption(
     "megabytes",
     64.0,
     "largest file [MB]: a table that needs more is written with the error it has",
@@ -128,7 +128,7 @@ MEGABYTES = Option(
     most_served=64.0,
 )
 
-WAVELENGTH = Option("wavelength", 550.0, "wavelength of a spectral table that is written [nm]", low=1.0, high=1e6)
+WAVELENGTH = FormatOption("wavelength", 550.0, "wavelength of a spectral table that is written [nm]", low=1.0, high=1e6)
 
 
 class Exporter(Protocol):
@@ -149,7 +149,7 @@ class Exporter(Protocol):
     kinds : tuple of str
         Kinds of files, one file each, that are made of one table: values of the keyword argument `kind`. Empty if one
         file holds the table.
-    options : tuple of Option
+    options : tuple of FormatOption
         All other keyword arguments.
     write : callable
         ``write(table, path, verdict=None, **options)`` writes the file, and those beside it, completely or not at all;
@@ -166,7 +166,7 @@ class Exporter(Protocol):
     summary: str
     tools: str
     kinds: tuple[str, ...]
-    options: tuple[Option, ...]
+    options: tuple[FormatOption, ...]
     write: Callable[..., Written]
 
 
@@ -191,10 +191,10 @@ class Importer(Protocol):
     read: Callable[..., FileTable | Samples]
 
 
-def options_of(exporter: Exporter) -> dict[str, Option]:
+def options_of(exporter: Exporter) -> dict[str, FormatOption]:
     """Return all options of a format by name, the kind of file among them."""
     kinds = exporter.kinds
-    kind = [Option("kind", kinds[0], "kind of file", choices=kinds)] if kinds else []
+    kind = [FormatOption("kind", kinds[0], "kind of file", choices=kinds)] if kinds else []
     return {option.name: option for option in (*kind, *exporter.options)}
 
 

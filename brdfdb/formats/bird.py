@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from brdfdb.errors import FileFormatError
 from brdfdb.formats._dense_files import (
     MOST_BYTES,
+    RESOLUTION,
     column,
     degrees_of,
     dense_record,
@@ -32,7 +33,7 @@ from brdfdb.formats._dense_files import (
     samples_of_rows,
     title_of,
 )
-from brdfdb.formats._interface import TOLERANCE, Option
+from brdfdb.formats._interface import TOLERANCE
 from brdfdb.formats._record import specular_remark
 from brdfdb.formats._written import Written, whole
 from brdfdb.place import path_of
@@ -47,10 +48,7 @@ media_type = "application/json"
 summary = "universal BRDF JSON of the project BiRD"
 tools = "BiRD view and other programs of the universal BRDF format"
 kinds = ()
-options = (
-    TOLERANCE,
-    Option("resolution", 0.0, "distance of nodes on all axes [degrees]; 0: few, where f_r bends", low=0.0, high=45.0),
-)
+options = (TOLERANCE, RESOLUTION)
 SCHEMA = "https://raw.githubusercontent.com/BiRD-project/BiRD_view/master/BRDF_JSON_schema/brdf_json_schema_v1.0.json"
 _LAST_DEG = 89.99  # polar angles stay below 90
 _DIGITS, _ENTRY_BYTES = 5, 45  # of a number, and of the numbers of one entry

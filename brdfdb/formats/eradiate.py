@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from brdfdb.errors import CannotHoldError, FileFormatError, import_extra
 from brdfdb.formats._channels import at_wavelength
 from brdfdb.formats._dense_files import record_of_attributes
-from brdfdb.formats._interface import TOLERANCE, WAVELENGTH, Option
+from brdfdb.formats._interface import TOLERANCE, WAVELENGTH, FormatOption
 from brdfdb.formats._nodes import samples_at_angles, weighted, without_holes
 from brdfdb.formats._record import history_of, record, specular_remark
 from brdfdb.formats._written import Written, whole
@@ -49,7 +49,7 @@ kinds = ()
 options = (
     TOLERANCE,
     WAVELENGTH,
-    Option(
+    FormatOption(
         "nodes",
         0,
         "number of cosines of light and viewer; 0: as few as the tolerance takes",

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.errors import ParameterError, WriteError
-from brdfdb.formats._interface import Option
+from brdfdb.formats._interface import FormatOption
 from brdfdb.formats._record import record, specular_remark
 from brdfdb.formats._written import Written, whole
 from brdfdb.place import path_of
@@ -35,9 +35,9 @@ tools = "every viewer of OpenEXR; spectral channels in the layout of Fichet et a
 SPHERE = "sphere"
 kinds = ("lobe", "half_difference", "in_plane", SPHERE)
 options = (
-    Option("theta_i", 45.0, "polar angle of the light of a lobe [degrees]", low=0.0, high=90.0),
-    Option("phi_i", 0.0, "azimuth of the light, or of the half vector [degrees]", low=-720.0, high=720.0),
-    Option("half", False, "16-bit floats, for viewing (default: 32-bit, for data)"),
+    FormatOption("theta_i", 45.0, "polar angle of the light of a lobe [degrees]", low=0.0, high=90.0),
+    FormatOption("phi_i", 0.0, "azimuth of the light, or of the half vector [degrees]", low=-720.0, high=720.0),
+    FormatOption("half", False, "16-bit floats, for viewing (default: 32-bit, for data)"),
 )
 QUANTITY = "f_r"
 UNIT = "1/sr"

@@ -22,9 +22,9 @@ from numpy.typing import NDArray
 
 from brdfdb.errors import FileFormatError, ParameterError
 from brdfdb.formats import _bsdf_xml
-from brdfdb.formats._bsdf_xml import FRONT_OF_RADIANCE, VISIBLE, Block, BsdfFile
+from brdfdb.formats._bsdf_xml import FRONT_OF_RADIANCE, VISIBLE, BsdfBlock, BsdfFile
 from brdfdb.formats._channels import LUMINOUS, XYZ, channels_of
-from brdfdb.formats._interface import FIXED, Option
+from brdfdb.formats._interface import FIXED, FormatOption
 from brdfdb.formats._nodes import samples_at_vectors
 from brdfdb.formats._written import Written, whole
 from brdfdb.parameters import Floats
@@ -115,9 +115,9 @@ tools = "WINDOW and pyWinCalc, EnergyPlus, Radiance"
 kinds = tuple(BASES)
 options = (
     FIXED,
-    Option("colour", False, "blocks of colour for Radiance; pyWinCalc refuses files that have them"),
+    FormatOption("colour", False, "blocks of colour for Radiance; pyWinCalc refuses files that have them"),
     *(
-        Option(
+        FormatOption(
             f"emissivity_{side}",
             0.0,
             f"emissivity of the {side} [1]; 0: that of the table if it covers 5 to 40 um, or else 0.9, as assumed",
@@ -226,7 +226,7 @@ def _material(emissivity: Mapping[str, float]) -> Iterator[str]:
     yield "<TIR>0</TIR>"
 
 
-def _blocks(basis: Basis, texts: list[str]) -> Iterator[Block]:
+def _blocks(basis: Basis, texts: list[str]) -> Iterator[BsdfBlock]:
     """Yield the blocks of a file: both sides and both spectra for WINDOW, the colour for Radiance."""
     visible = texts[1] if len(texts) > 1 else texts[0]
     dark = _text(np.zeros((len(basis), len(basis))))
@@ -237,10 +237,10 @@ def _blocks(basis: Basis, texts: list[str]) -> Iterator[Block]:
             ("Reflection Front", visible),
             (FRONT_OF_RADIANCE, visible),
         ):
-            yield Block(wavelength, side, basis.name, basis.name, text)
+            yield BsdfBlock(wavelength, side, basis.name, basis.name, text)
     if len(texts) > 1:
-        yield Block(CIE_X, FRONT_OF_RADIANCE, basis.name, basis.name, texts[0])
-        yield Block(CIE_Z, FRONT_OF_RADIANCE, basis.name, basis.name, texts[2])
+        yield BsdfBlock(CIE_X, FRONT_OF_RADIANCE, basis.name, basis.name, texts[0])
+        yield BsdfBlock(CIE_Z, FRONT_OF_RADIANCE, basis.name, basis.name, texts[2])
 
 
 def _text(matrix: Floats) -> str:

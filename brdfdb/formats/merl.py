@@ -21,7 +21,7 @@ from brdfdb.errors import CannotHoldError, FileFormatError
 from brdfdb.formats._angles import HALF_PI, HalfDifference
 from brdfdb.formats._angular_grid import AngularGrid, reciprocal
 from brdfdb.formats._channels import RGB, channels_of
-from brdfdb.formats._interface import FIXED, Option
+from brdfdb.formats._interface import FIXED, FormatOption
 from brdfdb.formats._nodes import samples_of_grid, without_holes
 from brdfdb.formats._record import beside, record, record_beside, specular_remark
 from brdfdb.formats._written import Written, whole
@@ -40,7 +40,7 @@ tools = "BRDF Explorer, plugins of Mitsuba and others, libbsdf"
 kinds = ()
 options = (
     FIXED,
-    Option(
+    FormatOption(
         "samples",
         "centres",
         "where values lie: at centres of bins, for readers that look one bin up (BRDF Explorer, Mitsuba plugins), or "
@@ -88,7 +88,7 @@ def write(
     if half:
         first = 0 if samples == "centres" else 1
         planes[..., SHAPE[2] // 2 :] = planes[..., first : first + SHAPE[2] // 2][..., ::-1]
-    error = comparison.error_of(_Reader(planes, samples))
+    error = comparison.error_of(MerlReader(planes, samples))
     remarks = (*channels.remarks, *specular_remark(table))
     holds = _HOLDS + ("centres of bins" if samples == "centres" else "lower edges of bins")
     document = record(table, error, verdict, holds=holds, remarks=remarks, tolerance=tolerance)
@@ -123,7 +123,7 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     samples = "edges" if known.get("samples") == "edges" else "centres"
     name = str(known.get("name") or path.stem)
     nodes = functools.partial(_samples, planes, samples, name, known)
-    return FileTable(name, RGB, None, _Reader(planes, samples), known, nodes)
+    return FileTable(name, RGB, None, MerlReader(planes, samples), known, nodes)
 
 
 def _samples(planes: Floats, samples: str, name: str, known: dict[str, Any]) -> Samples:
@@ -157,7 +157,7 @@ def _degrees_h(index: Floats) -> Floats:
     return np.asarray(index**2 / SHAPE[0])
 
 
-class _Reader:
+class MerlReader:
     """f_r [1/sr], shape (N, 3), at unit vectors (N, 3), of planes of numbers (3, theta_h, theta_d, phi_d)."""
 
     def __init__(self, planes: Floats, samples: str) -> None:

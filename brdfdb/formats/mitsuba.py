@@ -19,7 +19,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from brdfdb.formats._interface import Option
+from brdfdb.formats._interface import FormatOption
 from brdfdb.formats._record import U_AXIS, beside, frame_remark, record
 from brdfdb.formats._written import Written, whole
 from brdfdb.place import path_of
@@ -35,7 +35,9 @@ tools = "Mitsuba 3 with brdfdb.mitsuba"
 kinds: tuple[str, ...] = ()
 MODEL, TABLE = "model", "table"
 options = (
-    Option("plugin", MODEL, "the plugin of the model, if Mitsuba has one, or that of tables", choices=(MODEL, TABLE)),
+    FormatOption(
+        "plugin", MODEL, "the plugin of the model, if Mitsuba has one, or that of tables", choices=(MODEL, TABLE)
+    ),
 )
 
 VERSION = "3.0.0"

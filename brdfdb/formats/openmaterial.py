@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from brdfdb.errors import CannotHoldError, FileFormatError
 from brdfdb.formats._dense_files import (
     MOST_BYTES,
+    RESOLUTION,
     degrees_of,
     dense_record,
     parsed,
@@ -30,7 +31,7 @@ from brdfdb.formats._dense_files import (
     samples_of_rows,
     title_of,
 )
-from brdfdb.formats._interface import TOLERANCE, Option
+from brdfdb.formats._interface import TOLERANCE
 from brdfdb.formats._record import specular_remark
 from brdfdb.formats._written import Written, whole
 from brdfdb.place import path_of
@@ -45,10 +46,7 @@ media_type = "application/json"
 summary = "BRDF lookup tables of ASAM OpenMATERIAL 3D"
 tools = "simulators of ASAM OpenMATERIAL 3D"
 kinds = ()
-options = (
-    TOLERANCE,
-    Option("resolution", 0.0, "distance of nodes on all axes [degrees]; 0: few, where f_r bends", low=0.0, high=45.0),
-)
+options = (TOLERANCE, RESOLUTION)
 VERSION = "1.0.0"
 SCHEMA = (
     f"https://raw.githubusercontent.com/asam-ev/OpenMATERIAL-3D/refs/tags/v{VERSION}/schemas/material_brdf_schema.json"

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from brdfdb.errors import import_extra
-from brdfdb.formats._interface import Option
+from brdfdb.formats._interface import FormatOption
 from brdfdb.formats._record import record
 from brdfdb.formats._written import Written, whole
 from brdfdb.place import path_of
@@ -31,9 +31,9 @@ summary = "lit spheres and slices of tables as PNG files"
 tools = "every viewer of pictures; the numbers are in the other formats"
 kinds = (SPHERE, "lobe", "half_difference", "in_plane")
 options = (
-    Option("size", 160.0, "pixels across a sphere", low=16.0, high=2048.0, most_served=512.0),
-    Option("theta_i", 45.0, "polar angle of the light of a lobe [degrees]", low=0.0, high=90.0),
-    Option("phi_i", 0.0, "azimuth of the light, or of the half vector [degrees]", low=-720.0, high=720.0),
+    FormatOption("size", 160.0, "pixels across a sphere", low=16.0, high=2048.0, most_served=512.0),
+    FormatOption("theta_i", 45.0, "polar angle of the light of a lobe [degrees]", low=0.0, high=90.0),
+    FormatOption("phi_i", 0.0, "azimuth of the light, or of the half vector [degrees]", low=-720.0, high=720.0),
 )
 
 _TONES = "sRGB of x / (1 + x), x = pi f_r: a white Lambertian surface is half as bright as the brightest light"

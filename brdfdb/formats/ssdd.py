@@ -26,7 +26,7 @@ from brdfdb.errors import FileFormatError
 from brdfdb.formats._angles import HalfDifference, Specular, Spherical, System
 from brdfdb.formats._angular_grid import SIZE, AngularGrid, Sink, chosen, mirrored, reciprocal
 from brdfdb.formats._input import MOST_TEXT, check_size
-from brdfdb.formats._interface import TOLERANCE, Option
+from brdfdb.formats._interface import TOLERANCE, FormatOption
 from brdfdb.formats._nodes import samples_of_grid, without_holes
 from brdfdb.formats._record import lines, of_lines, record
 from brdfdb.formats._written import Written, whole
@@ -45,7 +45,7 @@ tools = "BSDF Processor, libbsdf"
 kinds = ()
 options = (
     TOLERANCE,
-    Option("data", "binary", "form of the values", choices=("binary", "ascii")),
+    FormatOption("data", "binary", "form of the values", choices=("binary", "ascii")),
     SIZE,
 )
 

@@ -20,7 +20,7 @@ from brdfdb.errors import FileFormatError
 from brdfdb.formats._angles import Spherical
 from brdfdb.formats._angular_grid import AngularGrid, filled
 from brdfdb.formats._channels import RGB, channels_of
-from brdfdb.formats._interface import FIXED, Option
+from brdfdb.formats._interface import FIXED, FormatOption
 from brdfdb.formats._nodes import samples_of_grid, without_holes
 from brdfdb.formats._record import beside, record, record_beside, specular_remark
 from brdfdb.formats._written import Written, whole
@@ -39,7 +39,7 @@ tools = "readers of UTIA, ALTA"
 kinds = ()
 options = (
     FIXED,
-    Option(
+    FormatOption(
         "encoding",
         "linear",
         "numbers are f_r, as UTIA's own reader and ALTA give them back (linear), or 140 times the sRGB curve of f_r / "
@@ -79,7 +79,7 @@ def write(
     comparison = Comparison(table, channels)
     grid = filled(table, comparison, _SYSTEM, _NODES)
     numbers = _encoded(np.maximum(grid.values.astype(np.float64), 0.0), encoding)
-    error = comparison.error_of(_Reader(numbers, encoding))
+    error = comparison.error_of(UtiaReader(numbers, encoding))
     remarks = (*channels.remarks, *specular_remark(table))
     holds = _LINEAR if encoding == "linear" else _DJ
     document = record(table, error, verdict, holds=holds, remarks=remarks, tolerance=tolerance)
@@ -116,7 +116,7 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     encoding = "dj_brdf" if known.get("encoding") == "dj_brdf" else "linear"
     name = str(known.get("name") or path.stem)
     nodes = functools.partial(_samples, planes, encoding, name, known)
-    return FileTable(name, RGB, None, _Reader(without_holes(numbers), encoding), known, nodes, listed=True)
+    return FileTable(name, RGB, None, UtiaReader(without_holes(numbers), encoding), known, nodes, listed=True)
 
 
 def _samples(planes: Floats, encoding: str, name: str, known: dict[str, Any]) -> Samples:
@@ -144,7 +144,7 @@ def _decoded(numbers: Floats, encoding: str) -> Floats:
     return np.asarray(np.maximum(100.0 * curve, 0.0))
 
 
-class _Reader:
+class UtiaReader:
     """f_r [1/sr], shape (N, 3), at unit vectors (N, 3), of numbers on the grid with the first azimuths repeated."""
 
     def __init__(self, numbers: Floats, encoding: str) -> None:

@@ -24,7 +24,7 @@ from brdfdb.formats._angles import Specular
 from brdfdb.formats._angular_grid import SIZE, AngularGrid, Sink, chosen
 from brdfdb.formats._channels import LUMINOUS, XYZ, channels_of
 from brdfdb.formats._input import Words
-from brdfdb.formats._interface import TOLERANCE, Option
+from brdfdb.formats._interface import TOLERANCE, FormatOption
 from brdfdb.formats._nodes import samples_of_grid, without_holes
 from brdfdb.formats._record import CONVENTION, lines, note, of_comments, of_lines, record, specular_remark
 from brdfdb.formats._written import Written, whole
@@ -46,7 +46,9 @@ tools = "OpticStudio, libbsdf"
 kinds = ()
 options = (
     TOLERANCE,
-    Option("colour", "auto", "CIE XYZ, or its Y alone; auto: XYZ of spectral tables", choices=("auto", "xyz", "grey")),
+    FormatOption(
+        "colour", "auto", "CIE XYZ, or its Y alone; auto: XYZ of spectral tables", choices=("auto", "xyz", "grey")
+    ),
     SIZE,
 )
 

@@ -18,10 +18,9 @@ from brdfdb.materials import Material
 from brdfdb.measurements.samples import Samples
 from brdfdb.tables.planner import plan
 from brdfdb.tables.polarisation import planned_theta_d
-from brdfdb.tables.table import Table, table_from
-from brdfdb.tables.tabulation import tabulate
+from brdfdb.tables.table import Table
 from tests.formats.round_trip import round_trip
-from tests.formats.small_tables import GREY, small_table
+from tests.formats.small_tables import GREY, small_table, table_of
 from tests.formats.test_rgl import mitsuba_of
 from tests.mitsuba.polarised import as_mitsuba_has_them, off_by, picture_of_lookups, picture_of_mitsuba
 
@@ -42,9 +41,7 @@ def plastic() -> Table:
     }
     material, at = Material.from_table("plastic", written), np.array([NM, 600.0])
     layout = replace(plan(material, at, TOLERANCE), facet_theta_d_deg=planned_theta_d(material, at, TOLERANCE))
-    dataset = tabulate(layout)
-    arrays = {str(name): np.asarray(variable.values) for name, variable in dataset.variables.items()}
-    return table_from("plastic", "r000001", arrays, dataset.attrs)
+    return table_of(layout)
 
 
 @pytest.fixture(scope="module")

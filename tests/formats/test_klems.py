@@ -12,7 +12,7 @@ import pytest
 from scipy.integrate import quad
 
 from brdfdb import formats
-from brdfdb.errors import FileFormatError, ParameterError
+from brdfdb.errors import ParameterError
 from brdfdb.formats import klems
 from brdfdb.formats._channels import channels_of
 from brdfdb.formats.klems import BASES, Basis, averages
@@ -25,6 +25,7 @@ from brdfdb.tables.table import Table
 from brdfdb.tables.tabulation import tabulate
 from tests.api.a_store import client_of
 from tests.formats.bsdf_judges import check_bsdf, in_window, klems_total, made, queried, thermal
+from tests.formats.refusals import check_changes_refused
 from tests.formats.small_tables import ANISOTROPIC, DIFFUSE, GREY, small_table
 from tests.pipelines.command import run
 
@@ -143,28 +144,18 @@ def test_rows_and_bases_of_others_are_read(tmp_path: Path, files: dict[tuple[str
     assert reflected[0, 1] == pytest.approx(numbers[1, 2], rel=AS_RADIANCE)
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "sentence"),
-    [
+def test_damaged_files_are_refused_with_a_sentence(tmp_path: Path, files: dict[tuple[str, str], Path]) -> None:
+    changes = [
         ("Columns", "Diagonals", "its structure 'Diagonals' is not Columns or Rows"),
         ("Reflection Back", "Reflection Front", "it has no Visible block of Reflection Back"),
         ("<RowAngleBasis>LBNL", "<RowAngleBasis>CIE", "the angle basis 'CIE/Klems Quarter' is not defined"),
         ("<ScatteringData>\n", "<ScatteringData>\n1,", "has 1682 numbers instead of 41 x 41"),
         ("<ScatteringData>\n", "<ScatteringData>\none,", "could not convert string to float"),
-        ("<nPhis>12</nPhis>", "<nPhis>many</nPhis>", "invalid literal for int()"),
+        ("<nPhis>12</nPhis>", "<nPhis>many</nPhis>", r"invalid literal for int\(\)"),
         ("<nPhis>12</nPhis>", "<nPhis>1000000000000</nPhis>", "more than 100000"),
         ("<UpperTheta>45", "<UpperTheta>5", "no rings of patches that rise to 90 degrees"),
-    ],
-)
-def test_damaged_files_are_refused_with_a_sentence(
-    tmp_path: Path, files: dict[tuple[str, str], Path], old: str, new: str, sentence: str
-) -> None:
-    path = tmp_path / "a.xml"
-    text = files[GREY, "quarter"].read_text()
-    path.write_text(text.replace(old, new))
-    with pytest.raises(FileFormatError, match=r"a\.xml: ") as refusal:
-        formats.read(path)
-    assert sentence in str(refusal.value)
+    ]
+    check_changes_refused(tmp_path / "a.xml", files[GREY, "quarter"].read_text(), changes, "klems")
 
 
 @pytest.mark.parametrize(("material", "kind"), [(GREY, "full"), (ANISOTROPIC, "half")])

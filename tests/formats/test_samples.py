@@ -15,6 +15,7 @@ from brdfdb.formats._readings import FileTable
 from brdfdb.formats.netcdf import write_samples
 from brdfdb.formats.rgl.tensors import write_tensors
 from brdfdb.measurements import Instrument, Samples
+from tests.formats.refusals import check_changes_refused, check_texts_refused
 from tests.formats.small_tables import ANISOTROPIC, DIFFUSE, SPECTRAL, small_table
 
 # Options that keep files small
@@ -207,24 +208,16 @@ def test_the_light_of_a_lighttools_file_has_an_azimuth_of_90_degrees(tmp_path: P
     assert samples.record["tis"] == [[[0.25]]]
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "sentence"),
-    [
+def test_a_damaged_lighttools_file_is_refused_with_line_and_field(tmp_path: Path) -> None:
+    changes = [
         ("0.1 0.4", "0.1 x", "line 16, field TIS of block 1: 'x' is not a number"),
         ("ScatterRadial 2\n0 30", "ScatterRadial 9\n0 30", "line 8, field ScatterRadial: 'DataBegin' is not a number"),
         ("ScatterAzimuth 2", "ScatterAzimuth 99999", "line 4, field ScatterAzimuth: '99999' is no number of values"),
         ("AOI 20\nPOI 0\nSide Front", "AOI up\nPOI 0\nSide Front", "line 14, field AOI: 'up' is not a number"),
         ("DataEnd\n", "", "field DataEnd: the text ends without it, after 2 blocks"),
         ("Side Back", "Side Front", "field AOI: 20 degrees stand twice for 550"),
-    ],
-)
-def test_a_damaged_lighttools_file_is_refused_with_line_and_field(
-    old: str, new: str, sentence: str, tmp_path: Path
-) -> None:
-    path = tmp_path / "sheet.bsdf"
-    path.write_text(LIGHTTOOLS.replace(old, new), encoding="utf-8")
-    with pytest.raises(FileFormatError, match=sentence):
-        formats.samples(path)
+    ]
+    check_changes_refused(tmp_path / "sheet.bsdf", LIGHTTOOLS, changes)
 
 
 PABOPTO = '#sample_name "shade"\n#format: theta phi DSF\n#incident_angle 150 20\n'
@@ -238,15 +231,13 @@ def test_the_cosine_of_a_pab_opto_file_is_divided_out_and_its_back_turned(tmp_pa
     assert np.degrees([samples.theta_i[0], samples.theta_r[0]]) == pytest.approx([30.0, 60.0])
     assert samples.values[:, 0] == pytest.approx([0.1])  # the other row is transmitted
     assert samples.record["below_the_horizon"] == 1
-    for text, sentence in (
-        (PABOPTO + "120 30\n", "line 4 has 2 fields; theta, phi and values are 3"),
-        (PABOPTO + "120 30 much\n", "line 4: 'much' is not a finite number"),
-        (PABOPTO.replace("DSF", "radiance") + "1 2 3\n", "field #format: 'radiance' is not one of dsf"),
-        (PABOPTO.replace("150 20", "150") + "1 2 3\n", "field #incident_angle"),
-    ):
-        path.write_text(text, encoding="utf-8")
-        with pytest.raises(FileFormatError, match=sentence):
-            formats.samples(path)
+    damages = {
+        PABOPTO + "120 30\n": "line 4 has 2 fields; theta, phi and values are 3",
+        PABOPTO + "120 30 much\n": "line 4: 'much' is not a finite number",
+        PABOPTO.replace("DSF", "radiance") + "1 2 3\n": "field #format: 'radiance' is not one of dsf",
+        PABOPTO.replace("150 20", "150") + "1 2 3\n": "field #incident_angle",
+    }
+    check_texts_refused(path, damages)
 
 
 def test_keywords_that_a_format_does_not_have_are_refused(tmp_path: Path) -> None:

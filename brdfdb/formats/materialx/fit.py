@@ -73,11 +73,11 @@ def fitted(kind: str, table: Table, channels: Channels) -> MaterialXSurface:
     if not np.any(nodes.truth) and not (smooth and np.any(nodes.specular)):
         black = (0.0,) * nodes.truth.shape[1]
         return MaterialXSurface(kind, black, black, specular_weight=0.0)
-    search = _Search(kind, nodes, normal, smooth, table.anisotropic)
+    search = _MaterialXSearch(kind, nodes, normal, smooth, table.anisotropic)
     return _tidied(min((search.descent(metal) for metal in search.metals), key=search.distance))
 
 
-class _Search:
+class _MaterialXSearch:
     """A search for the surface that is closest at nodes.
 
     `normal` is the lobe at normal incidence, None of a diffuse source. The facets of a smooth surface mirror.

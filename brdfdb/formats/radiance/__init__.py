@@ -20,9 +20,9 @@ import numpy as np
 
 from brdfdb.errors import FileFormatError
 from brdfdb.formats import _bsdf_xml
-from brdfdb.formats._bsdf_xml import FRONT_OF_RADIANCE, VISIBLE, Block
+from brdfdb.formats._bsdf_xml import FRONT_OF_RADIANCE, VISIBLE, BsdfBlock
 from brdfdb.formats._channels import LUMINOUS, XYZ, channels_of
-from brdfdb.formats._interface import TOLERANCE, Option
+from brdfdb.formats._interface import TOLERANCE, FormatOption
 from brdfdb.formats._nodes import samples_at_vectors
 from brdfdb.formats._record import lines
 from brdfdb.formats._written import Written, whole
@@ -55,7 +55,7 @@ tools = "Radiance (`BSDF`, `plastic2`, `metal2`), pyradiance"
 kinds = ()
 options = (
     TOLERANCE,
-    Option(
+    FormatOption(
         "cells",
         600_000.0,
         "most cells of a tree, of about 7 bytes each; a third where all would not be enough",
@@ -125,7 +125,7 @@ def write(
     remarks = (*channels.remarks, *specular_remark(table), *([_TAKEN_AS_BLACK] if dark else []))
     document = record(table, error, verdict, holds=_HOLDS, remarks=remarks, tolerance=tolerance)
     blocks = (
-        Block(wavelength, FRONT_OF_RADIANCE, _BASIS, "", tree.text(), "BRDF")
+        BsdfBlock(wavelength, FRONT_OF_RADIANCE, _BASIS, "", tree.text(), "BRDF")
         for wavelength, tree in zip(_WAVELENGTHS, trees, strict=False)
     )
     structure = f"<IncidentDataStructure>TensorTree{trees[0].rank}</IncidentDataStructure>"

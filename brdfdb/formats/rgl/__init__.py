@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from brdfdb.formats._interface import MEGABYTES, TOLERANCE, Option
+from brdfdb.formats._interface import MEGABYTES, TOLERANCE, FormatOption
 from brdfdb.place import path_of
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ kinds = ("spectral", "rgb")
 options = (
     TOLERANCE,
     MEGABYTES,
-    Option(
+    FormatOption(
         "azimuth",
         "reduced",
         "azimuths of the light of anisotropic tables: those that symmetry leaves, for Mitsuba 3, or all",

@@ -13,7 +13,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +28,7 @@ from brdfdb.formats.text.columns import (
     PERCENT,
     QUANTITIES,
     UNKNOWN_COSINE,
-    Layout,
+    TextLayout,
     is_logarithm,
     layout_of,
     length_unit,
@@ -65,6 +65,36 @@ _RELATIVE = re.compile(r"[\[(]rel(?:ative|\.)?[\])]", re.IGNORECASE)
 _PROBABILITY = re.compile(r"\d+(?:\.\d+)? ?(?:%|percent\b)")  # of an interval, such as U (95 %)
 
 
+class ListedValues(NamedTuple):
+    """Angles (N, 4) [rad], f_r (N, C) [1/sr] and its uncertainties of the rows of a text."""
+
+    angles: Array
+    values: Array
+    uncertainty: Array | None
+
+    def pivoted(self, at: Array) -> ListedValues:
+        """Return rows with a column a wavelength, of rows that have one wavelength each; what is missing is nan."""
+        wavelengths, channel = np.unique(np.round(at, 6), return_inverse=True)
+        pairs, first, pair = np.unique(np.round(self.angles, 9), axis=0, return_index=True, return_inverse=True)
+        cell = pair.reshape(-1) * wavelengths.size + channel.reshape(-1)
+        order = np.argsort(cell, kind="stable")
+        starts = np.flatnonzero(np.append(True, np.diff(cell[order]) > 0))
+        again: NDArray[np.intp] = np.empty(len(cell), dtype=np.intp)  # number of earlier measurements of the same
+        again[order] = np.arange(len(cell)) - np.repeat(starts, np.diff(np.append(starts, len(cell))))
+        row = again * len(pairs) + pair.reshape(-1)
+        count = (again.max() + 1) * len(pairs)
+
+        def table(column: Array) -> Array:
+            grid = np.full((count, wavelengths.size), np.nan)
+            grid[row, channel.reshape(-1)] = column[:, 0]
+            return grid
+
+        wide = table(self.values)
+        known = np.flatnonzero(np.any(np.isfinite(wide), axis=1))
+        uncertainty = None if self.uncertainty is None else table(self.uncertainty)[known]
+        return ListedValues(self.angles[first][known % len(pairs)], wide[known], uncertainty)
+
+
 def recognises(head: bytes) -> bool:
     """Return True for the first bytes of a text whose columns have names of angles and values."""
     layout = _layout_of_head(head)
@@ -77,7 +107,7 @@ def columns_of(head: bytes) -> tuple[str, ...]:
     return () if layout is None else layout.names
 
 
-def _layout_of_head(head: bytes) -> Layout | None:
+def _layout_of_head(head: bytes) -> TextLayout | None:
     """Return the layout of a text by its first bytes, without a line that they may cut; None of any other file."""
     if b"\0" in head and not head.startswith((b"\xff\xfe", b"\xfe\xff")):
         return None
@@ -138,19 +168,20 @@ def read(
     turned = angles_of_rows(path, rows, roles, layout, angles, record)
     doubt_end(path, np.rad2deg(turned[:, :2]), record)
     names = [layout.names[column] for column in roles["values"]]
-    scale = _scale(path, names, layout, quantity, turned, record)
-    values, uncertainty = _values(path, rows, roles, layout, scale, record, stated=quantity != "auto")
+    table = _values(path, rows, roles, layout, quantity, turned, record)
     at = _wavelengths(path, names, layout)
     if "wavelength" in roles:
-        if values.shape[1] != 1:
+        if table.values.shape[1] != 1:
             raise FileFormatError(f"{path}: line {layout.line}: beside a wavelength there may be one column of values")
         lengths = _nm(path, rows[:, roles["wavelength"][0]], layout.described[roles["wavelength"][0]], layout, record)
-        turned, values, uncertainty, at = _pivoted(turned, values, uncertainty, lengths)
+        at = np.unique(np.round(lengths, 6))
+        table = table.pivoted(lengths)
     elif at is not None:
         note(record, "Wavelengths are those in the names of the columns.")
         order = np.argsort(at)
-        at, values = at[order], values[:, order]
-        uncertainty = None if uncertainty is None else uncertainty[:, order]
+        at = at[order]
+        uncertainty = None if table.uncertainty is None else table.uncertainty[:, order]
+        table = table._replace(values=table.values[:, order], uncertainty=uncertainty)
     _doubt_titles(layout, quantity, record)
     instrument, length = of_comments({"titles": "\n".join(layout.titles)})
     if at is None and len(names) == 1 and length is not None:
@@ -162,13 +193,20 @@ def read(
     if left:
         record["columns_left_out"] = [layout.names[column] for column in sorted(left)]
     listed = samples_at_angles(
-        turned, values, path.stem, channels, at, record, uncertainty=uncertainty, instrument=instrument
+        table.angles,
+        table.values,
+        path.stem,
+        channels,
+        at,
+        record,
+        uncertainty=table.uncertainty,
+        instrument=instrument,
     )
     contradiction = contradiction_within(listed)
     return replace(listed, record={**listed.record, "contradiction": contradiction}) if contradiction else listed
 
 
-def _layout(path: Path) -> Layout:
+def _layout(path: Path) -> TextLayout:
     """Return the layout of a text; FileFormatError if it has no row, or its first row is damaged."""
     layout = layout_of(itertools.islice(lines_of(path), _LONGEST_TITLE))
     if layout is None:
@@ -183,7 +221,7 @@ def _layout(path: Path) -> Layout:
     return layout
 
 
-def _roles(path: Path, layout: Layout, columns: Mapping[str, str | Sequence[str]]) -> dict[str, list[int]]:
+def _roles(path: Path, layout: TextLayout, columns: Mapping[str, str | Sequence[str]]) -> dict[str, list[int]]:
     """Return the columns of each role: those that the caller names, and others by their names."""
     shown = ", ".join(layout.names)[:_SHOWN]
     given: dict[str, list[int]] = {}
@@ -219,7 +257,7 @@ def _missing(roles: Mapping[str, list[int]]) -> str:
 
 
 def _scale(
-    path: Path, names: Sequence[str], layout: Layout, quantity: str, angles: Array, record: dict[str, Any]
+    path: Path, names: Sequence[str], layout: TextLayout, quantity: str, angles: Array, record: dict[str, Any]
 ) -> Array:
     """Return the factors, shape (N, C) or (1, C), that make f_r of values: each column has the quantity of its name."""
     quantities = [quantity_of(name, layout.names) for name in names]
@@ -255,16 +293,16 @@ def _values(
     path: Path,
     rows: Array,
     roles: Mapping[str, list[int]],
-    layout: Layout,
-    scale: Array,
+    layout: TextLayout,
+    quantity: str,
+    angles: Array,
     record: dict[str, Any],
-    *,
-    stated: bool,
-) -> tuple[Array, Array | None]:
-    """Return f_r [1/sr] of rows, shape (N, C), and their uncertainties if there are any.
+) -> ListedValues:
+    """Return f_r [1/sr] of rows at their angles, shape (N, C), and their uncertainties if there are any.
 
     A unit that is not known is refused, unless the user has stated the quantity.
     """
+    scale = _scale(path, [layout.names[column] for column in roles["values"]], layout, quantity, angles, record)
     names = {role: [layout.described[column] for column in roles.get(role, ())] for role in ("values", "uncertainty")}
     factors = []
     for name in names["values"]:
@@ -272,7 +310,7 @@ def _values(
         where = f"{path}: line {layout.line}, field {name}"
         if is_logarithm(name):
             raise FileFormatError(f"{where}: values are logarithms; write f_r itself")
-        if unit and not stated:
+        if unit and quantity == "auto":
             known = "known are 1/sr, 1/msr, % and these times a power of ten such as 10^-3"
             raise FileFormatError(
                 f"{where}: the unit {unit!r} is not known; {known}; --quantity f_r takes numbers as they stand"
@@ -291,15 +329,16 @@ def _values(
     of_values = np.array(factors) * scale
     values: Array = without_fill_values(rows[:, roles["values"]]) * of_values
     if "uncertainty" not in roles:
-        return values, None
+        return ListedValues(angles, values, None)
     given = rows[:, roles["uncertainty"]]
     if given.shape != values.shape:
         raise FileFormatError(f"{path}: line {layout.line}: there are not as many uncertainties as values")
     where = f"{path}: line {layout.line}"
-    return values, uncertainty_of(where, names["uncertainty"], given, values, scale, np.array(factors), record)
+    uncertainty = uncertainty_of(where, names["uncertainty"], given, values, scale, np.array(factors), record)
+    return ListedValues(angles, values, uncertainty)
 
 
-def _doubt_titles(layout: Layout, quantity: str, record: dict[str, Any]) -> None:
+def _doubt_titles(layout: TextLayout, quantity: str, record: dict[str, Any]) -> None:
     """Note titles that speak of a cosine or of the forward direction, where the values were read without."""
     for line in layout.titles:
         shown = line.strip()[:_SHOWN]
@@ -310,7 +349,7 @@ def _doubt_titles(layout: Layout, quantity: str, record: dict[str, Any]) -> None
             record["forward_title"] = shown
 
 
-def _wavelengths(path: Path, names: Sequence[str], layout: Layout) -> Array | None:
+def _wavelengths(path: Path, names: Sequence[str], layout: TextLayout) -> Array | None:
     """Return the wavelengths [nm] that names of columns give; None if one gives none."""
     lengths = [wavelength_of(name) for name in names]
     if None in lengths:
@@ -323,7 +362,7 @@ def _wavelengths(path: Path, names: Sequence[str], layout: Layout) -> Array | No
     return at
 
 
-def _nm(path: Path, lengths: Array, name: str, layout: Layout, record: dict[str, Any]) -> Array:
+def _nm(path: Path, lengths: Array, name: str, layout: TextLayout, record: dict[str, Any]) -> Array:
     """Return wavelengths in nm, by the unit that a name gives, or by their size."""
     where = f"{path}: line {layout.line}, field {name}"
     if np.any(np.isnan(lengths)):
@@ -344,31 +383,6 @@ def _nm(path: Path, lengths: Array, name: str, layout: Layout, record: dict[str,
     else:
         note(record, f"Wavelengths are those of the column {name}.")
     return np.asarray(lengths * unit_nm)
-
-
-def _pivoted(
-    angles: Array, values: Array, uncertainty: Array | None, at: Array
-) -> tuple[Array, Array, Array | None, Array]:
-    """Return rows with a column a wavelength of rows with one wavelength each; what is missing is nan."""
-    wavelengths, channel = np.unique(np.round(at, 6), return_inverse=True)
-    pairs, first, pair = np.unique(np.round(angles, 9), axis=0, return_index=True, return_inverse=True)
-    cell = pair.reshape(-1) * wavelengths.size + channel.reshape(-1)
-    order = np.argsort(cell, kind="stable")
-    starts = np.flatnonzero(np.append(True, np.diff(cell[order]) > 0))
-    again: NDArray[np.intp] = np.empty(len(cell), dtype=np.intp)  # the number of measurements of the same before it
-    again[order] = np.arange(len(cell)) - np.repeat(starts, np.diff(np.append(starts, len(cell))))
-    row = again * len(pairs) + pair.reshape(-1)
-    count = (again.max() + 1) * len(pairs)
-
-    def table(column: Array) -> Array:
-        grid = np.full((count, wavelengths.size), np.nan)
-        grid[row, channel.reshape(-1)] = column[:, 0]
-        return grid
-
-    wide = table(values)
-    some = np.flatnonzero(np.any(np.isfinite(wide), axis=1))
-    of_rows = angles[first][some % len(pairs)]
-    return of_rows, wide[some], None if uncertainty is None else table(uncertainty)[some], wavelengths
 
 
 def uncertainty_of(

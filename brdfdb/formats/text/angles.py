@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from brdfdb.errors import FileFormatError
 from brdfdb.formats._record import note
-from brdfdb.formats.text.columns import ANGLE_UNITS, ANGLES, AZIMUTHS, Layout, angle_unit, plain_name
+from brdfdb.formats.text.columns import ANGLE_UNITS, ANGLES, AZIMUTHS, TextLayout, angle_unit, plain_name
 from brdfdb.formats.text.rows import line_of_row
 
 Array = NDArray[np.float64]
@@ -25,7 +25,7 @@ _UPRIGHT = np.radians(90.0 + 1e-6)
 
 
 def angles_of_rows(
-    path: Path, rows: Array, roles: Mapping[str, list[int]], layout: Layout, unit: str, record: dict[str, Any]
+    path: Path, rows: Array, roles: Mapping[str, list[int]], layout: TextLayout, unit: str, record: dict[str, Any]
 ) -> Array:
     """Return theta_i, phi_i, theta_r, phi_r [rad] of rows, shape (N, 4)."""
     from brdfdb.measurements.samples import RELATIVE
@@ -69,7 +69,7 @@ def angles_of_rows(
     return np.stack([given["theta_i"], phi_i, given["theta_r"], phi_r], axis=1)
 
 
-def _in_plane(path: Path, given: Mapping[str, Array], layout: Layout, record: dict[str, Any]) -> Array:
+def _in_plane(path: Path, given: Mapping[str, Array], layout: TextLayout, record: dict[str, Any]) -> Array:
     """Return the azimuth [rad] of positive theta_r in a text without azimuths, where the sign of theta_r has the side.
 
     If lights have signs, too, both angles are places along one arc. Else positive theta_r is the mirror side.
@@ -91,7 +91,7 @@ def _units(
     path: Path,
     given: Mapping[str, Array],
     roles: Mapping[str, list[int]],
-    layout: Layout,
+    layout: TextLayout,
     unit: str,
     record: dict[str, Any],
 ) -> dict[str, str]:

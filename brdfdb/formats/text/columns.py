@@ -94,7 +94,7 @@ _WAVELENGTH_TEXT = re.compile(r"\d+(?:\.\d+)? ?(?:nm|um|µm|μm)|nm|um|µm|μm")
 
 
 @dataclass(frozen=True)
-class Layout:
+class TextLayout:
     """The layout of a text.
 
     Attributes
@@ -161,7 +161,7 @@ def number_of(text: str) -> float | None:
         return None
 
 
-def layout_of(lines: Iterable[tuple[int, str]]) -> Layout | None:
+def layout_of(lines: Iterable[tuple[int, str]]) -> TextLayout | None:
     """Return the layout of a text; None if there is no row.
 
     Parameters
@@ -190,7 +190,7 @@ def layout_of(lines: Iterable[tuple[int, str]]) -> Layout | None:
         between = [some for some in before if some.number > at and not some.comment]
         between = between if at else [some for some in between[-1:] if len(fields_of(some.text, delimiter)) == count]
         damaged = next((fault for some in between if (fault := _fault(some, delimiter, names))), "")
-        return Layout(delimiter, at or number, names, titles, number, units, damaged)
+        return TextLayout(delimiter, at or number, names, titles, number, units, damaged)
     return None
 
 
@@ -199,7 +199,7 @@ def comment_of(line: str) -> str:
     return _COMMENT.sub("", line.rstrip("\r\n"))
 
 
-def header_of(text: str, layout: Layout) -> tuple[str, ...]:
+def header_of(text: str, layout: TextLayout) -> tuple[str, ...]:
     """Return the names of columns in a line with as many as a layout has, three of them known; else none."""
     names = _split(text, layout.delimiter, len(layout.names))
     known = sum(name in layout.names or bool(role_of(name)) for name in names if number_of(name) is None)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from brdfdb.errors import FileFormatError
 from brdfdb.formats._input import lines_of
 from brdfdb.formats._record import note, of_comments
-from brdfdb.formats.text.columns import Layout, angle_unit, comment_of, fields_of, header_of, number_of
+from brdfdb.formats.text.columns import TextLayout, angle_unit, comment_of, fields_of, header_of, number_of
 
 _ANGLE_UNIT = re.compile(r"(?<![\d.])(?<![\d.] )\b(?:degrees?|deg|m?rad|(?:milli)?radians?)\b", re.IGNORECASE)
 _SHOWN = 200  # characters of a comment that a sentence repeats
@@ -24,14 +24,14 @@ _NUMBER = re.compile(r"[-+]?\d*(?:[.,](?P<decimals>\d*))?(?P<exponent>[eEdD][-+]
 _SAME_DEG = 1e-6  # directions closer than this are one
 
 
-def rows_of(path: Path, layout: Layout, *, one_wavelength: bool) -> NDArray[np.float64]:
+def rows_of(path: Path, layout: TextLayout, *, one_wavelength: bool) -> NDArray[np.float64]:
     """Return the numbers of a text from its first row on, shape (N, columns).
 
     Parameters
     ----------
     path : path
         The file.
-    layout : Layout
+    layout : TextLayout
         Its layout.
     one_wavelength : bool
         True if all rows have the wavelength of the titles: a comment with another one is refused.
@@ -74,13 +74,13 @@ def rows_of(path: Path, layout: Layout, *, one_wavelength: bool) -> NDArray[np.f
     return np.frombuffer(numbers, dtype=np.float64).reshape(-1, count)
 
 
-def line_of_row(path: Path, layout: Layout, row: int) -> int:
+def line_of_row(path: Path, layout: TextLayout, row: int) -> int:
     """Return the number of the line that has a row, whose number counts from 0."""
     rows = (number for number, line in _from_first(path, layout) if not _is_comment(line))
     return next(itertools.islice(rows, row, None))
 
 
-def _from_first(path: Path, layout: Layout) -> Iterator[tuple[int, str]]:
+def _from_first(path: Path, layout: TextLayout) -> Iterator[tuple[int, str]]:
     """Yield the lines from the first row on, with their numbers, without empty ones."""
     return ((number, line) for number, line in lines_of(path) if number >= layout.first and line.strip())
 
@@ -89,7 +89,7 @@ def _is_comment(line: str) -> bool:
     return line.lstrip().startswith(("#", "%"))
 
 
-def _other_rows(text: str, number: int, layout: Layout, *, one_wavelength: bool) -> str:
+def _other_rows(text: str, number: int, layout: TextLayout, *, one_wavelength: bool) -> str:
     """Return a sentence on a comment between rows that gives them other columns or units; empty if it does not."""
     names = header_of(text, layout)
     if names and names != layout.names:

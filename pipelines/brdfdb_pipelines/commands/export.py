@@ -10,7 +10,7 @@ from brdfdb_pipelines.commands._arguments import add_jobs, add_out, add_store, p
 from brdfdb_pipelines.exit_codes import VIOLATED
 
 if TYPE_CHECKING:
-    from brdfdb.formats import Option
+    from brdfdb.formats import FormatOption
 
 HELP = "Write tables as files of other formats."
 
@@ -48,7 +48,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
             _add(command, option)
 
 
-def _add(command: argparse.ArgumentParser, option: Option) -> None:
+def _add(command: argparse.ArgumentParser, option: FormatOption) -> None:
     flag, target = f"--{option.name.replace('_', '-')}", f"option_{option.name}"
     if option.default is False:
         command.add_argument(flag, dest=target, action="store_const", const="true", help=option.help)
