@@ -22,8 +22,8 @@ from brdfdb.tables.shared_axes import (
     GRID,
     INK,
     MUTED,
-    Curve,
     Drawn,
+    DrawnCurve,
     add,
     axes_for,
     drawn_on,
@@ -202,7 +202,7 @@ class Plot:
         tops = np.cumsum(list(kept.values()), axis=0)
         colours = [COLOURS[list(shares).index(label) % len(COLOURS)] for label in kept]
         labels = [*itertools.islice(itertools.accumulate(kept, "{} + {}".format), len(kept) - 1), ""]
-        curves = [Curve(labels[at], ALBEDO_DEG, tops[at], colours[at], "-") for at in reversed(range(len(kept)))]
+        curves = [DrawnCurve(labels[at], ALBEDO_DEG, tops[at], colours[at], "-") for at in reversed(range(len(kept)))]
         without_only(axes)
         if not drawn_on(axes):
             axes.axhline(1.0, color=INK, lw=1.2)
@@ -289,7 +289,7 @@ class Plot:
         theta_i_deg: float | Sequence[float],
         phi_i_deg: float | Sequence[float] | None,
         wavelength_nm: float | Sequence[float] | None,
-    ) -> tuple[list[Curve], str]:
+    ) -> tuple[list[DrawnCurve], str]:
         """Return cuts in the plane of incidence, f_r over theta_r [degree], and the name of the plot.
 
         There is one for each light, azimuth and wavelength. Angles are negative towards the light.
@@ -320,7 +320,7 @@ class Plot:
                 colour, dashes = COLOURS[number % len(COLOURS)], DASHES[row % len(DASHES)]
             else:
                 colour, dashes = _spectral_colour(wavelength), DASHES[number % len(DASHES)]
-            curves.append(Curve(", ".join(parts), signed, brdf, colour, dashes))
+            curves.append(DrawnCurve(", ".join(parts), signed, brdf, colour, dashes))
         return curves, f"{self.table.name}{_at(wavelengths[0]) if len(wavelengths) == 1 else ''}"
 
     def _views(self, theta: float, wavelength: float | None) -> Array:
