@@ -1,4 +1,4 @@
-"""File formats of others: each module of this room whose name begins with no underscore is one.
+"""File formats of others: each module or folder of this room whose name begins with no underscore is one.
 
 A module that writes is an `Exporter`, one that reads an `Importer`; most are both. The command line and HTTP iterate
 over the registry.
@@ -50,13 +50,8 @@ _SHOWN = 200  # characters of names of columns that a refusal repeats
 _HEAD = 4096  # bytes of a file that tell its format
 
 
-def _modules() -> dict[str, Any]:
-    """Return the modules of the room by name."""
-    names = sorted(module.name for module in pkgutil.iter_modules(__path__) if not module.name.startswith("_"))
-    return {name: importlib.import_module(f"{__name__}.{name}") for name in names}
-
-
-_MODULES = _modules()
+_NAMES = sorted(module.name for module in pkgutil.iter_modules(__path__) if not module.name.startswith("_"))
+_MODULES: dict[str, Any] = {name: importlib.import_module(f"{__name__}.{name}") for name in _NAMES}
 EXPORTERS: dict[str, Exporter] = {name: module for name, module in _MODULES.items() if hasattr(module, "write")}
 IMPORTERS: dict[str, Importer] = {name: module for name, module in _MODULES.items() if hasattr(module, "read")}
 
@@ -268,7 +263,7 @@ def members(path: str | os.PathLike[str], file_format: str = "", **keywords: Any
 def _importer(path: Path, file_format: str, keywords: Mapping[str, Any]) -> Importer:
     """Return the importer of a file with keywords that it takes."""
     check_file(path)
-    every = {key for some in IMPORTERS.values() for key in getattr(some, "keywords", ())}
+    every = {key for importer in IMPORTERS.values() for key in getattr(importer, "keywords", ())}
     for name, value in keywords.items():
         if name not in every:
             allowed = ", ".join(sorted(every))

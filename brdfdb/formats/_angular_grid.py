@@ -110,8 +110,8 @@ class AngularGrid:
         values = np.empty((len(wi), channels))
         step = max(1, _AT_ONCE // (channels << len(self.nodes)))
         for start in range(0, len(wi), step):
-            some = slice(start, start + step)
-            values[some] = self._interpolated(self.system.angles(wi[some], wr[some]))
+            pairs = slice(start, start + step)
+            values[pairs] = self._interpolated(self.system.angles(wi[pairs], wr[pairs]))
         return values
 
     def _interpolated(self, angles: Floats) -> Floats:
@@ -146,10 +146,10 @@ def filled(table: Table, comparison: Comparison, system: System, nodes: Sequence
     values = np.empty((count, channels), np.float32)
     step = max(1, _AT_ONCE // channels)
     for start in range(0, count, step):
-        some = np.arange(start, min(start + step, count))
-        index = np.unravel_index(some, shape)
+        numbers = np.arange(start, min(start + step, count))
+        index = np.unravel_index(numbers, shape)
         angles = np.stack([axis[at] for axis, at in zip(nodes, index, strict=True)], axis=1)
-        values[some] = comparison.channels.values(table, *system.directions(angles))
+        values[numbers] = comparison.channels.values(table, *system.directions(angles))
     return AngularGrid(system, tuple(nodes), values.reshape(*shape, channels))
 
 
@@ -340,7 +340,7 @@ def chosen(
             most = min(grid.count - 1, int(_SHRUNK * grid.count * most_bytes / nbytes))
 
     plans = [AngularPlan(table, comparison, system, tolerance / 2.0) for system in systems]
-    plan = min(plans, key=lambda some: some.count(tolerance / 2.0))
+    plan = min(plans, key=lambda plan: plan.count(tolerance / 2.0))
     best = fitting(plan)
     if best.p99 > tolerance:
         steeper = AngularPlan(table, comparison, plan.system.steeper(), plan.target)

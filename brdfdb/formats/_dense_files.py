@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import json
 import math
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,7 +15,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from brdfdb.errors import FileFormatError, ParameterError
+from brdfdb.errors import FileFormatError, ParameterError, import_extra
+from brdfdb.formats._channels import names_of
 from brdfdb.formats._input import check_text
 from brdfdb.formats._interface import TOLERANCE, FormatOption
 from brdfdb.formats._nodes import samples_at_angles
@@ -61,6 +63,22 @@ _DEGREES, _RADIANS = ("", "degree", "degrees", "deg", "°"), ("rad", "radian", "
 MOST_BYTES = 40_000_000  # size of a file that is written, about
 _MOST_READ = 1 << 29  # of a file that is read
 _DECIMALS = 4  # of angles [degree]: radians in files have six
+
+
+@contextlib.contextmanager
+def opened_netcdf(path: Path) -> Iterator[xr.Dataset]:
+    """Open a netCDF 3 file; FileFormatError if it is damaged, MissingExtraError if SciPy is not installed."""
+    import xarray as xr
+
+    import_extra("scipy.io")
+    try:
+        with xr.open_dataset(path, engine="scipy") as opened:
+            yield opened
+    except (FileFormatError, FileNotFoundError):
+        raise
+    except Exception as error:  # SciPy raises what its parser comes to
+        first = str(error).partition("\n")[0]
+        raise FileFormatError(f"{path}: it is no netCDF 3 file, or is damaged ({first})") from error
 
 
 def dense_record(table: Table, dense: DenseTable, verdict: str | None, *, specular: bool) -> dict[str, Any]:
@@ -120,7 +138,12 @@ def read_dataset(path: Path, opened: xr.Dataset) -> FileTable | Samples:
         raise FileFormatError(
             f"{path}: it has no variable brdf, only {', '.join(map(str, opened.data_vars)) or 'none'}"
         )
-    brdf = _valid(opened["brdf"])
+    brdf = opened["brdf"]
+    # Values outside of the range that the attributes of CF declare valid are holes
+    valid = brdf.attrs
+    low, high = valid.get("valid_range", (valid.get("valid_min", -np.inf), valid.get("valid_max", np.inf)))
+    if not low == -high == -np.inf:
+        brdf = brdf.where((brdf >= low) & (brdf <= high))
     opened = opened.assign(brdf=brdf)
     if "sample" in brdf.dims:
         try:
@@ -143,13 +166,6 @@ def read_dataset(path: Path, opened: xr.Dataset) -> FileTable | Samples:
     at = _in_nm(path, opened["wavelength"]) if spectral else None
     axes = {name: _in_degrees(path, opened[name]) for name in names}
     return file_table(path, axes, values, at, record_of_attributes(opened.attrs))
-
-
-def _valid(brdf: xr.DataArray) -> xr.DataArray:
-    """Return values with nan outside of the range that the attributes of CF declare valid."""
-    known = brdf.attrs
-    low, high = known.get("valid_range", (known.get("valid_min", -np.inf), known.get("valid_max", np.inf)))
-    return brdf if low == -high == -np.inf else brdf.where((brdf >= low) & (brdf <= high))
 
 
 def check_sizes(path: Path, shapes: Mapping[Any, tuple[int, ...]]) -> None:
@@ -215,7 +231,7 @@ def file_table(
         raise FileFormatError(
             f"{path}: brdf holds holes alone, or values that are not finite, or above those of 32 bits"
         )
-    channels = ("grey",) if at is None else tuple(f"{value:g}nm" for value in at)
+    channels = names_of(at)
     name = str(known.get("name") or path_of(path).stem)
 
     def nodes() -> Samples:
@@ -312,7 +328,7 @@ def samples_of_rows(
         known = {**known, "azimuths": RELATIVE}
     phi_r = phi_i + angles["delta_phi"] if "delta_phi" in angles else angles.get("phi_r", zero)
     rows = np.deg2rad(np.stack([angles["theta_i"], phi_i, angles["theta_r"], phi_r], axis=1))
-    channels = ("grey",) if wavelength_nm is None else tuple(f"{value:g}nm" for value in wavelength_nm)
+    channels = names_of(wavelength_nm)
     return samples_at_angles(
         rows, values, str(known.get("name") or path.stem), channels, wavelength_nm, known, **keywords
     )

@@ -274,9 +274,9 @@ class _DensePlan:
         number = np.minimum((self.x[axis] * (_BINS / end)).astype(int), _BINS - 1)
         known = np.full(_BINS, np.nan)
         for index in range(_BINS):
-            some = relative[number == index]
-            if some.size >= 5:
-                known[index] = np.sqrt(np.quantile(some, _QUANTILE))
+            in_bin = relative[number == index]
+            if in_bin.size >= 5:
+                known[index] = np.sqrt(np.quantile(in_bin, _QUANTILE))
         there = np.flatnonzero(np.isfinite(known))
         need = np.interp(np.arange(_BINS), there, known[there]) if there.size else np.zeros(_BINS)
         share = np.bincount(number, minlength=_BINS) * (_BINS / number.size)

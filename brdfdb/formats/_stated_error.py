@@ -290,9 +290,9 @@ def of_file(table: Table, channels: Channels, floor: Floats, evaluate: Evaluate)
         """Return the limits of what a file is off by against lookups, shape (N, M), and of what these are off by."""
         relative = _quotient(np.abs(of_file - known) + errors, np.maximum(of_file, least))
         counted = np.asarray(np.isfinite(errors).all(axis=1))  # not where measured data are extrapolated
-        some = counted[:own] & inside
-        bands = np.array(error_measurement.limits_of_bands(relative[:own][some], drawn.band[some]))
-        unseen = np.bincount(drawn.band[some], minlength=places.BANDS) == 0  # of measured data
+        elsewhere = counted[:own] & inside
+        bands = np.array(error_measurement.limits_of_bands(relative[:own][elsewhere], drawn.band[elsewhere]))
+        unseen = np.bincount(drawn.band[elsewhere], minlength=places.BANDS) == 0  # of measured data
         bands[unseen] = bands.max(axis=0)
         there = error_measurement.limits_in_places(relative[own:], pairs, counted[own:])
         return Rows.of(np.concatenate([bands, there.alongside, there.one_grazing, there.both_grazing]))

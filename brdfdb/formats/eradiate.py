@@ -23,8 +23,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.errors import CannotHoldError, FileFormatError, import_extra
-from brdfdb.formats._channels import at_wavelength
-from brdfdb.formats._dense_files import record_of_attributes
+from brdfdb.formats._channels import at_wavelength, names_of
+from brdfdb.formats._dense_files import opened_netcdf, record_of_attributes
 from brdfdb.formats._interface import TOLERANCE, WAVELENGTH, FormatOption
 from brdfdb.formats._nodes import samples_at_angles, weighted, without_holes
 from brdfdb.formats._record import history_of, record, specular_remark
@@ -111,36 +111,24 @@ def recognises(head: bytes) -> bool:
 
 def read(path: str | os.PathLike[str]) -> FileTable:
     """Return f_r of a table of ``mqdiffuse`` as Eradiate's kernel interpolates it."""
-    import xarray as xr
-
     from brdfdb.formats._readings import FileTable
 
-    import_extra("scipy.io")
     path = path_of(path)
-    try:
-        with xr.open_dataset(path, engine="scipy") as opened:
-            values, known = _checked(opened, path), record_of_attributes(opened.attrs)
-    except (FileFormatError, FileNotFoundError):
-        raise
-    except Exception as error:  # SciPy raises what its parser comes to
-        first = str(error).partition("\n")[0]
-        raise FileFormatError(f"{path}: it is no netCDF 3 file, or is damaged ({first})") from error
-    name, nm = str(known.get("name") or path.stem), known.get("wavelength_nm")
+    with opened_netcdf(path) as opened:
+        values = _checked(opened, path)
+        known = record_of_attributes(opened.attrs)
+    name = str(known.get("name") or path.stem)
+    nm = known.get("wavelength_nm")
     at = np.array([float(nm)]) if isinstance(nm, int | float) else None
-    channels = ("grey",) if at is None else (f"{at[0]:g}nm",)
-    nodes = functools.partial(_samples, values, name, channels, at, known)
-    return FileTable(name, channels, at, functools.partial(_evaluated, values), known, nodes)
 
+    def nodes() -> Samples:
+        axes = (axis for _, axis, _ in _coordinates(values.shape).values())
+        viewer, turn, light = (grid.reshape(-1) for grid in np.meshgrid(*axes, indexing="ij"))
+        zero = np.zeros(values.size)
+        angles = np.stack([np.arccos(light), zero, np.arccos(viewer), -turn % (2.0 * np.pi)], axis=1)
+        return samples_at_angles(angles, values.reshape(-1, 1).astype(np.float64), name, names_of(at), at, known)
 
-def _samples(
-    values: NDArray[Any], name: str, channels: tuple[str, ...], at: NDArray[np.float64] | None, known: dict[str, Any]
-) -> Samples:
-    """Return the values of a file at its nodes."""
-    nodes = (axis for _, axis, _ in _coordinates(values.shape).values())
-    viewer, turn, light = (grid.reshape(-1) for grid in np.meshgrid(*nodes, indexing="ij"))
-    angles = np.stack([np.arccos(light), turn, np.arccos(viewer), np.zeros(values.size)], axis=1)
-    angles[:, 1], angles[:, 3] = 0.0, -turn % (2.0 * np.pi)
-    return samples_at_angles(angles, values.reshape(-1, 1).astype(np.float64), name, channels, at, known)
+    return FileTable(name, names_of(at), at, functools.partial(_evaluated, values), known, nodes)
 
 
 def _smallest(table: Table, comparison: Comparison, tolerance: float) -> tuple[int, int, int]:

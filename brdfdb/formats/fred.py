@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from brdfdb.errors import CannotHoldError, FileFormatError, counted
 from brdfdb.formats._angles import Spherical
 from brdfdb.formats._angular_grid import SIZE, AngularGrid, Sink, chosen
-from brdfdb.formats._channels import at_wavelength
+from brdfdb.formats._channels import at_wavelength, names_of
 from brdfdb.formats._input import lines_of
 from brdfdb.formats._interface import TOLERANCE, WAVELENGTH
 from brdfdb.formats._nodes import samples_at_angles, without_holes
@@ -117,7 +117,7 @@ def read(path: str | os.PathLike[str]) -> FileTable | Samples:
         raise FileFormatError(f"{path}: its record says {known['rows']!r:.20} viewers, and it has {len(rows)}")
     name, nm = str(known.get("name") or path.name.partition(".")[0]), known.get("wavelength_nm")
     at = np.array([float(nm)]) if isinstance(nm, int | float) else None
-    channels = ("grey",) if at is None else (f"{at[0]:g}nm",)
+    channels = names_of(at)
     doubt_end(path, rows[:, :2], known)
     grid = _grid(rows)
     angles = np.deg2rad(rows[:, :4])
@@ -143,9 +143,9 @@ def _write_blocks(stream: Sink, grid: AngularGrid) -> int:
         stream.write(f"{angle:.9g}\t0\n".encode())
         for row, theta in enumerate(theta_r):
             values = grid.values[number, row, :, 0]
-            some = [(0.0, columns[0])] if theta == 0.0 else list(zip(azimuths, columns, strict=True))
-            count += len(some)
-            rows = [f"{theta:.9g}\t{phi:.9g}\t{values[column]:.5g}\n" for phi, column in some]
+            viewers = [(0.0, columns[0])] if theta == 0.0 else list(zip(azimuths, columns, strict=True))
+            count += len(viewers)
+            rows = [f"{theta:.9g}\t{phi:.9g}\t{values[column]:.5g}\n" for phi, column in viewers]
             stream.write("".join(rows).encode())
     return count
 
@@ -186,7 +186,7 @@ def _rows(path: Path) -> NDArray[np.float64]:
         raise FileFormatError(f"{path}: line {bare} is a light without viewers: the file was cut")
     if has_open_end(path):
         words = ((number, text.split()) for number, text in lines_of(path) if number > 2)
-        check_last_number(path, ((number, some[2]) for number, some in words if len(some) == 3))
+        check_last_number(path, ((number, fields[2]) for number, fields in words if len(fields) == 3))
     return np.frombuffer(numbers, dtype=np.float64).reshape(-1, 5)
 
 

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from brdfdb.errors import CannotHoldError, FileFormatError, ParameterError
 from brdfdb.formats._angles import HalfDifference
-from brdfdb.formats._channels import Channels
+from brdfdb.formats._channels import Channels, names_of
 from brdfdb.formats._interface import MEGABYTES, TOLERANCE
 from brdfdb.formats._nodes import samples_of_grid
 from brdfdb.formats._record import document_of, record, specular_remark
@@ -108,7 +108,7 @@ def _channels(table: Table) -> Channels:
     elif at.size == 1 and nm[0] != at[0]:
         remarks = (f"of {at[0]:g} nm, which the file calls {nm[0]:g} nm",)
     known = at if at.size == 1 else nm
-    return Channels(tuple(f"{value:g}nm" for value in nm), known, None, "M at each wavelength", remarks)
+    return Channels(names_of(nm), known, None, "M at each wavelength", remarks)
 
 
 def _tensors(made: MuellerGrid, description: str) -> dict[str, NDArray[np.generic]]:
@@ -155,11 +155,10 @@ def read(path: str | os.PathLike[str]) -> Samples:
             raise FileFormatError(f"{path}: field {name!r} does not ascend")
     values = np.ascontiguousarray(matrix[..., 0, 0].transpose(2, 1, 0, 3)).astype(np.float64)
     values[np.isinf(values)] = np.nan
-    channels = tuple(f"{nm:g}nm" for nm in at)
     description = tensors.get("description")
     known = {} if description is None else document_of(description.tobytes())
     name = str(known.get("name") or path.stem)
-    samples = samples_of_grid(_SYSTEM, axes[::-1], values, name, channels, at, {**known, "element": "M[0, 0]"})
+    samples = samples_of_grid(_SYSTEM, axes[::-1], values, name, names_of(at), at, {**known, "element": "M[0, 0]"})
     return samples.selected(np.any(samples.known, axis=1))
 
 

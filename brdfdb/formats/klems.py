@@ -410,10 +410,10 @@ def averages(evaluate: Evaluate, basis: Basis, channels: int, *, isotropic: bool
     pair = np.arange(len(viewer))
     mean, spread = np.zeros((2, len(viewer), channels))
     for start in range(0, len(viewer), _AT_ONCE):
-        some = pair[start : start + _AT_ONCE, np.newaxis]
-        wi, wr = light(basis, incident[some], nodes), basis.vectors(viewer[some], nodes)
-        values = evaluate(wi[:, np.newaxis], wr[:, :, np.newaxis]).reshape(len(some), -1, channels)
-        mean[some[:, 0]], spread[some[:, 0]] = values.mean(axis=1), np.ptp(values, axis=1)
+        pairs = pair[start : start + _AT_ONCE, np.newaxis]
+        wi, wr = light(basis, incident[pairs], nodes), basis.vectors(viewer[pairs], nodes)
+        values = evaluate(wi[:, np.newaxis], wr[:, :, np.newaxis]).reshape(len(pairs), -1, channels)
+        mean[pairs[:, 0]], spread[pairs[:, 0]] = values.mean(axis=1), np.ptp(values, axis=1)
     weight = basis.solid_angles[viewer][:, np.newaxis]
     columns = basis.solid_angles @ mean[whose].reshape(size, -1)
     negligible = _NEGLIGIBLE * float(columns.max())
@@ -421,10 +421,10 @@ def averages(evaluate: Evaluate, basis: Basis, channels: int, *, isotropic: bool
     # Two nodes around a whole ring are none
     steep |= _next_to_mirror(basis)[viewer, incident] | (viewer == 0) | (incident == 0)
     for ring in (True, False):  # the first patch is a whole ring
-        some = np.flatnonzero(steep & ((incident == 0) == ring))
+        pairs = np.flatnonzero(steep & ((incident == 0) == ring))
         nodes, weights = _rule(_LIGHTS[size], periodic=ring)
-        refined = _refined(evaluate, basis, viewer[some], incident[some], nodes, channels, negligible)
-        mean[some] = np.einsum("pnc,n->pc", refined, weights)
+        refined = _refined(evaluate, basis, viewer[pairs], incident[pairs], nodes, channels, negligible)
+        mean[pairs] = np.einsum("pnc,n->pc", refined, weights)
     return mean[whose].reshape(size, size, channels)
 
 
@@ -442,15 +442,15 @@ def _refined(
         mean, spread = np.zeros((2, len(item), channels))
         lit = np.zeros(len(item), dtype=bool)
         for start in range(0, len(item), _AT_ONCE):
-            some = slice(start, start + _AT_ONCE)
-            pair, node = np.divmod(item[some], count)
+            cells = slice(start, start + _AT_ONCE)
+            pair, node = np.divmod(item[cells], count)
             wi = light(basis, incident[pair], nodes[node])
-            place = corner[some, np.newaxis] + length * (0.5 + _NODE * (2.0 * halves - 1.0))
+            place = corner[cells, np.newaxis] + length * (0.5 + _NODE * (2.0 * halves - 1.0))
             wr = basis.vectors(viewer[pair, np.newaxis], place)
             values = np.ascontiguousarray(np.moveaxis(evaluate(wi[:, np.newaxis], wr), 1, 0))  # reduced faster
-            mean[some], spread[some] = values.mean(axis=0), np.ptp(values, axis=0)
+            mean[cells], spread[cells] = values.mean(axis=0), np.ptp(values, axis=0)
             if depth < _AT_LEAST:
-                lit[some] = _at_mirror(wi, wr)
+                lit[cells] = _at_mirror(wi, wr)
         pair = item // count
         weight = length**2 * basis.solid_angles[viewer[pair]][:, np.newaxis]
         divided = np.any((spread > _STEEP * mean) & (spread * weight > negligible), axis=-1)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.errors import FileFormatError
-from brdfdb.formats._channels import XYZ
+from brdfdb.formats._channels import XYZ, names_of
 from brdfdb.formats._input import Words
 from brdfdb.formats._nodes import samples_of_grid
 from brdfdb.formats._record import of_lines
@@ -127,4 +127,4 @@ def _channels(keys: list[str]) -> tuple[NDArray[np.float64] | None, tuple[str, .
     if np.any(lengths <= 0.0):
         return None, ("grey",)
     lengths = lengths * (1e3 if lengths.max() < 100.0 else 1.0)
-    return lengths, tuple(f"{nm:g}nm" for nm in lengths)
+    return lengths, names_of(lengths)

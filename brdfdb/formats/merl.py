@@ -9,10 +9,9 @@ The file holds linear sRGB. Anisotropic tables are refused, and the specular par
 
 from __future__ import annotations
 
-import functools
 import json
 import os
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -122,17 +121,15 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     known = record_beside(path)
     samples = "edges" if known.get("samples") == "edges" else "centres"
     name = str(known.get("name") or path.stem)
-    nodes = functools.partial(_samples, planes, samples, name, known)
+
+    def nodes() -> Samples:
+        offset = 0.5 if samples == "centres" else 0.0
+        at = [np.arange(count) + offset for count in SHAPE]
+        axes = [np.deg2rad(axis) for axis in (_degrees_h(at[0]), at[1], at[2])]
+        values = np.moveaxis(without_holes(planes), 0, -1) * SCALE
+        return samples_of_grid(_SYSTEM, axes, values, name, RGB, None, known)
+
     return FileTable(name, RGB, None, MerlReader(planes, samples), known, nodes)
-
-
-def _samples(planes: Floats, samples: str, name: str, known: dict[str, Any]) -> Samples:
-    """Return the values of a file at its bins; negative numbers stand for what was not measured."""
-    offset = 0.5 if samples == "centres" else 0.0
-    at = [np.arange(count) + offset for count in SHAPE]
-    nodes = [np.deg2rad(axis) for axis in (_degrees_h(at[0]), at[1], at[2])]
-    values = np.moveaxis(without_holes(planes), 0, -1) * SCALE
-    return samples_of_grid(_SYSTEM, nodes, values, name, RGB, None, known)
 
 
 def _nodes(samples: str) -> tuple[NDArray[np.bool_], Floats]:

@@ -12,8 +12,8 @@ from __future__ import annotations
 import os
 from typing import TYPE_CHECKING
 
-from brdfdb.errors import FileFormatError, import_extra
-from brdfdb.formats._dense_files import OPTIONS, dataset, read_dataset
+from brdfdb.errors import import_extra
+from brdfdb.formats._dense_files import OPTIONS, dataset, opened_netcdf, read_dataset
 from brdfdb.formats._written import Written, whole
 from brdfdb.place import path_of
 
@@ -67,18 +67,9 @@ def recognises(head: bytes) -> bool:
 
 def read(path: str | os.PathLike[str]) -> FileTable | Samples:
     """Return f_r of a netCDF file with ``brdf`` over angles [degree], interpolated linearly; or samples."""
-    import xarray as xr
-
-    import_extra("scipy.io")
     path = path_of(path)
-    try:
-        with xr.open_dataset(path, engine="scipy") as opened:
-            return read_dataset(path, opened)
-    except (FileFormatError, FileNotFoundError):
-        raise
-    except Exception as error:  # SciPy raises what its parser comes to
-        first = str(error).partition("\n")[0]
-        raise FileFormatError(f"{path}: it is no netCDF 3 file, or is damaged ({first})") from error
+    with opened_netcdf(path) as opened:
+        return read_dataset(path, opened)
 
 
 def write_samples(samples: Samples, path: str | os.PathLike[str]) -> None:

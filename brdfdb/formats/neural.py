@@ -102,8 +102,8 @@ def _content(path: Path, member: str) -> tuple[str, bytes]:
         wanted = entries if not member and len(entries) == 1 else wanted
         if len(wanted) != 1:
             shown = ", ".join(sorted(names.values())[:60])
-            some = f"{member!r} is not one of the members" if member else "name one of the members"
-            raise ParameterError("member", f"{some} of {path}: {shown}", member, tuple(names.values()))
+            problem = f"{member!r} is not one of the members" if member else "name one of the members"
+            raise ParameterError("member", f"{problem} of {path}: {shown}", member, tuple(names.values()))
         if wanted[0].file_size > _MOST_BYTES:
             raise FileFormatError(f"{path}: {wanted[0].filename} has {wanted[0].file_size} bytes")
         name = names[wanted[0].filename]

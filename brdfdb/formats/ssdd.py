@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from brdfdb.errors import FileFormatError
 from brdfdb.formats._angles import HalfDifference, Specular, Spherical, System
 from brdfdb.formats._angular_grid import SIZE, AngularGrid, Sink, chosen, mirrored, reciprocal
+from brdfdb.formats._channels import names_of
 from brdfdb.formats._input import MOST_TEXT, check_size
 from brdfdb.formats._interface import TOLERANCE, FormatOption
 from brdfdb.formats._nodes import samples_of_grid, without_holes
@@ -124,7 +125,7 @@ def read(path: str | os.PathLike[str]) -> FileTable:
         document["specular_theta_i_deg"] = dirac.angles[0].tolist()
         document["specular_reflectance"] = dirac.values[:, 0, 0, 0].tolist()
     at = block.wavelength_nm
-    names = _COLOURS[block.entries["COLOR_MODEL"]] if at is None else tuple(f"{value:g}nm" for value in at)
+    names = _COLOURS[block.entries["COLOR_MODEL"]] if at is None else names_of(at)
     name = str(document.get("name") or block.entries.get("NAME") or path.stem)
     angles = [np.deg2rad(axis) for axis in block.angles]
     nodes = functools.partial(samples_of_grid, grid.system, angles, block.values, name, names, at, document)

@@ -9,10 +9,9 @@ Anisotropic tables fit. Spectral tables become linear sRGB. The specular part is
 
 from __future__ import annotations
 
-import functools
 import json
 import os
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -115,14 +114,12 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     numbers = np.pad(np.moveaxis(planes, 0, -1), [(0, 0), (0, 1), (0, 0), (0, 1), (0, 0)], mode="wrap")
     encoding = "dj_brdf" if known.get("encoding") == "dj_brdf" else "linear"
     name = str(known.get("name") or path.stem)
-    nodes = functools.partial(_samples, planes, encoding, name, known)
+
+    def nodes() -> Samples:
+        axes = [np.deg2rad(step * np.arange(count)) for step, count in zip(STEPS_DEG, SHAPE, strict=True)]
+        return samples_of_grid(_SYSTEM, axes, _decoded(np.moveaxis(planes, 0, -1), encoding), name, RGB, None, known)
+
     return FileTable(name, RGB, None, UtiaReader(without_holes(numbers), encoding), known, nodes, listed=True)
-
-
-def _samples(planes: Floats, encoding: str, name: str, known: dict[str, Any]) -> Samples:
-    """Return the values of a file at its own angles."""
-    nodes = [np.deg2rad(step * np.arange(count)) for step, count in zip(STEPS_DEG, SHAPE, strict=True)]
-    return samples_of_grid(_SYSTEM, nodes, _decoded(np.moveaxis(planes, 0, -1), encoding), name, RGB, None, known)
 
 
 def _encoded(f_r: Floats, encoding: str) -> Floats:

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import functools
 import os
-from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -212,17 +211,16 @@ def read(path: str | os.PathLike[str]) -> FileTable:
         except ValueError as error:
             raise FileFormatError(f"{path}: block {name} is no tensor tree: {error}") from None
     of_colour = XYZ if len(trees) > 1 else LUMINOUS
-    nodes = functools.partial(_samples, file.name, tuple(trees), of_colour, file.record)
+
+    def nodes() -> Samples:
+        """Return the values at the middles of the cells of the first tree."""
+        place = trees[0].middles()
+        used = slice(None) if rank == ANISOTROPIC else place[:, 0] < 0.5
+        wi, wr = lights(place[used, : rank - 2]), viewers(place[used, -2:])
+        values = trees[0].values[used, np.newaxis] if len(trees) == 1 else evaluated(tuple(trees), wi, wr)
+        return samples_at_vectors(wi, wr, values, file.name, of_colour, None, file.record)
+
     return FileTable(file.name, of_colour, None, functools.partial(evaluated, tuple(trees)), file.record, nodes)
-
-
-def _samples(name: str, trees: tuple[Tree, ...], channels: tuple[str, ...], record: Mapping[str, Any]) -> Samples:
-    """Return the values at the middles of the cells of the first tree."""
-    place = trees[0].middles()
-    used = slice(None) if trees[0].rank == ANISOTROPIC else place[:, 0] < 0.5
-    wi, wr = lights(place[used, : trees[0].rank - 2]), viewers(place[used, -2:])
-    values = trees[0].values[used, np.newaxis] if len(trees) == 1 else evaluated(trees, wi, wr)
-    return samples_at_vectors(wi, wr, values, name, channels, None, record)
 
 
 def material_text(table: Table, xml: str, record: dict[str, Any]) -> str:

@@ -75,13 +75,13 @@ class Growth:
         # One half of the first axis of rank 3 is not used
         live = np.flatnonzero(corner[:, 0] < 0.5 * 2.0**level) if self.rank == ISOTROPIC else np.arange(len(corner))
         for start in range(0, len(live), _AT_ONCE):
-            some = live[start : start + _AT_ONCE]
-            place = (corner[some, np.newaxis] + offsets) * 0.5 ** level[some, np.newaxis, np.newaxis]
+            cells = live[start : start + _AT_ONCE]
+            place = (corner[cells, np.newaxis] + offsets) * 0.5 ** level[cells, np.newaxis, np.newaxis]
             # The first bits of a node are those of the light, the last two those of the viewer
             light, viewer = lights(place[:, : self._kin // 4, :-2]), viewers(place[:, :: self._kin // 4, -2:])
             values = self._evaluate(light[:, np.newaxis], viewer[:, :, np.newaxis])
             values = values.reshape(-1, self._kin, self._channels)
-            mean[some], low[some], high[some] = values.mean(axis=1), values.min(axis=1), values.max(axis=1)
+            mean[cells], low[cells], high[cells] = values.mean(axis=1), values.min(axis=1), values.max(axis=1)
         return mean, low, high
 
     def _measured(self, mean: Floats, spread: Floats, level: Index) -> Floats:

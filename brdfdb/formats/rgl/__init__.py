@@ -10,14 +10,12 @@ left out.
 
 from __future__ import annotations
 
-import functools
 import json
 import os
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from brdfdb.formats._interface import MEGABYTES, TOLERANCE, FormatOption
 from brdfdb.place import path_of
@@ -25,7 +23,6 @@ from brdfdb.place import path_of
 if TYPE_CHECKING:
     from brdfdb.formats._readings import FileTable
     from brdfdb.formats._written import Written
-    from brdfdb.formats.rgl.fields import Fields
     from brdfdb.measurements.samples import Samples
     from brdfdb.tables.table import Table
 
@@ -99,7 +96,8 @@ def recognises(head: bytes) -> bool:
 
 def read(path: str | os.PathLike[str]) -> FileTable:
     """Return f_r of a tensor file as Mitsuba's `measured` evaluates it."""
-    from brdfdb.formats._channels import RGB
+    from brdfdb.formats._channels import GREY, RGB, names_of
+    from brdfdb.formats._nodes import samples_at_vectors
     from brdfdb.formats._readings import FileTable
     from brdfdb.formats._record import document_of
     from brdfdb.formats.rgl.fields import fields_of
@@ -110,17 +108,12 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     document = document_of(fields.description)
     name = str(document.get("name") or path.stem)
     at = None if fields.wavelength_nm is None else fields.wavelength_nm.astype(np.float64)
-    channels = RGB if at is None else tuple(f"{value:g}nm" for value in at)
+    channels = RGB if at is None else names_of(at)
     if document.get("channels") == ["grey"] and at is not None and at.size == 1:
-        channels, at = ("grey",), None
-    nodes = functools.partial(_samples, fields, name, channels, at, document)
+        channels = GREY
+        at = None
+
+    def nodes() -> Samples:
+        return samples_at_vectors(*fields.at_nodes(), name, channels, at, document)
+
     return FileTable(name, channels, at, fields.evaluate, document, nodes)
-
-
-def _samples(
-    fields: Fields, name: str, channels: tuple[str, ...], at: NDArray[np.float64] | None, document: dict[str, Any]
-) -> Samples:
-    """Return the values of a file at its own directions."""
-    from brdfdb.formats._nodes import samples_at_vectors
-
-    return samples_at_vectors(*fields.at_nodes(), name, channels, at, document)

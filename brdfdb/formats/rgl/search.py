@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.errors import ParameterError
-from brdfdb.formats._channels import RGB, Channels, channels_of
+from brdfdb.formats._channels import RGB, Channels, channels_of, names_of
 from brdfdb.formats.rgl.fields import Array, Fields, Floats32, MixedSlices, Warp, bilinear, of_azimuth, of_polar_angle
 from brdfdb.formats.rgl.surface import LAST_THETA, HalfVectorSurface, densities, lights
 from brdfdb.parameters import Floats
@@ -112,7 +112,7 @@ def _smallest(table: Table, kind: str, tolerance: float, most_bytes: float, full
     ladders = search.ladders(most_bytes, copies)
     first = [search.p99(plans[min(_FIRST, len(plans) - 1)]) for plans in ladders]
     best = search.best(ladders[int(np.argmin(first))])
-    names = channels.names if search.nodes is None else tuple(f"{value:g}nm" for value in search.nodes)
+    names = channels.names if search.nodes is None else names_of(search.nodes)
     return RglFit(best.fields, best.error, names, remarks)
 
 

@@ -183,13 +183,17 @@ def layout_of(lines: Iterable[tuple[int, str]]) -> TextLayout | None:
             continue
         count = len(fields_of(line, delimiter))
         at, names = _names(before, delimiter, count)
-        rows_of_units = [some for some in before if some.number > at and _are_units(some.text, delimiter, count)]
+        rows_of_units = [
+            earlier for earlier in before if earlier.number > at and _are_units(earlier.text, delimiter, count)
+        ]
         units = _split(rows_of_units[-1].text, delimiter, count) if rows_of_units else ()
-        before = [some for some in before if some not in rows_of_units]
-        titles = tuple(some.text for some in before if some.number != at and some.text.strip())
-        between = [some for some in before if some.number > at and not some.comment]
-        between = between if at else [some for some in between[-1:] if len(fields_of(some.text, delimiter)) == count]
-        damaged = next((fault for some in between if (fault := _fault(some, delimiter, names))), "")
+        before = [earlier for earlier in before if earlier not in rows_of_units]
+        titles = tuple(earlier.text for earlier in before if earlier.number != at and earlier.text.strip())
+        between = [earlier for earlier in before if earlier.number > at and not earlier.comment]
+        between = (
+            between if at else [earlier for earlier in between[-1:] if len(fields_of(earlier.text, delimiter)) == count]
+        )
+        damaged = next((fault for earlier in between if (fault := _fault(earlier, delimiter, names))), "")
         return TextLayout(delimiter, at or number, names, titles, number, units, damaged)
     return None
 

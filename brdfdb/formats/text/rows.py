@@ -100,7 +100,7 @@ def _other_rows(text: str, number: int, layout: TextLayout, *, one_wavelength: b
     if new and new != (units or {"deg"}):
         return f"line {number} gives angles another unit: {text.strip()[:_SHOWN]!r}; {_SPLIT}"
     if one_wavelength:
-        at, before = (of_comments({"titles": some})[1] for some in (text, "\n".join(layout.titles)))
+        at, before = (of_comments({"titles": titles})[1] for titles in (text, "\n".join(layout.titles)))
         if at is not None and at != before:
             was = "have none" if before is None else f"have {before:g} nm"
             return f"line {number} gives a wavelength of {at:g} nm, and rows before it {was}; {_SPLIT}"
