@@ -183,13 +183,11 @@ def layout_of(lines: Iterable[tuple[int, str]]) -> TextLayout | None:
             continue
         count = len(fields_of(line, delimiter))
         at, names = _names(before, delimiter, count)
-        rows_of_units = [
-            earlier for earlier in before if earlier.number > at and _are_units(earlier.text, delimiter, count)
-        ]
+        rows_of_units = [above for above in before if above.number > at and _are_units(above.text, delimiter, count)]
         units = _split(rows_of_units[-1].text, delimiter, count) if rows_of_units else ()
-        before = [earlier for earlier in before if earlier not in rows_of_units]
-        titles = tuple(earlier.text for earlier in before if earlier.number != at and earlier.text.strip())
-        between = [earlier for earlier in before if earlier.number > at and not earlier.comment]
+        before = [above for above in before if above not in rows_of_units]
+        titles = tuple(above.text for above in before if above.number != at and above.text.strip())
+        between = [above for above in before if above.number > at and not above.comment]
         between = (
             between if at else [earlier for earlier in between[-1:] if len(fields_of(earlier.text, delimiter)) == count]
         )
