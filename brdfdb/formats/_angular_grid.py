@@ -282,18 +282,10 @@ def chosen(
     *,
     as_text: bool = False,
 ) -> FittedGrid:
-    """Return the smallest grid within a tolerance; if there is none, that of the smallest error.
+    """Return the smallest grid within a tolerance, of the system with the fewest nodes; else that of the least error.
 
     Parameters
     ----------
-    table : Table
-        Table that is exported.
-    comparison : Comparison
-        Pairs of directions, and the channels.
-    systems : sequence of System
-        Systems of angles among which the one with the fewest nodes is taken.
-    tolerance : float [1]
-        Largest p99.
     size : float [MB]
         Largest size of the file.
     write : callable

@@ -95,16 +95,8 @@ def text_of(
 ) -> Iterable[str]:
     """Yield the text of a file in pieces.
 
-    Parameters
-    ----------
-    name, title : str
-        Of the material.
-    material, definition : iterable of str
-        Lines of XML on the material, and on the structure of the data.
-    blocks : iterable of BsdfBlock
-        The numbers.
-    record : dict
-        The record; it goes into the comments of the definition.
+    `material` and `definition` are lines of XML on the material and on the structure of the data. The record goes into
+    the comments of the definition.
     """
     yield _HEAD
     product = f"<ProductName>{escape(one_line(title))}</ProductName>\n" if title else ""

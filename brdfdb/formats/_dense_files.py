@@ -263,20 +263,8 @@ def reading_of_rows(
 ) -> FileTable | Samples:
     """Return f_r of rows of angles [degree]: interpolated linearly if they are a grid without holes, else as samples.
 
-    Parameters
-    ----------
-    path : path
-        The file, for errors and names.
-    angles : mapping of str to array (N,) [degree]
-        A column an axis.
-    values : array (N, C) [1/sr]
-        A column a wavelength, or one.
-    wavelength_nm : array (C,) [nm] or None
-        Wavelengths of the columns.
-    known : mapping
-        The record of the file.
-    nodes : callable, optional
-        Gives the samples of the file (default: `samples_of_rows`).
+    There is a column of angles (N,) for each axis, and one of values (N, C) [1/sr] for each wavelength, or a single
+    one. `known` is the record of the file. `nodes` gives its samples (default: `samples_of_rows`).
 
     Raises
     ------
@@ -311,14 +299,9 @@ def samples_of_rows(
     known: Mapping[str, Any],
     **keywords: Any,
 ) -> Samples:
-    """Return the samples of rows of theta_i, theta_r and their azimuths, or delta_phi [degree].
+    """Return the samples of rows of theta_i, theta_r and their azimuths, or delta_phi [degree], as `reading_of_rows`.
 
-    Parameters
-    ----------
-    path, angles, values, wavelength_nm, known
-        As of `reading_of_rows`.
-    **keywords
-        Those of `samples_at_angles`.
+    Keywords are those of `samples_at_angles`.
     """
     from brdfdb.measurements.samples import RELATIVE
 

@@ -94,10 +94,6 @@ def dense_table(
 
     Parameters
     ----------
-    table : Table
-        Table that is exported.
-    tolerance : float [1]
-        Largest p99 of the error against the table.
     axes : str
         "light_viewer": theta_i, theta_r, delta_phi, or theta_i, phi_i, theta_r, phi_r of anisotropic tables.
         "half_difference": theta_h, theta_d, phi_d, or theta_h, phi_h, theta_d, phi_d. "smallest": those that take fewer
@@ -105,18 +101,11 @@ def dense_table(
     resolution : float [degree]
         Distance of the nodes on all axes; 0: as few nodes as the tolerance allows, where f_r bends.
     most_values : int
-        Largest number of values. If it allows no grid within the tolerance, the nearest one is returned.
+        Largest number of values. ParameterError if a regular grid has more; else the nearest smaller grid is returned.
     digits : int
         Significant digits that values are rounded to; 0: float32.
     last_deg : float [degree]
         Last polar angle of light and viewer that the format takes.
-    channels : Channels, optional
-        The channels of the file, by default those of the table.
-
-    Raises
-    ------
-    ParameterError
-        If a regular grid has more values.
     """
     comparison = Comparison(table, channels)
     few = _at_few_wavelengths(comparison)

@@ -34,20 +34,9 @@ def record(
 ) -> dict[str, Any]:
     """Return the record of an exported table as JSON: the same keys in every format.
 
-    Parameters
-    ----------
-    table : Table
-        Table that is exported.
-    error : FileError or None
-        Error of the file against the table; None if the file holds values of the table as they are.
-    verdict : str or None
-        Verdict of the audit of this revision; None: not stated.
-    holds : str
-        Quantity, unit and cosine convention of the numbers in the file.
-    remarks : tuple of str
-        Sentences on what the format cannot hold of this table.
-    tolerance : float or None [1]
-        Largest p99 that was asked for.
+    `error` is that of the file against the table, None if the file holds values of the table as they are. `holds` says
+    quantity, unit and cosine convention of the numbers in the file, and `remarks` what the format cannot hold of this
+    table. `tolerance` is the largest p99 that was asked for.
     """
     from brdfdb.formats._stated_error import of_table
 

@@ -72,18 +72,9 @@ def write_source(
 
 
 def source(model: str, parameters: Mapping[str, Any], language: Language, name: str) -> str:
-    """Return the functions of a model, without the record.
+    """Return the functions of a model, one of `brdfdb.models.shaders.SHADERS`, without the record.
 
-    Parameters
-    ----------
-    model : str
-        One of `brdfdb.models.shaders.SHADERS`.
-    parameters : mapping
-        The arguments of the model; reflectances may have three numbers.
-    language : Language
-        The shading language.
-    name : str
-        Name of the material.
+    Parameters are the arguments of the model; reflectances may have three numbers.
     """
     from brdfdb.models import MODELS
     from brdfdb.models.shaders import FUNCTIONS, SHADERS

@@ -143,16 +143,10 @@ class Comparison:
 
 
 def _drawn(table: Table) -> tuple[Floats, Floats, Floats, bool]:
-    """Draw lights and viewers for a table: first over the hemisphere, then in the lobe.
+    """Draw lights and viewers (2 PAIRS, 3) for a table: first over the hemisphere, then in the lobe.
 
-    Returns
-    -------
-    wi, wr : array (2 PAIRS, 3)
-        Unit vectors.
-    weight : array (2 PAIRS,)
-        Cosine of the viewer over the density with which it was drawn; 0 below the horizon.
-    lobe : bool
-        False if the source has no lobe, or none is known: all viewers are then over the hemisphere.
+    Their weights are the cosine of the viewer over the density with which it was drawn; 0 below the horizon. `lobe` is
+    False if the source has no lobe, or none is known: all viewers are then over the hemisphere.
     """
     rng = np.random.default_rng(SEED)
     count = 2 * PAIRS

@@ -378,26 +378,11 @@ def light(basis: Basis, patch: Index, place: Floats) -> Floats:
 
 
 def averages(evaluate: Evaluate, basis: Basis, channels: int, *, isotropic: bool) -> Floats:
-    """Return averages [1/sr] of f_r over pairs of patches, weighted with projected solid angles.
+    """Return averages [1/sr] of f_r over pairs of patches (viewers, lights, C), weighted with projected solid angles.
 
-    Parameters
-    ----------
-    evaluate : callable
-        f_r [1/sr], shape (..., C), at unit vectors (..., 3) of light and viewer, which broadcast.
-    basis : Basis
-        The patches of light and viewer.
-    channels : int
-        C.
-    isotropic : bool
-        True if f_r depends on the difference of the azimuths alone, whatever its sign.
+    `evaluate` gives f_r [1/sr], shape (..., C), at unit vectors (..., 3) of light and viewer, which broadcast. If
+    `isotropic`, f_r depends on the difference of the azimuths alone, whatever its sign.
 
-    Returns
-    -------
-    array (viewers, lights, C)
-        In the order of files.
-
-    Notes
-    -----
     Two Gauss-Legendre nodes along each of the four axes of a pair. Where they differ, and where the patch of the viewer
     is that of the mirror direction or touches it, there are more nodes of the light, and for each of them cells of the
     viewer divide until their nodes are alike: column sums, which are albedos, are right then.

@@ -88,8 +88,9 @@ def write(
 
     def write_all(sink: Sink, grid: AngularGrid, error: FileError) -> None:
         document = record(table, error, verdict, tolerance=tolerance)
+        values = grid.values if table.anisotropic else grid.values[:, np.newaxis]  # over four angles
         sink.write(encoded_header(software, lines(document)))
-        sink.write(encoded_block(_entries(table, grid), _four(grid), data == "binary"))
+        sink.write(encoded_block(_entries(table, grid), values, data == "binary"))
         if table.specular is not None:
             sink.write(_specular(table, data == "binary"))
 
@@ -168,11 +169,6 @@ def _colour(table: Table) -> dict[str, str]:
 
 def _listed(numbers: NDArray[np.float64]) -> str:
     return " ".join(f"{number:.10g}" for number in numbers)
-
-
-def _four(grid: AngularGrid) -> NDArray[np.float32]:
-    """Return the values of a grid over four angles."""
-    return grid.values if len(grid.nodes) == 4 else grid.values[:, np.newaxis]
 
 
 def _specular(table: Table, binary: bool) -> bytes:

@@ -30,25 +30,11 @@ _FLOOR = 1e-4  # share of the mean f_r below which cube roots are those of this 
 
 
 def fitted(kind: str, table: Table, channels: Channels) -> MaterialXSurface:
-    """Return the surface whose f_r is closest to that of a table.
+    """Return the surface of a kind whose f_r in the channels is closest to that of a table.
 
-    Parameters
-    ----------
-    kind : str
-        "open_pbr_surface" or "standard_surface".
-    table : Table
-        Any table. Where nothing but the specular part is in its lobe, the facets of the surface mirror, with a
-        roughness of 0. Of others the specular part is left out.
-    channels : Channels
-        One channel, or red, green and blue.
+    The channels are one, or red, green and blue. If nothing but the specular part is in the lobe of the table, the
+    facets of the surface mirror, with a roughness of 0. The specular part of other tables is left out.
 
-    Returns
-    -------
-    MaterialXSurface
-        Colours with a number for each channel.
-
-    Notes
-    -----
     The sum over all pairs of directions, with both cosines, of the squared difference of cube roots of f_r is made
     least. It is the distance "lightness" of `brdfdb.conversion.convert`, which keeps highlights. All numbers of all
     channels are searched together by least squares, which takes half a second. The simplexes of `convert`, for which

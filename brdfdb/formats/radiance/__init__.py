@@ -226,14 +226,7 @@ def read(path: str | os.PathLike[str]) -> FileTable:
 def material_text(table: Table, xml: str, record: dict[str, Any]) -> str:
     """Return the text of a file with a BSDF material, and for Ward's models with Radiance's own plastic or metal.
 
-    Parameters
-    ----------
-    table : Table
-        Table of the material.
-    xml : str
-        Name of the file with its values, beside this one.
-    record : dict
-        The record of the export.
+    `xml` is the name of the file with the values, in the same folder.
     """
     name = "".join(c if c.isalnum() or c in "-_." else "_" for c in table.name) or "material"
     file = f'"{xml}"' if any(letter.isspace() for letter in xml) else xml

@@ -110,16 +110,10 @@ def rounded(values: Floats) -> Floats:
 
 
 def reduced(tree: Tree, parts: Floats, weight: Floats, tolerance: float) -> Tree:
-    """Return a tree of single cells with children merged where their values differ little.
+    """Return a tree of single cells with children merged where their values differ by no more than a tolerance.
 
-    Parameters
-    ----------
-    tree : Tree
-        Each leaf has one value, and children have larger numbers than their parents.
-    parts, weight : array (leaves,)
-        Values of the leaves, and their weights in averages.
-    tolerance : float
-        Largest difference of the values below a node that becomes a leaf.
+    Each leaf of the tree has one value, in `parts`, with a weight in averages. Children have larger numbers than their
+    parents.
     """
     inner = len(tree.children)
     # Of all nodes; leaf k, whose code is -1 - k, stands at that place from the end
@@ -186,7 +180,9 @@ def parsed(text: str, rank: int) -> Tree:
         if grid is not None:
             numbers = grid.replace(",", " ").split()
             start.append(len(values))
-            halvings.append(_halvings(len(numbers), rank))
+            halvings.append(max(0, len(numbers).bit_length() - 1) // rank)
+            if len(numbers) != 1 << rank * halvings[-1]:
+                raise ValueError(f"a grid of {len(numbers)} values is not of the same length along {rank} axes")
             values.extend(map(float, numbers))
             path[-1].append(-len(start))
         elif brace == "{":
@@ -209,14 +205,6 @@ def parsed(text: str, rank: int) -> Tree:
     inner = np.array(nodes, dtype=np.int64).reshape(-1, 1 << rank)
     inner = np.where(inner >= 0, len(nodes) - 1 - inner, inner)[::-1]  # the root is the first node, not the last
     return Tree(rank, inner, np.array(start), np.array(halvings), numbers_read)
-
-
-def _halvings(count: int, rank: int) -> int:
-    """Return how often each axis of a grid of `count` values is halved."""
-    halvings = max(0, count.bit_length() - 1) // rank
-    if count != 1 << rank * halvings:
-        raise ValueError(f"a grid of {count} values is not of the same length along {rank} axes")
-    return halvings
 
 
 def disk(square: Floats) -> Floats:

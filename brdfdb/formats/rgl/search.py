@@ -57,25 +57,9 @@ class RglFit:
 
 
 def smallest(table: Table, kind: str, tolerance: float, most_bytes: float, full: bool = False) -> RglFit:
-    """Return the smallest file within a tolerance, or the best one of at most so many bytes.
+    """Return the smallest file of a kind, "spectral" or "rgb", within a tolerance; else the best one of `most_bytes`.
 
-    Parameters
-    ----------
-    table : Table
-        Table in memory.
-    kind : str
-        "spectral" or "rgb".
-    tolerance : float [1]
-        Largest p99.
-    most_bytes : float
-        Largest size.
-    full : bool
-        The file holds all azimuths of the light.
-
-    Raises
-    ------
-    ParameterError
-        If the smallest file is larger.
+    If `full`, the file holds all azimuths of the light. ParameterError if the smallest file is larger.
     """
     if table.wavelength_nm is not None:
         return _smallest(table, kind, tolerance, most_bytes, full)

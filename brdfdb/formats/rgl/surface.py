@@ -174,18 +174,9 @@ def densities(
 ) -> Floats32:
     """Return densities over half vectors, shape (slices, rows, columns), for lights (slices, 1, 1, 3).
 
-    Parameters
-    ----------
-    surface : HalfVectorSurface
-        Values of the table.
-    wi : array (slices, 1, 1, 3)
-        Unit vectors of the light.
-    ndf : array (h, w)
-        Factor over half vectors, which is not in the values that are stored.
-    rows, columns : int
-        Nodes; 2 and 2 give the identity warp.
-    horizon : float
-        Share of each row above the horizon. 0: there is none, and densities fall off slowly below it.
+    `ndf` is the factor over half vectors, which is not in the values that are stored. Two rows and two columns give the
+    identity warp. `horizon` is the share of each row above the horizon; 0: there is none, and densities fall off slowly
+    below it.
     """
     if rows == 2:
         return np.ones((len(wi), 2, 2), np.float32)

@@ -394,29 +394,12 @@ def uncertainty_of(
     factors: NDArray[np.float64],
     record: dict[str, Any],
 ) -> NDArray[np.float64]:
-    """Return the standard uncertainties [1/sr] of values, shape (N, C).
+    """Return the standard uncertainties [1/sr] of values (N, C), of the numbers of their columns.
 
-    Parameters
-    ----------
-    where : str
-        The file and the line of the names of its columns.
-    names : sequence of str
-        Names of the columns, with their units.
-    given : array (N, C)
-        Numbers of the columns.
-    values : array (N, C) [1/sr]
-        f_r.
-    scale : array (N, C) or (1, C)
-        Factors that make f_r of the quantity of the values.
-    factors : array (C,)
-        Factors of the units of the values, which uncertainties without a unit of their own share.
-    record : dict
-        Record, whose notes say how the columns were read.
-
-    Raises
-    ------
-    FileFormatError
-        If a name gives a probability and no factor k, or k is 0.
+    `names` are the names of the columns with their units. `scale` makes f_r of the quantity of the values, and
+    `factors` of their units, which uncertainties without a unit share. Notes of the record say how the columns were
+    read; `where`, the file and the line of the names, begins the sentence on a name with a probability and no factor k,
+    or with a k of 0.
     """
     columns = f"column {names[0]}" if len(names) == 1 else f"columns {', '.join(names)}"
     note(record, f"Standard uncertainties were read from the {columns[:_SHOWN]}.")

@@ -114,7 +114,11 @@ def _units(
         note(record, f"Angles were taken as {_WORDS[unit]}: a title says {titles[0].strip()[:_SHOWN]!r}.")
         return dict.fromkeys(given, unit)
     other = named[0] if len(named) == 1 else "deg"  # of columns whose names give none
-    if other == "deg" and unnamed and _may_be_radians(unnamed):
+    # Angles without a unit may be radians if they are as small as radians are, and not 0 alone
+    largest = {name: float(np.abs(column).max(initial=0.0)) for name, column in unnamed.items()}
+    bounds = {name: (0.5 if name.startswith("theta") else 2.0) * np.pi + 1e-3 for name in unnamed}
+    may_be_radians = all(largest[name] <= bounds[name] for name in unnamed) and any(largest.values())
+    if other == "deg" and unnamed and may_be_radians:
         if named:
             columns = [layout.names[roles[name][0]] for name in unnamed]
             subject, verb = f"The column {columns[0]} was", "it gives"
@@ -126,13 +130,6 @@ def _units(
             text = "no polar angle exceeds pi/2 and no azimuth 2 pi, so they may be radians: --angles rad reads them so"
             note(record, f"Angles were taken as degrees, but no name gives a unit, {text}.")
     return {name: own or other for name, own in units.items()}
-
-
-def _may_be_radians(given: Mapping[str, Array]) -> bool:
-    """Return True if angles without a unit are as small as radians are, and not 0 alone."""
-    largest = {name: float(np.abs(column).max(initial=0.0)) for name, column in given.items()}
-    within = all(size <= (0.5 if name.startswith("theta") else 2.0) * np.pi + 1e-3 for name, size in largest.items())
-    return within and any(largest.values())
 
 
 def _exchange(given: dict[str, Array], record: dict[str, Any]) -> None:

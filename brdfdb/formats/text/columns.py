@@ -162,15 +162,8 @@ def number_of(text: str) -> float | None:
 
 
 def layout_of(lines: Iterable[tuple[int, str]]) -> TextLayout | None:
-    """Return the layout of a text; None if there is no row.
+    """Return the layout of a text by its first lines, with their numbers; None if there is no row.
 
-    Parameters
-    ----------
-    lines : iterable of (int, str)
-        The first lines of the text, with their numbers.
-
-    Notes
-    -----
     The first line of numbers alone is the first row: four at least, or three below the names of two polar angles. The
     last line before it with as many fields, three of them no numbers, has the names, also behind a sign of a comment.
     """

@@ -27,20 +27,9 @@ _SAME_DEG = 1e-6  # directions closer than this are one
 def rows_of(path: Path, layout: TextLayout, *, one_wavelength: bool) -> NDArray[np.float64]:
     """Return the numbers of a text from its first row on, shape (N, columns).
 
-    Parameters
-    ----------
-    path : path
-        The file.
-    layout : TextLayout
-        Its layout.
-    one_wavelength : bool
-        True if all rows have the wavelength of the titles: a comment with another one is refused.
-
-    Raises
-    ------
-    FileFormatError
-        If a row is damaged, stands below a comment with other columns, another unit of angles or another wavelength, or
-        the file was cut within its last number.
+    If all rows have the wavelength of the titles, `one_wavelength`, a comment with another wavelength is refused.
+    FileFormatError if a row is damaged, stands below a comment with other columns, another unit of angles or another
+    wavelength, or the file was cut within its last number.
     """
     numbers, count = array("d"), len(layout.names)
     decimals = ""  # the sign before decimals: a comma beside points may be that of thousands
@@ -120,19 +109,10 @@ def has_open_end(path: Path) -> bool:
 
 
 def check_last_number(path: Path, fields: Iterable[tuple[int, str]]) -> None:
-    """Refuse a text that was cut within its last number.
+    """Refuse a text without an end of its last line, of which the last number was cut.
 
-    Parameters
-    ----------
-    path : path
-        A text whose last line has no end.
-    fields : iterable of (int, str)
-        The last field of each row, with the number of its line.
-
-    Raises
-    ------
-    FileFormatError
-        If the last one has fewer digits behind the decimal point and in the exponent than all before it.
+    It was cut if it has fewer digits behind the decimal point and in the exponent than the last fields of all rows
+    before it; `fields` are these, with the numbers of their lines.
     """
     last, fewest = (0, ""), np.inf
     for field in fields:
@@ -148,14 +128,7 @@ def check_last_number(path: Path, fields: Iterable[tuple[int, str]]) -> None:
 def doubt_end(path: Path, lights_deg: NDArray[np.float64], record: dict[str, Any]) -> None:
     """Note that a text may have been cut: its last line has no end, and its last light has the fewest viewers.
 
-    Parameters
-    ----------
-    path : path
-        A text.
-    lights_deg : array (N, 2) [degree]
-        Direction of the light of each row, in the order of the file.
-    record : dict
-        Record of the samples.
+    `lights_deg` (N, 2) [degree] are the directions of the light of all rows, in the order of the file.
     """
     number, counts = np.unique(np.rint(lights_deg / _SAME_DEG), axis=0, return_inverse=True, return_counts=True)[1:]
     number = number.reshape(-1)
