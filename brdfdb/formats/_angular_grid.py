@@ -29,7 +29,6 @@ from brdfdb.parameters import Floats
 
 if TYPE_CHECKING:
     from brdfdb.formats._stated_error import Comparison, FileError
-    from brdfdb.tables.table import Table
 
 _AT_ONCE = 1 << 22  # values that are interpolated, or looked up, at a time
 _FIRST = 8  # intervals of each axis before any is halved
@@ -139,8 +138,8 @@ class FittedGrid(NamedTuple):
     error: FileError
 
 
-def filled(table: Table, comparison: Comparison, system: System, nodes: Sequence[Floats]) -> AngularGrid:
-    """Return a grid with f_r of a table, in the channels of the comparison, at nodes [rad] of each angle."""
+def filled(comparison: Comparison, system: System, nodes: Sequence[Floats]) -> AngularGrid:
+    """Return a grid with f_r of the table of a comparison, in its channels, at nodes [rad] of each angle."""
     shape = tuple(axis.size for axis in nodes)
     count, channels = math.prod(shape), len(comparison.channels.names)
     values = np.empty((count, channels), np.float32)
@@ -149,7 +148,7 @@ def filled(table: Table, comparison: Comparison, system: System, nodes: Sequence
         numbers = np.arange(start, min(start + step, count))
         index = np.unravel_index(numbers, shape)
         angles = np.stack([axis[at] for axis, at in zip(nodes, index, strict=True)], axis=1)
-        values[numbers] = comparison.channels.values(table, *system.directions(angles))
+        values[numbers] = comparison.channels.values(comparison.table, *system.directions(angles))
     return AngularGrid(system, tuple(nodes), values.reshape(*shape, channels))
 
 
@@ -161,20 +160,17 @@ class AngularPlan:
 
     Parameters
     ----------
-    table : Table
-        Table that is exported.
     comparison : Comparison
-        Pairs of directions, and the channels.
+        The table that is exported, pairs of directions, and the channels.
     system : System
         The angles.
     target : float [1]
         Error over each interval.
     """
 
-    def __init__(self, table: Table, comparison: Comparison, system: System, target: float) -> None:
+    def __init__(self, comparison: Comparison, system: System, target: float) -> None:
         above = np.flatnonzero(comparison.wr[:, 2] > 0.0)[::_EVERY]
         self.system = system
-        self.table = table
         self.comparison = comparison
         self.target = target
         self._truth = comparison.truth[above]
@@ -221,7 +217,7 @@ class AngularPlan:
         """Return f_r [1/sr] of pairs of directions of which one angle is moved to others [rad]."""
         moved = self._angles[pairs].copy()
         moved[:, axis] = at
-        return self.comparison.channels.values(self.table, *self.system.directions(moved))
+        return self.comparison.channels.values(self.comparison.table, *self.system.directions(moved))
 
     def _halved(self, axis: int, end: float) -> Intervals:
         """Return intervals from 0 to `end` [rad], and the error over each, by halving."""
@@ -273,7 +269,6 @@ class Intervals(NamedTuple):
 
 
 def chosen(
-    table: Table,
     comparison: Comparison,
     systems: Sequence[System],
     tolerance: float,
@@ -307,7 +302,7 @@ def chosen(
         return counter.nbytes
 
     def tried(plan: AngularPlan, target: float) -> Trial[FittedGrid]:
-        grid = filled(table, comparison, plan.system, plan.nodes(target))
+        grid = filled(comparison, plan.system, plan.nodes(target))
         grid = replace(grid, values=rounded(grid.values)) if as_text else grid
         fitted = FittedGrid(grid, comparison.error_of(grid.evaluate))
         return Trial(target, grid.values.size, fitted.error.p99, max(grid.values.shape[:-1]) == 2, fitted)
@@ -327,34 +322,34 @@ def chosen(
                 return best
             grid = best.grid.grid
             if max(grid.values.shape[:-1]) <= 2:
-                needed = f"the smallest file of {table.name} has {nbytes / 1e6:.3g} MB"
+                needed = f"the smallest file of {comparison.table.name} has {nbytes / 1e6:.3g} MB"
                 raise ParameterError(SIZE.name, f"{size:g} MB are too few: {needed}", most)
             most = min(grid.count - 1, int(_SHRUNK * grid.count * most_bytes / nbytes))
 
-    plans = [AngularPlan(table, comparison, system, tolerance / 2.0) for system in systems]
+    plans = [AngularPlan(comparison, system, tolerance / 2.0) for system in systems]
     plan = min(plans, key=lambda plan: plan.count(tolerance / 2.0))
     best = fitting(plan)
     if best.p99 > tolerance:
-        steeper = AngularPlan(table, comparison, plan.system.steeper(), plan.target)
+        steeper = AngularPlan(comparison, plan.system.steeper(), plan.target)
         best = min(best, fitting(steeper), key=lambda trial: trial.rank(tolerance))
     return best.grid
 
 
-def reciprocal(table: Table, comparison: Comparison) -> bool:
-    """Return True if a table is the same when light and viewer are exchanged, but for rounding."""
-    values = comparison.channels.values
-    return _same(comparison, lambda wi, wr: np.where(wr[:, 2:] > 0.0, values(table, _above(wr), wi), 0.0))
+def reciprocal(comparison: Comparison) -> bool:
+    """Return True if the table is the same when light and viewer are exchanged, but for rounding."""
+    values = functools.partial(comparison.channels.values, comparison.table)
+    return _same(comparison, lambda wi, wr: np.where(wr[:, 2:] > 0.0, values(_above(wr), wi), 0.0))
 
 
-def mirrored(table: Table, comparison: Comparison) -> bool:
-    """Return True if a table is the same when light and viewer are mirrored at the plane of half vector and normal."""
-    values = comparison.channels.values
+def mirrored(comparison: Comparison) -> bool:
+    """Return True if the table is the same when light and viewer are mirrored at the plane of half vector and z."""
+    values = functools.partial(comparison.channels.values, comparison.table)
     system = HalfDifference(anisotropic=True, mirrored=False, reciprocal=False)
 
     def turned(wi: Floats, wr: Floats) -> Floats:
         above = wr[:, 2] > 0.0
         angles = system.angles(wi, _above(wr)) * np.array([1.0, 1.0, 1.0, -1.0])
-        return np.where(above[:, np.newaxis], values(table, *system.directions(angles)), 0.0)
+        return np.where(above[:, np.newaxis], values(*system.directions(angles)), 0.0)
 
     return _same(comparison, turned)
 

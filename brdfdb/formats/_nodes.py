@@ -13,7 +13,7 @@ from brdfdb.formats._angles import System
 from brdfdb.parameters import Floats
 
 if TYPE_CHECKING:
-    from brdfdb.measurements.samples import Instrument, Samples
+    from brdfdb.measurements.samples import Samples
 
 _HORIZON = 0.5 * np.pi * (1.0 + 1e-9)  # largest polar angle [rad], with rounding
 _SAME = 1e-6  # difference of coordinates within which directions are the same: angles of files may have 32 bits
@@ -51,14 +51,13 @@ def samples_at_angles(
     record: Mapping[str, Any],
     *,
     uncertainty: Floats | None = None,
-    instrument: Instrument | None = None,
-    provenance: str = "",
+    **origin: Any,
 ) -> Samples:
     """Return samples at theta_i, phi_i, theta_r, phi_r [rad], shape (N, 4), above the horizon and without repetitions.
 
-    Values (N, C) [1/sr] are nan, or one of `FILL_VALUES`, where there are none. The other parameters are those of
-    `Samples`. The record counts the rows ``below_the_horizon`` and those ``repeated``: with the same directions and the
-    same values, as at all azimuths of the normal.
+    Values (N, C) [1/sr] are nan, or one of `FILL_VALUES`, where there are none. The other parameters, such as the
+    instrument and the provenance, are those of `Samples`. The record counts the rows ``below_the_horizon`` and those
+    ``repeated``: with the same directions and the same values, as at all azimuths of the normal.
 
     Raises
     ------
@@ -68,7 +67,7 @@ def samples_at_angles(
         If an angle is outside its range, or nan.
     """
     from brdfdb.geometry import check_phi, check_theta
-    from brdfdb.measurements.samples import ANGLES, Instrument, Samples
+    from brdfdb.measurements.samples import ANGLES, Samples
 
     for axis, column in zip(ANGLES, angles.T, strict=True):
         (check_theta if axis.startswith("theta") else check_phi)(axis, column)
@@ -91,9 +90,8 @@ def samples_at_angles(
         wavelength_nm,
         values[kept],
         uncertainty=None if uncertainty is None else uncertainty[kept],
-        instrument=instrument or Instrument(),
-        provenance=provenance,
         record={**record, **{key: count for key, count in counts.items() if count}},
+        **origin,
     )
 
 

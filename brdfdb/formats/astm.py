@@ -75,15 +75,8 @@ def write(
         sink.write(_TITLE + "".join(f"COMMENT {line}\n" for line in lines(document)).encode())
         _write_rows(sink, grid, names)
 
-    grid, error = chosen(
-        table,
-        comparison,
-        [Spherical(table.anisotropic, mirrored=not table.anisotropic)],
-        tolerance,
-        size,
-        write_all,
-        as_text=True,
-    )
+    system = Spherical(table.anisotropic, mirrored=not table.anisotropic)
+    grid, error = chosen(comparison, [system], tolerance, size, write_all, as_text=True)
     with whole(path) as (file,), file.open("wb") as stream:
         write_all(stream, grid, error)
     return Written((path_of(path),), error, tolerance, remarks)

@@ -85,15 +85,8 @@ def write(
     def write_all(sink: Sink, grid: AngularGrid, error: FileError) -> None:
         sink.write(text_beside(error, _write_blocks(sink, grid)))
 
-    grid, error = chosen(
-        table,
-        comparison,
-        [Spherical(anisotropic=False, mirrored=True)],
-        tolerance,
-        size,
-        write_all,
-        as_text=True,
-    )
+    system = Spherical(anisotropic=False, mirrored=True)
+    grid, error = chosen(comparison, [system], tolerance, size, write_all, as_text=True)
     with whole(path, beside(path)) as (file, there):
         with file.open("wb") as stream:
             rows = _write_blocks(stream, grid)

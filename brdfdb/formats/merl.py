@@ -80,7 +80,7 @@ def write(
     valid, angles = _nodes(samples)
     comparison = Comparison(table, channels)
     planes = np.full((3, *SHAPE), INVALID)
-    half = reciprocal(table, comparison)  # then the numbers at phi_d and pi - phi_d are the same
+    half = reciprocal(comparison)  # then the numbers at phi_d and pi - phi_d are the same
     looked_up = valid & (np.arange(SHAPE[2]) <= SHAPE[2] // 2) if half else valid
     numbers = channels.values(table, *_SYSTEM.directions(angles[looked_up[valid]]))
     planes[:, looked_up] = np.maximum(numbers, 0.0).T / SCALE[:, np.newaxis]

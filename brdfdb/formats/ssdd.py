@@ -94,7 +94,7 @@ def write(
         if table.specular is not None:
             sink.write(_specular(table, data == "binary"))
 
-    grid, error = chosen(table, comparison, _systems(table, comparison), tolerance, size, write_all)
+    grid, error = chosen(comparison, _systems(comparison), tolerance, size, write_all)
     with whole(path) as (file,), file.open("wb") as stream:
         write_all(stream, grid, error)
     return Written((path_of(path),), error, tolerance)
@@ -133,11 +133,11 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     return FileTable(name, names, at, grid.evaluate, document, nodes, listed=True)
 
 
-def _systems(table: Table, comparison: Comparison) -> list[System]:
+def _systems(comparison: Comparison) -> list[System]:
     """Return the systems of angles that a table may be written in, with the symmetries that it has."""
-    anisotropic = table.anisotropic
-    both_sides = not anisotropic or mirrored(table, comparison)
-    systems: list[System] = [HalfDifference(anisotropic, both_sides, reciprocal(table, comparison))]
+    anisotropic = comparison.table.anisotropic
+    both_sides = not anisotropic or mirrored(comparison)
+    systems: list[System] = [HalfDifference(anisotropic, both_sides, reciprocal(comparison))]
     if not anisotropic:
         systems += [Specular(anisotropic, mirrored=True), Spherical(anisotropic, mirrored=True)]
     return systems

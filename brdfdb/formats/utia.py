@@ -76,7 +76,7 @@ def write(
 
     channels = channels_of(table, "rgb")
     comparison = Comparison(table, channels)
-    grid = filled(table, comparison, _SYSTEM, _NODES)
+    grid = filled(comparison, _SYSTEM, _NODES)
     numbers = _encoded(np.maximum(grid.values.astype(np.float64), 0.0), encoding)
     error = comparison.error_of(UtiaReader(numbers, encoding))
     remarks = (*channels.remarks, *specular_remark(table))

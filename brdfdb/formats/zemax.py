@@ -92,15 +92,7 @@ def write(
         document["channels"] = list(channels.names)
         write_text(sink, _text(table, channels, albedo, grid, tuple(lines(document))))
 
-    grid, error = chosen(
-        table,
-        Comparison(table, channels),
-        [system],
-        tolerance,
-        size,
-        write_all,
-        as_text=True,
-    )
+    grid, error = chosen(Comparison(table, channels), [system], tolerance, size, write_all, as_text=True)
     with whole(path) as (file,), file.open("wb") as stream:
         write_all(stream, grid, error)
     return Written((path_of(path),), error, tolerance, remarks)
