@@ -123,8 +123,6 @@ def read(
 
     Parameters
     ----------
-    path : path
-        The file.
     quantity : {"auto", "f_r", "reflectance_factor", "f_r_cos", "f_r_cos_i"}
         Quantity of the values: f_r_cos is f_r times the cosine of the viewer, f_r_cos_i that of the light. By default
         the one that names or titles give, such as BRF, and else f_r. With a quantity, numbers whose unit is not known
@@ -145,14 +143,8 @@ def read(
         letters, and the record says so. Uncertainties that are relative, or expanded by a factor k, are made standard
         ones in 1/sr. Values that contradict at the same directions are an entry "contradiction" of the record.
 
-    Raises
-    ------
-    ParameterError
-        If there is no such role, column, quantity or unit.
-    FileFormatError
-        If the file is no text of numbers, a column is missing, a unit of angles or values is not known, the cosine in
-        a name of values is that of another angle, or rows stand below a comment that changes their wavelength, columns
-        or units; with the line and the field.
+    A FileFormatError names the line and the field: of a missing column, of a unit of angles or values that is not
+    known, or of rows below a comment that changes their wavelength, columns or units.
     """
     from brdfdb.measurements.joining import contradiction_within
 
