@@ -25,7 +25,7 @@ from brdfdb.formats._dense_files import OPTIONS, dense_record, reading_of_rows
 from brdfdb.formats._input import lines_of
 from brdfdb.formats._record import lines, of_lines, specular_remark
 from brdfdb.formats._written import Written, whole
-from brdfdb.formats.text.columns import number_of
+from brdfdb.formats.text._columns import number_of
 from brdfdb.place import path_of
 
 if TYPE_CHECKING:

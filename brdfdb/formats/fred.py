@@ -31,7 +31,7 @@ from brdfdb.formats._interface import TOLERANCE, WAVELENGTH
 from brdfdb.formats._nodes import samples_at_angles, without_holes
 from brdfdb.formats._record import beside, record, record_beside, specular_remark
 from brdfdb.formats._written import Written, whole
-from brdfdb.formats.text.rows import check_last_number, doubt_end, has_open_end
+from brdfdb.formats.text._rows import check_last_number, doubt_end, has_open_end
 from brdfdb.place import path_of
 
 if TYPE_CHECKING:

@@ -30,7 +30,7 @@ from brdfdb.formats._interface import MEGABYTES, TOLERANCE
 from brdfdb.formats._nodes import samples_of_grid
 from brdfdb.formats._record import document_of, record, specular_remark
 from brdfdb.formats._written import Written, whole
-from brdfdb.formats.rgl.tensors import MAGIC, read_tensors, write_tensors
+from brdfdb.formats.rgl._tensors import MAGIC, read_tensors, write_tensors
 from brdfdb.parameters import Floats
 from brdfdb.place import path_of
 

@@ -25,7 +25,7 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 import brdfdb
 from brdfdb.formats import rgl
 from brdfdb.formats._stated_error import FLOOR
-from brdfdb.formats.rgl.tensors import read_tensors
+from brdfdb.formats.rgl._tensors import read_tensors
 from brdfdb.geometry import radians, unit_vector
 from brdfdb.scenes.gbuffer import gather
 from brdfdb.scenes.renderer import render

@@ -15,7 +15,7 @@ import pytest
 from brdfdb import formats
 from brdfdb.errors import FileFormatError
 from brdfdb.formats import _input
-from brdfdb.formats.rgl.tensors import read_tensors, write_tensors
+from brdfdb.formats.rgl._tensors import read_tensors, write_tensors
 from tests.formats.refusals import check_refused, check_texts_refused
 from tests.formats.small_tables import DIFFUSE, GREY, SPECTRAL, small_table
 

@@ -12,7 +12,7 @@ import pytest
 from brdfdb import formats
 from brdfdb.errors import CannotHoldError, ParameterError
 from brdfdb.formats import kaist
-from brdfdb.formats.rgl.tensors import read_tensors
+from brdfdb.formats.rgl._tensors import read_tensors
 from brdfdb.geometry import unit_vector
 from brdfdb.materials import Material
 from brdfdb.measurements.samples import Samples

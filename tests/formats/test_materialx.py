@@ -16,9 +16,9 @@ from brdfdb.errors import FileFormatError
 from brdfdb.formats import materialx
 from brdfdb.formats._channels import channels_of
 from brdfdb.formats._stated_error import Comparison
-from brdfdb.formats.materialx.fit import fitted, of_alphas
-from brdfdb.formats.materialx.surface import OPEN_PBR, STANDARD, darkest_edge
-from brdfdb.formats.materialx.surface import MaterialXSurface as Surface
+from brdfdb.formats.materialx._fit import fitted, of_alphas
+from brdfdb.formats.materialx._surface import OPEN_PBR, STANDARD, darkest_edge
+from brdfdb.formats.materialx._surface import MaterialXSurface as Surface
 from brdfdb.geometry import radians, unit_vector
 from brdfdb.materials import FunctionSource, Material
 from brdfdb.tables.grids import Grid

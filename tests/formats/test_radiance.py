@@ -14,7 +14,7 @@ from brdfdb import formats
 from brdfdb.errors import WriteError
 from brdfdb.formats import radiance
 from brdfdb.formats._channels import channels_of
-from brdfdb.formats.radiance.tree import disk, lights, parsed, positions, square, viewers
+from brdfdb.formats.radiance._tree import disk, lights, parsed, positions, square, viewers
 from brdfdb.geometry import unit_vector
 from brdfdb.models import MODELS
 from brdfdb.parameters import Floats

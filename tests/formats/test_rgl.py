@@ -18,8 +18,8 @@ from brdfdb.errors import FileFormatError, ParameterError, WriteError
 from brdfdb.formats import rgl
 from brdfdb.formats._readings import FileTable
 from brdfdb.formats._stated_error import Comparison
-from brdfdb.formats.rgl.fields import MixedSlices, Warp, fields_of
-from brdfdb.formats.rgl.tensors import read_tensors, write_tensors
+from brdfdb.formats.rgl._fields import MixedSlices, Warp, fields_of
+from brdfdb.formats.rgl._tensors import read_tensors, write_tensors
 from brdfdb.geometry import unit_vector
 from brdfdb.tables.albedo import directional_albedo
 from tests.formats.small_tables import ANISOTROPIC, DIFFUSE, GREY, SPECTRAL, WAVELENGTHS_NM, small_table

@@ -13,7 +13,7 @@ from brdfdb.errors import FileFormatError, ParameterError
 from brdfdb.formats import zemax
 from brdfdb.formats._readings import FileTable
 from brdfdb.formats.netcdf import write_samples
-from brdfdb.formats.rgl.tensors import write_tensors
+from brdfdb.formats.rgl._tensors import write_tensors
 from brdfdb.measurements import Instrument, Samples
 from tests.formats.refusals import check_changes_refused, check_texts_refused
 from tests.formats.small_tables import ANISOTROPIC, DIFFUSE, SPECTRAL, small_table

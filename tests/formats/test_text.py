@@ -10,7 +10,7 @@ import pytest
 
 from brdfdb import formats
 from brdfdb.errors import FileFormatError, ParameterError
-from brdfdb.formats.text.columns import role_of, wavelength_of
+from brdfdb.formats.text._columns import role_of, wavelength_of
 from brdfdb.measurements import Samples
 from brdfdb.measurements.samples import RELATIVE
 from brdfdb.measurements.statement import statement

@@ -22,7 +22,7 @@ from brdfdb.formats._channels import RGB, channels_of, has_spectrum
 from brdfdb.formats._interface import TOLERANCE
 from brdfdb.formats._record import document_of, frame_remark, record, specular_remark
 from brdfdb.formats._written import Written, whole
-from brdfdb.formats.materialx.surface import OPEN_PBR, STANDARD, MaterialXSurface
+from brdfdb.formats.materialx._surface import OPEN_PBR, STANDARD, MaterialXSurface
 from brdfdb.place import path_of
 
 if TYPE_CHECKING:
@@ -83,7 +83,7 @@ def write(
     wrong place. The x axis of the table is the tangent of the geometry. The record is the `doc` of the material.
     """
     from brdfdb.formats._stated_error import Comparison
-    from brdfdb.formats.materialx.fit import fitted
+    from brdfdb.formats.materialx._fit import fitted
 
     channels = channels_of(table, "rgb" if has_spectrum(table) else "grey")
     surface = _rounded(fitted(kind, table, channels))

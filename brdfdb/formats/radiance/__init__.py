@@ -25,8 +25,8 @@ from brdfdb.formats._interface import TOLERANCE, FormatOption
 from brdfdb.formats._nodes import samples_at_vectors
 from brdfdb.formats._record import lines
 from brdfdb.formats._written import Written, whole
-from brdfdb.formats.radiance.growth import Growth
-from brdfdb.formats.radiance.tree import (
+from brdfdb.formats.radiance._growth import Growth
+from brdfdb.formats.radiance._tree import (
     ANISOTROPIC,
     ISOTROPIC,
     Tree,

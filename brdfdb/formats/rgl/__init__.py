@@ -69,8 +69,8 @@ def write(
     """
     from brdfdb.formats._record import U_AXIS, frame_remark, record, specular_remark
     from brdfdb.formats._written import Written, whole
-    from brdfdb.formats.rgl.search import smallest
-    from brdfdb.formats.rgl.tensors import write_tensors
+    from brdfdb.formats.rgl._search import smallest
+    from brdfdb.formats.rgl._tensors import write_tensors
 
     path = path_of(path)
     wavelengths = 0 if table.wavelength_nm is None else table.wavelength_nm.size
@@ -89,7 +89,7 @@ def write(
 
 def recognises(head: bytes) -> bool:
     """Return True if the first bytes of a file are those of a tensor file with a material of RGL."""
-    from brdfdb.formats.rgl.tensors import MAGIC
+    from brdfdb.formats.rgl._tensors import MAGIC
 
     return head.startswith(MAGIC) and b"vndf" in head
 
@@ -100,8 +100,8 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     from brdfdb.formats._nodes import samples_at_vectors
     from brdfdb.formats._readings import FileTable
     from brdfdb.formats._record import document_of
-    from brdfdb.formats.rgl.fields import fields_of
-    from brdfdb.formats.rgl.tensors import read_tensors
+    from brdfdb.formats.rgl._fields import fields_of
+    from brdfdb.formats.rgl._tensors import read_tensors
 
     path = path_of(path)
     fields = fields_of(path, read_tensors(path))

@@ -22,8 +22,8 @@ from brdfdb.errors import FileFormatError, ParameterError
 from brdfdb.formats._input import check_text, lines_of
 from brdfdb.formats._nodes import samples_at_angles, without_fill_values
 from brdfdb.formats._record import note, of_comments
-from brdfdb.formats.text.angles import angles_of_rows
-from brdfdb.formats.text.columns import (
+from brdfdb.formats.text._angles import angles_of_rows
+from brdfdb.formats.text._columns import (
     ANGLES,
     PERCENT,
     QUANTITIES,
@@ -39,7 +39,7 @@ from brdfdb.formats.text.columns import (
     units_in,
     wavelength_of,
 )
-from brdfdb.formats.text.rows import doubt_end, line_of_row, rows_of
+from brdfdb.formats.text._rows import doubt_end, line_of_row, rows_of
 from brdfdb.place import path_of
 
 if TYPE_CHECKING:

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from brdfdb.errors import FileFormatError
 from brdfdb.formats._record import note
-from brdfdb.formats.text.columns import ANGLE_UNITS, ANGLES, AZIMUTHS, TextLayout, angle_unit, plain_name
-from brdfdb.formats.text.rows import line_of_row
+from brdfdb.formats.text._columns import ANGLE_UNITS, ANGLES, AZIMUTHS, TextLayout, angle_unit, plain_name
+from brdfdb.formats.text._rows import line_of_row
 
 Array = NDArray[np.float64]
 

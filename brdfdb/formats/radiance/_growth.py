@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from brdfdb.formats.radiance.tree import ISOTROPIC, Index, Tree, lights, viewers
+from brdfdb.formats.radiance._tree import ISOTROPIC, Index, Tree, lights, viewers
 from brdfdb.parameters import Floats
 
 Evaluate = Callable[[Floats, Floats], Floats]  # f_r (..., C) at unit vectors (..., 3) of light and viewer

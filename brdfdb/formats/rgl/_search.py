@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from brdfdb.errors import ParameterError
 from brdfdb.formats._channels import RGB, Channels, channels_of, names_of
-from brdfdb.formats.rgl.fields import Array, Fields, Floats32, MixedSlices, Warp, bilinear, of_azimuth, of_polar_angle
-from brdfdb.formats.rgl.surface import LAST_THETA, HalfVectorSurface, densities, lights
+from brdfdb.formats.rgl._fields import Array, Fields, Floats32, MixedSlices, Warp, bilinear, of_azimuth, of_polar_angle
+from brdfdb.formats.rgl._surface import LAST_THETA, HalfVectorSurface, densities, lights
 from brdfdb.parameters import Floats
 
 if TYPE_CHECKING:

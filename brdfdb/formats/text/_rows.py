@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from brdfdb.errors import FileFormatError
 from brdfdb.formats._input import lines_of
 from brdfdb.formats._record import note, of_comments
-from brdfdb.formats.text.columns import TextLayout, angle_unit, comment_of, fields_of, header_of, number_of
+from brdfdb.formats.text._columns import TextLayout, angle_unit, comment_of, fields_of, header_of, number_of
 
 _ANGLE_UNIT = re.compile(r"(?<![\d.])(?<![\d.] )\b(?:degrees?|deg|m?rad|(?:milli)?radians?)\b", re.IGNORECASE)
 _SHOWN = 200  # characters of a comment that a sentence repeats

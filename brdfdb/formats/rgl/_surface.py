@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from brdfdb.formats.rgl.fields import Array, Floats32, bilinear, directions
+from brdfdb.formats.rgl._fields import Array, Floats32, bilinear, directions
 from brdfdb.parameters import Floats
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from brdfdb.conversion.nodes import COARSE, Nodes
 from brdfdb.errors import import_extra
 from brdfdb.formats._channels import Channels
-from brdfdb.formats.materialx.surface import OPEN_PBR, MaterialXSurface, darkest_edge
+from brdfdb.formats.materialx._surface import OPEN_PBR, MaterialXSurface, darkest_edge
 from brdfdb.integrals.pairs import Symmetry
 from brdfdb.lobes import Lobe
 from brdfdb.parameters import Floats
