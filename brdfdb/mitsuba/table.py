@@ -19,7 +19,7 @@ from brdfdb.mitsuba._grid_values import GridValues
 from brdfdb.mitsuba._mueller import Facet
 from brdfdb.mitsuba._surface import DIFFUSE, GLOSSY, SPECULAR, Formula, Values
 from brdfdb.mitsuba._wavelengths import Columns, projection
-from brdfdb.store.opening import open as open_store
+from brdfdb.store import open as open_store
 from brdfdb.tables._interpolation import prepared, weights_of_nodes
 from brdfdb.tables.polarisation import Facets
 from brdfdb.tables.table import Table, table_from

@@ -24,7 +24,7 @@ from brdfdb.materials import written_name
 from brdfdb.models import MODELS
 from brdfdb.notebook import card, percent
 from brdfdb.parameters import Floats, Parameter
-from brdfdb.store.sealed_json import read_sealed
+from brdfdb.store.files import read_sealed
 from brdfdb.tables.evaluation import Surface
 from brdfdb.tables.grids import Axis
 from brdfdb.tables.stated_error import Error

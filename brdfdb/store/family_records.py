@@ -27,11 +27,10 @@ from brdfdb.store.family import (
     stale,
     stencil,
 )
-from brdfdb.store.files import sync_directory
+from brdfdb.store.files import sync_directory, write_sealed
 from brdfdb.store.lock import Lock, writing
 from brdfdb.store.paths import family_path
 from brdfdb.store.reader import Store
-from brdfdb.store.sealed_json import write_sealed
 from brdfdb.tables import error_measurement, places
 from brdfdb.tables.layout import PLAIN
 from brdfdb.tables.places import BANDS

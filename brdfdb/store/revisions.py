@@ -12,7 +12,6 @@ from typing import Any, Literal
 
 from brdfdb.errors import BusyError, ParameterError, StoreError, UnknownMaterialError
 from brdfdb.store.lock import Lock, writing
-from brdfdb.store.manifest import Summary, check_manifest, read_manifest, whole_revisions
 from brdfdb.store.paths import (
     marker_path,
     material_path,
@@ -23,9 +22,17 @@ from brdfdb.store.paths import (
     revision_path,
     staging_path,
 )
-from brdfdb.store.pointer import known_manifests, point_to
 from brdfdb.store.reader import Store
-from brdfdb.store.snapshot_record import read_snapshot, snapshot_names
+from brdfdb.store.records import (
+    Summary,
+    check_manifest,
+    known_manifests,
+    point_to,
+    read_manifest,
+    read_snapshot,
+    snapshot_names,
+    whole_revisions,
+)
 
 SNAPSHOTS = ".snapshots"  # the lock that snapshots and collections take in turns; no material has such a name
 
@@ -57,11 +64,11 @@ def standing(root: Path, name: str, request: Mapping[str, Any]) -> Standing:
     store = Store(root)
     why = "new"
     try:
-        if name in store:  # the error of `current` for one that is not compares its name with all others
-            group, _, head = store.current(name)
+        if name in store:  # the error for an unknown material compares its name with all others
+            head = store.summary(name)
             if head["request_sha256"] == wanted:
                 store.verify(name)
-                return Standing("current", group.name)
+                return Standing("current", head["revision"])
             why = difference(store.metadata(name).whole_request, request)
     except StoreError as error:
         why = str(error)
@@ -75,9 +82,9 @@ def adoptable(root: Path, name: str, request_sha256: str) -> str | None:
     known = known_manifests(material)
     for group in reversed(whole_revisions(material)):
         with suppress(StoreError):
-            manifest, digest = read_manifest(group, known.get(group.name))
-            if manifest["summary"]["request_sha256"] == request_sha256:
-                check_manifest(group, digest, contents=True)
+            manifest = read_manifest(group, known.get(group.name))
+            if manifest.content["summary"]["request_sha256"] == request_sha256:
+                check_manifest(group, manifest.digest, contents=True)
                 return group.name
     return None
 
@@ -122,11 +129,12 @@ def history(root: Path, name: str) -> list[Revision]:
     StoreError
         If a manifest cannot be read.
     """
-    current, _, head = Store(root).current(name)
-    return [
-        Revision(group.name, read_manifest(group, head["manifests"].get(group.name))[0]["summary"], group == current)
-        for group in whole_revisions(current.parent)
-    ]
+    head = Store(root).summary(name)
+    revisions = []
+    for group in whole_revisions(material_path(root, name)):
+        manifest = read_manifest(group, head["manifests"].get(group.name)).content
+        revisions.append(Revision(group.name, manifest["summary"], group.name == head["revision"]))
+    return revisions
 
 
 def rollback(root: Path, name: str, revision: str) -> str:
@@ -286,7 +294,7 @@ def _collect_material(
 def strangers(group: Path, digest: str | None) -> list[Path]:
     """Return the files in a revision that its manifest does not list; none where the manifest is damaged."""
     try:
-        files = read_manifest(group, digest)[0]["files"]
+        files = read_manifest(group, digest).content["files"]
     except StoreError:
         return []
     return [path for path in group.rglob("*") if path.is_file() and path.relative_to(group).as_posix() not in files]

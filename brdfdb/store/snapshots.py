@@ -13,13 +13,12 @@ from pathlib import Path
 
 from brdfdb.errors import ParameterError, StoreError
 from brdfdb.store.family import stale
-from brdfdb.store.files import sync_directory
+from brdfdb.store.files import seal_of, sync_directory, write_sealed
 from brdfdb.store.lock import Lock, writing
 from brdfdb.store.paths import NAME, snapshot_path
 from brdfdb.store.reader import Store
+from brdfdb.store.records import SNAPSHOT_FORMAT, SNAPSHOT_VERSION, Pin, Snapshot, read_snapshot
 from brdfdb.store.revisions import SNAPSHOTS
-from brdfdb.store.sealed_json import seal_of, write_sealed
-from brdfdb.store.snapshot_record import SNAPSHOT_FORMAT, SNAPSHOT_VERSION, Pin, Snapshot, read_snapshot
 
 
 def create(root: Path, name: str, advance: Callable[[], None] = lambda: None) -> str:
@@ -37,7 +36,7 @@ def create(root: Path, name: str, advance: Callable[[], None] = lambda: None) ->
     Raises
     ------
     ValueError
-        If the name is none.
+        If the name is not one of a snapshot.
     StoreError
         If the store has a snapshot of this name, or no material; if a material is damaged or a family out of date.
     """
@@ -45,17 +44,18 @@ def create(root: Path, name: str, advance: Callable[[], None] = lambda: None) ->
         raise ParameterError(
             "snapshot", f"{name[:60]!r} is not made of lower-case letters, digits and single hyphens", name
         )
-    store, path = Store(root), snapshot_path(root, name)
+    store = Store(root)
+    path = snapshot_path(root, name)
     with Lock(root, SNAPSHOTS) as lock:
         if path.exists():
             raise StoreError(f"the store at {root} has a snapshot {name}, which never changes; take another name")
         materials: dict[str, Pin] = {}
         requests: dict[str, str] = {}
         for material in store:
-            group, digest, head = store.current(material)
+            current = store.current(material)
             store.verify(material)
-            materials[material] = {"revision": group.name, "manifest_sha256": digest}
-            requests[material] = head["request_sha256"]
+            materials[material] = {"revision": current.head["revision"], "manifest_sha256": current.location.digest}
+            requests[material] = current.head["request_sha256"]
             advance()
         if not materials:
             raise StoreError(f"the store at {root} has no material to name")
@@ -92,7 +92,7 @@ def remove(root: Path, name: str) -> None:
     with Lock(root, SNAPSHOTS):
         path = snapshot_path(root, name)
         if not (NAME.fullmatch(name) and path.is_file()):
-            read_snapshot(root, name)  # says which there are
+            read_snapshot(root, name)  # it raises an error that names the others
         with writing(root, f"the snapshot {name}"):
             path.unlink()
             sync_directory(path.parent)

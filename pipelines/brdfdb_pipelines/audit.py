@@ -27,7 +27,7 @@ from brdfdb.models import MODELS
 from brdfdb.store.family import Sweep
 from brdfdb.store.family_records import measure, verify_family
 from brdfdb.store.reader import Store
-from brdfdb.store.snapshot_record import snapshot_names
+from brdfdb.store.records import snapshot_names
 from brdfdb.store.summary_words import REPORT_OF_ALL, REPORT_OF_SOME
 from brdfdb.tables import _kernels
 from brdfdb.tables.layout import digest
@@ -303,7 +303,7 @@ def _family_sha256(store: Store, name: str) -> str:
     content: dict[str, Any] = {"name": name}
     with suppress(StoreError, UnknownMaterialError):
         content["record"] = store.family_content(name)
-        content["members"] = {member: store.location(member)[1] for member in content["record"]["members"]}
+        content["members"] = {member: store.location(member).digest for member in content["record"]["members"]}
     return digest(content)
 
 

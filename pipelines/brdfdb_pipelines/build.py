@@ -13,13 +13,11 @@ from typing import Any
 from brdfdb.errors import BusyError, ParameterError, StoreError
 from brdfdb.store.family import FamilyRecord, Sweep
 from brdfdb.store.family_records import recorded, write_family
-from brdfdb.store.files import Entry
+from brdfdb.store.files import FileEntry
 from brdfdb.store.lock import Lock, writing
-from brdfdb.store.manifest import read_manifest
-from brdfdb.store.marker import make_store
 from brdfdb.store.paths import material_path, revision_path
-from brdfdb.store.pointer import point_to
 from brdfdb.store.publication import publish_staged
+from brdfdb.store.records import make_store, point_to, read_manifest
 from brdfdb.store.staging import Block, discard, prepare, remove_begun, write_block, write_frame
 from brdfdb_pipelines import build_resources, workers
 from brdfdb_pipelines.build_progress import Event, Tally
@@ -73,7 +71,7 @@ class _Table:
     lock: Lock
     staging: Path = Path()
     blocks: deque[int] = field(default_factory=deque)  # not submitted yet
-    files: dict[str, Entry] = field(default_factory=dict)
+    files: dict[str, FileEntry] = field(default_factory=dict)
     waiting_reported: bool = False  # the event that another build holds the lock was sent
 
     @property
@@ -261,7 +259,7 @@ class _Builder:
 
     def _is_current(self, job: Job, revision: str) -> None:
         name = job.material.name
-        stored = read_manifest(revision_path(self.root, name, revision), None)[0]["summary"]["bytes"]
+        stored = read_manifest(revision_path(self.root, name, revision), None).content["summary"]["bytes"]
         self.built[name] = Built(job, "unchanged", revision, stored)
         self.report({"event": "unchanged", "material": name, "revision": revision})
 
@@ -326,7 +324,7 @@ class _Builder:
             with writing(self.root, name):
                 point_to(material_path(self.root, name), standing.revision)
             discard(self.root, name, job.request)  # the build that made this revision may have been killed
-            stored = read_manifest(revision_path(self.root, name, standing.revision), None)[0]["summary"]["bytes"]
+            stored = read_manifest(revision_path(self.root, name, standing.revision), None).content["summary"]["bytes"]
             self.built[name] = Built(job, "adopted", standing.revision, stored, standing.why)
             self.report({"event": "adopted", "material": name, "revision": standing.revision, "why": standing.why})
         else:
@@ -360,7 +358,7 @@ class _Builder:
         if len(table.files) == len(values):
             self.ready.append(table)
 
-    def _framed(self, table: _Table, future: Future[dict[str, Entry]]) -> None:
+    def _framed(self, table: _Table, future: Future[dict[str, FileEntry]]) -> None:
         if (files := self._result(table.name, future)) is None:
             self._close(table)
             return

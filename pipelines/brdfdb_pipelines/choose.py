@@ -20,7 +20,7 @@ from brdfdb.scenes.recorded_directions import Recorded
 from brdfdb.scenes.renderer import Reflector, reflectors
 from brdfdb.scenes.scene import Scene
 from brdfdb.scenes.shapes import Array
-from brdfdb.store.marker import make_store
+from brdfdb.store.records import make_store
 from brdfdb.store.staging import remove_begun
 from brdfdb_pipelines import terminal
 from brdfdb_pipelines.choice_publication import Built, build, with_reason

@@ -125,8 +125,9 @@ def _holds(audited: MaterialAudit, store: Store) -> bool:
     if audited.program != program() or audited.verdict == "accepted excess":
         return False
     try:
-        group, manifest_sha256, head = store.current(name)
-        if (audited.revision, audited.manifest_sha256) != (group.name, manifest_sha256):
+        current = store.current(name)
+        head = current.head
+        if (audited.revision, audited.manifest_sha256) != (head["revision"], current.location.digest):
             return False
         store.verify(name)
     except (StoreError, KeyError):

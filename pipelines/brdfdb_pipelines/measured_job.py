@@ -20,10 +20,9 @@ from brdfdb.measurements import MeasuredSource, Samples, joined
 from brdfdb.measurements.measured_source import MARGIN
 from brdfdb.place import path_of
 from brdfdb.store.lock import Lock, writing
-from brdfdb.store.manifest import read_manifest
 from brdfdb.store.paths import material_path, revision_path
-from brdfdb.store.pointer import point_to
 from brdfdb.store.publication import publish_layout
+from brdfdb.store.records import point_to, read_manifest
 from brdfdb.store.revisions import standing
 from brdfdb.tables.largest_albedo import largest_albedo
 from brdfdb.tables.layout import TABLE_VERSION, Layout
@@ -215,7 +214,7 @@ def build_measured(root: str, job: MeasuredJob) -> Tabulated:
         with Lock(store, job.name), writing(store, job.name):
             point_to(material_path(store, job.name), status.revision)
     if status.state != "missing":
-        stored = read_manifest(revision_path(store, job.name, status.revision), None)[0]["summary"]["bytes"]
+        stored = read_manifest(revision_path(store, job.name, status.revision), None).content["summary"]["bytes"]
         state = "unchanged" if status.state == "current" else "adopted"
         return Tabulated(state, status.revision, stored, status.why)
     try:

@@ -16,7 +16,7 @@ import pytest
 
 import brdfdb
 from brdfdb.errors import StoreError
-from brdfdb.store import http_client, http_service
+from brdfdb.store import http_client
 from tests.api.a_store import angles, npy, same, serving
 
 
@@ -120,7 +120,7 @@ BUSY = answer(b'{"detail": "the server is busy"}', "503 Service Unavailable", "R
 
 def test_a_busy_service_is_asked_again_when_it_says(monkeypatch: pytest.MonkeyPatch) -> None:
     pauses: list[float] = []
-    monkeypatch.setattr(http_service.time, "sleep", pauses.append)
+    monkeypatch.setattr(http_client.time, "sleep", pauses.append)
     with answering(BUSY, READY, BUSY, READY) as (url, asked):  # it is opened, and counts its materials
         assert len(http_client.RemoteStore(url)) == 3
     assert (pauses, len(asked)) == ([1, 1], 4)
@@ -130,7 +130,7 @@ def test_a_busy_service_is_asked_again_when_it_says(monkeypatch: pytest.MonkeyPa
 def test_a_wait_that_is_too_long_is_an_error_at_once(
     monkeypatch: pytest.MonkeyPatch, wait: str, timeout_s: float
 ) -> None:
-    monkeypatch.setattr(http_service.time, "sleep", lambda _: pytest.fail("waits"))
+    monkeypatch.setattr(http_client.time, "sleep", lambda _: pytest.fail("waits"))
     refusal = BUSY.replace(b"Retry-After: 1", f"Retry-After: {wait}".encode())
     with answering(refusal) as (url, _), pytest.raises(StoreError, match=r"^the server is busy$"):
         http_client.RemoteStore(url, timeout_s=timeout_s)
@@ -160,7 +160,7 @@ def test_a_new_connection_that_breaks_is_not_tried_again() -> None:
 def test_an_answer_in_chunks() -> None:
     chunks = b'4\r\n{"ma\r\nb\r\nterials":3}\r\n0\r\n\r\n'
     with answering(b"HTTP/1.1 200 OK\r\nTransfer-Encoding: chunked\r\n\r\n" + chunks) as (url, _):
-        assert http_service.Service(url).document("/readyz") == {"materials": 3}
+        assert http_client.Service(url).document("/readyz") == {"materials": 3}
 
 
 @pytest.mark.parametrize(
@@ -205,7 +205,7 @@ NUMBERS = npy(np.zeros((3, 2)))
 def test_something_else_than_the_array_asked_for(content: bytes) -> None:
     said = "^http://[^ ]+ is no service of brdfdb$"
     with answering(answer(content)) as (url, _), pytest.raises(StoreError, match=said):
-        http_service.Service(url).array("/v1", (3, 2))
+        http_client.Service(url).array("/v1", (3, 2))
 
 
 @pytest.mark.parametrize("status", ["301 Moved Permanently", "302 Found", "307 Temporary Redirect", "308 Permanent"])
@@ -213,7 +213,7 @@ def test_a_redirect_is_told_and_not_followed(status: str) -> None:
     moved = answer(PAGE, status, "Location: https://there.example/brdf/v1?a=1")
     for body in (None, {"theta_i": 0}):
         with answering(moved) as (url, _), pytest.raises(StoreError) as raised:
-            http_service.Service(f"{url}/brdf/").document("/v1?a=1", body)
+            http_client.Service(f"{url}/brdf/").document("/v1?a=1", body)
         where = "https://there.example/brdf/v1; open the address that the service itself has"
         assert str(raised.value) == f"{url}/brdf redirects /v1 to {where}"
 
@@ -223,21 +223,21 @@ def test_a_redirect_is_told_and_not_followed(status: str) -> None:
 
 def test_a_body_that_is_refused_before_it_was_read() -> None:
     with answering(TOO_LARGE, READY, TOO_LARGE, READY) as (url, asked):
-        there = http_service.Service(url)
+        there = http_client.Service(url)
         for _ in range(2):  # the second time, the connection is one that was closed in between
             with pytest.raises(
                 StoreError, match=f"^{url} answered 413 Request Entity Too Large, and does not say why$"
             ):
-                there.content("/v1", FAR_TOO_LARGE, http_service.NPY)
+                there.content("/v1", FAR_TOO_LARGE, http_client.NPY)
             assert there.document("/readyz") == {"materials": 3}
     assert [request[:4] for request in asked] == [b"POST", b"GET ", b"POST", b"GET "]
 
 
 def test_a_connection_on_which_a_body_was_not_sent_whole_is_not_used_again() -> None:
     with answering(answer(PAGE, "413"), READY, close=False) as (url, asked):
-        there = http_service.Service(url, timeout_s=3.0)
+        there = http_client.Service(url, timeout_s=3.0)
         with pytest.raises(StoreError, match=f"^{url} answered 413, and does not say why$"):
-            there.content("/v1", FAR_TOO_LARGE, http_service.NPY)
+            there.content("/v1", FAR_TOO_LARGE, http_client.NPY)
         assert there.document("/readyz") == {"materials": 3}
     assert len(asked) == 2
 

@@ -20,11 +20,10 @@ from brdfdb.audit.record import UNCHECKED, Record, expected_of, record_of
 from brdfdb.audit.table_error import TableError
 from brdfdb.errors import BrdfdbError, StoreError
 from brdfdb.materials import Material, presets
-from brdfdb.store.chunks import read_group
-from brdfdb.store.decoding import table_of
-from brdfdb.store.manifest import SUMMARY_FIELDS, check_manifest
+from brdfdb.store.decoding import read_group, table_of
+from brdfdb.store.files import read_sealed
 from brdfdb.store.reader import Store
-from brdfdb.store.sealed_json import read_sealed
+from brdfdb.store.records import Summary, check_manifest, fields_of
 from brdfdb.tables.table import Table
 from brdfdb_pipelines import audit_page, cli
 from tests.audit.a_table import ANISOTROPIC, tabulated
@@ -124,7 +123,7 @@ def test_every_leaf_of_a_summary_that_is_forged_is_noticed_or_listed(store: Path
         except StoreError:
             continue
         unnoticed.append(".".join(map(str, path)))
-    assert set(SUMMARY_FIELDS) <= summary.keys()
+    assert {field.name for field in fields_of(Summary)} <= summary.keys()
     assert unnoticed == [each.leaf for each in UNCHECKED if each.where == "pointer and manifest"]
 
 

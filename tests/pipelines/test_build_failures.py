@@ -131,7 +131,7 @@ def test_a_full_disk_is_one_sentence_and_what_was_written_is_kept(
         return write(path, data, temporary, **options)
 
     with monkeypatch.context() as patch:
-        for user in ("staging.write_file", "sealed_json.write_file", "files.write_file"):
+        for user in ("staging.write_file", "files.write_file"):
             patch.setattr(f"brdfdb.store.{user}", fill)
         assert cli.main(["build", str(recipe), "--store", str(root), "--jobs", "1"]) == 2
     out, err = capsys.readouterr()

@@ -13,7 +13,7 @@ import pytest
 
 import brdfdb
 from brdfdb.materials import presets
-from brdfdb.store import marker, staging
+from brdfdb.store import records, staging
 from brdfdb.tables.grids import Grid
 from brdfdb.tables.layout import Interpolation, Layout
 from brdfdb_pipelines import build_resources, build_survey, cli
@@ -41,7 +41,7 @@ def layout(name: str, half: bool, how: Interpolation, nodes: int, rows: int) -> 
     ],
 )
 def test_a_task_takes_at_most_the_memory_that_is_expected_and_not_a_tenth_of_it(table: Layout, tmp_path: Path) -> None:
-    marker.make_store(tmp_path / "store")
+    records.make_store(tmp_path / "store")
     text = json.dumps(table.document())
     directory = str(staging.prepare(tmp_path / "store", table.source.name, {"asked": "by a test"}, text))
     staging.write_block(directory, text, 0)  # the first time kernels are compiled

@@ -13,7 +13,7 @@ from brdfdb.audit.pairs import pairs_of
 from brdfdb.audit.table_error import table_error_of
 from brdfdb.forms.catalogue import forms
 from brdfdb.materials import presets
-from brdfdb.store.marker import make_store
+from brdfdb.store.records import make_store
 from brdfdb.tables.grids import Grid
 from brdfdb.tables.layout import Layout
 from brdfdb.tables.planner import plan

@@ -20,8 +20,8 @@ from brdfdb.materials import Material
 from brdfdb.store import family_records
 from brdfdb.store.family import Sweep
 from brdfdb.store.family_records import measure
+from brdfdb.store.files import write_sealed
 from brdfdb.store.reader import Store
-from brdfdb.store.sealed_json import write_sealed
 from brdfdb.tables import error_measurement, tabulation
 from brdfdb.tables.layout import Layout
 from brdfdb_pipelines import build as module

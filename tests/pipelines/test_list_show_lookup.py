@@ -12,8 +12,7 @@ import pytest
 
 import brdfdb
 from brdfdb.materials import Material, presets
-from brdfdb.store.catalogue import line_of
-from brdfdb.store.material_document import material_document
+from brdfdb.store.catalogue import line_of, material_document
 from brdfdb.store.publication import publish_dataset
 from brdfdb.tables.albedo import directional_albedo
 from brdfdb.tables.grids import Grid

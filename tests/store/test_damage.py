@@ -11,8 +11,8 @@ import pytest
 
 import brdfdb
 from brdfdb.errors import StoreError
+from brdfdb.store.files import sealed, unsealed
 from brdfdb.store.reader import Store
-from brdfdb.store.sealed_json import sealed, unsealed
 from tests.store.a_store import lambert
 from tests.store.published import pointer, publish, rho
 

@@ -17,8 +17,8 @@ from brdfdb.geometry import unit_vector
 from brdfdb.materials import Material
 from brdfdb.store.family import Family, FamilyRecord, Sweep, blended, read_record, stencil
 from brdfdb.store.family_records import POINTS, measure, parameter_points
+from brdfdb.store.files import sealed
 from brdfdb.store.paths import family_path
-from brdfdb.store.sealed_json import sealed
 from brdfdb.tables import error_measurement
 from brdfdb.tables.grids import Grid
 from brdfdb.tables.layout import Interpolation, Layout

@@ -20,10 +20,10 @@ from brdfdb.errors import StoreError, UnknownMaterialError, UnknownRevisionError
 from brdfdb.materials import Material
 from brdfdb.store import codec
 from brdfdb.store import reader as module
-from brdfdb.store.pointer import Head
+from brdfdb.store.files import sealed
 from brdfdb.store.publication import publish_dataset
 from brdfdb.store.reader import Store
-from brdfdb.store.sealed_json import sealed
+from brdfdb.store.records import Head
 from brdfdb.tables.layout import Layout
 from brdfdb.tables.tabulation import tabulate
 from brdfdb.tables.xarray_view import plain_attributes

@@ -19,10 +19,10 @@ import xarray as xr
 
 import brdfdb
 from brdfdb.errors import StoreError
-from brdfdb.store import codec, marker
+from brdfdb.store import codec, records
+from brdfdb.store.files import unsealed
 from brdfdb.store.lock import Lock
 from brdfdb.store.publication import publish_dataset, publish_staged
-from brdfdb.store.sealed_json import unsealed
 from brdfdb.store.staging import planned, prepare, write_block, write_frame
 from brdfdb.tables import layout as layouts
 from brdfdb.tables.error_measurement import measure
@@ -153,12 +153,12 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 import zarr, zarr.codecs
-from brdfdb.store import codec, files, pointer, publication, sealed_json
+from brdfdb.store import codec, files, publication, records
 
 def die(*_):
     os.kill(os.getpid(), signal.SIGKILL)
 
-places = {"files": files, "pointer": pointer, "publication": publication, "sealed_json": sealed_json, "Path": Path}
+places = {"files": files, "publication": publication, "records": records, "Path": Path}
 axes = {"theta_i": [0.0, 90.0], "theta_r": [0.0, 90.0], "delta_phi": [0.0, 180.0]}
 values = np.full((2, 2, 2), 9.0, dtype=np.float32)
 dataset = xr.Dataset({"brdf": (tuple(axes), values)}, coords=axes)  # the first one imports dask
@@ -189,15 +189,15 @@ def killed() -> Iterator[Callable[[Path, str], int]]:
 
 @pytest.mark.parametrize(
     "step", ["files write_file", "publication publish_staged", "publication sync_directory",
-             "publication write_sealed", "Path rename", "publication point_to", "pointer swap_sealed",
-             "sealed_json sync_directory"],
+             "publication write_sealed", "Path rename", "publication point_to", "records swap_sealed",
+             "files sync_directory"],
 )  # fmt: skip
 def test_a_killed_write_changes_nothing_for_readers_and_takes_no_number_twice(
     root: Path, step: str, killed: Callable[[Path, str], int]
 ) -> None:
     assert killed(root, step) == -signal.SIGKILL
     store = brdfdb.open(root)
-    if step == "sealed_json sync_directory":  # the pointer is swapped; only that it outlasts a power cut is not certain
+    if step == "files sync_directory":  # the pointer is swapped; only that it outlasts a power cut is not certain
         assert store.head("white") == "r000002"
         store.verify("white")
         return
@@ -205,7 +205,7 @@ def test_a_killed_write_changes_nothing_for_readers_and_takes_no_number_twice(
     assert (rho(root), store.head("white"), list(store)) == (0.25, "r000001", ["white"])
     before = contents(root / "materials")
     revision, _ = publish_dataset(root, "white", lambert(0.75))
-    taken = step in ("Path rename", "publication point_to", "pointer swap_sealed")
+    taken = step in ("Path rename", "publication point_to", "records swap_sealed")
     assert revision == ("r000003" if taken else "r000002")
     assert staged(root) == []
     after = contents(root / "materials")
@@ -219,7 +219,7 @@ def test_a_killed_write_changes_nothing_for_readers_and_takes_no_number_twice(
 
 
 def staged_table(root: Path, text: str) -> Path:
-    marker.make_store(root)
+    records.make_store(root)
     return prepare(root, "white", REQUEST, text)
 
 

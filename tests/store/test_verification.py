@@ -16,11 +16,11 @@ import xarray as xr
 import brdfdb
 from brdfdb.errors import ParameterError, StoreError
 from brdfdb.store import codec, files, publication, snapshots, verification
-from brdfdb.store.marker import make_store
+from brdfdb.store.files import sealed, unsealed
 from brdfdb.store.paths import manifest_path
 from brdfdb.store.publication import publish_dataset
+from brdfdb.store.records import make_store
 from brdfdb.store.revisions import adoptable, collect, history, rollback, standing
-from brdfdb.store.sealed_json import sealed, unsealed
 from brdfdb.tables.layout import digest
 from tests.store.a_white import lambert, rho
 

@@ -19,9 +19,8 @@ from starlette.types import Receive, Scope, Send
 
 from brdfdb import __version__
 from brdfdb.materials.model_document import ModelDocument
-from brdfdb.store.catalogue import Line
+from brdfdb.store.catalogue import Line, MaterialDocument
 from brdfdb.store.family import FamilyLine
-from brdfdb.store.material_document import MaterialDocument
 
 if TYPE_CHECKING:
     from brdfdb.tables.table import Table

@@ -13,8 +13,7 @@ from starlette.requests import Request
 from starlette.responses import Response
 
 from brdfdb.formats import EXPORTERS
-from brdfdb.store.catalogue import Choice
-from brdfdb.store.material_document import material_document
+from brdfdb.store.catalogue import Choice, material_document
 from brdfdb.store.paths import pinned
 from brdfdb_api.http import middleware
 from brdfdb_api.http.addresses import Revision, addresses, answers, both, shelf_of

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from brdfdb.errors import ParameterError
 from brdfdb.place import path_of
-from brdfdb.store.opening import default_root
+from brdfdb.store import default_root
 
 MOST_JOBS = 1024  # threads or processes
 MOST_WIDTH = 4096  # pixels across a picture: a wider one takes tens of gigabytes

@@ -51,10 +51,10 @@ def _create(root: Path, name: str) -> None:
 
 def _list(root: Path) -> None:
     """Print a line for each snapshot of a store."""
+    from brdfdb.store.files import seal_of
     from brdfdb.store.paths import snapshot_path
     from brdfdb.store.reader import Store
-    from brdfdb.store.sealed_json import seal_of
-    from brdfdb.store.snapshot_record import snapshot_names
+    from brdfdb.store.records import snapshot_names
 
     names = snapshot_names(Store(root).root)
     for name in names:
@@ -64,7 +64,7 @@ def _list(root: Path) -> None:
 
 
 def _contents(root: Path, name: str) -> str:
-    from brdfdb.store.snapshot_record import read_snapshot
+    from brdfdb.store.records import read_snapshot
 
     content = read_snapshot(root, name)
     return f"{name}: {counted(len(content['materials']), 'material')}, {len(content['families'])} families"
