@@ -88,8 +88,7 @@ def test_the_table_is_taken_if_it_is_asked_for(kind: str, tmp_path: Path) -> Non
 def test_models_with_a_plugin_are_those_that_mitsuba_registers() -> None:
     variant("scalar_rgb")
     from brdfdb.mitsuba import PLUGINS
-    from brdfdb.mitsuba.diffuse import FORMULAS
-    from brdfdb.mitsuba.oren_nayar import FORMS as OREN_NAYAR
+    from brdfdb.mitsuba.diffuse import FORMULAS, OREN_NAYAR
     from brdfdb.mitsuba.stray_light import FORMS as STRAY_LIGHT
     from brdfdb.mitsuba.ward import FORMS as WARD
 
