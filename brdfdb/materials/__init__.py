@@ -6,9 +6,8 @@ from typing import Any
 from pydantic import ValidationError
 
 from brdfdb.errors import BrdfdbError, sentence_of
-from brdfdb.materials.exact import exact_material
 from brdfdb.materials.function_source import FunctionRecord, FunctionSource
-from brdfdb.materials.material import Material
+from brdfdb.materials.material import Material, exact_material
 from brdfdb.materials.preset_files import PAPERS, libraries, presets
 from brdfdb.materials.source import Source
 from brdfdb.materials.written_parameters import written_name

@@ -93,6 +93,13 @@ class Lossless(NamedTuple):
     changes: dict[str, float | Spectrum]
 
 
+class RefractiveIndices(NamedTuple):
+    """n and k [1] at wavelengths, arrays (L,)."""
+
+    n: NDArray[np.float64]
+    k: NDArray[np.float64]
+
+
 class Source(Protocol):
     """A source of f_r: a material with a model, or a function.
 
@@ -201,9 +208,7 @@ class Source(Protocol):
     def lobe(self, cos_i: Floats, wavelength_nm: NDArray[np.float64] | None) -> Lobe | None:
         """Return the lobe for lights with the cosine cos_i, which broadcasts with wavelengths [nm]; None if diffuse."""
 
-    def refractive_indices(
-        self, wavelength_nm: NDArray[np.float64] | None
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+    def refractive_indices(self, wavelength_nm: NDArray[np.float64] | None) -> RefractiveIndices | None:
         """Return n and k [1] at wavelengths [nm]; None if f_r does not depend on them."""
 
     def attributes(self) -> dict[str, Any]:

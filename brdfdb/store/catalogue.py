@@ -336,7 +336,8 @@ class MaterialDocument(BaseModel):
 
 def material_document(table: Table, verdict: Verdict | None) -> dict[str, Any]:
     """Return the fields of `MaterialDocument`, with numpy arrays, of a table and the last audit of its material."""
-    metadata, attributes = table.metadata, table.attrs
+    metadata = table.metadata
+    attributes = table.attrs
     return {
         "name": table.name,
         "revision": table.revision,

@@ -36,14 +36,9 @@ def chunk_name(layout: Layout, number: int) -> str:
 
 
 def chunk_bytes(values: NDArray[np.floating[Any]], rows: int) -> bytes:
-    """Return the bytes that zarr writes for a chunk in float32 with `COMPRESSORS`, without its event loop.
+    """Return the bytes that zarr writes for a chunk of `rows` rows in float32, without its event loop.
 
-    Parameters
-    ----------
-    values : array
-        The rows of the chunk; fewer than `rows` are filled up with nan, because chunks are of one size.
-    rows : int
-        Rows of a chunk.
+    Fewer values are filled up with nan, because chunks are of one size.
     """
     if len(values) < rows:
         filled = np.full((rows, *values.shape[1:]), np.nan, dtype=np.float32)
@@ -55,13 +50,7 @@ def chunk_bytes(values: NDArray[np.floating[Any]], rows: int) -> bytes:
 
 
 def decoded(layout: Layout, number: int, data: bytes) -> NDArray[np.float32]:
-    """Return the block that the bytes of a file hold: the inverse of `chunk_bytes`.
-
-    Raises
-    ------
-    StoreError
-        If the checksum is not that of the bytes.
-    """
+    """Return the block in the bytes of a file, the inverse of `chunk_bytes`; StoreError if their checksum is wrong."""
     content = decoding.decoded(data)
     if content is None:
         raise StoreError(f"{layout.source.name}: the checksum of {chunk_name(layout, number)} is wrong")

@@ -74,19 +74,7 @@ def table_of(
 def read_group(group: Path, files: Mapping[str, FileEntry]) -> StoredArrays | None:
     """Return the arrays of a revision; None if their encoding is not that of `brdfdb.store.codec`.
 
-    Parameters
-    ----------
-    group : Path
-        Directory of the revision.
-    files : mapping
-        Size and sha256 of each file of the revision.
-
-    Raises
-    ------
-    StoreError
-        If a file is missing or changed.
-    ValueError, KeyError, TypeError, RuntimeError
-        If the files do not hold arrays.
+    StoreError names a file that is missing or changed; files that hold no arrays raise errors of other kinds.
     """
     metadata = json.loads(checked_bytes(group, METADATA, files))
     described = (metadata.get("consolidated_metadata") or {}).get("metadata")
@@ -149,22 +137,7 @@ def decoded(data: bytes) -> bytes | None:
 
 
 def checked_bytes(group: Path, key: str, files: Mapping[str, FileEntry]) -> bytes:
-    """Return the content of a file of a revision, checked in memory.
-
-    Parameters
-    ----------
-    group : Path
-        Directory of the revision.
-    key : str
-        Path of the file in it.
-    files : mapping
-        Size and sha256 of each file of the revision.
-
-    Raises
-    ------
-    StoreError
-        If the file is missing, cannot be read or changed.
-    """
+    """Return the content of a file of a revision; StoreError if it is missing, cannot be read or changed."""
     where = f"{group.parent.name} {group.name}"
     try:
         value = regular_bytes(group / key)

@@ -54,18 +54,9 @@ def sha256_of(path: str | Path) -> str:
 
 
 def write_file(path: Path, data: bytes, temporary: Path, *, sync: bool = True) -> FileEntry:
-    """Write a file so that it is complete and synced to disk, or does not exist.
+    """Write a file, by way of a directory of the same file system, so that it is complete or does not exist.
 
-    Parameters
-    ----------
-    path : Path
-        The file; its directory is made.
-    data : bytes
-        The content.
-    temporary : Path
-        A directory of the same file system, in which the file is written before it is moved to its place.
-    sync : bool
-        False for a file whose readers notice damage by a power cut, and can do without the file.
+    With `sync` False a power cut may damage it, which its readers must notice and can do without.
     """
     half = temporary / f".{path.name}.{uuid.uuid4().hex}"
     try:
@@ -114,20 +105,7 @@ def sealed(content: Mapping[str, Any]) -> bytes:
 
 
 def unsealed(data: bytes, where: str, file: str) -> dict[str, Any]:
-    """Return the content of a sealed JSON object.
-
-    Parameters
-    ----------
-    data : bytes
-        The file, as `sealed` made it.
-    where, file : str
-        Name of the material, family or snapshot, and of the file, for error messages.
-
-    Raises
-    ------
-    StoreError
-        If any byte of it changed.
-    """
+    """Return the content of a sealed JSON object; StoreError, naming `where` and `file`, if any byte of it changed."""
     seal = _SEAL.match(data)
     if seal is None:
         raise StoreError(f"{where} is damaged: the first line of {file} is not its digest")

@@ -74,23 +74,15 @@ class _Answer(NamedTuple):
 class Service:
     """HTTP to one service: a connection for each thread, kept open from one request to the next.
 
-    Parameters
-    ----------
-    url : str
-        ``http://`` or ``https://``, host, port, and a path if the service is not at the root.
-    timeout_s : float
-        For each step of an exchange [s].
-
-    Raises
-    ------
-    ValueError
-        If `url` is not such an address, or `timeout_s` out of range.
+    `url` is ``http://`` or ``https://``, host, port, and a path if the service is not at the root; `timeout_s` is for
+    each step of an exchange [s]. ParameterError says that either is wrong.
     """
 
     def __init__(self, url: str, timeout_s: float = TIMEOUT_S) -> None:
         try:
             split = urlsplit(url)
-            host, port = split.hostname, split.port
+            host = split.hostname
+            port = split.port
         except ValueError as error:
             raise ParameterError("url", f"{url!r} is not an address: {error}", url) from None
         if split.scheme not in ("http", "https") or not host or "@" in split.netloc or split.query or split.fragment:
@@ -168,7 +160,8 @@ class Service:
             problem = json.loads(answer)
             detail = str(problem["detail"])
         except (ValueError, TypeError, KeyError):  # the page of a proxy
-            problem, detail = {}, ""
+            problem = {}
+            detail = ""
         if status == 404 and "closest" in problem:
             raise UnknownMaterialError(path.partition("/materials/")[2].partition("/")[0] or path, problem["closest"])
         if status == 404 and problem.get("parameter") == "revision":
@@ -294,8 +287,7 @@ class RemoteTable(BaseTable):
     def lookup_vectors(self, wi: ArrayLike, wr: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:
         self._wavelengths(wavelength_nm)
         given = checked_vectors(wi, wr)
-        (theta_i, phi_i), (theta_r, phi_r) = spherical_angles(given.w_i), spherical_angles(given.w_r)
-        return self._looked_up((theta_i, phi_i, theta_r, phi_r), given, wavelength_nm)
+        return self._looked_up((*spherical_angles(given.w_i), *spherical_angles(given.w_r)), given, wavelength_nm)
 
     @array_lookup
     def specular_reflectance(self, theta_i: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:
@@ -482,7 +474,8 @@ class RemoteStore(Mapping[str, RemoteTable]):
         return self._service.document(f"/v1/materials/{name}{revision}")
 
     def _table(self, document: dict[str, Any]) -> RemoteTable:
-        error, wavelengths = document["error"], document["wavelength_nm"]
+        error = document["error"]
+        wavelengths = document["wavelength_nm"]
         return RemoteTable(
             name=document["name"],
             revision=document["revision"],

@@ -206,17 +206,8 @@ def publish_staged(root: Path, name: str, staging: Path, files: Mapping[str, Fil
     """Make a staged table the current revision of its material; the caller holds the lock.
 
     The last step swaps the pointer; until then readers see the revision before. After a crash just before that step,
-    the revision is complete, and the next build of the request makes it current.
-
-    Parameters
-    ----------
-    files : mapping
-        The files of the group, by their paths inside it; others are removed.
-
-    Raises
-    ------
-    StoreError
-        If it cannot be written.
+    the revision is complete, and the next build of the request makes it current. Files of the group that `files` does
+    not name are removed. StoreError says that it cannot be written.
     """
     material = material_path(root, name)
     table = staging / "table"

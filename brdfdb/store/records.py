@@ -173,14 +173,7 @@ def fields_of(record: Any) -> tuple[_Field, ...]:
 
 
 def record_of(content: Mapping[str, Any], record: type[Record], where: str, file: str) -> Record:
-    """Return a JSON object as a record.
-
-    Raises
-    ------
-    StoreError
-        If a field of the record is missing or of another type; it begins with `where`, and names the file and the
-        field.
-    """
+    """Return a JSON object as a record; StoreError names a field that is missing or of another type."""
     for field in fields_of(cast(Any, record)):
         if field.required or field.name in content:
             field.check(content.get(field.name, ...), where, file)
@@ -217,12 +210,8 @@ def check_marker(root: Path) -> None:
 def make_store(root: Path) -> bool:
     """Make a store unless there is one; return whether it was made.
 
-    A brdfdb.json that is missing or damaged beside tables of this version is written anew.
-
-    Raises
-    ------
-    StoreError
-        If `root` cannot be written, is a directory of a store such as its materials, or is something else.
+    A brdfdb.json that is missing or damaged beside tables of this version is written anew. StoreError says that `root`
+    cannot be written, is a directory of a store such as its materials, or is something else.
     """
     marker = marker_path(path_of(root, "root"))
     made = False
@@ -302,19 +291,9 @@ def whole_revisions(material: Path) -> list[Path]:
 
 
 def read_manifest(group: Path, digest: str | None) -> ReadManifest:
-    """Return the manifest of a revision.
+    """Return the manifest of a revision, whose digest is None if neither a pointer nor a snapshot records it.
 
-    Parameters
-    ----------
-    group : Path
-        Directory of the revision.
-    digest : str or None
-        sha256 of the manifest, if a pointer or a snapshot records it.
-
-    Raises
-    ------
-    StoreError
-        If the manifest is missing, changed or that of another revision, or has another digest.
+    StoreError says that it is missing, changed or that of another revision, or has another digest.
     """
     where = f"{group.parent.name} {group.name}"
     path = manifest_path(group)
@@ -333,19 +312,7 @@ def check_manifest(group: Path, digest: str | None, *, contents: bool) -> Manife
     """Check that the files of a revision exist, with the sizes in its manifest, and return the manifest.
 
     The content of metadata is checked too, since no checksum of a chunk protects it; with `contents`, the content of
-    every file, and what the manifest says of the table.
-
-    Parameters
-    ----------
-    group, digest
-        As in `read_manifest`.
-    contents : bool
-        Read every file.
-
-    Raises
-    ------
-    StoreError
-        Naming the first file that differs.
+    every file, and what the manifest says of the table. StoreError names the first file that differs.
     """
     where = f"{group.parent.name} {group.name}"
     directory = str(group)
@@ -370,20 +337,9 @@ def check_manifest(group: Path, digest: str | None, *, contents: bool) -> Manife
 def check_file(
     group: Path, key: str, value: bytes | None, files: Mapping[str, FileEntry], *, complete: bool = True
 ) -> None:
-    """Raise StoreError if a file of a revision is missing, or is not the one that its manifest names.
+    """Raise StoreError if a file of a revision is missing, or changed, by the list of files in its manifest.
 
-    Parameters
-    ----------
-    group : Path
-        Directory of the revision.
-    key : str
-        Path of the file in it.
-    value : bytes or None
-        Its content; None if there is no such file.
-    files : mapping
-        Size and sha256 of each file of the revision. Files that it does not name are not checked.
-    complete : bool
-        False if `value` is a part of the file, whose digest is not known.
+    The path `key` is inside the revision; `value` is None for a missing file, and a part of the file unless `complete`.
     """
     if (entry := files.get(key)) is None:
         return
@@ -458,10 +414,7 @@ def check_summary(head: Head, manifest: Manifest) -> None:
 def point_to(material: Path, revision: str) -> None:
     """Swap the pointer of a material to one of its revisions; the caller holds the lock.
 
-    Raises
-    ------
-    StoreError
-        If the manifest of the revision is damaged, or has another digest than in the pointer before.
+    StoreError says that the manifest of the revision is damaged, or has another digest than in the pointer before.
     """
     known = known_manifests(material)
     manifest = read_manifest(material / revision, known.get(revision)).content
@@ -507,13 +460,7 @@ def snapshot_names(root: Path) -> list[str]:
 
 
 def read_snapshot(root: Path, name: str) -> Snapshot:
-    """Return a snapshot of the store at `root`.
-
-    Raises
-    ------
-    StoreError
-        If there is none of this name, or it is damaged or of another version.
-    """
+    """Return a snapshot of the store at `root`; StoreError if there is none, or it is damaged or of another version."""
     where = f"the snapshot {name}"
     if not (NAME.fullmatch(name) and snapshot_path(root, name).is_file()):
         others = ", ".join(snapshot_names(root)) or "none"

@@ -41,14 +41,8 @@ SNAPSHOTS = ".snapshots"  # the lock that snapshots and collections take in turn
 class Standing:
     """The standing of a material towards a request.
 
-    Attributes
-    ----------
-    state : str
-        "current" if the current revision answers it and is undamaged, "adoptable" if another one does, else "missing".
-    revision : str
-        The one that answers it; empty if none does.
-    why : str
-        In a phrase, why the current revision does not.
+    "current" if the current revision answers it and is undamaged, "adoptable" if another one does, else "missing"; the
+    revision that answers it, if any; and in a phrase why the current revision does not.
     """
 
     state: Literal["current", "adoptable", "missing"]
@@ -96,7 +90,8 @@ def difference(old: Mapping[str, Any], new: Mapping[str, Any]) -> str:
     new = json.loads(json.dumps(new))
     changes: list[str] = []
     for key in sorted({*old, *new}):
-        before, after = old.get(key), new.get(key)
+        before = old.get(key)
+        after = new.get(key)
         if before == after:
             continue
         words = key.replace("_", " ")
@@ -120,15 +115,7 @@ class Revision:
 
 
 def history(root: Path, name: str) -> list[Revision]:
-    """Return the revisions of a material that are whole, oldest first.
-
-    Raises
-    ------
-    UnknownMaterialError
-        If the store has no such material.
-    StoreError
-        If a manifest cannot be read.
-    """
+    """Return the complete revisions of a material, oldest first; StoreError if a manifest cannot be read."""
     head = Store(root).summary(name)
     revisions = []
     for group in whole_revisions(material_path(root, name)):
@@ -138,21 +125,13 @@ def history(root: Path, name: str) -> list[Revision]:
 
 
 def rollback(root: Path, name: str, revision: str) -> str:
-    """Make an older revision current again, or a newer one; this repairs a pointer that is missing or damaged, too.
+    """Make another revision current, which also repairs a pointer that is missing or damaged.
 
-    Returns
-    -------
-    str
-        The revision that was current; empty if the pointer was missing or damaged.
-
-    Raises
-    ------
-    UnknownMaterialError
-        If the store has no such material.
-    StoreError
-        If the material has no such revision, or it is damaged.
+    Returns the revision that was current; empty if the pointer was missing or damaged. StoreError says that the
+    material has no such revision, or that it is damaged.
     """
-    store, material = Store(root), material_path(root, name)
+    store = Store(root)
+    material = material_path(root, name)
     if name not in store:
         raise UnknownMaterialError(name, list(store))
     with Lock(root, name):
@@ -170,17 +149,7 @@ def rollback(root: Path, name: str, revision: str) -> str:
 
 @dataclass
 class Collected:
-    """The result of a collection.
-
-    Attributes
-    ----------
-    removed : list of str
-        Paths, below the root of the store.
-    busy : list of str
-        Materials that were left alone, since a build is at work on them.
-    freed : int
-        Bytes.
-    """
+    """The result of a collection: removed paths below the root, materials with a build at work, and freed bytes."""
 
     removed: list[str] = field(default_factory=list)
     busy: list[str] = field(default_factory=list)
@@ -190,11 +159,10 @@ class Collected:
 def collect(root: Path, keep: int = 2, *, damaged: bool = False) -> Collected:
     """Remove what no reader is served and no build is at work on.
 
-    Staging directories of builds that were broken off (they could have been resumed), revisions that are neither
-    current nor among the newest nor named by a snapshot, and what crashes and others left behind: directories without
-    a manifest, manifests without a directory, temporary files, files in a revision that its manifest does not list. A
-    reader that holds a decoded table keeps it; one that is just reading a revision that goes reads the current one
-    instead, or is told.
+    Staging directories of interrupted builds (they could have been resumed), revisions that are neither current nor
+    among the newest nor named by a snapshot, and the remains of crashes: directories without a manifest, manifests
+    without a directory, temporary files, files in a revision that its manifest does not list. Decoded tables stay
+    usable; a reader of a revision that is removed reads the current one instead, or gets an error.
 
     Parameters
     ----------
@@ -223,7 +191,7 @@ def collect(root: Path, keep: int = 2, *, damaged: bool = False) -> Collected:
 
 
 def pinned(root: Path) -> dict[Path, str]:
-    """Return the revisions that snapshots name, each with the name of one; StoreError if a snapshot is damaged."""
+    """Return the revisions that snapshots name, with the name of a snapshot; StoreError if a snapshot is damaged."""
     groups = {}
     for name in snapshot_names(root):
         for material, pin in read_snapshot(root, name)["materials"].items():
@@ -240,7 +208,8 @@ def _collect(store: Store, keep: int, damaged: bool, collected: Collected) -> No
         raise StoreError(f"nothing is collected, since {error}; remove it with `brdfdb snapshot --remove`") from error
     for path in store.root.glob(f".{marker_path(store.root).name}.*"):
         _remove(store.root, path, collected)
-    staged, materials = staging_path(store.root), materials_path(store.root)
+    staged = staging_path(store.root)
+    materials = materials_path(store.root)
     names = {path.name for directory in (staged, materials) for path in directory.iterdir() if path.is_dir()}
     for name in sorted(names - {SNAPSHOTS}):
         try:
@@ -263,18 +232,19 @@ def _collect(store: Store, keep: int, damaged: bool, collected: Collected) -> No
 def _collect_material(
     store: Store, material: Path, keep: int, damaged: bool, stay: set[Path], collected: Collected
 ) -> None:
-    whole, known = whole_revisions(material), known_manifests(material)
+    revisions = whole_revisions(material)
+    known = known_manifests(material)
     kept: set[Path] = set()
     try:
         current = store.path(material.name)
-        others = [group for group in whole if group != current]
+        others = [group for group in revisions if group != current]
         # what a snapshot names stays, damaged or not: half of it may be all that is left
         kept = {current, *others[max(0, len(others) - (keep - 1)) :], *stay}
     except UnknownMaterialError:  # nothing but what crashes left behind
         current = material
     except StoreError:
         return  # nobody knows what the pointer pointed to: the next build repairs it
-    for group in sorted(kept & set(whole)):
+    for group in sorted(kept & set(revisions)):
         if damaged and group != current and group not in stay:
             try:
                 check_manifest(group, known.get(group.name), contents=True)

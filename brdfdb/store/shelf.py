@@ -20,14 +20,8 @@ if TYPE_CHECKING:
 class Shelf:
     """The materials of a store, as a program shows them that runs while the store changes.
 
-    Parameters
-    ----------
-    root, cache_bytes, snapshot
-        As of `Store`. It is opened when it is first needed, so that there may be none yet.
-    audit_files : sequence of Path
-        What ``brdfdb audit`` wrote as JSON, such as the reports on all materials and on some; each may be missing.
-    store : Store, optional
-        An open one in place of `root`.
+    The store at `root`, or an open one, is opened when it is first needed: there may be none yet. `audit_files` are
+    what ``brdfdb audit`` wrote as JSON, such as the reports on all materials and on some; each may be missing.
     """
 
     def __init__(
@@ -64,12 +58,8 @@ class Shelf:
     def table(self, name: str, revision: str | None = None) -> Table:
         """Return the table of a material, of its current revision or another.
 
-        Raises
-        ------
-        UnknownMaterialError, UnknownRevisionError
-            If there is none.
-        StoreError
-            If it cannot be read, or was there and is gone; the sentence names the material.
+        UnknownMaterialError and UnknownRevisionError say that there is none; StoreError, naming the material, that it
+        cannot be read, or was there and is gone.
         """
         with self._named(name):
             table = self.store[name] if revision is None else self.store.table(name, revision)

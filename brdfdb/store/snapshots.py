@@ -24,21 +24,8 @@ from brdfdb.store.revisions import SNAPSHOTS
 def create(root: Path, name: str, advance: Callable[[], None] = lambda: None) -> str:
     """Name the current revisions of all materials, and the families; return the digest of the snapshot.
 
-    Parameters
-    ----------
-    root : Path
-        Directory of the store.
-    name : str
-        Lower-case letters, digits and single hyphens.
-    advance : callable
-        Called after each material, every file of which is read.
-
-    Raises
-    ------
-    ValueError
-        If the name is not one of a snapshot.
-    StoreError
-        If the store has a snapshot of this name, or no material; if a material is damaged or a family out of date.
+    Every file of each material is read; `advance` is called after each. StoreError says that the store has a snapshot
+    of this name or no material, that a material is damaged or a family out of date.
     """
     if not NAME.fullmatch(name):
         raise ParameterError(
@@ -82,13 +69,7 @@ def create(root: Path, name: str, advance: Callable[[], None] = lambda: None) ->
 
 
 def remove(root: Path, name: str) -> None:
-    """Remove a snapshot, damaged or not; the revisions stay until they are collected.
-
-    Raises
-    ------
-    StoreError
-        If there is none of this name.
-    """
+    """Remove a snapshot, damaged or not; the revisions stay until they are collected. StoreError if there is none."""
     with Lock(root, SNAPSHOTS):
         path = snapshot_path(root, name)
         if not (NAME.fullmatch(name) and path.is_file()):

@@ -94,10 +94,7 @@ def planned(root: Path, name: str, request: Mapping[str, Any]) -> str | None:
 def _layout(text: str) -> Layout:
     """Return a layout from JSON; the cache serves a worker that gets many blocks of one layout.
 
-    Raises
-    ------
-    StoreError
-        If this program would compute something else than the program that wrote the JSON.
+    StoreError says that the JSON is of another version of this program, which computes something else.
     """
     document = json.loads(text)
     layout = Layout.from_document(document)
@@ -109,21 +106,8 @@ def _layout(text: str) -> Layout:
 def write_block(staging: str, layout: str, number: int, values: NDArray[np.float32] | None = None) -> Block:
     """Compute a block and write it, unless it is complete already: the task that a build gives to its workers.
 
-    Parameters
-    ----------
-    staging : str
-        The staging directory, on a file system that builder and worker share.
-    layout : str
-        Of the table, as JSON.
-    number : int
-        Of the block.
-    values : float32 array, optional
-        The values of the block, if they are known already.
-
-    Raises
-    ------
-    StoreError
-        If it cannot be written.
+    `staging` and `layout` are text: a directory that builder and worker share, and JSON. `values` are those of the
+    block, if they are known already. StoreError says that it cannot be written.
     """
     from brdfdb.store.codec import chunk_bytes, chunk_name
 
@@ -164,13 +148,7 @@ def _kept(marker: Path, path: Path, layout: str) -> FileEntry | None:
 
 
 def write_frame(staging: str, layout: str) -> dict[str, FileEntry]:
-    """Write all of a table but its blocks, which exist, as the last task of a table; return the written files.
-
-    Raises
-    ------
-    StoreError
-        If they cannot be written.
-    """
+    """Write all of a table but its blocks, which exist, as the last task of a table; return the written files."""
     from brdfdb.store.codec import frame_files
     from brdfdb.tables.statements import stated_metadata
 
@@ -198,7 +176,8 @@ def _reader(layout: Layout, table: Path) -> Callable[[slice], NDArray[np.float32
         return decoded(layout, number, (table / chunk_name(layout, number)).read_bytes())
 
     def read(rows: slice) -> NDArray[np.float32]:
-        first, last = rows.start // layout.block_rows, (rows.stop - 1) // layout.block_rows
+        first = rows.start // layout.block_rows
+        last = (rows.stop - 1) // layout.block_rows
         start = first * layout.block_rows
         blocks = np.concatenate([block(number) for number in range(first, last + 1)])
         return blocks[rows.start - start : rows.stop - start]

@@ -56,17 +56,12 @@ class WrongTableError(StoreError):
 
 
 def material(root: Path, name: str) -> Verified:
-    """Check a material with all its revisions.
+    """Check a material with all its revisions; UnknownMaterialError if the store has none of this name.
 
     In the current revision, sizes and sha256 of the files are compared with the manifest, the manifest and its summary
     with the pointer, and the list of files with the directory. Every chunk is decoded, which checks its crc32c.
     Dimensions, types, shapes and attributes must be those of a table. In the other revisions, manifest, sizes, sha256
     and the list of files are checked. A revision that is superseded and collected meanwhile is not a finding.
-
-    Raises
-    ------
-    UnknownMaterialError
-        If the store has no such material.
     """
     store = Store(root)
     while True:

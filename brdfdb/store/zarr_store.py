@@ -16,15 +16,7 @@ from brdfdb.store.records import check_file
 
 
 class CheckedRevision(LocalStore):
-    """A revision as zarr reads it; a file that is missing or changed raises an error that names it.
-
-    Parameters
-    ----------
-    group : Path
-        Directory of the revision.
-    files : mapping
-        Size and sha256 of each file that belongs there, by its path.
-    """
+    """A revision as zarr reads it; a file of its manifest that is missing or changed raises StoreError."""
 
     def __init__(self, group: Path, files: Mapping[str, FileEntry]) -> None:
         super().__init__(group, read_only=True)
@@ -45,17 +37,7 @@ class CheckedRevision(LocalStore):
 
 
 class CheckedRemoteRevision(FsspecStore):
-    """A revision at an address; a file that is missing or changed raises an error that names it.
-
-    Parameters
-    ----------
-    url : str
-        Address of the files of the revision.
-    where : str
-        Name of the revision in errors.
-    files : mapping
-        Size and sha256 of each file that belongs there, by its path.
-    """
+    """A revision at an address, called `where` in errors; a missing or changed file raises StoreError."""
 
     def __init__(self, url: str, where: str, files: Mapping[str, FileEntry]) -> None:
         from fsspec.implementations.http import HTTPFileSystem
