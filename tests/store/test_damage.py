@@ -13,8 +13,7 @@ import brdfdb
 from brdfdb.errors import StoreError
 from brdfdb.store.files import sealed, unsealed
 from brdfdb.store.reader import Store
-from tests.store.a_store import lambert
-from tests.store.published import pointer, publish, rho
+from tests.store.a_store import lambert, pointer, publish, rho
 
 # Damage
 

@@ -28,8 +28,7 @@ from brdfdb.tables.layout import Layout
 from brdfdb.tables.tabulation import tabulate
 from brdfdb.tables.xarray_view import plain_attributes
 from brdfdb_pipelines import cli
-from tests.store.a_store import GRID, contents, lambert
-from tests.store.published import pointer, publish, rho
+from tests.store.a_store import GRID, contents, lambert, pointer, publish, rho
 
 COPPER = {
     "title": "Rakić's copper",
