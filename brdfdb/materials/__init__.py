@@ -27,22 +27,10 @@ __all__ = [
 
 
 def source_of(document: Mapping[str, Any]) -> Material | FunctionRecord:
-    """Return the source that a document describes: a complete material, or a function without its callable.
+    """Return the source in a document of `Source.document`: a complete material, or a function without its callable.
 
-    Parameters
-    ----------
-    document : mapping
-        A result of `Source.document`. Other keys are ignored.
-
-    Returns
-    -------
-    Material or FunctionRecord
-        The material, or the record of the function.
-
-    Raises
-    ------
-    BrdfdbError
-        If the document describes no source, or a material whose model is not installed or has other parameters.
+    Other keys are ignored. BrdfdbError says that the document describes no source, or a material whose model is not
+    installed or has other parameters.
     """
     try:
         if "material" in document:

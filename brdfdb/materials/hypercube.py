@@ -50,20 +50,18 @@ class Axis(NamedTuple):
 def axes_of(spec: ModelSpec, ranges: Mapping[str, tuple[float, float]]) -> list[Axis]:
     """Return the drawn parameters of a model: usual ranges, or those given by names as files write them.
 
-    Raises
-    ------
-    ParameterError
-        If a name is unknown, or a range is not within that of the parameter.
+    ParameterError says that a name is unknown, or a range is not within that of the parameter.
     """
     usual = {name: ends for name, *ends in (*spec.draw.ranges, *_LIGHT_RANGES)}
     axes = []
-    for one in (*spec.parameters, *(_LIGHT if spec.spectral else ())):
-        if isinstance(one.default, bool):
+    for parameter in (*spec.parameters, *(_LIGHT if spec.spectral else ())):
+        if isinstance(parameter.default, bool):
             continue
-        low, high = usual.get(one.name, (one.low, one.high))
-        if one.unit == "rad":
-            low, high = round(float(degrees(low)), 12), round(float(degrees(high)), 12)
-        axes.append(Axis(as_written(one), low, high))
+        low, high = usual.get(parameter.name, (parameter.low, parameter.high))
+        if parameter.unit == "rad":
+            low = round(float(degrees(low)), 12)
+            high = round(float(degrees(high)), 12)
+        axes.append(Axis(as_written(parameter), low, high))
     known = [axis.parameter.name for axis in axes]
     for name, (low, high) in ranges.items():
         if name not in known:
@@ -82,12 +80,8 @@ def axes_of(spec: ModelSpec, ranges: Mapping[str, tuple[float, float]]) -> list[
 def materials(spec: ModelSpec, axes: list[Axis], count: int, seed: int) -> dict[str, Array]:
     """Return parameters (count,) of materials, as files write them: a Latin hypercube over the axes.
 
-    Materials that break the condition of the model are left out, and others drawn for them.
-
-    Raises
-    ------
-    ParameterError
-        If hardly any material of the ranges keeps the condition.
+    Materials that break the condition of the model are left out, and others drawn for them. ParameterError says that
+    hardly any material of the ranges keeps the condition.
     """
     rng = np.random.default_rng(seed)
     drawn = count

@@ -282,21 +282,9 @@ class Material(BaseModel, Lookups):
     def arguments(self, wavelength_nm: ArrayLike | None = None) -> dict[str, Any]:
         """Return the keyword arguments of the model call, without the angles.
 
-        Parameters
-        ----------
-        wavelength_nm : array_like [nm], optional
-            Wavelengths for a spectral material, by default those of its parameters; grey materials ignore them.
-
-        Returns
-        -------
-        dict
-            The parameters; a spectrum has an array in the shape of the wavelengths. A spectral model also has
-            ``wavelength_nm`` [nm], ``n`` and ``k`` [1], float64 arrays of that shape.
-
-        Raises
-        ------
-        ParameterError
-            If a spectral material has no wavelengths, or its refractive index or a spectrum is not known at one.
+        A spectrum is an array in the shape of the wavelengths [nm], which are by default those of the material; grey
+        materials ignore them. A spectral model also has ``wavelength_nm`` [nm], ``n`` and ``k`` [1] of that shape.
+        ParameterError says that wavelengths are missing, or that n and k or a spectrum are not known at one.
         """
         given = {**self.parameters, **self._changed}
         if not self.spectral:

@@ -102,20 +102,10 @@ class Wavelengths(BaseModel):
 
 
 class Library(BaseModel):
-    """One library: the kinds of substances in it, and its wavelengths.
+    """A library: the kinds of substances in it, the last part of the names of its materials, and its wavelengths.
 
-    Attributes
-    ----------
-    title : str
-        Sentence for lists.
-    kinds : tuple of str
-        Kinds of substances that it takes.
-    suffix : str
-        Last part of the names of its materials; "" for none.
-    wavelengths_nm : Wavelengths
-        Wavelengths of its recipe. A material whose entry covers fewer is stated for those alone.
-    least_nm : tuple of float [nm]
-        Range that an entry must cover; a substance with less is left out.
+    A material whose entry covers fewer wavelengths is stated for those alone; a substance whose entry does not cover
+    `least_nm` is left out.
     """
 
     model_config = _STRICT
@@ -194,13 +184,7 @@ def titles() -> dict[str, str]:
 
 @cache
 def entries(name: str) -> tuple[Entry, ...]:
-    """Return the materials of a computed library in the order of its file: substances, each with all finishes.
-
-    Raises
-    ------
-    ParameterError
-        If there is no such computed library.
-    """
+    """Return the materials of a computed library in the order of its file: substances, each with all finishes."""
     for file in files():
         if name in file.libraries:
             return tuple(_entries(file, file.libraries[name]))
@@ -224,7 +208,8 @@ def _entries(file: _File, library: Library) -> list[Entry]:
 
 def _table(library: Library, traits: Traits, substance: Substance, finish: Finish) -> dict[str, Any]:
     """Return a material as a TOML table would have it, without its model."""
-    every, covered = (library.wavelengths_nm.within(*ends) for ends in ((0.0, float("inf")), substance.covers_nm))
+    every = library.wavelengths_nm.within(0.0, float("inf"))
+    covered = library.wavelengths_nm.within(*substance.covers_nm)
     who = substance.citation.partition(":")[0].partition(",")[0]
     text = {
         "title": ", ".join([substance.title, finish.title, *filter(None, [library.suffix]), "computed"]),

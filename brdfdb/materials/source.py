@@ -183,10 +183,7 @@ class Source(Protocol):
     def brdf_at(self, wavelength_nm: NDArray[np.float64] | None) -> Evaluate:
         """Return f_r [1/sr] at wavelengths (L,) [nm] as a function of unit vectors (N, 3): shape (N, L), L = 1 if grey.
 
-        Raises
-        ------
-        ParameterError
-            If the source does not hold at one of the wavelengths.
+        ParameterError says that the source does not hold at one of the wavelengths.
         """
 
     def lookup(

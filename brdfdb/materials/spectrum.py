@@ -36,20 +36,8 @@ Values = Annotated[tuple[float, ...], Field(min_length=1, max_length=MOST_VALUES
 class Spectrum(BaseModel):
     """A reflectance over the wavelength, as the value of a parameter that is a reflectance or an albedo.
 
-    Attributes
-    ----------
-    wavelengths_nm : tuple of float
-        Wavelengths [nm], strictly increasing.
-    values : tuple of float
-        Reflectance [1] at each of them, one or more. Between two of them it is a straight line; outside there is no
-        value.
-    origin : str
-        The source of the values in words.
-
-    Raises
-    ------
-    ParameterError
-        If the wavelengths do not increase, or there is not one value for each.
+    It has a reflectance [1] at each of one or more strictly increasing wavelengths [nm], a straight line between them,
+    and no value outside. `origin` is the source of the values in words.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
@@ -74,12 +62,9 @@ class Spectrum(BaseModel):
         return self
 
     def at(self, name: str, wavelength_nm: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the reflectance [1] at wavelengths [nm], in their shape.
+        """Return the reflectance [1] of the parameter `name` at wavelengths [nm], in their shape.
 
-        Raises
-        ------
-        ParameterError
-            If a wavelength is outside the range of the spectrum; `name` is the parameter, for the sentence.
+        ParameterError says that a wavelength is outside the range of the spectrum.
         """
         low = self.wavelengths_nm[0]
         high = self.wavelengths_nm[-1]

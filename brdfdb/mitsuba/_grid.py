@@ -39,12 +39,8 @@ class CellPlace(NamedTuple):
 class GridAxis:
     """One axis of a grid.
 
-    Attributes
-    ----------
-    stencil : array (cells, 2 or 4)
-        The numbers of the nodes that count in each cell.
-    powers : array (cells, 2 or 4, 2 or 4)
-        Coefficients of the powers of the place in the cell, of each of these nodes.
+    `stencil` (cells, 2 or 4) are the numbers of the nodes that count in each cell, and `powers` (cells, 2 or 4, 2 or 4)
+    the coefficients of the powers of the place in the cell, of each of these nodes.
     """
 
     def __init__(self, axes: Axes, number: int) -> None:

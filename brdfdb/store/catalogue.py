@@ -106,13 +106,7 @@ class LastAudit(NamedTuple):
 
 
 class AuditFile:
-    """The file of a report, read anew when it changes. Threads may share it.
-
-    Parameters
-    ----------
-    path : Path
-        What ``brdfdb audit`` wrote as JSON; it may be missing.
-    """
+    """The file of a report of ``brdfdb audit``, read anew when it changes; it may be missing. Threads may share it."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -255,10 +249,7 @@ class Choice(BaseModel):
     def chosen(self, names: Sequence[str], line: Callable[[str], Mapping[str, Any]]) -> list[SortKey]:
         """Return the places of the materials that the filters let through, in order; `line` returns a line by name.
 
-        Raises
-        ------
-        ParameterError
-            If neither this program nor a line knows the model or the paper.
+        ParameterError says that neither this program nor a line knows the model or the paper.
         """
         if self.of_names:
             return [self.rank(name, {}) for name in sorted(names)]

@@ -71,10 +71,7 @@ class Sweep(FamilyLine):
         }
 
     def in_model_units(self, written: Mapping[str, float]) -> dict[str, float]:
-        """Return parameters, as files write them, by the names and in the units of the model: angles in radians.
-
-        Raises ParameterError for a name that is not that of a swept parameter.
-        """
+        """Return parameters of files by the names and in the units of the model; ParameterError for another name."""
         swept = self.parameters
         for name, value in written.items():
             if name not in swept:
@@ -245,13 +242,6 @@ class Family:
         The record in the store: members, interpolation, measured error.
     axes : dict of str to array
         The values of the swept parameters, in the units of the model: angles in radians.
-
-    Parameters
-    ----------
-    record : FamilyRecord
-        Of the family.
-    tables : mapping of str to Table
-        The members by name, such as the store; a member is read when a lookup first needs it.
     """
 
     def __init__(self, record: FamilyRecord, tables: Mapping[str, Table]) -> None:
@@ -378,22 +368,8 @@ class Family:
     ) -> Floats:
         """Interpolate the reflectance [1] of the specular part; 0 for models that have none.
 
-        Parameters
-        ----------
-        theta_i, wavelength_nm
-            As in `Table.specular_reflectance`.
-        **parameters : float
-            As in `lookup`.
-
-        Returns
-        -------
-        array [1]
-            Shaped as by `Table.specular_reflectance`; off by up to `record.specular_error`.
-
-        Raises
-        ------
-        ValueError, StoreError
-            As `lookup`.
+        Arguments, shape and errors are those of `Table.specular_reflectance` and `lookup`. The error is at most
+        `record.specular_error`.
         """
         parts = self._parts(parameters)
         values = [part.table.specular_reflectance(theta_i, wavelength_nm) for part in parts]
@@ -430,8 +406,8 @@ class Family:
             if limits.name not in parameters:
                 needed = f"missing, {self.name} needs a value in {limits.interval}"
                 raise ParameterError(limits.name, needed, None, (limits.low, limits.high))
-            found = stencil(nodes, _checked(limits, nodes, parameters[limits.name]), power, cubic=cubic)
-            around.append([(found.first + k, weight) for k, weight in enumerate(found.weights) if weight != 0.0])
+            near = stencil(nodes, _checked(limits, nodes, parameters[limits.name]), power, cubic=cubic)
+            around.append([(near.first + k, weight) for k, weight in enumerate(near.weights) if weight != 0.0])
         shape = [nodes.size for nodes in self.axes.values()]
         parts = []
         for corner in itertools.product(*around):

@@ -141,12 +141,8 @@ class Service:
     def content(self, path: str, body: bytes | None, media: str) -> bytes:
         """Return the bytes of an answer.
 
-        Raises
-        ------
-        StoreError
-            If there is no service at the address, it cannot read its store, or it fails.
-        UnknownMaterialError, UnknownRevisionError, ParameterError
-            As the store itself raises them.
+        StoreError says that no service answers, that it cannot read its store, or that it fails; errors of the store
+        itself are raised as it raised them.
         """
         response, answer = self._answer(path, body, media)
         status = response.status
@@ -245,16 +241,8 @@ class RemoteTable(BaseTable):
 
     Answers are those of the revision that it was opened with, also when the service has a newer one, or another store
     with the same numbers of revisions. A lookup raises StoreError if the service is gone, and UnknownRevisionError if
-    that revision is.
-
-    Attributes
-    ----------
-    name, revision, digest : str
-        Name of the material, its revision, and the sha256 of its manifest, by which the service is asked.
-    attrs : dict
-        The attributes as stored, without the request of the build; `metadata` is the typed record of them.
-    wavelength_nm : array (L,) [nm] or None
-        Wavelengths of a spectral table; None for a grey one, which holds at any wavelength.
+    that revision is. `attrs` are the stored attributes without the request of the build; `wavelength_nm` is None for a
+    grey table, which has the same values at any wavelength.
     """
 
     name: str
@@ -361,19 +349,9 @@ class RemoteTable(BaseTable):
 class RemoteStore(Mapping[str, RemoteTable]):
     """A store behind a service: a mapping of names to tables, with the methods of `brdfdb.store.reader.Store`.
 
-    Parameters
-    ----------
-    url : str
-        Where ``brdfdb serve`` listens, such as ``http://127.0.0.1:8000``.
-    timeout_s : float
-        For each step of an exchange: to connect, to send, to receive [s].
-
-    Raises
-    ------
-    ValueError
-        If `url` is not an address, or `timeout_s` out of range.
-    StoreError
-        If no service answers there, or it cannot read its store; later the same.
+    `url` is where ``brdfdb serve`` listens, such as ``http://127.0.0.1:8000``; `timeout_s` is for each step of an
+    exchange: to connect, to send, to receive [s]. ParameterError says that either is wrong; StoreError, also later,
+    that no service answers, or that it cannot read its store.
     """
 
     def __init__(self, url: str, timeout_s: float = TIMEOUT_S) -> None:
@@ -417,13 +395,7 @@ class RemoteStore(Mapping[str, RemoteTable]):
         return str(self._material(name)["revision"])
 
     def summary(self, name: str) -> Mapping[str, Any]:
-        """Return what lists show of the current revision: title, model, error_p99, created, bytes and more.
-
-        Raises
-        ------
-        UnknownMaterialError
-            If the store has no such material.
-        """
+        """Return what lists show of the current revision: title, model, error_p99, created, bytes and more."""
         for line in self._lines(name) if NAME.fullmatch(name) else ():
             if line["name"] == name:
                 return line
@@ -436,8 +408,8 @@ class RemoteStore(Mapping[str, RemoteTable]):
     def dataset(self, name: str, revision: str | None = None) -> xr.Dataset:
         """Return a revision, by default the current one, as a lazy Dataset that is read over HTTP as far as needed.
 
-        Each file is checked against the manifest of the revision. Errors are those of `Store.dataset`. StoreError, too,
-        if fsspec and aiohttp, which read zarr over HTTP, are not installed.
+        Each file is checked against the manifest of the revision. Errors are those of `Store.dataset`; StoreError also
+        says that fsspec and aiohttp, which read zarr over HTTP, are not installed.
         """
         document = self._material(name, "" if revision is None else f"/revisions/{quote(revision, safe='')}")
         if find_spec("fsspec") is None or find_spec("aiohttp") is None:

@@ -149,16 +149,11 @@ def publish_dataset(root: str | os.PathLike[str], name: str, dataset: xr.Dataset
         are float32; float64 is converted. Attributes may be missing. What `Store.dataset` gives is stored as it was:
         ``parts`` take the place of the ``brdf`` that is rebuilt of them.
 
-    Returns
-    -------
-    NewRevision
-        The revision, such as ``r000003``, and its size [byte].
-
     Raises
     ------
     ParameterError
-        If the name is none of a material, or the dataset is no table that can be looked up: also if ``brdf`` was
-        changed and ``parts`` were not.
+        If the name is not one of a material, or no lookup could read the dataset: also if ``brdf`` was changed and
+        ``parts`` were not.
     StoreError
         If the store cannot be written.
     """

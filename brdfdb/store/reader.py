@@ -73,17 +73,17 @@ _OBJECTS_BYTES = 20_000  # of a decoded table beside its arrays: metadata and wh
 class Store(Mapping[str, "Table"]):
     """A store opened for reading: a mapping from material names to decoded tables of the current revisions.
 
-    Threads may share it. A child of `os.fork` may go on using it, also while threads of the parent read tables, once
-    one table was read before the fork: the first one imports modules, whose locks a child would find taken.
+    Threads may share it. A child of `os.fork` may go on using it, also while threads of the parent read tables, once a
+    table was read before the fork: the first one imports modules, whose locks a child would find taken.
 
     Parameters
     ----------
     root : path
-        Directory of the store; a relative one is taken from the directory that is current now.
+        Directory of the store; a relative path begins at the working directory of the call.
     cache_bytes : int
-        Bytes of decoded tables that are kept; those used last stay, and always the very last.
+        Largest size of the decoded tables in memory; those used last stay, and always the very last.
     snapshot : str, optional
-        Name of a snapshot: the materials, revisions and families that it names are the store, whatever is built later.
+        Name of a snapshot: the store has the materials, revisions and families that it names, whatever is built later.
 
     Raises
     ------
@@ -175,13 +175,7 @@ class Store(Mapping[str, "Table"]):
         """Return the decoded table of a revision, current or not: ``r000003``, or ``r000003-0123456789abcdef``.
 
         The second name has the first 16 digits of `Table.digest`, and means the same table in any store.
-
-        Raises
-        ------
-        UnknownMaterialError, UnknownRevisionError
-            If the store has no such material, or it no such revision.
-        StoreError
-            If the revision is damaged.
+        UnknownMaterialError and UnknownRevisionError say that there is none; StoreError, that it is damaged.
         """
         return self._table(name, self.located(name, revision))
 
@@ -207,13 +201,7 @@ class Store(Mapping[str, "Table"]):
         return [group.name for group in groups]
 
     def held(self, name: str) -> Table | None:
-        """Return the current table of a material if it is decoded already, without waiting; else None.
-
-        Raises
-        ------
-        StoreError
-            As `location` does.
-        """
+        """Return the current table of a material if it is decoded already, without waiting, else None."""
         pointer = self._read_pointer(name)
         return None if pointer is None else self._used((name, pointer.location.digest))
 
@@ -230,7 +218,7 @@ class Store(Mapping[str, "Table"]):
             table = decode(name, location.group, files, location.digest)
             with self._lock:
                 self._decoded[key] = table
-                size = sum(each.nbytes + _OBJECTS_BYTES for each in self._decoded.values())
+                size = sum(table.nbytes + _OBJECTS_BYTES for table in self._decoded.values())
                 while size > self._cache_bytes and len(self._decoded) > 1:
                     size -= self._decoded.popitem(last=False)[1].nbytes + _OBJECTS_BYTES
             return table
@@ -243,13 +231,7 @@ class Store(Mapping[str, "Table"]):
             return self._decoded.get(key)
 
     def head(self, name: str) -> str:
-        """Return the current revision of a material, such as ``r000003``, read anew each time.
-
-        Raises
-        ------
-        UnknownMaterialError
-            If the store has no such material.
-        """
+        """Return the current revision of a material, such as ``r000003``, at this moment; errors as by `summary`."""
         return self.path(name).name
 
     def path(self, name: str) -> Path:
@@ -257,14 +239,9 @@ class Store(Mapping[str, "Table"]):
         return self.location(name).group
 
     def summary(self, name: str) -> Head:
-        """Return what lists show of the current revision: what its pointer says, without a look at the table.
+        """Return the content of the pointer of a material: what lists show of the current revision.
 
-        Raises
-        ------
-        UnknownMaterialError
-            If the store has no such material.
-        StoreError
-            If the pointer is damaged.
+        UnknownMaterialError says that the store has no such material; StoreError, that the pointer is damaged.
         """
         return self.current(name).head
 
@@ -292,19 +269,14 @@ class Store(Mapping[str, "Table"]):
     def family(self, name: str) -> Family:
         """Return a family: its model at any parameters between those of its members.
 
-        Raises
-        ------
-        UnknownFamilyError
-            If the store has no such family.
-        StoreError
-            If its record cannot be read.
+        UnknownFamilyError says that the store has no such family; StoreError, that its record cannot be read.
         """
         from brdfdb.store.family import Family, record_from
 
         return Family(record_from(self.family_content(name), f"the family {name}"), self)
 
     def family_content(self, name: str) -> dict[str, Any]:
-        """Return the record of a family as JSON, which is all that lists show of it; errors as by `family`."""
+        """Return the record of a family as JSON, for lists; errors as by `family`."""
         path = family_path(self.root, name)
         if self.snapshot is not None and name in self.snapshot["families"]:
             return self.snapshot["families"][name]
@@ -315,12 +287,8 @@ class Store(Mapping[str, "Table"]):
     def dataset(self, name: str, revision: str | None = None) -> xr.Dataset:
         """Return a revision, by default the current one, as a lazy Dataset: see `brdfdb.tables.xarray_view.opened`.
 
-        Raises
-        ------
-        UnknownMaterialError, UnknownRevisionError
-            If the store has no such material, or it no such revision.
-        StoreError
-            If a file of it is missing or changed, also later, while it is read; it names material, revision and file.
+        Errors are those of `table`; StoreError, naming material, revision and file, is also raised later, while the
+        Dataset is read.
         """
         from brdfdb.store.zarr_store import CheckedRevision
         from brdfdb.tables.xarray_view import opened
@@ -335,10 +303,7 @@ class Store(Mapping[str, "Table"]):
     def verify(self, name: str) -> None:
         """Check every file of the current revision against its manifest, and the manifest against the pointer.
 
-        Raises
-        ------
-        StoreError
-            Naming the first file that is missing, of another size or of another content.
+        StoreError names the first file that is missing, of another size or of another content.
         """
         current = self.current(name)
         check_summary(current.head, check_manifest(*current.location, contents=True))
@@ -421,7 +386,7 @@ _NUMBERS = itertools.count()
 
 
 def _after_fork() -> None:
-    """Give the stores of a child new locks: a fork copies one thread only, and what others held stays locked.
+    """Give the stores of a child new locks, because a fork copies one thread, and locks of the others stay locked.
 
     The state behind the locks is valid at any moment. Waiting for the threads before a fork fails: they may need locks
     that the fork has taken already, such as that of thread pools.

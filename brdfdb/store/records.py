@@ -148,7 +148,7 @@ class _Field(NamedTuple):
         if is_typeddict(kind):
             return cls(name, required, (dict,), record=kind)
         alternatives = get_args(kind) if isinstance(kind, UnionType) else (kind,)
-        types = tuple(get_origin(each) or each for each in alternatives)
+        types = tuple(get_origin(kind) or kind for kind in alternatives)
         if float in types:
             types = (*types, int)
         if types == (dict,) and get_args(kind)[1] is not Any:

@@ -35,7 +35,7 @@ class BrdfdbBackend(BackendEntrypoint):
         revision: str | None = None,
         snapshot: str | None = None,
     ) -> xr.Dataset:
-        """Open a table as a lazy Dataset.
+        """Open a table as a lazy Dataset, as `Store.dataset` gives it.
 
         Parameters
         ----------
@@ -51,11 +51,6 @@ class BrdfdbBackend(BackendEntrypoint):
             Its revision; by default the current one.
         snapshot : str, optional
             Name of a snapshot of the store, whose revision of the material is opened.
-
-        Returns
-        -------
-        Dataset
-            As `Store.dataset` gives it.
 
         Raises
         ------

@@ -42,6 +42,7 @@ MONO_NM, RGB_NM = 549.1, (611.4, 549.1, 464.2)
 THETA_BINS, PHI_BINS, FINE = 8, 16, 48  # bins of a chi-square test, and pieces of each along both sides
 LIGHT = unit_vector(np.deg2rad(50.0), 0.5).astype(np.float32)
 DRAWN, DRAWN_ONE_BY_ONE = 1 << 15, 200
+JOINED = 4  # bins that are one along both sides where few directions are drawn
 LEAST_DENSITY = 1e-9  # [1/sr] differences of smaller densities are relative to it
 FEWEST = 5.0  # expected directions of a bin; bins with fewer are one
 ROUNDED = 2e-6  # by which float32 moves a direction, which may then lie in the next cell of a sampler
@@ -337,6 +338,9 @@ def _p_value(case: Case, mitsuba: Any, wo: Array, count: int) -> float:
     row = np.clip((wo[:, 2] * THETA_BINS).astype(int), 0, THETA_BINS - 1)
     column = ((np.arctan2(wo[:, 1], wo[:, 0]) / (2.0 * np.pi)) % 1.0 * PHI_BINS).astype(int) % PHI_BINS
     found = np.bincount(row * PHI_BINS + column, minlength=expected.size).astype(float)
+    if count < DRAWN:
+        blocks = (THETA_BINS // JOINED, JOINED, PHI_BINS // JOINED, JOINED)
+        expected, found = (x.reshape(blocks).sum(axis=(1, 3)).ravel() for x in (expected, found))
     rare = expected < FEWEST
     # Directions below the horizon have no bin; their number is left over
     expected, found = (np.append(x[~rare], [x[rare].sum(), count - x.sum()]) for x in (expected, found))
