@@ -1,6 +1,6 @@
 """Each plugin in each variant of Mitsuba against the library: ``python -m tests.mitsuba.every_variant [VARIANT ...]``.
 
-Values and densities are compared in float64 at 500 pairs or more (150 in scalar variants): all nodes of a table as
+Values and densities are compared in float64 at 500 pairs or more (100 in scalar variants): all nodes of a table as
 float32 with the numbers next to them, the horizon, the mirror direction, and directions at random. The weights of
 samples are f_r cos / density, and their directions have a chi-square test with the density of the library. Prints a row
 for each plugin in each variant.
@@ -37,11 +37,11 @@ from tests.tables.made_up import made_up
 
 Array = NDArray[Any]
 
-PAIRS, PAIRS_ONE_BY_ONE = 500, 150  # together, and in scalar variants, which take a pair at a time
+PAIRS, PAIRS_ONE_BY_ONE = 500, 100  # together, and in scalar variants, which take a pair at a time
 MONO_NM, RGB_NM = 549.1, (611.4, 549.1, 464.2)
 THETA_BINS, PHI_BINS, FINE = 8, 16, 48  # bins of a chi-square test, and pieces of each along both sides
 LIGHT = unit_vector(np.deg2rad(50.0), 0.5).astype(np.float32)
-DRAWN, DRAWN_ONE_BY_ONE = 1 << 15, 200
+DRAWN, DRAWN_ONE_BY_ONE = 1 << 15, 100
 JOINED = 4  # bins that are one along both sides where few directions are drawn
 LEAST_DENSITY = 1e-9  # [1/sr] differences of smaller densities are relative to it
 FEWEST = 5.0  # expected directions of a bin; bins with fewer are one

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import brdfdb.mitsuba.table
-from tests.mitsuba.every_variant import CASES, PAIRS_ONE_BY_ONE, case_of, measure, tabulated
+from tests.mitsuba.every_variant import CASES, PAIRS, PAIRS_ONE_BY_ONE, case_of, measure, tabulated
 from tests.mitsuba.surfaces import variant
 
 VARIANTS = (
@@ -44,7 +44,7 @@ def test_values_densities_and_samples_are_those_of_the_library(name: str) -> Non
     for plugin in CASES:
         case = case_of(plugin)
         measured = measure(mitsuba, case)
-        assert measured.pairs == len(case.pairs(mitsuba)[0]) >= PAIRS_ONE_BY_ONE, plugin
+        assert measured.pairs >= (PAIRS_ONE_BY_ONE if name.startswith("scalar") else PAIRS), plugin
         assert measured.value <= (OF_MODELS if case.table is None else OF_TABLES), plugin
         assert measured.density <= DENSITY, plugin
         assert measured.weight <= WEIGHT, plugin
@@ -68,9 +68,10 @@ def numbers(*results: Any) -> Any:
 def test_nan_in_nan_out_and_masked_rays_are_0(name: str) -> None:
     mitsuba = variant(name)
     context = mitsuba.BSDFContext()
+    few = name.startswith("scalar")  # which compute nothing beforehand, and take a ray at a time
     for plugin in CASES:
         surface = mitsuba.load_dict(case_of(plugin).document)
-        for bad in NOT_FINITE:
+        for bad in NOT_FINITE[::3] if few else NOT_FINITE:
             for wi, wo in ((bad, GOOD), (GOOD, bad)):
                 asked = context, place_of(mitsuba, wi), mitsuba.Vector3f(*wo)
                 assert np.all(np.isnan(numbers(surface.eval(*asked), surface.pdf(*asked), *surface.eval_pdf(*asked))))
