@@ -1,4 +1,4 @@
-"""Sources that are functions: a callable of the user, and the record of it that a table keeps."""
+"""Sources that are functions: a callable of the user, and its record in a table."""
 
 from __future__ import annotations
 

@@ -93,7 +93,7 @@ class Spectrum(BaseModel):
 def made_lossless(
     lossless: Callable[[Mapping[str, Any]], dict[str, Any]], parameters: Mapping[str, Any]
 ) -> dict[str, float | Spectrum]:
-    """Return the changes that a model's `lossless` makes to parameters, some of which may be spectra.
+    """Return the changes that a model's `lossless` makes to parameters, which may be numbers or spectra.
 
     Spectra are joined: they get the wavelengths of all of them that lie in the range of each.
     """
@@ -237,7 +237,7 @@ def _of_srgb(name: str, written: Any) -> Spectrum:
         colour.MSDS_CMFS[OBSERVER].copy().align(shape),
         colour.SDS_ILLUMINANTS[ILLUMINANT].copy().align(shape),
     )
-    # each second wavelength is enough: straight lines between them are fitted to the spectrum, which keeps the colour
+    # straight lines between every second wavelength, fitted to the spectrum, preserve the colour
     nodes = made.wavelengths[::2]
     lines = np.column_stack([np.interp(made.wavelengths, nodes, one) for one in np.eye(nodes.size)])
     fitted = np.clip(np.linalg.lstsq(lines, made.values, rcond=None)[0], 0.0, 1.0)

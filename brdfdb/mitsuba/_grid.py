@@ -63,7 +63,7 @@ class GridAxis:
         self._inverse, self._buckets = Buffer(axes.inverse[rows]), self._buckets_of(nodes)
 
     def _buckets_of(self, nodes: Array) -> Buffer | None:
-        """Return rows for equal pieces of the axis, none longer than a cell: a node, 1 / steps beside it, its number.
+        """Return rows for equal pieces of the axis, not longer than a cell: a node, 1 / steps around it, its number.
 
         The node is that within the piece, or else the last one before it.
         """
@@ -187,7 +187,7 @@ def _nested(row: list[Any], widths: list[int], variables: list[Any]) -> Any:
 
 
 def _weighted(numbers: Any, at: NDArray[np.int64], weight: Array) -> Any:
-    """Return the numbers at some places, times weights: in NumPy or in Dr.Jit, as the numbers are."""
+    """Return numbers at places `at`, times weights, in NumPy or in Dr.Jit."""
     if isinstance(numbers, np.ndarray):
         return numbers[at.ravel()] * weight.ravel()
     taken = dr.gather(mi.Float, numbers, mi.UInt32(at.ravel().astype(np.uint32)))

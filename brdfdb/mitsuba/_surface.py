@@ -94,7 +94,7 @@ class Formula:
         return None
 
     def depolarised(self, values: Values) -> Any:  # noqa: ARG002  # of models whose glossy part is all polarised
-        """Return what is depolarised of the glossy part of f_r [1/sr]."""
+        """Return the depolarised part of the glossy f_r [1/sr]."""
         return 0.0
 
     def lobe(self, values: Values, wi: Any) -> SampledLobe | None:  # noqa: ARG002  # of a model that is diffuse
@@ -316,6 +316,6 @@ def _matrix(ctx: Any, wi: Any, wo: Any, facet: Facet, polarised: Any, depolarise
 
 
 def _across(w: Any, normal: Any, collinear: Any) -> Any:
-    """Return the normal of the plane, or where there is none a unit vector across `w`."""
+    """Return the normal of the plane, or a unit vector across `w` where light and viewer are collinear."""
     other = dr.cross(w, dr.select(dr.abs(w.z) < 0.9, mi.Vector3f(0.0, 0.0, 1.0), mi.Vector3f(1.0, 0.0, 0.0)))
     return dr.normalize(dr.select(collinear, other, normal))

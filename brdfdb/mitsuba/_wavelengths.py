@@ -61,7 +61,7 @@ def projection(props: Any, stored_nm: Array | None) -> Projection | None:
 
 
 class Columns:
-    """The wavelengths at which numbers of a table are kept: those of the channels, or close together in a spectrum."""
+    """The wavelengths of the columns of a table: those of the channels, or closely spaced in spectral variants."""
 
     def __init__(self, wavelength_nm: Array | None, single_nm: float = 0.0) -> None:
         """Take the wavelengths of the table, None of a grey one, which has one column; one for all channels if not 0.

@@ -164,7 +164,7 @@ class TableFormula(Formula):
         return None if self._facets is None else self._facets.at(values["places"], wi, wo)
 
     def depolarised(self, values: Values) -> Any:
-        """Return what is depolarised of the tabulated part [1/sr]: a uniform part that is among its numbers."""
+        """Return the depolarised part [1/sr] of the tabulated one: a uniform part that it includes."""
         return 0.0 if self._facets is None else self._facets.inside(values["places"])
 
     def lobe(self, values: Values, wi: Any) -> CellsLobe:  # noqa: ARG002  # the lobe of other models depends on them
@@ -233,7 +233,7 @@ class _TableFacets:
         return Facet(*(mi.UnpolarizedSpectrum([elements[k] for elements in channels]) for k in range(3)))
 
     def inside(self, places: list[Any]) -> Any:
-        """Return what is depolarised [1/sr] and stands among the numbers of the table, not beside them."""
+        """Return the depolarised part [1/sr] that the numbers of the table include."""
         return mi.UnpolarizedSpectrum([self._columns.read(self._inside, 0, place) for place in places])
 
 
@@ -306,7 +306,7 @@ class CellsLobe:
         self._edges = Buffer(np.stack([cells.edges[:-1], np.diff(cells.edges)], axis=1))
         self._along_theta = _Alias(cells.rings)
         self._along_phi = _Alias(cells.along_phi.reshape(-1, self._columns))
-        # The cells of two lights beside one another
+        # The cells of two adjacent lights
         density = cells.density.reshape(lights // self._turns, self._turns, self._rings, self._columns)
         self._density = Buffer(np.stack([density[:-1], density[1:]], axis=-1))
 

@@ -47,7 +47,7 @@ def open(root: str | os.PathLike[str] | None = None, *, snapshot: str | None = N
     ParameterError
         If `root` is neither a path nor such an address, as ``s3://bucket/store``.
     ValueError
-        If a snapshot is named beside an address: a service serves the one that it was started with.
+        If a snapshot is given with an address: a service serves the snapshot that it was started with.
     """
     parameter = "root" if root is not None else "BRDFDB_STORE"
     root = default_root() if root is None else root

@@ -73,7 +73,7 @@ class AuditSummary(BaseModel):
 
 
 class AuditedMaterial(AuditSummary):
-    """What an audit found on a material, as lists and pages show it; other fields of the report are kept."""
+    """What an audit found on a material, as lists and pages show it; other fields of the report are stored."""
 
     model_config = ConfigDict(extra="allow")
 

@@ -38,7 +38,7 @@ def chunk_name(layout: Layout, number: int) -> str:
 def chunk_bytes(values: NDArray[np.floating[Any]], rows: int) -> bytes:
     """Return the bytes that zarr writes for a chunk of `rows` rows in float32, without its event loop.
 
-    Fewer values are filled up with nan, because chunks are of one size.
+    Missing rows are nan, because all chunks have the same size.
     """
     if len(values) < rows:
         filled = np.full((rows, *values.shape[1:]), np.nan, dtype=np.float32)
@@ -102,7 +102,7 @@ def frame_files(layout: Layout, frame: Frame) -> dict[str, bytes]:
 
 
 def _chunks(shape: tuple[int, ...]) -> tuple[int, ...]:
-    """Return the shape of a chunk: whole rows of the first axis, about _CHUNK_VALUES values."""
+    """Return the shape of a chunk: complete rows of the first axis, about _CHUNK_VALUES values."""
     if not shape:
         return ()
     rest = int(np.prod(shape[1:]))

@@ -135,7 +135,7 @@ def read_record(path: Path) -> FamilyRecord:
 
 
 def record_from(content: Mapping[str, Any], where: str) -> FamilyRecord:
-    """Return a family from its JSON; StoreError, beginning with `where`, if it is none that this program reads."""
+    """Return a family from its JSON; StoreError, beginning with `where`, if this program cannot read it."""
     if (content.get("format"), content.get("version")) != (FORMAT, FORMAT_VERSION):
         raise StoreError(
             f"{where} is of format {content.get('format')} version {content.get('version')}, "

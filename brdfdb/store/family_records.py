@@ -165,7 +165,9 @@ def _between(sweep: Sweep, tables: Mapping[str, Table], seed: int, way: _Way, fl
     truth = measured.truth.reshape(-1, at.size)
     value = _interpolated(sweep, measured, measured.corners, way).reshape(truth.shape)
     larger = np.maximum(floor[1:], floor[:-1])
-    error = error_measurement.relative(truth, value, larger)[drawn.above]  # to what a lookup knows
+    error = error_measurement.relative(truth, value, larger)[
+        drawn.above
+    ]  # relative to the interpolated value, which a lookup knows
     elsewhere = ~places.anywhere(drawn.wi[drawn.above], drawn.wr[drawn.above])
     few = places.draw(len(measured.points), seed)
     return Between(
@@ -186,7 +188,7 @@ def _in_places(sweep: Sweep, way: _Way, measured: _Measured, pairs: places.Pairs
 
 
 def _shared_out(pairs: places.Pairs, points: int) -> NDArray[np.int64]:
-    """Return the pairs of each point, shape (points, N): as many of each sample."""
+    """Return the pairs of each point, shape (points, N), the same number from each sample."""
     rows = np.arange(len(pairs.wi)).reshape(pairs.sample[-1] + 1, -1, points)
     return np.moveaxis(rows, -1, 0).reshape(points, -1)
 
@@ -288,7 +290,9 @@ def _ways(sweep: Sweep, measured: _Measured, drawn: error_measurement.Draw, floo
             straight: Power = 1
             best = _Way(method, offset, (straight,) * len(shape))
             least = left(best, _THINNED)
-            for axis, values in [*enumerate(sweep.axes.values())] * 2:  # the best of one depends on the others
+            for axis, values in [
+                *enumerate(sweep.axes.values())
+            ] * 2:  # the best power of an axis depends on the others
                 for power in _POWERS if values[0] > 0.0 else (1, 2) if values[0] == 0.0 else (1,):
                     other = best._replace(powers=(*best.powers[:axis], power, *best.powers[axis + 1 :]))
                     if other != best and (there := left(other, _THINNED)) < least:
@@ -298,7 +302,7 @@ def _ways(sweep: Sweep, measured: _Measured, drawn: error_measurement.Draw, floo
 
 
 def _interpolated(sweep: Sweep, measured: _Measured, corners: Floats, way: _Way) -> Floats:
-    """Return what a way of interpolation makes of the values of the members around the points."""
+    """Interpolate the values of the members around the points."""
     nodes = sweep.nodes
     shape = tuple(axis.size for axis in nodes.values())
     rows = []

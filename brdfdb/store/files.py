@@ -1,4 +1,4 @@
-"""Files of a store: written whole or not at all, hashed, and as JSON sealed with the digest of its content."""
+"""Files of a store: atomic writing, digests, and JSON that is sealed with the digest of its content."""
 
 from __future__ import annotations
 
@@ -141,7 +141,7 @@ def swap_sealed(path: Path, content: Mapping[str, Any]) -> None:
 
 
 def read_json(path: Path) -> dict[str, Any]:
-    """Return the JSON object in a file; StoreError, naming the file, if it cannot be read or is none."""
+    """Return the JSON object in a file; StoreError, naming the file, if it cannot be read or holds something else."""
     try:
         content = json.loads(path.read_bytes())
     except OSError as error:

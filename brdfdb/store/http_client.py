@@ -330,7 +330,7 @@ class RemoteTable(BaseTable):
             axes = (
                 *(() if len(at) == 1 else wavelengths.tail),
                 *elements,
-            )  # an address cannot tell a list of one from a number
+            )  # in an address, a list of one number looks like a number
 
             def ask(part: slice) -> Any:
                 points = np.stack([angle[part] for angle in flat], axis=-1)

@@ -62,7 +62,7 @@ def publish(
 
     This is the way for a `brdfdb.materials.FunctionSource`, which no recipe can name and no other process can read. It
     runs in this process, with the whole table in memory, and starts anew after a crash: a build from a recipe
-    (``brdfdb build``) goes on where it was.
+    (``brdfdb build``) resumes.
 
     Parameters
     ----------

@@ -2,7 +2,7 @@
 
 ROOT/brdfdb.json                     format name and version
 ROOT/materials/NAME/r000001/         a self-contained zarr v3 group, never modified
-ROOT/materials/NAME/r000001.MANIFEST.json   size and sha256 of its files; beside it, zarr warns of strangers inside
+ROOT/materials/NAME/r000001.MANIFEST.json   size and sha256 of its files, outside: zarr warns of others inside
 ROOT/materials/NAME/HEAD.json        current revision, digests of the manifests, and what lists show; swapped atomically
 ROOT/families/NAME.json              which materials make a family, and how well it interpolates (`brdfdb.store.family`)
 ROOT/snapshots/NAME.json             a whole database: a revision of each material, families (`brdfdb.store.snapshots`)
@@ -66,8 +66,8 @@ if TYPE_CHECKING:
     from brdfdb.tables.table import Table
 
 
-CACHE_BYTES = 256 * 2**20  # of decoded tables that a Store keeps
-_OBJECTS_BYTES = 20_000  # of a decoded table beside its arrays: metadata and what kernels take
+CACHE_BYTES = 256 * 2**20  # largest size of the decoded tables in memory
+_OBJECTS_BYTES = 20_000  # size of a decoded table without its arrays: metadata and arguments of kernels
 
 
 class Store(Mapping[str, "Table"]):
@@ -81,7 +81,7 @@ class Store(Mapping[str, "Table"]):
     root : path
         Directory of the store; a relative path begins at the working directory of the call.
     cache_bytes : int
-        Largest size of the decoded tables in memory; those used last stay, and always the very last.
+        Largest size of the decoded tables in memory; the tables used last stay, at least one.
     snapshot : str, optional
         Name of a snapshot: the store has the materials, revisions and families that it names, whatever is built later.
 

@@ -157,7 +157,7 @@ class Collected:
 
 
 def collect(root: Path, keep: int = 2, *, damaged: bool = False) -> Collected:
-    """Remove what no reader is served and no build is at work on.
+    """Remove what neither readers nor builds use.
 
     Staging directories of interrupted builds (they could have been resumed), revisions that are neither current nor
     among the newest nor named by a snapshot, and the remains of crashes: directories without a manifest, manifests
@@ -238,7 +238,7 @@ def _collect_material(
     try:
         current = store.path(material.name)
         others = [group for group in revisions if group != current]
-        # what a snapshot names stays, damaged or not: half of it may be all that is left
+        # a revision that a snapshot names stays, even damaged: it may be the only copy
         kept = {current, *others[max(0, len(others) - (keep - 1)) :], *stay}
     except UnknownMaterialError:  # nothing but what crashes left behind
         current = material

@@ -43,7 +43,7 @@ class Shelf:
 
     @property
     def store(self) -> Store:
-        """Open store; StoreError if there is none."""
+        """The open store; StoreError if it does not exist."""
         if self._store is None:
             self._store = Store(self._root, self._cache_bytes, snapshot=self._snapshot)
         return self._store

@@ -73,7 +73,7 @@ def prepare(root: Path, name: str, request: Mapping[str, Any], layout: str) -> P
 
 
 def discard(root: Path, name: str, request: Mapping[str, Any]) -> None:
-    """Remove what is staged of a request; the lock must be held."""
+    """Remove the staging directory of a request; the caller holds the lock."""
     shutil.rmtree(request_path(root, name, digest(request)), ignore_errors=True)
 
 

@@ -41,7 +41,7 @@ def last_audit(root: Path) -> dict[tuple[str, str], Audited]:
 
 
 def audited_materials(root: Path) -> list[dict[str, Any]]:
-    """Return the entries of the reports that lie in a store: of all materials and of some, the newer report last.
+    """Return the entries of the reports in a store, on all materials and on a part of them, the newer report last.
 
     Entries of other tables are left out, as of a store that was built anew: see `is_of_store`.
     """
@@ -112,7 +112,7 @@ def energy(head: Mapping[str, Any], audited: Audited | None) -> str:
 
 
 def _beyond(head: Mapping[str, Any]) -> str:
-    """Return the angle beyond those judged where an albedo passes 1, in words; empty if there is none."""
+    """Return in words the grazing angle, beyond those judged, where an albedo passes 1; empty without one."""
     largest = head.get("largest_albedo") or {}
     passes = (largest.get("grazing") or {}).get("passes_1_at_theta_i_deg")
     return "" if passes is None else f"albedo of the {_whose(largest)} passes 1 at {near_90(passes)}°"

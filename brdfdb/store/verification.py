@@ -37,7 +37,7 @@ class StoreFinding:
 
     @property
     def remark(self) -> bool:
-        """True if nothing is damaged: the sentence says what a table does not state of itself."""
+        """True if nothing is damaged, and the sentence names missing metadata of a table."""
         return not self.repair
 
     def __str__(self) -> str:

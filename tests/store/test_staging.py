@@ -18,7 +18,7 @@ import pytest
 import xarray as xr
 
 import brdfdb
-from brdfdb.errors import StoreError
+from brdfdb.errors import ParameterError, StoreError
 from brdfdb.store import codec, records
 from brdfdb.store.files import unsealed
 from brdfdb.store.lock import Lock
@@ -45,19 +45,19 @@ def four_blocks(monkeypatch: pytest.MonkeyPatch) -> str:
 # Where a store can be made
 
 
-@pytest.mark.parametrize("name", ["thesis.tex", ".git", "materials", "HEAD.json"])
-def test_a_directory_of_something_else_is_not_touched(tmp_path: Path, name: str) -> None:
-    (tmp_path / name).write_text("precious")
-    said = f"^{tmp_path} is not empty and not a store; name an empty or a new directory$"
-    with pytest.raises(StoreError, match=said):
-        publish_dataset(tmp_path, "white", lambert(0.5))
-    assert contents(tmp_path) == {name: b"precious"}
+def test_a_directory_of_something_else_is_not_touched(tmp_path: Path) -> None:
+    for name in ("thesis.tex", ".git", "materials", "HEAD.json"):
+        (tmp_path / name).write_text("precious")
+        with pytest.raises(StoreError, match=f"^{tmp_path} is not empty and not a store"):
+            publish_dataset(tmp_path, "white", lambert(0.5))
+        assert contents(tmp_path) == {name: b"precious"}
+        (tmp_path / name).unlink()
 
 
-@pytest.mark.parametrize("name", ["White", "white-x1.5", "a/b", "..", "", "white-", "white--2"])
-def test_a_name_that_would_not_be_found_again_is_refused(tmp_path: Path, name: str) -> None:
-    with pytest.raises(ValueError, match="is not made of lower-case letters, digits and single hyphens"):
-        publish_dataset(tmp_path / "store", name, lambert(0.5))
+def test_a_name_that_would_not_be_found_again_is_refused(tmp_path: Path) -> None:
+    for name in ("White", "white-x1.5", "a/b", "..", "", "white-", "white--2"):
+        with pytest.raises(ParameterError, match=r"^name: "):
+            publish_dataset(tmp_path / "store", name, lambert(0.5))
     assert not (tmp_path / "store").exists()
 
 
@@ -74,12 +74,11 @@ def test_what_a_build_that_was_killed_at_once_left_behind_becomes_a_store(tmp_pa
     assert publish_dataset(tmp_path, "white", lambert(0.5))[0] == "r000001"
 
 
-@pytest.mark.parametrize("below", ["file/store", "file"])
-def test_a_root_that_cannot_be_made_is_one_sentence(tmp_path: Path, below: str) -> None:
+def test_a_root_that_cannot_be_made_is_one_sentence(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("precious")
-    where = tmp_path / below
-    with pytest.raises(StoreError, match=f"^cannot write a store at {where}: "):
-        publish_dataset(where, "white", lambert(0.5))
+    for where in (tmp_path / "file" / "store", tmp_path / "file"):
+        with pytest.raises(StoreError, match=f"^cannot write a store at {where}: "):
+            publish_dataset(where, "white", lambert(0.5))
     assert contents(tmp_path) == {"file": b"precious"}
 
 
