@@ -165,9 +165,8 @@ def _between(sweep: Sweep, tables: Mapping[str, Table], seed: int, way: _Way, fl
     truth = measured.truth.reshape(-1, at.size)
     value = _interpolated(sweep, measured, measured.corners, way).reshape(truth.shape)
     larger = np.maximum(floor[1:], floor[:-1])
-    error = error_measurement.relative(truth, value, larger)[
-        drawn.above
-    ]  # relative to the interpolated value, which a lookup knows
+    # Relative to the interpolated value, which a lookup knows
+    error = error_measurement.relative(truth, value, larger)[drawn.above]
     elsewhere = ~places.anywhere(drawn.wi[drawn.above], drawn.wr[drawn.above])
     few = places.draw(len(measured.points), seed)
     return Between(
