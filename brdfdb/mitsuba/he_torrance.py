@@ -251,7 +251,7 @@ def directional_diffuse(wi: Any, wo: Any, surface: OpticalSurface) -> Any:
     return dr.minimum(value, _LARGEST)
 
 
-class _Band(NamedTuple):
+class _WavelengthTriple(NamedTuple):
     """Three wavelengths [nm] of a projection, those of n and k [1] that are spectra, and weights [1] (3, channels)."""
 
     wavelength_nm: list[float]
@@ -356,7 +356,7 @@ def _surface_of(values: Values, wavelength_nm: Any) -> OpticalSurface:
     return OpticalSurface(wave, correlation, sigma_0 / tau, values["n"], values["k"])
 
 
-def _bands_of(props: Any) -> list[_Band]:
+def _bands_of(props: Any) -> list[_WavelengthTriple]:
     """Return the wavelengths of a projection, three at a time; none if each channel has its own."""
     spectra = {name: spectrum for name in ("n", "k") if (spectrum := spectrum_of(props, name)) is not None}
     ends = [nm[[0, -1]] for nm, _ in spectra.values()] or [PICTURE_NM[[0, -1]]]
@@ -376,6 +376,8 @@ def _bands_of(props: Any) -> list[_Band]:
     weights = np.concatenate([chosen.weights, np.zeros((lacking, 3))])
     indices = {name: np.interp(nm, *spectrum) for name, spectrum in spectra.items()}
     return [
-        _Band(nm[part].tolist(), {name: x[part].tolist() for name, x in indices.items()}, weights[part].tolist())
+        _WavelengthTriple(
+            nm[part].tolist(), {name: x[part].tolist() for name, x in indices.items()}, weights[part].tolist()
+        )
         for part in (slice(first, first + 3) for first in range(0, nm.size, 3))
     ]

@@ -240,14 +240,14 @@ class _TableFacets:
 # Samples from the cells of a table: `brdfdb.tables.sampler`, with alias tables in place of searches
 
 
-class _Choice(NamedTuple):
+class _RandomChoice(NamedTuple):
     """A choice between two by a random number: whether it is the second, and a random number for the next choice."""
 
     second: Any
     number: Any
 
     @classmethod
-    def of(cls, number: Any, weight: Any) -> _Choice:
+    def of(cls, number: Any, weight: Any) -> _RandomChoice:
         """Choose the second of two with a probability."""
         second = number < weight
         low, width = dr.select(second, 0.0, weight), dr.select(second, weight, 1.0 - weight)
@@ -313,11 +313,11 @@ class CellsLobe:
     def draw(self, wi: Any, choice: Any, sample: Any) -> Any:
         """Return the direction `wi` mirrored in a half vector of the cells."""
         light, weight = self._light(wi)
-        chosen = _Choice.of(choice, weight)
+        chosen = _RandomChoice.of(choice, weight)
         row = (light + dr.select(chosen.second, mi.UInt32(1), mi.UInt32(0))) * self._turns
         if self._turns > 1:
             turn = self._turn(wi)
-            second = _Choice.of(chosen.number, turn.weight).second
+            second = _RandomChoice.of(chosen.number, turn.weight).second
             row = row + dr.select(second, turn.behind, turn.before)
         ring, u = self._along_theta.draw(row, sample.x)
         low, width = self._edges.row(ring, 2)
