@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.figure import Statement
+from brdfdb.integrals.quadrature import gauss_rule
 from brdfdb.misprints import Misprint
 
 Array = NDArray[np.float64]
@@ -59,7 +60,7 @@ def largest(deviations: Iterable[Any]) -> float:
 @functools.cache
 def hemisphere(polar: int, azimuths: int) -> tuple[Array, Array, Array]:
     """Return theta [rad] of shape (polar, 1), phi [rad], and the weights cos(theta) d omega [sr] of a hemisphere."""
-    x, w = np.polynomial.legendre.leggauss(polar)
+    x, w = gauss_rule(polar)
     theta = (x[:, np.newaxis] + 1.0) * np.pi / 4.0
     phi = (np.arange(azimuths) + 0.5) * 2.0 * np.pi / azimuths
     weights = w[:, np.newaxis] * np.pi / 4.0 * np.sin(theta) * np.cos(theta) * 2.0 * np.pi / azimuths

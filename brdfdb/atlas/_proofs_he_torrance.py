@@ -10,6 +10,7 @@ import numpy as np
 
 from brdfdb.atlas._proofs import Array, Form, Proof, albedo, largest
 from brdfdb.geometry import unit_vector
+from brdfdb.integrals.quadrature import gauss_rule
 
 _MIRROR = {"n": 1e-3, "k": 1e4}  # |F| is 1 within 1e-7. The phase of F is off by 2e-4
 _PAIRS = ((50.0, 30.0, 60.0), (70.0, 65.0, 170.0), (45.0, 45.0, 90.0), (20.0, 80.0, 130.0))
@@ -167,7 +168,7 @@ def _waves_of_eq_56(form: Form, cases: tuple[tuple[float, float], ...]) -> float
 @functools.cache
 def _scattered(g: float, V: float) -> float:
     """Return the left side of eq. 56 without its coherent part, over pi tau^2 [1]: an integral over t = r^2 / tau^2."""
-    x, w = np.polynomial.legendre.leggauss(24)
+    x, w = gauss_rule(24)
     edges = np.concatenate([[0.0], np.geomspace(1e-3 / (1.0 + g), 60.0, 60)])
     half = np.diff(edges)[:, np.newaxis] / 2.0
     t = edges[:-1, np.newaxis] + half * (x + 1.0)

@@ -9,6 +9,7 @@ import numpy as np
 
 from brdfdb.atlas._proofs import Array, Form, Proof, albedo, largest
 from brdfdb.geometry import unit_vector
+from brdfdb.integrals.quadrature import gauss_rule
 
 _RAYS = 20_000  # rays across a facet: the edge of a shadow is known to half of a 20000th of the facet
 _POINTS = 500  # points on each facet, between which light bounces
@@ -80,7 +81,7 @@ def _bounce(form: Form) -> float:
 def _averaged_bounce(form: Form) -> float:
     """Return the relative error [1] of the bounce, averaged over Gaussian slopes of 30 degrees and all azimuths."""
     sigma, theta_i, theta_r = np.deg2rad(30.0), np.deg2rad(75.0), np.deg2rad(10.0)
-    nodes, w = np.polynomial.legendre.leggauss(10)
+    nodes, w = gauss_rule(10)
     slopes = (nodes + 1.0) * np.pi / 4.0
     share = w * np.exp(-(slopes**2) / (2.0 * sigma**2)) * np.sin(slopes)
     azimuths = (np.arange(12) + 0.5) * np.pi / 12  # The other half belongs to the other facet

@@ -25,6 +25,7 @@ from brdfdb.atlas._albedos import (
 )
 from brdfdb.figure import Figure, Panel, Statement
 from brdfdb.geometry import radians
+from brdfdb.integrals.quadrature import gauss_rule
 from brdfdb.integrals.uniform_bound import largest_uniform
 from brdfdb.materials import presets
 from brdfdb.models import he_torrance_specular
@@ -246,7 +247,7 @@ def _magnesium_oxide() -> Figure:
 def _minnaert() -> Figure:
     """Draw the albedos of Minnaert's law with rho of 1."""
     albedos = {k: albedo_of("minnaert", k=k, rho=1.0) for k in (0.3, 0.6, 0.9, 1.0)}
-    nodes, weights = np.polynomial.legendre.leggauss(12)
+    nodes, weights = gauss_rule(12)
     root = 0.5 * (nodes + 1.0)  # square root of cos(theta_i): the albedo is a power of it
     over_roots = albedo_of("minnaert", np.rad2deg(np.arccos(root**2)), k=0.6, rho=1.0)
     mean = float(np.sum(0.5 * weights * over_roots * 2.0 * root**2 * 2.0 * root))

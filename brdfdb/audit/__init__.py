@@ -8,10 +8,9 @@ from importlib.metadata import version
 
 import numpy as np
 
-from brdfdb.audit.answers import as_published, conserves_energy
 from brdfdb.audit.finding import DECISIVE, Finding, NotJudged, Sentence, Subject, TableVerdict
 from brdfdb.audit.registry import FINDINGS
-from brdfdb.audit.report import AuditReport, MaterialAudit, explanations
+from brdfdb.audit.report import AuditReport, MaterialAudit, as_published, conserves_energy, explanations
 from brdfdb.errors import ParameterError
 from brdfdb.figure import Figure
 from brdfdb.materials import Material, Source

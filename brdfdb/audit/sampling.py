@@ -13,7 +13,7 @@ from brdfdb.audit.finding import Cell, Finding, NumberTable, Sentence, Subject, 
 from brdfdb.audit.pairs import SEED, representative_nm
 from brdfdb.figure import Numbers, number, numbers
 from brdfdb.geometry import radians, unit_vector
-from brdfdb.integrals.quadrature import spectral_albedo
+from brdfdb.integrals.quadrature import gauss_rule, spectral_albedo
 from brdfdb.integrals.sampling import lobe_of, mixture_density, sample
 from brdfdb.lobes import Lobe
 from brdfdb.materials import Material
@@ -208,7 +208,7 @@ def _shares(wi: Array, lobe: Lobe, alpha: Array, t_edges: Array) -> Array:
 
 def _gauss(edges: Array) -> tuple[Array, Array]:
     """Return nodes and weights between edges, as rows."""
-    x, weight = np.polynomial.legendre.leggauss(_NODES)
+    x, weight = gauss_rule(_NODES)
     half = np.diff(edges)[:, np.newaxis] / 2.0
     return (edges[:-1] + edges[1:])[:, np.newaxis] / 2.0 + half * x, half * weight
 

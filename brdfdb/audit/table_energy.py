@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, Field
 
-from brdfdb.audit.excess import DIGITS, crossing, limit_of, place
 from brdfdb.audit.finding import STRICT, Verdict
+from brdfdb.audit.model_energy import DIGITS, crossing, limit_of, place
 from brdfdb.figure import Numbers, numbers, rows
 from brdfdb.geometry import radians
 from brdfdb.materials.provenance import KnownExcess

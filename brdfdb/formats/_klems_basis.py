@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from brdfdb.integrals.quadrature import gauss_rule
 from brdfdb.parameters import Floats
 
 Index = NDArray[np.int64]
@@ -200,7 +201,7 @@ def _rule(count: int, *, periodic: bool = False) -> tuple[Floats, Floats]:
 
     Along the second axis of a patch that is a whole ring, `periodic`, they have equal distances.
     """
-    x, w = np.polynomial.legendre.leggauss(count)
+    x, w = gauss_rule(count)
     x, w = 0.5 + 0.5 * x, 0.5 * w
     around, share = ((np.arange(count) + 0.5) / count, np.full(count, 1.0 / count)) if periodic else (x, w)
     return np.stack(np.meshgrid(x, around, indexing="ij"), axis=-1).reshape(-1, 2), np.outer(w, share).reshape(-1)

@@ -7,6 +7,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike
 
+from brdfdb.integrals.quadrature import gauss_rule
 from brdfdb.models import oren_nayar_single_slope_parts
 from brdfdb.models.oren_nayar_1994 import Parts
 from brdfdb.parameters import Floats
@@ -55,7 +56,7 @@ def evaluated_parts(
     last = min(_REACH * sigma, np.pi / 2.0)
     starts = [np.zeros(cot_i.shape), *(np.arctan(cot) for cot in (cot_i, cot_r, np.hypot(cot_i, cot_r)))]
     edges = np.sort(np.minimum([*starts, np.full(cot_i.shape, last)], last), axis=0)
-    x, w = np.polynomial.legendre.leggauss(_NODES)
+    x, w = gauss_rule(_NODES)
     u, w = (x + 1.0) / 2.0, w / 2.0
     direct = bounce = total = np.zeros(cot_i.shape)
     for low, high in pairwise(edges):

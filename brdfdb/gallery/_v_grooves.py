@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from brdfdb.integrals.quadrature import gauss_rule
+
 Array = NDArray[np.float64]
 
 STRIPS = 32  # strips of a facet: more strips change no bounce by 0.2 % of the radiance
@@ -72,7 +74,7 @@ def bounces(
     slope_i = np.tan(theta_i) * np.cos(azimuth)
     slope_r = np.tan(theta_r)[:, None] * np.cos(azimuth - delta_phi[:, None])
     last = min(_REACH * sigma, np.pi / 2.0)
-    nodes, weights = np.polynomial.legendre.leggauss(SLOPES)
+    nodes, weights = gauss_rule(SLOPES)
     slopes = (nodes + 1.0) / 2.0 * last
     # Eq. (26) with the sine of eq. (8), normalised over the slope
     weights = weights * np.exp(-0.5 * (slopes / sigma) ** 2) * np.sin(slopes)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
@@ -10,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.geometry import HALF_PI, unit_vector
-from brdfdb.integrals.quadrature import mirrored_on_rays
+from brdfdb.integrals.quadrature import gauss_rule, mirrored_on_rays
 from brdfdb.lobes import Lobe
 
 Array = NDArray[np.float64]
@@ -90,7 +89,7 @@ def views(lobe: Callable[[Array], Lobe | None], counts: Counts, symmetry: Symmet
     `brdfdb.integrals.quadrature.mirrored_on_rays`, which are stretched so that the lobe and each octave beyond it have
     nodes. An isotropic f_r is the same on both sides of the plane of incidence.
     """
-    thetas, steps = _gauss(counts.theta, 0.0, HALF_PI)
+    thetas, steps = gauss_rule(counts.theta).on(0.0, HALF_PI)
     quarters = 4 if symmetry.anisotropic and not symmetry.elliptical else 1
     around = quarters * counts.phi if symmetry.anisotropic else 1
     phis = (np.arange(around) + 0.5) * (quarters * HALF_PI / around) if symmetry.anisotropic else np.zeros(1)
@@ -110,31 +109,17 @@ def view_of(
 ) -> View:
     """Return one viewer at theta, phi [rad] with its lights; the arguments are those of `views`."""
     wr = unit_vector(theta, phi)
-    alpha_x, alpha_y = _widths(lobe(wr[2]))
-    x, of_x = _gauss(counts.ray, 0.0, 1.0)
+    around = lobe(wr[2])
+    alpha_x = alpha_y = WIDTHS[1]
+    if around is not None:
+        alpha_x, alpha_y = (float(np.clip(np.min(alpha), *WIDTHS)) for alpha in (around.alpha_x, around.alpha_y))
+    x, of_x = gauss_rule(counts.ray).on(0.0, 1.0)
     across = np.arctan2(alpha_x * wr[0], -alpha_y * wr[1]) if theta > 0.0 else HALF_PI
     quarters = 4 if symmetry.anisotropic else 2
-    panels = [_gauss(counts.turn, 0.0, HALF_PI) for _ in range(quarters)]
+    quarter = gauss_rule(counts.turn).on(0.0, HALF_PI)
     first = across + HALF_PI  # a psi in the plane of incidence
-    psi = np.concatenate([first + HALF_PI * number + nodes for number, (nodes, _) in enumerate(panels)])
-    of_psi = np.concatenate([steps for _, steps in panels]) * (4 / quarters)
+    psi = np.concatenate([first + HALF_PI * number + quarter.nodes for number in range(quarters)])
+    of_psi = np.tile(quarter.weights, quarters) * (4 / quarters)
     wi, measure = mirrored_on_rays((wr[0], wr[1], wr[2]), alpha_x, alpha_y, x[:, np.newaxis], psi)
     weights = measure * np.maximum(wi[..., 2], 0.0) * of_x[:, np.newaxis] * of_psi
     return View(theta, phi, float(weight), wr, wi.reshape(-1, 3), weights.reshape(-1))
-
-
-_rule = functools.cache(np.polynomial.legendre.leggauss)  # a millisecond each
-
-
-def _gauss(count: int, low: float, high: float) -> tuple[Array, Array]:
-    """Return nodes and weights of Gauss's rule on an interval."""
-    x, weight = _rule(count)
-    half = 0.5 * (high - low)
-    return low + half * (x + 1.0), half * weight
-
-
-def _widths(lobe: Lobe | None) -> tuple[float, float]:
-    if lobe is None:
-        return WIDTHS[1], WIDTHS[1]
-    alpha_x, alpha_y = (float(np.clip(np.min(alpha), *WIDTHS)) for alpha in (lobe.alpha_x, lobe.alpha_y))
-    return alpha_x, alpha_y

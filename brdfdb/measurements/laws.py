@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from brdfdb.geometry import radians, unit_vector
+from brdfdb.integrals.quadrature import gauss_rule
 from brdfdb.materials.source import Evaluate
 from brdfdb.parameters import Floats
 
@@ -82,7 +83,7 @@ def _viewers(light: Floats, *, whole: bool) -> tuple[Floats, Floats]:
     the rule of Gauss and Legendre in u, for theta_h in proportion to sinh(k u), and that of the midpoint in phi_h. A
     half vector of d omega_h makes viewers of 4 cos(theta_d) d omega_h.
     """
-    x, w = np.polynomial.legendre.leggauss(_RINGS)
+    x, w = gauss_rule(_RINGS)
     u = 0.5 * (x + 1.0)
     spokes = _SPOKES if whole else _SPOKES // 2
     turn = 2.0 * np.pi if whole else np.pi

@@ -11,9 +11,9 @@ from _site.files import remove_others, write_page
 from _site.markup import WIDE, Card, cards, chip, code, plain, raw, table, toctree
 from _site.papers import PAPERS, Paper, cited
 from brdfdb.audit import MaterialAudit
-from brdfdb.audit.answers import AS_PUBLISHED, CONSERVES_ENERGY
 from brdfdb.audit.energy import Energy
 from brdfdb.audit.finding import Sentence
+from brdfdb.audit.report import AS_PUBLISHED, CONSERVES_ENERGY
 from brdfdb.figure import number
 from brdfdb.geometry import degrees
 from brdfdb.materials import Material

@@ -17,9 +17,8 @@ from typing import Any, NamedTuple
 import brdfdb
 from brdfdb._numba import is_cached
 from brdfdb.audit import FINDINGS, AuditReport, audit, report
-from brdfdb.audit.answers import NO_PAPER
 from brdfdb.audit.record import differences, leaves
-from brdfdb.audit.report import FamilyAudit
+from brdfdb.audit.report import NO_PAPER, FamilyAudit
 from brdfdb.errors import BrdfdbError, ParameterError, StoreError, UnknownMaterialError
 from brdfdb.figure import Figure
 from brdfdb.materials import presets

@@ -8,9 +8,9 @@ from itertools import groupby
 from typing import NamedTuple
 
 from brdfdb.audit import FINDINGS, AuditReport, MaterialAudit
-from brdfdb.audit.answers import AS_PUBLISHED, CONSERVES_ENERGY, NO_PAPER, Answer
 from brdfdb.audit.energy import Energy
 from brdfdb.audit.finding import LAST, LEVELS, RANKS, Cell, Finding, NotJudged, NumberTable, Word
+from brdfdb.audit.report import AS_PUBLISHED, CONSERVES_ENERGY, NO_PAPER, Answer
 from brdfdb.audit.validity import Validity
 from brdfdb.figure import Figure
 from brdfdb_pipelines import figure_look, figure_svg, html_page

@@ -6,10 +6,10 @@ from typing import Any
 
 import pytest
 
-from brdfdb.audit.answers import as_published, conserves_energy
 from brdfdb.audit.energy import Energy
 from brdfdb.audit.finding import LEVELS, NotJudged
 from brdfdb.audit.model_energy import ModelEnergy
+from brdfdb.audit.report import as_published, conserves_energy
 from brdfdb.audit.table_error import TableError
 from brdfdb.audit.validity import Validity
 from tests.pipelines.a_report import material

@@ -14,7 +14,7 @@ import pytest
 
 from brdfdb.audit import FINDINGS, AuditReport, audit, report
 from brdfdb.audit.energy import Energy
-from brdfdb.audit.excess import cause_of
+from brdfdb.audit.model_energy import cause_of
 from brdfdb.audit.table_energy import table_energy_of
 from brdfdb.audit.values import Values
 from brdfdb.materials import presets

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from brdfdb.audit.answers import as_published, conserves_energy
 from brdfdb.audit.energy import Energy
 from brdfdb.audit.finding import Finding, Verdict
 from brdfdb.audit.model_energy import EnergyVerdict, Furnace, ModelEnergy, UniformBound
@@ -16,7 +15,7 @@ from brdfdb.audit.polarisation import PolarisationFinding
 from brdfdb.audit.reciprocity import Asymmetry, Reciprocity
 from brdfdb.audit.record import Record
 from brdfdb.audit.registry import FINDINGS
-from brdfdb.audit.report import AuditReport, MaterialAudit, explanations
+from brdfdb.audit.report import AuditReport, MaterialAudit, as_published, conserves_energy, explanations
 from brdfdb.audit.sampling import Sampling
 from brdfdb.audit.smoothness import Jump, Smoothness
 from brdfdb.audit.table_energy import TableEnergy
