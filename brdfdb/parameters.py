@@ -14,6 +14,7 @@ from brdfdb.arrays import plain, unlabelled
 from brdfdb.errors import ParameterError
 from brdfdb.lobes import Lobe
 
+Array = NDArray[np.float64]
 Floats = NDArray[np.floating[Any]]
 Arguments = Mapping[str, Any]  # of a model call, directions apart; a spectral model's include wavelength_nm, n and k
 

@@ -21,9 +21,9 @@ from brdfdb.measurements.samples import Samples
 from brdfdb.models import MODELS
 from brdfdb.parameters import ModelSpec
 from brdfdb.spectra import refractive_index
+from brdfdb.tables.evaluation import PointsBody
 from brdfdb.tables.grids import Grid
 from brdfdb.tables.layout import Layout
-from brdfdb.tables.points import PointsBody
 from brdfdb_pipelines.recipe_file import load
 from tests.models.draws import drawn
 from tests.tables.made_up import made_up

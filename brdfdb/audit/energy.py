@@ -23,8 +23,8 @@ from brdfdb.errors import counted
 from brdfdb.figure import Curve, Map, Numbers, Panel, number
 from brdfdb.materials import Material, Source
 from brdfdb.materials.provenance import KnownExcess
-from brdfdb.tables.first_numbers import Grazing
-from brdfdb.tables.largest_albedo import grazing_of_table
+from brdfdb.tables.albedo import grazing_of_table
+from brdfdb.tables.stated_error import Grazing
 from brdfdb.tables.table import Table
 
 _SEVERITY: tuple[EnergyVerdict, ...] = (

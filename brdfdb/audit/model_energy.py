@@ -20,9 +20,9 @@ from brdfdb.materials.provenance import KnownExcess
 from brdfdb.materials.source import Lossless
 from brdfdb.models.shared_integrals import sharing
 from brdfdb.parameters import Floats
-from brdfdb.tables.first_numbers import Grazing
+from brdfdb.tables.albedo import LAST_LIGHT_DEG, grazing_of_source, last_light
 from brdfdb.tables.grids import Axis
-from brdfdb.tables.largest_albedo import LAST_LIGHT_DEG, grazing_of_source, last_light
+from brdfdb.tables.stated_error import Grazing
 
 # Tolerance of an albedo of 1 [1]. Sums of float32 values round: an ideal diffuser measures 1 + 1.2e-7
 ENERGY_TOLERANCE = 1e-6

@@ -8,7 +8,7 @@ from brdfdb.materials import Material, Source
 from brdfdb.parameters import Floats
 from brdfdb.tables import error_measurement
 from brdfdb.tables.albedo import wavelengths_of
-from brdfdb.tables.error_measurement import Draw
+from brdfdb.tables.error_measurement import RandomPairs
 from brdfdb.tables.table import Table
 
 SEED = 1967  # differs from the seeds of build and planner, which the table was fitted to
@@ -23,7 +23,7 @@ class Pairs(NamedTuple):
     Where the source of a table is not known, `model` and `model_exchanged` are those of the table itself.
     """
 
-    drawn: Draw
+    drawn: RandomPairs
     table: Floats
     table_exchanged: Floats
     model: Floats

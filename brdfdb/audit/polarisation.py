@@ -10,7 +10,7 @@ from brdfdb.audit.finding import LAST, Cell, Finding, NumberTable, Sentence, Sub
 from brdfdb.figure import number
 from brdfdb.parameters import Floats
 from brdfdb.tables import error_measurement
-from brdfdb.tables.polarisation_measurement import element_error
+from brdfdb.tables.statements import element_error
 
 _DIRECTIONS, _SEED = 400, 1986  # directions of a band of theta_i, others than those of the stated error
 # Allowed ratio of the error at these directions to the stated one, both a 99th percentile of a sample: measured up to

@@ -13,19 +13,16 @@ from brdfdb.audit.finding import STRICT, Cell, Finding, Sentence, Subject, Verdi
 from brdfdb.audit.statement import contradictions
 from brdfdb.errors import counted
 from brdfdb.materials import FunctionRecord, Material, Source, exact_material, libraries, presets
-from brdfdb.tables.albedo import LARGEST_TOLERANCE, wavelengths_of
+from brdfdb.tables.albedo import LARGEST_TOLERANCE, AlbedoAt, albedo_of, wavelengths_of
 from brdfdb.tables.error_measurement import SEED, directions_of_a_band, draw
-from brdfdb.tables.first_numbers import LargestAlbedo
-from brdfdb.tables.formula_measurement import first_numbers
 from brdfdb.tables.grids import Axis
-from brdfdb.tables.largest_albedo import AlbedoAt, albedo_of
 from brdfdb.tables.layout import digest
 from brdfdb.tables.metadata import TableMetadata
 from brdfdb.tables.places import BANDS_DEG
 from brdfdb.tables.planner import first_reason
-from brdfdb.tables.statements import MEASURED
-from brdfdb.tables.table import Table
-from brdfdb.tables.table_source import TableSource
+from brdfdb.tables.stated_error import LargestAlbedo
+from brdfdb.tables.statements import MEASURED, first_numbers
+from brdfdb.tables.table import Table, TableSource
 from brdfdb.tables.tabulation import metadata_of, rounded
 
 # Numbers are repeated but for rounding. Measured ones have three digits, of which the last may differ; errors below the

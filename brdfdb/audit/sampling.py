@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from brdfdb.audit.finding import Cell, Finding, NumberTable, Sentence, Subject, Verdict
@@ -17,7 +16,7 @@ from brdfdb.integrals.quadrature import gauss_rule, spectral_albedo
 from brdfdb.integrals.sampling import lobe_of, mixture_density, sample
 from brdfdb.lobes import Lobe
 from brdfdb.materials import Material
-from brdfdb.parameters import ModelSpec
+from brdfdb.parameters import Array, ModelSpec
 from brdfdb.tables.table import Table
 
 SAMPLES = 100_000  # number of samples for each light
@@ -34,8 +33,6 @@ _TENTHS = 1.0 - np.arange(10) / 10.0
 _HALF_OCTAVES = 2.0 ** (np.arange(1, 33) / 2.0)
 _PSI_EDGES = np.linspace(-np.pi, np.pi, 13)
 _NODES = 12  # number of Gauss nodes along each side of a bin
-
-Array = NDArray[np.float64]
 
 
 class Sampling(Finding):

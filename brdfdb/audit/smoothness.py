@@ -7,7 +7,6 @@ from functools import partial
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel, Field
 
 from brdfdb.audit.finding import STRICT, Cell, Finding, NumberTable, Sentence, Subject, Verdict
@@ -15,7 +14,7 @@ from brdfdb.audit.pairs import Pairs
 from brdfdb.figure import number
 from brdfdb.geometry import degrees, radians, spherical_angles, unit_vector, vectors_from_half_difference
 from brdfdb.materials import Source
-from brdfdb.parameters import Floats
+from brdfdb.parameters import Array, Floats
 from brdfdb.tables import error_measurement
 from brdfdb.tables.albedo import wavelengths_of
 from brdfdb.tables.places import RINGS, RINGS_DEG
@@ -36,7 +35,6 @@ _SEED = 1992
 _NODES = 200  # number of crossings of nodes on each axis
 _ROW = 64  # length of a row; its values are then read from the table of the sum
 
-Array = NDArray[np.float64]
 Function = Callable[[Array, Array], Floats]
 
 _THETA = np.array([0.2, 0.6, 1.0, 1.4])

@@ -22,7 +22,7 @@ from brdfdb.audit.finding import STRICT
 from brdfdb.audit.pairs import Pairs
 from brdfdb.parameters import Floats
 from brdfdb.tables import error_measurement
-from brdfdb.tables.error_measurement import Draw
+from brdfdb.tables.error_measurement import RandomPairs
 from brdfdb.tables.grids import Axis
 from brdfdb.tables.places import BANDS, BANDS_DEG, RINGS
 from brdfdb.tables.stated_error import Error, Overall
@@ -207,7 +207,7 @@ def _of_floor(stated: Floats, pairs: Pairs, band: _Band, nm: list[float | None])
         yield _disagreement("floor", band, nm[w], float(stated[w]), float(fresh[w]))
 
 
-def _bands(drawn: Draw, wavelength_nm: Axis | None) -> Iterator[_Band]:
+def _bands(drawn: RandomPairs, wavelength_nm: Axis | None) -> Iterator[_Band]:
     """Yield each band of theta_i, then all directions. Every draw has the same share of directions in a band."""
     share = error_measurement.directions_of_a_band(wavelength_nm) * BANDS / len(drawn.band)
     for number, name in enumerate(zip(BANDS_DEG[:-1].tolist(), BANDS_DEG[1:].tolist(), strict=True)):

@@ -15,9 +15,8 @@ from brdfdb.geometry import radians
 from brdfdb.materials.provenance import KnownExcess
 from brdfdb.parameters import Floats
 from brdfdb.tables.albedo import directional_albedo, hemispherical_albedo, tolerance_of
-from brdfdb.tables.first_numbers import Grazing
 from brdfdb.tables.grids import Axis
-from brdfdb.tables.stated_error import Error
+from brdfdb.tables.stated_error import Error, Grazing
 from brdfdb.tables.table import Table
 
 # Largest stated error [1] that counts. A table that states more is judged as if it stated this

@@ -34,7 +34,7 @@ from brdfdb.materials.recipe_text import rounded, toml_of
 from brdfdb.measurements import MeasuredSource
 from brdfdb.models import MODELS
 from brdfdb.parameters import ModelSpec, check_nanometres, closest
-from brdfdb.tables.table_source import TableSource
+from brdfdb.tables.table import TableSource
 
 Array = NDArray[np.float64]
 

@@ -26,8 +26,7 @@ from brdfdb.tables.grids import (
 from brdfdb.tables.layout import Layout
 from brdfdb.tables.measured_layout import tabulated
 from brdfdb.tables.planner import check_tolerance, plan
-from brdfdb.tables.table import Table
-from brdfdb.tables.table_source import TableSource
+from brdfdb.tables.table import Table, TableSource
 from brdfdb.tables.tabulation import POLE_END_DEG
 
 Kind = Literal[FormKind, "table"]

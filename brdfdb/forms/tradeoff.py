@@ -261,7 +261,7 @@ def _diagnostic(materials: Sequence[Material], wavelength_nm: NDArray[np.float64
 
 
 def _timed(
-    forms: Sequence[Form], drawn: error_measurement.Draw, tick: Callable[[], None]
+    forms: Sequence[Form], drawn: error_measurement.RandomPairs, tick: Callable[[], None]
 ) -> tuple[list[timing.Times], list[timing.Times], list[timing.Times]]:
     """Return the times of calls with many directions, with a block of them, and with one."""
     # Directions are shuffled, so that a few of them are as varied as all
@@ -298,10 +298,10 @@ def _described(form: Form, batch: timing.Times, block: timing.Times, single: tim
     }
 
 
-def _errors(forms: Sequence[Form], drawn: error_measurement.Draw) -> list[dict[str, Any]]:
+def _errors(forms: Sequence[Form], drawn: error_measurement.RandomPairs) -> list[dict[str, Any]]:
     """Return the errors of each form against the first one, fields of a `Point` with three digits."""
     truth = forms[0].evaluate(drawn.wi, drawn.wr)
-    classes = error_measurement.classes(drawn)
+    classes = drawn.classes()
     rows = []
     for form in forms:
         given = drawn.wi.astype(form.dtype), drawn.wr.astype(form.dtype)

@@ -6,13 +6,11 @@ from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from brdfdb.geometry import HALF_PI, unit_vector
 from brdfdb.integrals.quadrature import gauss_rule, mirrored_on_rays
 from brdfdb.lobes import Lobe
-
-Array = NDArray[np.float64]
+from brdfdb.parameters import Array
 
 # The least and the largest width [1] that nodes follow: lobes beyond count as these. A diffuse f_r has the latter
 WIDTHS = 1e-5, 0.5

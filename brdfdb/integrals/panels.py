@@ -7,9 +7,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from brdfdb.parameters import Floats
+from brdfdb.parameters import Array, Floats
 
-Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 Integrand = Callable[[Indices, Array, Array], Array]
 

@@ -16,9 +16,7 @@ from brdfdb.geometry import HALF_PI, check_phi, check_theta, unit_vector
 from brdfdb.integrals.panels import Indices, Integrand, integrated, rectangles
 from brdfdb.lobes import Lobe, narrowest
 from brdfdb.models import MODELS
-from brdfdb.parameters import Floats, ModelSpec
-
-Array = NDArray[np.float64]
+from brdfdb.parameters import Array, Floats, ModelSpec
 
 MOST_PANELS = 40_000  # number of panels of a light at which the quadrature stops, whatever its error
 _QUARTERS = HALF_PI * np.arange(5)

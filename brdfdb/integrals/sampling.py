@@ -6,16 +6,14 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from brdfdb.arrays import array_function
 from brdfdb.errors import ParameterError
 from brdfdb.geometry import checked_vectors
 from brdfdb.integrals.quadrature import named, spec_of
 from brdfdb.lobes import Lobe
-from brdfdb.parameters import Floats, ModelSpec
-
-Array = NDArray[np.float64]
+from brdfdb.parameters import Array, Floats, ModelSpec
 
 _TINY = 1e-300  # least u, so that its logarithm is finite
 _FLAT = 1e-70  # z of a half vector up to which the density counts as 0: z^4 is still a number
@@ -170,7 +168,7 @@ def directions(lobe: Lobe, u1: Array, u2: Array, i: Array) -> Array:
     return _vectors(*chosen)
 
 
-def mirrored_in_lobe(u1: Array, angle: Array, i: Array, lobe: Lobe) -> Array:
+def mirrored_in_lobe(u1: Floats, angle: Floats, i: Floats, lobe: Lobe) -> Array:
     """Return the light (..., 3) mirrored in half vectors whose slopes follow the distribution of the lobe."""
     radius = lobe.distribution.radius(u1)
     s_x, s_y = radius * lobe.alpha_x * np.cos(angle), radius * lobe.alpha_y * np.sin(angle)
@@ -187,11 +185,11 @@ def _mirrored_in_visible(u1: Array, angle: Array, i: Array, lobe: Lobe) -> Array
     return _mirrored((lobe.alpha_x * h_x, lobe.alpha_y * h_y, h_z), i)
 
 
-def _stretched_length(i: Array, lobe: Lobe) -> Array:
+def _stretched_length(i: Floats, lobe: Lobe) -> Array:
     return np.asarray(np.sqrt((lobe.alpha_x * i[..., 0]) ** 2 + (lobe.alpha_y * i[..., 1]) ** 2 + i[..., 2] ** 2))
 
 
-def _mirrored(h: tuple[Array, Array, Array], i: Array) -> Array:
+def _mirrored(h: tuple[Floats, Floats, Floats], i: Floats) -> Array:
     """Return the light mirrored in half vectors of any length, of which `h` holds the components."""
     x, y, z = h
     length = np.sqrt(np.maximum(x * x + y * y + z * z, _TINY))
@@ -200,7 +198,7 @@ def _mirrored(h: tuple[Array, Array, Array], i: Array) -> Array:
     return _vectors(*(2.0 * h_i * component - i[..., axis] for axis, component in enumerate(unit)))
 
 
-def _vectors(x: Array, y: Array, z: Array) -> Array:
+def _vectors(x: Floats, y: Floats, z: Floats) -> Array:
     """Return vectors (..., 3) of components, written one by one: arithmetic along an axis of three numbers is slow."""
     vectors = np.empty((*np.broadcast_shapes(x.shape, y.shape, z.shape), 3))
     for axis, component in enumerate((x, y, z)):
@@ -213,7 +211,7 @@ def _cosine_weighted(u1: Array, angle: Array) -> tuple[Array, Array, Array]:
     return sin_theta * np.cos(angle), sin_theta * np.sin(angle), np.sqrt(1.0 - u1)
 
 
-def mixture_density(lobe: Lobe, i: Array, r: Array) -> Array:
+def mixture_density(lobe: Lobe, i: Floats, r: Floats) -> Array:
     """Return the density [1/sr] of lobe and cosine together, over the whole sphere."""
     cosine = np.maximum(r[..., 2], 0.0) / np.pi
     if not np.any(lobe.share):
@@ -232,7 +230,7 @@ def mixture_density(lobe: Lobe, i: Array, r: Array) -> Array:
     return np.asarray(lobe.share * mirrored + (1.0 - lobe.share) * cosine)
 
 
-def _of_visible(slopes: Floats, length2: Array, z: Array, lobe: Lobe, i: Array) -> Array:
+def _of_visible(slopes: Floats, length2: Floats, z: Floats, lobe: Lobe, i: Floats) -> Array:
     """Return the density [1/sr] of directions mirrored in visible facets, D / (4 projected area)."""
     assert lobe.distribution.area is not None
     stretched = _stretched_length(i, lobe)

@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from brdfdb.arrays import array_function
 from brdfdb.errors import ParameterError
 from brdfdb.geometry import HALF_PI
 from brdfdb.integrals.quadrature import named, spec_of, spectral_albedo
-from brdfdb.parameters import Floats, ModelSpec
-
-Array = NDArray[np.float64]
+from brdfdb.parameters import Array, Floats, ModelSpec
 
 # Angles of the first search are even in arcsinh(tan theta_i), which is theta_i near 0 and -ln(cos theta_i) near
 # grazing. The reflectance near grazing has its peak where shadowing begins

@@ -20,8 +20,8 @@ from brdfdb.geometry import degrees, radians, spherical_angles, unit_vector
 from brdfdb.materials.source import Evaluate
 from brdfdb.measurements.aperture import cone, disk
 from brdfdb.measurements.samples import Instrument, Samples
+from brdfdb.parameters import Array
 
-Array = NDArray[np.float64]
 Frames = NDArray[np.float32]
 
 _RANGES = {

@@ -18,7 +18,7 @@ from brdfdb.lobes import Lobe
 from brdfdb.materials import Source
 from brdfdb.place import path_of
 from brdfdb.scenes.shapes import STRICT, Array
-from brdfdb.tables.table_source import TableSource
+from brdfdb.tables.table import TableSource
 
 # Least and largest share of directions that follow a lobe. With fewer, a few directions would carry all of a faint
 # gloss. The largest share bounds f_r cos / pdf in the tails, also for other forms at the same directions

@@ -21,7 +21,7 @@ from brdfdb.scenes.recorded_directions import Recorded
 from brdfdb.scenes.shapes import STRICT, AnyShape, Array, Vector, check_direction, unit
 from brdfdb.spectra import ILLUMINANT, OBSERVER, check_illuminant, check_observer, covers_visible
 from brdfdb.store.reader import Store
-from brdfdb.tables.table_source import TableSource, source_of_table
+from brdfdb.tables.table import TableSource, source_of_table
 
 STORED = "store:"  # prefix of the name of a material that is read from the store of the scene
 WAVELENGTHS_NM = [float(wavelength) for wavelength in range(380, 781, 10)]

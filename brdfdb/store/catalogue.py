@@ -15,7 +15,7 @@ from brdfdb.models import MODELS
 from brdfdb.store.decoding import read_metadata
 from brdfdb.store.last_audit import ShownAnswer
 from brdfdb.store.summary_words import NOT_AUDITED
-from brdfdb.tables.first_numbers import FormulaRung, LargestAlbedo
+from brdfdb.tables.stated_error import FormulaRung, LargestAlbedo
 
 _SEARCHED = ("name", "title", "model", "model_title", "paper", "source")  # fields in which words are looked for
 

@@ -82,7 +82,7 @@ class _Measured(NamedTuple):
     parameters: list[dict[str, float]]  # in the units of the model
     corners: Floats  # f_r of the members that a cubic is made of, of shape (points, corners, directions, wavelengths)
     truth: Floats  # (points, directions, wavelengths)
-    drawn: list[error_measurement.Draw]
+    drawn: list[error_measurement.RandomPairs]
     specular_corners: Floats | None  # (points, corners, angles, wavelengths)
     specular_truth: Floats | None
 
@@ -125,7 +125,7 @@ def measure(sweep: Sweep, tables: Mapping[str, Table], seed: int = SEED) -> Fami
         If a member is not the one that the sweep asks for, or members have different wavelengths.
     """
     measured = _look(sweep, tables, seed)
-    drawn = error_measurement.Draw(*(np.concatenate(parts) for parts in zip(*measured.drawn, strict=True)))
+    drawn = error_measurement.RandomPairs(*(np.concatenate(parts) for parts in zip(*measured.drawn, strict=True)))
     truth = measured.truth.reshape(-1, measured.truth.shape[-1])
     floor = error_measurement.floor_of(truth, drawn)
     ways = _ways(sweep, measured, drawn, floor)
@@ -170,9 +170,10 @@ def _between(sweep: Sweep, tables: Mapping[str, Table], seed: int, way: _Way, fl
     pairs = error_measurement.draw(material, stored, _SEARCHED, seed)
     wi, wr = pairs.wi[pairs.above], pairs.wr[pairs.above]
     how = replace(PLAIN, wavelengths=first.interpolation.wavelengths)
-    at = error_measurement.worst_wavelengths(material, stored, how, wi, wr, floor)
+    worst = error_measurement.worst_between(material, stored, how, wi, wr, floor)
+    at = np.array([place.wavelength_nm for place in worst])
     measured = _look(sweep, tables, seed, at)
-    drawn = error_measurement.Draw(*(np.concatenate(parts) for parts in zip(*measured.drawn, strict=True)))
+    drawn = error_measurement.RandomPairs(*(np.concatenate(parts) for parts in zip(*measured.drawn, strict=True)))
     truth = measured.truth.reshape(-1, at.size)
     value = blended(*_weighted(sweep, measured, measured.corners, way), way.offset).reshape(truth.shape)
     larger = np.maximum(floor[1:], floor[:-1])
@@ -271,7 +272,7 @@ def _width(shape: tuple[int, ...]) -> int:
     return 4 if math.prod(min(4, nodes) for nodes in shape) <= _MOST_CORNERS else 2
 
 
-def _ways(sweep: Sweep, measured: _Measured, drawn: error_measurement.Draw, floor: Floats) -> dict[_Way, float]:
+def _ways(sweep: Sweep, measured: _Measured, drawn: error_measurement.RandomPairs, floor: Floats) -> dict[_Way, float]:
     """Return the best powers of each method, in f_r and in logarithms, with the 99th percentile of their error."""
     above = drawn.above.reshape(measured.truth.shape[:2])
     shape = tuple(map(len, sweep.axes.values()))

@@ -14,9 +14,8 @@ from brdfdb.measurements.record import Measured
 from brdfdb.models import MODELS
 from brdfdb.store.catalogue import SpectrumKind, spectrum_of
 from brdfdb.store.last_audit import AuditSummary, Verdict
-from brdfdb.tables.first_numbers import FormulaError, LargestAlbedo
 from brdfdb.tables.metadata import TableMetadata
-from brdfdb.tables.stated_error import Error
+from brdfdb.tables.stated_error import Error, FormulaError, LargestAlbedo
 from brdfdb.tables.table import Table
 
 

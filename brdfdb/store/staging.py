@@ -191,7 +191,7 @@ def _reader(layout: Layout, table: Path) -> Callable[[slice], NDArray[np.float32
     A table whose albedo is integrated is held as a whole, so that each block is decoded once.
     """
     from brdfdb.store.codec import chunk_name, decoded
-    from brdfdb.tables.formula_measurement import LARGE
+    from brdfdb.tables.statements import LARGE
 
     @lru_cache(maxsize=4)
     def block(number: int) -> NDArray[np.float32]:

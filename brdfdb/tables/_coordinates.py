@@ -8,12 +8,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from brdfdb._elementary import cos, cosine, sine, twice_arctan
 from brdfdb._numba import inner_loop, kernel, loop
-
-Array = NDArray[np.float64]
+from brdfdb.parameters import Array
 
 PI, TURN, HALF_PI = np.pi, 2.0 * np.pi, np.pi / 2.0
 

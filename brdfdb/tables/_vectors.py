@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb._numba import instructions
+from brdfdb.parameters import Array
 
-Array = NDArray[np.float64]
 Index = Any  # an int of Python, or a uint64 of a kernel
 CUBIC_COLUMNS = 16  # of `Axes.lines`: four vectors of four weights
 LANES = 4  # points that are interpolated linearly at once

@@ -148,7 +148,7 @@ class Lines(NamedTuple):
     mu: Floats
 
 
-def lines(layout: Layout, axis: int, drawn: error_measurement.Draw) -> Lines:
+def lines(layout: Layout, axis: int, drawn: error_measurement.RandomPairs) -> Lines:
     """Evaluate a source along lines of one axis of a layout through directions of a draw."""
     grid = layout.grid
     above = np.flatnonzero(drawn.above)

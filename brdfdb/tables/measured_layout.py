@@ -25,8 +25,7 @@ from brdfdb.tables.grids import (
 from brdfdb.tables.layout import Interpolation, Layout
 from brdfdb.tables.mixture import mixture_of
 from brdfdb.tables.planner import check_tolerance, offset_of
-from brdfdb.tables.table import Table
-from brdfdb.tables.table_source import TableSource
+from brdfdb.tables.table import Table, TableSource
 
 _LADDER = (16, 24, 36, 54, 72)  # nodes of theta_h or theta_i
 _ANISOTROPIC_LADDER = (10, 14, 20)

@@ -40,7 +40,7 @@ class Sample(NamedTuple):
     `hot_spot` has pairs near the light if their error has a tolerance of its own.
     """
 
-    drawn: error_measurement.Draw
+    drawn: error_measurement.RandomPairs
     truth: Floats
     floor: Floats
     hot_spot: HotSpot | None = None
@@ -51,7 +51,7 @@ class Sample(NamedTuple):
         return self._replace(truth=self.truth[:, wavelengths], floor=self.floor[wavelengths], hot_spot=spot)
 
     @property
-    def for_lines(self) -> error_measurement.Draw:
+    def for_lines(self) -> error_measurement.RandomPairs:
         """The pairs that lines are drawn through: those near the light, too, if their error has a tolerance."""
         if self.hot_spot is None:
             return self.drawn
@@ -59,7 +59,7 @@ class Sample(NamedTuple):
         wi, wr = np.concatenate([self.drawn.wi, pairs.wi]), np.concatenate([self.drawn.wr, pairs.wr])
         order = np.random.default_rng(SEED).permutation(len(wi))
         ones, none = np.ones(len(wi)), np.zeros(len(wi), dtype=bool)
-        return error_measurement.Draw(wi[order], wr[order], np.zeros(len(wi), np.int64), ones, none, ~none)
+        return error_measurement.RandomPairs(wi[order], wr[order], np.zeros(len(wi), np.int64), ones, none, ~none)
 
 
 def sample_of(

@@ -8,14 +8,14 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from brdfdb.errors import ParameterError, import_extra
 from brdfdb.geometry import check_azimuth_deg, radians
 from brdfdb.integrals.quadrature import reflected_share
 from brdfdb.lobes import around_mirror, narrowest
 from brdfdb.materials import FunctionRecord, Material
-from brdfdb.parameters import Floats
+from brdfdb.parameters import Array, Floats
 from brdfdb.tables.shared_axes import (
     COLOURS,
     DASHES,
@@ -36,8 +36,6 @@ from brdfdb.tables.slices import Slice, Sliced, half_difference_slice, in_plane_
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-Array = NDArray[np.float64]
 
 _SHOWN_NM = 550.0  # wavelength of a plot by default
 _UNIT = "$f_r$ [1/sr]"

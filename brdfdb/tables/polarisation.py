@@ -30,7 +30,7 @@ from brdfdb.parameters import Floats
 from brdfdb.tables import stokes
 from brdfdb.tables._interpolation import weights_of_nodes
 from brdfdb.tables.layout import Layout
-from brdfdb.tables.polarisation_record import ELEMENTS
+from brdfdb.tables.stokes import ELEMENTS
 from brdfdb.tables.table_base import Located
 
 GRID_TOLERANCE = 1e-3  # of the elements, where a recipe gives grids and no tolerance

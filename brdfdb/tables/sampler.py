@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.geometry import radians, unit_vector
+from brdfdb.parameters import Array
 
-Array = NDArray[np.float64]
 # f_r [1/sr] for unit vectors of lights and viewers, in their broadcast shape
 Evaluate = Callable[[Array, Array], Array]
 

@@ -17,7 +17,7 @@ from brdfdb.tables.grids import RECIPROCITY, Axis, Grid
 from brdfdb.tables.layout import TABLE_VERSION, Layout
 from brdfdb.tables.metadata import TableMetadata
 from brdfdb.tables.polarisation import facets_of
-from brdfdb.tables.polarisation_record import record
+from brdfdb.tables.stokes import record
 
 if TYPE_CHECKING:
     import xarray as xr

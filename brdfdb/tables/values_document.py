@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, Field
 
 from brdfdb.tables.albedo import AlbedoDocument
-from brdfdb.tables.evaluation import Output, Values
-from brdfdb.tables.lobe_views import View as ViewName
-from brdfdb.tables.stokes_document import StokesDocument
+from brdfdb.tables.evaluation import Output, StokesDocument, Values
+from brdfdb.tables.evaluation import View as ViewName
 from brdfdb.tables.table import Table
 
 

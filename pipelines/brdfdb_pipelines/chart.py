@@ -24,8 +24,7 @@ from brdfdb.store.family import Family, Sweep
 from brdfdb.store.family_records import recorded
 from brdfdb.store.reader import Store
 from brdfdb.tables.planner import check_tolerance
-from brdfdb.tables.table import Table
-from brdfdb.tables.table_source import source_of_table
+from brdfdb.tables.table import Table, source_of_table
 from brdfdb_pipelines import family_plot, recipe_file, terminal, tradeoff_plot
 from brdfdb_pipelines.named_source import measured_source
 from brdfdb_pipelines.plot_panels import percent

@@ -25,7 +25,7 @@ from brdfdb.store.paths import material_path, revision_path
 from brdfdb.store.pointer import point_to
 from brdfdb.store.publication import publish_layout
 from brdfdb.store.revisions import standing
-from brdfdb.tables.largest_albedo import largest_albedo
+from brdfdb.tables.albedo import largest_albedo
 from brdfdb.tables.layout import TABLE_VERSION, Layout
 from brdfdb.tables.measured_layout import tabulated
 from brdfdb.tables.table import Table

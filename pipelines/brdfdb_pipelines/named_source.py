@@ -12,7 +12,7 @@ from brdfdb.errors import ParameterError
 from brdfdb.materials import Source
 from brdfdb.measurements import MeasuredSource
 from brdfdb.parameters import closest
-from brdfdb.tables.table_source import source_of_table
+from brdfdb.tables.table import source_of_table
 from brdfdb_pipelines import recipe_file
 from brdfdb_pipelines.measured_job import MeasuredJob
 

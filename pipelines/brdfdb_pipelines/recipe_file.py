@@ -30,10 +30,10 @@ from brdfdb.store.family import Sweep
 from brdfdb.store.paths import NAME
 from brdfdb.tables.grids import Axis, Grid, check_wavelengths
 from brdfdb.tables.layout import TABLE_VERSION, Interpolation, Layout, digest, over_wavelengths
+from brdfdb.tables.mixture import refined_wavelengths
 from brdfdb.tables.planner import PLAN_VERSION, coarsest, offset_of, planned
 from brdfdb.tables.polarisation import GRID_TOLERANCE, planned_theta_d
-from brdfdb.tables.polarisation_record import POLARISATION_VERSION
-from brdfdb.tables.wavelengths import refined
+from brdfdb.tables.stokes import POLARISATION_VERSION
 from brdfdb_pipelines import preset_names, toml_file
 from brdfdb_pipelines.measured_job import MeasuredJob, measured_job
 from brdfdb_pipelines.recipe_grids import LIST, STRICT, Grids, Nodes, Range, RecipeError, nodes_of
@@ -84,7 +84,7 @@ class Job:
         assert self.tolerance is not None
         given = self.wavelength_nm
         # the members of a family share their wavelengths
-        more = given if self.family is not None else refined(self.material, given, self.tolerance)
+        more = given if self.family is not None else refined_wavelengths(self.material, given, self.tolerance)
         plan = functools.partial(planned, alike=self.planned_on, hot_spot_tolerance=self.hot_spot_tolerance)
         try:
             return plan(self.material, more, self.tolerance)

@@ -19,8 +19,8 @@ from brdfdb.store import family_records
 from brdfdb.store.family import Sweep
 from brdfdb.store.publication import publish_dataset
 from brdfdb.tables.albedo import source_albedo
+from brdfdb.tables.evaluation import view_directions
 from brdfdb.tables.layout import Layout
-from brdfdb.tables.lobe_views import view_directions
 from brdfdb.tables.tabulation import tabulate
 from tests.api.a_store import GREY, NPY, Client, client_of, publish, read_npy
 

@@ -29,8 +29,7 @@ from brdfdb.scenes.environment import Environment
 from brdfdb.scenes.studio import studio
 from brdfdb.store.publication import publish
 from brdfdb.tables.sampler import Sampler
-from brdfdb.tables.table import Table
-from brdfdb.tables.table_source import TableSource
+from brdfdb.tables.table import Table, TableSource
 from tests.benchmarks.formats import tables
 from tests.benchmarks.recording import Column, Run
 

@@ -125,7 +125,7 @@ def uniform_nodes(layout: Layout, error: float) -> int:
 
 
 def uniform_lookup(
-    material: Material, wavelength_nm: NDArray[np.float64] | None, drawn: error_measurement.Draw, count: int
+    material: Material, wavelength_nm: NDArray[np.float64] | None, drawn: error_measurement.RandomPairs, count: int
 ) -> Array:
     """Multilinear interpolation on `count` nodes a quarter turn, without the table: the model at the nodes around."""
     theta = [np.arccos(np.clip(w[:, 2], -1.0, 1.0)) for w in (drawn.wi, drawn.wr)]

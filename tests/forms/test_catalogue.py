@@ -38,7 +38,7 @@ CLOSED = 1e-3  # relative, 24 slopes less the 400 of the misprint: 4.1e-4
 SHORT = 3e-8  # l1 of ten terms where g stays below 1.3: 2.3e-8; the first one left out is g^10 / (11! 11) of the first
 
 
-def of(material: Material, *tolerances: float) -> tuple[dict[str, Form], error_measurement.Draw]:
+def of(material: Material, *tolerances: float) -> tuple[dict[str, Form], error_measurement.RandomPairs]:
     wavelength_nm = wavelengths(material)
     forms = {form.key: form for form in catalogue.forms(material, wavelength_nm, tolerances)}
     return forms, error_measurement.draw(material, wavelength_nm, 100, 7)
@@ -52,7 +52,7 @@ def values(form: Form, wi: Any, wr: Any) -> Any:
     return form.evaluate(np.asarray(wi, dtype=form.dtype), np.asarray(wr, dtype=form.dtype)).astype(np.float64)
 
 
-def l1(forms: dict[str, Form], drawn: error_measurement.Draw, key: str) -> float:
+def l1(forms: dict[str, Form], drawn: error_measurement.RandomPairs, key: str) -> float:
     truth = values(next(iter(forms.values())), drawn.wi, drawn.wr)
     return float(error_measurement.mean_error(values(forms[key], drawn.wi, drawn.wr), truth, drawn.weight).max())
 
@@ -163,7 +163,7 @@ def test_the_fit_is_a_few_percent_off_and_the_qualitative_model_worse_forward() 
     forms, drawn = of(presets()["wall-plaster"])
     fit, rough, smooth = (l1(forms, drawn, key) for key in ("fit", "qualitative", "lambert"))
     assert 0.01 < fit < 0.04 < rough < smooth
-    forward, back = (error_measurement.classes(drawn)[name] for name in ("forward", "back"))
+    forward, back = (drawn.classes()[name] for name in ("forward", "back"))
     truth = values(forms["facets"], drawn.wi, drawn.wr)
     found = values(forms["qualitative-057"], drawn.wi, drawn.wr)
     ahead, behind = (
@@ -281,7 +281,7 @@ def cpu_seconds(*calls: Callable[[], Any]) -> list[float]:
     return [min(taken[number :: len(calls)]) for number in range(len(calls))]
 
 
-def many(form: Form, drawn: error_measurement.Draw, count: int = 20_000) -> Callable[[], Any]:
+def many(form: Form, drawn: error_measurement.RandomPairs, count: int = 20_000) -> Callable[[], Any]:
     """A call of a form at many of the directions that were drawn; what it compiles is there."""
     wi, wr = np.resize(drawn.wi, (count, 3)), np.resize(drawn.wr, (count, 3))
     form.evaluate(wi, wr)

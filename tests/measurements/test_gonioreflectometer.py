@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from brdfdb import formats, presets
 from brdfdb.errors import FileFormatError, ParameterError
@@ -16,7 +15,6 @@ from brdfdb.formats.gonioreflectometer import read_picture, write_picture
 from brdfdb.measurements.aperture import averaged
 from brdfdb.measurements.gonioreflectometer import Gonioreflectometer, Picture, eq_3, photograph, reduced, traced
 
-Array = NDArray[np.float64]
 SMALL = Gonioreflectometer(width=324, height=240)
 PARAMETERS = ("rho_d", "rho_s", "alpha_x", "alpha_y")
 # Lights [degrees] of the pictures: the grain of an anisotropic sample is seen from both sides

@@ -23,7 +23,7 @@ from brdfdb.audit.table_error import TableError
 from brdfdb.audit.validity import Limit, Validity
 from brdfdb.audit.values import Values
 from brdfdb.figure import Curve, Figure, Map, Panel, Picture, Statement, numbers
-from brdfdb.tables.first_numbers import Grazing
+from brdfdb.tables.stated_error import Grazing
 
 THETA = np.linspace(0.0, 89.0, 60)
 ODD = '<b>&"it\'s" $größe$'

@@ -133,7 +133,7 @@ def test_a_family_of_he_torrance_is_as_far_off_as_it_states(copper: Path) -> Non
         draws.append(drawn)
         truth.append(error_measurement.model_values(material, family.wavelength_nm, drawn.wi, drawn.wr))
         found.append(family.lookup_vectors(drawn.wi, drawn.wr, **at))
-    whole = error_measurement.Draw(*(np.concatenate(parts) for parts in zip(*draws, strict=True)))
+    whole = error_measurement.RandomPairs(*(np.concatenate(parts) for parts in zip(*draws, strict=True)))
     afresh = error_measurement.compare(np.concatenate(found), np.concatenate(truth), whole)
     assert afresh.overall.p99 == pytest.approx(family.error.overall.p99, rel=AGREEMENT)
 

@@ -160,7 +160,7 @@ def test_the_stated_error_and_one_measured_afresh_agree(name: str, families: Fam
         draws.append(drawn)
         truth.append(error_measurement.model_values(material, family.wavelength_nm, drawn.wi, drawn.wr))
         found.append(family.lookup_vectors(drawn.wi, drawn.wr, **at).reshape(truth[-1].shape))
-    whole = error_measurement.Draw(*(np.concatenate(parts) for parts in zip(*draws, strict=True)))
+    whole = error_measurement.RandomPairs(*(np.concatenate(parts) for parts in zip(*draws, strict=True)))
     afresh = error_measurement.compare(np.concatenate(found), np.concatenate(truth), whole)
     assert afresh.overall.p99 == pytest.approx(family.error.overall.p99, rel=AGREEMENT)
     assert family.error.overall.p99 > 1e-3

@@ -19,7 +19,7 @@ from brdfdb.scenes.gbuffer import gather
 from brdfdb.scenes.offered_forms import offered_forms
 from brdfdb.scenes.renderer import reflectors, render
 from brdfdb.store.publication import Published, publish
-from brdfdb.tables.table_source import source_of_table
+from brdfdb.tables.table import source_of_table
 from brdfdb_pipelines import cli, scene_file
 from tests.api.a_store import client_of
 

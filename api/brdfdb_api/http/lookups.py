@@ -19,8 +19,7 @@ from starlette.responses import Response
 from brdfdb.errors import ParameterError
 from brdfdb.store.paths import pinned
 from brdfdb.store.shelf import Shelf
-from brdfdb.tables.evaluation import Surface, Values, surface_of
-from brdfdb.tables.points import ANGLES, Points, PointsBody
+from brdfdb.tables.evaluation import ANGLES, Points, PointsBody, Surface, Values, surface_of
 from brdfdb.tables.table import Table
 from brdfdb.tables.values_document import Lookup, Lookups, arrays_of, npy_bytes, of_table, values_document
 from brdfdb_api.http import queries, responses

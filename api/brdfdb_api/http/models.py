@@ -19,8 +19,7 @@ from brdfdb.parameters import ModelSpec
 from brdfdb.spectra import PICTURE_NM
 from brdfdb.store.family import FamilyLine
 from brdfdb.tables.albedo import reflected_by
-from brdfdb.tables.evaluation import Surface
-from brdfdb.tables.points import PointsBody
+from brdfdb.tables.evaluation import PointsBody, Surface
 from brdfdb.tables.values_document import FamilyLookup, ModelAlbedo, ModelLobe, ModelLookup
 from brdfdb_api.http.addresses import NPY_ANSWER, Content, addresses, answers, body, shelf_of
 from brdfdb_api.http.errors import refused

@@ -24,10 +24,7 @@ from pydantic import (
 from starlette.requests import Request
 
 from brdfdb.geometry import AZIMUTH_MOST_DEG
-from brdfdb.tables.evaluation import Output
-from brdfdb.tables.lobe_views import View
-from brdfdb.tables.points import TURN, Points, PointsBody, fields_of_npy, listed
-from brdfdb.tables.stokes_document import read_stokes
+from brdfdb.tables.evaluation import TURN, Output, Points, PointsBody, View, fields_of_npy, listed, read_stokes
 from brdfdb_api.http.errors import RequestError, refusal_of, refused
 from brdfdb_api.http.responses import JSON, NPY, preferred
 

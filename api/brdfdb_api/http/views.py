@@ -19,9 +19,7 @@ from brdfdb.scenes import lit_sphere
 from brdfdb.store.archive import ZIP
 from brdfdb.store.summary_words import NOT_AUDITED
 from brdfdb.tables.albedo import reflected
-from brdfdb.tables.evaluation import Surface
-from brdfdb.tables.lobe_views import MOST_POINTS, view_directions
-from brdfdb.tables.points import Points, listed
+from brdfdb.tables.evaluation import MOST_POINTS, Points, Surface, listed, view_directions
 from brdfdb.tables.values_document import Albedo, Lobe, lobe_document, npy_bytes, of_table
 from brdfdb_api.http.addresses import NPY_ANSWER, Revision, addresses, answers, both, shelf_of
 from brdfdb_api.http.errors import RequestError, refused

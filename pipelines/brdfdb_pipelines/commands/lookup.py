@@ -119,8 +119,7 @@ def _reflected(source: Table | Family, angles_deg: list[float], options: argpars
     import numpy as np
 
     from brdfdb.geometry import radians
-    from brdfdb.tables.points import Points
-    from brdfdb.tables.stokes_document import read_stokes, stokes_document
+    from brdfdb.tables.evaluation import Points, read_stokes, stokes_document
     from brdfdb.tables.table import Table
 
     if options.stokes is None:

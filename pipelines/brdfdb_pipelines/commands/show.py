@@ -15,12 +15,10 @@ if TYPE_CHECKING:
     from brdfdb.materials.provenance import Assumption
     from brdfdb.store.family import Family
     from brdfdb.store.summary_words import Audited
-    from brdfdb.tables.first_numbers import FormulaError
     from brdfdb.tables.grids import Axis
     from brdfdb.tables.metadata import TableMetadata
-    from brdfdb.tables.stated_error import Error, Overall
+    from brdfdb.tables.stated_error import Error, FormulaError, Overall, WorstPair
     from brdfdb.tables.table import Table
-    from brdfdb.tables.worst_pair import WorstPair
 
 HELP = "Show parameters, sources, grid, albedo and files of a material, or a family."
 
