@@ -10,7 +10,7 @@ from typing import Any, ClassVar, Literal, NamedTuple, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from brdfdb.audit.pairs import Pairs, pairs_of
+from brdfdb.audit.pairs import ComparedPairs, pairs_of
 from brdfdb.figure import Map, Panel
 from brdfdb.materials import FunctionRecord, Source
 from brdfdb.tables.metadata import TableMetadata
@@ -207,7 +207,7 @@ class Subject:
     findings: dict[str, Finding] = field(default_factory=dict)
 
     @cached_property
-    def pairs(self) -> Pairs:
+    def pairs(self) -> ComparedPairs:
         """Return f_r [1/sr] of table and source at the directions that several findings share."""
         return pairs_of(self.table, self.source)
 

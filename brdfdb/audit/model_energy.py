@@ -215,7 +215,7 @@ class _Reflected(NamedTuple):
         return _Place(int(theta), int(wavelength))
 
 
-class _Forms(NamedTuple):
+class _ReflectedForms(NamedTuple):
     """Albedos of a source, and of its lossless form; None if it has none."""
 
     source: _Reflected
@@ -259,7 +259,7 @@ class _Model(NamedTuple):
         order = np.argsort(theta_i_deg)
         return _Lights(theta_i_deg[order], np.concatenate([weights, np.zeros(others.size)])[order])
 
-    def reflected(self, lights: _Lights) -> _Forms:
+    def reflected(self, lights: _Lights) -> _ReflectedForms:
         """Return the albedos [1] of the source and of its lossless form, for lights from all azimuths that differ.
 
         Both are integrated over the same directions. Lights whose albedo is closer to a limit than its error are
@@ -323,7 +323,7 @@ class _Model(NamedTuple):
             )
             for part, mirrored in zip(np.split(diffuse, widths[:1], axis=2), specular, strict=False)
         ]
-        return _Forms(reflected[0], reflected[1] if self.lossless is not None else None)
+        return _ReflectedForms(reflected[0], reflected[1] if self.lossless is not None else None)
 
     def first_above_1(self, lights: _Lights, reflected: _Reflected) -> float | None:
         """Return the angle [degree] above which an albedo exceeds 1, or None. It lies between two lights."""

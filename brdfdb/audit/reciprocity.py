@@ -8,7 +8,7 @@ from pydantic import BaseModel, Field
 
 from brdfdb._elementary import COS_HORIZON
 from brdfdb.audit.finding import STRICT, Cell, Finding, NumberTable, Sentence, Subject, Verdict
-from brdfdb.audit.pairs import Pairs
+from brdfdb.audit.pairs import ComparedPairs
 from brdfdb.figure import number
 from brdfdb.parameters import Floats
 from brdfdb.tables.albedo import wavelengths_of
@@ -146,7 +146,7 @@ class Reciprocity(Finding):
         return [(name, asymmetry) for name, asymmetry in named if asymmetry is not None]
 
 
-def reciprocity_of(table: Table, pairs: Pairs) -> Reciprocity:
+def reciprocity_of(table: Table, pairs: ComparedPairs) -> Reciprocity:
     """Return the asymmetry of random pairs, of pairs in the lobe, and of all pairs of nodes."""
     above, in_lobe = pairs.drawn.above & _measured_both_ways(table, pairs), pairs.drawn.in_lobe
     interpolation = table.interpolation
@@ -175,7 +175,7 @@ def reciprocity_of(table: Table, pairs: Pairs) -> Reciprocity:
     return asymmetries.judged()
 
 
-def _measured_both_ways(table: Table, pairs: Pairs) -> NDArray[np.bool_] | bool:
+def _measured_both_ways(table: Table, pairs: ComparedPairs) -> NDArray[np.bool_] | bool:
     """Return which pairs lie within the directions that were measured, and do so exchanged; True without samples."""
     measured = table.metadata.measured
     if measured is None or measured.extent is None:

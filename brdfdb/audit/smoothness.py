@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import BaseModel, Field
 
 from brdfdb.audit.finding import STRICT, Cell, Finding, NumberTable, Sentence, Subject, Verdict
-from brdfdb.audit.pairs import Pairs
+from brdfdb.audit.pairs import ComparedPairs
 from brdfdb.figure import number
 from brdfdb.geometry import degrees, radians, spherical_angles, unit_vector, vectors_from_half_difference
 from brdfdb.materials import Source
@@ -117,7 +117,7 @@ class Smoothness(Finding):
         return [*(("model", jump) for jump in self.model), *(("table", jump) for jump in self.table)]
 
 
-def smoothness_of(table: Table, source: Source | None, pairs: Pairs) -> Smoothness:
+def smoothness_of(table: Table, source: Source | None, pairs: ComparedPairs) -> Smoothness:
     """Return the jumps of a table, and of its source if it is known, at all wavelengths of the table.
 
     A table may jump by the stated 99th percentile of the error in the band of theta_i at the wavelength. If theta_r is

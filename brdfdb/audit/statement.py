@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, Field
 
 from brdfdb.audit.finding import STRICT
-from brdfdb.audit.pairs import Pairs
+from brdfdb.audit.pairs import ComparedPairs
 from brdfdb.parameters import Floats
 from brdfdb.tables import error_measurement
 from brdfdb.tables.error_measurement import RandomPairs
@@ -142,7 +142,7 @@ def _whole(error: Error, at: int, between: int, *, mixed: bool) -> bool:
     )
 
 
-def disagreements(error: Error, pairs: Pairs, wavelength_nm: Axis | None) -> list[Disagreement]:
+def disagreements(error: Error, pairs: ComparedPairs, wavelength_nm: Axis | None) -> list[Disagreement]:
     """Return the numbers of a consistent statement that fresh directions contradict, the worst first.
 
     The statement is taken as one of as many directions as builds draw. What it says of that is itself under test.
@@ -150,7 +150,7 @@ def disagreements(error: Error, pairs: Pairs, wavelength_nm: Axis | None) -> lis
     return sorted(_disagreements(error, pairs, wavelength_nm), key=_severity, reverse=True)
 
 
-def _disagreements(error: Error, pairs: Pairs, wavelength_nm: Axis | None) -> Iterator[Disagreement]:
+def _disagreements(error: Error, pairs: ComparedPairs, wavelength_nm: Axis | None) -> Iterator[Disagreement]:
     drawn, floor = (
         pairs.drawn,
         np.array(error.floor),
@@ -197,7 +197,7 @@ def _judged(whole: bool, of_worst: bool, too_good: NDArray[np.bool_]) -> NDArray
     return np.full_like(too_good, np.all(too_good)) if of_worst else too_good
 
 
-def _of_floor(stated: Floats, pairs: Pairs, band: _Band, nm: list[float | None]) -> Iterator[Disagreement]:
+def _of_floor(stated: Floats, pairs: ComparedPairs, band: _Band, nm: list[float | None]) -> Iterator[Disagreement]:
     """Yield the disagreements on the floor, a share of the mean reflectance over uniform directions."""
     values = error_measurement.FLOOR / np.pi * pairs.drawn.weight[:, np.newaxis] * pairs.model
     fresh = values.mean(axis=0)

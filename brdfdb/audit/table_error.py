@@ -9,7 +9,7 @@ from pydantic import Field
 
 from brdfdb.audit.finding import LAST, Cell, Finding, Sentence, Subject, Verdict, Word
 from brdfdb.audit.nodes import Nodes
-from brdfdb.audit.pairs import SEED, Pairs, representative_nm
+from brdfdb.audit.pairs import SEED, ComparedPairs, representative_nm
 from brdfdb.audit.statement import Disagreement, contradictions, disagreements
 from brdfdb.figure import Map, Panel, number, rows
 from brdfdb.geometry import radians, spherical_angles, unit_vector
@@ -107,7 +107,7 @@ class TableError(Finding):
         return list(self.maps)
 
 
-def table_error_of(table: Table, source: Source, pairs: Pairs, nodes: Word = "passes") -> TableError:
+def table_error_of(table: Table, source: Source, pairs: ComparedPairs, nodes: Word = "passes") -> TableError:
     """Return the error of a table compared with its stated error, and maps of it at the middle wavelength.
 
     `nodes` is the verdict on its nodes. If it or the error violates, the fault of the table is searched for.
@@ -174,7 +174,7 @@ def _map(table: Table, source: Source, floor: Floats, title: str, delta_phi_deg:
     )
 
 
-def bias_of(pairs: Pairs) -> float | None:
+def bias_of(pairs: ComparedPairs) -> float | None:
     """Return the signed mean error [1] at the wavelength where it is largest; positive if the table is too bright."""
     weight = pairs.drawn.weight
     whole = weight @ pairs.model
@@ -184,7 +184,7 @@ def bias_of(pairs: Pairs) -> float | None:
     return float(f"{largest:.3g}") if np.isfinite(largest) else None
 
 
-def likeness_of(table: Table, source: Source, pairs: Pairs) -> str:
+def likeness_of(table: Table, source: Source, pairs: ComparedPairs) -> str:
     """Return, in words, the changed model with which a table agrees at least twice as well; empty if there is none."""
     chosen = np.flatnonzero(pairs.drawn.above)[:: max(len(pairs.drawn.wi) // DIRECTIONS, 1)]
     middle = pairs.table.shape[1] // 2

@@ -9,7 +9,7 @@ from brdfdb.figure import Figure, Map, Panel, curve_of, rows
 from brdfdb.fitting.document import Fits
 from brdfdb.fitting.fitted import Fitted
 from brdfdb.geometry import degrees, radians, unit_vector
-from brdfdb.measurements.aperture import View
+from brdfdb.measurements.aperture import InstrumentView
 
 Array = NDArray[np.float64]
 
@@ -79,7 +79,7 @@ def _cut(fitted: Fitted, chosen: NDArray[np.int64], channel: int, title: str) ->
     row = chosen[0]
     wi = np.broadcast_to(unit_vector(samples.theta_i[row], samples.phi_i[row]), (fine.size, 3))
     wr = unit_vector(np.abs(radians(fine)), samples.phi_i[row] + np.where(fine > 0.0, np.pi, 0.0))
-    model = fitted.seen(View(np.ascontiguousarray(wi), wr, samples.instrument))[:, channel]
+    model = fitted.seen(InstrumentView(np.ascontiguousarray(wi), wr, samples.instrument))[:, channel]
     return Panel(
         title=title,
         x_label="theta_r [degree], mirror side positive",

@@ -20,7 +20,7 @@ from brdfdb.fitting.residuals import Kind, Residual
 from brdfdb.fitting.surface import ASSUMED_NM, NotDescribedError, Surface, fitted_by_default
 from brdfdb.geometry import degrees, radians, versine
 from brdfdb.measurements import Samples
-from brdfdb.measurements.aperture import View
+from brdfdb.measurements.aperture import InstrumentView
 from brdfdb.models import MODELS
 from brdfdb.parameters import Floats
 
@@ -77,8 +77,8 @@ def fit(samples: Samples, model: str, *, residual: Kind = "log", refractive_inde
     value for each channel and are solved for at every shape (variable projection); the shape is shared.
 
     Where the instrument of the samples has solid angles, lobes are averaged over them, and a specular part within them
-    is added (`brdfdb.measurements.aperture.View`). Where it has none, samples near the mirror direction are left out if
-    the specular part of the fit counts there.
+    is added (`brdfdb.measurements.aperture.InstrumentView`). Where it has none, samples near the mirror direction are
+    left out if the specular part of the fit counts there.
 
     References
     ----------
@@ -109,7 +109,7 @@ def _searched(samples: Samples, surface: Surface, residual: Kind, hidden: Mask) 
     """Return the best point of a surface at the samples that count and are not hidden."""
     counting = Residual(samples, residual)
     rows = np.flatnonzero(counting.used.any(axis=1) & ~hidden)
-    view = View(samples.w_i[rows], samples.w_r[rows], samples.instrument)
+    view = InstrumentView(samples.w_i[rows], samples.w_r[rows], samples.instrument)
     problem = Problem(surface, view, counting.selected(rows))
     point = problem.best()
     sigma = _sigma(problem, point)

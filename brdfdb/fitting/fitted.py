@@ -13,7 +13,7 @@ from brdfdb.fitting.residuals import logarithms
 from brdfdb.fitting.surface import Surface
 from brdfdb.fitting.uncertainty import Covariance, covariance
 from brdfdb.measurements import Samples
-from brdfdb.measurements.aperture import View
+from brdfdb.measurements.aperture import InstrumentView
 from brdfdb.parameters import Floats
 
 Mask = NDArray[np.bool_]
@@ -57,15 +57,15 @@ class Fitted:
         return covariance(self.problem, self.point)
 
     @cached_property
-    def view(self) -> View:
+    def view(self) -> InstrumentView:
         """The directions of all samples, as their instrument sees them."""
-        return View(self.samples.w_i, self.samples.w_r, self.samples.instrument)
+        return InstrumentView(self.samples.w_i, self.samples.w_r, self.samples.instrument)
 
     def f_r(self, wi: Floats, wr: Floats) -> Floats:
         """Return f_r (N, C) [1/sr] of the fit at unit vectors (N, 3) of light and viewer, without its specular part."""
-        return self.surface.f_r(self.point.x, self.point.values, View(wi, wr))
+        return self.surface.f_r(self.point.x, self.point.values, InstrumentView(wi, wr))
 
-    def seen(self, view: View) -> Floats:
+    def seen(self, view: InstrumentView) -> Floats:
         """Return f_r (N, C) [1/sr] of the fit as an instrument sees it."""
         return self.surface.f_r(self.point.x, self.point.values, view)
 

@@ -13,7 +13,7 @@ from brdfdb.fitting.residuals import Residual
 from brdfdb.fitting.shape_slopes import basis_slopes
 from brdfdb.fitting.surface import Surface, total
 from brdfdb.fitting.variables import best_apart, spread
-from brdfdb.measurements.aperture import RESOLVED, View
+from brdfdb.measurements.aperture import RESOLVED, InstrumentView
 from brdfdb.parameters import Floats
 
 Array = NDArray[np.float64]
@@ -48,7 +48,7 @@ class Problem:
     ----------
     surface : Surface
         The surface.
-    view : View
+    view : InstrumentView
         Directions of light and viewer as the instrument sees them.
     residual : Residual
         Of the same N samples.
@@ -61,7 +61,7 @@ class Problem:
     def __init__(
         self,
         surface: Surface,
-        view: View,
+        view: InstrumentView,
         residual: Residual,
         fixed: Mapping[int, float] | None = None,
         held: Mapping[int, float] | None = None,

@@ -9,13 +9,13 @@ from numpy.typing import NDArray
 
 from brdfdb.fitting.surface import Surface, Term, columns
 from brdfdb.fitting.variables import EDGE, NORMAL, index_slopes
-from brdfdb.measurements.aperture import View
+from brdfdb.measurements.aperture import InstrumentView
 from brdfdb.parameters import Floats
 
 Array = NDArray[np.float64]
 
 
-def basis_slopes(surface: Surface, x: Array, view: View) -> dict[int, Floats]:
+def basis_slopes(surface: Surface, x: Array, view: InstrumentView) -> dict[int, Floats]:
     """Return the derivatives (M, N, C) or (M, N, 1) [1/sr] of `Surface.basis` by shape variables.
 
     Parameters
@@ -24,7 +24,7 @@ def basis_slopes(surface: Surface, x: Array, view: View) -> dict[int, Floats]:
         The surface.
     x : array (S,)
         A point of the unit cube.
-    view : View
+    view : InstrumentView
         N pairs of directions.
 
     Returns
@@ -83,7 +83,7 @@ def _moves(surface: Surface, variable: int, x: Array, numbers: list[dict[str, fl
     return moves
 
 
-def _term_slopes(term: Term, view: View, given: Mapping[str, float], names: set[str]) -> dict[str, Floats]:
+def _term_slopes(term: Term, view: InstrumentView, given: Mapping[str, float], names: set[str]) -> dict[str, Floats]:
     """Return the derivatives (M, N) [1/sr] of the factors of a term by some of its parameters."""
     assert term.spec.gradient is not None
     model, ordered = term.spec.gradient, sorted(names)

@@ -15,7 +15,7 @@ from brdfdb.errors import ParameterError
 from brdfdb.fitting.polynomials import Polynomial, coefficients, unit_of
 from brdfdb.fitting.variables import EDGE, NORMAL, index_of, index_variables, switches, variable
 from brdfdb.geometry import unit_vector
-from brdfdb.measurements.aperture import View
+from brdfdb.measurements.aperture import InstrumentView
 from brdfdb.models import MODELS
 from brdfdb.parameters import Floats, ModelSpec, closest
 from brdfdb.spectra import refractive_index
@@ -82,7 +82,7 @@ class Term:
         self.polynomial = (
             Polynomial(1, 1, constant=False) if self.scaled else Polynomial(len(names), degree, constant=bright)
         )
-        self.memory: tuple[View, dict[Any, Floats]] | None = None
+        self.memory: tuple[InstrumentView, dict[Any, Floats]] | None = None
         self.tied = None if turned else spec.lobe_axes
         out = {*self.fixed, *self.linear, *(self.tied or ())[1:]}
         self.free = [p for p in spec.parameters if p.name not in out]
@@ -94,7 +94,7 @@ class Term:
         parameters = [self.spec.parameter(name) for name in self.linear]
         return [Coefficient(number, p.name, f"{self.label}{p.name}", p.low, p.high, unit_of(p)) for p in parameters]
 
-    def basis(self, view: View, points: Sequence[Numbers], *, remember: bool) -> Floats:
+    def basis(self, view: InstrumentView, points: Sequence[Numbers], *, remember: bool) -> Floats:
         """Return the factors (B, M, N) [1/sr] of the monomials of this term at B points.
 
         Points are evaluated together, equal ones once. Those of the last call with `remember` are known.
@@ -128,7 +128,7 @@ class Term:
             for node in self.polynomial.nodes.tolist()
         ]
 
-    def _computed(self, view: View, points: Sequence[Numbers]) -> Floats:
+    def _computed(self, view: InstrumentView, points: Sequence[Numbers]) -> Floats:
         """Return the factors (B, M, N) [1/sr] of the monomials at points that are not known yet."""
         nodes = self.nodes
         rows = [{**one, **node} for one in points for node in nodes]
@@ -143,7 +143,7 @@ class Term:
         values = seen.reshape(len(points), len(nodes), -1)
         return values if self.scaled else self.polynomial.parts(values)
 
-    def _seen(self, view: View, width: float, points: Sequence[Numbers]) -> Floats:
+    def _seen(self, view: InstrumentView, width: float, points: Sequence[Numbers]) -> Floats:
         """Return f_r (B, N) [1/sr] as an instrument sees it, with the specular part that falls into its aperture."""
         given, shape = columns(points), (len(points), len(view))
         if not view.half_angle:
@@ -153,7 +153,7 @@ class Term:
             return f_r
         return f_r + view.mirror * self.reflected(view, given)
 
-    def reflected(self, view: View, given: Mapping[str, Any]) -> Floats:
+    def reflected(self, view: InstrumentView, given: Mapping[str, Any]) -> Floats:
         """Return the specular reflectance (N,) [1] for each direction of the light; 0 for models without one."""
         if self.spec.specular is None:
             return np.zeros(len(view))
@@ -291,11 +291,11 @@ class Surface:
         own = {one.name: float(values[row, channel]) for row, one in enumerate(self.coefficients) if one.term == number}
         return given | {name: value for name, value in own.items() if name != SCALE}, own.get(SCALE, 1.0)
 
-    def basis(self, x: Array, view: View) -> Floats:
+    def basis(self, x: Array, view: InstrumentView) -> Floats:
         """Return the factors (M, N, C) [1/sr] of all monomials; (M, N, 1) if they are the same in each channel."""
         return np.asarray(self.bases(x[np.newaxis], view)[0])
 
-    def bases(self, points: Array, view: View) -> Floats:
+    def bases(self, points: Array, view: InstrumentView) -> Floats:
         """Return the factors (B, M, N, C) or (B, M, N, 1) [1/sr] at points (B, S), which models take together.
 
         The terms of a point that was evaluated alone are remembered until the next: its neighbours share some of them.
@@ -335,11 +335,11 @@ class Surface:
     def _in_units(self, values: Floats, at: int, count: int) -> Floats:
         return np.asarray(values[at : at + count] / self.units[at : at + count])
 
-    def f_r(self, x: Array, values: Floats, view: View) -> Floats:
+    def f_r(self, x: Array, values: Floats, view: InstrumentView) -> Floats:
         """Return f_r (N, C) [1/sr] as an instrument sees it, with coefficients (K, C)."""
         return total(self.basis(x, view), self.monomials(values))
 
-    def reflected(self, x: Array, values: Array, view: View) -> Floats:
+    def reflected(self, x: Array, values: Array, view: InstrumentView) -> Floats:
         """Return the specular reflectance (N, C) [1] for each direction of the light."""
         sums = np.zeros((len(view), self.channels))
         for number, term in enumerate(self.terms):

@@ -20,7 +20,7 @@ from brdfdb.formats._written import whole
 from brdfdb.place import path_of
 
 if TYPE_CHECKING:
-    from brdfdb.measurements.gonioreflectometer import Picture
+    from brdfdb.measurements.gonioreflectometer import CameraPicture
     from brdfdb.measurements.samples import Samples
 
 suffix = ".exr"
@@ -31,12 +31,12 @@ _PARTS = ("sample", "standard", "background")
 _MOST_BYTES = 2**30
 
 
-def write_picture(picture: Picture, path: str | os.PathLike[str]) -> None:
+def write_picture(picture: CameraPicture, path: str | os.PathLike[str]) -> None:
     """Write a picture of the instrument, ZIP compressed: whole, or not at all.
 
     Parameters
     ----------
-    picture : Picture
+    picture : CameraPicture
         A picture, simulated or measured.
     path : path
         The file; one that is there is replaced.
@@ -76,7 +76,7 @@ def recognises(head: bytes) -> bool:
     return head.startswith(_MAGIC) and _KEY.encode() in head
 
 
-def read_picture(path: str | os.PathLike[str]) -> Picture:
+def read_picture(path: str | os.PathLike[str]) -> CameraPicture:
     """Return the picture of a file.
 
     Raises
@@ -89,7 +89,7 @@ def read_picture(path: str | os.PathLike[str]) -> Picture:
     import OpenEXR
 
     from brdfdb.geometry import radians
-    from brdfdb.measurements.gonioreflectometer import Gonioreflectometer, Picture
+    from brdfdb.measurements.gonioreflectometer import CameraPicture, Gonioreflectometer
 
     path = path_of(path)
     if path.stat().st_size > _MOST_BYTES:
@@ -109,7 +109,7 @@ def read_picture(path: str | os.PathLike[str]) -> Picture:
         theta_i, phi_i = (float(radians(document[name])) for name in ("theta_i_deg", "phi_i_deg"))
         name, provenance = (str(document.get(key, "")) for key in ("name", "provenance"))
         sample, standard, background = (stacks[part] for part in _PARTS)
-        return Picture(settings, theta_i, phi_i, sample, standard, background, name, provenance)
+        return CameraPicture(settings, theta_i, phi_i, sample, standard, background, name, provenance)
     except KeyError as error:
         raise FileFormatError(f"{path}: it has no {error}") from None
     except (ParameterError, TypeError, ValueError) as error:

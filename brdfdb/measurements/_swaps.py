@@ -16,7 +16,7 @@ _SAME_DEG = 0.01  # directions closer than this are one
 
 
 @dataclass(frozen=True)
-class Reciprocity:
+class ExchangedPairs:
     """Asymmetry abs(a - b) / (abs(a) + abs(b)) [1] of samples that are each other's swap of light and viewer.
 
     Attributes
@@ -32,7 +32,7 @@ class Reciprocity:
     largest: float
 
 
-def reciprocity_of(samples: Samples, one_side: bool) -> Reciprocity | None:
+def reciprocity_of(samples: Samples, one_side: bool) -> ExchangedPairs | None:
     """Return the asymmetry of samples that are each other's swap; None without any."""
     angles = [degrees(angle) for angle in (samples.theta_i, samples.phi_i, samples.theta_r, samples.phi_r)]
     theta_i, phi_i, theta_r, phi_r = (np.rint(angle / _SAME_DEG).astype(np.int64) for angle in angles)
@@ -56,7 +56,7 @@ def reciprocity_of(samples: Samples, one_side: bool) -> Reciprocity | None:
     if not pairs:
         return None
     asymmetry = asymmetries(a, b, level)
-    return Reciprocity(pairs, float(np.median(asymmetry)), float(asymmetry.max()))
+    return ExchangedPairs(pairs, float(np.median(asymmetry)), float(asymmetry.max()))
 
 
 def _wide(parts: Sequence[NDArray[np.int64]]) -> list[NDArray[np.uint64]]:

@@ -54,7 +54,7 @@ def cone(w: Floats, half_angle: float, rings: int = 1) -> Floats:
     return np.asarray(spread / np.linalg.norm(spread, axis=2, keepdims=True))
 
 
-class View:
+class InstrumentView:
     """Pairs of directions as an instrument sees them.
 
     Parameters
@@ -87,9 +87,9 @@ class View:
     def __len__(self) -> int:
         return len(self.w_i)
 
-    def selected(self, rows: NDArray[np.int64]) -> View:
+    def selected(self, rows: NDArray[np.int64]) -> InstrumentView:
         """Return the view of some of the pairs."""
-        return View(self.w_i[rows], self.w_r[rows], self.instrument)
+        return InstrumentView(self.w_i[rows], self.w_r[rows], self.instrument)
 
     @cached_property
     def theta_i(self) -> Floats:
@@ -158,9 +158,9 @@ class View:
 def averaged(brdf: Evaluate, instrument: Instrument) -> Evaluate:
     """Return f_r averaged over the solid angles of an instrument, a function of unit vectors like `brdf`.
 
-    `brdf` gives f_r [1/sr], shape (N, C), at unit vectors (N, 3) of light and viewer. `View` says what is averaged.
+    `brdf` gives f_r [1/sr], shape (N, C), at unit vectors (N, 3) of light and viewer.
     """
-    return lambda w_i, w_r: View(w_i, w_r, instrument).mean(brdf)
+    return lambda w_i, w_r: InstrumentView(w_i, w_r, instrument).mean(brdf)
 
 
 def _half_angle(solid_angle: float) -> float:

@@ -188,7 +188,7 @@ class Gonioreflectometer:
 
 
 @dataclass(frozen=True, eq=False)
-class Picture:
+class CameraPicture:
     """Counts of the camera for one direction of the light.
 
     Attributes
@@ -225,7 +225,7 @@ class Picture:
 
 def photograph(
     brdf: Evaluate, settings: Gonioreflectometer, theta_i: float, phi_i: float, seed: int, name: str = "sample"
-) -> Picture:
+) -> CameraPicture:
     """Return the picture that the instrument takes of a surface: blurred, noisy, and clipped where it saturates.
 
     Parameters
@@ -268,7 +268,7 @@ def photograph(
     rng = np.random.default_rng(seed)
     parts = (light[0], 1), (light[1], settings.frames), (np.zeros_like(light[0]), settings.frames)
     sample, standard, background = (_counts(part, settings, frames, rng) for part, frames in parts)
-    return Picture(settings, theta_i, phi_i, sample, standard, background, name, "simulated")
+    return CameraPicture(settings, theta_i, phi_i, sample, standard, background, name, "simulated")
 
 
 def _turned(w: Array, phi: float) -> Array:
@@ -290,12 +290,12 @@ def _counts(light: Array, settings: Gonioreflectometer, frames: int, rng: np.ran
     return np.stack(exposed).astype(np.float32)
 
 
-def reduced(picture: Picture, thin: bool = True) -> Samples:
+def reduced(picture: CameraPicture, thin: bool = True) -> Samples:
     """Return the samples of a picture: f_r by eq. 2 at the directions of the pixels, with its standard uncertainty.
 
     Parameters
     ----------
-    picture : Picture
+    picture : CameraPicture
         One that was simulated or measured.
     thin : bool
         Leave pixels out where f_r hardly changes, so that the samples are dense at the peak alone.

@@ -42,7 +42,7 @@ class _Scales(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Interpolation:
+class SampleInterpolation:
     """f_r of samples everywhere: a base times a smooth ratio.
 
     The logarithm is asinh(f_r / (2 noise)), which is linear where f_r is less than its noise: values below 0 count.
@@ -255,7 +255,7 @@ class _Problem(NamedTuple):
 class Fitted(NamedTuple):
     """The interpolation of samples, its error at samples that were held out, and its base in words."""
 
-    f_r: Interpolation
+    f_r: SampleInterpolation
     held_out: HeldOut
     base: str
 
@@ -292,7 +292,7 @@ def fit(samples: Samples, base: Base | None = None) -> Fitted:
     order = np.random.default_rng(_SEED).permutation(len(problem.wi))
     few = problem.some(order[:_SEARCHED])
     tried = [
-        Interpolation(f_base, alpha, level, _Scales(half * both, both, both, noise), samples.turned, mean, lowest)
+        SampleInterpolation(f_base, alpha, level, _Scales(half * both, both, both, noise), samples.turned, mean, lowest)
         for half, both, noise in itertools.product((1.0, 2.0), _SCALES, _ROUGHNESS)
     ]
     scores = [np.mean(np.minimum(np.abs(_held_out(one, few, few) - few.y), 3.0)) for one in tried]
@@ -331,11 +331,11 @@ def _problem(samples: Samples, base: Base) -> tuple[_Problem, Floats, str]:
     return _Problem(wi, wr, values, of_base, y, noise, group), level, "incidences" if scans else "folds"
 
 
-def _x(how: Interpolation, problem: _Problem) -> Floats:
+def _x(how: SampleInterpolation, problem: _Problem) -> Floats:
     return features(problem.wi, problem.wr, how.alpha, how.scales[:3], turned=how.turned)
 
 
-def _normal(how: Interpolation, problem: _Problem, phi: Floats) -> tuple[Floats, Floats]:
+def _normal(how: SampleInterpolation, problem: _Problem, phi: Floats) -> tuple[Floats, Floats]:
     """Return the matrix and the right sides of the normal equations of some samples, from radial functions at them."""
     weighted = phi / (problem.noise**2 + how.scales.noise**2)[:, np.newaxis]
     return weighted.T @ phi, weighted.T @ (problem.y - how.mean)
@@ -350,7 +350,7 @@ def _solved(matrix: Floats, right: Floats, smooth: Floats) -> Floats:
     return np.asarray(cho_solve(cho_factor(whole), right))
 
 
-def _held_out(how: Interpolation, problem: _Problem, centres: _Problem) -> Floats:
+def _held_out(how: SampleInterpolation, problem: _Problem, centres: _Problem) -> Floats:
     """Return the numbers (N, C) that the interpolation gives at each group of samples from those of the others.
 
     The centres of radial functions stay: only values tell, not places.
@@ -366,7 +366,7 @@ def _held_out(how: Interpolation, problem: _Problem, centres: _Problem) -> Float
     return predicted
 
 
-def _stated(samples: Samples, problem: _Problem, predicted: Floats, how: Interpolation, scheme: str) -> HeldOut:
+def _stated(samples: Samples, problem: _Problem, predicted: Floats, how: SampleInterpolation, scheme: str) -> HeldOut:
     """Return the error at samples that were held out and lie within the directions of the others."""
     inside = np.ones(len(problem.wi), dtype=bool)
     x = places(problem.wi, problem.wr, turned=samples.turned)

@@ -13,7 +13,7 @@ from brdfdb.geometry import degrees
 from brdfdb.measurements._doubts import azimuths, is_constant, missing, units
 from brdfdb.measurements._incidences import BAND_DEG, PEAK, Incidence, incidences_of
 from brdfdb.measurements._notes import notes_of, percent
-from brdfdb.measurements._swaps import Reciprocity, reciprocity_of
+from brdfdb.measurements._swaps import ExchangedPairs, reciprocity_of
 from brdfdb.measurements.samples import NODES, Samples
 
 _SAME_DEG = 0.01  # directions of the light closer than this are one
@@ -55,7 +55,7 @@ class Claim:
 
 
 @dataclass(frozen=True)
-class Statement:
+class SampleStatement:
     """Statement on samples: the angles that they cover, the values that they hold, and what contradicts.
 
     Attributes
@@ -93,7 +93,7 @@ class Statement:
         True if the directions are scattered, and `incidences` are bands of theta_i, as if azimuths did not matter.
     incidences : tuple of Incidence
         Directions of the light with viewers enough.
-    reciprocity : Reciprocity or None
+    reciprocity : ExchangedPairs or None
         None if no sample is the swap of another.
     claims : tuple of Claim
         Claims of the header that can be compared.
@@ -122,7 +122,7 @@ class Statement:
     wavelength_nm: tuple[float, float] | None
     in_bands: bool
     incidences: tuple[Incidence, ...]
-    reciprocity: Reciprocity | None
+    reciprocity: ExchangedPairs | None
     claims: tuple[Claim, ...]
     notes: tuple[str, ...]
     hints: tuple[str, ...]
@@ -146,7 +146,7 @@ class Statement:
         return {**asdict(self), "largest": largest, "sentences": list(self.sentences)}
 
 
-def statement(samples: Samples, progress: Callable[[float], None] | None = None) -> Statement:
+def statement(samples: Samples, progress: Callable[[float], None] | None = None) -> SampleStatement:
     """Return what samples cover, what they integrate to, and what looks wrong.
 
     Parameters
@@ -179,7 +179,7 @@ def statement(samples: Samples, progress: Callable[[float], None] | None = None)
     integrated, in_bands = incidences_of(full, delta, progress, one_side=one_side)
     at = samples.wavelength_nm
     peak = np.unravel_index(int(np.argmax(np.where(known, samples.values, -np.inf))), samples.values.shape)[0]
-    return Statement(
+    return SampleStatement(
         name=samples.name,
         channels=samples.channels,
         samples=len(samples),
@@ -235,7 +235,7 @@ def _claims(samples: Samples, incidences: Sequence[Incidence]) -> tuple[Claim, .
     return tuple(claims)
 
 
-def _on_angles(known: Statement) -> list[str]:
+def _on_angles(known: SampleStatement) -> list[str]:
     lights = counted(known.lights, "direction") + " of the light"
     channels = counted(len(known.channels), "channel")
     low, high = known.theta_i_deg
@@ -247,7 +247,7 @@ def _on_angles(known: Statement) -> list[str]:
     return [text, *(side if known.one_side and known.incidences else [])]
 
 
-def _on_values(known: Statement) -> list[str]:
+def _on_values(known: SampleStatement) -> list[str]:
     theta_i, theta_r, turn = known.largest_at_deg
     where = f"theta_i {theta_i:.4g}, theta_r {theta_r:.4g} and an azimuth of {turn:.4g} degrees from the light"
     counts = f"{counted(known.holes, 'hole')}, {counted(known.negative, 'negative value')}"
@@ -267,7 +267,7 @@ def _on_values(known: Statement) -> list[str]:
     return lines
 
 
-def _on_albedo(known: Statement) -> list[str]:
+def _on_albedo(known: SampleStatement) -> list[str]:
     if not known.incidences:
         return ["No albedo: no direction of the light has viewers around the hemisphere."]
     numbers = np.unique(np.linspace(0, len(known.incidences) - 1, _SHOWN).astype(int))
@@ -304,7 +304,7 @@ def _digits(value: float) -> str:
     return f"{value:.4f}" if 1e-3 <= abs(value) < 1.0 or value == 0.0 else f"{value:.4g}"
 
 
-def _on_pairs(known: Statement) -> list[str]:
+def _on_pairs(known: SampleStatement) -> list[str]:
     if known.reciprocity is None:
         return ["Reciprocity: no sample is the swap of another."]
     pairs = known.reciprocity
@@ -315,7 +315,7 @@ def _on_pairs(known: Statement) -> list[str]:
     ]
 
 
-def _on_claims(known: Statement) -> list[str]:
+def _on_claims(known: SampleStatement) -> list[str]:
     lines, agree = [], 0
     for claim in known.claims:
         if claim.known and abs(claim.relative) > _CLAIM:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from brdfdb.geometry import radians, unit_vector
 from brdfdb.materials.source import Evaluate
 from brdfdb.measurements.extent import Extent
-from brdfdb.measurements.record import Spread, Symmetry
+from brdfdb.measurements.record import MeasuredSymmetry, Spread
 from brdfdb.parameters import Floats
 
 _HALF_TURN = np.array([-1.0, -1.0, 1.0])
@@ -101,7 +101,7 @@ def _floored(f: Floats, other: Floats) -> Spread | None:
     return spread_of(np.abs(f - other) / np.maximum(total, floor))
 
 
-def reciprocity(f_r: Evaluate, extent: Extent | None, noise: float | None) -> Symmetry:
+def reciprocity(f_r: Evaluate, extent: Extent | None, noise: float | None) -> MeasuredSymmetry:
     """Return whether data keep to reciprocity within their noise [1]; it is not assumed where they cannot tell.
 
     Pairs everywhere and `lobe_pairs` decide. The asymmetry is that of pairs everywhere.
@@ -113,22 +113,22 @@ def reciprocity(f_r: Evaluate, extent: Extent | None, noise: float | None) -> Sy
     spreads += [_floored(f_r(*in_lobe), f_r(*in_lobe[::-1]))] if len(in_lobe[0]) else []
     p99 = max((one.p99 for one in spreads if one is not None), default=np.inf)
     allowed = _ROUNDING if noise is None else max(_WITHIN * noise, _ROUNDING)
-    return Symmetry(assumed=p99 <= allowed, asymmetry=_spread(f, other), allowed=noise)
+    return MeasuredSymmetry(assumed=p99 <= allowed, asymmetry=_spread(f, other), allowed=noise)
 
 
-def mirror(f_r: Evaluate, noise: float | None) -> Symmetry:
+def mirror(f_r: Evaluate, noise: float | None) -> MeasuredSymmetry:
     """Return whether data everywhere keep to the mirror symmetry that isotropic tables use."""
     wi, wr = drawn_pairs()
     f, other = f_r(wi, wr), f_r(wi * MIRROR, wr * MIRROR)
     seen = _floored(f, other)
     allowed = _CONTRADICTED if noise is None else max(_WITHIN * noise, _CONTRADICTED)
     kept = (seen is None or seen.median <= allowed) and _of_lobes(f_r, lambda w: w * MIRROR) <= allowed
-    return Symmetry(assumed=kept, asymmetry=_spread(f, other), allowed=noise)
+    return MeasuredSymmetry(assumed=kept, asymmetry=_spread(f, other), allowed=noise)
 
 
-def mirror_of_samples(f: Floats, other: Floats, noise: float) -> Symmetry:
+def mirror_of_samples(f: Floats, other: Floats, noise: float) -> MeasuredSymmetry:
     """Return the mirror symmetry that tables of isotropic samples assume, with the asymmetry of samples (N, C)."""
-    return Symmetry(assumed=True, asymmetry=_spread(f, other), allowed=noise)
+    return MeasuredSymmetry(assumed=True, asymmetry=_spread(f, other), allowed=noise)
 
 
 def is_turned(f_r: Evaluate, noise: float | None) -> bool:

@@ -19,7 +19,7 @@ from brdfdb.errors import StoreError
 from brdfdb.store import chunks
 from brdfdb.store.paths import METADATA
 from brdfdb.tables.layout import Layout
-from brdfdb.tables.tabulation import VARIABLES, Frame, Variable
+from brdfdb.tables.tabulation import VARIABLES, Frame, StoredArray
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -122,14 +122,14 @@ def _chunks(shape: tuple[int, ...]) -> tuple[int, ...]:
 def dataset_files(dataset: xr.Dataset) -> dict[str, bytes]:
     """Return all files of a revision that holds a dataset."""
     variables = {
-        str(name): Variable(tuple(map(str, variable.dims)), np.asarray(variable.values), variable.attrs)
+        str(name): StoredArray(tuple(map(str, variable.dims)), np.asarray(variable.values), variable.attrs)
         for name, variable in dataset.variables.items()
     }
     return group_files(variables, dataset.attrs, {})
 
 
 def group_files(
-    variables: Mapping[str, Variable], attrs: Mapping[str, Any], others: Mapping[str, bytes]
+    variables: Mapping[str, StoredArray], attrs: Mapping[str, Any], others: Mapping[str, bytes]
 ) -> dict[str, bytes]:
     """Return the files of a group of plain arrays; the metadata of the group repeats those of the arrays.
 

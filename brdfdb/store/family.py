@@ -25,7 +25,7 @@ from brdfdb.models import MODELS
 from brdfdb.notebook import card, percent
 from brdfdb.parameters import Floats, Parameter
 from brdfdb.store.sealed_json import read_sealed
-from brdfdb.tables.evaluation import Surface
+from brdfdb.tables.evaluation import LookupSubject
 from brdfdb.tables.grids import Axis
 from brdfdb.tables.stated_error import Error
 from brdfdb.tables.table import Table
@@ -287,9 +287,9 @@ class Family:
         """Wavelengths [nm] of all members; None if they are grey."""
         return self._member(0).wavelength_nm
 
-    def surface(self, written: Mapping[str, float]) -> Surface:
+    def surface(self, written: Mapping[str, float]) -> LookupSubject:
         """Return the family at parameters as files write them; a lookup raises what `lookup` does."""
-        return Surface(_AtParameters(self, self.record.in_model_units(written)), "family", self.wavelength_nm)
+        return LookupSubject(_AtParameters(self, self.record.in_model_units(written)), "family", self.wavelength_nm)
 
     @array_lookup
     def lookup(

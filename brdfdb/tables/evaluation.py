@@ -32,7 +32,7 @@ Output = Literal["spectrum", "xyz", "linear-srgb"]
 
 _ROUNDING = 1e-6  # of a degree of polarisation that is written as decimals
 _AT_ONCE = 25_000  # points whose spectra are in memory at once while colours are computed
-View = Literal["cut", "hemisphere", "half-difference"]
+ViewName = Literal["cut", "hemisphere", "half-difference"]
 
 _CUT = np.arange(-90.0, 91.0)  # theta_r [degree], negative back towards the light
 _OVER = np.linspace(0.0, 90.0, 31)  # theta_r of a hemisphere [degree]
@@ -43,7 +43,7 @@ _HALF: Array = np.arange(90, dtype=np.float64) + 0.5  # theta_h and theta_d [deg
 MOST_POINTS = _HALF.size**2  # points of the largest view
 
 
-class Points(NamedTuple):
+class LookupPoints(NamedTuple):
     """Directions and wavelengths of one lookup, checked.
 
     Attributes
@@ -61,7 +61,7 @@ class Points(NamedTuple):
     wavelength_nm: float | NDArray[np.float64] | None
 
     @classmethod
-    def of(cls, angles: Angles, wavelength_nm: float | NDArray[np.float64] | None) -> Points:
+    def of(cls, angles: Angles, wavelength_nm: float | NDArray[np.float64] | None) -> LookupPoints:
         """Return points at angles [rad]."""
         return cls(angles, np.broadcast_shapes(*(np.shape(angle) for angle in angles)), wavelength_nm)
 
@@ -172,9 +172,9 @@ class PointsBody(BaseModel):
         return self
 
     @property
-    def points(self) -> Points:
+    def points(self) -> LookupPoints:
         """The points."""
-        return Points.of(self.angles, self.wavelength_nm)
+        return LookupPoints.of(self.angles, self.wavelength_nm)
 
 
 def fields_of_npy(body: bytes) -> dict[str, Any]:
@@ -221,8 +221,8 @@ class Values(NamedTuple):
     `stokes` has the fields of `StokesDocument`, or is None where no incident Stokes vector was given.
     """
 
-    surface: Surface
-    points: Points
+    surface: LookupSubject
+    points: LookupPoints
     output: Output
     illuminant: str | None  # None of spectra
     brdf: Any
@@ -238,7 +238,7 @@ class Values(NamedTuple):
         return np.asarray(self.brdf if self.error is None else np.stack([self.brdf, self.error]))
 
 
-class Surface(NamedTuple):
+class LookupSubject(NamedTuple):
     """Subject of a lookup.
 
     Attributes
@@ -255,13 +255,13 @@ class Surface(NamedTuple):
     kind: Literal["table", "model", "family"]
     wavelength_nm: NDArray[np.float64] | None
 
-    def wavelengths(self, points: Points) -> Any:
+    def wavelengths(self, points: LookupPoints) -> Any:
         """Return the wavelengths [nm] of the values at some points; None if they are grey."""
         return self.wavelength_nm if points.wavelength_nm is None else points.wavelength_nm
 
     def values(
         self,
-        points: Points,
+        points: LookupPoints,
         output: Output = "spectrum",
         illuminant: str | None = None,
         *,
@@ -304,13 +304,13 @@ class Surface(NamedTuple):
         return Values(self, points, output, light, brdf, stated, mirrored)
 
 
-def surface_of(table: Table, kind: str = "table") -> Surface:
+def surface_of(table: Table, kind: str = "table") -> LookupSubject:
     """Return a table, or the "model" that it was made of; ParameterError if it keeps none."""
     if kind == "table":
-        return Surface(table, "table", table.wavelength_nm)
+        return LookupSubject(table, "table", table.wavelength_nm)
     if not isinstance(table.source, Material):
         raise ParameterError("from", f"the table of {table.name} keeps no model; ask for from=table", kind)
-    return Surface(_InRange(table.source, table), "model", table.wavelength_nm)
+    return LookupSubject(_InRange(table.source, table), "model", table.wavelength_nm)
 
 
 class _InRange(NamedTuple):
@@ -328,7 +328,7 @@ class _InRange(NamedTuple):
 
 
 def _coloured(
-    points: Points,
+    points: LookupPoints,
     spectra: Callable[[Angles], tuple[Any, Any]],
     weights: NDArray[np.float64],
     grey: bool,
@@ -356,7 +356,7 @@ def _mixed(values: Any, weights: NDArray[np.float64], grey: bool) -> Any:
 
 
 def view_directions(
-    view: View, theta_i_deg: float, phi_i_deg: float
+    view: ViewName, theta_i_deg: float, phi_i_deg: float
 ) -> tuple[dict[str, Array], tuple[Array | float, Array | float, Array | float, Array | float]]:
     """Return the axes of a view [degree], and theta_i, phi_i, theta_r, phi_r of its points [rad].
 
@@ -421,7 +421,7 @@ def read_stokes(text: str) -> tuple[float, ...]:
     return numbers
 
 
-def stokes_document(table: Table, points: Points, incident: Sequence[float]) -> dict[str, Any]:
+def stokes_document(table: Table, points: LookupPoints, incident: Sequence[float]) -> dict[str, Any]:
     """Return the fields of `StokesDocument`, with numpy arrays; ParameterError as by `Table.mueller`."""
     record = table.metadata.polarisation
     light = np.array(incident)

@@ -35,7 +35,7 @@ class Sliced(Protocol):
 
 
 @dataclass(frozen=True)
-class Axis:
+class SliceAxis:
     """One axis of a slice: `first` and `last` are the pixel centres where `direction` starts and where it ends."""
 
     name: str
@@ -55,7 +55,7 @@ class Slice:
         "half_difference", "in_plane" or "lobe".
     description : str
         Explanation of the axes in words.
-    x, y : Axis
+    x, y : SliceAxis
         Columns and rows.
     fixed_deg : tuple of (str, float)
         The angles that are the same in every pixel, by name [degrees].
@@ -72,8 +72,8 @@ class Slice:
 
     kind: str
     description: str
-    x: Axis
-    y: Axis
+    x: SliceAxis
+    y: SliceAxis
     fixed_deg: tuple[tuple[str, float], ...]
     values: NDArray[np.float32]
     wavelength_nm: NDArray[Any] | None
@@ -114,8 +114,8 @@ def half_difference_slice(table: Sliced, *, phi_h_deg: float = 0.0, phi_d_deg: f
     return Slice(
         kind="half_difference",
         description="specular lobe on the left edge, grazing incidence at the top, retroreflection at the bottom",
-        x=Axis("theta_h", 0.5, 89.5, LEFT_TO_RIGHT),
-        y=Axis("theta_d", 0.5, 89.5, BOTTOM_TO_TOP),
+        x=SliceAxis("theta_h", 0.5, 89.5, LEFT_TO_RIGHT),
+        y=SliceAxis("theta_d", 0.5, 89.5, BOTTOM_TO_TOP),
         fixed_deg=(("phi_h", phi_h_deg), ("phi_d", phi_d_deg)),
         values=np.asarray(table.lookup(*directions), dtype=np.float32),
         wavelength_nm=table.wavelength_nm,
@@ -147,8 +147,8 @@ def in_plane_slice(table: Sliced, *, phi_i_deg: float = 0.0) -> Slice:
     return Slice(
         kind="in_plane",
         description="theta_r is positive on the mirror side and negative back towards the light",
-        x=Axis("signed theta_r", -89.5, 89.5, LEFT_TO_RIGHT),
-        y=Axis("theta_i", 0.5, 89.5, BOTTOM_TO_TOP),
+        x=SliceAxis("signed theta_r", -89.5, 89.5, LEFT_TO_RIGHT),
+        y=SliceAxis("theta_i", 0.5, 89.5, BOTTOM_TO_TOP),
         fixed_deg=(("phi_i", phi_i_deg),),
         values=np.asarray(table.lookup(*directions), dtype=np.float32),
         wavelength_nm=table.wavelength_nm,
@@ -193,8 +193,8 @@ def lobe_map(table: Sliced, *, theta_i_deg: float = 45.0, phi_i_deg: float = 0.0
     return Slice(
         kind="lobe",
         description="radius = theta_r, seen from above, light from the left, mirror direction on the right",
-        x=Axis("-theta_r cos(phi_r - phi_i)", -edge, edge, LEFT_TO_RIGHT),
-        y=Axis("-theta_r sin(phi_r - phi_i)", -edge, edge, BOTTOM_TO_TOP),
+        x=SliceAxis("-theta_r cos(phi_r - phi_i)", -edge, edge, LEFT_TO_RIGHT),
+        y=SliceAxis("-theta_r sin(phi_r - phi_i)", -edge, edge, BOTTOM_TO_TOP),
         fixed_deg=(("theta_i", theta_i_deg), ("phi_i", phi_i_deg)),
         values=np.asarray(table.lookup(*directions), dtype=np.float32),
         wavelength_nm=table.wavelength_nm,

@@ -31,7 +31,7 @@ SPECULAR_THETA_DEG = np.append(np.arange(0.0, 60.0, 0.5), np.arange(60.0, 90.01,
 _SLAB = 1 << 17  # values evaluated at a time: fewer cost calls, more cost memory
 
 
-class Variable(NamedTuple):
+class StoredArray(NamedTuple):
     """An array of a table: the names of its axes, its values, and its attributes such as units."""
 
     dims: tuple[str, ...]
@@ -45,8 +45,8 @@ class Frame(NamedTuple):
     Coordinates hold the axes, in degrees and nm. Variables hold the specular part, the basis and refractive indices.
     """
 
-    variables: Mapping[str, Variable]
-    coordinates: Mapping[str, Variable]
+    variables: Mapping[str, StoredArray]
+    coordinates: Mapping[str, StoredArray]
     attrs: Mapping[str, Any]
 
 
@@ -256,40 +256,40 @@ def frame(layout: Layout) -> Frame:
     coordinates = {name: _coordinate(name, nodes) for name, nodes in grid.axes.items()}
     variables = {}
     if wavelength_nm is not None:
-        coordinates["wavelength"] = Variable(
+        coordinates["wavelength"] = StoredArray(
             ("wavelength",),
             wavelength_nm,
             {"units": "nm", "long_name": "wavelength in vacuum", "standard_name": "radiation_wavelength"},
         )
     if (indices := source.refractive_indices(wavelength_nm)) is not None:
         for name, meaning, values in zip("nk", ("refractive index", "extinction coefficient"), indices, strict=True):
-            variables[name] = Variable(("wavelength",), np.asarray(values), {"units": "1", "long_name": meaning})
+            variables[name] = StoredArray(("wavelength",), np.asarray(values), {"units": "1", "long_name": meaning})
     if layout.spectra is not None:
         name = "spectra" if layout.part_nm is None else "mixture"
-        variables[name] = Variable(("part", "wavelength"), layout.spectra, VARIABLES[name])
+        variables[name] = StoredArray(("part", "wavelength"), layout.spectra, VARIABLES[name])
     if layout.uniform is not None:
         of_each = layout.uniform.size > 1
         value = layout.uniform if of_each else layout.uniform[0]
         dims = ("wavelength",) if of_each else ()
-        variables["uniform"] = Variable(dims, np.asarray(value), VARIABLES["uniform"])
+        variables["uniform"] = StoredArray(dims, np.asarray(value), VARIABLES["uniform"])
     if source.has_specular:
         theta_i_deg = specular_nodes(layout)
         name = "specular_theta_i" if theta_i_deg is SPECULAR_THETA_DEG else "theta_i"
         coordinates[name] = _coordinate(name, theta_i_deg)
-        variables["specular_reflectance"] = Variable(
+        variables["specular_reflectance"] = StoredArray(
             (name, *spectral),
             np.asarray(source.specular_reflectance(radians(theta_i_deg), wavelength_nm)),
             {"units": "1", "long_name": "reflectance of the specular part, in the exact mirror direction"},
         )
     if isinstance(source, MeasuredSource) and source.measured.extent is not None:
-        variables["extrapolated"] = Variable(grid.names, extrapolated(source, grid), VARIABLES["extrapolated"])
+        variables["extrapolated"] = StoredArray(grid.names, extrapolated(source, grid), VARIABLES["extrapolated"])
     if (facets := facets_of(layout)) is not None:
         coordinates["mueller_theta_d"] = _coordinate("mueller_theta_d", facets.theta_d_deg)
         named = ("mueller_theta_d", "wavelength", "element")
-        variables["mueller"] = Variable(named, facets.elements, VARIABLES["mueller"])
+        variables["mueller"] = StoredArray(named, facets.elements, VARIABLES["mueller"])
         depolarised = facets.depolarised if facets.depolarised.size > 1 else facets.depolarised[0]
         at = ("wavelength",) if facets.depolarised.size > 1 else ()
-        variables["depolarised"] = Variable(at, np.asarray(depolarised), VARIABLES["depolarised"])
+        variables["depolarised"] = StoredArray(at, np.asarray(depolarised), VARIABLES["depolarised"])
     return Frame(variables, coordinates, metadata_of(layout).attributes())
 
 
@@ -306,8 +306,8 @@ def specular_nodes(layout: Layout) -> Axis:
     return layout.grid.axes["theta_i"] if given else SPECULAR_THETA_DEG
 
 
-def _coordinate(name: str, nodes: Axis) -> Variable:
-    return Variable((name,), nodes, {"units": "degree", "long_name": _LONG_NAMES[name]})
+def _coordinate(name: str, nodes: Axis) -> StoredArray:
+    return StoredArray((name,), nodes, {"units": "degree", "long_name": _LONG_NAMES[name]})
 
 
 def _reconstruction(layout: Layout) -> str:

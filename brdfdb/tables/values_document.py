@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, Field
 
 from brdfdb.tables.albedo import AlbedoDocument
-from brdfdb.tables.evaluation import Output, StokesDocument, Values
-from brdfdb.tables.evaluation import View as ViewName
+from brdfdb.tables.evaluation import Output, StokesDocument, Values, ViewName
 from brdfdb.tables.table import Table
 
 
@@ -41,7 +40,7 @@ class Evaluated(BaseModel):
     )
 
 
-class View(BaseModel):
+class LobeView(BaseModel):
     """One light, and the axes of the values."""
 
     view: ViewName
@@ -69,17 +68,17 @@ class Lookup(Evaluated, OfTable):
     )
 
 
-class Lookups(BaseModel):
+class TableLookups(BaseModel):
     """Values of several materials."""
 
     materials: list[Lookup]
 
 
-class Lobe(Lookup, View):
+class TableLobe(Lookup, LobeView):
     """f_r of a material for one light over viewers, or over half and difference angles."""
 
 
-class Albedo(AlbedoDocument, OfTable):
+class TableAlbedoDocument(AlbedoDocument, OfTable):
     """Directional albedo of a table."""
 
 
@@ -95,7 +94,7 @@ class ModelLookup(Evaluated, OfModel):
     """Values of a model."""
 
 
-class ModelLobe(Evaluated, View, OfModel):
+class ModelLobe(Evaluated, LobeView, OfModel):
     """f_r of a model for one light."""
 
 
@@ -135,7 +134,7 @@ def values_document(values: Values) -> dict[str, Any]:
 def lobe_document(
     values: Values, axes_deg: Mapping[str, Any], view: ViewName, theta_i_deg: float, phi_i_deg: float
 ) -> dict[str, Any]:
-    """Return the fields of `View` and `Evaluated` of a lobe; of half-difference there is no one light."""
+    """Return the fields of `LobeView` and `Evaluated` of a lobe; of half-difference there is no one light."""
     surface, no_light = values.surface, view == "half-difference"
     document = values_document(values)
     if surface.kind == "table" and surface.source.metadata.measured is not None:

@@ -14,7 +14,7 @@ from brdfdb import formats
 from brdfdb.errors import BrdfdbError, MissingExtraError, ParameterError
 from brdfdb.formats.netcdf import write_samples
 from brdfdb.measurements.samples import Samples
-from brdfdb.measurements.statement import Statement, statement
+from brdfdb.measurements.statement import SampleStatement, statement
 from brdfdb_pipelines import import_tables, terminal
 from brdfdb_pipelines.import_tables import Tables, Target
 
@@ -31,7 +31,7 @@ class Imported:
 
     Attributes
     ----------
-    statements : list of (Target, Statement)
+    statements : list of (Target, SampleStatement)
         The materials that were read.
     refused : list of str
         A sentence on each file or table that was refused.
@@ -39,7 +39,7 @@ class Imported:
         Audit of the tables; None if no table was built.
     """
 
-    statements: list[tuple[Target, Statement]] = field(default_factory=list)
+    statements: list[tuple[Target, SampleStatement]] = field(default_factory=list)
     refused: list[str] = field(default_factory=list)
     report: AuditReport | None = None
 
@@ -172,7 +172,7 @@ def _refuse(result: Imported, target: Target, error: BrdfdbError | OSError) -> N
         terminal.say(sentence)
 
 
-def _read(target: Target, label: str, patience_s: float) -> tuple[Samples, Statement]:
+def _read(target: Target, label: str, patience_s: float) -> tuple[Samples, SampleStatement]:
     """Return the samples of a material and the statement on them; a bar appears after some time."""
     with terminal.progress(counted=False, transient=True) as bar:
         task = bar.add_task(label, total=1.0, visible=patience_s <= 0.0)

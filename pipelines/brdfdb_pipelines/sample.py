@@ -26,7 +26,7 @@ from brdfdb.place import path_of
 from brdfdb.store.codec import array_files, chunk_bytes, group_files
 from brdfdb.store.files import write_file
 from brdfdb.store.paths import METADATA
-from brdfdb.tables.tabulation import Variable
+from brdfdb.tables.tabulation import StoredArray
 from brdfdb_pipelines import terminal
 
 Array = NDArray[np.float64]
@@ -246,10 +246,10 @@ def _arrays(made: TrainingSet) -> dict[str, bytes]:
     }
 
 
-def _coordinates(made: TrainingSet) -> dict[str, Variable]:
+def _coordinates(made: TrainingSet) -> dict[str, StoredArray]:
     """Return parameters along the materials, and angles along the directions."""
     variables = {
-        axis.parameter.name: Variable(
+        axis.parameter.name: StoredArray(
             _DIMENSIONS[:1],
             made.written[axis.parameter.name],
             {"units": axis.parameter.unit, "long_name": axis.parameter.meaning},
@@ -257,7 +257,7 @@ def _coordinates(made: TrainingSet) -> dict[str, Variable]:
         for axis in made.axes
     }
     return variables | {
-        name: Variable(_DIMENSIONS[1:], angles, {"units": "degree"}) for name, angles in made.angles.items()
+        name: StoredArray(_DIMENSIONS[1:], angles, {"units": "degree"}) for name, angles in made.angles.items()
     }
 
 

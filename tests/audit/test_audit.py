@@ -15,7 +15,7 @@ from brdfdb.audit.energy import Energy
 from brdfdb.audit.reciprocity import Reciprocity
 from brdfdb.audit.table_energy import table_energy_of
 from brdfdb.audit.table_error import TableError
-from brdfdb.audit.values import Values
+from brdfdb.audit.values import ValueCounts
 from brdfdb.models import MODELS
 from brdfdb.tables.albedo import directional_albedo
 from brdfdb.tables.grids import Grid
@@ -64,12 +64,12 @@ def test_a_lambertian_reflects_rho_at_every_angle(rho: float, grid: Grid) -> Non
     assert found.of(Energy).table.theta_i_deg == grid.axes["theta_i"].tolist()
     assert (found.of(Energy).table.wavelength_nm, found.of(Energy).table.max_at_wavelength_nm) == (None, None)
     assert (found.of(Energy).table.exceeds_1_from_theta_i_deg, found.of(Energy).table.reason) == (None, "")
-    assert (found.of(Values).count, found.of(Values).negative, found.of(Values).not_finite) == (
+    assert (found.of(ValueCounts).count, found.of(ValueCounts).negative, found.of(ValueCounts).not_finite) == (
         np.prod(grid.shape),
         0,
         0,
     )
-    assert found.of(Values).smallest == np.float32(rho / np.pi)
+    assert found.of(ValueCounts).smallest == np.float32(rho / np.pi)
 
 
 def random_table(grid: Grid, wavelengths: NDArray[np.float64] | None) -> Table:
@@ -162,10 +162,10 @@ TABLES = pytest.mark.parametrize(
 @TABLES
 def test_one_negative_value_violates(table: Table) -> None:
     found = audit(node(table, -1e-30))
-    assert (found.verdict, found.of(Values).positivity) == ("violates", "violates")
-    assert found.of(Values).negative == (1 if table.wavelength_nm is None else 3)
-    assert found.of(Values).smallest == np.float32(-1e-30)
-    assert found.of(Values).finiteness == "passes"
+    assert (found.verdict, found.of(ValueCounts).positivity) == ("violates", "violates")
+    assert found.of(ValueCounts).negative == (1 if table.wavelength_nm is None else 3)
+    assert found.of(ValueCounts).smallest == np.float32(-1e-30)
+    assert found.of(ValueCounts).finiteness == "passes"
     assert written([found])["violations"] == ["made-up"]
 
 
@@ -173,9 +173,9 @@ def test_one_negative_value_violates(table: Table) -> None:
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
 def test_one_value_that_is_not_finite_violates_and_the_report_is_json(table: Table, value: float) -> None:
     found = audit(node(table, value))
-    assert (found.verdict, found.of(Values).finiteness) == ("violates", "violates")
-    assert found.of(Values).not_finite == (1 if table.wavelength_nm is None else 3)
-    assert found.of(Values).negative == 0
+    assert (found.verdict, found.of(ValueCounts).finiteness) == ("violates", "violates")
+    assert found.of(ValueCounts).not_finite == (1 if table.wavelength_nm is None else 3)
+    assert found.of(ValueCounts).negative == 0
     written([found])
 
 
@@ -196,8 +196,8 @@ def test_an_albedo_that_is_not_finite_is_null_in_the_report(table: Table, value:
 def test_a_table_of_nan_alone_has_no_smallest_value() -> None:
     table = lambert(0.5)
     found = audit(replace(table, values=np.full_like(table.brdf, np.nan)))
-    assert found.of(Values).smallest is None
-    assert found.of(Values).not_finite == found.of(Values).count
+    assert found.of(ValueCounts).smallest is None
+    assert found.of(ValueCounts).not_finite == found.of(ValueCounts).count
     assert found.of(Reciprocity).table_nodes is not None
     assert found.of(Reciprocity).table_nodes.min == found.of(Reciprocity).table_random.min == 1.0
     assert found.of(TableError).fresh_p99 is None
@@ -296,7 +296,7 @@ def test_the_values_of_the_dirac_part_are_audited(value: float, verdict: str) ->
     mirror[2] = value
     found = audit(replace(lambert(0.5), specular=mirror))
     assert verdicts(found)[verdict] == "violates"
-    assert found.of(Values).count == np.prod(ISOTROPIC.shape) + len(THETA)
+    assert found.of(ValueCounts).count == np.prod(ISOTROPIC.shape) + len(THETA)
 
 
 def test_a_model_that_is_not_reciprocal_is_caught(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -16,7 +16,7 @@ from brdfdb.audit import FINDINGS, AuditReport, audit, report
 from brdfdb.audit.energy import Energy
 from brdfdb.audit.model_energy import cause_of
 from brdfdb.audit.table_energy import table_energy_of
-from brdfdb.audit.values import Values
+from brdfdb.audit.values import ValueCounts
 from brdfdb.materials import presets
 from brdfdb.materials.provenance import KnownExcess
 from brdfdb.tables.albedo import directional_albedo
@@ -146,7 +146,7 @@ def test_what_a_recipe_says_of_an_excess_is_repeated_and_excuses_nothing() -> No
 def test_what_is_accepted_excuses_nothing_but_the_energy_of_the_model() -> None:
     table = node(tabulated(material("oren_nayar", {"rho": 1.0, "sigma_deg": 20}), fine(5.0)), -1.0)
     found = audit(table, accept_excess=True)
-    assert (found.verdict, found.of(Energy).model.verdict, found.of(Values).positivity) == (
+    assert (found.verdict, found.of(Energy).model.verdict, found.of(ValueCounts).positivity) == (
         *("violates", "accepted excess"),
         "violates",
     )

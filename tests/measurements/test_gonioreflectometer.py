@@ -13,7 +13,7 @@ from brdfdb import formats, presets
 from brdfdb.errors import FileFormatError, ParameterError
 from brdfdb.formats.gonioreflectometer import read_picture, write_picture
 from brdfdb.measurements.aperture import averaged
-from brdfdb.measurements.gonioreflectometer import Gonioreflectometer, Picture, eq_3, photograph, reduced, traced
+from brdfdb.measurements.gonioreflectometer import CameraPicture, Gonioreflectometer, eq_3, photograph, reduced, traced
 
 SMALL = Gonioreflectometer(width=324, height=240)
 PARAMETERS = ("rho_d", "rho_s", "alpha_x", "alpha_y")
@@ -26,7 +26,7 @@ def brdf_of(name: str) -> Any:
     return presets()[name].brdf_at(None)
 
 
-def taken(name: str, settings: Gonioreflectometer = SMALL, theta_i: float = 30.0, phi_i: float = 40.0) -> Picture:
+def taken(name: str, settings: Gonioreflectometer = SMALL, theta_i: float = 30.0, phi_i: float = 40.0) -> CameraPicture:
     return photograph(brdf_of(name), settings, np.radians(theta_i), np.radians(phi_i), 7, name)
 
 

@@ -21,7 +21,7 @@ from brdfdb.audit.smoothness import Jump, Smoothness
 from brdfdb.audit.table_energy import TableEnergy
 from brdfdb.audit.table_error import TableError
 from brdfdb.audit.validity import Limit, Validity
-from brdfdb.audit.values import Values
+from brdfdb.audit.values import ValueCounts
 from brdfdb.figure import Curve, Figure, Map, Panel, Picture, Statement, numbers
 from brdfdb.tables.stated_error import Grazing
 
@@ -179,7 +179,7 @@ def others() -> tuple[Finding, ...]:
             table_nodes=asymmetry(0.0),
             verdict="passes",
         ),
-        Values(**values, positivity="passes", finiteness="passes", verdict="passes"),
+        ValueCounts(**values, positivity="passes", finiteness="passes", verdict="passes"),
         Nodes(compared=360, count=720, wrong=0, stored=None, expected=None, beside=[], verdict="passes"),
         Smoothness(
             model=[Jump(seam="alpha = 45°", crossings=9, largest=2e-7, where="45°, 45°", tolerance=1e-5)],

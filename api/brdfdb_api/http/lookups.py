@@ -19,9 +19,9 @@ from starlette.responses import Response
 from brdfdb.errors import ParameterError
 from brdfdb.store.paths import pinned
 from brdfdb.store.shelf import Shelf
-from brdfdb.tables.evaluation import ANGLES, Points, PointsBody, Surface, Values, surface_of
+from brdfdb.tables.evaluation import ANGLES, LookupPoints, LookupSubject, PointsBody, Values, surface_of
 from brdfdb.tables.table import Table
-from brdfdb.tables.values_document import Lookup, Lookups, arrays_of, npy_bytes, of_table, values_document
+from brdfdb.tables.values_document import Lookup, TableLookups, arrays_of, npy_bytes, of_table, values_document
 from brdfdb_api.http import queries, responses
 from brdfdb_api.http.addresses import (
     NPY_ANSWER,
@@ -51,7 +51,9 @@ SPECTRA_OF_COLOURS = 10  # factor on the number of values where only colours are
 # Parameters of the library that a request calls the same
 _PARAMETERS = (*ANGLES, "wavelength_nm", *queries.OfTable.model_fields)
 NPZ = "application/x-npz"
-Asked = tuple[Surface, Points, dict[str, Any]]  # surface and points of a body, and what the answer says of them
+Asked = tuple[
+    LookupSubject, LookupPoints, dict[str, Any]
+]  # surface and points of a body, and what the answer says of them
 
 lookups = addresses()
 
@@ -85,7 +87,7 @@ async def in_thread(state: State, work: Callable[[], T], *, large: bool) -> T:
         return await run_in_threadpool(work)
 
 
-def surface_in(table: Table, options: queries.OfTable) -> Surface:
+def surface_in(table: Table, options: queries.OfTable) -> LookupSubject:
     """Return a table, or the model that it was made of; RequestError (422) if it keeps none."""
     if options.source == "table":
         return surface_of(table)
@@ -93,14 +95,16 @@ def surface_in(table: Table, options: queries.OfTable) -> Surface:
         return surface_of(table, options.source)
 
 
-def tag_in(table: Table, surface: Surface) -> str:
+def tag_in(table: Table, surface: LookupSubject) -> str:
     """Return the ETag of values of a table, or of its model, whose version it names then."""
     if surface.kind == "table":
         return responses.tag_of(table)
     return responses.tag_of(table, surface.source.material.spec.version)
 
 
-def evaluate(points: Points, options: queries.Options, surface: Surface, *, specular: bool = True) -> Values:
+def evaluate(
+    points: LookupPoints, options: queries.Options, surface: LookupSubject, *, specular: bool = True
+) -> Values:
     """Look up points; RequestError (422) outside the range of the surface, or where it makes no colour."""
     error, incident = getattr(options, "error", False), getattr(options, "stokes", None)  # models have neither
     try:
@@ -114,7 +118,7 @@ def evaluate(points: Points, options: queries.Options, surface: Surface, *, spec
 
 
 def checked_size(
-    max_points: int, points: Points, options: queries.Options, surface: Surface, kind: queries.Format
+    max_points: int, points: LookupPoints, options: queries.Options, surface: LookupSubject, kind: queries.Format
 ) -> int:
     """Return the number of values to look up; RequestError (413) if they are too many for one answer."""
     most_points, most_values = (factor * max_points for factor in LIMITS[kind])
@@ -151,9 +155,9 @@ async def looked_up(
 
 async def answered(
     state: State,
-    points: Points,
+    points: LookupPoints,
     options: queries.Options,
-    surface: Surface,
+    surface: LookupSubject,
     kind: queries.Format,
     headers: responses.Encoded,
     about: Any,
@@ -257,7 +261,7 @@ async def lookup_points(
 @lookups.post(
     "/v1/lookup",
     tags=["lookup"],
-    responses=answers(Lookups, 404, 413, 415, 503, media={NPZ: "an array a material, by its name"}),
+    responses=answers(TableLookups, 404, 413, 415, 503, media={NPZ: "an array a material, by its name"}),
     openapi_extra=body(queries.ManyBody),
     dependencies=[LARGE],
 )

@@ -19,7 +19,7 @@ from brdfdb.parameters import ModelSpec
 from brdfdb.spectra import PICTURE_NM
 from brdfdb.store.family import FamilyLine
 from brdfdb.tables.albedo import reflected_by
-from brdfdb.tables.evaluation import PointsBody, Surface
+from brdfdb.tables.evaluation import LookupSubject, PointsBody
 from brdfdb.tables.values_document import FamilyLookup, ModelAlbedo, ModelLobe, ModelLookup
 from brdfdb_api.http.addresses import NPY_ANSWER, Content, addresses, answers, body, shelf_of
 from brdfdb_api.http.errors import refused
@@ -80,7 +80,7 @@ def _with_address(spec: ModelSpec) -> dict[str, Any]:
     return {**document_of(spec), "href": f"/v1/models/{spec.name}"}
 
 
-def _surface(spec: ModelSpec, given: Parameters) -> tuple[Surface, dict[str, Any]]:
+def _surface(spec: ModelSpec, given: Parameters) -> tuple[LookupSubject, dict[str, Any]]:
     """Return the material of a request, by default at the wavelengths of pictures, and what answers say of it."""
     with refused():
         material = given.material(spec)
@@ -89,7 +89,7 @@ def _surface(spec: ModelSpec, given: Parameters) -> tuple[Surface, dict[str, Any
         for name, value in material.file_parameters().items()
     }
     about = {"model": spec.name, "model_version": spec.version, "parameters": written}
-    return Surface(material, "model", PICTURE_NM if material.spectral else None), about
+    return LookupSubject(material, "model", PICTURE_NM if material.spectral else None), about
 
 
 @models.post(

@@ -24,7 +24,16 @@ from pydantic import (
 from starlette.requests import Request
 
 from brdfdb.geometry import AZIMUTH_MOST_DEG
-from brdfdb.tables.evaluation import TURN, Output, Points, PointsBody, View, fields_of_npy, listed, read_stokes
+from brdfdb.tables.evaluation import (
+    TURN,
+    LookupPoints,
+    Output,
+    PointsBody,
+    ViewName,
+    fields_of_npy,
+    listed,
+    read_stokes,
+)
 from brdfdb_api.http.errors import RequestError, refusal_of, refused
 from brdfdb_api.http.responses import JSON, NPY, preferred
 
@@ -142,18 +151,18 @@ class PointQuery(OfTable):
     )
 
     @property
-    def points(self) -> Points:
+    def points(self) -> LookupPoints:
         """The point."""
         t_i, p_i, t_r, p_r = (
             math.radians(math.fmod(angle, TURN)) for angle in (self.theta_i, self.phi_i, self.theta_r, self.phi_r)
         )
-        return Points((t_i, p_i, t_r, p_r), (), listed(self.wavelength_nm))
+        return LookupPoints((t_i, p_i, t_r, p_r), (), listed(self.wavelength_nm))
 
 
 class Light(Query):
     """The direction of one light, and the viewers that are looked at."""
 
-    view: View = Field(default="cut", description="the plane of incidence, all viewers, or theta_h and theta_d")
+    view: ViewName = Field(default="cut", description="the plane of incidence, all viewers, or theta_h and theta_d")
     theta_i: Finite = Field(default=45.0, ge=0.0, le=90.0, description="polar angle of the light [degrees]")
     phi_i: Azimuth = Field(default=0.0, description="azimuth of the light [degrees]")
     wavelength_nm: Wavelengths = ()
@@ -205,7 +214,7 @@ def from_json(model: type[M], body: bytes) -> M:
     return checked(model, fields)
 
 
-def from_array(body: bytes, wavelengths: Sequence[float]) -> Points:
+def from_array(body: bytes, wavelengths: Sequence[float]) -> LookupPoints:
     """Return the points of a .npy body; RequestError (422) if it is none."""
     with refused():
         fields = fields_of_npy(body)

@@ -19,8 +19,8 @@ from brdfdb.scenes import lit_sphere
 from brdfdb.store.archive import ZIP
 from brdfdb.store.summary_words import NOT_AUDITED
 from brdfdb.tables.albedo import reflected
-from brdfdb.tables.evaluation import MOST_POINTS, Points, Surface, listed, view_directions
-from brdfdb.tables.values_document import Albedo, Lobe, lobe_document, npy_bytes, of_table
+from brdfdb.tables.evaluation import MOST_POINTS, LookupPoints, LookupSubject, listed, view_directions
+from brdfdb.tables.values_document import TableAlbedoDocument, TableLobe, lobe_document, npy_bytes, of_table
 from brdfdb_api.http.addresses import NPY_ANSWER, Revision, addresses, answers, both, shelf_of
 from brdfdb_api.http.errors import RequestError, refused
 from brdfdb_api.http.lookups import LARGE, checked_size, evaluate, surface_in, tag_in, turn
@@ -53,7 +53,7 @@ class ThumbnailQuery(Query):
     size: int = Field(default=THUMBNAIL, ge=16, le=MOST, description="pixels across")
 
 
-@both(views, "/albedo", tags=["views"], responses=answers(Albedo, 304, 404, 503))
+@both(views, "/albedo", tags=["views"], responses=answers(TableAlbedoDocument, 304, 404, 503))
 def albedo(request: Request, name: str, revision: Revision = None) -> Response:
     """Return the directional and the hemispherical albedo [1] of the table."""
     table = shelf_of(request).table(name, revision)
@@ -65,7 +65,7 @@ def albedo(request: Request, name: str, revision: Revision = None) -> Response:
     views,
     "/lobe",
     tags=["views"],
-    responses=answers(Lobe, 304, 404, 413, 503, media=NPY_ANSWER),
+    responses=answers(TableLobe, 304, 404, 413, 503, media=NPY_ANSWER),
 )
 def lobe(request: Request, name: str, query: Annotated[LobeQuery, InQuery()], revision: Revision = None) -> Response:
     """Return f_r [1/sr] for one light, in the plane of incidence or over all viewers; or over theta_h and theta_d.
@@ -80,12 +80,17 @@ def lobe(request: Request, name: str, query: Annotated[LobeQuery, InQuery()], re
 
 
 def lobe_answer(
-    request: Request, surface: Surface, light: Light, options: Options, about: dict[str, Any], headers: dict[str, str]
+    request: Request,
+    surface: LookupSubject,
+    light: Light,
+    options: Options,
+    about: dict[str, Any],
+    headers: dict[str, str],
 ) -> Response:
     """Return the answer with the lobe of a surface; `about` begins the document."""
     kind = options.kind(accept_of(request))
     axes, angles = view_directions(light.view, light.theta_i, light.phi_i)
-    points = Points.of(angles, listed(light.wavelength_nm))
+    points = LookupPoints.of(angles, listed(light.wavelength_nm))
     # The view fixes the points; the client chooses only the wavelengths. Bytes have the limit of JSON, too
     checked_size(max(request.app.state.settings.max_points, MOST_POINTS), points, options, surface, "json")
     values = evaluate(points, options, surface)

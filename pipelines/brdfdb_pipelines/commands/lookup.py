@@ -119,7 +119,7 @@ def _reflected(source: Table | Family, angles_deg: list[float], options: argpars
     import numpy as np
 
     from brdfdb.geometry import radians
-    from brdfdb.tables.evaluation import Points, read_stokes, stokes_document
+    from brdfdb.tables.evaluation import LookupPoints, read_stokes, stokes_document
     from brdfdb.tables.table import Table
 
     if options.stokes is None:
@@ -128,7 +128,7 @@ def _reflected(source: Table | Family, angles_deg: list[float], options: argpars
     if not isinstance(source, Table):
         raise ParameterError("stokes", f"{options.name} is a family, which has no Mueller matrices", options.stokes)
     at = None if options.wavelength_nm is None else np.array(options.wavelength_nm)
-    document = stokes_document(source, Points.of(tuple(radians(angles_deg)), at), incident)
+    document = stokes_document(source, LookupPoints.of(tuple(radians(angles_deg)), at), incident)
     return {key: np.asarray(value).tolist() if key in _STOKES else value for key, value in document.items()}
 
 
