@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from brdfdb.errors import ParameterError, counted
 from brdfdb.geometry import degrees
-from brdfdb.measurements._notes import percent
-from brdfdb.measurements.samples import ANGLES, NODES, RELATIVE, Instrument, Samples
+from brdfdb.measurements.samples import ANGLES, NODES, RELATIVE, Instrument, Samples, percent
 from brdfdb.parameters import Floats
 
 _BETWEEN = " _-.,+"  # signs between the words of a name
