@@ -1,4 +1,4 @@
-"""The report of an audit as data: the findings on each table, in one JSON document."""
+"""The report of an audit as data: the findings on each table and its answers to two questions, in one JSON document."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pydantic_core import CoreSchema, core_schema
 
 from brdfdb.audit.energy import Energy
 from brdfdb.audit.finding import STRICT, F, Finding, NotJudged, Sentence, TableVerdict, Verdict, Word
-from brdfdb.audit.model_energy import LOSS_UP_TO_DEG, Furnace, ModelEnergy
+from brdfdb.audit.model_energy import LOSS_UP_TO_DEG, ModelEnergy
 from brdfdb.audit.reciprocity import Reciprocity
 from brdfdb.audit.record import Difference
 from brdfdb.audit.registry import FINDINGS
@@ -38,9 +38,11 @@ def as_published(findings: Mapping[str, Finding]) -> Answer:
     """Return the answer to `AS_PUBLISHED`: every finding on the table, its excess over that of the model included."""
     energy = findings[Energy.key]
     failing = [
-        FINDINGS[key].title.lower() for key, finding in findings.items() if key != Energy.key and _violates(finding)
+        FINDINGS[key].title.lower()
+        for key, finding in findings.items()
+        if key != Energy.key and finding.verdict == "violates"
     ]
-    if isinstance(energy, Energy) and _of_table_alone(energy):
+    if isinstance(energy, Energy) and energy.table.verdict == "violates" and not _model_violates(energy):
         failing.insert(0, "energy of the table")
     if failing:
         named = ", ".join(failing)
@@ -60,41 +62,28 @@ def as_published(findings: Mapping[str, Finding]) -> Answer:
 def conserves_energy(findings: Mapping[str, Finding]) -> Answer:
     """Return the answer to `CONSERVES_ENERGY`, which the table has no part in, unless it is measured."""
     energy = findings[Energy.key]
-    if isinstance(energy, Energy) and _is_measured(findings):
-        return _of_data(energy)
+    if isinstance(energy, Energy) and _is_measured(findings):  # data have no model
+        table = energy.table
+        most = "not finite" if table.max_albedo is None else f"albedo {table.max_albedo:.3g}"
+        where = f"{most} at {table.max_at_theta_i_deg:.3g}°"
+        if table.verdict != "violates" and table.reason:
+            text = f"cannot be judged: {where}, within the error of the table"
+            return Answer(word="not judged", text=text, reason=table.reason)
+        text = f"the data {'do not' if table.verdict == 'violates' else 'do'}: {where}"
+        return Answer(word=table.verdict, text=text, reason=table.reason or text)
     if not isinstance(energy, Energy) or energy.model is None:
         return Answer(word="not judged", text="not judged", reason="no model of this table can be evaluated")
     model = energy.model
     return Answer(word=model.verdict, text=_short(model), reason=model.reason)
 
 
+def _model_violates(energy: Energy) -> bool:
+    return energy.model is not None and energy.model.verdict == "violates"
+
+
 def _is_measured(findings: Mapping[str, Finding]) -> bool:
     reciprocity = findings[Reciprocity.key]
     return isinstance(reciprocity, Reciprocity) and reciprocity.table_random.measured
-
-
-def _of_data(energy: Energy) -> Answer:
-    """Return the answer for measured data, which have no model: that of their table."""
-    table = energy.table
-    most = "not finite" if table.max_albedo is None else f"albedo {table.max_albedo:.3g}"
-    where = f"{most} at {table.max_at_theta_i_deg:.3g}°"
-    if table.verdict == "violates":
-        text = f"the data do not: {where}"
-    elif table.reason:
-        text = f"cannot be judged: {where}, within the error of the table"
-        return Answer(word="not judged", text=text, reason=table.reason)
-    else:
-        text = f"the data do: {where}"
-    return Answer(word=table.verdict, text=text, reason=table.reason or text)
-
-
-def _violates(finding: Finding) -> bool:
-    return finding.verdict == "violates"
-
-
-def _of_table_alone(energy: Energy) -> bool:
-    """Return True if a table reflects too much where its model does not, or more than its model."""
-    return energy.table.verdict == "violates" and (energy.model is None or energy.model.verdict != "violates")
 
 
 def _short(model: ModelEnergy) -> str:
@@ -108,28 +97,23 @@ def _short(model: ModelEnergy) -> str:
     if model.verdict == "conserves":
         return f"yes{up_to}" if model.furnace is not None else f"yes{up_to}, no lossless form to judge"
     if model.verdict == "loses":
-        loss, at = _loss(model.furnace)
-        return f"conserves energy{up_to} {'up to' if bounded else 'but for'} a loss of {_percent(loss)} at {at:.3g}°"
+        assert model.furnace is not None
+        judged = zip(model.furnace.theta_i_deg, model.furnace.albedo, strict=True)
+        least = [(min(value for value in row if value is not None), at) for at, row in judged if at <= LOSS_UP_TO_DEG]
+        albedo, at = min(least)
+        return (
+            f"conserves energy{up_to} {'up to' if bounded else 'but for'} a loss of {_percent(1.0 - albedo)} "
+            f"at {at:.3g}°"
+        )
     if model.verdict == "gains":
-        return f"conserves energy{up_to}; would create {_percent(_gain(model.furnace))} if nothing were absorbed"
+        largest = None if model.furnace is None else model.furnace.largest
+        gain = 0.0 if largest is None else largest - 1.0
+        return f"conserves energy{up_to}; would create {_percent(gain)} if nothing were absorbed"
     return {
         "known published excess": f"no, as published: {where}",
         "accepted excess": f"no, as accepted: {where}",
         "violates": f"no: {where}",
     }[model.verdict]
-
-
-def _loss(furnace: Furnace | None) -> tuple[float, float]:
-    """Return the largest loss [1] of a lossless model up to the last angle that is judged, and its angle [degree]."""
-    assert furnace is not None
-    judged = zip(furnace.theta_i_deg, furnace.albedo, strict=True)
-    least = [(min(value for value in row if value is not None), at) for at, row in judged if at <= LOSS_UP_TO_DEG]
-    return 1.0 - min(least)[0], min(least)[1]
-
-
-def _gain(furnace: Furnace | None) -> float:
-    """Return the largest excess [1] of a lossless model."""
-    return 0.0 if furnace is None or furnace.largest is None else furnace.largest - 1.0
 
 
 def _percent(share: float) -> str:
@@ -142,12 +126,12 @@ def _read(findings: Any) -> Any:
         return findings
     if unknown := [key for key in findings if key not in FINDINGS]:
         raise ParameterError("findings", f"{unknown[0]!r} is not one of {', '.join(FINDINGS)}")
-    return {key: value if isinstance(value, Finding) else _finding(key, value) for key, value in findings.items()}
-
-
-def _finding(key: str, value: Any) -> Finding:
-    judged = not (isinstance(value, Mapping) and value.get("verdict") == "not judged")
-    return (FINDINGS[key] if judged else NotJudged).model_validate(value)
+    read: dict[str, Finding] = {}
+    for key, value in findings.items():
+        unjudged = isinstance(value, Mapping) and value.get("verdict") == "not judged"
+        kind = NotJudged if unjudged else FINDINGS[key]
+        read[key] = value if isinstance(value, Finding) else kind.model_validate(value)
+    return read
 
 
 def _referred(kind: type[Finding]) -> CoreSchema:
