@@ -186,19 +186,10 @@ class NotJudged(Finding):
 
 @dataclass(frozen=True, eq=False)
 class Subject:
-    """A table under audit.
+    """A table under audit, with its source: the material or function that gave its values, None if it is not known.
 
-    Attributes
-    ----------
-    table : Table
-        Table of a store, or in memory.
-    source : Source or None
-        Material or function that gave the values of the table. None if it is not known, or if it is a function, of
-        which a store holds the name only.
-    accept_excess : bool
-        Accept that the model reflects more than it receives.
-    findings : dict
-        Findings that have been judged, in the order of the registry.
+    With `accept_excess` the model may reflect more than it receives. `findings` are those judged so far, in the order
+    of the registry.
     """
 
     table: Table

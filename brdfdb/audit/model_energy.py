@@ -110,12 +110,7 @@ def place(theta_i_deg: float, wavelength_nm: float | None) -> str:
 def crossing(excess: Callable[[float], float], low: float, high: float) -> float:
     """Return the angle [degree] above which an excess is positive, by bisection to `ANGLE_TOLERANCE_DEG`.
 
-    Parameters
-    ----------
-    excess : callable
-        Albedo minus 1 [1], as a function of an angle [degree].
-    low, high : float [degree]
-        Angles where the excess is not positive, and where it is positive.
+    `excess` is an albedo minus 1 [1] as a function of the angle; it is not positive at `low`, and positive at `high`.
     """
     while high - low > ANGLE_TOLERANCE_DEG:
         between = (low + high) / 2.0

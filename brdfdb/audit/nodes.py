@@ -83,10 +83,7 @@ class _Wrong(NamedTuple):
 def nodes_of(table: Table, source: Source) -> Nodes:
     """Return the number of stored numbers that are not those of the model, and the one with the largest difference.
 
-    Raises
-    ------
-    ValueError
-        If no layout of the source has the shape of the table.
+    ParameterError if no layout of the source has the shape of the table.
     """
     bits, layout = table.metadata.bits, table.laid_out(source)
     if layout.shape != table.values.shape:

@@ -176,13 +176,7 @@ class MaterialAudit(BaseModel):
     )
 
     def of(self, kind: type[F]) -> F:
-        """Return the finding of one kind.
-
-        Raises
-        ------
-        LookupError
-            If it is not judged.
-        """
+        """Return the finding of one kind; LookupError if it is not judged."""
         finding = self.findings[kind.key]
         if not isinstance(finding, kind):
             raise LookupError(f"{kind.key} of {self.material} is not judged")

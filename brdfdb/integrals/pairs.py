@@ -37,20 +37,10 @@ class Symmetry(NamedTuple):
 
 
 class View(NamedTuple):
-    """One viewer, and lights that follow the lobe around its mirror direction.
+    """A viewer at theta, phi [rad], and lights that follow the lobe around its mirror direction.
 
-    Attributes
-    ----------
-    theta, phi : float [rad]
-        Direction of the viewer.
-    weight : float [sr]
-        cos theta_r times its solid angle. The sum over all viewers is pi.
-    wr : array (3,)
-        Unit vector of the viewer.
-    wi : array (N, 3)
-        Unit vectors of the lights.
-    weights : array (N,) [sr]
-        cos theta_i times the solid angle of each light. Their sum is close to pi.
+    `wr` (3,) and `wi` (N, 3) are unit vectors. `weight` [sr] is cos theta_r times the solid angle of the viewer: its
+    sum over all viewers is pi. `weights` (N,) [sr] are cos theta_i times those of the lights: their sum is close to pi.
     """
 
     theta: float
@@ -64,21 +54,9 @@ class View(NamedTuple):
 def views(lobe: Callable[[Array], Lobe | None], counts: Counts, symmetry: Symmetry) -> Iterator[View]:
     """Yield viewers over the hemisphere, each with lights over the hemisphere.
 
-    Parameters
-    ----------
-    lobe : callable
-        ``lobe(cos)`` gives the lobe of f_r for directions with that cosine; its widths may be arrays over the
-        wavelength, of which the narrowest counts. None: a diffuse f_r.
-    counts : Counts
-        Numbers of nodes.
-    symmetry : Symmetry
-        Symmetry of f_r, which makes nodes unnecessary.
-
-    Yields
-    ------
-    View
-        The sum of weight * weights * f_r over all of them is the integral of f_r cos theta_i cos theta_r over both
-        hemispheres, pi times the mean albedo.
+    The sum of weight * weights * f_r over all of them is the integral of f_r cos theta_i cos theta_r over both
+    hemispheres, pi times the mean albedo. ``lobe(cos)`` gives the lobe of f_r for directions with that cosine, None for
+    a diffuse f_r; its widths may be arrays over the wavelength, of which the narrowest counts.
 
     Notes
     -----

@@ -76,7 +76,7 @@ def rectangles(first: Floats, second: Floats) -> Array:
 def integrated(
     integrand: Integrand, panels: Array, of: Indices, tolerance: float, most_panels: int, width: int = 1
 ) -> tuple[Array, Array]:
-    """Return integrals over panels, and estimates of their errors.
+    """Return integrals over panels, shape (integrals, width), and estimates of their errors (integrals,).
 
     Panels with large errors are halved, until those of each integral add up to less than the tolerance. All integrals
     that still want panels are evaluated in one call.
@@ -86,21 +86,12 @@ def integrated(
     integrand : callable
         ``integrand(of, x, y)`` gives values (P, 15, 15, width) for P panels: the integral to which each belongs (P,),
         and the variables at its nodes, (P, 15, 1) and (P, 1, 15).
-    panels : array (P, 4)
-        Rectangles, as from `rectangles`.
-    of : array (P,)
-        Index of the integral to which each panel belongs. Each integral has a panel at least.
+    panels, of : array (P, 4), array (P,)
+        Rectangles, as from `rectangles`, and the index of the integral of each. Each integral has a panel at least.
     tolerance : float
-        Absolute error to stay below, for the worst of the values of an integral.
+        Absolute error to stay below, for the worst of the `width` values of an integral.
     most_panels : int
         Number of new panels at which an integral stops.
-    width : int
-        Number of values of an integral.
-
-    Returns
-    -------
-    array (integrals, width), array (integrals,)
-        Integrals and errors.
     """
     count = int(of.max(initial=-1)) + 1
     values, errors = _rules(integrand, panels, of, width)

@@ -163,7 +163,8 @@ def reflected_share(
 ) -> Albedo:
     """Return the directional albedo [1] of a function of unit vectors that gives several values of f_r at once.
 
-    All lights are integrated together, each on panels of its own.
+    All lights are integrated together, each on panels of its own. The albedo has the shape (..., width), the error is
+    one for each light; it is above the tolerance where the quadrature stopped early.
 
     Parameters
     ----------
@@ -172,23 +173,11 @@ def reflected_share(
     theta_i, phi_i : array_like [rad]
         Directions of the lights, theta up to pi/2. They broadcast.
     lobe : Lobe or None
-        Lobe that all values of a light share, with widths that are numbers or broadcast with the lights; None if they
-        share none.
-    tolerance : float
-        Absolute error to stay below, for the worst of the values of a light.
-    most_panels : int
-        Number of panels at which the quadrature of a light stops.
-    width : int
-        Number of values that brdf gives for a pair of directions.
+        Lobe that all values of a light share, with widths that are numbers or broadcast with the lights.
+    tolerance, most_panels : float, int
+        Absolute error to stay below, for the worst of the values of a light; number of panels at which it stops.
     mirrored : array_like of bool
-        True if f_r is the same on both sides of the plane of incidence. Only one side is then integrated. It broadcasts
-        with the lights.
-
-    Returns
-    -------
-    Albedo
-        Albedo of shape (..., width), and one estimate of the error for each light. It is above the tolerance where the
-        quadrature stopped early.
+        True if f_r is the same on both sides of the plane of incidence, so that one side is integrated. It broadcasts.
     """
     theta, phi, one_side = np.broadcast_arrays(np.asarray(theta_i, dtype=np.float64), phi_i, mirrored)
     if theta.size == 0:
@@ -224,26 +213,9 @@ def spectral_albedo(
 ) -> Albedo:
     """Return the directional albedo [1] of a model for several sets of parameters at once, such as wavelengths.
 
-    Parameters
-    ----------
-    spec : ModelSpec
-        The model.
-    theta_i, phi_i : array_like [rad]
-        Directions of the lights, theta up to pi/2. They broadcast.
-    parameters : mapping
-        All parameters of the model: numbers, or arrays of one shape (L,).
-    tolerance, most_panels, mirrored
-        As in `reflected_share`.
-
-    Returns
-    -------
-    Albedo
-        As from `reflected_share`, of width L, or 1 where all parameters are numbers. The specular part is left out.
-
-    Raises
-    ------
-    ParameterError
-        If a parameter is outside its range, or the tolerance outside [1e-13, 1].
+    `parameters` are all of the model: numbers, or arrays of one shape (L,), which make an albedo of width L. All else
+    is as in `reflected_share`. The specular part is left out. ParameterError if a parameter is outside its range, or
+    the tolerance outside [1e-13, 1].
     """
     _check_tolerance(tolerance)
     width = np.broadcast(*parameters.values()).size

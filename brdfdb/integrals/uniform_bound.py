@@ -77,27 +77,11 @@ def largest_uniform(model: ModelSpec | str, *, tolerance: float = 1e-6, **parame
 def largest_uniform_beside(
     spec: ModelSpec, theta_i: Array, reflectance: Floats, surfaces: Mapping[str, ArrayLike], tolerance: float
 ) -> Array:
-    """Return `largest_uniform` [1] of surfaces whose reflectance is known at some angles.
+    """Return `largest_uniform` [1], shape (surfaces,), of surfaces whose reflectance is known at some angles.
 
-    Angles between the known ones are searched for a larger reflectance.
-
-    Parameters
-    ----------
-    spec : ModelSpec
-        The model.
-    theta_i : array (angles,) [rad]
-        Increasing angles of incidence up to 90 degrees.
-    reflectance : array (angles, surfaces) [1]
-        Reflectance, specular and directional diffuse.
-    surfaces : mapping
-        Arguments of the model except the uniform part: numbers, or arrays of one shape (surfaces,).
-    tolerance : float
-        As in `largest_uniform`.
-
-    Returns
-    -------
-    array (surfaces,) [1]
-        1 less the largest reflectance, at these angles or between them. It is 0 where that reflectance is above 1.
+    Angles between the known ones are searched for a larger reflectance. `theta_i` (angles,) [rad] increases up to 90
+    degrees; `reflectance` (angles, surfaces) [1] is specular and directional diffuse; `surfaces` are the arguments of
+    the model except the uniform part: numbers, or arrays of one shape (surfaces,).
     """
     below = theta_i < HALF_PI
     peak = _peak(

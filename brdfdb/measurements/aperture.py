@@ -126,12 +126,8 @@ class InstrumentView:
     def mean(self, brdf: Callable[[Floats, Floats], Floats], width: float | None = None) -> Floats:
         """Return f_r [1/sr] averaged over the aperture.
 
-        Parameters
-        ----------
-        brdf : callable
-            f_r [1/sr], shape (M,) or (M, C), at unit vectors (M, 3) of light and viewer.
-        width : float [1], optional
-            Width of its lobe, in slopes: a narrow one takes more points, and a very wide one the middle alone.
+        `brdf` gives f_r [1/sr], shape (M,) or (M, C), at unit vectors (M, 3) of light and viewer. `width` [1] is that
+        of its lobe, in slopes: a narrow lobe takes more points, and a very wide one the middle alone.
         """
         middle = np.asarray(brdf(self.w_i, self.w_r))
         rings = _rings(self.half_angle, width)

@@ -98,13 +98,7 @@ class Extent(BaseModel):
 
     @functools.cached_property
     def measured(self) -> Cells:
-        """The cells, with three or four axes as `cells` has them.
-
-        Raises
-        ------
-        ParameterError
-            If they are damaged.
-        """
+        """The cells, with three or four axes as `cells` has them; ParameterError if they are damaged."""
         shape = _shape(round(90.0 / self.cell_deg), turned=self.turned)
         size = (int(np.prod(shape)) + 7) // 8
         try:

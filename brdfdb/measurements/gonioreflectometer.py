@@ -191,17 +191,10 @@ class Gonioreflectometer:
 class CameraPicture:
     """Counts of the camera for one direction of the light.
 
-    Attributes
-    ----------
-    settings : Gonioreflectometer
-        The instrument.
-    theta_i, phi_i : float [rad]
-        The light, in the frame of the sample. Light comes from the right, and the sample is turned by -phi_i.
-    sample, standard, background : array (E, height, width)
-        Counts with the sample, with the standard, and without either, an array an exposure. Standard and background are
-        means of `frames` pictures.
-    name, provenance : str
-        The material, and where the picture comes from.
+    `theta_i`, `phi_i` [rad] is the light in the frame of the sample: light comes from the right, and the sample is
+    turned by -phi_i. `sample`, `standard`, `background` are counts (E, height, width) with the sample, with the
+    standard, and without either, an array an exposure. Standard and background are means of `frames` pictures.
+    `provenance` is where the picture comes from.
     """
 
     settings: Gonioreflectometer
@@ -228,18 +221,8 @@ def photograph(
 ) -> CameraPicture:
     """Return the picture that the instrument takes of a surface: blurred, noisy, and clipped where it saturates.
 
-    Parameters
-    ----------
-    brdf : callable
-        f_r [1/sr], shape (N, 1), at unit vectors (N, 3) of light and viewer.
-    settings : Gonioreflectometer
-        The instrument.
-    theta_i, phi_i : float [rad]
-        The light, in the frame of the sample.
-    seed : int
-        Seed of the noise.
-    name : str
-        Name of the material.
+    `brdf` gives f_r [1/sr], shape (N, 1), at unit vectors (N, 3) of light and viewer. The light at `theta_i`, `phi_i`
+    [rad] is in the frame of the sample. `seed` is that of the noise.
 
     Notes
     -----
@@ -293,17 +276,8 @@ def _counts(light: Array, settings: Gonioreflectometer, frames: int, rng: np.ran
 def reduced(picture: CameraPicture, thin: bool = True) -> Samples:
     """Return the samples of a picture: f_r by eq. 2 at the directions of the pixels, with its standard uncertainty.
 
-    Parameters
-    ----------
-    picture : CameraPicture
-        One that was simulated or measured.
-    thin : bool
-        Leave pixels out where f_r hardly changes, so that the samples are dense at the peak alone.
-
-    Raises
-    ------
-    ParameterError
-        If no pixel can be used: all are dark, saturated or outside.
+    With `thin`, pixels are left out where f_r hardly changes, so that samples are dense at the peak alone.
+    ParameterError if all pixels are dark, saturated or outside.
 
     Notes
     -----

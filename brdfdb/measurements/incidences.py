@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,17 +38,10 @@ def averaged(points: Floats, values: Floats) -> tuple[Floats, Floats]:
 
 @dataclass(frozen=True)
 class DiskIntegrals:
-    """Integrals of values over the unit disk.
+    """Integrals (C,) of values over the unit disk, and over the share of it that the points surround.
 
-    Attributes
-    ----------
-    covered : float [1]
-        Share of the disk that the points surround.
-    inside, whole : array (C,)
-        Integrals over what is covered, and over the disk.
-    peak : float [1]
-        Largest share of one point in the integrals over the disk: of many points it is small, unless the values have a
-        peak that is narrower than the distance of the points.
+    `peak` [1] is the largest share of one point in the integrals over the disk. Of many points it is small, unless the
+    values have a peak that is narrower than the distance of the points.
     """
 
     covered: float
@@ -89,49 +83,34 @@ def integrals(points: Floats, values: Floats) -> DiskIntegrals | None:
 
 @dataclass(frozen=True)
 class Incidence:
-    """Albedo of one direction of the light: the integral of its samples.
-
-    Attributes
-    ----------
-    theta_i_deg, phi_i_deg : float [degree]
-        Direction of the light.
-    viewers : int
-        Directions of the viewer.
-    covered : float [1]
-        Share of the projected solid angle of the hemisphere that the viewers surround, of the channel with most holes.
-    measured : tuple of float [1]
-        Integral of f_r cos(theta_r) over what is covered, of each channel.
-    albedo : tuple of float [1]
-        The same over the hemisphere; beyond the viewers f_r is that of the nearest one.
-    peak : float [1]
-        Largest share of one viewer in the albedo of a channel. Above a tenth the lobe is narrower than the steps
-        between viewers, and the albedo is not known.
-    """
+    """Albedo of one direction of the light: the integral of its samples."""
 
     theta_i_deg: float
     phi_i_deg: float
-    viewers: int
-    covered: float
-    measured: tuple[float, ...]
-    albedo: tuple[float, ...]
+    viewers: int  # number of directions of the viewer
+    covered: float  # share of the projected hemisphere that viewers surround, in the channel with most holes
+    measured: tuple[float, ...]  # integral of f_r cos(theta_r) over what is covered, of each channel
+    albedo: tuple[float, ...]  # integral over the hemisphere; beyond the viewers f_r is that of the nearest
+    # Largest share of one viewer in the albedo of a channel. Above a tenth the lobe is narrower than the steps between
+    # viewers, and the albedo is not known
     peak: float
+
+
+class Incidences(NamedTuple):
+    """Albedos of directions of the light; of bands of theta_i if the directions are scattered."""
+
+    incidences: tuple[Incidence, ...]
+    in_bands: bool
 
 
 def incidences_of(
     samples: Samples, delta_deg: Floats, progress: Callable[[float], None] | None, *, one_side: bool
-) -> tuple[tuple[Incidence, ...], bool]:
-    """Return the albedos of directions of the light, and True if these are bands of scattered directions.
+) -> Incidences:
+    """Return the albedos of directions of the light, or of bands of scattered directions.
 
-    Parameters
-    ----------
-    samples : Samples
-        Samples; their holes are nan.
-    delta_deg : array (N,) [degree]
-        Azimuths from the light to the viewer, in [0, 360).
-    progress : callable or None
-        Called with the share [1] that is done.
-    one_side : bool
-        The viewers are on one side of the plane of incidence: the other one is its mirror image.
+    `delta_deg` (N,) are azimuths [degree] from the light to the viewer, in [0, 360). With `one_side` the viewers are on
+    one side of the plane of incidence, and the other side is its mirror image. `progress` is called with the share [1]
+    done.
     """
     for in_bands, groups in ((False, lights(samples)), (True, bands(samples))):
         incidences = []
@@ -139,9 +118,9 @@ def incidences_of(
             incidences.append(_incidence(samples, rows, delta_deg, one_side, in_bands))
             if progress is not None:
                 progress((number + 1) / len(groups))
-        if integrated := tuple(some for some in incidences if some is not None):
-            return integrated, in_bands
-    return (), False
+        if integrated := tuple(incidence for incidence in incidences if incidence is not None):
+            return Incidences(integrated, in_bands)
+    return Incidences((), False)
 
 
 def lights(samples: Samples, fewest: int = _FEWEST_VIEWERS) -> list[NDArray[np.intp]]:

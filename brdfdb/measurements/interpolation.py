@@ -168,11 +168,8 @@ def _listed(samples: Samples) -> tuple[Floats, Floats, Floats, Floats | None]:
 def _check_values(samples: Samples) -> None:
     """Refuse samples of which no value is above 0, or that stand for holes with numbers that noise does not explain.
 
-    Raises
-    ------
-    ParameterError
-        If a value is below minus three times the largest one, or a channel has the same number three times or more,
-        below 0 by three times its noise or the tenth percentile of the values above 0.
+    Such a number is below minus three times the largest value, or occurs three times or more in a channel, and is below
+    0 by three times the noise or the tenth percentile of the values above 0.
     """
     values = samples.values
     largest, lowest = np.max(values, where=samples.known, initial=0.0), np.min(values, where=samples.known, initial=0.0)

@@ -256,12 +256,7 @@ class MeasuredSource(FunctionSource):
             for each light, the largest up to 1 that keeps the albedo at 1 or below; times that of the viewer, too, if
             it is reciprocal.
         margin : float [1]
-            What the albedo stays below 1: room for the error of a table.
-
-        Raises
-        ------
-        ParameterError
-            If there is no such law.
+            Difference of the albedo from 1: room for the error of a table.
         """
         if law not in ("reciprocal", "conserving"):
             raise ParameterError(

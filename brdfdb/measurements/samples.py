@@ -46,18 +46,10 @@ _QUANTITIES = {
 
 @dataclass(frozen=True)
 class Instrument:
-    """The instrument of a measurement. What is not known is None, or an empty text.
+    """The instrument of a measurement; None, or an empty text, where something is not known.
 
-    Attributes
-    ----------
-    name : str
-        What people call it.
-    source_solid_angle_sr, receiver_solid_angle_sr : float [sr] or None
-        Solid angles of the light and of the receiver, as the sample sees them.
-    spot_mm : float [mm] or None
-        Diameter of the spot that is measured.
-    polarisation : str
-        Polarisation of light and receiver, in words.
+    Solid angles [sr] of light and receiver are those that the sample sees. `spot_mm` is the diameter of the spot that
+    is measured, `polarisation` that of light and receiver in words.
     """
 
     name: str = ""
@@ -314,13 +306,7 @@ def _units(dataset: xr.Dataset, name: str) -> str:
 
 
 def _length_nm(dataset: xr.Dataset, name: str) -> NDArray[np.float64] | None:
-    """Return wavelengths or bandwidths [nm] of a Dataset, shape (C,), in the unit that it states; None if it has none.
-
-    Raises
-    ------
-    ParameterError
-        If the unit is not nm, um or m.
-    """
+    """Return wavelengths or bandwidths [nm] of a Dataset, shape (C,), from nm, um or m; None if it has none."""
     if name not in dataset.variables:
         return None
     units = _units(dataset, name)

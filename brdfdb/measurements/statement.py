@@ -34,20 +34,11 @@ _FEWEST = 5  # viewers of a light
 
 @dataclass(frozen=True)
 class Claim:
-    """A total integrated scatter that a header states, and what its own values integrate to.
+    """A total integrated scatter that a header states for a channel, and what its own values integrate to [1].
 
-    Attributes
-    ----------
-    theta_i_deg : float [degree]
-        Polar angle of the light.
-    channel : str
-        Channel.
-    claimed, integrated : float [1]
-        Number of the header, and the albedo of its values.
-    at_least : bool
-        True if viewers surround too little for an albedo: `integrated` is the integral over what they surround.
-    known : bool
-        False if values cannot judge the claim: it is above such an integral, or the lobe is narrower than the steps.
+    With `at_least` viewers surround too little for an albedo: `integrated` is the integral over what they surround.
+    `known` is False if values cannot judge the claim: it is above such an integral, or the lobe is narrower than the
+    steps.
     """
 
     theta_i_deg: float
@@ -65,76 +56,31 @@ class Claim:
 
 @dataclass(frozen=True)
 class SampleStatement:
-    """Statement on samples: the angles that they cover, the values that they hold, and what contradicts.
-
-    Attributes
-    ----------
-    name : str
-        Name of the samples.
-    channels : tuple of str
-        Names of the channels.
-    samples : int
-        Number of directions.
-    nodes : bool
-        True if they are nodes of a grid.
-    lights : int
-        Number of directions of the light.
-    theta_i_deg, theta_r_deg : (float, float) [degree]
-        Smallest and largest polar angle of the light and of the viewer.
-    turned : bool
-        True if the light comes from several azimuths.
-    one_side : bool
-        True if the viewers are on one side of the plane of incidence, so that integrals take the other for its mirror
-        image.
-    holes, negative, zeros : int
-        Numbers of values that are missing, below 0, and exactly 0 beside others: many files write 0 for a hole.
-    constant : bool
-        True if f_r of each channel is one number at all directions.
-    largest : float [1/sr]
-        Largest value.
-    largest_at_deg : (float, float, float) [degree]
-        theta_i, theta_r and the difference of the azimuths there.
-    uncertainty : float [1] or None
-        Median of the standard uncertainties over the absolute values; None if none is stated.
-    wavelength_nm : (float, float) [nm] or None
-        Smallest and largest wavelength; None if none is stated.
-    in_bands : bool
-        True if the directions are scattered, and `incidences` are bands of theta_i, as if azimuths did not matter.
-    incidences : tuple of Incidence
-        Directions of the light with viewers enough.
-    reciprocity : ExchangedPairs or None
-        None if no sample is the swap of another.
-    claims : tuple of Claim
-        Claims of the header that can be compared.
-    notes : tuple of str
-        What the reader did to the file, in sentences.
-    hints : tuple of str
-        What looks wrong, in sentences.
-    """
+    """Statement on samples: the angles that they cover, the values that they hold, and what contradicts."""
 
     name: str
     channels: tuple[str, ...]
-    samples: int
-    nodes: bool
-    lights: int
-    theta_i_deg: tuple[float, float]
-    theta_r_deg: tuple[float, float]
-    turned: bool
-    one_side: bool
-    holes: int
-    negative: int
-    zeros: int
-    constant: bool
-    largest: float
-    largest_at_deg: tuple[float, float, float]
-    uncertainty: float | None
-    wavelength_nm: tuple[float, float] | None
-    in_bands: bool
-    incidences: tuple[Incidence, ...]
-    reciprocity: ExchangedPairs | None
-    claims: tuple[Claim, ...]
-    notes: tuple[str, ...]
-    hints: tuple[str, ...]
+    samples: int  # number of directions
+    nodes: bool  # True if the directions are nodes of a grid
+    lights: int  # number of directions of the light
+    theta_i_deg: tuple[float, float]  # smallest and largest polar angle of the light
+    theta_r_deg: tuple[float, float]  # smallest and largest polar angle of the viewer
+    turned: bool  # True if the light comes from several azimuths
+    one_side: bool  # True if viewers are on one side of the plane of incidence; integrals mirror it to the other
+    holes: int  # number of values that are missing
+    negative: int  # number of values below 0
+    zeros: int  # number of values that are exactly 0 while others are not: many files write 0 for a hole
+    constant: bool  # True if f_r of each channel is one number at all directions
+    largest: float  # largest value [1/sr]
+    largest_at_deg: tuple[float, float, float]  # theta_i, theta_r and the difference of the azimuths there
+    uncertainty: float | None  # median of the standard uncertainties over the absolute values [1]; None: not stated
+    wavelength_nm: tuple[float, float] | None  # smallest and largest wavelength; None: not stated
+    in_bands: bool  # True if directions are scattered, and `incidences` are bands of theta_i at any azimuth
+    incidences: tuple[Incidence, ...]  # directions of the light with viewers enough
+    reciprocity: ExchangedPairs | None  # None if no sample is the swap of another
+    claims: tuple[Claim, ...]  # claims of the header that can be compared
+    notes: tuple[str, ...]  # sentences on what the reader did to the file
+    hints: tuple[str, ...]  # sentences on what looks wrong
 
     @property
     def sentences(self) -> tuple[str, ...]:
@@ -344,15 +290,7 @@ def _on_claims(known: SampleStatement) -> list[str]:
 
 @dataclass(frozen=True)
 class ExchangedPairs:
-    """Asymmetry abs(a - b) / (abs(a) + abs(b)) [1] of samples that are each other's swap of light and viewer.
-
-    Attributes
-    ----------
-    pairs : int
-        Number of pairs.
-    median, largest : float [1]
-        Median and largest asymmetry over pairs and channels.
-    """
+    """Asymmetry abs(a - b) / (abs(a) + abs(b)) [1] of samples that are each other's swap of light and viewer."""
 
     pairs: int
     median: float
@@ -457,12 +395,7 @@ def is_constant(samples: Samples) -> bool:
 def azimuths(samples: Samples, delta_deg: Floats) -> tuple[str, ...]:
     """Return whether a lobe lies at the light and none in the mirror direction, in a sentence.
 
-    Parameters
-    ----------
-    samples : Samples
-        Samples.
-    delta_deg : array (N,) [degree]
-        Azimuths from the light to the viewer, in [0, 360).
+    `delta_deg` (N,) are azimuths [degree] from the light to the viewer, in [0, 360).
     """
     known, theta_i = samples.known, np.degrees(samples.theta_i)
     f_r = np.where(known, samples.values, 0.0).sum(axis=1) / np.maximum(known.sum(axis=1), 1)

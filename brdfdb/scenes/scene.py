@@ -274,7 +274,7 @@ def _stored(root: str, name: str, held_to: tuple[float, ...] | None) -> Source:
     """Return a material of a store. It is kept in memory, because a scene needs it at every list of points."""
     try:
         return source_of_table(
-            Store(root)[name.removeprefix(STORED)], held_to=None if held_to is None else np.array(held_to)
+            Store(root)[name.removeprefix(STORED)], known_nm=None if held_to is None else np.array(held_to)
         )
     except BrdfdbError as error:
         raise ParameterError(f"material {name}", str(error)) from None

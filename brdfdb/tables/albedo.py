@@ -41,16 +41,10 @@ AlbedoAt = Callable[[Axis, float], Floats]  # of lights [degree] and a tolerance
 
 
 class TableAlbedo(NamedTuple):
-    """The directional albedo of a table, without the specular part.
+    """The directional albedo [1] of a table, (theta_i, phi_i, wavelengths), without the specular part, and its lights.
 
-    Attributes
-    ----------
-    theta_i_deg, phi_i_deg : array [degree]
-        The lights; one phi_i, 0, of isotropic tables.
-    albedo : array (theta_i, phi_i, wavelengths) [1]
-        One wavelength of grey tables.
-    error : array (theta_i,) [1]
-        Estimate of its absolute error, over phi_i and wavelengths the largest; 0 where it is exact.
+    `error` (theta_i,) estimates the largest absolute error over phi_i and wavelengths; 0 where the integral is exact.
+    Isotropic tables have one phi_i, 0, and grey ones one wavelength.
     """
 
     theta_i_deg: Axis
@@ -132,19 +126,9 @@ def tolerance_of(table: Table) -> float:
 
 
 def hemispherical_albedo(theta_i_deg: Axis, albedo: Floats) -> Floats:
-    """Return the share [1] that is reflected of light that is the same from everywhere.
+    """Return the share [1] of uniform light that is reflected, twice the integral of albedo cos(theta_i) sin(theta_i).
 
-    Parameters
-    ----------
-    theta_i_deg : array (theta_i,) [degree]
-        From 0 on.
-    albedo : array (theta_i, wavelengths) [1]
-        Directional albedo at these angles, taken as linear between them and the same beyond the last.
-
-    Returns
-    -------
-    array (wavelengths,) [1]
-        Twice the integral of albedo cos(theta_i) sin(theta_i).
+    `albedo` (theta_i, wavelengths) is linear between the angles, which begin at 0, and the same beyond the last.
     """
     return np.asarray(2.0 * _theta_weights(radians(theta_i_deg)) @ albedo)
 
@@ -196,13 +180,7 @@ _REFLECTED: WeakKeyDictionary[Table, Reflected] = WeakKeyDictionary()
 
 
 def reflected_by(source: Source, wavelength_nm: Axis | None) -> Reflected:
-    """Return what a source reflects at wavelengths (L,) [nm], or at none if it is grey.
-
-    Raises
-    ------
-    ParameterError
-        If the source does not hold at one of the wavelengths.
-    """
+    """Return what a source reflects at wavelengths (L,) [nm]; ParameterError if it does not hold at one of them."""
     phi_i_deg = azimuths_deg(source)
     angles = radians(THETA_I_DEG)[:, np.newaxis], radians(phi_i_deg)
     albedo, error = source_albedo(source, *angles, wavelength_nm, tolerance=LARGEST_TOLERANCE)
@@ -233,24 +211,10 @@ def source_albedo(
     tolerance: float,
     most_panels: int = MOST_PANELS,
 ) -> Albedo:
-    """Integrate f_r cos theta_r of a source over the hemisphere [1], at all wavelengths at once.
+    """Integrate f_r cos theta_r of a source over the hemisphere [1], at all its wavelengths (L,) [nm] at once.
 
-    Parameters
-    ----------
-    source : Source
-        Material or function.
-    theta_i, phi_i : array_like [rad]
-        Directions of the lights, theta up to pi/2. They broadcast.
-    wavelength_nm : array (L,) [nm], or None
-        For spectral sources, and only for them.
-    tolerance, most_panels
-        As in `brdfdb.integrals.quadrature.reflected_share`.
-
-    Returns
-    -------
-    Albedo
-        Albedo of shape (..., L), or (..., 1) of a grey source, without the specular part; and an estimate of the error
-        for each light.
+    The lights at `theta_i`, `phi_i` [rad], theta up to pi/2, broadcast. All else is as in
+    `brdfdb.integrals.quadrature.reflected_share`. The specular part is left out.
     """
 
     f_r = source.brdf_at(wavelength_nm)

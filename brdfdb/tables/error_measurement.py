@@ -54,20 +54,11 @@ Read = Callable[[slice], NDArray[np.float32]]  # rows of the first axis of a sto
 
 
 class RandomPairs(NamedTuple):
-    """Random pairs of directions.
+    """Random pairs of directions: unit vectors `wi` of the light and `wr` of the viewer (N, 3).
 
-    Attributes
-    ----------
-    wi, wr : array (N, 3)
-        Unit vectors of light and viewer.
-    band : array (N,)
-        Index of the band of theta_i.
-    weight : array (N,)
-        cos theta_r over the density with which the viewer was drawn, as integrals need it; 0 below the horizon.
-    in_lobe : bool array (N,)
-        True for viewers that were drawn in the lobe.
-    measured : bool array (N,)
-        False for pairs outside of the directions that measured data cover.
+    `band` is the index of the band of theta_i, `weight` cos theta_r over the density of the viewer, as integrals need
+    it, and 0 below the horizon. `in_lobe` is True for viewers that were drawn in the lobe, `measured` False for pairs
+    outside of the directions that measured data cover.
     """
 
     wi: Floats
@@ -112,16 +103,8 @@ class RandomPairs(NamedTuple):
 class _RandomDirections(NamedTuple):
     """Random numbers that the draws of all sources share.
 
-    Attributes
-    ----------
-    lights, viewers : array (N, 3)
-        Unit vectors: lights uniform in their band of theta_i, viewers uniform over the hemisphere.
-    u, angle : array (N,)
-        Numbers in (0, 1] and in [0, 2 pi) for a viewer in a lobe.
-    band : array (N,)
-        Index of the band of each light.
-    selector : array (N,)
-        Numbers in [0, 1) that choose among hemisphere and lobes.
+    `lights` are uniform in their `band` of theta_i, `viewers` over the hemisphere, unit vectors (N, 3). `u` in (0, 1]
+    and `angle` in [0, 2 pi) are for a viewer in a lobe, `selector` in [0, 1) chooses among hemisphere and lobes.
     """
 
     lights: Floats
@@ -272,24 +255,16 @@ def _compared(
 
 
 def measure(layout: Layout, read: Read, count: int | None = None, seed: int = SEED) -> Error:
-    """Measure the error of a table.
+    """Measure the error of a table in each band and wavelength, overall, in places and between wavelengths.
 
     Parameters
     ----------
     layout : Layout
-        Layout of the table.
+        Layout of the table. The error of a mixture is that at its worst wavelength alone.
     read : callable
         Gives some rows of the first axis of the stored array. Large tables are read piece by piece.
-    count : int, optional
-        Number of directions in a band of theta_i, by default 4000, or 3000 for more than four wavelengths.
-    seed : int
-        Seed of the directions.
-
-    Returns
-    -------
-    Error
-        For each band and wavelength, and overall, to three digits; and limits in places and between wavelengths. Of a
-        mixture, at its worst wavelength alone.
+    count, seed : int
+        Number of directions in a band of theta_i, by default 4000, or 3000 for more than four wavelengths; their seed.
     """
     count = directions_of_a_band(layout.wavelength_nm) if count is None else count
     pairs = draw(layout.source, layout.wavelength_nm, count, seed)
@@ -314,20 +289,9 @@ def measure(layout: Layout, read: Read, count: int | None = None, seed: int = SE
 def worst_pair(
     error: Floats, truth: Floats, floor: Floats, pairs: RandomPairs, source: Source, wavelength_nm: Axis | None
 ) -> WorstPair:
-    """Return the pair of directions that counts with the largest error, and why it is large there.
+    """Return the pair of directions that counts with the largest relative error (N, L) [1], and why it is large there.
 
-    Parameters
-    ----------
-    error, truth : arrays (N, L)
-        Relative errors [1], and f_r [1/sr] of the source.
-    floor : array (L,) [1/sr]
-        Values below which an error is relative to the floor.
-    pairs : RandomPairs
-        The pairs of directions.
-    source : Source
-        Material or function that has the lobe and the pole.
-    wavelength_nm : array (L,) [nm], or None
-        None for a grey source.
+    `truth` (N, L) [1/sr] is f_r of the source. Below `floor` (L,) [1/sr] an error is relative to the floor.
     """
     error = np.where(pairs.above[:, np.newaxis], error, -np.inf)
     row, column = np.unravel_index(int(np.argmax(error)), error.shape)

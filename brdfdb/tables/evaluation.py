@@ -44,16 +44,10 @@ MOST_POINTS = _HALF.size**2  # points of the largest view
 
 
 class LookupPoints(NamedTuple):
-    """Directions and wavelengths of one lookup, checked.
+    """Checked directions and wavelengths of one lookup.
 
-    Attributes
-    ----------
-    angles : tuple of arrays [rad]
-        theta_i, phi_i, theta_r, phi_r; they broadcast.
-    shape : tuple of int
-        What they broadcast to.
-    wavelength_nm : float, array of shape (n,) or None
-        None is every wavelength of the surface.
+    `angles` are theta_i, phi_i, theta_r, phi_r [rad], which broadcast to `shape`. `wavelength_nm` is a number, an array
+    (n,), or None for every wavelength of the surface.
     """
 
     angles: Angles
@@ -180,10 +174,7 @@ class PointsBody(BaseModel):
 def fields_of_npy(body: bytes) -> dict[str, Any]:
     """Return the angles [degrees] of a .npy file: theta_i, phi_i, theta_r, phi_r, float32 or float64, in (..., 4).
 
-    Raises
-    ------
-    ParameterError
-        For any other array.
+    ParameterError for any other array.
     """
     degrees = _npy(body)
     if degrees.ndim == 0 or degrees.shape[-1] != 4:
@@ -239,16 +230,9 @@ class Values(NamedTuple):
 
 
 class LookupSubject(NamedTuple):
-    """Subject of a lookup.
+    """A table, model or family. All have `lookup` and `specular_reflectance`, a table also errors and `extrapolated`.
 
-    Attributes
-    ----------
-    source : Table, Material or other object
-        It has `lookup` and `specular_reflectance`; a table has `lookup_with_error` and `extrapolated`, too.
-    kind : str
-        "table", "model" or "family".
-    wavelength_nm : array (L,) [nm] or None
-        Wavelengths that are meant where a request names none; None: grey.
+    `wavelength_nm` (L,) are used where a request names none; None: grey.
     """
 
     source: Any
@@ -272,11 +256,7 @@ class LookupSubject(NamedTuple):
         """Return the values at points, with the stated `error`, and with the `specular` part at their theta_i.
 
         With an `incident` Stokes vector (I, Q, U, V) the light that a polarised table reflects is beside its spectra.
-
-        Raises
-        ------
-        ParameterError
-            Outside the range of the surface, where it makes no colour, or where it is not polarised.
+        ParameterError outside the range of the surface, where it makes no colour, or where it is not polarised.
         """
         if incident is not None and getattr(self.source, "facets", None) is None:
             raise ParameterError("stokes", f"the table of {self.source.name} is unpolarised", incident)
@@ -358,7 +338,7 @@ def _mixed(values: Any, weights: NDArray[np.float64], grey: bool) -> Any:
 def view_directions(
     view: ViewName, theta_i_deg: float, phi_i_deg: float
 ) -> tuple[dict[str, Array], tuple[Array | float, Array | float, Array | float, Array | float]]:
-    """Return the axes of a view [degree], and theta_i, phi_i, theta_r, phi_r of its points [rad].
+    """Return the directions of a view of a lobe, closer together around the mirror direction.
 
     Parameters
     ----------
@@ -367,13 +347,6 @@ def view_directions(
         theta_r and delta_phi. "half-difference" is theta_h and theta_d with phi_d = 90 degrees.
     theta_i_deg, phi_i_deg : float [degree]
         The light, theta_i in [0, 90]. Of half-difference phi_i is phi_h, and theta_i is not used.
-
-    Returns
-    -------
-    axes : dict of str to array [degree]
-        In the order of the axes of the points.
-    angles : tuple of four arrays [rad]
-        They broadcast to one point for each combination of the axes.
     """
     light, turned = radians(theta_i_deg), radians(phi_i_deg)
     if view == "half-difference":

@@ -172,14 +172,9 @@ def directions(names: tuple[str, ...], nodes: Sequence[Axis]) -> tuple[NDArray[n
 
 
 def axes_among(names: Iterable[Any]) -> tuple[str, ...]:
-    """Return the axes of a grid among the names of arrays or dimensions.
+    """Return the axes of a grid among the names of arrays or dimensions; ParameterError if there are none.
 
     An anisotropic grid of half and difference vectors has the axes of an isotropic one, too.
-
-    Raises
-    ------
-    ValueError
-        If there are none.
     """
     known = set(names)
     for kind in reversed(KINDS):

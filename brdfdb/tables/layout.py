@@ -240,13 +240,7 @@ class Layout:
 
     @classmethod
     def from_document(cls, document: Mapping[str, Any]) -> Layout:
-        """Return the layout that a document describes.
-
-        Raises
-        ------
-        BrdfdbError
-            If its source is a function, which a document cannot hold.
-        """
+        """Return the layout that a document describes; BrdfdbError for a function, which a document cannot hold."""
         source = source_of(document)
         if not isinstance(source, Material):
             raise BrdfdbError(

@@ -24,16 +24,10 @@ _STRAIGHT = Interpolation(PLAIN.method, wavelengths=LINEAR)
 
 
 class Mixture(NamedTuple):
-    """A few wavelengths whose f_r, without the uniform part, makes f_r at all wavelengths.
+    """A few wavelengths [nm] whose f_r, without the uniform part, makes f_r at all wavelengths.
 
-    Attributes
-    ----------
-    part_nm : array (parts,) [nm]
-        Wavelengths of the parts.
-    spectra : array (parts, L) [1]
-        f_r at wavelength l is the sum over parts p of spectra[p, l] times f_r at part_nm[p].
-    extremes : int64 array
-        Numbers of the wavelengths where the source is brightest and darkest.
+    f_r at wavelength l is the sum over parts p of spectra[p, l] times f_r at part_nm[p]. `extremes` are the numbers of
+    the wavelengths where the source is brightest and darkest.
     """
 
     part_nm: NDArray[np.float64]

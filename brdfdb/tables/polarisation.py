@@ -42,16 +42,10 @@ _WITHIN_CELL = np.array([0.25, 0.5, 0.75])  # where a cell between nodes is meas
 
 @dataclass(frozen=True, eq=False)
 class Facets:
-    """The polarisation of a table in memory.
+    """The polarisation of a table in memory, at nodes (T,) of theta_d from 0 to 90 degrees.
 
-    Attributes
-    ----------
-    theta_d_deg : array (T,) [degree]
-        Nodes, from 0 to 90.
-    elements : float32 array (T, L, 3)
-        m01, m22 and m23 over m00 of the facet, between bases of the plane of light and viewer.
-    depolarised : array (1,) or (L,) [1/sr]
-        The depolarised part of f_r.
+    `elements` (T, L, 3) are m01, m22 and m23 over m00 of the facet, between bases of the plane of light and viewer.
+    `depolarised` (1,) or (L,) [1/sr] is the depolarised part of f_r.
     """
 
     theta_d_deg: NDArray[np.float64]
@@ -124,12 +118,8 @@ def _elements(source: Source, theta_d: Floats, wavelength_nm: NDArray[np.float64
 def planned_theta_d(source: Source, wavelength_nm: NDArray[np.float64], tolerance: float) -> NDArray[np.float64]:
     """Return the nodes [degree] of theta_d at which no element of the facet is off by more than half a tolerance.
 
-    Cells between nodes, in which cubic interpolation is off by more, are halved until none is.
-
-    Raises
-    ------
-    ParameterError
-        If the source has no Mueller matrices, or the tolerance takes more than 10 000 nodes.
+    Cells between nodes, in which cubic interpolation is off by more, are halved until none is. ParameterError if the
+    source has no Mueller matrices, or the tolerance takes more than 10 000 nodes.
     """
     nodes = _FIRST_DEG
     while True:

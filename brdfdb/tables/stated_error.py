@@ -221,24 +221,12 @@ def _rows(bands: Numbers | NDArray[np.float64], some: Places | None) -> NDArray[
 
 
 def stated(limits: Floats, floor: Floats, directions: Directions, brdf: Floats) -> Floats:
-    """Return the error [1/sr] that a table, a family or a file states for values of f_r.
+    """Return the error [1/sr] that a table, a family or a file states for values of f_r [1/sr], shape (..., M).
 
-    Parameters
-    ----------
-    limits : array (rows, M)
-        Limits of relative errors by row of `places`, for each wavelength, such as columns of `Error.limits`.
-    floor : array (M,) [1/sr]
-        Their floors.
-    directions : Angles or Vectors
-        Checked directions, which broadcast to the shape of `brdf` without its last axis.
-    brdf : array (..., M) [1/sr]
-        Values that were looked up.
-
-    Returns
-    -------
-    array (..., M) [1/sr]
-        The largest of what is stated for the band of theta_i and for the places that a pair is in; nan where a value is
-        nan, or nothing is stated. 0 below the horizon, where f_r is exactly 0.
+    `limits` (rows, M) are relative errors by row of `places` for each wavelength, such as columns of `Error.limits`,
+    and `floor` (M,) [1/sr] their floors. `directions` broadcast to the shape of `brdf` without its last axis. The
+    largest of what is stated for the band of theta_i and for the places of a pair counts; nan where a value is nan, or
+    nothing is stated. It is 0 below the horizon, where f_r is exactly 0.
     """
     relative = functools.reduce(np.maximum, (limits[row] for row in places.rows_of(directions)))
     errors = relative * np.maximum(brdf, floor) + 0.0 * brdf

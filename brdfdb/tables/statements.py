@@ -42,18 +42,8 @@ MEASURED = ("error", "formula_error", "largest_albedo", "polarisation")  # attri
 def first_numbers(layout: Layout, read: Read) -> dict[str, Any]:
     """Return the attributes of a table that lists show beside its stated error.
 
-    Parameters
-    ----------
-    layout : Layout
-        Of the table.
-    read : callable
-        Gives some rows of the first axis of the stored array.
-
-    Returns
-    -------
-    dict
-        `formula_error`; `largest_albedo` unless the table has more than `LARGE` values; `polarisation` of a polarised
-        table.
+    They are `formula_error`; `largest_albedo` unless the table has more than `LARGE` values; `polarisation` of a
+    polarised table. `read` gives some rows of the first axis of the stored array.
     """
     numbers: dict[str, Any] = {"formula_error": formula_error_of(layout.source, layout.wavelength_nm)}
     polarised = layout.facet_theta_d_deg is not None
@@ -77,19 +67,9 @@ def highest_rung(material: Material, wavelength_nm: NDArray[np.float64] | None) 
 
 
 def formula_error_of(source: Source, wavelength_nm: NDArray[np.float64] | None) -> FormulaError:
-    """Measure the error of the formula of a source against the highest rung.
+    """Measure the error of the formula of a source against the highest rung, by directions and metric of the charts.
 
-    Parameters
-    ----------
-    source : Source
-        Material, or function, of which no rung is known.
-    wavelength_nm : array of shape (L,) [nm], or None
-        Wavelengths of a spectral source, and only of such a source. At most four of them are measured.
-
-    Returns
-    -------
-    FormulaError
-        Measured with the directions and the metric of the charts.
+    At most four of the wavelengths (L,) [nm] of a spectral source are measured. No rung of a function is known.
     """
     if not isinstance(source, Material):
         return _NONE_KNOWN
@@ -189,19 +169,8 @@ def _up(values: Floats) -> list[list[float]]:
 def stated_metadata(layout: Layout, read: Read, request: Mapping[str, Any] | None = None) -> TableMetadata:
     """Return the metadata of a table with its stated error, its first numbers and the request that it was made for.
 
-    Parameters
-    ----------
-    layout : Layout
-        Of the table.
-    read : callable
-        Gives some rows of the first axis of the stored array. Large tables are read piece by piece.
-    request : mapping, optional
-        The whole request of a build.
-
-    Returns
-    -------
-    TableMetadata
-        The same whenever it is measured, but for rounding: directions are drawn with seeds of their own.
+    `read` gives some rows of the first axis of the stored array: large tables are read piece by piece. The metadata is
+    the same whenever it is measured, but for rounding: directions are drawn with seeds of their own.
     """
     known = metadata_of(layout)
     made_for = {} if request is None else {"request": known.without_source(request), "request_sha256": digest(request)}

@@ -37,14 +37,9 @@ Matrix = list[list[float]]
 class Plane(NamedTuple):
     """The plane of light and viewer, seen from the basis of the surface.
 
-    Attributes
-    ----------
-    theta_d : array [rad]
-        Half the angle between light and viewer.
-    light, viewer : array (..., 4, 4)
-        Rotations of Stokes vectors: of the light from the basis of the surface to that of the plane, of the viewer from
-        that of the plane to that of the surface. The Mueller matrix between bases of the surface is
-        ``viewer @ M @ light`` of that between bases of the plane.
+    `theta_d` [rad] is half the angle between light and viewer. `light` and `viewer` (..., 4, 4) rotate Stokes vectors:
+    of the light from the basis of the surface to that of the plane, of the viewer back. The Mueller matrix between
+    bases of the surface is ``viewer @ M @ light`` of that between bases of the plane.
     """
 
     theta_d: NDArray[np.float64]

@@ -358,17 +358,7 @@ class Table(BaseTable):
     def facet_mueller(self, theta_d: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:
         """Interpolate the Mueller matrix [1] of a facet over its first element, between bases of the plane.
 
-        Parameters
-        ----------
-        theta_d : array_like [rad]
-            Half the angle between light and viewer, in [0, pi/2].
-        wavelength_nm : float or array_like (M,) [nm], optional
-            As in `lookup`.
-
-        Returns
-        -------
-        array [1]
-            Shaped as by `lookup`, and (4, 4).
+        `theta_d` [rad] is half the angle between light and viewer, in [0, pi/2]. Shaped as by `lookup`, and (4, 4).
         """
         facets, at = self._polarised, self._wavelengths(wavelength_nm)
         matrix = facets.facet(np.asarray(theta_d, np.float64), at)
@@ -478,22 +468,17 @@ def table_from(name: str, revision: str, arrays: Mapping[str, NDArray[Any]], att
 class TableSource(FunctionSource):
     """A table as a source: the values of its lookups are its f_r.
 
-    Parameters
-    ----------
-    table : Table
-        The table.
-    held_to : array (L,) [nm], optional
-        Wavelengths, increasing, at which the source is known. Beyond the range of a table of two or more wavelengths
-        f_r is that of its first or last one. By default the source has the range of the table.
+    With `known_nm` (L,) [nm], increasing, the source is known at these wavelengths, too: beyond the range of a table of
+    two or more wavelengths f_r is that of its first or last one. By default the source has the range of the table.
     """
 
     _table: Table = PrivateAttr()
 
-    def __init__(self, table: Table, held_to: NDArray[np.float64] | None = None) -> None:
+    def __init__(self, table: Table, known_nm: NDArray[np.float64] | None = None) -> None:
         recorded = table.source
         wavelength_nm, metadata = table.wavelength_nm, table.metadata
-        if held_to is not None and wavelength_nm is not None and wavelength_nm.size > 1:
-            wavelength_nm = np.union1d(wavelength_nm, held_to)
+        if known_nm is not None and wavelength_nm is not None and wavelength_nm.size > 1:
+            wavelength_nm = np.union1d(wavelength_nm, known_nm)
         stated = metadata.source or "source not stated"
         record: dict[str, Any] = {
             "name": table.name,
@@ -556,12 +541,9 @@ def _held(table: Table, wavelength_nm: ArrayLike | None) -> ArrayLike | None:
     return wavelength_nm if wavelength_nm is None or stored is None else np.clip(wavelength_nm, stored[0], stored[-1])
 
 
-def source_of_table(table: Table, held_to: NDArray[np.float64] | None = None) -> Source:
+def source_of_table(table: Table, known_nm: NDArray[np.float64] | None = None) -> Source:
     """Return the material that a table was tabulated from, or else the table as a source, as of `TableSource`.
 
-    Raises
-    ------
-    ParameterError
-        If the table holds what no f_r can be, or its name is not that of a material.
+    ParameterError if the table holds what no f_r can be, or its name is not that of a material.
     """
-    return table.source if isinstance(table.source, Material) else TableSource(table, held_to)
+    return table.source if isinstance(table.source, Material) else TableSource(table, known_nm)

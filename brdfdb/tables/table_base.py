@@ -34,16 +34,9 @@ _SAMPLED = 5  # wavelengths whose mean decides how directions are drawn
 class Located(NamedTuple):
     """Wavelengths that are asked for, M of them, on the axis of a table.
 
-    Attributes
-    ----------
-    nodes : int64 array (M, 4)
-        Numbers of the wavelengths of the table that count.
-    weight : float64 array (M, 4)
-        Their weights, as by `weights_of_nodes`.
-    column : int64 array (M,)
-        The column of `Error.limits` for each.
-    tail : tuple of int
-        The shape that the wavelengths add to that of the directions.
+    `nodes` (M, 4) are the numbers of the wavelengths of the table that count, `weight` (M, 4) their weights, as by
+    `weights_of_nodes`. `column` (M,) is the column of `Error.limits` for each. `tail` is the shape that the wavelengths
+    add to that of the directions.
     """
 
     nodes: NDArray[np.int64]
@@ -168,24 +161,9 @@ class BaseTable(Lookups):
 
     @abstractmethod
     def specular_reflectance(self, theta_i: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:
-        """Interpolate the reflectance [1] of the specular part; 0 for a model that has none.
+        """Interpolate the reflectance [1] of the specular part at theta_i [rad] in [0, pi]; 0 without it.
 
-        Parameters
-        ----------
-        theta_i : array_like [rad]
-            Angle of incidence, in [0, pi].
-        wavelength_nm : float or array_like (M,) [nm], optional
-            As in `lookup`.
-
-        Returns
-        -------
-        array [1]
-            Shaped as by `lookup`.
-
-        Raises
-        ------
-        ParameterError, StoreError, UnknownRevisionError
-            As by `lookup`.
+        Wavelengths, shape and errors are those of `lookup`.
         """
 
     @array_lookup
@@ -320,10 +298,7 @@ class BaseTable(Lookups):
     ) -> Floats:
         """Return the error [1/sr] that is stated for values, in their shape.
 
-        Raises
-        ------
-        ValueError
-            If a wavelength is between those of the table, and the error was not measured there.
+        ParameterError if a wavelength is between those of the table, and the error was not measured there.
         """
         at = self._wavelengths(wavelength_nm)
         if error.between is None and at.size and at.column.max() >= len(error.floor):

@@ -136,16 +136,9 @@ def _evaluated(layout: Layout, rows: slice, wavelength_nm: ArrayLike | None) -> 
 
 
 def numbers(layout: Layout, wi: Floats, wr: Floats) -> Floats:
-    """Return the numbers of a table at any directions, shape (..., L), before a spectrum of logarithms is factored.
+    """Return the numbers of a table at unit vectors (..., 3), before a spectrum is factored, shape (..., L).
 
     If spectra mix f_r itself, they are those of the parts, shape (..., parts).
-
-    Parameters
-    ----------
-    layout : Layout
-        Layout of the table.
-    wi, wr : arrays of shape (..., 3)
-        Unit vectors, at the horizon or above.
     """
     return layout.interpolation.numbers(*values_at(layout, wi, wr))
 
