@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,9 +74,16 @@ def rectangles(first: Floats, second: Floats) -> Array:
     )
 
 
+class Integrals(NamedTuple):
+    """Integrals, and estimates of their errors."""
+
+    values: Array
+    errors: Array
+
+
 def integrated(
     integrand: Integrand, panels: Array, of: Indices, tolerance: float, most_panels: int, width: int = 1
-) -> tuple[Array, Array]:
+) -> Integrals:
     """Return integrals over panels, shape (integrals, width), and estimates of their errors (integrals,).
 
     Panels with large errors are halved, until those of each integral add up to less than the tolerance. All integrals
@@ -100,7 +108,7 @@ def integrated(
         total = errors.sum(axis=1)
         wanting = (_sums(of, total, count) > tolerance) & (done < most_panels)
         if not np.any(wanting):
-            return _by_pairs(of, values), _sums(of, total, count)
+            return Integrals(_by_pairs(of, values), _sums(of, total, count))
         chosen = _chosen(total, of, wanting, tolerance)
         halved, of_halved = _halved(panels[chosen], errors[chosen]), np.tile(of[chosen], 2)
         new_values, new_errors = _rules(integrand, halved, of_halved, width)
@@ -150,7 +158,7 @@ def _halved(panels: Array, errors: Array) -> Array:
     return np.concatenate([low, high])
 
 
-def _rules(integrand: Integrand, panels: Array, of: Indices, width: int) -> tuple[Array, Array]:
+def _rules(integrand: Integrand, panels: Array, of: Indices, width: int) -> Integrals:
     """Return integrals over each panel, and their largest change with Gauss's rule in the first or second variable.
 
     The integrand gives `width` values per point, in a last axis.
@@ -167,4 +175,4 @@ def _rules(integrand: Integrand, panels: Array, of: Indices, width: int) -> tupl
         values[batch] = area * (_W_KRONROD @ by_first)
         errors[batch, 0] = _SAFETY * np.max(np.abs(values[batch] - area * (_W_GAUSS @ by_first)), axis=1)
         errors[batch, 1] = _SAFETY * np.max(np.abs(values[batch] - area * (_W_GAUSS @ by_second)), axis=1)
-    return values, errors
+    return Integrals(values, errors)

@@ -193,11 +193,11 @@ def reflected_share(
         return values
 
     if lobe is None:
-        integrand, panels, of = _over_the_hemisphere(reflected, theta.ravel(), phi.ravel(), one_side.ravel())
+        integrals = _over_the_hemisphere(reflected, theta.ravel(), phi.ravel(), one_side.ravel())
     else:
         widths = [np.broadcast_to(alpha, theta.shape).ravel() for alpha in (lobe.alpha_x, lobe.alpha_y)]
-        integrand, panels, of = _over_the_slopes(reflected, lights, np.clip(widths, 1e-9, 10.0), one_side.ravel())
-    albedo, error = integrated(integrand, panels, of, tolerance, most_panels, width)
+        integrals = _over_the_slopes(reflected, lights, np.clip(widths, 1e-9, 10.0), one_side.ravel())
+    albedo, error = integrated(*integrals, tolerance, most_panels, width)
     return Albedo(albedo.reshape(*theta.shape, width), error.reshape(theta.shape)[()])
 
 
@@ -241,9 +241,17 @@ def spectral_albedo(
 _Reflected = Callable[[Indices, Array, Array], Array]
 
 
+class _PanelIntegrals(NamedTuple):
+    """Integrals over panels, as `integrated` takes them: integrand, panels, and the integral of each panel."""
+
+    integrand: Integrand
+    panels: Array
+    of: Indices
+
+
 def _over_the_hemisphere(
     reflected: _Reflected, theta_i: Array, phi_i: Array, one_side: NDArray[np.bool_]
-) -> tuple[Integrand, Array, Indices]:
+) -> _PanelIntegrals:
     """Return the integrand over theta_r and phi_r, and panels that end at the edges of Oren and Nayar's model."""
 
     def integrand(of: Indices, theta: Array, phi: Array) -> Array:
@@ -253,12 +261,12 @@ def _over_the_hemisphere(
     panels = [
         rectangles(np.array([0.0, edge, HALF_PI]), phi + _QUARTERS) for edge, phi in zip(edges, phi_i, strict=True)
     ]
-    return integrand, *_sides(panels, phi_i, one_side)
+    return _panel_integrals(integrand, panels, phi_i, one_side)
 
 
 def _over_the_slopes(
     reflected: _Reflected, lights: Array, widths: Array, one_side: NDArray[np.bool_]
-) -> tuple[Integrand, Array, Indices]:
+) -> _PanelIntegrals:
     """Return the integrand over the slopes of lobes, for lights (L, 3) and widths (2, L), and its panels.
 
     The integrand is a function of x in [0, 1], the position on a ray, and psi, the azimuth on the ellipse of the lobe.
@@ -273,24 +281,33 @@ def _over_the_slopes(
     x_i, y_i = lights[:, 0], lights[:, 1]
     across = np.where(x_i**2 + y_i**2 > 0.0, np.arctan2(widths[0] * x_i, -widths[1] * y_i), HALF_PI)  # p = 0
     panels = [rectangles(np.linspace(0.0, 1.0, 5), begin + _QUARTERS) for begin in across]
-    return integrand, *_sides(panels, across + HALF_PI, one_side)
+    return _panel_integrals(integrand, panels, across + HALF_PI, one_side)
 
 
-def _sides(panels: list[Array], begin: Array, one_side: NDArray[np.bool_]) -> tuple[Array, Indices]:
-    """Return the panels of all lights, and the light of each.
+def _panel_integrals(
+    integrand: Integrand, panels: list[Array], begin: Array, one_side: NDArray[np.bool_]
+) -> _PanelIntegrals:
+    """Return the integrals of all lights over their panels.
 
-    Where `one_side` says so, they cover one side of the plane of incidence, which begins at the azimuth `begin`.
+    Where `one_side` says so, panels cover one side of the plane of incidence, which begins at the azimuth `begin`.
     """
     of = np.repeat(np.arange(len(panels)), [len(some) for some in panels])
     rows = np.concatenate(panels)
     kept = ~one_side[of] | ((rows[:, 1] > begin[of]) & (rows[:, 1] < begin[of] + np.pi))
-    return rows[kept], of[kept]
+    return _PanelIntegrals(integrand, rows[kept], of[kept])
+
+
+class MirroredDirections(NamedTuple):
+    """Unit vectors (..., 3), and the solid angle [sr] (...) of each for dx dpsi."""
+
+    w: Array
+    solid_angle: Array
 
 
 def mirrored_on_rays(
     i: tuple[Floats, Floats, Floats], alpha_x: float | Array, alpha_y: float | Array, x: Array, psi: Array
-) -> tuple[Array, Array]:
-    """Return directions mirrored in half vectors on rays of slopes, and the solid angle [sr] for dx dpsi.
+) -> MirroredDirections:
+    """Return directions mirrored in half vectors on rays of slopes.
 
     Parameters
     ----------
@@ -302,11 +319,6 @@ def mirrored_on_rays(
         Position on the ray, in [0, 1]: 0 is the mirror direction, and 1 the horizon. It is stretched near the lobe.
     psi : array [rad]
         Azimuth of the ray on the ellipse of the lobe.
-
-    Returns
-    -------
-    array (..., 3), array (...)
-        Unit vectors, and their solid angle, in the broadcast shape of the arguments.
     """
     x_i, y_i, cos_i = i
     s_x, s_y = alpha_x * np.cos(psi), alpha_y * np.sin(psi)  # slopes of the half vector, divided by t
@@ -325,4 +337,4 @@ def mirrored_on_rays(
     for axis, (h, w_i) in enumerate(((t * s_x * cos_h, x_i), (t * s_y * cos_h, y_i), (cos_h, cos_i))):
         wr[..., axis] = 2.0 * h_i * h - w_i
     # d omega_r = 4 (h.i) d omega_h, d omega_h = cos^3 d(slopes), d(slopes) = alpha_x alpha_y t dt dpsi
-    return wr, np.asarray(4.0 * h_i * cos_h**3 * (alpha_x * alpha_y) * t * jacobian)
+    return MirroredDirections(wr, np.asarray(4.0 * h_i * cos_h**3 * (alpha_x * alpha_y) * t * jacobian))

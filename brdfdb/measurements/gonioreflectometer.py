@@ -10,7 +10,7 @@ from __future__ import annotations
 import itertools
 from dataclasses import asdict, dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -76,6 +76,13 @@ def traced(theta_c: Array, phi_c: Array, offset: float) -> Array:
     along = out @ camera
     point = camera + (-along + np.sqrt(along**2 + 1.0 - offset**2))[..., None] * out
     return np.asarray(2.0 * np.sum(out * point, axis=-1, keepdims=True) * point - out)
+
+
+class CameraAngles(NamedTuple):
+    """Polar angles and azimuths [rad] of directions of the camera."""
+
+    theta_c: Array
+    phi_c: Array
 
 
 @dataclass(frozen=True)
@@ -150,8 +157,8 @@ class Gonioreflectometer:
         """The largest count."""
         return float(2**self.bits - 1)
 
-    def pixels(self, within: tuple[float, ...] = (0.5,)) -> tuple[Array, Array]:
-        """Return theta_c and phi_c [rad] of the camera, the top row first.
+    def pixels(self, within: tuple[float, ...] = (0.5,)) -> CameraAngles:
+        """Return the angles of the pixels, the top row first.
 
         The shape is (height * K, width * K) for K points along each axis of a pixel, at `within` [pixel] of its corner.
         """
@@ -160,7 +167,7 @@ class Gonioreflectometer:
         )
         right, up = np.meshgrid(x, -y)
         sine = 0.5 * self.pitch * np.hypot(right, up)  # of half of theta_c
-        return 2.0 * np.arcsin(np.minimum(sine, 1.0)), np.arctan2(up, right)
+        return CameraAngles(2.0 * np.arcsin(np.minimum(sine, 1.0)), np.arctan2(up, right))
 
     @cached_property
     def directions(self) -> Array:
@@ -238,7 +245,7 @@ def photograph(
     turned = _turned(wr[above], phi_i)
     f_r = np.zeros(len(wr))
     beam = cone(unit_vector(theta_i, phi_i)[np.newaxis], float(radians(settings.light_half_angle_deg)))
-    for w_i, weight in zip(beam, disk(1)[1], strict=True):
+    for w_i, weight in zip(beam, disk(1).weights, strict=True):
         share = weight * w_i[0, 2] / np.cos(theta_i)
         f_r[above] += share * brdf(np.broadcast_to(w_i, turned.shape), turned)[:, 0]
     light = np.zeros((2, *theta_c.shape))
@@ -317,8 +324,15 @@ def reduced(picture: CameraPicture, thin: bool = True) -> Samples:
     )
 
 
-def _unsaturated(counts: Frames, background: Frames, settings: Gonioreflectometer, frames: int) -> tuple[Array, Array]:
-    """Return counts less the background, a unit of time, and their standard uncertainty; nan where all saturate.
+class _Exposed(NamedTuple):
+    """Counts less the background, a unit of time, and their standard uncertainty; nan where all exposures saturate."""
+
+    counts: Array
+    noise: Array
+
+
+def _unsaturated(counts: Frames, background: Frames, settings: Gonioreflectometer, frames: int) -> _Exposed:
+    """Return the counts of the longest exposure in which a pixel does not saturate.
 
     Noise and saturation are judged by counts that are smoothed over some pixels. A pixel that is dark by chance would
     otherwise count as one with less noise, and a fit that weighs by uncertainty would come out too dark.
@@ -337,7 +351,7 @@ def _unsaturated(counts: Frames, background: Frames, settings: Gonioreflectomete
         used = np.isnan(value) & (smooth < _SATURATED * settings.saturation) & (some < settings.saturation)
         value[used] = (some.astype(np.float64) - dark)[used] / time
         noise[used] = np.sqrt(variance[used]) / time
-    return value, noise
+    return _Exposed(value, noise)
 
 
 def _smoothed(f_r: Array) -> Array:

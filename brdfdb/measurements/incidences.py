@@ -23,17 +23,25 @@ _FEWEST_VIEWERS = 12  # of an incidence that is integrated
 _MOST_INCIDENCES = 400  # that are integrated, evenly among all
 
 
-def averaged(points: Floats, values: Floats) -> tuple[Floats, Floats]:
+class ScatteredValues(NamedTuple):
+    """Values (N, C) at points (N, 2)."""
+
+    points: Floats
+    values: Floats
+
+
+def averaged(points: Floats, values: Floats) -> ScatteredValues:
     """Return each point once, with the mean of its values without holes."""
     _, first, which = np.unique(np.round(points, 9), axis=0, return_index=True, return_inverse=True)
     which = which.reshape(-1)
     if first.size == len(points):
-        return points, values
+        return ScatteredValues(points, values)
     known = np.isfinite(values)
     totals, counts = np.zeros((2, first.size, values.shape[1]))
     np.add.at(totals, which, np.where(known, values, 0.0))
     np.add.at(counts, which, known)
-    return points[first], np.divide(totals, counts, out=np.full_like(totals, np.nan), where=counts > 0)
+    means = np.divide(totals, counts, out=np.full_like(totals, np.nan), where=counts > 0)
+    return ScatteredValues(points[first], means)
 
 
 @dataclass(frozen=True)

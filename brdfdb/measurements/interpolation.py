@@ -113,8 +113,25 @@ def _radial(x: Floats, centres: Floats) -> Floats:
     return r
 
 
-def lambert_and_lobe(samples: Samples) -> tuple[Base, float, str]:
-    """Return the base that fits samples best, the width of its lobe [1], and its name in words.
+class LobeBase(NamedTuple):
+    """A base, the width of its lobe [1], and its name in words."""
+
+    f_r: Base
+    alpha: float
+    words: str
+
+
+class _LobeFit(NamedTuple):
+    """Coefficients (3, C) of a base with a lobe of a width [1], and the residual of its fit."""
+
+    residual: float
+    alpha: float
+    tail: bool
+    coefficients: Floats
+
+
+def lambert_and_lobe(samples: Samples) -> LobeBase:
+    """Return the base that fits samples best.
 
     It is Lambert and one lobe in tan theta_h, Gaussian or with a tail, alone and with Schlick's fifth power, over a
     denominator that is never 0; coefficients are not negative. A lobe that a few samples do not lie within could
@@ -126,8 +143,8 @@ def lambert_and_lobe(samples: Samples) -> tuple[Base, float, str]:
     some = np.random.default_rng(_SEED).permutation(len(wi))[: 4 * _SEARCHED]
     wi, wr, values = wi[some], wr[some], values[some]
     weight = 1.0 / (np.abs(values) + FLOOR * np.nanmean(np.abs(values), axis=0))
-    best: tuple[float, float, str, Floats] | None = None
-    tan2 = np.sort(half_angles(wi, wr)[0])
+    best: _LobeFit | None = None
+    tan2 = np.sort(half_angles(wi, wr).tan2_h)
     narrowest = np.sqrt(tan2[min(_SEEN, tan2.size) - 1])
     for alpha, tail in itertools.product(np.append(_ALPHAS[narrowest <= _ALPHAS], _ALPHAS[-1]), (False, True)):
         columns = _columns(wi, wr, alpha, tail=tail)
@@ -136,16 +153,17 @@ def lambert_and_lobe(samples: Samples) -> tuple[Base, float, str]:
             for c in range(values.shape[1])
             for good in [np.isfinite(values[:, c])]
         ]
-        left = sum(residual for _, residual in fits)
-        if best is None or left < best[0]:
-            best = left, float(alpha), "with a tail" if tail else "Gaussian", np.stack([fit for fit, _ in fits], axis=1)
+        residual = float(sum(residual for _, residual in fits))
+        if best is None or residual < best.residual:
+            best = _LobeFit(residual, float(alpha), tail, np.stack([fit for fit, _ in fits], axis=1))
     assert best is not None
-    _, width, kind, coefficients = best
+    chosen = best
 
     def base(wi: Floats, wr: Floats) -> Floats:
-        return np.asarray(_columns(wi, wr, width, tail=kind != "Gaussian") @ coefficients)
+        return np.asarray(_columns(wi, wr, chosen.alpha, tail=chosen.tail) @ chosen.coefficients)
 
-    return base, width, f"Lambert and one {kind} lobe of width {width:.2g}"
+    kind = "with a tail" if chosen.tail else "Gaussian"
+    return LobeBase(base, chosen.alpha, f"Lambert and one {kind} lobe of width {chosen.alpha:.2g}")
 
 
 def _columns(wi: Floats, wr: Floats, alpha: float, *, tail: bool) -> Floats:
@@ -282,14 +300,16 @@ def fit(samples: Samples, base: Base | None = None) -> Fitted:
     `brdfdb.measurements.extent.Extent` marks. Samples without such a pattern are held out in ten parts, by chance.
     """
     _check_values(samples)
-    own, alpha, words = lambert_and_lobe(samples)
-    f_base = own if base is None else base
+    lobe = lambert_and_lobe(samples)
+    f_base = lobe.f_r if base is None else base
     problem, level, scheme = _problem(samples, f_base)
     mean, lowest = problem.y.mean(axis=0), float(min(problem.wi[:, 2].min(), problem.wr[:, 2].min()))
     order = np.random.default_rng(_SEED).permutation(len(problem.wi))
     few = problem.some(order[:_SEARCHED])
     tried = [
-        SampleInterpolation(f_base, alpha, level, _Scales(half * both, both, both, noise), samples.turned, mean, lowest)
+        SampleInterpolation(
+            f_base, lobe.alpha, level, _Scales(half * both, both, both, noise), samples.turned, mean, lowest
+        )
         for half, both, noise in itertools.product((1.0, 2.0), _SCALES, _ROUGHNESS)
     ]
     scores = [np.mean(np.minimum(np.abs(_held_out(one, few, few) - few.y), 3.0)) for one in tried]
@@ -298,7 +318,9 @@ def fit(samples: Samples, base: Base | None = None) -> Fitted:
     held_out = _stated(samples, problem, _held_out(chosen, problem, centres), chosen, scheme)
     at = _x(chosen, centres)
     weights = _solved(*_normal(chosen, problem, _radial(_x(chosen, problem), at)), _radial(at, at))
-    return Fitted(replace(chosen, centres=at, weights=weights), held_out, words if base is None else "the given base")
+    return Fitted(
+        replace(chosen, centres=at, weights=weights), held_out, lobe.words if base is None else "the given base"
+    )
 
 
 def _problem(samples: Samples, base: Base) -> tuple[_Problem, Floats, str]:

@@ -6,7 +6,7 @@ import itertools
 import re
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -123,16 +123,14 @@ def _contradiction(parts: Sequence[Samples]) -> str:
     codes = [_codes(part) for part in parts]
     values = np.concatenate([part.values for part in parts])
     noises = np.concatenate([_noise(part) for part in parts])
-    worst, sentence = 0.0, ""
+    worst = _Difference(0.0, "")
     for number in range(1, len(parts)):
         before = np.concatenate(codes[:number])
         _, one, two = np.intersect1d(before, codes[number], return_indices=True)
         files = "both files have" if len(parts) == 2 else f"{parts[number].name} and files before it have"
-        ratio, text = _difference(values, noises, one, two + len(before), files)
-        if ratio > worst:
-            worst, sentence = ratio, text
-    own = [str(part.record["contradiction"]) for part in parts if "contradiction" in part.record]
-    return sentence or next(iter(own), "")
+        worst = max(worst, _difference(values, noises, one, two + len(before), files), key=lambda found: found.ratio)
+    recorded = [str(part.record["contradiction"]) for part in parts if "contradiction" in part.record]
+    return worst.sentence or next(iter(recorded), "")
 
 
 def contradiction_within(samples: Samples) -> str:
@@ -143,35 +141,38 @@ def contradiction_within(samples: Samples) -> str:
     _, first, directions = np.unique(_codes(samples), return_index=True, return_inverse=True)
     one = first[directions]
     again = np.flatnonzero(one != np.arange(one.size))
-    return _difference(samples.values, _noise(samples), one[again], again, "more than one row has")[1]
+    return _difference(samples.values, _noise(samples), one[again], again, "more than one row has").sentence
+
+
+class _Difference(NamedTuple):
+    """The median ratio of values at the same directions, and a sentence; 0 and "" if they do not contradict."""
+
+    ratio: float
+    sentence: str
 
 
 def _difference(
     values: Floats, noises: Floats, one: NDArray[np.intp], two: NDArray[np.intp], holders: str
-) -> tuple[float, str]:
-    """Return the median ratio of rows `one` and `two`, and a sentence; 0 and an empty text if they do not contradict.
+) -> _Difference:
+    """Return the difference of rows `one` and `two` (n,), which have the same directions.
 
-    Parameters
-    ----------
-    values, noises : array (N, C) [1/sr]
-        f_r and its standard uncertainties, 0 where none is stated.
-    one, two : array (n,)
-        Rows with the same directions.
-    holders : str
-        What has the directions, with its verb.
+    `values` and `noises` (N, C) [1/sr] are f_r and its standard uncertainties, 0 where none is stated. `holders` is
+    what has the directions, with its verb.
     """
     positive = np.minimum(values[one], values[two]) > 0.0
     if not positive.any():
-        return 0.0, ""
+        return _Difference(0.0, "")
     a, b, u = values[one][positive], values[two][positive], np.hypot(noises[one], noises[two])[positive]
     ratio = float(np.median(np.maximum(a, b) / np.minimum(a, b)))
     stated = (u > 0.0) & np.isfinite(u)
     beyond = stated.any() and float(np.median(np.abs(a - b)[stated] / u[stated])) > _UNLIKELY
     if not (ratio > _RATIO or beyond):
-        return 0.0, ""
+        return _Difference(0.0, "")
     end = ", which is beyond the stated uncertainties" if beyond else ""
     directions = counted(np.unique(one[np.any(positive, axis=1)]).size, "direction")
-    return ratio, f"At {directions} that {holders}, f_r differs by {percent(ratio - 1.0)} in the median{end}."
+    return _Difference(
+        ratio, f"At {directions} that {holders}, f_r differs by {percent(ratio - 1.0)} in the median{end}."
+    )
 
 
 def _noise(part: Samples) -> Floats:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.geometry import radians, unit_vector
 from brdfdb.materials.source import Evaluate
+from brdfdb.measurements.coordinates import DirectionPairs
 from brdfdb.measurements.extent import Extent
 from brdfdb.measurements.record import MeasuredSymmetry, Spread
 from brdfdb.parameters import Floats
@@ -24,20 +26,28 @@ _IN_OCTAVE = 400
 _WITHIN = 1.2  # times the noise is how large the asymmetry may be, because both are estimates
 
 
-def drawn_pairs(extent: Extent | None = None, up_to_deg: float = _UP_TO_DEG) -> tuple[Floats, Floats]:
+def drawn_pairs(extent: Extent | None = None, up_to_deg: float = _UP_TO_DEG) -> DirectionPairs:
     """Return pairs of unit vectors (N, 3) up to an angle [degree]; with an extent, those within it, also exchanged."""
     rng = np.random.default_rng(_SEED)
     theta = np.arccos(rng.uniform(np.cos(radians(up_to_deg)), 1.0, (2, _DRAWN)))
     phi = rng.uniform(0.0, 2.0 * np.pi, (2, _DRAWN))
     wi, wr = (unit_vector(theta[k], phi[k]) for k in (0, 1))
     if extent is None:
-        return wi, wr
+        return DirectionPairs(wi, wr)
     inside = _inside(extent, wi, wr)
-    return wi[inside], wr[inside]
+    return DirectionPairs(wi[inside], wr[inside])
 
 
-def lobe_pairs(extent: Extent | None = None) -> tuple[Floats, Floats, NDArray[np.int64]]:
-    """Return pairs of unit vectors (N, 3) around the mirror direction and the light, and their octaves (N,).
+class LobePairs(NamedTuple):
+    """Unit vectors (N, 3) of light and viewer, and the octave (N,) of the slope of their half vectors."""
+
+    wi: Floats
+    wr: Floats
+    octave: NDArray[np.int64]
+
+
+def lobe_pairs(extent: Extent | None = None) -> LobePairs:
+    """Return pairs around the mirror direction and the light.
 
     As many pairs have half vectors with slopes of 0.002 to 0.004, as of 0.004 to 0.008, and so on up to 2: a lobe of
     any width has a share of them. The same viewers, turned by 180 degrees, are about the light. Those of samples lie
@@ -55,7 +65,7 @@ def lobe_pairs(extent: Extent | None = None) -> tuple[Floats, Floats, NDArray[np
     inside = wr[:, 2] > np.cos(radians(_UP_TO_DEG))
     if extent is not None:
         inside &= _inside(extent, wi, wr)
-    return wi[inside], wr[inside], octave[inside]
+    return LobePairs(wi[inside], wr[inside], octave[inside])
 
 
 def _inside(extent: Extent, wi: Floats, wr: Floats) -> NDArray[np.bool_]:
@@ -108,9 +118,9 @@ def reciprocity(f_r: Evaluate, extent: Extent | None, noise: float | None) -> Me
     """
     wi, wr = drawn_pairs(extent)
     f, other = (f_r(wi, wr), f_r(wr, wi)) if len(wi) else (np.empty((0, 1)),) * 2
-    in_lobe = lobe_pairs(extent)[:2]
+    lobe = lobe_pairs(extent)
     spreads = [_floored(f, other)] if len(wi) else []
-    spreads += [_floored(f_r(*in_lobe), f_r(*in_lobe[::-1]))] if len(in_lobe[0]) else []
+    spreads += [_floored(f_r(lobe.wi, lobe.wr), f_r(lobe.wr, lobe.wi))] if len(lobe.wi) else []
     p99 = max((one.p99 for one in spreads if one is not None), default=np.inf)
     allowed = _ROUNDING if noise is None else max(_WITHIN * noise, _ROUNDING)
     return MeasuredSymmetry(assumed=p99 <= allowed, asymmetry=_spread(f, other), allowed=noise)

@@ -31,8 +31,11 @@ THETA_I_DEG = np.array([*range(0, 85, 5), 82.5, 85.0, 87.5, 89.0, 89.5], dtype=n
 _PHI_I_STEP_DEG = 30.0
 LAST_LIGHT_DEG = 89.9  # largest angle at which the albedo of a source with a pole at the horizon is judged
 _ROUNDS = 4  # of the search for the largest albedo of a source; each halves the steps around it
-# Cosines of the lights that show the growth of an albedo towards 90 degrees; the least cosine that is tried
-_NEAR, _NEARER, _NEAREST, _LEAST = 1e-4, 1e-6, 1e-8, 1e-12
+# Cosines of the lights that show the growth of an albedo towards 90 degrees
+_NEAR = 1e-4
+_NEARER = 1e-6
+_NEAREST = 1e-8
+_LEAST = 1e-12  # smallest cosine that is tried
 _GRAZING_TOLERANCE = 1e-5  # of those albedos, relative to the albedo at the light before, or to 1
 _PASSING = 1e-3  # relative tolerance of the cosine from which on an albedo exceeds 1
 _FLAT = 1e-4  # rise from light to light, relative to the albedo, up to which it is bounded
@@ -298,35 +301,28 @@ def _theta_weights(nodes: Axis) -> Axis:
 def largest_albedo(table: Table, source: Source | None) -> LargestAlbedo:
     """Return the largest directional albedo [1] that a table states, specular part included.
 
-    Parameters
-    ----------
-    table : Table
-        The table.
-    source : Source or None
-        What was tabulated. The albedo is that of a model or a function, so that it is the same at each tolerance of a
-        table. The albedo of measured data, and of a table whose source is not known, is that of the lookups.
-
-    Returns
-    -------
-    LargestAlbedo
-        For lights up to `last_light` of a source, or up to the last light of `directional_albedo` of a table.
+    It is that of the model or function that was tabulated, so that it is the same at each tolerance of a table, for
+    lights up to `last_light`. The albedo of measured data, and of a table whose source is not known, is that of the
+    lookups, for the lights of `directional_albedo`.
     """
-    nm, albedo_at = table.wavelength_nm, albedo_of(table, source)
-    if _looked_up(source):
-        of_source, power = False, None
+    wavelength_nm = table.wavelength_nm
+    albedo_at = albedo_of(table, source)
+    power = None
+    of_source = source is not None and not _looked_up(source)
+    if source is None or not of_source:
         integrated = directional_albedo(table, tolerance=LARGEST_TOLERANCE)
-        lights, whole = integrated.theta_i_deg, _whole(table, integrated.theta_i_deg, nm, integrated.albedo)
+        lights = integrated.theta_i_deg
+        albedos = _with_specular(table, lights, wavelength_nm, integrated.albedo)
     else:
-        assert source is not None
-        of_source, power = True, source.grazing_power(nm)
+        power = source.grazing_power(wavelength_nm)
         lights = np.append(THETA_I_DEG, np.unique([LAST_LIGHT_DEG, last_light(source)]))
-        lights, whole = _searched(albedo_at, lights)
-    row, column = np.unravel_index(int(np.argmax(np.where(np.isfinite(whole), whole, np.inf))), whole.shape)
-    largest = float(whole[row, column])
+        lights, albedos = _searched(albedo_at, lights)
+    row, column = np.unravel_index(int(np.argmax(np.where(np.isfinite(albedos), albedos, np.inf))), albedos.shape)
+    largest = float(albedos[row, column])
     return LargestAlbedo(
         albedo=float(f"{largest:.4g}") if np.isfinite(largest) else None,
         theta_i_deg=float(f"{lights[row]:.6g}"),
-        wavelength_nm=None if nm is None else float(nm[column]),
+        wavelength_nm=None if wavelength_nm is None else float(wavelength_nm[column]),
         tolerance=LARGEST_TOLERANCE,
         of="source" if of_source else "table",
         up_to_theta_i_deg=float(lights[-1]),
@@ -371,29 +367,36 @@ def _of_source(source: Source, wavelength_nm: Axis | None) -> AlbedoAt:
     def albedo_at(theta_i_deg: Axis, tolerance: float) -> Floats:
         theta_i = radians(theta_i_deg)[:, np.newaxis]
         albedo, _ = source_albedo(source, theta_i, phi_i, wavelength_nm, tolerance=tolerance, most_panels=_MOST_PANELS)
-        return _whole(source, theta_i_deg, wavelength_nm, albedo)
+        return _with_specular(source, theta_i_deg, wavelength_nm, albedo)
 
     return albedo_at
 
 
 def _of_table(table: Table) -> AlbedoAt:
     """Return the albedo of the lookups of a table with its specular part, largest over the azimuths of the light."""
-    return lambda theta_i_deg, tolerance: _whole(
+    return lambda theta_i_deg, tolerance: _with_specular(
         table, theta_i_deg, table.wavelength_nm, directional_albedo(table, theta_i_deg, tolerance).albedo
     )
 
 
-def _whole(surface: Table | Source, theta_i_deg: Axis, wavelength_nm: Axis | None, albedo: Floats) -> Floats:
+def _with_specular(surface: Table | Source, theta_i_deg: Axis, wavelength_nm: Axis | None, albedo: Floats) -> Floats:
     """Return albedos (theta_i, wavelengths) [1] with the specular part, from those (theta_i, phi_i, wavelengths)."""
     specular = np.asarray(surface.specular_reflectance(radians(theta_i_deg), wavelength_nm))
     return np.asarray(albedo.max(axis=1) + specular.reshape(theta_i_deg.size, -1))
 
 
-def _searched(albedo_at: AlbedoAt, lights: Axis) -> tuple[Axis, Floats]:
-    """Return lights [degree] with more of them around each maximum that may be the largest albedo, and the albedos."""
-    whole = albedo_at(lights, LARGEST_TOLERANCE)
+class _Albedos(NamedTuple):
+    """Lights [degree], and albedos (lights, wavelengths) [1] with the specular part."""
+
+    theta_i_deg: Axis
+    albedo: Floats
+
+
+def _searched(albedo_at: AlbedoAt, lights: Axis) -> _Albedos:
+    """Return the albedos of lights, and of more lights around each maximum that may be the largest albedo."""
+    albedos = albedo_at(lights, LARGEST_TOLERANCE)
     for _ in range(_ROUNDS):
-        of_lights = whole.max(axis=1)
+        of_lights = albedos.max(axis=1)
         between: set[float] = set()
         for at, albedo in enumerate(of_lights):
             around = slice(max(at - 1, 0), at + 2)
@@ -405,9 +408,9 @@ def _searched(albedo_at: AlbedoAt, lights: Axis) -> tuple[Axis, Floats]:
             break
         added = np.array(sorted(between))
         order = np.argsort(np.append(lights, added))
-        whole = np.concatenate([whole, albedo_at(added, LARGEST_TOLERANCE)])[order]
+        albedos = np.concatenate([albedos, albedo_at(added, LARGEST_TOLERANCE)])[order]
         lights = np.append(lights, added)[order]
-    return lights, whole
+    return _Albedos(lights, albedos)
 
 
 def _grazing(albedo_at: AlbedoAt, declared: float | None, largest: float, up_to_theta_i_deg: float) -> Grazing | None:

@@ -34,6 +34,7 @@ _ROUNDING = 1e-6  # of a degree of polarisation that is written as decimals
 _AT_ONCE = 25_000  # points whose spectra are in memory at once while colours are computed
 ViewName = Literal["cut", "hemisphere", "half-difference"]
 
+# Angles of views
 _CUT = np.arange(-90.0, 91.0)  # theta_r [degree], negative back towards the light
 _OVER = np.linspace(0.0, 90.0, 31)  # theta_r of a hemisphere [degree]
 _AROUND = np.linspace(0.0, 360.0, 61)  # delta_phi [degree]
@@ -229,6 +230,13 @@ class Values(NamedTuple):
         return np.asarray(self.brdf if self.error is None else np.stack([self.brdf, self.error]))
 
 
+class _Values(NamedTuple):
+    """f_r [1/sr], and its stated error or None."""
+
+    brdf: Any
+    error: Any
+
+
 class LookupSubject(NamedTuple):
     """A table, model or family. All have `lookup` and `specular_reflectance`, a table also errors and `extrapolated`.
 
@@ -263,9 +271,10 @@ class LookupSubject(NamedTuple):
         # A table takes None as all of its wavelengths, which is faster than naming them
         at = points.wavelength_nm if self.kind == "table" else self.wavelengths(points)
 
-        def spectra(angles: Angles) -> tuple[Any, Any]:
-            source = self.source
-            return source.lookup_with_error(*angles, at) if error else (source.lookup(*angles, at), None)
+        def spectra(angles: Angles) -> _Values:
+            if error:
+                return _Values(*self.source.lookup_with_error(*angles, at))
+            return _Values(self.source.lookup(*angles, at), None)
 
         def dirac() -> Any:
             return self.source.specular_reflectance(points.angles[0], at) if specular else None
@@ -309,15 +318,16 @@ class _InRange(NamedTuple):
 
 def _coloured(
     points: LookupPoints,
-    spectra: Callable[[Angles], tuple[Any, Any]],
+    spectra: Callable[[Angles], _Values],
     weights: NDArray[np.float64],
     grey: bool,
     *,
     error: bool,
-) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
+) -> _Values:
     """Return colours of spectra, in batches of points: 41 values of each of a million points would be 300 MB."""
     flat = [np.broadcast_to(angle, points.shape).reshape(-1) for angle in points.angles]
-    brdf, stated = np.empty((points.count, 3)), np.empty((points.count, 3)) if error else None
+    brdf = np.empty((points.count, 3))
+    stated = np.empty((points.count, 3)) if error else None
     for start in range(0, points.count, _AT_ONCE):
         rows = slice(start, start + _AT_ONCE)
         t_i, p_i, t_r, p_r = (angle[rows] for angle in flat)
@@ -326,7 +336,7 @@ def _coloured(
         if stated is not None:
             stated[rows] = _mixed(errors, np.abs(weights), grey)
     shape = (*points.shape, 3)
-    return brdf.reshape(shape), None if stated is None else stated.reshape(shape)
+    return _Values(brdf.reshape(shape), None if stated is None else stated.reshape(shape))
 
 
 def _mixed(values: Any, weights: NDArray[np.float64], grey: bool) -> Any:
@@ -335,9 +345,17 @@ def _mixed(values: Any, weights: NDArray[np.float64], grey: bool) -> Any:
     return np.asarray((whole[..., np.newaxis] if grey else whole) @ weights)
 
 
-def view_directions(
-    view: ViewName, theta_i_deg: float, phi_i_deg: float
-) -> tuple[dict[str, Array], tuple[Array | float, Array | float, Array | float, Array | float]]:
+class LobeDirections(NamedTuple):
+    """The axes of a view [degree] in the order of those of its points, and theta_i, phi_i, theta_r, phi_r [rad].
+
+    The angles broadcast to one point for each combination of the axes.
+    """
+
+    axes_deg: dict[str, Array]
+    angles: Angles
+
+
+def view_directions(view: ViewName, theta_i_deg: float, phi_i_deg: float) -> LobeDirections:
     """Return the directions of a view of a lobe, closer together around the mirror direction.
 
     Parameters
@@ -351,16 +369,16 @@ def view_directions(
     light, turned = radians(theta_i_deg), radians(phi_i_deg)
     if view == "half-difference":
         points = directions_from_half_difference(radians(_HALF)[:, np.newaxis], turned, radians(_HALF), radians(90.0))
-        return {"theta_h": _HALF, "theta_d": _HALF}, points
+        return LobeDirections({"theta_h": _HALF, "theta_d": _HALF}, points)
     if view == "cut":
         signed = np.unique(np.clip(np.concatenate([_CUT, theta_i_deg + _NEAR]), -90.0, 90.0))
         beyond = turned + np.where(signed > 0.0, np.pi, 0.0)
-        return {"theta_r": signed}, (light, turned, radians(np.abs(signed)), beyond)
+        return LobeDirections({"theta_r": signed}, (light, turned, radians(np.abs(signed)), beyond))
     theta_r = np.unique(np.clip(np.concatenate([_OVER, theta_i_deg + _NEAR]), 0.0, 90.0))
     spread = _NEAR / max(np.sin(light), 0.1)
     delta_phi = np.unique(np.clip(np.concatenate([_AROUND, 180.0 + spread]), 0.0, 360.0))
     axes = {"theta_r": theta_r, "delta_phi": delta_phi}
-    return axes, (light, turned, radians(theta_r)[:, np.newaxis], turned + radians(delta_phi))
+    return LobeDirections(axes, (light, turned, radians(theta_r)[:, np.newaxis], turned + radians(delta_phi)))
 
 
 class StokesDocument(BaseModel):

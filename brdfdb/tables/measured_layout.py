@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,17 +31,25 @@ from brdfdb.tables.table import Table, TableSource
 _LADDER = (16, 24, 36, 54, 72)  # nodes of theta_h or theta_i
 _ANISOTROPIC_LADDER = (10, 14, 20)
 _WIDE = 0.5  # width [1] of a lobe beyond which directions of light and viewer suit as well
-_DRAWS, _SEED = 300, 1867
+_DIRECTIONS = 300  # pairs of directions in a band of theta_i
+_SEED = 1867
 _EASED = 0.02  # share of the nodes of theta_h that are spread evenly, so that no two are the same
 _BITS = 14  # rounds a logarithm by less than measured data are uncertain
 # nodes of the other axes, as shares of those of the first
 _SHARES = {"theta_d": 0.6, "phi_d": 0.7, "theta_r": 1.0, "delta_phi": 1.0, "phi_h": 1.2, "phi_i": 1.2, "phi_r": 1.6}
 
 
+class MeasuredLayout(NamedTuple):
+    """The layout of a table of measured data, and its values, which were tabulated to choose it."""
+
+    layout: Layout
+    values: NDArray[np.float32]
+
+
 def tabulated(
     source: MeasuredSource | TableSource, wavelength_nm: NDArray[np.float64] | None, tolerance: float
-) -> tuple[Layout, NDArray[np.float32]]:
-    """Return the layout of a table of measured data, and its values, which were tabulated to choose it.
+) -> MeasuredLayout:
+    """Return the coarsest layout of measured data that keeps to a tolerance.
 
     Parameters
     ----------
@@ -67,7 +76,7 @@ def tabulated(
     check_tolerance(tolerance)
     offset = offset_of(source, wavelength_nm)
     mixture = mixture_of(source, wavelength_nm)
-    drawn = error_measurement.draw(source, wavelength_nm, _DRAWS, _SEED)
+    drawn = error_measurement.draw(source, wavelength_nm, _DIRECTIONS, _SEED)
     truth = error_measurement.model_values(source, wavelength_nm, drawn.wi, drawn.wr)
     if not np.any(truth > 0.0):
         raise ParameterError("values", "no value is above 0, which leaves nothing to tabulate", 0.0)
@@ -96,7 +105,7 @@ def tabulated(
     assert layout is not None
     kept = "keeps" if reached <= tolerance else "is the finest grid of measured data, and does not keep"
     reason = f"{math.prod(layout.grid.shape)} nodes; {kept} to a tolerance of {tolerance:g} against the data"
-    return replace(layout, reason=reason), values
+    return MeasuredLayout(replace(layout, reason=reason), values)
 
 
 def _grid(source: Source, count: int, *, chiral: bool) -> Grid:

@@ -51,9 +51,11 @@ _SPECTRUM = (
 )
 
 # Angles of a cut [degree]: even ones up to where poles at the horizon begin, and more around the mirror direction
-_EVEN_DEG, _AROUND_DEG = np.linspace(-89.0, 89.0, 357), np.linspace(-8.0, 8.0, 161)
+_EVEN_DEG = np.linspace(-89.0, 89.0, 357)
+_AROUND_DEG = np.linspace(-8.0, 8.0, 161)
 ALBEDO_DEG = np.array([*range(0, 85, 5), 82.5, 85.0, 87.5, 89.0], dtype=np.float64)
-_TOLERANCE, _MOST_PANELS = 1e-3, 300  # of an albedo; a line is as wide as 0.005
+_TOLERANCE = 1e-3  # of an albedo; a line is as wide as 0.005
+_MOST_PANELS = 300
 
 _SLICES: dict[str, Callable[[Sliced], Slice]] = {"in_plane": in_plane_slice, "half_difference": half_difference_slice}
 
@@ -196,11 +198,11 @@ class Plot:
         check_azimuth_deg("phi_i_deg", phi_i_deg)
         axes = axes_for("albedo", ax, (6.4, 3.9))
         shares = albedo_shares(self.table, float(radians(phi_i_deg)), wavelength)
-        kept = {label: share for label, share in shares.items() if np.max(share) > 0.0} or {"reflected": np.zeros(21)}
-        tops = np.cumsum(list(kept.values()), axis=0)
-        colours = [COLOURS[list(shares).index(label) % len(COLOURS)] for label in kept]
-        labels = [*itertools.islice(itertools.accumulate(kept, "{} + {}".format), len(kept) - 1), ""]
-        curves = [Curve(labels[at], ALBEDO_DEG, tops[at], colours[at], "-") for at in reversed(range(len(kept)))]
+        shown = {label: share for label, share in shares.items() if np.max(share) > 0.0} or {"reflected": np.zeros(21)}
+        tops = np.cumsum(list(shown.values()), axis=0)
+        colours = [COLOURS[list(shares).index(label) % len(COLOURS)] for label in shown]
+        labels = [*itertools.islice(itertools.accumulate(shown, "{} + {}".format), len(shown) - 1), ""]
+        curves = [Curve(labels[at], ALBEDO_DEG, tops[at], colours[at], "-") for at in reversed(range(len(shown)))]
         without_only(axes)
         if not drawn_on(axes):
             axes.axhline(1.0, color=INK, lw=1.2)
@@ -208,7 +210,7 @@ class Plot:
         azimuth = f", $\\phi_i$ = {phi_i_deg:g}°" if self.table.anisotropic else ""
         plots = add(axes, "albedo", f"{self.table.name}{_at(wavelength)}{azimuth}", curves, legend=False)
         if len(plots) == 1:
-            _stack(axes, kept, colours)
+            _stack(axes, shown, colours)
         highest = max(float(curve.y.max()) for plot in plots for curve in plot.curves)
         axes.set(xlim=(0.0, 90.0), ylim=(0.0, max(1.1, 1.05 * highest)), xticks=range(0, 91, 15))
         axes.set_xlabel("$\\theta_i$ [°]", color=MUTED)
@@ -245,12 +247,8 @@ class Plot:
         ParameterError, MissingExtraError
             As of `lobe`; also if `kind` is another word.
         """
-        ways: dict[str, Callable[[Sliced], Slice]] = {
-            "in_plane": in_plane_slice,
-            "half_difference": half_difference_slice,
-        }
-        if kind not in ways:
-            raise ParameterError("kind", f"{kind!r} is not one of {', '.join(ways)}", kind, tuple(ways))
+        if kind not in _SLICES:
+            raise ParameterError("kind", f"{kind!r} is not one of {', '.join(_SLICES)}", kind, tuple(_SLICES))
         wanted = self._wavelength(wavelength_nm)
         axes = axes_for("slices", ax, (6.4, 3.6))
         picture = _SLICES[kind](self.table)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
@@ -39,17 +39,39 @@ from brdfdb.tables.polarisation import Facets, checked_facets, facets_of
 from brdfdb.tables.sampler import Sampler
 from brdfdb.tables.table_base import BaseTable
 
-# how numbers become f_r, the axes, the numbers, how many a node, how they make up a spectrum, the uniform part
-_Ready = tuple[_coordinates.Rule, Axes, NDArray[np.float32], int, NDArray[np.float64], NDArray[np.float64]]
-
-# Cut that notebooks show: angles of viewer and light, and the wavelength
-_SKETCHED_DEG, _SKETCHED_LIGHT_DEG, _SKETCHED_NM = np.linspace(-88.0, 88.0, 177), 45.0, 550.0
+# The cut that notebooks show
+_SKETCHED_DEG = np.linspace(-88.0, 88.0, 177)  # angles of the viewer
+_SKETCHED_LIGHT_DEG = 45.0
+_SKETCHED_NM = 550.0
 # Variance of f_r over its mean square, for directions that follow the cosine. Up to it, the cosine has less noise than
 # cells of a table: see docs/results/environments.json
 _EVEN = 0.1
-_LIGHTS_DEG, _DRAWN = (0.0, 25.0, 50.0, 70.0), 1024  # lights, and directions of each, that this variance is taken from
+_LIGHTS_DEG = (0.0, 25.0, 50.0, 70.0)  # lights at which this variance is measured
+_DRAWN = 1024  # directions of each of them
 _TURN = (np.sqrt(5.0) - 1.0) / 2.0  # the golden section
 _BLACK = 1e-100  # least albedo
+
+
+class _Arrays(NamedTuple):
+    """A table as kernels read it.
+
+    `rule` is the way from numbers to f_r. `channels` numbers at each node make up a spectrum by `spectra`. `uniform` is
+    the uniform part [1/sr] of each wavelength.
+    """
+
+    rule: _coordinates.Rule
+    axes: Axes
+    numbers: NDArray[np.float32]
+    channels: int
+    spectra: NDArray[np.float64]
+    uniform: NDArray[np.float64]
+
+
+class _Specular(NamedTuple):
+    """Nodes [rad] of the specular part, and its values there, a row a node."""
+
+    theta_i: NDArray[np.float64]
+    rows: NDArray[np.float32]
 
 
 @dataclass(frozen=True, eq=False)
@@ -289,7 +311,7 @@ class Table(BaseTable):
         return values[()] if out is None else values
 
     @functools.cached_property
-    def _kernel(self) -> _Ready:
+    def _kernel(self) -> _Arrays:
         """The table as kernels read it."""
         grid, how = self.grid, self.interpolation
         # a cubic, and what continues beyond the horizon; a sum of positive numbers does not
@@ -310,7 +332,7 @@ class Table(BaseTable):
         spectra = np.empty((0, 0)) if self.spectra is None else np.ascontiguousarray(self.spectra)  # else a kernel more
         count = 1 if self.wavelength_nm is None else self.wavelength_nm.size
         uniform = np.zeros(count) if self.uniform is None else np.broadcast_to(self.uniform, (count,)).copy()
-        return rule, axes, self.values.reshape(-1), channels, spectra, uniform
+        return _Arrays(rule, axes, self.values.reshape(-1), channels, spectra, uniform)
 
     @array_lookup
     def specular_reflectance(self, theta_i: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:
@@ -389,10 +411,10 @@ class Table(BaseTable):
         return self.facets
 
     @functools.cached_property
-    def _specular_rows(self) -> tuple[NDArray[np.float64], NDArray[np.float32]]:
-        """Nodes [rad] of the specular part, and its values there, a row a node; empty arrays where there is none."""
+    def _specular_rows(self) -> _Specular:
+        """The specular part as kernels read it; empty arrays where there is none."""
         if self.specular is None:
-            return np.empty(0), np.empty((0, 0), np.float32)
+            return _Specular(np.empty(0), np.empty((0, 0), np.float32))
         at_deg = self.specular_theta_deg
         nodes = radians(self.axes_deg["theta_i"] if at_deg is None else at_deg)
         expected = (nodes.size,) if self.wavelength_nm is None else (nodes.size, self.wavelength_nm.size)
@@ -400,7 +422,7 @@ class Table(BaseTable):
             raise ParameterError(
                 "specular", f"shape {self.specular.shape} of {self.name} is not {expected}, two nodes or more"
             )
-        return nodes, np.ascontiguousarray(self.specular.reshape(nodes.size, -1))
+        return _Specular(nodes, np.ascontiguousarray(self.specular.reshape(nodes.size, -1)))
 
 
 def _flat(array: NDArray[Any], shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
