@@ -254,7 +254,7 @@ class Table(BaseTable):
     def _at_angles(
         self, angles: FourAngles, wavelength_nm: ArrayLike | None, out: Floats | None = None, threads: int = 1
     ) -> Floats:
-        at = self._wavelengths(wavelength_nm)
+        located = self._wavelengths(wavelength_nm)
         shape: tuple[int, ...] = ()
         if FLOAT_TYPES.issuperset(map(type, angles)):  # broadcasting takes longer than the lookup of one point
             numbers = np.array(angles).reshape(4, 1)
@@ -271,14 +271,14 @@ class Table(BaseTable):
         unusual = []
 
         def write(part: slice, values: NDArray[Any]) -> None:
-            given = [angle[part] for angle in flat]
+            theta_i, phi_i, theta_r, phi_r = (angle[part] for angle in flat)
             if not _kernels.by_angles(
-                *self._kernel, at.nodes, at.weight, given[0], given[1], given[2], given[3], horizon, values
+                *self._kernel, located.nodes, located.weight, theta_i, phi_i, theta_r, phi_r, horizon, values
             ):
                 unusual.append(part)
 
         arguments = dict(zip(("theta_i", "phi_i", "theta_r", "phi_r"), angles, strict=True))
-        values = filled(write, array_for_result(out, shape + at.tail, dtype, arguments), at.size, threads)
+        values = filled(write, array_for_result(out, shape + located.tail, dtype, arguments), located.size, threads)
         if unusual:
             checked_angles(*angles)  # raises an error or warns
         return values[()] if out is None else values
@@ -297,17 +297,17 @@ class Table(BaseTable):
 
         Wavelengths, `out`, `threads`, result and errors are those of `lookup`.
         """
-        at = self._wavelengths(wavelength_nm)
+        located = self._wavelengths(wavelength_nm)
         vectors = checked_vectors(wi, wr)
         shape = np.broadcast_shapes(vectors.w_i.shape, vectors.w_r.shape)
         w_i, w_r = (_flat(w, shape, vectors.dtype) for w in (vectors.w_i, vectors.w_r))
 
         def write(part: slice, values: NDArray[Any]) -> None:
             numbers = slice(3 * part.start, 3 * part.stop)
-            _kernels.by_vectors(*self._kernel, at.nodes, at.weight, w_i[numbers], w_r[numbers], values)
+            _kernels.by_vectors(*self._kernel, located.nodes, located.weight, w_i[numbers], w_r[numbers], values)
 
-        result = array_for_result(out, shape[:-1] + at.tail, vectors.dtype, {"wi": wi, "wr": wr})
-        values = filled(write, result, at.size, threads)
+        result = array_for_result(out, shape[:-1] + located.tail, vectors.dtype, {"wi": wi, "wr": wr})
+        values = filled(write, result, located.size, threads)
         return values[()] if out is None else values
 
     @functools.cached_property
@@ -336,26 +336,28 @@ class Table(BaseTable):
 
     @array_lookup
     def specular_reflectance(self, theta_i: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:
-        at = self._wavelengths(wavelength_nm)
+        located = self._wavelengths(wavelength_nm)
         given = np.asarray(theta_i)
         dtype = asked_for(theta_i)
         if given.dtype.kind not in "iuf":
             checked_angles(theta_i, 0.0, 0.0, 0.0)
-        values = np.zeros(given.size * at.size, dtype)
+        values = np.zeros(given.size * located.size, dtype)
         horizon = float(dtype.type(HALF_PI))
         nodes, rows = self._specular_rows
-        if not _kernels.specular(nodes, rows, at.nodes, at.weight, _flat(given, given.shape, dtype), horizon, values):
+        if not _kernels.specular(
+            nodes, rows, located.nodes, located.weight, _flat(given, given.shape, dtype), horizon, values
+        ):
             checked_angles(theta_i, 0.0, 0.0, 0.0)
-        return values.reshape(given.shape + at.tail)[()]
+        return values.reshape(given.shape + located.tail)[()]
 
     def _mueller_at(self, angles: FourAngles, wavelength_nm: ArrayLike | None) -> Floats:
         facets = self._polarised
-        at = self._wavelengths(wavelength_nm)
+        located = self._wavelengths(wavelength_nm)
         f_r = self._at_angles(angles, wavelength_nm)
-        values = np.asarray(f_r if at.tail else np.asarray(f_r)[..., np.newaxis])
-        normalised = facets.of_surface(angles, values, at)
+        values = np.asarray(f_r if located.tail else np.asarray(f_r)[..., np.newaxis])
+        normalised = facets.of_surface(angles, values, located)
         matrix = np.where(values == 0.0, 0.0, values)[..., np.newaxis, np.newaxis] * normalised
-        return np.asarray(matrix if at.tail else matrix[..., 0, :, :], dtype=np.asarray(f_r).dtype)
+        return np.asarray(matrix if located.tail else matrix[..., 0, :, :], dtype=np.asarray(f_r).dtype)
 
     @array_lookup
     def mueller_vectors(self, wi: ArrayLike, wr: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:
@@ -368,13 +370,13 @@ class Table(BaseTable):
     @array_lookup
     def mueller_in_plane(self, wi: ArrayLike, wr: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:
         """Interpolate the Mueller BRDF [1/sr] between bases of the plane of light and viewer; as `mueller_vectors`."""
-        facets, at = self._polarised, self._wavelengths(wavelength_nm)
+        facets, located = self._polarised, self._wavelengths(wavelength_nm)
         vectors = checked_vectors(wi, wr)
         f_r = np.asarray(self.lookup_vectors(wi, wr, wavelength_nm))
-        values = f_r if at.tail else f_r[..., np.newaxis]
+        values = f_r if located.tail else f_r[..., np.newaxis]
         theta_d = stokes.half_angle(*(w.astype(np.float64) for w in (vectors.w_i, vectors.w_r)))
-        matrix = values[..., np.newaxis, np.newaxis] * facets.in_plane(theta_d, values, at)
-        return np.asarray(matrix if at.tail else matrix[..., 0, :, :], dtype=vectors.dtype)
+        matrix = values[..., np.newaxis, np.newaxis] * facets.in_plane(theta_d, values, located)
+        return np.asarray(matrix if located.tail else matrix[..., 0, :, :], dtype=vectors.dtype)
 
     @array_lookup
     def facet_mueller(self, theta_d: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:
@@ -382,14 +384,14 @@ class Table(BaseTable):
 
         `theta_d` [rad] is half the angle between light and viewer, in [0, pi/2]. Shaped as by `lookup`, and (4, 4).
         """
-        facets, at = self._polarised, self._wavelengths(wavelength_nm)
-        matrix = facets.facet(np.asarray(theta_d, np.float64), at)
-        return matrix if at.tail else matrix[..., 0, :, :]
+        facets, located = self._polarised, self._wavelengths(wavelength_nm)
+        matrix = facets.facet(np.asarray(theta_d, np.float64), located)
+        return matrix if located.tail else matrix[..., 0, :, :]
 
     def depolarised(self, wavelength_nm: ArrayLike | None = None) -> Floats:
         """Interpolate the depolarised part of f_r [1/sr], which is uniform, shape (M,); () for one wavelength."""
-        at = self._wavelengths(wavelength_nm)
-        return self._polarised.depolarised_at(at).reshape(at.tail)
+        located = self._wavelengths(wavelength_nm)
+        return self._polarised.depolarised_at(located).reshape(located.tail)
 
     @array_lookup
     def specular_mueller(self, theta_i: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:
@@ -415,8 +417,8 @@ class Table(BaseTable):
         """The specular part as kernels read it; empty arrays where there is none."""
         if self.specular is None:
             return _Specular(np.empty(0), np.empty((0, 0), np.float32))
-        at_deg = self.specular_theta_deg
-        nodes = radians(self.axes_deg["theta_i"] if at_deg is None else at_deg)
+        nodes_deg = self.specular_theta_deg
+        nodes = radians(self.axes_deg["theta_i"] if nodes_deg is None else nodes_deg)
         expected = (nodes.size,) if self.wavelength_nm is None else (nodes.size, self.wavelength_nm.size)
         if self.specular.shape != expected or nodes.size < 2:  # kernels do not look
             raise ParameterError(
@@ -544,7 +546,7 @@ class TableSource(FunctionSource):
 
     def specular_reflectance(self, theta_i: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:
         """Return the reflectance [1] of the specular part at theta_i [rad], 0 without one; shaped as by `lookup`."""
-        return self._table.specular_reflectance(theta_i, _held(self._table, wavelength_nm))
+        return self._table.specular_reflectance(theta_i, _in_range(self._table, wavelength_nm))
 
     def _check_function(self) -> None:
         """Take the table as it is: between its nodes the two halves of a symmetry differ by its error."""
@@ -552,13 +554,13 @@ class TableSource(FunctionSource):
 
 def _brdf_of(table: Table) -> Function:
     def brdf(wi: Floats, wr: Floats, wavelength_nm: NDArray[np.float64] | None) -> Floats:
-        return table.lookup_vectors(wi, wr, _held(table, wavelength_nm))
+        return table.lookup_vectors(wi, wr, _in_range(table, wavelength_nm))
 
     return brdf
 
 
-def _held(table: Table, wavelength_nm: ArrayLike | None) -> ArrayLike | None:
-    """Return wavelengths [nm], or the end of the range of a table where they are beyond it."""
+def _in_range(table: Table, wavelength_nm: ArrayLike | None) -> ArrayLike | None:
+    """Return wavelengths [nm], those outside of the range of a table moved to its end."""
     stored = table.wavelength_nm
     return wavelength_nm if wavelength_nm is None or stored is None else np.clip(wavelength_nm, stored[0], stored[-1])
 
