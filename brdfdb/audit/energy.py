@@ -207,7 +207,8 @@ def energy_of(
     model = model_energy_of(source, table.wavelength_nm, known, claim, accept_excess=accept_excess, grazing=grazing)
     # The excess that is published or accepted is that of the model. An excess of the table alone is excused by neither
     excess = known if model.verdict == "known published excess" else None
-    most, first = model.max_albedo, model.exceeds_1_from_theta_i_deg
+    most = model.max_albedo
+    first = model.exceeds_1_from_theta_i_deg
     if model.verdict in ("accepted excess", "violates") and first is not None and most is not None:
         excess = KnownExcess(
             max_albedo=most + TOLERANCE,

@@ -210,7 +210,8 @@ class Subject:
         """
         if self.source is None:
             return None
-        layout, values = self.table.laid_out(self.source), self.table.values
+        layout = self.table.laid_out(self.source)
+        values = self.table.values
         if not set(MEASURED) & self.table.attrs.keys():
             return metadata_of(layout)
         return stated_metadata(layout, lambda rows: values[rows])

@@ -97,9 +97,11 @@ def nodes_of(table: Table, source: Source) -> Nodes:
     wrong = 0
     worst = _Wrong(0.0, 0.0, 0.0)
     for span in _rows(layout):
-        stored, expected = table.values[span].astype(np.float64), block(layout, span).astype(np.float64)
+        stored = table.values[span].astype(np.float64)
+        expected = block(layout, span).astype(np.float64)
         rows += span.stop - span.start
-        off, allowed = np.abs(stored - expected), 2.0**-bits * np.abs(expected)
+        off = np.abs(stored - expected)
+        allowed = 2.0**-bits * np.abs(expected)
         off = np.where(np.isfinite(off) | (stored == expected), off, np.inf)
         excess = off - allowed * (1.0 + _ROUNDING) - _ROUNDING * np.max(np.abs(expected))
         beyond = (excess > 0.0) | (rounded(table.values[span], bits) != table.values[span])

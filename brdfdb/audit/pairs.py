@@ -14,7 +14,9 @@ from brdfdb.tables.table import Table
 SEED = 1967  # differs from the seeds of build and planner, which the table was fitted to
 # Directions per band of theta_i, half of them in the lobe. Tables with more than `_FEW` wavelengths use fewer, because
 # their wavelengths vary alike, and so do tables of slow models
-DIRECTIONS, _FEW, _FEWER_DIRECTIONS = 3000, 4, 1000
+DIRECTIONS = 3000
+_FEW = 4
+_FEWER_DIRECTIONS = 1000
 
 
 class ComparedPairs(NamedTuple):

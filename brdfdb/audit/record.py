@@ -158,7 +158,8 @@ def expected_of(subject: Subject) -> dict[str, Any]:
         return {**absent, **expected, **request}
     source = TableSource(table)
     layout = table.laid_out(source)
-    known, numbers = metadata_of(layout).attributes(), first_numbers(layout, lambda rows: table.values[rows])
+    known = metadata_of(layout).attributes()
+    numbers = first_numbers(layout, lambda rows: table.values[rows])
     expected = {key: value for key, value in known.items() if key not in _OF_SOURCE}
     expected = _plain(expected) | {key: value.model_dump(mode="json") for key, value in numbers.items()}
     if table.error is not None:
@@ -293,7 +294,8 @@ def _numbers(material: Material) -> tuple[Any, ...]:
 def _of_reason(table: Table) -> Iterator[Difference]:
     """Yield what the reason for a layout says of its table if it is not so."""
     request = table.metadata.request or {}
-    tolerance, reason = request.get("tolerance"), table.metadata.reason
+    tolerance = request.get("tolerance")
+    reason = table.metadata.reason
     if isinstance(tolerance, float) and isinstance(table.source, Material):
         expected = first_reason(table, tolerance)
         if "takes" in reason and expected not in reason:

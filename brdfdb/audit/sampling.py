@@ -147,7 +147,8 @@ def _light(
     wi = unit_vector(radians(theta_i_deg), radians(PHI_I_DEG))
     u1, u2 = np.random.default_rng(SEED).random((2, count))
     drawn = sample(spec, u1, u2, wi, **arguments)
-    mean, deviation = float(np.mean(drawn.weight)), float(np.std(drawn.weight, ddof=1))
+    mean = float(np.mean(drawn.weight))
+    deviation = float(np.std(drawn.weight, ddof=1))
     standard_error = deviation / np.sqrt(count)
     p = _chance(drawn.wr, wi, lobe_of(spec, wi, arguments))
     off = abs(mean - albedo)
@@ -192,8 +193,10 @@ def _shares(wi: Array, lobe: Lobe, alpha: Array, t_edges: Array) -> Array:
     """Return the integral [1] of the density over each bin, shape (bins of t, bins of psi)."""
     t, t_weight = _gauss(t_edges)
     psi, psi_weight = _gauss(_PSI_EDGES)
-    t, psi = t[:, :, np.newaxis, np.newaxis], psi[np.newaxis, np.newaxis]
-    s_x, s_y = alpha[0] * t * np.cos(psi), alpha[1] * t * np.sin(psi)
+    t = t[:, :, np.newaxis, np.newaxis]
+    psi = psi[np.newaxis, np.newaxis]
+    s_x = alpha[0] * t * np.cos(psi)
+    s_y = alpha[1] * t * np.sin(psi)
     cos_h = 1.0 / np.sqrt(1.0 + s_x * s_x + s_y * s_y)
     h = np.stack([s_x * cos_h, s_y * cos_h, cos_h], axis=-1)
     h_i = h @ wi

@@ -128,7 +128,9 @@ def table_energy_of(
 ) -> TableEnergy:
     """Return the energy of a table; `excused` is the verdict on an excess that is not above the known one."""
     integrated = directional_albedo(table)
-    theta_i, integration, diffuse = integrated.theta_i_deg, integrated.error, integrated.albedo.max(axis=1)
+    theta_i = integrated.theta_i_deg
+    integration = integrated.error
+    diffuse = integrated.albedo.max(axis=1)
     specular = _specular(table, theta_i, diffuse.shape)
     albedo = diffuse + specular
     finite = np.where(np.isfinite(albedo), albedo, np.inf)
@@ -210,7 +212,8 @@ def _judge(table: Table, theta_i_deg: Axis, diffuse: Floats) -> _Judge:
         return _Judge(identity, identity.astype(bool), nothing, nothing)
     measured = table.metadata.measured
     uncertain = 0.0 if measured is None or measured.held_out is None else measured.held_out.l1
-    edges, l1 = np.array(table.error.theta_i_deg), np.minimum(np.add(table.error.l1, uncertain), MOST_ERROR)
+    edges = np.array(table.error.theta_i_deg)
+    l1 = np.minimum(np.add(table.error.l1, uncertain), MOST_ERROR)
     means = _band_means(theta_i_deg, edges)
     covers = (theta_i_deg >= edges[:-1, np.newaxis]) & (theta_i_deg <= edges[1:, np.newaxis])
     return _Judge(means, covers, l1, (means @ diffuse) / (1.0 - l1))

@@ -24,7 +24,9 @@ from brdfdb.tables.table import Table
 SPECULAR_TOLERANCE = 1e-6
 _STEP_DEG = 3.0  # step of the maps
 _LAST_DEG = 89.0
-LEAST, _MOST = 1e-6, 1.0  # smaller errors are drawn as LEAST, because zero has no logarithm; all maps share one scale
+# smaller errors are drawn as LEAST, because zero has no logarithm; all maps share one scale
+LEAST = 1e-6
+_MOST = 1.0
 # Azimuth [degree] of viewers at negative theta_r
 _PLANES = {"in the plane of incidence": 0.0, "across the plane of incidence": 90.0}
 DIRECTIONS = 3000  # number of directions at which changed models are evaluated
@@ -190,7 +192,9 @@ def likeness_of(table: Table, source: Source, pairs: ComparedPairs) -> str:
     middle = pairs.table.shape[1] // 2
     wavelength = representative_nm(table)
     at = None if wavelength is None else np.array([wavelength])
-    values, truth, weight = pairs.table[chosen, middle], pairs.model[chosen, middle], pairs.drawn.weight[chosen]
+    values = pairs.table[chosen, middle]
+    truth = pairs.model[chosen, middle]
+    weight = pairs.drawn.weight[chosen]
     if not np.isfinite(values).all():
         return ""
     light, viewer = pairs.drawn.wi[chosen], pairs.drawn.wr[chosen]

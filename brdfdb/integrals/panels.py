@@ -110,9 +110,11 @@ def integrated(
         if not np.any(wanting):
             return Integrals(_by_pairs(of, values), _sums(of, total, count))
         chosen = _chosen(total, of, wanting, tolerance)
-        halved, of_halved = _halved(panels[chosen], errors[chosen]), np.tile(of[chosen], 2)
+        halved = _halved(panels[chosen], errors[chosen])
+        of_halved = np.tile(of[chosen], 2)
         new_values, new_errors = _rules(integrand, halved, of_halved, width)
-        panels, of = np.concatenate([panels[~chosen], halved]), np.concatenate([of[~chosen], of_halved])
+        panels = np.concatenate([panels[~chosen], halved])
+        of = np.concatenate([of[~chosen], of_halved])
         values = np.concatenate([values[~chosen], new_values])
         errors = np.concatenate([errors[~chosen], new_errors])
         done += np.bincount(of_halved, minlength=count)
@@ -163,7 +165,8 @@ def _rules(integrand: Integrand, panels: Array, of: Indices, width: int) -> Inte
 
     The integrand gives `width` values per point, in a last axis.
     """
-    values, errors = np.empty((len(panels), width)), np.empty((len(panels), 2))
+    values = np.empty((len(panels), width))
+    errors = np.empty((len(panels), 2))
     step = max(_BATCH // width, _FEWEST)
     for start in range(0, len(panels), step):
         batch = slice(start, start + step)

@@ -105,9 +105,11 @@ def directional_albedo(
     spec = spec_of(model)
     parameters = named(spec, parameters)
     _check_tolerance(tolerance)
-    thetas, phis = check_theta("theta_i", theta_i), check_phi("phi_i", phi_i)
+    thetas = check_theta("theta_i", theta_i)
+    phis = check_phi("phi_i", phi_i)
     arrays = np.broadcast_arrays(thetas, phis, *(np.asarray(value) for value in parameters.values()))
-    albedo, error = np.full(arrays[0].shape, np.nan), np.full(arrays[0].shape, np.nan)
+    albedo = np.full(arrays[0].shape, np.nan)
+    error = np.full(arrays[0].shape, np.nan)
     theta, phi, *values = (array.ravel() for array in arrays)
     for one, rows in _alike(parameters, values):
         above = rows[theta[rows] <= HALF_PI]  # nan is not
@@ -115,7 +117,8 @@ def directional_albedo(
         albedo.flat[below], error.flat[below] = 0.0, 0.0
         above = above[np.isfinite(phi[above])]
         integrals = spectral_albedo(spec, theta[above], phi[above], one, tolerance=tolerance, most_panels=MOST_PANELS)
-        albedo.flat[above], error.flat[above] = integrals.albedo[:, 0], integrals.error
+        albedo.flat[above] = integrals.albedo[:, 0]
+        error.flat[above] = integrals.error
     if specular and spec.specular is not None:
         albedo = albedo + spec.specular(thetas, **{name: parameters[name] for name in spec.specular_parameters})
     return Albedo(albedo[()], error[()])
@@ -321,7 +324,9 @@ def mirrored_on_rays(
         Azimuth of the ray on the ellipse of the lobe.
     """
     x_i, y_i, cos_i = i
-    s_x, s_y = alpha_x * np.cos(psi), alpha_y * np.sin(psi)  # slopes of the half vector, divided by t
+    # slopes of the half vector, divided by t
+    s_x = alpha_x * np.cos(psi)
+    s_y = alpha_y * np.sin(psi)
     s2 = s_x**2 + s_y**2
     # cos theta_r = 0 at cos_i s2 t^2 - 2 p t - cos_i = 0
     p = x_i * s_x + y_i * s_y

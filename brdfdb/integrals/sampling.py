@@ -124,7 +124,8 @@ def pdf(model: ModelSpec | str, wi: ArrayLike, wr: ArrayLike, **parameters: Arra
     0.31831
     """
     vectors = checked_vectors(wi, wr)
-    i, r = vectors.w_i.astype(np.float64), vectors.w_r.astype(np.float64)
+    i = vectors.w_i.astype(np.float64)
+    r = vectors.w_r.astype(np.float64)
     spec = spec_of(model)
     parameters = named(spec, parameters)
     density = mixture_density(lobe_of(spec, i, parameters), i, r) + 0.0 * (i + r).sum(axis=-1)  # nan is passed on
@@ -171,7 +172,8 @@ def directions(lobe: Lobe, u1: Array, u2: Array, i: Array) -> Array:
 def mirrored_in_lobe(u1: Floats, angle: Floats, i: Floats, lobe: Lobe) -> Array:
     """Return the light (..., 3) mirrored in half vectors whose slopes follow the distribution of the lobe."""
     radius = lobe.distribution.radius(u1)
-    s_x, s_y = radius * lobe.alpha_x * np.cos(angle), radius * lobe.alpha_y * np.sin(angle)
+    s_x = radius * lobe.alpha_x * np.cos(angle)
+    s_y = radius * lobe.alpha_y * np.sin(angle)
     return _mirrored((s_x, s_y, np.ones(())), i)
 
 

@@ -117,7 +117,9 @@ def _peak(x: Array, y: Floats, f: Callable[[Array], Array], tolerance: float) ->
         fresh = np.unique([(x[i + side - 1] + x[i + side]) / 2.0 for i in at for side in (0, 1)])
         x, y = np.append(x, fresh), np.concatenate([y, f(fresh)])
         order = np.argsort(x)
-        x, y, before = x[order], y[order], top
+        x = x[order]
+        y = y[order]
+        before = top
         top = tops(x, y)
         moving &= np.abs(top - before) > tolerance
         if not np.any(moving):
@@ -129,7 +131,8 @@ def tops(x: Array, y: Floats) -> Array:
     """Return the tops of the parabolas through the largest values and their neighbours, between these neighbours."""
     middle = np.clip(np.argmax(y, axis=0), 1, x.size - 2)
     column = np.arange(y.shape[1])
-    (x0, x1, x2), (y0, y1, y2) = (x[middle + i] for i in (-1, 0, 1)), (y[middle + i, column] for i in (-1, 0, 1))
+    (x0, x1, x2) = (x[middle + i] for i in (-1, 0, 1))
+    (y0, y1, y2) = (y[middle + i, column] for i in (-1, 0, 1))
     rise, fall = (y1 - y0) / (x1 - x0), (y2 - y1) / (x2 - x1)
     bend = (fall - rise) / (x2 - x0)
     # The parabola is y1 + s (x - x1) + bend (x - x1)^2, with the slope s at x1

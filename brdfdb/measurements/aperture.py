@@ -99,7 +99,9 @@ class InstrumentView:
     """
 
     def __init__(self, w_i: Floats, w_r: Floats, instrument: Instrument | None = None) -> None:
-        self.w_i, self.w_r, self.instrument = w_i, w_r, instrument
+        self.w_i = w_i
+        self.w_r = w_r
+        self.instrument = instrument
         angles = () if instrument is None else (instrument.source_solid_angle_sr, instrument.receiver_solid_angle_sr)
         self._half_angles = [
             float(np.arccos(max(1.0 - solid_angle / (2.0 * np.pi), 0.0)))

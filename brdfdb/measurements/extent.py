@@ -17,8 +17,13 @@ from brdfdb.measurements.coordinates import DirectionPairs, beyond, places
 from brdfdb.measurements.samples import Samples
 from brdfdb.parameters import Floats
 
-_CELL_DEG, _TURNED_CELL_DEG = 2.5, 7.5  # cells of three coordinates, and of four, which are many more
-_LIGHTS, _VIEWERS, _SCATTERED = 2.0, 4.0, 4.0  # volume of a ball, in those that typically fit between samples
+# cells of three coordinates, and of four, which are many more
+_CELL_DEG = 2.5
+_TURNED_CELL_DEG = 7.5
+# volume of a ball, in those that typically fit between samples
+_LIGHTS = 2.0
+_VIEWERS = 4.0
+_SCATTERED = 4.0
 _THINNED = 400  # samples that the typical ball is measured with
 _LOWEST = radians(89.9)  # polar angle of directions that are drawn, at most
 _LEAST = 1.5  # radius of a ball in cells, at least: smaller ones slip through the cells
@@ -129,7 +134,8 @@ class Extent(BaseModel):
         x = x * radians(self.cell_deg)
         theta_i = np.hypot(x[:, 0], x[:, 1]) if self.turned else np.abs(x[:, 0])
         phi_i = np.arctan2(x[:, 1], x[:, 0]) if self.turned else rng.uniform(0.0, 2.0 * np.pi, count)
-        theta_r, phi_r = np.hypot(x[:, -2], x[:, -1]), np.arctan2(x[:, -1], x[:, -2]) + phi_i * (not self.turned)
+        theta_r = np.hypot(x[:, -2], x[:, -1])
+        phi_r = np.arctan2(x[:, -1], x[:, -2]) + phi_i * (not self.turned)
         theta_i, theta_r = (np.minimum(theta, _LOWEST) for theta in (theta_i, theta_r))
         return DirectionPairs(unit_vector(theta_i, phi_i), unit_vector(theta_r, phi_r))
 

@@ -59,7 +59,9 @@ def eq_3(theta_c: Array, phi_c: Array, offset: float) -> Array:
     """
     sine = np.sin(phi_c) * np.sin(theta_c)
     r_c = offset * sine + np.sqrt(offset**2 * sine**2 + 1.0 - offset**2)
-    x, y, z = r_c * np.cos(phi_c) * np.sin(theta_c), r_c * sine - 2.0 * offset, r_c * np.cos(theta_c)
+    x = r_c * np.cos(phi_c) * np.sin(theta_c)
+    y = r_c * sine - 2.0 * offset
+    z = r_c * np.cos(theta_c)
     theta_r = np.arccos(z / np.sqrt(x**2 + y**2 + z**2))
     return unit_vector(theta_r, np.arctan2(y, x))
 
@@ -342,7 +344,8 @@ def _unsaturated(counts: Frames, background: Frames, settings: Gonioreflectomete
     value = np.full(counts.shape[1:], np.nan)
     noise = np.full(counts.shape[1:], np.nan)
     for time, some, dark in zip(settings.exposures, counts, background, strict=True):
-        smooth, variance = gaussian_filter(some, _SMOOTH), np.zeros(some.shape)
+        smooth = gaussian_filter(some, _SMOOTH)
+        variance = np.zeros(some.shape)
         for part, number in ((smooth, frames), (dark, settings.frames)):
             electrons = (
                 np.maximum(part, 0.0) * settings.electrons + settings.read_noise**2 + settings.electrons**2 / 12.0

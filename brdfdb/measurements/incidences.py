@@ -157,23 +157,28 @@ def _incidence(
     samples: Samples, rows: NDArray[np.intp], delta: Floats, one_side: bool, in_bands: bool
 ) -> Incidence | None:
     """Return what the samples of one direction of the light integrate to; None if the viewers cover too little."""
-    radius, turn = np.sin(samples.theta_r[rows]), np.deg2rad(delta[rows])
+    radius = np.sin(samples.theta_r[rows])
+    turn = np.deg2rad(delta[rows])
     points = np.stack([radius * np.cos(turn), radius * np.sin(turn)], axis=1)
     values = samples.values[rows]
     if one_side or in_bands:
         points = np.concatenate([points, points * np.array([1.0, -1.0])])
         values = np.concatenate([values, values])
     points, values = averaged(points, values)
-    covered, peak, (measured, albedo) = 1.0, 0.0, np.zeros((2, len(samples.channels)))
+    covered = 1.0
+    peak = 0.0
+    (measured, albedo) = np.zeros((2, len(samples.channels)))
     patterns, of_pattern = np.unique(np.isfinite(values), axis=1, return_inverse=True)
     for number, known in enumerate(patterns.T):
         channels = np.flatnonzero(of_pattern.reshape(-1) == number)
         part = integrals(points[known], values[np.ix_(known, channels)])
         if part is None:
             return None
-        covered, peak = min(covered, part.covered), max(peak, part.peak)
+        covered = min(covered, part.covered)
+        peak = max(peak, part.peak)
         measured[channels], albedo[channels] = part.inside, part.whole
-    theta_i, phi_i = degrees(samples.theta_i[rows]), degrees(samples.phi_i[rows]) % 360.0
+    theta_i = degrees(samples.theta_i[rows])
+    phi_i = degrees(samples.phi_i[rows]) % 360.0
     return Incidence(
         round(float(np.mean(theta_i)), 4),
         0.0 if in_bands else round(float(phi_i[0]), 4) % 360.0,

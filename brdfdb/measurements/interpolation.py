@@ -141,7 +141,9 @@ def lambert_and_lobe(samples: Samples) -> LobeBase:
 
     wi, wr, values, _ = _listed(samples)
     some = np.random.default_rng(_SEED).permutation(len(wi))[: 4 * _SEARCHED]
-    wi, wr, values = wi[some], wr[some], values[some]
+    wi = wi[some]
+    wr = wr[some]
+    values = values[some]
     weight = 1.0 / (np.abs(values) + FLOOR * np.nanmean(np.abs(values), axis=0))
     best: _LobeFit | None = None
     tan2 = np.sort(half_angles(wi, wr).tan2_h)
@@ -190,7 +192,8 @@ def _check_values(samples: Samples) -> None:
     0 by three times the noise or the tenth percentile of the values above 0.
     """
     values = samples.values
-    largest, lowest = np.max(values, where=samples.known, initial=0.0), np.min(values, where=samples.known, initial=0.0)
+    largest = np.max(values, where=samples.known, initial=0.0)
+    lowest = np.min(values, where=samples.known, initial=0.0)
     if not largest > 0.0:
         raise ParameterError("values", "no value is above 0, which leaves nothing to tabulate", float(largest))
     if lowest < -_ABSURD * largest:
@@ -303,7 +306,8 @@ def fit(samples: Samples, base: Base | None = None) -> Fitted:
     lobe = lambert_and_lobe(samples)
     f_base = lobe.f_r if base is None else base
     problem, level, scheme = _problem(samples, f_base)
-    mean, lowest = problem.y.mean(axis=0), float(min(problem.wi[:, 2].min(), problem.wr[:, 2].min()))
+    mean = problem.y.mean(axis=0)
+    lowest = float(min(problem.wi[:, 2].min(), problem.wr[:, 2].min()))
     order = np.random.default_rng(_SEED).permutation(len(problem.wi))
     few = problem.some(order[:_SEARCHED])
     tried = [
@@ -338,7 +342,8 @@ def _problem(samples: Samples, base: Base) -> tuple[_Problem, Floats, str]:
         slope = np.sqrt(values**2 + 4.0 * level**2)
         noise = np.nan_to_num(np.nanmean(uncertainty / slope, axis=1)) / max(float(np.std(y)), 1e-3)
     known = samples.selected(np.flatnonzero(samples.known.any(axis=1)))
-    lights, pairs = int(known.incidence.max()) + 1, int(known.pair.max()) + 1
+    lights = int(known.incidence.max()) + 1
+    pairs = int(known.pair.max()) + 1
     scans = lights > 1 and known.scanned
     rng = np.random.default_rng(_SEED)
     if scans:

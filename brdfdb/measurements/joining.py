@@ -162,7 +162,9 @@ def _difference(
     positive = np.minimum(values[one], values[two]) > 0.0
     if not positive.any():
         return _Difference(0.0, "")
-    a, b, u = values[one][positive], values[two][positive], np.hypot(noises[one], noises[two])[positive]
+    a = values[one][positive]
+    b = values[two][positive]
+    u = np.hypot(noises[one], noises[two])[positive]
     ratio = float(np.median(np.maximum(a, b) / np.minimum(a, b)))
     stated = (u > 0.0) & np.isfinite(u)
     beyond = stated.any() and float(np.median(np.abs(a - b)[stated] / u[stated])) > _UNLIKELY

@@ -359,7 +359,8 @@ def _width(f_r: Evaluate) -> float | None:
         wi = np.broadcast_to(unit_vector(radians(light), 0.0), (_HALF_DEG.size, 3))
         # half vectors across the plane of incidence: the viewer stays above the horizon longest
         theta = radians(_HALF_DEG)
-        along, across = unit_vector(radians(0.0), 0.0), np.array([0.0, 1.0, 0.0])
+        along = unit_vector(radians(0.0), 0.0)
+        across = np.array([0.0, 1.0, 0.0])
         half = np.cos(theta)[:, np.newaxis] * along + np.sin(theta)[:, np.newaxis] * across
         wr = 2.0 * np.sum(wi * half, axis=1, keepdims=True) * half - wi
         above = wr[:, 2] > 0.05

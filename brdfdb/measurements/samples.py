@@ -312,7 +312,8 @@ def _length_nm(dataset: xr.Dataset, name: str) -> NDArray[np.float64] | None:
     units = _units(dataset, name)
     if units not in NM_PER:
         raise ParameterError(name, f"its units are {units!r}; allowed are nm, um and m", units, tuple(NM_PER))
-    lengths, scale = np.asarray(dataset[name], dtype=np.float64).reshape(-1), NM_PER[units]
+    lengths = np.asarray(dataset[name], dtype=np.float64).reshape(-1)
+    scale = NM_PER[units]
     return lengths if scale == 1.0 else np.round(lengths * scale, 9)
 
 

@@ -26,7 +26,9 @@ _BLACK = 2e-4  # albedo below which the unit is doubted: the blackest coatings r
 _MISSING = np.array([-1.0, -99.0, -999.0, -9999.0])  # numbers that files write for values that are missing
 _FILLED = np.array([9.99, 99.99, 999.99, 99999.0, 1e20, 9.96921e36])  # the same above 0; the last two are of netCDF
 _FAR = 10.0  # times the largest other value is where a number is a mark
-_LOBE, _LEVEL = 2.0, 1.25  # f_r of a lobe over the median from which on there is one, and below which there is none
+# f_r of a lobe over the median from which on there is one, and below which there is none
+_LOBE = 2.0
+_LEVEL = 1.25
 _ABOUT_DEG = 15.0  # angles to the mirror direction and to the light within which lobes are looked for
 _TILTED_DEG = (20.0, 75.0)  # polar angles of lights that tell the sides apart
 _FEWEST = 5  # viewers of a light
@@ -123,7 +125,8 @@ def statement(samples: Samples, progress: Callable[[float], None] | None = None)
     Delaunay triangles of the points f_r is linear. Between them and the rim of the disk it is that of the point closest
     to the rim. Zeros are taken for holes where less than half of the values are 0.
     """
-    theta_i, theta_r = degrees(samples.theta_i), degrees(samples.theta_r)
+    theta_i = degrees(samples.theta_i)
+    theta_r = degrees(samples.theta_r)
     delta = degrees(samples.phi_r - samples.phi_i) % 360.0
     known = samples.known
     in_plane = (np.abs(delta % 180.0 - 90.0) > 89.99) | (theta_r == 0.0)
@@ -309,7 +312,8 @@ def reciprocity_of(samples: Samples, one_side: bool) -> ExchangedPairs | None:
         delta = np.where((theta_i == 0) | (theta_r == 0), 0, (phi_r - phi_i) % turn)
         other = np.where(delta == 0, 0, turn - delta)
         delta, other = (np.minimum(delta, other),) * 2 if one_side else (delta, other)
-        coordinates, swapped = (theta_i, theta_r, delta, 0 * delta), (theta_r, theta_i, other, 0 * delta)
+        coordinates = (theta_i, theta_r, delta, 0 * delta)
+        swapped = (theta_r, theta_i, other, 0 * delta)
     code, code_swapped = (((a * turn + b) * turn + c) * turn + d for a, b, c, d in (_wide(coordinates), _wide(swapped)))
     order = np.argsort(code, kind="stable")
     place = np.clip(np.searchsorted(code[order], code_swapped), 0, len(order) - 1)
@@ -335,9 +339,11 @@ def units(samples: Samples, incidences: Sequence[Incidence]) -> tuple[str, ...]:
         return ("There is no value at all.",)
     sound = [max(some.albedo) for some in incidences if some.peak <= PEAK]
     if sound:
-        albedo, how = float(np.median(sound)), "the values integrate to"
+        albedo = float(np.median(sound))
+        how = "the values integrate to"
     else:
-        albedo, how = float(np.pi * np.nanmedian(samples.values)), "pi times the median of f_r is"
+        albedo = float(np.pi * np.nanmedian(samples.values))
+        how = "pi times the median of f_r is"
     if albedo > _EXCESS:
         reasons = [f"reflectance factors, which make {albedo / np.pi:.3g} when they are divided by pi"]
         if albedo / 100.0 > _BLACK and albedo > 10.0:

@@ -17,7 +17,9 @@ from brdfdb.parameters import Floats
 
 _HALF_TURN = np.array([-1.0, -1.0, 1.0])
 MIRROR = np.array([1.0, -1.0, 1.0])  # of unit vectors, that exchanges left and right of the plane of phi = 0
-_DRAWN, _UP_TO_DEG, _SEED = 4000, 80.0, 1924
+_DRAWN = 4000
+_UP_TO_DEG = 80.0
+_SEED = 1924
 _FAINT = 1e-3  # share of the median of abs(f_r) below which pairs do not count in an asymmetry
 _ROUNDING = 1e-6  # asymmetry that a file in float32 has
 _CONTRADICTED = 0.05  # asymmetry above which data of unknown noise contradict a symmetry
@@ -58,9 +60,11 @@ def lobe_pairs(extent: Extent | None = None) -> LobePairs:
     slope = _SLOPES[octave] * 2.0 ** rng.uniform(0.0, 1.0, octave.size)
     theta = np.arccos(rng.uniform(np.cos(radians(_UP_TO_DEG)), 1.0, octave.size))
     phi = rng.uniform(0.0, 2.0 * np.pi, (2, octave.size))
-    wi, half = unit_vector(theta, phi[0]), unit_vector(np.arctan(slope), phi[1])
+    wi = unit_vector(theta, phi[0])
+    half = unit_vector(np.arctan(slope), phi[1])
     wr = 2.0 * np.sum(wi * half, axis=1, keepdims=True) * half - wi
-    wi, wr = np.concatenate([wi, wi]), np.concatenate([wr, wr * _HALF_TURN])
+    wi = np.concatenate([wi, wi])
+    wr = np.concatenate([wr, wr * _HALF_TURN])
     octave = np.concatenate([octave, octave + _SLOPES.size])
     inside = wr[:, 2] > np.cos(radians(_UP_TO_DEG))
     if extent is not None:

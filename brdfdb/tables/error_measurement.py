@@ -143,7 +143,9 @@ def draw(source: Source | FunctionRecord | None, wavelength_nm: Axis | None, cou
     wi, wr = extent.drawn(len(pairs.wi), np.random.default_rng(seed))
     band = np.clip(np.searchsorted(radians(BANDS_DEG), np.arccos(wi[:, 2]), side="right") - 1, 0, BANDS_DEG.size - 2)
     order = np.argsort(band, kind="stable")
-    wi, wr, band = wi[order], wr[order], band[order]
+    wi = wi[order]
+    wr = wr[order]
+    band = band[order]
     weight = wr[:, 2] * np.sinc(np.arccos(wr[:, 2]) / np.pi)  # drawn evenly in theta (cos phi, sin phi)
     none = np.zeros(band.size, dtype=bool)
     return RandomPairs(wi, wr, band, weight * (np.pi / weight.mean()), none, ~none)

@@ -82,7 +82,9 @@ def tabulated(
         raise ParameterError("values", "no value is above 0, which leaves nothing to tabulate", 0.0)
     floor = error_measurement.floor_of(truth, drawn)
     weight = np.where(drawn.above, drawn.weight, 0.0)
-    layout, values, reached = None, np.empty(0, np.float32), math.inf
+    layout = None
+    values = np.empty(0, np.float32)
+    reached = math.inf
     chiral = source.measured is not None and source.measured.chiral
     for count in _ANISOTROPIC_LADDER if source.anisotropic and not chiral else _LADDER:
         layout = Layout(

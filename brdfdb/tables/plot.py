@@ -292,7 +292,8 @@ class Plot:
         """
         if phi_i_deg is None:
             phi_i_deg = (0.0, 90.0) if self.table.anisotropic else 0.0
-        lights, azimuths = _numbers("theta_i_deg", theta_i_deg), _numbers("phi_i_deg", phi_i_deg)
+        lights = _numbers("theta_i_deg", theta_i_deg)
+        azimuths = _numbers("phi_i_deg", phi_i_deg)
         check_azimuth_deg("phi_i_deg", azimuths)
         wavelengths = self._wavelengths(wavelength_nm)
         for theta in lights:
@@ -313,9 +314,11 @@ class Plot:
             parts += [f"{wavelength:g} nm"] if len(wavelengths) > 1 else []
             colour: str | tuple[float, ...]
             if wavelength is None or len(wavelengths) == 1:
-                colour, dashes = COLOURS[number % len(COLOURS)], DASHES[row % len(DASHES)]
+                colour = COLOURS[number % len(COLOURS)]
+                dashes = DASHES[row % len(DASHES)]
             else:
-                colour, dashes = _spectral_colour(wavelength), DASHES[number % len(DASHES)]
+                colour = _spectral_colour(wavelength)
+                dashes = DASHES[number % len(DASHES)]
             curves.append(Curve(", ".join(parts), signed, brdf, colour, dashes))
         return curves, f"{self.table.name}{_at(wavelengths[0]) if len(wavelengths) == 1 else ''}"
 

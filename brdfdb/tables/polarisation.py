@@ -89,7 +89,8 @@ class Facets:
     def of_surface(self, angles: tuple[ArrayLike, ...], f_r: Floats, located: Located) -> NDArray[np.float64]:
         """Return m_ij / m_00 between bases of the surface, (..., M, 4, 4), at four angles [rad] and f_r (..., M)."""
         plane = stokes.plane(*angles)
-        light, viewer = plane.light[..., np.newaxis, :, :], plane.viewer[..., np.newaxis, :, :]
+        light = plane.light[..., np.newaxis, :, :]
+        viewer = plane.viewer[..., np.newaxis, :, :]
         turned = viewer @ self.facet(plane.theta_d, located) @ light
         return self._with_share(turned, f_r, located)
 

@@ -62,7 +62,8 @@ def rotation(angle: ArrayLike) -> NDArray[np.float64]:
 def plane(theta_i: ArrayLike, phi_i: ArrayLike, theta_r: ArrayLike, phi_r: ArrayLike) -> Plane:
     """Return the plane of light and viewer at angles [rad], which broadcast."""
     angles = np.broadcast_arrays(*(np.asarray(angle, np.float64) for angle in (theta_i, phi_i, theta_r, phi_r)))
-    w_i, w_r = unit_vector(angles[0], angles[1]), unit_vector(angles[2], angles[3])
+    w_i = unit_vector(angles[0], angles[1])
+    w_r = unit_vector(angles[2], angles[3])
     s_i, s_r = horizontal(angles[1]), horizontal(angles[3])
     normal = np.cross(w_i, w_r)
     length = np.linalg.norm(normal, axis=-1, keepdims=True)
@@ -82,7 +83,8 @@ def horizontal(phi: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _to(s: NDArray[np.float64], own: NDArray[np.float64], k: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the rotation to the basis of `s` from that of `own`, unit vectors normal to the direction of travel k."""
-    cos, sin = np.sum(s * own, axis=-1), np.sum(s * np.cross(own, k), axis=-1)
+    cos = np.sum(s * own, axis=-1)
+    sin = np.sum(s * np.cross(own, k), axis=-1)
     return _turned(cos * cos - sin * sin, 2.0 * cos * sin)
 
 

@@ -370,7 +370,8 @@ class Table(BaseTable):
     @array_lookup
     def mueller_in_plane(self, wi: ArrayLike, wr: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:
         """Interpolate the Mueller BRDF [1/sr] between bases of the plane of light and viewer; as `mueller_vectors`."""
-        facets, located = self._polarised, self._wavelengths(wavelength_nm)
+        facets = self._polarised
+        located = self._wavelengths(wavelength_nm)
         vectors = checked_vectors(wi, wr)
         f_r = np.asarray(self.lookup_vectors(wi, wr, wavelength_nm))
         values = f_r if located.tail else f_r[..., np.newaxis]
@@ -384,7 +385,8 @@ class Table(BaseTable):
 
         `theta_d` [rad] is half the angle between light and viewer, in [0, pi/2]. Shaped as by `lookup`, and (4, 4).
         """
-        facets, located = self._polarised, self._wavelengths(wavelength_nm)
+        facets = self._polarised
+        located = self._wavelengths(wavelength_nm)
         matrix = facets.facet(np.asarray(theta_d, np.float64), located)
         return matrix if located.tail else matrix[..., 0, :, :]
 
@@ -437,7 +439,9 @@ def _flat(array: NDArray[Any], shape: tuple[int, ...], dtype: DTypeLike) -> NDAr
 
 def points(grid: Grid, wi: Floats, wr: Floats) -> NDArray[np.float64]:
     """Return the coordinates [rad] on a grid, of shape (axes, N), of unit vectors of shape (N, 3)."""
-    x, mu, scratch = np.empty((len(grid.axes), len(wi))), np.empty(len(wi)), np.empty((6, len(wi)))
+    x = np.empty((len(grid.axes), len(wi)))
+    mu = np.empty(len(wi))
+    scratch = np.empty((6, len(wi)))
     rule = _coordinates.Rule(grid.half_difference, grid.reciprocal, grid.copies, False, 0.0, 0.0, False, False, False)
     flat = [_flat(w, np.shape(w), np.float64) for w in (wi, wr)]
     _coordinates.points_of_vectors(rule, flat[0], flat[1], len(wi), x, mu, scratch)
@@ -453,7 +457,8 @@ def table_from(name: str, revision: str, arrays: Mapping[str, NDArray[Any]], att
     if variable not in arrays:
         raise ParameterError("brdf", f"neither it nor parts is among the arrays {', '.join(arrays) or 'none'}")
     grid = Grid({axis: arrays[axis] for axis in axes_among(arrays)})
-    specular, uniform = arrays.get("specular_reflectance"), arrays.get("uniform")
+    specular = arrays.get("specular_reflectance")
+    uniform = arrays.get("uniform")
     wavelength_nm = arrays.get("wavelength")
     part_nm = np.array(metadata.part_wavelengths_nm) if metadata.part_wavelengths_nm else None
     basis = "mixture" if "mixture" in arrays else "spectra"
@@ -525,10 +530,13 @@ class TableSource(FunctionSource):
     @functools.cached_property
     def sampler(self) -> Sampler | None:
         """The sampler of the table; None if f_r hardly varies, where the cosine draws directions with less noise."""
-        number, wi = np.arange(_DRAWN), unit_vector(radians(_LIGHTS_DEG)[:, np.newaxis], 0.0)
+        number = np.arange(_DRAWN)
+        wi = unit_vector(radians(_LIGHTS_DEG)[:, np.newaxis], 0.0)
         drawn = self._table.sample((number + 0.5) / _DRAWN, number * _TURN % 1.0, wi)
         weight, pdf = (np.reshape(values, (*drawn.wr.shape[:2], -1)) for values in (drawn.weight, drawn.pdf))
-        mean, density, cosine = weight.mean(axis=-1), pdf[..., 0], np.maximum(drawn.wr[..., 2], 0.0)
+        mean = weight.mean(axis=-1)
+        density = pdf[..., 0]
+        cosine = np.maximum(drawn.wr[..., 2], 0.0)
         square = np.divide(np.pi * mean**2 * density, cosine, out=np.zeros(cosine.shape), where=cosine > 0.0)
         albedo = np.maximum(mean.mean(axis=1), _BLACK)
         varies = np.mean(square.mean(axis=1) / albedo**2 - 1.0) > _EVEN

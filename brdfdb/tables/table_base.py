@@ -359,7 +359,9 @@ class BaseTable(Lookups):
             return self._on_axis(np.zeros(1), np.zeros(asked_nm.size), shape)
         outside = (asked_nm < stored_nm[0]) | (asked_nm > stored_nm[-1])
         if np.any(outside):
-            wrong, low, high = float(asked_nm[outside][0]), float(stored_nm[0]), float(stored_nm[-1])
+            wrong = float(asked_nm[outside][0])
+            low = float(stored_nm[0])
+            high = float(stored_nm[-1])
             range_nm = f"outside [{low:g}, {high:g}] nm of" if low < high else f"not {low:g} nm, the one wavelength of"
             raise ParameterError("wavelength_nm", f"{wrong:.9g} is {range_nm} {self.name}", wrong, (low, high))
         return self._on_axis(stored_nm, asked_nm, shape)

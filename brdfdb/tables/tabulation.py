@@ -128,9 +128,11 @@ def _evaluated(layout: Layout, rows: slice, wavelength_nm: ArrayLike | None) -> 
         return evaluate(*layout.grid.directions(rows))
     theta, _, delta_phi = (radians(nodes) for nodes in layout.grid.axes.values())
     row, column = (index.ravel() for index in np.indices((rows.stop - rows.start, theta.size)))
-    smaller, larger = np.minimum(row + rows.start, column), np.maximum(row + rows.start, column)
+    smaller = np.minimum(row + rows.start, column)
+    larger = np.maximum(row + rows.start, column)
     pairs, pair = np.unique(smaller * theta.size + larger, return_inverse=True)  # of which each is evaluated once
-    light, viewer = theta[pairs // theta.size], theta[pairs % theta.size]
+    light = theta[pairs // theta.size]
+    viewer = theta[pairs % theta.size]
     values = evaluate(light[:, np.newaxis], np.zeros(()), viewer[:, np.newaxis], delta_phi)
     return values[pair].reshape(-1, theta.size, *values.shape[1:])
 
@@ -210,7 +212,8 @@ def held(
         end = radians(POLE_END_DEG)
         lowest, theta_h = float(np.cos(end)), np.minimum(theta_h, end)
     # cos theta_r = along cos theta_d - across sin theta_d, at phi_d or at the other side
-    along, across = np.cos(theta_h), np.sin(theta_h) * np.abs(np.cos(phi_d))
+    along = np.cos(theta_h)
+    across = np.sin(theta_h) * np.abs(np.cos(phi_d))
     largest = np.arccos(np.minimum(lowest / np.hypot(along, across), 1.0)) - np.arctan2(across, along)
     largest = np.maximum(largest * (1.0 - 1e-12), 0.0)
     within = np.minimum(theta_d, largest)
@@ -244,7 +247,9 @@ def _half_vectors(theta_h: Floats, phi_h: Floats, theta_d: Floats, phi_d: Floats
 
 def frame(layout: Layout) -> Frame:
     """Return a table without its values: coordinates, specular part, basis, refractive indices and attributes."""
-    source, grid, wavelength_nm = layout.source, layout.grid, layout.wavelength_nm
+    source = layout.source
+    grid = layout.grid
+    wavelength_nm = layout.wavelength_nm
     spectral = () if wavelength_nm is None else ("wavelength",)
     coordinates = {name: _coordinate(name, nodes) for name, nodes in grid.axes.items()}
     variables = {}

@@ -116,7 +116,9 @@ def of_table(table: Table) -> dict[str, Any]:
 
 def values_document(values: Values) -> dict[str, Any]:
     """Return the fields of `Evaluated`, and those of the reflected light if there is some, with numpy arrays."""
-    surface, points, known = values.surface, values.points, values.error is not None and values.surface.kind == "table"
+    surface = values.surface
+    points = values.points
+    known = values.error is not None and values.surface.kind == "table"
     return {
         "source": surface.kind,
         "unit": "1/sr",
