@@ -12,14 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.arrays import check_rows, plain
-from brdfdb.errors import ParameterError
+from brdfdb.errors import ParameterError, counted
 from brdfdb.geometry import check_phi, degrees, radians, unit_vector
 from brdfdb.parameters import Floats, check_nanometres
 
 if TYPE_CHECKING:
     import xarray as xr
-
-from brdfdb.errors import counted
 
 RELATIVE = "relative to the light"  # entry "azimuths" of a record: the azimuth on the surface is not known
 NODES = "nodes"  # entry of a record that is true if the samples are all nodes of a grid

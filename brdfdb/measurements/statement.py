@@ -88,11 +88,11 @@ class SampleStatement:
     def sentences(self) -> tuple[str, ...]:
         """The statement in sentences."""
         return (
-            *_on_angles(self),
-            *_on_values(self),
-            *_on_albedo(self),
-            *_on_pairs(self),
-            *_on_claims(self),
+            *self._on_angles(),
+            *self._on_values(),
+            *self._on_albedo(),
+            *self._on_pairs(),
+            *self._on_claims(),
             *self.notes,
             *self.hints,
         )
@@ -101,6 +101,89 @@ class SampleStatement:
         """Return the statement as JSON."""
         largest = self.largest if np.isfinite(self.largest) else None
         return {**asdict(self), "largest": largest, "sentences": list(self.sentences)}
+
+    def _on_angles(self) -> list[str]:
+        lights = counted(self.lights, "direction") + " of the light"
+        channels = counted(len(self.channels), "channel")
+        low, high = self.theta_i_deg
+        samples = counted(self.samples, "node" if self.nodes else "sample")
+        around = "from several azimuths" if self.turned else "from one azimuth"
+        text = f"{samples} of {channels}: {lights}, {around}, theta_i {low:.4g} to {high:.4g} degrees"
+        text += f"; theta_r {self.theta_r_deg[0]:.4g} to {self.theta_r_deg[1]:.4g} degrees."
+        side = ["All viewers are on one side of the plane of incidence: the other is taken for its mirror image."]
+        return [text, *(side if self.one_side and self.incidences else [])]
+
+    def _on_values(self) -> list[str]:
+        theta_i, theta_r, turn = self.largest_at_deg
+        where = f"theta_i {theta_i:.4g}, theta_r {theta_r:.4g} and an azimuth of {turn:.4g} degrees from the light"
+        counts = f"{counted(self.holes, 'hole')}, {counted(self.negative, 'negative value')}"
+        lines = [f"{counts}; the largest value is {self.largest:.4g} /sr at {where}."]
+        if self.wavelength_nm is not None:
+            low, high = self.wavelength_nm
+            lines.append(f"Wavelengths: {low:.4g} to {high:.4g} nm." if high > low else f"Wavelength: {low:.4g} nm.")
+        elif self.channels == ("grey",):
+            lines.append("No wavelength is stated; --wavelength-nm states one.")
+        if self.uncertainty is not None:
+            lines.append(f"Standard uncertainties are stated: {percent(self.uncertainty)} of f_r in the median.")
+        if self.constant:
+            of_channel = "f_r of each channel" if len(self.channels) > 1 else "f_r"
+            lines.append(f"{of_channel} is one number at all directions: the samples tell no shape.")
+        if self.zeros:
+            lines.append(f"{counted(self.zeros, 'value')} of exactly 0: integrals and pairs take them for holes.")
+        return lines
+
+    def _on_albedo(self) -> list[str]:
+        if not self.incidences:
+            return ["No albedo: no direction of the light has viewers around the hemisphere."]
+        numbers = np.unique(np.linspace(0, len(self.incidences) - 1, _SHOWN).astype(int))
+        lines = []
+        for some in (self.incidences[number] for number in numbers):
+            azimuth = f", phi_i {some.phi_i_deg:.4g}" if self.turned and not self.in_bands else ""
+            text = f"Albedo at theta_i {some.theta_i_deg:.4g}{azimuth}: {_shown(self.channels, some.albedo)}"
+            if some.covered < _ALL_COVERED:
+                inside = _shown(self.channels, some.measured)
+                text += f"; viewers surround {100.0 * some.covered:.3g} % of the hemisphere, with {inside}"
+            if some.peak > PEAK:
+                text += f"; unknown: one viewer makes {percent(some.peak)} of it, the lobe is narrower than the steps"
+            lines.append(f"{text}.")
+        if self.in_bands:
+            lines.append(
+                f"Directions are scattered: these are lights within {BAND_DEG:g} degree, as if azimuths did not matter."
+            )
+        if len(numbers) < len(self.incidences):
+            lines.append(f"{len(self.incidences)} directions of the light are integrated in all.")
+        return lines
+
+    def _on_pairs(self) -> list[str]:
+        if self.reciprocity is None:
+            return ["Reciprocity: no sample is the swap of another."]
+        pairs = self.reciprocity
+        return [
+            f"Reciprocity: {counted(pairs.pairs, 'pair')} of {'nodes' if self.nodes else 'samples'} with light and viewer "
+            f"exchanged; asymmetry |f - f'| / (|f| + |f'|) of these: median {100.0 * pairs.median:.3g} %, largest "
+            f"{100.0 * pairs.largest:.3g} %."
+        ]
+
+    def _on_claims(self) -> list[str]:
+        lines, agree = [], 0
+        for claim in self.claims:
+            if claim.known and abs(claim.relative) > _CLAIM:
+                size = f"{percent(abs(claim.relative))} {'low' if claim.relative < 0.0 else 'high'}"
+                of_channel = f" ({claim.channel})" if len(self.channels) > 1 else ""
+                text = f"The header claims {claim.claimed:.4g} at theta_i {claim.theta_i_deg:.4g}{of_channel}"
+                least = "at least " if claim.at_least else ""
+                lines.append(
+                    f"{text}, and its own values integrate to {least}{claim.integrated:.4g}: the claim is {size}."
+                )
+            agree += claim.known and abs(claim.relative) <= _CLAIM
+        if agree:
+            lines.append(
+                f"{counted(agree, 'claim')} of the header {'agrees' if agree == 1 else 'agree'} with its values."
+            )
+        if open_ones := sum(not claim.known for claim in self.claims):
+            why = "viewers surround too little of the hemisphere, or steps are wider than the lobe"
+            lines.append(f"{counted(open_ones, 'claim')} of the header cannot be judged: {why}.")
+        return lines
 
 
 def statement(samples: Samples, progress: Callable[[float], None] | None = None) -> SampleStatement:
@@ -136,6 +219,11 @@ def statement(samples: Samples, progress: Callable[[float], None] | None = None)
     full = replace(samples, values=np.where(zeros, np.nan, samples.values)) if zeros.any() else samples
     integrated, in_bands = incidences_of(full, delta, progress, one_side=one_side)
     at = samples.wavelength_nm
+    uncertainty = None
+    if samples.uncertainty is not None:
+        stated = np.isfinite(samples.uncertainty) & known & (samples.values != 0.0)
+        relative = samples.uncertainty[stated] / np.abs(samples.values[stated])
+        uncertainty = float(np.median(relative)) if stated.any() else None
     peak = np.unravel_index(int(np.argmax(np.where(known, samples.values, -np.inf))), samples.values.shape)[0]
     return SampleStatement(
         name=samples.name,
@@ -153,7 +241,7 @@ def statement(samples: Samples, progress: Callable[[float], None] | None = None)
         constant=is_constant(samples),
         largest=float(np.nanmax(samples.values)) if known.any() else np.nan,
         largest_at_deg=(float(theta_i[peak]), float(theta_r[peak]), float(delta[peak])),
-        uncertainty=_uncertainty(samples),
+        uncertainty=uncertainty,
         wavelength_nm=None if at is None else (float(at.min()), float(at.max())),
         in_bands=in_bands,
         incidences=integrated,
@@ -162,14 +250,6 @@ def statement(samples: Samples, progress: Callable[[float], None] | None = None)
         notes=notes_of(samples.record),
         hints=(*missing(samples), *azimuths(samples, delta), *units(samples, integrated)),
     )
-
-
-def _uncertainty(samples: Samples) -> float | None:
-    """Return the median of the standard uncertainties over the absolute values [1]; None if none is known."""
-    if samples.uncertainty is None:
-        return None
-    stated = np.isfinite(samples.uncertainty) & samples.known & (samples.values != 0.0)
-    return float(np.median(samples.uncertainty[stated] / np.abs(samples.values[stated]))) if stated.any() else None
 
 
 def _claims(samples: Samples, incidences: Sequence[Incidence]) -> tuple[Claim, ...]:
@@ -193,61 +273,6 @@ def _claims(samples: Samples, incidences: Sequence[Incidence]) -> tuple[Claim, .
     return tuple(claims)
 
 
-def _on_angles(known: SampleStatement) -> list[str]:
-    lights = counted(known.lights, "direction") + " of the light"
-    channels = counted(len(known.channels), "channel")
-    low, high = known.theta_i_deg
-    samples = counted(known.samples, "node" if known.nodes else "sample")
-    around = "from several azimuths" if known.turned else "from one azimuth"
-    text = f"{samples} of {channels}: {lights}, {around}, theta_i {low:.4g} to {high:.4g} degrees"
-    text += f"; theta_r {known.theta_r_deg[0]:.4g} to {known.theta_r_deg[1]:.4g} degrees."
-    side = ["All viewers are on one side of the plane of incidence: the other is taken for its mirror image."]
-    return [text, *(side if known.one_side and known.incidences else [])]
-
-
-def _on_values(known: SampleStatement) -> list[str]:
-    theta_i, theta_r, turn = known.largest_at_deg
-    where = f"theta_i {theta_i:.4g}, theta_r {theta_r:.4g} and an azimuth of {turn:.4g} degrees from the light"
-    counts = f"{counted(known.holes, 'hole')}, {counted(known.negative, 'negative value')}"
-    lines = [f"{counts}; the largest value is {known.largest:.4g} /sr at {where}."]
-    if known.wavelength_nm is not None:
-        low, high = known.wavelength_nm
-        lines.append(f"Wavelengths: {low:.4g} to {high:.4g} nm." if high > low else f"Wavelength: {low:.4g} nm.")
-    elif known.channels == ("grey",):
-        lines.append("No wavelength is stated; --wavelength-nm states one.")
-    if known.uncertainty is not None:
-        lines.append(f"Standard uncertainties are stated: {percent(known.uncertainty)} of f_r in the median.")
-    if known.constant:
-        of_channel = "f_r of each channel" if len(known.channels) > 1 else "f_r"
-        lines.append(f"{of_channel} is one number at all directions: the samples tell no shape.")
-    if known.zeros:
-        lines.append(f"{counted(known.zeros, 'value')} of exactly 0: integrals and pairs take them for holes.")
-    return lines
-
-
-def _on_albedo(known: SampleStatement) -> list[str]:
-    if not known.incidences:
-        return ["No albedo: no direction of the light has viewers around the hemisphere."]
-    numbers = np.unique(np.linspace(0, len(known.incidences) - 1, _SHOWN).astype(int))
-    lines = []
-    for some in (known.incidences[number] for number in numbers):
-        azimuth = f", phi_i {some.phi_i_deg:.4g}" if known.turned and not known.in_bands else ""
-        text = f"Albedo at theta_i {some.theta_i_deg:.4g}{azimuth}: {_shown(known.channels, some.albedo)}"
-        if some.covered < _ALL_COVERED:
-            inside = _shown(known.channels, some.measured)
-            text += f"; viewers surround {100.0 * some.covered:.3g} % of the hemisphere, with {inside}"
-        if some.peak > PEAK:
-            text += f"; unknown: one viewer makes {percent(some.peak)} of it, the lobe is narrower than the steps"
-        lines.append(f"{text}.")
-    if known.in_bands:
-        lines.append(
-            f"Directions are scattered: these are lights within {BAND_DEG:g} degree, as if azimuths did not matter."
-        )
-    if len(numbers) < len(known.incidences):
-        lines.append(f"{len(known.incidences)} directions of the light are integrated in all.")
-    return lines
-
-
 def _shown(channels: tuple[str, ...], values: tuple[float, ...]) -> str:
     """Return values of channels as text: all of up to three, else the smallest and the largest."""
     if len(channels) == 1:
@@ -260,35 +285,6 @@ def _shown(channels: tuple[str, ...], values: tuple[float, ...]) -> str:
 def _digits(value: float) -> str:
     """Return a number with four digits behind the point, and no more than four that count."""
     return f"{value:.4f}" if 1e-3 <= abs(value) < 1.0 or value == 0.0 else f"{value:.4g}"
-
-
-def _on_pairs(known: SampleStatement) -> list[str]:
-    if known.reciprocity is None:
-        return ["Reciprocity: no sample is the swap of another."]
-    pairs = known.reciprocity
-    return [
-        f"Reciprocity: {counted(pairs.pairs, 'pair')} of {'nodes' if known.nodes else 'samples'} with light and viewer "
-        f"exchanged; asymmetry |f - f'| / (|f| + |f'|) of these: median {100.0 * pairs.median:.3g} %, largest "
-        f"{100.0 * pairs.largest:.3g} %."
-    ]
-
-
-def _on_claims(known: SampleStatement) -> list[str]:
-    lines, agree = [], 0
-    for claim in known.claims:
-        if claim.known and abs(claim.relative) > _CLAIM:
-            size = f"{percent(abs(claim.relative))} {'low' if claim.relative < 0.0 else 'high'}"
-            of_channel = f" ({claim.channel})" if len(known.channels) > 1 else ""
-            text = f"The header claims {claim.claimed:.4g} at theta_i {claim.theta_i_deg:.4g}{of_channel}"
-            least = "at least " if claim.at_least else ""
-            lines.append(f"{text}, and its own values integrate to {least}{claim.integrated:.4g}: the claim is {size}.")
-        agree += claim.known and abs(claim.relative) <= _CLAIM
-    if agree:
-        lines.append(f"{counted(agree, 'claim')} of the header {'agrees' if agree == 1 else 'agree'} with its values.")
-    if open_ones := sum(not claim.known for claim in known.claims):
-        why = "viewers surround too little of the hemisphere, or steps are wider than the lobe"
-        lines.append(f"{counted(open_ones, 'claim')} of the header cannot be judged: {why}.")
-    return lines
 
 
 @dataclass(frozen=True)
