@@ -93,28 +93,15 @@ class Finding(BaseModel):
 
     A subclass defines the class attributes, the field `verdict` and the method `judge`. `brdfdb.audit.registry` finds
     it in its module.
-
-    Attributes
-    ----------
-    key : str
-        Name in the report: lower-case letters and underscores.
-    order : int
-        Position among the findings, which are judged and shown in this order.
-    title : str
-        Name for people; by default the key in words.
-    columns : tuple of str
-        Headings of its cells; by default one, the title.
-    explanation : str
-        Sentences on how to read it.
     """
 
     model_config = STRICT
 
-    key: ClassVar[str]
-    order: ClassVar[int] = 100
-    title: ClassVar[str]
-    columns: ClassVar[tuple[str, ...]]
-    explanation: ClassVar[str]
+    key: ClassVar[str]  #: name in the report: lower-case letters and underscores
+    order: ClassVar[int] = 100  #: position among the findings, which are judged and shown in this order
+    title: ClassVar[str]  #: name for people; by default the key in words
+    columns: ClassVar[tuple[str, ...]]  #: headings of its cells; by default one, the title
+    explanation: ClassVar[str]  #: sentences on how to read it
 
     verdict: Word
 

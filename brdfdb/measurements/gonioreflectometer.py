@@ -89,51 +89,28 @@ class CameraAngles(NamedTuple):
 
 @dataclass(frozen=True)
 class Gonioreflectometer:
-    """The instrument. The defaults are those of a camera of today; the paper prints few of its numbers.
+    """The instrument. The defaults are those of a camera of today; the paper prints few of its numbers."""
 
-    Attributes
-    ----------
-    width, height : int
-        Pixels of the camera. The paper reduces its pictures to 108 by 80 before it uses them.
-    offset : float [1]
-        D / R: half of the distance of sample and camera over the radius of the hemisphere.
-    field_deg : float [degree]
-        Angle of the lens at the upper edge of the picture. The lens gives all pixels the same solid angle: the distance
-        from the middle is in proportion to the sine of half of the angle.
-    largest_theta_r_deg : float [degree]
-        Largest polar angle of the viewer that is used; the hemisphere ends there.
-    standard_reflectance : float [1]
-        Reflectance of the diffuse standard, rho_standard of eq. 2.
-    light_half_angle_deg : float [degree]
-        Half of the angle of the beam, seen from the sample.
-    blur_px : float [pixel]
-        Standard deviation of the blur of hemisphere and lens.
-    full_well, read_noise : float [electron]
-        Charge at the largest count, and noise of a pixel in the dark.
-    bits : int
-        Bits of a count.
-    exposures : tuple of float [1]
-        Times of exposure, relative to the longest. Their range is that of the measured values.
-    frames : int
-        Number of pictures of the standard and of the background that are averaged.
-    stray : float [1]
-        Stray light in the background, relative to that of a perfect white.
-    """
-
+    #: width, height: pixels of the camera. The paper reduces its pictures to 108 by 80 before it uses them
     width: int = 432
     height: int = 320
-    offset: float = 0.05
+    offset: float = 0.05  #: D / R: half of the distance of sample and camera over the radius of the hemisphere, [1]
+    #: angle of the lens at the upper edge of the picture. The lens gives all pixels the same solid angle: the distance
+    #: from the middle is in proportion to the sine of half of the angle, [degree]
     field_deg: float = 85.0
+    #: largest polar angle of the viewer that is used; the hemisphere ends there, [degree]
     largest_theta_r_deg: float = 75.0
-    standard_reflectance: float = 0.98
-    light_half_angle_deg: float = 0.5
-    blur_px: float = 0.7
+    standard_reflectance: float = 0.98  #: reflectance of the diffuse standard, rho_standard of eq. 2, [1]
+    light_half_angle_deg: float = 0.5  #: half of the angle of the beam, seen from the sample, [degree]
+    blur_px: float = 0.7  #: standard deviation of the blur of hemisphere and lens, [pixel]
+    #: full_well, read_noise: charge at the largest count, and noise of a pixel in the dark, [electron]
     full_well: float = 20000.0
     read_noise: float = 8.0
-    bits: int = 14
+    bits: int = 14  #: bits of a count
+    #: times of exposure, relative to the longest. Their range is that of the measured values, [1]
     exposures: tuple[float, ...] = (1.0, 1.0 / 16.0, 1.0 / 256.0)
-    frames: int = 16
-    stray: float = 0.002
+    frames: int = 16  #: number of pictures of the standard and of the background that are averaged
+    stray: float = 0.002  #: stray light in the background, relative to that of a perfect white, [1]
 
     def __post_init__(self) -> None:
         for name, (low, high) in _RANGES.items():

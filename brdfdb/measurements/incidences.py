@@ -95,10 +95,10 @@ class Incidence:
 
     theta_i_deg: float
     phi_i_deg: float
-    viewers: int  # number of directions of the viewer
-    covered: float  # share of the projected hemisphere that viewers surround, in the channel with most holes
-    measured: tuple[float, ...]  # integral of f_r cos(theta_r) over what is covered, of each channel
-    albedo: tuple[float, ...]  # integral over the hemisphere; beyond the viewers f_r is that of the nearest
+    viewers: int  #: number of directions of the viewer
+    covered: float  #: share of the projected hemisphere that viewers surround, in the channel with most holes
+    measured: tuple[float, ...]  #: integral of f_r cos(theta_r) over what is covered, of each channel
+    albedo: tuple[float, ...]  #: integral over the hemisphere; beyond the viewers f_r is that of the nearest
     # Largest share of one viewer in the albedo of a channel. Above a tenth the lobe is narrower than the steps between
     # viewers, and the albedo is not known
     peak: float

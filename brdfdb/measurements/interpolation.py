@@ -46,35 +46,21 @@ class SampleInterpolation:
     """f_r of samples everywhere: a base times a smooth ratio.
 
     The logarithm is asinh(f_r / (2 noise)), which is linear where f_r is less than its noise: values below 0 count.
-
-    Attributes
-    ----------
-    base : callable
-        f_r [1/sr] that the ratio is taken to.
-    alpha : float
-        Width [1] of the lobe that the coordinates crowd in.
-    level : array (C,) [1/sr]
-        Noise of small values: their uncertainty, or that of the values below 0, which a few wrong ones do not set.
-    scales : tuple
-        Scales of the coordinates, and the noise of the logarithm that no uncertainty states, relative to its spread.
-    turned : bool
-        True if the samples can tell the azimuth of the light.
-    mean : array (C,)
-        Mean of the logarithm of the ratio.
-    lowest : float
-        Smallest cosine of a light or a viewer that was measured. Directions closer to the horizon have the values
-        there, as in tables: a lobe that is continued may reflect any amount.
-    centres, weights : array (M, D), (M, C)
-        Centres of the radial functions in the coordinates, and their weights.
     """
 
-    base: Base
-    alpha: float
+    base: Base  #: f_r [1/sr] that the ratio is taken to
+    alpha: float  #: width [1] of the lobe that the coordinates crowd in
+    #: noise of small values: their uncertainty, or that of the values below 0, which a few wrong ones do not set, (C,)
+    #: [1/sr]
     level: Floats
+    #: scales of the coordinates, and the noise of the logarithm that no uncertainty states, relative to its spread
     scales: _Scales
-    turned: bool
-    mean: Floats
+    turned: bool  #: True if the samples can tell the azimuth of the light
+    mean: Floats  #: mean of the logarithm of the ratio, (C,)
+    #: smallest cosine of a light or a viewer that was measured. Directions closer to the horizon have the values there,
+    #: as in tables: a lobe that is continued may reflect any amount
     lowest: float
+    #: centres, weights: centres of the radial functions in the coordinates, and their weights, (M, D) (M, C)
     centres: Floats = field(default_factory=lambda: np.empty((0, 0)))
     weights: Floats = field(default_factory=lambda: np.empty((0, 0)))
 
@@ -242,29 +228,18 @@ def floor_of(samples: Samples) -> Floats:
 
 
 class _Problem(NamedTuple):
-    """Samples as the least-squares problem reads them.
+    """Samples as the least-squares problem reads them."""
 
-    Attributes
-    ----------
-    wi, wr : array (N, 3)
-        Directions.
-    values : array (N, C) [1/sr]
-        f_r; nan in holes.
-    of_base, y : array (N, C)
-        Logarithm of the base, and the number to interpolate: the logarithm of f_r less that of the base.
-    noise : array (N,)
-        Noise of y, relative to its spread.
-    group : array (N,)
-        Groups that are held out together.
-    """
-
+    #: wi, wr: directions, (N, 3)
     wi: Floats
     wr: Floats
-    values: Floats
+    values: Floats  #: f_r; nan in holes, (N, C) [1/sr]
+    #: of_base, y: logarithm of the base, and the number to interpolate: the logarithm of f_r less that of the base, (N,
+    #: C)
     of_base: Floats
     y: Floats
-    noise: Floats
-    group: NDArray[np.int64]
+    noise: Floats  #: noise of y, relative to its spread, (N,)
+    group: NDArray[np.int64]  #: groups that are held out together, (N,)
 
     def some(self, rows: NDArray[Any]) -> _Problem:
         return _Problem(*(part[rows] for part in self))

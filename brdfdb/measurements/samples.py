@@ -67,29 +67,6 @@ class Instrument:
 class Samples:
     """f_r at some directions, as an instrument measured it or as a file lists it.
 
-    Attributes
-    ----------
-    name : str
-        Name of the material, or of the file.
-    theta_i, phi_i, theta_r, phi_r : array (N,) [rad]
-        Directions of light and viewer. Polar angles are in [0, pi/2].
-    channels : tuple of str
-        Names of the columns of `values`: ("R", "G", "B"), ("X", "Y", "Z"), ("grey",), or wavelengths as "550nm".
-    wavelength_nm : array (C,) [nm] or None
-        Wavelengths of the channels; None of colours and of grey samples.
-    values : array (N, C) [1/sr]
-        f_r without the cosine. A hole is nan. Noise may make values negative.
-    uncertainty : array (N, C) [1/sr] or None
-        Standard uncertainty of each value, nan where it is not known; None, also of nan alone, if none is known.
-    bandwidth_nm : array (C,) [nm] or None
-        Full width of each band at half of its height; None if it is not known.
-    instrument : Instrument
-        The instrument.
-    provenance : str
-        Where the samples come from, in words.
-    record : mapping
-        What the file says beside its values: its header, or the record of an export.
-
     Raises
     ------
     ParameterError
@@ -97,18 +74,26 @@ class Samples:
         or infinite.
     """
 
-    name: str
+    name: str  #: name of the material, or of the file
+    #: theta_i, phi_i, theta_r, phi_r: directions of light and viewer. Polar angles are in [0, pi/2], (N,) [rad]
     theta_i: Floats = field(repr=False)
     phi_i: Floats = field(repr=False)
     theta_r: Floats = field(repr=False)
     phi_r: Floats = field(repr=False)
+    #: names of the columns of `values`: ("R", "G", "B"), ("X", "Y", "Z"), ("grey",), or wavelengths as "550nm"
     channels: tuple[str, ...]
+    #: wavelengths of the channels; None of colours and of grey samples, (C,) [nm]
     wavelength_nm: NDArray[np.float64] | None
+    #: f_r without the cosine. A hole is nan. Noise may make values negative, (N, C) [1/sr]
     values: Floats = field(repr=False)
+    #: standard uncertainty of each value, nan where it is not known; None, also of nan alone, if none is known, (N, C)
+    #: [1/sr]
     uncertainty: Floats | None = field(default=None, repr=False)
+    #: full width of each band at half of its height; None if it is not known, (C,) [nm]
     bandwidth_nm: NDArray[np.float64] | None = None
-    instrument: Instrument = Instrument()
-    provenance: str = ""
+    instrument: Instrument = Instrument()  #: the instrument
+    provenance: str = ""  #: where the samples come from, in words
+    #: what the file says beside its values: its header, or the record of an export
     record: Mapping[str, Any] = field(default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:

@@ -62,27 +62,27 @@ class SampleStatement:
 
     name: str
     channels: tuple[str, ...]
-    samples: int  # number of directions
-    nodes: bool  # True if the directions are nodes of a grid
-    lights: int  # number of directions of the light
-    theta_i_deg: tuple[float, float]  # smallest and largest polar angle of the light
-    theta_r_deg: tuple[float, float]  # smallest and largest polar angle of the viewer
-    turned: bool  # True if the light comes from several azimuths
-    one_side: bool  # True if viewers are on one side of the plane of incidence; integrals mirror it to the other
-    holes: int  # number of values that are missing
-    negative: int  # number of values below 0
-    zeros: int  # number of values that are exactly 0 while others are not: many files write 0 for a hole
-    constant: bool  # True if f_r of each channel is one number at all directions
-    largest: float  # largest value [1/sr]
-    largest_at_deg: tuple[float, float, float]  # theta_i, theta_r and the difference of the azimuths there
-    uncertainty: float | None  # median of the standard uncertainties over the absolute values [1]; None: not stated
-    wavelength_nm: tuple[float, float] | None  # smallest and largest wavelength; None: not stated
-    in_bands: bool  # True if directions are scattered, and `incidences` are bands of theta_i at any azimuth
-    incidences: tuple[Incidence, ...]  # directions of the light with viewers enough
-    reciprocity: ExchangedPairs | None  # None if no sample is the swap of another
-    claims: tuple[Claim, ...]  # claims of the header that can be compared
-    notes: tuple[str, ...]  # sentences on what the reader did to the file
-    hints: tuple[str, ...]  # sentences on what looks wrong
+    samples: int  #: number of directions
+    nodes: bool  #: True if the directions are nodes of a grid
+    lights: int  #: number of directions of the light
+    theta_i_deg: tuple[float, float]  #: smallest and largest polar angle of the light
+    theta_r_deg: tuple[float, float]  #: smallest and largest polar angle of the viewer
+    turned: bool  #: True if the light comes from several azimuths
+    one_side: bool  #: True if viewers are on one side of the plane of incidence; integrals mirror it to the other
+    holes: int  #: number of values that are missing
+    negative: int  #: number of values below 0
+    zeros: int  #: number of values that are exactly 0 while others are not: many files write 0 for a hole
+    constant: bool  #: True if f_r of each channel is one number at all directions
+    largest: float  #: largest value [1/sr]
+    largest_at_deg: tuple[float, float, float]  #: theta_i, theta_r and the difference of the azimuths there
+    uncertainty: float | None  #: median of the standard uncertainties over the absolute values [1]; None: not stated
+    wavelength_nm: tuple[float, float] | None  #: smallest and largest wavelength; None: not stated
+    in_bands: bool  #: True if directions are scattered, and `incidences` are bands of theta_i at any azimuth
+    incidences: tuple[Incidence, ...]  #: directions of the light with viewers enough
+    reciprocity: ExchangedPairs | None  #: None if no sample is the swap of another
+    claims: tuple[Claim, ...]  #: claims of the header that can be compared
+    notes: tuple[str, ...]  #: sentences on what the reader did to the file
+    hints: tuple[str, ...]  #: sentences on what looks wrong
 
     @property
     def sentences(self) -> tuple[str, ...]:
@@ -159,9 +159,9 @@ class SampleStatement:
             return ["Reciprocity: no sample is the swap of another."]
         pairs = self.reciprocity
         return [
-            f"Reciprocity: {counted(pairs.pairs, 'pair')} of {'nodes' if self.nodes else 'samples'} with light and viewer "
-            f"exchanged; asymmetry |f - f'| / (|f| + |f'|) of these: median {100.0 * pairs.median:.3g} %, largest "
-            f"{100.0 * pairs.largest:.3g} %."
+            f"Reciprocity: {counted(pairs.pairs, 'pair')} of {'nodes' if self.nodes else 'samples'} "
+            f"with light and viewer exchanged; asymmetry |f - f'| / (|f| + |f'|) of these: "
+            f"median {100.0 * pairs.median:.3g} %, largest {100.0 * pairs.largest:.3g} %."
         ]
 
     def _on_claims(self) -> list[str]:

@@ -51,18 +51,13 @@ class Grid:
     at 180 for surfaces that half a turn leaves the same, or at 90 for those that are also their own mirror image in x.
     Both ends of an axis are nodes; nodes need not be uniform.
 
-    Parameters
-    ----------
-    axes : mapping of str to sequence of float [degree]
-        Nodes of each axis, strictly increasing, in the order of the table's dimensions.
-
     Raises
     ------
     ValueError
         If the axes are not one of the four sets, or an axis does not start, end or increase as it must.
     """
 
-    axes: dict[str, Axis]
+    axes: dict[str, Axis]  #: nodes of each axis, strictly increasing, in the order of the table's dimensions, [degree]
 
     @classmethod
     def part(cls, whole: Grid, rows: slice) -> Grid:

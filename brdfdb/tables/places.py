@@ -32,22 +32,13 @@ ROWS = 2 * BANDS + 2 * RINGS
 
 
 class Pairs(NamedTuple):
-    """Pairs of directions that were drawn in places.
+    """Pairs of directions that were drawn in places."""
 
-    Attributes
-    ----------
-    wi, wr : float64 arrays (N, 3)
-        Unit vectors of light and viewer, above the horizon.
-    row : int64 array (N,)
-        The place of each.
-    sample : int64 array (N,)
-        Which sample it belongs to: several samples are drawn alongside the light.
-    """
-
+    #: wi, wr: unit vectors of light and viewer, above the horizon, (N, 3)
     wi: Floats
     wr: Floats
-    row: NDArray[np.int64]
-    sample: NDArray[np.int64]
+    row: NDArray[np.int64]  #: the place of each, (N,)
+    sample: NDArray[np.int64]  #: which sample it belongs to: several samples are drawn alongside the light, (N,)
 
     def some(self, chosen: NDArray[np.bool_]) -> Pairs:
         """Return the pairs that are chosen."""

@@ -29,25 +29,15 @@ _GAUSS = (0.5 - 0.5 / np.sqrt(3.0), 0.5 + 0.5 / np.sqrt(3.0))  # places in a cel
 
 
 class Cells(NamedTuple):
-    """Probabilities of half vectors, constant in each cell.
+    """Probabilities of half vectors, constant in each cell."""
 
-    Attributes
-    ----------
-    theta_i : array (K,) [rad]
-        Polar angles of the lights.
-    turns : int
-        Number of azimuths of the lights, evenly around the circle; 1 of an isotropic table, whose half vectors are
-        turned with the light.
-    edges : array (T + 1,) [1]
-        Edges of cells in 1 - cos(theta_h), from 0 to 1. Edges in phi_h are even from 0 to 2 pi.
-    probability : array (K * turns, T, P) [1]
-        Probability of each cell, lights with their azimuths one after another.
-    """
-
-    theta_i: Array
+    theta_i: Array  #: polar angles of the lights, (K,) [rad]
+    #: number of azimuths of the lights, evenly around the circle; 1 of an isotropic table, whose half vectors are
+    #: turned with the light
     turns: int
+    #: edges of cells in 1 - cos(theta_h), from 0 to 1. Edges in phi_h are even from 0 to 2 pi, (T + 1,) [1]
     edges: Array
-    probability: Array
+    probability: Array  #: probability of each cell, lights with their azimuths one after another, (K * turns, T, P) [1]
 
     @property
     def rings(self) -> Array:

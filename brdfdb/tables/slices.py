@@ -49,34 +49,20 @@ class SliceAxis:
 class Slice:
     """A picture of a table: f_r [1/sr] over two angles, row 0 at the top as in an image file.
 
-    Attributes
-    ----------
-    kind : str
-        "half_difference", "in_plane" or "lobe".
-    description : str
-        Explanation of the axes in words.
-    x, y : SliceAxis
-        Columns and rows.
-    fixed_deg : tuple of (str, float)
-        The angles that are the same in every pixel, by name [degrees].
-    values : float32 array, shape (H, W) or (H, W, L) [1/sr]
-        Without and with a wavelength axis.
-    wavelength_nm : float array, shape (L,), or None
-        The wavelengths of the last axis of `values` [nm].
-
     Raises
     ------
     ValueError
         If the shape of `values` does not fit `wavelength_nm`.
     """
 
-    kind: str
-    description: str
+    kind: str  #: "half_difference", "in_plane" or "lobe"
+    description: str  #: explanation of the axes in words
+    #: x, y: columns and rows
     x: SliceAxis
     y: SliceAxis
-    fixed_deg: tuple[tuple[str, float], ...]
-    values: NDArray[np.float32]
-    wavelength_nm: NDArray[Any] | None
+    fixed_deg: tuple[tuple[str, float], ...]  #: the angles that are the same in every pixel, by name [degrees]
+    values: NDArray[np.float32]  #: without and with a wavelength axis, (H, W) or (H, W, L) [1/sr]
+    wavelength_nm: NDArray[Any] | None  #: the wavelengths of the last axis of `values` [nm], (L,)
 
     def __post_init__(self) -> None:
         spectral = () if self.wavelength_nm is None else self.wavelength_nm.shape

@@ -76,57 +76,35 @@ class _Specular(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Table(BaseTable):
-    """A decoded table: the values of one revision of one material, in memory.
+    """A decoded table: the values of one revision of one material, in memory."""
 
-    Attributes
-    ----------
-    name, revision : str
-        Name of the material, and its revision.
-    attrs : dict
-        The attributes as stored; `metadata` is the typed record of them.
-    grid : Grid
-        The angular axes, in the order of the dimensions.
-    wavelength_nm : array (L,) [nm] or None
-        Wavelengths of a spectral table; None for a grey one, which holds at any wavelength.
-    values : float32 array
-        Numbers over the angular axes and, last, the wavelengths, or the coefficients of a factored spectrum.
-    specular : float32 array (theta_i[, L]) [1] or None
-        Reflectance of the specular part; None if the source has none.
-    specular_theta_deg : array [degree] or None
-        Its nodes; by default those of the axis theta_i.
-    interpolation : Interpolation
-        The way from the numbers to f_r between nodes; by default they are f_r, interpolated linearly.
-    spectra : array (coefficients, L) or None
-        The basis of a factored spectrum: of logarithms, or of f_r itself if `part_nm` is given.
-    part_nm : array (coefficients,) [nm] or None
-        Wavelengths at which the parts of such a table are f_r.
-    uniform : array (L,) or (1,) [1/sr]
-        The uniform part of f_r, which is not in `values`.
-    digest : str
-        sha256 of the manifest of the revision; empty of a table that was not read from a store.
-    n, k : array (L,) [1] or None
-        Refractive index and extinction coefficient that the store says the table was computed with. Lookups do not
-        read them.
-    facets : Facets or None
-        The polarisation; None of an unpolarised table.
-    """
-
+    #: name, revision: name of the material, and its revision
     name: str
     revision: str
-    attrs: Mapping[str, Any] = field(repr=False)
-    grid: Grid = field(repr=False)
+    attrs: Mapping[str, Any] = field(repr=False)  #: the attributes as stored; `metadata` is the typed record of them
+    grid: Grid = field(repr=False)  #: the angular axes, in the order of the dimensions
+    #: wavelengths of a spectral table; None for a grey one, which holds at any wavelength, (L,) [nm]
     wavelength_nm: Axis | None = field(repr=False)
+    #: numbers over the angular axes and, last, the wavelengths, or the coefficients of a factored spectrum
     values: NDArray[np.float32] = field(repr=False)
+    #: reflectance of the specular part; None if the source has none, (theta_i[, L]) [1]
     specular: NDArray[np.float32] | None = field(repr=False)
+    #: nodes of the specular part; by default those of the axis theta_i, [degree]
     specular_theta_deg: Axis | None = field(default=None, repr=False)
+    #: the way from the numbers to f_r between nodes; by default they are f_r, interpolated linearly
     interpolation: Interpolation = PLAIN
+    #: the basis of a factored spectrum: of logarithms, or of f_r itself if `part_nm` is given, (coefficients, L)
     spectra: NDArray[np.float64] | None = field(default=None, repr=False)
+    #: the uniform part of f_r, which is not in `values`, (L,) or (1,) [1/sr]
     uniform: NDArray[np.float64] | None = field(default=None, repr=False)
-    digest: str = ""
+    digest: str = ""  #: sha256 of the manifest of the revision; empty of a table that was not read from a store
+    #: wavelengths at which the parts of such a table are f_r, (coefficients,) [nm]
     part_nm: Axis | None = field(default=None, repr=False)
+    #: n, k: refractive index and extinction coefficient that the store says the table was computed with. Lookups do not
+    #: read them, (L,) [1]
     n: Axis | None = field(default=None, repr=False)
     k: Axis | None = field(default=None, repr=False)
-    facets: Facets | None = field(default=None, repr=False)
+    facets: Facets | None = field(default=None, repr=False)  #: the polarisation; None of an unpolarised table
 
     @classmethod
     def of(cls, layout: Layout, values: NDArray[np.float32], grid: Grid | None = None) -> Table:

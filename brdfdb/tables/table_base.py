@@ -51,20 +51,13 @@ class Located(NamedTuple):
 
 
 class Stated(NamedTuple):
-    """Values of f_r with the error that their table states for them.
+    """Values of f_r with the error that their table states for them."""
 
-    Attributes
-    ----------
-    brdf : array [1/sr]
-        Values as by `Table.lookup`.
-    error : array [1/sr]
-        In the same shape. At a wavelength of the table 99 of 100 values in this band of theta_i are within that of the
-        source, or of what was measured if it is a measurement, whose uncertainty is added; nan outside of the
-        directions that were measured, where nothing is known. Between wavelengths, and in
-        the places of `brdfdb.tables.stated_error.Places`, 98 of 100 are.
-    """
-
-    brdf: Floats
+    brdf: Floats  #: values as by `Table.lookup`, [1/sr]
+    #: in the same shape. At a wavelength of the table 99 of 100 values in this band of theta_i are within that of the
+    #: source, or of what was measured if it is a measurement, whose uncertainty is added; nan outside of the directions
+    #: that were measured, where nothing is known. Between wavelengths, and in the places of
+    #: `brdfdb.tables.stated_error.Places`, 98 of 100 are, [1/sr]
     error: Floats
 
 
