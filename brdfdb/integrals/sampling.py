@@ -97,26 +97,9 @@ def sample(model: ModelSpec | str, u1: ArrayLike, u2: ArrayLike, wi: ArrayLike, 
 
 @array_function
 def pdf(model: ModelSpec | str, wi: ArrayLike, wr: ArrayLike, **parameters: ArrayLike) -> Floats:
-    """Return the density [1/sr] with which `sample` draws `wr` for the light `wi`.
+    """Return the density [1/sr] with which `sample` draws `wr`, anywhere on the sphere, for the light `wi`.
 
-    Parameters
-    ----------
-    model : ModelSpec or str
-        A model, or its name in `brdfdb.models.MODELS`.
-    wi, wr : array_like
-        Unit vectors of shape (..., 3), `wr` anywhere on the sphere.
-    **parameters : array_like
-        Parameters of the model, which broadcast with the vectors.
-
-    Returns
-    -------
-    array [1/sr]
-        In the broadcast shape of all arguments. Its integral over the sphere is 1.
-
-    Raises
-    ------
-    ParameterError
-        If an argument is outside its range.
+    Arguments and errors are those of `sample`. The integral of the density over the sphere is 1.
 
     Examples
     --------

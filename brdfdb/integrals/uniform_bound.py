@@ -23,6 +23,9 @@ _ROUNDS = 12  # rounds of the search around the largest value; each halves the s
 def largest_uniform(model: ModelSpec | str, *, tolerance: float = 1e-6, **parameters: ArrayLike) -> Floats:
     """Return the largest albedo [1] of the uniform part with which a model reflects no more than it receives.
 
+    It is 1 less the largest directional-hemispherical reflectance, specular and directional diffuse, over all angles of
+    incidence from 0 to 90 degrees, and 0 where that reflectance is above 1.
+
     Parameters
     ----------
     model : ModelSpec or str
@@ -31,12 +34,6 @@ def largest_uniform(model: ModelSpec | str, *, tolerance: float = 1e-6, **parame
         Absolute error of the directional albedo, in [1e-13, 1].
     **parameters : array_like
         Parameters of the model except the uniform part. They broadcast, and are integrated together.
-
-    Returns
-    -------
-    array [1]
-        1 less the largest directional-hemispherical reflectance, specular and directional diffuse, over all angles of
-        incidence from 0 to 90 degrees. It is 0 where that reflectance is above 1.
 
     Raises
     ------

@@ -76,19 +76,11 @@ class _Around(NamedTuple):
 
 
 class InstrumentView:
-    """Pairs of directions as an instrument sees them.
+    """Pairs of directions, unit vectors (N, 3), as an instrument with wide light and receiver sees them.
 
-    Parameters
-    ----------
-    w_i, w_r : array (N, 3)
-        Unit vectors of light and viewer, the middles of their solid angles.
-    instrument : Instrument, optional
-        Solid angles that are unknown count as 0. None: f_r at the directions themselves.
-
-    Attributes
-    ----------
-    half_angle : float [rad]
-        Half angle of the disk that light and receiver make together; 0 where neither has a known solid angle.
+    Solid angles that are unknown count as 0; without an instrument f_r is that at the directions themselves.
+    `half_angle` [rad] is that of the disk that light and receiver make together; 0 where neither has a known solid
+    angle.
 
     Notes
     -----

@@ -254,19 +254,10 @@ class Fitted(NamedTuple):
 
 
 def fit(samples: Samples, base: Base | None = None) -> Fitted:
-    """Fit the interpolation of samples.
+    """Fit the interpolation of ten samples or more.
 
-    Parameters
-    ----------
-    samples : Samples
-        Ten or more.
-    base : callable, optional
-        f_r that the ratio is taken to; by default `lambert_and_lobe`, of the same samples.
-
-    Raises
-    ------
-    ParameterError
-        If there are too few samples, no value is above 0, or numbers far below 0 stand for holes.
+    `base` is f_r that the ratio is taken to; by default `lambert_and_lobe`, of the same samples. ParameterError if
+    there are too few samples, no value is above 0, or numbers far below 0 stand for holes.
 
     Notes
     -----

@@ -30,13 +30,8 @@ def joined(parts: Sequence[Samples]) -> Samples:
     The name is the words that all names begin with, or all names. The record is that of the first part, with the notes
     and counts of all; instruments and origins are those of all. Where parts hold different values at the same
     directions, a sentence says so in the entry "contradiction" of the record. Uncertainties are left out, with a note,
-    unless all parts state them.
-
-    Raises
-    ------
-    ParameterError
-        If there is none, they have different channels, or their azimuths have no direction in common: those of one
-        part are relative to its light, and lights of another come from other azimuths of the surface than 0.
+    unless all parts state them. ParameterError if there is no part, channels differ, or azimuths have no direction in
+    common: those of one part are relative to its light, and lights of another come from other azimuths of the surface.
     """
     if not parts:
         raise ParameterError("parts", "there are no samples to join", 0)

@@ -87,23 +87,12 @@ class MeasuredSource(FunctionSource):
     def of_samples(
         cls, samples: Samples, *, name: str = "", title: str = "", provenance: str = "", base: Base | None = None
     ) -> Self:
-        """Return samples as a source: between them f_r is interpolated as `brdfdb.measurements.interpolation` says.
+        """Return ten samples or more as a source, by the fit of `brdfdb.measurements.interpolation`.
 
-        Parameters
-        ----------
-        samples : Samples
-            Ten or more. f_r is anisotropic if they have several azimuths of the light.
-        name, title, provenance : str
-            By default those of the samples.
-        base : callable, optional
-            f_r [1/sr] (N, C) at unit vectors, such as `Source.brdf_at` of a fit, to which the ratio is interpolated;
-            by default Lambert and one lobe.
-
-        Raises
-        ------
-        ParameterError
-            If there are too few samples, no value is above 0, numbers far below 0 stand for holes, or the name has no
-            letters or digits.
+        f_r is anisotropic if the samples have several azimuths of the light. Name, title and provenance are by default
+        those of the samples. `base` is f_r [1/sr] (N, C) at unit vectors, such as `Source.brdf_at` of a fit, to which
+        the ratio is interpolated; by default Lambert and one lobe. ParameterError if there are too few samples, no
+        value is above 0, numbers far below 0 stand for holes, or the name has no letters or digits.
         """
         fitted = fit(samples, base)
         noise = None

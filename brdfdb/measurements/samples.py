@@ -226,12 +226,8 @@ class Samples:
         """Return the samples of a Dataset as `to_xarray` gives it.
 
         Only the angles theta_i, theta_r and phi_r in degrees or radians (attribute ``units``) and brdf are required.
-        Wavelengths and bandwidths are in nm, um or m, by default nm; brdf and uncertainty are in 1/sr.
-
-        Raises
-        ------
-        ParameterError
-            If a variable is missing or has other units, or the samples are not allowed.
+        Wavelengths and bandwidths are in nm, um or m, by default nm; brdf and uncertainty are in 1/sr. ParameterError
+        if a variable is missing or has other units, or the samples are not allowed.
         """
         brdf = dataset.get("brdf")
         if brdf is None or not {"theta_i", "theta_r", "phi_r"} <= set(dataset.variables):

@@ -189,18 +189,9 @@ class SampleStatement:
 def statement(samples: Samples, progress: Callable[[float], None] | None = None) -> SampleStatement:
     """Return what samples cover, what they integrate to, and what looks wrong.
 
-    Parameters
-    ----------
-    samples : Samples
-        Samples. Their record may hold ``tis``, the total integrated scatter that a header claims, with the channels
-        last, over ``theta_i_deg`` before.
-    progress : callable, optional
-        Called with the share [1] that is done.
-
-    Raises
-    ------
-    MissingExtraError
-        If SciPy, which triangulates, is not installed.
+    The record of the samples may hold ``tis``, the total integrated scatter that a header claims, with the channels
+    last, over ``theta_i_deg`` before. `progress` is called with the share [1] that is done. MissingExtraError if SciPy,
+    which triangulates, is not installed.
 
     Notes
     -----

@@ -74,25 +74,19 @@ def directional_albedo(
     table : Table
         Any decoded table. Of those that are not f_r, linear over light and viewer, the attributes name the source.
     theta_i_deg : array (theta_i,) [degree], optional
-        The lights, in [0, 90].
+        The lights, in [0, 90]. By default the nodes of theta_i and phi_i where the integral is exact, else
+        `THETA_I_DEG` and every 30 degrees of phi_i; nodes and `THETA_I_DEG` if a planner chose the nodes: the attribute
+        ``reason`` says so. Such nodes are at 90 degrees only if f_r has no pole there.
     tolerance : float [1], optional
         Absolute tolerance of the quadrature, where the integral is not exact; by default `tolerance_of`.
     source : Source, optional
         Source whose lobe the quadrature follows; by default that of the table.
 
-    Returns
-    -------
-    TableAlbedo
-        By default at the nodes of theta_i and phi_i where the integral is exact, else at `THETA_I_DEG` and every 30
-        degrees of phi_i; at nodes and `THETA_I_DEG` if a planner chose the nodes: the attribute ``reason`` says so.
-        Such nodes are at 90 degrees only if f_r has no pole there.
-
     Notes
     -----
     Exact for what `Table.lookup` returns where that is linear in each angle, so that the integral is a sum of the
     stored values with the integrals of the hat functions of their axes as weights. Other tables are looked up, by the
-    quadrature of `brdfdb.integrals.quadrature`, to the tolerance. It follows the lobe of the source if that
-    is known.
+    quadrature of `brdfdb.integrals.quadrature`, to the tolerance.
     """
     if not linear_in_angles(table):
         within = tolerance_of(table) if tolerance is None else tolerance

@@ -49,14 +49,12 @@ class MeasuredLayout(NamedTuple):
 def tabulated(
     source: MeasuredSource | TableSource, wavelength_nm: NDArray[np.float64] | None, tolerance: float
 ) -> MeasuredLayout:
-    """Return the coarsest layout of measured data that keeps to a tolerance.
+    """Return the coarsest layout of measured data, or of a table of them, that keeps to a tolerance.
 
     Parameters
     ----------
-    source : MeasuredSource or TableSource
-        Measured data, or a table of them.
-    wavelength_nm : array (L,) [nm], or None
-        For spectral data, and only for them.
+    source, wavelength_nm : MeasuredSource or TableSource, array (L,) [nm] or None
+        Measured data, and the wavelengths of spectral data.
     tolerance : float
         95th percentile of the relative error against the source, and the l1 error, in [1e-4, 0.5]. If the finest grid
         does not keep to it, the grid is taken all the same, and its table states the error that it has: noise, steps

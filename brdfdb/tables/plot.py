@@ -99,6 +99,9 @@ class Plot:
     ) -> Axes:
         """Draw f_r [1/sr] in the plane of incidence as a polar plot, with the light on the left.
 
+        The radius is f_r, and the angle to the vertical is theta_r: on the right around the mirror direction, on the
+        left back towards the light. ParameterError if an angle or a wavelength is out of range.
+
         Parameters
         ----------
         theta_i_deg : float or sequence [degree]
@@ -109,19 +112,6 @@ class Plot:
             Wavelengths of a spectral table. The default is the one of its range that is closest to 550 nm.
         ax : matplotlib Axes, optional
             Axes to draw on.
-
-        Returns
-        -------
-        Axes
-            The axes. The radius is f_r, and the angle to the vertical is theta_r: on the right around the mirror
-            direction, on the left back towards the light.
-
-        Raises
-        ------
-        ParameterError
-            If an angle or a wavelength is out of range.
-        MissingExtraError
-            If matplotlib is not installed.
         """
         curves, name = self._curves(theta_i_deg, phi_i_deg, wavelength_nm)
         axes = axes_for("lobe", ax, (6.4, 3.9))
@@ -175,24 +165,8 @@ class Plot:
     def albedo(self, phi_i_deg: float = 0.0, wavelength_nm: float | None = None, *, ax: Axes | None = None) -> Axes:
         """Draw the directional albedo [1] over theta_i: the shares of uniform part, lobe and specular part, and 1.
 
-        Parameters
-        ----------
-        phi_i_deg : float [degree]
-            Azimuth of the light. It matters for anisotropic tables only.
-        wavelength_nm : float [nm], optional
-            As of `lobe`.
-        ax : matplotlib Axes, optional
-            Axes to draw on.
-
-        Returns
-        -------
-        Axes
-            The axes. The shares are stacked. The uniform part is shown where the source of the table names it.
-
-        Raises
-        ------
-        ParameterError, MissingExtraError
-            As of `lobe`.
+        The shares are stacked. The uniform part is shown where the source of the table names it. The azimuth of the
+        light matters for anisotropic tables only; `wavelength_nm`, `ax` and errors are those of `lobe`.
         """
         wavelength = self._wavelength(wavelength_nm)
         check_azimuth_deg("phi_i_deg", phi_i_deg)
@@ -224,28 +198,12 @@ class Plot:
         *,
         ax: Axes | None = None,
     ) -> Axes:
-        """Draw f_r [1/sr] as an image on a logarithmic scale.
+        """Draw f_r [1/sr] as an image on a logarithmic scale, with a colour bar on axes of its own.
 
-        Parameters
-        ----------
-        kind : str
-            "in_plane": theta_i over theta_r in the plane of incidence, as `brdfdb.tables.slices.in_plane_slice`.
-            "half_difference": theta_d over theta_h, as `brdfdb.tables.slices.half_difference_slice`.
-        wavelength_nm : float [nm], optional
-            Of a spectral table. The wavelength of the table that is closest is shown; the default is the closest to
-            550 nm.
-        ax : matplotlib Axes, optional
-            Axes to draw on.
-
-        Returns
-        -------
-        Axes
-            The axes; the colour bar has its own beside them.
-
-        Raises
-        ------
-        ParameterError, MissingExtraError
-            As of `lobe`; also if `kind` is another word.
+        `kind` is "in_plane": theta_i over theta_r in the plane of incidence, as `brdfdb.tables.slices.in_plane_slice`;
+        or "half_difference": theta_d over theta_h, as `brdfdb.tables.slices.half_difference_slice`. The wavelength of
+        the table that is closest to `wavelength_nm` is shown, by default to 550 nm. Errors are those of `lobe`, also
+        for another kind.
         """
         if kind not in _SLICES:
             raise ParameterError("kind", f"{kind!r} is not one of {', '.join(_SLICES)}", kind, tuple(_SLICES))
@@ -349,14 +307,7 @@ class Plot:
 def albedo_shares(table: Plotted, phi_i: float, wavelength_nm: float | None) -> dict[str, Array]:
     """Return shares [1] of reflected light at `ALBEDO_DEG`: uniform part, rest of f_r, specular part, by their labels.
 
-    Parameters
-    ----------
-    table : Table or RemoteTable
-        The table. Its lookups are integrated to 1e-3.
-    phi_i : float [rad]
-        Azimuth of the light.
-    wavelength_nm : float [nm] or None
-        None for a grey table.
+    Lookups are integrated to 1e-3, for lights at the azimuth `phi_i` [rad]; `wavelength_nm` is None for a grey table.
     """
     source, theta_i = table.source, radians(ALBEDO_DEG)
 

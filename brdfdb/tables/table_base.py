@@ -170,16 +170,11 @@ class BaseTable(Lookups):
         phi_r: ArrayLike,
         wavelength_nm: ArrayLike | None = None,
     ) -> Floats:
-        """Interpolate the Mueller BRDF [1/sr]: f_r times the normalised Mueller matrix.
+        """Interpolate the Mueller BRDF [1/sr], f_r times the normalised Mueller matrix, shaped as by `lookup`, (4, 4).
 
-        Parameters and errors are those of `lookup`; ParameterError, too, if the table is unpolarised.
-
-        Returns
-        -------
-        array [1/sr]
-            Shaped as by `lookup`, and (4, 4). It gives the Stokes vector of the reflected radiance from that of the
-            irradiance, between bases of the surface, in the convention of `brdfdb.tables.stokes`. Element [0, 0] is
-            `lookup`. 0 below the horizon, nan where an angle is nan.
+        It gives the Stokes vector of the reflected radiance from that of the irradiance, between bases of the surface,
+        in the convention of `brdfdb.tables.stokes`. Element [0, 0] is `lookup`. 0 below the horizon, nan where an angle
+        is nan. Parameters and errors are those of `lookup`; ParameterError, too, if the table is unpolarised.
         """
         return self._mueller_at((theta_i, phi_i, theta_r, phi_r), wavelength_nm)
 

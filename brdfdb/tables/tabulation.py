@@ -51,16 +51,13 @@ class Frame(NamedTuple):
 
 
 def tabulate(layout: Layout, values: NDArray[np.float32] | None = None) -> xr.Dataset:
-    """Tabulate the BRDF of a source: all blocks of a layout, in memory, or those values of them that are known.
+    """Tabulate the BRDF of a source: all blocks of a layout, in memory, or the values of them if they are known.
 
-    Returns
-    -------
-    Dataset
-        ``brdf`` [1/sr], or ``parts``, from which it is rebuilt as the attribute ``reconstruction`` says: float32, over
-        the axes of the grid and, last, ``wavelength`` or ``part``; for models with a specular part
-        ``specular_reflectance`` [1] over theta_i, or specular_theta_i, and wavelength; for spectral materials ``n`` and
-        ``k`` as used.
-        Coordinates in degrees and nm, with units. Attributes: title, model, parameters, sources and notes.
+    The Dataset has ``brdf`` [1/sr], or ``parts``, from which it is rebuilt as the attribute ``reconstruction`` says:
+    float32, over the axes of the grid and, last, ``wavelength`` or ``part``; for models with a specular part
+    ``specular_reflectance`` [1] over theta_i, or specular_theta_i, and wavelength; for spectral materials ``n`` and
+    ``k`` as used. Coordinates are in degrees and nm, with units. Attributes: title, model, parameters, sources and
+    notes.
     """
     import xarray as xr
 
