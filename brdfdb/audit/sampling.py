@@ -12,7 +12,7 @@ from brdfdb.audit.finding import Cell, Finding, NumberTable, Sentence, Subject, 
 from brdfdb.audit.pairs import SEED, representative_nm
 from brdfdb.figure import Numbers, number, numbers
 from brdfdb.geometry import radians, unit_vector
-from brdfdb.integrals.quadrature import gauss_rule, spectral_albedo
+from brdfdb.integrals.quadrature import GaussRule, gauss_rule, spectral_albedo
 from brdfdb.integrals.sampling import lobe_of, mixture_density, sample
 from brdfdb.lobes import Lobe
 from brdfdb.materials import Material
@@ -179,9 +179,14 @@ def _chance(wr: Array, wi: Array, lobe: Lobe) -> float:
     t_edges = _t_edges(lobe)
     counts, _, _ = np.histogram2d(t, psi, bins=(t_edges, _PSI_EDGES))
     expected = len(wr) * _shares(wi, lobe, alpha, t_edges)
-    observed, wanted = _pooled(np.append(counts, len(wr) - counts.sum()), np.append(expected, len(wr) - expected.sum()))
-    chi_square = float(np.sum((observed - wanted) ** 2 / wanted))
-    return float(mpmath.gammainc((len(wanted) - 1) / 2.0, chi_square / 2.0, regularized=True))
+    observed = np.append(counts, len(wr) - counts.sum())
+    expected = np.append(expected, len(wr) - expected.sum())
+    order = np.argsort(expected)[::-1]  # the fullest bins first; bins with few expected samples are merged
+    starts = np.arange(max(int(np.count_nonzero(expected >= _ENOUGH)), 1))
+    observed = np.add.reduceat(observed[order], starts)
+    expected = np.add.reduceat(expected[order], starts)
+    chi_square = float(np.sum((observed - expected) ** 2 / expected))
+    return float(mpmath.gammainc((len(expected) - 1) / 2.0, chi_square / 2.0, regularized=True))
 
 
 def _t_edges(lobe: Lobe) -> Array:
@@ -206,16 +211,8 @@ def _shares(wi: Array, lobe: Lobe, alpha: Array, t_edges: Array) -> Array:
     return np.asarray(np.einsum("abcd,ab,cd->ac", mixture_density(lobe, wi, wr) * measure, t_weight, psi_weight))
 
 
-def _gauss(edges: Array) -> tuple[Array, Array]:
-    """Return nodes and weights between edges, as rows."""
-    x, weight = gauss_rule(_NODES)
+def _gauss(edges: Array) -> GaussRule:
+    """Return a rule between neighbouring edges, as rows."""
+    rule = gauss_rule(_NODES)
     half = np.diff(edges)[:, np.newaxis] / 2.0
-    return (edges[:-1] + edges[1:])[:, np.newaxis] / 2.0 + half * x, half * weight
-
-
-def _pooled(observed: Array, expected: Array) -> tuple[Array, Array]:
-    """Return the bins, the fullest first. Bins with few expected samples are merged into the last one."""
-    order = np.argsort(expected)[::-1]
-    last = max(int(np.count_nonzero(expected >= _ENOUGH)) - 1, 0)
-    starts = np.arange(last + 1)
-    return np.add.reduceat(observed[order], starts), np.add.reduceat(expected[order], starts)
+    return GaussRule((edges[:-1] + edges[1:])[:, np.newaxis] / 2.0 + half * rule.nodes, half * rule.weights)

@@ -147,7 +147,9 @@ def directions(lobe: Lobe, u1: Array, u2: Array, i: Array) -> Array:
     angle = 2.0 * np.pi * u2
     mirror = _mirrored_in_visible if lobe.visible else mirrored_in_lobe
     mirrored = mirror(np.clip(stretched, _TINY, 1.0), angle, i, lobe)
-    others = _cosine_weighted(np.clip(stretched, 0.0, 1.0), angle)
+    share = np.clip(stretched, 0.0, 1.0)  # directions that follow the cosine
+    sin_theta = np.sqrt(share)
+    others = (sin_theta * np.cos(angle), sin_theta * np.sin(angle), np.sqrt(1.0 - share))
     chosen = [np.where(in_lobe, mirrored[..., axis], other) for axis, other in enumerate(others)]
     return _vectors(*chosen)
 
@@ -189,11 +191,6 @@ def _vectors(x: Floats, y: Floats, z: Floats) -> Array:
     for axis, component in enumerate((x, y, z)):
         vectors[..., axis] = component
     return vectors
-
-
-def _cosine_weighted(u1: Array, angle: Array) -> tuple[Array, Array, Array]:
-    sin_theta = np.sqrt(u1)
-    return sin_theta * np.cos(angle), sin_theta * np.sin(angle), np.sqrt(1.0 - u1)
 
 
 def mixture_density(lobe: Lobe, i: Floats, r: Floats) -> Array:

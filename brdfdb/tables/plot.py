@@ -39,6 +39,7 @@ if TYPE_CHECKING:
 
 _SHOWN_NM = 550.0  # wavelength of a plot by default
 _UNIT = "$f_r$ [1/sr]"
+# Colours [sRGB] of wavelengths: violet, blue, green, orange, red, all dark enough for labels
 _SPECTRUM_NM = (400.0, 450.0, 500.0, 550.0, 600.0, 650.0, 750.0)
 _SPECTRUM = (
     (0.35, 0.10, 0.55),
@@ -275,7 +276,8 @@ class Plot:
                 colour = COLOURS[number % len(COLOURS)]
                 dashes = DASHES[row % len(DASHES)]
             else:
-                colour = _spectral_colour(wavelength)
+                channels = zip(*_SPECTRUM, strict=True)
+                colour = tuple(float(np.interp(wavelength, _SPECTRUM_NM, channel)) for channel in channels)
                 dashes = DASHES[number % len(DASHES)]
             curves.append(Curve(", ".join(parts), signed, brdf, colour, dashes))
         return curves, f"{self.table.name}{_at(wavelengths[0]) if len(wavelengths) == 1 else ''}"
@@ -344,11 +346,6 @@ def _numbers(name: str, given: float | Sequence[float]) -> list[float]:
 
 def _at(wavelength_nm: float | None) -> str:
     return "" if wavelength_nm is None else f" at {wavelength_nm:g} nm"
-
-
-def _spectral_colour(wavelength_nm: float) -> tuple[float, ...]:
-    """Return the colour [sRGB] of a wavelength: violet, blue, green, orange, red, all dark enough for labels."""
-    return tuple(float(np.interp(wavelength_nm, _SPECTRUM_NM, channel)) for channel in zip(*_SPECTRUM, strict=True))
 
 
 def _stack(axes: Axes, shares: Mapping[str, Array], colours: Sequence[str]) -> None:
