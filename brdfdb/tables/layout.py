@@ -154,6 +154,11 @@ class Layout:
         return self.source if self.plain else self.source.without_uniform()
 
     @property
+    def evaluated_nm(self) -> NDArray[np.float64] | None:
+        """The wavelengths [nm] at which nodes are evaluated: those of the parts of a mixture; None: grey."""
+        return self.wavelength_nm if self.part_nm is None else self.part_nm
+
+    @property
     def uniform(self) -> NDArray[np.float64] | None:
         """The uniform part [1/sr] where it is beside the table, not in it: (1,), or (L,) if it is a spectrum."""
         return None if self.plain else self.source.uniform_at(self.wavelength_nm)

@@ -22,13 +22,13 @@ from brdfdb.tables.stokes import record
 if TYPE_CHECKING:
     import xarray as xr
 
-_SLOPE_STEP = np.deg2rad(2.0)  # from which the slope at the horizon is taken
-POLE_END_DEG = 89.9  # of light and viewer, where the pole of a model is tabulated as it is
-_RISE = 1.0  # largest rise of the stored numbers of measured data beyond the horizon: their slopes there have no reason
-_CONTINUED = 7.5  # how many such steps numbers go on with it beyond the horizon
-# Where the specular part is tabulated, unless on an axis theta_i that somebody gave: a planner has no nodes for it
+_SLOPE_STEP = np.deg2rad(2.0)  # step of the difference that gives the slope at the horizon
+POLE_END_DEG = 89.9  # last angle of light and viewer if the pole of a model is tabulated
+_RISE = 1.0  # largest rise of the stored numbers of measured data beyond the horizon, where their slopes are noise
+_CONTINUED = 7.5  # number of steps up to which numbers are continued beyond the horizon
+# Nodes of the specular part, unless a recipe gives an axis theta_i: planned nodes do not suit it
 SPECULAR_THETA_DEG = np.append(np.arange(0.0, 60.0, 0.5), np.arange(60.0, 90.01, 0.1).round(1))
-_SLAB = 1 << 17  # values evaluated at a time: fewer cost calls, more cost memory
+_SLAB = 1 << 17  # number of values that are evaluated together: fewer cost calls, more cost memory
 
 
 class StoredArray(NamedTuple):
@@ -70,21 +70,21 @@ def tabulate(layout: Layout, values: NDArray[np.float32] | None = None) -> xr.Da
 def block(layout: Layout, rows: slice) -> NDArray[np.float32]:
     """Return the values of some rows of the first axis of a table: float32, over its other axes, too."""
     values = np.empty((rows.stop - rows.start, *layout.shape[1:]), dtype=np.float32)
-    for some in slabs(layout, rows):
-        at = slice(some.start - rows.start, some.stop - rows.start)
+    for slab in slabs(layout, rows):
+        at = slice(slab.start - rows.start, slab.stop - rows.start)
         if layout.plain and not layout.grid.half_difference:
-            nodes_nm = _node_wavelengths(layout)
+            nodes_nm = layout.evaluated_nm
             for number, wavelength in enumerate([None] if nodes_nm is None else nodes_nm.tolist()):
                 index: tuple[Any, ...] = (at, ...) if wavelength is None else (at, ..., number)
-                values[index] = _evaluated(layout, some, wavelength)
+                values[index] = _evaluated(layout, slab, wavelength)
         else:
-            numbers = stored(layout, node_numbers(layout, some))
-            values[at] = numbers.reshape(some.stop - some.start, *layout.shape[1:])
+            numbers = stored(layout, node_numbers(layout, slab))
+            values[at] = numbers.reshape(slab.stop - slab.start, *layout.shape[1:])
     return rounded(values, layout.bits)
 
 
 def slabs(layout: Layout, rows: slice) -> Iterator[slice]:
-    """Yield rows of the first axis of a table that are evaluated at a time."""
+    """Yield rows of the first axis of a table that are evaluated together."""
     step = max(1, _SLAB // int(np.prod(layout.grid.shape[1:])))
     for start in range(rows.start, rows.stop, step):
         yield slice(start, min(start + step, rows.stop))
@@ -94,22 +94,17 @@ def stored(layout: Layout, numbers: Floats) -> Floats:
     """Return what a table stores of `node_numbers`: the coefficients of a factored spectrum, or the numbers."""
     if layout.spectra is None or layout.part_nm is not None:
         return numbers
-    # a BLAS sums in an order that depends on where a row stands: what was symmetric would not stay it
+    # A BLAS sums in an order that depends on the position of a row, which would break the symmetry of a table
     return np.asarray(np.einsum("...w,pw->...p", numbers, layout.spectra))
 
 
 def rounded(values: NDArray[np.float32], bits: int) -> NDArray[np.float32]:
-    """Return float32 values rounded to so many bits of their mantissa: off by 2**-(bits + 1) of them at most."""
+    """Return float32 values rounded to a number of bits of their mantissa, with an error of 2**-(bits + 1) at most."""
     drop = 23 - bits
     if drop == 0:
         return values
-    whole = np.ascontiguousarray(values, dtype=np.float32).view(np.uint32)
-    return ((whole + np.uint32(1 << (drop - 1))) >> np.uint32(drop) << np.uint32(drop)).view(np.float32)
-
-
-def _node_wavelengths(layout: Layout) -> NDArray[np.float64] | None:
-    """Return the wavelengths [nm] at which nodes are evaluated; None for a grey table."""
-    return layout.wavelength_nm if layout.part_nm is None else layout.part_nm
+    mantissa = np.ascontiguousarray(values, dtype=np.float32).view(np.uint32)
+    return ((mantissa + np.uint32(1 << (drop - 1))) >> np.uint32(drop) << np.uint32(drop)).view(np.float32)
 
 
 def _evaluated(layout: Layout, rows: slice, wavelength_nm: ArrayLike | None) -> Floats:
@@ -127,7 +122,7 @@ def _evaluated(layout: Layout, rows: slice, wavelength_nm: ArrayLike | None) -> 
     row, column = (index.ravel() for index in np.indices((rows.stop - rows.start, theta.size)))
     smaller = np.minimum(row + rows.start, column)
     larger = np.maximum(row + rows.start, column)
-    pairs, pair = np.unique(smaller * theta.size + larger, return_inverse=True)  # of which each is evaluated once
+    pairs, pair = np.unique(smaller * theta.size + larger, return_inverse=True)  # each pair is evaluated once
     light = theta[pairs // theta.size]
     viewer = theta[pairs % theta.size]
     values = evaluate(light[:, np.newaxis], np.zeros(()), viewer[:, np.newaxis], delta_phi)
@@ -149,7 +144,7 @@ def values_at(layout: Layout, wi: Floats, wr: Floats) -> tuple[Floats, Floats]:
     """
     wi, wr = np.broadcast_arrays(wi, wr)
     mu = np.maximum(wi[..., 2], COS_HORIZON) * np.maximum(wr[..., 2], COS_HORIZON)
-    f_r = layout.tabulated.brdf_at(_node_wavelengths(layout))(wi.reshape(-1, 3), wr.reshape(-1, 3))
+    f_r = layout.tabulated.brdf_at(layout.evaluated_nm)(wi.reshape(-1, 3), wr.reshape(-1, 3))
     return f_r.reshape(*mu.shape, -1), mu
 
 
@@ -163,7 +158,7 @@ def node_numbers(layout: Layout, rows: slice) -> Floats:
     if not grid.half_difference:
         angles = grid.directions(rows)
         mu = np.maximum(np.cos(angles[0]), COS_HORIZON) * np.maximum(np.cos(angles[2]), COS_HORIZON)
-        nodes_nm = _node_wavelengths(layout)
+        nodes_nm = layout.evaluated_nm
         f_r = _evaluated(layout, rows, nodes_nm)
         return layout.interpolation.numbers(f_r[..., np.newaxis] if nodes_nm is None else f_r, mu)
     axes = [radians(nodes) for nodes in grid.axes.values()]
