@@ -147,8 +147,8 @@ def disagreements(error: Error, pairs: ComparedPairs, wavelength_nm: Axis | None
 
     The statement is taken as one of as many directions as builds draw. What it says of that is itself under test.
     """
-    found = _disagreements(error, pairs, wavelength_nm)
-    return sorted(found, key=lambda each: np.inf if each.times is None else each.times, reverse=True)
+    contradicted = _disagreements(error, pairs, wavelength_nm)
+    return sorted(contradicted, key=lambda number: np.inf if number.times is None else number.times, reverse=True)
 
 
 def _disagreements(error: Error, pairs: ComparedPairs, wavelength_nm: Axis | None) -> Iterator[Disagreement]:

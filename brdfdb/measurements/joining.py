@@ -123,7 +123,9 @@ def _contradiction(parts: Sequence[Samples]) -> str:
         before = np.concatenate(codes[:number])
         _, one, two = np.intersect1d(before, codes[number], return_indices=True)
         files = "both files have" if len(parts) == 2 else f"{parts[number].name} and files before it have"
-        worst = max(worst, _difference(values, noises, one, two + len(before), files), key=lambda found: found.ratio)
+        worst = max(
+            worst, _difference(values, noises, one, two + len(before), files), key=lambda difference: difference.ratio
+        )
     recorded = [str(part.record["contradiction"]) for part in parts if "contradiction" in part.record]
     return worst.sentence or next(iter(recorded), "")
 
