@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from brdfdb.figure import Figure, Map, Panel, curve_of, rows
 from brdfdb.fitting.document import Fits
-from brdfdb.fitting.fitted import Fitted
+from brdfdb.fitting.fitted import FittedSurface
 from brdfdb.geometry import degrees, radians, unit_vector
 from brdfdb.measurements.aperture import View
 
@@ -18,14 +18,14 @@ _PLANE_DEG = 2.5  # distance from the plane of incidence of samples that a cut s
 _THETA_DEG, _PHI_DEG = 5.0, 10.0  # cells of the maps
 
 
-def figure_of(document: Fits, fitted: Fitted) -> Figure:
+def figure_of(document: Fits, fitted: FittedSurface) -> Figure:
     """Return the figure of a fit.
 
     Parameters
     ----------
     document : Fits
         The document, for names and numbers.
-    fitted : Fitted
+    fitted : FittedSurface
         The fit that is shown, with its samples.
 
     Returns
@@ -60,12 +60,12 @@ def figure_of(document: Fits, fitted: Fitted) -> Figure:
     )
 
 
-def _turned(fitted: Fitted, chosen: NDArray[np.int64]) -> Array:
+def _turned(fitted: FittedSurface, chosen: NDArray[np.int64]) -> Array:
     """Return the azimuths [degree] of viewers from that of the light, in [0, 360)."""
     return np.asarray(degrees(fitted.samples.phi_r[chosen] - fitted.samples.phi_i[chosen]) % 360.0)
 
 
-def _cut(fitted: Fitted, chosen: NDArray[np.int64], channel: int, title: str) -> Panel | None:
+def _cut(fitted: FittedSurface, chosen: NDArray[np.int64], channel: int, title: str) -> Panel | None:
     samples, phi = fitted.samples, _turned(fitted, chosen)
     theta = degrees(samples.theta_r[chosen])
     mirror, back = np.abs(phi - 180.0) < _PLANE_DEG, np.minimum(phi, 360.0 - phi) < _PLANE_DEG
@@ -92,7 +92,7 @@ def _cut(fitted: Fitted, chosen: NDArray[np.int64], channel: int, title: str) ->
     )
 
 
-def _map(fitted: Fitted, chosen: NDArray[np.int64], channel: int, title: str) -> Map:
+def _map(fitted: FittedSurface, chosen: NDArray[np.int64], channel: int, title: str) -> Map:
     phi = _turned(fitted, chosen)
     folded = np.minimum(phi, 360.0 - phi)
     theta = degrees(fitted.samples.theta_r[chosen])

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from brdfdb.fitting.problem import Point, Problem
 from brdfdb.fitting.residuals import logarithms
-from brdfdb.fitting.surface import Surface
+from brdfdb.fitting.surface import SearchedSurface
 from brdfdb.fitting.uncertainty import Covariance, covariance
 from brdfdb.measurements import Samples
 from brdfdb.measurements.aperture import View
@@ -20,7 +20,7 @@ Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
-class Fitted:
+class FittedSurface:
     """The best point of a surface.
 
     Attributes
@@ -28,7 +28,7 @@ class Fitted:
     samples : Samples
         The samples.
     problem : Problem
-        Surface, residual and the scale of robustness.
+        SearchedSurface, residual and the scale of robustness.
     point : Point
         The best point.
     sigma : float
@@ -47,7 +47,7 @@ class Fitted:
     hidden: Mask
 
     @property
-    def surface(self) -> Surface:
+    def surface(self) -> SearchedSurface:
         """The surface that was fitted."""
         return self.problem.surface
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from brdfdb.conversion.nodes import COARSE, Nodes
+from brdfdb.conversion.nodes import COARSE, TruthNodes
 from brdfdb.errors import import_extra
 from brdfdb.formats._channels import Channels
 from brdfdb.formats._materialx_closures import OPEN_PBR, Surface, darkest_edge
@@ -69,7 +69,7 @@ def fitted(kind: str, table: Table, channels: Channels) -> Surface:
 
     normal = lobe(np.asarray(1.0))
     smooth = table.specular is not None and normal is not None and not np.any(normal.share)
-    nodes = Nodes(lobe, COARSE, symmetry, truth, mirror if smooth else None, "lightness")
+    nodes = TruthNodes(lobe, COARSE, symmetry, truth, mirror if smooth else None, "lightness")
     if not np.any(nodes.truth) and not (smooth and np.any(nodes.specular)):
         black = (0.0,) * nodes.truth.shape[1]
         return Surface(kind, black, black, specular_weight=0.0)
@@ -83,7 +83,7 @@ class _Search:
     `normal` is the lobe at normal incidence, None of a diffuse source. The facets of a smooth surface mirror.
     """
 
-    def __init__(self, kind: str, nodes: Nodes, normal: Lobe | None, smooth: bool, anisotropic: bool) -> None:
+    def __init__(self, kind: str, nodes: TruthNodes, normal: Lobe | None, smooth: bool, anisotropic: bool) -> None:
         self.kind, self.nodes, self.smooth, self.diffuse = kind, nodes, smooth, normal is None
         self.black = not np.any(nodes.truth)  # but for the mirror direction
         self.metals = _METALS[:1] if self.diffuse or self.black else _METALS

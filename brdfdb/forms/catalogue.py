@@ -8,9 +8,10 @@ from typing import Any, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from brdfdb.errors import ParameterError
+from brdfdb.figure import DocumentPart
 from brdfdb.materials import Material, Source, exact_material
 from brdfdb.measurements import MeasuredSource
 from brdfdb.parameters import Floats, FormKind, ModelForm, bytes_of
@@ -85,10 +86,8 @@ class Form:
     copied: Callable[[], Evaluate] | None = None
 
 
-class LeftOut(BaseModel):
+class LeftOut(DocumentPart):
     """A form that cannot be made."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     key: str
     title: str

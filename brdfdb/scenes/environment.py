@@ -104,7 +104,7 @@ class Environment(BaseModel):
 
         return np.asarray((1.0 - down) * along(upper) + down * along(lower))
 
-    def drawn(self, source: Source, wavelength_nm: Array, wr: Array, stream: tuple[int, ...]) -> Drawn:
+    def drawn(self, source: Source, wavelength_nm: Array, wr: Array, stream: tuple[int, ...]) -> DrawnDirections:
         """Draw directions for points of a source, from its table or from its lobe, and from the hemisphere.
 
         Parameters
@@ -120,7 +120,7 @@ class Environment(BaseModel):
 
         Returns
         -------
-        Drawn
+        DrawnDirections
             `samples` directions for each point, the same in every call.
 
         Notes
@@ -143,10 +143,10 @@ class Environment(BaseModel):
             wi = directions(lobe, u1, u2, wr)
             density = mixture_density(lobe, wr, wi)
         solid_angle = np.divide(1.0, self.samples * density, where=wi[..., 2] > 0.0, out=np.zeros(density.shape))
-        return Drawn(wi, solid_angle)
+        return DrawnDirections(wi, solid_angle)
 
 
-class Drawn(NamedTuple):
+class DrawnDirections(NamedTuple):
     """Unit vectors (samples, N, 3) in the frame of the surface, and their solid angles (samples, N) [sr].
 
     The sum over samples of f_r times radiance times cosine times solid angle is an unbiased estimate of the reflected

@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 
 from brdfdb.errors import ParameterError
 from brdfdb.geometry import radians
-from brdfdb.scenes.recorded_directions import Recorded
 from brdfdb.scenes.scene import Camera, Object, Scene
-from brdfdb.scenes.shapes import Array, Plane, unit
+from brdfdb.scenes.shapes import Array, PlaneShape, Recorded, unit
 
 # Distance of the origins of shadow and mirror rays from their surface, as a share of the height of the picture there,
 # and as a share of coordinates, which are rounded
@@ -26,7 +25,7 @@ _LENGTH_OFF = 0.05  # largest error of the length of a recorded vector; it is 5e
 
 
 @dataclass(frozen=True, eq=False)
-class Points:
+class VisiblePoints:
     """The points of one object that a camera sees, directly or in the mirror of another object.
 
     Attributes
@@ -60,21 +59,21 @@ class Points:
     at: NDArray[np.int64]
 
 
-class View(NamedTuple):
+class CameraView(NamedTuple):
     """The view of a camera: lists of points. Points seen in a mirror come after the points of the mirror.
 
     `samples` is the number of rays of each of width x height pixels. Rays without a point meet no object.
     `background` (width * height,) is the radiance of the environment along those, summed over the rays of each pixel.
     """
 
-    points: list[Points]
+    points: list[VisiblePoints]
     width: int
     height: int
     samples: int
     background: Array
 
 
-def gather(scene: Scene, width: int, *, across: int = 1) -> View:
+def gather(scene: Scene, width: int, *, across: int = 1) -> CameraView:
     """Trace rays from the camera to the nearest object, from there to the lights, and once into mirrors.
 
     Parameters
@@ -88,7 +87,7 @@ def gather(scene: Scene, width: int, *, across: int = 1) -> View:
 
     Returns
     -------
-    View
+    CameraView
         A list of points for each object, then for each mirror and each object that it shows.
 
     Raises
@@ -114,12 +113,12 @@ def gather(scene: Scene, width: int, *, across: int = 1) -> View:
         unseen = [item.name for item in scene.objects if item.name not in {met.name for met in points}]
         if unseen:
             raise ParameterError("objects", f"no ray of {width} x {height} pixels meets {', '.join(unseen)}")
-        view = View(points, width, height, across**2, background)
+        view = CameraView(points, width, height, across**2, background)
     _check_lights(scene, view.points)
     return view
 
 
-def gather_at(scene: Scene, places: Array) -> View:
+def gather_at(scene: Scene, places: Array) -> CameraView:
     """Trace single rays through places in the picture.
 
     Parameters
@@ -131,16 +130,16 @@ def gather_at(scene: Scene, places: Array) -> View:
 
     Returns
     -------
-    View
+    CameraView
         N pixels in one row, in the order of the places.
     """
     points, background = _traced(scene, scene.camera.through(places), np.arange(len(places)), len(places))
-    return View(points, len(places), 1, 1, background)
+    return CameraView(points, len(places), 1, 1, background)
 
 
 def _traced(
     scene: Scene, rays: tuple[Array, Array], pixels: NDArray[np.int64], count: int
-) -> tuple[list[Points], Array]:
+) -> tuple[list[VisiblePoints], Array]:
     """Return the points that rays meet, directly and in mirrors, and the background of each of `count` pixels."""
     points, surfaces, missed = _seen(scene, *rays, pixels)
     for number, surface in enumerate(surfaces):
@@ -168,7 +167,7 @@ def _seen(
     at: NDArray[np.int64],
     via: int | None = None,
     before: Array | float = 0.0,
-) -> tuple[list[Points], list[_Surface], NDArray[np.int64]]:
+) -> tuple[list[VisiblePoints], list[_Surface], NDArray[np.int64]]:
     """Return points of each object that rays meet first, the surfaces that they lie on, and the rays that meet none.
 
     `before` is the distance of the origins from the camera.
@@ -185,12 +184,12 @@ def _seen(
         wr = _viewed(surface)
         wi, irradiance = _lit(scene, item, surface, wr, (number, 0 if via is None else via + 1))
         beyond = _from_afar(scene, _mirror(surface))
-        points.append(Points(item.name, item.material, wr, wi, irradiance, beyond, via, at[rays]))
+        points.append(VisiblePoints(item.name, item.material, wr, wi, irradiance, beyond, via, at[rays]))
         surfaces.append(surface)
     return points, surfaces, np.flatnonzero(~np.isfinite(distance))
 
 
-def _mirrored(scene: Scene, points: list[Points], number: int, surface: _Surface) -> list[Points]:
+def _mirrored(scene: Scene, points: list[VisiblePoints], number: int, surface: _Surface) -> list[VisiblePoints]:
     """Return the points that the mirror of some points shows, and set `beyond` to 0 where the mirror shows one."""
     facing = np.flatnonzero(points[number].wr[:, 2] > 0.0)
     origins, directions = _lifted(scene.camera, surface)[facing], _mirror(surface)[facing]
@@ -280,7 +279,7 @@ def _viewed(surface: _Surface) -> Array:
     return unit(np.einsum("nij,nj->ni", surface.frame, surface.viewer))
 
 
-def _recorded(scene: Scene, item: Object, shape: Recorded) -> View:
+def _recorded(scene: Scene, item: Object, shape: Recorded) -> CameraView:
     """Return the points of a file of directions."""
     arrays = shape.read()
     height, width = arrays["normal" if "normal" in arrays else "wr"].shape[:2]
@@ -312,7 +311,9 @@ def _recorded(scene: Scene, item: Object, shape: Recorded) -> View:
         beyond = np.full(at.size, scene.ambient)
     directions, none = scene.camera.rays(width, height)[1], np.flatnonzero(~good)
     background = _background(scene, directions[none], none, width * height)
-    return View([Points(item.name, item.material, wr, wi, irradiance, beyond, None, at)], width, height, 1, background)
+    return CameraView(
+        [VisiblePoints(item.name, item.material, wr, wi, irradiance, beyond, None, at)], width, height, 1, background
+    )
 
 
 def _frames(
@@ -355,15 +356,15 @@ def _height(camera: Camera, width: int, across: int) -> int:
     return height
 
 
-def _check_outside(scene: Scene, points: Sequence[Points]) -> None:
+def _check_outside(scene: Scene, points: Sequence[VisiblePoints]) -> None:
     """Raise a ParameterError if the camera is inside an object, or behind a plane, and sees only black backs."""
     shapes = {item.name: item.shape for item in scene.objects}
     for seen in points:
-        if not isinstance(shapes[seen.name], Plane) and np.median(seen.wr[:, 2]) < _BEHIND:
+        if not isinstance(shapes[seen.name], PlaneShape) and np.median(seen.wr[:, 2]) < _BEHIND:
             raise ParameterError("camera.position", f"is inside {seen.name}, which is black from there")
 
 
-def _check_lights(scene: Scene, points: Sequence[Points]) -> None:
+def _check_lights(scene: Scene, points: Sequence[VisiblePoints]) -> None:
     """Raise a ParameterError if a light falls on nothing visible."""
     start = 0
     for number, light in enumerate(scene.lights):

@@ -14,7 +14,7 @@ from brdfdb.geometry import radians
 from brdfdb.materials import Source
 from brdfdb.materials.source import Lookups
 from brdfdb.parameters import Floats
-from brdfdb.scenes.gbuffer import Points, View
+from brdfdb.scenes.gbuffer import CameraView, VisiblePoints
 from brdfdb.scenes.scene import Scene
 from brdfdb.scenes.shapes import Array
 from brdfdb.tables.albedo import source_albedo
@@ -107,14 +107,14 @@ def reflectors(scene: Scene) -> dict[str, Reflector]:
     return {name: Reflector(source, wavelength) for name, source in scene.materials.items()}
 
 
-def radiance(scene: Scene, points: Points, reflector: Reflector, brdf: Brdf | None = None) -> Floats:
+def radiance(scene: Scene, points: VisiblePoints, reflector: Reflector, brdf: Brdf | None = None) -> Floats:
     """Return the spectral radiance of points in multiples of the illuminant; white has 1.
 
     Parameters
     ----------
     scene : Scene
         The scene, for its wavelengths and ambient light.
-    points : Points
+    points : VisiblePoints
         The visible points.
     reflector : Reflector
         The material of the points.
@@ -167,7 +167,7 @@ def radiance(scene: Scene, points: Points, reflector: Reflector, brdf: Brdf | No
 
 def render(
     scene: Scene,
-    view: View,
+    view: CameraView,
     brdfs: Mapping[str, Brdf | Lookups] | None = None,
     *,
     materials: Mapping[str, Reflector] | None = None,
@@ -179,7 +179,7 @@ def render(
     ----------
     scene : Scene
         The scene.
-    view : View
+    view : CameraView
         The points of the view, from `brdfdb.scenes.gbuffer.gather`.
     brdfs : mapping, optional
         By the name of a material, a function, a source or a table that replaces its model.
@@ -232,7 +232,7 @@ def _function(name: str, given: Brdf | Lookups) -> Brdf:
 
 
 def composed(
-    scene: Scene, view: View, lists: Sequence[Floats], materials: Mapping[str, Reflector]
+    scene: Scene, view: CameraView, lists: Sequence[Floats], materials: Mapping[str, Reflector]
 ) -> NDArray[np.float64]:
     """Return the picture (height, width, L) of radiances of each list of points; mirrors add what they show."""
     known, lists = materials, [values.copy() for values in lists]

@@ -17,8 +17,7 @@ from brdfdb.materials.provenance import Text
 from brdfdb.parameters import closest
 from brdfdb.place import path_of
 from brdfdb.scenes.environment import Environment
-from brdfdb.scenes.recorded_directions import Recorded
-from brdfdb.scenes.shapes import STRICT, AnyShape, Array, Vector, check_direction, unit
+from brdfdb.scenes.shapes import STRICT, AnyShape, Array, Recorded, Vector, check_direction, unit
 from brdfdb.spectra import ILLUMINANT, OBSERVER, check_illuminant, check_observer, covers_visible
 from brdfdb.store.reader import Store
 from brdfdb.tables.table_source import TableSource, source_of_table

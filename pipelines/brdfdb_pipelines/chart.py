@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 import brdfdb
 from brdfdb.errors import BrdfdbError, ParameterError
 from brdfdb.forms.catalogue import Form, of_table
-from brdfdb.forms.tradeoff import STEPS, TIMED, chart, chart_family
-from brdfdb.forms.tradeoff_document import Chart, Charts, FamilyChart, Point
+from brdfdb.forms.tradeoff import STEPS, TIMED, Chart, ChartPoint, Charts, FamilyChart, chart, chart_family
 from brdfdb.materials import Material, Source
 from brdfdb.measurements import Measured
 from brdfdb.store.family import Family, Sweep
@@ -231,7 +230,7 @@ def _print(one: Chart) -> None:
     terminal.print_table(f"{one.material}: samplers, noise and time", ("sampler", *work), rows, numbers=work)
 
 
-def _said(point: Point) -> str:
+def _said(point: ChartPoint) -> str:
     off = f"{percent(point.l1)} off in the mean, p99 {percent(point.p99)}"
     error = "the truth" if point.l1 == 0.0 else off
     faster = "" if point.saving is None else f", {terminal.count(float(f'{point.saving.times:.2g}'))} times as fast as"

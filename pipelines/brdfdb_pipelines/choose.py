@@ -12,14 +12,26 @@ import numpy as np
 from brdfdb.errors import ParameterError
 from brdfdb.forms import timing
 from brdfdb.scenes import image, sample_positions
-from brdfdb.scenes.choice import CONFIDENCE, GRAZING_DEG, Decision, Look, Seen, check_feasible, choose
-from brdfdb.scenes.choice_document import Choice, Price, Weigh, describe, statement, within
-from brdfdb.scenes.gbuffer import View, gather, gather_at
+from brdfdb.scenes.choice import (
+    CONFIDENCE,
+    GRAZING_DEG,
+    Decision,
+    Look,
+    Price,
+    SceneChoice,
+    Seen,
+    Weigh,
+    check_feasible,
+    choose,
+    describe,
+    statement,
+    within,
+)
+from brdfdb.scenes.gbuffer import CameraView, gather, gather_at
 from brdfdb.scenes.offered_forms import OfferedForm, offered_forms
-from brdfdb.scenes.recorded_directions import Recorded
 from brdfdb.scenes.renderer import Reflector, reflectors
 from brdfdb.scenes.scene import Scene
-from brdfdb.scenes.shapes import Array
+from brdfdb.scenes.shapes import Array, Recorded
 from brdfdb.store.marker import make_store
 from brdfdb.store.staging import remove_begun
 from brdfdb_pipelines import terminal
@@ -41,7 +53,7 @@ def run(
     weigh: Weigh = "time",
     store: Path | None = None,
     tolerances: Sequence[float] | None = None,
-) -> Choice:
+) -> SceneChoice:
     """Choose for a scene; write ``choice.json``, ``NAME.png``, ``NAME-truth.exr`` and ``NAME-choice.exr``.
 
     Parameters
@@ -63,7 +75,7 @@ def run(
 
     Returns
     -------
-    Choice
+    SceneChoice
         The document that was written.
 
     Raises
@@ -92,7 +104,7 @@ def _run(
     weigh: Weigh,
     store: Path | None,
     tolerances: Sequence[float] | None,
-) -> Choice:
+) -> SceneChoice:
     with terminal.progress(counted=False, transient=True) as bar:
         bar.add_task("tracing rays", total=None)
         view = gather(scene, width)
@@ -131,7 +143,7 @@ def _run(
         {key: planned.even.pixels(key).size for key in offered},
         {key: one.revision for key, one in built.items()},
     )
-    choice = Choice(
+    choice = SceneChoice(
         brdfdb=version("brdfdb"),
         when=datetime.now(UTC),
         machine=terminal.machine(),
@@ -156,7 +168,7 @@ def _run(
 
 
 def _looks(
-    scene: Scene, view: View, offered: Mapping[str, Sequence[OfferedForm]], materials: Mapping[str, Reflector]
+    scene: Scene, view: CameraView, offered: Mapping[str, Sequence[OfferedForm]], materials: Mapping[str, Reflector]
 ) -> tuple[Look, Callable[[int], Look | None]]:
     """Return the scene where forms are compared, and a function from the number of a check to fresh places."""
     truths = {key: forms[0] for key, forms in offered.items()}
@@ -178,7 +190,7 @@ def _looks(
     return Look(picture, beside_edges(0)), check
 
 
-def _pairs(view: View, material: str) -> tuple[Array, Array]:
+def _pairs(view: CameraView, material: str) -> tuple[Array, Array]:
     """Return pairs of directions (n, 3) at which the scene evaluates a material, shuffled; at least one."""
     pairs = [
         (points.wi[light, point], points.wr[point])
@@ -227,7 +239,7 @@ def _draw(
     stem.with_name(f"{stem.name}.png").write_bytes(choice_picture.png(seen, choice, cheaper, left_out))
 
 
-def _print(choice: Choice, built: Mapping[str, Built]) -> None:
+def _print(choice: SceneChoice, built: Mapping[str, Built]) -> None:
     """Print the choices as a table, their reasons, and the tables that were published."""
     numbers = ("alone", "whole", "largest", "ns", "bytes", "share of the truth")
     rows = [

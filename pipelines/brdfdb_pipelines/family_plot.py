@@ -16,7 +16,7 @@ from matplotlib.text import OffsetFrom
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
 from brdfdb.errors import counted
-from brdfdb.forms.tradeoff_document import Between, Curve, Diagnostic, FamilyChart, Form
+from brdfdb.forms.tradeoff import BetweenMembers, ChartedForm, FamilyChart, FamilyCurve, FamilyDiagnostic
 from brdfdb_pipelines import figure_look, terminal
 from brdfdb_pipelines.plot_panels import (
     BELOW,
@@ -98,7 +98,7 @@ def drawn(whole: FamilyChart) -> Canvas:
         high.tick_params(labelleft=False)
     left = tail + _TAIL + 2.0 * GAP
     _costs(canvas.add_axes(box(left, _FAMILY_ABOVE, WIDTH - RIGHT - left)), whole)
-    forms: list[Curve | Between] = [*whole.curves, *([whole.between] if whole.between else [])]
+    forms: list[FamilyCurve | BetweenMembers] = [*whole.curves, *([whole.between] if whole.between else [])]
     bar = Line2D(
         [], [], color=figure_look.MUTED, linewidth=3.0, alpha=0.3, label="from the least to the most of the members"
     )
@@ -110,7 +110,11 @@ def drawn(whole: FamilyChart) -> Canvas:
 
 
 def _sweep(
-    axes: Axes, whole: FamilyChart, axis: str, errors: Callable[[Curve], list[float | None]], between: float | None
+    axes: Axes,
+    whole: FamilyChart,
+    axis: str,
+    errors: Callable[[FamilyCurve], list[float | None]],
+    between: float | None,
 ) -> None:
     """Draw errors along one parameter; forms worth having at most members of a value are drawn large."""
     x = whole.axes[axis]
@@ -147,7 +151,7 @@ def headed(axes: Axes, text: str) -> None:
     axes.set_title(text, fontsize=8, color=figure_look.MUTED, loc="left")
 
 
-def _diagnostic(axes: Axes, x: list[float], diagnostic: Diagnostic) -> None:
+def _diagnostic(axes: Axes, x: list[float], diagnostic: FamilyDiagnostic) -> None:
     """Write the diagnostic of members above the panel, of as many as there is room for."""
     shown = [len(x) - 1]
     for index in range(len(x) - 1, -1, -1):
@@ -211,7 +215,7 @@ def apart(wanted: Sequence[float], least: float, most: float) -> list[float]:
 def _costs(axes: Axes, whole: FamilyChart) -> None:
     """Draw error over cost: a bar from the least to the largest mean error of the members, a mark at the median."""
     labels = []
-    forms: list[tuple[Form, list[float | None]]] = [(curve, curve.l1) for curve in whole.curves]
+    forms: list[tuple[ChartedForm, list[float | None]]] = [(curve, curve.l1) for curve in whole.curves]
     if whole.between is not None:
         forms.append((whole.between, [whole.between.l1]))
     cost_axes(axes, [t for form, _ in forms for t in (form.batch.low, form.batch.high)], [_HIGHEST / 2.0])
@@ -233,9 +237,9 @@ def _costs(axes: Axes, whole: FamilyChart) -> None:
 _FAMILY_HEADS = ("mean: least", "median", "most", "within 1 %", "p99: median", "ns, many", "ns, one", "worth having")
 
 
-def _family_row(whole: FamilyChart, form: Curve | Between) -> tuple[Form, tuple[str, ...], bool]:
+def _family_row(whole: FamilyChart, form: FamilyCurve | BetweenMembers) -> tuple[ChartedForm, tuple[str, ...], bool]:
     times = terminal.count(form.batch.ns), terminal.count(form.single.ns)
-    if isinstance(form, Between):
+    if isinstance(form, BetweenMembers):
         return form, ("", percent(form.l1), "", "", percent(form.p99), *times, ""), False
     means, tails = ([v for v in values if v is not None] for values in (form.l1, form.p99))
     errors = (percent(min(means)), percent(float(np.median(means))), percent(max(means)))

@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullLocator
 
 from brdfdb.forms.catalogue import Kind
-from brdfdb.forms.tradeoff_document import Chart, FamilyChart, Form
+from brdfdb.forms.tradeoff import Chart, ChartedForm, FamilyChart
 from brdfdb_pipelines import figure_look, terminal
 
 WIDTH, PLOT, ABOVE, BELOW, ROW = 1000.0, 270.0, 64.0, 58.0, 12.0  # points
@@ -185,7 +185,7 @@ def table_of(
     canvas: Canvas,
     columns: Sequence[float],
     heads: Iterable[str],
-    rows: Iterable[tuple[Form, Iterable[str], bool]],
+    rows: Iterable[tuple[ChartedForm, Iterable[str], bool]],
     top: float,
     height: float,
 ) -> None:

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure as Canvas
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
-from brdfdb.forms.tradeoff_document import Chart, Cost, FamilyChart, Point, Sampler
+from brdfdb.forms.tradeoff import Chart, ChartedSampler, ChartPoint, Cost, FamilyChart
 from brdfdb_pipelines import family_plot, figure_canvas, figure_look, terminal
 from brdfdb_pipelines.plot_panels import (
     ABOVE,
@@ -87,7 +87,7 @@ def _drawn(chart: Chart) -> Canvas:
     def of(cost: Cost) -> tuple[float, float, float]:
         return cost.low, cost.ns, cost.high
 
-    panels: tuple[tuple[str, Callable[[Point], tuple[float, float, float]], list[str]], ...] = (
+    panels: tuple[tuple[str, Callable[[ChartPoint], tuple[float, float, float]], list[str]], ...] = (
         ("ns a value, many directions at once", lambda p: of(p.batch), chart.fronts.batch),
         ("256 directions", lambda p: of(p.block), []),
         ("one direction", lambda p: of(p.single), chart.fronts.single),
@@ -126,7 +126,7 @@ def _drawn(chart: Chart) -> Canvas:
     return canvas
 
 
-def tail(point: Point) -> str:
+def tail(point: ChartPoint) -> str:
     """Return the 99th percentile of the error and its confidence interval [%] as text."""
     if point.p99 <= SMALLEST:
         return percent(point.p99)
@@ -140,7 +140,7 @@ def quartiles(cost: Cost) -> str:
     return f"{ns} ({low}-{high})"
 
 
-def against(point: Point) -> str:
+def against(point: ChartPoint) -> str:
     """Return the speed of a form relative to the cheapest rung of the exact form that is as accurate, and that rung."""
     return "" if point.saving is None else f"{terminal.count(float(f'{point.saving.times:.2g}'))} ({point.rung})"
 
@@ -148,7 +148,7 @@ def against(point: Point) -> str:
 _WORK_HEADS = ("variance", "ns a sample", "ms to 1 % (quartiles)")
 
 
-def works(sampler: Sampler) -> tuple[str, ...]:
+def works(sampler: ChartedSampler) -> tuple[str, ...]:
     """Return variance, time and their product of a sampler as text, for the albedo and then for the sphere."""
     cells: list[str] = []
     for work in (sampler.albedo, sampler.sphere):
@@ -200,7 +200,7 @@ def _samplers(canvas: Canvas, chart: Chart, top: float, height: float) -> None:
 
 
 def _panel(
-    axes: Axes, chart: Chart, cost: Callable[[Point], tuple[float, float, float]], front: list[str], *, named: bool
+    axes: Axes, chart: Chart, cost: Callable[[ChartPoint], tuple[float, float, float]], front: list[str], *, named: bool
 ) -> None:
     points = {point.key: point for point in chart.points}
     costs = {key: cost(point) for key, point in points.items()}

@@ -18,7 +18,7 @@ from unittest import mock
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from brdfdb.forms import sampler_efficiency, timing, tradeoff
-from brdfdb.forms.tradeoff_document import Chart, Cost, FamilyChart
+from brdfdb.forms.tradeoff import Chart, Cost, FamilyChart
 from brdfdb_pipelines import chart
 from tests.benchmarks.recording import Column, Run
 

@@ -26,7 +26,7 @@ from brdfdb.materials import Material, Source, presets
 from brdfdb.measurements import MeasuredSource
 from brdfdb.parameters import Floats
 from brdfdb.scenes.environment import Environment
-from brdfdb.scenes.studio import studio
+from brdfdb.scenes.lit_sphere import studio
 from brdfdb.store.publication import publish
 from brdfdb.tables.sampler import Sampler
 from brdfdb.tables.table import Table

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from brdfdb.forms import catalogue, sampler_efficiency, timing, tradeoff
-from brdfdb.forms.tradeoff_document import Chart
+from brdfdb.forms.tradeoff import Chart
 from brdfdb.models import MODELS
-from brdfdb.scenes.choice_document import Choice, Price
+from brdfdb.scenes.choice import Price, SceneChoice
 from brdfdb.scenes.offered_forms import OfferedForm
 from brdfdb.tables import planner
 from brdfdb_pipelines import chart, choose, cli, tradeoff_plot
@@ -69,7 +69,7 @@ def test_a_table_that_is_too_large_is_left_out_of_a_choice_and_named(
     monkeypatch.setattr(planner, "MOST_VALUES", 1)
     path = scene(draws("ward_bounded", 1)[0], tmp_path)
     assert cli.main(["choose", path, "--width", "8", "--out", str(tmp_path / "out")]) == 0
-    written = Choice.model_validate(json.loads((tmp_path / "out" / "choice.json").read_text(encoding="utf-8")))
+    written = SceneChoice.model_validate(json.loads((tmp_path / "out" / "choice.json").read_text(encoding="utf-8")))
     (one,) = written.materials
     assert [each.key for each in one.left_out] == ["table-10", "table-1", "table-0-05"]
     assert one.left_out[2].reason == "tolerance: 0.0005 takes more than 1 values of drawn; ask for a larger one"

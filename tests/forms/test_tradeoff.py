@@ -12,8 +12,7 @@ from scipy.stats import binom
 from brdfdb.forms import catalogue, timing
 from brdfdb.forms import tradeoff as charting
 from brdfdb.forms.catalogue import Kind
-from brdfdb.forms.tradeoff import STEPS, chart, chart_family, ranks
-from brdfdb.forms.tradeoff_document import Chart, FamilyChart
+from brdfdb.forms.tradeoff import STEPS, Chart, FamilyChart, chart, chart_family, ranks
 from brdfdb.geometry import unit_vector
 from brdfdb.materials import FunctionSource, Material, presets
 from brdfdb.store.family import Sweep

@@ -14,18 +14,18 @@ import pytest
 
 from brdfdb.forms import catalogue, timing
 from brdfdb.forms import tradeoff as charting
-from brdfdb.forms.tradeoff_document import (
-    Between,
+from brdfdb.forms.tradeoff import (
+    BetweenMembers,
     Chart,
+    ChartedSampler,
+    ChartPoint,
     Charts,
     Cost,
-    Curve,
     FamilyChart,
+    FamilyCurve,
     Fronts,
-    Point,
-    Sampler,
+    SamplerWork,
     Saving,
-    Work,
 )
 from brdfdb.materials import presets
 from brdfdb.store import family_records
@@ -63,19 +63,19 @@ def family_charted(folder: Path, name: str) -> FamilyChart:
     return whole
 
 
-def point(key: str, l1: float, ns: float, **more: Any) -> Point:
+def point(key: str, l1: float, ns: float, **more: Any) -> ChartPoint:
     time = Cost(ns=ns, low=0.9 * ns, high=1.2 * ns, directions=1)
     errors = dict.fromkeys(("forward", "back", "grazing"), l1) | {"l1": l1, "p99": 5.0 * l1}
     errors |= {"p99_low": 4.0 * l1, "p99_high": 6.0 * l1, "mixed": time, "rung": None, "saving": None}
     fixed = {"title": f"the form {key}", "kind": "table", "python": "none", "dtype": "float64", "bytes": 100}
     costs = {"batch": time, "block": time, "single": time}
-    return Point.model_validate({"key": key, **costs, **errors, **fixed, **more})
+    return ChartPoint.model_validate({"key": key, **costs, **errors, **fixed, **more})
 
 
-WORK = Work(variance=0.25, ns=40.0, low_ms=0.09, ms=0.1, high_ms=0.11)
+WORK = SamplerWork(variance=0.25, ns=40.0, low_ms=0.09, ms=0.1, high_ms=0.11)
 
 
-def made_up(*points: Point) -> Chart:
+def made_up(*points: ChartPoint) -> Chart:
     keys = [each.key for each in points]
     return Chart(
         material="made-up",
@@ -87,7 +87,7 @@ def made_up(*points: Point) -> Chart:
         truth=keys[0],
         points=list(points),
         ladder=[each.key for each in points if each.kind in ("exact", "quadrature")],
-        samplers=[Sampler(key="model", title="the model's lobe", albedo=WORK, sphere=WORK)],
+        samplers=[ChartedSampler(key="model", title="the model's lobe", albedo=WORK, sphere=WORK)],
         fronts=Fronts(batch=keys[:2], single=keys[:1], bytes=keys[:1]),
     )
 
@@ -338,7 +338,7 @@ def time(ns: float) -> Cost:
     return Cost(ns=ns, low=ns, high=ns, directions=1)
 
 
-def made_up_family(between: Between | None = None, **axes: list[float]) -> FamilyChart:
+def made_up_family(between: BetweenMembers | None = None, **axes: list[float]) -> FamilyChart:
     """A truth, and a form that gets better along the family."""
     members = [f"member-{number}" for number in range(len([*itertools.product(*axes.values())]))]
     fixed = {"python": "none", "dtype": "float64", "bytes": 8, "timed": members[0]}
@@ -356,7 +356,7 @@ def made_up_family(between: Between | None = None, **axes: list[float]) -> Famil
         wavelength_nm=None,
         truth="exact",
         curves=[
-            Curve.model_validate({**form, **fixed, **timing, "l1": l1, "p99": l1})
+            FamilyCurve.model_validate({**form, **fixed, **timing, "l1": l1, "p99": l1})
             for form, timing, l1 in zip(forms, costs, errors, strict=True)
         ],
         between=between,
@@ -366,7 +366,7 @@ def made_up_family(between: Between | None = None, **axes: list[float]) -> Famil
 
 def test_the_picture_of_a_family_names_every_form_beside_its_curve_and_in_the_table() -> None:
     fixed = {"key": "between", "title": "between members", "kind": "table", "python": "none", "dtype": "float64"}
-    between = Between.model_validate(
+    between = BetweenMembers.model_validate(
         {**fixed, "bytes": 8, **dict.fromkeys(("batch", "block", "single"), time(5.0)), "l1": 0.1, "p99": 1.0}
     )
     text = tradeoff_plot.svg(made_up_family(between, height=[1.0, 2.0, 4.0, 9.0]))

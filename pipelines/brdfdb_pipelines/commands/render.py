@@ -31,8 +31,8 @@ def run(options: argparse.Namespace) -> int:
     from brdfdb.errors import ParameterError, import_extra
     from brdfdb.scenes import image
     from brdfdb.scenes.gbuffer import gather
-    from brdfdb.scenes.recorded_directions import Recorded
     from brdfdb.scenes.renderer import reflectors, render
+    from brdfdb.scenes.shapes import Recorded
     from brdfdb_pipelines import scene_file, terminal
 
     for module in ("matplotlib.image", "OpenEXR"):  # before the time is spent
