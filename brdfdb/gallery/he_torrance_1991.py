@@ -1,4 +1,4 @@
-"""He, Torrance, Sillion and Greenberg 1991: the measured samples, Figs 7 to 11, and all figures of section 4 and 5."""
+"""He, Torrance, Sillion and Greenberg 1991: the measured samples, Figs 7 to 11."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ import numpy as np
 
 from brdfdb.figure import Figure, Panel, Statement, curve_of, listed
 from brdfdb.gallery import _he_torrance_by_hand as by_hand
-from brdfdb.gallery import he_torrance_1991_objects as objects
 from brdfdb.gallery._he_torrance_cuts import (
     CONE_SR,
     HALF_ANGLE_DEG,
@@ -190,7 +189,6 @@ def _first_surface(surface: Surface, thetas_deg: Floats) -> Floats:
 
 
 def _diffuse_ceramic(surface: Surface, cuts: list[Cut], thetas_deg: Floats) -> list[Statement]:
-    """Return the statements on the nearly uniform pattern and on light from below the surface."""
     first_surface = _first_surface(surface, thetas_deg)
     fresnel = by_hand.fresnel(thetas_deg, surface["n"], surface["k"])
     spread = float(cuts[0].f_r.max() / cuts[0].f_r.min())
@@ -218,7 +216,6 @@ def _diffuse_ceramic(surface: Surface, cuts: list[Cut], thetas_deg: Floats) -> l
 
 
 def _peak_of_ceramic(surface: Surface, cuts: list[Cut], thetas_deg: Floats) -> list[Statement]:
-    """Return the statements that a peak emerges with the angle of incidence, and that it is specular."""
     mirror = np.array([cut.mirror for cut in cuts]) / (surface["a"] / np.pi)
     rho_s = specular(surface, thetas_deg)
     wavelengths = surface["sigma_0_um"] * 1000.0 / surface["wavelength_nm"]
@@ -244,7 +241,6 @@ def _peak_of_ceramic(surface: Surface, cuts: list[Cut], thetas_deg: Floats) -> l
 
 
 def _bound_of_ceramic(surface: Surface, thetas_deg: Floats) -> Statement:
-    """Return the statement that a keeps to the bound of energy conservation."""
     total = _first_surface(surface, thetas_deg) + surface["a"]
     return Statement(
         says="The a(λ) of Fig. 9 keeps to the upper bound that energy conservation gives.",
@@ -257,7 +253,6 @@ def _bound_of_ceramic(surface: Surface, thetas_deg: Floats) -> Statement:
 
 
 def _lambertian_ceramic(surface: Surface, across: list[Cut], thetas_deg: Floats) -> Statement:
-    """Return the statement that light from below the surface is Lambertian."""
     excess = [float(cut.f_r.max()) / (surface["a"] / np.pi) - 1.0 for cut in across]
     return Statement(
         says="Subsurface scattered light is approximated as uniform-diffuse (i.e., Lambertian).",
@@ -417,7 +412,4 @@ FIGURES: dict[str, Callable[[], Figure]] = {
     "he-torrance-1991-fig-09": fig_09,
     "he-torrance-1991-fig-10": fig_10,
     "he-torrance-1991-fig-11": fig_11,
-    "he-torrance-1991-fig-12": objects.fig_12,
-    "he-torrance-1991-fig-13": objects.fig_13,
-    "he-torrance-1991-fig-14": objects.fig_14,
 }

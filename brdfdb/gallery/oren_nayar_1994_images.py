@@ -175,7 +175,6 @@ def _at(radiance: Floats, x: float) -> float:
 
 
 def _nearly_constant(lines: dict[str, Floats]) -> Statement:
-    """Return the statement that brightness is nearly constant over most of the vase."""
     flat = {name: float(np.mean(_over_largest(line) >= 1.0 - SMALL)) for name, line in lines.items()}
     return Statement(
         says="the brightness of the real vase remains nearly constant over most of the cross-section; the proposed "
@@ -190,7 +189,6 @@ def _nearly_constant(lines: dict[str, Floats]) -> Statement:
 
 
 def _to_zero_at_the_limbs(lines: dict[str, Floats]) -> Statement:
-    """Return the statement that brightness drops to zero at the limbs."""
     limb = {name: _at(line, -0.999) for name, line in lines.items()}
     return Statement(
         says="the brightness of the real vase drops quickly to zero very close to the limbs; the proposed model does "
@@ -205,7 +203,6 @@ def _to_zero_at_the_limbs(lines: dict[str, Floats]) -> Statement:
 
 
 def _asymmetric(lines: dict[str, Floats]) -> Statement:
-    """Return the statement that light from the right makes brightness asymmetric."""
     left, right = _at(lines["functional"], -0.8), _at(lines["functional"], 0.8)
     absolute = [float(np.interp(x, ACROSS, lines["functional"])) for x in (-0.801, 0.801)]
     expected = [by_hand.cylinder(x, ASIDE_DEG, 0.7, 40.0) for x in (-0.801, 0.801)]
@@ -220,7 +217,6 @@ def _asymmetric(lines: dict[str, Floats]) -> Statement:
 
 
 def _right_limb(lines: dict[str, Floats]) -> Statement:
-    """Return the statement on the brightness close to the right limb."""
     limb = {name: _at(line, 0.95) for name, line in lines.items()}
     return Statement(
         says="the Lambertian model forces the brightness close to the right limb of the vase to drop much faster",
@@ -233,7 +229,6 @@ def _right_limb(lines: dict[str, Floats]) -> Statement:
 
 
 def _peaks(lines: dict[str, Floats]) -> Statement:
-    """Return the statement on the place of the brightest point."""
     peak = {name: float(ACROSS[np.argmax(line)]) for name, line in lines.items()}
     return Statement(
         says="the brightness peak predicted by the Lambertian model is significantly away from the actual peak",

@@ -10,7 +10,6 @@ import numpy as np
 
 from brdfdb.figure import Figure, Panel, Statement, listed
 from brdfdb.gallery import _oren_nayar_by_hand as by_hand
-from brdfdb.gallery._oren_nayar_evaluated import evaluated
 from brdfdb.gallery._oren_nayar_lines import (
     PAPER,
     SMALL,
@@ -22,6 +21,7 @@ from brdfdb.gallery._oren_nayar_lines import (
     between,
     curve,
     distance,
+    evaluated,
     left_past,
     very_accurate,
 )
@@ -77,12 +77,10 @@ def _rough(material: Material, theta_i_deg: float, delta_phi_deg: float = 0.0) -
 
 
 def _accurate(lines: list[_Lines], lights_deg: list[float]) -> Statement:
-    """Return the statement that the functional approximation is very accurate."""
     return very_accurate([distance(line.functional, line.evaluated) for line in lines], lights_deg, "section 4.3")
 
 
 def _assumptions(lines: list[_Lines], lights_deg: list[float]) -> Statement:
-    """Return the statement that the paper's evaluation validates its assumptions."""
     off = [distance(line.evaluated, line.facets) for line in lines]
     forward = [line.evaluated[0] / line.facets[0] - 1.0 for line in lines]
     return Statement(
@@ -215,7 +213,6 @@ def _sigma_deg(material: Material) -> float:
 
 
 def _approaching(number: int, sums: list[Floats], material: Material) -> Statement:
-    """Return the statement that radiance increases towards the source."""
     last = [between(total, light / 2.0, light) for light, total in zip(LIGHTS_DEG, sums, strict=True)]
     grows = [at(total, light) / at(total, 10.0) for light, total in zip(LIGHTS_DEG, sums, strict=True)]
     expected = [_sum_by_hand(material, light, light) / _sum_by_hand(material, light, 10.0) for light in LIGHTS_DEG]
@@ -232,7 +229,6 @@ def _approaching(number: int, sums: list[Floats], material: Material) -> Stateme
 
 
 def _cut_off(number: int, sums: list[Floats]) -> Statement:
-    """Return the statement that radiance is cut off in the direction of the source."""
     left = [left_past(total, light) for light, total in zip(LIGHTS_DEG, sums, strict=True)]
     return Statement(
         says="the cut-off in radiance that takes place in the source direction",
@@ -245,7 +241,6 @@ def _cut_off(number: int, sums: list[Floats]) -> Statement:
 
 
 def _foam(sums: list[Floats], bodies: list[Floats], material: Material) -> Statement:
-    """Return the statement that the surface of the foam brightens the forward direction."""
     forward = [at(total, -80.0) / float(between(total, -80.0, 0.0).min()) for total in sums]
     over_normal = [at(total, -80.0) / at(total, 0.0) for total in sums]
     expected = [_sum_by_hand(material, light, -80.0) / _sum_by_hand(material, light, 0.0) for light in LIGHTS_DEG]
@@ -271,7 +266,6 @@ def _lobes(theta_i_deg: float) -> dict[float, Floats]:
 
 
 def _peak() -> Statement:
-    """Return the statement on the direction of the peak of eq. 31."""
     peaks = {light: [float(-THETA_R[np.argmax(lobe)]) for lobe in _lobes(light).values()] for light in LIGHTS_DEG}
     rows = "; ".join(f"{listed(row, '.0f')}° for θ_i = {light:.0f}°" for light, row in peaks.items())
     return Statement(
@@ -292,7 +286,6 @@ def _deviation(lobe: Floats) -> float:
 
 
 def _width() -> Statement:
-    """Return the statement that the lobe of eq. 31 widens with roughness."""
     lobes = {sigma_deg: lobe[1:-1] for sigma_deg, lobe in _lobes(45.0).items()}
     widths = [_deviation(lobe) for lobe in lobes.values()]
     expected = [

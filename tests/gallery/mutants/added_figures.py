@@ -9,7 +9,7 @@ import numpy as np
 
 from brdfdb import fresnel
 from brdfdb.gallery import _he_torrance_cuts as cuts
-from brdfdb.gallery import _v_grooves as grooves
+from brdfdb.gallery import oren_nayar_1994_bounces as grooves
 from brdfdb.geometry import unit_vector
 from brdfdb.integrals import sampling
 from brdfdb.measurements import gonioreflectometer
