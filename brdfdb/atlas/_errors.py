@@ -101,7 +101,7 @@ def errors(
 
 
 @dataclass(frozen=True)
-class Sweep:
+class FormSweep:
     """A quantity x over which forms are compared with the truth.
 
     `arguments` gives the arguments of the forms and of the truth at x. Errors are relative, or over `scale` [1/sr].
@@ -249,7 +249,7 @@ def wrong(entry: Misprint, label: str = "") -> ComparedForm:
 
 
 def misprint(
-    key: str, title: str, sweep: Sweep, *, caption: str, within: float = CLOSED
+    key: str, title: str, sweep: FormSweep, *, caption: str, within: float = CLOSED
 ) -> tuple[str, Callable[[], Figure]]:
     """Return the key of a misprint and the function that draws its figure: both forms over one quantity.
 

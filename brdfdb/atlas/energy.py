@@ -353,7 +353,7 @@ def _compensation() -> Figure:
     def exchanged(model: Callable[..., Any]) -> Array:
         """Return f_r over f_r with light and viewer exchanged."""
         there = np.asarray(model(radians(_FROM_DEG), 0.0, other, np.pi, f_0=1.0, alpha=1.0))
-        return np.asarray(model(other, 0.0, radians(_FROM_DEG), np.pi, f_0=1.0, alpha=1.0)) / there
+        return np.asarray(model(other, 0.0, radians(_FROM_DEG), np.pi, f_0=1.0, alpha=1.0) / there)
 
     reciprocal, scaled = exchanged(ggx_compensated), exchanged(ggx_scaled)
     single = albedo_of("ggx_schlick", rho_d=0.0, f_0=_F_0, alpha_x=1.0, alpha_y=1.0)

@@ -21,7 +21,7 @@ from brdfdb.atlas._errors import (
     VIEWER,
     ComparedForm,
     ErrorPanel,
-    Sweep,
+    FormSweep,
     directions,
     error_map,
     errors,
@@ -67,7 +67,7 @@ def _around_the_normal(key: str, title: str, note: str = "") -> tuple[str, Calla
     return misprint(
         key,
         title,
-        Sweep(
+        FormSweep(
             np.linspace(5.0, 175.0, 35),
             "viewer's azimuth from the light's [degrees]",
             lambda x: {"phi_r": np.deg2rad(x)},
@@ -82,7 +82,7 @@ def four_dot_products() -> Figure:
     """Draw the errors of G towards backscatter and towards the normal."""
     entry = BY_KEY["four-dot-products"]
     forms = [wrong(entry, "dot products"), ComparedForm("ours", "ours", entry.corrected)]
-    back = Sweep(
+    back = FormSweep(
         DISTANCES,
         f"{OFF_LIGHT} (1e-13: 0)",
         lambda x: directions(40.0, 40.0 + np.rad2deg(zero(x)), np.rad2deg(zero(x))),
@@ -90,7 +90,7 @@ def four_dot_products() -> Figure:
         title="towards backscatter, at 40 degrees",
         log_x=True,
     ).panel(forms)
-    normal = Sweep(
+    normal = FormSweep(
         DISTANCES,
         "light and viewer [radians from the normal] (1e-13: 0)",
         lambda x: directions(0.0, 0.0, 90.0) | dict.fromkeys(("theta_i", "theta_r"), zero(x)),
@@ -186,10 +186,10 @@ def ten_terms() -> Figure:
         ComparedForm("all terms, from e^-g on", "textbook", _all_terms),
         ComparedForm("ours", "ours", _ours),
     ]
-    over_g = Sweep(
+    over_g = FormSweep(
         np.logspace(-6.0, 6.0, 25), "g", lambda g: {"g": g, "V": 0.0}, _sum, title="V = 0", log_x=True
     ).panel(forms)
-    over_V = Sweep(
+    over_V = FormSweep(
         np.logspace(-2.0, 3.0, 21), "V", lambda V: {"g": 2.0, "V": V}, _sum, title="g = 2", log_x=True
     ).panel(forms)
     caption = f"The sum of eq. 78. {TRUTH}"
@@ -208,7 +208,7 @@ def beckmanns_limit() -> Figure:
 
     def panel(b: float) -> ErrorPanel:
         title = f"V / g = {b:g}"
-        return Sweep(
+        return FormSweep(
             np.logspace(0.0, 5.0, 21), "g", lambda g: {"g": g, "V": b * g}, _sum, title=title, log_x=True
         ).panel(forms)
 
@@ -247,7 +247,7 @@ def shadowing_divided_by_cosines() -> Figure:
     """Draw S_1 / cos(theta) towards the horizon, and on it over the slope."""
     entry = BY_KEY["shadowing-divided-by-cosines"]
     forms = [wrong(entry), ComparedForm("ours", "ours", entry.corrected)]
-    towards_horizon = Sweep(
+    towards_horizon = FormSweep(
         [*np.logspace(-0.1, -16.0, 32), _HORIZON],
         "cosine of the direction (1e-17: 0, the horizon)",
         lambda x: {"cos_theta": 0.0 if x == _HORIZON else x, "slope": entry.where["slope"]},
@@ -255,7 +255,7 @@ def shadowing_divided_by_cosines() -> Figure:
         title="towards the horizon, aluminum of Fig. 8",
         log_x=True,
     ).panel(forms)
-    on_horizon = Sweep(
+    on_horizon = FormSweep(
         np.logspace(-3.0, 1.0, 21),
         "sigma_0 / tau",
         lambda slope: {"cos_theta": 0.0, "slope": slope},
@@ -281,7 +281,7 @@ def root_search() -> Figure:
     ]
 
     def panel(slope: float) -> ErrorPanel:
-        return Sweep(
+        return FormSweep(
             np.logspace(1.5, -3.0, 30),
             "light and viewer [degrees above the horizon]",
             lambda x: dict.fromkeys(("theta_i", "theta_r"), np.deg2rad(90.0 - x)) | {"slope": slope},
@@ -308,7 +308,7 @@ def plainly() -> Figure:
     ]
 
     def towards(title: str, x_label: str, pair: Callable[[float], dict[str, Any]]) -> ErrorPanel:
-        return Sweep(
+        return FormSweep(
             DISTANCES,
             f"{x_label} (1e-13: 0)",
             lambda x: pair(zero(x)) | _GLOSSY | {"wavelength_nm": 2000.0},
@@ -324,7 +324,7 @@ def plainly() -> Figure:
         towards("grazing", "viewer [radians above the horizon]", lambda x: angles(0.6, np.pi / 2 - x, 2.0)),
         towards("backscatter", OFF_LIGHT, lambda x: angles(0.6, 0.6 + x, x)),
         towards("normal incidence", "light [radians from the normal]", lambda x: angles(x, 0.3, 0.0)),
-        Sweep(
+        FormSweep(
             np.logspace(3.5, 1.5, 21),
             "wavelength [nm]",
             lambda wavelength: angles(0.6, 0.7, 3.0) | _GLOSSY | {"wavelength_nm": wavelength},
@@ -398,7 +398,7 @@ def in_float32() -> Figure:
         "Directional diffuse part, sigma_0 of 0.1 um, tau of 1.5 um, n of 1.5, angles of 32 bits. "
         "Truth: 40 digits, at those angles.",
         [
-            Sweep(np.logspace(3.5, 1.5, 21), "wavelength [nm]", arguments, _directional, log_x=True).panel(
+            FormSweep(np.logspace(3.5, 1.5, 21), "wavelength [nm]", arguments, _directional, log_x=True).panel(
                 [
                     ComparedForm(
                         "all terms, in float32", "textbook", functools.partial(_plainly, total=_all_terms_in_float32)
@@ -416,7 +416,7 @@ FIGURES: dict[str, Callable[[], Figure]] = dict(
         misprint(
             "hemispherical-for-bidirectional",
             "The curves of Figs 7 to 10 are those of rho_bd",
-            Sweep(
+            FormSweep(
                 np.linspace(0.0, 85.0, 18),
                 VIEWER,
                 lambda theta: directions(45.0, theta, 180.0),
@@ -428,20 +428,20 @@ FIGURES: dict[str, Callable[[], Figure]] = dict(
         misprint(
             "uniform-diffuse-without-pi",
             "An albedo is no BRDF",
-            Sweep(np.linspace(0.05, 1.0, 20), "a(lambda)", lambda a: {"a": a}, he_torrance_1991.uniform_diffuse),
+            FormSweep(np.linspace(0.05, 1.0, 20), "a(lambda)", lambda a: {"a": a}, he_torrance_1991.uniform_diffuse),
             caption=f"The uniform diffuse part. {TRUTH}",
         ),
         _around_the_normal("one-matrix-for-two", "Incident light in the plane of incidence"),
         misprint(
             "two-pi-in-the-cone",
             "Light that a mirror sends into its cone",
-            Sweep(np.linspace(0.0, 85.0, 18), LIGHT, lambda theta: {"theta_i": np.deg2rad(theta)}, _smooth),
+            FormSweep(np.linspace(0.0, 85.0, 18), LIGHT, lambda theta: {"theta_i": np.deg2rad(theta)}, _smooth),
             caption=f"A smooth surface, n of 1.5: the specular reflectance. {TRUTH}",
         ),
         misprint(
             "amplitudes-over-cross-product",
             "Amplitudes at backscatter: 0 over 0",
-            Sweep(
+            FormSweep(
                 DISTANCES,
                 f"{OFF_LIGHT} (1e-13: 0, backscatter)",
                 lambda x: {"theta_r": np.deg2rad(40.0) + zero(x), "phi_r": zero(x)},
@@ -455,13 +455,13 @@ FIGURES: dict[str, Callable[[], Figure]] = dict(
         misprint(
             "intensities-without-shadowing",
             "Shadowed parts do not shine",
-            Sweep(np.linspace(0.0, 89.5, 30), LIGHT, lambda theta: directions(theta, 40.0, 180.0), _perfect_mirror),
+            FormSweep(np.linspace(0.0, 89.5, 30), LIGHT, lambda theta: directions(theta, 40.0, 180.0), _perfect_mirror),
             caption=f"Aluminum of Fig. 8 as a perfect mirror, seen from 40 degrees, 500 nm: f_r. {TRUTH}",
         ),
         misprint(
             "squares-without-moduli",
             "A reflectance is no complex number",
-            Sweep(
+            FormSweep(
                 np.linspace(0.0, 89.0, 30),
                 "angle of incidence [degrees]",
                 lambda theta: {"cos_theta": np.cos(np.deg2rad(theta))},
@@ -473,7 +473,7 @@ FIGURES: dict[str, Callable[[], Figure]] = dict(
         misprint(
             "v-without-wave-number",
             "The unit of v",
-            Sweep(np.linspace(0.0, 85.0, 35), VIEWER, lambda theta: directions(0.0, theta, 0.0), _perfect_mirror),
+            FormSweep(np.linspace(0.0, 85.0, 35), VIEWER, lambda theta: directions(0.0, theta, 0.0), _perfect_mirror),
             caption=f"Aluminum of Fig. 8 as a perfect mirror, light along the normal, 500 nm: f_r. {TRUTH}",
         ),
         _around_the_normal(
@@ -483,7 +483,7 @@ FIGURES: dict[str, Callable[[], Figure]] = dict(
         misprint(
             "lambda-without-gaussian",
             "Smith's Lambda has a Gaussian",
-            Sweep(
+            FormSweep(
                 np.linspace(30.0, 89.9, 40),
                 "direction [degrees from the normal]",
                 lambda theta: {"theta": np.deg2rad(theta)},

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from brdfdb import models
-from brdfdb.atlas._errors import CLOSED, OFF_LIGHT, TRUTH, ComparedForm, Sweep, figure
+from brdfdb.atlas._errors import CLOSED, OFF_LIGHT, TRUTH, ComparedForm, FormSweep, figure
 from brdfdb.figure import Figure
 from brdfdb.geometry import unit_vector
 from brdfdb.reference import lucht_2000, rahman_1993
@@ -80,7 +80,7 @@ def rpv_hot_spot() -> Figure:
     def truth(theta_i: Any, phi_i: Any, theta_r: Any, phi_r: Any, **parameters: float) -> Any:
         return rahman_1993.rpv(theta_i, theta_r, phi_r - phi_i, **parameters)
 
-    sweep = Sweep(DISTANCES, OFF_LIGHT, lambda x: _beside(x) | SAVANNA, truth, log_x=True)
+    sweep = FormSweep(DISTANCES, OFF_LIGHT, lambda x: _beside(x) | SAVANNA, truth, log_x=True)
     forms = [
         ComparedForm("tan^2 + tan^2 - 2 tan tan cos", "textbook", _rpv_plainly),
         ComparedForm("ours, angles", "ours", models.rpv),
@@ -101,7 +101,7 @@ def ross_li_hot_spot() -> Figure:
     def truth(theta_i: Any, phi_i: Any, theta_r: Any, phi_r: Any, **weights: float) -> Any:
         return lucht_2000.ross_li(theta_i, theta_r, phi_r - phi_i, **weights)
 
-    sweep = Sweep(DISTANCES, OFF_LIGHT, lambda x: _beside(x) | LEAVES, truth, log_x=True)
+    sweep = FormSweep(DISTANCES, OFF_LIGHT, lambda x: _beside(x) | LEAVES, truth, log_x=True)
     forms = [
         ComparedForm("phase angle by its cosine", "textbook", _ross_li_plainly),
         ComparedForm("ours, angles", "ours", models.ross_li),

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from brdfdb import models
-from brdfdb.atlas._errors import BY_KEY, LIGHT, SINGLE, TRUTH, ComparedForm, Sweep, directions, figure, misprint
+from brdfdb.atlas._errors import BY_KEY, LIGHT, SINGLE, TRUTH, ComparedForm, FormSweep, directions, figure, misprint
 from brdfdb.figure import Figure
 from brdfdb.misprints import ORENNAYAR
 from brdfdb.reference import mp, oren_nayar_1994
@@ -100,7 +100,7 @@ def fit_in_float32() -> Figure:
         "Angles of 32 bits next to the horizon",
         "Light and viewer opposite, rho 0.5, sigma 0.5: f_r for angles of 32 bits. Truth: 40 digits, at those angles.",
         [
-            Sweep(
+            FormSweep(
                 np.logspace(0.0, -6.5, 27), "light and viewer [radians above the horizon]", arguments, _fit, log_x=True
             ).panel(
                 [
@@ -118,7 +118,7 @@ FIGURES: dict[str, Callable[[], Figure]] = dict(
         misprint(
             "gaf-of-the-larger",
             "Shadowing and masking: the smaller of the two",
-            Sweep(
+            FormSweep(
                 _ANGLES, _LIGHT_AND_VIEWER, lambda theta: directions(theta, theta, 180.0), _cavity(0), scale=1.0 / np.pi
             ),
             caption="Cavities with slopes of 45 degrees, light and viewer opposite: direct part of f_r. The error is "
@@ -127,19 +127,19 @@ FIGURES: dict[str, Callable[[], Figure]] = dict(
         misprint(
             "shadowed-facet",
             "Radiance of a shadowed facet",
-            Sweep(_ANGLES, LIGHT, lambda theta: directions(theta, 20.0, 0.0), _cavity(0)),
+            FormSweep(_ANGLES, LIGHT, lambda theta: directions(theta, 20.0, 0.0), _cavity(0)),
             caption=f"Cavities with slopes of 45 degrees, seen from 20 degrees: direct part of f_r. {TRUTH}",
         ),
         misprint(
             "visible-and-masked-widths",
             "The second bounce: widths that are masked",
-            Sweep(_ANGLES, LIGHT, lambda theta: directions(theta, 20.0, 0.0), _cavity(1)),
+            FormSweep(_ANGLES, LIGHT, lambda theta: directions(theta, 20.0, 0.0), _cavity(1)),
             caption=f"Cavities with slopes of 45 degrees, seen from 20 degrees: interreflected part of f_r. {TRUTH}",
         ),
         misprint(
             "normalised-over-the-hemisphere",
             "Slopes are distributed over slopes",
-            Sweep(
+            FormSweep(
                 _FEW_ANGLES, LIGHT, lambda theta: directions(theta, 0.0, 0.0) | {"sigma": np.deg2rad(30.0)}, _slopes(0)
             ),
             caption="Seen along the normal, sigma of 30 degrees: direct part of f_r. Truth: the double integral, to "
@@ -149,7 +149,7 @@ FIGURES: dict[str, Callable[[], Figure]] = dict(
         misprint(
             "fit-below-zero",
             "The fit falls below zero",
-            Sweep(
+            FormSweep(
                 np.linspace(40.0, 89.5, 34),
                 _LIGHT_AND_VIEWER,
                 lambda theta: directions(theta, theta, 180.0),
@@ -162,7 +162,7 @@ FIGURES: dict[str, Callable[[], Figure]] = dict(
         misprint(
             "tangent-at-grazing",
             "0 times infinity on the horizon",
-            Sweep(
+            FormSweep(
                 [*np.logspace(-0.5, -16.0, 32), _HORIZON],
                 "cosine of light and viewer (1e-17: 0, the horizon)",
                 _towards_the_horizon,
@@ -175,13 +175,13 @@ FIGURES: dict[str, Callable[[], Figure]] = dict(
         misprint(
             "surface-radiance-as-brdf",
             "A radiance is no BRDF",
-            Sweep(np.linspace(0.0, 89.0, 30), LIGHT, lambda theta: directions(theta, 30.0, 180.0), _surface),
+            FormSweep(np.linspace(0.0, 89.0, 30), LIGHT, lambda theta: directions(theta, 30.0, 180.0), _surface),
             caption=f"Facets with sigma of 20 degrees, seen from 30 degrees in the mirror half plane: f_r. {TRUTH}",
         ),
         misprint(
             "surface-without-e-0",
             "A surface that does not follow the light",
-            Sweep(
+            FormSweep(
                 np.logspace(0.0, 1.0, 21),
                 "E_0, in the unit of the radiance of eq. 31",
                 lambda e_0: {"e_0": e_0},
@@ -194,7 +194,7 @@ FIGURES: dict[str, Callable[[], Figure]] = dict(
         misprint(
             "interreflection-factor",
             "Eq. 48 in place of eq. 47",
-            Sweep(_FEW_ANGLES, LIGHT, lambda theta: directions(theta, 0.0, 0.0), _slopes(1)),
+            FormSweep(_FEW_ANGLES, LIGHT, lambda theta: directions(theta, 0.0, 0.0), _slopes(1)),
             caption="Seen along the normal, sigma of 30 degrees: interreflected part of f_r. "
             "Truth: the double integral, to 1e-11.",
             within=SLOPES,

@@ -17,7 +17,7 @@ from brdfdb.atlas._errors import (
     VIEWER,
     ComparedForm,
     ErrorPanel,
-    Sweep,
+    FormSweep,
     directions,
     error_map,
     errors,
@@ -76,7 +76,7 @@ def lobe_that_loses_light() -> Figure:
         curve_of("rho_s, as stated", theta, np.ones_like(theta), "truth"),
     ]
     values = Panel(title="Albedo", x_label=LIGHT, y_label="albedo of the lobe, rho_s = 1", curves=albedos)
-    integrals = Sweep(
+    integrals = FormSweep(
         np.linspace(0.0, 60.0, 13),
         LIGHT,
         lambda x: {"theta_i": np.deg2rad(x)} | lobe(alpha),
@@ -136,7 +136,7 @@ def wide_lobes() -> Figure:
         "From narrow lobes to wide ones",
         f"On the shoulder of the lobe, light at 30 degrees, viewer alpha beyond the mirror direction: f_r. {TRUTH}",
         [
-            Sweep(
+            FormSweep(
                 np.logspace(-6.0, 0.0, 31),
                 "alpha",
                 lambda alpha: directions(30.0, 30.0 + np.rad2deg(alpha), 180.0) | lobe(alpha),
@@ -158,7 +158,7 @@ def near_the_pole() -> Figure:
         "Next to the pole a cosine has no digits of the angle",
         f"Light along the normal, alpha of 1e-6: f_r as the viewer nears the normal, too. {TRUTH}",
         [
-            Sweep(
+            FormSweep(
                 np.logspace(-12.0, -5.5, 27),
                 "viewer [radians from the normal]",
                 lambda x: {"theta_i": 0.0, "phi_i": 0.0, "theta_r": x, "phi_r": 0.7} | lobe(alpha),
@@ -191,7 +191,7 @@ def far_from_the_peak() -> Figure:
         "Far from the peak",
         f"Light along the normal, alpha of 1e-4: f_r from its peak down to 1e-297 of it. {TRUTH}",
         [
-            Sweep(
+            FormSweep(
                 np.linspace(0.0, 700.0, 29),
                 "exponent of the lobe",
                 lambda x: directions(0.0, 2.0 * np.rad2deg(np.arctan(alpha * np.sqrt(x))), 0.0) | lobe(alpha),
@@ -218,7 +218,7 @@ def lobe_in_float32() -> Figure:
         "A narrow lobe in 32 bits",
         "Light along the normal, alpha of 0.001, angles of 32 bits: f_r. Truth: 40 digits, at those angles.",
         [
-            Sweep(np.linspace(0.0, 80.0, 33), "exponent of the lobe", arguments, _elliptical).panel(
+            FormSweep(np.linspace(0.0, 80.0, 33), "exponent of the lobe", arguments, _elliptical).panel(
                 [
                     ComparedForm("eq. 5a in float32", "textbook", _of_unit_vectors),
                     ComparedForm("ours, float32 in and out", "ours", models.ward),
@@ -297,7 +297,7 @@ FIGURES: dict[str, Callable[[], Figure]] = dict(
         misprint(
             "deviation-of-slopes",
             "alpha is no standard deviation",
-            Sweep(
+            FormSweep(
                 np.logspace(-3.0, 0.0, 19),
                 "alpha",
                 lambda alpha: {"alpha_x": alpha, "alpha_y": alpha},
@@ -311,13 +311,13 @@ FIGURES: dict[str, Callable[[], Figure]] = dict(
         misprint(
             "half-vector-form",
             "Two formulas, two lobes",
-            Sweep(np.linspace(0.0, 75.0, 31), VIEWER, lambda theta: directions(0.0, theta, 0.0), _elliptical),
+            FormSweep(np.linspace(0.0, 75.0, 31), VIEWER, lambda theta: directions(0.0, theta, 0.0), _elliptical),
             caption=f"Light along the normal, alpha of 0.2: f_r by eq. 5a. {TRUTH}",
         ),
         misprint(
             "delta-without-arctan",
             "An angle is not its tangent",
-            Sweep(
+            FormSweep(
                 np.logspace(-3.0, np.log10(2.0), 30),
                 "alpha",
                 lambda alpha: {"alpha_x": alpha, "alpha_y": alpha},
@@ -330,7 +330,7 @@ FIGURES: dict[str, Callable[[], Figure]] = dict(
         misprint(
             "arctangent-of-7a",
             "The arctangent that keeps its quadrant",
-            Sweep(
+            FormSweep(
                 np.linspace(0.02, 0.98, 33),
                 "u2",
                 lambda u2: {"u2": u2, "alpha_y": 0.2},
@@ -343,7 +343,7 @@ FIGURES: dict[str, Callable[[], Figure]] = dict(
         misprint(
             "uniform-weights",
             "Samples have weights",
-            Sweep(
+            FormSweep(
                 np.linspace(0.0, 75.0, 31),
                 LIGHT,
                 lambda theta: {"wi": unit_vector(np.deg2rad(theta), 0.0), "u1": 0.3, "u2": 0.2},

@@ -278,7 +278,7 @@ def _searched(request: _Request, tick: Callable[[], None]) -> _Fit:
         return _Fit(result, np.zeros((target.count, 0)), fitted)
     nodes = _nodes(request, lobe, request.counts, request.before)
     every = Distance(target, nodes, np.arange(target.count, dtype=np.int64), _alphas(lobe))
-    ends = [every.of_column(result.numbers, column, column)[1] for column in range(target.count)]
+    ends = [every.of_column(result.numbers, column, column).point for column in range(target.count)]
     return _Fit(result, np.stack(ends), nodes)
 
 

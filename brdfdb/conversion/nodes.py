@@ -70,24 +70,11 @@ def sides_of(source: Source, material: Material, wavelength_nm: Array | None) ->
 
 
 class TruthNodes:
-    """The truth at the nodes of one rule, of L columns.
+    """The truth at N pairs of directions from V viewers, in L columns.
 
-    Attributes
-    ----------
-    wi, wr : array (N, 3)
-        Unit vectors of light and viewer.
-    weight : array (N,) [sr^2]
-        Weights of the integral over both hemispheres, with both cosines.
-    truth : array (N, L) [1/sr]
-        f_r of the source.
-    theta, theta_weight : array (V,) [rad], [sr]
-        Angles of the viewers, with the weights of an integral over them, for the specular part.
-    specular : array (V, L) [1]
-        Reflectance of the specular part of the source.
-    total : array (L,)
-        Integral of all that the source reflects.
-    weigh : {"light", "lightness"}
-        What `distance` compares.
+    `wi` and `wr` (N, 3) are unit vectors, `weight` (N,) [sr^2] has both cosines, and `truth` (N, L) [1/sr] is f_r.
+    `theta` (V,) [rad] with `theta_weight` (V,) [sr] and `specular` (V, L) [1] are those of the specular part. `total`
+    (L,) is the integral of all light that the source reflects.
     """
 
     def __init__(
@@ -136,14 +123,10 @@ def _sum(weight: Floats, values: Floats) -> float:
 
 
 class RemainingDifference:
-    """The difference of a model from a source over all pairs of directions, summed viewer by viewer.
+    """The difference of a model from a source over all pairs of directions, in L columns, summed viewer by viewer.
 
-    Attributes
-    ----------
-    l1 : array (L,) [1]
-        Distance over all pairs of directions.
-    reflected, specular : array (L,) [1]
-        Mean albedo of the model over that of the source, and the share of the specular part in the source.
+    `l1` is the distance, `reflected` the mean albedo of the model over that of the source, and `specular` the share of
+    the specular part in the source, all (L,) [1].
     """
 
     def __init__(self, sides: Sides, counts: Counts, symmetry: Symmetry) -> None:
@@ -160,13 +143,10 @@ class RemainingDifference:
 
 
 class ViewError:
-    """The error of a model for one viewer, over all lights, in L columns.
+    """The error of a model for one viewer under uniform light, over all lights, in L columns.
 
-    Attributes
-    ----------
-    wrong, source, model, specular : array (L,) [1]
-        Under uniform light: light in the wrong place, light that the source reflects to the viewer, light that the
-        model reflects to the viewer, and the specular part of the source.
+    `wrong` is the light in the wrong place, `source` and `model` the light that both reflect to the viewer, and
+    `specular` the specular part of the source, all (L,) [1].
     """
 
     def __init__(self, view: View, sides: Sides) -> None:

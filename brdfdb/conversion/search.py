@@ -42,39 +42,23 @@ _NOTHING = 0.01  # value below which differences are relative to this value: har
 _LEAST_K = 1e-6  # smaller values of k are taken as 0
 
 
+class Minimum(NamedTuple):
+    """A point of the unit cube where a function is least, and its value there."""
+
+    point: Array
+    value: float
+
+
 def downhill(
     function: Callable[[Array], float], begin: Array, size: Array, *, tolerance: float = 1e-7, most: int = 400
-) -> tuple[Array, float]:
-    """Return a minimum of a function in the unit cube, and its value, by the simplex of Nelder and Mead 1965.
+) -> Minimum:
+    """Return a minimum of a function in the unit cube, by the simplex of Nelder and Mead 1965 (``neldermead1965``).
 
-    Parameters
-    ----------
-    function : callable
-        A function of an array (variables,) in [0, 1].
-    begin : array (variables,)
-        The first corner of the simplex.
-    size : array (variables,)
-        Lengths of its edges.
-    tolerance : float
-        The search stops when values at the corners differ by less than this, relative to the value at the beginning,
-        or to a hundredth if that is more, and the corners by less than a hundred times as much: corners on both sides
-        of a minimum may share a value.
-    most : int
-        Number of evaluations at which the search stops.
-
-    Returns
-    -------
-    array (variables,), float
-        The best corner and its value.
-
-    Notes
-    -----
+    The simplex begins at `begin`, with edges of the lengths `size`. The search stops after `most` evaluations, or when
+    values at the corners differ by less than `tolerance`, relative to the first value or to a hundredth if that is
+    more, and the corners by less than a hundred times as much: corners on both sides of a minimum may share a value.
     Corners outside the cube are moved to its surface. No gradient is needed: the integral of an absolute difference has
     none where the difference is 0 over a region.
-
-    References
-    ----------
-    neldermead1965
     """
     from scipy.optimize import minimize
 
@@ -88,26 +72,15 @@ def downhill(
         end = minimize(function, best, method="Nelder-Mead", bounds=[(0.0, 1.0)] * begin.size, options=options)
         if end.fun < value:
             best, value = np.asarray(end.x), float(end.fun)
-    return best, value
+    return Minimum(best, value)
 
 
 class Target:
     """A model whose parameters are searched, for a source at L wavelengths, or 1 without any.
 
-    Attributes
-    ----------
-    spec : ModelSpec
-        The model.
-    shape : list of Variable
-        Numbers that all wavelengths share.
-    colours : list of Variable
-        Reflectances with a value at each of several wavelengths; empty where there is one.
-    wavelength_nm : array (L,) [nm] or None
-        Wavelengths of the model, None for a grey one.
-    symmetry : Symmetry
-        Symmetry that source and model have in common.
-    entry : str or None
-        The refractive index of a spectral model; None where n and k are searched, and for other models.
+    `shape` are the variables that all wavelengths share, `colours` the reflectances with a value at each of several
+    wavelengths. `symmetry` is common to source and model. `entry` is the refractive index of a spectral model, None
+    where n and k are searched.
     """
 
     def __init__(
@@ -140,19 +113,15 @@ class Target:
         self.searched_index = spec.spectral and entry is None
         if self.searched_index:
             self.shape += index_variables()
-        self.indices = self._indices()
+        self.indices: list[dict[str, float]] = [{}] * self.count
+        if spec.spectral:
+            assert wavelength_nm is not None
+            self.indices = [{"wavelength_nm": float(wavelength)} for wavelength in wavelength_nm]
+            if entry is not None:
+                n, k = refractive_index(entry, wavelength_nm)
+                self.indices = [index | {"n": float(n[w]), "k": float(k[w])} for w, index in enumerate(self.indices)]
         if not self.shape and not self.colours:
             raise ParameterError("fixed", f"all parameters of {spec.name} are fixed; leave one to search", tuple(fixed))
-
-    def _indices(self) -> list[dict[str, float]]:
-        if not self.spec.spectral:
-            return [{}] * self.count
-        assert self.wavelength_nm is not None
-        at = [{"wavelength_nm": float(value)} for value in self.wavelength_nm]
-        if self.entry is None:
-            return at
-        n, k = refractive_index(self.entry, self.wavelength_nm)
-        return [one | {"n": float(n[w]), "k": float(k[w])} for w, one in enumerate(at)]
 
     def numbers(self, shape: Array) -> dict[str, float]:
         """Return the shared parameters at a point of the unit cube, with n and k where they are searched."""
@@ -221,24 +190,12 @@ def _checked(spec: ModelSpec, fixed: Mapping[str, float]) -> dict[str, float]:
 
 
 class Result(NamedTuple):
-    """The parameters that came closest.
+    """The parameters that came closest."""
 
-    Attributes
-    ----------
-    numbers : dict
-        Parameters that all wavelengths share, with n and k where they were searched.
-    distance : float
-        Distance [1] at the nodes of the search.
-    as_good : dict
-        Range of each number among the sets with nearly this distance.
-    evaluations : int
-        Sets of parameters that were tried.
-    """
-
-    numbers: dict[str, float]
-    distance: float
-    as_good: dict[str, tuple[float, float]]
-    evaluations: int
+    numbers: dict[str, float]  # parameters that all wavelengths share, with n and k where they were searched
+    distance: float  # distance [1] at the nodes of the search
+    as_good: dict[str, tuple[float, float]]  # range of each number among the sets with nearly this distance
+    evaluations: int  # sets of parameters that were tried
 
 
 class Distance:
@@ -266,8 +223,8 @@ class Distance:
             return REFUSED
         total = 0.0
         for row, column in enumerate(self.columns.tolist()):
-            best, self.colours[row] = self.of_column(numbers, row, column)
-            total += best
+            self.colours[row], least = self.of_column(numbers, row, column)
+            total += least
         self.edge = _NEXT_EDGE
         mean = total / self.columns.size
         mean = min(mean, REFUSED) if math.isfinite(mean) else REFUSED
@@ -275,8 +232,8 @@ class Distance:
         self.record.append((mean, numbers))
         return mean
 
-    def of_column(self, numbers: Mapping[str, float], row: int, column: int) -> tuple[float, Array]:
-        """Return the distance [1] in a column of the truth, with the colours that make it least.
+    def of_column(self, numbers: Mapping[str, float], row: int, column: int) -> Minimum:
+        """Return the colours that make the distance [1] in a column of the truth least, and that distance.
 
         `row` is the column of the truth at the nodes, `column` the wavelength of the target.
         """
@@ -290,10 +247,9 @@ class Distance:
                 return nodes.distance(row, f_r(colours), mirror)
 
         if not target.colours:
-            return left(np.zeros(0)), np.zeros(0)
+            return Minimum(np.zeros(0), left(np.zeros(0)))
         size = np.full(len(target.colours), self.edge)
-        best, value = downhill(left, self.colours[row], size, tolerance=_COLOURS, most=60 * size.size)
-        return value, best
+        return downhill(left, self.colours[row], size, tolerance=_COLOURS, most=60 * size.size)
 
 
 def search(
@@ -304,31 +260,13 @@ def search(
     alphas: Array,
     tick: Callable[[], None],
 ) -> Result:
-    """Search the shared parameters.
+    """Search the shared parameters of a target for the lobe of a source with the widths `alphas` (2,), nan without a
+    lobe.
 
-    Parameters
-    ----------
-    target : Target
-        The model.
-    coarse, fitted : TruthNodes
-        The truth at few nodes, for many sets of parameters, and at those of the last descents.
-    columns : array of int
-        Wavelengths of the target in the columns of both.
-    alphas : array (2,) [1]
-        Widths of the lobe of the source along x and y; nan for a diffuse one.
-    tick : callable
-        A function that is called `STEPS` times.
-
-    Returns
-    -------
-    Result
-        The best parameters.
-
-    Notes
-    -----
     Points are spread evenly over the ranges of the parameters. The first of them, and those whose lobe is most nearly
     as wide as that of the source, are tried at coarse nodes. Simplexes begin at the best three that are not near each
-    other, and go downhill at coarse nodes. Ends within 3 % of the best go on at all nodes.
+    other, and go downhill at coarse nodes. Ends within 3 % of the best go on at all nodes. `columns` are the
+    wavelengths of the target in the columns of the nodes. `tick` is called `STEPS` times at most.
     """
     distances = Distance(target, coarse, columns, alphas), Distance(target, fitted, columns, alphas)
     steps = np.array([variable.step for variable in target.shape])
@@ -342,7 +280,8 @@ def search(
     for point in best_apart(points, values, BEGINNINGS):
         starts.append(downhill(distances[0], point, steps, tolerance=_COARSE, most=80 * steps.size))
         tick()
-    ends, values = np.array([end for end, _ in starts]), np.array([value for _, value in starts])
+    ends = np.array([minimum.point for minimum in starts])
+    values = np.array([minimum.value for minimum in starts])
     good = values <= _PROMISING * values.min()
     for point in best_apart(ends[good], values[good], BEGINNINGS):
         downhill(distances[1], point, 0.2 * steps, tolerance=_FINE, most=100 * steps.size)

@@ -162,20 +162,15 @@ def correlations_of(fitted: FittedSurface) -> list[Correlation]:
             coefficient = matrix[a, b] / (errors[a] * errors[b]) if errors[a] > 0.0 and errors[b] > 0.0 else np.nan
             if not abs(coefficient) > _CLOSE:
                 continue
-            what = _measured(fitted, a, b, errors, float(coefficient))
-            sentence = f"{names[a]} and {names[b]} are correlated by {coefficient:.3f}: only {what} is measured."
+            measured = "a combination of the two"
+            first, second = (_relative_error(fitted, index, float(errors[index])) for index in (a, b))
+            if first is not None and second is not None and abs(np.log(first / second)) < _SAME:
+                measured = "their ratio" if coefficient > 0.0 else "their product"
+            sentence = f"{names[a]} and {names[b]} are correlated by {coefficient:.3f}: only {measured} is measured."
             pairs.append(
                 Correlation(first=names[a], second=names[b], coefficient=float(coefficient), sentence=sentence)
             )
     return pairs
-
-
-def _measured(fitted: FittedSurface, a: int, b: int, errors: Array, coefficient: float) -> str:
-    """Return what is known of two numbers that are not told apart, in words."""
-    first, second = (_relative_error(fitted, index, float(errors[index])) for index in (a, b))
-    if first is not None and second is not None and abs(np.log(first / second)) < _SAME:
-        return "their ratio" if coefficient > 0.0 else "their product"
-    return "a combination of the two"
 
 
 def _relative_error(fitted: FittedSurface, index: int, error: float) -> float | None:

@@ -19,21 +19,10 @@ _THETA_DEG, _PHI_DEG = 5.0, 10.0  # cells of the maps
 
 
 def figure_of(document: Fits, fitted: FittedSurface) -> Figure:
-    """Return the figure of a fit.
+    """Return the figure of a fit: cuts and maps for up to six incidences, of the middle channel.
 
-    Parameters
-    ----------
-    document : Fits
-        The document, for names and numbers.
-    fitted : FittedSurface
-        The fit that is shown, with its samples.
-
-    Returns
-    -------
-    Figure
-        For up to six incidences, f_r of samples and fit in the plane of incidence, where there are samples in it. After
-        all of these, for each incidence a map of the mean of ln(model / sample) over the direction of the viewer. Of
-        several channels, the middle one.
+    A cut has f_r of samples and fit in the plane of incidence, where samples are in it. A map has the mean of
+    ln(model / sample) over the direction of the viewer.
     """
     samples = fitted.samples
     _, first = np.unique(samples.incidence, return_index=True)

@@ -246,7 +246,7 @@ def fits(
     return document, surfaces
 
 
-class _Search(NamedTuple):
+class _FittedModel(NamedTuple):
     """A fit, and ln(model / sample) (N, C) at incidences that were left out in turn; None if the light has one."""
 
     fitted: FittedSurface
@@ -260,16 +260,16 @@ def _searches(
     refractive_index: str | None,
     tick: Callable[[str], None],
     keep_finished: bool,
-) -> tuple[list[_Search], dict[str, str]]:
+) -> tuple[list[_FittedModel], dict[str, str]]:
     """Return the fits of all models that can describe the samples, and by name the reasons that others are skipped."""
-    searches: list[_Search] = []
+    searches: list[_FittedModel] = []
     skipped: dict[str, str] = {}
     tried = fitted_by_default() if models is None else models
     for number, model in enumerate(tried):
         try:
             tick(model)
             fitted = fit(samples, model, residual=residual, refractive_index=refractive_index)
-            searches.append(_Search(fitted, _predicted(fitted)))
+            searches.append(_FittedModel(fitted, _predicted(fitted)))
         except NotDescribedError as error:
             if models is not None and len(models) == 1:
                 raise
@@ -316,7 +316,7 @@ def _rank(one: Fit) -> tuple[float, float]:
     return (0.0 if one.held_out is None else float(f"{one.held_out.rms:.3g}"), one.bic)
 
 
-def _document(search: _Search, shared: Mask) -> Fit:
+def _document(search: _FittedModel, shared: Mask) -> Fit:
     """Return the record of a fit, with intervals of its covariance."""
     fitted = search.fitted
     logs = fitted.logarithms[np.isfinite(fitted.logarithms) & ~shared]

@@ -21,30 +21,14 @@ Mask = NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class FittedSurface:
-    """The best point of a surface.
-
-    Attributes
-    ----------
-    samples : Samples
-        The samples.
-    problem : Problem
-        SearchedSurface, residual and the scale of robustness.
-    point : Point
-        The best point.
-    sigma : float
-        Robust standard deviation of the residuals.
-    rows : array of int
-        Samples that count, those of `problem`.
-    hidden : array (N,) of bool
-        Samples that are left out, because a specular part is seen there through an aperture that is not known.
-    """
+    """The best point of a surface, with the samples that it was fitted to."""
 
     samples: Samples
     problem: Problem
     point: Point
-    sigma: float
-    rows: NDArray[np.int64]
-    hidden: Mask
+    sigma: float  # robust standard deviation of the residuals
+    rows: NDArray[np.int64]  # samples that count: those of the problem
+    hidden: Mask  # samples (N,) that are left out: a specular part is seen there through an aperture that is not known
 
     @property
     def surface(self) -> SearchedSurface:

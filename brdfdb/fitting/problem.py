@@ -51,20 +51,10 @@ class Point(NamedTuple):
 
 
 class Problem:
-    """A surface, the samples it is fitted to, and the scale of robustness.
+    """A surface, the samples that it is fitted to, and the scale of robustness.
 
-    Parameters
-    ----------
-    surface : SearchedSurface
-        The surface.
-    view : View
-        Directions of light and viewer as the instrument sees them.
-    residual : Residual
-        Of the same N samples.
-    fixed : mapping of int to float
-        Shape variables that are held, with their places in the unit cube.
-    held : mapping of int to float
-        Coefficients that are held at a value in each channel.
+    `fixed` and `held` are shape variables (places in the unit cube) and coefficients (values in each channel) that are
+    not searched, by index.
     """
 
     def __init__(
@@ -260,29 +250,12 @@ def _project(
     start: Array,
     tolerance: float = FINE,
 ) -> Array:
-    """Return the coefficients (K, C) that make the robust cost of residuals least, between bounds.
+    """Return the coefficients (K, C) between bounds (K, C) that make the robust cost of residuals least.
 
-    Parameters
-    ----------
-    surface : SearchedSurface
-        The surface.
-    basis : array (M, N, C) or (M, N, 1) [1/sr]
-        Factors of its monomials, as `SearchedSurface.basis` gives them.
-    residual : Residual
-        The residual of N samples in C channels.
-    scale : float
-        The size of a residual from which on it counts less than squared.
-    bounds : pair of arrays (K, C)
-        Lower and upper bounds; where they are the same, the coefficient is fixed.
-    start : array (K, C)
-        Where to begin.
-    tolerance : float
-        Change of the cost, relative to it, that ends the steps.
-
-    Notes
-    -----
-    Gauss and Newton's steps with Levenberg's damping. A coefficient at a bound that would leave the range stays there.
-    Channels are independent, and each has a damping of its own.
+    `basis` (M, N, C) or (M, N, 1) has the factors [1/sr] of the monomials. Coefficients with equal bounds are fixed.
+    The steps are those of Gauss and Newton with Levenberg's damping, and end where the relative change of the cost is
+    below `tolerance`. A coefficient at a bound stays there if its step would leave the range. Channels are independent,
+    and each has its own damping.
     """
     low, high = bounds
     values = np.clip(start, low, high)
@@ -335,22 +308,10 @@ def _slopes_of(surface: SearchedSurface, basis: Floats, values: Array) -> Floats
 
 
 def _basis_slopes(surface: SearchedSurface, x: Array, view: View) -> dict[int, Floats]:
-    """Return the derivatives (M, N, C) or (M, N, 1) [1/sr] of `SearchedSurface.basis` by shape variables.
+    """Return the derivatives (M, N, C) or (M, N, 1) [1/sr] of `SearchedSurface.basis` by shape variables, by index.
 
-    Parameters
-    ----------
-    surface : SearchedSurface
-        The surface.
-    x : array (S,)
-        A point of the unit cube.
-    view : View
-        N pairs of directions.
-
-    Returns
-    -------
-    dict of int to array
-        The variables of terms whose models have a gradient. A specular part inside an aperture has none, nor have n and
-        k where k is 0, at the end of its range.
+    Only models with a gradient have them. A specular part inside an aperture has none, nor have n and k where k is 0,
+    the end of its range.
     """
     numbers = surface.numbers(x)
     several = surface.channels if surface.indexed else 1
@@ -399,8 +360,9 @@ def _moves(
     ends = {name: surface.shape[labels.index(name)].value(float(x[labels.index(name)])) for name in (NORMAL, EDGE)}
     for number, term in enumerate(surface.terms):
         if term.spec.spectral and numbers[number]["k"] > 0.0:
-            n_slope, k_slope = index_slopes(ends[NORMAL], ends[EDGE])[0 if one.name == NORMAL else 1]
-            moves[number] = {"n": n_slope * one.slope(0.5), "k": k_slope * one.slope(0.5)}
+            slopes = index_slopes(ends[NORMAL], ends[EDGE])
+            index = slopes.by_normal if one.name == NORMAL else slopes.by_edge
+            moves[number] = {"n": index.n * one.slope(0.5), "k": index.k * one.slope(0.5)}
     return moves
 
 

@@ -208,20 +208,20 @@ def _parameters(terms: list[PublishedLobe], channel: int) -> dict[str, float]:
     """Return the parameters of the model of some terms in a channel, as recipes write them."""
     model = _model(terms)
     assert model is not None
+
+    def in_channel(numbers: list[float]) -> float:
+        return numbers[min(channel, len(numbers) - 1)]
+
     values: dict[str, float] = {}
     spec = MODELS[model]
     uniform = spec.uniform or spec.parameters[0].name
     for term in terms:
         if term.name == _FLAT:
-            values[uniform] = _of(term.numbers["albedo"], channel)
+            values[uniform] = in_channel(term.numbers["albedo"])
             continue
         for name, theirs in _named()[term.name]["parameters"].items():
-            values[name] = _of(term.numbers[theirs], channel)
+            values[name] = in_channel(term.numbers[theirs])
     return {uniform: 0.0} | values
-
-
-def _of(numbers: list[float], channel: int) -> float:
-    return numbers[min(channel, len(numbers) - 1)]
 
 
 def _flags(terms: list[PublishedLobe]) -> list[str]:

@@ -41,8 +41,15 @@ def unit_of(parameter: Parameter) -> float:
     return min(parameter.high, 1.0)
 
 
+class LinearParameters(NamedTuple):
+    """The parameters in which f_r is a polynomial, and its degree."""
+
+    names: tuple[str, ...]
+    degree: int
+
+
 @cache
-def coefficients(spec: ModelSpec) -> tuple[tuple[str, ...], int]:
+def coefficients(spec: ModelSpec) -> LinearParameters:
     """Return the parameters in which f_r is a polynomial, and its degree.
 
     Notes
@@ -52,12 +59,12 @@ def coefficients(spec: ModelSpec) -> tuple[tuple[str, ...], int]:
     """
     names = [p.name for p in spec.parameters if _is_amplitude(p)]
     if spec.degree is not None:
-        return tuple(name for name in names if spec.parameter(name).reflectance), spec.degree
+        return LinearParameters(tuple(name for name in names if spec.parameter(name).reflectance), spec.degree)
     linear: list[str] = []
     for name in names:
         if _is_linear(spec, [*linear, name]):
             linear.append(name)
-    return tuple(linear), 1
+    return LinearParameters(tuple(linear), 1)
 
 
 def _is_amplitude(parameter: Parameter) -> bool:
@@ -85,16 +92,10 @@ def _is_linear(spec: ModelSpec, names: list[str]) -> bool:
 
 
 class Polynomial:
-    """The monomials of K coefficients up to a degree, as arrays over M monomials.
+    """The M monomials of K coefficients up to a degree.
 
-    Attributes
-    ----------
-    exponents : array (M, K) of int
-        Powers of the coefficients.
-    nodes : array (M, K)
-        Values of the coefficients, in their units, at which the model is evaluated.
-
-    Without `constant`, the polynomial is 0 where its coefficients are.
+    `exponents` (M, K) are the powers of the coefficients, `nodes` (M, K) the coefficients, in their units, at which the
+    model is evaluated. Without `constant`, the polynomial is 0 where its coefficients are.
     """
 
     def __init__(self, count: int, degree: int, *, constant: bool) -> None:
@@ -142,22 +143,10 @@ class Coefficient(NamedTuple):
 
 
 class Term:
-    """One term of a sum.
+    """One term of a sum: a model, in which some parameters are linear, others free, and two widths may be the same.
 
-    Attributes
-    ----------
-    spec : ModelSpec
-        Its model.
-    label : str
-        What the names of its parameters begin with; empty if it stands alone.
-    fixed : dict
-        Parameters that are not searched.
-    linear : tuple of str
-        Parameters in which f_r is a polynomial; empty for a term with a scale.
-    free : list of Parameter
-        The others that are searched, without n and k.
-    tied : tuple of str or None
-        Two widths that are the same.
+    `linear` are the parameters in which f_r is a polynomial; a term with a scale has none. `free` are the others that
+    are searched, without n and k. `label` precedes the names of its parameters in a sum.
     """
 
     def __init__(self, spec: ModelSpec, label: str, *, alone: bool, beside_flat: bool, turned: bool) -> None:
@@ -262,36 +251,30 @@ def _is_bright(spec: ModelSpec, names: tuple[str, ...], fixed: Mapping[str, floa
 
 
 class SearchedSurface:
-    """A sum of terms as a function of a point of the unit cube (its shape) and of coefficients of each channel.
+    """A model, or a sum of models, whose numbers are searched.
+
+    `shape` has the variables that all channels share, `owners` their terms, None for n and k. `coefficients` have a
+    value in each channel.
 
     Parameters
     ----------
     name : str
-        A model, or models joined by " + "; "2 NAME" is two lobes of one.
+    A model, or models joined by +, such as "A + 2 B".
     wavelength_nm : array (C,) [nm] or None
-        Wavelengths of the channels.
+    Wavelengths of the channels.
     channels : int
-        Number of channels, C.
+    Number of channels, C.
     turned : bool
-        True if the light comes from several azimuths, so that two widths can be told apart.
+    True if the light comes from several azimuths, so that two widths can be told apart.
     entry : str, optional
-        Refractive index of models with n and k; without one they are searched.
-
-    Attributes
-    ----------
-    terms : list of Term
-        The terms.
-    shape : list of Variable
-        Numbers that all channels share; `owners` are the terms that they belong to, None for n and k.
-    coefficients : list of Coefficient
-        Numbers with a value for each channel. `units`, shape (K, 1), are theirs.
+    Refractive index of models with n and k; without one they are searched.
 
     Raises
     ------
     ParameterError
-        If a model is unknown.
+    If a model is unknown.
     NotDescribedError
-        If it cannot describe such samples.
+    If it cannot describe such samples.
     """
 
     def __init__(

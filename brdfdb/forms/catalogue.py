@@ -43,47 +43,23 @@ _UNFACTORED = 0.01  # tolerance of the table that is offered with and without a 
 class Form:
     """One way to evaluate f_r of a source at some wavelengths.
 
-    Attributes
-    ----------
-    key : str
-        Lower-case words joined by hyphens, unique among the forms of a source.
-    title : str
-        A name for people, with the equation.
-    kind : str
-        A kind of `brdfdb.parameters.ModelForm`, or "table".
-    python : str
-        The function in Python.
-    evaluate : callable
-        ``evaluate(wi, wr)`` gives f_r [1/sr] of shape (N, L) for unit vectors of shape (N, 3) and of the dtype below.
-        The specular part is left out, because it is the same for all forms.
-    bytes : int
-        Size of the numbers that an evaluation reads: parameters, spectra and constants of kernels, or the values of a
-        table. It is 0 for a function, whose numbers are not known. Memory that an evaluation writes is not counted.
-    dtype : float32 or float64
-        Type of the vectors and of the values.
-    rounded : bool
-        True for a form that repeats another one with float32 vectors and values. It takes as much work, and its error
-        is rounding.
-    layout : Layout or None
-        The layout of a table that was tabulated here.
-    values : array or None
-        All values of such a table: who publishes it need not tabulate again.
-    copied : callable or None
-        For a table, a function without arguments. It returns an evaluation that reads a copy of the values, like
-        another table of this size.
+    ``evaluate(wi, wr)`` gives f_r [1/sr] of shape (N, L) for unit vectors (N, 3) of the dtype. The specular part is
+    left out, because it is the same for all forms. `bytes` is the size of the numbers that an evaluation reads:
+    parameters, spectra and constants of kernels, or the values of a table; 0 for a function, whose numbers are not
+    known.
     """
 
-    key: str
-    title: str
+    key: str  # lower-case words joined by hyphens, unique among the forms of a source
+    title: str  # a name for people, with the equation
     kind: Kind
-    python: str
+    python: str  # the function in Python
     evaluate: Evaluate
     bytes: int
-    dtype: type[np.floating[Any]] = np.float64
-    rounded: bool = False
-    layout: Layout | None = None
-    values: NDArray[np.float32] | None = None
-    copied: Callable[[], Evaluate] | None = None
+    dtype: type[np.floating[Any]] = np.float64  # of vectors and values
+    rounded: bool = False  # True for a form that repeats another one with float32 vectors and values
+    layout: Layout | None = None  # of a table that was tabulated here
+    values: NDArray[np.float32] | None = None  # all values of such a table, which need not be tabulated again
+    copied: Callable[[], Evaluate] | None = None  # returns an evaluation that reads a copy of the values of a table
 
 
 class LeftOut(DocumentPart):

@@ -60,26 +60,10 @@ def works(
 ) -> dict[str, tuple[Work, Work]]:
     """Measure noise and time of samplers for the directional albedo and for the picture of a lit sphere.
 
-    Parameters
-    ----------
-    source : Source
-        A material or a function. It is sampled without the specular part.
-    wavelength_nm : float [nm] or None
-        Wavelength of a spectral source.
-    rounds : int
-        Number of rounds. All samplers share the random numbers of a round.
-    samples : int
-        Samples per estimate and round.
-    clock : callable
-        A function without arguments that gives the time in seconds.
+    For each of `SAMPLERS`, the result has the work of the albedo and that of the sphere. The source is sampled without
+    its specular part, at one wavelength [nm] if it is spectral. All samplers share the random numbers of a round, and
+    take `samples` of them per estimate. `clock()` gives the time in seconds.
 
-    Returns
-    -------
-    dict
-        For each of `SAMPLERS`, the work of the albedo and that of the sphere.
-
-    Notes
-    -----
     The light comes from `THETA_DEG` for the albedo. The sphere is seen from afar under a sky and a lamp. Its variance
     is the mean over points of the variance at a point. Random numbers are drawn before the clock starts. Seeds are
     fixed, so that means and variances are the same in every run.

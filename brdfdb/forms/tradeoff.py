@@ -281,15 +281,20 @@ def _against(
     own = errors[number]
     as_good = [rival for rival in rungs if errors[rival]["l1"] <= own["l1"] and errors[rival]["p99"] <= own["p99"]]
     rung = min(as_good, key=lambda rival: float(np.median(seconds[:, rival])))
-    ratios = seconds[:, rung] / seconds[:, number]
-    low, middle, high = (float(f"{ratio:.3g}") for ratio in np.percentile(ratios, [25.0, 50.0, 75.0]).tolist())
-    return {"rung": forms[rung].key, "saving": Saving(low=low, times=middle, high=high)}
+    ratios = timing.quartiles(seconds[:, rung] / seconds[:, number])
+    saving = Saving(low=_short(ratios.low), times=_short(ratios.middle), high=_short(ratios.high))
+    return {"rung": forms[rung].key, "saving": saving}
 
 
 def _work(work: sampler_efficiency.Work) -> SamplerWork:
-    low, middle, high = np.percentile(1e3 * work.seconds_to_percent, [25.0, 50.0, 75.0]).tolist()
-    numbers = (float(np.median(work.variance)), 1e9 * float(np.median(work.seconds)), low, middle, high)
-    return SamplerWork(**dict(zip(SamplerWork.model_fields, (float(f"{n:.3g}") for n in numbers), strict=True)))
+    times_ms = timing.quartiles(1e3 * work.seconds_to_percent)
+    return SamplerWork(
+        variance=_short(float(np.median(work.variance))),
+        ns=_short(1e9 * float(np.median(work.seconds))),
+        low_ms=_short(times_ms.low),
+        ms=_short(times_ms.middle),
+        high_ms=_short(times_ms.high),
+    )
 
 
 def chart_family(
@@ -404,7 +409,7 @@ def _diagnostic(materials: Sequence[Material], wavelength_nm: NDArray[np.float64
     if diagnostic is None:
         return None
     middle = None if wavelength_nm is None else wavelength_nm[wavelength_nm.size // 2]
-    values = [float(f"{diagnostic.value(material.arguments(middle)):.3g}") for material in materials]
+    values = [_short(diagnostic.value(material.arguments(middle))) for material in materials]
     return FamilyDiagnostic(symbol=diagnostic.symbol, title=diagnostic.title, values=values)
 
 
@@ -456,7 +461,7 @@ def _errors(forms: Sequence[Form], drawn: error_measurement.Draw) -> list[dict[s
         values = truth if form is forms[0] else form.evaluate(*given).astype(np.float64)
         overall = error_measurement.compare(values, truth, drawn, SEED).overall
         parts = {
-            name: float(f"{error_measurement.mean_error(values, truth, np.where(some, drawn.weight, 0.0)).max():.3g}")
+            name: _short(error_measurement.mean_error(values, truth, np.where(some, drawn.weight, 0.0)).max())
             for name, some in classes.items()
         }
         low, high = _tail(
@@ -474,26 +479,15 @@ def _tail(errors: Floats) -> tuple[float, float | None]:
     """
     worst = np.sort(errors[:, int(np.argmax(np.percentile(errors, 100.0 * SHARE, axis=0)))])
     low, high = ranks(len(worst), SHARE, CONFIDENCE)
-    at = [None if rank > len(worst) else float(f"{worst[max(rank, 1) - 1]:.3g}") for rank in (low, high)]
+    at = [None if rank > len(worst) else _short(worst[max(rank, 1) - 1]) for rank in (low, high)]
     return at[0] or 0.0, at[1]
 
 
 def ranks(count: int, share: float, confidence: float) -> tuple[int, int]:
     """Return the ranks, from 1, of the order statistics that enclose a quantile with a confidence (binomial law).
 
-    Parameters
-    ----------
-    count : int
-        Number of independent draws.
-    share : float [1]
-        Share of the distribution below the quantile, in (0, 1).
-    confidence : float [1]
-        Least confidence, in (0, 1).
-
-    Returns
-    -------
-    tuple of int
-        Lower and upper rank. Rank 0 stands for no lower bound, and count + 1 for no upper bound.
+    `count` independent draws are taken, and `share` of the distribution is below the quantile. Rank 0 stands for no
+    lower bound, and count + 1 for no upper bound.
     """
     k = np.arange(count + 1)
     log_factorial = np.concatenate([[0.0], np.cumsum(np.log(np.arange(1, count + 1)))])
@@ -509,5 +503,10 @@ def ranks(count: int, share: float, confidence: float) -> tuple[int, int]:
 
 
 def _cost(times: timing.Times) -> Cost:
-    low, middle, high = (float(f"{ns:.3g}") for ns in times.quartiles_ns)
-    return Cost(ns=middle, low=low, high=high, directions=times.directions)
+    ns = times.quartiles_ns
+    return Cost(ns=_short(ns.middle), low=_short(ns.low), high=_short(ns.high), directions=times.directions)
+
+
+def _short(value: float) -> float:
+    """Return a number with three digits."""
+    return float(f"{value:.3g}")

@@ -9,7 +9,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from brdfdb.figure import Curve, Role, Statement, curve_of, listed
+from brdfdb.figure import Curve, Panel, Role, Statement, curve_of, listed
 from brdfdb.geometry import radians
 from brdfdb.models import oren_nayar_single_slope_parts
 from brdfdb.models.oren_nayar_1994 import Parts
@@ -17,7 +17,6 @@ from brdfdb.parameters import Floats
 
 PAPER = "orennayar1994"
 THETA_R = np.arange(-90.0, 91.0)  # angles of viewers [degree], positive on the side of the light
-THETA_R_LABEL = "θ_r [degree], above 0 on the side of the light"
 
 # Our readings of words of the paper, mostly as a share of the mean
 SMALL = 0.1  # "near", "nearly" and "slight"
@@ -45,22 +44,10 @@ def to_radiance(theta_i_deg: float) -> float:
 
 
 def across(model: Callable[..., Result], theta_i_deg: float, delta_phi_deg: float = 0.0, **parameters: float) -> Result:
-    """Return the result of a model for viewers at THETA_R.
+    """Return the result of a model of angles for viewers at THETA_R: an array [1/sr], or the model's own type of
+    arrays.
 
-    Parameters
-    ----------
-    model : callable
-        A function of `brdfdb.models` that takes angles.
-    theta_i_deg : float [degree]
-        Polar angle of the light, in [0, 90].
-    delta_phi_deg : float [degree]
-        phi_r - phi_i of viewers with positive THETA_R; it is half a turn more for the others.
-    **parameters : float
-        Parameters of the model, in its units.
-
-    Returns
-    -------
-    array [1/sr] of the shape of THETA_R, or the model's own result type of such arrays
+    `delta_phi_deg` is phi_r - phi_i of viewers with positive THETA_R; it is half a turn more for the others.
     """
     delta_phi = np.where(THETA_R < 0.0, delta_phi_deg + 180.0, delta_phi_deg)
     return model(radians(theta_i_deg), 0.0, radians(np.abs(THETA_R)), radians(delta_phi), **parameters)
@@ -97,6 +84,11 @@ def curve(label: str, values: Floats, role: Role = "other") -> Curve:
     return curve_of(label, THETA_R, values, role)
 
 
+def line_panel(curves: list[Curve], title: str = "", y_label: str = RADIANCE) -> Panel:
+    """Return a panel of curves over THETA_R."""
+    return Panel(title=title, x_label="θ_r [degree], above 0 on the side of the light", y_label=y_label, curves=curves)
+
+
 def very_accurate(off: list[float], lights_deg: list[float], where: str) -> Statement:
     return Statement(
         says="in all cases, the functional approximation proves to be very accurate",
@@ -117,31 +109,13 @@ def evaluated_parts(
     rho: float,
     sigma: float,
 ) -> Parts:
-    """Return the direct and the interreflected part [1/sr] of eq. 25 over the closed forms of one slope.
+    """Return the direct and the interreflected part [1/sr] of eq. 25 over the closed forms of one slope; angles in
+    radians.
 
-    Parameters
-    ----------
-    theta_i, phi_i, theta_r, phi_r : array_like [rad]
-        Directions of light and viewer; theta in [0, pi/2).
-    rho : float [1]
-        Albedo of a facet, in [0, 1].
-    sigma : float [rad]
-        Standard deviation of the slope angle, in (0, pi/2].
-
-    Returns
-    -------
-    Parts [1/sr]
-        Arrays of the broadcast shape of the directions.
-
-    Notes
-    -----
-    Section 4.3 evaluates eq. 25 with eq. 24 for direct light. For the second bounce it uses eq. 49 of appendix B.2.
-    The weight of eq. 26 is normalised over the slope. The integral is split at the slopes where shadowing, masking, or
-    both begin (eqs 39 and 43), because the closed forms start as square roots there.
-
-    References
-    ----------
-    orennayar1994
+    This is the evaluation that Oren and Nayar drew. Section 4.3 evaluates eq. 25 with eq. 24 for direct light, and with
+    eq. 49 of appendix B.2 for the second bounce. The weight of eq. 26 is normalised over the slope. The integral is
+    split at the slopes where shadowing, masking, or both begin (eqs 39 and 43), because the closed forms start as
+    square roots there.
     """
     theta_i, phi_i, theta_r, phi_r = np.broadcast_arrays(theta_i, phi_i, theta_r, phi_r)
     cot_i, cot_r = 1.0 / np.tan(np.maximum(theta_i, 1e-9)), 1.0 / np.tan(np.maximum(theta_r, 1e-9))

@@ -19,6 +19,7 @@ from brdfdb.gallery._he_torrance_cuts import (
     measured_cuts,
     parameters_text,
     polar,
+    polar_panel,
     reflected,
     specular,
     specular_of_peak,
@@ -166,12 +167,8 @@ def fig_09() -> Figure:
         f"{parameters_text(surface)}. {APERTURES}",
         panels=[
             polar(cuts),
-            Panel(
-                kind="polar",
-                title="Across the plane of incidence",
-                x_label="θ_r [degree]",
-                y_label="f_r over a/π",
-                curves=[cut.curve(surface["a"] / np.pi) for cut in across],
+            polar_panel(
+                [cut.curve(surface["a"] / np.pi) for cut in across], "f_r over a/π", "Across the plane of incidence"
             ),
         ],
         statements=[
@@ -295,14 +292,12 @@ def fig_10() -> Figure:
         f"text; the caption says 0.5). The paper prints only σ_0/τ = {slope:g}. σ_0 is our choice, and the limit is "
         "beside it.",
         panels=[
-            Panel(
-                kind="polar",
-                x_label="θ_r [degree]",
-                y_label="f_r over f_r along the normal",
-                curves=[
+            polar_panel(
+                [
                     curve_of(f"σ_0 = {surface['sigma_0_um']:g} µm", cut.x_deg, normalised, "ours"),
                     curve_of("σ_0/λ → ∞", limit.x_deg, limit.f_r / limit.mirror),
                 ],
+                "f_r over f_r along the normal",
             )
         ],
         statements=[

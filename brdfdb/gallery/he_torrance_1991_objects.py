@@ -15,6 +15,7 @@ from brdfdb.gallery._he_torrance_cuts import (
     cut_of,
     lobe_at,
     parameters_text,
+    polar_panel,
     reflected,
     smooth,
     specular,
@@ -71,15 +72,13 @@ def fig_12() -> Figure:
                 y_label="ρ_s",
                 curves=[_over_incidence(cylinder.label, cylinder.image) for cylinder in cylinders],
             ),
-            Panel(
-                kind="polar",
-                title="Directional diffuse, θ_i = 30°",
-                x_label="θ_r [degree]",
-                y_label="f_r over f_r in the mirror direction",
-                curves=[
+            polar_panel(
+                [
                     cylinder.lobe.curve(cylinder.lobe.mirror).model_copy(update={"label": cylinder.label})
                     for cylinder in cylinders
                 ],
+                "f_r over f_r in the mirror direction",
+                "Directional diffuse, θ_i = 30°",
             ),
         ],
         statements=[
@@ -216,14 +215,12 @@ def fig_13() -> Figure:
         "of (a). The specular part of (b) is a Dirac delta; the second panel has its reflectance. The last panel has "
         "the distances of He and Torrance's model from its two limits at the slope of (a), at 30 degrees.",
         panels=[
-            Panel(
-                kind="polar",
-                x_label="θ_r [degree]",
-                y_label="f_r [1/sr]",
-                curves=[
+            polar_panel(
+                [
                     curve_of(label, lobe.x_deg, lobe.f_r)
                     for label, lobe in (("(a)", cut), ("(a), σ_0/λ → ∞", limit), ("(c)", uniform))
                 ],
+                "f_r [1/sr]",
             ),
             Panel(
                 title="Specular reflectance",

@@ -12,12 +12,10 @@ from brdfdb.gallery import _oren_nayar_by_hand as by_hand
 from brdfdb.gallery._oren_nayar_lines import (
     GRAZING_LIGHT,
     PAPER,
-    RADIANCE,
     RHO,
     ROUNDING,
     SMALL,
     THETA_R,
-    THETA_R_LABEL,
     VERY_ACCURATE,
     across,
     at,
@@ -25,6 +23,7 @@ from brdfdb.gallery._oren_nayar_lines import (
     curve,
     distance,
     left_past,
+    line_panel,
     rough,
     to_radiance,
     variation,
@@ -63,14 +62,12 @@ def fig_08() -> Figure:
         caption="σ = 30°, ρ = 0.90, θ_i = 75°. Eqs 8 to 20 integrated over the slopes, with eq. 47 for the second "
         "bounce.",
         panels=[
-            Panel(
-                x_label=THETA_R_LABEL,
-                y_label=RADIANCE,
-                curves=[
+            line_panel(
+                [
                     curve("with interreflections", total, "truth"),
                     curve("direct illumination alone", direct),
                     curve("Lambert", flat),
-                ],
+                ]
             )
         ],
         statements=[
@@ -197,12 +194,8 @@ def fig_09() -> Figure:
         title="Fig. 9: the effect of roughness on radiance",
         caption="θ_i = 75°, ρ = 0.9, plane of incidence, Gaussian slopes integrated. The roughnesses are our choice.",
         panels=[
-            Panel(
-                x_label=THETA_R_LABEL,
-                y_label=RADIANCE,
-                curves=[
-                    curve(f"σ = {sigma_deg:.0f}°", values) for sigma_deg, values in zip(sigmas_deg, curves, strict=True)
-                ],
+            line_panel(
+                [curve(f"σ = {sigma_deg:.0f}°", values) for sigma_deg, values in zip(sigmas_deg, curves, strict=True)]
             )
         ],
         statements=[
@@ -242,10 +235,9 @@ def fig_10() -> Figure:
         title="Fig. 10: BRDF for different angles of incidence",
         caption="σ = 40°, ρ = 0.9, plane of incidence, Gaussian slopes integrated. The angles are our choice.",
         panels=[
-            Panel(
-                x_label=THETA_R_LABEL,
+            line_panel(
+                [curve(f"θ_i = {light:.0f}°", values) for light, values in zip(lights_deg, curves, strict=True)],
                 y_label="f_r [1/sr]",
-                curves=[curve(f"θ_i = {light:.0f}°", values) for light, values in zip(lights_deg, curves, strict=True)],
             )
         ],
         statements=[
@@ -302,14 +294,12 @@ def fig_11() -> Figure:
         caption="σ = 40°, ρ = 0.9, Gaussian slopes integrated. The caption prints no θ_i. 75° is the angle of the "
         "figures around it, and 60° is for comparison. The azimuths are our choice.",
         panels=[
-            Panel(
-                title=f"θ_i = {light:.0f}°",
-                x_label=THETA_R_LABEL,
-                y_label=RADIANCE,
-                curves=[
+            line_panel(
+                [
                     curve(f"φ_r - φ_i = {azimuth:.0f}°", values)
                     for azimuth, values in zip(azimuths_deg, lines[light], strict=True)
                 ],
+                title=f"θ_i = {light:.0f}°",
             )
             for light in lights_deg
         ],
@@ -364,15 +354,13 @@ def _forms(theta_i_deg: float, delta_phi_deg: float = 0.0) -> _Forms:
 
 def _side_by_side(title: str, forms: _Forms) -> Panel:
     """Return a panel of the radiance of all forms."""
-    return Panel(
-        title=title,
-        x_label=THETA_R_LABEL,
-        y_label=RADIANCE,
-        curves=[
+    return line_panel(
+        [
             curve("integrated", forms.integrated, "truth"),
             curve("functional approximation, eqs 27 and 28", forms.functional, "ours"),
             curve("qualitative model, eq. 30", forms.qualitative, "textbook"),
         ],
+        title=title,
     )
 
 

@@ -11,10 +11,8 @@ from numpy.typing import NDArray
 from brdfdb.figure import Figure, Map, Panel, Statement, curve_of, listed, rows
 from brdfdb.gallery._oren_nayar_lines import (
     PAPER,
-    RADIANCE,
     SMALL,
     THETA_R,
-    THETA_R_LABEL,
     VERY_ACCURATE,
     across,
     at,
@@ -23,6 +21,7 @@ from brdfdb.gallery._oren_nayar_lines import (
     evaluated,
     evaluated_parts,
     left_past,
+    line_panel,
     rough,
     to_radiance,
     very_accurate,
@@ -87,27 +86,12 @@ def _on_strips(facing: Array, width: Array, strips: int) -> Array:
 def bounces(
     theta_i: float, theta_r: Array, delta_phi: Array, rho: float, sigma: float, orders: int, strips: int = STRIPS
 ) -> Array:
-    """Return f_r [1/sr] of Gaussian slopes bounce by bounce, shape (orders, viewers).
+    """Return f_r [1/sr] of Gaussian slopes bounce by bounce, shape (orders, viewers); the last row has all later
+    bounces.
 
-    Parameters
-    ----------
-    theta_i : float [rad]
-        Polar angle of the light.
-    theta_r, delta_phi : array [rad]
-        Polar angles of viewers and their azimuths from the light, both of shape (viewers,).
-    rho : float [1]
-        Albedo of a facet, in [0, 1).
-    sigma : float [rad]
-        Standard deviation of the slope angle.
-    orders : int
-        Rows of the result. The last row is the sum of all later bounces.
-    strips : int
-        Strips of a facet.
-
-    Notes
-    -----
-    The surface is that of Oren and Nayar 1994 (eqs 8 and 26): long grooves. Each facet is cut into strips, and a strip
-    has one radiosity. The view factors of strips are exact. No equation of the paper for interreflection is used.
+    Angles are radians: the polar angle of the light, those of viewers, and their azimuths from the light. The surface
+    is that of Oren and Nayar 1994 (eqs 8 and 26): long grooves. Each facet is cut into strips, and a strip has one
+    radiosity. The view factors of strips are exact. No equation of the paper for interreflection is used.
     """
     azimuth = (np.arange(AZIMUTHS) + 0.5) * np.pi / AZIMUTHS
     slope_i = np.tan(theta_i) * np.cos(azimuth)
@@ -167,11 +151,8 @@ def two_bounces() -> Figure:
         "view factors; no equation of the paper's interreflection is used. The paper mentions such a simulation but "
         "shows no figure. θ_i = 75° is that of Fig. 8.",
         panels=[
-            Panel(
-                title=f"θ_i = {light:.0f}°",
-                x_label=THETA_R_LABEL,
-                y_label=RADIANCE,
-                curves=[
+            line_panel(
+                [
                     curve_of("all bounces", VIEWERS_DEG, line.summed.sum(axis=0), "truth"),
                     curve_of("two bounces, eqs 10 to 20", VIEWERS_DEG, line.direct + line.second, "ours"),
                     curve_of("second bounce", VIEWERS_DEG, line.summed[1]),
@@ -179,6 +160,7 @@ def two_bounces() -> Figure:
                     curve_of("fourth", VIEWERS_DEG, line.summed[3]),
                     curve_of("fifth and later", VIEWERS_DEG, line.summed[4]),
                 ],
+                title=f"θ_i = {light:.0f}°",
             )
             for light, line in lines.items()
         ],
@@ -417,25 +399,22 @@ def evaluation() -> Figure:
         caption="σ = 30°, ρ = 0.90, plane of incidence: eqs 24 and 49 over Gaussian slopes (eq. 25), which section 4.3 "
         "evaluates, beside the facets with eq. 47 and the functional approximation.",
         panels=[
-            Panel(
-                title="Fig. 8, θ_i = 75°",
-                x_label=THETA_R_LABEL,
-                y_label=RADIANCE,
-                curves=[
+            line_panel(
+                [
                     curve("the paper's own evaluation, eqs 24 and 49", totals[0], "printed"),
                     curve("facet by facet, eq. 47", totals[1], "truth"),
                     curve("direct illumination alone, eq. 24", cosine * own.direct),
                 ],
+                title="Fig. 8, θ_i = 75°",
             ),
             *(
-                Panel(
-                    title=f"Fig. 12, θ_i = {theta_i:.0f}°",
-                    x_label=THETA_R_LABEL,
-                    y_label="f_r [1/sr]",
-                    curves=[
+                line_panel(
+                    [
                         curve("the paper's own evaluation, eqs 24 and 49", numbers, "printed"),
                         curve("functional approximation, eqs 27 and 28", fit, "ours"),
                     ],
+                    title=f"Fig. 12, θ_i = {theta_i:.0f}°",
+                    y_label="f_r [1/sr]",
                 )
                 for theta_i, (fit, numbers) in zip(lights_deg, fits, strict=True)
                 if theta_i in (30.0, 75.0)

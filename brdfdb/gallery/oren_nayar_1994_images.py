@@ -26,23 +26,11 @@ Vectors = Callable[..., Floats]
 
 
 def cylinder(model: Vectors, x: Floats, light_deg: float, **parameters: float) -> Floats:
-    """Return the radiance [1] across an upright cylinder of radius 1, seen from far away.
+    """Return the radiance [1] across an upright cylinder of radius 1 at places x, seen from far away by a model of
+    vectors.
 
-    Parameters
-    ----------
-    model : callable
-        A function of `brdfdb.models` that takes unit vectors.
-    x : array [1]
-        Places across the cylinder, from -1, its left limb, to 1.
-    light_deg : float [degree]
-        Angle of the distant light, to the right of the camera.
-    **parameters : float
-        Parameters of the model, in its units.
-
-    Returns
-    -------
-    array [1]
-        Radiance over that of a white Lambertian surface that faces the light.
+    The unit is the radiance of a white Lambertian surface that faces the light. x runs from -1, the left limb, to 1.
+    The distant light is `light_deg` to the right of the camera.
     """
     depth = np.sqrt((1.0 - x) * (1.0 + x))
     viewer, light = (

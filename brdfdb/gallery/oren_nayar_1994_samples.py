@@ -14,7 +14,6 @@ from brdfdb.gallery._oren_nayar_lines import (
     PAPER,
     SMALL,
     THETA_R,
-    THETA_R_LABEL,
     VERY_ACCURATE,
     across,
     at,
@@ -23,6 +22,7 @@ from brdfdb.gallery._oren_nayar_lines import (
     distance,
     evaluated,
     left_past,
+    line_panel,
     very_accurate,
 )
 from brdfdb.materials import Material, presets
@@ -57,15 +57,14 @@ class _Lines(NamedTuple):
 
 def _panel(theta_i_deg: float, lines: _Lines, where: str = "") -> Panel:
     """Return a panel of all three forms for one light."""
-    return Panel(
-        title=f"θ_i = {theta_i_deg:.0f}°{where}",
-        x_label=THETA_R_LABEL,
-        y_label=NORMALISED,
-        curves=[
+    return line_panel(
+        [
             curve("the paper's own evaluation, eqs 24 and 49", lines.evaluated, "printed"),
             curve("facet by facet, eq. 47", lines.facets, "truth"),
             curve("functional approximation, eqs 27 and 28", lines.functional, "ours"),
         ],
+        title=f"θ_i = {theta_i_deg:.0f}°{where}",
+        y_label=NORMALISED,
     )
 
 
@@ -181,14 +180,13 @@ def _with_surface(number: int, sample: str) -> Figure:
         caption=f"{_printed(material)}, F = 1, plane of incidence. Eq. 32 with eq. 27 for the body; both curves over "
         "the sum along the normal. The measured dots are not in the text; the angles are those of Fig. 15.",
         panels=[
-            Panel(
-                title=f"θ_i = {light:.0f}°",
-                x_label=THETA_R_LABEL,
-                y_label=NORMALISED,
-                curves=[
+            line_panel(
+                [
                     curve("body and surface", _normalised(total), "ours"),
                     curve("body alone", body / at(total, 0.0)),
                 ],
+                title=f"θ_i = {light:.0f}°",
+                y_label=NORMALISED,
             )
             for light, total, body in zip(LIGHTS_DEG, sums, bodies, strict=True)
         ],

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from brdfdb.figure import Figure, Map, Panel, Picture, Role, Statement, curve_of, listed, rows
+from brdfdb.figure import Curve, Figure, Map, Panel, Picture, Role, Statement, curve_of, listed, rows
 from brdfdb.gallery.ward_1992_renderings import CAMERA_DEG, LIGHT_DEG, points_at
 from brdfdb.geometry import HALF_PI, degrees, radians
 from brdfdb.integrals.quadrature import directional_albedo
@@ -20,7 +20,6 @@ Array = NDArray[np.float64]
 PLANES = {"x": 0.0, "y": HALF_PI}  # azimuths [rad] of light in the planes along both axes
 ALONG_Y = PLANES["y"]
 VIEWERS_DEG = np.arange(-88.0, 88.5, 1.0)
-ANGLE = "theta_r [degree], negative: back towards the light"
 BRDF = "f_r [1/sr]"
 SLICES_DEG = (0.0, 15.0, 30.0, 45.0, 60.0, 75.0)
 LOBES_DEG = (30.0, 60.0)  # theta_i of the lobes and of the forms
@@ -119,16 +118,14 @@ def lobes() -> Figure:
     round_brass = isotropic(brass)
     forms: tuple[tuple[str, Material, Role], ...] = (("eq. 5a", brass, "ours"), ("eq. 4", round_brass, "other"))
     panels = [
-        Panel(
-            kind="polar",
-            title=f"plane of incidence along {axis}",
-            x_label=ANGLE,
-            y_label=BRDF,
-            curves=[
+        _slice_panel(
+            f"plane of incidence along {axis}",
+            [
                 curve_of(f"{label}, theta_i = {theta_i_deg:g}", VIEWERS_DEG, slice_of(form, theta_i_deg, phi), role)
                 for theta_i_deg in LOBES_DEG
                 for label, form, role in forms
             ],
+            kind="polar",
         )
         for axis, phi in PLANES.items()
     ]
@@ -175,8 +172,8 @@ def forms() -> Figure:
         slices = [(label, role, slice_of(in_form(model, brass), theta_i_deg, ALONG_Y)) for model, label, role in FORMS]
         curves = [curve_of(label, VIEWERS_DEG, f_r, role) for label, role, f_r in slices]
         title = f"theta_i = {theta_i_deg:g} degrees"
-        panels.append(Panel(kind="polar", title=title, x_label=ANGLE, y_label=BRDF, curves=curves))
-        panels.append(Panel(title=title, x_label=ANGLE, y_label=BRDF, curves=curves, log_y=True))
+        panels.append(_slice_panel(title, curves, kind="polar"))
+        panels.append(_slice_panel(title, curves, log_y=True))
     return Figure(
         key="ward-1992-forms",
         paper="ward1992",
@@ -285,6 +282,14 @@ def _in_the_mirror(material: Material) -> Statement:
     )
 
 
+def _slice_panel(
+    title: str, curves: list[Curve], kind: Literal["curves", "polar"] = "curves", *, log_y: bool = False
+) -> Panel:
+    """Return a panel of slices through f_r in the plane of incidence."""
+    x_label = "theta_r [degree], negative: back towards the light"
+    return Panel(kind=kind, title=title, x_label=x_label, y_label=BRDF, curves=curves, log_y=log_y)
+
+
 def _image() -> Figure:
     """Draw Fig. 4: the hemisphere that the gonioreflectometer sees at once."""
     aluminum = presets()["rolled-aluminum"]
@@ -350,11 +355,9 @@ def _slices() -> Figure:
     """Draw Fig. 6: slices in the plane of incidence."""
     aluminum = presets()["rolled-aluminum"]
     panels = [
-        Panel(
-            title=f"plane of incidence along {axis}",
-            x_label=ANGLE,
-            y_label=BRDF,
-            curves=[
+        _slice_panel(
+            f"plane of incidence along {axis}",
+            [
                 curve_of(f"theta_i = {theta_i_deg:g}", VIEWERS_DEG, slice_of(aluminum, theta_i_deg, phi))
                 for theta_i_deg in SLICES_DEG
             ],

@@ -70,51 +70,23 @@ class PlaceSample(NamedTuple):
 
 
 class Decision(NamedTuple):
-    """The choice for a material, with its error by itself and together with all other choices.
-
-    Attributes
-    ----------
-    pick : Pick
-        The chosen form.
-    left : PictureError
-        Error of the choice by itself, at the places where forms are compared.
-    cheaper_left : PictureError or None
-        Error of the next cheaper form, which exceeds the tolerance.
-    refused : bool
-        True if the next cheaper form exceeds the tolerance only at the places where choices are checked.
-    whole : PictureError
-        Error together with all other choices, at every pixel of the picture and at fresh places.
-    even, edges : PlaceSample or None
-        Fresh places, evenly spread over the picture and at edges. None for a recorded scene.
-    """
+    """The choice for a material, with its error by itself and together with all other choices."""
 
     pick: Pick
-    left: PictureError
-    cheaper_left: PictureError | None
-    refused: bool
-    whole: PictureError
-    even: PlaceSample | None = None
-    edges: PlaceSample | None = None
+    left: PictureError  # of the choice by itself, at the places where forms are compared
+    cheaper_left: PictureError | None  # of the next cheaper form, which exceeds the tolerance
+    refused: bool  # True if the next cheaper form exceeds the tolerance only at the places where choices are checked
+    whole: PictureError  # together with all other choices, at every pixel of the picture and at fresh places
+    even: PlaceSample | None = None  # fresh places, evenly spread over the picture; None for a recorded scene
+    edges: PlaceSample | None = None  # fresh places at edges; None for a recorded scene
 
 
 class Seen:
     """A scene at the points of one view: its true picture, and pictures with forms for some materials.
 
-    Parameters
-    ----------
-    scene : Scene
-        The scene.
-    view : CameraView
-        The points of the view.
-    truths : mapping
-        By the name of each material, the form with which the others are compared.
-    materials : mapping
-        The result of `brdfdb.scenes.renderer.reflectors`: mirror and albedo, which are the same for all forms.
-
-    Attributes
-    ----------
-    truth : array (height, width, L)
-        The true picture.
+    `truths` has the form of each material with which the others are compared, by name. `materials`, the result of
+    `brdfdb.scenes.renderer.reflectors`, has mirror and albedo, which are the same for all forms. `truth` (height,
+    width, L) is the true picture.
     """
 
     def __init__(
@@ -176,23 +148,11 @@ def _differences(scene: Scene, truth: Array, picture: Array) -> Array:
 def pick(costs: Floats, error: Callable[[int], float], tolerance: float) -> Pick:
     """Pick the cheapest form within a tolerance. Of forms with about the same cost, pick the most accurate one.
 
-    Parameters
-    ----------
-    costs : array of shape (rounds, forms)
-        Cost of each form in each round of timing, in one unit. Costs without scatter have one round.
-    error : callable
-        ``error(index)`` gives the error of a form, which is 0 for the truth. It is called in the order of median costs,
-        and not for forms that are clearly costlier than necessary.
-    tolerance : float
-        Largest error.
-
-    Returns
-    -------
-    Pick
-        Two costs are about the same if neither is clearly cheaper (`brdfdb.forms.timing.clearly_cheaper`), as in a
-        chart. Two errors are about the same if their ratio is less than `brdfdb.forms.timing.ALIKE`. Of forms alike in
-        both, the first one given is picked. The next cheaper form is the most accurate of the forms that are clearly
-        cheaper than the choice, all of which exceed the tolerance.
+    `costs` (rounds, forms) are those of each round of timing. `error(index)` gives the error of a form, 0 for the
+    truth. It is called in the order of median costs, and not for forms that are clearly costlier than necessary. Two
+    costs are about the same if neither is clearly cheaper (`brdfdb.forms.timing.clearly_cheaper`), two errors if their
+    ratio is below `brdfdb.forms.timing.ALIKE`. Of forms alike in both, the first one is picked. The next cheaper form
+    is the most accurate of those that are clearly cheaper than the choice, all of which exceed the tolerance.
     """
     errors: dict[int, float] = {}
     least: int | None = None

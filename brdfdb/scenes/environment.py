@@ -105,30 +105,14 @@ class Environment(BaseModel):
         return np.asarray((1.0 - down) * along(upper) + down * along(lower))
 
     def drawn(self, source: Source, wavelength_nm: Array, wr: Array, stream: tuple[int, ...]) -> DrawnDirections:
-        """Draw directions for points of a source, from its table or from its lobe, and from the hemisphere.
+        """Draw `samples` directions for each point of a source, the same in every call.
 
-        Parameters
-        ----------
-        source : Source
-            The source of f_r at the points.
-        wavelength_nm : array (L,) [nm]
-            Wavelengths of the scene. The lobe is that of the wavelength where it is widest.
-        wr : array (N, 3)
-            Unit vectors towards the viewer in the frame of the surface.
-        stream : tuple of int
-            Numbers that identify the points. The turns of other points are independent.
-
-        Returns
-        -------
-        DrawnDirections
-            `samples` directions for each point, the same in every call.
-
-        Notes
-        -----
-        Directions of a table follow its own sampler, as in `Table.sample`, unless its f_r hardly varies. The sampler
-        finds peaks that no lobe states. For others, the lobe around the mirror direction of the viewer equals that of
-        the light by reciprocity. Half vectors follow eq. (7) of Ward 1992 (``ward1992``), with its misprint corrected
-        and weights in place of "uniformly weighted" samples.
+        `wr` (N, 3) are unit vectors towards the viewer in the frame of the surface, `stream` numbers that identify the
+        points: the turns of other points are independent. Directions of a table follow its own sampler, as in
+        `Table.sample`, unless its f_r hardly varies. The sampler finds peaks that no lobe states. For other sources,
+        the lobe around the mirror direction of the viewer equals that of the light by reciprocity, at the wavelength
+        where it is widest. Half vectors follow eq. (7) of Ward 1992 (``ward1992``), with its misprint corrected and
+        weights in place of "uniformly weighted" samples.
         """
         turns = np.random.default_rng([self.seed, *stream]).random((2, 1, len(wr)))
         number = np.arange(self.samples)[:, np.newaxis]
@@ -160,13 +144,8 @@ class DrawnDirections(NamedTuple):
 def widest_lobe(lobe: Lobe | None, count: int) -> Lobe:
     """Return a lobe of shape (count,), no narrower than that of any wavelength.
 
-    Parameters
-    ----------
-    lobe : Lobe or None
-        The lobe of a source around the mirror directions of viewers, (count, 1) or (count, wavelengths). None for a
-        diffuse source.
-    count : int
-        Number of viewers.
+    `lobe` is that of a source around the mirror directions of viewers, (count, 1) or (count, wavelengths); None for a
+    diffuse source.
     """
     share, alpha_x, alpha_y = (
         np.broadcast_to(value, np.broadcast_shapes(np.shape(value), (count, 1))) for value in (lobe or DIFFUSE)[:3]

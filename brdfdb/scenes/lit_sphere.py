@@ -92,23 +92,13 @@ def _smooth(x: Array) -> Array:
 
 
 class Detail(NamedTuple):
-    """The numbers that decide between the quality of a picture and the time that it takes.
+    """The numbers that decide between the quality of a picture and the time that it takes."""
 
-    Attributes
-    ----------
-    thetas, phis : int
-        Normals at which reflected light is computed: angles to the viewer, and azimuths, a multiple of 4.
-    samples, samples_anisotropic : int
-        Directions of light for each normal, multiples of 4. Anisotropic surfaces have many more normals.
-    across : int
-        Points across each pixel, and down. With one, the edge is smoothed by the distance to it.
-    """
-
-    thetas: int
-    phis: int
-    samples: int
-    samples_anisotropic: int
-    across: int
+    thetas: int  # normals at which reflected light is computed: angles to the viewer
+    phis: int  # azimuths of these normals, a multiple of 4
+    samples: int  # directions of light for each normal, a multiple of 4
+    samples_anisotropic: int  # the same for anisotropic surfaces, which have many more normals
+    across: int  # points across each pixel, and down; with one, the edge is smoothed by the distance to it
 
 
 FINE = Detail(72, 96, 768, 256, 3)
@@ -158,18 +148,7 @@ def lit_sphere(surface: Source | BaseTable, size: int = SIZE, light: Light = stu
 
 
 def sphere_png(surface: Source | BaseTable, size: int = SIZE, detail: Detail = FINE) -> bytes:
-    """Return the picture of `lit_sphere` as a PNG file of 8 bits with transparent corners.
-
-    Parameters
-    ----------
-    surface, size, detail
-        As of `lit_sphere`.
-
-    Raises
-    ------
-    ParameterError
-        If `size` is out of range.
-    """
+    """Return the picture of `lit_sphere` as a PNG file of 8 bits with transparent corners."""
     pixels = np.rint(255.0 * lit_sphere(surface, size, detail=detail)).astype(np.uint8)
     return png_of(pixels, level=1)
 
@@ -194,18 +173,7 @@ def prepare() -> None:
 
 
 def linear_sphere(surface: Source | BaseTable, size: int = SIZE, light: Light = studio, detail: Detail = FINE) -> Array:
-    """Return the picture of `lit_sphere` in linear sRGB (size, size, 4), not clipped, with its coverage at the end.
-
-    Parameters
-    ----------
-    surface, size, light, detail
-        As of `lit_sphere`.
-
-    Raises
-    ------
-    ParameterError
-        If `size` is out of range.
-    """
+    """Return the picture of `lit_sphere` in linear sRGB (size, size, 4), not clipped, with its coverage at the end."""
     if not 1 <= size <= MOST_SIZE:
         raise ParameterError("size", f"{size} is not a number of pixels from 1 to {MOST_SIZE}", size, (1, MOST_SIZE))
     pixels = (_kept_pixels if size <= _KEPT_SIZE else _pixels)(size, light, detail)
@@ -219,16 +187,8 @@ def sphere_radiance(
 ) -> Array:
     """Return the radiance (..., 3) in linear sRGB of points of a sphere, in the unit of the light.
 
-    Parameters
-    ----------
-    surface : Source or BaseTable
-        As of `lit_sphere`.
-    theta : array [rad]
-        Angle between the normal and the viewer, 0 to pi/2.
-    phi : array [rad]
-        Azimuth of the normal in the picture, counter-clockwise from the right.
-    light, detail
-        As of `lit_sphere`.
+    `theta` [rad] is the angle between the normal and the viewer, in [0, pi/2]. `phi` [rad] is the azimuth of the normal
+    in the picture, counter-clockwise from the right.
     """
     theta, phi = np.broadcast_arrays(theta, phi)
     weights = _weights_at(theta.ravel(), phi.ravel(), light, detail)
@@ -332,16 +292,15 @@ class _Shown(NamedTuple):
 
 def _shown(surface: Source | BaseTable) -> _Shown:
     """Return a surface with the wavelengths of its picture: the visible, or the first one that it is known for."""
-    if not isinstance(surface, BaseTable):
-        return _at(surface, surface, surface.evaluated_at(PICTURE_NM))
-    at = surface.wavelength_nm
-    if at is not None:
-        visible = picture_wavelengths(at)
-        at = at[:1] if visible is None else visible
-    return _at(surface, surface.source, at)
-
-
-def _at(surface: Source | BaseTable, source: Source | FunctionRecord | None, at: Array | None) -> _Shown:
+    if isinstance(surface, BaseTable):
+        source: Source | FunctionRecord | None = surface.source
+        at = surface.wavelength_nm
+        if at is not None:
+            visible = picture_wavelengths(at)
+            at = at[:1] if visible is None else visible
+    else:
+        source = surface
+        at = surface.evaluated_at(PICTURE_NM)
     weights = np.ones((1, 1)) if at is None else srgb_weights(tuple(at.tolist()))
     return _Shown(surface, source, at, weights)
 

@@ -35,18 +35,13 @@ _BATCH = 20_000  # pairs of viewer and light at a time; the calls cost little, a
 class Reflector:
     """The reflection of a source in a scene: f_r, the albedo for ambient light, and the mirror.
 
-    Attributes
-    ----------
-    source : Source
-        Material, or table of a store.
-    wavelength_nm : array (L,) [nm] or None
-        Wavelengths of its evaluation: those of the scene, or the first of a source that is stated for too few
-        wavelengths for a colour. None for a grey source.
+    `wavelength_nm` are those of its evaluation: of the scene, or the first of a source that is stated for too few
+    wavelengths for a colour; None for a grey source.
 
     Raises
     ------
     ParameterError
-        If the source is stated for invisible light, or is not known at the wavelengths of the scene.
+    If the source is stated for invisible light, or is not known at the wavelengths of the scene.
     """
 
     def __init__(self, source: Source, wavelength_nm: Array) -> None:

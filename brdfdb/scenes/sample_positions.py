@@ -30,29 +30,12 @@ def even(width: int, height: int, rng: np.random.Generator) -> Array:
 
 
 def at_edges(scene: Scene, width: int, height: int, count: int, rng: np.random.Generator) -> Array:
-    """Return places near edges, with distances from the edges that are even in their logarithm.
+    """Return places (N, 2) near edges, with distances from the edges that are even in their logarithm.
 
-    Parameters
-    ----------
-    scene : Scene
-        The scene, which must not be recorded.
-    width, height : int
-        Pixels of the picture. Edges are searched between places that are a pixel apart.
-    count : int
-        Number of places to return, if the scene shows edges.
-    rng : numpy.random.Generator
-        Source of random numbers.
-
-    Returns
-    -------
-    array of shape (N, 2)
-        Places, as in `brdfdb.scenes.scene.Camera.through`. N is `count`, or less if there are few edges.
-
-    Notes
-    -----
-    Each place is drawn independently. The draw selects a point on an edge between two neighbours of a grid, across or
-    down, then one of its two sides, and then a distance along the grid. The distance is between the width of a pixel
-    and `DECADES` powers of ten less.
+    Edges are searched between places that are a pixel apart. N is `count`, or less if the scene, which must not be
+    recorded, has few edges. Each place is drawn independently: a point on an edge between two neighbours of a grid,
+    across or down, then one of its two sides, then a distance along the grid, from the width of a pixel down to
+    `DECADES` powers of ten less.
 
     Rays on the two sides of an edge meet different objects, directly or in a mirror, different faces of an object, or
     different lights. Edges are limbs and outlines, terminators and the edges of shadows. At a distance d from its limb

@@ -176,14 +176,11 @@ class Revolution(Shape):
         c2, c3 = 3.0 * (r1 - r0) - 2.0 * m0 - m1, 2.0 * (r0 - r1) + m0 + m1
         return ((c3 * u + c2) * u + m0) * u + r0, ((3.0 * c3 * u + 2.0 * c2) * u + m0) / h
 
-    def _rings(self) -> tuple[Array, Array]:
-        """Radii and heights where one cone ends and the next begins."""
+    def _hit(self, o: Array, d: Array) -> Array:
+        # Radii and heights where one cone ends and the next begins
         height = np.array(self.profile)[:, 1]
         z = np.interp(np.arange((height.size - 1) * _FACETS + 1) / _FACETS, np.arange(height.size), height)
-        return self.radius_at(z)[0], z
-
-    def _hit(self, o: Array, d: Array) -> Array:
-        radius, z = self._rings()
+        radius = self.radius_at(z)[0]
         t = np.minimum(*(_disc(o, d, radius[end], z[end]) for end in (0, -1)))
         # Only rays that meet the cylinder around all cones, and then the cylinder around some of them, are traced
         whole = np.flatnonzero(np.isfinite(_cone(o, d, radius.max(), radius.max(), z[0], z[-1])))

@@ -140,7 +140,7 @@ def test_an_error_of_zero_is_drawn_and_one_of_nan_is_a_gap_that_the_label_counts
         ComparedForm("exact", "ours", lambda x: x),
         ComparedForm("inverse", "printed", lambda x: x * np.divide(1.0, x) * x),
     ]
-    measured = _errors.Sweep([0.0, 2.0], "x", lambda x: {"x": x}, lambda x: x, scale=1.0).panel(forms)
+    measured = _errors.FormSweep([0.0, 2.0], "x", lambda x: {"x": x}, lambda x: x, scale=1.0).panel(forms)
     assert isinstance(measured.panel, Panel)
     exact, inverse = measured.panel.curves
     assert exact.y == [_errors.NONE, _errors.NONE]

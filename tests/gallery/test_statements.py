@@ -88,7 +88,7 @@ def test_a_figure_is_complete(key: str) -> None:
             assert len({len(row) for row in panel.radiance}) == 1
             pixels = [pixel for row in panel.radiance for pixel in row if pixel is not None]
             assert len(pixels) > len(panel.radiance) ** 2 / 2
-            assert 0.0 < min(pixels) < max(pixels) <= 1.0
+            assert 0.0 <= min(pixels) < max(pixels) <= 1.0
 
 
 def test_wrong_models_cover_every_figure_and_have_unique_names() -> None:
