@@ -66,6 +66,8 @@ def fig_06() -> Figure:
     diffuse = cut_of(he_torrance, PARTS_DEG, **surface)
     uniform = np.full(parts.x_deg.shape, surface["a"] / np.pi)
     heights, shares = _shares()
+    rest = diffuse.f_r - parts.f_r
+    added = float(reflected(surface, PARTS_DEG) - reflected({**surface, "a": 0.0}, PARTS_DEG))
     return Figure(
         key="he-torrance-1991-fig-06",
         paper="he1991",
@@ -91,7 +93,14 @@ def fig_06() -> Figure:
         statements=[
             _contained(surface),
             _far_from_diffuse(surface, parts.f_r),
-            _uniform(surface, diffuse.f_r - parts.f_r),
+            Statement(
+                says="the last part is uniform diffuse (Lambertian)",
+                where="section 3.2, on Fig. 6; a is an albedo by section 4, on Fig. 11",
+                seen=f"It is {rest.min():.4f} to {rest.max():.4f} /sr in the plane of incidence, and {added:.3f} of "
+                f"the light: a = {surface['a']:g}.",
+                threshold_from="the paper's number: a of the table top, as an albedo",
+                holds=bool(np.ptp(rest) < 1e-9) and abs(added - surface["a"]) < 1e-3,
+            ),
             _partition(shares),
         ],
     )
@@ -146,18 +155,6 @@ def _far_from_diffuse(surface: Surface, f_r: Floats) -> Statement:
         f"{FAR:.0f}).",
         threshold_from="our reading: far from ideal diffuse is ten times as high",
         holds=bool(f_r.max() > FAR * mean),
-    )
-
-
-def _uniform(surface: Surface, rest: Floats) -> Statement:
-    added = float(reflected(surface, PARTS_DEG) - reflected({**surface, "a": 0.0}, PARTS_DEG))
-    return Statement(
-        says="the last part is uniform diffuse (Lambertian)",
-        where="section 3.2, on Fig. 6; a is an albedo by section 4, on Fig. 11",
-        seen=f"It is {rest.min():.4f} to {rest.max():.4f} /sr in the plane of incidence, and {added:.3f} of the light: "
-        f"a = {surface['a']:g}.",
-        threshold_from="the paper's number: a of the table top, as an albedo",
-        holds=bool(np.ptp(rest) < 1e-9) and abs(added - surface["a"]) < 1e-3,
     )
 
 

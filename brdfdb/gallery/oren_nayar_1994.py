@@ -55,6 +55,8 @@ def fig_08() -> Figure:
     direct, bounce = cosine * parts.direct, cosine * parts.interreflected
     total = direct + bounce
     flat = cosine * across(lambert, GRAZING_LIGHT, rho=RHO)
+    share = total / flat
+    largest = THETA_R[np.argmax(total)]
     return Figure(
         key="oren-nayar-1994-fig-08",
         paper=PAPER,
@@ -71,25 +73,27 @@ def fig_08() -> Figure:
             )
         ],
         statements=[
-            _far_from_lambert(total, flat),
+            Statement(
+                says="these radiance plots deviate substantially from Lambertian reflectance",
+                where="section 4.3, Fig. 8",
+                seen=f"The radiance is {share.min():.2f} to {share.max():.2f} times Lambert's.",
+                holds=bool(share.min() < 1.0 - SMALL and share.max() > 1.0 + SMALL),
+                threshold_from="our reading: substantial is more than a tenth, on both sides",
+            ),
             _towards_the_source(total),
-            _largest_towards_the_source(total),
+            Statement(
+                says="in the backward (source) direction, the radiance is maximum",
+                where="section 4.3, Fig. 8",
+                seen=f"It is largest at θ_r = {largest:.0f}°, past the source, and there "
+                f"{total.max() / at(total, GRAZING_LIGHT) - 1.0:.1%} more than at 75°.",
+                holds=bool(largest >= GRAZING_LIGHT),
+                threshold_from="the paper's words: in the backward direction, where θ_r exceeds θ_i",
+            ),
             _cut_off(),
             _scaled_tangent(total),
             _interreflections_dominate(bounce / total),
             _not_symmetrical(total),
         ],
-    )
-
-
-def _far_from_lambert(total: Floats, flat: Floats) -> Statement:
-    share = total / flat
-    return Statement(
-        says="these radiance plots deviate substantially from Lambertian reflectance",
-        where="section 4.3, Fig. 8",
-        seen=f"The radiance is {share.min():.2f} to {share.max():.2f} times Lambert's.",
-        holds=bool(share.min() < 1.0 - SMALL and share.max() > 1.0 + SMALL),
-        threshold_from="our reading: substantial is more than a tenth, on both sides",
     )
 
 
@@ -105,18 +109,6 @@ def _towards_the_source(total: Floats) -> Statement:
         f"{expected:.3f}.",
         holds=bool(np.all(np.diff(rising) > 0.0) and np.isclose(grows, expected, rtol=BY_HAND)),
         threshold_from="the paper's words: increases, at every degree; an independent evaluation of the growth",
-    )
-
-
-def _largest_towards_the_source(total: Floats) -> Statement:
-    largest = THETA_R[np.argmax(total)]
-    return Statement(
-        says="in the backward (source) direction, the radiance is maximum",
-        where="section 4.3, Fig. 8",
-        seen=f"It is largest at θ_r = {largest:.0f}°, past the source, and there "
-        f"{total.max() / at(total, GRAZING_LIGHT) - 1.0:.1%} more than at 75°.",
-        holds=bool(largest >= GRAZING_LIGHT),
-        threshold_from="the paper's words: in the backward direction, where θ_r exceeds θ_i",
     )
 
 
@@ -287,6 +279,7 @@ def fig_11() -> Figure:
         ]
         for light in lights_deg
     }
+    radiances = [at(values, GRAZING_LIGHT) for values in lines[GRAZING_LIGHT]]
     return Figure(
         key="oren-nayar-1994-fig-11",
         paper=PAPER,
@@ -305,7 +298,13 @@ def fig_11() -> Figure:
         ],
         statements=[
             _perpendicular(lights_deg, [lines[light][-1] for light in lights_deg]),
-            _towards_the_source_in_azimuth([at(values, GRAZING_LIGHT) for values in lines[GRAZING_LIGHT]]),
+            Statement(
+                says="the radiance of rough diffuse surfaces increases as the viewer approaches the source direction",
+                where="section 4",
+                seen=f"With θ_r = θ_i = 75° it is {listed(radiances, '.3f')} for φ_r - φ_i of 0, 30, 60 and 90°.",
+                holds=bool(np.all(np.diff(radiances) < 0.0)),
+                threshold_from="the paper's words: increases, with every step towards the light",
+            ),
         ],
     )
 
@@ -324,16 +323,6 @@ def _perpendicular(lights_deg: list[float], lines: list[Floats]) -> Statement:
         "horizon, where shadowing and masking overlap (eq. 43).",
         holds=max(varies) < SMALL,
         threshold_from="our reading: near is a tenth of the mean",
-    )
-
-
-def _towards_the_source_in_azimuth(radiances: list[float]) -> Statement:
-    return Statement(
-        says="the radiance of rough diffuse surfaces increases as the viewer approaches the source direction",
-        where="section 4",
-        seen=f"With θ_r = θ_i = 75° it is {listed(radiances, '.3f')} for φ_r - φ_i of 0, 30, 60 and 90°.",
-        holds=bool(np.all(np.diff(radiances) < 0.0)),
-        threshold_from="the paper's words: increases, with every step towards the light",
     )
 
 

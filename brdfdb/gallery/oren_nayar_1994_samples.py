@@ -173,6 +173,7 @@ def _with_surface(number: int, sample: str) -> Figure:
     rho, sigma = material.numbers["rho"], material.numbers["sigma"]
     sums = [across(oren_nayar_body_surface, light, **material.numbers) for light in LIGHTS_DEG]
     bodies = [across(oren_nayar, light, rho=rho, sigma=sigma, interreflection=False) for light in LIGHTS_DEG]
+    left = [left_past(total, light) for light, total in zip(LIGHTS_DEG, sums, strict=True)]
     return Figure(
         key=f"oren-nayar-1994-fig-{number}",
         paper=PAPER,
@@ -192,7 +193,14 @@ def _with_surface(number: int, sample: str) -> Figure:
         ],
         statements=[
             _approaching(number, sums, material),
-            _cut_off(number, sums),
+            Statement(
+                says="the cut-off in radiance that takes place in the source direction",
+                where=f"section 5, Fig. {number}",
+                seen=f"In the first degree past θ_i of {listed(LIGHTS_DEG, '.0f')}° radiance grows by "
+                f"{listed(left, '.0%')} of its growth in the last degree before.",
+                holds=max(left) < 1.0 - SMALL,
+                threshold_from="our reading: a cut-off leaves less than nine tenths of the slope",
+            ),
             *([_foam(sums, bodies, material), _peak(), _width()] if sample == "foam" else []),
         ],
     )
@@ -223,18 +231,6 @@ def _approaching(number: int, sums: list[Floats], material: Material) -> Stateme
         and bool(np.allclose(grows, expected, rtol=EXACT)),
         threshold_from="the paper's words: increase, at every degree; a closed form, eqs 27, 31 and 32 with the "
         "numbers of the caption and E_0 = π",
-    )
-
-
-def _cut_off(number: int, sums: list[Floats]) -> Statement:
-    left = [left_past(total, light) for light, total in zip(LIGHTS_DEG, sums, strict=True)]
-    return Statement(
-        says="the cut-off in radiance that takes place in the source direction",
-        where=f"section 5, Fig. {number}",
-        seen=f"In the first degree past θ_i of {listed(LIGHTS_DEG, '.0f')}° radiance grows by {listed(left, '.0%')} "
-        "of its growth in the last degree before.",
-        holds=max(left) < 1.0 - SMALL,
-        threshold_from="our reading: a cut-off leaves less than nine tenths of the slope",
     )
 
 
