@@ -495,8 +495,8 @@ def _he_torrance() -> Figure:
         he_torrance_specular(radians(THETA_DEG), sigma_0_um=0.1, tau_um=5.0, **_MIRROR, wavelength_nm=500.0)
     )
     total = by_slope[0.02]
-    low = THETA_DEG <= 30.0
-    gentle = np.concatenate([albedo[low] for albedo in (by_slope[0.02], by_slope[0.05])])
+    diffuse = total - specular
+    gentle = np.concatenate([by_slope[slope][THETA_DEG <= 30.0] for slope in (0.02, 0.05)])
     everything = [*by_slope.values(), *by_height.values()]
     worst = max(by_slope, key=lambda slope: float(by_slope[slope].max()))
     mirror = fresnel.unpolarised(np.cos(radians(THETA_DEG)), np.asarray(_MIRROR["n"]), np.asarray(_MIRROR["k"]))
@@ -517,11 +517,7 @@ def _he_torrance() -> Figure:
             ),
             panel(
                 "sigma_0 / tau = 0.02",
-                [
-                    curve("all", total, "ours"),
-                    curve("specular", specular),
-                    curve("directional diffuse", total - specular),
-                ],
+                [curve("all", total, "ours"), curve("specular", specular), curve("directional diffuse", diffuse)],
             ),
         ],
         statements=[
@@ -556,7 +552,7 @@ def _he_torrance() -> Figure:
                 'masking/shadowing, and energy"',
                 where="abstract; our reading: no more is reflected than arrives",
                 seen=f"sigma_0 = 0.1 um, tau = 5 um: {at(total, 85.5):.3f} at 85.5 degrees, of which "
-                f"{at(specular, 85.5):.3f} is specular and {at(total - specular, 85.5):.3f} directional diffuse: "
+                f"{at(specular, 85.5):.3f} is specular and {at(diffuse, 85.5):.3f} directional diffuse: "
                 f"roughness scatters more than the {1.0 - at(specular, 85.5):.3f} that it takes from the mirror. The "
                 f"largest is {largest(by_slope[worst])}, sigma_0 / tau = {worst:g}",
                 holds=max(float(albedo.max()) for albedo in everything) <= 1.0 + TOLERANCE,

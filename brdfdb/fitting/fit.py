@@ -188,7 +188,7 @@ def fits(
 
     Returns
     -------
-    Fits, list of Fitted
+    Fits, list of FittedSurface
         The document, and the fits in its order. They are ranked by the root mean square of ln(model / sample) over
         incidences that were left out, or by BIC where the light has one direction. Samples that are outliers of every
         fit do not count in it, unless they are many.
@@ -228,12 +228,7 @@ def fits(
         refractive_index=refractive_index,
         source_solid_angle_sr=samples.instrument.source_solid_angle_sr,
         receiver_solid_angle_sr=samples.instrument.receiver_solid_angle_sr,
-        left_out=UnusedSamples(
-            below_horizon=int(samples.record.get("below_the_horizon", 0)),
-            holes=counting.holes,
-            at_horizon=counting.at_horizon,
-            unusable=counting.left_out,
-        ),
+        left_out=_unused(samples, counting),
         remarks=remarks_on_samples(samples, counting),
         ranked_by="BIC" if records[0].held_out is None else "held-out rms of ln",
         fits=records,
@@ -244,6 +239,15 @@ def fits(
         interrupted=interrupted,
     )
     return document, surfaces
+
+
+def _unused(samples: Samples, counting: Residual) -> UnusedSamples:
+    return UnusedSamples(
+        below_horizon=int(samples.record.get("below_the_horizon", 0)),
+        holes=counting.holes,
+        at_horizon=counting.at_horizon,
+        unusable=counting.left_out,
+    )
 
 
 class _FittedModel(NamedTuple):

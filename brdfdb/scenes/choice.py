@@ -265,10 +265,7 @@ def choose(
         checked = check(number)
         looks = [planned] if checked is None else [planned, checked]
         errors = [look.errors(forms, forms) for look in looks]
-        whole = {
-            name: PictureError(*np.max([_left(of_look[name], percentile) for of_look in errors], axis=0))
-            for name in forms
-        }
+        whole = {name: PictureError(*np.max([_left(by[name], percentile) for by in errors], axis=0)) for name in forms}
         tick()
         if max(whole.values()).counted <= tolerance:
             break
