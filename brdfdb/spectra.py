@@ -22,8 +22,12 @@ from brdfdb.arrays import plain
 from brdfdb.errors import ParameterError
 from brdfdb.parameters import check_nanometres, closest
 
-ILLUMINANT, OBSERVER = "D65", "CIE 1931 2 Degree Standard Observer"
-VISIBLE_FROM_NM, VISIBLE_TO_NM, VISIBLE_STEP_NM = 420.0, 680.0, 20.0
+ILLUMINANT = "D65"
+OBSERVER = "CIE 1931 2 Degree Standard Observer"
+# Wavelengths make a colour if they reach from 420 to 680 nm in steps of 20 nm or less
+VISIBLE_FROM_NM = 420.0
+VISIBLE_TO_NM = 680.0
+VISIBLE_STEP_NM = 20.0
 MOST_OF_A_COLOUR = 1000  # wavelengths of a colour: the cost of its weights grows with the square
 PICTURE_NM = np.arange(VISIBLE_FROM_NM, VISIBLE_TO_NM + 1.0, VISIBLE_STEP_NM)  # wavelengths of a picture
 

@@ -50,25 +50,16 @@ def test_sapphire_follows_its_dispersion_formula():
     np.testing.assert_array_equal(k, 0.0)  # the entry has no extinction data
 
 
-def test_refractive_index_keeps_the_shape_and_is_float64():
+def test_an_entry_has_an_index_in_its_range_only():
     n, k = refractive_index("main/Cu/Johnson", np.float32([[450, 550, 650]]))
     assert n.shape == k.shape == (1, 3)
     assert n.dtype == k.dtype == np.float64
-
-
-def test_the_ends_of_a_range_belong_to_it():
     n, k = refractive_index("main/Cu/Johnson", [187.9, 1937.0])  # its first and last row
     np.testing.assert_array_equal(n, [0.94, 1.09])
     np.testing.assert_array_equal(k, [1.337, 13.43])
-
-
-def test_outside_its_range_an_entry_has_no_index():
     for wavelength_nm in (3000.0, 100.0, np.nan, [500.0, 3000.0]):
         with pytest.raises(ParameterError, match=r"wavelength_nm: .* main/Cu/Johnson, .* \[187\.9, 1937\] nm"):
             refractive_index("main/Cu/Johnson", wavelength_nm)
-
-
-def test_an_unknown_entry_is_named():
     for entry in ("main/Unobtainium/Nobody", "main/Al", "", "main/Al/Rakic/n"):
         with pytest.raises(ParameterError, match=f"refractive_index: '{entry}'"):
             refractive_index(entry, 500.0)

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from brdfdb.atlas._proofs import PROOFS, proved
 from brdfdb.figure import Figure, Map, Panel, Picture, Role, Statement, curve_of, rows
-from brdfdb.geometry import radians
+from brdfdb.geometry import radians, unit_vector
 from brdfdb.misprints import MISPRINTS, Kind, Misprint
 
 Array = NDArray[np.float64]
@@ -74,6 +74,15 @@ def directions(theta_i: float, theta_r: float, delta_phi: float) -> dict[str, An
 def lobe(alpha: ArrayLike) -> dict[str, Any]:
     """Return the parameters of Ward's round lobe alone, with a specular reflectance of 1."""
     return {"rho_d": 0.0, "rho_s": 1.0, "alpha_x": alpha, "alpha_y": alpha}
+
+
+def of_vectors(model: Callable[..., Any]) -> Callable[..., Any]:
+    """Return a model of unit vectors as a function of angles."""
+
+    def evaluate(theta_i: Any, phi_i: Any, theta_r: Any, phi_r: Any, **parameters: float) -> Any:
+        return model(unit_vector(theta_i, phi_i), unit_vector(theta_r, phi_r), **parameters)
+
+    return evaluate
 
 
 def zero(distance: float) -> float:

@@ -28,6 +28,7 @@ from brdfdb.atlas._errors import (
     figure,
     misprint,
     of_misprint,
+    of_vectors,
     wrong,
     zero,
 )
@@ -304,7 +305,7 @@ def plainly() -> Figure:
     forms = [
         ComparedForm("as the equations stand", "textbook", _plainly),
         ComparedForm("ours, angles", "ours", models.he_torrance),
-        ComparedForm("ours, unit vectors", "ours", _of_vectors),
+        ComparedForm("ours, unit vectors", "ours", of_vectors(models.he_torrance_vectors)),
     ]
 
     def towards(title: str, x_label: str, pair: Callable[[float], dict[str, Any]]) -> ErrorPanel:
@@ -348,26 +349,20 @@ def _directional(theta_i: Any, phi_i: Any, theta_r: Any, phi_r: Any, **surface: 
     return he_torrance_1991.directional_diffuse(*angles, *(surface[name] for name in _GLOSSY))
 
 
-def _of_vectors(theta_i: Any, phi_i: Any, theta_r: Any, phi_r: Any, **surface: float) -> Any:
-    """Return f_r [1/sr] of our model for unit vectors."""
-    return models.he_torrance_vectors(unit_vector(theta_i, phi_i), unit_vector(theta_r, phi_r), **surface)
-
-
 def _plainly(
     theta_i: Any,
     phi_i: Any,
     theta_r: Any,
     phi_r: Any,
     *,
-    wavelength_nm: float,
-    sigma_0_um: float,
-    tau_um: float,
-    n: float,
-    k: float,
     total: Callable[[Any, Any], Any] = BY_KEY["ten-terms"].as_printed,
+    **surface: float,
 ) -> Any:
     """Return the directional diffuse f_r [1/sr] by eqs 71 to 86 as they stand; `total` is the sum of eq. 78."""
-    wavelength, slope = wavelength_nm / 1000.0, sigma_0_um / tau_um
+    wavelength = surface["wavelength_nm"] / 1000.0
+    sigma_0_um = surface["sigma_0_um"]
+    tau_um = surface["tau_um"]
+    slope = sigma_0_um / tau_um
     v = unit_vector(theta_i, phi_i) + unit_vector(theta_r, phi_r)
     # Eqs (79)-(81)
     z_0 = BY_KEY["root-search"].as_printed(theta_i, theta_r, slope)
@@ -380,7 +375,7 @@ def _plainly(
     light, viewer = (
         BY_KEY["shadowing-divided-by-cosines"].as_printed(np.cos(theta), slope) for theta in (theta_i, theta_r)
     )
-    return fresnel.unpolarised(np.linalg.norm(v) / 2.0, n, k) / np.pi * G * light * viewer * D
+    return fresnel.unpolarised(np.linalg.norm(v) / 2.0, surface["n"], surface["k"]) / np.pi * G * light * viewer * D
 
 
 def in_float32() -> Figure:

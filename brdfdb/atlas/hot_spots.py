@@ -8,9 +8,8 @@ from typing import Any
 import numpy as np
 
 from brdfdb import models
-from brdfdb.atlas._errors import CLOSED, OFF_LIGHT, TRUTH, ComparedForm, FormSweep, figure
+from brdfdb.atlas._errors import CLOSED, OFF_LIGHT, TRUTH, ComparedForm, FormSweep, figure, of_vectors
 from brdfdb.figure import Figure
-from brdfdb.geometry import unit_vector
 from brdfdb.reference import lucht_2000, rahman_1993
 
 LIGHT_DEG = 85.0  # angle of incidence, at which squares of tangents cancel over two digits sooner than at 30
@@ -65,15 +64,6 @@ def _ross_li_plainly(
     return (f_iso + f_vol * k_vol + f_geo * k_geo) / np.pi
 
 
-def _of_vectors(model: Callable[..., Any]) -> Callable[..., Any]:
-    """Return a model of unit vectors as a function of angles."""
-
-    def evaluate(theta_i: Any, phi_i: Any, theta_r: Any, phi_r: Any, **parameters: float) -> Any:
-        return model(unit_vector(theta_i, phi_i), unit_vector(theta_r, phi_r), **parameters)
-
-    return evaluate
-
-
 def rpv_hot_spot() -> Figure:
     """Draw the hot spot of RPV, whose distance of tangents is a difference of squares."""
 
@@ -84,7 +74,7 @@ def rpv_hot_spot() -> Figure:
     forms = [
         ComparedForm("tan^2 + tan^2 - 2 tan tan cos", "textbook", _rpv_plainly),
         ComparedForm("ours, angles", "ours", models.rpv),
-        ComparedForm("ours, unit vectors", "ours", _of_vectors(models.rpv_vectors)),
+        ComparedForm("ours, unit vectors", "ours", of_vectors(models.rpv_vectors)),
     ]
     title = "The hot spot is a distance, and not a difference of squares"
     caption = (
@@ -105,7 +95,7 @@ def ross_li_hot_spot() -> Figure:
     forms = [
         ComparedForm("phase angle by its cosine", "textbook", _ross_li_plainly),
         ComparedForm("ours, angles", "ours", models.ross_li),
-        ComparedForm("ours, unit vectors", "ours", _of_vectors(models.ross_li_vectors)),
+        ComparedForm("ours, unit vectors", "ours", of_vectors(models.ross_li_vectors)),
     ]
     title = "The arccosine of more than 1"
     caption = (

@@ -25,6 +25,7 @@ from brdfdb.atlas._errors import (
     lobe,
     misprint,
     of_misprint,
+    of_vectors,
     stays,
     wrong,
 )
@@ -168,17 +169,12 @@ def near_the_pole() -> Figure:
                 [
                     ComparedForm("tan^2 as 1 / cos^2 - 1", "textbook", _of_unit_vectors),
                     ComparedForm("ours, angles", "ours", models.ward),
-                    ComparedForm("ours, unit vectors", "ours", _of_vectors),
+                    ComparedForm("ours, unit vectors", "ours", of_vectors(models.ward_vectors)),
                 ]
             )
         ],
         within=CLOSED,
     )
-
-
-def _of_vectors(theta_i: Any, phi_i: Any, theta_r: Any, phi_r: Any, **parameters: float) -> Any:
-    """Return f_r [1/sr] of our model for unit vectors."""
-    return models.ward_vectors(unit_vector(theta_i, phi_i), unit_vector(theta_r, phi_r), **parameters)
 
 
 def far_from_the_peak() -> Figure:

@@ -68,7 +68,7 @@ def convert(
     weigh: Weigh | None = None,
     tick: Callable[[], None] = lambda: None,
 ) -> Conversion:
-    """Search the parameters of a model that come closest to a source, and measure the error that is left.
+    """Search the parameters of a model that come closest to a source, and measure the remaining error.
 
     Parameters
     ----------
@@ -461,7 +461,7 @@ def _with_highlight(conversion: Conversion, least: Conversion) -> Conversion:
 
 
 def _at_an_end(conversion: Conversion) -> list[str]:
-    """Return the numbers that the search left at an end of their range, with the values, as recipes write them."""
+    """Return the numbers that ended at a limit of their range, with the values, as recipes write them."""
     in_file, ends = conversion.material.file_parameters(), []
     for parameter in MODELS[conversion.model].parameters:
         value = conversion.parameters[parameter.name]

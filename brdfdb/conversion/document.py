@@ -1,4 +1,4 @@
-"""Types of the document of a conversion: parameters, the error that is left, and where it is worst."""
+"""Types of the document of a conversion: parameters, the remaining error, and where it is worst."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Peak(DocumentPart):
 
 
 class Conversion(DocumentPart):
-    """The parameters of a model that come closest to a source, and the error that is left."""
+    """The parameters of a model that come closest to a source, and the remaining error."""
 
     source: str = Field(description="name of the source")
     source_model: str = Field(description="its model, or measured; empty for a function")

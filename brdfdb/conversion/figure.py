@@ -41,12 +41,12 @@ def figure_of(source: Source, conversion: Conversion) -> Figure:
         )
     )
     where = "" if middle is None else f" at {middle[0]:g} nm"
-    left = f"l1 {percent(conversion.l1)}, p99 {percent(conversion.p99)}"
+    errors = f"l1 {percent(conversion.l1)}, p99 {percent(conversion.p99)}"
     return Figure(
         key=conversion.name,
         paper=conversion.material.spec.reference,
         title=f"{conversion.source} as {conversion.model}",
-        caption=f"f_r in the plane of incidence{where}. {left}.",
+        caption=f"f_r in the plane of incidence{where}. {errors}.",
         panels=list(panels),
         statements=[],
     )

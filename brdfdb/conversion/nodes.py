@@ -118,7 +118,7 @@ class TruthNodes:
 
 
 def _sum(weight: Floats, values: Floats) -> float:
-    """Return a weighted sum. A BLAS would wait for its threads, and sum in an order of its own."""
+    """Return a weighted sum. A BLAS would wait for its threads, and sum in another order."""
     return float(np.einsum("i,i->", weight, values))
 
 

@@ -240,16 +240,16 @@ class Distance:
         nodes, target = self.nodes, self.target
         f_r = target.coloured(numbers, column, nodes.wi, nodes.wr)
 
-        def left(colours: Array) -> float:
+        def distance(colours: Array) -> float:
             values = {v.name: v.value(u) for v, u in zip(target.colours, colours.tolist(), strict=True)}
             mirror = target.specular(target.arguments(numbers, column, values), nodes.theta)
             with np.errstate(all="ignore"):  # extreme parameters may raise flags; the sum is tested
                 return nodes.distance(row, f_r(colours), mirror)
 
         if not target.colours:
-            return Minimum(np.zeros(0), left(np.zeros(0)))
+            return Minimum(np.zeros(0), distance(np.zeros(0)))
         size = np.full(len(target.colours), self.edge)
-        return downhill(left, self.colours[row], size, tolerance=_COLOURS, most=60 * size.size)
+        return downhill(distance, self.colours[row], size, tolerance=_COLOURS, most=60 * size.size)
 
 
 def search(

@@ -1,4 +1,4 @@
-"""Types of the document of fits: the models in order, their parameters with intervals, and the error that is left."""
+"""Types of the document of fits: the models in order, their parameters with intervals, and the remaining error."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Estimate(DocumentPart):
 
 
 class Correlation(DocumentPart):
-    """A pair of numbers that the samples hardly tell apart."""
+    """A pair of numbers that the samples hardly distinguish."""
 
     first: str
     second: str

@@ -1,4 +1,4 @@
-"""Estimates of a fit: every number with its standard error and 95 % interval, and the pairs that are not told apart."""
+"""Estimates of a fit: numbers with standard errors and 95 % intervals, and pairs that samples do not distinguish."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from brdfdb.materials import written_name
 Array = NDArray[np.float64]
 
 _STEP = 1e-6  # step of finite differences, in the unit cube
-_CLOSE = 0.99  # correlation above which the samples do not tell two numbers apart
+_CLOSE = 0.99  # correlation above which the samples do not distinguish two numbers
 _SAME = 0.1  # relative difference of two standard errors of logarithms below which a ratio or a product is measured
 
 

@@ -15,7 +15,8 @@ Array = NDArray[np.float64]
 
 _MOST = 6  # incidences that are shown
 _PLANE_DEG = 2.5  # distance from the plane of incidence of samples that a cut shows
-_THETA_DEG, _PHI_DEG = 5.0, 10.0  # cells of the maps
+_THETA_DEG = 5.0  # height of the cells of a map
+_PHI_DEG = 10.0  # width of the cells of a map
 
 
 def figure_of(document: Fits, fitted: FittedSurface) -> Figure:
@@ -85,12 +86,12 @@ def _map(fitted: FittedSurface, chosen: NDArray[np.int64], channel: int, title: 
     phi = _turned(fitted, chosen)
     folded = np.minimum(phi, 360.0 - phi)
     theta = degrees(fitted.samples.theta_r[chosen])
-    left = fitted.logarithms[chosen, channel]
-    known = np.isfinite(left)
+    logarithms = fitted.logarithms[chosen, channel]
+    known = np.isfinite(logarithms)
     across, up = int(180.0 / _PHI_DEG) + 1, int(90.0 / _THETA_DEG) + 1
     cell = np.round(folded / _PHI_DEG).astype(np.int64), np.round(theta / _THETA_DEG).astype(np.int64)
     sums, counts = np.zeros((up, across)), np.zeros((up, across))
-    np.add.at(sums, (cell[1][known], cell[0][known]), left[known])
+    np.add.at(sums, (cell[1][known], cell[0][known]), logarithms[known])
     np.add.at(counts, (cell[1][known], cell[0][known]), 1.0)
     with np.errstate(invalid="ignore"):
         mean = sums / counts

@@ -1,4 +1,4 @@
-"""Fits of models to samples: parameters with intervals, the error that is left, and a ranking."""
+"""Fits of models to samples: parameters with intervals, the remaining error, and a ranking."""
 
 from __future__ import annotations
 

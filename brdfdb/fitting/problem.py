@@ -53,8 +53,8 @@ class Point(NamedTuple):
 class Problem:
     """A surface, the samples that it is fitted to, and the scale of robustness.
 
-    `fixed` and `held` are shape variables (places in the unit cube) and coefficients (values in each channel) that are
-    not searched, by index.
+    `fixed` and `fixed_coefficients` are shape variables (places in the unit cube) and coefficients (values in each
+    channel) that are not searched, by index.
     """
 
     def __init__(
@@ -63,7 +63,7 @@ class Problem:
         view: View,
         residual: Residual,
         fixed: Mapping[int, float] | None = None,
-        held: Mapping[int, float] | None = None,
+        fixed_coefficients: Mapping[int, float] | None = None,
     ) -> None:
         self.surface, self.view, self.residual = surface, view, residual
         self.fixed = dict(fixed or {})
@@ -71,7 +71,7 @@ class Problem:
         shape = (len(surface.coefficients), surface.channels)
         self.low = np.array([np.full(surface.channels, one.low) for one in surface.coefficients]).reshape(shape)
         self.high = np.array([np.full(surface.channels, one.high) for one in surface.coefficients]).reshape(shape)
-        for index, value in (held or {}).items():
+        for index, value in (fixed_coefficients or {}).items():
             self.low[index] = self.high[index] = value
         level = np.pi * float(np.median(np.maximum(residual.truth[residual.used], 0.0)))
         self.begin = np.broadcast_to(np.clip(level, 0.01, 0.5) * surface.units, shape)
@@ -194,7 +194,7 @@ class Problem:
     def best(self) -> Point:
         """Return the best end of descents from several beginnings, from which a descent at all samples goes on.
 
-        Points are tried at some of the samples. Descents from the best three that are apart end at those samples, and
+        Points are tried at some of the samples. Descents from the best three distant points end at those samples, and
         the promising ones go on at more of them.
         """
         if not self.free:
@@ -327,9 +327,9 @@ def _basis_slopes(surface: SearchedSurface, x: Array, view: View) -> dict[int, F
         if term.spec.gradient is None or (view.half_angle and term.spec.specular is not None):
             refused |= wanted.keys()
             continue
-        own = several if term.spec.spectral else 1
+        count = several if term.spec.spectral else 1
         names = {name for moves in wanted.values() for name in moves}
-        by_name = [_term_slopes(term, view, surface.arguments(number, numbers[number], c), names) for c in range(own)]
+        by_name = [_term_slopes(term, view, surface.arguments(number, numbers[number], c), names) for c in range(count)]
         for variable, moves in wanted.items():
             of_term = np.stack([sum(move * one[name] for name, move in moves.items()) for one in by_name], axis=-1)
             if variable not in slopes:

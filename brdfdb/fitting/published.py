@@ -28,7 +28,8 @@ from brdfdb.place import path_of
 
 SUFFIX = ".fit"
 CHANNELS = ("R", "G", "B")
-_MOST_BYTES, _MOST_LINE = 1 << 24, 4096
+_MOST_BYTES = 1 << 24  # of a file
+_MOST_LINE = 4096  # characters of a line
 _FLAT = "Lambertian"
 _NAMED = Path(__file__).with_name("published.toml")
 

@@ -259,22 +259,22 @@ class SearchedSurface:
     Parameters
     ----------
     name : str
-    A model, or models joined by +, such as "A + 2 B".
+        A model, or models joined by " + "; "2 NAME" is two lobes of one.
     wavelength_nm : array (C,) [nm] or None
-    Wavelengths of the channels.
+        Wavelengths of the channels.
     channels : int
-    Number of channels, C.
+        Number of channels, C.
     turned : bool
-    True if the light comes from several azimuths, so that two widths can be told apart.
+        True if the light comes from several azimuths, so that samples distinguish two widths.
     entry : str, optional
-    Refractive index of models with n and k; without one they are searched.
+        Refractive index of models with n and k; without one they are searched.
 
     Raises
     ------
     ParameterError
-    If a model is unknown.
+        If a model is unknown.
     NotDescribedError
-    If it cannot describe such samples.
+        If it cannot describe such samples.
     """
 
     def __init__(
@@ -362,8 +362,10 @@ class SearchedSurface:
     def in_channel(self, x: Array, values: Array, number: int, channel: int) -> tuple[dict[str, float], float]:
         """Return all arguments of a term in a channel, and its scale."""
         given = self.arguments(number, self.numbers(x)[number], channel)
-        own = {one.name: float(values[row, channel]) for row, one in enumerate(self.coefficients) if one.term == number}
-        return given | {name: value for name, value in own.items() if name != SCALE}, own.get(SCALE, 1.0)
+        rows = [row for row, one in enumerate(self.coefficients) if one.term == number]
+        linear = {self.coefficients[row].name: float(values[row, channel]) for row in rows}
+        scale = linear.pop(SCALE, 1.0)
+        return given | linear, scale
 
     def basis(self, x: Array, view: View) -> Floats:
         """Return the factors (M, N, C) [1/sr] of all monomials; (M, N, 1) if they are the same in each channel."""
@@ -377,11 +379,11 @@ class SearchedSurface:
         parts, numbers = [], [self.numbers(x) for x in points]
         several = self.channels if self.indexed else 1
         for number, term in enumerate(self.terms):
-            own = several if term.spec.spectral else 1
-            wanted = [self.arguments(number, of_point[number], c) for of_point in numbers for c in range(own)]
+            count = several if term.spec.spectral else 1
+            wanted = [self.arguments(number, of_point[number], c) for of_point in numbers for c in range(count)]
             with np.errstate(all="ignore"):  # extreme parameters may raise flags
                 part = term.basis(view, wanted, remember=len(points) == 1)
-            part = part.reshape(len(points), own, *part.shape[1:]).transpose(0, 2, 3, 1)
+            part = part.reshape(len(points), count, *part.shape[1:]).transpose(0, 2, 3, 1)
             parts.append(np.broadcast_to(part, (*part.shape[:3], several)))
         bases = np.concatenate(parts, axis=1)
         return bases if np.all(np.isfinite(bases)) else np.nan_to_num(bases, nan=0.0, posinf=0.0, neginf=0.0)

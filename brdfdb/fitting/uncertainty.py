@@ -113,14 +113,14 @@ class Profile:
         shapes = len(problem.surface.shape)
         index = shape if shape is not None else shapes + int(coefficient or 0)
         along = np.nan_to_num(known.both[:shapes, index] / known.both[index, index])
-        self.along = np.where(np.isfinite(along), along, 0.0)  # where the others go with the number that is held
+        self.along = np.where(np.isfinite(along), along, 0.0)  # changes of the others with the fixed number
 
     def deviation(self, at: float) -> float:
-        """Return the square root of the deviance with the number held: 1.96 at the ends of a 95 % interval."""
+        """Return the square root of the deviance with the number fixed: 1.96 at the ends of a 95 % interval."""
         p = self.problem
         fixed = p.fixed if self.shape is None else {**p.fixed, self.shape: at}
-        held = None if self.coefficient is None else {self.coefficient: at}
-        one = Problem(p.surface, p.view, p.residual, fixed, held)
+        fixed_coefficients = None if self.coefficient is None else {self.coefficient: at}
+        one = Problem(p.surface, p.view, p.residual, fixed, fixed_coefficients)
         one.scale = p.scale
         begin = np.clip(self.point.x + self.along * (at - self.best), 0.0, 1.0)
         cost = one.descend(begin[one.free], _EVALUATIONS).cost

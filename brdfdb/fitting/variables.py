@@ -13,7 +13,9 @@ from brdfdb.parameters import ModelSpec, Parameter
 
 Array = NDArray[np.float64]
 
-NORMAL, EDGE = "reflectance at normal incidence", "edge"  # the two variables in the place of n and k
+# The two variables in the place of n and k
+NORMAL = "reflectance at normal incidence"
+EDGE = "edge"
 REFLECTANCES = 1e-4, 0.9999  # at normal incidence, of facets whose n and k are searched
 
 _DECADES = 1e3  # ratio of the ends of a range from which on a variable is searched in logarithms

@@ -121,9 +121,9 @@ def forms(source: Source, wavelength_nm: ArrayLike | None, tolerances: Sequence[
         itself = Form(key, title, "exact", f"source {source.name}", source.brdf_at(at), 0)
         return _offered([itself], _tables(source, source, at, tolerances, "table"))
     listed = list(_of_model(source, at))
-    tabulated = exact_material(source)
-    title = "table" if listed[0].python == f"models.{tabulated.model}" else "table of the fit"
-    return _offered(listed, _tables(source, tabulated, at, tolerances, title))
+    evaluated = exact_material(source)
+    title = "table" if listed[0].python == f"models.{evaluated.model}" else "table of the fit"
+    return _offered(listed, _tables(source, evaluated, at, tolerances, title))
 
 
 def _offered(listed: Sequence[Form], tables: Iterator[Form | LeftOut]) -> Forms[Form]:
@@ -175,7 +175,7 @@ def _single(form: Form) -> Form:
 
 def _tables(
     planned: Source,
-    held: Source,
+    evaluated: Source,
     wavelength_nm: NDArray[np.float64] | None,
     tolerances: Sequence[float],
     table: str,
@@ -196,19 +196,19 @@ def _tables(
             ):
                 layout, _ = tabulated(planned, wavelength_nm, tolerance)
             else:
-                layout = replace(plan(planned, wavelength_nm, tolerance), source=held)
+                layout = replace(plan(planned, wavelength_nm, tolerance), source=evaluated)
         except ParameterError as error:
             yield LeftOut(key=key, title=title, reason=str(error))
             continue
         yield _table(layout, key, title)
         if layout.spectra is not None and tolerance == _UNFACTORED:
-            whole = replace(layout, spectra=None, part_nm=None)
-            yield _table(whole, f"{key}-unfactored", f"the {percent} % table, spectra whole")
+            unfactored = replace(layout, spectra=None, part_nm=None)
+            yield _table(unfactored, f"{key}-unfactored", f"the {percent} % table, spectra whole")
     for halves, key, title in (
         (False, "table-even", "even angles"),
         (True, "table-halves", "half vectors"),
     ):
-        layout = Layout(held, _plain_grid(held, halves=halves), wavelength_nm)
+        layout = Layout(evaluated, _plain_grid(evaluated, halves=halves), wavelength_nm)
         yield _table(layout, key, f"{table}, {title}, linear")
 
 

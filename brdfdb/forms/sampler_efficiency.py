@@ -26,8 +26,10 @@ ROUNDS = 9
 PER_POINT = 4  # samples per point of the sphere; the noise is their variance, not the difference between points
 SEED = 1994
 
-# Radiance of the light on the sphere: a sky that brightens upwards, and a lamp about 20 degrees wide on the right
-_SKY, _LAMP, _SHARPNESS = 0.2, 5.0, 20.0
+# Radiance of the light on the sphere: a sky that brightens upwards, and a lamp on the right
+_SKY = 0.2
+_LAMP = 5.0
+_SHARPNESS = 20.0  # a lamp about 20 degrees wide
 _LAMP_AT = np.array([0.6, 0.4, np.sqrt(1.0 - 0.6**2 - 0.4**2)])
 
 Draw = Callable[[Array, Array, Array], tuple[Array, Array]]

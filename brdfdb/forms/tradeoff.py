@@ -26,7 +26,8 @@ BLOCK = 256  # directions of a call of medium size
 SINGLES = 21  # rounds of calls with one direction, and with `BLOCK` directions
 TIMED = timing.ROUNDS + 2 * SINGLES  # calls of `tick` during the timing
 STEPS = 4 + TIMED  # calls of `tick` for a chart
-SHARE, CONFIDENCE = 0.99, 0.95  # percentile that is charted, and the confidence of its interval
+SHARE = 0.99  # charted percentile
+CONFIDENCE = 0.95  # of the interval of this percentile
 
 
 class Cost(DocumentPart):
@@ -278,8 +279,8 @@ def _against(
     """Return fields of a `ChartPoint`: the cheapest rung as accurate as a form, and the ratio of their times."""
     if forms[number].kind in ("exact", "quadrature"):
         return {"rung": None, "saving": None}
-    own = errors[number]
-    as_good = [rival for rival in rungs if errors[rival]["l1"] <= own["l1"] and errors[rival]["p99"] <= own["p99"]]
+    error = errors[number]
+    as_good = [rival for rival in rungs if errors[rival]["l1"] <= error["l1"] and errors[rival]["p99"] <= error["p99"]]
     rung = min(as_good, key=lambda rival: float(np.median(seconds[:, rival])))
     ratios = timing.quartiles(seconds[:, rung] / seconds[:, number])
     saving = Saving(low=_short(ratios.low), times=_short(ratios.middle), high=_short(ratios.high))
@@ -336,8 +337,8 @@ def chart_family(
         If a member of `family` was built again since it was recorded.
     """
     tolerances = SPECTRAL_TOLERANCES if tolerances is None else tolerances
-    kept, errors, left_out = _forms_of_members(materials, wavelength_nm, tolerances, tick)
-    timed = [form for _, form in kept.values()]
+    representatives, errors, left_out = _forms_of_members(materials, wavelength_nm, tolerances, tick)
+    timed = [form for _, form in representatives.values()]
     between = None if family is None else of_family(family)
     drawn = error_measurement.draw(materials[len(materials) // 2], wavelength_nm, DIRECTIONS, SEED)
     batch, block, single = _timed([*timed, *([between] if between else [])], drawn, tick)
@@ -363,7 +364,7 @@ def chart_family(
                 l1=[member[form.key]["l1"] if form.key in member else None for member in errors],
                 p99=[member[form.key]["p99"] if form.key in member else None for member in errors],
             )
-            for (number, form), *costs in zip(kept.values(), batch, block, single, strict=False)
+            for (number, form), *costs in zip(representatives.values(), batch, block, single, strict=False)
         ],
         between=None
         if family is None or between is None
@@ -389,7 +390,7 @@ def _forms_of_members(
     """
     middle = len(materials) // 2
     left_out: list[LeftOutOfMember] = []
-    kept: dict[str, tuple[int, Form]] = {}
+    representatives: dict[str, tuple[int, Form]] = {}
     errors: list[dict[str, dict[str, Any]]] = []
     for number, material in enumerate(materials):
         forms = catalogue.forms(material, wavelength_nm, tolerances)
@@ -397,10 +398,10 @@ def _forms_of_members(
         left_out += [LeftOutOfMember(member=material.name, **out.model_dump()) for out in forms.left_out]
         errors.append(dict(zip((form.key for form in forms), _errors(forms, drawn), strict=True)))
         for form in forms:
-            if form.key not in kept or abs(number - middle) <= abs(kept[form.key][0] - middle):
-                kept[form.key] = number, form
+            if form.key not in representatives or abs(number - middle) <= abs(representatives[form.key][0] - middle):
+                representatives[form.key] = number, form
         tick()
-    return kept, errors, left_out
+    return representatives, errors, left_out
 
 
 def _diagnostic(materials: Sequence[Material], wavelength_nm: NDArray[np.float64] | None) -> FamilyDiagnostic | None:

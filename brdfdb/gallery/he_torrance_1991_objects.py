@@ -24,7 +24,9 @@ from brdfdb.gallery._he_torrance_cuts import (
 from brdfdb.models import he_torrance, he_torrance_very_rough, lambert
 from brdfdb.parameters import Floats
 
-GREEN_NM, BLUE_NM, RED_NM = 550.0, 450.0, 650.0
+GREEN_NM = 550.0
+BLUE_NM = 450.0
+RED_NM = 650.0
 BY_HAND = 1e-9  # relative difference of a closed form and the model
 THETA_DEG = np.arange(0.0, 90.0)  # angles of incidence of drawn reflectances
 

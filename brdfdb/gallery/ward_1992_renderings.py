@@ -47,7 +47,8 @@ OVERHEAD = np.array([0.5, 2.0, 2.2])
 MOON = unit_vector(radians(65.0), radians(115.0))  # through the window
 STRENGTHS = 0.35, 0.35, 1.0, 0.15  # irradiance of each light at the middle of the lid, across the light
 LINE = 0.45  # y of the line of the profile
-ROWS, COLUMNS = 44, 72
+ROWS = 44
+COLUMNS = 72
 
 
 class SpherePoints(NamedTuple):

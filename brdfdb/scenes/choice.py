@@ -73,10 +73,10 @@ class Decision(NamedTuple):
     """The choice for a material, with its error by itself and together with all other choices."""
 
     pick: Pick
-    left: PictureError  # of the choice by itself, at the places where forms are compared
-    cheaper_left: PictureError | None  # of the next cheaper form, which exceeds the tolerance
+    error: PictureError  # of the choice by itself, at the places where forms are compared
+    cheaper_error: PictureError | None  # of the next cheaper form, which exceeds the tolerance
     refused: bool  # True if the next cheaper form exceeds the tolerance only at the places where choices are checked
-    whole: PictureError  # together with all other choices, at every pixel of the picture and at fresh places
+    joint_error: PictureError  # together with all other choices, at every pixel of the picture and at fresh places
     even: PlaceSample | None = None  # fresh places, evenly spread over the picture; None for a recorded scene
     edges: PlaceSample | None = None  # fresh places at edges; None for a recorded scene
 
@@ -162,9 +162,9 @@ def pick(costs: Floats, error: Callable[[int], float], tolerance: float) -> Pick
         errors[index] = error(index)
         if errors[index] <= tolerance and least is None:
             least = index
-    kept = {index: errors[index] for index in sorted(errors) if errors[index] <= tolerance}
-    chosen = next(index for index in kept if kept[index] <= ALIKE * min(kept.values()))
-    cheaper = [index for index in sorted(errors) if index not in kept and clearly_cheaper(costs, index, chosen)]
+    precise = {index: errors[index] for index in sorted(errors) if errors[index] <= tolerance}
+    chosen = next(index for index in precise if precise[index] <= ALIKE * min(precise.values()))
+    cheaper = [index for index in sorted(errors) if index not in precise and clearly_cheaper(costs, index, chosen)]
     return Pick(chosen, min(cheaper, key=lambda index: errors[index], default=None))
 
 
@@ -192,7 +192,7 @@ class Look(NamedTuple):
         }
 
 
-def _left(errors: Sequence[Array], percentile: float) -> PictureError:
+def _error(errors: Sequence[Array], percentile: float) -> PictureError:
     """Return the error at even places and at edges. Edges count if the tolerance is for all places."""
     most = max(float(values.max(initial=0.0)) for values in errors)
     if percentile == 100.0 or not errors[0].size:
@@ -245,13 +245,13 @@ def choose(
     tolerance, percentile = planned.even.scene.tolerance.value, planned.even.scene.tolerance.percentile
     refused: dict[tuple[str, int], PictureError] = {}
 
-    def left(look: Look, name: str, index: int) -> PictureError:
-        return _left(look.errors([name], {name: offered[name][index]})[name], percentile)
+    def alone(look: Look, name: str, index: int) -> PictureError:
+        return _error(look.errors([name], {name: offered[name][index]})[name], percentile)
 
-    alone = functools.cache(functools.partial(left, planned))
+    planned_error = functools.cache(functools.partial(alone, planned))
 
     def known(name: str, index: int) -> PictureError:
-        return refused[name, index] if (name, index) in refused else alone(name, index)
+        return refused[name, index] if (name, index) in refused else planned_error(name, index)
 
     def picked(name: str) -> Pick:
         return pick(costs[name], lambda index: known(name, index).counted, tolerance)
@@ -265,24 +265,24 @@ def choose(
         checked = check(number)
         looks = [planned] if checked is None else [planned, checked]
         errors = [look.errors(forms, forms) for look in looks]
-        whole = {name: PictureError(*np.max([_left(by[name], percentile) for by in errors], axis=0)) for name in forms}
+        joint = {name: PictureError(*np.max([_error(by[name], percentile) for by in errors], axis=0)) for name in forms}
         tick()
-        if max(whole.values()).counted <= tolerance:
+        if max(joint.values()).counted <= tolerance:
             break
-        own = {name: max(left(look, name, one.chosen) for look in looks) for name, one in picks.items() if one.chosen}
+        own = {name: max(alone(look, name, one.chosen) for look in looks) for name, one in picks.items() if one.chosen}
         # Choices that exceed the tolerance by themselves are refused, else the choice with the largest error
         broken = {name: error for name, error in own.items() if error.counted > tolerance}
-        for name, error in (broken or {max(own, key=lambda name: own[name]): max(whole.values())}).items():
+        for name, error in (broken or {max(own, key=lambda name: own[name]): max(joint.values())}).items():
             refused[name, picks[name].chosen] = error
             picks[name] = picked(name)
     confidence = 1.0 - (1.0 - CONFIDENCE) / (number * (number + 1))
     return {
         name: Decision(
             one,
-            alone(name, one.chosen),
+            planned_error(name, one.chosen),
             None if one.cheaper is None else known(name, one.cheaper),
             (name, one.cheaper) in refused,
-            whole[name],
+            joint[name],
             *(_sample(values, tolerance, confidence) for fresh in errors[1:] for values in fresh[name]),
         )
         for name, one in picks.items()
@@ -414,7 +414,7 @@ def describe(
 ) -> list[MaterialChoice]:
     """Return the choice for each material of a scene, with costs to three digits and reasons."""
 
-    def option(name: str, index: int, left: PictureError) -> Option:
+    def option(name: str, index: int, error: PictureError) -> Option:
         one, price = offered[name][index], prices[name][index]
         form, at = one.form, one.wavelength_nm
         return Option(
@@ -427,16 +427,16 @@ def describe(
             bytes=form.bytes,
             ns=_short(price.ns),
             share=_short(price.cost / prices[name][0].cost),
-            error=Residue(**left._asdict()),
+            error=Residue(**error._asdict()),
         )
 
     materials = []
     for name, decision in chosen.items():
         truth = option(name, 0, PictureError(0.0, 0.0))
-        choice = option(name, decision.pick.chosen, decision.left)
+        choice = option(name, decision.pick.chosen, decision.error)
         cheaper = None
-        if decision.pick.cheaper is not None and decision.cheaper_left is not None:
-            cheaper = option(name, decision.pick.cheaper, decision.cheaper_left)
+        if decision.pick.cheaper is not None and decision.cheaper_error is not None:
+            cheaper = option(name, decision.pick.cheaper, decision.cheaper_error)
         materials.append(
             MaterialChoice(
                 material=name,
@@ -446,7 +446,7 @@ def describe(
                 choice=choice,
                 next_cheaper=cheaper,
                 refused=decision.refused,
-                whole=Residue(**decision.whole._asdict()),
+                whole=Residue(**decision.joint_error._asdict()),
                 even=_sampled(decision.even),
                 edges=_sampled(decision.edges),
                 reason=_reason(choice, cheaper, decision, scene.tolerance.value),
@@ -467,8 +467,8 @@ def _reason(choice: Option, cheaper: Option | None, decision: Decision, toleranc
     where = " at fresh places" if decision.refused else ""
     # At least two digits, and enough to show that the error is above the tolerance
     error = cheaper.error.counted
-    left = next(text for digits in range(2, 18) if float(text := f"{error:.{digits}g}") > tolerance)
-    return f"{clause}; the best of what is cheaper, {cheaper.title}, would leave {left}{where}"
+    text = next(text for digits in range(2, 18) if float(text := f"{error:.{digits}g}") > tolerance)
+    return f"{clause}; the best of what is cheaper, {cheaper.title}, would leave {text}{where}"
 
 
 def _sampled(sample: PlaceSample | None) -> Sampled | None:

@@ -20,9 +20,10 @@ from brdfdb.place import path_of
 from brdfdb.scenes.shapes import STRICT, Array
 from brdfdb.tables.table_source import TableSource
 
-# Least and largest share of directions that follow a lobe. With fewer, a few directions would carry all of a faint
-# gloss. The largest share bounds f_r cos / pdf in the tails, also for other forms at the same directions
-_LEAST, _MOST = 0.25, 0.9
+# Least share of directions that follow a lobe: with fewer, a few directions would carry all of a faint gloss
+_LEAST = 0.25
+# Largest share of them, which bounds f_r cos / pdf in the tails, also for other forms at the same directions
+_MOST = 0.9
 _TURN = (np.sqrt(5.0) - 1.0) / 2.0  # the golden section
 _LUMINANCE = {"R": 0.2126, "G": 0.7152, "B": 0.0722}  # luminance of the primaries of linear sRGB
 
@@ -170,7 +171,7 @@ def _checked(name: str, picture: Array) -> Array:
 
 @functools.lru_cache(maxsize=4)
 def _read(path: Path, _written: int) -> Array:
-    """Return the picture of a file. It is kept in memory until the file changes, because all lists of points use it."""
+    """Return the picture of a file. It stays in memory until the file changes, because all lists of points use it."""
     picture = _from_exr(path) if path.suffix == ".exr" else _from_numpy(path)
     if picture.ndim != 2 or picture.dtype.kind not in "iuf" or not picture.size:
         raise ParameterError("environment.file", f"{path}: must hold numbers of shape (rows, columns)")

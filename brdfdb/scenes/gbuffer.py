@@ -14,13 +14,14 @@ from brdfdb.geometry import radians
 from brdfdb.scenes.scene import Camera, Object, Rays, Scene
 from brdfdb.scenes.shapes import Array, PlaneShape, Recorded, unit
 
-# Distance of the origins of shadow and mirror rays from their surface, as a share of the height of the picture there,
-# and as a share of coordinates, which are rounded
-_LIFT, _ROUNDED = 1e-4, 1e-14
+# Distance of the origins of shadow and mirror rays from their surface
+_LIFT = 1e-4  # share of the height of the picture there
+_ROUNDED = 1e-14  # share of coordinates, which are rounded
 _BATCH = 40_000  # shadow rays at a time; fewer are slow because of the calls, and twice as many leave the cache
 # Cosine that separates limbs from backs of surfaces. The smooth normals of cones turn away by half a degree at limbs
 _BEHIND = -0.1
-_WIDEST, _MOST = 8192, 16384  # most pixels and most rays on a side; a spectral picture of 8192 x 6144 takes 16 GB
+_WIDEST = 8192  # most pixels on a side: a spectral picture of 8192 x 6144 takes 16 GB
+_MOST = 16384  # most rays on a side
 _LENGTH_OFF = 0.05  # largest error of the length of a recorded vector; it is 5e-4 in an EXR with 16 bits
 
 

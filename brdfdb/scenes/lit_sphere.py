@@ -27,17 +27,20 @@ Array = NDArray[np.float64]
 # Radiance [1] that comes from directions (..., 3): x to the right, y upwards, z towards the viewer
 Light = Callable[[Array], Array]
 
-SIZE, MOST_SIZE = 160, 2048  # pixels across a picture
+SIZE = 160  # usual pixels across a picture
+MOST_SIZE = 2048  # most pixels across a picture
 WHITE = 0.8  # linear value of a white Lambertian sphere where it is brightest
 _LAST_DEG = 89.0  # largest angle to the viewer of normals at which reflected light is computed
 _GOLDEN = (np.sqrt(5.0) - 1.0) / 2.0
-# Table of the light: half a degree apart, columns a multiple of azimuths; every eighth row and column is blurred
-_ROWS, _COLUMNS, _COARSE = 385, 768, 8
+# Table of the light, about half a degree apart
+_ROWS = 385
+_COLUMNS = 768  # a multiple of the azimuths
+_COARSE = 8  # every eighth row and column is blurred
 # Standard deviations of the blurred light, and the radius of a sample from which each is used
 _BLURS_DEG = np.array([3.5, 7.0])
 _BLURS_FROM = radians(np.array([1.2, 2.4]))
 _TABULATION = threading.Lock()  # threads that begin together wait for one table: each would take 0.4 s of its own
-_KEPT_SIZE = 512  # largest picture [pixels across] whose weights are kept: 30 MB
+_KEPT_SIZE = 512  # largest picture [pixels across] whose weights stay in memory: 30 MB
 _BLOCK_SIZE = 2**17  # directions of light, or points of pixels, of a block: its arrays stay in the cache
 
 
@@ -58,7 +61,10 @@ class _Softbox(NamedTuple):
 # In the frame of the picture: x to the right, y upwards, z towards the viewer
 _KEY = _Softbox((-0.58, 0.64, 0.50), 0.46, 0.46, 0.30, 11.0)
 _STRIP = _Softbox((0.92, 0.10, 0.10), 0.16, 0.80, 0.50, 3.5)
-_SKY, _HORIZON, _FLOOR = 0.48, 0.24, 0.05
+# Radiance above, at the horizon, and below
+_SKY = 0.48
+_HORIZON = 0.24
+_FLOOR = 0.05
 
 
 def studio(towards: Array) -> Array:
@@ -154,7 +160,7 @@ def sphere_png(surface: Source | BaseTable, size: int = SIZE, detail: Detail = F
 
 
 def thumbnail_png(table: BaseTable, size: int) -> bytes:
-    """Return the bytes of a small picture, drawn as a draft as by `sphere_png`; the last one is kept with its table."""
+    """Return the bytes of a small draft as by `sphere_png`; the last one stays in memory with its table."""
     kept_size, picture = _THUMBNAILS.get(table, (0, b""))
     if kept_size != size:
         picture = sphere_png(table, size, DRAFT)

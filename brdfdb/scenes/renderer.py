@@ -22,9 +22,10 @@ from brdfdb.tables.albedo import source_albedo
 # (wi, wr, wavelengths [nm]) of shapes (N, 3), (N, 3), (L,) -> f_r [1/sr] of shape (N, L), or (N, 1) without colour
 Brdf = Callable[[Array, Array, Array], Floats]
 
-# Albedos are polynomials of theta_r through this number of angles from 0 to the last, and constant beyond. The error is
-# at most 4e-3 for the metals of the papers. Lines through 17 angles would have an error of 3e-2
-_DEGREE, _LAST = 20, float(radians(89.5))
+# Albedos are polynomials of theta_r through this number of angles. The error is at most 4e-3 for the metals of the
+# papers. Lines through 17 angles would have an error of 3e-2
+_DEGREE = 20
+_LAST = float(radians(89.5))  # last of these angles, beyond which albedos are constant
 # Azimuths of anisotropic materials. The other half turn is the same, because lobes are ellipses and grooves straight
 _PHI = np.pi / 6.0
 _TOLERANCE = 1e-3  # absolute error of these albedos
@@ -41,7 +42,7 @@ class Reflector:
     Raises
     ------
     ParameterError
-    If the source is stated for invisible light, or is not known at the wavelengths of the scene.
+        If the source is stated for invisible light, or is not known at the wavelengths of the scene.
     """
 
     def __init__(self, source: Source, wavelength_nm: Array) -> None:

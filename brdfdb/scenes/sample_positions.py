@@ -55,11 +55,11 @@ def at_edges(scene: Scene, width: int, height: int, count: int, rng: np.random.G
 
     corners, axes = _straddling(met, width, height, rng)
     positions = [np.empty((0, 2))]
-    left = count if len(corners) else 0
+    missing = count if len(corners) else 0
     for _ in range(_TRIES):
-        if left <= 0:
+        if missing <= 0:
             break
-        chosen = rng.integers(len(corners), size=2 * left)
+        chosen = rng.integers(len(corners), size=2 * missing)
         near, axis = corners[chosen], axes[chosen]
         rows = np.arange(len(near))
         near[rows, 1 - axis] += rng.random(len(near)) - 0.5  # a random point along the edge in this pixel
@@ -76,8 +76,8 @@ def at_edges(scene: Scene, width: int, height: int, count: int, rng: np.random.G
         away = 10.0 ** (-DECADES * rng.random(len(near)))
         place[np.arange(len(near)), axis] += np.where(before, -away, away)
         place = place[np.all((place >= 0.0) & (place <= size), axis=1)]
-        positions.append(place[:left])
-        left -= len(positions[-1])
+        positions.append(place[:missing])
+        missing -= len(positions[-1])
     return _places(np.concatenate(positions), width, height)
 
 

@@ -276,7 +276,7 @@ class Scene(BaseModel):
 
 @functools.lru_cache(maxsize=64)
 def _stored(root: str, name: str, held_to: tuple[float, ...] | None) -> Source:
-    """Return a material of a store. It is kept in memory, because a scene needs it at every list of points."""
+    """Return a material of a store. It stays in memory, because a scene needs it at every list of points."""
     try:
         return source_of_table(
             Store(root)[name.removeprefix(STORED)], held_to=None if held_to is None else np.array(held_to)

@@ -54,7 +54,7 @@ class Shape(BaseModel, ABC):
     turn_deg: float = Field(default=0.0, description="about the axis, counter-clockwise")
 
     @property
-    def _own(self) -> Array:
+    def _axes(self) -> Array:
         """The shape's own x, y and z axes in the scene, as rows."""
         z = unit(np.asarray(self.axis))
         aside = np.eye(3)[0 if abs(z[0]) < 0.9 else 1]
@@ -65,14 +65,14 @@ class Shape(BaseModel, ABC):
 
     def hit(self, origins: Array, directions: Array) -> Array:
         """Return the distance (N,) along each ray to the first hit, in units of its direction; inf without a hit."""
-        own = self._own
-        return self._hit((origins - np.asarray(self.position)) @ own.T, directions @ own.T)
+        axes = self._axes
+        return self._hit((origins - np.asarray(self.position)) @ axes.T, directions @ axes.T)
 
     def frame(self, points: Array) -> Array:
         """Return tangent, bitangent and outward normal at points as the rows of (N, 3, 3)."""
-        own = self._own
-        tangent, normal = self._tangent_and_normal((points - np.asarray(self.position)) @ own.T)
-        return np.stack([tangent, np.cross(normal, tangent), normal], axis=1) @ own
+        axes = self._axes
+        tangent, normal = self._tangent_and_normal((points - np.asarray(self.position)) @ axes.T)
+        return np.stack([tangent, np.cross(normal, tangent), normal], axis=1) @ axes
 
     @abstractmethod
     def _hit(self, o: Array, d: Array) -> Array:
@@ -183,11 +183,11 @@ class Revolution(Shape):
         radius = self.radius_at(z)[0]
         t = np.minimum(*(_disc(o, d, radius[end], z[end]) for end in (0, -1)))
         # Only rays that meet the cylinder around all cones, and then the cylinder around some of them, are traced
-        whole = np.flatnonzero(np.isfinite(_cone(o, d, radius.max(), radius.max(), z[0], z[-1])))
+        candidates = np.flatnonzero(np.isfinite(_cone(o, d, radius.max(), radius.max(), z[0], z[-1])))
         for start in range(0, len(z) - 1, _FACETS):
             r_part, z_part = radius[start : start + _FACETS + 1], z[start : start + _FACETS + 1]
-            around = _cone(o[whole], d[whole], r_part.max(), r_part.max(), z_part[0], z_part[-1])
-            near = whole[np.isfinite(around)]
+            around = _cone(o[candidates], d[candidates], r_part.max(), r_part.max(), z_part[0], z_part[-1])
+            near = candidates[np.isfinite(around)]
             o_near, d_near = o[near], d[near]
             for r0, r1, z0, z1 in zip(r_part[:-1], r_part[1:], z_part[:-1], z_part[1:], strict=True):
                 t[near] = np.minimum(t[near], _cone(o_near, d_near, r0, r1, z0, z1, open_ends=True))

@@ -218,7 +218,7 @@ def test_limbs_that_no_pixel_of_the_picture_shows_refuse_a_table(rough: list[Off
     assert keys[one.pick.chosen] == "table-1-true-limbs"
     assert one.even is not None
     assert one.edges is not None
-    assert (one.whole.most <= 1.0, one.even.most <= 1.0, one.edges.most <= 1.0) == (True, True, True)
+    assert (one.joint_error.most <= 1.0, one.even.most <= 1.0, one.edges.most <= 1.0) == (True, True, True)
 
 
 def test_the_last_hundredth_of_a_degree_before_the_horizon_does_not_count() -> None:
@@ -272,7 +272,7 @@ def test_every_place_counts_or_as_many_as_the_tolerance_says(percentile: float, 
     chosen = choose(look(Mostly()), lambda _: look(Mostly()), {"a": [0.0, 5.0]}, {"a": np.array([[9.0, 1.0]])})
     one = chosen["a"]
     assert one.pick.chosen == (1 if kept else 0)
-    assert one.whole == (PictureError(0.0, 5.0) if kept else PictureError(0.0, 0.0))
+    assert one.joint_error == (PictureError(0.0, 5.0) if kept else PictureError(0.0, 0.0))
     assert one.even is not None
     # Clopper and Pearson 1934: 0 and 1 of 20, upper limits of two-sided 95 %
     assert one.even.share == pytest.approx(0.2487 if kept else 0.1684, abs=1e-4)
@@ -289,15 +289,15 @@ def test_the_choice_for_a_shipped_scene_keeps_its_tolerance_where_it_was_not_pla
     picture = checked.picture({key: offered[key][one.pick.chosen] for key, one in chosen.items()})
     for key, one in chosen.items():
         assert checked.errors(key, picture).max() <= tolerance
-        assert one.left.most <= tolerance
-        assert one.whole.most <= tolerance
+        assert one.error.most <= tolerance
+        assert one.joint_error.most <= tolerance
         for index, form in enumerate(offered[key]):
             if CHEAPER * costs[key][0, index] < costs[key][0, one.pick.chosen]:
                 broken = [most(seen, key, form) for seen in (planned, checked)]
                 assert max(broken) > tolerance
                 if index == one.pick.cheaper:
-                    assert one.cheaper_left is not None
-                    assert one.cheaper_left.most == (max(broken) if one.refused else broken[0]) > tolerance
+                    assert one.cheaper_error is not None
+                    assert one.cheaper_error.most == (max(broken) if one.refused else broken[0]) > tolerance
 
 
 @pytest.mark.parametrize(
@@ -320,9 +320,9 @@ def test_what_breaks_the_tolerance_at_other_places_is_refused() -> None:
     (one,) = chosen.values()
     forms = [each.form.key for each in offered["rendered-sphere-40deg"]]
     assert forms[one.pick.chosen] == "bounce-49"  # the closed forms cost about the same
-    assert one.whole.most <= 0.8
-    assert one.cheaper_left is not None
-    assert one.cheaper_left.most > 0.8
+    assert one.joint_error.most <= 0.8
+    assert one.cheaper_error is not None
+    assert one.cheaper_error.most > 0.8
     fit = offered["rendered-sphere-40deg"][forms.index("fit")]
     assert most(planned, "rendered-sphere-40deg", fit) <= 0.8
     assert most(checked, "rendered-sphere-40deg", fit) > 0.8
@@ -334,7 +334,7 @@ def test_what_breaks_the_tolerance_only_together_refuses_the_furthest_off() -> N
     chosen = choose(look(Summed()), lambda _: look(Summed()), offered, costs)
     assert {name: one.pick for name, one in chosen.items()} == {"a": Pick(1, 2), "b": Pick(1, None)}
     assert chosen["a"].refused
-    assert chosen["a"].cheaper_left == PictureError(0.7 + 0.6, 0.7 + 0.6)
+    assert chosen["a"].cheaper_error == PictureError(0.7 + 0.6, 0.7 + 0.6)
     assert not chosen["b"].refused
 
 
@@ -344,7 +344,7 @@ def test_the_truth_is_what_is_left_when_all_else_is_refused() -> None:
     chosen = choose(look(Summed()), lambda _: look(Summed(100.0)), offered, costs)
     assert [one.pick.chosen for one in chosen.values()] == [0, 0]
     assert all(one.refused for one in chosen.values())
-    assert [one.cheaper_left for one in chosen.values()] == [PictureError(2.0, 2.0), PictureError(5.0, 5.0)]
+    assert [one.cheaper_error for one in chosen.values()] == [PictureError(2.0, 2.0), PictureError(5.0, 5.0)]
 
 
 def test_each_round_of_checks_costs_confidence() -> None:
@@ -418,9 +418,9 @@ def test_with_an_environment_all_forms_meet_the_same_directions() -> None:
     offered, (planned, checked) = offered_and_seen(scene, 24, 37)
     chosen = choose(look(planned), lambda _: look(checked), offered, made_up_costs(offered))
     (one,) = chosen.values()
-    assert one.whole.counted <= 0.03
-    assert one.cheaper_left is not None
-    assert one.cheaper_left.counted > 0.03
+    assert one.joint_error.counted <= 0.03
+    assert one.cheaper_error is not None
+    assert one.cheaper_error.counted > 0.03
     # another 4 directions a point are further off than the tolerance, and than what was chosen
     other = gather(Scene.model_validate({**scene.model_dump(), "environment": {**room, "seed": 1}}), 37)
     noise = checked.differences(render(scene, other)).ravel()[checked.pixels("rendered-sphere-40deg")]
