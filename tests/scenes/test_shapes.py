@@ -86,18 +86,18 @@ def test_frames_are_right_handed_and_normals_face_the_ray(shape: Shape) -> None:
 
 @EVERY
 def test_a_shape_that_is_moved_and_turned_is_the_same_shape(shape: Shape) -> None:
-    # the axis towards x, turned by 90 degrees about it: its own z is the scene's x
+    # the axis towards x, turned by 90 degrees about it: the z axis of the shape is the scene's x
     moved = shape.model_copy(update={"position": (0.3, -0.2, 0.1), "axis": (2.0, 0.0, 0.0), "turn_deg": 90.0})
-    own = moved._own
-    assert np.abs(own[2] - [1.0, 0.0, 0.0]).max() < ROUNDING
+    axes = moved._axes
+    assert np.abs(axes[2] - [1.0, 0.0, 0.0]).max() < ROUNDING
     origins, directions = rays(500)
     t = shape.hit(origins, directions)
-    there = moved.hit(origins @ own + [0.3, -0.2, 0.1], directions @ own)
+    there = moved.hit(origins @ axes + [0.3, -0.2, 0.1], directions @ axes)
     assert np.array_equal(np.isfinite(t), np.isfinite(there))
     hit = np.isfinite(t)
     assert np.abs(there[hit] - t[hit]).max() < ROUNDING
     points = origins[hit] + t[hit, np.newaxis] * directions[hit]
-    assert np.abs(moved.frame(points @ own + [0.3, -0.2, 0.1]) - shape.frame(points) @ own).max() < FRAME
+    assert np.abs(moved.frame(points @ axes + [0.3, -0.2, 0.1]) - shape.frame(points) @ axes).max() < FRAME
 
 
 @pytest.mark.parametrize("name", ["sphere", "cylinder", "revolution", "box"])
