@@ -24,7 +24,6 @@ from brdfdb.tables.layout import Layout
 from brdfdb.tables.tabulation import tabulate
 from brdfdb_api import server
 from brdfdb_api.http.app import create_app
-from brdfdb_api.http.connection import Connection
 from brdfdb_api.serving.log import flush
 from brdfdb_api.serving.settings import Settings
 
@@ -100,8 +99,8 @@ def serving(root: Path, port: int = 0, **settings: Any) -> Iterator[str]:
     """The address of a service in a thread of this process, at any free port or the one that is given."""
     app = create_app(Settings(store=root, log_level="error", **settings))
     with socket.create_server(("127.0.0.1", port)) as listener:
-        config = uvicorn.Config(app, http=Connection, log_level="error", timeout_graceful_shutdown=1, lifespan="off")
-        service = server.Server(config)
+        config = uvicorn.Config(app, http="httptools", log_level="error", timeout_graceful_shutdown=1, lifespan="off")
+        service = server.DrainingServer(config)
         thread = threading.Thread(target=service.run, kwargs={"sockets": [listener]})
         thread.start()
         try:

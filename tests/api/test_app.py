@@ -158,13 +158,15 @@ def test_serve_on_a_port_that_is_taken(root: Path, monkeypatch: pytest.MonkeyPat
             serve(root, "127.0.0.1", port)
 
 
-@pytest.mark.parametrize("host", ["127.0.0.1", "localhost"])
-def test_serve(root: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], host: str) -> None:
+@pytest.mark.parametrize(("host", "lines"), [("127.0.0.1", 1), ("localhost", 1), ("0.0.0.0", 2)])
+def test_serve(
+    root: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], host: str, lines: int
+) -> None:
     ports = []
 
     def run(server: Any, sockets: list[socket.socket]) -> None:
         (listener,) = sockets
-        assert listener.getsockname()[0] == "127.0.0.1"
+        assert listener.getsockname()[0] in ("127.0.0.1", host)
         # an accepted socket inherits this; asyncio turns the 40 ms delay of small answers off only where it is named
         assert listener.proto == socket.IPPROTO_TCP
         server.config.load()
@@ -175,7 +177,10 @@ def test_serve(root: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.Captu
     monkeypatch.setenv("BRDFDB_STORE", "put back afterwards")
     monkeypatch.setattr("uvicorn.Server.run", run)
     serve(root, host, 0)
-    assert capsys.readouterr().out == f"serving {root} at http://{host}:{ports[0]}/\n"
+    said = capsys.readouterr().out.splitlines()
+    assert said[0] == f"serving {root} at http://{host}:{ports[0]}/"
+    assert len(said) == lines
+    assert all("nginx or Caddy" in line for line in said[1:])
 
 
 def test_serve_on_no_port(tmp_path: Path) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import functools
 import io
 import os
@@ -27,8 +26,7 @@ from brdfdb_api.serving.settings import LogLevel
 GONE = 499  # status of a request whose client went away, as nginx counts it
 SMALL = 64 * 2**10  # size up to which bodies and answers are not counted [byte]
 BODIES = 1  # bodies of the largest size that may be in memory together
-STALLED_S = 10.0  # time that a body may be late [s]: behind `RATE`, the lowest speed at which it may arrive
-RATE = 100_000  # [byte/s]
+RETRY_S = 10  # time after which room may be free again [s]
 PIECE = 256 * 2**10  # size of the pieces of larger answers [byte]
 ROOM = {"memory": 64 * 2**20, "files": 2**31}  # bytes of larger answers that may wait to be read
 _REQUEST_ID = re.compile(rb"[A-Za-z0-9._-]{1,64}")
@@ -119,20 +117,17 @@ class _Exchange:
         self.head = scope["method"] == "HEAD"
         self.size = 0  # bytes of the body so far
         self.counted = 0  # those that count
-        self.due_at = 0.0  # time when the next piece of the body must have come [s]
-        self.whole = False  # whether the body is
         self.status = 0  # status of the answer, once there is one
         self.start: Message | None = None  # the head of the answer, which waits for the first piece of the body
         self.large: bytes | None = None  # the body of an answer that is sent once the application has ended
         self.started = self.ended = self.gone = False
 
     async def receive(self) -> Message:
-        message = await (self._receive() if self.whole else self._piece())
+        message = await self._receive()
         if message["type"] == "http.disconnect":
             if not self.ended:
                 self.gone, self.status, self.ended = True, GONE, True
             return message
-        self.whole = not message.get("more_body", False)
         size = len(message.get("body", b""))
         self.size += size
         if self.size > self.edge.limit:
@@ -142,20 +137,7 @@ class _Exchange:
             self.counted = self.size
             if self.edge.bodies > BODIES * self.edge.limit:
                 detail = "the server holds as many large bodies as it can; ask again later"
-                raise RequestError(503, detail, retry_after_s=round(STALLED_S))
-        return message
-
-    async def _piece(self) -> Message:
-        """Return the next piece of the body; RequestError (408) if it does not come in time."""
-        now = asyncio.get_running_loop().time
-        self.due_at = self.due_at or now() + STALLED_S
-        try:
-            async with asyncio.timeout_at(self.due_at):
-                message = await self._receive()
-        except TimeoutError:
-            detail = f"the body did not arrive in time: at {RATE} bytes a second, after the first {STALLED_S:g} s"
-            raise RequestError(408, detail) from None
-        self.due_at = min(now() + STALLED_S, self.due_at + len(message.get("body", b"")) / RATE)
+                raise RequestError(503, detail, retry_after_s=RETRY_S)
         return message
 
     async def send(self, message: Message) -> None:
@@ -191,7 +173,7 @@ class _Exchange:
         place = next((place for place, room in ROOM.items() if unread[place] + size <= room), None)
         if place is None:
             detail = "too many large answers wait to be read; ask again later"
-            raise RequestError(503, detail, retry_after_s=round(STALLED_S))
+            raise RequestError(503, detail, retry_after_s=RETRY_S)
         unread[place] += size
         try:
             in_memory = place == "memory"
