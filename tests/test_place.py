@@ -21,7 +21,7 @@ from brdfdb.materials import presets
 from brdfdb.place import is_service, path_of
 from brdfdb.store.publication import publish, publish_dataset, publish_layout
 from brdfdb.tables.table import Table
-from brdfdb_api.serving.settings import Settings
+from brdfdb_api.settings import Settings
 from brdfdb_pipelines import cli, sample, scene_file
 from brdfdb_pipelines.recipe_file import load
 from tests.measurements.made_up import scattered

@@ -22,8 +22,8 @@ import uvicorn
 import brdfdb
 from brdfdb._numba import when_compiling
 from brdfdb.errors import BrdfdbError, ParameterError
-from brdfdb_api.serving import log
-from brdfdb_api.serving.settings import Settings
+from brdfdb_api import log
+from brdfdb_api.settings import Settings
 
 PAUSE_S = 1.0  # time before a failed worker is replaced [s]
 LAST_S = 0.5  # time after the signal to stop in which requests on connections that are open are answered [s]

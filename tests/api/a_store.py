@@ -24,8 +24,8 @@ from brdfdb.tables.layout import Layout
 from brdfdb.tables.tabulation import tabulate
 from brdfdb_api import server
 from brdfdb_api.http.app import create_app
-from brdfdb_api.serving.log import flush
-from brdfdb_api.serving.settings import Settings
+from brdfdb_api.log import flush
+from brdfdb_api.settings import Settings
 
 PROBLEM = "application/problem+json"
 NPY = "application/x-npy"

@@ -15,7 +15,7 @@ import brdfdb_api
 from brdfdb.errors import ParameterError, StoreError
 from brdfdb_api.http.app import create_app, openapi_json
 from brdfdb_api.server import ServerError, serve
-from brdfdb_api.serving.settings import Settings
+from brdfdb_api.settings import Settings
 from tests.api.a_store import Client
 
 OPENAPI = Path(__file__).parents[2] / "api" / "openapi.json"

@@ -13,11 +13,11 @@ from pathlib import Path
 import httpx
 import pytest
 
-from brdfdb_api.explorer import bundle
+from brdfdb_api.http import pages
 from brdfdb_api.http.app import create_app
-from brdfdb_api.serving.settings import Settings
+from brdfdb_api.settings import Settings
 
-FOLDER = Path(bundle.__file__).parent
+FOLDER = Path(str(pages.FOLDER))
 NAMES = sorted(path.name for path in FOLDER.iterdir() if path.suffix in (".html", ".css", ".js"))
 OUTSIDE = re.compile(r"(?:https?:)?//[a-z0-9-]+\.[a-z0-9.-]+[^\s\"']*")
 FIRST = ("index.html", "begin.js", "explorer.css", "explorer.js")  # before there is a picture
@@ -40,7 +40,7 @@ def get(path: str, **headers: str) -> httpx.Response:
 
 
 def test_what_is_served_is_what_there_is() -> None:
-    assert sorted(bundle.MEDIA) == sorted([*NAMES, "explorer.js", "views.js"])
+    assert sorted(pages.MEDIA) == sorted([*NAMES, "explorer.js", "views.js"])
 
 
 def test_the_page_finds_the_views_by_the_names_of_their_modules() -> None:

@@ -15,7 +15,7 @@ from brdfdb.store.reader import Store
 from brdfdb_api.http import responses
 from brdfdb_api.http.app import create_app
 from brdfdb_api.http.responses import preferred
-from brdfdb_api.serving.settings import Settings
+from brdfdb_api.settings import Settings
 from tests.api.a_store import NPY, PROBLEM, Client, client_of, pinned_of, read_npy
 
 FOIL = "/v1/materials/copper-foil"

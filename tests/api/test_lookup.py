@@ -18,7 +18,7 @@ from brdfdb.errors import ParameterError
 from brdfdb.store.reader import Store
 from brdfdb.tables.table import Table
 from brdfdb_api.http.app import create_app
-from brdfdb_api.serving.settings import Settings
+from brdfdb_api.settings import Settings
 from tests.api.a_store import NPY, VISIBLE_NM, Client, client_of, degrees, npy, read_npy
 
 FOIL = "/v1/materials/copper-foil/lookup"

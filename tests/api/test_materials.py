@@ -16,7 +16,7 @@ from brdfdb.store.publication import publish_dataset
 from brdfdb.store.reader import Store
 from brdfdb.store.shelf import Shelf
 from brdfdb_api.http.app import create_app
-from brdfdb_api.serving.settings import Settings
+from brdfdb_api.settings import Settings
 from tests.api.a_store import VISIBLE_NM, Client, client_of, pinned_of, publish
 
 FOIL = "/v1/materials/copper-foil"

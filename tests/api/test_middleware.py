@@ -14,7 +14,7 @@ import pytest
 
 from brdfdb_api.http.errors import problem_of
 from brdfdb_api.http.middleware import Edge
-from brdfdb_api.serving.log import flush
+from brdfdb_api.log import flush
 from tests.api.a_store import Client, client_of, npy
 
 FELT = "/v1/materials/grey-felt"

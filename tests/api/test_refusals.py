@@ -115,7 +115,7 @@ def test_without_descriptors_the_page_is_to_be_asked_for_again(client: Client, m
     def fail(*_: Any, **__: Any) -> Any:
         raise OSError(errno.EMFILE, "Too many open files")
 
-    monkeypatch.setattr("brdfdb_api.http.pages.content_of", fail)
+    monkeypatch.setattr("brdfdb_api.http.pages._explorer_file", fail)
     assert "too many files" in client.problem("GET", "/", 503)["detail"]
     assert client.get("/").headers["retry-after"] == "1"
 

@@ -20,7 +20,7 @@ from brdfdb.materials import presets
 from brdfdb.measurements import Samples
 from brdfdb.store.summary_words import audited_materials
 from brdfdb_api.http.app import create_app
-from brdfdb_api.serving.settings import Settings
+from brdfdb_api.settings import Settings
 from brdfdb_pipelines import former_audit, recipe_file
 from tests.api.a_store import Client
 from tests.formats.test_neural import network

@@ -6,7 +6,7 @@ import asyncio
 import contextlib
 import io
 from collections.abc import AsyncIterator, Callable
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any, NamedTuple, TypeVar
 
 import numpy as np
 from fastapi import Depends
@@ -43,18 +43,26 @@ T = TypeVar("T")
 
 INLINE_VALUES = 1000  # larger lookups run in a thread, so that the event loop can serve others
 INLINE_BYTES = 96 * 2**10  # larger bodies are read in a thread; 1000 points take about this many bytes
-# Number of larger bodies, or larger answers, that are processed at a time
-LARGE_BYTES, LARGE_VALUES, LARGE_AT_ONCE = 2**20, 100_000, 2
+LARGE_BYTES = 2**20  # larger bodies wait for a turn
+LARGE_VALUES = 100_000  # larger answers wait for a turn
+LARGE_AT_ONCE = 2  # turns at a time
 TURN_S = 10.0  # longest wait for a turn [s]
 LIMITS = {"json": (1, 100), "npy": (100, 400)}  # points and values of one answer, as multiples of max_points
 MATRIX = 16  # elements of the Mueller matrix that a Stokes vector takes
 SPECTRA_OF_COLOURS = 10  # factor on the number of values where only colours are returned
 # Parameters of the library that a request calls the same
-_PARAMETERS = (*ANGLES, "wavelength_nm", *queries.OfTable.model_fields)
+_PARAMETERS = (*ANGLES, "wavelength_nm", *queries.TableOptions.model_fields)
 NPZ = "application/x-npz"
-Asked = tuple[Surface, Points, dict[str, Any]]  # surface and points of a body, and what the answer says of them
 
 lookups = addresses()
+
+
+class AskedPoints(NamedTuple):
+    """The surface and the points of a request, and the fields that begin its document."""
+
+    surface: Surface
+    points: Points
+    about: dict[str, Any]
 
 
 @contextlib.asynccontextmanager
@@ -86,12 +94,12 @@ async def in_thread(state: State, work: Callable[[], T], *, large: bool) -> T:
         return await run_in_threadpool(work)
 
 
-def surface_in(table: Table, options: queries.OfTable) -> Surface:
+def surface_in(table: Table, query: queries.TableOptions) -> Surface:
     """Return a table, or the model that it was made of; RequestError (422) if it keeps none."""
-    if options.source == "table":
+    if query.source == "table":
         return surface_of(table)
     with refused():
-        return surface_of(table, options.source)
+        return surface_of(table, query.source)
 
 
 def tag_in(table: Table, surface: Surface) -> str:
@@ -101,13 +109,12 @@ def tag_in(table: Table, surface: Surface) -> str:
     return responses.tag_of(table, surface.source.material.spec.version)
 
 
-def evaluate(points: Points, options: queries.Options, surface: Surface, *, specular: bool = True) -> Values:
+def evaluate(points: Points, query: queries.Options, surface: Surface, *, specular: bool = True) -> Values:
     """Look up points; RequestError (422) outside the range of the surface, or where it makes no colour."""
-    error, incident = getattr(options, "error", False), getattr(options, "stokes", None)  # models have neither
+    error = getattr(query, "error", False)  # models state none
+    incident = getattr(query, "stokes", None)  # models have none
     try:
-        return surface.values(
-            points, options.output, options.illuminant, error=error, specular=specular, incident=incident
-        )
+        return surface.values(points, query.output, query.illuminant, error=error, specular=specular, incident=incident)
     except ParameterError as wrong:
         if surface.kind == "table" and wrong.parameter not in _PARAMETERS:
             raise
@@ -115,7 +122,7 @@ def evaluate(points: Points, options: queries.Options, surface: Surface, *, spec
 
 
 def checked_size(
-    max_points: int, points: Points, options: queries.Options, surface: Surface, kind: queries.Format
+    max_points: int, points: Points, query: queries.Options, surface: Surface, kind: queries.Format
 ) -> int:
     """Return the number of values to look up; RequestError (413) if they are too many for one answer."""
     most_points, most_values = (factor * max_points for factor in LIMITS[kind])
@@ -126,8 +133,8 @@ def checked_size(
         )
     wavelengths = surface.wavelengths(points)
     values = points.count * (1 if wavelengths is None else int(np.size(wavelengths)))
-    values *= 1 if getattr(options, "stokes", None) is None else MATRIX
-    if options.output != "spectrum" and surface.kind == "table":
+    values *= 1 if getattr(query, "stokes", None) is None else MATRIX
+    if query.output != "spectrum" and surface.kind == "table":
         most_values *= SPECTRA_OF_COLOURS
     if values > most_values:
         raise RequestError(413, f"{values} values are more than the {most_values} that one {kind} answer may be of")
@@ -136,43 +143,39 @@ def checked_size(
 
 async def looked_up(
     request: Request,
-    options: queries.Options,
+    query: queries.Options,
     size: int,
-    read: Callable[[], Asked],
+    read: Callable[[], AskedPoints],
     *,
     binary: bool = False,
     quick: bool = False,
 ) -> Response:
     """Answer a body of `size` bytes: read it, in a thread unless it is `quick`, and look its points up."""
-    state, kind = request.app.state, options.kind(queries.accept_of(request), binary=binary)
-    surface, points, about = read() if quick else await in_thread(state, read, large=size > LARGE_BYTES)
-    headers = responses.value_headers(kind, None, about.get("revision"), about.get("digest"))
-    return await answered(state, points, options, surface, kind, headers, about)
+    state = request.app.state
+    kind = query.kind(queries.accept_of(request), binary=binary)
+    asked = read() if quick else await in_thread(state, read, large=size > LARGE_BYTES)
+    headers = responses.value_headers(kind, None, asked.about.get("revision"), asked.about.get("digest"))
+    return await answered(state, asked, query, kind, headers)
 
 
 async def answered(
-    state: State,
-    points: Points,
-    options: queries.Options,
-    surface: Surface,
-    kind: queries.Format,
-    headers: responses.Encoded,
-    about: Any,
+    state: State, asked: AskedPoints, query: queries.Options, kind: queries.Format, headers: responses.Encoded
 ) -> Response:
-    """Look the points up and write them as `kind`, in a thread unless that is quick; `about` begins the document."""
-    values = checked_size(state.settings.max_points, points, options, surface, kind)
+    """Look the points up and write them as `kind`, in a thread unless that is quick."""
+    surface, points, about = asked
+    count = checked_size(state.settings.max_points, points, query, surface, kind)
 
     def write() -> Response:
         POINTS.labels(surface.kind).inc(points.count)
-        values = evaluate(points, options, surface, specular=kind == "json")
+        values = evaluate(points, query, surface, specular=kind == "json")
         if kind == "npy":
-            return responses.Answer(npy_bytes(values.array), headers)
-        return responses.Answer(responses.json_bytes(about | values_document(values)), headers)
+            return responses.ValuesResponse(npy_bytes(values.array), headers)
+        return responses.ValuesResponse(responses.json_bytes(about | values_document(values)), headers)
 
-    if values <= INLINE_VALUES and surface.kind == "table" and options.output == "spectrum":
+    if count <= INLINE_VALUES and surface.kind == "table" and query.output == "spectrum":
         return write()
     # a row and a column of angles take few bytes and make many points
-    return await in_thread(state, write, large=values > LARGE_VALUES)
+    return await in_thread(state, write, large=count > LARGE_VALUES)
 
 
 _OF_POINTS = queries.names_of(queries.PointQuery)
@@ -210,8 +213,8 @@ async def lookup_point(
     computed = query.source == "model" or query.output != "spectrum" or query.stokes is not None
     tag, immutable = tag_in(table, surface), is_pinned(revision) and not computed
     headers = responses.value_headers(kind, tag, table.revision, table.digest, immutable=immutable)
-    about = of_table(table)
-    answer = await answered(state, points, query, surface, kind, headers, about)
+    asked = AskedPoints(surface, points, of_table(table))
+    answer = await answered(state, asked, query, kind, headers)
     return responses.unchanged(answer, held) if held else answer
 
 
@@ -243,13 +246,16 @@ async def lookup_points(
     if query.wavelength_nm and not binary:
         raise RequestError(422, "wavelength_nm: a JSON body holds it, not the query", "wavelength_nm")
     table = await _table(shelf_of(request), name, revision)
-    surface, content = surface_in(table, query), await request.body()
+    surface = surface_in(table, query)
+    content = await request.body()
     about = of_table(table)
 
-    def read() -> Asked:
+    def read() -> AskedPoints:
         if binary:
-            return surface, queries.from_array(content, query.wavelength_nm), about
-        return surface, queries.from_json(PointsBody, content).points, about
+            points = queries.from_array(content, query.wavelength_nm)
+        else:
+            points = queries.from_json(PointsBody, content).points
+        return AskedPoints(surface, points, about)
 
     quick = len(content) <= INLINE_BYTES
     return await looked_up(request, query, len(content), read, binary=binary, quick=quick)
@@ -264,10 +270,13 @@ async def lookup_points(
 )
 def lookup_many(request: Request, query: Annotated[queries.ManyQuery, InQuery()], content: Content) -> Response:
     """Return the BRDF of several materials at the same pairs of directions (angles in degrees)."""
-    given, shelf = queries.from_json(queries.ManyBody, content), shelf_of(request)
+    given = queries.from_json(queries.ManyBody, content)
+    shelf = shelf_of(request)
     points = given.points
     kind: queries.Format = "npy" if query.format == "npz" else "json"
-    max_points, total, results = request.app.state.settings.max_points, 0, {}
+    max_points = request.app.state.settings.max_points
+    total = 0
+    results = {}
     for name in given.materials:
         table = shelf.table(name)
         surface = surface_in(table, query)
@@ -281,4 +290,4 @@ def lookup_many(request: Request, query: Annotated[queries.ManyQuery, InQuery()]
         np.savez(data, **arrays)
         return Response(data.getvalue(), media_type=NPZ, headers=responses.NO_STORE)
     documents = [of_table(table) | values_document(values) for table, values in results.values()]
-    return responses.Answer(responses.json_bytes({"materials": documents}), responses.value_headers("json"))
+    return responses.ValuesResponse(responses.json_bytes({"materials": documents}), responses.value_headers("json"))

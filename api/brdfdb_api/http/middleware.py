@@ -11,7 +11,7 @@ import tempfile
 import time
 import traceback
 from collections.abc import Callable, Sequence
-from typing import IO
+from typing import IO, Any
 
 from prometheus_client import REGISTRY, CollectorRegistry, Counter, Histogram, generate_latest
 from starlette.concurrency import run_in_threadpool
@@ -19,9 +19,9 @@ from starlette.responses import Response
 from starlette.routing import BaseRoute, Router
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from brdfdb_api import log
 from brdfdb_api.http.errors import RequestError
-from brdfdb_api.serving import log
-from brdfdb_api.serving.settings import LogLevel
+from brdfdb_api.settings import LogLevel
 
 GONE = 499  # status of a request whose client went away, as nginx counts it
 SMALL = 64 * 2**10  # size up to which bodies and answers are not counted [byte]
@@ -42,6 +42,12 @@ SECONDS = Histogram(
 POINTS = Counter("brdfdb_points", "Pairs of directions looked up", ["source"])
 
 LOGGED_FROM: dict[LogLevel, int] = {"info": 0, "warning": 400, "error": 500}  # lowest status that is logged
+
+
+@functools.lru_cache(maxsize=4096)
+def _labelled(metric: Any, *labels: object) -> Any:
+    """Return a metric with its labels, cached: finding them takes as long as a lookup."""
+    return metric.labels(*labels)
 
 
 class Edge:
@@ -101,9 +107,9 @@ class Edge:
             self.bodies -= exchange.counted
             seconds = time.perf_counter() - start
             status = exchange.status or GONE  # no client waits for a cancelled request
-            requests, observed = _counters(getattr(scope.get("route"), "path", "other"), status)
-            requests.inc()
-            observed.observe(seconds)
+            route = getattr(scope.get("route"), "path", "other")
+            _labelled(REQUESTS, route, status).inc()
+            _labelled(SECONDS, route).observe(seconds)
             if status >= self.logged_from:
                 log.write(_about(original_scope, exchange.id) | {"status": status, "ms": round(1e3 * seconds, 3)})
 
@@ -195,12 +201,6 @@ def _in_file(content: bytes) -> IO[bytes]:
     file.write(content)
     file.seek(0)
     return file
-
-
-@functools.lru_cache(maxsize=4096)
-def _counters(route: str, status: int) -> tuple[Counter, Histogram]:
-    """Return the counters of a route and a status, cached: finding labels takes as long as a lookup."""
-    return REQUESTS.labels(route, status), SECONDS.labels(route)
 
 
 def metrics() -> bytes:

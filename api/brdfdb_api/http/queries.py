@@ -43,6 +43,10 @@ def _digits(value: object) -> object:
     return value
 
 
+def _radians(angle: float) -> float:
+    return math.radians(math.fmod(angle, TURN))
+
+
 Finite = Annotated[float, Field(allow_inf_nan=False), BeforeValidator(_digits)]
 Polar = Annotated[Finite, Field(ge=0.0, le=180.0)]
 Azimuth = Annotated[Finite, Field(ge=-AZIMUTH_MOST_DEG, le=AZIMUTH_MOST_DEG)]
@@ -83,7 +87,7 @@ class Options(Query):
         return "npy" if preferred(accept, *offers) == NPY else "json"
 
 
-class OfTable(Options):
+class TableOptions(Options):
     """Form of values of a table, or of its model; of a table with its stated errors, and the light that it reflects."""
 
     source: Literal["table", "model"] = Field(
@@ -119,13 +123,13 @@ class OfTable(Options):
         return kind
 
 
-class BodyQuery(OfTable):
+class BodyQuery(TableOptions):
     """The query of a lookup whose points are in the body."""
 
     wavelength_nm: Wavelengths = Field(default=(), description="wavelength [nm] of a .npy body; JSON holds its own")
 
 
-class ManyQuery(OfTable):
+class ManyQuery(TableOptions):
     """The query of a lookup of many materials."""
 
     format: Literal["json", "npz"] = Field(
@@ -133,7 +137,7 @@ class ManyQuery(OfTable):
     )  # type: ignore[assignment]
 
 
-class PointQuery(OfTable):
+class PointQuery(TableOptions):
     """The query of a lookup of one point."""
 
     wavelength_nm: Wavelengths = ()
@@ -147,13 +151,12 @@ class PointQuery(OfTable):
     @property
     def points(self) -> Points:
         """The point."""
-        t_i, p_i, t_r, p_r = (
-            math.radians(math.fmod(angle, TURN)) for angle in (self.theta_i, self.phi_i, self.theta_r, self.phi_r)
-        )
-        return Points((t_i, p_i, t_r, p_r), (), listed(self.wavelength_nm))
+        light = (_radians(self.theta_i), _radians(self.phi_i))
+        viewer = (_radians(self.theta_r), _radians(self.phi_r))
+        return Points((*light, *viewer), (), listed(self.wavelength_nm))
 
 
-class Light(Query):
+class LightQuery(Query):
     """The direction of one light, and the viewers that are looked at."""
 
     view: View = Field(default="cut", description="the plane of incidence, all viewers, or theta_h and theta_d")
@@ -162,8 +165,12 @@ class Light(Query):
     wavelength_nm: Wavelengths = ()
 
 
-class LobeQuery(Light, OfTable):
+class LobeQuery(LightQuery, TableOptions):
     """The query of a lobe of a table."""
+
+
+class LobeOptions(LightQuery, Options):
+    """The query of a lobe of a model."""
 
 
 def accept_of(request: Request) -> str:

@@ -10,7 +10,7 @@ import re
 from typing import TYPE_CHECKING, Annotated, Any
 
 import orjson
-from pydantic import BaseModel, Field, GetJsonSchemaHandler
+from pydantic import BaseModel, ConfigDict, Field, GetJsonSchemaHandler
 from pydantic_core import CoreSchema
 from starlette.concurrency import run_in_threadpool
 from starlette.datastructures import Headers
@@ -36,8 +36,10 @@ COMPRESSED_FROM = 1024  # length of a document [byte]
 _QUALITY = re.compile(r"(?<![^\s;])q=(0(?:\.\d*)?|1(?:\.0*)?)\s*(?:;|$)")
 
 
-class Problem(BaseModel):
+class ServedProblem(BaseModel):
     """An error (RFC 9457)."""
+
+    model_config = ConfigDict(title="Problem")
 
     type: str = Field(description="about:blank: the status says which kind of error this is")
     title: str
@@ -54,8 +56,10 @@ class Health(BaseModel):
     materials: int | None = Field(default=None, description="number of materials in the store")
 
 
-class Summary(Line):
+class ServedSummary(Line):
     """One line of the catalogue; of a damaged material only `name`, `damaged` and `href`."""
+
+    model_config = ConfigDict(title="Summary")
 
     href: str
     thumbnail: str | None = Field(default=None, description="address of its picture")
@@ -64,13 +68,15 @@ class Summary(Line):
 class Catalogue(BaseModel):
     """Materials of the store, a page of them."""
 
-    materials: list[Summary]
+    materials: list[ServedSummary]
     total: int = Field(description="materials that the filters let through, on all pages")
     next: str | None = Field(description="address of the next page; null: this is the last")
 
 
-class Material(MaterialDocument):
+class ServedMaterial(MaterialDocument):
     """One material: where its table comes from, where it is sampled, how far to believe it."""
+
+    model_config = ConfigDict(title="Material")
 
     revisions: list[str] = Field(description="that are kept, oldest first")
     links: dict[str, str]
@@ -160,7 +166,7 @@ class Document(Response):
         await super().__call__(scope, receive, send)
 
 
-class Answer(Response):
+class ValuesResponse(Response):
     """Values as JSON or .npy, with headers that many answers share: to encode them takes as long as to look them up."""
 
     def __init__(self, content: bytes, headers: Encoded) -> None:
