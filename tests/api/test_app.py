@@ -53,12 +53,13 @@ def test_the_audit_lies_in_the_store_unless_it_is_named(tmp_path: Path) -> None:
     assert Settings(store=tmp_path, audit=Path("other.json")).audit_files == (Path("other.json"),)
 
 
-@pytest.mark.parametrize("variable", ["BRDFDB_MAX_POINTS", "BRDFDB_MAX_BODY_BYTES", "BRDFDB_CACHE_BYTES"])
-@pytest.mark.parametrize("value", ["0", "-1", "1e4", "", "many", "²"])
-def test_a_bad_setting_is_named(monkeypatch: pytest.MonkeyPatch, variable: str, value: str) -> None:
-    monkeypatch.setenv(variable, value)
-    with pytest.raises(ParameterError, match=f"^{variable}: '.*' (is not a whole number|must be greater than 0)$"):
-        create_app()
+def test_a_bad_setting_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    for value in ["0", "-1", "1e4", "", "many", "²"]:
+        for variable in ["BRDFDB_MAX_POINTS", "BRDFDB_MAX_BODY_BYTES", "BRDFDB_CACHE_BYTES"]:
+            with monkeypatch.context() as patch:
+                patch.setenv(variable, value)
+                with pytest.raises(ParameterError, match=f"^{variable}: "):
+                    create_app()
 
 
 def test_an_unknown_level_of_the_log_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -87,9 +88,9 @@ def test_openapi_is_served(client: Client) -> None:
     assert "/openapi.json" in client.get("/docs").text
 
 
-@pytest.mark.parametrize(
-    ("method", "address", "path", "status"),
-    [
+def test_answers_are_as_documented(client: Client) -> None:
+    document = json.loads(OPENAPI.read_text())
+    for method, address, path, status in [
         ("GET", "/healthz", "/healthz", 200),
         ("GET", "/v1/materials", "/v1/materials", 200),
         ("GET", "/v1/materials/copper-foil", "/v1/materials/{name}", 200),
@@ -127,21 +128,18 @@ def test_openapi_is_served(client: Client) -> None:
         ("GET", "/v1/families", "/v1/families", 200),
         ("GET", "/v1/store/zarr.json", "/v1/store/zarr.json", 200),
         ("GET", f"{FOIL}/thumbnail.png", "/v1/materials/{name}/thumbnail.png", 200),
-    ],
-)
-def test_answers_are_as_documented(client: Client, method: str, address: str, path: str, status: int) -> None:
-    document = json.loads(OPENAPI.read_text())
-    operation = document["paths"][path][method.lower()]
-    content = {}
-    if method == "POST":
-        documented = operation["requestBody"]["content"]["application/json"]
-        jsonschema.validate(documented["example"], {**documented["schema"], "components": document["components"]})
-        content = {"json": documented["example"]}
-    answer = client.request(method, address, **content)
-    assert answer.status_code == status
-    media = operation["responses"][str(status)]["content"][answer.headers["content-type"].partition(";")[0]]
-    if "json" in answer.headers["content-type"]:
-        jsonschema.validate(answer.json(), {**media["schema"], "components": document["components"]})
+    ]:
+        operation = document["paths"][path][method.lower()]
+        content = {}
+        if method == "POST":
+            documented = operation["requestBody"]["content"]["application/json"]
+            jsonschema.validate(documented["example"], {**documented["schema"], "components": document["components"]})
+            content = {"json": documented["example"]}
+        answer = client.request(method, address, **content)
+        assert answer.status_code == status
+        media = operation["responses"][str(status)]["content"][answer.headers["content-type"].partition(";")[0]]
+        if "json" in answer.headers["content-type"]:
+            jsonschema.validate(answer.json(), {**media["schema"], "components": document["components"]})
 
 
 def test_serve_needs_a_store(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

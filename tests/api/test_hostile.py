@@ -139,35 +139,18 @@ def npy(shape: str, data: bytes = b"", descr: str = "'<f8'", version: bytes = b"
 
 
 BODIES = {
-    "nothing": b"",
-    "not JSON": b"{theta_i: 1}",
     "not UTF-8": b'{"theta_i": "\xff\xfe"}',
-    "a list": b"[1, 2]",
-    "null": b"null",
-    "a nan": b'{"theta_i": NaN, "theta_r": 0}',
-    "an infinity": b'{"theta_i": -Infinity, "theta_r": 0}',
-    "a number past all floats": b'{"theta_i": 1e999, "theta_r": 0}',
     "an integer of a thousand digits": b'{"theta_i": ' + b"9" * 1000 + b', "theta_r": 0}',
     "an integer of a million digits": b'{"theta_i": ' + b"9" * 10**6 + b', "theta_r": 0}',
     "deep lists": b'{"theta_r": 0, "theta_i": ' + b"[" * 900 + b"1" + b"]" * 900 + b"}",
     "deeper lists": b'{"theta_r": 0, "theta_i": ' + b"[" * 200_000 + b"1" + b"]" * 200_000 + b"}",
     "deep objects": b'{"a":' * 100_000 + b"1" + b"}" * 100_000,
-    "lists that do not fit": b'{"theta_i": [1, [2]], "theta_r": 0}',
-    "empty lists": b'{"theta_i": [], "theta_r": [[]]}',
-    "words": b'{"theta_i": "45", "theta_r": 0}',
-    "truth": b'{"theta_i": true, "theta_r": 0}',
-    "objects": b'{"theta_i": {"x": 1}, "theta_r": 0}',
     "an unknown name": b'{"theta_i": 1, "theta_r": 0, "__proto__": 2}',
     "a name of a megabyte": b'{"theta_i": 1, "theta_r": 0, "' + b"x" * 2**20 + b'": 2}',
-    "a polar angle below the surface of the earth": b'{"theta_i": 181, "theta_r": 0}',
-    "wavelengths in lists of lists": b'{"theta_i": 1, "theta_r": 0, "wavelength_nm": [[500]]}',
     "a wavelength of nothing": b'{"theta_i": 1, "theta_r": 0, "wavelength_nm": 0}',
 }
 ARRAYS = {
-    "nothing": b"",
     "no .npy": b"PK\x03\x04" + bytes(100),
-    "only magic": b"\x93NUMPY",
-    "a version of the future": npy("(1, 4)", bytes(32), version=b"\x09\x00"),
     "a header that is code": b"\x93NUMPY\x01\x00"
     + struct.pack("<H", 40)
     + b"__import__('os').system('echo hi')".ljust(40),
@@ -176,21 +159,11 @@ ARRAYS = {
     "a petabyte": npy("(35184372088832, 4)", bytes(64)),
     "a product past 64 bits": npy("(4611686018427387904, 4611686018427387904, 4)", bytes(64)),
     "a negative shape": npy("(-1, 4)", bytes(32)),
-    "fewer numbers": npy("(2, 4)", bytes(32)),
-    "more numbers": npy("(1, 4)", bytes(64)),
-    "objects": npy("(1, 4)", bytes(32), "'|O'"),
     "records": npy("(1, 4)", bytes(32), "[('a', '<f8')]"),
-    "other bytes first": npy("(1, 4)", bytes(32), "'>f8'"),
-    "integers": npy("(1, 4)", bytes(32), "'<i8'"),
-    "three columns": npy("(1, 3)", bytes(24)),
-    "no columns": npy("()", bytes(8)),
-    "no rows": npy("(0, 4)"),
     "no rows, and more of them than 64 bits count": npy("(0, 1000000000000000000000000000000, 4)"),
     "no columns of more than memory": npy("(4611686018427387904, 0, 4)"),
     "seventy axes": npy(f"({'1, ' * 70}4)", bytes(32)),
     "truth for a length": npy("(True, 4)", bytes(32)),
-    "nan": npy("(1, 4)", struct.pack("<4d", float("nan"), 0, 0, 0)),
-    "an infinite azimuth": npy("(1, 4)", struct.pack("<4d", 1, float("inf"), 0, 0)),
 }
 
 
@@ -231,22 +204,8 @@ def test_points_that_broadcast_to_more_than_may_be_are_refused_before_they_are_m
 
 
 QUERIES = [
-    "theta_i=nan&theta_r=0",
-    "theta_i=inf&theta_r=0",
-    "theta_i=1_0&theta_r=0",
     "theta_i=0x10&theta_r=0",
-    "theta_i=&theta_r=0",
-    "theta_i=1&theta_i=2&theta_r=0",
-    "theta_i=1",
-    "theta_i=-0.1&theta_r=0",
-    "theta_i=1&theta_r=0&wavelength_nm=-5",
-    "theta_i=1&theta_r=0&wavelength_nm=",
-    "theta_i=1&theta_r=0&from=hell",
     "theta_i=1&theta_r=0&output=xyz&illuminant=%00",
-    "theta_i=1&theta_r=0&output=xyz&illuminant=D66",
-    "theta_i=1&theta_r=0&illuminant=D65",
-    "theta_i=1&theta_r=0&error=perhaps",
-    "theta_i=1&theta_r=0&error=true",
     "theta_i=1&theta_r=0&format=pickle",
     "theta_i=1&theta_r=0&%F0%9F%92%A9=1",
     "theta_i=%ff%fe&theta_r=0",
