@@ -169,6 +169,7 @@ def test_a_refused_method_names_all_that_are_allowed(client: Client) -> None:
     ]:
         answer = client.request("DELETE", address)
         assert (answer.status_code, answer.headers["content-type"], answer.headers["allow"]) == (405, PROBLEM, allowed)
+        assert answer.json()["detail"] == f"DELETE is not allowed at this address; allowed are {allowed}"
 
 
 def test_a_compressed_body_is_refused(client: Client) -> None:

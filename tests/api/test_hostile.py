@@ -243,11 +243,6 @@ def test_path_tricks_lead_nowhere(server: Server) -> None:
         server.refused(404, "GET", path)
 
 
-def test_other_methods_are_refused(server: Server) -> None:
-    for method in ("PUT", "DELETE", "PATCH", "PROPFIND"):
-        server.refused(405, method, LOOKUP)
-
-
 @pytest.mark.parametrize(
     "data",
     [

@@ -43,17 +43,6 @@ def test_an_address_that_is_none_says_where_all_are(client: Client) -> None:
     assert problem["detail"] == "'/v1/material/grey-felt' is no address; /docs lists all that there are"
 
 
-def test_a_method_that_is_not_allowed_says_which_are(client: Client) -> None:
-    for method, address, allowed in [
-        ("DELETE", FELT, "GET, HEAD, POST"),
-        ("POST", "/v1/materials", "GET, HEAD"),
-        ("GET", "/v1/lookup", "POST"),
-    ]:
-        problem = client.problem(method, address, 405)
-        assert problem["detail"] == f"{method} is not allowed at this address; allowed are {allowed}"
-        assert client.request(method, address).headers["allow"] == allowed
-
-
 def test_a_filter_that_nothing_can_have_says_what_is_allowed(client: Client) -> None:
     for query, sentence in [
         ("model=phong", "model: 'phong' is not one of abg, beckmann, "),
