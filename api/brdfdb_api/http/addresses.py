@@ -1,4 +1,4 @@
-"""Addresses: how they are added, the parameters that they know, and their answers as OpenAPI describes them."""
+"""Routes of the service, and the descriptions of their answers in the OpenAPI document."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ Content = Annotated[bytes, Depends(_content)]  # of addresses that run in a thre
 
 
 class Address(APIRoute):
-    """An address that refuses parameters of the query that it does not name, and sends nothing that a client holds."""
+    """A route that refuses unknown query parameters, and answers 304 to a client that has the current answer."""
 
     def __init__(self, path: str, endpoint: Callable[..., Any], **keywords: Any) -> None:
         super().__init__(path, endpoint, **keywords)
@@ -95,9 +95,9 @@ class Address(APIRoute):
 
 
 class Quick(Address):
-    """GET of an address whose endpoint reads its query itself: FastAPI describes it, and does not parse it.
+    """A GET route whose endpoint parses its query itself, because FastAPI takes three times as long to answer.
 
-    To answer it, too, takes FastAPI three times as long.
+    FastAPI describes the parameters in the OpenAPI document.
     """
 
     def __init__(self, path: str, endpoint: Callable[..., Any], **keywords: Any) -> None:
@@ -117,7 +117,7 @@ def addresses() -> APIRouter:
 def both(
     router: APIRouter, path: str, *, method: str = "GET", **keywords: Any
 ) -> Callable[[Callable[..., T]], Callable[..., T]]:
-    """Serve an address of the current revision, and the same of any revision, named with its digest or without."""
+    """Add a route for the current revision of a material, and the same route for a named revision."""
 
     def add(function: Callable[..., T]) -> Callable[..., T]:
         signature = inspect.signature(function, eval_str=True)

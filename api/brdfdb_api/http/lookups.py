@@ -50,14 +50,14 @@ TURN_S = 10.0  # longest wait for a turn [s]
 LIMITS = {"json": (1, 100), "npy": (100, 400)}  # points and values of one answer, as multiples of max_points
 MATRIX = 16  # elements of the Mueller matrix that a Stokes vector takes
 SPECTRA_OF_COLOURS = 10  # factor on the number of values where only colours are returned
-# Parameters of the library that a request calls the same
+# Parameters with the same name in the library and in requests
 _PARAMETERS = (*ANGLES, "wavelength_nm", *queries.TableOptions.model_fields)
 NPZ = "application/x-npz"
 
 lookups = addresses()
 
 
-class AskedPoints(NamedTuple):
+class RequestedPoints(NamedTuple):
     """The surface and the points of a request, and the fields that begin its document."""
 
     surface: Surface
@@ -67,7 +67,7 @@ class AskedPoints(NamedTuple):
 
 @contextlib.asynccontextmanager
 async def turn(turns: asyncio.Semaphore) -> AsyncIterator[None]:
-    """Wait for a turn; RequestError (503) if none comes within `TURN_S`."""
+    """Wait until fewer large requests run; RequestError (503) after `TURN_S`."""
     try:
         async with asyncio.timeout(TURN_S):
             await turns.acquire()
@@ -85,17 +85,17 @@ async def _large(request: Request) -> AsyncIterator[None]:
         yield
 
 
-LARGE = Depends(_large)  # of addresses that take much memory, or much time
+LARGE = Depends(_large)  # for addresses that need much memory or time
 
 
 async def in_thread(state: State, work: Callable[[], T], *, large: bool) -> T:
-    """Return what work returns, done in a thread; large work waits for a turn."""
+    """Run work in a thread and return its result; large work waits for a turn."""
     async with turn(state.large) if large else contextlib.nullcontext():
         return await run_in_threadpool(work)
 
 
 def surface_in(table: Table, query: queries.TableOptions) -> Surface:
-    """Return a table, or the model that it was made of; RequestError (422) if it keeps none."""
+    """Return a table, or the model that it was made of; RequestError (422) if the table has no model."""
     if query.source == "table":
         return surface_of(table)
     with refused():
@@ -145,7 +145,7 @@ async def looked_up(
     request: Request,
     query: queries.Options,
     size: int,
-    read: Callable[[], AskedPoints],
+    read: Callable[[], RequestedPoints],
     *,
     binary: bool = False,
     quick: bool = False,
@@ -153,16 +153,16 @@ async def looked_up(
     """Answer a body of `size` bytes: read it, in a thread unless it is `quick`, and look its points up."""
     state = request.app.state
     kind = query.kind(queries.accept_of(request), binary=binary)
-    asked = read() if quick else await in_thread(state, read, large=size > LARGE_BYTES)
-    headers = responses.value_headers(kind, None, asked.about.get("revision"), asked.about.get("digest"))
-    return await answered(state, asked, query, kind, headers)
+    requested = read() if quick else await in_thread(state, read, large=size > LARGE_BYTES)
+    headers = responses.value_headers(kind, None, requested.about.get("revision"), requested.about.get("digest"))
+    return await answered(state, requested, query, kind, headers)
 
 
 async def answered(
-    state: State, asked: AskedPoints, query: queries.Options, kind: queries.Format, headers: responses.Encoded
+    state: State, requested: RequestedPoints, query: queries.Options, kind: queries.Format, headers: responses.Encoded
 ) -> Response:
     """Look the points up and write them as `kind`, in a thread unless that is quick."""
-    surface, points, about = asked
+    surface, points, about = requested
     count = checked_size(state.settings.max_points, points, query, surface, kind)
 
     def write() -> Response:
@@ -201,21 +201,21 @@ async def lookup_point(
     """
     scope = request.scope
     query = queries.checked(queries.PointQuery, queries.parsed(scope["query_string"], _OF_POINTS))
-    accept = held = ""
+    accept = if_none_match = ""
     for key, value in scope["headers"]:
         if key == b"accept":
             accept += f",{value.decode('latin-1')}"  # the header may come in several lines
         elif key == b"if-none-match":
-            held = value.decode("latin-1")
+            if_none_match = value.decode("latin-1")
     state, kind, points = scope["app"].state, query.kind(accept), query.points
     table = await _table(state.shelf, name, revision)
     surface = surface_in(table, query)
     computed = query.source == "model" or query.output != "spectrum" or query.stokes is not None
     tag, immutable = tag_in(table, surface), is_pinned(revision) and not computed
     headers = responses.value_headers(kind, tag, table.revision, table.digest, immutable=immutable)
-    asked = AskedPoints(surface, points, of_table(table))
-    answer = await answered(state, asked, query, kind, headers)
-    return responses.unchanged(answer, held) if held else answer
+    requested = RequestedPoints(surface, points, of_table(table))
+    answer = await answered(state, requested, query, kind, headers)
+    return responses.unchanged(answer, if_none_match) if if_none_match else answer
 
 
 async def _table(shelf: Shelf, name: str, revision: str | None) -> Table:
@@ -250,12 +250,12 @@ async def lookup_points(
     content = await request.body()
     about = of_table(table)
 
-    def read() -> AskedPoints:
+    def read() -> RequestedPoints:
         if binary:
             points = queries.from_array(content, query.wavelength_nm)
         else:
             points = queries.from_json(PointsBody, content).points
-        return AskedPoints(surface, points, about)
+        return RequestedPoints(surface, points, about)
 
     quick = len(content) <= INLINE_BYTES
     return await looked_up(request, query, len(content), read, binary=binary, quick=quick)

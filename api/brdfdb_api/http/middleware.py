@@ -115,14 +115,14 @@ class Edge:
 
 
 class _Exchange:
-    """A request and its answer: room and time for the body, an id, and a large answer sent as it is read."""
+    """A request and its answer: its id, the bytes of its body in memory, and a large answer that waits to be read."""
 
     def __init__(self, edge: Edge, scope: Scope, receive: Receive, send: Send) -> None:
         self.edge, self._receive, self._send = edge, receive, send
         self.id = _request_id(scope)
         self.head = scope["method"] == "HEAD"
         self.size = 0  # bytes of the body so far
-        self.counted = 0  # those that count
+        self.counted = 0  # bytes of the body that are counted against the limit of all bodies
         self.status = 0  # status of the answer, once there is one
         self.start: Message | None = None  # the head of the answer, which waits for the first piece of the body
         self.large: bytes | None = None  # the body of an answer that is sent once the application has ended

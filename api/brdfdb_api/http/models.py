@@ -24,7 +24,7 @@ from brdfdb.tables.points import PointsBody
 from brdfdb.tables.values_document import FamilyLookup, ModelAlbedo, ModelLobe, ModelLookup
 from brdfdb_api.http.addresses import NPY_ANSWER, Content, addresses, answers, body, shelf_of
 from brdfdb_api.http.errors import refused
-from brdfdb_api.http.lookups import LARGE, AskedPoints, looked_up
+from brdfdb_api.http.lookups import LARGE, RequestedPoints, looked_up
 from brdfdb_api.http.queries import Flag, LobeOptions, Options, Query, Wavelengths, from_json
 from brdfdb_api.http.responses import NO_STORE, NPY, Document, Families, Model, Models
 from brdfdb_api.http.views import SPHERE, SphereQuery, lobe_answer, sphere_answer
@@ -110,10 +110,10 @@ async def model_lookup(
     A spectral model is evaluated from 420 to 680 nm in steps of 20 nm, unless wavelength_nm says otherwise.
     """
 
-    def read() -> AskedPoints:
+    def read() -> RequestedPoints:
         given = from_json(PointsAt, content)
         surface, about = _surface(spec, given)
-        return AskedPoints(surface, given.points, about)
+        return RequestedPoints(surface, given.points, about)
 
     return await looked_up(request, query, len(content), read)
 
@@ -188,10 +188,10 @@ async def family_lookup(
 ) -> Response:
     """Return the BRDF of a family at parameters between those of its members, interpolated in their tables."""
 
-    def read() -> AskedPoints:
+    def read() -> RequestedPoints:
         given = from_json(PointsOfFamily, content)
         with refused():
             surface = shelf_of(request).store.family(family).surface(given.parameters)
-        return AskedPoints(surface, given.points, {"family": family, "parameters": given.parameters})
+        return RequestedPoints(surface, given.points, {"family": family, "parameters": given.parameters})
 
     return await looked_up(request, query, len(content), read)

@@ -72,15 +72,15 @@ def explorer_file(request: Request, file: str) -> Response:
     if file not in MEDIA:
         raise RequestError(404, "the explorer has no such file")
     packed = preferred(request.headers.get("accept-encoding", ""), "identity", "gzip") == "gzip"
-    found = _explorer_file(file, packed=packed)
+    stored = _explorer_file(file, packed=packed)
     headers = {
         **SAFE,
-        "ETag": f'"{found.tag}"',
+        "ETag": f'"{stored.tag}"',
         "Cache-Control": "no-cache",
         "Vary": "Accept-Encoding",
         **({"Content-Encoding": "gzip"} if packed else {}),
     }
-    answer = Response(found.content, media_type=MEDIA[file], headers=headers)
+    answer = Response(stored.content, media_type=MEDIA[file], headers=headers)
     return unchanged(answer, request.headers.get("if-none-match"))
 
 
