@@ -4,7 +4,11 @@ from __future__ import annotations
 
 import asyncio
 import io
+import os
+import signal
 import socket
+import subprocess
+import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -108,6 +112,24 @@ def serving(root: Path, port: int = 0, **settings: Any) -> Iterator[str]:
         finally:
             service.should_exit = True
             thread.join()
+
+
+@contextmanager
+def serving_command(
+    root: Path, *options: str, stderr: Any = subprocess.DEVNULL, **environment: str
+) -> Iterator[tuple[subprocess.Popen[str], int]]:
+    """The process of `brdfdb serve` on a free port, and this port; Ctrl-C ends it, and it must end well."""
+    command = [sys.executable, "-m", "brdfdb_pipelines.cli", "serve", "--store", str(root), "--port", "0", *options]
+    inherited = {key: value for key, value in os.environ.items() if not key.startswith("BRDFDB_")}
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=stderr, text=True, env={**inherited, **environment}
+    ) as process:
+        assert process.stdout is not None
+        try:
+            yield process, int(process.stdout.readline().rsplit(":", 1)[1].strip(" /\n"))
+        finally:
+            process.send_signal(signal.SIGINT)
+    assert process.returncode == 0
 
 
 def read_npy(content: bytes) -> np.ndarray:

@@ -5,11 +5,7 @@ from __future__ import annotations
 import contextlib
 import http.client
 import json
-import os
-import signal
 import socket
-import subprocess
-import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -122,66 +118,3 @@ def test_answers_that_are_not_read_wait_in_little_room(port: int, monkeypatch: p
 
     wait_until(answered)
     np.testing.assert_allclose(np.frombuffer(whole[-8_000_000:]), 0.25 / np.pi, rtol=1e-6)
-
-
-SCRIPT = """
-import sys
-from pathlib import Path
-from brdfdb_api import server
-ended = server._ended
-
-async def told(signs):
-    if not await signs.read(64):
-        return "ended"
-    print("a worker gives its first sign of life", flush=True)
-    return await ended(signs)
-
-server._ended = told
-{}
-server.serve(Path(sys.argv[1]), "127.0.0.1", 0, workers=2)
-"""
-
-
-@contextlib.contextmanager
-def process(store: Path, change: str, **pipes: int) -> Iterator[tuple[subprocess.Popen[str], int]]:
-    """`brdfdb serve` with two workers and a constant that is changed; its process and port."""
-    command = [sys.executable, "-c", SCRIPT.format(change), str(store)]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, **pipes) as served:
-        try:
-            assert served.stdout is not None
-            port = int(served.stdout.readline().rsplit(":", 1)[1].strip(" /\n"))
-            for _ in range(2):
-                assert served.stdout.readline() == "a worker gives its first sign of life\n"
-            wait_until(lambda: get(port, "/readyz")[0] == 200)
-            assert len(_children(served.pid)) == 2
-            yield served, port
-        finally:
-            served.kill()
-
-
-def _children(pid: int) -> set[int]:
-    return {int(child) for child in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()}
-
-
-def test_a_log_that_nobody_reads_stops_neither_answers_nor_the_end(store: Path) -> None:
-    with process(store, "pass", stderr=subprocess.PIPE) as (served, port):
-        query = f"{POINT}&phi_r={'0' * 3000}"
-        for _ in range(100):  # 300 kB of lines; a pipe holds 64
-            assert get(port, query)[0] == 200
-        served.send_signal(signal.SIGTERM)
-        assert served.wait(WAIT_S) == 0
-
-
-def test_a_halted_worker_is_replaced_and_does_not_keep_the_server_from_ending(store: Path) -> None:
-    change = "server.LOADED_S, server.HALTED_S, server.STOPPED_S = 6.0, 6.0, 1.0"  # after the first sign of life
-    with process(store, change, stderr=subprocess.DEVNULL) as (served, port):
-        before = _children(served.pid)
-        os.kill(min(before), signal.SIGSTOP)
-        wait_until(lambda: len(_children(served.pid) - before) == 1)
-        assert not Path(f"/proc/{min(before)}").exists()
-        for _ in range(4):
-            assert get(port)[0] == 200
-        os.kill(max(before), signal.SIGSTOP)
-        served.send_signal(signal.SIGTERM)
-        assert served.wait(WAIT_S) == 0
-    assert not Path(f"/proc/{max(before)}").exists()

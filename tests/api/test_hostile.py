@@ -10,7 +10,6 @@ import re
 import socket
 import struct
 import subprocess
-import sys
 import time
 from collections import Counter
 from collections.abc import Iterator
@@ -20,13 +19,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from brdfdb.materials import Material
-from brdfdb.store.publication import publish_dataset
-from brdfdb.tables.grids import Grid
-from brdfdb.tables.layout import Layout
-from brdfdb.tables.tabulation import tabulate
+from tests.api.a_store import publish, serving_command
 
-GRID = Grid({"theta_i": [0, 30, 60, 85], "theta_r": [0, 30, 60, 85], "delta_phi": [0, 90, 180]})
 LOOKUP = "/v1/materials/white/lookup"
 GONE = "499"
 JSON, NPY = "application/json", "application/x-npy"
@@ -101,21 +95,13 @@ class Server:
 @contextlib.contextmanager
 def running(folder: Path) -> Iterator[Server]:
     """A server of a store with one white material, until the end."""
-    table = {"title": "White", "model": "lambert", "source": "no paper", "parameters": {"rho": 1.0}}
-    publish_dataset(folder / "store", "white", tabulate(Layout(Material.from_table("white", table), GRID)))
-    command = [sys.executable, "-m", "brdfdb_pipelines.cli", "serve", "--store", str(folder / "store"), "--port", "0"]
-    with (
-        (folder / "log").open("w") as log,
-        subprocess.Popen(command, stdout=subprocess.PIPE, stderr=log, text=True) as process,
-    ):
-        assert process.stdout is not None
-        port = int(process.stdout.readline().rsplit(":", 1)[1].strip(" /\n"))
+    publish(folder / "store", "white", "lambert", rho=1.0)
+    with (folder / "log").open("w") as log, serving_command(folder / "store", stderr=log) as (process, port):
         server, deadline = Server(process, port), time.monotonic() + WAIT_S
         while server.ask("GET", "/readyz")[0] != 200:  # kernels are loaded, or compiled
             assert time.monotonic() < deadline
             time.sleep(0.05)
         yield server
-        process.terminate()
 
 
 @pytest.fixture(scope="module")
