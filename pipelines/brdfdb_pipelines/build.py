@@ -2,29 +2,53 @@
 
 from __future__ import annotations
 
+import contextlib
+import gc
+import threading
 import time
 from collections import deque
 from collections.abc import Callable
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
+from brdfdb._numba import is_cached
 from brdfdb.errors import BusyError, ParameterError, StoreError
+from brdfdb.materials import FunctionSource, Material
+from brdfdb.models import MODELS
 from brdfdb.store.family import FamilyRecord, Sweep
 from brdfdb.store.family_records import recorded, write_family
 from brdfdb.store.files import Entry
 from brdfdb.store.lock import Lock, writing
 from brdfdb.store.manifest import read_manifest
 from brdfdb.store.marker import make_store
-from brdfdb.store.paths import material_path, revision_path
+from brdfdb.store.paths import material_path, pointer_path, revision_path
 from brdfdb.store.pointer import point_to
 from brdfdb.store.publication import publish_staged
 from brdfdb.store.staging import Block, discard, prepare, remove_begun, write_block, write_frame
-from brdfdb_pipelines import build_resources, workers
+from brdfdb.tables import _kernels
+from brdfdb.tables.layout import Layout
+from brdfdb.tables.planner import coarsest
+from brdfdb.tables.table import Table, points
+from brdfdb.tables.tabulation import block
+from brdfdb_pipelines import workers
 from brdfdb_pipelines.build_progress import Event, Tally
-from brdfdb_pipelines.build_survey import Survey, cost_of_plan, cost_of_table, head_of, survey
-from brdfdb_pipelines.measured_job import MeasuredJob, Tabulated, build_measured
+from brdfdb_pipelines.build_survey import (
+    Survey,
+    check_disk,
+    check_memory,
+    cost_of_plan,
+    cost_of_table,
+    head_of,
+    memory_of_plan,
+    survey,
+)
+from brdfdb_pipelines.measured_job import MeasuredJob, MeasuredResult, build_measured
 from brdfdb_pipelines.recipe_file import Job, Recipe
 from brdfdb_pipelines.workers import Workers, WorkersError
 
@@ -225,7 +249,7 @@ class _Builder:
         for job in self.jobs:
             if job.tolerance is not None:
                 wavelengths = 1 if job.wavelength_nm is None else job.wavelength_nm.size
-                self._claim(f"planning {job.material.name}", build_resources.plan_bytes(wavelengths, job.tolerance))
+                self._claim(f"planning {job.material.name}", memory_of_plan(wavelengths, job.tolerance))
         jobs = deque(sorted(self.jobs, key=cost_of_plan, reverse=True))
         while jobs or self.running:
             while jobs and self._room:
@@ -242,14 +266,14 @@ class _Builder:
         self.task_bytes = 1
         for table in missing:
             self._claim(f"a block of {table.name}", table.survey.task_bytes)
-        build_resources.check_disk(sum(table.survey.disk_bytes for table in missing), self.root)
+        check_disk(sum(table.survey.disk_bytes for table in missing), self.root)
         self.tally = Tally(sum(table.survey.size for table in missing))
         self.report({"event": "planned", "tables": len(missing), "values": self.tally.total})
 
     def _claim(self, what: str, need: int) -> None:
         """Raise the memory [byte] per task to that of this one; ParameterError if it alone exceeds what is allowed."""
         self.task_bytes = max(self.task_bytes, need)
-        build_resources.check_memory(what, need, self.memory)
+        check_memory(what, need, self.memory)
 
     def _surveyed(self, job: Job, result: Survey) -> None:
         name = job.material.name
@@ -388,7 +412,7 @@ class _Builder:
             while jobs and self._room:
                 job = jobs.popleft()
 
-                def then(future: Future[Tabulated], job: MeasuredJob = job) -> None:
+                def then(future: Future[MeasuredResult], job: MeasuredJob = job) -> None:
                     if (result := self._result(job.name, future)) is not None:
                         self.built[job.name] = Built(job, *result)
                         event = {"event": result.state, "material": job.name, "revision": result.revision}
@@ -448,3 +472,75 @@ class _Builder:
         self.error = self.error or error
         self.report({"event": "failed", "material": name, "error": str(error)})
         return None
+
+
+_UP = np.array([[0.0, 0.0, 1.0], [0.6, 0.0, 0.8], [0.0, 0.6, 0.8]])  # three directions: any will do
+_AZIMUTHS = np.linspace(0.0, np.pi, 16)  # a row for which He-Torrance sums its table of the series
+
+
+def compile_kernels(recipe: Recipe, root: Path, jobs: int, report: Callable[[Event], None]) -> None:
+    """Compile the kernels of a build into numba's cache, where tables are missing and nothing was compiled yet.
+
+    A build compiles what is missing anyway, one kernel after the other; this takes less time and reports it. This
+    process compiles, too: it has imported already what each process imports.
+    """
+    missing = [job for job in recipe.jobs() if not pointer_path(material_path(root, job.material.name)).exists()]
+    if jobs == 1 or not missing or is_cached(_kernels.by_vectors):
+        return
+    models: dict[str, Callable[[], None]] = {}
+    for job in missing:
+        models.setdefault(job.material.model, partial(_compile_model, job.material, job.wavelength_nm))
+    # the longest first: lookups, and kernels of spectral models
+    tasks = deque(
+        [_compile_tables, *(models[name] for name in sorted(models, key=lambda name: not MODELS[name].spectral))]
+    )
+    others = min(jobs, len(tasks)) - 1
+    lock = threading.Lock()
+    report({"event": "compiling", "kernels": len(tasks)})
+
+    def work(run: Callable[[Callable[[], None]], None]) -> None:
+        with contextlib.suppress(IndexError):  # no task is left
+            while True:
+                task = tasks.popleft()
+                with contextlib.suppress(Exception):  # the build meets the error again, and reports it
+                    run(task)
+                with lock:
+                    report({"event": "compiled"})
+
+    with ThreadPoolExecutor(others) as threads, workers.processes(others, patient=False) as pool:
+        helpers = [
+            threads.submit(work, lambda task: pool.executor.submit(_compiled, task).result()) for _ in range(others)
+        ]
+        try:
+            work(_compiled)
+            wait(helpers)
+        finally:
+            tasks.clear()  # no other task begins after Ctrl-C
+
+
+def _compiled(task: Callable[[], None]) -> None:
+    """Run a task without the collector of garbage, which takes a tenth of the time: what numba makes stays in use."""
+    enabled = gc.isenabled()
+    gc.disable()
+    try:
+        task()
+    finally:
+        if enabled:
+            gc.enable()
+
+
+def _compile_tables() -> None:
+    """Compile the kernels of lookups."""
+    white = FunctionSource(brdf=lambda wi, *_: np.full(len(wi), 0.3), name="white", title="White", provenance="none")
+    layout = Layout(white, coarsest(white), None)
+    Table.of(layout, np.zeros(layout.shape, np.float32)).lookup_vectors(_UP, _UP[::-1])
+    points(layout.grid, _UP, _UP[::-1])
+
+
+def _compile_model(material: Material, wavelength_nm: NDArray[np.float64] | None) -> None:
+    """Compile the kernels of the model of a material."""
+    at = None if wavelength_nm is None else wavelength_nm[:2]
+    material.lookup_vectors(_UP, _UP[::-1], at)
+    block(Layout(material, coarsest(material), at), slice(0, 1))
+    material.lookup(0.5, 0.0, 0.5, _AZIMUTHS, at)
+    material.specular_reflectance(0.5, at)

@@ -36,10 +36,10 @@ class Tally:
         }
 
 
-class Lines:
+class JsonLines:
     """Printer of events as JSON; a context manager like `Bars`."""
 
-    def __enter__(self) -> Lines:
+    def __enter__(self) -> JsonLines:
         return self
 
     def __exit__(

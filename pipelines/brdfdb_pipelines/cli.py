@@ -21,9 +21,8 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from brdfdb.errors import BrdfdbError, UnknownMaterialError, missing_extra
-from brdfdb_pipelines.commands import commands
+from brdfdb_pipelines.commands import BUG, INTERRUPTED, REFUSED, TERMINATED, VIOLATED, commands
 from brdfdb_pipelines.commands._arguments import place
-from brdfdb_pipelines.exit_codes import BUG, INTERRUPTED, REFUSED, TERMINATED, VIOLATED
 
 # Errors of the operating system that concern the machine, also where they name no file
 _MACHINE = {
@@ -201,7 +200,12 @@ def _refusal(error: Exception) -> str | None:
     """Return the sentence of an error that the user can act on; None for a bug of this program."""
     match error:
         case UnknownMaterialError(kind="material"):
-            return f"{error}{_of_library(error.name)}"
+            from brdfdb.materials import libraries, presets
+
+            library = next((library for library in libraries() if error.name in presets(library)), None)
+            if library is None:
+                return str(error)
+            return f"{error}; it is a preset of the library {library}, and not built in this store"
         case BrdfdbError():
             return str(error)
         case OSError(filename=str() | bytes() | os.PathLike() as file):
@@ -215,14 +219,6 @@ def _refusal(error: Exception) -> str | None:
             return None if missing is None else str(missing)
         case _:
             return None
-
-
-def _of_library(name: str) -> str:
-    """Return a phrase on the library of presets that a name is in; empty if there is none."""
-    from brdfdb_pipelines.preset_names import library_of
-
-    library = library_of(name)
-    return "" if library is None else f"; it is a preset of the library {library}, and not built in this store"
 
 
 def _bug(error: Exception, arguments: Sequence[str]) -> str:

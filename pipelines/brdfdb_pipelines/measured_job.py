@@ -40,12 +40,11 @@ _ADDED = {"columns", "quantity", "angles", "azimuth", "wavelength_nm", "side"}
 _MARGINS = 3  # tables of data that are made to conserve, each a little darker, until none is above 1
 
 
-def _listed(value: Any) -> Any:
-    """Return a list of the one text that may stand for it."""
-    return [value] if isinstance(value, str) else value
-
-
-Texts = Annotated[list[Annotated[str, Field(min_length=1)]], BeforeValidator(_listed), Field(min_length=1)]
+Texts = Annotated[
+    list[Annotated[str, Field(min_length=1)]],
+    BeforeValidator(lambda value: [value] if isinstance(value, str) else value),
+    Field(min_length=1),
+]
 
 
 class MeasuredTable(BaseModel):
@@ -133,7 +132,7 @@ class MeasuredJob:
         }
 
     def source(self) -> MeasuredSource:
-        """Read the file as a source, without the laws that it is to be made to keep.
+        """Return the data of the files as a source, unchanged.
 
         Raises
         ------
@@ -157,6 +156,14 @@ class MeasuredJob:
                 nodes=read.nodes() if read.nodes is not None and read.listed else None,
             )
         return source.recorded(file=self.files, file_sha256=self.sha256)
+
+    def lawful_source(self) -> MeasuredSource:
+        """Return the data, made reciprocal or energy-conserving if the table asks for it; errors as of `source`."""
+        source = self.source()
+        for law in ("reciprocal", "conserving"):
+            if getattr(self.table, law):
+                source = source.made(law)
+        return source
 
 
 def measured_table(name: str, fields: Mapping[str, Any]) -> MeasuredTable:
@@ -196,8 +203,8 @@ def _sha256(path: Path) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-class Tabulated(NamedTuple):
-    """The result of one job, as `brdfdb_pipelines.build.Built` has it."""
+class MeasuredResult(NamedTuple):
+    """The result of one job, in the fields of `brdfdb_pipelines.build.Built`."""
 
     state: str
     revision: str
@@ -207,7 +214,14 @@ class Tabulated(NamedTuple):
     wavelengths: int = 0
 
 
-def build_measured(root: str, job: MeasuredJob) -> Tabulated:
+class _Values(NamedTuple):
+    """The layout of a table, and its values."""
+
+    layout: Layout
+    values: NDArray[np.float32]
+
+
+def build_measured(root: str, job: MeasuredJob) -> MeasuredResult:
     """Build the table of a job unless the store has it: a task for a worker."""
     store, request = Path(root), job.request
     status = standing(store, job.name, request)
@@ -217,7 +231,7 @@ def build_measured(root: str, job: MeasuredJob) -> Tabulated:
     if status.state != "missing":
         stored = read_manifest(revision_path(store, job.name, status.revision), None)[0]["summary"]["bytes"]
         state = "unchanged" if status.state == "current" else "adopted"
-        return Tabulated(state, status.revision, stored, status.why)
+        return MeasuredResult(state, status.revision, stored, status.why)
     try:
         layout, values = _tabulated(job)
         published = publish_layout(store, job.name, layout, request, values=values)
@@ -226,28 +240,27 @@ def build_measured(root: str, job: MeasuredJob) -> Tabulated:
     except BrdfdbError as error:
         raise ParameterError(job.name, f"{job.files}: {error}") from None
     wavelengths = 0 if layout.wavelength_nm is None else layout.wavelength_nm.size
-    return Tabulated("published", published.revision, published.bytes, status.why, tuple(layout.shape), wavelengths)
+    shape = tuple(layout.shape)
+    return MeasuredResult("published", published.revision, published.bytes, status.why, shape, wavelengths)
 
 
-def _tabulated(job: MeasuredJob) -> tuple[Layout, NDArray[np.float32]]:
-    """Return the layout of a table, and its values, made to keep the laws that are asked for."""
+def _tabulated(job: MeasuredJob) -> _Values:
+    """Tabulate the data, made reciprocal or energy-conserving where the job asks for it.
+
+    Interpolation can raise an albedo above 1 again: the data are then darkened further, in at most `_MARGINS` steps.
+    """
     source = job.source()
-    at = None if source.wavelengths_nm is None else np.array(source.wavelengths_nm)
+    wavelength_nm = None if source.wavelengths_nm is None else np.array(source.wavelengths_nm)
     if job.table.reciprocal:
         source = source.made("reciprocal")
-    return _conserving(source, at, job.tolerance) if job.table.conserving else tabulated(source, at, job.tolerance)
-
-
-def _conserving(
-    source: MeasuredSource, at: NDArray[np.float64] | None, tolerance: float
-) -> tuple[Layout, NDArray[np.float32]]:
-    """Return the layout of a table that conserves energy, and its values."""
+    if not job.table.conserving:
+        return _Values(*tabulated(source, wavelength_nm, job.tolerance))
     margin = MARGIN
     for _ in range(_MARGINS):
         made = source.made("conserving", margin)
-        layout, values = tabulated(made, at, tolerance)
+        layout, values = tabulated(made, wavelength_nm, job.tolerance)
         largest = largest_albedo(Table.of(layout, values), made)
         if not largest.above_1:
             break
         margin += 1.1 * ((largest.albedo or 2.0) - 1.0)
-    return layout, values
+    return _Values(layout, values)

@@ -6,8 +6,10 @@ import fnmatch
 import functools
 import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from importlib import resources
+from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -23,9 +25,10 @@ from pydantic import (
 )
 
 from brdfdb.errors import MaterialError, ParameterError, sentence_of
-from brdfdb.materials import PAPERS, Material, exact_material, presets, written_name
+from brdfdb.materials import PAPERS, Material, exact_material, libraries, presets, written_name
 from brdfdb.materials.polarised import polarised_source
 from brdfdb.models import MODELS
+from brdfdb.parameters import closest
 from brdfdb.store.family import Sweep
 from brdfdb.store.paths import NAME
 from brdfdb.tables.grids import Axis, Grid, check_wavelengths
@@ -34,14 +37,22 @@ from brdfdb.tables.planner import PLAN_VERSION, coarsest, offset_of, planned
 from brdfdb.tables.polarisation import GRID_TOLERANCE, planned_theta_d
 from brdfdb.tables.polarisation_record import POLARISATION_VERSION
 from brdfdb.tables.wavelengths import refined
-from brdfdb_pipelines import preset_names, toml_file
+from brdfdb_pipelines import toml_file
 from brdfdb_pipelines.measured_job import MeasuredJob, measured_job
 from brdfdb_pipelines.recipe_grids import LIST, STRICT, Grids, Nodes, Range, RecipeError, nodes_of
 
-_MOST_VALUES = 1 << 36  # of a table: 275 GB
-_MOST_PATTERNS = 10_000  # each is compared with every name
-_MOST_MEMBERS = 100_000  # of all families of a recipe
-_MOST_SWEPT = 6  # parameters of a family: a lookup is made of two members for each, 64 in all
+_MOST_VALUES = 1 << 36  # values of a table: 275 GB
+_MOST_PATTERNS = 10_000  # names and patterns of a recipe; each is compared with every name
+_MOST_MEMBERS = 100_000  # members of all families of a recipe
+_MOST_SWEPT = 6  # parameters of a family; a lookup interpolates between two members along each, 64 in all
+
+
+def _known_library(name: str) -> str:
+    """Return the name of a library; ValueError for pydantic if there is none."""
+    names = libraries()
+    if name not in names:
+        raise ValueError(f"{name!r} is not one of {', '.join(names)}")
+    return name
 
 
 @dataclass(frozen=True)
@@ -144,7 +155,7 @@ class Recipe(BaseModel):
     materials: Annotated[list[str], FailFast()] = Field(
         min_length=1, max_length=_MOST_PATTERNS, description="names or shell patterns"
     )
-    library: Annotated[str, AfterValidator(preset_names.checked)] = Field(
+    library: Annotated[str, AfterValidator(_known_library)] = Field(
         default=PAPERS, description="library of presets that the names mean"
     )
     wavelengths_nm: Nodes = Field(default=[], description="of spectral materials that state none themselves")
@@ -322,9 +333,7 @@ class Recipe(BaseModel):
             for family in fnmatch.filter(families, pattern):
                 matches += families[family]
             if not matches and not named:
-                raise RecipeError(
-                    "materials", preset_names.sentence_without(pattern, [*known, *measured, *families], self.library)
-                )
+                raise RecipeError("materials", _no_match(pattern, [*known, *measured, *families], self.library))
             chosen |= {name: known[name] for name in matches}
         self._measured = list(files.values())
         return list(chosen.values())
@@ -397,7 +406,7 @@ def load(path: Path | None = None, library: str = PAPERS, *, to_build: bool = Tr
     ParameterError
         If there is no such library.
     """
-    source = preset_names.recipe_of(library) if path is None else path
+    source = recipe_of(library) if path is None else path
     try:
         content = toml_file.read(source)
         recipe = Recipe.model_validate(content if to_build else _completed(content))
@@ -427,3 +436,21 @@ def _first(error: ValidationError) -> tuple[str, str]:
     field = ".".join(str(part) for part in first["loc"] if part not in ("float", "Range", "plain", "half"))
     hint = "; 0.01 is 1 %" if field == "tolerance" and first["type"] != "missing" else ""
     return field, sentence_of(first) + hint
+
+
+def recipe_of(library: str) -> Traversable:
+    """Return the packaged recipe of a library of presets; ParameterError if there is no such library."""
+    try:
+        name = "default" if _known_library(library) == PAPERS else library
+    except ValueError as error:
+        raise ParameterError("library", str(error), library, tuple(libraries())) from None
+    return resources.files("brdfdb_pipelines") / "recipes" / f"{name}.toml"
+
+
+def _no_match(pattern: str, names: Iterable[str], library: str) -> str:
+    """Return the sentence on a name or pattern that matches none of the names that a recipe can use."""
+    for other in libraries():
+        if other != library and fnmatch.filter(presets(other), pattern):
+            return f'{pattern!r} is in the library {other}; for its materials, write library = "{other}"'
+    option = "" if library == PAPERS else f" --library {library}"
+    return f"{pattern!r} matches no material{closest(pattern, names)}; `brdfdb list --presets{option}` names them"

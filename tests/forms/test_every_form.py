@@ -15,7 +15,7 @@ from brdfdb.models import MODELS
 from brdfdb.scenes.choice_document import Choice, Price
 from brdfdb.scenes.offered_forms import OfferedForm
 from brdfdb.tables import planner
-from brdfdb_pipelines import chart, choose, cli, tradeoff_plot
+from brdfdb_pipelines import chart, chart_picture, choose, cli
 from tests.benchmarks.every_form import NM, SETS, draws, missing, scene
 
 TOLERANCES = (0.1,)
@@ -80,7 +80,7 @@ def test_a_table_that_is_too_large_is_left_out_of_a_chart_and_named(capsys: pyte
     drawn: Chart = tradeoff.chart(draws("abg", 2)[1], None, (0.2, 1e-4))
     assert [each.key for each in drawn.left_out] == ["table-0-01"]
     assert drawn.left_out[0].reason.startswith("tolerance: 0.0001 takes more than 60 values of drawn")
-    assert "cannot be made" in tradeoff_plot.svg(drawn)
+    assert "cannot be made" in chart_picture.svg(drawn)
     chart._print(drawn)
     assert f"left out: {drawn.left_out[0].title}" in capsys.readouterr().out
 

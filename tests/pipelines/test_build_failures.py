@@ -22,7 +22,7 @@ from brdfdb.tables import tabulation
 from brdfdb.tables.layout import Layout
 from brdfdb_pipelines import cli
 from brdfdb_pipelines.build import build
-from brdfdb_pipelines.exit_codes import BUG
+from brdfdb_pipelines.commands import BUG
 from brdfdb_pipelines.recipe_file import Recipe, load
 from brdfdb_pipelines.recipe_grids import RecipeError
 from tests.pipelines.a_build import Captured, OneByOne, changed, failing, staged, states

@@ -16,7 +16,7 @@ from brdfdb.materials import presets
 from brdfdb.store import marker, staging
 from brdfdb.tables.grids import Grid
 from brdfdb.tables.layout import Interpolation, Layout
-from brdfdb_pipelines import build_resources, build_survey, cli
+from brdfdb_pipelines import build_survey, cli
 
 LOG = Interpolation("cubic", True, 1e-4)
 WAVELENGTHS = np.linspace(400.0, 700.0, 31)
@@ -57,13 +57,13 @@ def test_a_task_takes_at_most_the_memory_that_is_expected_and_not_a_tenth_of_it(
     staging.write_frame(directory, text)
     peaks.append(tracemalloc.get_traced_memory()[1])
     tracemalloc.stop()
-    assert 0.1 * build_resources.task_bytes(table) <= max(peaks) <= build_resources.task_bytes(table)
+    assert 0.1 * build_survey.memory_of_task(table) <= max(peaks) <= build_survey.memory_of_task(table)
 
 
 def test_a_disk_that_is_too_small_is_one_sentence_before_anything_is_written(
     recipe: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(build_resources.shutil, "disk_usage", lambda _: SimpleNamespace(free=10_000))
+    monkeypatch.setattr(build_survey.shutil, "disk_usage", lambda _: SimpleNamespace(free=10_000))
     root = tmp_path / "store"
     assert cli.main(["build", str(recipe), "--store", str(root)]) == 2
     said = capsys.readouterr().err.splitlines()[-1]
@@ -78,7 +78,7 @@ def test_a_disk_too_small_for_planned_tables_leaves_nothing(
 ) -> None:
     planned = tmp_path / "planned.toml"
     planned.write_text('materials = ["foam", "rolled-brass"]\ntolerance = 0.01\n', encoding="utf-8")
-    monkeypatch.setattr(build_resources.shutil, "disk_usage", lambda _: SimpleNamespace(free=free))
+    monkeypatch.setattr(build_survey.shutil, "disk_usage", lambda _: SimpleNamespace(free=free))
     names: list[str] = []
 
     def write_block(directory: str, *given: Any) -> staging.Block:
@@ -98,6 +98,6 @@ def test_what_is_staged_already_needs_no_disk_again(
 ) -> None:
     root = tmp_path / "store"
     assert cli.main(["build", str(recipe), "--store", str(root)]) == 0
-    monkeypatch.setattr(build_resources.shutil, "disk_usage", lambda _: SimpleNamespace(free=0))
+    monkeypatch.setattr(build_survey.shutil, "disk_usage", lambda _: SimpleNamespace(free=0))
     assert cli.main(["build", str(recipe), "--store", str(root)]) == 0
     assert brdfdb.open(root).head("foam") == "r000001"

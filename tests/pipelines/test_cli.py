@@ -15,9 +15,8 @@ import pytest
 import brdfdb
 from brdfdb.materials import presets
 from brdfdb_pipelines import terminal
-from brdfdb_pipelines.commands import commands
+from brdfdb_pipelines.commands import INTERRUPTED, commands
 from brdfdb_pipelines.commands.build import shape_in_words
-from brdfdb_pipelines.exit_codes import INTERRUPTED
 from tests.pipelines.command import Captured, run
 from tests.pipelines.failing import fails
 

@@ -12,8 +12,7 @@ import pytest
 
 import brdfdb
 from brdfdb.errors import ParameterError
-from brdfdb_pipelines.commands import commands
-from brdfdb_pipelines.exit_codes import BUG, REFUSED
+from brdfdb_pipelines.commands import BUG, REFUSED, commands
 from tests.pipelines.command import Captured, run
 
 

@@ -22,7 +22,7 @@ from brdfdb.store.publication import publish_dataset
 from brdfdb.tables.grids import Grid
 from brdfdb.tables.layout import Layout
 from brdfdb.tables.tabulation import tabulate
-from brdfdb_pipelines.exit_codes import TERMINATED
+from brdfdb_pipelines.commands import TERMINATED
 from tests.pipelines.command import Captured, run
 
 P99 = {"grey": 0.01, "dark": 0.03001}

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import brdfdb
-from brdfdb_pipelines import audit, former_audit
+from brdfdb_pipelines import audit
 from tests.pipelines.command import Captured, run
 
 NAMES = ("blue-plastic", "foam", "mirror")
@@ -75,7 +75,7 @@ def test_a_damaged_or_foreign_report_audits_everything(harm: Callable[[str], str
 
 @pytest.mark.usefixtures("no_plots")
 def test_another_program_audits_everything(store: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(former_audit, "program", lambda: "another")
+    monkeypatch.setattr(audit, "program", lambda: "another")
     assert taken(store) == []
 
 

@@ -135,8 +135,8 @@ def test_there_are_sixty_recipes_and_each_has_a_name_of_its_own() -> None:
 NURSERY = """
 import json, os, resource, shutil, signal, sys
 from types import SimpleNamespace
-from brdfdb_pipelines import build, build_resources, cli
-build_resources.machine_memory = lambda: 24 * 10**9  # whatever this machine has
+from brdfdb_pipelines import build, build_survey, cli
+build_survey.machine_memory = lambda: 24 * 10**9  # whatever this machine has
 shutil.disk_usage = lambda _: SimpleNamespace(free=50 * 10**9)
 for line in sys.stdin:
     recipe, store, said, seconds = json.loads(line)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from brdfdb import formats, models
-from brdfdb_pipelines.import_summary import _percent
+from brdfdb_pipelines.import_samples import _percent
 from tests.pipelines.command import Captured, run
 
 

@@ -21,7 +21,7 @@ from brdfdb.measurements import Samples
 from brdfdb.store.summary_words import audited_materials
 from brdfdb_api.http.app import create_app
 from brdfdb_api.serving.settings import Settings
-from brdfdb_pipelines import former_audit, recipe_file
+from brdfdb_pipelines import audit, recipe_file
 from tests.api.a_store import Client
 from tests.formats.test_neural import network
 from tests.measurements.made_up import scattered
@@ -139,11 +139,11 @@ def test_an_audit_of_some_does_not_bring_back_what_the_audit_of_all_has_repeated
     for name in ("first", "second"):
         assert run("import", "clay.nc", "--store", "store", "--name", name, *ONE_JOB) == 0
     part = Path("store/audit-part.json")
-    former = former_audit.read_former(part)
+    former = audit.read_former(part)
     assert former is not None
     wrong = [audited.model_copy(update={"verdict": "violates"}) for audited in former.materials]
     older = {"materials": wrong, "when": former.when - timedelta(hours=1)}
-    part.write_bytes(former_audit.sealed(former.model_copy(update=older)))
+    part.write_bytes(audit.sealed(former.model_copy(update=older)))
     assert run("audit", "--store", "store", "--no-figures") == 0
     assert run("audit", "second", "--store", "store", "--all") == 0
     last = {one["material"]: one["verdict"] for one in audited_materials(Path("store"))}

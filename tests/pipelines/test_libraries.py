@@ -11,8 +11,7 @@ import pytest
 
 import brdfdb
 from brdfdb.materials import PAPERS, libraries, presets
-from brdfdb_pipelines.preset_names import recipe_of
-from brdfdb_pipelines.recipe_file import load
+from brdfdb_pipelines.recipe_file import load, recipe_of
 from brdfdb_pipelines.recipe_grids import RecipeError
 from tests.pipelines.command import Captured, run
 

@@ -22,7 +22,7 @@ from brdfdb.materials import Material
 from brdfdb.models import MODELS
 from brdfdb.store import lock
 from brdfdb.tables import _kernels
-from brdfdb_pipelines import build_resources, cli, compilation, recipe_file, terminal, workers
+from brdfdb_pipelines import build, build_survey, cli, recipe_file, terminal, workers
 from brdfdb_pipelines.build_progress import Event
 from brdfdb_pipelines.build_survey import check_values
 from brdfdb_pipelines.commands import _arguments
@@ -129,7 +129,7 @@ def test_systems_that_do_not_tell_processors_or_memory_have_defaults(monkeypatch
     monkeypatch.delattr(os, "sched_getaffinity")
     monkeypatch.delattr(os, "sysconf")
     assert _arguments.processors() == os.cpu_count()
-    assert build_resources.machine_memory() is None
+    assert build_survey.machine_memory() is None
 
 
 def test_kernels_compile_in_processes_before_the_first_build_only(
@@ -140,13 +140,13 @@ def test_kernels_compile_in_processes_before_the_first_build_only(
     recipe, events = recipe_file.load(path), list[Event]()
     pool = workers.Workers(ThreadPoolExecutor(1), lambda: 1)
     monkeypatch.setattr(workers, "processes", lambda _, **__: _Opened(pool))
-    monkeypatch.setattr(compilation, "is_cached", lambda _: False)
-    compilation.compile_kernels(recipe, tmp_path, 2, events.append)
+    monkeypatch.setattr(build, "is_cached", lambda _: False)
+    build.compile_kernels(recipe, tmp_path, 2, events.append)
     assert [event["event"] for event in events] == ["compiling", *["compiled"] * 3]
     assert events[0]["kernels"] == 3
     events.clear()
-    monkeypatch.setattr(compilation, "is_cached", lambda _: True)
-    compilation.compile_kernels(recipe, tmp_path, 2, events.append)
+    monkeypatch.setattr(build, "is_cached", lambda _: True)
+    build.compile_kernels(recipe, tmp_path, 2, events.append)
     assert events == []
     assert _numba.INTERPRETED or _numba.is_cached(_kernels.by_vectors)
     assert {"lambert", "ward"} <= {*MODELS}

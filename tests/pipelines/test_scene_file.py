@@ -15,8 +15,8 @@ from matplotlib.image import imread
 from brdfdb.scenes.gbuffer import gather
 from brdfdb.scenes.renderer import render
 from brdfdb_pipelines import cli
+from brdfdb_pipelines.commands import REFUSED
 from brdfdb_pipelines.documents import schema
-from brdfdb_pipelines.exit_codes import REFUSED
 from brdfdb_pipelines.scene_file import SceneError, load, shipped
 
 COARSE = [float(wavelength) for wavelength in range(420, 681, 20)]

@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 import sys
 
+from brdfdb_pipelines.commands import INTERRUPTED, VIOLATED
 from brdfdb_pipelines.commands._arguments import add_jobs, add_store, place, share_cores
-from brdfdb_pipelines.exit_codes import INTERRUPTED, VIOLATED
 
 HELP = (
     "Audit tables and their models, and all that tables state; exit 1 on a violation, or where nothing can be judged."

@@ -11,8 +11,8 @@ from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from brdfdb_pipelines.commands import INTERRUPTED
 from brdfdb_pipelines.commands._arguments import add_jobs, add_store, byte_count, place, share_cores
-from brdfdb_pipelines.exit_codes import INTERRUPTED
 
 if TYPE_CHECKING:
     from brdfdb_pipelines.build import Built
@@ -64,10 +64,10 @@ def _build(options: argparse.Namespace) -> None:
     from brdfdb._numba import when_compiling
     from brdfdb.errors import ParameterError
     from brdfdb.materials import PAPERS
-    from brdfdb_pipelines import build_resources, recipe_file, workers
-    from brdfdb_pipelines.build import build
-    from brdfdb_pipelines.build_progress import Bars, Lines
-    from brdfdb_pipelines.compilation import compile_kernels
+    from brdfdb_pipelines import recipe_file, workers
+    from brdfdb_pipelines.build import build, compile_kernels
+    from brdfdb_pipelines.build_progress import Bars, JsonLines
+    from brdfdb_pipelines.build_survey import machine_memory
 
     if options.recipe is not None and options.library is not None:
         raise ParameterError("--library", f"goes without a recipe file, and {options.recipe} is given", options.library)
@@ -78,9 +78,9 @@ def _build(options: argparse.Namespace) -> None:
     if options.scheduler:
         at = workers.cluster(options.scheduler)
     else:
-        memory = build_resources.machine_memory() if memory is None else memory
+        memory = machine_memory() if memory is None else memory
         at = (workers.processes if options.processes else workers.threads)(options.jobs)
-    with at as opened, Lines() if options.json else Bars() as report:
+    with at as opened, JsonLines() if options.json else Bars() as report:
         if not options.scheduler:
             compile_kernels(recipe, options.store, options.jobs, report)
         with when_compiling(lambda: report({"event": "compiling", "kernels": 0})):

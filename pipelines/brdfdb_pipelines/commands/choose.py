@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 import sys
 
+from brdfdb_pipelines.commands import INTERRUPTED
 from brdfdb_pipelines.commands._arguments import MOST_WIDTH, add_out, add_scene, place, share_cores, whole_number
-from brdfdb_pipelines.exit_codes import INTERRUPTED
 
 HELP = "Choose the cheapest form of each material that a scene cannot tell from the model."
 

@@ -51,15 +51,18 @@ def run(options: argparse.Namespace) -> int:
 
     if options.picture is not None:
         import_extra("matplotlib")  # before the time is spent
-    convert.run(
-        options.name,
-        options.to,
-        store=options.store,
-        recipe_path=options.recipe,
+    request = convert.ConversionRequest(
+        model=options.to,
         wavelength_nm=options.wavelength_nm,
         fixed=options.fix,
         refractive_index=options.refractive_index,
         weigh=options.weigh,
+    )
+    convert.run(
+        options.name,
+        request,
+        store=options.store,
+        recipe_path=options.recipe,
         json=options.json,
         picture=options.picture,
     )

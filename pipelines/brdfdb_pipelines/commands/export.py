@@ -6,8 +6,8 @@ import argparse
 from typing import TYPE_CHECKING
 
 from brdfdb.errors import ParameterError
+from brdfdb_pipelines.commands import VIOLATED
 from brdfdb_pipelines.commands._arguments import add_jobs, add_out, add_store, place
-from brdfdb_pipelines.exit_codes import VIOLATED
 
 if TYPE_CHECKING:
     from brdfdb.formats import Option

@@ -5,11 +5,28 @@ from __future__ import annotations
 import argparse
 import sys
 
+from brdfdb_pipelines.commands import INTERRUPTED
 from brdfdb_pipelines.commands._arguments import place, share_cores
 from brdfdb_pipelines.commands._reading import add_reading, reading_keys
-from brdfdb_pipelines.exit_codes import INTERRUPTED
 
-HELP = "Fit models to measured samples: their parameters with intervals, ranked by the error at incidences left out."
+HELP = "Fit models to measured samples; rank them by their error at incidences left out of the fit."
+
+# Options that only a fit to samples has
+_OF_SAMPLES = (
+    "format",
+    "column",
+    "quantity",
+    "angles",
+    "azimuth",
+    "wavelength_nm",
+    "member",
+    "side",
+    "model",
+    "refractive_index",
+    "receiver_deg",
+    "source_deg",
+    "page",
+)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -56,47 +73,35 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Fit, and print the ranking."""
     share_cores()
-    from brdfdb.errors import counted, import_extra
+    from brdfdb.errors import ParameterError, counted, import_extra
     from brdfdb.fitting.published import SUFFIX
     from brdfdb_pipelines import fit
 
     import_extra("scipy")
+    first, *others = options.data
     if any(file.suffix.lower() == SUFFIX for file in options.data):
-        return _published(options)
+        if others:
+            raise ParameterError("DATA", f"{len(options.data)} files; a file of published fits is listed by itself")
+        for name in _OF_SAMPLES:
+            if getattr(options, name):
+                option = f"--{name.replace('_', '-')}"
+                raise ParameterError(option, f"{first} contains published fits and no samples; leave the option out")
+        fit.list_published(first, channel=options.channel, json=options.json, recipe=options.recipe)
+        return 0
     if options.page is not None:
         import_extra("matplotlib")  # before the time is spent
         import_extra("jinja2")
-    document = fit.run(
-        options.data,
-        options.model or None,
-        keys=reading_keys(options),
+    settings = fit.FitSettings(
+        models=options.model or None,
+        reading=reading_keys(options),
         residual=options.residual,
         channel=options.channel,
         refractive_index=options.refractive_index,
         receiver_deg=options.receiver_deg,
         source_deg=options.source_deg,
-        json=options.json,
-        page=options.page,
-        recipe=options.recipe,
     )
+    document = fit.run(options.data, settings, fit.FitOutputs(options.json, options.page, options.recipe))
     if document.interrupted:
-        print(f"brdfdb: interrupted; {counted(len(document.fits), 'model')} of the search are above", file=sys.stderr)
+        print(f"brdfdb: interrupted; {counted(len(document.fits), 'finished model')} printed above", file=sys.stderr)
         return INTERRUPTED
-    return 0
-
-
-def _published(options: argparse.Namespace) -> int:
-    """List published fits; options of searches are refused."""
-    from brdfdb.errors import ParameterError
-    from brdfdb_pipelines import published_fits
-
-    first, *others = options.data
-    if others:
-        raise ParameterError("DATA", f"{first} and {len(others)} more: published fits are listed one file at a time")
-    of_samples = ("format", "column", "quantity", "angles", "azimuth", "wavelength_nm", "member", "side")
-    for name in (*of_samples, "model", "refractive_index", "receiver_deg", "source_deg", "page"):
-        if getattr(options, name):
-            option = f"--{name.replace('_', '-')}"
-            raise ParameterError(option, f"{first} holds the fits of others and no samples; leave it out")
-    published_fits.run(first, channel=options.channel, json=options.json, recipe=options.recipe)
     return 0

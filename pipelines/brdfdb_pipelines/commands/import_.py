@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import argparse
 
+from brdfdb_pipelines.commands import REFUSED, VIOLATED
 from brdfdb_pipelines.commands._arguments import add_jobs, place, share_cores
 from brdfdb_pipelines.commands._reading import add_reading, reading_keys
-from brdfdb_pipelines.exit_codes import REFUSED, VIOLATED
 
 HELP = "Import measurements: state what files of others cover, integrate to and claim, and make audited tables of them."
 
@@ -47,18 +47,17 @@ def run(options: argparse.Namespace) -> int:
     share_cores()
     from brdfdb.errors import ParameterError
     from brdfdb_pipelines import import_samples
-    from brdfdb_pipelines.import_tables import TOLERANCE, Tables
 
     keys = reading_keys(options)
     of_table = ("tolerance", "reciprocal", "conserving", "name", "title", "source")
     tables = None
     if options.store is not None or options.recipe is not None:
-        tables = Tables(
+        tables = import_samples.Tables(
             store=options.store,
             recipe=options.recipe,
             name=options.name,
             title=options.title,
-            tolerance=TOLERANCE if options.tolerance is None else options.tolerance,
+            tolerance=import_samples.TOLERANCE if options.tolerance is None else options.tolerance,
             jobs=options.jobs,
         )
     else:

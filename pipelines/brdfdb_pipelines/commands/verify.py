@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 import sys
 
+from brdfdb_pipelines.commands import REFUSED
 from brdfdb_pipelines.commands._arguments import add_store
-from brdfdb_pipelines.exit_codes import REFUSED
 
 HELP = (
     "Verify tables: sizes, sha256, each chunk with its crc32c, dimensions and attributes; families and snapshots. "
