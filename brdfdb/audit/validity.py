@@ -64,7 +64,7 @@ class Validity(Finding):
         ]
 
     def cells(self) -> list[Cell]:
-        """Return the number of limits that are not kept, or at the edge."""
+        """Return the number of limits that are not met, or at the edge."""
         standings = [limit.standing for limit in self.limits]
         edges = [words for word, words in counts_of(standings) if word in ("at the edge", "outside")]
         text = ", ".join(words.replace(" ", f" of {len(self.limits)} limits ", 1) for words in edges)

@@ -15,9 +15,8 @@ NOT_MEASURED = "not measured"
 NOT_AUDITED = "not audited"
 # What the two errors of a list are, for the line below it
 ERRORS_EXPLAINED = (
-    "table error: the table against its formula; formula error: the formula against "
-    "the highest rung, which is the form of the same model without an approximation; 0, exact form: the formula is "
-    "that form; of measured tables, the table against the data"
+    "table error: of the table relative to its formula, or to the data if it is measured; formula error: of the formula "
+    "relative to the exact form of the same model; 0, exact form: the formula is exact"
 )
 COLUMNS = ("what the paper says?", "model conserves energy?")  # headings of the two answers
 
@@ -100,7 +99,7 @@ def formula_error(head: Mapping[str, Any], percent: Callable[[float], str]) -> s
         return NOT_MEASURED
     if stated["against"] == "measured":
         return percent(stated["p99"])
-    return "0, exact form" if stated["against"] == "highest rung" else "none known"
+    return "0, exact form" if stated["against"] == "highest rung" else "no exact form"
 
 
 def energy(head: Mapping[str, Any], audited: Audited | None) -> str:

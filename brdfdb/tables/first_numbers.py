@@ -20,7 +20,7 @@ class FormulaError(BaseModel):
 
     against: Rung = Field(
         description="measured: against a higher rung; highest rung: the formula is that rung, with an error of 0; "
-        "none known: the formula is a fit, or no higher rung is known"
+        "none known: there is no more exact form to compare with, as of a fit"
     )
     rung: str = Field(description="name of the highest rung; empty: none is known")
     directions: int = Field(description="drawn above the horizon, half of the viewers in the lobe; 0: not measured")
@@ -43,7 +43,7 @@ class FormulaError(BaseModel):
         return {
             "measured": f"against {self.rung}",
             "highest rung": f"exact form of its model: {self.rung}",
-            "none known": "no higher rung is known",
+            "none known": "no more exact form to compare with",
         }[self.against]
 
 

@@ -156,7 +156,7 @@ def _assumption(name: str, assumed: Assumption) -> str:
         lines.append(f"The largest albedo is {assumed.max_albedo:.3f}.")
     for other in assumed.alternatives:
         values = ", ".join(f"`{written} = {value}`" for written, value in other.parameters.items())
-        excess = ", more than arrives" if other.max_albedo > 1.0 else ""
+        excess = ", above 1" if other.max_albedo > 1.0 else ""
         lines.append(f"With {values} it would be {other.max_albedo:.3f}{excess}.")
     return " ".join(lines) + "\n"
 
@@ -168,7 +168,7 @@ def _formula(stored: Table) -> str:
         return "not measured"
     if error.against != "measured":
         return plain(error.in_words())
-    return f"**{terminal.error(error.p99)} of f_r** in 99 of 100 directions, {plain(error.in_words())}"
+    return f"**{terminal.error(error.p99)} of f_r** at 99 % of the directions, {plain(error.in_words())}"
 
 
 def _table(stored: Table) -> str:
@@ -193,7 +193,7 @@ def _table(stored: Table) -> str:
     error = stored.error
     assert error is not None
     overall = error.overall
-    stated = f"{terminal.error(overall.p99)} of f_r in 99 of 100 of {error.directions} directions"
+    stated = f"{terminal.error(overall.p99)} of f_r at 99 % of {error.directions} directions"
     rows.append(("error of the table", f"**{stated}** (median {overall.median:.2g}, largest {overall.max:.2g})"))
     largest = "" if error.worst is None else f" The largest: {plain(error.worst.why)}."
     rows.append(("error of the formula", _formula(stored)))

@@ -168,8 +168,10 @@ def run(
     if shown:
         _print(root, audit_report, report_path)
         if before.when is not None and taken_over:
-            share = f"{len(taken_over)} of {len(audits)} taken from the report of {before.when:%Y-%m-%d %H:%M} UTC"
-            print(f"{share}, of the same bytes by the same program; --all audits everything")
+            share = (
+                f"{len(taken_over)} of {len(audits)} results reused from the report of {before.when:%Y-%m-%d %H:%M} UTC"
+            )
+            print(f"{share}, because table and program are unchanged; --all audits everything again")
     if damaged:
         raise StoreError("; ".join(damaged))
     return audit_report
@@ -389,11 +391,11 @@ def _drawn(key: str) -> list[Section]:
 def _why(store: Store, name: str) -> str:
     """Return the reason why the source of a table cannot be evaluated."""
     if store.metadata(name).measured is not None:
-        return "it is measured, and a table does not hold the data"
+        return "it is measured, and the table does not contain the data"
     model = store.metadata(name).model
     if model is None or model in MODELS:
         return "its source cannot be evaluated"
-    return f"its model {model} is not known here, --models FILE or $BRDFDB_MODELS adds it"
+    return f"its model {model} is unknown; add it with --models FILE or $BRDFDB_MODELS"
 
 
 def _print(root: Path, audit_report: AuditReport, report_path: Path) -> None:
@@ -427,7 +429,7 @@ def _print(root: Path, audit_report: AuditReport, report_path: Path) -> None:
     accepted = sum(a.verdict == "accepted excess" for a in audits)
     violating, unjudged = len(audit_report.violations), len(audit_report.not_judged)
     partly = sum(bool(a.not_judged) for a in audits)
-    not_whole = f"{partly} only in part, for lack of a source; " if partly else ""
+    not_whole = f"{partly} only in part, because the source is unknown; " if partly else ""
     allowed = f"accepted excess {accepted}, " if accepted else ""
     without = f"not judged {unjudged}, " if unjudged else ""
     remarks = audit_page.remarked(audit_report)

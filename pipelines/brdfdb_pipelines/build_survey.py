@@ -170,7 +170,7 @@ def check_memory(what: str, need: int, memory: int | None) -> None:
     """Raise ParameterError if a task needs more memory [byte] than is allowed; None allows any."""
     if memory is not None and need > memory:
         raise ParameterError(
-            "memory", f"{what} takes about {terminal.size(need)}, more than the {terminal.size(memory)} allowed", memory
+            "memory", f"{what} takes about {terminal.size(need)}; {terminal.size(memory)} are allowed", memory
         )
 
 
@@ -179,7 +179,7 @@ def check_disk(need: int, directory: Path) -> None:
     free = free_bytes(directory)
     if need > free:
         raise ParameterError(
-            "disk", f"the tables take up to {terminal.size(need)}, {directory} has {terminal.size(free)} free"
+            "disk", f"the tables take up to {terminal.size(need)}, and {directory} has {terminal.size(free)} free"
         )
 
 

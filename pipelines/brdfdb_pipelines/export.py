@@ -114,7 +114,7 @@ def _verdicts(root: Path, audit: Path | None, revisions: Mapping[str, str]) -> d
         ours = [entry for entry in materials if is_of_store(root, entry)]
         given = {(entry["material"], entry["revision"]): entry["verdict"] for entry in ours}
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-        reason = error.strerror if isinstance(error, OSError) else "it is no report of `brdfdb audit`"
+        reason = error.strerror if isinstance(error, OSError) else "it is not a report of `brdfdb audit`"
         raise ParameterError("audit", f"{audit} cannot be read: {reason}", str(audit)) from None
     return {key[0]: given[key] for key in revisions.items() if key in given}
 
@@ -123,19 +123,21 @@ def _report(exports: list[_Export], directory: Path, file_format: str) -> bool:
     """Print what was written, and what is beyond its tolerance; return True if nothing is beyond."""
     written = [(export.name, files) for export in exports for files in export.files]
     beside, total = sum(len(files.paths) - 1 for _, files in written), sum(files.nbytes for _, files in written)
-    others = f" and {beside} beside {'it' if len(written) == 1 else 'them'}" if beside else ""
+    others = f" and {beside} more" if beside else ""
     print(f"{counted(len(written), f'{file_format.upper()} file')}{others}, {terminal.size(total)}, in {directory}")
     stated = [(files.error.document()["p99"], files.paths[0].name) for _, files in written if files.error is not None]
     if stated:
         worst, file = max(stated)
-        print(f"error against the table: 99 of 100 values within {_share(worst)} ({file}), each file states its own")
+        print(
+            f"error relative to the table: 99 % of the values within {_share(worst)} ({file}), each file states its error"
+        )
     known = [(files.error.statement, files.paths[0].name) for _, files in written if files.error is not None]
     if statements := [(statement, name) for statement, name in known if statement is not None]:
         whole, file = max(statements, key=lambda item: item[0].p98)
         rows = whole.places
         light, horizon = max(rows.alongside), max(rows.one_grazing + rows.both_grazing)
         print(
-            f"error against {whole.against}, with that of the table: 98 of 100 values within {_share(whole.p98)} "
+            f"error relative to {whole.against}, with that of the table: 98 % of the values within {_share(whole.p98)} "
             f"({file}), near the light {_share(light)}, next to the horizon {_share(horizon)}"
         )
     beyond = [files for _, files in written if not files.within]
@@ -143,7 +145,7 @@ def _report(exports: list[_Export], directory: Path, file_format: str) -> bool:
         assert files.error is not None
         assert files.tolerance is not None
         p99 = files.error.document()["p99"]
-        print(f"{files.paths[0].name}: {_share(p99)}, beyond the tolerance of {_share(files.tolerance)}")
+        print(f"{files.paths[0].name}: {_share(p99)}, above the tolerance of {_share(files.tolerance)}")
     for remark in sorted({remark for _, files in written for remark in files.remarks}):
         names = list(dict.fromkeys(name for name, files in written if remark in files.remarks))
         more = f" and {counted(len(names) - _NAMED, 'other material')}" if len(names) > _NAMED else ""

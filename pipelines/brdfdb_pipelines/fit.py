@@ -213,13 +213,13 @@ def lines(document: Fits) -> list[str]:
     for one in document.fits:
         held = "      -" if one.held_out is None else f"{one.held_out.rms:7.3f}"
         alone = "      -" if one.rms_ln is None else f"{one.rms_ln:6.3f}"
-        light = "" if one.albedo.conserves else "  reflects more than arrives"
+        light = "" if one.albedo.conserves else "  above 1"
         text.append(
             f"  {one.model:<{width}}  {held} {alone}   {one.numbers:7d} {one.bic:8.0f}  {one.albedo.value:6.3f}{light}"
         )
-    text.append("  held out, all: rms of ln(model / sample), at incidences left out of the fit, and of all")
+    text.append("  held out, all: rms of ln(model / sample) at the incidences left out of the fit, and at all")
     if document.shared_outlier_count:
-        text.append(f"  both leave out {counted(document.shared_outlier_count, 'value')} far from every fit")
+        text.append(f"  both without {counted(document.shared_outlier_count, 'value')} far from every fit")
     text += [
         f"  not fitted: {reason if reason.startswith(name) else f'{name}, {reason}'}"
         for name, reason in document.skipped.items()
@@ -227,15 +227,15 @@ def lines(document: Fits) -> list[str]:
     ]
     if document.interrupted:
         missing = list(document.skipped.values()).count(INTERRUPTED)
-        text.append(f"  interrupted: {counted(missing, 'model')} not fitted, and intervals are those of the covariance")
+        text.append(f"  interrupted: {counted(missing, 'model')} not fitted, and intervals come from the covariance")
     best = document.fits[0]
     text += ["", f"best: {best.model}", *_numbers(best.estimates)]
     text += [f"  note  {sentence}" for sentence in best.remarks]
     if document.outlier_count:
         farthest = document.outliers[0]
         text.append(
-            f"  {document.outlier_count} taken for outliers; the farthest: f_r {farthest.value:.3g} against "
-            f"{farthest.model:.3g} /sr at theta_i {farthest.theta_i_deg:g}°, theta_r {farthest.theta_r_deg:g}°, "
+            f"  {counted(document.outlier_count, 'outlier')}; the farthest: f_r {farthest.value:.3g} /sr, of the model "
+            f"{farthest.model:.3g} /sr, at theta_i {farthest.theta_i_deg:g}°, theta_r {farthest.theta_r_deg:g}°, "
             f"phi_r {farthest.phi_r_deg:g}°"
         )
     if best.recipe is None:
@@ -254,17 +254,17 @@ def _aperture(document: Fits) -> list[str]:
         for name, known in solid_angles.items()
         if known is not None
     ]
-    return [f"  seen through the aperture: {', '.join(cones)}"] if cones else []
+    return [f"  averaged over the aperture: {', '.join(cones)}"] if cones else []
 
 
 def _no_recipe(document: Fits) -> str:
     """Return a sentence on why no fit is a recipe."""
-    why = "all are sums, or one model with amplitudes of channels that are no spectra"
+    why = "each fit is a sum of models, or has amplitudes of channels without wavelengths"
     if len(document.channels) > 1 and document.wavelengths_nm is None:
-        why = "the channels have no wavelengths; --channel fits one of them"
+        why = "the channels have no wavelengths; fit one of them with --channel"
     elif all("+" in one.model for one in document.fits):
-        why = "all are sums, and a recipe takes one model"
-    return f"no fit is one model of the registry with wavelengths, so that there is no recipe: {why}"
+        why = "each fit is a sum, and a recipe takes a single model"
+    return f"no recipe can be written: {why}"
 
 
 def _numbers(estimates: Sequence[Estimate]) -> list[str]:

@@ -178,7 +178,7 @@ def measured_table(name: str, fields: Mapping[str, Any]) -> MeasuredTable:
 def measured_job(name: str, fields: Mapping[str, Any], folder: Path | None, tolerance: float | None) -> MeasuredJob:
     """Return the job of a measured material of a recipe; RecipeError if it cannot be built."""
     if tolerance is None:
-        raise RecipeError("tolerance", f"is missing; {name} is measured, and grids are for models")
+        raise RecipeError("tolerance", f"is missing; {name} is measured, and grids are only for models")
     table = measured_table(name, fields)
     paths = tuple((folder or Path()) / path_of(sample, "samples") for sample in table.samples)
     digests = []

@@ -112,7 +112,7 @@ class Job:
             polarised_source(self.material)
         if layout.size > _MOST_VALUES:
             shape = " x ".join(map(str, layout.shape))
-            raise RecipeError("", f"{shape} are {layout.size:.3g} values, more than the {_MOST_VALUES:.3g} of a table")
+            raise RecipeError("", f"{shape} nodes are {layout.size:.3g} values; a table has at most {_MOST_VALUES:.3g}")
 
     @property
     def name(self) -> str:
@@ -212,20 +212,24 @@ class Recipe(BaseModel):
 
     def _jobs(self) -> list[Job]:
         if (self.tolerance is None) == (self.grids is None):
-            raise RecipeError("tolerance, grids", "give one of the two")
+            raise RecipeError("tolerance, grids", "give exactly one of them")
         if self.interpolation is not None and self.grids is None:
-            raise RecipeError("interpolation", "goes with grids; to a tolerance, the planner chooses")
+            raise RecipeError(
+                "interpolation", "is allowed only with grids; with a tolerance, the planner chooses the interpolation"
+            )
         if self.hot_spot_tolerance is not None and self.tolerance is None:
-            raise RecipeError("hot_spot_tolerance", "goes with tolerance; on grids, an error is only stated")
+            raise RecipeError(
+                "hot_spot_tolerance", "is allowed only with tolerance; on grids, the error is measured and stated"
+            )
         given = {} if self.grids is None else {name: grid for name, grid in self.grids if grid is not None}
         grids = {name: self._grid(grid, name) for name, grid in given.items()}
         wavelengths = self._wavelengths()
         jobs = []
         selected = self._selected()
         if self.polarised and self._measured:
-            raise RecipeError("polarised", f"{self._measured[0].name} is measured, and f_r alone is known of it")
+            raise RecipeError("polarised", f"{self._measured[0].name} is measured, and its polarisation is unknown")
         if self.hot_spot_tolerance is not None and self._measured:
-            raise RecipeError("hot_spot_tolerance", f"{self._measured[0].name} is measured; it is for models")
+            raise RecipeError("hot_spot_tolerance", f"is only for models, and {self._measured[0].name} is measured")
         for named, family in selected:
             material = exact_material(named) if self.forms == "exact" and family is None else named
             wavelength_nm = None
@@ -233,7 +237,9 @@ class Recipe(BaseModel):
                 stated = material.wavelengths_nm
                 wavelength_nm = wavelengths if stated is None else np.array(stated)
                 if wavelength_nm is None:
-                    raise RecipeError("wavelengths_nm", f"is missing; {material.name} is spectral and states none")
+                    raise RecipeError(
+                        "wavelengths_nm", f"is missing; {material.name} is spectral and states no wavelengths"
+                    )
             several = wavelength_nm is not None and wavelength_nm.size > 1
             kind = "anisotropic" if material.anisotropic else "spectral" if several else "isotropic"
             if self.grids is not None and kind not in grids:
@@ -297,7 +303,7 @@ class Recipe(BaseModel):
         known = {name: (material, None) for name, material in presets(self.library).items()}
         for name, table in self.define.items():
             if name in known:
-                raise RecipeError(f"define.{name}", "is the name of a preset; give yours another")
+                raise RecipeError(f"define.{name}", "is the name of a preset; choose another name")
             if "samples" in table:
                 if not NAME.fullmatch(name):
                     raise RecipeError(f"define.{name}", "is not made of lower-case letters, digits and single hyphens")
@@ -313,8 +319,7 @@ class Recipe(BaseModel):
             if count > _MOST_MEMBERS:
                 raise RecipeError(
                     f"sweep.{name}.parameters",
-                    f"the lists make {count} members, more than the {_MOST_MEMBERS} that all "
-                    "families of a recipe may have",
+                    f"the lists make {count} members; the families of a recipe have at most {_MOST_MEMBERS} in total",
                 )
         for name, table in self.sweep.items():
             members = {material.name: (material, family) for material, family in _members(name, table, self._folder)}
@@ -345,9 +350,9 @@ def _swept(name: str, table: Mapping[str, Any]) -> dict[str, list[float]]:
     where = f"sweep.{name}.parameters"
     lists = {x: v for x, v in parameters.items() if isinstance(v, list)} if isinstance(parameters, dict) else {}
     if not lists:
-        raise RecipeError(where, "give a list of numbers for one of them at least")
+        raise RecipeError(where, "give a list of numbers for at least one parameter")
     if len(lists) > _MOST_SWEPT:
-        raise RecipeError(where, f"{len(lists)} are lists, at most {_MOST_SWEPT} may be")
+        raise RecipeError(where, f"{len(lists)} parameters are lists; at most {_MOST_SWEPT} are allowed")
     known = [written_name(p) for p in MODELS[model].parameters] if isinstance(model, str) and model in MODELS else []
     axes = {}
     for x in sorted(lists, key=lambda x: known.index(x) if x in known else len(known)):

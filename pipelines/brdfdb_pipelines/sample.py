@@ -158,13 +158,13 @@ def run(
     out = path_of(out, "out")
     spec = MODELS[model]
     if seed < 0:
-        raise ParameterError("--seed", f"{seed} is not at least 0", seed)
+        raise ParameterError("--seed", f"{seed} is less than 0", seed)
     if gradients and spec.gradient is None:
         known = [one.name for one in MODELS.values() if one.gradient is not None]
-        text = f"{model} has no derivatives; those that have: {', '.join(known)}"
+        text = f"{model} has no derivatives; models with derivatives: {', '.join(known)}"
         raise ParameterError("--gradients", text, model, known)
     if os.path.lexists(out):
-        raise SampleError(f"{out} is there already; remove it, or give another name")
+        raise SampleError(f"{out} exists already; remove it, or give another name")
     axes = axes_of(spec, ranges or {})
     made = TrainingSet(spec, axes, materials(spec, axes, count, seed), pairs(directions, seed), gradients)
     partial = out.with_name(f"{out.name}.partial")
@@ -185,10 +185,10 @@ def _alone(partial: Path, out: Path) -> Iterator[None]:
         if os.path.lexists(out):  # another writer finished it meanwhile
             with contextlib.suppress(OSError):
                 partial.rmdir()
-            raise SampleError(f"{out} is there already; remove it, or give another name")
+            raise SampleError(f"{out} exists already; remove it, or give another name")
         yield
     except BlockingIOError:
-        raise SampleError(f"another process writes {partial}; wait for it, or give another name") from None
+        raise SampleError(f"another process is writing {partial}; wait for it, or give another name") from None
     finally:
         os.close(handle)
 
@@ -199,9 +199,9 @@ def _write(made: TrainingSet, seed: int, partial: Path, jobs: int) -> None:
     last = files.pop(METADATA)
     begun = [partial / name for name in (_LAST, METADATA) if (partial / name).exists()]
     if any(file.read_bytes() != last for file in begun):
-        raise SampleError(f"{partial} is a part of another set; finish that one, or remove it")
+        raise SampleError(f"{partial} is part of another set; finish that set, or remove it")
     if not begun and any(not file.name.startswith(".") for file in partial.iterdir()):
-        raise SampleError(f"{partial} holds files that are of no set; remove them, or give another name")
+        raise SampleError(f"{partial} contains files that do not belong to a set; remove them, or give another name")
     write_file(partial / _LAST, last, partial)
     for name, data in files.items():
         write_file(partial / name, data, partial)

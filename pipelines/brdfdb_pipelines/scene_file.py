@@ -51,7 +51,7 @@ def load(name: str) -> Scene:
         If there is no such scene, or the file is not TOML or not a scene.
     """
     if not name.endswith(".toml") and name not in shipped():
-        sentence = f"is no scene{closest(name, shipped())}; give a path that ends in .toml or one of "
+        sentence = f"is not a scene{closest(name, shipped())}; give a path that ends in .toml, or one of "
         raise SceneError(name, "", sentence + ", ".join(shipped()))
     path = path_of(name, "scene")
     source = path if name.endswith(".toml") else _SHIPPED / f"{name}.toml"

@@ -159,7 +159,7 @@ def test_a_family_is_listed_shown_and_looked_up(copper: Path, capsys: Captured) 
     out = capsys.readouterr().out
     assert "  tables      4, rough-copper-001 to rough-copper-004\n" in out
     assert "    sigma_0_um      2 values, 0.1 to 0.12\n" in out
-    assert f"  error       {terminal.error(p99)} of f_r against the model, in 99 of 100 of " in out
+    assert f"  error       {terminal.error(p99)} of f_r relative to the model, at 99 % of " in out
     assert f"{terminal.error(max(family.error.p99[-1])).replace(' %', '%'):>9}\n" in out
     assert f"  worst       {terminal.error(family.record.worst.p99)} at sigma_0_um " in out
     assert "  specular    within " in out

@@ -73,7 +73,7 @@ def test_show_has_a_dash_where_nothing_was_measured(folder: Path, capsys: Captur
     assert run("show", NAME, "--store", folder / "store") == 0
     printed = capsys.readouterr().out
     rows = {line[4:16].strip(): line[16:].split() for line in printed.splitlines() if line.startswith("    ")}
-    assert rows["one there"] == rows["both beyond"] == ["-"] * len(rows["one there"])
+    assert rows["one direction grazing"] == rows["both grazing"] == ["-"] * len(rows["both grazing"])
     assert "-" not in rows["99 of 100"][:3]
 
 

@@ -32,7 +32,7 @@ def test_a_grey_material_says_so(at: Any, text: str) -> None:
         (None, "not measured"),
         ({"against": "measured", "rung": "facets", "p99": 0.119}, "12 %"),
         ({"against": "highest rung", "rung": "the sum", "p99": 0.0}, "0, exact form"),
-        ({"against": "none known", "rung": "", "p99": None}, "none known"),
+        ({"against": "none known", "rung": "", "p99": None}, "no exact form"),
     ],
 )
 def test_the_formula_stands_apart_from_the_table(stated: Any, text: str) -> None:

@@ -36,7 +36,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs="+",
         type=place,
         metavar="DATA",
-        help="a file of samples, or several of one surface; a table of another program; or published fits (NAME.fit)",
+        help="a file of samples, or several files of the same surface; a table of another program; or published fits "
+        "(NAME.fit)",
     )
     add_reading(parser)
     parser.add_argument(
@@ -44,30 +45,34 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="NAME",
-        help="a model, or a sum such as 'A + 2 B'; may be repeated (default: every model, and sums with a uniform f_r)",
+        help="a model, or a sum such as 'A + 2 B'; may be repeated (default: all models, and sums with a uniform f_r)",
     )
     parser.add_argument(
         "--residual",
         choices=("log", "relative", "cosine", "uncertainty"),
         default="log",
-        help="what is made small (default: log, the difference of logarithms)",
+        help="difference to minimise (default: log, the difference of logarithms)",
     )
-    parser.add_argument("--channel", metavar="NAME", help="the channel that is fitted (default: all together)")
+    parser.add_argument("--channel", metavar="NAME", help="fit one channel (default: all channels together)")
     parser.add_argument(
         "--refractive-index",
         metavar="ENTRY",
-        help="shelf/book/page of models with n and k (default: n and k are searched)",
+        help="refractive index for models with n and k: shelf/book/page (default: n and k are fitted)",
     )
     parser.add_argument(
         "--receiver-deg",
         type=float,
         metavar="DEG",
-        help="full angle of the receiver, as the sample sees it: lobes are averaged over it (default: as DATA states)",
+        help="full angle of the receiver, seen from the sample; lobes are averaged over it (default: as DATA states)",
     )
-    parser.add_argument("--source-deg", type=float, metavar="DEG", help="the same of the light")
+    parser.add_argument(
+        "--source-deg", type=float, metavar="DEG", help="full angle of the light source, in the same way"
+    )
     parser.add_argument("--json", type=place, metavar="FILE", help="write all fits as JSON")
     parser.add_argument("--page", type=place, metavar="FILE", help="write a page with figures, FILE.html")
-    parser.add_argument("--recipe", type=place, metavar="FILE", help="write the best model as a recipe, FILE.toml")
+    parser.add_argument(
+        "--recipe", type=place, metavar="FILE", help="write the best single model as a recipe, FILE.toml"
+    )
 
 
 def run(options: argparse.Namespace) -> int:

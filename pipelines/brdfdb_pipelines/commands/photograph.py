@@ -12,7 +12,7 @@ from brdfdb_pipelines.commands._arguments import add_out, add_store, place, whol
 if TYPE_CHECKING:
     from brdfdb.measurements.gonioreflectometer import Gonioreflectometer
 
-HELP = "Simulate Ward's gonioreflectometer: pictures of a material as EXR, which `brdfdb import` and `fit` read."
+HELP = "Simulate Ward's gonioreflectometer: write pictures of a material as EXR for `brdfdb import` and `brdfdb fit`."
 
 # Lights (theta_i, phi_i) [degree]: along the grain of an anisotropic surface, across it and between
 LIGHTS = ((15.0, 0.0), (30.0, 45.0), (45.0, 90.0), (60.0, 20.0))
@@ -29,18 +29,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs=2,
         type=float,
         metavar=("THETA", "PHI"),
-        help="a direction of the light [degrees]; may be repeated (default: 15 0, 30 45, 45 90 and 60 20)",
+        help="direction of the light [degree]; may be repeated (default: 15 0, 30 45, 45 90 and 60 20)",
     )
-    parser.add_argument("--wavelength-nm", type=float, default=550.0, metavar="NM", help="(default: %(default)s)")
+    parser.add_argument(
+        "--wavelength-nm", type=float, default=550.0, metavar="NM", help="wavelength (default: %(default)s)"
+    )
     parser.add_argument(
         "--set",
         action="append",
         default=[],
         metavar="X=VALUE",
-        help="a setting of the instrument, such as blur_px=1 or exposures=1,0.1; may be repeated",
+        help="setting of the instrument, such as blur_px=1 or exposures=1,0.1; may be repeated",
     )
     parser.add_argument(
-        "--seed", type=whole_number(), default=1, metavar="N", help="of the noise (default: %(default)s)"
+        "--seed", type=whole_number(), default=1, metavar="N", help="seed of the noise (default: %(default)s)"
     )
     add_out(parser, "pictures")
 

@@ -7,7 +7,7 @@ import io
 
 from brdfdb_pipelines.commands._arguments import add_out, add_store
 
-HELP = "Plot materials: lobe, cuts, albedo and slices, as PNG or SVG."
+HELP = "Plot lobe, cuts, albedo and slices of materials as PNG or SVG."
 
 KINDS = ("lobe", "cuts", "albedo", "slices")
 _SIZE = (6.4, 3.9)  # width and height [inch]
@@ -18,7 +18,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the materials, the kind of plot and the format."""
     parser.add_argument("names", nargs="+", metavar="NAME", help="materials")
     add_store(parser)
-    parser.add_argument("--kind", choices=KINDS, metavar="KIND", help=f"{', '.join(KINDS)} (default: all of them)")
+    parser.add_argument("--kind", choices=KINDS, metavar="KIND", help=f"{', '.join(KINDS)} (default: all)")
     parser.add_argument("--format", choices=("png", "svg"), default="png", help="format of the files (default: png)")
     parser.add_argument("--wavelength", type=float, metavar="NM", help="wavelength in nanometres (default: 550)")
     add_out(parser, "brdf-plots")
