@@ -267,7 +267,7 @@ class Offset(NamedTuple):
     y: float
 
 
-class Box(NamedTuple):
+class TextBox(NamedTuple):
     """The rectangle [point] that a text covers."""
 
     left: float
@@ -276,12 +276,12 @@ class Box(NamedTuple):
     top: float
 
     @classmethod
-    def at(cls, point: Any, offset: Offset, width: float) -> Box:
+    def at(cls, point: Any, offset: Offset, width: float) -> TextBox:
         """Return the box of a text whose left end is at an offset from its point."""
         x, y = point[0] + offset.x, point[1] + offset.y
         return cls(x, y - _LINE / 2.0, x + width, y + _LINE / 2.0)
 
-    def hidden(self, taken: Iterable[Box], frame: Any) -> float:
+    def hidden(self, taken: Iterable[TextBox], frame: Any) -> float:
         """Return the area [point^2] that this box would hide; area outside the frame counts most."""
         area = sum(
             max(0.0, min(self.right, other.right) - max(self.left, other.left))
@@ -307,22 +307,22 @@ def _labelled(axes: Axes, labels: Sequence[_Label]) -> None:
     scale = 72.0 / mpl.rcParams["figure.dpi"]
     at = [axes.transData.transform((label.x, label.y)) * scale for label in labels]
     frame = axes.get_window_extent().extents * scale
-    taken = [Box(x - 3.0, y - 3.0, x + 3.0, y + 3.0) for x, y in at]
+    taken = [TextBox(x - 3.0, y - 3.0, x + 3.0, y + 3.0) for x, y in at]
     chosen = []
     for label, point in zip(labels, at, strict=True):
         width = label.width(label.least)
-        boxes = {offset: Box.at(point, offset, width).hidden(taken, frame) for offset in offsets(width)}
+        boxes = {offset: TextBox.at(point, offset, width).hidden(taken, frame) for offset in offsets(width)}
         best = min(boxes, key=boxes.__getitem__)
-        taken.append(Box.at(point, best, width))
+        taken.append(TextBox.at(point, best, width))
         chosen.append(best)
     for index, (label, point, best) in enumerate(zip(labels, at, chosen, strict=True)):
         text, number, width = label.least, len(at) + index, label.width(label.full)
         others = [*taken[:number], *taken[number + 1 :]]
         near = [offset for offset in offsets(width) if abs(offset.y) <= _NEAR]
-        free = [offset for offset in near if Box.at(point, offset, width).hidden(others, frame) == 0.0]
+        free = [offset for offset in near if TextBox.at(point, offset, width).hidden(others, frame) == 0.0]
         if free:
             text, best = label.full, free[0]
-            taken[number] = Box.at(point, best, width)
+            taken[number] = TextBox.at(point, best, width)
         width = label.width(text)
         side = min(max(-best.x / width, 0.0), 1.0)  # side of the text that is next to its point: left, middle or right
         axes.annotate(

@@ -128,9 +128,7 @@ def _report(exports: list[_Export], directory: Path, file_format: str) -> bool:
     stated = [(files.error.document()["p99"], files.paths[0].name) for _, files in written if files.error is not None]
     if stated:
         worst, file = max(stated)
-        print(
-            f"error relative to the table: 99 % of the values within {_share(worst)} ({file}), each file states its error"
-        )
+        print(f"error relative to the table: 99 % of the values within {_share(worst)} ({file}); files state theirs")
     known = [(files.error.statement, files.paths[0].name) for _, files in written if files.error is not None]
     if statements := [(statement, name) for statement, name in known if statement is not None]:
         whole, file = max(statements, key=lambda item: item[0].p98)

@@ -257,14 +257,14 @@ def test_counts_are_written_for_people(value: float, text: str) -> None:
 
 def test_labels_hide_neither_points_nor_each_other_where_there_is_room() -> None:
     frame = (0.0, 0.0, 200.0, 100.0)
-    taken = [chart_picture.Box(97.0, 47.0, 103.0, 53.0)]
+    taken = [chart_picture.TextBox(97.0, 47.0, 103.0, 53.0)]
     boxes = []
     for _ in range(4):  # four names for one point
         best = min(
             chart_picture.offsets(30.0),
-            key=lambda offset: chart_picture.Box.at((100.0, 50.0), offset, 30.0).hidden(taken, frame),
+            key=lambda offset: chart_picture.TextBox.at((100.0, 50.0), offset, 30.0).hidden(taken, frame),
         )
-        boxes.append(chart_picture.Box.at((100.0, 50.0), best, 30.0))
+        boxes.append(chart_picture.TextBox.at((100.0, 50.0), best, 30.0))
         assert boxes[-1].hidden(taken, frame) == 0.0
         taken.append(boxes[-1])
     assert len(set(boxes)) == 4
