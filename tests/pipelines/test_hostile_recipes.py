@@ -67,8 +67,8 @@ RECIPES: list[tuple[str, str | bytes, str]] = [
     ("a key of spaced dots", "a . " * 100_000 + "a = 1", "parts between dots"),
     ("an array of tables of dots", "[[" + "a." * 100_000 + "a]]", "parts between dots"),
     ("a key of dots in a table", "x = {" + "a." * 100_000 + "a = 1}", "parts between dots"),
-    ("200 MB of numbers", b"wavelengths_nm = [" + b"500," * 50_000_000 + b"]", "MB that a file may have"),
-    ("5 MB of a comment", "#" * 5_000_000, "MB that a file may have"),
+    ("200 MB of numbers", b"wavelengths_nm = [" + b"500," * 50_000_000 + b"]", "the limit for a file"),
+    ("5 MB of a comment", "#" * 5_000_000, "the limit for a file"),
     ("3.9 MB of a comment", "#" * 3_900_000, "materials"),
     ("3.9 MB of one word", "a" * 3_900_000, "not TOML"),
     ("3.9 MB of quotes", "a = " + '"' * 3_900_000, "not TOML"),
@@ -84,7 +84,7 @@ RECIPES: list[tuple[str, str | bytes, str]] = [
     ("a million wrong materials", GOOD.replace('"foam"', "1," * 1_500_000), "materials"),
     ("a pattern of stars", GOOD.replace("foam", "*a" * 5000 + "!"), "materials"),
     ("9999 patterns", GOOD.replace('"foam"', many(9999, lambda n: f'"*x{n}",')), "materials"),
-    ("112 ranges of 99 999", GOOD.replace(AXIS, f"theta_i_deg = [{LONG * 112}]"), "nodes an axis may have"),
+    ("112 ranges of 99 999", GOOD.replace(AXIS, f"theta_i_deg = [{LONG * 112}]"), "nodes; an axis has at most"),
     ("a range of 1e300 nodes", GOOD.replace(AXIS, "theta_i_deg = [{ start = 0, stop = 80, step = 1e-298 }]"), "nodes"),
     ("a range of wavelengths", HEAD.replace("[500]", "[{ start = 1, stop = 1e9, step = 1e-9 }]") + COARSE, "nodes"),
     ("112 ranges of wavelengths", GOOD.replace("[500]", f"[{LONG * 112}]"), "nodes"),
@@ -92,11 +92,11 @@ RECIPES: list[tuple[str, str | bytes, str]] = [
     ("a number of 100 000 digits", HEAD.replace("500", "5" * 100_000), "not TOML: Exceeds the limit"),
     ("an exponent of 100 000 digits", HEAD.replace("500", "1e" + "5" * 100_000), "wavelengths_nm"),
     ("a number of 4000 digits", HEAD.replace("500", "5" * 4000), "wavelengths_nm"),
-    ("1e12 values", fine(GOOD, 0.016), "values, more than"),
+    ("1e12 values", fine(GOOD, 0.016), "a table has at most"),
     (
         "axes of 80 001 nodes",
         ranged(ranged(ranged(GOOD, "theta_i", 1e-3), "theta_r", 1e-3), "delta_phi", 9),
-        "values, more",
+        "a table has at most",
     ),
     (
         "246 GB",
@@ -173,22 +173,16 @@ def test_sixty_hostile_recipes_are_a_sentence_each(tmp_path: Path) -> None:
     assert not failures, "\n".join(f"{name}: {said}" for name, said in failures.items())
 
 
-@pytest.mark.parametrize("command", [("build",), ("render",), ("chart", "foam", "--recipe")], ids=lambda c: c[0])
-@pytest.mark.parametrize("kind", ["device", "pipe", "directory"])
-def test_what_is_no_file_is_refused(
-    command: tuple[str, ...], kind: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    path = tmp_path / "recipe.toml"
-    if kind == "device":
-        path.symlink_to("/dev/zero")
-    elif kind == "pipe":
-        os.mkfifo(path)
-    else:
-        path.mkdir()
-    out = ["--out", str(tmp_path / "out")] if command[0] != "build" else []
-    store = ["--store", str(tmp_path / "store")] if command[0] != "render" else []
-    assert cli.main([*command, str(path), *out, *store]) == 2
-    said = capsys.readouterr().err.splitlines()[-1]
-    assert said.startswith(f"brdfdb: {path}: ")
-    assert ("Is a directory" if kind == "directory" else "is no regular file") in said
-    assert sorted(tmp_path.iterdir()) == [path]
+def test_what_is_no_file_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    device, pipe, directory = paths = [tmp_path / f"{kind}.toml" for kind in ("device", "pipe", "directory")]
+    device.symlink_to("/dev/zero")
+    os.mkfifo(pipe)
+    directory.mkdir()
+    out, store = ["--out", str(tmp_path / "out")], ["--store", str(tmp_path / "store")]
+    for path in paths:
+        for command in (["build", str(path), *store], ["render", str(path), *out]):
+            assert cli.main(command) == 2
+            assert capsys.readouterr().err.splitlines()[-1].startswith(f"brdfdb: {path}: ")
+        assert cli.main(["chart", "foam", "--recipe", str(path), *out, *store]) == 2
+        assert capsys.readouterr().err.splitlines()[-1].startswith(f"brdfdb: {path}: ")
+    assert sorted(tmp_path.iterdir()) == sorted(paths)
