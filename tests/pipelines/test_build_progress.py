@@ -7,7 +7,7 @@ import json
 import pytest
 
 from brdfdb_pipelines import build_progress
-from brdfdb_pipelines.build_progress import Bars, Lines, Tally
+from brdfdb_pipelines.build_progress import Bars, JsonLines, Tally
 
 
 def test_the_rate_is_that_of_what_was_computed_and_tells_the_time_left(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -24,7 +24,7 @@ def test_the_rate_is_that_of_what_was_computed_and_tells_the_time_left(monkeypat
 
 
 def test_lines_are_json_and_bars_are_on_stderr(capsys: pytest.CaptureFixture[str]) -> None:
-    with Lines() as lines:
+    with JsonLines() as lines:
         lines({"event": "unchanged", "material": "Größe", "revision": "r000001"})
     out, err = capsys.readouterr()
     assert (json.loads(out), err) == ({"event": "unchanged", "material": "Größe", "revision": "r000001"}, "")
