@@ -5,8 +5,7 @@ from __future__ import annotations
 import inspect
 from pathlib import Path
 
-from _site.files import write_page
-from _site.markup import plain, table
+from _site.markup import plain, table, write_page
 from brdfdb.formats import EXPORTERS, IMPORTERS, Option, options_of
 
 

@@ -120,7 +120,7 @@ def test_pages_with_code_have_run(site: Path, pages: dict[Path, Page]) -> None:
     executed = [path for path in (ROOT / "docs").rglob("*.md") if "file_format: mystnb" in path.read_text("utf-8")[:99]]
     tutorials = {path for path in (ROOT / "docs" / "tutorials").glob("*.md") if path.stem != "index"}
     assert tutorials <= set(executed)
-    has_llvm = runpy.run_path(str(ROOT / "docs" / "_site" / "llvm.py"))["llvm_path"]() != ""
+    has_llvm = runpy.run_path(str(ROOT / "docs" / "conf.py"))["llvm_path"]() != ""
     for path in executed:
         built = site / path.relative_to(ROOT / "docs").with_suffix(".html")
         page = pages[built]
