@@ -378,7 +378,7 @@ def test_parameters_that_are_none_are_refused(settings: list[str], said: str, fi
 
 def test_parameters_of_a_material_are_fixed_and_degrees_are_degrees(first: Path, capsys: Captured) -> None:
     assert run(first, "lookup", "foam", 0, 0, 0, 0, "--set", "rho=0.1") == 2
-    assert capsys.readouterr().err == "brdfdb: --set rho=0.1: foam is a material, whose parameters are fixed\n"
+    assert capsys.readouterr().err.startswith("brdfdb: --set rho=0.1: foam is a material")
     assert run(first, "lookup", "gray", 0, 0, 0, 0) == 2
     assert capsys.readouterr().err.startswith("brdfdb: no material 'gray' in the store; closest: ")
     assert run(first, "lookup", "grey", 30, 0, 40, 90, "--set", "sigma_deg=20", "--json") == 0
