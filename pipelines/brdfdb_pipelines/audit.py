@@ -47,20 +47,10 @@ Figures = Mapping[str, Callable[[], Figure]]
 
 
 class Former(NamedTuple):
-    """The audits and figures that a new audit takes from the last report.
+    """The audits and figures that a new audit takes from the last report, by material and by key.
 
-    Attributes
-    ----------
-    audits : dict
-        Audits, by material.
-    figures : dict
-        Figures of atlas and gallery, by key.
-    when : datetime or None
-        The date of that report; None: nothing is taken from it.
-    page : tuple of str
-        Subjects of its page, if the page is still the one that was written with it; else empty.
-    families : tuple of FamilyAudit
-        Audits of families by the same program.
+    `when` is the date of that report; None: nothing is taken from it. `page` has the subjects of its page if that page
+    is unchanged, else none. `families` were audited by the same program.
     """
 
     audits: dict[str, MaterialAudit]
@@ -105,35 +95,17 @@ def run(
     shown: bool = True,
     again: bool = False,
 ) -> AuditReport:
-    """Audit the named materials of a store, or all of them.
+    """Audit the named materials of a store, or all of them, with `jobs` processes.
 
-    Parameters
-    ----------
-    root : Path
-        Directory of the store.
-    names : list of str
-        Materials; empty for all.
-    report_path : Path
-        The JSON report, which ends in .json; the page is written beside it, as .html. Both are written when everything
-        has been audited. The report of some materials that lies in the store keeps what it said of others before, as
-        long as their revisions are current; its page has those of this run.
-    jobs : int
-        Number of processes; 1: this one.
-    figures : bool
-        Compute the atlas and the gallery, too.
-    allow : sequence of str
-        Materials whose models may reflect more than they receive. The report records that this was accepted.
-    shown : bool
-        Print the findings.
-    again : bool
-        Audit everything. Else what the report at `report_path` says of the same bytes, by the same program, is taken
-        from it.
+    The report is JSON, and the page lies beside it as .html. Both are written when everything has been audited. The
+    report of some materials that lies in the store preserves what it said of others, as long as their revisions are
+    current. The `figures` are atlas and gallery. `allow` names materials whose models may have an albedo above 1. With
+    `again`, nothing is taken from the last report. Findings are printed if they are to be `shown`.
 
     Raises
     ------
     StoreError, UnknownMaterialError
-        If the store or a material is missing. Every file is checked against its manifest. Damaged tables are an error,
-        too, after the report on the others has been written.
+        If the store or a material is missing. Damaged tables are an error after the report on the others was written.
     OSError, ValueError
         If the report cannot be written there.
     """
@@ -480,18 +452,9 @@ def read_former(path: Path) -> AuditReport | None:
 
 
 def former_of(path: Path, store: Store, materials: Sequence[str], allowed: Sequence[str]) -> Former:
-    """Return what of the report at a path holds: of the same bytes of a table, and of the same program.
+    """Return the parts of the report at a path that still hold: of the same bytes of a table, by the same program.
 
-    Parameters
-    ----------
-    path : Path
-        The report.
-    store : Store
-        The store that is audited.
-    materials : sequence of str
-        Materials that are audited.
-    allowed : sequence of str
-        Materials whose excess is accepted: they are audited again.
+    Materials whose excess is `allowed` are audited again.
     """
     report = read_former(path)
     if report is None:

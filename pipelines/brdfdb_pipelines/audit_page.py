@@ -76,20 +76,7 @@ def plots_of(subject: MaterialAudit | Figure) -> list[DrawnPlot]:
 
 
 def render(report: AuditReport, plots: Mapping[str, list[DrawnPlot]] | None = None) -> str:
-    """Return the page of a report.
-
-    Parameters
-    ----------
-    report : AuditReport
-        Findings of a store.
-    plots : mapping, optional
-        Plots of each material and figure by `key_of`; by default drawn with `plots_of`.
-
-    Returns
-    -------
-    str
-        An HTML document.
-    """
+    """Return the page of a report as HTML; plots by `key_of` are drawn with `plots_of` if they are not given."""
     environment = html_page.environment()
     environment.filters |= {"level": LEVELS.__getitem__, "mark": _MARKS.__getitem__, "sentence": _sentence}
     environment.globals |= {"anchor": anchor, "key_of": key_of, "rank": RANKS.__getitem__}

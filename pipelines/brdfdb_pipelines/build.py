@@ -61,22 +61,8 @@ _POLL_S = 0.1  # interval [s] at which a lock of another build is tried again
 class Built:
     """The result of one job.
 
-    Attributes
-    ----------
-    job : Job
-        The request.
-    state : str
-        "published", "adopted" (an existing revision is current again) or "unchanged".
-    revision : str
-        The current revision.
-    stored_bytes : int
-        Size of that revision [byte].
-    why : str
-        Phrase on why the table was not left unchanged; empty for "unchanged".
-    shape : tuple of int
-        Shape of the table; empty unless it was computed.
-    wavelengths : int
-        Number of wavelengths for which it holds; 0 if it is grey.
+    `state` is "published", "adopted" (an existing revision is current again) or "unchanged". `why` says in a phrase why
+    the table is not unchanged. `shape` is empty unless the table was computed; `wavelengths` is 0 if it is grey.
     """
 
     job: Job | MeasuredJob
@@ -113,36 +99,20 @@ def build(
     *,
     memory: int | None = None,
 ) -> list[Built]:
-    """Build the missing tables of a recipe and measure its families.
+    """Build the missing tables of a recipe and measure its families; return the results in the order of the recipe.
 
-    Parameters
-    ----------
-    recipe : Recipe
-        The recipe.
-    root : Path
-        Directory of the store; made if it does not exist.
-    at : Workers or Executor
-        Executor of the tasks: threads, processes or machines that see `root` under the same path.
-    report : callable
-        Function that takes every event; the README lists them.
-    memory : int, optional
-        Memory of all tasks together [byte].
-
-    Returns
-    -------
-    list of Built
-        In the order of the recipe.
+    The executor works in threads, processes or machines that see `root` under the same path. `report` takes every
+    event; `memory` [byte] is that of all tasks together. Published tables and complete blocks stay after any error: the
+    next build of the same recipe resumes from them. An error of one table is raised after the other tables are built.
 
     Raises
     ------
     RecipeError
         Before anything is written, if the recipe cannot be built.
     ParameterError
-        If a single task exceeds `memory`, or the tables do not fit on the disk. A store that was made for them is
-        removed again.
+        If a single task exceeds `memory`, or the tables do not fit on the disk. A store made for them is removed.
     StoreError
-        If the store cannot be written. Published tables and complete blocks stay: the next build of the same
-        recipe resumes from them. Any other error of a table is raised after the other tables are built.
+        If the store cannot be written.
     """
     jobs = recipe.jobs()
     measured = recipe.measured_jobs()

@@ -55,30 +55,10 @@ def run(
     recipe_path: Path | None = None,
     tolerances: Sequence[float] | None = None,
 ) -> Charts:
-    """Chart materials and families; write ``NAME.json``, ``NAME.svg`` and ``NAME.png`` for each.
+    """Chart materials and families of recipe or store; write ``NAME.json``, ``NAME.svg`` and ``NAME.png`` of each.
 
-    Parameters
-    ----------
-    names : sequence of str
-        Materials or families of the recipe (by default every preset) or of the store.
-    out : Path
-        Directory to write to; made if it does not exist.
-    store : Path, optional
-        Store whose tables and families are charted as well; it need not exist.
-    recipe_path : Path, optional
-        A recipe that defines materials or families, and the wavelengths of spectral ones.
-    tolerances : sequence of float, optional
-        Tolerances of planned tables: see `brdfdb.forms.catalogue`.
-
-    Returns
-    -------
-    Charts
-        All charts. Each is written to a file of its own, so that another run replaces only what it charts again.
-
-    Raises
-    ------
-    ParameterError
-        If a name is neither in the recipe nor in the store, or a tolerance is out of range.
+    The tables and families of a store are charted as well; the store need not exist. ParameterError if a name is
+    unknown, or a tolerance is out of range.
     """
     for tolerance in tolerances or ():
         check_tolerance(tolerance)

@@ -85,27 +85,9 @@ def run(
 ) -> Choice:
     """Choose for a scene; write ``choice.json``, ``NAME.png``, ``NAME-truth.exr`` and ``NAME-choice.exr``.
 
-    Parameters
-    ----------
-    name : str
-        A scene by its file or name.
-    out : Path
-        Directory to write to; made if it is not there.
-    width : int
-        Pixels across the picture where forms are compared. The choice as a whole is checked at fresh places: `FINER`
-        squared times as many, and `EDGES` beside edges. A recorded scene has the size of its file, and no other places.
-    weigh : str
-        Cost to minimise: "time", "bytes", or "both", which is their product.
-    store : Path, optional
-        Store where chosen tables are published, under the names of their materials, each with its error; made if it
-        does not exist.
-    tolerances : sequence of float, optional
-        Tolerances of planned tables: see `brdfdb.scenes.offered_forms`.
-
-    Returns
-    -------
-    Choice
-        The document that was written.
+    Forms are compared in a picture of `width` pixels. The choice is checked at other places: `FINER` squared times as
+    many, and `EDGES` near edges. A recorded scene has the size of its file, and no other places. Chosen tables are
+    published in the store, each with its error, under the names of their materials.
 
     Raises
     ------
@@ -299,19 +281,8 @@ def publish_choices(
 ) -> dict[str, PublishedChoice]:
     """Publish tables under names of materials, each with its error against the model that it stands for.
 
-    Parameters
-    ----------
-    root : Path
-        Directory of an existing store.
-    layouts : mapping
-        Layouts by the name under which their table is published. A table that is current already stays.
-    values : mapping, optional
-        Values of tables by the same names, where they are known. Other tables are tabulated.
-
-    Raises
-    ------
-    StoreError
-        If the store cannot be written.
+    A table that is current already stays. Tables without values are tabulated. StoreError if the store cannot be
+    written.
     """
     built = {}
     with terminal.progress() as bar:
@@ -369,14 +340,7 @@ def with_reason(layout: Layout, title: str, wanted: str) -> Layout:
 def png(seen: Seen, choice: Array, cheaper: Array | None, left_out: Sequence[str] = ()) -> bytes:
     """Draw truth, choice and next cheaper forms, and below them a colour bar and the differences of the two.
 
-    Parameters
-    ----------
-    seen : Seen
-        The scene, with the truth and the measure of differences.
-    choice, cheaper : array (height, width, L)
-        Spectral radiance. `cheaper` is None if nothing is cheaper.
-    left_out : sequence of str
-        Material and title of each form that could not be made. They are listed below the bar.
+    The forms that could not be made are listed below the bar. `cheaper` is None if nothing is cheaper.
     """
     import matplotlib as mpl
     from matplotlib.cm import ScalarMappable

@@ -53,18 +53,9 @@ _HEAD = 40.0
 
 @dataclass(frozen=True)
 class ConversionRequest:
-    """What a material is converted to.
+    """What a material is converted to: the model, and what its search is given.
 
-    Attributes
-    ----------
-    model : str
-        The model to convert to.
-    wavelength_nm : sequence of float [nm], optional
-        Wavelengths in place of those of the material.
-    fixed : sequence of str
-        Parameters that are not searched, ``name=value`` as recipes write them.
-    refractive_index, weigh
-        As of `brdfdb.conversion.convert.convert`.
+    Wavelengths [nm] replace those of the material. Fixed parameters are ``name=value``, as recipes write them.
     """
 
     model: str
@@ -106,27 +97,9 @@ def run(
     json: bool = False,
     picture: Path | None = None,
 ) -> Conversion:
-    """Convert a material to another model and print the result.
+    """Convert a material of the recipe or the store to another model, and print the result; ParameterError if refused.
 
-    Parameters
-    ----------
-    name : str
-        A material of the recipe (by default every preset) or of the store.
-    request : ConversionRequest
-        The model, and what is searched.
-    store : Path, optional
-        Store whose materials can be named, too; it need not exist.
-    recipe_path : Path, optional
-        A recipe that defines materials, and the wavelengths of spectral ones. It needs nothing else.
-    json : bool
-        Print the whole document as JSON.
-    picture : Path, optional
-        A file to draw both models in, whose name ends in .svg or .png.
-
-    Raises
-    ------
-    ParameterError
-        If the material is unknown, or the conversion is refused.
+    The store need not exist, and the recipe needs only to define materials. The picture shows both models.
     """
     named = named_source(name, store, recipe_path)
     wavelength_nm = named.wavelength_nm

@@ -39,17 +39,11 @@ def run(
     audit: Path | None,
     jobs: int,
 ) -> bool:
-    """Write the named materials of a store, or all of them, in a format of `EXPORTERS`, and print what was written.
+    """Write the named materials of a store, or all of them, as files; return whether all are accurate enough.
 
     A format with several kinds of files writes one of each, NAME_KIND.SUFFIX, unless the options choose a kind. Of all
     materials, those that the format cannot hold are left out and named. `audit` is the report whose verdicts are
-    written; None: that of the store, if it has one. A few materials are written by `jobs` threads, more by as many
-    processes.
-
-    Returns
-    -------
-    bool
-        True if each file is as near to its table as was asked for.
+    written, by default that of the store. A few materials are written by `jobs` threads, more by as many processes.
 
     Raises
     ------

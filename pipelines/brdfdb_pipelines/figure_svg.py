@@ -66,25 +66,10 @@ _COLOURS = 65  # number of colours of the bar beside a map
 
 
 def svg(drawing: Drawing, key: str) -> str:
-    """Draw a panel, a map or a picture.
+    """Draw a panel, a map or a picture as an ``svg`` element without a size, for a page that defines the `VARIABLES`.
 
-    Parameters
-    ----------
-    drawing : Panel or Map or Picture
-        What to draw.
-    key : str
-        Unique on the page: what the ids in the SVG begin with.
-
-    Returns
-    -------
-    str
-        An ``svg`` element without a size, for a page that defines the `VARIABLES`. Lines of a panel stand in groups
-        with the attribute ``data-curve``, their index.
-
-    Raises
-    ------
-    ValueError
-        If a polar panel asks for logarithmic axes, or has angles beyond -90 to 90 degrees.
+    Ids begin with the key, which is unique on the page. Lines of a panel stand in groups with the attribute
+    ``data-curve``, their index. ValueError if a polar panel has logarithmic axes, or angles beyond -90 to 90 degrees.
     """
     if isinstance(drawing, Picture):
         return _picture(drawing)

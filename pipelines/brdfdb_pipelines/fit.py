@@ -34,17 +34,7 @@ _WIDEST_DEG = 30.0  # full angle of a cone: wider cones have no direction
 
 @dataclass(frozen=True)
 class FitOutputs:
-    """Files that a fit writes.
-
-    Attributes
-    ----------
-    json : Path, optional
-        All fits.
-    page : Path, optional
-        A page with figures of the best fit.
-    recipe : Path, optional
-        The best fit that is a model of the registry, as a recipe.
-    """
+    """Files that a fit writes: all fits, a page with figures of the best fit, and its recipe."""
 
     json: Path | None = None
     page: Path | None = None
@@ -55,18 +45,9 @@ class FitOutputs:
 class FitSettings:
     """What is fitted to samples, and how the samples are read.
 
-    Attributes
-    ----------
-    models : sequence of str, optional
-        Models and sums, by default all.
-    reading : mapping
-        Keys of `brdfdb_pipelines.measured_job.MeasuredTable`, without `samples`.
-    residual, refractive_index
-        As of `brdfdb.fitting.fit.fits`.
-    channel : str, optional
-        The one channel that is fitted.
-    receiver_deg, source_deg : float [degree], optional
-        Full angles of the cones of receiver and light, as the sample sees them, in place of those that the file states.
+    By default all models are fitted. `reading` are keys of `MeasuredTable`, without `samples`. Only one channel is
+    fitted if it is given. The full angles [degree] of the cones of receiver and light, seen from the sample, replace
+    those of the file.
     """
 
     models: Sequence[str] | None = None
@@ -81,8 +62,8 @@ class FitSettings:
 def run(data: Sequence[Path], settings: FitSettings, outputs: FitOutputs) -> Fits:
     """Fit models to the samples of a file, or of several files of one surface, and print the result.
 
-    The notes of the reader, and what looks wrong with the samples, are printed before the search, as by an import.
-    Ctrl-C ends the search. Finished models are ranked and written; `Fits.interrupted` is then true.
+    The notes of the reader, and what looks wrong with the samples, are printed before the search. Ctrl-C ends the
+    search: finished models are ranked and written, and `Fits.interrupted` is true.
 
     Raises
     ------
@@ -285,21 +266,8 @@ def list_published(
 ) -> PublishedFits:
     """Print the fits of a file of published fits, and which of them contradict physics.
 
-    Parameters
-    ----------
-    data : Path
-        A file that `brdfdb.fitting.published.read_published` reads.
-    channel : str, optional
-        The channel of the recipe, R, G or B; G by default.
-    json, recipe : Path, optional
-        Files to write: all fits, and those that are models of the registry as a recipe.
-
-    Raises
-    ------
-    FileFormatError
-        If it is no such file.
-    ParameterError
-        If a recipe is asked for and no fit is a model of the registry.
+    The recipe has the fits that are models of the registry, in the channel R, G or B, by default G. FileFormatError if
+    it is no such file; ParameterError if a recipe is asked for and no fit is such a model.
     """
     with terminal.progress(counted=False, transient=True) as bar:
         bar.add_task(data.name, total=None)

@@ -87,18 +87,7 @@ class ImportTarget:
 class Tables:
     """What is made of imported samples: tables in a store, and the recipe of the same tables.
 
-    Attributes
-    ----------
-    store : Path or None
-        Directory of the store in which tables are built; None: none is built.
-    recipe : Path or None
-        File of the recipe that builds the same tables.
-    name, title : str or None
-        Name and title of the single material; by default those of the file.
-    tolerance : float
-        Tolerance of the tables, in [1e-4, 0.5].
-    jobs : int
-        Number of processes.
+    Name and title are those of a single material; by default those of the file.
     """
 
     store: Path | None
@@ -116,17 +105,7 @@ class Tables:
 
 @dataclass
 class Imported:
-    """The result of an import.
-
-    Attributes
-    ----------
-    statements : list of (ImportTarget, Statement)
-        The materials that were read.
-    refused : list of str
-        A sentence on each file or table that was refused.
-    report : AuditReport or None
-        Audit of the tables; None if no table was built.
-    """
+    """The result of an import: statements on what was read, a sentence on each refusal, and the audit of the tables."""
 
     statements: list[tuple[ImportTarget, Statement]] = field(default_factory=list)
     refused: list[str] = field(default_factory=list)
@@ -137,31 +116,12 @@ class Imported:
 class ImportedTable:
     """Figures of one imported table; a row of the summary.
 
-    Attributes
-    ----------
-    material, revision : str
-        Name and revision.
-    error_p95 : float [1]
-        Relative error of the table that 95 of 100 values keep to, against the data: the one that a tolerance bounds.
-    measured : float [1]
-        Share of all pairs of directions that were measured; 1 if f_r is known everywhere.
-    asymmetry_median, asymmetry_p99 : float [1] or None
-        abs(f - f') / (abs(f) + abs(f')) of f_r that the table is made of, interpolated between samples, f' with light
-        and viewer exchanged; None: the data cannot tell.
-    uncertainty : float [1] or None
-        Relative uncertainty that 99 of 100 values keep to; None if nothing is known of it.
-    asymmetric : bool or None
-        True if the asymmetry of the table is larger than the uncertainty explains; None without an uncertainty.
-    albedo : float [1] or None
-        Largest directional albedo of the table; None: not finite.
-    albedo_error : float [1] or None
-        Part of it that the stated error of the table, and that at samples held out, may make; None: not known.
-    at_theta_i_deg : float [degree]
-        Polar angle of the light there.
-    above_1 : bool
-        True if an albedo is above 1.
-    verdict : str
-        Verdict of the audit; "not judged" where the error of the albedo does not tell whether it is above 1.
+    `error_p95` [1] is the relative error of the table against the data that a tolerance bounds. `measured` [1] is the
+    share of all pairs of directions that were measured. The asymmetry [1] is abs(f - f') / (abs(f) + abs(f')) of the
+    interpolated f_r, with light and viewer exchanged in f'; None: unknown. `uncertainty` [1] holds for 99 % of the
+    values; the table is `asymmetric` if that does not explain its asymmetry. `albedo` is the largest directional
+    albedo; None: not finite. Its error includes that at samples that were held out. `verdict` is that of the audit, or
+    "not judged" where the error of the albedo does not tell whether it is above 1.
     """
 
     material: str
@@ -190,28 +150,14 @@ def run(
 ) -> Imported:
     """Read files, print a statement on each, and build and audit tables of them if that is asked for.
 
-    A file that is refused is one sentence on stderr; the others are imported.
-
-    Parameters
-    ----------
-    files : sequence of Path
-        Files of measurements.
-    keys : dict
-        Keys of `brdfdb_pipelines.measured_job.MeasuredTable`, without `samples`. All materials of an archive are
-        imported unless a `member` is named.
-    join : bool
-        Take all files as one set of samples.
-    json : bool
-        Print one JSON object.
-    out : Path, optional
-        The netCDF file to write the samples of the single material to.
-    tables : Tables, optional
-        Tables to make of the samples.
+    A file that is refused is one sentence on stderr; the others are imported. `keys` are those of `MeasuredTable`,
+    without `samples`. All materials of an archive are imported unless a `member` is named. The samples of a single file
+    are written to `out`, as netCDF. With `join`, all files are one set of samples.
 
     Raises
     ------
     ParameterError
-        If options do not go together; before anything is read, unless a file is an archive.
+        If options cannot be combined; before anything is read, unless a file is an archive.
     StoreError
         If the store cannot be written.
     """
@@ -310,16 +256,10 @@ def _read(target: ImportTarget, label: str, patience_s: float) -> _Read:
 
 
 def _named(targets: Sequence[ImportTarget], tables: Tables, count: int, result: Imported) -> list[ImportTarget]:
-    """Return materials with their names; all materials that would have the same name are refused.
+    """Return materials with their names; materials that would have the same name are refused.
 
     A name is that of the command line, that of the file or the member, as words, or the words that the names of joined
-    files begin with.
-
-    Raises
-    ------
-    ParameterError
-        If a name is given to several materials, is that of a preset, is not made of words, or joined files have no word
-        in common.
+    files begin with. ParameterError if a name is not allowed.
     """
     for option, text in (("--name", tables.name), ("--title", tables.title)):
         if text is not None and count != 1:
@@ -355,12 +295,7 @@ def _named(targets: Sequence[ImportTarget], tables: Tables, count: int, result: 
 def _make(targets: Sequence[ImportTarget], tables: Tables, result: Imported) -> None:
     """Write the recipe of materials, build its tables, and audit them, where that is asked for.
 
-    Raises
-    ------
-    RecipeError
-        If a file has changed, or a name is not allowed.
-    StoreError, WorkersError, OSError
-        If the store or the recipe cannot be written. A table that fails is recorded, and the others are built.
+    A table that fails is recorded, and the others are built.
     """
     recipe = Recipe.model_validate(_content(targets, tables.tolerance, Path()))
     recipe.jobs()

@@ -91,13 +91,7 @@ class MeasuredTable(BaseModel):
         return formats.read(paths[0], self.format, **self.keywords) if len(paths) == 1 else self.joined(paths)
 
     def joined(self, paths: Sequence[Path]) -> Samples:
-        """Return the samples of files as one.
-
-        Raises
-        ------
-        FileFormatError, ParameterError, OSError
-            If a file cannot be read, or files cannot be joined.
-        """
+        """Return the joined samples of files; FileFormatError, ParameterError or OSError for a bad file."""
         return joined([formats.samples(path, self.format, **self.keywords) for path in paths])
 
 
@@ -132,13 +126,7 @@ class MeasuredJob:
         }
 
     def source(self) -> MeasuredSource:
-        """Return the data of the files as a source, unchanged.
-
-        Raises
-        ------
-        FileFormatError, ParameterError, OSError
-            If the file cannot be read, or is not what a table needs.
-        """
+        """Return the data of the files as a source, unchanged; errors as of `MeasuredTable.joined`."""
         read = self.table.read(self.paths)
         title = self.table.title or read.name
         file = f"the file {self.files}" if len(self.paths) == 1 else f"the files {self.files}"

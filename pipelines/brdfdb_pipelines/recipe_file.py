@@ -194,13 +194,7 @@ class Recipe(BaseModel):
     _checked: list[Job] | None = PrivateAttr(default=None)  # jobs of this recipe, which does not change once it is read
 
     def jobs(self) -> list[Job]:
-        """Return a job for each table of a model that the recipe asks for.
-
-        Raises
-        ------
-        RecipeError
-            If a name matches nothing, or a material, grid or wavelength is not what it must be.
-        """
+        """Return a job for each table of a model that the recipe asks for; RecipeError if the recipe is wrong."""
         if self._checked is None:
             self._checked = self._jobs()
         return [*self._checked]
@@ -400,16 +394,10 @@ def _completed(content: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def load(path: Path | None = None, library: str = PAPERS, *, to_build: bool = True) -> Recipe:
-    """Read a recipe file, by default that of a library of presets, and see that it can be built.
+    """Read a recipe file, by default that of a library of presets, and check that it can be built.
 
     If it is not `to_build`, it may leave out `materials`, which are those that it defines, and `tolerance` or `grids`.
-
-    Raises
-    ------
-    RecipeError
-        If the file cannot be read, is not TOML, or is not a recipe; the message names the file and the field.
-    ParameterError
-        If there is no such library.
+    RecipeError names the file and the field; ParameterError if there is no such library.
     """
     source = recipe_of(library) if path is None else path
     try:

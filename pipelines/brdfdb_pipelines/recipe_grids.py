@@ -15,13 +15,7 @@ _MOST_NODES = 100_000  # nodes of an axis: far more than any recipe uses, and fa
 
 
 class RecipeError(ParameterError):
-    """A recipe that cannot be built; `parameter` is its field, with the tables around it, and may be "".
-
-    Attributes
-    ----------
-    file : str
-        Path of the recipe; "" of a recipe that was not read from a file.
-    """
+    """A recipe that cannot be built: the file, the field with the tables around it, and a sentence."""
 
     file = ""
 

@@ -44,18 +44,8 @@ class SampleError(BrdfdbError):
 class TrainingSet:
     """A training set before its values: the drawn materials and directions.
 
-    Attributes
-    ----------
-    spec : ModelSpec
-        The model.
-    axes : list of Axis
-        Its drawn parameters.
-    written : dict
-        Their values (M,), as files write them.
-    angles : dict
-        Angles (D,) [degree] of light and viewer.
-    gradients : bool
-        True if derivatives by the drawn parameters stand beside f_r.
+    `written` has the drawn parameters (M,) as files write them, `angles` those (D,) [degree] of light and viewer. With
+    `gradients`, derivatives by the drawn parameters are written, too.
     """
 
     spec: ModelSpec
@@ -129,31 +119,17 @@ def run(
     gradients: bool = False,
     jobs: int = 1,
 ) -> None:
-    """Write a training set, or go on with one that was interrupted.
+    """Write a training set, or resume one that was interrupted.
 
-    Parameters
-    ----------
-    model : str
-        A name in `brdfdb.models.MODELS`.
-    out : Path
-        The zarr group to write. Until it is complete its name ends in ``.partial``.
-    count, directions : int
-        Materials, and pairs of directions that all of them share.
-    ranges : mapping of str to (float, float), optional
-        Ranges of parameters in place of the usual ones, by names and in units as files write them.
-    seed : int
-        The same seed draws the same set.
-    gradients : bool
-        Write derivatives by the drawn parameters, too.
-    jobs : int
-        Threads.
+    Until the zarr group is complete its name ends in ``.partial``. Ranges of parameters have the names and units of
+    recipes. The same seed draws the same set.
 
     Raises
     ------
     ParameterError
         If the model is unknown or has no derivatives, or a range is refused.
     SampleError
-        If the group is there already, another process writes it, or another set is half written under its name.
+        If the group exists already, another process writes it, or part of another set has its name.
     """
     out = path_of(out, "out")
     spec = MODELS[model]

@@ -26,25 +26,7 @@ class TomlError(BrdfdbError):
 
 
 def read(source: Path | Traversable) -> dict[str, Any]:
-    """Return the content of a TOML file.
-
-    Parameters
-    ----------
-    source : Path or Traversable
-        A file of the user, or one that comes with the program.
-
-    Returns
-    -------
-    dict
-        The content, unchecked.
-
-    Raises
-    ------
-    OSError
-        If the file cannot be read.
-    TomlError
-        If it is no regular file, is larger than `MOST_BYTES`, or is not TOML.
-    """
+    """Return the unchecked content of a TOML file; TomlError or OSError if it cannot be read."""
     data = _bounded(source) if isinstance(source, Path) else source.read_bytes()
     try:
         text = data.decode("utf-8")

@@ -72,14 +72,8 @@ def _start_process() -> None:
 def cluster(address: str) -> Iterator[Workers]:
     """Provide the workers of a running dask scheduler; they must see the store under the same path.
 
-    Raises
-    ------
-    WorkersError
-        If nothing answers there; from `slots`, if the scheduler is gone.
-    ParameterError
-        If the address has no port.
-    MissingExtraError
-        If dask is not installed.
+    WorkersError if nothing answers there, or from `slots` if the scheduler is gone. ParameterError for an address
+    without a port; MissingExtraError without dask.
     """
     if ":" not in address:  # dask waits for half a minute, and then prints a traceback of its own
         raise ParameterError("--scheduler", f"{address!r} is not an address such as tcp://10.0.0.1:8786", address)

@@ -118,7 +118,7 @@ def test_kinds_before_one_that_is_refused_count(
     monkeypatch.setitem(EXPORTERS, "list", kinds)
     assert run("export", "list", "grey", "--store", store, "--out", tmp_path / "out") == 2
     captured = capsys.readouterr()
-    assert captured.out.startswith("1 LIST file and 1 beside it, ")
+    assert captured.out.startswith("1 LIST file and 1 more, ")
     assert captured.err.endswith("\nbrdfdb: grey: wavelength: 900 nm is outside\n")
 
 

@@ -20,13 +20,7 @@ TERMINATED = 143  # told to end, as batch systems and containers do: 128 + SIGTE
 
 
 class Command(Protocol):
-    """The interface of a module of this package.
-
-    Attributes
-    ----------
-    HELP : str
-        The sentence that ``brdfdb --help`` and the help of the command show.
-    """
+    """The interface of a module of this package; `HELP` is the sentence that ``brdfdb --help`` shows."""
 
     HELP: str
 

@@ -49,13 +49,7 @@ def add_reading(parser: argparse.ArgumentParser) -> None:
 
 
 def reading_keys(options: argparse.Namespace) -> dict[str, Any]:
-    """Return the options as keys of `brdfdb_pipelines.measured_job.MeasuredTable`.
-
-    Raises
-    ------
-    ParameterError
-        If the wavelength is out of range, or a column is not written NAME=HEADER.
-    """
+    """Return the options as keys of `MeasuredTable`; ParameterError for a wavelength out of range or a wrong column."""
     from brdfdb.formats._stated import check_wavelength
 
     keys: dict[str, Any] = {name: getattr(options, name) or "" for name in _KEYS}
