@@ -33,7 +33,7 @@ def counts_of(standings: Sequence[Standing]) -> Iterator[tuple[Standing, str]]:
 
 
 def in_words(standings: Sequence[Standing]) -> str:
-    """Return whether a material is within the limits that the paper states, or the number of limits of each standing."""
+    """Return whether a material is within the limits of its paper, or the number of limits of each standing."""
     count = len(standings)
     if not standings:
         return "the paper states no limits"

@@ -15,8 +15,8 @@ NOT_MEASURED = "not measured"
 NOT_AUDITED = "not audited"
 # What the two errors of a list are, for the line below it
 ERRORS_EXPLAINED = (
-    "table error: of the table relative to its formula, or to the data if it is measured; formula error: of the formula "
-    "relative to the exact form of the same model; 0, exact form: the formula is exact"
+    "table error: of the table relative to its formula, or to the data if it is measured; formula error: of the "
+    "formula relative to the exact form of the same model; 0, exact form: the formula is exact"
 )
 COLUMNS = ("what the paper says?", "model conserves energy?")  # headings of the two answers
 
