@@ -153,7 +153,7 @@ def test_a_terminal_without_the_letters_is_no_error(built: Path, tmp_path: Path)
 
 def test_no_file_is_opened_in_the_encoding_of_the_locale(tmp_path: Path) -> None:
     recipe = tmp_path / "recipe.toml"
-    recipe.write_text('title = "Größe"\nmaterials = ["glossy-grey-paper"]\n' + isotropic(), encoding="utf-8")
+    recipe.write_text('title = "Größe"\nmaterials = ["aluminum-cylinder-13c"]\n' + isotropic(), encoding="utf-8")
     code = """
 import sys, warnings
 warnings.filterwarnings("error", category=EncodingWarning, module=r"brdfdb")
@@ -162,7 +162,7 @@ recipe, store, report = sys.argv[1:]
 for command in (
     ["build", recipe],
     ["audit", "--no-figures", "--jobs", "1", "--report", report],
-    ["show", "glossy-grey-paper"],
+    ["show", "aluminum-cylinder-13c"],
     ["list"],
 ):
     assert main([*command, "--store", store]) == 0
