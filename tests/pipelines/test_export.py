@@ -160,7 +160,7 @@ def test_a_report_that_is_named_must_be_one(store: Path, tmp_path: Path, capsys:
     report, reason = tmp_path / "report.json", "No such file or directory"
     if text is not None:
         report.write_text(text)
-        reason = "report of `brdfdb audit`"
+        reason = "it is not a report of `brdfdb audit`"
     out = tmp_path / "out"
     assert run("export", "list", "grey", "--audit", report, "--store", store, "--out", out) == 2
     assert capsys.readouterr().err == f"brdfdb: audit: {report} cannot be read: {reason}\n"

@@ -43,9 +43,9 @@ def test_history_is_a_line_a_revision(root: Path, capsys: Captured) -> None:
 
 def test_rollback_says_what_was_current(root: Path, capsys: Captured) -> None:
     assert run(root, "rollback", "foam", "r000001") == 0
-    assert capsys.readouterr().out == "foam: r000001 is current, r000002 was\n"
+    assert capsys.readouterr().out == "foam: r000001 is current now, instead of r000002\n"
     assert run(root, "rollback", "foam", "r000001") == 0
-    assert capsys.readouterr().out == "foam: r000001 stays current\n"
+    assert capsys.readouterr().out == "foam: r000001 was current already\n"
     assert run(root, "rollback", "foam", "r000007") == 2
     assert capsys.readouterr().err == "brdfdb: foam has no revision 'r000007'; it has r000001, r000002\n"
 

@@ -114,7 +114,7 @@ def test_a_killed_set_does_not_look_complete_and_goes_on(tmp_path: Path) -> None
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
-        (("lambert", "--gradients"), "--gradients: lambert has no derivatives; those that have: oren_nayar, "),
+        (("lambert", "--gradients"), "--gradients: lambert has no derivatives; "),
         (("lambrt",), "model: 'lambrt' is not one of "),
         (("ward", "--range", "rho=0:1"), "--range rho: the parameters of ward are rho_d, rho_s, alpha_x, alpha_y"),
         (("ward", "--range", "rho_d=0:2"), "--range rho_d: 0:2 is no range within [0, 1]"),
@@ -145,7 +145,7 @@ def test_one_process_writes_a_set(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
 
     def beside(*made: Any) -> None:
         assert run("sample", "ward", *SMALL, "--seed", 3, "--out", out) == 2
-        assert f"another process writes {out}.partial; wait for it" in capsys.readouterr().err
+        assert f"another process is writing {out}.partial" in capsys.readouterr().err
         chunks(*made)
 
     monkeypatch.setattr(sample, "_write_chunks", beside)
@@ -160,7 +160,7 @@ def test_a_set_that_lacks_only_its_name_is_not_mixed_with_another(tmp_path: Path
     values = xr.open_zarr(out)["f_r"].values
     partial = out.rename(tmp_path / "set.zarr.partial")
     assert run("sample", "ward", *SMALL, "--seed", 3, "--out", out) == 2
-    assert "is a part of another set" in capsys.readouterr().err
+    assert "is part of another set" in capsys.readouterr().err
     assert run("sample", "ward", *SMALL, "--out", out) == 0
     assert np.array_equal(xr.open_zarr(out)["f_r"].values, values)
     assert not partial.exists()
