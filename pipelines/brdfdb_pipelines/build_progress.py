@@ -99,9 +99,7 @@ class Bars:
             case "waiting":
                 self._progress.console.print(f"waiting for {event['material']}: another build is building it")
             case "idle":
-                self._progress.console.print(
-                    "the cluster has no workers; waiting for a worker. Ctrl-C stops; complete blocks are preserved"
-                )
+                self._progress.console.print("the cluster has no workers; waiting for a worker (Ctrl-C stops)")
             case "failed":
                 self._progress.console.print(
                     f"{event['material']} failed: {event['error']}", markup=False, soft_wrap=True

@@ -93,7 +93,7 @@ def test_a_build_names_a_material_that_reflects_more_than_it_receives(tmp_path: 
     assert cli.main(["build", str(path), "--store", str(tmp_path / "store"), "--jobs", "1"]) == 0
     said = [line for line in capsys.readouterr().out.splitlines() if "reflects more" in line]
     assert len(said) == 1
-    assert said[0].startswith("b reflects more than it receives: albedo of the model 1.")
+    assert said[0].startswith("b reflects more light than it receives: albedo of the model 1.")
 
 
 OF_A_WAVELENGTH = 100  # bytes that a wavelength adds to a mixture; measured: 80

@@ -68,7 +68,7 @@ def test_a_disk_that_is_too_small_is_one_sentence_before_anything_is_written(
     assert cli.main(["build", str(recipe), "--store", str(root)]) == 2
     said = capsys.readouterr().err.splitlines()[-1]
     assert said.startswith("brdfdb: disk: the tables take up to ")
-    assert said.endswith(f" kB, {root} has 10 kB free")
+    assert said.endswith(f" kB, and {root} has 10 kB free")
     assert not root.exists()
 
 
