@@ -8,7 +8,7 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
-from brdfdb.store.opening import open
+from brdfdb.store import open
 
 if TYPE_CHECKING:
     from brdfdb.materials import presets

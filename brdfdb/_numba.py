@@ -156,7 +156,10 @@ def _load_alone(cache: Any) -> None:
     def load_overload(signature: Any, context: Any) -> Any:
         rtsys.initialize(context)
         context.install_registry(builtin_registry)
-        return cache._load_overload(signature, context)
+        try:
+            return cache._load_overload(signature, context)
+        except ImportError:  # stored by a process that knew the file as another module: it is compiled again
+            return None
 
     cache.load_overload = load_overload
 

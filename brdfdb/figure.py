@@ -1,4 +1,4 @@
-"""Figures as data: curves, maps and pictures, and statements of a paper about them; pixels as a PNG file."""
+"""Documents: their base, and figures as data with the statements of a paper about them; pixels as a PNG file."""
 
 from __future__ import annotations
 
@@ -16,13 +16,16 @@ Numbers = list[float | None]
 Role = Literal["ours", "printed", "textbook", "truth", "other"]
 
 _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-_STRICT = ConfigDict(frozen=True, extra="forbid")
 
 
-class Curve(BaseModel):
+class DocumentPart(BaseModel):
+    """A document or a part of one: immutable, without unknown keys."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class Curve(DocumentPart):
     """One line of a panel."""
-
-    model_config = _STRICT
 
     label: str
     x: list[float]
@@ -33,10 +36,8 @@ class Curve(BaseModel):
     dots: bool = Field(default=False, description="true: points, such as samples, that no line joins")
 
 
-class Panel(BaseModel):
+class Panel(DocumentPart):
     """Curves over common axes. In a polar panel x is the angle from the normal, -90 to 90 degrees, and y the radius."""
-
-    model_config = _STRICT
 
     kind: Literal["curves", "polar"] = "curves"
     title: str = ""
@@ -47,10 +48,8 @@ class Panel(BaseModel):
     log_y: bool = False
 
 
-class Map(BaseModel):
+class Map(DocumentPart):
     """Values over two axes, shown as colours."""
-
-    model_config = _STRICT
 
     kind: Literal["map"] = "map"
     title: str = ""
@@ -67,20 +66,16 @@ class Map(BaseModel):
     high: float | None = Field(default=None, description="value of the brightest colour; null: the largest value")
 
 
-class Picture(BaseModel):
+class Picture(DocumentPart):
     """A rendered image."""
-
-    model_config = _STRICT
 
     kind: Literal["picture"] = "picture"
     title: str = ""
     radiance: list[Numbers] = Field(description="[row][column] from the top, linear, 1 is white; null: background")
 
 
-class Statement(BaseModel):
+class Statement(DocumentPart):
     """A sentence about a figure, and the result of the comparison with the computed figure."""
-
-    model_config = _STRICT
 
     says: str = Field(description="statement of the paper on its figure, or a known fact of the form")
     where: str = Field(description="place of the statement")
@@ -91,10 +86,8 @@ class Statement(BaseModel):
     )
 
 
-class Figure(BaseModel):
+class Figure(DocumentPart):
     """Panels with a caption, and the statements that they are compared with."""
-
-    model_config = _STRICT
 
     key: str = Field(description="unique, of lower-case letters, digits and hyphens")
     paper: str = Field(description="key in references.bib")

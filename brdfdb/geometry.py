@@ -95,7 +95,7 @@ def check_azimuth_deg(name: str, phi_deg: ArrayLike) -> None:
 
 
 def _float_array(name: str, angle: ArrayLike) -> Floats:
-    array = np.asarray(plain(name, unlabelled(name, angle)))
+    array = np.asarray(angle if type(angle) in PLAIN_TYPES else plain(name, unlabelled(name, angle)))
     if array.dtype.kind not in "iuf":
         raise ParameterError(name, f"{angle!r} is not a number of radians")
     return array if array.dtype in (np.float32, np.float64) else array.astype(np.float64)
@@ -152,9 +152,21 @@ class Angles:
     y_i = functools.cached_property(lambda self: self.sin_i * self.sine(self.phi_i))
     x_r = functools.cached_property(lambda self: self.sin_r * self.cosine(self.phi_r))
     y_r = functools.cached_property(lambda self: self.sin_r * self.sine(self.phi_r))
+    # Read once a call: to keep them costs 1 us each
+    cos_phi_i = property(lambda self: self.cosine(self.phi_i))
+    sin_phi_i = property(lambda self: self.sine(self.phi_i))
+    cos_phi_r = property(lambda self: self.cosine(self.phi_r))
+    sin_phi_r = property(lambda self: self.sine(self.phi_r))
     cos_dphi = functools.cached_property(lambda self: self.cosine(self.phi_r - self.phi_i))
     sin_dphi = functools.cached_property(lambda self: self.sine(self.phi_r - self.phi_i))
     one_plus_cos_dphi = functools.cached_property(lambda self: 2.0 * self.cosine((self.phi_r - self.phi_i) / 2.0) ** 2)
+    one_less_abs_cos_dphi = property(lambda self: _one_less_abs_cos(self.sin_dphi, self.cos_dphi))
+
+
+def _one_less_abs_cos(sin: Floats, cos: Floats) -> Floats:
+    """Return 1 - abs(cos) [1] with all its digits where abs(cos) is near 1."""
+    result: Floats = sin**2 / (1.0 + np.abs(cos))
+    return result
 
 
 def _changes(angle: NDArray[np.float64]) -> bool:
@@ -238,6 +250,8 @@ class Vectors:
         across = self.x_i * self.y_r - self.y_i * self.x_r
         sin: NDArray[np.float64] = np.divide(across, product, where=product > NO_AZIMUTH, out=np.zeros_like(across))
         return np.clip(sin, -1.0, 1.0)
+
+    one_less_abs_cos_dphi = property(lambda self: _one_less_abs_cos(self.sin_dphi, self.cos_dphi))
 
 
 def checked_vectors(wi: ArrayLike, wr: ArrayLike) -> Vectors:

@@ -7,8 +7,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from typing import Any
 
-# Errors [1] that are not told apart, that read better as factors, and as factors with an exponent
-_SMALL_ERROR, _LARGE_ERROR, _HUGE_ERROR = 1e-5, 10.0, 1e4
+_SMALL_ERROR = 1e-5  # error [1] below which a reader needs no digits
+_LARGE_ERROR = 10.0  # error [1] above which a factor reads better than a percentage
+_HUGE_ERROR = 1e4  # error [1] above which the factor has an exponent
 _CARD = (
     "display:inline-block;max-width:60em;padding:0.6em 1em;border:1px solid rgba(128,128,128,0.4);border-radius:6px;"
     "line-height:1.4;color:inherit"

@@ -10,10 +10,11 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from brdfdb.arrays import plain, unlabelled
+from brdfdb.arrays import PLAIN_TYPES, plain, unlabelled
 from brdfdb.errors import ParameterError
 from brdfdb.lobes import Lobe
 
+Array = NDArray[np.float64]
 Floats = NDArray[np.floating[Any]]
 Arguments = Mapping[str, Any]  # of a model call, directions apart; a spectral model's include wavelength_nm, n and k
 
@@ -21,6 +22,8 @@ LEAST_NM = 1.0  # least wavelength: smaller numbers are micrometres, and shorter
 
 FormKind = Literal["exact", "quadrature", "closed form", "approximation", "customary", "printed", "other model"]
 Standing = Literal["inside", "at the edge", "outside", "unknown"]
+STANDINGS: tuple[Standing, ...] = ("inside", "at the edge", "outside")  # the best first
+MUCH = 10.0  # ratio that counts as "much" where a paper gives no number: "much less" is a tenth
 
 
 @dataclass(frozen=True)
@@ -47,7 +50,8 @@ class Parameter:
 
     def check(self, value: ArrayLike) -> Floats:
         """Return `value` as float64, or raise a ValueError that names the parameter, the value and the range."""
-        given = np.asarray(plain(self.name, unlabelled(self.name, value)))
+        usual = type(value) in PLAIN_TYPES
+        given = np.asarray(value if usual else plain(self.name, unlabelled(self.name, value)))
         if given.dtype.kind not in "biuf":
             raise ParameterError(
                 self.name, f"{value!r} is not a number in {self.interval}", value, (self.low, self.high)
@@ -64,6 +68,24 @@ class Parameter:
                 interval += "; is it in micrometres?"
             raise ParameterError(self.name, f"{value} is outside {interval}", float(first), (self.low, self.high))
         return array
+
+
+@dataclass(frozen=True)
+class Count(Parameter):
+    """A parameter that is one whole number."""
+
+    def check(self, value: Any) -> Floats:
+        """Return `value` as float64, or raise a ParameterError if it is no whole number in the range."""
+        if isinstance(value, bool) or not isinstance(value, int | np.integer) or not self.low <= value <= self.high:
+            range_ = (self.low, self.high)
+            raise ParameterError(self.name, f"{value!r} is not a whole number in {self.interval}", value, range_)
+        return super().check(value)
+
+
+# What comes with the light and with the substance, beside the parameters of a surface
+WAVELENGTH_NM = Parameter("wavelength_nm", "λ", "nm", LEAST_NM, 1e7, "wavelength in vacuum")
+N = Parameter("n", "n", "1", 1e-3, 100.0, "refractive index")
+K = Parameter("k", "k", "1", 0.0, 1e4, "extinction coefficient")
 
 
 def check_nanometres(name: str, wavelength_nm: ArrayLike) -> NDArray[np.float64]:
@@ -151,6 +173,11 @@ class StatedLimit(NamedTuple):
     words: str
     where: str
     of_energy: bool = False
+
+
+def standing(value: float, inside: float, edge: float) -> Standing:
+    """Return the standing of a value that must be small: inside up to the first limit, at the edge below the second."""
+    return "inside" if value <= inside else "at the edge" if value < edge else "outside"
 
 
 class Diagnostic(NamedTuple):

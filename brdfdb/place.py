@@ -41,7 +41,15 @@ def path_of(place: str | os.PathLike[str], parameter: str = "path") -> Path:
     if not text or "\0" in text:
         raise ParameterError(parameter, f"{text!r} is not a path", place)
     if scheme == "file" and isinstance(place, str):
-        return _path_of_file(place, parameter)
+        try:
+            parts = urlsplit(place.strip())
+        except ValueError as error:
+            raise ParameterError(parameter, f"{place!r} is not an address: {error}", place) from None
+        if parts.netloc not in ("", "localhost") or not parts.path.startswith("/"):
+            raise ParameterError(parameter, f"{place!r} is not an address such as file:///data/store", place)
+        if parts.query or parts.fragment or "%00" in parts.path:
+            raise ParameterError(parameter, f"{place!r} has parts that paths lack; ? is written %3F and # %23", place)
+        return Path(url2pathname(parts.path))
     if scheme in _SERVICES:
         sentence = f"{text!r} is the address of a service, which brdfdb.open reads; a path is needed here"
         raise ParameterError(parameter, sentence, place)
@@ -56,15 +64,3 @@ def _scheme(text: str) -> str:
     """Return the scheme that a text begins with, in lower case; empty without one."""
     match = _SCHEME.match(text)
     return match[1].lower() if match else ""
-
-
-def _path_of_file(address: str, parameter: str) -> Path:
-    try:
-        parts = urlsplit(address.strip())
-    except ValueError as error:
-        raise ParameterError(parameter, f"{address!r} is not an address: {error}", address) from None
-    if parts.netloc not in ("", "localhost") or not parts.path.startswith("/"):
-        raise ParameterError(parameter, f"{address!r} is not an address such as file:///data/store", address)
-    if parts.query or parts.fragment or "%00" in parts.path:
-        raise ParameterError(parameter, f"{address!r} has parts that paths lack; ? is written %3F and # %23", address)
-    return Path(url2pathname(parts.path))

@@ -22,8 +22,12 @@ from brdfdb.arrays import plain
 from brdfdb.errors import ParameterError
 from brdfdb.parameters import check_nanometres, closest
 
-ILLUMINANT, OBSERVER = "D65", "CIE 1931 2 Degree Standard Observer"
-VISIBLE_FROM_NM, VISIBLE_TO_NM, VISIBLE_STEP_NM = 420.0, 680.0, 20.0
+ILLUMINANT = "D65"
+OBSERVER = "CIE 1931 2 Degree Standard Observer"
+# Wavelengths make a colour if they reach from 420 to 680 nm in steps of 20 nm or less
+VISIBLE_FROM_NM = 420.0
+VISIBLE_TO_NM = 680.0
+VISIBLE_STEP_NM = 20.0
 MOST_OF_A_COLOUR = 1000  # wavelengths of a colour: the cost of its weights grows with the square
 PICTURE_NM = np.arange(VISIBLE_FROM_NM, VISIBLE_TO_NM + 1.0, VISIBLE_STEP_NM)  # wavelengths of a picture
 
@@ -286,9 +290,12 @@ def linear_srgb(wavelength_nm: ArrayLike, reflectance: ArrayLike) -> NDArray[np.
     wavelength = np.asarray(wavelength_nm, dtype=np.float64)
     values = np.asarray(reflectance)
     if not covers_visible(wavelength):
+        summary = "an empty axis"
+        if wavelength.size:
+            summary = f"{wavelength.size} from {wavelength.flat[0]:g} to {wavelength.flat[-1]:g} nm"
         raise ParameterError(
             "wavelength_nm",
-            f"{_summary(wavelength)} does not cover the visible; needed are increasing wavelengths "
+            f"{summary} does not cover the visible; needed are increasing wavelengths "
             f"from {VISIBLE_FROM_NM:g} nm or less to {VISIBLE_TO_NM:g} nm or more in steps of at most "
             f"{VISIBLE_STEP_NM:g} nm",
         )
@@ -334,10 +341,3 @@ def colour_weights(
     at = (380.0, 780.0) if wavelength_nm is None else tuple(wavelength_nm.tolist())
     weights = (xyz_weights if colour == "xyz" else srgb_weights)(at, illuminant)
     return weights.sum(axis=0, keepdims=True) if wavelength_nm is None else weights
-
-
-def _summary(wavelength: NDArray[np.float64]) -> str:
-    """Return wavelengths in a few words, for a message."""
-    if wavelength.size == 0:
-        return "an empty axis"
-    return f"{wavelength.size} from {wavelength.flat[0]:g} to {wavelength.flat[-1]:g} nm"

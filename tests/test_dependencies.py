@@ -29,7 +29,7 @@ ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 EXTRAS: dict[str, list[str]] = PROJECT["optional-dependencies"]
 # Packages with an upper bound that follows a reason; "<next major" alone needs none
-CAPPED = ("numba", "uvicorn")
+CAPPED = ("numba",)
 
 
 def _numba_is_used_inside() -> None:
@@ -46,23 +46,12 @@ def _square(x: float) -> float:
     return x * x
 
 
-def _uvicorn_is_used_inside() -> None:
-    from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
-
-    from brdfdb_api.http.connection import Connection
-
-    replaced = {name for name in vars(Connection) if not name.startswith("__")} & set(dir(HttpToolsProtocol))
-    assert replaced == {
-        *("data_received", "on_headers_complete", "on_body", "on_response_complete", "resume_writing"),
-        *("send_400_response", "_should_upgrade", "handle_websocket_upgrade"),
-    }
-
-
-REASONS: dict[str, Callable[[], None]] = {"numba": _numba_is_used_inside, "uvicorn": _uvicorn_is_used_inside}
+REASONS: dict[str, Callable[[], None]] = {"numba": _numba_is_used_inside}
 
 
 def _requirements() -> list[Requirement]:
-    lines = [*PROJECT["dependencies"], *(line for name in EXTRAS if name != "test" for line in EXTRAS[name])]
+    extras = EXTRAS.keys() - {"test", "judges"}
+    lines = [*PROJECT["dependencies"], *(line for name in extras for line in EXTRAS[name])]
     return [Requirement(line) for line in lines]
 
 
@@ -84,7 +73,7 @@ def test_the_reason_for_a_cap_still_stands(name: str) -> None:
 
 def test_all_is_every_extra() -> None:
     (line,) = EXTRAS["all"]
-    assert set(Requirement(line).extras) == set(EXTRAS) - {"all", "site", "test"}
+    assert set(Requirement(line).extras) == set(EXTRAS) - {"all", "site", "test", "judges"}
 
 
 def _closure(names: list[str]) -> set[str]:

@@ -1,8 +1,7 @@
-"""The text of code and pages: one word for one thing, variables that are nouns, docstrings that begin with a verb."""
+"""The text of code and pages: one word for one thing, as the glossary says."""
 
 from __future__ import annotations
 
-import ast
 import io
 import re
 import tokenize
@@ -18,13 +17,6 @@ _WRITTEN = {"_build", "generated", "figures", "materials", "papers", "api"}
 _DECISIONS = ROOT / "docs" / "explanation" / "decisions"
 _OF_THE_SITE = {path for path in (ROOT / "docs").rglob("*.md") if not _WRITTEN & {*path.relative_to(ROOT).parts}}
 PAGES = [ROOT / "README.md", ROOT / "brdfdb" / "DESIGN.md", *sorted(_OF_THE_SITE - {GLOSSARY, *_DECISIONS.iterdir()})]
-# Names of variables that say nothing of what they hold
-EMPTY_NAMES = {"found", "each", "said", "told", "asked", "here"}
-# A function's docstring begins with a verb in the imperative; these begin another kind of sentence
-NO_VERB = re.compile(
-    r"(What|How|Where|Whether|Which|Who|When|Of|From|As|The|A|An|All|Each|Every|It|If|True|False|Is|Are|Has|Its|To|On|"
-    r"In|For|With|By|So|Such|Those|That|This|At)\b"
-)
 
 
 @cache
@@ -52,30 +44,3 @@ def test_no_retired_word_is_used() -> None:
     lines = (*((path, _prose(path)) for path in SOURCES), *pages)
     text = ((path, number, line) for path, prose in lines for number, line in prose)
     assert [f"{path}:{number}: {hit.group()}" for path, number, line in text if (hit := words.search(line))] == []
-
-
-def test_variables_are_nouns() -> None:
-    stored = (
-        (f"{path}:{node.lineno}", node.id if isinstance(node, ast.Name) else node.arg)
-        for path in SOURCES
-        for node in ast.walk(_tree(path))
-        if isinstance(node, ast.arg) or (isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store))
-    )
-    assert [f"{place}: {name}" for place, name in stored if name in EMPTY_NAMES] == []
-
-
-def test_docstrings_of_functions_begin_with_a_verb() -> None:
-    plain = (
-        (path, node)
-        for path in SOURCES
-        for node in ast.walk(_tree(path))
-        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)
-        and not any("property" in ast.unparse(each) for each in node.decorator_list)
-    )
-    first = ((path, node.name, text) for path, node in plain if (text := ast.get_docstring(node)))
-    assert [f"{path}: {name}: {text.splitlines()[0]}" for path, name, text in first if NO_VERB.match(text)] == []
-
-
-@cache
-def _tree(path: Path) -> ast.Module:
-    return ast.parse(path.read_text(encoding="utf-8"))

@@ -6,6 +6,7 @@ import sys
 import numpy as np
 import pytest
 
+from brdfdb.errors import ParameterError
 from brdfdb.spectra import covers_visible, linear_srgb, picture_wavelengths, refractive_index, srgb_weights, xyz_weights
 
 EVERY_10_NM = np.arange(380.0, 781.0, 10.0)
@@ -49,39 +50,28 @@ def test_sapphire_follows_its_dispersion_formula():
     np.testing.assert_array_equal(k, 0.0)  # the entry has no extinction data
 
 
-def test_refractive_index_keeps_the_shape_and_is_float64():
+def test_an_entry_has_an_index_in_its_range_only():
     n, k = refractive_index("main/Cu/Johnson", np.float32([[450, 550, 650]]))
     assert n.shape == k.shape == (1, 3)
     assert n.dtype == k.dtype == np.float64
-
-
-def test_the_ends_of_a_range_belong_to_it():
     n, k = refractive_index("main/Cu/Johnson", [187.9, 1937.0])  # its first and last row
     np.testing.assert_array_equal(n, [0.94, 1.09])
     np.testing.assert_array_equal(k, [1.337, 13.43])
+    for wavelength_nm in (3000.0, 100.0, np.nan, [500.0, 3000.0]):
+        with pytest.raises(ParameterError, match=r"wavelength_nm: .* main/Cu/Johnson, .* \[187\.9, 1937\] nm"):
+            refractive_index("main/Cu/Johnson", wavelength_nm)
+    for entry in ("main/Unobtainium/Nobody", "main/Al", "", "main/Al/Rakic/n"):
+        with pytest.raises(ParameterError, match=f"refractive_index: '{entry}'"):
+            refractive_index(entry, 500.0)
 
 
-@pytest.mark.parametrize("wavelength_nm", [3000.0, 100.0, np.nan, [500.0, 3000.0]])
-def test_outside_its_range_an_entry_has_no_index(wavelength_nm):
-    with pytest.raises(ValueError, match=r"wavelength_nm: \w+ .* main/Cu/Johnson, which covers \[187\.9, 1937\] nm"):
-        refractive_index("main/Cu/Johnson", wavelength_nm)
-
-
-@pytest.mark.parametrize("entry", ["main/Unobtainium/Nobody", "main/Al", "", "main/Al/Rakic/n"])
-def test_an_unknown_entry_is_named(entry):
-    with pytest.raises(ValueError, match=f"'{entry}' is not a shelf/book/page"):
-        refractive_index(entry, 500.0)
-
-
-@pytest.mark.parametrize("value", [0.0, 0.18, 1.0, 1e6])
-@pytest.mark.parametrize(
-    "wavelength_nm",
-    [EVERY_10_NM, np.arange(400.0, 701.0, 20.0), np.array([*range(380, 601, 5), *range(610, 2000, 10)])],
-)
-def test_a_flat_spectrum_is_grey_of_the_same_value(value, wavelength_nm):
-    rgb = linear_srgb(wavelength_nm, np.full((2, 3, len(wavelength_nm)), value))
-    assert rgb.shape == (2, 3, 3)
-    np.testing.assert_allclose(rgb, value, rtol=SUMMATION_TOLERANCE)
+def test_a_flat_spectrum_is_grey_of_the_same_value():
+    steps = np.array([*range(380, 601, 5), *range(610, 2000, 10)])
+    for wavelength_nm in (EVERY_10_NM, np.arange(400.0, 701.0, 20.0), steps):
+        for value in (0.0, 0.18, 1.0, 1e6):
+            rgb = linear_srgb(wavelength_nm, np.full((2, 3, len(wavelength_nm)), value))
+            assert rgb.shape == (2, 3, 3)
+            np.testing.assert_allclose(rgb, value, rtol=SUMMATION_TOLERANCE)
 
 
 @pytest.mark.parametrize("patch", ["blue", "red", "yellow", "cyan", "light skin"])
@@ -117,61 +107,44 @@ def test_a_nan_in_a_spectrum_is_a_nan_in_its_colour_only():
     assert np.isnan(linear_srgb(EVERY_10_NM, image)).all(axis=-1).tolist() == [True, False]
 
 
-@pytest.mark.parametrize(
-    ("wavelength_nm", "covered"),
-    [
-        (EVERY_10_NM, True),
-        ([420.0, *range(440, 680, 20), 680.0], True),
-        (np.arange(421.0, 781.0, 10.0), False),
-        (np.arange(380.0, 680.0, 10.0), False),
-        (np.arange(380.0, 781.0, 25.0), False),
-        (EVERY_10_NM[::-1], False),
-        (np.repeat(EVERY_10_NM, 2), False),
-        ([550.0], False),
-        ([], False),
-        (550.0, False),
-        ([380.0, np.nan, 780.0], False),
-    ],
-)
-def test_covers_visible(wavelength_nm, covered):
-    assert covers_visible(wavelength_nm) is covered
+def test_covers_visible():
+    assert covers_visible(EVERY_10_NM)
+    assert covers_visible([420.0, *range(440, 680, 20), 680.0])
+    for wavelength_nm in (
+        np.arange(421.0, 781.0, 10.0),
+        np.arange(380.0, 680.0, 10.0),
+        np.arange(380.0, 781.0, 25.0),
+        EVERY_10_NM[::-1],
+        np.repeat(EVERY_10_NM, 2),
+        [550.0],
+        [],
+        550.0,
+        [380.0, np.nan, 780.0],
+    ):
+        assert covers_visible(wavelength_nm) is False
 
 
-@pytest.mark.parametrize(
-    ("stored_nm", "coloured"),
-    [
-        (EVERY_10_NM, True),
-        (np.arange(400.0, 701.0, 25.0), True),
-        ([420.0, 680.0], True),
-        ([421.0, 700.0], False),
-        ([400.0, 679.0], False),
-        ([550.0], False),
-    ],
-)
-def test_pictures_look_up_at_wavelengths_that_make_a_colour(stored_nm, coloured):
-    at = picture_wavelengths(stored_nm)
-    assert (at is not None) is coloured
-    assert at is None or covers_visible(at)
+def test_pictures_look_up_at_wavelengths_that_make_a_colour():
+    for stored_nm in (EVERY_10_NM, np.arange(400.0, 701.0, 25.0), [420.0, 680.0]):
+        assert covers_visible(picture_wavelengths(stored_nm))
+    for stored_nm in ([421.0, 700.0], [400.0, 679.0], [550.0]):
+        assert picture_wavelengths(stored_nm) is None
 
 
-def test_a_colour_needs_the_whole_visible():
-    with pytest.raises(ValueError, match=r"wavelength_nm: 3 from 450 to 650 nm does not cover the visible"):
-        linear_srgb([450.0, 550.0, 650.0], [0.1, 0.2, 0.3])
-    with pytest.raises(ValueError, match=r"wavelength_nm: an empty axis does not cover the visible"):
-        linear_srgb([], [])
+def test_wavelengths_and_values_that_make_no_colour_are_refused():
+    for wavelength_nm, values in (([450.0, 550.0, 650.0], [0.1, 0.2, 0.3]), ([], [])):
+        with pytest.raises(ParameterError, match=r"^wavelength_nm: .* does not cover the visible"):
+            linear_srgb(wavelength_nm, values)
+    for reflectance in (1.0, np.ones(40), np.ones((41, 1))):
+        with pytest.raises(ParameterError, match=r"^reflectance: "):
+            linear_srgb(EVERY_10_NM, reflectance)
 
 
-@pytest.mark.parametrize("reflectance", [1.0, np.ones(40), np.ones((41, 1))])
-def test_a_colour_needs_a_value_for_each_wavelength(reflectance):
-    with pytest.raises(ValueError, match=r"one value for each of the 41 wavelengths"):
-        linear_srgb(EVERY_10_NM, reflectance)
-
-
-@pytest.mark.parametrize("weights", [xyz_weights, srgb_weights])
-def test_weights_are_kept_of_so_many_lists_of_wavelengths_only(weights):
-    for last_nm in range(681, 781):
-        weights((420.0, float(last_nm)))
-    assert 0 < weights.cache_info().currsize < 100
+def test_weights_are_cached_for_a_limited_number_of_lists_of_wavelengths():
+    for weights in (xyz_weights, srgb_weights):
+        for last_nm in range(681, 781):
+            weights((420.0, float(last_nm)))
+        assert 0 < weights.cache_info().currsize < 100
 
 
 def test_the_heavy_packages_load_when_they_are_used_and_without_a_plotting_library():

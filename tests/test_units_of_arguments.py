@@ -19,11 +19,10 @@ from brdfdb.materials import FunctionSource, Material, presets
 from brdfdb.materials.spectrum import Spectrum
 from brdfdb.measurements.samples import Samples
 from brdfdb.models import MODELS
-from brdfdb.parameters import ModelSpec
 from brdfdb.spectra import refractive_index
+from brdfdb.tables.evaluation import PointsBody
 from brdfdb.tables.grids import Grid
 from brdfdb.tables.layout import Layout
-from brdfdb.tables.points import PointsBody
 from brdfdb_pipelines.recipe_file import load
 from tests.models.draws import drawn
 from tests.tables.made_up import made_up
@@ -45,24 +44,24 @@ LOOKUPS: dict[str, Callable[..., Any]] = {
 }
 
 
-@pytest.mark.parametrize("name", LOOKUPS)
-@pytest.mark.parametrize("threads", [False, True])
-def test_lookups_warn_of_degrees_and_answer(name: str, threads: bool) -> None:
-    angles = tuple(np.full(3000, angle) for angle in MISTAKEN) if threads else MISTAKEN
-    more = {"threads": 2} if threads and name.startswith("table") else {}
-    with pytest.warns(DegreesWarning, match="^phi_r: 180 rad is more than two turns; angles are radians") as caught:
-        found = LOOKUPS[name](*angles, **more)
-    assert caught[0].filename == __file__  # the line of the caller, so that each place is told once
-    assert np.atleast_1d(found)[0] == pytest.approx(float(LOOKUPS[name](*TURNED)), rel=1e-9)
+def test_lookups_warn_of_degrees_and_answer() -> None:
+    many = tuple(np.full(3000, angle) for angle in MISTAKEN)
+    for name, lookup in LOOKUPS.items():
+        for angles, threads in ((MISTAKEN, 1), (many, 2)):
+            more = {"threads": threads} if threads > 1 and name.startswith("table") else {}
+            with pytest.warns(DegreesWarning, match="^phi_r: 180 rad is more than two turns") as caught:
+                f_r = lookup(*angles, **more)
+            assert caught[0].filename == __file__  # the line of the caller, so that each place is told once
+            assert np.atleast_1d(f_r)[0] == pytest.approx(float(lookup(*TURNED)), rel=1e-9), name
 
 
-@pytest.mark.parametrize("spec", MODELS.values(), ids=lambda spec: spec.name)
-def test_every_model_warns_of_degrees_and_answers(spec: ModelSpec) -> None:
-    parameters = drawn(spec, np.random.default_rng(3))
-    with pytest.warns(DegreesWarning, match=r"^phi_i: -90 rad"):
-        found = spec.evaluate(0.3, -90.0, 0.4, 2.0, **parameters)
+def test_every_model_warns_of_degrees_and_answers() -> None:
     wound = -90.0 + 30.0 * np.pi
-    assert found == pytest.approx(spec.evaluate(0.3, wound, 0.4, 2.0, **parameters), rel=1e-6)
+    for name, spec in MODELS.items():
+        parameters = drawn(spec, np.random.default_rng(3))
+        with pytest.warns(DegreesWarning, match=r"^phi_i: -90 rad"):
+            f_r = spec.evaluate(0.3, -90.0, 0.4, 2.0, **parameters)
+        assert f_r == pytest.approx(spec.evaluate(0.3, wound, 0.4, 2.0, **parameters), rel=1e-6), name
 
 
 def test_more_functions_of_azimuths_warn() -> None:
@@ -79,8 +78,8 @@ def test_an_unwrapped_scan_may_filter_the_warning() -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         warnings.simplefilter("ignore", DegreesWarning)
-        found = LOOKUPS["table"](0.5, 0.0, 0.6, scan)
-    np.testing.assert_allclose(found, LOOKUPS["table"](0.5, 0.0, 0.6, np.mod(scan, 2.0 * np.pi)), rtol=1e-9)
+        f_r = LOOKUPS["table"](0.5, 0.0, 0.6, scan)
+    np.testing.assert_allclose(f_r, LOOKUPS["table"](0.5, 0.0, 0.6, np.mod(scan, 2.0 * np.pi)), rtol=1e-9)
     assert LOOKUPS["table"](0.5, 0.0, 0.6, 4.0 * np.pi) > 0.0  # two turns are usual: pytest makes a warning an error
 
 
@@ -90,16 +89,14 @@ def test_polar_angles_in_degrees_are_refused() -> None:
             look(30, 0, 30, 180)
 
 
-COPPER = Material.from_table(
-    "copper",
-    {
-        "title": "Copper",
-        "model": "he_torrance",
-        "source": "no paper",
-        "parameters": {"sigma_0_um": 0.1, "tau_um": 2.0, "a": 0.0},
-        "refractive_index": "main/Cu/Johnson",
-    },
-)
+COPPER_TABLE = {
+    "title": "Copper",
+    "model": "he_torrance",
+    "source": "no paper",
+    "parameters": {"sigma_0_um": 0.1, "tau_um": 2.0, "a": 0.0},
+    "refractive_index": "main/Cu/Johnson",
+}
+COPPER = Material.from_table("copper", COPPER_TABLE)
 WAVELENGTHS: dict[str, Callable[[float], Any]] = {
     "model": lambda nm: models.he_torrance(0.5, 0.0, 0.5, 3.0, wavelength_nm=nm, **SURFACE),
     "model of vectors": lambda nm: models.he_torrance_vectors([0, 0, 1], [0, 0, 1], wavelength_nm=nm, **SURFACE),
@@ -125,11 +122,11 @@ WAVELENGTHS: dict[str, Callable[[float], Any]] = {
 }
 
 
-@pytest.mark.parametrize("name", WAVELENGTHS)
-@pytest.mark.parametrize("wrong", [0.55, 0.999, 1e-4])
-def test_a_wavelength_in_micrometres_is_refused_with_the_hint(name: str, wrong: float) -> None:
-    with pytest.raises((BrdfdbError, ValueError), match=rf"{wrong:g} [^\n]*is it in micrometres\?"):
-        WAVELENGTHS[name](wrong)
+def test_a_wavelength_in_micrometres_is_refused_with_the_hint() -> None:
+    for function in WAVELENGTHS.values():
+        for wrong in (0.55, 0.999, 1e-4):
+            with pytest.raises((BrdfdbError, ValueError), match=rf"{wrong:g} [^\n]*is it in micrometres\?"):
+                function(wrong)
 
 
 def test_a_recipe_in_micrometres_is_refused_with_the_hint(tmp_path: Path) -> None:
@@ -138,17 +135,7 @@ def test_a_recipe_in_micrometres_is_refused_with_the_hint(tmp_path: Path) -> Non
     with pytest.raises(BrdfdbError, match=r"wavelengths_nm: 0\.45 is below 1 nm; is it in micrometres"):
         load(path)
     with pytest.raises(ParameterError, match=r"wavelengths_nm: 0\.55 is below 1 nm; is it in micrometres"):
-        Material.from_table("rod", COPPER_IN_UM)
-
-
-COPPER_IN_UM = {
-    "title": "Copper",
-    "model": "he_torrance",
-    "source": "no paper",
-    "parameters": {"sigma_0_um": 0.1, "tau_um": 2.0, "a": 0.0},
-    "refractive_index": "main/Cu/Johnson",
-    "wavelengths_nm": [0.55],
-}
+        Material.from_table("rod", {**COPPER_TABLE, "wavelengths_nm": [0.55]})
 
 
 def test_a_file_in_micrometres_is_refused_with_the_hint(tmp_path: Path) -> None:

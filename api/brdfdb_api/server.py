@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import ipaddress
 import logging
 import os
 import shutil
@@ -21,9 +22,8 @@ import uvicorn
 import brdfdb
 from brdfdb._numba import when_compiling
 from brdfdb.errors import BrdfdbError, ParameterError
-from brdfdb_api.http.connection import Connection
-from brdfdb_api.serving import log
-from brdfdb_api.serving.settings import Settings
+from brdfdb_api import log
+from brdfdb_api.settings import Settings
 
 PAUSE_S = 1.0  # time before a failed worker is replaced [s]
 LAST_S = 0.5  # time after the signal to stop in which requests on connections that are open are answered [s]
@@ -34,6 +34,7 @@ HALTED_S = 15.0  # time without one after which a worker is replaced [s]
 COUNTS_BYTES = 2**20  # room for the counts of one kind of a worker; all addresses and statuses take a tenth
 LOADED_S = 120.0  # time until the first one: packages are loaded [s]
 
+OPEN_ADDRESS = "other computers reach this address: put nginx or Caddy in front, with a file of 'Serving on a network'"
 COMPILES: dict[str, object] = {"compiles": "kernels, once after an installation: the first answers wait"}
 OTHERS = ("uvicorn", "py.warnings")  # loggers of other packages
 
@@ -76,12 +77,14 @@ def serve(store_dir: Path, host: str, port: int, workers: int = 1, snapshot: str
     brdfdb.open(store_dir, snapshot=settings.snapshot)
     with contextlib.ExitStack() as stack:
         listener = stack.enter_context(_listening(host, port))
-        port = listener.getsockname()[1]
+        address, port = listener.getsockname()[:2]
         print(f"serving {store_dir} at http://{f'[{host}]' if ':' in host else host}:{port}/", flush=True)
+        if not ipaddress.ip_address(address).is_loopback:
+            print(OPEN_ADDRESS, flush=True)
         stack.enter_context(_ended_by_signals())
         if workers == 1:
             stack.enter_context(when_compiling(lambda: log.write(COMPILES)))
-            Server(_config()).run(sockets=[listener])
+            DrainingServer(_config()).run(sockets=[listener])
         else:
             # directory where workers write their counts, so that each can report all of them
             place = tempfile.TemporaryDirectory(prefix="brdfdb-metrics-", ignore_cleanup_errors=True)
@@ -89,30 +92,13 @@ def serve(store_dir: Path, host: str, port: int, workers: int = 1, snapshot: str
             asyncio.run(_keep(workers, listener, counts))
 
 
-class Server(uvicorn.Server):
-    """A server that ends connections without requests, and answers what is on its way when it stops."""
-
-    async def on_tick(self, counter: int) -> bool:
-        if counter % 10 == 0:  # each second
-            now = asyncio.get_running_loop().time()
-            for connection in tuple(self.server_state.connections):
-                if isinstance(connection, Connection):
-                    connection.end_if_quiet(now)
-        return await super().on_tick(counter)
+class DrainingServer(uvicorn.Server):
+    """A server that answers requests on open connections for `LAST_S` after it has stopped accepting new ones."""
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
-        accepted = []
-        for listener in sockets or ():  # its end resets connections that nobody has accepted
-            listener.listen(0)  # few come while the last ones are accepted
-            with contextlib.suppress(BlockingIOError):
-                while True:
-                    accepted.append(listener.accept()[0])
         for server in self.servers:
             server.close()
         self.server_state.default_headers.append((b"connection", b"close"))  # clients send no more requests
-        state = {"config": self.config, "server_state": self.server_state, "app_state": self.lifespan.state}
-        for connection in accepted:
-            await asyncio.get_running_loop().connect_accepted_socket(lambda: Connection(**state), connection)
         await asyncio.sleep(LAST_S)
         await super().shutdown(sockets)
 
@@ -195,7 +181,7 @@ def _work(descriptor: int) -> None:
         with contextlib.suppress(OSError):  # nobody reads any more
             os.write(signs, b".")
 
-    server = Server(_config(callback_notify=beat, timeout_notify=BEAT_S))
+    server = DrainingServer(_config(callback_notify=beat, timeout_notify=BEAT_S))
 
     counts = Path(os.environ["PROMETHEUS_MULTIPROC_DIR"])
     for kind in ("counter", "histogram"):  # files that are memory: without their blocks a full disk kills the process
@@ -225,7 +211,7 @@ def _config(**keywords: Any) -> uvicorn.Config:
     return uvicorn.Config(
         "brdfdb_api:create_app",
         factory=True,
-        http=Connection,
+        http="httptools",
         ws="none",
         access_log=False,
         log_config={

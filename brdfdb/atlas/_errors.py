@@ -4,21 +4,19 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from brdfdb.atlas import _proofs_he_torrance, _proofs_oren_nayar, _proofs_ward
-from brdfdb.atlas._proofs import Proof, proved
+from brdfdb.atlas._proofs import PROOFS, proved
 from brdfdb.figure import Figure, Map, Panel, Picture, Role, Statement, curve_of, rows
-from brdfdb.geometry import radians
+from brdfdb.geometry import radians, unit_vector
 from brdfdb.misprints import MISPRINTS, Kind, Misprint
 
 Array = NDArray[np.float64]
 Arguments = Mapping[str, Any]
-Drawing = Callable[[], Figure]
 
 # Relative errors that the models promise. Worst measured errors of closed forms: 9.9e-16 for Oren and Nayar, 8.8e-13
 # for He et al. with the sum of eq. 78 and 8e-16 without it, 3.4e-11 for Ward at an alpha of 1e-6
@@ -38,11 +36,6 @@ VIEWER = "viewer [degrees from the normal]"
 OFF_LIGHT = "viewer off the light [radians]"
 
 BY_KEY = {misprint.key: misprint for misprint in MISPRINTS}
-PROOFS: Mapping[str, Proof] = {
-    **_proofs_oren_nayar.PROOFS,
-    **_proofs_he_torrance.PROOFS,
-    **_proofs_ward.PROOFS,
-}
 # Names and roles of the form that is not right: in the caption, in the legend, and as drawn
 LEADS: Mapping[Kind, str] = {"printed": "Printed", "customary": "Customary", "words": "In words alone"}
 LABELS: Mapping[Kind, str] = {"printed": "as printed", "customary": "as is customary", "words": "as the words say"}
@@ -57,7 +50,7 @@ PAPERS = {
 
 
 @dataclass(frozen=True)
-class Form:
+class ComparedForm:
     """One way to compute a quantity."""
 
     label: str
@@ -81,6 +74,15 @@ def directions(theta_i: float, theta_r: float, delta_phi: float) -> dict[str, An
 def lobe(alpha: ArrayLike) -> dict[str, Any]:
     """Return the parameters of Ward's round lobe alone, with a specular reflectance of 1."""
     return {"rho_d": 0.0, "rho_s": 1.0, "alpha_x": alpha, "alpha_y": alpha}
+
+
+def of_vectors(model: Callable[..., Any]) -> Callable[..., Any]:
+    """Return a model of unit vectors as a function of angles."""
+
+    def evaluate(theta_i: Any, phi_i: Any, theta_r: Any, phi_r: Any, **parameters: float) -> Any:
+        return model(unit_vector(theta_i, phi_i), unit_vector(theta_r, phi_r), **parameters)
+
+    return evaluate
 
 
 def zero(distance: float) -> float:
@@ -107,28 +109,35 @@ def errors(
         return np.array([relative(evaluate(**row), truth, scale) for row, truth in zip(arguments, truths, strict=True)])
 
 
-def sweep(
-    x: Sequence[float] | Array,
-    x_label: str,
-    arguments: Callable[[float], Arguments],
-    truth: Callable[..., Any],
-    forms: Sequence[Form],
-    *,
-    title: str = "",
-    log_x: bool = False,
-    scale: float | None = None,
-) -> ErrorPanel:
-    """Return a panel of relative errors over x; `arguments` gives those of the forms and of the truth at x."""
-    rows = [arguments(float(value)) for value in x]
-    truths = [rounded(truth(**row)) for row in rows]
-    measured = [(form.label, form.role, errors(form.evaluate, rows, truths, scale)) for form in forms]
-    curves = [
-        curve_of(with_gaps(label, deviations), axis(x), np.maximum(deviations, NONE), role)
-        for label, role, deviations in measured
-    ]
-    y_label = ERROR if scale is None else ERROR.replace("relative error", f"error over {scale:.3g}/sr")
-    panel = Panel(title=title, x_label=x_label, y_label=y_label, curves=curves, log_x=log_x, log_y=True)
-    return ErrorPanel(panel, measured)
+@dataclass(frozen=True)
+class FormSweep:
+    """A quantity x over which forms are compared with the truth.
+
+    `arguments` gives the arguments of the forms and of the truth at x. Errors are relative, or over `scale` [1/sr].
+    """
+
+    x: Sequence[float] | Array
+    x_label: str
+    arguments: Callable[[float], Arguments]
+    truth: Callable[..., Any]
+    title: str = ""
+    log_x: bool = False
+    scale: float | None = None
+
+    def panel(self, forms: Sequence[ComparedForm]) -> ErrorPanel:
+        """Return the panel of the errors of forms."""
+        rows = [self.arguments(float(value)) for value in self.x]
+        truths = [rounded(self.truth(**row)) for row in rows]
+        measured = [(form.label, form.role, errors(form.evaluate, rows, truths, self.scale)) for form in forms]
+        curves = [
+            curve_of(with_gaps(label, deviations), axis(self.x), np.maximum(deviations, NONE), role)
+            for label, role, deviations in measured
+        ]
+        y_label = ERROR if self.scale is None else ERROR.replace("relative error", f"error over {self.scale:.3g}/sr")
+        panel = Panel(
+            title=self.title, x_label=self.x_label, y_label=y_label, curves=curves, log_x=self.log_x, log_y=True
+        )
+        return ErrorPanel(panel, measured)
 
 
 def axis(x: Sequence[float] | Array) -> list[float]:
@@ -149,7 +158,7 @@ def with_gaps(label: str, deviations: Array) -> str:
     return label if gaps == 0 else f"{label} (nan or inf at {gaps} of {deviations.size})"
 
 
-def error_map(x: Array, y: Array, form: Form, deviations: Array, *, x_label: str, y_label: str) -> ErrorPanel:
+def error_map(x: Array, y: Array, form: ComparedForm, deviations: Array, *, x_label: str, y_label: str) -> ErrorPanel:
     """Return a map of the errors of one form over logarithmic axes; x runs fastest."""
     panel = Map(
         title=with_gaps(form.label, deviations),
@@ -193,26 +202,6 @@ def figure(
     ]
     panels: list[Panel | Map | Picture] = [entry.panel for entry in measured]
     return Figure(key=key, paper=paper, title=title, caption=caption, panels=panels, statements=[*statements, *more])
-
-
-def figure_of_sweep(
-    key: str,
-    paper: str,
-    where: str,
-    title: str,
-    x: Sequence[float] | Array,
-    x_label: str,
-    arguments: Callable[[float], Arguments],
-    truth: Callable[..., Any],
-    forms: Sequence[Form],
-    *,
-    caption: str,
-    within: float,
-    log_x: bool = False,
-) -> Figure:
-    """Return a figure with one panel, the `sweep` of some forms over x."""
-    panel = sweep(x, x_label, arguments, truth, forms, log_x=log_x)
-    return figure(key, paper, where, title, caption, [panel], within=within)
 
 
 def stays(label: str, deviations: Array, within: float, where: str) -> Statement:
@@ -263,40 +252,23 @@ def of_misprint(
     return figure(key, entry.paper, where, title, text, measured, within=within, more=[*more, proof])
 
 
-def wrong(entry: Misprint, label: str = "") -> Form:
+def wrong(entry: Misprint, label: str = "") -> ComparedForm:
     """Return the form of an entry that is not right, labelled and drawn by its kind."""
-    return Form(label or LABELS[entry.kind], ROLES[entry.kind], entry.as_printed)
+    return ComparedForm(label or LABELS[entry.kind], ROLES[entry.kind], entry.as_printed)
 
 
 def misprint(
-    key: str,
-    title: str,
-    x: Sequence[float] | Array,
-    x_label: str,
-    arguments: Callable[[float], Arguments],
-    truth: Callable[..., Any],
-    *,
-    caption: str,
-    within: float = CLOSED,
-    log_x: bool = False,
-    scale: float | None = None,
-) -> tuple[str, Drawing]:
-    """Return the key of a misprint and the function that draws its figure: both forms over one quantity x.
+    key: str, title: str, sweep: FormSweep, *, caption: str, within: float = CLOSED
+) -> tuple[str, Callable[[], Figure]]:
+    """Return the key of a misprint and the function that draws its figure: both forms over one quantity.
 
-    The arguments that `arguments` does not give are those of the entry, where the two forms differ.
+    The arguments that the sweep does not give are those of the entry, where the two forms differ.
     """
     entry = BY_KEY[key]
 
     def draw() -> Figure:
-        panel = sweep(
-            x,
-            x_label,
-            lambda value: {**entry.where, **arguments(value)},
-            truth,
-            [wrong(entry), Form("ours", "ours", entry.corrected)],
-            log_x=log_x,
-            scale=scale,
-        )
+        whole = replace(sweep, arguments=lambda x: {**entry.where, **sweep.arguments(x)})
+        panel = whole.panel([wrong(entry), ComparedForm("ours", "ours", entry.corrected)])
         return of_misprint(key, title, caption, [panel], within=within)
 
     return key, draw

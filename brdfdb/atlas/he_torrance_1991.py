@@ -13,19 +13,22 @@ from brdfdb.atlas._errors import (
     BY_KEY,
     CLOSED,
     DISTANCES,
+    LIGHT,
     OFF_LIGHT,
     ROLES,
     SINGLE,
     TRUTH,
+    VIEWER,
+    ComparedForm,
     ErrorPanel,
-    Form,
+    FormSweep,
+    directions,
     error_map,
     errors,
     figure,
-    figure_of_sweep,
     misprint,
     of_misprint,
-    sweep,
+    of_vectors,
     wrong,
     zero,
 )
@@ -39,6 +42,102 @@ SERIES = 1e-11  # Relative error of eq. 78 that `diffraction_series` promises. W
 
 _HORIZON = 1e-17  # drawn for a cosine of 0 on a logarithmic axis
 _GLOSSY = {"wavelength_nm": 500.0, "sigma_0_um": 0.1, "tau_um": 1.5, "n": 1.5, "k": 0.0}
+
+_MIRROR = 1e-3, 1e4  # n and k
+
+
+# Vectors
+
+
+def _jones(theta_i: float, phi_i: float, theta_r: float, phi_r: float, *, n: float, k: float) -> Any:
+    """Return the Jones matrix [1]."""
+    return he_torrance_1991.jones(theta_i, theta_r, mp.mpf(phi_r) - mp.mpf(phi_i), n, k)
+
+
+def _geometry(theta_i: float, phi_i: float, theta_r: float, phi_r: float) -> Any:
+    """Return G [1] of eq. 76 without its factor that is 1."""
+    theta_i, theta_r, delta_phi = mp.mpf(theta_i), mp.mpf(theta_r), mp.mpf(phi_r) - mp.mpf(phi_i)
+    v_z = mp.cos(theta_i) + mp.cos(theta_r)
+    v_xy2 = mp.sin(theta_i) ** 2 + mp.sin(theta_r) ** 2
+    v_xy2 += 2 * mp.sin(theta_i) * mp.sin(theta_r) * mp.cos(delta_phi)
+    return ((v_xy2 + v_z**2) / v_z) ** 2
+
+
+def _around_the_normal(key: str, title: str, note: str = "") -> tuple[str, Callable[[], Figure]]:
+    """Return key and drawing of a misprint of the Jones matrix, over the azimuth of the viewer."""
+    return misprint(
+        key,
+        title,
+        FormSweep(
+            np.linspace(5.0, 175.0, 35),
+            "viewer's azimuth from the light's [degrees]",
+            lambda x: {"phi_r": np.deg2rad(x)},
+            _jones,
+        ),
+        caption="Light at 50 degrees, viewer at 30, a perfect mirror: the 2x2 matrix of amplitudes, over its largest. "
+        f"{note}{TRUTH}",
+    )
+
+
+def four_dot_products() -> Figure:
+    """Draw the errors of G towards backscatter and towards the normal."""
+    entry = BY_KEY["four-dot-products"]
+    forms = [wrong(entry, "dot products"), ComparedForm("ours", "ours", entry.corrected)]
+    back = FormSweep(
+        DISTANCES,
+        f"{OFF_LIGHT} (1e-13: 0)",
+        lambda x: directions(40.0, 40.0 + np.rad2deg(zero(x)), np.rad2deg(zero(x))),
+        _geometry,
+        title="towards backscatter, at 40 degrees",
+        log_x=True,
+    ).panel(forms)
+    normal = FormSweep(
+        DISTANCES,
+        "light and viewer [radians from the normal] (1e-13: 0)",
+        lambda x: directions(0.0, 0.0, 90.0) | dict.fromkeys(("theta_i", "theta_r"), zero(x)),
+        _geometry,
+        title="towards the normal",
+        log_x=True,
+    ).panel(forms)
+    caption = f"The factor G of eq. 76. {TRUTH}"
+    title = "Four dot products over a cross product"
+    return of_misprint(entry.key, title, caption, [back, normal], within=CLOSED)
+
+
+# The whole
+
+
+def _smooth(theta_i: float, *, n: float, k: float, wavelength_nm: float) -> Any:
+    """Return the specular reflectance [1] of a smooth surface."""
+    return he_torrance_1991.specular_reflectance(theta_i, wavelength_nm, 0, 1, n, k)
+
+
+def _over_the_mirror_direction(theta_i: float, phi_i: float, theta_r: float, phi_r: float, **surface: float) -> Any:
+    """Return the directional diffuse f_r [1] over its value in the mirror direction."""
+    values = [surface[name] for name in ("wavelength_nm", "sigma_0_um", "tau_um", "n", "k")]
+    seen, specular = (
+        he_torrance_1991.directional_diffuse(theta_i, theta, mp.mpf(azimuth), *values)
+        for theta, azimuth in ((theta_r, phi_r - phi_i), (theta_i, np.pi))
+    )
+    return seen / specular
+
+
+def _perfect_mirror(
+    theta_i: Any,
+    phi_i: Any,
+    theta_r: Any,
+    phi_r: Any,
+    *,
+    wavelength_nm: float,
+    sigma_0_um: float,
+    tau_um: float,
+) -> Any:
+    """Return f_r [1/sr] of eq. 71 with abs(F)^2 = 1: the reflectance of a good mirror is divided out."""
+    angles = mp.mpf(theta_i), mp.mpf(theta_r), mp.mpf(phi_r) - mp.mpf(phi_i)
+    cosines, sines = (f(angles[0]) * f(angles[1]) for f in (mp.cos, mp.sin))
+    half = mp.sqrt((1 + cosines + sines * mp.cos(angles[2])) / 2)
+    f_r = he_torrance_1991.directional_diffuse(*angles, wavelength_nm, sigma_0_um, tau_um, *_MIRROR)
+    return f_r / he_torrance_1991.fresnel_unpolarised(half, *_MIRROR)
 
 
 @functools.cache
@@ -85,15 +184,15 @@ def ten_terms() -> Figure:
     entry = BY_KEY["ten-terms"]
     forms = [
         wrong(entry, "ten terms"),
-        Form("all terms, from e^-g on", "textbook", _all_terms),
-        Form("ours", "ours", _ours),
+        ComparedForm("all terms, from e^-g on", "textbook", _all_terms),
+        ComparedForm("ours", "ours", _ours),
     ]
-    over_g = sweep(
-        np.logspace(-6.0, 6.0, 25), "g", lambda g: {"g": g, "V": 0.0}, _sum, forms, title="V = 0", log_x=True
-    )
-    over_V = sweep(
-        np.logspace(-2.0, 3.0, 21), "V", lambda V: {"g": 2.0, "V": V}, _sum, forms, title="g = 2", log_x=True
-    )
+    over_g = FormSweep(
+        np.logspace(-6.0, 6.0, 25), "g", lambda g: {"g": g, "V": 0.0}, _sum, title="V = 0", log_x=True
+    ).panel(forms)
+    over_V = FormSweep(
+        np.logspace(-2.0, 3.0, 21), "V", lambda V: {"g": 2.0, "V": V}, _sum, title="g = 2", log_x=True
+    ).panel(forms)
     caption = f"The sum of eq. 78. {TRUTH}"
     title = "Ten terms of a sum that needs thousands"
     return of_misprint(entry.key, title, caption, [over_g, over_V], within=SERIES)
@@ -104,15 +203,15 @@ def beckmanns_limit() -> Figure:
     entry = BY_KEY["beckmanns-limit"]
     forms = [
         wrong(entry, "Beckmann's limit"),
-        Form("the limit, corrected to first order", "textbook", _corrected_limit),
-        Form("ours", "ours", _ours),
+        ComparedForm("the limit, corrected to first order", "textbook", _corrected_limit),
+        ComparedForm("ours", "ours", _ours),
     ]
 
     def panel(b: float) -> ErrorPanel:
         title = f"V / g = {b:g}"
-        return sweep(
-            np.logspace(0.0, 5.0, 21), "g", lambda g: {"g": g, "V": b * g}, _sum, forms, title=title, log_x=True
-        )
+        return FormSweep(
+            np.logspace(0.0, 5.0, 21), "g", lambda g: {"g": g, "V": b * g}, _sum, title=title, log_x=True
+        ).panel(forms)
 
     panels = [panel(0.0), panel(1.0), panel(8.0)]
     caption = f"The sum of eq. 78 against its limit for large g, b = V / g. {TRUTH}"
@@ -127,7 +226,7 @@ def large_g() -> Figure:
     forms = [
         wrong(BY_KEY["ten-terms"], "ten terms"),
         wrong(BY_KEY["beckmanns-limit"], "Beckmann's limit"),
-        Form("ours", "ours", _ours),
+        ComparedForm("ours", "ours", _ours),
     ]
     maps = [error_map(g, V, form, errors(form.evaluate, rows, truths), x_label="g", y_label="V") for form in forms]
     caption = f"The sum of eq. 78 by three methods. {TRUTH}"
@@ -148,25 +247,23 @@ def _shadowing_over_cosine(cos_theta: float, slope: float) -> Any:
 def shadowing_divided_by_cosines() -> Figure:
     """Draw S_1 / cos(theta) towards the horizon, and on it over the slope."""
     entry = BY_KEY["shadowing-divided-by-cosines"]
-    forms = [wrong(entry), Form("ours", "ours", entry.corrected)]
-    towards_horizon = sweep(
+    forms = [wrong(entry), ComparedForm("ours", "ours", entry.corrected)]
+    towards_horizon = FormSweep(
         [*np.logspace(-0.1, -16.0, 32), _HORIZON],
         "cosine of the direction (1e-17: 0, the horizon)",
         lambda x: {"cos_theta": 0.0 if x == _HORIZON else x, "slope": entry.where["slope"]},
         _shadowing_over_cosine,
-        forms,
         title="towards the horizon, aluminum of Fig. 8",
         log_x=True,
-    )
-    on_horizon = sweep(
+    ).panel(forms)
+    on_horizon = FormSweep(
         np.logspace(-3.0, 1.0, 21),
         "sigma_0 / tau",
         lambda slope: {"cos_theta": 0.0, "slope": slope},
         _shadowing_over_cosine,
-        forms,
         title="on the horizon",
         log_x=True,
-    )
+    ).panel(forms)
     caption = f"S_1 / cos(theta) of one direction. {TRUTH} On the horizon: the limit sqrt(pi) tau / (2 sigma_0)."
     title = "0 over 0 on the horizon"
     return of_misprint(entry.key, title, caption, [towards_horizon, on_horizon], within=CLOSED)
@@ -180,20 +277,19 @@ def root_search() -> Figure:
         return lambda **arguments: 1.0 / np.sqrt(1.0 + height(**arguments) ** 2)
 
     forms = [
-        Form("Newton's search", ROLES[entry.kind], roughness(entry.as_printed)),
-        Form("Lambert's W, ours", "ours", roughness(entry.corrected)),
+        ComparedForm("Newton's search", ROLES[entry.kind], roughness(entry.as_printed)),
+        ComparedForm("Lambert's W, ours", "ours", roughness(entry.corrected)),
     ]
 
     def panel(slope: float) -> ErrorPanel:
-        return sweep(
+        return FormSweep(
             np.logspace(1.5, -3.0, 30),
             "light and viewer [degrees above the horizon]",
             lambda x: dict.fromkeys(("theta_i", "theta_r"), np.deg2rad(90.0 - x)) | {"slope": slope},
             lambda theta_i, theta_r, slope: he_torrance_1991.effective_roughness(theta_i, theta_r, slope, 1) / slope,
-            forms,
             title=f"sigma_0 / tau = {slope:g}",
             log_x=True,
-        )
+        ).panel(forms)
 
     panels = [panel(0.16), panel(1.0)]
     caption = f"The effective roughness sigma / sigma_0 of eq. 80. {TRUTH}"
@@ -207,21 +303,20 @@ def root_search() -> Figure:
 def plainly() -> Figure:
     """Draw eq. 71 by the right equations, evaluated as they stand, towards four corners."""
     forms = [
-        Form("as the equations stand", "textbook", _plainly),
-        Form("ours, angles", "ours", models.he_torrance),
-        Form("ours, unit vectors", "ours", _of_vectors),
+        ComparedForm("as the equations stand", "textbook", _plainly),
+        ComparedForm("ours, angles", "ours", models.he_torrance),
+        ComparedForm("ours, unit vectors", "ours", of_vectors(models.he_torrance_vectors)),
     ]
 
     def towards(title: str, x_label: str, pair: Callable[[float], dict[str, Any]]) -> ErrorPanel:
-        return sweep(
+        return FormSweep(
             DISTANCES,
             f"{x_label} (1e-13: 0)",
             lambda x: pair(zero(x)) | _GLOSSY | {"wavelength_nm": 2000.0},
             _directional,
-            forms,
             title=title,
             log_x=True,
-        )
+        ).panel(forms)
 
     def angles(theta_i: float, theta_r: float, phi_r: float) -> dict[str, Any]:
         return {"theta_i": theta_i, "phi_i": 0.0, "theta_r": theta_r, "phi_r": phi_r}
@@ -230,15 +325,14 @@ def plainly() -> Figure:
         towards("grazing", "viewer [radians above the horizon]", lambda x: angles(0.6, np.pi / 2 - x, 2.0)),
         towards("backscatter", OFF_LIGHT, lambda x: angles(0.6, 0.6 + x, x)),
         towards("normal incidence", "light [radians from the normal]", lambda x: angles(x, 0.3, 0.0)),
-        sweep(
+        FormSweep(
             np.logspace(3.5, 1.5, 21),
             "wavelength [nm]",
             lambda wavelength: angles(0.6, 0.7, 3.0) | _GLOSSY | {"wavelength_nm": wavelength},
             _directional,
-            forms,
             title="short waves, large g",
             log_x=True,
-        ),
+        ).panel(forms),
     ]
     caption = (
         "Directional diffuse part, sigma_0 of 0.1 um, tau of 1.5 um, n of 1.5; 2000 nm except in the last panel. As "
@@ -255,26 +349,20 @@ def _directional(theta_i: Any, phi_i: Any, theta_r: Any, phi_r: Any, **surface: 
     return he_torrance_1991.directional_diffuse(*angles, *(surface[name] for name in _GLOSSY))
 
 
-def _of_vectors(theta_i: Any, phi_i: Any, theta_r: Any, phi_r: Any, **surface: float) -> Any:
-    """Return f_r [1/sr] of our model for unit vectors."""
-    return models.he_torrance_vectors(unit_vector(theta_i, phi_i), unit_vector(theta_r, phi_r), **surface)
-
-
 def _plainly(
     theta_i: Any,
     phi_i: Any,
     theta_r: Any,
     phi_r: Any,
     *,
-    wavelength_nm: float,
-    sigma_0_um: float,
-    tau_um: float,
-    n: float,
-    k: float,
     total: Callable[[Any, Any], Any] = BY_KEY["ten-terms"].as_printed,
+    **surface: float,
 ) -> Any:
     """Return the directional diffuse f_r [1/sr] by eqs 71 to 86 as they stand; `total` is the sum of eq. 78."""
-    wavelength, slope = wavelength_nm / 1000.0, sigma_0_um / tau_um
+    wavelength = surface["wavelength_nm"] / 1000.0
+    sigma_0_um = surface["sigma_0_um"]
+    tau_um = surface["tau_um"]
+    slope = sigma_0_um / tau_um
     v = unit_vector(theta_i, phi_i) + unit_vector(theta_r, phi_r)
     # Eqs (79)-(81)
     z_0 = BY_KEY["root-search"].as_printed(theta_i, theta_r, slope)
@@ -287,7 +375,7 @@ def _plainly(
     light, viewer = (
         BY_KEY["shadowing-divided-by-cosines"].as_printed(np.cos(theta), slope) for theta in (theta_i, theta_r)
     )
-    return fresnel.unpolarised(np.linalg.norm(v) / 2.0, n, k) / np.pi * G * light * viewer * D
+    return fresnel.unpolarised(np.linalg.norm(v) / 2.0, surface["n"], surface["k"]) / np.pi * G * light * viewer * D
 
 
 def in_float32() -> Figure:
@@ -297,36 +385,105 @@ def in_float32() -> Figure:
         angles = {"theta_i": 0.6, "phi_i": 0.0, "theta_r": 0.7, "phi_r": 3.0}
         return {name: np.float32(x) for name, x in angles.items()} | _GLOSSY | {"wavelength_nm": wavelength}
 
-    return figure_of_sweep(
+    return figure(
         "he-torrance-float32",
         HE,
         "eq. 78",
         "e^-g in 32 bits",
-        np.logspace(3.5, 1.5, 21),
-        "wavelength [nm]",
-        arguments,
-        _directional,
-        [
-            Form("all terms, in float32", "textbook", functools.partial(_plainly, total=_all_terms_in_float32)),
-            Form("ours, float32 in and out", "ours", models.he_torrance),
-        ],
-        caption="Directional diffuse part, sigma_0 of 0.1 um, tau of 1.5 um, n of 1.5, angles of 32 bits. "
+        "Directional diffuse part, sigma_0 of 0.1 um, tau of 1.5 um, n of 1.5, angles of 32 bits. "
         "Truth: 40 digits, at those angles.",
+        [
+            FormSweep(np.logspace(3.5, 1.5, 21), "wavelength [nm]", arguments, _directional, log_x=True).panel(
+                [
+                    ComparedForm(
+                        "all terms, in float32", "textbook", functools.partial(_plainly, total=_all_terms_in_float32)
+                    ),
+                    ComparedForm("ours, float32 in and out", "ours", models.he_torrance),
+                ]
+            )
+        ],
         within=SINGLE,
-        log_x=True,
     )
 
 
 FIGURES: dict[str, Callable[[], Figure]] = dict(
     (
+        misprint(
+            "hemispherical-for-bidirectional",
+            "The curves of Figs 7 to 10 are those of rho_bd",
+            FormSweep(
+                np.linspace(0.0, 85.0, 18),
+                VIEWER,
+                lambda theta: directions(45.0, theta, 180.0),
+                _over_the_mirror_direction,
+            ),
+            caption="Aluminum of Fig. 8, light at 45 degrees, 500 nm: the drawn value, 1 in the mirror direction. "
+            f"rho_hd is the directional albedo of the viewer's direction. {TRUTH}",
+        ),
+        misprint(
+            "uniform-diffuse-without-pi",
+            "An albedo is no BRDF",
+            FormSweep(np.linspace(0.05, 1.0, 20), "a(lambda)", lambda a: {"a": a}, he_torrance_1991.uniform_diffuse),
+            caption=f"The uniform diffuse part. {TRUTH}",
+        ),
+        _around_the_normal("one-matrix-for-two", "Incident light in the plane of incidence"),
+        misprint(
+            "two-pi-in-the-cone",
+            "Light that a mirror sends into its cone",
+            FormSweep(np.linspace(0.0, 85.0, 18), LIGHT, lambda theta: {"theta_i": np.deg2rad(theta)}, _smooth),
+            caption=f"A smooth surface, n of 1.5: the specular reflectance. {TRUTH}",
+        ),
+        misprint(
+            "amplitudes-over-cross-product",
+            "Amplitudes at backscatter: 0 over 0",
+            FormSweep(
+                DISTANCES,
+                f"{OFF_LIGHT} (1e-13: 0, backscatter)",
+                lambda x: {"theta_r": np.deg2rad(40.0) + zero(x), "phi_r": zero(x)},
+                _jones,
+                log_x=True,
+            ),
+            caption="Light and viewer at 40 degrees, n of 1.5: the 2x2 matrix of amplitudes, over its largest. "
+            f"{TRUTH}",
+        ),
+        _around_the_normal("sign-of-m-ps", "The sign of M_ps"),
+        misprint(
+            "intensities-without-shadowing",
+            "Shadowed parts do not shine",
+            FormSweep(np.linspace(0.0, 89.5, 30), LIGHT, lambda theta: directions(theta, 40.0, 180.0), _perfect_mirror),
+            caption=f"Aluminum of Fig. 8 as a perfect mirror, seen from 40 degrees, 500 nm: f_r. {TRUTH}",
+        ),
+        misprint(
+            "squares-without-moduli",
+            "A reflectance is no complex number",
+            FormSweep(
+                np.linspace(0.0, 89.0, 30),
+                "angle of incidence [degrees]",
+                lambda theta: {"cos_theta": np.cos(np.deg2rad(theta))},
+                he_torrance_1991.fresnel_unpolarised,
+            ),
+            caption=f"Aluminum at 500 nm: |F|^2 of unpolarised light. {TRUTH}",
+        ),
+        ("four-dot-products", four_dot_products),
+        misprint(
+            "v-without-wave-number",
+            "The unit of v",
+            FormSweep(np.linspace(0.0, 85.0, 35), VIEWER, lambda theta: directions(0.0, theta, 0.0), _perfect_mirror),
+            caption=f"Aluminum of Fig. 8 as a perfect mirror, light along the normal, 500 nm: f_r. {TRUTH}",
+        ),
+        _around_the_normal(
+            "local-normal-for-z", "The normal that defines s and p", "G of eq. 76 has the same value with either. "
+        ),
         ("shadowing-divided-by-cosines", shadowing_divided_by_cosines),
         misprint(
             "lambda-without-gaussian",
             "Smith's Lambda has a Gaussian",
-            np.linspace(30.0, 89.9, 40),
-            "direction [degrees from the normal]",
-            lambda theta: {"theta": np.deg2rad(theta)},
-            lambda theta, slope: he_torrance_1991.shadowing(theta, slope, 1),
+            FormSweep(
+                np.linspace(30.0, 89.9, 40),
+                "direction [degrees from the normal]",
+                lambda theta: {"theta": np.deg2rad(theta)},
+                lambda theta, slope: he_torrance_1991.shadowing(theta, slope, 1),
+            ),
             caption=f"Shadowing S_1 of one direction, sigma_0 / tau of 0.16. {TRUTH}",
         ),
         ("ten-terms", ten_terms),

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 
 from brdfdb import models
-from brdfdb.atlas._errors import CLOSED, OFF_LIGHT, TRUTH, Form, figure_of_sweep
+from brdfdb.atlas._errors import CLOSED, OFF_LIGHT, TRUTH, ComparedForm, FormSweep, figure, of_vectors
 from brdfdb.figure import Figure
-from brdfdb.geometry import unit_vector
 from brdfdb.reference import lucht_2000, rahman_1993
 
 LIGHT_DEG = 85.0  # angle of incidence, at which squares of tangents cancel over two digits sooner than at 30
+DISTANCES = np.logspace(-12.0, -1.0, 45)  # of the viewer from the light [rad]
 SAVANNA = {"rho_0": 0.06, "k": 0.7, "asymmetry": -0.2, "rho_c": 0.06}
 LEAVES = {"f_iso": 0.3, "f_vol": 0.2, "f_geo": 0.01}
 
@@ -64,63 +64,46 @@ def _ross_li_plainly(
     return (f_iso + f_vol * k_vol + f_geo * k_geo) / np.pi
 
 
-def _of_vectors(model: Callable[..., Any]) -> Callable[..., Any]:
-    """Return a model of unit vectors as a function of angles."""
-
-    def evaluate(theta_i: Any, phi_i: Any, theta_r: Any, phi_r: Any, **parameters: float) -> Any:
-        return model(unit_vector(theta_i, phi_i), unit_vector(theta_r, phi_r), **parameters)
-
-    return evaluate
-
-
 def rpv_hot_spot() -> Figure:
     """Draw the hot spot of RPV, whose distance of tangents is a difference of squares."""
-    return figure_of_sweep(
-        "rpv-hot-spot",
-        "rahman1993",
-        "the function G",
-        "The hot spot is a distance, and not a difference of squares",
-        np.logspace(-12.0, -1.0, 45),
-        OFF_LIGHT,
-        lambda x: _beside(x) | SAVANNA,
-        lambda theta_i, phi_i, theta_r, phi_r, **parameters: rahman_1993.rpv(
-            theta_i, theta_r, phi_r - phi_i, **parameters
-        ),
-        [
-            Form("tan^2 + tan^2 - 2 tan tan cos", "textbook", _rpv_plainly),
-            Form("ours, angles", "ours", models.rpv),
-            Form("ours, unit vectors", "ours", _of_vectors(models.rpv_vectors)),
-        ],
-        caption=f"Light at {LIGHT_DEG:g} degrees, viewer beside it: f_r. The sum of squares is rounded and may be "
-        f"below 0. Where it should be 0, its root is off by 1e-8 tan(theta). {TRUTH}",
-        within=CLOSED,
-        log_x=True,
+
+    def truth(theta_i: Any, phi_i: Any, theta_r: Any, phi_r: Any, **parameters: float) -> Any:
+        return rahman_1993.rpv(theta_i, theta_r, phi_r - phi_i, **parameters)
+
+    sweep = FormSweep(DISTANCES, OFF_LIGHT, lambda x: _beside(x) | SAVANNA, truth, log_x=True)
+    forms = [
+        ComparedForm("tan^2 + tan^2 - 2 tan tan cos", "textbook", _rpv_plainly),
+        ComparedForm("ours, angles", "ours", models.rpv),
+        ComparedForm("ours, unit vectors", "ours", of_vectors(models.rpv_vectors)),
+    ]
+    title = "The hot spot is a distance, and not a difference of squares"
+    caption = (
+        f"Light at {LIGHT_DEG:g} degrees, viewer beside it: f_r. The sum of squares is rounded and may be below 0. "
+        f"Where it should be 0, its root is off by 1e-8 tan(theta). {TRUTH}"
     )
+    panels = [sweep.panel(forms)]
+    return figure("rpv-hot-spot", "rahman1993", "the function G", title, caption, panels, within=CLOSED)
 
 
 def ross_li_hot_spot() -> Figure:
     """Draw the kernels of Ross and Li near the light, where the phase angle is the arccosine of a rounded 1."""
-    return figure_of_sweep(
-        "ross-li-hot-spot",
-        "lucht2000",
-        "the kernels",
-        "The arccosine of more than 1",
-        np.logspace(-12.0, -1.0, 45),
-        OFF_LIGHT,
-        lambda x: _beside(x) | LEAVES,
-        lambda theta_i, phi_i, theta_r, phi_r, **weights: lucht_2000.ross_li(
-            theta_i, theta_r, phi_r - phi_i, **weights
-        ),
-        [
-            Form("phase angle by its cosine", "textbook", _ross_li_plainly),
-            Form("ours, angles", "ours", models.ross_li),
-            Form("ours, unit vectors", "ours", _of_vectors(models.ross_li_vectors)),
-        ],
-        caption=f"Light at {LIGHT_DEG:g} degrees, viewer beside it: f_r. The cosine of the phase angle may be rounded "
-        f"to more than 1, and the distance of the tangents is a difference of squares. {TRUTH}",
-        within=CLOSED,
-        log_x=True,
+
+    def truth(theta_i: Any, phi_i: Any, theta_r: Any, phi_r: Any, **weights: float) -> Any:
+        return lucht_2000.ross_li(theta_i, theta_r, phi_r - phi_i, **weights)
+
+    sweep = FormSweep(DISTANCES, OFF_LIGHT, lambda x: _beside(x) | LEAVES, truth, log_x=True)
+    forms = [
+        ComparedForm("phase angle by its cosine", "textbook", _ross_li_plainly),
+        ComparedForm("ours, angles", "ours", models.ross_li),
+        ComparedForm("ours, unit vectors", "ours", of_vectors(models.ross_li_vectors)),
+    ]
+    title = "The arccosine of more than 1"
+    caption = (
+        f"Light at {LIGHT_DEG:g} degrees, viewer beside it: f_r. The cosine of the phase angle may be rounded to more "
+        f"than 1, and the distance of the tangents is a difference of squares. {TRUTH}"
     )
+    panels = [sweep.panel(forms)]
+    return figure("ross-li-hot-spot", "lucht2000", "the kernels", title, caption, panels, within=CLOSED)
 
 
 FIGURES: dict[str, Callable[[], Figure]] = {"rpv-hot-spot": rpv_hot_spot, "ross-li-hot-spot": ross_li_hot_spot}

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from brdfdb import models
-from brdfdb.atlas._errors import BY_KEY, LIGHT, SINGLE, TRUTH, Form, directions, figure_of_sweep, misprint
+from brdfdb.atlas._errors import BY_KEY, LIGHT, SINGLE, TRUTH, ComparedForm, FormSweep, directions, figure, misprint
 from brdfdb.figure import Figure
 from brdfdb.misprints import ORENNAYAR
 from brdfdb.reference import mp, oren_nayar_1994
@@ -32,13 +32,7 @@ def _cavity(part: int) -> Callable[..., Any]:
     return truth
 
 
-@functools.cache
-def _gaussian(theta_i: float, theta_r: float, delta_phi: float, rho: float, sigma: float) -> tuple[float, float]:
-    """Return both parts of f_r [1/sr] of Gaussian slopes.
-
-    Kept because one value takes half a second, and two figures share their directions.
-    """
-    return oren_nayar_1994.gaussian(theta_i, theta_r, delta_phi, rho, sigma)
+_gaussian = functools.cache(oren_nayar_1994.gaussian)  # a value takes 0.5 s, and two figures share their directions
 
 
 def _slopes(part: int) -> Callable[..., Any]:
@@ -93,23 +87,23 @@ def fit_in_float32() -> Figure:
         pair = {"theta_i": theta, "phi_i": np.float32(0), "theta_r": theta, "phi_r": np.float32(np.pi)}
         return pair | {"rho": 0.5, "sigma": 0.5}
 
-    return figure_of_sweep(
+    return figure(
         "oren-nayar-float32",
         ORENNAYAR,
         "eqs 27-29",
         "Angles of 32 bits next to the horizon",
-        np.logspace(0.0, -6.5, 27),
-        "light and viewer [radians above the horizon]",
-        arguments,
-        _fit,
+        "Light and viewer opposite, rho 0.5, sigma 0.5: f_r for angles of 32 bits. Truth: 40 digits, at those angles.",
         [
-            Form("eq. 29 in float32", "textbook", BY_KEY["fit-below-zero"].as_printed),
-            Form("ours, float32 in and out", "ours", models.oren_nayar),
+            FormSweep(
+                np.logspace(0.0, -6.5, 27), "light and viewer [radians above the horizon]", arguments, _fit, log_x=True
+            ).panel(
+                [
+                    ComparedForm("eq. 29 in float32", "textbook", BY_KEY["fit-below-zero"].as_printed),
+                    ComparedForm("ours, float32 in and out", "ours", models.oren_nayar),
+                ]
+            )
         ],
-        caption="Light and viewer opposite, rho 0.5, sigma 0.5: f_r for angles of 32 bits. Truth: 40 digits, at those "
-        "angles.",
         within=SINGLE,
-        log_x=True,
     )
 
 
@@ -118,39 +112,30 @@ FIGURES: dict[str, Callable[[], Figure]] = dict(
         misprint(
             "gaf-of-the-larger",
             "Shadowing and masking: the smaller of the two",
-            _ANGLES,
-            _LIGHT_AND_VIEWER,
-            lambda theta: directions(theta, theta, 180.0),
-            _cavity(0),
+            FormSweep(
+                _ANGLES, _LIGHT_AND_VIEWER, lambda theta: directions(theta, theta, 180.0), _cavity(0), scale=1.0 / np.pi
+            ),
             caption="Cavities with slopes of 45 degrees, light and viewer opposite: direct part of f_r. The error is "
             "over that of Lambert, 1 / pi, because the right value is 0 beyond 45 degrees. " + TRUTH,
-            scale=1.0 / np.pi,
         ),
         misprint(
             "shadowed-facet",
             "Radiance of a shadowed facet",
-            _ANGLES,
-            LIGHT,
-            lambda theta: directions(theta, 20.0, 0.0),
-            _cavity(0),
+            FormSweep(_ANGLES, LIGHT, lambda theta: directions(theta, 20.0, 0.0), _cavity(0)),
             caption=f"Cavities with slopes of 45 degrees, seen from 20 degrees: direct part of f_r. {TRUTH}",
         ),
         misprint(
             "visible-and-masked-widths",
             "The second bounce: widths that are masked",
-            _ANGLES,
-            LIGHT,
-            lambda theta: directions(theta, 20.0, 0.0),
-            _cavity(1),
+            FormSweep(_ANGLES, LIGHT, lambda theta: directions(theta, 20.0, 0.0), _cavity(1)),
             caption=f"Cavities with slopes of 45 degrees, seen from 20 degrees: interreflected part of f_r. {TRUTH}",
         ),
         misprint(
             "normalised-over-the-hemisphere",
             "Slopes are distributed over slopes",
-            _FEW_ANGLES,
-            LIGHT,
-            lambda theta: directions(theta, 0.0, 0.0) | {"sigma": np.deg2rad(30.0)},
-            _slopes(0),
+            FormSweep(
+                _FEW_ANGLES, LIGHT, lambda theta: directions(theta, 0.0, 0.0) | {"sigma": np.deg2rad(30.0)}, _slopes(0)
+            ),
             caption="Seen along the normal, sigma of 30 degrees: direct part of f_r. Truth: the double integral, to "
             "1e-11.",
             within=SLOPES,
@@ -158,52 +143,52 @@ FIGURES: dict[str, Callable[[], Figure]] = dict(
         misprint(
             "fit-below-zero",
             "The fit falls below zero",
-            np.linspace(40.0, 89.5, 34),
-            _LIGHT_AND_VIEWER,
-            lambda theta: directions(theta, theta, 180.0),
-            _fit,
+            FormSweep(
+                np.linspace(40.0, 89.5, 34),
+                _LIGHT_AND_VIEWER,
+                lambda theta: directions(theta, theta, 180.0),
+                _fit,
+                scale=0.1 / np.pi,
+            ),
             caption="Light and viewer opposite, sigma of 60 degrees, rho of 0.1. The error of f_r is over rho / pi, "
             f"because the right value is 0 where the fit is below. {TRUTH}",
-            scale=0.1 / np.pi,
         ),
         misprint(
             "tangent-at-grazing",
             "0 times infinity on the horizon",
-            [*np.logspace(-0.5, -16.0, 32), _HORIZON],
-            "cosine of light and viewer (1e-17: 0, the horizon)",
-            _towards_the_horizon,
-            _fit_of_vectors,
+            FormSweep(
+                [*np.logspace(-0.5, -16.0, 32), _HORIZON],
+                "cosine of light and viewer (1e-17: 0, the horizon)",
+                _towards_the_horizon,
+                _fit_of_vectors,
+                log_x=True,
+            ),
             caption="Opposite unit vectors of light and viewer: f_r for sigma of 0.5. "
             f"The difference in C_2 cancels as tan(beta) grows. {TRUTH}",
-            log_x=True,
         ),
         misprint(
             "surface-radiance-as-brdf",
             "A radiance is no BRDF",
-            np.linspace(0.0, 89.0, 30),
-            LIGHT,
-            lambda theta: directions(theta, 30.0, 180.0),
-            _surface,
+            FormSweep(np.linspace(0.0, 89.0, 30), LIGHT, lambda theta: directions(theta, 30.0, 180.0), _surface),
             caption=f"Facets with sigma of 20 degrees, seen from 30 degrees in the mirror half plane: f_r. {TRUTH}",
         ),
         misprint(
             "surface-without-e-0",
             "A surface that does not follow the light",
-            np.logspace(0.0, 1.0, 21),
-            "E_0, in the unit of the radiance of eq. 31",
-            lambda e_0: {"e_0": e_0},
-            _towel,
+            FormSweep(
+                np.logspace(0.0, 1.0, 21),
+                "E_0, in the unit of the radiance of eq. 31",
+                lambda e_0: {"e_0": e_0},
+                _towel,
+                log_x=True,
+            ),
             caption="The towel of Fig. 20, light at 60 degrees, viewer at 70 opposite: f_r = L_r / (E_0 cos(theta_i)) "
             f"in more and more light. Ours is scaled for E_0 = pi, where the two agree. {TRUTH}",
-            log_x=True,
         ),
         misprint(
             "interreflection-factor",
             "Eq. 48 in place of eq. 47",
-            _FEW_ANGLES,
-            LIGHT,
-            lambda theta: directions(theta, 0.0, 0.0),
-            _slopes(1),
+            FormSweep(_FEW_ANGLES, LIGHT, lambda theta: directions(theta, 0.0, 0.0), _slopes(1)),
             caption="Seen along the normal, sigma of 30 degrees: interreflected part of f_r. "
             "Truth: the double integral, to 1e-11.",
             within=SLOPES,

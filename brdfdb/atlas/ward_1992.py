@@ -15,18 +15,18 @@ from brdfdb.atlas._errors import (
     SINGLE,
     TRUTH,
     VIEWER,
+    ComparedForm,
     ErrorPanel,
-    Form,
+    FormSweep,
     directions,
     error_map,
     errors,
     figure,
-    figure_of_sweep,
     lobe,
     misprint,
     of_misprint,
+    of_vectors,
     stays,
-    sweep,
     wrong,
 )
 from brdfdb.figure import Figure, Panel, Statement, curve_of
@@ -77,14 +77,13 @@ def lobe_that_loses_light() -> Figure:
         curve_of("rho_s, as stated", theta, np.ones_like(theta), "truth"),
     ]
     values = Panel(title="Albedo", x_label=LIGHT, y_label="albedo of the lobe, rho_s = 1", curves=albedos)
-    integrals = sweep(
+    integrals = FormSweep(
         np.linspace(0.0, 60.0, 13),
         LIGHT,
         lambda x: {"theta_i": np.deg2rad(x)} | lobe(alpha),
         _bounded_albedo,
-        [wrong(entry), Form("ours", "ours", entry.corrected)],
         title="Error of the albedo",
-    )
+    ).panel([wrong(entry), ComparedForm("ours", "ours", entry.corrected)])
     caption = (
         "Alpha of 0.05. Truth of the errors: the bounded form at 40 digits, integrated over the slopes by Gauss and "
         "Laguerre."
@@ -120,77 +119,81 @@ def _rms_slope(*, alpha_x: float, alpha_y: float) -> Any:
     return mp.mpf(alpha_x) / mp.sqrt(2) + 0 * alpha_y
 
 
-def _shader_forms() -> list[Form]:
+def _shader_forms() -> list[ComparedForm]:
     """Return eq. 5a, eq. 5b in its place, and eq. 5a by the cosine of the half vector."""
     return [
-        Form("eq. 5b for eq. 5a", "printed", models.ward_half_vector),
-        Form("eq. 5a, tan^2 as 1 / cos^2 - 1", "textbook", _of_unit_vectors),
-        Form("eq. 5a, ours", "ours", models.ward),
+        ComparedForm("eq. 5b for eq. 5a", "printed", models.ward_half_vector),
+        ComparedForm("eq. 5a, tan^2 as 1 / cos^2 - 1", "textbook", _of_unit_vectors),
+        ComparedForm("eq. 5a, ours", "ours", models.ward),
     ]
 
 
 def wide_lobes() -> Figure:
     """Draw eq. 5b, and eq. 5a by the cosine of the half vector, over the whole range of alpha."""
-    return figure_of_sweep(
+    return figure(
         "ward-alpha",
         WARD,
         "eqs 5a, 5b",
         "From narrow lobes to wide ones",
-        np.logspace(-6.0, 0.0, 31),
-        "alpha",
-        # On the shoulder the half vector leans by half of alpha
-        lambda alpha: directions(30.0, 30.0 + np.rad2deg(alpha), 180.0) | lobe(alpha),
-        _elliptical,
-        _shader_forms(),
-        caption="On the shoulder of the lobe, light at 30 degrees, viewer alpha beyond the mirror direction: f_r. "
-        f"{TRUTH}",
+        f"On the shoulder of the lobe, light at 30 degrees, viewer alpha beyond the mirror direction: f_r. {TRUTH}",
+        [
+            FormSweep(
+                np.logspace(-6.0, 0.0, 31),
+                "alpha",
+                lambda alpha: directions(30.0, 30.0 + np.rad2deg(alpha), 180.0) | lobe(alpha),
+                _elliptical,
+                log_x=True,
+            ).panel(_shader_forms())
+        ],
         within=CLOSED,
-        log_x=True,
     )
 
 
 def near_the_pole() -> Figure:
     """Draw the forms for a viewer near the normal, where a cosine loses the angle of the half vector."""
     alpha = 1e-6
-    return figure_of_sweep(
+    return figure(
         "ward-pole",
         WARD,
         "eq. 5a",
         "Next to the pole a cosine has no digits of the angle",
-        np.logspace(-12.0, -5.5, 27),
-        "viewer [radians from the normal]",
-        lambda x: {"theta_i": 0.0, "phi_i": 0.0, "theta_r": x, "phi_r": 0.7} | lobe(alpha),
-        _elliptical,
+        f"Light along the normal, alpha of 1e-6: f_r as the viewer nears the normal, too. {TRUTH}",
         [
-            Form("tan^2 as 1 / cos^2 - 1", "textbook", _of_unit_vectors),
-            Form("ours, angles", "ours", models.ward),
-            Form("ours, unit vectors", "ours", _of_vectors),
+            FormSweep(
+                np.logspace(-12.0, -5.5, 27),
+                "viewer [radians from the normal]",
+                lambda x: {"theta_i": 0.0, "phi_i": 0.0, "theta_r": x, "phi_r": 0.7} | lobe(alpha),
+                _elliptical,
+                log_x=True,
+            ).panel(
+                [
+                    ComparedForm("tan^2 as 1 / cos^2 - 1", "textbook", _of_unit_vectors),
+                    ComparedForm("ours, angles", "ours", models.ward),
+                    ComparedForm("ours, unit vectors", "ours", of_vectors(models.ward_vectors)),
+                ]
+            )
         ],
-        caption=f"Light along the normal, alpha of 1e-6: f_r as the viewer nears the normal, too. {TRUTH}",
         within=CLOSED,
-        log_x=True,
     )
-
-
-def _of_vectors(theta_i: Any, phi_i: Any, theta_r: Any, phi_r: Any, **parameters: float) -> Any:
-    """Return f_r [1/sr] of our model for unit vectors."""
-    return models.ward_vectors(unit_vector(theta_i, phi_i), unit_vector(theta_r, phi_r), **parameters)
 
 
 def far_from_the_peak() -> Figure:
     """Draw the forms down to where float64 ends: errors of the exponent are errors of f_r."""
     alpha = 1e-4
-    return figure_of_sweep(
+    return figure(
         "ward-far-from-the-peak",
         WARD,
         "eqs 5a, 5b",
         "Far from the peak",
-        np.linspace(0.0, 700.0, 29),
-        "exponent of the lobe",
-        lambda x: directions(0.0, 2.0 * np.rad2deg(np.arctan(alpha * np.sqrt(x))), 0.0) | lobe(alpha),
-        _elliptical,
-        _shader_forms(),
-        caption=f"Light along the normal, alpha of 1e-4: f_r from its peak down to 1e-297 of it. {TRUTH}",
+        f"Light along the normal, alpha of 1e-4: f_r from its peak down to 1e-297 of it. {TRUTH}",
+        [
+            FormSweep(
+                np.linspace(0.0, 700.0, 29),
+                "exponent of the lobe",
+                lambda x: directions(0.0, 2.0 * np.rad2deg(np.arctan(alpha * np.sqrt(x))), 0.0) | lobe(alpha),
+                _elliptical,
+            ).panel(_shader_forms())
+        ],
         within=CLOSED,
     )
 
@@ -204,20 +207,20 @@ def lobe_in_float32() -> Figure:
         pair = {"theta_i": np.float32(0), "phi_i": np.float32(0), "theta_r": theta, "phi_r": np.float32(0)}
         return pair | lobe(alpha)
 
-    return figure_of_sweep(
+    return figure(
         "ward-float32",
         WARD,
         "eq. 5a",
         "A narrow lobe in 32 bits",
-        np.linspace(0.0, 80.0, 33),
-        "exponent of the lobe",
-        arguments,
-        _elliptical,
+        "Light along the normal, alpha of 0.001, angles of 32 bits: f_r. Truth: 40 digits, at those angles.",
         [
-            Form("eq. 5a in float32", "textbook", _of_unit_vectors),
-            Form("ours, float32 in and out", "ours", models.ward),
+            FormSweep(np.linspace(0.0, 80.0, 33), "exponent of the lobe", arguments, _elliptical).panel(
+                [
+                    ComparedForm("eq. 5a in float32", "textbook", _of_unit_vectors),
+                    ComparedForm("ours, float32 in and out", "ours", models.ward),
+                ]
+            )
         ],
-        caption="Light along the normal, alpha of 0.001, angles of 32 bits: f_r. Truth: 40 digits, at those angles.",
         within=SINGLE,
     )
 
@@ -230,7 +233,7 @@ def narrow_lobes_at_grazing() -> Figure:
         for y in heights
         for x in alphas
     ]
-    ours = Form("ours", "ours", models.ward)
+    ours = ComparedForm("ours", "ours", models.ward)
     deviations = errors(ours.evaluate, rows, [float(_elliptical(**row)) for row in rows])
     measured = error_map(
         alphas, heights, ours, deviations, x_label="alpha", y_label="light [radians above the horizon]"
@@ -290,42 +293,45 @@ FIGURES: dict[str, Callable[[], Figure]] = dict(
         misprint(
             "deviation-of-slopes",
             "alpha is no standard deviation",
-            np.logspace(-3.0, 0.0, 19),
-            "alpha",
-            lambda alpha: {"alpha_x": alpha, "alpha_y": alpha},
-            _rms_slope,
+            FormSweep(
+                np.logspace(-3.0, 0.0, 19),
+                "alpha",
+                lambda alpha: {"alpha_x": alpha, "alpha_y": alpha},
+                _rms_slope,
+                log_x=True,
+            ),
             caption="Root mean square of the slope along x of samples of the lobe. Truth: alpha_x / sqrt(2), the "
             "deviation of exp(-(p / alpha_x)^2).",
             within=MOMENT,
-            log_x=True,
         ),
         misprint(
             "half-vector-form",
             "Two formulas, two lobes",
-            np.linspace(0.0, 75.0, 31),
-            VIEWER,
-            lambda theta: directions(0.0, theta, 0.0),
-            _elliptical,
+            FormSweep(np.linspace(0.0, 75.0, 31), VIEWER, lambda theta: directions(0.0, theta, 0.0), _elliptical),
             caption=f"Light along the normal, alpha of 0.2: f_r by eq. 5a. {TRUTH}",
         ),
         misprint(
             "delta-without-arctan",
             "An angle is not its tangent",
-            np.logspace(-3.0, np.log10(2.0), 30),
-            "alpha",
-            lambda alpha: {"alpha_x": alpha, "alpha_y": alpha},
-            _delta,
+            FormSweep(
+                np.logspace(-3.0, np.log10(2.0), 30),
+                "alpha",
+                lambda alpha: {"alpha_x": alpha, "alpha_y": alpha},
+                _delta,
+                log_x=True,
+            ),
             caption="Slope delta of the half vector that u1 of 0.01 draws. Truth: eq. 7a with the arctan, 40 digits.",
             within=SAMPLED,
-            log_x=True,
         ),
         misprint(
             "arctangent-of-7a",
             "The arctangent that keeps its quadrant",
-            np.linspace(0.02, 0.98, 33),
-            "u2",
-            lambda u2: {"u2": u2, "alpha_y": 0.2},
-            lambda *, u2, alpha_x, alpha_y, **_: _azimuth(u2, alpha_x, alpha_y),
+            FormSweep(
+                np.linspace(0.02, 0.98, 33),
+                "u2",
+                lambda u2: {"u2": u2, "alpha_y": 0.2},
+                lambda *, u2, alpha_x, alpha_y, **_: _azimuth(u2, alpha_x, alpha_y),
+            ),
             caption="Azimuth of the half vector that eq. 7b draws, alpha of 0.1 and 0.2, from -180 to 180 degrees. "
             f"{TRUTH}",
             within=MOMENT,
@@ -333,10 +339,12 @@ FIGURES: dict[str, Callable[[], Figure]] = dict(
         misprint(
             "uniform-weights",
             "Samples have weights",
-            np.linspace(0.0, 75.0, 31),
-            LIGHT,
-            lambda theta: {"wi": unit_vector(np.deg2rad(theta), 0.0), "u1": 0.3, "u2": 0.2},
-            _weight,
+            FormSweep(
+                np.linspace(0.0, 75.0, 31),
+                LIGHT,
+                lambda theta: {"wi": unit_vector(np.deg2rad(theta), 0.0), "u1": 0.3, "u2": 0.2},
+                _weight,
+            ),
             caption="Weight of the sample that u1 of 0.3 and u2 of 0.2 draw, alpha of 0.1. "
             "Truth: f_r cos(theta_r) / pdf of the direction of eq. 7, 40 digits.",
             within=SAMPLED,

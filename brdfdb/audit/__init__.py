@@ -8,10 +8,9 @@ from importlib.metadata import version
 
 import numpy as np
 
-from brdfdb.audit.answers import as_published, conserves_energy
 from brdfdb.audit.finding import DECISIVE, Finding, NotJudged, Sentence, Subject, TableVerdict
 from brdfdb.audit.registry import FINDINGS
-from brdfdb.audit.report import AuditReport, MaterialAudit, explanations
+from brdfdb.audit.report import AuditReport, MaterialAudit, as_published, conserves_energy, explanations
 from brdfdb.errors import ParameterError
 from brdfdb.figure import Figure
 from brdfdb.materials import Material, Source
@@ -24,32 +23,20 @@ __all__ = ["FINDINGS", "AuditReport", "Finding", "MaterialAudit", "audit", "repo
 def audit(table: Table, *, source: Source | None = None, accept_excess: bool = False) -> MaterialAudit:
     """Return the audit of one table: each finding of `FINDINGS`, on values that are looked up in the table.
 
-    Parameters
-    ----------
-    table : Table
-        A decoded table. If its source is not known, the table is audited alone, and findings that need a source are
-        not judged.
-    source : Source, optional
-        Source of the table, for example a function, which a store does not hold; by default the source of the table.
-    accept_excess : bool
-        Accept that the model reflects more than it receives at these parameters, and the table with it.
+    `source` is that of the table, for example a function, which a store does not hold; by default the source that the
+    table names. If it is not known, the table is audited alone, and findings that need a source are not judged. With
+    `accept_excess` the model may reflect more than it receives at these parameters, and the table with it.
+    ParameterError if the table is behind a service.
 
-    Returns
-    -------
-    MaterialAudit
-        The findings. The verdict is "not judged" if nothing says what the values of the table are of; a table of
-        measured data or of a function is judged as far as that goes without them. The verdict on energy is "known
-        published excess" if the albedo of the model exceeds 1, its parameters are those of a preset, and the albedos of
-        model and table are within the excess that is recorded for the preset. It is "accepted excess" if the caller
-        accepts the excess of the model, and "violates" if either albedo exceeds 1 otherwise. A table may exceed these
-        limits by as much as its stated error explains. A model that "loses" or "gains" light where nothing absorbs is
-        reported, and passes. `as_published` and `conserves_energy` answer the two questions that a reader has, of the
-        table and of its model.
-
-    Raises
-    ------
-    ParameterError
-        If the table is behind a service.
+    Notes
+    -----
+    The verdict is "not judged" if nothing says what the values of the table are of; a table of measured data or of a
+    function is judged as far as that goes without them. The verdict on energy is "known published excess" if the albedo
+    of the model exceeds 1, its parameters are those of a preset, and the albedos of model and table are within the
+    excess that is recorded for the preset. It is "accepted excess" if the caller accepts the excess of the model, and
+    "violates" if either albedo exceeds 1 otherwise. A table may exceed these limits by as much as its stated error
+    explains. A model that "loses" or "gains" light where nothing absorbs is reported, and passes. `as_published` and
+    `conserves_energy` answer the two questions that a reader has, of the table and of its model.
     """
     if not isinstance(table, Table):
         raise ParameterError("table", f"{type(table).__name__}: an audit needs a table that is decoded in this process")

@@ -1,4 +1,4 @@
-"""Energy of a material: the verdict on the model behind a table, that on the table, and the worse of the two."""
+"""Energy of a material: the verdicts on the model behind a table and on the table, the worse of the two, and plots."""
 
 from __future__ import annotations
 
@@ -7,25 +7,24 @@ from collections.abc import Sequence
 import numpy as np
 from pydantic import Field
 
-from brdfdb.audit.energy_figures import panels_of
-from brdfdb.audit.excess import ANGLE_TOLERANCE_DEG, published_excess
 from brdfdb.audit.finding import LAST, Cell, Finding, Sentence, Subject, Word
 from brdfdb.audit.model_energy import (
+    ANGLE_TOLERANCE_DEG,
     LOSSLESS,
     TOLERANCE,
     EnergyVerdict,
     Furnace,
     ModelEnergy,
-    UniformBound,
     model_energy_of,
+    published_excess,
 )
 from brdfdb.audit.table_energy import TableEnergy, table_energy_of
 from brdfdb.errors import counted
-from brdfdb.figure import Map, Panel, number
+from brdfdb.figure import Curve, Map, Numbers, Panel, number
 from brdfdb.materials import Material, Source
 from brdfdb.materials.provenance import KnownExcess
-from brdfdb.tables.first_numbers import Grazing
-from brdfdb.tables.largest_albedo import grazing_of_table
+from brdfdb.tables.albedo import grazing_of_table
+from brdfdb.tables.stated_error import Grazing
 from brdfdb.tables.table import Table
 
 _SEVERITY: tuple[EnergyVerdict, ...] = (
@@ -40,6 +39,11 @@ _SEVERITY: tuple[EnergyVerdict, ...] = (
 WITHIN_1: tuple[EnergyVerdict, ...] = ("conserves", "loses", "gains")
 _ACCEPTED = "accepted, not published"
 _OF_MODEL = "the model itself reflects more than arrives, and the table follows it"
+_CURVES = 4  # Largest number of wavelengths in a plot
+_ALL_OF_IT = Curve(label="all that arrives", x=[0.0, 90.0], y=[1.0, 1.0])
+_IDEAL = Curve(label="ideal", x=[0.0, 90.0], y=[1.0, 1.0], role="truth")
+_THETA = "angle of the light, degrees"
+_ALBEDO = "directional albedo"
 
 
 class Energy(Finding):
@@ -98,10 +102,20 @@ class Energy(Finding):
             self.sentence(model.verdict, model.reason, title="Energy of the model"),
             self.sentence(table.verdict, of_table, title="Energy of the table"),
         ]
-        if model.furnace is not None:
-            sentences.append(_of_furnace(model.furnace))
-        if model.bound_on_a is not None:
-            sentences.append(_of_bound(model.bound_on_a))
+        if (furnace := model.furnace) is not None:
+            cell = furnace_cell(furnace)
+            least = f"{number(furnace.smallest, 4)} at {furnace.smallest_at_theta_i_deg:.4g}°"
+            most = f"{number(furnace.largest, 4)} at {furnace.largest_at_theta_i_deg:.4g}°"
+            text = f"{furnace.lossless}; the albedo is between {least} and {most}, in uniform light {cell.text}"
+            sentences.append(self.sentence(cell.word, text, title="White furnace"))
+        if (bound := model.bound_on_a) is not None:
+            preset = largest = ""
+            if len(bound.largest) == 1:
+                preset = f" of {number(bound.preset[0], 4)}"
+                largest = f" of {number(bound.largest[0], 4)}"
+            keeps = "keeps to" if bound.keeps else "is above"
+            text = f"the material's own a(λ){preset} {keeps} the largest that conserves energy{largest}"
+            sentences.append(self.sentence("inside" if bound.keeps else "outside", text, title="Uniform diffuse part"))
         return sentences
 
     def problems(self) -> list[str]:
@@ -139,10 +153,10 @@ class Energy(Finding):
                 f"{counted(within, 'table')} above 1 by no more than the stated error, or that of the integration, "
                 f"{'passes' if within == 1 else 'pass'}"
             )
-        for verdict, one, many in (("loses", "loses light", "lose light"), ("gains", "gains light", "gain light")):
+        for verdict in ("loses", "gains"):
             count = sum(energy.verdict == verdict for energy in energies)
             if count:
-                does = f"a model that {one}" if count == 1 else f"models that {many}"
+                does = f"a model that {verdict} light" if count == 1 else f"models that {verdict[:-1]} light"
                 sentences.append(
                     f"{counted(count, 'table')} of {does} where nothing absorbs it: the report says how much, and where"
                 )
@@ -165,23 +179,6 @@ def furnace_cell(furnace: Furnace | None) -> Cell:
     worst = max(values, key=lambda value: abs(value - 1.0))
     word: Word = "loses" if worst < LOSSLESS else "gains" if worst > 2.0 - LOSSLESS else "conserves"
     return Cell(word, f"{worst:.3f}", worst)
-
-
-def _of_furnace(furnace: Furnace) -> Sentence:
-    cell = furnace_cell(furnace)
-    least = f"{number(furnace.smallest, 4)} at {furnace.smallest_at_theta_i_deg:.4g}°"
-    most = f"{number(furnace.largest, 4)} at {furnace.largest_at_theta_i_deg:.4g}°"
-    text = f"{furnace.lossless}; the albedo is between {least} and {most}, in uniform light {cell.text}"
-    return Energy.sentence(cell.word, text, title="White furnace")
-
-
-def _of_bound(bound: UniformBound) -> Sentence:
-    own, largest = "", ""
-    if len(bound.largest) == 1:
-        own, largest = (f" of {number(value, 4)}" for value in (bound.preset[0], bound.largest[0]))
-    kept = "keeps to" if bound.keeps else "is above"
-    text = f"the material's own a(λ){own} {kept} the largest that conserves energy{largest}"
-    return Energy.sentence("inside" if bound.keeps else "outside", text, title="Uniform diffuse part")
 
 
 def energy_of(
@@ -209,7 +206,15 @@ def energy_of(
     claim = "" if stated is None else stated.citation
     model = model_energy_of(source, table.wavelength_nm, known, claim, accept_excess=accept_excess, grazing=grazing)
     # The excess that is published or accepted is that of the model. An excess of the table alone is excused by neither
-    excess = known if model.verdict == "known published excess" else _of_model(model)
+    excess = known if model.verdict == "known published excess" else None
+    most = model.max_albedo
+    first = model.exceeds_1_from_theta_i_deg
+    if model.verdict in ("accepted excess", "violates") and first is not None and most is not None:
+        excess = KnownExcess(
+            max_albedo=most + TOLERANCE,
+            from_theta_i_deg=max(first - 2.0 * ANGLE_TOLERANCE_DEG, 0.0),
+            citation=_ACCEPTED if model.verdict == "accepted excess" else _OF_MODEL,
+        )
     excused = model.verdict if model.verdict in ("accepted excess", "violates") else "known published excess"
     stored = table_energy_of(table, excess, excused)
     of_table: EnergyVerdict = "conserves" if stored.verdict == "passes" else stored.verdict
@@ -219,17 +224,51 @@ def energy_of(
     return Energy(model=model, table=stored, verdict=model.verdict, reason=model.reason)
 
 
-def _of_model(model: ModelEnergy) -> KnownExcess | None:
-    """Return the excess of a model, accepted or not: its largest albedo [1], and the angle [degree] where it begins."""
-    if (
-        model.verdict in WITHIN_1
-        or model.exceeds_1_from_theta_i_deg is None
-        or model.max_albedo is None
-        or not np.isfinite(model.max_albedo)
-    ):
-        return None
-    return KnownExcess(
-        max_albedo=model.max_albedo + TOLERANCE,
-        from_theta_i_deg=max(model.exceeds_1_from_theta_i_deg - 2.0 * ANGLE_TOLERANCE_DEG, 0.0),
-        citation=_ACCEPTED if model.verdict == "accepted excess" else _OF_MODEL,
-    )
+def panels_of(model: ModelEnergy | None, table: TableEnergy) -> list[Panel]:
+    """Return the panels of a table, and of its model if it is known."""
+    panels: list[Panel] = []
+    strongest = 0
+    at = ""
+    wavelengths = table.wavelength_nm
+    if wavelengths is not None and len(wavelengths) > 1:
+        albedo = np.array((table if model is None else model).albedo, dtype=np.float64)  # nan for None
+        strongest = int(np.argmax(np.nan_to_num(albedo, nan=-np.inf).max(axis=0)))
+        at = f" at {wavelengths[strongest]:g} nm"
+        if model is not None:
+            curves = _spectral(model.theta_i_deg, model.albedo, wavelengths)
+            panels.append(Panel(title="Albedo of the model", x_label=_THETA, y_label=_ALBEDO, curves=curves))
+        curves = [Curve(label="table", x=wavelengths, y=table.hemispherical, role="ours")]
+        if model is not None:
+            curves.append(Curve(label="model", x=wavelengths, y=model.hemispherical, role="truth"))
+        panels.append(Panel(title="In uniform light", x_label="wavelength, nm", y_label="albedo", curves=curves))
+    both = [Curve(label="table", x=table.theta_i_deg, y=_column(table.albedo, strongest), role="ours")]
+    if model is not None:
+        both.append(Curve(label="model", x=model.theta_i_deg, y=_column(model.albedo, strongest), role="truth"))
+    title = f"{'Table' if model is None else 'Model and table'}{at}"
+    panels.append(Panel(title=title, x_label=_THETA, y_label=_ALBEDO, curves=[*both, _ALL_OF_IT]))
+    if model is not None and model.furnace is not None:
+        furnace = model.furnace
+        curves = [*_spectral(furnace.theta_i_deg, furnace.albedo, furnace.wavelength_nm), _IDEAL]
+        panels.append(Panel(title="White furnace: made lossless", x_label=_THETA, y_label=_ALBEDO, curves=curves))
+    if model is not None and model.bound_on_a is not None and len(model.bound_on_a.wavelength_nm) > 1:
+        x = model.bound_on_a.wavelength_nm
+        curves = [
+            Curve(label="this material", x=x, y=model.bound_on_a.preset, role="ours"),
+            Curve(label="largest that conserves", x=x, y=model.bound_on_a.largest, role="truth"),
+        ]
+        title = "Uniform diffuse part a(λ)"
+        panels.append(Panel(title=title, x_label="wavelength, nm", y_label="a(λ)", curves=curves))
+    return panels
+
+
+def _spectral(x: list[float], rows: list[Numbers], wavelengths: list[float] | None) -> list[Curve]:
+    """Return curves at a few wavelengths, the first and the last among them."""
+    if wavelengths is None or len(rows[0]) == 1:
+        return [Curve(label="model", x=x, y=_column(rows, 0), role="ours")]
+    count = min(_CURVES, len(wavelengths))
+    chosen = sorted({round(k * (len(wavelengths) - 1) / max(count - 1, 1)) for k in range(count)})
+    return [Curve(label=f"{wavelengths[k]:g} nm", x=x, y=_column(rows, k)) for k in chosen]
+
+
+def _column(rows: list[Numbers], k: int) -> Numbers:
+    return [row[k] for row in rows]

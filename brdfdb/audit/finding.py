@@ -10,7 +10,7 @@ from typing import Any, ClassVar, Literal, NamedTuple, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from brdfdb.audit.pairs import Pairs, pairs_of
+from brdfdb.audit.pairs import ComparedPairs, pairs_of
 from brdfdb.figure import Map, Panel
 from brdfdb.materials import FunctionRecord, Source
 from brdfdb.tables.metadata import TableMetadata
@@ -93,28 +93,15 @@ class Finding(BaseModel):
 
     A subclass defines the class attributes, the field `verdict` and the method `judge`. `brdfdb.audit.registry` finds
     it in its module.
-
-    Attributes
-    ----------
-    key : str
-        Name in the report: lower-case letters and underscores.
-    order : int
-        Position among the findings, which are judged and shown in this order.
-    title : str
-        Name for people; by default the key in words.
-    columns : tuple of str
-        Headings of its cells; by default one, the title.
-    explanation : str
-        Sentences on how to read it.
     """
 
     model_config = STRICT
 
-    key: ClassVar[str]
-    order: ClassVar[int] = 100
-    title: ClassVar[str]
-    columns: ClassVar[tuple[str, ...]]
-    explanation: ClassVar[str]
+    key: ClassVar[str]  #: name in the report: lower-case letters and underscores
+    order: ClassVar[int] = 100  #: position among the findings, which are judged and shown in this order
+    title: ClassVar[str]  #: name for people; by default the key in words
+    columns: ClassVar[tuple[str, ...]]  #: headings of its cells; by default one, the title
+    explanation: ClassVar[str]  #: sentences on how to read it
 
     verdict: Word
 
@@ -186,19 +173,10 @@ class NotJudged(Finding):
 
 @dataclass(frozen=True, eq=False)
 class Subject:
-    """A table under audit.
+    """A table under audit, with its source: the material or function that gave its values, None if it is not known.
 
-    Attributes
-    ----------
-    table : Table
-        Table of a store, or in memory.
-    source : Source or None
-        Material or function that gave the values of the table. None if it is not known, or if it is a function, of
-        which a store holds the name only.
-    accept_excess : bool
-        Accept that the model reflects more than it receives.
-    findings : dict
-        Findings that have been judged, in the order of the registry.
+    With `accept_excess` the model may reflect more than it receives. `findings` are those judged so far, in the order
+    of the registry.
     """
 
     table: Table
@@ -207,7 +185,7 @@ class Subject:
     findings: dict[str, Finding] = field(default_factory=dict)
 
     @cached_property
-    def pairs(self) -> Pairs:
+    def pairs(self) -> ComparedPairs:
         """Return f_r [1/sr] of table and source at the directions that several findings share."""
         return pairs_of(self.table, self.source)
 
@@ -219,7 +197,8 @@ class Subject:
         """
         if self.source is None:
             return None
-        layout, values = self.table.laid_out(self.source), self.table.values
+        layout = self.table.laid_out(self.source)
+        values = self.table.values
         if not set(MEASURED) & self.table.attrs.keys():
             return metadata_of(layout)
         return stated_metadata(layout, lambda rows: values[rows])

@@ -2,33 +2,37 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, Field
 
-from brdfdb.audit.excess import DIGITS, ENERGY_TOLERANCE, cause_of, crossing, limit_of, place
 from brdfdb.audit.finding import STRICT
 from brdfdb.figure import Numbers, numbers, rows
 from brdfdb.geometry import radians
-from brdfdb.integrals.quadrature import Albedo, reflected_share
+from brdfdb.integrals.quadrature import Albedo, gauss_rule, reflected_share
 from brdfdb.integrals.uniform_bound import largest_uniform_beside, tops
 from brdfdb.lobes import narrowest
-from brdfdb.materials import Material, Source
+from brdfdb.materials import Material, Source, presets
 from brdfdb.materials.provenance import KnownExcess
 from brdfdb.materials.source import Lossless
 from brdfdb.models.shared_integrals import sharing
 from brdfdb.parameters import Floats
-from brdfdb.tables.first_numbers import Grazing
+from brdfdb.tables.albedo import LAST_LIGHT_DEG, grazing_of_source, last_light
 from brdfdb.tables.grids import Axis
-from brdfdb.tables.largest_albedo import LAST_LIGHT_DEG, grazing_of_source, last_light
+from brdfdb.tables.stated_error import Grazing
+
+# Tolerance of an albedo of 1 [1]. Sums of float32 values round: an ideal diffuser measures 1 + 1.2e-7
+ENERGY_TOLERANCE = 1e-6
+DIGITS = 7  # significant digits of albedos in a report: as many as a float32 holds
+ANGLE_TOLERANCE_DEG = 1e-3  # tolerance of the angle above which an albedo exceeds 1
 
 EnergyVerdict = Literal["conserves", "loses", "gains", "known published excess", "accepted excess", "violates"]
 
-# Absolute tolerance of each albedo [1], of which four digits are shown, and of one that is closer to a limit
-TOLERANCE, FINE = 1e-5, 1e-6
+TOLERANCE = 1e-5  # absolute tolerance of each albedo [1], of which four digits are shown
+FINE = 1e-6  # tolerance of an albedo [1] that is closer to a limit than its error
 SURE_DECIMALS = 5  # decimals of an albedo that its tolerance leaves
 MOST_PANELS = 1000  # number of panels at which the quadrature of one light stops
 BOUND_TOLERANCE = 2e-5  # absolute tolerance of the largest a(lambda) [1]
@@ -38,15 +42,80 @@ THETA_I_DEG = (0.0, 10.0, 30.0, 45.0, 60.0, 75.0, 80.0, 85.0, 87.5, 89.0, 89.5, 
 NODES = 16  # number of Gauss nodes: the mean differs by less than 2e-4 from that of 48 nodes, for all presets
 # Lights are added next to the largest albedo in at most ROUNDS rounds: until it differs by less than FLAT from its
 # neighbours, or, after LEAST_ROUNDS, from the top of the parabola through them
-LEAST_ROUNDS, ROUNDS, FLAT = 2, 4, 1e-6
+LEAST_ROUNDS = 2
+ROUNDS = 4
+FLAT = 1e-6
 # A lossless model loses light if it reflects less than this share at an angle [degree] up to this one. At larger angles
 # shadowing alone takes more from every model of single scattering
-LOSSLESS, LOSS_UP_TO_DEG = 0.99, 85.0
+LOSSLESS = 0.99
+LOSS_UP_TO_DEG = 85.0
 GAIN = 1e-4  # smallest excess over 1 of a lossless model that is reported
 LIMITS = (LOSSLESS, 1.0, 1.0 + GAIN)  # albedos [1] that a verdict depends on
 # Azimuths of a light over a lobe with two axes; the other quadrants repeat them
 _ELLIPSE_DEG = np.array([0.0, 30.0, 60.0, 90.0])
 _TURN_DEG = np.arange(0.0, 360.0, 60.0)
+
+
+def published_excess(material: Material, wavelength_nm: Axis | None) -> KnownExcess | None:
+    """Return the excess that is known as published of a material [1, degree], or None.
+
+    Only presets have a known excess. A material has it if its parameters, index of refraction and wavelengths are
+    those of the preset, under any name. Neither a model nor a recipe excuses an excess. `Material` refuses a known
+    excess that rests on an assumption.
+    """
+    for preset in presets().values():
+        known = preset.known_excess
+        if known is None:
+            continue
+        stated = preset.wavelengths_nm
+        same = (preset.model, preset.file_parameters(), preset.refractive_index) == (
+            *(material.model, material.file_parameters()),
+            material.refractive_index,
+        )
+        if same and (stated is None or np.array_equal(stated, wavelength_nm if wavelength_nm is not None else ())):
+            return known
+    return None
+
+
+def cause_of(material: Material, wavelength_nm: Axis | None) -> str:
+    """Return why the model of a material can reflect more than arrives, in words; empty if its paper does not say.
+
+    A limit of energy that the parameters do not keep comes first. The general reason of the model follows only if they
+    leave another limit, too, or keep all of them.
+    """
+    spec = material.spec
+    stated = [] if spec.limits is None else list(spec.limits(material.arguments(wavelength_nm)))
+    outside = [limit for limit in stated if limit.standing == "outside" and limit.of_energy]
+    causes = [
+        f"a limit is not met: {limit.quantity} is {limit.value}, valid {limit.valid}; {limit.where}"
+        for limit in outside
+    ]
+    others = any(limit.standing in ("at the edge", "outside") for limit in stated if not limit.of_energy)
+    if spec.excess and (others or not outside):
+        causes.append(spec.excess)
+    return "; ".join(causes)
+
+
+def limit_of(known: KnownExcess | None, theta_i_deg: Axis) -> Axis:
+    """Return the largest allowed albedo [1] at each angle [degree]: 1, or the known excess above its angle."""
+    one = np.full(theta_i_deg.size, 1.0 + ENERGY_TOLERANCE)
+    return one if known is None else np.where(theta_i_deg >= known.from_theta_i_deg, known.max_albedo, one)
+
+
+def place(theta_i_deg: float, wavelength_nm: float | None) -> str:
+    """Return the angle [degree] of an albedo in words, with its wavelength [nm] unless it is grey."""
+    return f"{theta_i_deg:.4g} degrees" + ("" if wavelength_nm is None else f" and {wavelength_nm:g} nm")
+
+
+def crossing(excess: Callable[[float], float], low: float, high: float) -> float:
+    """Return the angle [degree] above which an excess is positive, by bisection to `ANGLE_TOLERANCE_DEG`.
+
+    `excess` is an albedo minus 1 [1] as a function of the angle; it is not positive at `low`, and positive at `high`.
+    """
+    while high - low > ANGLE_TOLERANCE_DEG:
+        between = (low + high) / 2.0
+        low, high = (low, between) if excess(between) > 0.0 else (between, high)
+    return round(high, 4)
 
 
 class Furnace(BaseModel):
@@ -110,20 +179,11 @@ class _Lights(NamedTuple):
     weights: Axis
 
 
-class _White(NamedTuple):
-    """The lossless form of a source, and the wavelengths [nm] of its white furnace; None if grey."""
+class _Place(NamedTuple):
+    """Indices of a light and of a wavelength."""
 
-    lossless: Lossless
-    nm: Axis | None
-
-
-class _Model(NamedTuple):
-    """A source with its wavelengths [nm] and its lossless form, and the albedos [1] that its verdict depends on."""
-
-    source: Source
-    wavelength_nm: Axis | None
-    white: _White | None
-    limits: tuple[float, ...]
+    theta: int
+    wavelength: int
 
 
 class _Reflected(NamedTuple):
@@ -136,6 +196,147 @@ class _Reflected(NamedTuple):
     mean: Floats
     specular: Floats
     error: Floats
+
+    @property
+    def certain(self) -> Floats:
+        """Return the largest albedos less their errors."""
+        return self.largest - self.error
+
+    @property
+    def worst(self) -> _Place:
+        """Return the place of the largest albedo. Non-finite values rank first; ties resolve to the smallest angle."""
+        ranked = np.where(np.isfinite(self.largest), np.round(self.largest, 12), np.inf)
+        theta, wavelength = np.unravel_index(np.argmax(ranked), ranked.shape)
+        return _Place(int(theta), int(wavelength))
+
+
+class _ReflectedForms(NamedTuple):
+    """Albedos of a source, and of its lossless form; None if it has none."""
+
+    source: _Reflected
+    lossless: _Reflected | None
+
+
+class _Judgement(NamedTuple):
+    """The verdict on a model, and its reason."""
+
+    verdict: EnergyVerdict
+    reason: str
+
+
+class _Model(NamedTuple):
+    """A source, and the lossless form of it (None if it has none), each with its wavelengths [nm] (None if grey).
+
+    `limits` are the albedos [1] that the verdict depends on.
+    """
+
+    source: Source
+    wavelength_nm: Axis | None
+    lossless: Lossless | None
+    lossless_nm: Axis | None
+    limits: tuple[float, ...]
+
+    @classmethod
+    def of(cls, source: Source, wavelength_nm: Axis | None, limits: tuple[float, ...]) -> _Model:
+        """Return the model of a source. Its lossless form has the first, the middle and the last wavelength."""
+        few = wavelength_nm
+        if wavelength_nm is not None:
+            few = wavelength_nm[np.unique([0, wavelength_nm.size // 2, wavelength_nm.size - 1])]
+        return cls(source, wavelength_nm, source.lossless, few, limits)
+
+    def lights(self) -> _Lights:
+        """Return the lights of the source, 90 degrees included unless f_r has a pole at grazing."""
+        rule = gauss_rule(NODES)
+        nodes = np.round(45.0 * (1.0 + rule.nodes), 4)  # rounded for the report
+        weights = rule.weights * (np.pi / 4.0) * np.sin(2.0 * radians(nodes))
+        others = np.unique([*THETA_I_DEG, last_light(self.source)])
+        theta_i_deg = np.concatenate([nodes, others])
+        order = np.argsort(theta_i_deg)
+        return _Lights(theta_i_deg[order], np.concatenate([weights, np.zeros(others.size)])[order])
+
+    def reflected(self, lights: _Lights) -> _ReflectedForms:
+        """Return the albedos [1] of the source and of its lossless form, for lights from all azimuths that differ.
+
+        Both are integrated over the same directions. Lights whose albedo is closer to a limit than its error are
+        integrated again, to `FINE`.
+        """
+        source = self.source
+        theta_i = radians(lights.theta_i_deg)
+        phi_i_deg = np.zeros(1)
+        of_azimuths = np.ones(1)  # weights in the mean over azimuths
+        if source.anisotropic and source.elliptical:
+            phi_i_deg = _ELLIPSE_DEG
+            of_azimuths = np.array([1.0, 2.0, 2.0, 1.0]) / 6.0
+        elif source.anisotropic:
+            phi_i_deg = _TURN_DEG
+            of_azimuths = np.full(_TURN_DEG.size, 1.0 / _TURN_DEG.size)
+        forms = [(source, self.wavelength_nm)]
+        if self.lossless is not None:
+            forms.append((self.lossless.source, self.lossless_nm))
+        widths = [1 if nm is None else nm.size for _, nm in forms]
+        shapes = [(theta_i.size, width) for width in widths]
+        specular = [
+            np.broadcast_to(np.reshape(form.specular_reflectance(theta_i, nm), (theta_i.size, -1)), shape)
+            for (form, nm), shape in zip(forms, shapes, strict=True)
+        ]
+        evaluated = [form.brdf_at(nm) for form, nm in forms]
+
+        def brdf(wi: Floats, wr: Floats) -> Floats:
+            with np.errstate(all="ignore"):  # nodes lie in every corner; what is finite is tested, not flagged
+                # f_r of a lossless form may be the same at all wavelengths, and have one column
+                values = [
+                    np.broadcast_to(f_r(wi, wr), (len(wi), width)) for f_r, width in zip(evaluated, widths, strict=True)
+                ]
+            return np.concatenate(values, axis=-1)
+
+        def integrated(rows: NDArray[np.intp], tolerance: float) -> Albedo:
+            return reflected_share(
+                brdf,
+                theta_i[rows, np.newaxis],
+                radians(phi_i_deg),
+                narrowest(source.lobe(np.cos(theta_i[rows])[:, np.newaxis, np.newaxis], self.wavelength_nm)),
+                tolerance=tolerance,
+                most_panels=MOST_PANELS,
+                width=sum(widths),
+                # f_r is the same on both sides of a light along an axis of an ellipse
+                mirrored=(phi_i_deg % 90.0 == 0.0) & (source.elliptical or not source.anisotropic),
+            )
+
+        diffuse, error = integrated(np.arange(theta_i.size), TOLERANCE)
+        albedo = diffuse + np.concatenate(specular, axis=1)[:, np.newaxis]
+        distance = np.abs(np.subtract.outer(albedo, self.limits)).min(axis=(2, 3))
+        near = np.flatnonzero(np.any(distance <= error + ENERGY_TOLERANCE, axis=1))
+        if near.size:
+            diffuse[near], error[near] = integrated(near, FINE)
+        largest_error = np.max(error, axis=1, keepdims=True)
+        reflected = [
+            _Reflected(
+                part.max(axis=1) + mirrored,
+                np.einsum("tpw,p->tw", part, of_azimuths) + mirrored,
+                mirrored,
+                largest_error,
+            )
+            for part, mirrored in zip(np.split(diffuse, widths[:1], axis=2), specular, strict=False)
+        ]
+        return _ReflectedForms(reflected[0], reflected[1] if self.lossless is not None else None)
+
+    def first_above_1(self, lights: _Lights, reflected: _Reflected) -> float | None:
+        """Return the angle [degree] above which an albedo exceeds 1, or None. It lies between two lights."""
+
+        def excess(reflected: _Reflected) -> Axis:
+            return np.asarray(np.max(reflected.certain, axis=1) - 1.0 - ENERGY_TOLERANCE)
+
+        excesses = excess(reflected)
+        if not np.any(excesses > 0.0):
+            return None
+        first = int(np.argmax(excesses > 0.0))
+        if first == 0 or not np.isfinite(excesses[first - 1]):
+            return float(lights.theta_i_deg[first])
+
+        def between(theta_i_deg: float) -> float:
+            return float(excess(self.reflected(_Lights(np.array([theta_i_deg]), np.zeros(1))).source)[0])
+
+        return crossing(between, *lights.theta_i_deg[first - 1 : first + 1].tolist())
 
 
 def model_energy_of(
@@ -153,26 +354,48 @@ def model_energy_of(
     quotes it, and it excuses nothing. With `accept_excess` an excess that is not known is accepted. `grazing`
     is the albedo for lights beyond the last; by default it is measured.
     """
-    limits = LIMITS if known is None else (*LIMITS, known.max_albedo)
-    model = _Model(source, wavelength_nm, _white_of(source, wavelength_nm), limits)
-    lights = _lights(source)
+    model = _Model.of(source, wavelength_nm, LIMITS if known is None else (*LIMITS, known.max_albedo))
+    lights = model.lights()
+    furnace = None
     with sharing():  # model and furnace are evaluated at the same directions
-        reflected, white = _reflected(model, lights)
-        furnace = None if model.white is None or white is None else _furnace(model.white, lights, white)
-        lights, reflected = _refined(model, lights, reflected)
-        first = _first_above_1(model, lights, reflected)
-        largest = float(reflected.largest.max())
+        forms = model.reflected(lights)
+        if model.lossless is not None and forms.lossless is not None:
+            furnace = _furnace(model.lossless, model.lossless_nm, lights, forms.lossless)
+        reflected = forms.source
+        for rounds in range(ROUNDS):  # peaks lie between round angles
+            worst = reflected.worst.theta
+            around = slice(max(worst - 1, 0), worst + 2)
+            largest = reflected.largest.max(axis=1)
+            if not np.ptp(largest[around]) > FLAT:  # nan is not
+                break
+            if rounds >= LEAST_ROUNDS and tops(lights.theta_i_deg, largest[:, np.newaxis])[0] - largest[worst] <= FLAT:
+                break
+            near = lights.theta_i_deg[around]
+            between = np.round((near[1:] + near[:-1]) / 2.0, 4)
+            more = _Lights(between, np.zeros(between.size))
+            order = np.argsort(np.concatenate([lights.theta_i_deg, between]))
+            added = model.reflected(more).source
+            lights = _Lights(*(np.concatenate(pair)[order] for pair in zip(lights, more, strict=True)))
+            reflected = _Reflected(*(np.concatenate(pair)[order] for pair in zip(reflected, added, strict=True)))
+        first = model.first_above_1(lights, reflected)
+        most = float(reflected.largest.max())
         if grazing is None:
-            grazing = grazing_of_source(source, wavelength_nm, largest)
+            grazing = grazing_of_source(source, wavelength_nm, most)
         elif grazing.max_albedo is not None:  # more lights were looked at
-            most = max(grazing.max_albedo, float(f"{largest:.4g}"))
-            grazing = grazing.model_copy(update={"max_albedo": most})
-    theta, wavelength = _worst(reflected.largest)
-    growth = "" if grazing is None else f"; {grazing.in_words(float(reflected.largest.max()))}"
-    verdict, reason = _verdict(lights, wavelength_nm, reflected, furnace, known, growth)
+            grazing = grazing.model_copy(update={"max_albedo": max(grazing.max_albedo, float(f"{most:.4g}"))})
+    growth = "" if grazing is None else f"; {grazing.in_words(most)}"
+    verdict, reason = _judged(lights, wavelength_nm, reflected, furnace, known, growth)
     if verdict == "violates" and first is not None:
-        reason += _explained(source, wavelength_nm, reflected, first, known, claim)
+        finite = float(np.max(np.where(np.isfinite(reflected.largest), reflected.largest, -np.inf)))
+        reason += f"; this model does so by itself for such parameters: up to {finite:.4g}, from {first:.4g} degrees"
+        if isinstance(source, Material) and (cause := cause_of(source, wavelength_nm)):
+            reason += f" ({cause})"
+        if known is not None:
+            reason += f"; the paper has up to {known.max_albedo:.4g}, from {known.from_theta_i_deg:.4g} degrees"
+        elif claim:
+            reason += f"; its recipe excuses it, which is not accepted: {claim}"
         verdict = "accepted excess" if accept_excess and np.isfinite(reflected.largest).all() else verdict
+    place_of_worst = reflected.worst
     return ModelEnergy(
         theta_i_deg=lights.theta_i_deg.tolist(),
         wavelength_nm=None if wavelength_nm is None else wavelength_nm.tolist(),
@@ -180,9 +403,9 @@ def model_energy_of(
         specular=rows(reflected.specular, DIGITS),
         integration_error=_finite(float(f"{reflected.error.max():.2g}")),
         hemispherical=numbers(lights.weights @ reflected.mean, 4),
-        max_albedo=_finite(reflected.largest[theta, wavelength]),
-        max_at_theta_i_deg=float(lights.theta_i_deg[theta]),
-        max_at_wavelength_nm=None if wavelength_nm is None else float(wavelength_nm[wavelength]),
+        max_albedo=_finite(reflected.largest[place_of_worst]),
+        max_at_theta_i_deg=float(lights.theta_i_deg[place_of_worst.theta]),
+        max_at_wavelength_nm=_nm(wavelength_nm, place_of_worst.wavelength),
         exceeds_1_from_theta_i_deg=first,
         judged_up_to_theta_i_deg=float(lights.theta_i_deg[-1]),
         grazing=grazing,
@@ -193,88 +416,33 @@ def model_energy_of(
     )
 
 
-def _refined(model: _Model, lights: _Lights, reflected: _Reflected) -> tuple[_Lights, _Reflected]:
-    """Return lights and albedos with more lights around the largest albedo, because peaks lie between round angles."""
-    for rounds in range(ROUNDS):
-        worst, _ = _worst(reflected.largest)
-        around, largest = slice(max(worst - 1, 0), worst + 2), reflected.largest.max(axis=1)
-        if not np.ptp(largest[around]) > FLAT:  # nan is not
-            break
-        if rounds >= LEAST_ROUNDS and tops(lights.theta_i_deg, largest[:, np.newaxis])[0] - largest[worst] <= FLAT:
-            break
-        beside = lights.theta_i_deg[around]
-        between = np.round((beside[1:] + beside[:-1]) / 2.0, 4)
-        more = _Lights(between, np.zeros(between.size))
-        order = np.argsort(np.concatenate([lights.theta_i_deg, between]))
-        lights = _Lights(*(np.concatenate(pair)[order] for pair in zip(lights, more, strict=True)))
-        new, _ = _reflected(model, more)
-        reflected = _Reflected(*(np.concatenate(pair)[order] for pair in zip(reflected, new, strict=True)))
-    return lights, reflected
-
-
-def _first_above_1(model: _Model, lights: _Lights, reflected: _Reflected) -> float | None:
-    """Return the angle [degree] above which an albedo exceeds 1, or None. It lies between two lights."""
-
-    def excess(reflected: _Reflected) -> Axis:
-        return np.asarray(np.max(reflected.largest - reflected.error, axis=1) - 1.0 - ENERGY_TOLERANCE)
-
-    excesses = excess(reflected)
-    if not np.any(excesses > 0.0):
-        return None
-    first = int(np.argmax(excesses > 0.0))
-    if first == 0 or not np.isfinite(excesses[first - 1]):
-        return float(lights.theta_i_deg[first])
-
-    def between(theta_i_deg: float) -> float:
-        return float(excess(_reflected(model, _Lights(np.array([theta_i_deg]), np.zeros(1)))[0])[0])
-
-    return crossing(between, *lights.theta_i_deg[first - 1 : first + 1].tolist())
-
-
-def _explained(
-    source: Source,
-    wavelength_nm: Axis | None,
-    reflected: _Reflected,
-    first: float,
-    known: KnownExcess | None,
-    claim: str,
-) -> str:
-    """Return a clause on an excess that is not known as published: its origin, and the claim on it."""
-    most = float(np.max(np.where(np.isfinite(reflected.largest), reflected.largest, -np.inf)))
-    clause = f"; this model does so by itself for such parameters: up to {most:.4g}, from {first:.4g} degrees"
-    if isinstance(source, Material) and (cause := cause_of(source, wavelength_nm)):
-        clause += f" ({cause})"
-    if known is not None:
-        return f"{clause}; the paper has up to {known.max_albedo:.4g}, from {known.from_theta_i_deg:.4g} degrees"
-    return f"{clause}; its recipe excuses it, which is not accepted: {claim}" if claim else clause
-
-
-def _worst(albedo: Floats) -> tuple[int, int]:
-    """Return the index of the largest albedo. Non-finite values rank first; ties resolve to the smallest angle."""
-    ranked = np.where(np.isfinite(albedo), np.round(albedo, 12), np.inf)
-    theta, wavelength = np.unravel_index(np.argmax(ranked), ranked.shape)
-    return int(theta), int(wavelength)
-
-
 def _finite(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
 
 
-def _verdict(
+def _nm(wavelength_nm: Axis | Sequence[float] | None, index: int | np.integer[Any]) -> float | None:
+    return None if wavelength_nm is None else float(wavelength_nm[int(index)])
+
+
+def _judged(
     lights: _Lights,
     wavelength_nm: Axis | None,
     reflected: _Reflected,
     furnace: Furnace | None,
     known: KnownExcess | None,
     growth: str,
-) -> tuple[EnergyVerdict, str]:
-    """Return the verdict on a model, and its reason with angle and wavelength, and the growth for lights beyond."""
-    theta_i_deg, certain = lights.theta_i_deg, reflected.largest - reflected.error
+) -> _Judgement:
+    """Return the verdict on a model, and its reason with angle and wavelength, and the growth for lights beyond.
+
+    A model that reflects at most what arrives is judged by its lossless form, a gain before a loss.
+    """
+    theta_i_deg = lights.theta_i_deg
+    certain = reflected.certain
     if not np.isfinite(certain).all():
         broken, wavelength = np.argwhere(~np.isfinite(certain))[0]
         at = place(theta_i_deg[broken], _nm(wavelength_nm, wavelength))
-        return "violates", f"the model reflects no finite share of what arrives at {at}"
-    worst, wavelength = _worst(reflected.largest)
+        return _Judgement("violates", f"the model reflects no finite share of what arrives at {at}")
+    worst, wavelength = reflected.worst
     if np.any(certain > 1.0 + ENERGY_TOLERANCE):
         beyond = np.max(certain, axis=1) - limit_of(known, theta_i_deg) - ENERGY_TOLERANCE
         published = known is not None and bool(np.all(beyond <= 0.0))
@@ -284,18 +452,13 @@ def _verdict(
         at = place(theta_i_deg[worst], _nm(wavelength_nm, wavelength))
         share = f"{reflected.largest[worst].max():.4g} of what arrives at {at}{growth}"
         if known is not None and published:
-            return "known published excess", f"reflects {share}: {known.citation}"
-        return "violates", f"the model reflects {share}"
+            return _Judgement("known published excess", f"reflects {share}: {known.citation}")
+        return _Judgement("violates", f"the model reflects {share}")
     at = place(theta_i_deg[worst], _nm(wavelength_nm, wavelength))
     up_to = f"for lights up to {theta_i_deg[-1]:g} degrees"
     largest = f"reflects at most {np.max(reflected.largest):.4g} of what arrives, {up_to}, at {at}{growth}"
     if furnace is None:
-        return "conserves", f"{largest}; no parameters make the model lossless"
-    return _where_nothing_absorbs(furnace, largest)
-
-
-def _where_nothing_absorbs(furnace: Furnace, largest: str) -> tuple[EnergyVerdict, str]:
-    """Return the verdict on a model that reflects at most what arrives: by its lossless form, a gain before a loss."""
+        return _Judgement("conserves", f"{largest}; no parameters make the model lossless")
     albedo = np.array(furnace.albedo, dtype=np.float64)[np.array(furnace.theta_i_deg) <= LOSS_UP_TO_DEG]
     row, column = np.unravel_index(np.argmin(albedo), albedo.shape)
     at = place(furnace.theta_i_deg[row], _nm(furnace.wavelength_nm, column))
@@ -303,119 +466,30 @@ def _where_nothing_absorbs(furnace: Furnace, largest: str) -> tuple[EnergyVerdic
     if furnace.largest is not None and furnace.largest > 1.0 + GAIN:
         at = place(furnace.largest_at_theta_i_deg, furnace.largest_at_wavelength_nm)
         more = f"{furnace.largest:.5g} of what arrives at {at}" + (f", and {least}" if least else "")
-        return "gains", f"{largest}; lossless ({furnace.lossless}), the model would reflect {more}"
+        return _Judgement("gains", f"{largest}; lossless ({furnace.lossless}), the model would reflect {more}")
     if least:
-        return "loses", f"lossless ({furnace.lossless}), the model reflects {least}; as it is, it {largest}"
-    return "conserves", largest
+        loss = f"lossless ({furnace.lossless}), the model reflects {least}; as it is, it {largest}"
+        return _Judgement("loses", loss)
+    return _Judgement("conserves", largest)
 
 
-def _nm(wavelength_nm: Axis | Sequence[float] | None, index: int | np.integer[Any]) -> float | None:
-    return None if wavelength_nm is None else float(wavelength_nm[int(index)])
-
-
-def _lights(source: Source) -> _Lights:
-    """Return the lights of a source, 90 degrees included unless f_r has a pole at grazing."""
-    x, weight = np.polynomial.legendre.leggauss(NODES)
-    nodes, weights = np.round(45.0 * (1.0 + x), 4), weight * (np.pi / 4.0)  # rounded for the report
-    others = np.unique([*THETA_I_DEG, last_light(source)])
-    theta_i_deg = np.concatenate([nodes, others])
-    weights = np.concatenate([weights * np.sin(2.0 * radians(nodes)), np.zeros(others.size)])
-    order = np.argsort(theta_i_deg)
-    return _Lights(theta_i_deg[order], weights[order])
-
-
-def _reflected(model: _Model, lights: _Lights) -> tuple[_Reflected, _Reflected | None]:
-    """Return the albedos [1] of a source, and of its lossless form, for lights from all azimuths that differ.
-
-    Both are integrated over the same directions. Lights whose albedo is closer to a limit than its error are integrated
-    again, to `FINE`.
-    """
-    source, theta_i = model.source, radians(lights.theta_i_deg)
-    phi_i_deg, weights = _azimuths(source)
-    forms = [(source, model.wavelength_nm)]
-    if model.white is not None:
-        forms.append((model.white.lossless.source, model.white.nm))
-    widths = [1 if nm is None else nm.size for _, nm in forms]
-    specular = [
-        np.broadcast_to(np.reshape(form.specular_reflectance(theta_i, nm), (theta_i.size, -1)), (theta_i.size, width))
-        for (form, nm), width in zip(forms, widths, strict=True)
-    ]
-    evaluated = [form.brdf_at(nm) for form, nm in forms]
-
-    def brdf(wi: Floats, wr: Floats) -> Floats:
-        with np.errstate(all="ignore"):  # nodes lie in every corner; what is finite is tested, not flagged
-            # f_r of a lossless form may be the same at all wavelengths, and have one column
-            values = [
-                np.broadcast_to(f_r(wi, wr), (len(wi), width)) for f_r, width in zip(evaluated, widths, strict=True)
-            ]
-        return np.concatenate(values, axis=-1)
-
-    def integrated(rows: NDArray[np.intp], tolerance: float) -> Albedo:
-        return reflected_share(
-            brdf,
-            theta_i[rows, np.newaxis],
-            radians(phi_i_deg),
-            narrowest(source.lobe(np.cos(theta_i[rows])[:, np.newaxis, np.newaxis], model.wavelength_nm)),
-            tolerance=tolerance,
-            most_panels=MOST_PANELS,
-            width=sum(widths),
-            # f_r is the same on both sides of a light along an axis of an ellipse
-            mirrored=(phi_i_deg % 90.0 == 0.0) & (source.elliptical or not source.anisotropic),
-        )
-
-    diffuse, error = integrated(np.arange(theta_i.size), TOLERANCE)
-    whole = diffuse + np.concatenate(specular, axis=1)[:, np.newaxis]
-    off = np.abs(np.subtract.outer(whole, model.limits)).min(axis=(2, 3))
-    near = np.flatnonzero(np.any(off <= error + ENERGY_TOLERANCE, axis=1))
-    if near.size:
-        diffuse[near], error[near] = integrated(near, FINE)
-    own, *others = (
-        _Reflected(
-            part.max(axis=1) + extra,
-            np.einsum("tpw,p->tw", part, weights) + extra,
-            extra,
-            np.max(error, axis=1, keepdims=True),
-        )
-        for part, extra in zip(np.split(diffuse, widths[:1], axis=2), specular, strict=False)
-    )
-    return own, others[0] if others else None
-
-
-def _azimuths(source: Source) -> tuple[Axis, Axis]:
-    """Return the azimuths of lights [degree] that differ, and their weights in the mean over azimuths."""
-    if not source.anisotropic:
-        return np.zeros(1), np.ones(1)
-    if source.elliptical:
-        return _ELLIPSE_DEG, np.array([1.0, 2.0, 2.0, 1.0]) / 6.0
-    return _TURN_DEG, np.full(_TURN_DEG.size, 1.0 / _TURN_DEG.size)
-
-
-def _white_of(source: Source, wavelength_nm: Axis | None) -> _White | None:
-    """Return the lossless form of a source, with the first, the middle and the last wavelength; None if it has none."""
-    if source.lossless is None:
-        return None
-    few = None if wavelength_nm is None else np.unique([0, wavelength_nm.size // 2, wavelength_nm.size - 1])
-    return _White(source.lossless, None if wavelength_nm is None else wavelength_nm[few])
-
-
-def _furnace(white: _White, lights: _Lights, reflected: _Reflected) -> Furnace:
+def _furnace(lossless: Lossless, wavelength_nm: Axis | None, lights: _Lights, reflected: _Reflected) -> Furnace:
     """Return the white furnace of a source from the albedos of its lossless form."""
-    wavelengths = white.nm
     # Albedos that differ by less than their error are alike, and the smallest of their angles stands for them
     alike = np.round(reflected.largest, SURE_DECIMALS)
     low, high = (np.unravel_index(extreme(alike), alike.shape) for extreme in (np.argmin, np.argmax))
     return Furnace(
-        lossless=", ".join(f"{name} = {value:.4g}" for name, value in white.lossless.changes.items()),
+        lossless=", ".join(f"{name} = {value:.4g}" for name, value in lossless.changes.items()),
         theta_i_deg=lights.theta_i_deg.tolist(),
-        wavelength_nm=None if wavelengths is None else wavelengths.tolist(),
+        wavelength_nm=None if wavelength_nm is None else wavelength_nm.tolist(),
         albedo=rows(reflected.largest, DIGITS),
         hemispherical=numbers(lights.weights @ reflected.mean, 4),
         smallest=_finite(reflected.largest[low]),
         smallest_at_theta_i_deg=float(lights.theta_i_deg[low[0]]),
-        smallest_at_wavelength_nm=_nm(wavelengths, low[1]),
+        smallest_at_wavelength_nm=_nm(wavelength_nm, low[1]),
         largest=_finite(reflected.largest[high]),
         largest_at_theta_i_deg=float(lights.theta_i_deg[high[0]]),
-        largest_at_wavelength_nm=_nm(wavelengths, high[1]),
+        largest_at_wavelength_nm=_nm(wavelength_nm, high[1]),
     )
 
 

@@ -8,29 +8,31 @@ from brdfdb.materials import Material, Source
 from brdfdb.parameters import Floats
 from brdfdb.tables import error_measurement
 from brdfdb.tables.albedo import wavelengths_of
-from brdfdb.tables.error_measurement import Draw
+from brdfdb.tables.error_measurement import RandomPairs
 from brdfdb.tables.table import Table
 
 SEED = 1967  # differs from the seeds of build and planner, which the table was fitted to
 # Directions per band of theta_i, half of them in the lobe. Tables with more than `_FEW` wavelengths use fewer, because
 # their wavelengths vary alike, and so do tables of slow models
-DIRECTIONS, _FEW, _FEWER_DIRECTIONS = 3000, 4, 1000
+DIRECTIONS = 3000
+_FEW = 4
+_FEWER_DIRECTIONS = 1000
 
 
-class Pairs(NamedTuple):
+class ComparedPairs(NamedTuple):
     """f_r [1/sr] of table and model at pairs of directions, shape (N, L), and with light and viewer exchanged.
 
     Where the source of a table is not known, `model` and `model_exchanged` are those of the table itself.
     """
 
-    drawn: Draw
+    drawn: RandomPairs
     table: Floats
     table_exchanged: Floats
     model: Floats
     model_exchanged: Floats
 
 
-def pairs_of(table: Table, source: Source | None) -> Pairs:
+def pairs_of(table: Table, source: Source | None) -> ComparedPairs:
     """Return f_r [1/sr] of a table, and of its source if it is known, at all wavelengths of the table."""
     slow = isinstance(source, Material) and source.spec.slow
     count = DIRECTIONS if wavelengths_of(table) <= _FEW and not slow else _FEWER_DIRECTIONS
@@ -39,8 +41,8 @@ def pairs_of(table: Table, source: Source | None) -> Pairs:
     both = ((drawn.wi, drawn.wr), (drawn.wr, drawn.wi))
     looked_up = [table.lookup_vectors(*directions).reshape(shape) for directions in both]
     if source is None:
-        return Pairs(drawn, *looked_up, *looked_up)
-    return Pairs(
+        return ComparedPairs(drawn, *looked_up, *looked_up)
+    return ComparedPairs(
         drawn,
         *looked_up,
         *(error_measurement.model_values(source, table.wavelength_nm, *directions) for directions in both),

@@ -10,9 +10,11 @@ from brdfdb.audit.finding import LAST, Cell, Finding, NumberTable, Sentence, Sub
 from brdfdb.figure import number
 from brdfdb.parameters import Floats
 from brdfdb.tables import error_measurement
-from brdfdb.tables.polarisation_measurement import element_error
+from brdfdb.tables.statements import element_error
 
-_DIRECTIONS, _SEED = 400, 1986  # directions of a band of theta_i, others than those of the stated error
+# directions of a band of theta_i, others than those of the stated error
+_DIRECTIONS = 400
+_SEED = 1986
 # Allowed ratio of the error at these directions to the stated one, both a 99th percentile of a sample: measured up to
 # 1.13
 _OF_STATED = 1.5
@@ -48,7 +50,8 @@ class PolarisationFinding(Finding):
     @classmethod
     def judge(cls, subject: Subject) -> Finding:
         """Judge a polarised table; of an unpolarised one, return a finding without lookups."""
-        table, record = subject.table, subject.table.metadata.polarisation
+        table = subject.table
+        record = subject.table.metadata.polarisation
         if table.facets is None:
             return cls(
                 lookups=0,

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel, Field
 
 from brdfdb._elementary import COS_HORIZON
 from brdfdb.audit.finding import STRICT, Cell, Finding, NumberTable, Sentence, Subject, Verdict
-from brdfdb.audit.pairs import Pairs
+from brdfdb.audit.pairs import ComparedPairs
 from brdfdb.figure import number
 from brdfdb.parameters import Floats
 from brdfdb.tables.albedo import wavelengths_of
@@ -95,7 +94,14 @@ class Reciprocity(Finding):
     def sentences(self) -> list[Sentence]:
         """Return a sentence on the largest asymmetry of those that are judged."""
         if any(asymmetry.measured for _, asymmetry in self.named()):
-            return [self.sentence(self.verdict, self._of_measured())]
+            measured = [asymmetry for _, asymmetry in self.named() if asymmetry.measured]
+            worst = max(measured, key=lambda asymmetry: asymmetry.p99 or 0.0)
+            text = f"asymmetry of the table: median {_shown(worst.median)}, 99 of 100 up to {_shown(worst.p99)}"
+            if worst.tolerance is None:
+                text += "; not judged, because their uncertainty is not known"
+            else:
+                text += f", of {number(worst.tolerance, 2)} that their uncertainty and the error of the table explain"
+            return [self.sentence(self.verdict, text)]
         judged = [
             (asymmetry.max, asymmetry.tolerance) for _, asymmetry in self.named() if asymmetry.tolerance is not None
         ]
@@ -105,14 +111,6 @@ class Reciprocity(Finding):
         most, allowed = max(judged, key=lambda pair: (pair[0] > pair[1], pair[0]))
         text = f"asymmetry up to {number(most)}, of {number(allowed)} allowed"
         return [self.sentence(self.verdict, text if most <= allowed else f"not reciprocal: {text}")]
-
-    def _of_measured(self) -> str:
-        """Return the asymmetry of a table of measured data in words."""
-        worst = max((asymmetry for _, asymmetry in self.named() if asymmetry.measured), key=lambda one: one.p99 or 0.0)
-        text = f"asymmetry of the table: median {_shown(worst.median)}, 99 of 100 up to {_shown(worst.p99)}"
-        if worst.tolerance is None:
-            return f"{text}; not judged, because their uncertainty is not known"
-        return f"{text}, of {number(worst.tolerance, 2)} that their uncertainty and the error of the table explain"
 
     def cells(self) -> list[Cell]:
         """Return the largest asymmetry."""
@@ -146,42 +144,41 @@ class Reciprocity(Finding):
         return [(name, asymmetry) for name, asymmetry in named if asymmetry is not None]
 
 
-def reciprocity_of(table: Table, pairs: Pairs) -> Reciprocity:
+def reciprocity_of(table: Table, pairs: ComparedPairs) -> Reciprocity:
     """Return the asymmetry of random pairs, of pairs in the lobe, and of all pairs of nodes."""
-    above, in_lobe = pairs.drawn.above & _measured_both_ways(table, pairs), pairs.drawn.in_lobe
+    above = pairs.drawn.above
+    in_lobe = pairs.drawn.in_lobe
+    measured = table.metadata.measured
+    if measured is not None and measured.extent is not None:
+        wi, wr = pairs.drawn.wi, pairs.drawn.wr
+        above = above & ~(measured.extent.outside(wi, wr) | measured.extent.outside(wr, wi))
     interpolation = table.interpolation
     mu = np.maximum(pairs.drawn.wi[:, 2:] * pairs.drawn.wr[:, 2:], COS_HORIZON**2)
     offset = interpolation.offset / mu**interpolation.power  # f_r far below the offset is rounding only
     allowed = _interpolant_tolerance(table.grid)
-    measured = table.metadata.measured
     if measured is not None and not (table.grid.reciprocal and measured.reciprocity.assumed):
         stated = 0.0 if table.error is None else table.error.overall.p99
         allowed = None if measured.uncertainty is None else measured.uncertainty + stated
-    looked_up = (pairs.table + offset, pairs.table_exchanged + offset, allowed)
-    model = (pairs.model, pairs.model_exchanged, MODEL_RECIPROCITY_TOLERANCE)
-    asymmetries = Reciprocity(
-        model_random=_over(above & ~in_lobe, *model),
-        model_lobe=_over(above & in_lobe, *model) if in_lobe.any() else None,
-        table_random=_over(above & ~in_lobe, *looked_up),
-        table_lobe=_over(above & in_lobe, *looked_up) if in_lobe.any() else None,
+
+    def of(f: Floats, exchanged: Floats, tolerance: float | None, *, measured: bool) -> list[Asymmetry | None]:
+        """Return the asymmetry of random viewers, and that of viewers in the lobe."""
+        chosen = [above & ~in_lobe, above & in_lobe]
+        both = [_asymmetry(f[rows], exchanged[rows], tolerance, measured=measured) for rows in chosen]
+        return [both[0], both[1] if in_lobe.any() else None]
+
+    model_random, model_lobe = of(pairs.model, pairs.model_exchanged, MODEL_RECIPROCITY_TOLERANCE, measured=False)
+    table_random, table_lobe = of(
+        pairs.table + offset, pairs.table_exchanged + offset, allowed, measured=measured is not None
+    )
+    assert table_random is not None
+    return Reciprocity(
+        model_random=model_random,
+        model_lobe=model_lobe,
+        table_random=table_random,
+        table_lobe=table_lobe,
         table_nodes=None if table.grid.half_difference or measured is not None else _node_asymmetry(table),
         verdict="passes",
-    )
-    if measured is not None:
-        as_measured = {"measured": True}
-        of_table = (asymmetries.table_random, asymmetries.table_lobe)
-        random, lobe = (None if one is None else one.model_copy(update=as_measured) for one in of_table)
-        asymmetries = asymmetries.model_copy(update={"table_random": random, "table_lobe": lobe})
-    return asymmetries.judged()
-
-
-def _measured_both_ways(table: Table, pairs: Pairs) -> NDArray[np.bool_] | bool:
-    """Return which pairs lie within the directions that were measured, and do so exchanged; True without samples."""
-    measured = table.metadata.measured
-    if measured is None or measured.extent is None:
-        return True
-    outside, (wi, wr) = measured.extent.outside, (pairs.drawn.wi, pairs.drawn.wr)
-    return ~(outside(wi, wr) | outside(wr, wi))
+    ).judged()
 
 
 def _interpolant_tolerance(grid: Grid) -> float | None:
@@ -209,23 +206,28 @@ def _node_asymmetry(table: Table) -> Asymmetry:
     return _asymmetry(f.reshape(-1, width), exchanged.reshape(-1, width), TABLE_RECIPROCITY_TOLERANCE)
 
 
-def _over(chosen: NDArray[np.bool_], f: Floats, exchanged: Floats, tolerance: float | None) -> Asymmetry:
-    return _asymmetry(f[chosen], exchanged[chosen], tolerance)
-
-
-def _asymmetry(f: Floats, exchanged: Floats, tolerance: float | None) -> Asymmetry:
+def _asymmetry(f: Floats, exchanged: Floats, tolerance: float | None, *, measured: bool = False) -> Asymmetry:
     """Return the asymmetry of values of shape (pairs, wavelengths)."""
     differs = f != exchanged  # True for nan. Few nodes differ, and only they are computed
-    one, other = f[differs].astype(np.float64), exchanged[differs].astype(np.float64)
+    values = f[differs].astype(np.float64)
+    others = exchanged[differs].astype(np.float64)
     with np.errstate(invalid="ignore"):  # what is not finite counts as 1
-        relative = np.abs(one - other) / (np.abs(one) + np.abs(other) + _TINY)
+        relative = np.abs(values - others) / (np.abs(values) + np.abs(others) + _TINY)
     relative = np.where(np.isfinite(relative), relative, 1.0)
     smallest = float(relative.min(initial=1.0)) if differs.all() else 0.0
-    mean, largest = float(relative.sum() / max(differs.size, 1)), float(relative.max(initial=0.0))
-    whole = np.zeros(max(differs.size, 1))
-    whole[: relative.size] = relative
-    median, p99 = (float(value) for value in np.percentile(whole, [50.0, 99.0]))
-    return Asymmetry(pairs=len(f), min=smallest, mean=mean, median=median, p99=p99, max=largest, tolerance=tolerance)
+    with_zeros = np.zeros(max(differs.size, 1))
+    with_zeros[: relative.size] = relative
+    median, p99 = (float(value) for value in np.percentile(with_zeros, [50.0, 99.0]))
+    return Asymmetry(
+        pairs=len(f),
+        min=smallest,
+        mean=float(relative.sum() / max(differs.size, 1)),
+        median=median,
+        p99=p99,
+        max=float(relative.max(initial=0.0)),
+        tolerance=tolerance,
+        measured=measured,
+    )
 
 
 def _shown(value: float | None) -> str:

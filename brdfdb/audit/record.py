@@ -13,31 +13,26 @@ from brdfdb.audit.finding import STRICT, Cell, Finding, Sentence, Subject, Verdi
 from brdfdb.audit.statement import contradictions
 from brdfdb.errors import counted
 from brdfdb.materials import FunctionRecord, Material, Source, exact_material, libraries, presets
-from brdfdb.tables.albedo import LARGEST_TOLERANCE, wavelengths_of
+from brdfdb.tables.albedo import LARGEST_TOLERANCE, AlbedoAt, albedo_of, wavelengths_of
 from brdfdb.tables.error_measurement import SEED, directions_of_a_band, draw
-from brdfdb.tables.first_numbers import LargestAlbedo
-from brdfdb.tables.formula_measurement import first_numbers
-from brdfdb.tables.grids import Axis
-from brdfdb.tables.largest_albedo import AlbedoAt, albedo_of
 from brdfdb.tables.layout import digest
 from brdfdb.tables.metadata import TableMetadata
 from brdfdb.tables.places import BANDS_DEG
 from brdfdb.tables.planner import first_reason
-from brdfdb.tables.statements import MEASURED
-from brdfdb.tables.table import Table
-from brdfdb.tables.table_source import TableSource
+from brdfdb.tables.statements import MEASURED, first_numbers
+from brdfdb.tables.table import Table, TableSource
 from brdfdb.tables.tabulation import metadata_of, rounded
 
-# Numbers are repeated but for rounding. Measured ones have three digits, of which the last may differ; errors below the
-# second number are those of float64 sums. Places have two decimals
-_SAME, _NOTHING, _SAME_PLACE = 1e-9, 1e-9, 0.011
+_SAME = 1e-9  # relative difference of numbers that are equal but for rounding
+# Measured numbers have three digits, of which the last may differ
+_NOTHING = 1e-9  # measured errors below this are those of float64 sums
+_SAME_PLACE = 0.011  # difference of places, which have two decimals
 _PASSES = 0.015  # relative difference of angles to 90 degrees that are found to a thousandth, and have three digits
-_TIE = 1e-9  # albedos [1] that are so close are equally large
-_ROUNDING = "it is rounding"  # why the error of a table is largest where it is, if it is not
+_TIE = 1e-9  # difference of albedos [1] that are equally large
+_ROUNDING = "it is rounding"  # reason for the place of the largest error if all errors are rounding
 _SHOWN = 3  # differences that a sentence names
-# Attributes that a source decides, and no array
-_OF_SOURCE = ("title", "material", "source", "source_record", "measured", "reason")
-_DISTINCT = 64  # so many values have the last of the bits that are kept, but for a chance of 2^-64
+_OF_SOURCE = ("title", "material", "source", "source_record", "measured", "reason")  # attributes that no array decides
+_DISTINCT = 64  # of so many distinct values some have the last of the stored bits, but for a chance of 2^-64
 
 
 class Unchecked(NamedTuple):
@@ -163,13 +158,18 @@ def expected_of(subject: Subject) -> dict[str, Any]:
         return {**absent, **expected, **request}
     source = TableSource(table)
     layout = table.laid_out(source)
-    known, numbers = metadata_of(layout).attributes(), first_numbers(layout, lambda rows: table.values[rows])
+    known = metadata_of(layout).attributes()
+    numbers = first_numbers(layout, lambda rows: table.values[rows])
     expected = {key: value for key, value in known.items() if key not in _OF_SOURCE}
     expected = _plain(expected) | {key: value.model_dump(mode="json") for key, value in numbers.items()}
     if table.error is not None:
-        expected["error"] = {**table.attrs["error"], **_drawn(source, table.wavelength_nm)}
+        pairs = draw(source, table.wavelength_nm, directions_of_a_band(table.wavelength_nm), SEED)
+        directions = int(np.count_nonzero(pairs.above))
+        of_build = {"theta_i_deg": BANDS_DEG.tolist(), "directions": directions, "seed": SEED}
+        expected["error"] = {**table.attrs["error"], **of_build}
     if isinstance(record := table.source, FunctionRecord):
-        if _of_source(table.metadata.largest_albedo):
+        largest = table.metadata.largest_albedo
+        if largest is not None and largest.of == "source":
             del expected["largest_albedo"]  # that of the function, as a user has it
         expected |= {"title": record.title, "material": record.name, "source": record.provenance}
     return expected
@@ -179,12 +179,6 @@ def _plain(expected: dict[str, Any]) -> dict[str, Any]:
     """Return attributes in which the offset of logarithms is 0 where there are none."""
     how = expected["interpolation"]
     return expected if how["logarithm"] else {**expected, "interpolation": {**how, "offset": 0.0}}
-
-
-def _drawn(source: Source, wavelength_nm: Axis | None) -> dict[str, Any]:
-    """Return what the stated error of a table says of the directions of a build."""
-    drawn = draw(source, wavelength_nm, directions_of_a_band(wavelength_nm), SEED)
-    return {"theta_i_deg": BANDS_DEG.tolist(), "directions": int(np.count_nonzero(drawn.above)), "seed": SEED}
 
 
 def leaves(value: Any, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Any]]:
@@ -240,15 +234,12 @@ def _tied(table: Table, albedo_at: AlbedoAt, difference: Difference, stated: Any
     if "worst" in path and path[-1] != "why":
         return _is_rounding(stated) and _is_rounding(expected)
     if path[:3] == ["error", "between", "wavelength_nm"]:
-        return _is_rounding(stated) and _is_rounding(expected) and _within(table.wavelength_nm, difference.stated)
+        nodes = table.wavelength_nm
+        within = nodes is not None and nodes[0] <= float(difference.stated or 0.0) <= nodes[-1]
+        return _is_rounding(stated) and _is_rounding(expected) and within
     if path in (["largest_albedo", "theta_i_deg"], ["largest_albedo", "wavelength_nm"]):
         return bool(abs(_albedo(table, albedo_at, stated) - _albedo(table, albedo_at, expected)) <= _TIE)
     return False
-
-
-def _within(wavelength_nm: Axis | None, stated: str) -> bool:
-    """Return whether a wavelength [nm] is in the range of a table."""
-    return wavelength_nm is not None and wavelength_nm[0] <= float(stated or 0.0) <= wavelength_nm[-1]
 
 
 def _albedo(table: Table, albedo_at: AlbedoAt, place: Mapping[str, Any]) -> float:
@@ -267,8 +258,8 @@ def _is_rounding(error: Any) -> bool:
 
 def _of_request(metadata: TableMetadata) -> Iterator[Difference]:
     """Yield the digest of the request if it is another one, and what the request says other than the attributes."""
-    whole = metadata.request if metadata.measured is not None else metadata.whole_request  # of data there is a file
-    expected = None if metadata.request is None or whole is None else digest(whole)
+    request = metadata.request if metadata.measured is not None else metadata.whole_request  # of data there is a file
+    expected = None if metadata.request is None or request is None else digest(request)
     if metadata.request_sha256 != expected:
         yield Difference(leaf="request_sha256", stated=_written(metadata.request_sha256), expected=_written(expected))
     known = metadata.measured
@@ -303,15 +294,12 @@ def _numbers(material: Material) -> tuple[Any, ...]:
 def _of_reason(table: Table) -> Iterator[Difference]:
     """Yield what the reason for a layout says of its table if it is not so."""
     request = table.metadata.request or {}
-    tolerance, reason = request.get("tolerance"), table.metadata.reason
+    tolerance = request.get("tolerance")
+    reason = table.metadata.reason
     if isinstance(tolerance, float) and isinstance(table.source, Material):
         expected = first_reason(table, tolerance)
         if "takes" in reason and expected not in reason:
             yield Difference(leaf="reason", stated=_written(reason), expected=_written(expected))
-
-
-def _of_source(largest: LargestAlbedo | None) -> bool:
-    return largest is not None and largest.of == "source"
 
 
 def _of_function(table: Table) -> Iterator[Difference]:
@@ -332,9 +320,9 @@ def _of_function(table: Table) -> Iterator[Difference]:
 
 
 def _of_bits(table: Table) -> Iterator[Difference]:
-    """Yield the number of bits that are kept if the stored values have others."""
+    """Yield the stated number of bits if the stored values have another."""
     bits, values = table.metadata.bits, table.values
-    kept = np.array_equal(rounded(values, bits), values, equal_nan=True)
+    stored = np.array_equal(rounded(values, bits), values, equal_nan=True)
     fewer = bits > 1 and np.array_equal(rounded(values, bits - 1), values, equal_nan=True)
-    if not kept or (fewer and np.unique(values).size > _DISTINCT):
+    if not stored or (fewer and np.unique(values).size > _DISTINCT):
         yield Difference(leaf="bits", stated=_written(bits), expected="another number, that of the stored values,")

@@ -1,4 +1,4 @@
-"""The report of an audit as data: the findings on each table, in one JSON document."""
+"""The report of an audit as data: the findings on each table and its answers to two questions, in one JSON document."""
 
 from __future__ import annotations
 
@@ -9,12 +9,115 @@ from typing import Annotated, Any, Literal, cast
 from pydantic import BaseModel, BeforeValidator, Field, GetJsonSchemaHandler, SerializeAsAny
 from pydantic_core import CoreSchema, core_schema
 
-from brdfdb.audit.answers import AS_PUBLISHED, CONSERVES_ENERGY, Answer
-from brdfdb.audit.finding import STRICT, F, Finding, NotJudged, Sentence, TableVerdict, Verdict
+from brdfdb.audit.energy import Energy
+from brdfdb.audit.finding import STRICT, F, Finding, NotJudged, Sentence, TableVerdict, Verdict, Word
+from brdfdb.audit.model_energy import LOSS_UP_TO_DEG, ModelEnergy
+from brdfdb.audit.reciprocity import Reciprocity
 from brdfdb.audit.record import Difference
 from brdfdb.audit.registry import FINDINGS
+from brdfdb.audit.table_error import TableError
 from brdfdb.errors import ParameterError
 from brdfdb.figure import Figure
+
+AS_PUBLISHED = "is it what the paper says?"
+CONSERVES_ENERGY = "does the published model conserve energy?"
+NO_PAPER = "where no paper states a material, its model, or its function, takes the place of the paper"
+
+
+class Answer(BaseModel):
+    """The answer to one of the two questions, in a few words and in a sentence."""
+
+    model_config = STRICT
+
+    word: Word = Field(description="verdict behind the answer")
+    text: str = Field(description="the answer in a few words, for a column")
+    reason: str = Field(description="the answer in a sentence, with its angle and its wavelength")
+
+
+def as_published(findings: Mapping[str, Finding]) -> Answer:
+    """Return the answer to `AS_PUBLISHED`: every finding on the table, its excess over that of the model included."""
+    energy = findings[Energy.key]
+    failing = [
+        FINDINGS[key].title.lower()
+        for key, finding in findings.items()
+        if key != Energy.key and finding.verdict == "violates"
+    ]
+    if isinstance(energy, Energy) and energy.table.verdict == "violates" and not _model_violates(energy):
+        failing.insert(0, "energy of the table")
+    if failing:
+        named = ", ".join(failing)
+        if _is_measured(findings):
+            text = f"the data break a law by more than their uncertainty: {named}"
+            return Answer(word="violates", text=f"no: {named}", reason=text)
+        return Answer(word="violates", text=f"no: {named}", reason=f"the table differs from its source in: {named}")
+    error = findings[TableError.key]
+    if isinstance(error, NotJudged):
+        return Answer(
+            word="not judged", text="measured" if _is_measured(findings) else "not judged", reason=error.reason
+        )
+    reason = "the table keeps to the formulas of its source within the error that it states"
+    return Answer(word="passes", text="yes", reason=reason)
+
+
+def conserves_energy(findings: Mapping[str, Finding]) -> Answer:
+    """Return the answer to `CONSERVES_ENERGY`, which the table has no part in, unless it is measured."""
+    energy = findings[Energy.key]
+    if isinstance(energy, Energy) and _is_measured(findings):  # data have no model
+        table = energy.table
+        most = "not finite" if table.max_albedo is None else f"albedo {table.max_albedo:.3g}"
+        where = f"{most} at {table.max_at_theta_i_deg:.3g}°"
+        if table.verdict != "violates" and table.reason:
+            text = f"cannot be judged: {where}, within the error of the table"
+            return Answer(word="not judged", text=text, reason=table.reason)
+        text = f"the data {'do not' if table.verdict == 'violates' else 'do'}: {where}"
+        return Answer(word=table.verdict, text=text, reason=table.reason or text)
+    if not isinstance(energy, Energy) or energy.model is None:
+        return Answer(word="not judged", text="not judged", reason="no model of this table can be evaluated")
+    model = energy.model
+    return Answer(word=model.verdict, text=_short(model), reason=model.reason)
+
+
+def _model_violates(energy: Energy) -> bool:
+    return energy.model is not None and energy.model.verdict == "violates"
+
+
+def _is_measured(findings: Mapping[str, Finding]) -> bool:
+    reciprocity = findings[Reciprocity.key]
+    return isinstance(reciprocity, Reciprocity) and reciprocity.table_random.measured
+
+
+def _short(model: ModelEnergy) -> str:
+    """Return the verdict on a model in a few words: yes, no, or the light that it loses or creates if lossless."""
+    most = "not finite" if model.max_albedo is None else f"albedo {model.max_albedo:.3g}"
+    where = f"{most} at {model.max_at_theta_i_deg:.3g}°"
+    if model.max_at_wavelength_nm is not None:
+        where += f", {model.max_at_wavelength_nm:g} nm"
+    bounded = model.grazing is None or (model.grazing.power == 0.0 and model.grazing.passes_1_at_theta_i_deg is None)
+    up_to = "" if bounded else f" for lights up to {model.judged_up_to_theta_i_deg:g}°"
+    if model.verdict == "conserves":
+        return f"yes{up_to}" if model.furnace is not None else f"yes{up_to}, no lossless form to judge"
+    if model.verdict == "loses":
+        assert model.furnace is not None
+        judged = zip(model.furnace.theta_i_deg, model.furnace.albedo, strict=True)
+        least = [(min(value for value in row if value is not None), at) for at, row in judged if at <= LOSS_UP_TO_DEG]
+        albedo, at = min(least)
+        return (
+            f"conserves energy{up_to} {'up to' if bounded else 'but for'} a loss of {_percent(1.0 - albedo)} "
+            f"at {at:.3g}°"
+        )
+    if model.verdict == "gains":
+        largest = None if model.furnace is None else model.furnace.largest
+        gain = 0.0 if largest is None else largest - 1.0
+        return f"conserves energy{up_to}; would create {_percent(gain)} if nothing were absorbed"
+    return {
+        "known published excess": f"no, as published: {where}",
+        "accepted excess": f"no, as accepted: {where}",
+        "violates": f"no: {where}",
+    }[model.verdict]
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.2g} %" if share < 0.995 else "100 %"
 
 
 def _read(findings: Any) -> Any:
@@ -23,12 +126,12 @@ def _read(findings: Any) -> Any:
         return findings
     if unknown := [key for key in findings if key not in FINDINGS]:
         raise ParameterError("findings", f"{unknown[0]!r} is not one of {', '.join(FINDINGS)}")
-    return {key: value if isinstance(value, Finding) else _finding(key, value) for key, value in findings.items()}
-
-
-def _finding(key: str, value: Any) -> Finding:
-    judged = not (isinstance(value, Mapping) and value.get("verdict") == "not judged")
-    return (FINDINGS[key] if judged else NotJudged).model_validate(value)
+    read: dict[str, Finding] = {}
+    for key, value in findings.items():
+        unjudged = isinstance(value, Mapping) and value.get("verdict") == "not judged"
+        kind = NotJudged if unjudged else FINDINGS[key]
+        read[key] = value if isinstance(value, Finding) else kind.model_validate(value)
+    return read
 
 
 def _referred(kind: type[Finding]) -> CoreSchema:
@@ -73,13 +176,7 @@ class MaterialAudit(BaseModel):
     )
 
     def of(self, kind: type[F]) -> F:
-        """Return the finding of one kind.
-
-        Raises
-        ------
-        LookupError
-            If it is not judged.
-        """
+        """Return the finding of one kind; LookupError if it is not judged."""
         finding = self.findings[kind.key]
         if not isinstance(finding, kind):
             raise LookupError(f"{kind.key} of {self.material} is not judged")

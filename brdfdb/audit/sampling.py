@@ -6,18 +6,17 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from brdfdb.audit.finding import Cell, Finding, NumberTable, Sentence, Subject, Verdict
 from brdfdb.audit.pairs import SEED, representative_nm
 from brdfdb.figure import Numbers, number, numbers
 from brdfdb.geometry import radians, unit_vector
-from brdfdb.integrals.quadrature import spectral_albedo
+from brdfdb.integrals.quadrature import GaussRule, gauss_rule, spectral_albedo
 from brdfdb.integrals.sampling import lobe_of, mixture_density, sample
 from brdfdb.lobes import Lobe
 from brdfdb.materials import Material
-from brdfdb.parameters import ModelSpec
+from brdfdb.parameters import Array, ModelSpec
 from brdfdb.tables.table import Table
 
 SAMPLES = 100_000  # number of samples for each light
@@ -34,8 +33,6 @@ _TENTHS = 1.0 - np.arange(10) / 10.0
 _HALF_OCTAVES = 2.0 ** (np.arange(1, 33) / 2.0)
 _PSI_EDGES = np.linspace(-np.pi, np.pi, 13)
 _NODES = 12  # number of Gauss nodes along each side of a bin
-
-Array = NDArray[np.float64]
 
 
 class Sampling(Finding):
@@ -150,7 +147,8 @@ def _light(
     wi = unit_vector(radians(theta_i_deg), radians(PHI_I_DEG))
     u1, u2 = np.random.default_rng(SEED).random((2, count))
     drawn = sample(spec, u1, u2, wi, **arguments)
-    mean, deviation = float(np.mean(drawn.weight)), float(np.std(drawn.weight, ddof=1))
+    mean = float(np.mean(drawn.weight))
+    deviation = float(np.std(drawn.weight, ddof=1))
     standard_error = deviation / np.sqrt(count)
     p = _chance(drawn.wr, wi, lobe_of(spec, wi, arguments))
     off = abs(mean - albedo)
@@ -181,9 +179,14 @@ def _chance(wr: Array, wi: Array, lobe: Lobe) -> float:
     t_edges = _t_edges(lobe)
     counts, _, _ = np.histogram2d(t, psi, bins=(t_edges, _PSI_EDGES))
     expected = len(wr) * _shares(wi, lobe, alpha, t_edges)
-    observed, wanted = _pooled(np.append(counts, len(wr) - counts.sum()), np.append(expected, len(wr) - expected.sum()))
-    chi_square = float(np.sum((observed - wanted) ** 2 / wanted))
-    return float(mpmath.gammainc((len(wanted) - 1) / 2.0, chi_square / 2.0, regularized=True))
+    observed = np.append(counts, len(wr) - counts.sum())
+    expected = np.append(expected, len(wr) - expected.sum())
+    order = np.argsort(expected)[::-1]  # the fullest bins first; bins with few expected samples are merged
+    starts = np.arange(max(int(np.count_nonzero(expected >= _ENOUGH)), 1))
+    observed = np.add.reduceat(observed[order], starts)
+    expected = np.add.reduceat(expected[order], starts)
+    chi_square = float(np.sum((observed - expected) ** 2 / expected))
+    return float(mpmath.gammainc((len(expected) - 1) / 2.0, chi_square / 2.0, regularized=True))
 
 
 def _t_edges(lobe: Lobe) -> Array:
@@ -195,8 +198,10 @@ def _shares(wi: Array, lobe: Lobe, alpha: Array, t_edges: Array) -> Array:
     """Return the integral [1] of the density over each bin, shape (bins of t, bins of psi)."""
     t, t_weight = _gauss(t_edges)
     psi, psi_weight = _gauss(_PSI_EDGES)
-    t, psi = t[:, :, np.newaxis, np.newaxis], psi[np.newaxis, np.newaxis]
-    s_x, s_y = alpha[0] * t * np.cos(psi), alpha[1] * t * np.sin(psi)
+    t = t[:, :, np.newaxis, np.newaxis]
+    psi = psi[np.newaxis, np.newaxis]
+    s_x = alpha[0] * t * np.cos(psi)
+    s_y = alpha[1] * t * np.sin(psi)
     cos_h = 1.0 / np.sqrt(1.0 + s_x * s_x + s_y * s_y)
     h = np.stack([s_x * cos_h, s_y * cos_h, cos_h], axis=-1)
     h_i = h @ wi
@@ -206,16 +211,8 @@ def _shares(wi: Array, lobe: Lobe, alpha: Array, t_edges: Array) -> Array:
     return np.asarray(np.einsum("abcd,ab,cd->ac", mixture_density(lobe, wi, wr) * measure, t_weight, psi_weight))
 
 
-def _gauss(edges: Array) -> tuple[Array, Array]:
-    """Return nodes and weights between edges, as rows."""
-    x, weight = np.polynomial.legendre.leggauss(_NODES)
+def _gauss(edges: Array) -> GaussRule:
+    """Return a rule between neighbouring edges, as rows."""
+    rule = gauss_rule(_NODES)
     half = np.diff(edges)[:, np.newaxis] / 2.0
-    return (edges[:-1] + edges[1:])[:, np.newaxis] / 2.0 + half * x, half * weight
-
-
-def _pooled(observed: Array, expected: Array) -> tuple[Array, Array]:
-    """Return the bins, the fullest first. Bins with few expected samples are merged into the last one."""
-    order = np.argsort(expected)[::-1]
-    last = max(int(np.count_nonzero(expected >= _ENOUGH)) - 1, 0)
-    starts = np.arange(last + 1)
-    return np.add.reduceat(observed[order], starts), np.add.reduceat(expected[order], starts)
+    return GaussRule((edges[:-1] + edges[1:])[:, np.newaxis] / 2.0 + half * rule.nodes, half * rule.weights)

@@ -7,15 +7,14 @@ from functools import partial
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel, Field
 
 from brdfdb.audit.finding import STRICT, Cell, Finding, NumberTable, Sentence, Subject, Verdict
-from brdfdb.audit.pairs import Pairs
+from brdfdb.audit.pairs import ComparedPairs
 from brdfdb.figure import number
 from brdfdb.geometry import degrees, radians, spherical_angles, unit_vector, vectors_from_half_difference
 from brdfdb.materials import Source
-from brdfdb.parameters import Floats
+from brdfdb.parameters import Array, Floats
 from brdfdb.tables import error_measurement
 from brdfdb.tables.albedo import wavelengths_of
 from brdfdb.tables.places import RINGS, RINGS_DEG
@@ -36,7 +35,6 @@ _SEED = 1992
 _NODES = 200  # number of crossings of nodes on each axis
 _ROW = 64  # length of a row; its values are then read from the table of the sum
 
-Array = NDArray[np.float64]
 Function = Callable[[Array, Array], Floats]
 
 _THETA = np.array([0.2, 0.6, 1.0, 1.4])
@@ -56,6 +54,13 @@ class _Seam(NamedTuple):
     at: Array
     moved: int
     half_difference: bool = False
+
+
+class _Directions(NamedTuple):
+    """Unit vectors of light and viewer."""
+
+    wi: Array
+    wr: Array
 
 
 class Jump(BaseModel):
@@ -119,7 +124,7 @@ class Smoothness(Finding):
         return [*(("model", jump) for jump in self.model), *(("table", jump) for jump in self.table)]
 
 
-def smoothness_of(table: Table, source: Source | None, pairs: Pairs) -> Smoothness:
+def smoothness_of(table: Table, source: Source | None, pairs: ComparedPairs) -> Smoothness:
     """Return the jumps of a table, and of its source if it is known, at all wavelengths of the table.
 
     A table may jump by the stated 99th percentile of the error in the band of theta_i at the wavelength. If theta_r is
@@ -132,20 +137,17 @@ def smoothness_of(table: Table, source: Source | None, pairs: Pairs) -> Smoothne
 
     # Jumps are relative to the floor of the error where f_r is below it
     floor = error_measurement.floor_of(pairs.model, pairs.drawn) + _TINY
-    of_model = [] if source is None else _jumps_of_model(source, wavelengths, np.full_like(floor, _TINY))
+    of_model = []
+    if source is not None:
+        model = partial(error_measurement.model_values, source, wavelengths)
+        tiny = np.full_like(floor, _TINY)
+        of_model = [_jump(seam, model, wavelengths, tiny, _rounding) for seam in _crossed(_of_model())]
+        of_model.append(_between_methods(source, wavelengths, tiny))
     of_table = [
         _jump(seam, looked_up, wavelengths, floor, partial(_allowed, table)) for seam in _crossed(_of_table(table))
     ]
     good = all(jump.largest <= jump.tolerance for jump in (*of_model, *of_table))
     return Smoothness(model=of_model, table=of_table, verdict="passes" if good else "violates")
-
-
-def _jumps_of_model(source: Source, wavelengths: Array | None, floor: Floats) -> list[Jump]:
-    def model(wi: Array, wr: Array) -> Floats:
-        return error_measurement.model_values(source, wavelengths, wi, wr)
-
-    jumps = [_jump(seam, model, wavelengths, floor, _rounding) for seam in _crossed(_of_model())]
-    return [*jumps, _between_methods(source, wavelengths, floor)]
 
 
 def _rounding(*_: Array) -> Floats:
@@ -196,7 +198,7 @@ def _of_table(table: Table) -> Iterator[_Seam]:
         at[:, 3] = at[:, 1] + delta_phi
         yield _Seam(f"delta_phi of {name} degrees", at, 3)
     rng = np.random.default_rng(_SEED)
-    columns = _columns(table)
+    columns = list(range(4)) if table.anisotropic else [0, 2, 3]  # index of the angle of each axis
     for axis, (name, nodes) in enumerate(table.axes_deg.items()):
         on = np.stack(
             [radians(rng.uniform(0.0, axis_nodes[-1], _NODES)) for axis_nodes in table.axes_deg.values()], axis=1
@@ -212,21 +214,16 @@ def _of_table(table: Table) -> Iterator[_Seam]:
             yield _Seam(f"last node of {name}", at, moved)
 
 
-def _columns(table: Table) -> list[int]:
-    """Return the index of the angle of each axis of a grid. Isotropic grids have no phi_i or phi_h."""
-    return list(range(4)) if table.anisotropic else [0, 2, 3]
-
-
 def _all(*angles: Floats) -> Array:
     return np.stack(np.meshgrid(*angles, indexing="ij"), axis=-1, dtype=np.float64).reshape(-1, 4)
 
 
-def _directions(angles: Array, half_difference: bool) -> tuple[Array, Array]:
+def _directions(angles: Array, half_difference: bool) -> _Directions:
     """Return unit vectors of light and viewer."""
     t_i, p_i, t_r, p_r = np.moveaxis(angles, -1, 0)
     if half_difference:
-        return vectors_from_half_difference(t_i, p_i, t_r, p_r)
-    return unit_vector(t_i, p_i), unit_vector(t_r, p_r)
+        return _Directions(*vectors_from_half_difference(t_i, p_i, t_r, p_r))
+    return _Directions(unit_vector(t_i, p_i), unit_vector(t_r, p_r))
 
 
 def _crossed(seams: Iterable[_Seam]) -> Iterator[_Seam]:
@@ -257,7 +254,7 @@ def _between_methods(source: Source, wavelength_nm: Array | None, floor: Floats)
         np.reshape(source.lookup(*angles, wavelength_nm), (theta_i.size, -1))
         for angles in ((theta_i[..., :1], 0.0, theta_r[..., :1], phi_r), (theta_i, 0.0, theta_r, phi_r))
     )
-    at = unit_vector(theta_i, 0.0).reshape(-1, 3), unit_vector(theta_r, phi_r).reshape(-1, 3)
+    at = _Directions(unit_vector(theta_i, 0.0).reshape(-1, 3), unit_vector(theta_r, phi_r).reshape(-1, 3))
     relative = _relative(rows, single, floor)
     return _largest("values in rows and one by one", relative, at, wavelength_nm, _rounding())
 
@@ -269,20 +266,14 @@ def _relative(before: Floats, after: Floats, floor: Floats) -> Floats:
     return np.where(np.isfinite(relative), relative, 1.0)
 
 
-def _largest(
-    seam: str, relative: Floats, at: tuple[Array, Array], wavelength_nm: Array | None, allowed: Floats
-) -> Jump:
+def _largest(seam: str, relative: Floats, at: _Directions, wavelength_nm: Array | None, allowed: Floats) -> Jump:
     """Return the jump with the largest ratio to its tolerance."""
     allowed = np.broadcast_to(allowed, relative.shape)
     row, column = np.unravel_index(int(np.argmax(relative / allowed)), relative.shape)
-    where = _where(*(w[row] for w in at))
+    theta, phi = (degrees(angles) for angles in spherical_angles(np.stack([w[row] for w in at])))
+    named = zip(("theta_i", "phi_i", "theta_r", "phi_r"), (theta[0], phi[0], theta[1], phi[1]), strict=True)
+    where = ", ".join(f"{name} {angle:.4g}" for name, angle in named) + " degrees"
     if wavelength_nm is not None:
         where += f", {wavelength_nm[column]:g} nm"
     largest = float(f"{relative[row, column]:.3g}")
     return Jump(seam=seam, crossings=len(relative), largest=largest, where=where, tolerance=float(allowed[row, column]))
-
-
-def _where(wi: Array, wr: Array) -> str:
-    theta, phi = (degrees(angles) for angles in spherical_angles(np.stack([wi, wr])))
-    named = zip(("theta_i", "phi_i", "theta_r", "phi_r"), (theta[0], phi[0], theta[1], phi[1]), strict=True)
-    return ", ".join(f"{name} {angle:.4g}" for name, angle in named) + " degrees"

@@ -19,10 +19,10 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, Field
 
 from brdfdb.audit.finding import STRICT
-from brdfdb.audit.pairs import Pairs
+from brdfdb.audit.pairs import ComparedPairs
 from brdfdb.parameters import Floats
 from brdfdb.tables import error_measurement
-from brdfdb.tables.error_measurement import Draw
+from brdfdb.tables.error_measurement import RandomPairs
 from brdfdb.tables.grids import Axis
 from brdfdb.tables.places import BANDS, BANDS_DEG, RINGS
 from brdfdb.tables.stated_error import Error, Overall
@@ -142,19 +142,18 @@ def _whole(error: Error, at: int, between: int, *, mixed: bool) -> bool:
     )
 
 
-def disagreements(error: Error, pairs: Pairs, wavelength_nm: Axis | None) -> list[Disagreement]:
+def disagreements(error: Error, pairs: ComparedPairs, wavelength_nm: Axis | None) -> list[Disagreement]:
     """Return the numbers of a consistent statement that fresh directions contradict, the worst first.
 
     The statement is taken as one of as many directions as builds draw. What it says of that is itself under test.
     """
-    return sorted(_disagreements(error, pairs, wavelength_nm), key=_severity, reverse=True)
+    contradicted = _disagreements(error, pairs, wavelength_nm)
+    return sorted(contradicted, key=lambda number: np.inf if number.times is None else number.times, reverse=True)
 
 
-def _disagreements(error: Error, pairs: Pairs, wavelength_nm: Axis | None) -> Iterator[Disagreement]:
-    drawn, floor = (
-        pairs.drawn,
-        np.array(error.floor),
-    )  # the stated floor; that of the fresh draw differs by a few percent
+def _disagreements(error: Error, pairs: ComparedPairs, wavelength_nm: Axis | None) -> Iterator[Disagreement]:
+    drawn = pairs.drawn
+    floor = np.array(error.floor)  # the stated floor; that of the fresh draw differs by a few percent
     with np.errstate(invalid="ignore"):
         relative = error_measurement.relative(pairs.table, pairs.model, floor)
     nm = [None] * floor.size if wavelength_nm is None else wavelength_nm.tolist()
@@ -172,7 +171,8 @@ def _disagreements(error: Error, pairs: Pairs, wavelength_nm: Axis | None) -> It
             around = _exceeding(of_band, stated * (1.0 - DIGITS))
             too_good = _judged(whole, of_worst, (around <= least) & (stated > EXACT))
             for w in np.flatnonzero((above >= most) | too_good):
-                fresh = _percentile(of_band[:, w], quantile)
+                finite = np.where(np.isfinite(of_band[:, w]), of_band[:, w], np.inf)
+                fresh = float(np.percentile(finite, 100.0 * quantile, method="lower"))
                 yield _disagreement(name, band, nm[w], float(stated[w]), fresh)
         stated = np.broadcast_to(error.overall.l1 if whole else error.l1[number], floor.size)
         ratio, off = _ratio(np.abs(pairs.table - pairs.model), pairs.model, drawn.weight, band)
@@ -197,7 +197,7 @@ def _judged(whole: bool, of_worst: bool, too_good: NDArray[np.bool_]) -> NDArray
     return np.full_like(too_good, np.all(too_good)) if of_worst else too_good
 
 
-def _of_floor(stated: Floats, pairs: Pairs, band: _Band, nm: list[float | None]) -> Iterator[Disagreement]:
+def _of_floor(stated: Floats, pairs: ComparedPairs, band: _Band, nm: list[float | None]) -> Iterator[Disagreement]:
     """Yield the disagreements on the floor, a share of the mean reflectance over uniform directions."""
     values = error_measurement.FLOOR / np.pi * pairs.drawn.weight[:, np.newaxis] * pairs.model
     fresh = values.mean(axis=0)
@@ -207,7 +207,7 @@ def _of_floor(stated: Floats, pairs: Pairs, band: _Band, nm: list[float | None])
         yield _disagreement("floor", band, nm[w], float(stated[w]), float(fresh[w]))
 
 
-def _bands(drawn: Draw, wavelength_nm: Axis | None) -> Iterator[_Band]:
+def _bands(drawn: RandomPairs, wavelength_nm: Axis | None) -> Iterator[_Band]:
     """Yield each band of theta_i, then all directions. Every draw has the same share of directions in a band."""
     share = error_measurement.directions_of_a_band(wavelength_nm) * BANDS / len(drawn.band)
     for number, name in enumerate(zip(BANDS_DEG[:-1].tolist(), BANDS_DEG[1:].tolist(), strict=True)):
@@ -215,22 +215,28 @@ def _bands(drawn: Draw, wavelength_nm: Axis | None) -> Iterator[_Band]:
         chosen = drawn.above & in_band
         stated = max(int(share * np.count_nonzero(chosen)), LEAST_DIRECTIONS)
         yield _Band(name, chosen, int(np.count_nonzero(in_band)), stated)
-    whole = int(share * np.count_nonzero(drawn.above))
-    yield _Band((0.0, 90.0), drawn.above, len(drawn.band), max(whole, LEAST_DIRECTIONS))
+    stated = max(int(share * np.count_nonzero(drawn.above)), LEAST_DIRECTIONS)
+    yield _Band((0.0, 90.0), drawn.above, len(drawn.band), stated)
 
 
-def limits(stated: int, fresh: int, quantile: float) -> tuple[int, int]:
+class CountLimits(NamedTuple):
+    """Counts up to `least`, and from `most` on, have a probability below `CHANCE`."""
+
+    least: int
+    most: int
+
+
+def limits(stated: int, fresh: int, quantile: float) -> CountLimits:
     """Return the limits of the number of `fresh` values above a quantile of `stated` others.
 
-    A count up to the first limit, or from the second limit on, has a probability below `CHANCE`. The first limit is -1
-    if no count is too small. The quantile lies between two order statistics: each limit takes the one that makes
-    it wider.
+    `least` is -1 if no count is too small. The quantile lies between two order statistics: each limit takes that which
+    makes it wider.
     """
     rank = int(quantile * (stated - 1)) + 1
     lower = np.cumsum(_probabilities(stated, fresh, min(rank + 1, stated)))
     upper = np.cumsum(_probabilities(stated, fresh, rank)[::-1])[::-1]  # probability of at least so many
     least = int(np.count_nonzero(lower <= CHANCE)) - 1
-    return least if quantile < 1.0 else -1, int(np.count_nonzero(upper > CHANCE))
+    return CountLimits(least if quantile < 1.0 else -1, int(np.count_nonzero(upper > CHANCE)))
 
 
 def _probabilities(stated: int, fresh: int, rank: int) -> Floats:
@@ -259,20 +265,28 @@ def _exceeding(values: Floats, limit: Floats) -> Counts:
     return np.asarray(np.count_nonzero(~(values <= limit), axis=0))
 
 
-def _ratio(wrong: Floats, whole: Floats, weight: Floats, band: _Band) -> tuple[Floats, Floats]:
-    """Return the ratio of two integrals over a band, and the standard error of its difference from a stated one."""
+class _Ratio(NamedTuple):
+    """The ratio of two integrals over a band, and the standard error of its difference from a stated one."""
+
+    value: Floats
+    error: Floats
+
+
+def _ratio(difference: Floats, truth: Floats, weight: Floats, band: _Band) -> _Ratio:
+    """Return the ratio of the integrals of a difference and of the truth."""
     rows = band.chosen
     weights = weight[rows, np.newaxis]
-    above, below = weights * wrong[rows], weights * whole[rows]
+    above = weights * difference[rows]
+    below = weights * truth[rows]
     total = below.sum(axis=0)
     with np.errstate(invalid="ignore", divide="ignore"):
         ratio = np.where(total > 0.0, above.sum(axis=0) / total, 0.0)
         influence = (above - ratio * below) / np.where(total > 0.0, total, 1.0)
         off = np.sqrt(np.sum(influence**2, axis=0) * (1.0 + np.count_nonzero(rows) / band.stated))
-    return ratio, np.where(np.isfinite(off), off, 0.0)
+    return _Ratio(ratio, np.where(np.isfinite(off), off, 0.0))
 
 
-def _rare(largest: Floats, whole: Floats, weight: Floats, band: _Band) -> Floats:
+def _rare(largest: Floats, truth: Floats, weight: Floats, band: _Band) -> Floats:
     """Return the part of a stated l1 [1] that directions too rare for the fresh draw can explain.
 
     Their number is such that the fresh draw misses all of them with the probability `CHANCE`. Each of them has the
@@ -282,18 +296,10 @@ def _rare(largest: Floats, whole: Floats, weight: Floats, band: _Band) -> Floats
     if fresh == 0:
         return np.zeros(largest.size)
     count = np.log(CHANCE) / np.log(band.stated / (band.stated + fresh))
-    share = weight[band.chosen, np.newaxis] * whole[band.chosen]
+    share = weight[band.chosen, np.newaxis] * truth[band.chosen]
     mean = share.mean(axis=0)
     largest_share = np.divide(share.max(axis=0), mean, out=np.ones(mean.size), where=mean > 0.0)
     return np.asarray(count * largest * largest_share / band.stated)
-
-
-def _percentile(values: Floats, quantile: float) -> float:
-    return float(np.percentile(np.where(np.isfinite(values), values, np.inf), 100.0 * quantile, method="lower"))
-
-
-def _severity(disagreement: Disagreement) -> float:
-    return np.inf if disagreement.times is None else disagreement.times
 
 
 def _disagreement(name: Statistic, band: _Band, nm: float | None, stated: float, fresh: float) -> Disagreement:

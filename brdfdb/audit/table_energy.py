@@ -8,23 +8,22 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, Field
 
-from brdfdb.audit.excess import DIGITS, crossing, limit_of, place
 from brdfdb.audit.finding import STRICT, Verdict
+from brdfdb.audit.model_energy import DIGITS, crossing, limit_of, place
 from brdfdb.figure import Numbers, numbers, rows
 from brdfdb.geometry import radians
 from brdfdb.materials.provenance import KnownExcess
 from brdfdb.parameters import Floats
 from brdfdb.tables.albedo import directional_albedo, hemispherical_albedo, tolerance_of
-from brdfdb.tables.first_numbers import Grazing
 from brdfdb.tables.grids import Axis
-from brdfdb.tables.stated_error import Error
+from brdfdb.tables.stated_error import Grazing
 from brdfdb.tables.table import Table
 
-# Largest stated error [1] that counts. A table that states more is judged as if it stated this
+# Largest stated error [1]. A table that states more is judged as if it stated this
 MOST_ERROR = 0.5
 _BAND_POINTS = 100  # number of points of the mean over a band of theta_i
-# Value in place of an albedo that is not finite, and a limit below every mean that includes it
-_NOT_FINITE, _FINITE = 1e30, 1e20
+_NOT_FINITE = 1e30  # value in place of an albedo that is not finite
+_FINITE = 1e20  # smallest mean that includes such a value
 
 
 class Bands(BaseModel):
@@ -129,7 +128,9 @@ def table_energy_of(
 ) -> TableEnergy:
     """Return the energy of a table; `excused` is the verdict on an excess that is not above the known one."""
     integrated = directional_albedo(table)
-    theta_i, integration, diffuse = integrated.theta_i_deg, integrated.error, integrated.albedo.max(axis=1)
+    theta_i = integrated.theta_i_deg
+    integration = integrated.error
+    diffuse = integrated.albedo.max(axis=1)
     specular = _specular(table, theta_i, diffuse.shape)
     albedo = diffuse + specular
     finite = np.where(np.isfinite(albedo), albedo, np.inf)
@@ -140,10 +141,19 @@ def table_energy_of(
     one = limit_of(None, theta_i)
     first = _first_above_1(table, theta_i, np.max(finite, axis=1) - one)
     unexplained = theta_i[judge.unexplained(certain, one)]
-    bands = None if table.error is None else _bands(table.error, judge.explained(one), judge.excess(certain, one))
+    bands = None
+    if table.error is not None:
+        explained, excess = (
+            rows(np.where(means < _FINITE, means, np.nan), DIGITS)
+            for means in (judge.explained(one), judge.excess(certain, one))
+        )
+        bands = Bands(
+            theta_i_deg=table.error.theta_i_deg, stated_error=table.error.l1, explained=explained, excess=excess
+        )
     verdict: Verdict
     worst_nm = None if table.wavelength_nm is None else float(table.wavelength_nm[worst_wavelength])
-    reason = f"reflects {_share(largest)} of what arrives at {place(theta_i[worst_theta], worst_nm)}"
+    share = f"{largest:.4g}" if np.isfinite(largest) else "no finite share"
+    reason = f"reflects {share} of what arrives at {place(theta_i[worst_theta], worst_nm)}"
     if unexplained.size == 0:
         verdict = "passes"
         cause = "its integration has" if bands is None else "the table states"
@@ -190,10 +200,6 @@ def _first_above_1(table: Table, theta_i_deg: Axis, excess: Axis) -> float | Non
     return crossing(between, *theta_i_deg[first - 1 : first + 1].tolist())
 
 
-def _share(albedo: float) -> str:
-    return f"{albedo:.4g}" if np.isfinite(albedo) else "no finite share"
-
-
 def _judge(table: Table, theta_i_deg: Axis, diffuse: Floats) -> _Judge:
     """Return the averages by which a table is judged: bands of theta_i, or each theta_i if it states no error.
 
@@ -206,15 +212,11 @@ def _judge(table: Table, theta_i_deg: Axis, diffuse: Floats) -> _Judge:
         return _Judge(identity, identity.astype(bool), nothing, nothing)
     measured = table.metadata.measured
     uncertain = 0.0 if measured is None or measured.held_out is None else measured.held_out.l1
-    edges, l1 = np.array(table.error.theta_i_deg), np.minimum(np.add(table.error.l1, uncertain), MOST_ERROR)
+    edges = np.array(table.error.theta_i_deg)
+    l1 = np.minimum(np.add(table.error.l1, uncertain), MOST_ERROR)
     means = _band_means(theta_i_deg, edges)
     covers = (theta_i_deg >= edges[:-1, np.newaxis]) & (theta_i_deg <= edges[1:, np.newaxis])
     return _Judge(means, covers, l1, (means @ diffuse) / (1.0 - l1))
-
-
-def _bands(error: Error, explained: Floats, excess: Floats) -> Bands:
-    known, above = (rows(np.where(means < _FINITE, means, np.nan), DIGITS) for means in (explained, excess))
-    return Bands(theta_i_deg=error.theta_i_deg, stated_error=error.l1, explained=known, excess=above)
 
 
 def _known(values: Floats) -> Floats:

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+
 import numpy as np
 from pydantic import Field
 
 from brdfdb.audit.finding import LAST, Cell, Finding, Sentence, Subject, Verdict, Word
-from brdfdb.audit.likeness import bias_of, likeness_of
 from brdfdb.audit.nodes import Nodes
-from brdfdb.audit.pairs import SEED, Pairs, representative_nm
+from brdfdb.audit.pairs import SEED, ComparedPairs, representative_nm
 from brdfdb.audit.statement import Disagreement, contradictions, disagreements
 from brdfdb.figure import Map, Panel, number, rows
-from brdfdb.geometry import radians, unit_vector
+from brdfdb.geometry import radians, spherical_angles, unit_vector
 from brdfdb.materials import Source
 from brdfdb.notebook import error_in_words
 from brdfdb.parameters import Floats
@@ -23,9 +24,17 @@ from brdfdb.tables.table import Table
 SPECULAR_TOLERANCE = 1e-6
 _STEP_DEG = 3.0  # step of the maps
 _LAST_DEG = 89.0
-LEAST, _MOST = 1e-6, 1.0  # smaller errors are drawn as LEAST, because zero has no logarithm; all maps share one scale
+# smaller errors are drawn as LEAST, because zero has no logarithm; all maps share one scale
+LEAST = 1e-6
+_MOST = 1.0
 # Azimuth [degree] of viewers at negative theta_r
 _PLANES = {"in the plane of incidence": 0.0, "across the plane of incidence": 90.0}
+DIRECTIONS = 3000  # number of directions at which changed models are evaluated
+MUCH_BETTER = 0.5  # largest mean error with the change, as a share of the mean error without it
+_TURNS_DEG = range(15, 180, 15)  # angles below half a turn, because a lobe with two axes repeats after half a turn
+_SCALE = 0.01  # smallest difference of a scale from 1 that is reported
+
+Directions = tuple[Floats, Floats]
 
 
 class TableError(Finding):
@@ -100,7 +109,7 @@ class TableError(Finding):
         return list(self.maps)
 
 
-def table_error_of(table: Table, source: Source, pairs: Pairs, nodes: Word = "passes") -> TableError:
+def table_error_of(table: Table, source: Source, pairs: ComparedPairs, nodes: Word = "passes") -> TableError:
     """Return the error of a table compared with its stated error, and maps of it at the middle wavelength.
 
     `nodes` is the verdict on its nodes. If it or the error violates, the fault of the table is searched for.
@@ -165,3 +174,66 @@ def _map(table: Table, source: Source, floor: Floats, title: str, delta_phi_deg:
         low=LEAST,
         high=_MOST,
     )
+
+
+def bias_of(pairs: ComparedPairs) -> float | None:
+    """Return the signed mean error [1] at the wavelength where it is largest; positive if the table is too bright."""
+    weight = pairs.drawn.weight
+    whole = weight @ pairs.model
+    with np.errstate(invalid="ignore"):
+        signed = np.divide(weight @ (pairs.table - pairs.model), whole, out=np.zeros_like(whole), where=whole > 0.0)
+    largest = float(signed[np.argmax(np.abs(signed))])
+    return float(f"{largest:.3g}") if np.isfinite(largest) else None
+
+
+def likeness_of(table: Table, source: Source, pairs: ComparedPairs) -> str:
+    """Return, in words, the changed model with which a table agrees at least twice as well; empty if there is none."""
+    chosen = np.flatnonzero(pairs.drawn.above)[:: max(len(pairs.drawn.wi) // DIRECTIONS, 1)]
+    middle = pairs.table.shape[1] // 2
+    wavelength = representative_nm(table)
+    at = None if wavelength is None else np.array([wavelength])
+    values = pairs.table[chosen, middle]
+    truth = pairs.model[chosen, middle]
+    weight = pairs.drawn.weight[chosen]
+    if not np.isfinite(values).all():
+        return ""
+    light, viewer = pairs.drawn.wi[chosen], pairs.drawn.wr[chosen]
+    errors = {"": weight @ np.abs(values - truth)}
+    scale = float(weight @ values / (weight @ truth)) if weight @ truth > 0.0 else 1.0
+    if abs(scale - 1.0) > _SCALE:
+        errors[f"the model times {scale:.3g}"] = weight @ np.abs(values - scale * truth)
+    for name, changed in _changes(source.anisotropic):
+        model = error_measurement.model_values(source, at, *changed(light, viewer))[:, 0]
+        errors[name] = weight @ np.abs(values - model)
+    best = min(errors, key=lambda name: errors[name])
+    return best if errors[best] < MUCH_BETTER * errors[""] else ""
+
+
+def _changes(anisotropic: bool) -> Iterator[tuple[str, Callable[[Floats, Floats], Directions]]]:
+    yield "the model with light and viewer exchanged", lambda wi, wr: (wr, wi)
+    yield "the model seen from the other side, delta_phi of 180 degrees for 0", lambda wi, wr: (wi, _turned(wr, 180.0))
+    yield "the model with theta counted from the horizon", lambda wi, wr: (_upended(wi), _upended(wr))
+    if not anisotropic:
+        return
+    yield "the model in a mirror, -phi for phi", lambda wi, wr: (_mirrored(wi), _mirrored(wr))
+    for angle in _TURNS_DEG:
+        yield (
+            f"the model turned by {angle} degrees",
+            lambda wi, wr, by=float(angle): (_turned(wi, by), _turned(wr, by)),  # type: ignore[misc]
+        )
+
+
+def _turned(w: Floats, degrees: float) -> Floats:
+    """Return unit vectors turned about the normal."""
+    cos, sin = np.cos(radians(degrees)), np.sin(radians(degrees))
+    return np.stack([cos * w[:, 0] - sin * w[:, 1], sin * w[:, 0] + cos * w[:, 1], w[:, 2]], axis=-1)
+
+
+def _mirrored(w: Floats) -> Floats:
+    return np.asarray(w * np.array([1.0, -1.0, 1.0]))
+
+
+def _upended(w: Floats) -> Floats:
+    """Return unit vectors with the complements of their polar angles."""
+    theta, phi = spherical_angles(w)
+    return unit_vector(np.clip(np.pi / 2.0 - theta, 0.0, np.pi / 2.0 - 1e-9), phi)

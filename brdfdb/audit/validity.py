@@ -7,7 +7,7 @@ from pydantic import BaseModel, Field
 from brdfdb.audit.finding import RANKS, STRICT, Cell, Finding, Sentence, Subject
 from brdfdb.materials import Material
 from brdfdb.materials.stated_limits import counts_of, in_words, limits_of
-from brdfdb.parameters import Standing, StatedLimit
+from brdfdb.parameters import Standing
 from brdfdb.tables.grids import Axis
 
 _ORDER: tuple[Standing, ...] = ("inside", "at the edge", "outside")
@@ -64,7 +64,7 @@ class Validity(Finding):
         ]
 
     def cells(self) -> list[Cell]:
-        """Return the number of limits that are not kept, or at the edge."""
+        """Return the number of limits that are not met, or at the edge."""
         standings = [limit.standing for limit in self.limits]
         edges = [words for word, words in counts_of(standings) if word in ("at the edge", "outside")]
         text = ", ".join(words.replace(" ", f" of {len(self.limits)} limits ", 1) for words in edges)
@@ -73,11 +73,9 @@ class Validity(Finding):
 
 def validity_of(material: Material, wavelength_nm: Axis | None) -> Validity:
     """Return the limits of the model, judged at the wavelengths [nm] of the table."""
-    limits = [_limit(limit) for limit in limits_of(material, wavelength_nm)]
+    limits = [
+        Limit(**{name: getattr(limit, name) for name in Limit.model_fields})
+        for limit in limits_of(material, wavelength_nm)
+    ]
     known = [limit.standing for limit in limits if limit.standing != "unknown"]
     return Validity(limits=limits, verdict=max(known, key=_ORDER.index, default="inside"))
-
-
-def _limit(stated: StatedLimit) -> Limit:
-    """Return a stated limit as the report has it."""
-    return Limit(**{name: getattr(stated, name) for name in Limit.model_fields})

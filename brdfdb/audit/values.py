@@ -12,7 +12,7 @@ from brdfdb.tables.albedo import linear_in_angles
 from brdfdb.tables.table import Table
 
 
-class Values(Finding):
+class ValueCounts(Finding):
     """Counts of stored values and of values of f_r that are negative or not finite."""
 
     key = "values"
@@ -32,7 +32,7 @@ class Values(Finding):
     verdict: Verdict = Field(description="worse of the two")
 
     @classmethod
-    def judge(cls, subject: Subject) -> Values:
+    def judge(cls, subject: Subject) -> ValueCounts:
         """Return the counts of values of a table that are negative or not finite."""
         # A linear interpolant is never below its nodes
         pairs, linear = subject.pairs, linear_in_angles(subject.table)
@@ -53,7 +53,7 @@ class Values(Finding):
         return [Cell(self.verdict, f"{bad} bad" if bad else "all good", bad)]
 
 
-def values_of(table: Table, looked_up: Floats | None) -> Values:
+def values_of(table: Table, looked_up: Floats | None) -> ValueCounts:
     """Return the counts of values that are negative or not finite, at nodes and in lookups of f_r [1/sr].
 
     `looked_up` is None for a table that is linear between its nodes. Nodes over half and difference vectors may be
@@ -69,7 +69,7 @@ def values_of(table: Table, looked_up: Floats | None) -> Values:
     # -inf counts as not finite, not as negative
     negative = sum(int(np.count_nonzero((array < 0.0) & np.isfinite(array))) for array in (*judged, *specular))
     smallest = min(float(np.min(array, initial=np.inf, where=np.isfinite(array))) for array in judged)
-    return Values(
+    return ValueCounts(
         count=sum(array.size for array in (table.values, *apart))
         + (0 if table.specular is None else table.specular.size),
         looked_up=0 if looked_up is None else len(looked_up),

@@ -1,1 +1,1 @@
-"""Conversion from one model to another: the parameters that come closest, and the error that is left."""
+"""Conversion from one model to another: the parameters that come closest, and the remaining error."""

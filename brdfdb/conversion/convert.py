@@ -8,25 +8,26 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from brdfdb.conversion.document import Conversion, percent
-from brdfdb.conversion.measurement import (
-    VIEWS_DEG,
-    l1_at,
-    left_by,
+from brdfdb.conversion.document import Conversion, Peak, WorstView, percent
+from brdfdb.conversion.nodes import (
+    COARSE,
+    FINER,
+    FITTED,
+    WEIGHS,
+    RemainingDifference,
+    Sides,
+    TruthNodes,
+    ViewError,
+    Weigh,
     lobe_of,
-    p99_of,
-    peak_of,
     sides_of,
-    worst_view,
+    specular_of,
 )
-from brdfdb.conversion.nodes import COARSE, FINER, FITTED, WEIGHS, Nodes, Weigh, specular_of
-from brdfdb.conversion.remarks import is_lost, remarks, with_highlight
-from brdfdb.conversion.search import REFUSED, Distance, Result, search
+from brdfdb.conversion.search import REFUSED, Distance, Result, Target, search
 from brdfdb.conversion.search import STEPS as _SEARCH_STEPS
-from brdfdb.conversion.target import Target
 from brdfdb.errors import ParameterError
-from brdfdb.geometry import degrees
-from brdfdb.integrals.pairs import Counts, Symmetry
+from brdfdb.geometry import degrees, radians, unit_vector
+from brdfdb.integrals.pairs import Counts, Symmetry, view_of
 from brdfdb.lobes import Lobe
 from brdfdb.materials import Material, Source, written_name
 from brdfdb.materials.provenance import MOST_NAME
@@ -34,7 +35,8 @@ from brdfdb.materials.recipe_text import rounded, toml_of
 from brdfdb.measurements import MeasuredSource
 from brdfdb.models import MODELS
 from brdfdb.parameters import ModelSpec, check_nanometres, closest
-from brdfdb.tables.table_source import TableSource
+from brdfdb.tables import error_measurement
+from brdfdb.tables.table import TableSource
 
 Array = NDArray[np.float64]
 
@@ -42,6 +44,18 @@ FIT = "fit"  # the refractive index that asks for a search of n and k
 SEARCHED = 5  # wavelengths at most at which shared parameters are searched
 ASSUMED_NM = 550.0  # wavelength of the n and k that are searched for a grey source
 STEPS = _SEARCH_STEPS  # calls of `tick` in a conversion
+DIRECTIONS = 1000  # directions of p99 per band of theta_i, as in charts
+SEED = 1992  # seed of these directions
+VIEWS_DEG = np.arange(0.0, 90.0, 5.0)  # theta_r of the viewers among whom the worst one is searched
+STEP_DEG = 15.0  # step of phi_r of these viewers, for an anisotropic source
+PEAK_DEG = 45.0  # theta_i of the mirror direction whose f_r is stated
+
+# Thresholds of remarks
+_NOT_NEAR = 0.9  # l1 above which the model is hardly nearer than black, whose l1 is 1
+_END = 1e-3  # distance from the end of a range, relative to that end, that counts as the end; 0 is no end
+_SEEN = 0.01  # share of the light above which a specular part is mentioned
+_LOST = 0.5  # share of its peak below which a highlight is lost
+_UNSURE = 0.01  # error of l1, relative to l1, above which it is mentioned
 
 
 def convert(
@@ -54,7 +68,7 @@ def convert(
     weigh: Weigh | None = None,
     tick: Callable[[], None] = lambda: None,
 ) -> Conversion:
-    """Search the parameters of a model that come closest to a source, and measure the error that is left.
+    """Search the parameters of a model that come closest to a source, and measure the remaining error.
 
     Parameters
     ----------
@@ -119,21 +133,21 @@ def convert(
     """
     request = _request(source, model, wavelength_nm, fixed or {}, refractive_index, weigh or "light")
     least = _measured(request, _searched(request, tick))
-    if weigh is not None or MODELS[model].lobe is None or not is_lost(source, least):
+    if weigh is not None or MODELS[model].lobe is None or not _is_lost(source, least):
         return least
     request = request._replace(weigh="lightness")
     other = _measured(request, _searched(request, tick))
-    return least if is_lost(source, other) else with_highlight(other, least)
+    return least if _is_lost(source, other) else _with_highlight(other, least)
 
 
-class Difference(NamedTuple):
+class MaterialDifference(NamedTuple):
     """The distance of two materials, l1 and p99 as in `Conversion`."""
 
     l1: float
     p99: float
 
 
-def compare(source: Source, other: Material, wavelength_nm: ArrayLike | None = None) -> Difference:
+def compare(source: Source, other: Material, wavelength_nm: ArrayLike | None = None) -> MaterialDifference:
     """Return the error of a material in the place of a source, such as one with a copied alpha.
 
     Parameters
@@ -147,7 +161,7 @@ def compare(source: Source, other: Material, wavelength_nm: ArrayLike | None = N
 
     Returns
     -------
-    Difference
+    MaterialDifference
         l1 [1] and p99 [1].
 
     Raises
@@ -164,8 +178,12 @@ def compare(source: Source, other: Material, wavelength_nm: ArrayLike | None = N
     """
     at = _wavelengths(source, other, wavelength_nm)
     sides = sides_of(source, other, at)
-    left = left_by(sides, FITTED.finer(FINER), _symmetry(source, other))
-    return Difference(float(np.mean(left.l1)), p99_of(source, at if source.spectral else None, sides))
+    symmetry = Symmetry(
+        source.anisotropic or other.anisotropic,
+        (source.elliptical or not source.anisotropic) and (other.elliptical or not other.anisotropic),
+    )
+    remaining = RemainingDifference(sides, FITTED.finer(FINER), symmetry)
+    return MaterialDifference(float(np.mean(remaining.l1)), _p99_of(source, at if source.spectral else None, sides))
 
 
 class _Request(NamedTuple):
@@ -191,7 +209,7 @@ class _Fit(NamedTuple):
 
     result: Result
     colours: Array
-    nodes: Nodes
+    nodes: TruthNodes
 
 
 def _request(
@@ -245,14 +263,6 @@ def _wavelengths(source: Source, other: ModelSpec | Material, wavelength_nm: Arr
     return None
 
 
-def _symmetry(source: Source, other: Material) -> Symmetry:
-    """Return the symmetry that two have in common."""
-    return Symmetry(
-        source.anisotropic or other.anisotropic,
-        (source.elliptical or not source.anisotropic) and (other.elliptical or not other.anisotropic),
-    )
-
-
 def _searched(request: _Request, tick: Callable[[], None]) -> _Fit:
     """Search the shared parameters at a few wavelengths, then the colours at all of them."""
     source, target, columns = request.source, request.target, request.columns
@@ -268,16 +278,16 @@ def _searched(request: _Request, tick: Callable[[], None]) -> _Fit:
         return _Fit(result, np.zeros((target.count, 0)), fitted)
     nodes = _nodes(request, lobe, request.counts, request.before)
     every = Distance(target, nodes, np.arange(target.count, dtype=np.int64), _alphas(lobe))
-    ends = [every.of_column(result.numbers, column, column)[1] for column in range(target.count)]
+    ends = [every.of_column(result.numbers, column, column).point for column in range(target.count)]
     return _Fit(result, np.stack(ends), nodes)
 
 
 def _nodes(
     request: _Request, lobe: Callable[[Array], Lobe | None], counts: Counts, wavelength_nm: Array | None
-) -> Nodes:
+) -> TruthNodes:
     """Return the truth at nodes, of a source that reflects something at each wavelength."""
     f_r, mirror = request.source.brdf_at(wavelength_nm), specular_of(request.source, wavelength_nm)
-    nodes = Nodes(lobe, counts, request.symmetry, f_r, mirror, request.weigh)
+    nodes = TruthNodes(lobe, counts, request.symmetry, f_r, mirror, request.weigh)
     dark = ~(np.max(nodes.truth, axis=0) > 0.0)
     if np.any(dark):
         where = "" if wavelength_nm is None else f" at {wavelength_nm[dark][0]:g} nm"
@@ -296,11 +306,8 @@ def _alphas(lobe: Callable[[Array], Lobe | None]) -> Array:
     return np.full(2, np.nan) if normal is None else np.array([np.min(normal.alpha_x), np.min(normal.alpha_y)])
 
 
-# What is left
-
-
 def _measured(request: _Request, fit: _Fit) -> Conversion:
-    """Measure what a material with the parameters that were found leaves, at more nodes."""
+    """Return the conversion to the parameters that the search ended at, with its errors at more nodes."""
     source, target = request.source, request.target
     spec = target.spec
     table = _table(request, fit, f"converted from {source.name}")
@@ -308,15 +315,21 @@ def _measured(request: _Request, fit: _Fit) -> Conversion:
     material = Material.from_table(name, table)
     sides = sides_of(source, material, request.at)
     finer = request.counts.finer(FINER)
-    left = left_by(sides, finer, request.symmetry)
-    l1, p99 = float(np.mean(left.l1)), p99_of(source, request.before, sides)
+    remaining = RemainingDifference(sides, finer, request.symmetry)
+    l1 = float(np.mean(remaining.l1))
+    p99 = _p99_of(source, request.before, sides)
     was = f" ({source.model})" if isinstance(source, Material) else ""
+    source_model = ""
+    if isinstance(source, Material):
+        source_model = source.model
+    elif isinstance(source, MeasuredSource | TableSource) and source.measured is not None:
+        source_model = "measured"
     table["source"] = f"converted from {source.name}{was}; l1 {percent(l1)}, p99 {percent(p99)}"
-    largest, worst = worst_view(sides, finer, request.symmetry, request.at)
+    largest, worst = _worst_view(sides, finer, request.symmetry, request.at)
     searched = fit.result.numbers if target.searched_index else {}
     conversion = Conversion(
         source=source.name,
-        source_model=_model_of(source),
+        source_model=source_model,
         model=spec.name,
         weigh=request.weigh,
         parameters=material.parameters,
@@ -326,12 +339,12 @@ def _measured(request: _Request, fit: _Fit) -> Conversion:
         refractive_index=target.entry,
         wavelengths_nm=None if request.at is None else request.at.tolist(),
         l1=l1,
-        l1_of=left.l1.tolist(),
-        quadrature=abs(l1 - l1_at(fit.nodes, sides)),
+        l1_of=remaining.l1.tolist(),
+        quadrature=abs(l1 - _l1_at(fit.nodes, sides)),
         p99=p99,
-        reflected=float(np.mean(left.reflected)),
-        specular_share=float(np.mean(left.specular)),
-        peak=peak_of(sides),
+        reflected=float(np.mean(remaining.reflected)),
+        specular_share=float(np.mean(remaining.specular)),
+        peak=_peak_of(sides),
         worst_view=worst,
         views_deg=VIEWS_DEG.tolist(),
         l1_of_views=largest,
@@ -341,7 +354,7 @@ def _measured(request: _Request, fit: _Fit) -> Conversion:
         recipe=toml_of(name, table),
         remarks=[],
     )
-    return conversion.model_copy(update={"remarks": remarks(source, conversion)})
+    return conversion.model_copy(update={"remarks": _remarks(source, conversion)})
 
 
 def _table(request: _Request, fit: _Fit, origin: str) -> dict[str, Any]:
@@ -374,8 +387,124 @@ def _table(request: _Request, fit: _Fit, origin: str) -> dict[str, Any]:
     return {**table, "parameters": values}
 
 
-def _model_of(source: Source) -> str:
-    """Return the model of a source, "measured" of measured data, or nothing of a function."""
-    if isinstance(source, Material):
-        return source.model
-    return "measured" if isinstance(source, MeasuredSource | TableSource) and source.measured is not None else ""
+def _l1_at(nodes: TruthNodes, sides: Sides) -> float:
+    """Return the mean l1 [1] at the nodes of a search, of all wavelengths that these have."""
+    values = sides.model(nodes.wi, nodes.wr)
+    mirror = sides.model_specular
+    specular = np.zeros(nodes.specular.shape) if mirror is None else mirror(nodes.theta)
+    wrong = nodes.weight @ np.abs(values - nodes.truth) + nodes.theta_weight @ np.abs(specular - nodes.specular)
+    return float(np.mean(wrong / nodes.total))
+
+
+def _peak_of(sides: Sides) -> Peak:
+    """Return f_r of both in the mirror direction at `PEAK_DEG`, at the middle wavelength."""
+    wi, wr = (unit_vector(radians(PEAK_DEG), phi)[np.newaxis] for phi in (0.0, np.pi))
+    before, after = (np.ravel(one(wi, wr)) for one in (sides.truth, sides.model))
+    return Peak(theta_deg=PEAK_DEG, before=float(before[before.size // 2]), after=float(after[after.size // 2]))
+
+
+def _p99_of(source: Source, wavelength_nm: Array | None, sides: Sides) -> float:
+    """Return the 99th percentile of the relative error [1], at directions drawn as charts draw them."""
+    drawn = error_measurement.draw(source, wavelength_nm, DIRECTIONS, SEED)
+    truth, values = sides.truth(drawn.wi, drawn.wr), sides.model(drawn.wi, drawn.wr)
+    return error_measurement.compare(values, truth, drawn).overall.p99
+
+
+def _worst_view(
+    sides: Sides, counts: Counts, symmetry: Symmetry, wavelength_nm: Array | None
+) -> tuple[list[float], WorstView]:
+    """Return the largest l1 of viewers at each theta_r, and the viewer with the largest of all."""
+    anisotropic, elliptical = symmetry
+    end_deg = 90.0 if elliptical else 345.0
+    phis_deg = np.arange(0.0, end_deg + 1.0, STEP_DEG) if anisotropic else np.zeros(1)
+    largest: list[float] = []
+    worst: tuple[float, int, ViewError] | None = None
+    for theta_deg in VIEWS_DEG.tolist():
+        of_theta = 0.0
+        for phi_deg in phis_deg.tolist():
+            view = view_of(sides.lobe, float(radians(theta_deg)), float(radians(phi_deg)), counts, symmetry)
+            error = ViewError(view, sides)
+            column = int(np.argmax(error.l1))
+            l1 = float(error.l1[column])
+            of_theta = max(of_theta, l1)
+            if worst is None or l1 > worst[0]:
+                worst = l1, column, error
+        largest.append(of_theta)
+    assert worst is not None
+    l1, column, error = worst
+    light = error.largest(column)
+    x, y, z = error.view.wi[light]
+    return largest, WorstView(
+        theta_r_deg=round(float(degrees(error.view.theta)), 6),
+        phi_r_deg=round(float(degrees(error.view.phi)), 6),
+        l1=l1,
+        wavelength_nm=None if wavelength_nm is None else float(wavelength_nm[column]),
+        theta_i_deg=round(float(degrees(np.arccos(np.clip(z, -1.0, 1.0)))), 2),
+        phi_i_deg=round(float(degrees(np.arctan2(y, x))) % 360.0, 2),
+        before=float(error.f[light, column]),
+        after=float(error.g[light, column]),
+    )
+
+
+def _is_lost(source: Source, conversion: Conversion) -> bool:
+    """Return True if a lobe of the source has less than half of its peak in the model."""
+    return source.has_lobe and conversion.peak.after < _LOST * conversion.peak.before
+
+
+def _with_highlight(conversion: Conversion, least: Conversion) -> Conversion:
+    """Return a conversion that keeps the highlight, with a sentence on the one with the least l1, which loses it."""
+    sentence = (
+        f"Cube roots of f_r were compared, because the least l1, {percent(least.l1)}, is without the highlight: f_r in "
+        f"the mirror direction at {least.peak.theta_deg:g} degrees is {least.peak.after:.3g} /sr there."
+    )
+    return conversion.model_copy(update={"remarks": [sentence, *conversion.remarks]})
+
+
+def _at_an_end(conversion: Conversion) -> list[str]:
+    """Return the numbers that ended at a limit of their range, with the values, as recipes write them."""
+    in_file, ends = conversion.material.file_parameters(), []
+    for parameter in MODELS[conversion.model].parameters:
+        value = conversion.parameters[parameter.name]
+        if parameter.name in conversion.fixed or parameter.reflectance or not isinstance(value, float):
+            continue
+        if any(end != 0.0 and abs(value - end) <= _END * abs(end) for end in (parameter.low, parameter.high)):
+            name = written_name(parameter)
+            ends.append(f"{name} = {in_file[name]:g}")
+    return ends
+
+
+def _remarks(source: Source, conversion: Conversion) -> list[str]:
+    """Return sentences on how far the model is, what it lacks of the source, a lost highlight, and an inexact l1."""
+    spec, made = MODELS[conversion.model], conversion.material
+    sentences = []
+    if conversion.l1 >= _NOT_NEAR:
+        sentences.append(
+            f"{spec.name} cannot carry {source.name}: black, which reflects nothing, has an l1 of 100 %, too."
+        )
+    if ends := _at_an_end(conversion):
+        sentences.append(f"At the end of their range: {', '.join(ends)}. A closer fit lies beyond.")
+    if conversion.specular_share > _SEEN:
+        share = f"{percent(conversion.specular_share)} of the light of {source.name} is its specular part"
+        lacks = "has one, too" if spec.specular else "has none: that light counts as error"
+        sentences.append(f"{share} (a Dirac delta); {spec.name} {lacks}.")
+    if isinstance(source, Material) and source.spec.uniform and spec.uniform is None and spec.lobe is not None:
+        uniform = source.parameters[source.spec.uniform]
+        if not isinstance(uniform, float) or uniform > 0.0:
+            others = closest(
+                spec.name, [name for name, other in MODELS.items() if other.uniform and name != source.model]
+            )
+            with_one = others.replace("; closest: ", "; models with one: ")
+            sentences.append(
+                f"{source.name} has a uniform part ({source.spec.uniform} = {uniform}); {spec.name} has none{with_one}."
+            )
+    if source.anisotropic and not made.anisotropic:
+        sentences.append(f"{source.name} is anisotropic; {made.name} is not.")
+    if _is_lost(source, conversion):
+        peak = conversion.peak
+        sentences.append(
+            f"The highlight is lost: f_r in the mirror direction at {peak.theta_deg:g} degrees falls from "
+            f"{peak.before:.3g} to {peak.after:.3g} /sr. Fix reflectance and width to keep one."
+        )
+    if conversion.quadrature > _UNSURE * conversion.l1:
+        sentences.append(f"l1 is known to within {percent(conversion.quadrature)} of the light.")
+    return sentences

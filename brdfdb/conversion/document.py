@@ -1,23 +1,18 @@
-"""Types of the document of a conversion: parameters, the error that is left, and where it is worst."""
+"""Types of the document of a conversion: parameters, the remaining error, and where it is worst."""
 
 from __future__ import annotations
 
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
+from brdfdb.figure import DocumentPart
 from brdfdb.materials import Material
 from brdfdb.materials.provenance import Number
 from brdfdb.materials.spectrum import Spectrum
 
 
-class _Record(BaseModel):
-    """A part of the document: immutable, without keys that it does not know."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-
-class WorstView(_Record):
+class WorstView(DocumentPart):
     """The viewer for whom most light is in the wrong place, under light from everywhere."""
 
     theta_r_deg: float
@@ -30,7 +25,7 @@ class WorstView(_Record):
     after: float = Field(description="f_r of the model for it, in 1/sr")
 
 
-class Peak(_Record):
+class Peak(DocumentPart):
     """f_r in the mirror direction of one angle, in the plane through x, at the middle wavelength."""
 
     theta_deg: float
@@ -38,8 +33,8 @@ class Peak(_Record):
     after: float = Field(description="f_r of the model, in 1/sr")
 
 
-class Conversion(_Record):
-    """The parameters of a model that come closest to a source, and the error that is left."""
+class Conversion(DocumentPart):
+    """The parameters of a model that come closest to a source, and the remaining error."""
 
     source: str = Field(description="name of the source")
     source_model: str = Field(description="its model, or measured; empty for a function")

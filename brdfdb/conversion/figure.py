@@ -20,21 +20,10 @@ _LEAST = 1e-5  # share of the largest value below which a curve has a gap
 
 
 def figure_of(source: Source, conversion: Conversion) -> Figure:
-    """Return the figure of a conversion.
+    """Return the figure of a conversion: f_r of both in the plane of incidence for three lights, and l1 of views.
 
-    Parameters
-    ----------
-    source : Source
-        The source that was converted.
-    conversion : Conversion
-        The result.
-
-    Returns
-    -------
-    Figure
-        A panel for each of three lights, with f_r of both over the angle of the viewer in the plane of incidence, from
-        the side of the light (negative) to that of the mirror direction. An anisotropic source has two such planes.
-        The last panel has the l1 of each view. Spectra are shown at their middle wavelength.
+    Viewers run from the side of the light (negative) to that of the mirror direction. An anisotropic source has two
+    such planes. Spectra are shown at their middle wavelength.
     """
     at = conversion.wavelengths_nm
     middle = None if at is None else np.array(at[len(at) // 2 :][:1])
@@ -52,12 +41,12 @@ def figure_of(source: Source, conversion: Conversion) -> Figure:
         )
     )
     where = "" if middle is None else f" at {middle[0]:g} nm"
-    left = f"l1 {percent(conversion.l1)}, p99 {percent(conversion.p99)}"
+    errors = f"l1 {percent(conversion.l1)}, p99 {percent(conversion.p99)}"
     return Figure(
         key=conversion.name,
         paper=conversion.material.spec.reference,
         title=f"{conversion.source} as {conversion.model}",
-        caption=f"f_r in the plane of incidence{where}. {left}.",
+        caption=f"f_r in the plane of incidence{where}. {errors}.",
         panels=list(panels),
         statements=[],
     )

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from typing import Literal
+from collections.abc import Callable
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from brdfdb.geometry import degrees
 from brdfdb.integrals.pairs import Counts, Symmetry, View, views
 from brdfdb.lobes import Lobe
-from brdfdb.materials import Source
+from brdfdb.materials import Material, Source
 from brdfdb.parameters import Floats
 
 Array = NDArray[np.float64]
@@ -20,8 +19,9 @@ Specular = Callable[[Array], Floats]  # reflectance (V, L) of the specular part 
 Weigh = Literal["light", "lightness"]  # what is compared: f_r, or its cube root
 WEIGHS: tuple[Weigh, ...] = ("light", "lightness")
 
-COARSE, FITTED = Counts(8, 3, 12, 4), Counts(14, 5, 18, 7)
-FINER = 1.75  # nodes along each axis of the rule that measures what is left, relative to the rule that was fitted
+COARSE = Counts(8, 3, 12, 4)  # nodes at which many sets of parameters are tried
+FITTED = Counts(14, 5, 18, 7)  # nodes of the last descents
+FINER = 1.75  # nodes along each axis of the rule that measures the result, relative to the rule of the search
 
 
 def specular_of(source: Source, wavelength_nm: Array | None) -> Specular | None:
@@ -31,25 +31,50 @@ def specular_of(source: Source, wavelength_nm: Array | None) -> Specular | None:
     return lambda theta: np.reshape(source.specular_reflectance(theta, wavelength_nm), (theta.size, -1))
 
 
-class Nodes:
-    """The truth at the nodes of one rule, of L columns.
+def lobe_of(source: Source, wavelength_nm: Array | None) -> Callable[[Array], Lobe | None]:
+    """Return the lobe of a source at wavelengths [nm] as a function of the cosine alone."""
+    return lambda cosine: source.lobe(cosine, wavelength_nm) if source.has_lobe else None
 
-    Attributes
-    ----------
-    wi, wr : array (N, 3)
-        Unit vectors of light and viewer.
-    weight : array (N,) [sr^2]
-        Weights of the integral over both hemispheres, with both cosines.
-    truth : array (N, L) [1/sr]
-        f_r of the source.
-    theta, theta_weight : array (V,) [rad], [sr]
-        Angles of the viewers, with the weights of an integral over them, for the specular part.
-    specular : array (V, L) [1]
-        Reflectance of the specular part of the source.
-    total : array (L,)
-        Integral of all that the source reflects.
-    weigh : {"light", "lightness"}
-        What `distance` compares.
+
+class Sides(NamedTuple):
+    """Source and model as functions: f_r (N, L) of both, their specular parts, and the narrower lobe."""
+
+    truth: Evaluate
+    model: Evaluate
+    truth_specular: Specular | None
+    model_specular: Specular | None
+    lobe: Callable[[Array], Lobe | None]
+
+
+def sides_of(source: Source, material: Material, wavelength_nm: Array | None) -> Sides:
+    """Return source and model at wavelengths [nm]; None where both are grey."""
+    before = wavelength_nm if source.spectral else None
+    after = wavelength_nm if material.spectral else None
+    lobes = lobe_of(source, before), lobe_of(material, after)
+
+    def narrower(cosine: Array) -> Lobe | None:
+        both = [lobe for lobe in (one(cosine) for one in lobes) if lobe is not None]
+        if not both:
+            return None
+        alpha_x = min(np.min(lobe.alpha_x) for lobe in both)
+        alpha_y = min(np.min(lobe.alpha_y) for lobe in both)
+        return Lobe(np.asarray(1.0), np.asarray(alpha_x), np.asarray(alpha_y))
+
+    return Sides(
+        source.brdf_at(before),
+        material.brdf_at(after),
+        specular_of(source, before),
+        specular_of(material, after),
+        narrower,
+    )
+
+
+class TruthNodes:
+    """The truth at N pairs of directions from V viewers, in L columns.
+
+    `wi` and `wr` (N, 3) are unit vectors, `weight` (N,) [sr^2] has both cosines, and `truth` (N, L) [1/sr] is f_r.
+    `theta` (V,) [rad] with `theta_weight` (V,) [sr] and `specular` (V, L) [1] are those of the specular part. `total`
+    (L,) is the integral of all light that the source reflects.
     """
 
     def __init__(
@@ -93,63 +118,55 @@ class Nodes:
 
 
 def _sum(weight: Floats, values: Floats) -> float:
-    """Return a weighted sum. A BLAS would wait for its threads, and sum in an order of its own."""
+    """Return a weighted sum. A BLAS would wait for its threads, and sum in another order."""
     return float(np.einsum("i,i->", weight, values))
 
 
-class Left:
-    """The error that a model leaves, summed viewer by viewer.
+class RemainingDifference:
+    """The difference of a model from a source over all pairs of directions, in L columns, summed viewer by viewer.
 
-    Attributes
-    ----------
-    l1 : array (L,) [1]
-        Distance over all pairs of directions.
-    reflected, specular : array (L,) [1]
-        Mean albedo of the model over that of the source, and the share of the specular part in the source.
+    `l1` is the distance, `reflected` the mean albedo of the model over that of the source, and `specular` the share of
+    the specular part in the source, all (L,) [1].
     """
 
-    def __init__(
-        self, rule: Iterator[View], truth: Evaluate, model: Evaluate, mirrors: tuple[Specular | None, Specular | None]
-    ) -> None:
-        wrong, ours, theirs, of_mirror = (np.zeros(1) for _ in range(4))
-        for view in rule:
-            one = ViewError(view, truth, model, mirrors)
-            wrong, ours = wrong + view.weight * one.wrong, ours + view.weight * one.whole
-            theirs, of_mirror = theirs + view.weight * one.model, of_mirror + view.weight * one.specular
-        self.l1, self.reflected, self.specular = wrong / ours, theirs / ours, of_mirror / ours
+    def __init__(self, sides: Sides, counts: Counts, symmetry: Symmetry) -> None:
+        wrong, source, model, specular = (np.zeros(1) for _ in range(4))
+        for view in views(sides.lobe, counts, symmetry):
+            error = ViewError(view, sides)
+            wrong = wrong + view.weight * error.wrong
+            source = source + view.weight * error.source
+            model = model + view.weight * error.model
+            specular = specular + view.weight * error.specular
+        self.l1 = wrong / source
+        self.reflected = model / source
+        self.specular = specular / source
 
 
 class ViewError:
-    """The error of a model for one viewer, over all lights, in L columns.
+    """The error of a model for one viewer under uniform light, over all lights, in L columns.
 
-    Attributes
-    ----------
-    wrong, whole, model, specular : array (L,) [1]
-        Light in the wrong place, all light that the source reflects to the viewer, all of the model, and the specular
-        part of the source, under uniform light.
+    `wrong` is the light in the wrong place, `source` and `model` the light that both reflect to the viewer, and
+    `specular` the specular part of the source, all (L,) [1].
     """
 
-    def __init__(
-        self, view: View, truth: Evaluate, model: Evaluate, mirrors: tuple[Specular | None, Specular | None]
-    ) -> None:
+    def __init__(self, view: View, sides: Sides) -> None:
         wr = np.broadcast_to(view.wr, view.wi.shape)
-        self.view, self.f, self.g = view, truth(view.wi, wr), model(view.wi, wr)
+        self.view = view
+        self.f = sides.truth(view.wi, wr)
+        self.g = sides.model(view.wi, wr)
         theta = np.array([view.theta])
-        first, second = (0.0 if mirror is None else mirror(theta)[0] for mirror in mirrors)
-        columns = self.f.shape[1]
-        self.specular = np.broadcast_to(np.asarray(first, dtype=np.float64), (columns,))
-        self.wrong = view.weights @ np.abs(self.g - self.f) + np.abs(np.asarray(second) - first)
-        self.whole = view.weights @ self.f + self.specular
-        self.model = view.weights @ self.g + second
+        before = 0.0 if sides.truth_specular is None else sides.truth_specular(theta)[0]
+        after = 0.0 if sides.model_specular is None else sides.model_specular(theta)[0]
+        self.specular = np.broadcast_to(np.asarray(before, dtype=np.float64), (self.f.shape[1],))
+        self.wrong = view.weights @ np.abs(self.g - self.f) + np.abs(np.asarray(after) - before)
+        self.source = view.weights @ self.f + self.specular
+        self.model = view.weights @ self.g + after
 
     @property
     def l1(self) -> Floats:
         """Return the share (L,) of light in the wrong place."""
-        return np.divide(self.wrong, self.whole, out=np.zeros(self.whole.shape), where=self.whole > 0.0)
+        return np.divide(self.wrong, self.source, out=np.zeros(self.source.shape), where=self.source > 0.0)
 
-    def largest(self, column: int) -> tuple[tuple[float, float], float, float]:
-        """Return theta_i and phi_i [degree] where abs(g - f) cos theta_i is largest, and f and g [1/sr] there."""
-        index = int(np.argmax(np.abs(self.g - self.f)[:, column] * np.maximum(self.view.wi[:, 2], 0.0)))
-        x, y, z = self.view.wi[index]
-        at = float(degrees(np.arccos(np.clip(z, -1.0, 1.0)))), float(degrees(np.arctan2(y, x))) % 360.0
-        return at, float(self.f[index, column]), float(self.g[index, column])
+    def largest(self, column: int) -> int:
+        """Return the number of the light for which abs(g - f) cos theta_i is largest."""
+        return int(np.argmax(np.abs(self.g - self.f)[:, column] * np.maximum(self.view.wi[:, 2], 0.0)))

@@ -1,1 +1,1 @@
-"""Fits: the parameters of models that come closest to samples, with their intervals and the error that is left."""
+"""Fits: the parameters of models that come closest to samples, with their intervals and the remaining error."""

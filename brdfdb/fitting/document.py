@@ -1,21 +1,21 @@
-"""Types of the document of fits: the models in order, their parameters with intervals, and the error that is left."""
+"""Types of the document of fits: the models in order, their parameters with intervals, and the remaining error."""
 
 from __future__ import annotations
 
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+import numpy as np
+from numpy.typing import ArrayLike
+from pydantic import Field
 
+from brdfdb.figure import DocumentPart
 from brdfdb.materials import Material
 
-
-class _Record(BaseModel):
-    """A part of the document: immutable, without keys that it does not know."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
+ALBEDO_ANGLES_DEG = (0.0, 30.0, 60.0, 75.0, 85.0)  # theta_i at which the albedo of every fit is computed
+ALBEDO_TOLERANCE = 1e-3  # absolute tolerance of these albedos
 
 
-class Estimate(_Record):
+class Estimate(DocumentPart):
     """One number of a fit with its uncertainty, angles in degrees."""
 
     name: str = Field(description="parameter, as recipes write it; of a sum after the name of its term")
@@ -32,8 +32,8 @@ class Estimate(_Record):
     )
 
 
-class Correlation(_Record):
-    """A pair of numbers that the samples hardly tell apart."""
+class Correlation(DocumentPart):
+    """A pair of numbers that the samples hardly distinguish."""
 
     first: str
     second: str
@@ -41,7 +41,7 @@ class Correlation(_Record):
     sentence: str
 
 
-class HeldOut(_Record):
+class HeldOutIncidences(DocumentPart):
     """Prediction of samples that the fit did not see: one group of incidences after the other is left out."""
 
     theta_i_deg: list[list[float]] = Field(description="polar angles of the light of each group")
@@ -52,7 +52,7 @@ class HeldOut(_Record):
     median: float = Field(description="median of abs(ln(model / sample)) over them")
 
 
-class Albedo(_Record):
+class FitAlbedo(DocumentPart):
     """The largest directional albedo of a fit, at the channel that reflects most."""
 
     theta_i_deg: float
@@ -60,8 +60,21 @@ class Albedo(_Record):
     error: float = Field(description="estimated error of the quadrature")
     conserves: bool = Field(description="false: the fit reflects more light than arrives")
 
+    @classmethod
+    def largest(cls, theta_i_deg: ArrayLike, albedo: ArrayLike, error: ArrayLike) -> FitAlbedo:
+        """Return the largest of some albedos [1], with its angle and the error of its quadrature."""
+        index = int(np.argmax(albedo))
+        value = float(np.asarray(albedo)[index])
+        uncertainty = float(np.asarray(error)[index])
+        return cls(
+            theta_i_deg=float(np.asarray(theta_i_deg)[index]),
+            value=value,
+            error=uncertainty,
+            conserves=value <= 1.0 + uncertainty + ALBEDO_TOLERANCE,
+        )
 
-class Outlier(_Record):
+
+class Outlier(DocumentPart):
     """A sample that the best fit is far from."""
 
     theta_i_deg: float
@@ -74,7 +87,7 @@ class Outlier(_Record):
     sigmas: float = Field(description="its residual over the robust standard deviation of all residuals")
 
 
-class Fit(_Record):
+class Fit(DocumentPart):
     """One model, or sum of models, fitted to the samples."""
 
     model: str = Field(description="a model of the registry, or models joined by +")
@@ -84,7 +97,7 @@ class Fit(_Record):
     )
     median_ln: float | None = Field(description="median of its absolute value")
     sigma: float = Field(description="robust standard deviation of the residuals: 1.4826 times their median size")
-    held_out: HeldOut | None = Field(description="null: the light has one direction alone")
+    held_out: HeldOutIncidences | None = Field(description="null: the light has one direction alone")
     numbers: int = Field(description="numbers that were searched")
     aic: float = Field(description="Akaike's criterion, N ln(2 cost / N) + 2 p, of the robust cost")
     bic: float = Field(description="Schwarz's criterion, N ln(2 cost / N) + p ln N")
@@ -96,14 +109,14 @@ class Fit(_Record):
         description="samples near the mirror direction that are left out: the fit has a specular part there, and the "
         "instrument states no solid angle"
     )
-    albedo: Albedo
+    albedo: FitAlbedo
     correlations: list[Correlation]
     remarks: list[str]
     material: Material | None = Field(description="the fit as a material; null for a sum")
     recipe: str | None = Field(description="the material as a part of a recipe, [define.NAME] in TOML")
 
 
-class Left(_Record):
+class UnusedSamples(DocumentPart):
     """Values of the samples that no fit uses."""
 
     below_horizon: int = Field(description="values of the file with a direction below the horizon")
@@ -115,7 +128,7 @@ class Left(_Record):
     )
 
 
-class Fits(_Record):
+class Fits(DocumentPart):
     """All models that were fitted to some samples, best first."""
 
     name: str
@@ -129,7 +142,7 @@ class Fits(_Record):
     refractive_index: str | None
     source_solid_angle_sr: float | None = Field(description="solid angle of the light; null: not known")
     receiver_solid_angle_sr: float | None = Field(description="solid angle of the receiver; null: not known")
-    left_out: Left
+    left_out: UnusedSamples
     remarks: list[str] = Field(description="on the samples, and on the residual for them")
     ranked_by: Literal["held-out rms of ln", "BIC"]
     fits: list[Fit]

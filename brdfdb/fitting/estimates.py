@@ -1,15 +1,14 @@
-"""Estimates of a fit: every number with its standard error and 95 % interval, and the pairs that are not told apart."""
+"""Estimates of a fit: numbers with standard errors and 95 % intervals, and pairs that samples do not distinguish."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.fitting.document import Correlation, Estimate
-from brdfdb.fitting.fitted import Fitted
+from brdfdb.fitting.fitted import FittedSurface
 from brdfdb.fitting.surface import SCALE
 from brdfdb.fitting.uncertainty import NORMAL_95, Profile
 from brdfdb.fitting.variables import EDGE, NORMAL, Variable, index_of
@@ -17,14 +16,13 @@ from brdfdb.geometry import degrees
 from brdfdb.materials import written_name
 
 Array = NDArray[np.float64]
-Method = Literal["covariance", "profile", "end of range"]
 
-_STEP = 1e-6
-_CLOSE = 0.99  # correlation from which on two numbers are not told apart
-_SAME = 0.1  # relative difference of two standard errors of logarithms that makes a ratio or a product of two numbers
+_STEP = 1e-6  # step of finite differences, in the unit cube
+_CLOSE = 0.99  # correlation above which the samples do not distinguish two numbers
+_SAME = 0.1  # relative difference of two standard errors of logarithms below which a ratio or a product is measured
 
 
-def estimates_of(fitted: Fitted, *, profiles: bool) -> list[Estimate]:
+def estimates_of(fitted: FittedSurface, *, profiles: bool) -> list[Estimate]:
     """Return all numbers of a fit: shared ones first, then those of each channel, then n and k where searched.
 
     With `profiles`, intervals are those of profiles where the number is at an end of its range, or where the deviance
@@ -44,7 +42,7 @@ def estimates_of(fitted: Fitted, *, profiles: bool) -> list[Estimate]:
             if profiles and not several:
                 profile = Profile(fitted.problem, fitted.point, covariance, coefficient=number)
             error = float(np.sqrt(variance)) if np.isfinite(variance) else None
-            low, high, method = _interval(value, error, coefficient.low, coefficient.high, profile)
+            interval = _interval(value, error, coefficient.low, coefficient.high, profile)
             spec = surface.terms[coefficient.term].spec
             unit = "1" if coefficient.name == SCALE else spec.parameter(coefficient.name).unit
             estimates.append(
@@ -54,29 +52,37 @@ def estimates_of(fitted: Fitted, *, profiles: bool) -> list[Estimate]:
                     unit=unit,
                     value=value,
                     standard_error=error,
-                    low=low,
-                    high=high,
-                    method=method,
+                    **interval._asdict(),
                 )
             )
     return [*estimates, *_indices(fitted)]
 
 
-def _interval(
-    best: float, error: float | None, low: float, high: float, profile: Profile | None
-) -> tuple[float, float, Method]:
+class _Interval(NamedTuple):
+    """A 95 % interval of a number, and the method that gives it."""
+
+    low: float
+    high: float
+    method: Literal["covariance", "profile", "end of range"]
+
+
+def _interval(best: float, error: float | None, low: float, high: float, profile: Profile | None) -> _Interval:
     """Return the 95 % interval of a number in the variable in which it is searched."""
     if profile is not None and (error is None or not profile.agrees(error)):
-        return *profile.interval(error), "profile"
+        return _Interval(*profile.interval(error), "profile")
     if error is None:
-        return best, best, "end of range"
-    return max(best - NORMAL_95 * error, low), min(best + NORMAL_95 * error, high), "covariance"
+        return _Interval(best, best, "end of range")
+    return _Interval(max(best - NORMAL_95 * error, low), min(best + NORMAL_95 * error, high), "covariance")
 
 
-def _of_variable(fitted: Fitted, index: int, one: Variable, variance: float, profile: Profile | None) -> Estimate:
-    surface, u = fitted.surface, float(fitted.point.x[index])
+def _of_variable(
+    fitted: FittedSurface, index: int, one: Variable, variance: float, profile: Profile | None
+) -> Estimate:
+    """Return the estimate of a shape variable."""
+    surface = fitted.surface
+    u = float(fitted.point.x[index])
     error = float(np.sqrt(variance)) if np.isfinite(variance) else None
-    low, high, method = _interval(u, error, 0.0, 1.0, profile)
+    interval = _interval(u, error, 0.0, 1.0, profile)
     owner = surface.owners[index]
     parameter = None if owner is None else surface.terms[owner].spec.parameter(one.name)
     angle = parameter is not None and parameter.unit == "rad"
@@ -95,36 +101,36 @@ def _of_variable(fitted: Fitted, index: int, one: Variable, variance: float, pro
         unit="1" if parameter is None else "degree" if angle else parameter.unit,
         value=shown(u),
         standard_error=None if error is None else float(error * abs(slope)),
-        low=shown(low),
-        high=shown(high),
-        method=method,
+        low=shown(interval.low),
+        high=shown(interval.high),
+        method=interval.method,
     )
 
 
-def _indices(fitted: Fitted) -> list[Estimate]:
+def _indices(fitted: FittedSurface) -> list[Estimate]:
     """Return n and k where they were searched, whose variance is that of the two variables in their place."""
     surface, x = fitted.surface, fitted.point.x
     if not surface.searched_index:
         return []
     names = [one.name for one in surface.shape]
     at = [names.index(NORMAL), names.index(EDGE)]
-    some = fitted.covariance.shape[np.ix_(at, at)]
-    some = np.where(np.isfinite(some), some, 0.0)
+    variances = fitted.covariance.shape[np.ix_(at, at)]
+    variances = np.where(np.isfinite(variances), variances, 0.0)
     variables = [surface.shape[index] for index in at]
-    functions: list[tuple[str, int, float]] = [("n", 0, 0.01), ("k", 1, 0.0)]
+    best = x[at]
 
-    def place(part: int) -> Callable[[Array], float]:
-        return lambda u: index_of(*(one.value(float(v)) for one, v in zip(variables, u, strict=True)))[part]
+    def index_at(u: Array, part: int) -> float:
+        return index_of(*(one.value(float(v)) for one, v in zip(variables, u, strict=True)))[part]
 
     estimates = []
-    for name, part, least in functions:
-        function, best = place(part), x[at]
+    for name, part, least in (("n", 0, 0.01), ("k", 1, 0.0)):
+        value = index_at(best, part)
         gradient = np.zeros(2)
         for axis in range(2):
             step = np.zeros(2)
             step[axis] = -_STEP if best[axis] > 0.5 else _STEP
-            gradient[axis] = (function(best + step) - function(best)) / step[axis]
-        value, error = function(best), float(np.sqrt(max(float(gradient @ some @ gradient), 0.0)))
+            gradient[axis] = (index_at(best + step, part) - value) / step[axis]
+        error = float(np.sqrt(max(float(gradient @ variances @ gradient), 0.0)))
         estimates.append(
             Estimate(
                 name=name,
@@ -140,7 +146,7 @@ def _indices(fitted: Fitted) -> list[Estimate]:
     return estimates
 
 
-def correlations_of(fitted: Fitted) -> list[Correlation]:
+def correlations_of(fitted: FittedSurface) -> list[Correlation]:
     """Return the pairs of numbers with a correlation near 1 or -1, with a sentence on what the samples measure."""
     surface, covariance = fitted.surface, fitted.covariance
     shapes = len(surface.shape)
@@ -156,23 +162,18 @@ def correlations_of(fitted: Fitted) -> list[Correlation]:
             coefficient = matrix[a, b] / (errors[a] * errors[b]) if errors[a] > 0.0 and errors[b] > 0.0 else np.nan
             if not abs(coefficient) > _CLOSE:
                 continue
-            what = _measured(fitted, a, b, errors, float(coefficient))
-            sentence = f"{names[a]} and {names[b]} are correlated by {coefficient:.3f}: only {what} is measured."
+            measured = "a combination of the two"
+            first, second = (_relative_error(fitted, index, float(errors[index])) for index in (a, b))
+            if first is not None and second is not None and abs(np.log(first / second)) < _SAME:
+                measured = "their ratio" if coefficient > 0.0 else "their product"
+            sentence = f"{names[a]} and {names[b]} are correlated by {coefficient:.3f}: only {measured} is measured."
             pairs.append(
                 Correlation(first=names[a], second=names[b], coefficient=float(coefficient), sentence=sentence)
             )
     return pairs
 
 
-def _measured(fitted: Fitted, a: int, b: int, errors: Array, coefficient: float) -> str:
-    """Return what is known of two numbers that are not told apart, in words."""
-    first, second = (_relative_error(fitted, index, float(errors[index])) for index in (a, b))
-    if first is not None and second is not None and abs(np.log(first / second)) < _SAME:
-        return "their ratio" if coefficient > 0.0 else "their product"
-    return "a combination of the two"
-
-
-def _relative_error(fitted: Fitted, index: int, error: float) -> float | None:
+def _relative_error(fitted: FittedSurface, index: int, error: float) -> float | None:
     """Return the standard error of the logarithm of a number; None if it is 0."""
     surface = fitted.surface
     if index < len(surface.shape):

@@ -7,33 +7,23 @@ from numpy.typing import NDArray
 
 from brdfdb.figure import Figure, Map, Panel, curve_of, rows
 from brdfdb.fitting.document import Fits
-from brdfdb.fitting.fitted import Fitted
+from brdfdb.fitting.fitted import FittedSurface
 from brdfdb.geometry import degrees, radians, unit_vector
-from brdfdb.measurements.aperture import View
+from brdfdb.measurements.aperture import InstrumentView
 
 Array = NDArray[np.float64]
 
 _MOST = 6  # incidences that are shown
 _PLANE_DEG = 2.5  # distance from the plane of incidence of samples that a cut shows
-_THETA_DEG, _PHI_DEG = 5.0, 10.0  # cells of the maps
+_THETA_DEG = 5.0  # height of the cells of a map
+_PHI_DEG = 10.0  # width of the cells of a map
 
 
-def figure_of(document: Fits, fitted: Fitted) -> Figure:
-    """Return the figure of a fit.
+def figure_of(document: Fits, fitted: FittedSurface) -> Figure:
+    """Return the figure of a fit: cuts and maps for up to six incidences, of the middle channel.
 
-    Parameters
-    ----------
-    document : Fits
-        The document, for names and numbers.
-    fitted : Fitted
-        The fit that is shown, with its samples.
-
-    Returns
-    -------
-    Figure
-        For up to six incidences, f_r of samples and fit in the plane of incidence, where there are samples in it. After
-        all of these, for each incidence a map of the mean of ln(model / sample) over the direction of the viewer. Of
-        several channels, the middle one.
+    A cut has f_r of samples and fit in the plane of incidence, where samples are in it. A map has the mean of
+    ln(model / sample) over the direction of the viewer.
     """
     samples = fitted.samples
     _, first = np.unique(samples.incidence, return_index=True)
@@ -60,12 +50,12 @@ def figure_of(document: Fits, fitted: Fitted) -> Figure:
     )
 
 
-def _turned(fitted: Fitted, chosen: NDArray[np.int64]) -> Array:
+def _turned(fitted: FittedSurface, chosen: NDArray[np.int64]) -> Array:
     """Return the azimuths [degree] of viewers from that of the light, in [0, 360)."""
     return np.asarray(degrees(fitted.samples.phi_r[chosen] - fitted.samples.phi_i[chosen]) % 360.0)
 
 
-def _cut(fitted: Fitted, chosen: NDArray[np.int64], channel: int, title: str) -> Panel | None:
+def _cut(fitted: FittedSurface, chosen: NDArray[np.int64], channel: int, title: str) -> Panel | None:
     samples, phi = fitted.samples, _turned(fitted, chosen)
     theta = degrees(samples.theta_r[chosen])
     mirror, back = np.abs(phi - 180.0) < _PLANE_DEG, np.minimum(phi, 360.0 - phi) < _PLANE_DEG
@@ -79,7 +69,7 @@ def _cut(fitted: Fitted, chosen: NDArray[np.int64], channel: int, title: str) ->
     row = chosen[0]
     wi = np.broadcast_to(unit_vector(samples.theta_i[row], samples.phi_i[row]), (fine.size, 3))
     wr = unit_vector(np.abs(radians(fine)), samples.phi_i[row] + np.where(fine > 0.0, np.pi, 0.0))
-    model = fitted.seen(View(np.ascontiguousarray(wi), wr, samples.instrument))[:, channel]
+    model = fitted.seen(InstrumentView(np.ascontiguousarray(wi), wr, samples.instrument))[:, channel]
     return Panel(
         title=title,
         x_label="theta_r [degree], mirror side positive",
@@ -92,16 +82,16 @@ def _cut(fitted: Fitted, chosen: NDArray[np.int64], channel: int, title: str) ->
     )
 
 
-def _map(fitted: Fitted, chosen: NDArray[np.int64], channel: int, title: str) -> Map:
+def _map(fitted: FittedSurface, chosen: NDArray[np.int64], channel: int, title: str) -> Map:
     phi = _turned(fitted, chosen)
     folded = np.minimum(phi, 360.0 - phi)
     theta = degrees(fitted.samples.theta_r[chosen])
-    left = fitted.logarithms[chosen, channel]
-    known = np.isfinite(left)
+    logarithms = fitted.logarithms[chosen, channel]
+    known = np.isfinite(logarithms)
     across, up = int(180.0 / _PHI_DEG) + 1, int(90.0 / _THETA_DEG) + 1
     cell = np.round(folded / _PHI_DEG).astype(np.int64), np.round(theta / _THETA_DEG).astype(np.int64)
     sums, counts = np.zeros((up, across)), np.zeros((up, across))
-    np.add.at(sums, (cell[1][known], cell[0][known]), left[known])
+    np.add.at(sums, (cell[1][known], cell[0][known]), logarithms[known])
     np.add.at(counts, (cell[1][known], cell[0][known]), 1.0)
     with np.errstate(invalid="ignore"):
         mean = sums / counts

@@ -1,47 +1,64 @@
-"""Fits of models to samples: parameters with intervals, the error that is left, and a ranking."""
+"""Fits of models to samples: parameters with intervals, the remaining error, and a ranking."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.errors import ParameterError
-from brdfdb.fitting.albedo import albedo_of
-from brdfdb.fitting.document import Fit, Fits, Left, Outlier
+from brdfdb.fitting.document import (
+    ALBEDO_ANGLES_DEG,
+    ALBEDO_TOLERANCE,
+    Fit,
+    FitAlbedo,
+    Fits,
+    HeldOutIncidences,
+    Outlier,
+    UnusedSamples,
+)
 from brdfdb.fitting.estimates import correlations_of, estimates_of
-from brdfdb.fitting.fitted import Fitted
-from brdfdb.fitting.held_out import held_out, predicted
-from brdfdb.fitting.material import material_of
+from brdfdb.fitting.fitted import FittedSurface
 from brdfdb.fitting.problem import Point, Problem
 from brdfdb.fitting.remarks import remarks_of, remarks_on_samples, sees_anisotropy
-from brdfdb.fitting.residuals import Kind, Residual
-from brdfdb.fitting.surface import ASSUMED_NM, NotDescribedError, Surface, fitted_by_default
+from brdfdb.fitting.residuals import Kind, Residual, logarithms
+from brdfdb.fitting.surface import ASSUMED_NM, NotDescribedError, SearchedSurface, fitted_by_default
 from brdfdb.geometry import degrees, radians, versine
+from brdfdb.integrals.quadrature import directional_albedo
+from brdfdb.materials import Material, written_name
+from brdfdb.materials.provenance import MOST_NAME
+from brdfdb.materials.recipe_text import rounded, toml_of
 from brdfdb.measurements import Samples
-from brdfdb.measurements.aperture import View
+from brdfdb.measurements.aperture import InstrumentView
+from brdfdb.measurements.measured_source import slug
 from brdfdb.models import MODELS
 from brdfdb.parameters import Floats
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-ROBUST = 3.0  # robust standard deviations of residuals from which on a sample counts less than squared
-FAR = 6.0  # the same, from which on a sample of the best fit is an outlier
+ROBUST = 3.0  # size of a residual [robust standard deviations] above which it counts less than squared
+FAR = 6.0  # size of the residual of an outlier [robust standard deviations]
 MAD = 1.4826  # standard deviation of normal noise over the median of its size
-_MANY = 0.02  # share of the samples from which on outliers of every fit are no accident
-_REACHED, _NEARLY_ALL = 0.1, 5.0  # share of f_r that a fit must have, at this percentage of the samples
-_LISTED = 20  # outliers that are listed
+_MANY = 0.02  # share of the samples above which the outliers of every fit are no accident
+_REACHED = 0.1  # share of f_r that a fit must reach at nearly all samples
+_NEARLY_ALL = 5.0  # percentage of the samples that may be below that share
+_LISTED = 20  # largest number of outliers in the document
 _SETTLED = 0.05  # relative change of the scale that ends the iterations
-_SCALES, _EVALUATIONS = 4, 60
-_LEAST_SCALE = 1e-9  # of noise-free samples
-INTERRUPTED = "the search was interrupted"  # why a model was not fitted
+_SCALES = 4  # largest number of iterations of the scale
+_EVALUATIONS = 60  # evaluations of a descent at all samples
+_HELD_OUT_EVALUATIONS = 40  # evaluations of a descent without one group of incidences
+_LEAST_SCALE = 1e-9  # scale of noise-free samples
+INTERRUPTED = "the search was interrupted"  # reason of a model that was not fitted
 _NEAR_MIRROR = float(radians(3.0))  # angle from the mirror direction within which apertures may catch a specular part
-_COUNTS = 0.01  # share of f_r that a specular part adds in an aperture of that half angle, so that it counts
+_COUNTS = 0.01  # share of f_r that a specular part must add in an aperture of that half angle to count
+GROUPS = 8  # largest number of groups of incidences; fewer incidences are left out one at a time
+_MOST_ANGLES = 4  # largest number of theta_i of the samples at which the albedo is computed
 
 
-def fit(samples: Samples, model: str, *, residual: Kind = "log", refractive_index: str | None = None) -> Fitted:
+def fit(samples: Samples, model: str, *, residual: Kind = "log", refractive_index: str | None = None) -> FittedSurface:
     """Fit a model, or a sum of models, to samples.
 
     Parameters
@@ -58,7 +75,7 @@ def fit(samples: Samples, model: str, *, residual: Kind = "log", refractive_inde
 
     Returns
     -------
-    Fitted
+    FittedSurface
         The best point.
 
     Raises
@@ -77,8 +94,8 @@ def fit(samples: Samples, model: str, *, residual: Kind = "log", refractive_inde
     value for each channel and are solved for at every shape (variable projection); the shape is shared.
 
     Where the instrument of the samples has solid angles, lobes are averaged over them, and a specular part within them
-    is added (`brdfdb.measurements.aperture.View`). Where it has none, samples near the mirror direction are left out if
-    the specular part of the fit counts there.
+    is added (`brdfdb.measurements.aperture.InstrumentView`). Where it has none, samples near the mirror direction are
+    left out if the specular part of the fit counts there.
 
     References
     ----------
@@ -97,7 +114,9 @@ def fit(samples: Samples, model: str, *, residual: Kind = "log", refractive_inde
     [[0.7]]
     """
     turned = sees_anisotropy(samples)
-    surface = Surface(model, samples.wavelength_nm, len(samples.channels), turned=turned, entry=refractive_index)
+    surface = SearchedSurface(
+        model, samples.wavelength_nm, len(samples.channels), turned=turned, entry=refractive_index
+    )
     fitted = _searched(samples, surface, residual, np.zeros(len(samples), dtype=np.bool_))
     hidden = _hidden(fitted)
     if hidden.any() and np.any(fitted.problem.residual.used[~hidden[fitted.rows]]):
@@ -105,11 +124,11 @@ def fit(samples: Samples, model: str, *, residual: Kind = "log", refractive_inde
     return fitted
 
 
-def _searched(samples: Samples, surface: Surface, residual: Kind, hidden: Mask) -> Fitted:
+def _searched(samples: Samples, surface: SearchedSurface, residual: Kind, hidden: Mask) -> FittedSurface:
     """Return the best point of a surface at the samples that count and are not hidden."""
     counting = Residual(samples, residual)
     rows = np.flatnonzero(counting.used.any(axis=1) & ~hidden)
-    view = View(samples.w_i[rows], samples.w_r[rows], samples.instrument)
+    view = InstrumentView(samples.w_i[rows], samples.w_r[rows], samples.instrument)
     problem = Problem(surface, view, counting.selected(rows))
     point = problem.best()
     sigma = _sigma(problem, point)
@@ -119,10 +138,10 @@ def _searched(samples: Samples, surface: Surface, residual: Kind, hidden: Mask) 
         last, sigma = sigma, _sigma(problem, point)
         if abs(sigma - last) <= _SETTLED * last:
             break
-    return Fitted(samples, problem, point, sigma, rows, hidden)
+    return FittedSurface(samples, problem, point, sigma, rows, hidden)
 
 
-def _hidden(fitted: Fitted) -> Mask:
+def _hidden(fitted: FittedSurface) -> Mask:
     """Return the samples at which the specular part of a fit counts, where the aperture is not known, shape (N,)."""
     view = fitted.view
     near = (view.from_mirror < _NEAR_MIRROR) & (view.w_r[:, 2] > 0.0)
@@ -149,7 +168,7 @@ def fits(
     profiles: bool = True,
     tick: Callable[[str], None] = lambda _: None,
     keep_finished: bool = False,
-) -> tuple[Fits, list[Fitted]]:
+) -> tuple[Fits, list[FittedSurface]]:
     """Fit several models to samples and rank them.
 
     Parameters
@@ -169,7 +188,7 @@ def fits(
 
     Returns
     -------
-    Fits, list of Fitted
+    Fits, list of FittedSurface
         The document, and the fits in its order. They are ranked by the root mean square of ln(model / sample) over
         incidences that were left out, or by BIC where the light has one direction. Samples that are outliers of every
         fit do not count in it, unless they are many.
@@ -183,20 +202,20 @@ def fits(
     counting = Residual(samples, residual)
     searches, skipped = _searches(samples, models, residual, refractive_index, tick, keep_finished)
     interrupted = INTERRUPTED in skipped.values()
-    shared = _shared_outliers([fitted for fitted, _ in searches])
-    made = [(_document(fitted, errors, shared), fitted) for fitted, errors in searches]
-    by_held_out = made[0][0].held_out is not None
-    made.sort(key=lambda one: _rank(one[0]))
+    shared = _shared_outliers([search.fitted for search in searches])
+    ranked = sorted(((_document(search, shared), search.fitted) for search in searches), key=lambda fit: _rank(fit[0]))
+    records = [record for record, _ in ranked]
+    surfaces = [fitted for _, fitted in ranked]
     if profiles and not interrupted:
         try:
             tick("intervals")
-            made[0] = _profiled(*made[0])
+            records[0] = records[0].model_copy(update={"estimates": estimates_of(surfaces[0], profiles=True)})
         except KeyboardInterrupt:
             if not keep_finished:
                 raise
             interrupted = True
-    far, count = _outliers(made[0][1])
-    indexed = any(fitted.surface.indexed for _, fitted in made)
+    sigmas = _sigmas(surfaces[0])
+    indexed = any(fitted.surface.indexed for fitted in surfaces)
     document = Fits(
         name=samples.name,
         provenance=samples.provenance,
@@ -209,22 +228,21 @@ def fits(
         refractive_index=refractive_index,
         source_solid_angle_sr=samples.instrument.source_solid_angle_sr,
         receiver_solid_angle_sr=samples.instrument.receiver_solid_angle_sr,
-        left_out=_left_out(samples, counting),
+        left_out=_unused(samples, counting),
         remarks=remarks_on_samples(samples, counting),
-        ranked_by="held-out rms of ln" if by_held_out else "BIC",
-        fits=[one for one, _ in made],
-        outliers=far,
-        outlier_count=count,
+        ranked_by="BIC" if records[0].held_out is None else "held-out rms of ln",
+        fits=records,
+        outliers=_outliers(surfaces[0], sigmas),
+        outlier_count=int(np.count_nonzero(np.abs(sigmas) > FAR)),
         shared_outlier_count=int(shared.sum()),
         skipped=skipped,
         interrupted=interrupted,
     )
-    return document, [fitted for _, fitted in made]
+    return document, surfaces
 
 
-def _left_out(samples: Samples, counting: Residual) -> Left:
-    """Return the numbers of values that no fit uses, by reason."""
-    return Left(
+def _unused(samples: Samples, counting: Residual) -> UnusedSamples:
+    return UnusedSamples(
         below_horizon=int(samples.record.get("below_the_horizon", 0)),
         holes=counting.holes,
         at_horizon=counting.at_horizon,
@@ -232,9 +250,11 @@ def _left_out(samples: Samples, counting: Residual) -> Left:
     )
 
 
-def _profiled(record: Fit, fitted: Fitted) -> tuple[Fit, Fitted]:
-    """Return a fit with the intervals of profiles where the covariance misleads."""
-    return record.model_copy(update={"estimates": estimates_of(fitted, profiles=True)}), fitted
+class _FittedModel(NamedTuple):
+    """A fit, and ln(model / sample) (N, C) at incidences that were left out in turn; None if the light has one."""
+
+    fitted: FittedSurface
+    errors: Floats | None
 
 
 def _searches(
@@ -244,16 +264,16 @@ def _searches(
     refractive_index: str | None,
     tick: Callable[[str], None],
     keep_finished: bool,
-) -> tuple[list[tuple[Fitted, Floats | None]], dict[str, str]]:
-    """Return the fits of all models that can describe the samples with their errors held out, and why others lack."""
-    searches: list[tuple[Fitted, Floats | None]] = []
+) -> tuple[list[_FittedModel], dict[str, str]]:
+    """Return the fits of all models that can describe the samples, and by name the reasons that others are skipped."""
+    searches: list[_FittedModel] = []
     skipped: dict[str, str] = {}
     tried = fitted_by_default() if models is None else models
     for number, model in enumerate(tried):
         try:
             tick(model)
             fitted = fit(samples, model, residual=residual, refractive_index=refractive_index)
-            searches.append((fitted, predicted(fitted)))
+            searches.append(_FittedModel(fitted, _predicted(fitted)))
         except NotDescribedError as error:
             if models is not None and len(models) == 1:
                 raise
@@ -268,11 +288,11 @@ def _searches(
     if models is None:
         slow = "its values are integrals, which take minutes; name it to fit it"
         skipped |= {name: slow for name in MODELS if name not in tried}
-    _check_reach([fitted for fitted, _ in searches])
+    _check_reach([search.fitted for search in searches])
     return searches, skipped
 
 
-def _check_reach(searches: Sequence[Fitted]) -> None:
+def _check_reach(searches: Sequence[FittedSurface]) -> None:
     """Raise ParameterError if f_r of the samples is beyond what any of the models can have."""
     for one in searches:
         logs = one.logarithms[np.isfinite(one.logarithms)]
@@ -287,7 +307,7 @@ def _check_reach(searches: Sequence[Fitted]) -> None:
     )
 
 
-def _shared_outliers(searches: Sequence[Fitted]) -> Mask:
+def _shared_outliers(searches: Sequence[FittedSurface]) -> Mask:
     """Return the samples (N, C) that are far from every fit; none where they are too many to be accidents."""
     of_fits = [np.abs(_sigmas(one)) > FAR for one in searches]
     hidden = [one.hidden[:, np.newaxis] for one in searches]
@@ -296,33 +316,32 @@ def _shared_outliers(searches: Sequence[Fitted]) -> Mask:
 
 
 def _rank(one: Fit) -> tuple[float, float]:
-    """Return what fits are sorted by: the error held out to three digits, then BIC, which outliers hardly change."""
+    """Return the rank of a fit: its held-out error to three digits, then BIC, which outliers hardly change."""
     return (0.0 if one.held_out is None else float(f"{one.held_out.rms:.3g}"), one.bic)
 
 
-def _document(fitted: Fitted, errors: Floats | None, shared: Mask) -> Fit:
+def _document(search: _FittedModel, shared: Mask) -> Fit:
     """Return the record of a fit, with intervals of its covariance."""
+    fitted = search.fitted
     logs = fitted.logarithms[np.isfinite(fitted.logarithms) & ~shared]
     used = fitted.problem.residual.count
     searched = len(fitted.problem.free) + fitted.point.values.size
     deviance = used * float(np.log(max(2.0 * fitted.point.cost / used, 1e-300)))
-    albedo = albedo_of(fitted.surface, fitted.point, fitted.samples)
-    material, recipe = material_of(fitted.surface, fitted.point, fitted.samples)
-    correlations = correlations_of(fitted)
+    material, recipe = _material_of(fitted.surface, fitted.point, fitted.samples)
     record = Fit(
         model=fitted.surface.name,
         estimates=estimates_of(fitted, profiles=False),
         rms_ln=float(np.sqrt(np.mean(logs**2))) if logs.size else None,
         median_ln=float(np.median(np.abs(logs))) if logs.size else None,
         sigma=fitted.sigma,
-        held_out=held_out(fitted.samples, errors, shared),
+        held_out=_held_out(fitted.samples, search.errors, shared),
         numbers=searched,
         aic=deviance + 2.0 * (searched + 1),
         bic=deviance + (searched + 1) * float(np.log(used)),
         pattern=_pattern(fitted),
         at_mirror=int(np.sum(fitted.hidden)),
-        albedo=albedo,
-        correlations=correlations,
+        albedo=_albedo_of(fitted.surface, fitted.point, fitted.samples),
+        correlations=correlations_of(fitted),
         remarks=[],
         material=material,
         recipe=recipe,
@@ -330,7 +349,7 @@ def _document(fitted: Fitted, errors: Floats | None, shared: Mask) -> Fit:
     return record.model_copy(update={"remarks": remarks_of(record, fitted)})
 
 
-def _pattern(fitted: Fitted) -> float:
+def _pattern(fitted: FittedSurface) -> float:
     """Return the correlation of residuals with those of the nearest other direction."""
     from scipy.spatial import cKDTree
 
@@ -345,7 +364,7 @@ def _pattern(fitted: Fitted) -> float:
     return min(float(np.sum((r * r[nearest])[used]) / size), 1.0) if size > 0.0 else 0.0
 
 
-def _sigmas(fitted: Fitted) -> Floats:
+def _sigmas(fitted: FittedSurface) -> Floats:
     """Return the residuals (N, C) of all samples over their robust standard deviation; 0 where they do not count."""
     residual = Residual(fitted.samples, fitted.problem.residual.kind)
     counts = residual.used & ~fitted.hidden[:, np.newaxis]
@@ -353,17 +372,16 @@ def _sigmas(fitted: Fitted) -> Floats:
     return np.asarray(np.where(counts, of_all, 0.0))
 
 
-def _outliers(fitted: Fitted) -> tuple[list[Outlier], int]:
-    """Return the samples that are far from a fit, the farthest first, and their number."""
-    samples, f_r, sigmas = fitted.samples, fitted.seen(fitted.view), _sigmas(fitted)
+def _outliers(fitted: FittedSurface, sigmas: Floats) -> list[Outlier]:
+    """Return the samples that are far from a fit, the farthest first."""
+    samples = fitted.samples
+    f_r = fitted.seen(fitted.view)
     far = np.argwhere(np.abs(sigmas) > FAR)
     order = np.argsort(-np.abs(sigmas[far[:, 0], far[:, 1]]), kind="stable")[:_LISTED]
-    listed = [
+    angles = {f"{name}_deg": degrees(getattr(samples, name)) for name in ("theta_i", "phi_i", "theta_r", "phi_r")}
+    return [
         Outlier(
-            theta_i_deg=_degrees(samples.theta_i[row]),
-            phi_i_deg=_degrees(samples.phi_i[row]),
-            theta_r_deg=_degrees(samples.theta_r[row]),
-            phi_r_deg=_degrees(samples.phi_r[row]),
+            **{name: round(float(values[row]), 6) for name, values in angles.items()},
             channel=samples.channels[column],
             value=float(samples.values[row, column]),
             model=float(f_r[row, column]),
@@ -371,8 +389,119 @@ def _outliers(fitted: Fitted) -> tuple[list[Outlier], int]:
         )
         for row, column in far[order].tolist()
     ]
-    return listed, len(far)
 
 
-def _degrees(angle: float) -> float:
-    return round(float(degrees(angle)), 6)
+def _predicted(fitted: FittedSurface) -> Floats | None:
+    """Return ln(model / sample) (N, C) at incidences that were left out in turn; None if the light has one direction.
+
+    Each search begins at the best point for all samples, and fits the remaining samples. More than eight incidences
+    are left out in groups of neighbours. Samples that are hidden or not positive have nan.
+    """
+    samples, surface, view = fitted.samples, fitted.surface, fitted.view
+    groups = _groups_of(samples)
+    if len(groups) < 2:
+        return None
+    residual = Residual(samples, fitted.problem.residual.kind)
+    counts = residual.used.any(axis=1) & ~fitted.hidden
+    errors = np.full(samples.values.shape, np.nan)
+    for rows in groups:
+        remaining = counts.copy()
+        remaining[rows] = False
+        if not remaining.any():
+            continue
+        fitted_rows = np.flatnonzero(remaining)
+        part = Problem(surface, view.selected(fitted_rows), residual.selected(fitted_rows))
+        part.scale = fitted.problem.scale
+        end = part.descend(fitted.point.x[part.free], _HELD_OUT_EVALUATIONS)
+        errors[rows] = logarithms(samples.selected(rows), surface.f_r(end.x, end.values, view.selected(rows)))
+    errors[fitted.hidden] = np.nan
+    return errors
+
+
+def _held_out(samples: Samples, errors: Floats | None, outliers: Mask) -> HeldOutIncidences | None:
+    """Return the error at incidences that were left out, less outliers (N, C); None if nothing was predicted."""
+    if errors is None:
+        return None
+    counts = np.isfinite(errors) & ~outliers
+    groups = [rows for rows in _groups_of(samples) if counts[rows].any()]
+    if not groups:
+        return None
+    together = errors[counts]
+    return HeldOutIncidences(
+        theta_i_deg=[np.unique(np.round(degrees(samples.theta_i[rows]), 3)).tolist() for rows in groups],
+        rms_ln=[float(np.sqrt(np.mean(errors[rows][counts[rows]] ** 2))) for rows in groups],
+        rms=float(np.sqrt(np.mean(together**2))),
+        median=float(np.median(np.abs(together))),
+    )
+
+
+def _groups_of(samples: Samples) -> list[NDArray[np.int64]]:
+    """Return the rows of each incidence, or of groups of neighbouring ones, by theta_i and then phi_i."""
+    numbers, first = np.unique(samples.incidence, return_index=True)
+    order = np.lexsort((samples.phi_i[first], samples.theta_i[first]))
+    parts = np.array_split(numbers[order], min(GROUPS, numbers.size))
+    return [np.flatnonzero(np.isin(samples.incidence, part)) for part in parts]
+
+
+def _material_of(surface: SearchedSurface, point: Point, samples: Samples) -> tuple[Material | None, str | None]:
+    """Return a fit as a material and its text in a recipe; None for a sum, and for colours without wavelengths.
+
+    Reflectances of samples with a wavelength are spectra, also of one wavelength: the material holds there only.
+    """
+    at = samples.wavelength_nm
+    several = len(samples.channels) > 1
+    if len(surface.terms) > 1 or (several and at is None):
+        return None, None
+    spec = surface.terms[0].spec
+    origin = f"fitted to {samples.name}"
+    (numbers,) = surface.numbers(point.x)
+    values: dict[str, Any] = {}
+    for parameter in spec.parameters:
+        name = parameter.name
+        column = next((i for i, one in enumerate(surface.coefficients) if one.name == name), None)
+        if at is not None and parameter.reflectance and (column is not None or not several):
+            fitted = [numbers[name]] if column is None else point.values[column].tolist()
+            spectrum = [rounded(value) for value in fitted]
+            values[name] = {"wavelengths_nm": at.tolist(), "values": spectrum, "origin": origin}
+            continue
+        if column is not None and several:
+            return None, None  # an amplitude that is no reflectance has no spectrum
+        value = float(point.values[column, 0]) if column is not None else numbers[name]
+        in_file = float(degrees(value)) if parameter.unit == "rad" else value
+        values[written_name(parameter)] = value if isinstance(value, bool) else rounded(in_file)
+    table: dict[str, Any] = {"title": f"{samples.name}, as {spec.title}", "model": spec.name, "source": origin}
+    if surface.searched_index:
+        table["refractive_index"] = f"constant/{rounded(numbers['n'])!r}/{rounded(numbers['k'])!r}"
+    elif surface.entry is not None and spec.spectral:
+        table["refractive_index"] = surface.entry
+    spectra = any(isinstance(value, dict) for value in values.values())
+    if spec.spectral or spectra:
+        table["wavelengths_nm"] = surface.wavelength_nm.tolist()
+    elif at is not None:
+        table["note"] = f"fitted at {at[0]:g} nm; the model is grey, and its numbers hold at this wavelength only"
+    table["parameters"] = values
+    name = slug(f"{samples.name}-as-{spec.name}")[:MOST_NAME].rstrip("-")
+    return Material.from_table(name, table), toml_of(name, table)
+
+
+def _albedo_of(surface: SearchedSurface, point: Point, samples: Samples) -> FitAlbedo:
+    """Return the largest directional albedo [1] of a fit with its specular part, at some angles of the light.
+
+    The channel is that with the largest f_r at the samples. Polar angles of the light are 0 to 85 degrees, and some of
+    those of the samples. The azimuth is 0.
+    """
+    measured = np.unique(np.round(degrees(samples.theta_i), 3))
+    measured = measured[np.linspace(0, measured.size - 1, min(_MOST_ANGLES, measured.size)).round().astype(np.int64)]
+    angles = np.union1d(ALBEDO_ANGLES_DEG, measured[measured < 89.0])
+    channel = int(np.argmax(np.mean(point.f_r, axis=0)))
+    total, error = np.zeros(angles.size), np.zeros(angles.size)
+    for number, term in enumerate(surface.terms):
+        given, scale = surface.in_channel(point.x, point.values, number, channel)
+        if scale <= 0.0:
+            continue
+        albedo = directional_albedo(
+            term.spec, radians(angles), tolerance=ALBEDO_TOLERANCE, specular=term.spec.specular is not None, **given
+        )
+        total += scale * albedo.albedo
+        error += scale * albedo.error
+    return FitAlbedo.largest(angles, total, error)

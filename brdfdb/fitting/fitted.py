@@ -10,44 +10,28 @@ from numpy.typing import NDArray
 
 from brdfdb.fitting.problem import Point, Problem
 from brdfdb.fitting.residuals import logarithms
-from brdfdb.fitting.surface import Surface
+from brdfdb.fitting.surface import SearchedSurface
 from brdfdb.fitting.uncertainty import Covariance, covariance
 from brdfdb.measurements import Samples
-from brdfdb.measurements.aperture import View
+from brdfdb.measurements.aperture import InstrumentView
 from brdfdb.parameters import Floats
 
 Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
-class Fitted:
-    """The best point of a surface.
-
-    Attributes
-    ----------
-    samples : Samples
-        The samples.
-    problem : Problem
-        Surface, residual and the scale of robustness.
-    point : Point
-        The best point.
-    sigma : float
-        Robust standard deviation of the residuals.
-    rows : array of int
-        Samples that count, those of `problem`.
-    hidden : array (N,) of bool
-        Samples that are left out, because a specular part is seen there through an aperture that is not known.
-    """
+class FittedSurface:
+    """The best point of a surface, with the samples that it was fitted to."""
 
     samples: Samples
     problem: Problem
     point: Point
-    sigma: float
-    rows: NDArray[np.int64]
-    hidden: Mask
+    sigma: float  # robust standard deviation of the residuals
+    rows: NDArray[np.int64]  # samples that count: those of the problem
+    hidden: Mask  # samples (N,) that are left out: a specular part is seen there through an aperture that is not known
 
     @property
-    def surface(self) -> Surface:
+    def surface(self) -> SearchedSurface:
         """The surface that was fitted."""
         return self.problem.surface
 
@@ -57,15 +41,15 @@ class Fitted:
         return covariance(self.problem, self.point)
 
     @cached_property
-    def view(self) -> View:
+    def view(self) -> InstrumentView:
         """The directions of all samples, as their instrument sees them."""
-        return View(self.samples.w_i, self.samples.w_r, self.samples.instrument)
+        return InstrumentView(self.samples.w_i, self.samples.w_r, self.samples.instrument)
 
     def f_r(self, wi: Floats, wr: Floats) -> Floats:
         """Return f_r (N, C) [1/sr] of the fit at unit vectors (N, 3) of light and viewer, without its specular part."""
-        return self.surface.f_r(self.point.x, self.point.values, View(wi, wr))
+        return self.surface.f_r(self.point.x, self.point.values, InstrumentView(wi, wr))
 
-    def seen(self, view: View) -> Floats:
+    def seen(self, view: InstrumentView) -> Floats:
         """Return f_r (N, C) [1/sr] of the fit as an instrument sees it."""
         return self.surface.f_r(self.point.x, self.point.values, view)
 

@@ -8,26 +8,35 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brdfdb.fitting.projection import COARSE, FINE, cost_of, project, slopes_of
 from brdfdb.fitting.residuals import Residual
-from brdfdb.fitting.shape_slopes import basis_slopes
-from brdfdb.fitting.surface import Surface, total
-from brdfdb.fitting.variables import best_apart, spread
-from brdfdb.measurements.aperture import RESOLVED, View
+from brdfdb.fitting.surface import SearchedSurface, Term, columns, total
+from brdfdb.fitting.variables import EDGE, NORMAL, best_apart, index_slopes, spread
+from brdfdb.measurements.aperture import RESOLVED, InstrumentView
 from brdfdb.parameters import Floats
 
 Array = NDArray[np.float64]
 
 POINTS = 128  # points of the unit cube that are tried at some of the samples
-STARTS = 3  # of them from which descents begin
+STARTS = 3  # descents, which begin at the best of these points
 _SPREAD = 4096  # points among which those with a lobe that samples can show are chosen
-_SOME, _MORE = 300, 1000  # samples at which points are tried, and at which the promising ones go on
-_NARROWEST, _WIDEST = 0.002, 1.5  # widths of lobes that descents begin with
-_STEP = 1e-6  # of differences, in the unit cube
+_SOME = 300  # samples at which points are tried
+_MORE = 1000  # samples of the promising descents
+_NARROWEST = 0.002  # width of the narrowest lobe at which a descent begins
+_WIDEST = 1.5  # width of the widest one
+_STEP = 1e-6  # step of finite differences, in the unit cube
 _INSIDE = 1e-9  # distance of beginnings from the surface of the cube
-_COARSE, _FINE = 20, 60  # evaluations of descents, at some samples and at more
-_PROMISING = 1.5  # times the least cost at some samples
-_AT_END = 1e-12  # distance of a coefficient from an end of its range that is the end, in its unit
+_COARSE = 20  # evaluations of descents at some samples
+_FINE = 60  # evaluations of descents at more samples
+_PROMISING = 1.5  # largest cost of a promising descent, over the least cost
+_AT_END = 1e-12  # distance from an end of its range, in its unit, at which a coefficient is at the end
+
+MOST = 60  # steps of the search for coefficients in a descent
+_FEW = 6  # steps of that search in a trial
+FINE = 1e-10  # relative change of the cost that ends the steps of a descent
+COARSE = 1e-3  # relative change of the cost that ends the steps of a trial
+_EDGE = 1e-12  # share of a range within which a coefficient is at its end
+_FIRST_DAMPING = 1e-4  # damping of the first step: two equal lobes make a singular matrix
+_LEAST_DAMPING = 1e-10  # damping of later steps
 
 
 class Point(NamedTuple):
@@ -42,29 +51,19 @@ class Point(NamedTuple):
 
 
 class Problem:
-    """A surface, the samples it is fitted to, and the scale of robustness.
+    """A surface, the samples that it is fitted to, and the scale of robustness.
 
-    Parameters
-    ----------
-    surface : Surface
-        The surface.
-    view : View
-        Directions of light and viewer as the instrument sees them.
-    residual : Residual
-        Of the same N samples.
-    fixed : mapping of int to float
-        Shape variables that are held, with their places in the unit cube.
-    held : mapping of int to float
-        Coefficients that are held at a value in each channel.
+    `fixed` and `fixed_coefficients` are shape variables (places in the unit cube) and coefficients (values in each
+    channel) that are not searched, by index.
     """
 
     def __init__(
         self,
-        surface: Surface,
-        view: View,
+        surface: SearchedSurface,
+        view: InstrumentView,
         residual: Residual,
         fixed: Mapping[int, float] | None = None,
-        held: Mapping[int, float] | None = None,
+        fixed_coefficients: Mapping[int, float] | None = None,
     ) -> None:
         self.surface, self.view, self.residual = surface, view, residual
         self.fixed = dict(fixed or {})
@@ -72,7 +71,7 @@ class Problem:
         shape = (len(surface.coefficients), surface.channels)
         self.low = np.array([np.full(surface.channels, one.low) for one in surface.coefficients]).reshape(shape)
         self.high = np.array([np.full(surface.channels, one.high) for one in surface.coefficients]).reshape(shape)
-        for index, value in (held or {}).items():
+        for index, value in (fixed_coefficients or {}).items():
             self.low[index] = self.high[index] = value
         level = np.pi * float(np.median(np.maximum(residual.truth[residual.used], 0.0)))
         self.begin = np.broadcast_to(np.clip(level, 0.01, 0.5) * surface.units, shape)
@@ -101,10 +100,10 @@ class Problem:
         if basis is None:
             basis = self.surface.basis(x, self.view)
         begin = self.begin if start is None else start
-        values = project(self.surface, basis, self.residual, self.scale, (self.low, self.high), begin, tolerance)
+        values = _project(self.surface, basis, self.residual, self.scale, (self.low, self.high), begin, tolerance)
         f_r = total(basis, self.surface.monomials(values))
         residuals = self.residual.of(f_r)
-        return Point(x, values, basis, f_r, residuals, float(np.sum(cost_of(residuals, self.scale))))
+        return Point(x, values, basis, f_r, residuals, float(np.sum(_cost_of(residuals, self.scale))))
 
     def shape_jacobian(self, point: Point) -> Floats:
         """Return the derivatives (S, N, C) of residuals by the free shape variables, at fixed coefficients.
@@ -114,7 +113,7 @@ class Problem:
         monomials = self.surface.monomials(point.values)
         slope = self.residual.slope(point.f_r)
         columns = np.zeros((len(self.free), *point.f_r.shape))
-        derived = basis_slopes(self.surface, point.x, self.view)
+        derived = _basis_slopes(self.surface, point.x, self.view)
         rest = [column for column, variable in enumerate(self.free) if variable not in derived]
         for column, variable in enumerate(self.free):
             if variable in derived:
@@ -133,7 +132,7 @@ class Problem:
         span = self.high - self.low
         units = self.surface.units
         free = (point.values > self.low + _AT_END * units) & (point.values < self.high - _AT_END * units) & (span > 0.0)
-        jacobian = slopes_of(self.surface, point.basis, point.values) * self.residual.slope(point.f_r)
+        jacobian = _slopes_of(self.surface, point.basis, point.values) * self.residual.slope(point.f_r)
         return jacobian * free[:, np.newaxis, :], free
 
     def descend(self, begin: Array, most: int) -> Point:
@@ -184,21 +183,18 @@ class Problem:
         """Return points (P, S) of the free variables, spread evenly, whose lobes are as wide as samples can show."""
         points = spread(_SPREAD, max(len(self.free), 1))[:, : len(self.free)]
         chosen: list[Array] = []
+        narrowest = max(_NARROWEST, RESOLVED * self.view.half_angle)
         for some in np.split(points, _SPREAD // POINTS):
-            chosen += list(some[self._shows(self.placed(some))])
+            widths = self.surface.widths(self.placed(some))
+            chosen += list(some[np.all((narrowest <= widths) & (widths <= _WIDEST), axis=1)])
             if len(chosen) >= POINTS:
                 break
         return np.array(chosen[:POINTS] if chosen else points[:POINTS])
 
-    def _shows(self, points: Array) -> NDArray[np.bool_]:
-        """Return False for points (P, S) where a lobe is too narrow or too wide to begin with."""
-        narrowest, widths = max(_NARROWEST, RESOLVED * self.view.half_angle), self.surface.widths(points)
-        return np.asarray(np.all((narrowest <= widths) & (widths <= _WIDEST), axis=1))
-
     def best(self) -> Point:
         """Return the best end of descents from several beginnings, from which a descent at all samples goes on.
 
-        Points are tried at some of the samples. Descents from the best three that are apart end at those samples, and
+        Points are tried at some of the samples. Descents from the best three distant points end at those samples, and
         the promising ones go on at more of them.
         """
         if not self.free:
@@ -237,3 +233,151 @@ def _undone(columns: Floats, inner: Floats, weights: Floats) -> Floats:
     normal = weighted @ of_channels.transpose(0, 2, 1)
     solved = np.linalg.pinv(normal, rcond=1e-12, hermitian=True) @ (weighted @ columns.transpose(2, 1, 0))
     return np.asarray((solved.transpose(0, 2, 1) @ of_channels).transpose(1, 2, 0))
+
+
+def _cost_of(residuals: Floats, scale: float) -> Floats:
+    """Return half of the sum (C,) over rows of s^2 rho((r / s)^2), rho(z) = 2 (sqrt(1 + z) - 1)."""
+    z = (residuals / scale) ** 2
+    return np.asarray(scale**2 * np.sum(np.sqrt(1.0 + z) - 1.0, axis=0))
+
+
+def _project(
+    surface: SearchedSurface,
+    basis: Floats,
+    residual: Residual,
+    scale: float,
+    bounds: tuple[Array, Array],
+    start: Array,
+    tolerance: float = FINE,
+) -> Array:
+    """Return the coefficients (K, C) between bounds (K, C) that make the robust cost of residuals least.
+
+    `basis` (M, N, C) or (M, N, 1) has the factors [1/sr] of the monomials. Coefficients with equal bounds are fixed.
+    The steps are those of Gauss and Newton with Levenberg's damping, and end where the relative change of the cost is
+    below `tolerance`. A coefficient at a bound stays there if its step would leave the range. Channels are independent,
+    and each has its own damping.
+    """
+    low, high = bounds
+    values = np.clip(start, low, high)
+    if not len(values):
+        return values
+    span = np.where(high > low, high - low, 1.0)
+    f_r = total(basis, surface.monomials(values))
+    residuals = residual.of(f_r)
+    cost = _cost_of(residuals, scale)
+    damping = np.full(cost.shape, _FIRST_DAMPING)
+    diagonal = np.arange(len(values))
+    for _ in range(MOST if tolerance < COARSE else _FEW):
+        jacobian = _slopes_of(surface, basis, values) * residual.slope(f_r)
+        weights = 1.0 / np.sqrt(1.0 + (residuals / scale) ** 2)
+        columns = np.ascontiguousarray(jacobian.transpose(2, 0, 1))  # (C, K, N): products of matrices are quick
+        weighted = columns * weights.T[:, np.newaxis, :]
+        gradient = np.einsum("ckn,cn->ck", weighted, residuals.T)
+        normal = weighted @ columns.transpose(0, 2, 1)
+        stays = ((values <= low + _EDGE * span) & (gradient.T > 0.0)) | (
+            (values >= high - _EDGE * span) & (gradient.T < 0.0)
+        )
+        stays |= high <= low
+        size = np.sqrt(np.maximum(normal[:, diagonal, diagonal], 1e-300))
+        normal = normal / (size[:, :, np.newaxis] * size[:, np.newaxis, :])
+        normal = np.where(stays.T[:, :, np.newaxis] | stays.T[:, np.newaxis, :], 0.0, normal)
+        normal[:, diagonal, diagonal] = 1.0 + damping[:, np.newaxis]
+        step = np.linalg.solve(normal, np.where(stays.T, 0.0, gradient / size)[..., np.newaxis])[..., 0] / size
+        tried = np.clip(values - step.T, low, high)
+        f_tried = total(basis, surface.monomials(tried))
+        r_tried = residual.of(f_tried)
+        cost_tried = _cost_of(r_tried, scale)
+        better = cost_tried <= cost
+        gain = np.where(better, cost - cost_tried, 0.0)
+        done = np.where(better, gain <= tolerance * cost, damping > 1e8)
+        values = np.where(better, tried, values)
+        f_r, residuals = np.where(better, f_tried, f_r), np.where(better, r_tried, residuals)
+        cost = np.where(better, cost_tried, cost)
+        damping = np.where(better, np.maximum(0.1 * damping, _LEAST_DAMPING), 10.0 * np.maximum(damping, 1e-6))
+        if np.all(done):
+            break
+    return values
+
+
+def _slopes_of(surface: SearchedSurface, basis: Floats, values: Array) -> Floats:
+    """Return the derivatives (K, N, C) [1/sr] of f_r by each coefficient (K, C)."""
+    slopes = surface.slopes(values)
+    if basis.shape[2] == 1:
+        return np.asarray(np.einsum("mn,kmc->knc", basis[:, :, 0], slopes))
+    return np.asarray(np.einsum("mnc,kmc->knc", basis, slopes))
+
+
+def _basis_slopes(surface: SearchedSurface, x: Array, view: InstrumentView) -> dict[int, Floats]:
+    """Return the derivatives (M, N, C) or (M, N, 1) [1/sr] of `SearchedSurface.basis` by shape variables, by index.
+
+    Only models with a gradient have them. A specular part inside an aperture has none, nor have n and k where k is 0,
+    the end of its range.
+    """
+    numbers = surface.numbers(x)
+    several = surface.channels if surface.indexed else 1
+    sizes = [len(term.polynomial.exponents) for term in surface.terms]
+    slopes: dict[int, Floats] = {}
+    of_variables = [_moves(surface, variable, x, numbers) for variable in range(len(surface.shape))]
+    starts = np.concatenate([[0], np.cumsum(sizes)])
+    refused: set[int] = set()
+    for number, term in enumerate(surface.terms):
+        wanted = {variable: moves[number] for variable, moves in enumerate(of_variables) if moves[number]}
+        if not wanted:
+            continue
+        if term.spec.gradient is None or (view.half_angle and term.spec.specular is not None):
+            refused |= wanted.keys()
+            continue
+        count = several if term.spec.spectral else 1
+        names = {name for moves in wanted.values() for name in moves}
+        by_name = [_term_slopes(term, view, surface.arguments(number, numbers[number], c), names) for c in range(count)]
+        for variable, moves in wanted.items():
+            of_term = np.stack([sum(move * one[name] for name, move in moves.items()) for one in by_name], axis=-1)
+            if variable not in slopes:
+                slopes[variable] = np.zeros((starts[-1], len(view), several))
+            slopes[variable][starts[number] : starts[number + 1]] = of_term
+    return {
+        variable: np.nan_to_num(values, nan=0.0, posinf=0.0, neginf=0.0)
+        for variable, values in slopes.items()
+        if variable not in refused and any(of_variables[variable])
+    }
+
+
+def _moves(
+    surface: SearchedSurface, variable: int, x: Array, numbers: list[dict[str, float]]
+) -> list[dict[str, float]]:
+    """Return the derivatives of the parameters of each term by a shape variable; empty where a term has no part in it.
+
+    All are empty for the variables in the place of n and k if k is 0: it begins there like a square root.
+    """
+    one, owner = surface.shape[variable], surface.owners[variable]
+    moves: list[dict[str, float]] = [{} for _ in surface.terms]
+    if owner is not None:
+        term = surface.terms[owner]
+        names = term.tied if term.tied and one.name == term.tied[0] else (one.name,)
+        moves[owner] = dict.fromkeys(names, one.slope(float(x[variable])))
+        return moves
+    labels = [member.name for member in surface.shape]
+    ends = {name: surface.shape[labels.index(name)].value(float(x[labels.index(name)])) for name in (NORMAL, EDGE)}
+    for number, term in enumerate(surface.terms):
+        if term.spec.spectral and numbers[number]["k"] > 0.0:
+            slopes = index_slopes(ends[NORMAL], ends[EDGE])
+            index = slopes.by_normal if one.name == NORMAL else slopes.by_edge
+            moves[number] = {"n": index.n * one.slope(0.5), "k": index.k * one.slope(0.5)}
+    return moves
+
+
+def _term_slopes(term: Term, view: InstrumentView, given: Mapping[str, float], names: set[str]) -> dict[str, Floats]:
+    """Return the derivatives (M, N) [1/sr] of the factors of a term by some of its parameters."""
+    assert term.spec.gradient is not None
+    model, ordered = term.spec.gradient, sorted(names)
+    arguments, count = columns([{**given, **node} for node in term.nodes]), len(term.nodes)
+    width = term.widths([given]) if view.half_angle else None
+
+    def derivatives(wi: Floats, wr: Floats) -> Floats:
+        by = model(wi, wr, **arguments).derivatives
+        return np.concatenate([np.broadcast_to(by[name], (count, len(wi))) for name in ordered]).T
+
+    with np.errstate(all="ignore"):  # extreme parameters may raise flags
+        seen = view.mean(derivatives, None if width is None else float(width[0])).T
+    values = seen.reshape(len(ordered), count, len(view))
+    return dict(zip(ordered, values if term.scaled else term.polynomial.parts(values), strict=True))

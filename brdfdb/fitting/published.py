@@ -11,10 +11,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from brdfdb.errors import FileFormatError, ParameterError
-from brdfdb.fitting.document import Albedo
+from brdfdb.figure import DocumentPart
+from brdfdb.fitting.document import ALBEDO_ANGLES_DEG, ALBEDO_TOLERANCE, FitAlbedo
 from brdfdb.fitting.surface import flat_model
 from brdfdb.geometry import radians
 from brdfdb.integrals.quadrature import directional_albedo
@@ -27,36 +28,31 @@ from brdfdb.place import path_of
 
 SUFFIX = ".fit"
 CHANNELS = ("R", "G", "B")
-_MOST_BYTES, _MOST_LINE = 1 << 24, 4096
-_ANGLES_DEG = (0.0, 30.0, 60.0, 75.0, 85.0)  # theta_i at which the albedo is computed
-_TOLERANCE = 1e-3  # of albedos
+_MOST_BYTES = 1 << 24  # of a file
+_MOST_LINE = 4096  # characters of a line
 _FLAT = "Lambertian"
 _NAMED = Path(__file__).with_name("published.toml")
 
 
-class _Record(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-
-class Lobe(_Record):
+class PublishedLobe(DocumentPart):
     """One term of a published fit."""
 
     name: str = Field(description="as the file names it")
     numbers: dict[str, list[float]] = Field(description="its numbers; three are those of R, G and B")
 
 
-class PublishedFit(_Record):
+class PublishedFit(DocumentPart):
     """One material of a file of published fits."""
 
     name: str
     line: int = Field(description="line of the file")
-    terms: list[Lobe]
+    terms: list[PublishedLobe]
     model: str | None = Field(description="the model of the registry with the same formula; null: none, or not known")
-    albedo: Albedo | None = Field(description="the largest directional albedo, of R, G or B; null: without a model")
+    albedo: FitAlbedo | None = Field(description="the largest directional albedo, of R, G or B; null: without a model")
     flags: list[str] = Field(description="sentences on what is no physics")
 
 
-class PublishedFits(_Record):
+class PublishedFits(DocumentPart):
     """A file of published fits."""
 
     name: str
@@ -174,7 +170,7 @@ def _fit(path: Path, number: int, line: str) -> PublishedFit:
     return PublishedFit(name=name.strip(), line=number, terms=terms, model=model, albedo=albedo, flags=flags)
 
 
-def _terms(node: ast.expr) -> list[Lobe]:
+def _terms(node: ast.expr) -> list[PublishedLobe]:
     """Return the terms of a call: those of its arguments, or itself."""
     if not isinstance(node, ast.Call) or not isinstance(node.func, ast.Name):
         raise FileFormatError("it is not LOBE(NUMBER = ...)")
@@ -183,7 +179,7 @@ def _terms(node: ast.expr) -> list[Lobe]:
         raise FileFormatError(f"{name} has both terms and numbers")
     if node.args:
         return [term for part in node.args for term in _terms(part)]
-    return [Lobe(name=name, numbers={str(word.arg): _numbers(name, word) for word in node.keywords})]
+    return [PublishedLobe(name=name, numbers={str(word.arg): _numbers(name, word) for word in node.keywords})]
 
 
 def _numbers(name: str, word: ast.keyword) -> list[float]:
@@ -198,7 +194,7 @@ def _numbers(name: str, word: ast.keyword) -> list[float]:
     return values
 
 
-def _model(terms: list[Lobe]) -> str | None:
+def _model(terms: list[PublishedLobe]) -> str | None:
     """Return the model of the registry that some terms are, or None."""
     lobes = [term for term in terms if term.name != _FLAT]
     if not lobes:
@@ -209,27 +205,27 @@ def _model(terms: list[Lobe]) -> str | None:
     return str(known["model"]) if set(known["parameters"].values()) == set(lobes[0].numbers) else None
 
 
-def _parameters(terms: list[Lobe], channel: int) -> dict[str, float]:
+def _parameters(terms: list[PublishedLobe], channel: int) -> dict[str, float]:
     """Return the parameters of the model of some terms in a channel, as recipes write them."""
     model = _model(terms)
     assert model is not None
+
+    def in_channel(numbers: list[float]) -> float:
+        return numbers[min(channel, len(numbers) - 1)]
+
     values: dict[str, float] = {}
     spec = MODELS[model]
     uniform = spec.uniform or spec.parameters[0].name
     for term in terms:
         if term.name == _FLAT:
-            values[uniform] = _of(term.numbers["albedo"], channel)
+            values[uniform] = in_channel(term.numbers["albedo"])
             continue
         for name, theirs in _named()[term.name]["parameters"].items():
-            values[name] = _of(term.numbers[theirs], channel)
+            values[name] = in_channel(term.numbers[theirs])
     return {uniform: 0.0} | values
 
 
-def _of(numbers: list[float], channel: int) -> float:
-    return numbers[min(channel, len(numbers) - 1)]
-
-
-def _flags(terms: list[Lobe]) -> list[str]:
+def _flags(terms: list[PublishedLobe]) -> list[str]:
     flags = []
     for term in terms:
         known = _named().get(term.name, {"scale": "albedo"})
@@ -242,7 +238,7 @@ def _flags(terms: list[Lobe]) -> list[str]:
     return flags
 
 
-def _out_of_range(model: str, terms: list[Lobe]) -> list[str]:
+def _out_of_range(model: str, terms: list[PublishedLobe]) -> list[str]:
     """Return sentences on numbers outside the ranges of a model."""
     flags: list[str] = []
     for channel in range(len(CHANNELS)):
@@ -254,12 +250,10 @@ def _out_of_range(model: str, terms: list[Lobe]) -> list[str]:
     return list(dict.fromkeys(flags))
 
 
-def _albedo(model: str, terms: list[Lobe]) -> Albedo:
+def _albedo(model: str, terms: list[PublishedLobe]) -> FitAlbedo:
     """Return the largest directional albedo [1], in the channel whose reflectances add up to most."""
     given = [_parameters(terms, channel) for channel in range(len(CHANNELS))]
     bright = [sum(v for name, v in one.items() if MODELS[model].parameter(name).reflectance) for one in given]
-    one: dict[str, Any] = dict(given[int(np.argmax(bright))])
-    computed = directional_albedo(model, radians(np.array(_ANGLES_DEG)), tolerance=_TOLERANCE, **one)
-    index = int(np.argmax(computed.albedo))
-    value, error = float(computed.albedo[index]), float(computed.error[index])
-    return Albedo(theta_i_deg=_ANGLES_DEG[index], value=value, error=error, conserves=value <= 1.0 + error + _TOLERANCE)
+    brightest: dict[str, Any] = dict(given[int(np.argmax(bright))])
+    computed = directional_albedo(model, radians(np.array(ALBEDO_ANGLES_DEG)), tolerance=ALBEDO_TOLERANCE, **brightest)
+    return FitAlbedo.largest(ALBEDO_ANGLES_DEG, computed.albedo, computed.error)

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from brdfdb.fitting.document import Fit
-from brdfdb.fitting.fitted import Fitted
+from brdfdb.fitting.fitted import FittedSurface
 from brdfdb.fitting.residuals import CREDIBLE, Residual
 from brdfdb.geometry import degrees
 from brdfdb.measurements import Samples
@@ -30,7 +30,7 @@ def sees_anisotropy(samples: Samples) -> bool:
     return bool(np.any(apart > _SAME_AZIMUTH))
 
 
-def remarks_of(fit: Fit, fitted: Fitted) -> list[str]:
+def remarks_of(fit: Fit, fitted: FittedSurface) -> list[str]:
     """Return sentences on light from nothing, a pattern in the residuals, ends of ranges, and pairs of numbers."""
     surface, samples = fitted.surface, fitted.samples
     sentences = _of_aperture(fit, fitted)
@@ -104,7 +104,7 @@ def _on_uncertainties(samples: Samples, residual: Residual) -> list[str]:
     return sentences
 
 
-def _of_aperture(fit: Fit, fitted: Fitted) -> list[str]:
+def _of_aperture(fit: Fit, fitted: FittedSurface) -> list[str]:
     """Return sentences on what an aperture hides, or one that is not known."""
     width = float(np.min(fitted.surface.widths(fitted.point.x[np.newaxis]), initial=math.inf))
     half_angle = fitted.view.half_angle

@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.errors import ParameterError
-from brdfdb.fitting.polynomials import Polynomial, coefficients, unit_of
-from brdfdb.fitting.variables import EDGE, NORMAL, index_of, index_variables, switches, variable
+from brdfdb.fitting.variables import EDGE, NORMAL, index_of, index_variables, spread, switches, variable
 from brdfdb.geometry import unit_vector
-from brdfdb.measurements.aperture import View
+from brdfdb.measurements.aperture import InstrumentView
 from brdfdb.models import MODELS
-from brdfdb.parameters import Floats, ModelSpec, closest
+from brdfdb.parameters import Floats, ModelSpec, Parameter, closest
 from brdfdb.spectra import refractive_index
 
 Array = NDArray[np.float64]
@@ -25,10 +25,102 @@ Numbers = Mapping[str, Any]
 
 ASSUMED_NM = 550.0  # wavelength of samples that state none, for models with n and k
 SCALE = "scale"
-_MOST_LOBES = 4  # terms of a sum
-_MOST_SHAPE = 2  # numbers of the shape of a lobe in the sums that are tried unasked
-_VALUES = 1 << 18  # values that are computed together, so that they stay in the caches
-_LEAST_K = 1e-6  # below it, k is 0
+_MOST_LOBES = 4  # largest number of terms of a sum
+_MOST_SHAPE = 2  # largest number of shape parameters of a lobe in the sums that are fitted by default
+_VALUES = 1 << 18  # values that are computed together: they stay in the caches
+_LEAST_K = 1e-6  # smaller values of k are taken as 0
+
+_PROBES = 64  # pairs of directions at which a model is tried
+_SETS = 4  # sets of parameters at which it is tried
+_SAME = 1e-9  # largest difference of values of a polynomial, relative to the largest value
+_STEEPEST = 1.2  # largest polar angle [rad] of these directions
+
+
+def unit_of(parameter: Parameter) -> float:
+    """Return the value of a coefficient at which the model is evaluated: 1, or the end of its range."""
+    return min(parameter.high, 1.0)
+
+
+class LinearParameters(NamedTuple):
+    """The parameters in which f_r is a polynomial, and its degree."""
+
+    names: tuple[str, ...]
+    degree: int
+
+
+@cache
+def coefficients(spec: ModelSpec) -> LinearParameters:
+    """Return the parameters in which f_r is a polynomial, and its degree.
+
+    Notes
+    -----
+    Models say so of their reflectances (`ModelSpec.degree`). The others are tried: at a few directions and parameters,
+    f_r half way between two reflectances or amplitudes [1/sr] is the mean of its values there.
+    """
+    names = [p.name for p in spec.parameters if _is_amplitude(p)]
+    if spec.degree is not None:
+        return LinearParameters(tuple(name for name in names if spec.parameter(name).reflectance), spec.degree)
+    linear: list[str] = []
+    for name in names:
+        if _is_linear(spec, [*linear, name]):
+            linear.append(name)
+    return LinearParameters(tuple(linear), 1)
+
+
+def _is_amplitude(parameter: Parameter) -> bool:
+    return parameter.low == 0.0 and (parameter.reflectance or parameter.unit == "1/sr")
+
+
+def _is_linear(spec: ModelSpec, names: list[str]) -> bool:
+    """Return True if f_r is linear in some parameters together."""
+    u = spread(_PROBES, 3)
+    wi = unit_vector(_STEEPEST * u[:, 0], np.zeros(_PROBES))
+    wr = unit_vector(_STEEPEST * u[:, 1], 2.0 * np.pi * u[:, 2])
+    index = {"wavelength_nm": 550.0, "n": 1.5, "k": 0.0} if spec.spectral else {}
+    low = np.array([p.low for p in spec.parameters])
+    high = np.array([unit_of(p) if _is_amplitude(p) else min(p.high, 2.0) for p in spec.parameters])
+    for row in low + (high - low) * spread(_SETS, low.size):
+        numbers = dict(zip((p.name for p in spec.parameters), row.tolist(), strict=True)) | switches(spec)
+        first = {name: 0.2 * unit_of(spec.parameter(name)) for name in names}
+        second = {name: numbers[name] for name in names}
+        middle = {name: 0.5 * (first[name] + second[name]) for name in names}
+        with np.errstate(all="ignore"):
+            a, b, m = (spec.vectors(wi, wr, **index, **(numbers | given)) for given in (first, second, middle))
+        if not np.max(np.abs(m - 0.5 * (a + b))) <= _SAME * max(float(np.max(np.abs(b))), 1e-30):
+            return False
+    return True
+
+
+class Polynomial:
+    """The M monomials of K coefficients up to a degree.
+
+    `exponents` (M, K) are the powers of the coefficients, `nodes` (M, K) the coefficients, in their units, at which the
+    model is evaluated. Without `constant`, the polynomial is 0 where its coefficients are.
+    """
+
+    def __init__(self, count: int, degree: int, *, constant: bool) -> None:
+        powers = itertools.product(range(degree + 1), repeat=count)
+        rows = [row for row in powers if (0 if constant or not count else 1) <= sum(row) <= degree]
+        self.exponents = np.array(rows, dtype=np.int64).reshape(len(rows), count)
+        self.nodes = self.exponents / max(degree, 1)
+        self.inverse = np.linalg.inv(self.monomials(self.nodes.T).T)
+        self.lowered = np.maximum(self.exponents[np.newaxis] - np.eye(count, dtype=np.int64)[:, np.newaxis], 0)
+
+    def monomials(self, values: Floats) -> Floats:
+        """Return the monomials (M, ...) of coefficients (K, ...)."""
+        powers = self.exponents.reshape(*self.exponents.shape, *(1,) * (values.ndim - 1))
+        return np.asarray(np.prod(values[np.newaxis] ** powers, axis=1))
+
+    def slopes(self, values: Floats) -> Floats:
+        """Return the derivatives (K, M, ...) of the monomials by each coefficient."""
+        further = (1,) * (values.ndim - 1)
+        factors = self.exponents.T.reshape(*self.exponents.T.shape, *further)
+        powers = self.lowered.reshape(*self.lowered.shape, *further)
+        return np.asarray(factors * np.prod(values[np.newaxis, np.newaxis] ** powers, axis=2))
+
+    def parts(self, values: Floats) -> Floats:
+        """Return the factors (..., M, N) of the monomials from the values (..., M, N) of a model at the nodes."""
+        return np.asarray(self.inverse @ values)
 
 
 class NotDescribedError(ParameterError):
@@ -51,22 +143,10 @@ class Coefficient(NamedTuple):
 
 
 class Term:
-    """One term of a sum.
+    """One term of a sum: a model, in which some parameters are linear, others free, and two widths may be the same.
 
-    Attributes
-    ----------
-    spec : ModelSpec
-        Its model.
-    label : str
-        What the names of its parameters begin with; empty if it stands alone.
-    fixed : dict
-        Parameters that are not searched.
-    linear : tuple of str
-        Parameters in which f_r is a polynomial; empty for a term with a scale.
-    free : list of Parameter
-        The others that are searched, without n and k.
-    tied : tuple of str or None
-        Two widths that are the same.
+    `linear` are the parameters in which f_r is a polynomial; a term with a scale has none. `free` are the others that
+    are searched, without n and k. `label` precedes the names of its parameters in a sum.
     """
 
     def __init__(self, spec: ModelSpec, label: str, *, alone: bool, beside_flat: bool, turned: bool) -> None:
@@ -82,7 +162,7 @@ class Term:
         self.polynomial = (
             Polynomial(1, 1, constant=False) if self.scaled else Polynomial(len(names), degree, constant=bright)
         )
-        self.memory: tuple[View, dict[Any, Floats]] | None = None
+        self.memory: tuple[InstrumentView, dict[Any, Floats]] | None = None
         self.tied = None if turned else spec.lobe_axes
         out = {*self.fixed, *self.linear, *(self.tied or ())[1:]}
         self.free = [p for p in spec.parameters if p.name not in out]
@@ -94,7 +174,7 @@ class Term:
         parameters = [self.spec.parameter(name) for name in self.linear]
         return [Coefficient(number, p.name, f"{self.label}{p.name}", p.low, p.high, unit_of(p)) for p in parameters]
 
-    def basis(self, view: View, points: Sequence[Numbers], *, remember: bool) -> Floats:
+    def basis(self, view: InstrumentView, points: Sequence[Numbers], *, remember: bool) -> Floats:
         """Return the factors (B, M, N) [1/sr] of the monomials of this term at B points.
 
         Points are evaluated together, equal ones once. Those of the last call with `remember` are known.
@@ -128,7 +208,7 @@ class Term:
             for node in self.polynomial.nodes.tolist()
         ]
 
-    def _computed(self, view: View, points: Sequence[Numbers]) -> Floats:
+    def _computed(self, view: InstrumentView, points: Sequence[Numbers]) -> Floats:
         """Return the factors (B, M, N) [1/sr] of the monomials at points that are not known yet."""
         nodes = self.nodes
         rows = [{**one, **node} for one in points for node in nodes]
@@ -143,7 +223,7 @@ class Term:
         values = seen.reshape(len(points), len(nodes), -1)
         return values if self.scaled else self.polynomial.parts(values)
 
-    def _seen(self, view: View, width: float, points: Sequence[Numbers]) -> Floats:
+    def _seen(self, view: InstrumentView, width: float, points: Sequence[Numbers]) -> Floats:
         """Return f_r (B, N) [1/sr] as an instrument sees it, with the specular part that falls into its aperture."""
         given, shape = columns(points), (len(points), len(view))
         if not view.half_angle:
@@ -153,7 +233,7 @@ class Term:
             return f_r
         return f_r + view.mirror * self.reflected(view, given)
 
-    def reflected(self, view: View, given: Mapping[str, Any]) -> Floats:
+    def reflected(self, view: InstrumentView, given: Mapping[str, Any]) -> Floats:
         """Return the specular reflectance (N,) [1] for each direction of the light; 0 for models without one."""
         if self.spec.specular is None:
             return np.zeros(len(view))
@@ -170,8 +250,11 @@ def _is_bright(spec: ModelSpec, names: tuple[str, ...], fixed: Mapping[str, floa
     return bool(np.any(spec.vectors(wi, wr, **(middle | dict(fixed) | dict.fromkeys(names, 0.0) | index)) > 0.0))
 
 
-class Surface:
-    """A sum of terms as a function of a point of the unit cube (its shape) and of coefficients of each channel.
+class SearchedSurface:
+    """A model, or a sum of models, whose numbers are searched.
+
+    `shape` has the variables that all channels share, `owners` their terms, None for n and k. `coefficients` have a
+    value in each channel.
 
     Parameters
     ----------
@@ -182,18 +265,9 @@ class Surface:
     channels : int
         Number of channels, C.
     turned : bool
-        True if the light comes from several azimuths, so that two widths can be told apart.
+        True if the light comes from several azimuths, so that samples distinguish two widths.
     entry : str, optional
         Refractive index of models with n and k; without one they are searched.
-
-    Attributes
-    ----------
-    terms : list of Term
-        The terms.
-    shape : list of Variable
-        Numbers that all channels share; `owners` are the terms that they belong to, None for n and k.
-    coefficients : list of Coefficient
-        Numbers with a value for each channel. `units`, shape (K, 1), are theirs.
 
     Raises
     ------
@@ -288,14 +362,16 @@ class Surface:
     def in_channel(self, x: Array, values: Array, number: int, channel: int) -> tuple[dict[str, float], float]:
         """Return all arguments of a term in a channel, and its scale."""
         given = self.arguments(number, self.numbers(x)[number], channel)
-        own = {one.name: float(values[row, channel]) for row, one in enumerate(self.coefficients) if one.term == number}
-        return given | {name: value for name, value in own.items() if name != SCALE}, own.get(SCALE, 1.0)
+        rows = [row for row, one in enumerate(self.coefficients) if one.term == number]
+        linear = {self.coefficients[row].name: float(values[row, channel]) for row in rows}
+        scale = linear.pop(SCALE, 1.0)
+        return given | linear, scale
 
-    def basis(self, x: Array, view: View) -> Floats:
+    def basis(self, x: Array, view: InstrumentView) -> Floats:
         """Return the factors (M, N, C) [1/sr] of all monomials; (M, N, 1) if they are the same in each channel."""
         return np.asarray(self.bases(x[np.newaxis], view)[0])
 
-    def bases(self, points: Array, view: View) -> Floats:
+    def bases(self, points: Array, view: InstrumentView) -> Floats:
         """Return the factors (B, M, N, C) or (B, M, N, 1) [1/sr] at points (B, S), which models take together.
 
         The terms of a point that was evaluated alone are remembered until the next: its neighbours share some of them.
@@ -303,11 +379,11 @@ class Surface:
         parts, numbers = [], [self.numbers(x) for x in points]
         several = self.channels if self.indexed else 1
         for number, term in enumerate(self.terms):
-            own = several if term.spec.spectral else 1
-            wanted = [self.arguments(number, of_point[number], c) for of_point in numbers for c in range(own)]
+            count = several if term.spec.spectral else 1
+            wanted = [self.arguments(number, of_point[number], c) for of_point in numbers for c in range(count)]
             with np.errstate(all="ignore"):  # extreme parameters may raise flags
                 part = term.basis(view, wanted, remember=len(points) == 1)
-            part = part.reshape(len(points), own, *part.shape[1:]).transpose(0, 2, 3, 1)
+            part = part.reshape(len(points), count, *part.shape[1:]).transpose(0, 2, 3, 1)
             parts.append(np.broadcast_to(part, (*part.shape[:3], several)))
         bases = np.concatenate(parts, axis=1)
         return bases if np.all(np.isfinite(bases)) else np.nan_to_num(bases, nan=0.0, posinf=0.0, neginf=0.0)
@@ -335,11 +411,11 @@ class Surface:
     def _in_units(self, values: Floats, at: int, count: int) -> Floats:
         return np.asarray(values[at : at + count] / self.units[at : at + count])
 
-    def f_r(self, x: Array, values: Floats, view: View) -> Floats:
+    def f_r(self, x: Array, values: Floats, view: InstrumentView) -> Floats:
         """Return f_r (N, C) [1/sr] as an instrument sees it, with coefficients (K, C)."""
         return total(self.basis(x, view), self.monomials(values))
 
-    def reflected(self, x: Array, values: Array, view: View) -> Floats:
+    def reflected(self, x: Array, values: Array, view: InstrumentView) -> Floats:
         """Return the specular reflectance (N, C) [1] for each direction of the light."""
         sums = np.zeros((len(view), self.channels))
         for number, term in enumerate(self.terms):

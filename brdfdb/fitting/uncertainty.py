@@ -24,27 +24,13 @@ _LEAST_NOISE = 1e-18  # variance of noise-free samples: residuals of 1e-9 are ro
 
 
 class Covariance(NamedTuple):
-    """Covariance of the numbers of a fit, those at an end of their range left out.
+    """Covariance of the numbers of a fit; nan for those at an end of their range."""
 
-    Attributes
-    ----------
-    shape : array (S, S)
-        Of all shape variables, in the unit cube; nan for those at an end.
-    coefficients : array (K, C)
-        Variances of coefficients; nan at an end.
-    both : array (S + K, S + K)
-        Of shape and the coefficients of the first channel.
-    noise : float
-        The factor between cost and deviance: twice the rise of the cost over it is chi-squared of one freedom.
-    searched : int
-        Number of numbers that were searched and are not at an end.
-    """
-
-    shape: Array
-    coefficients: Array
-    both: Array
-    noise: float
-    searched: int
+    shape: Array  # (S, S), of all shape variables, in the unit cube
+    coefficients: Array  # (K, C), variances
+    both: Array  # (S + K, S + K), of shape and the coefficients of the first channel
+    noise: float  # factor between cost and deviance: twice the rise of the cost over it is chi-squared of one freedom
+    searched: int  # numbers that were searched and are not at an end
 
 
 def noise_of(problem: Problem, residuals: Floats, searched: int) -> tuple[float, float]:
@@ -64,7 +50,10 @@ def covariance(problem: Problem, point: Point) -> Covariance:
     searched = int(inside.sum() + free.sum())
     factor, noise = noise_of(problem, point.residuals, searched)
     some, count, shapes = columns[inside], len(inner), len(problem.surface.shape)
-    of_channels = [_normal(some[:, :, c], inner[free[:, c], :, c]) for c in range(point.f_r.shape[1])]
+    of_channels = []
+    for c in range(point.f_r.shape[1]):
+        outer, of_inner = some[:, :, c], inner[free[:, c], :, c]
+        of_channels.append((outer @ outer.T, outer @ of_inner.T, of_inner @ of_inner.T))
     reduced = np.zeros((len(some), len(some)))
     for a, b, d in of_channels:
         reduced += a - b @ _inverse(d) @ b.T
@@ -89,10 +78,6 @@ def covariance(problem: Problem, point: Point) -> Covariance:
     return Covariance(shape, variances, both, noise, searched)
 
 
-def _normal(outer: Floats, inner: Floats) -> tuple[Array, Array, Array]:
-    return outer @ outer.T, outer @ inner.T, inner @ inner.T
-
-
 def _inverse(matrix: Array) -> Array:
     """Return the inverse of a normal matrix, scaled before: units of its rows differ by powers of ten."""
     if not len(matrix):
@@ -103,18 +88,9 @@ def _inverse(matrix: Array) -> Array:
 
 
 class Profile:
-    """The deviance of a fit as a function of one number that is held, all others searched.
+    """The deviance of a fit as a function of one number, with all others searched.
 
-    Parameters
-    ----------
-    problem : Problem
-        The problem, of one channel where a coefficient is held.
-    point : Point
-        Its best point.
-    known : Covariance
-        Its covariance.
-    shape, coefficient : int, optional
-        The number that is held, one of the two.
+    The number is a shape variable or, where the problem has one channel, a coefficient.
     """
 
     def __init__(
@@ -137,14 +113,14 @@ class Profile:
         shapes = len(problem.surface.shape)
         index = shape if shape is not None else shapes + int(coefficient or 0)
         along = np.nan_to_num(known.both[:shapes, index] / known.both[index, index])
-        self.along = np.where(np.isfinite(along), along, 0.0)  # where the others go with the number that is held
+        self.along = np.where(np.isfinite(along), along, 0.0)  # changes of the others with the fixed number
 
     def deviation(self, at: float) -> float:
-        """Return the square root of the deviance with the number held: 1.96 at the ends of a 95 % interval."""
+        """Return the square root of the deviance with the number fixed: 1.96 at the ends of a 95 % interval."""
         p = self.problem
         fixed = p.fixed if self.shape is None else {**p.fixed, self.shape: at}
-        held = None if self.coefficient is None else {self.coefficient: at}
-        one = Problem(p.surface, p.view, p.residual, fixed, held)
+        fixed_coefficients = None if self.coefficient is None else {self.coefficient: at}
+        one = Problem(p.surface, p.view, p.residual, fixed, fixed_coefficients)
         one.scale = p.scale
         begin = np.clip(self.point.x + self.along * (at - self.best), 0.0, 1.0)
         cost = one.descend(begin[one.free], _EVALUATIONS).cost

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +13,9 @@ from brdfdb.parameters import ModelSpec, Parameter
 
 Array = NDArray[np.float64]
 
-NORMAL, EDGE = "reflectance at normal incidence", "edge"  # the two variables in the place of n and k
+# The two variables in the place of n and k
+NORMAL = "reflectance at normal incidence"
+EDGE = "edge"
 REFLECTANCES = 1e-4, 0.9999  # at normal incidence, of facets whose n and k are searched
 
 _DECADES = 1e3  # ratio of the ends of a range from which on a variable is searched in logarithms
@@ -61,7 +64,21 @@ def index_variables() -> list[Variable]:
     return [Variable(NORMAL, *REFLECTANCES, False), Variable(EDGE, 0.0, 1.0, False, loose=True)]
 
 
-def index_of(normal: float, edge: float) -> tuple[float, float]:
+class Index(NamedTuple):
+    """The refractive index n + ik of facets, or its derivatives."""
+
+    n: float
+    k: float
+
+
+class IndexSlopes(NamedTuple):
+    """The derivatives of n and k by the two variables in their place."""
+
+    by_normal: Index
+    by_edge: Index
+
+
+def index_of(normal: float, edge: float) -> Index:
     """Return n and k [1] of facets with a reflectance at normal incidence, and their place between the two ends of n.
 
     ln n runs evenly from -ln m at `edge` = 0 to ln m at 1, m = (1 + sqrt(R)) / (1 - sqrt(R)), where k is 0. All n and k
@@ -70,11 +87,11 @@ def index_of(normal: float, edge: float) -> tuple[float, float]:
     root = math.sqrt(normal)
     n = min((1.0 + root) / (1.0 - root), _MOST_N) ** (2.0 * edge - 1.0)
     k2 = (normal * (n + 1.0) ** 2 - (n - 1.0) ** 2) / (1.0 - normal)
-    return n, math.sqrt(max(k2, 0.0))
+    return Index(n, math.sqrt(max(k2, 0.0)))
 
 
-def index_slopes(normal: float, edge: float) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Return the derivatives of n and k of `index_of` by `normal`, and those by `edge`; those of k are 0 where k is."""
+def index_slopes(normal: float, edge: float) -> IndexSlopes:
+    """Return the derivatives of n and k of `index_of`; those of k are 0 where k is."""
     root = math.sqrt(normal)
     most = (1.0 + root) / (1.0 - root)
     n, k = index_of(normal, edge)
@@ -84,7 +101,9 @@ def index_slopes(normal: float, edge: float) -> tuple[tuple[float, float], tuple
     half = 0.5 / k if k > 0.0 else 0.0  # k is a square root
     k2_by_n = (2.0 * normal * (n + 1.0) - 2.0 * (n - 1.0)) / (1.0 - normal)
     k2_by_normal = 4.0 * n / (1.0 - normal) ** 2
-    return (by_normal, half * (k2_by_n * by_normal + k2_by_normal)), (by_edge, half * k2_by_n * by_edge)
+    return IndexSlopes(
+        Index(by_normal, half * (k2_by_n * by_normal + k2_by_normal)), Index(by_edge, half * k2_by_n * by_edge)
+    )
 
 
 def switches(spec: ModelSpec) -> dict[str, float]:

@@ -1,4 +1,4 @@
-"""File formats of others: each module of this room whose name begins with no underscore is one.
+"""File formats of others: each module or folder of this room whose name begins with no underscore is one.
 
 A module that writes is an `Exporter`, one that reads an `Importer`; most are both. The command line and HTTP iterate
 over the registry.
@@ -17,8 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from brdfdb.errors import FileFormatError, ParameterError
 from brdfdb.formats._input import check_file
-from brdfdb.formats._interface import Exporter, Importer, Option, options_of, parsed_options, schema_of
-from brdfdb.formats._stated import AZIMUTHS, at_wavelength, from_forward
+from brdfdb.formats._interface import Exporter, FormatOption, Importer, options_of, parsed_options, schema_of
 from brdfdb.parameters import check_nanometres
 from brdfdb.place import path_of
 
@@ -32,8 +31,8 @@ __all__ = [
     "EXPORTERS",
     "IMPORTERS",
     "Exporter",
+    "FormatOption",
     "Importer",
-    "Option",
     "members",
     "options_of",
     "packed",
@@ -45,18 +44,14 @@ __all__ = [
     "write",
 ]
 
+AZIMUTHS = ("light", "forward")
 _TEXT = "text"
 _SHOWN = 200  # characters of names of columns that a refusal repeats
 _HEAD = 4096  # bytes of a file that tell its format
 
 
-def _modules() -> dict[str, Any]:
-    """Return the modules of the room by name."""
-    names = sorted(module.name for module in pkgutil.iter_modules(__path__) if not module.name.startswith("_"))
-    return {name: importlib.import_module(f"{__name__}.{name}") for name in names}
-
-
-_MODULES = _modules()
+_NAMES = sorted(module.name for module in pkgutil.iter_modules(__path__) if not module.name.startswith("_"))
+_MODULES: dict[str, Any] = {name: importlib.import_module(f"{__name__}.{name}") for name in _NAMES}
 EXPORTERS: dict[str, Exporter] = {name: module for name, module in _MODULES.items() if hasattr(module, "write")}
 IMPORTERS: dict[str, Importer] = {name: module for name, module in _MODULES.items() if hasattr(module, "read")}
 
@@ -110,7 +105,7 @@ def write(
     return exporter.write(table, path_of(path), verdict=verdict, **parsed)
 
 
-def served_options(file_format: str) -> dict[str, Option]:
+def served_options(file_format: str) -> dict[str, FormatOption]:
     """Return the options of a format by name, with the ranges that a service allows."""
     return {name: option.served for name, option in options_of(EXPORTERS[file_format]).items()}
 
@@ -125,7 +120,7 @@ def served_schemas() -> dict[str, tuple[dict[str, Any], str]]:
 def packed(table: Table, file_format: str, *, verdict: str, **options: Any) -> tuple[str, str, bytes]:
     """Return the name, the media type and the bytes of a file of another format; several files as a zip archive.
 
-    `options` are values that `Option.parse` returned. Errors are those of `write`.
+    `options` are values that `FormatOption.parse` returned. Errors are those of `write`.
     """
     from brdfdb.store.archive import ZIP, zipped  # the parser of the command line loads no store
 
@@ -189,6 +184,8 @@ def read(
     Traceback (most recent call last):
     FileNotFoundError: [Errno 2] No such file or directory: 'brass.exr'
     """
+    from brdfdb.formats._readings import at_wavelength, from_forward
+
     if azimuth not in AZIMUTHS:
         raise ParameterError("azimuth", f"{azimuth!r} is not one of {', '.join(AZIMUTHS)}", azimuth, AZIMUTHS)
     path = path_of(path)
@@ -266,7 +263,7 @@ def members(path: str | os.PathLike[str], file_format: str = "", **keywords: Any
 def _importer(path: Path, file_format: str, keywords: Mapping[str, Any]) -> Importer:
     """Return the importer of a file with keywords that it takes."""
     check_file(path)
-    every = {key for some in IMPORTERS.values() for key in getattr(some, "keywords", ())}
+    every = {key for importer in IMPORTERS.values() for key in getattr(importer, "keywords", ())}
     for name, value in keywords.items():
         if name not in every:
             allowed = ", ".join(sorted(every))

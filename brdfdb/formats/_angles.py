@@ -7,8 +7,9 @@ same half vector, or on the same line to the specular direction.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import Protocol
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, field, replace
+from typing import ClassVar, NamedTuple, Self
 
 import numpy as np
 
@@ -22,39 +23,185 @@ STEEPEST = float(np.deg2rad(89.5))
 STEEPER = float(np.deg2rad(89.95))
 
 
-class System(Protocol):
-    """A system of angles [rad] of a pair of directions.
+class LightAndViewer(NamedTuple):
+    """Unit vectors (N, 3) of light and viewer."""
+
+    wi: Floats
+    wr: Floats
+
+
+@dataclass(frozen=True)
+class System(ABC):
+    """A system of angles [rad] of a pair of directions: a polar angle and an azimuth, twice.
 
     Attributes
     ----------
     anisotropic : bool
-        True if there are four angles.
-    axes : tuple of str
-        Names of the angles.
-    ends : tuple of float [rad]
-        Largest value of each.
+        False: without the first azimuth; the second one counts from it.
+    mirrored : bool
+        f_r is the same for the negative second azimuth, so that it ends at pi.
+    steepest : float [rad]
+        Largest polar angle of directions of nodes.
     """
 
-    @property
-    def anisotropic(self) -> bool: ...
+    anisotropic: bool
+    mirrored: bool = True
+    steepest: float = field(default=STEEPEST, kw_only=True)
+
+    names: ClassVar[tuple[str, ...]]
 
     @property
-    def axes(self) -> tuple[str, ...]: ...
+    @abstractmethod
+    def ends_of_four(self) -> tuple[float, ...]:
+        """Largest value [rad] of each of the four angles."""
 
-    @property
-    def ends(self) -> tuple[float, ...]: ...
-
+    @abstractmethod
     def angles(self, wi: Floats, wr: Floats) -> Floats:
         """Return the angles [rad], shape (N, axes), of unit vectors (N, 3) of light and viewer."""
 
-    def vectors(self, angles: Floats) -> tuple[Floats, Floats]:
-        """Return unit vectors (N, 3) of light and viewer for angles (N, axes) [rad], also below the horizon."""
+    @abstractmethod
+    def vectors(self, angles: Floats) -> LightAndViewer:
+        """Return unit vectors for angles (N, axes) [rad], also below the horizon."""
 
-    def directions(self, angles: Floats) -> tuple[Floats, Floats]:
-        """Return unit vectors (N, 3) of light and viewer for angles (N, axes) [rad], held above the horizon."""
+    @abstractmethod
+    def directions(self, angles: Floats) -> LightAndViewer:
+        """Return unit vectors for angles (N, axes) [rad]; those below the horizon are moved above it."""
 
-    def steeper(self) -> System:
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """Names of the angles."""
+        return self.names if self.anisotropic else (self.names[0], *self.names[2:])
+
+    @property
+    def ends(self) -> tuple[float, ...]:
+        """Largest value [rad] of each angle."""
+        four = self.ends_of_four
+        return four if self.anisotropic else (four[0], *four[2:])
+
+    def steeper(self) -> Self:
         """Return the same system with directions of nodes that come closer to the horizon."""
+        return replace(self, steepest=STEEPER)
+
+    def _stacked(self, *four: Floats) -> Floats:
+        """Return the angles, shape (N, axes), of all four."""
+        return np.stack(four if self.anisotropic else (four[0], *four[2:]), axis=1)
+
+
+class Spherical(System):
+    """Polar angle and azimuth of light and viewer."""
+
+    names = ("theta_i", "phi_i", "theta_r", "phi_r")
+
+    @property
+    def ends_of_four(self) -> tuple[float, ...]:
+        return HALF_PI, 2.0 * np.pi, HALF_PI, 2.0 * np.pi / (1 + self.mirrored)
+
+    def angles(self, wi: Floats, wr: Floats) -> Floats:
+        phi_i = _azimuth(wi[:, 0], wi[:, 1])
+        phi_r = _azimuth(wr[:, 0], wr[:, 1])
+        if not self.anisotropic:
+            phi_r = (phi_r - phi_i) % (2.0 * np.pi)
+        return self._stacked(_polar(wi), phi_i, _polar(wr), _folded(phi_r) if self.mirrored else phi_r)
+
+    def vectors(self, angles: Floats) -> LightAndViewer:
+        from brdfdb.geometry import unit_vector
+
+        theta_i, phi_i, theta_r, phi_r = _four(angles)
+        return LightAndViewer(unit_vector(theta_i, phi_i), unit_vector(theta_r, phi_r))
+
+    def directions(self, angles: Floats) -> LightAndViewer:
+        theta_i, phi_i, theta_r, phi_r = _four(angles)
+        theta_i = np.minimum(theta_i, self.steepest)
+        theta_r = np.minimum(theta_r, self.steepest)
+        return self.vectors(np.stack([theta_i, phi_i, theta_r, phi_r], axis=1))
+
+
+class Specular(System):
+    """The light, and the viewer about the specular direction.
+
+    The polar angle of the viewer is that from the specular direction. Its azimuth is 0 from there towards the normal
+    and grows counter-clockwise as seen from above (libbsdf, ``SpecularCoordinateSystem``; Zemax has the same).
+    """
+
+    names = ("theta_i", "phi_i", "theta_s", "phi_s")
+
+    @property
+    def ends_of_four(self) -> tuple[float, ...]:
+        return HALF_PI, 2.0 * np.pi, np.pi, 2.0 * np.pi / (1 + self.mirrored)
+
+    def angles(self, wi: Floats, wr: Floats) -> Floats:
+        theta_i = _polar(wi)
+        phi_i = _azimuth(wi[:, 0], wi[:, 1])
+        w = _tilted(_turned(wr, -phi_i), theta_i)
+        phi_s = _azimuth(w[:, 0], w[:, 1])
+        return self._stacked(theta_i, phi_i, _polar(w), _folded(phi_s) if self.mirrored else phi_s)
+
+    def vectors(self, angles: Floats) -> LightAndViewer:
+        from brdfdb.geometry import unit_vector
+
+        theta_i, phi_i, theta_s, phi_s = _four(angles)
+        viewer = _turned(_tilted(unit_vector(theta_s, phi_s), -theta_i), phi_i)
+        return LightAndViewer(unit_vector(theta_i, phi_i), viewer)
+
+    def directions(self, angles: Floats) -> LightAndViewer:
+        theta_i, phi_i, theta_s, phi_s = _four(angles)
+        theta_i = np.minimum(theta_i, self.steepest)
+        # The cosine to the normal is length cos(theta_s - inclined): it is the lowest one at the largest theta_s
+        inclined = np.arctan2(np.sin(theta_i) * np.cos(phi_s), np.cos(theta_i))
+        length = np.hypot(np.cos(theta_i), np.sin(theta_i) * np.cos(phi_s))
+        largest = inclined + np.arccos(np.minimum(np.cos(self.steepest) / length, 1.0))
+        return self.vectors(np.stack([theta_i, phi_i, np.minimum(theta_s, np.maximum(largest, 0.0)), phi_s], axis=1))
+
+
+@dataclass(frozen=True)
+class HalfDifference(System):
+    """The half vector, and the light about it (Rusinkiewicz 1998, ``rusinkiewicz1998``).
+
+    Attributes
+    ----------
+    mirrored, reciprocal : bool
+        f_r is the same for -phi_d, and for phi_d + pi, where light and viewer are exchanged. Each halves the range of
+        phi_d.
+    """
+
+    reciprocal: bool = True
+
+    names = ("theta_h", "phi_h", "theta_d", "phi_d")
+
+    @property
+    def ends_of_four(self) -> tuple[float, ...]:
+        return HALF_PI, 2.0 * np.pi, HALF_PI, 2.0 * np.pi / (1 + self.mirrored) / (1 + self.reciprocal)
+
+    def angles(self, wi: Floats, wr: Floats) -> Floats:
+        half = wi + wr
+        half /= np.linalg.norm(half, axis=1, keepdims=True)
+        theta_h = _polar(half)
+        phi_h = _azimuth(half[:, 0], half[:, 1])
+        d = _tilted(_turned(wi, -phi_h), -theta_h)
+        phi_d = _azimuth(d[:, 0], d[:, 1])
+        if self.mirrored:
+            phi_d = _folded(phi_d)
+            phi_d = np.minimum(phi_d, np.pi - phi_d) if self.reciprocal else phi_d
+        elif self.reciprocal:
+            phi_d = phi_d % np.pi
+        return self._stacked(theta_h, phi_h, np.minimum(_polar(d), HALF_PI), phi_d)
+
+    def vectors(self, angles: Floats) -> LightAndViewer:
+        from brdfdb.geometry import unit_vector
+
+        theta_h, phi_h, theta_d, phi_d = _four(angles)
+        d = unit_vector(theta_d, phi_d)
+        opposite = d * np.array([-1.0, -1.0, 1.0])
+        return LightAndViewer(_turned(_tilted(d, theta_h), phi_h), _turned(_tilted(opposite, theta_h), phi_h))
+
+    def directions(self, angles: Floats) -> LightAndViewer:
+        theta_h, phi_h, theta_d, phi_d = _four(angles)
+        theta_h = np.minimum(theta_h, self.steepest)
+        # The lower one of the two directions has the cosine length cos(theta_d + inclined) to the normal
+        inclined = np.arctan2(np.sin(theta_h) * np.abs(np.cos(phi_d)), np.cos(theta_h))
+        length = np.hypot(np.cos(theta_h), np.sin(theta_h) * np.cos(phi_d))
+        largest = np.maximum(np.arccos(np.minimum(np.cos(self.steepest) / length, 1.0)) - inclined, 0.0)
+        return self.vectors(np.stack([theta_h, phi_h, np.minimum(theta_d, largest), phi_d], axis=1))
 
 
 def _polar(w: Floats) -> Floats:
@@ -77,175 +224,6 @@ def _tilted(w: Floats, theta: Floats) -> Floats:
     """Return vectors (N, 3) tilted in the plane of x and z, so that the normal moves by theta [rad] towards x."""
     c, s = np.cos(theta), np.sin(theta)
     return np.stack([c * w[:, 0] + s * w[:, 2], w[:, 1], c * w[:, 2] - s * w[:, 0]], axis=1)
-
-
-@dataclass(frozen=True)
-class Spherical:
-    """Polar angle and azimuth of light and viewer.
-
-    Attributes
-    ----------
-    anisotropic : bool
-        False: without the azimuth of the light, and that of the viewer counts from the light.
-    mirrored : bool
-        f_r is the same for -phi_r, so that it ends at pi.
-    steepest : float [rad]
-        Largest polar angle of directions of nodes.
-    """
-
-    anisotropic: bool
-    mirrored: bool
-    steepest: float = STEEPEST
-
-    def steeper(self) -> System:
-        return replace(self, steepest=STEEPER)
-
-    @property
-    def axes(self) -> tuple[str, ...]:
-        return ("theta_i", "phi_i", "theta_r", "phi_r") if self.anisotropic else ("theta_i", "theta_r", "phi_r")
-
-    @property
-    def ends(self) -> tuple[float, ...]:
-        turn = np.pi if self.mirrored else 2.0 * np.pi
-        return (HALF_PI, 2.0 * np.pi, HALF_PI, turn) if self.anisotropic else (HALF_PI, HALF_PI, turn)
-
-    def angles(self, wi: Floats, wr: Floats) -> Floats:
-        phi_i, phi_r = _azimuth(wi[:, 0], wi[:, 1]), _azimuth(wr[:, 0], wr[:, 1])
-        if not self.anisotropic:
-            phi_r = (phi_r - phi_i) % (2.0 * np.pi)
-        phi_r = _folded(phi_r) if self.mirrored else phi_r
-        return np.stack([_polar(wi), *([phi_i] if self.anisotropic else []), _polar(wr), phi_r], axis=1)
-
-    def vectors(self, angles: Floats) -> tuple[Floats, Floats]:
-        from brdfdb.geometry import unit_vector
-
-        theta_i, phi_i, theta_r, phi_r = _four(angles)
-        return unit_vector(theta_i, phi_i), unit_vector(theta_r, phi_r)
-
-    def directions(self, angles: Floats) -> tuple[Floats, Floats]:
-        theta_i, phi_i, theta_r, phi_r = _four(angles)
-        held = np.minimum(theta_i, self.steepest), phi_i, np.minimum(theta_r, self.steepest), phi_r
-        return self.vectors(np.stack(held, axis=1))
-
-
-@dataclass(frozen=True)
-class Specular:
-    """The light, and the viewer about the specular direction.
-
-    The polar angle of the viewer is that from the specular direction. Its azimuth is 0 from there towards the normal
-    and grows counter-clockwise as seen from above (libbsdf, ``SpecularCoordinateSystem``; Zemax has the same).
-
-    Attributes
-    ----------
-    anisotropic : bool
-        False: without the azimuth of the light.
-    mirrored : bool
-        f_r is the same for -phi_s, so that it ends at pi.
-    steepest : float [rad]
-        Largest polar angle of directions of nodes.
-    """
-
-    anisotropic: bool
-    mirrored: bool
-    steepest: float = STEEPEST
-
-    def steeper(self) -> System:
-        return replace(self, steepest=STEEPER)
-
-    @property
-    def axes(self) -> tuple[str, ...]:
-        return ("theta_i", "phi_i", "theta_s", "phi_s") if self.anisotropic else ("theta_i", "theta_s", "phi_s")
-
-    @property
-    def ends(self) -> tuple[float, ...]:
-        turn = np.pi if self.mirrored else 2.0 * np.pi
-        return (HALF_PI, 2.0 * np.pi, np.pi, turn) if self.anisotropic else (HALF_PI, np.pi, turn)
-
-    def angles(self, wi: Floats, wr: Floats) -> Floats:
-        theta_i, phi_i = _polar(wi), _azimuth(wi[:, 0], wi[:, 1])
-        w = _tilted(_turned(wr, -phi_i), theta_i)
-        phi_s = _azimuth(w[:, 0], w[:, 1])
-        phi_s = _folded(phi_s) if self.mirrored else phi_s
-        return np.stack([theta_i, *([phi_i] if self.anisotropic else []), _polar(w), phi_s], axis=1)
-
-    def vectors(self, angles: Floats) -> tuple[Floats, Floats]:
-        from brdfdb.geometry import unit_vector
-
-        theta_i, phi_i, theta_s, phi_s = _four(angles)
-        return unit_vector(theta_i, phi_i), _turned(_tilted(unit_vector(theta_s, phi_s), -theta_i), phi_i)
-
-    def directions(self, angles: Floats) -> tuple[Floats, Floats]:
-        theta_i, phi_i, theta_s, phi_s = _four(angles)
-        theta_i = np.minimum(theta_i, self.steepest)
-        # the cosine to the normal is length cos(theta_s - inclined): it is the lowest one at the largest theta_s
-        inclined = np.arctan2(np.sin(theta_i) * np.cos(phi_s), np.cos(theta_i))
-        length = np.hypot(np.cos(theta_i), np.sin(theta_i) * np.cos(phi_s))
-        largest = inclined + np.arccos(np.minimum(np.cos(self.steepest) / length, 1.0))
-        return self.vectors(np.stack([theta_i, phi_i, np.minimum(theta_s, np.maximum(largest, 0.0)), phi_s], axis=1))
-
-
-@dataclass(frozen=True)
-class HalfDifference:
-    """The half vector, and the light about it (Rusinkiewicz 1998, ``rusinkiewicz1998``).
-
-    Attributes
-    ----------
-    anisotropic : bool
-        False: without the azimuth of the half vector.
-    mirrored, reciprocal : bool
-        f_r is the same for -phi_d, and for phi_d + pi, where light and viewer are exchanged. Each halves the range of
-        phi_d.
-    steepest : float [rad]
-        Largest polar angle of directions of nodes.
-    """
-
-    anisotropic: bool
-    mirrored: bool = True
-    reciprocal: bool = True
-    steepest: float = STEEPEST
-
-    def steeper(self) -> System:
-        return replace(self, steepest=STEEPER)
-
-    @property
-    def axes(self) -> tuple[str, ...]:
-        return ("theta_h", "phi_h", "theta_d", "phi_d") if self.anisotropic else ("theta_h", "theta_d", "phi_d")
-
-    @property
-    def ends(self) -> tuple[float, ...]:
-        turn = 2.0 * np.pi / (1 + self.mirrored) / (1 + self.reciprocal)
-        return (HALF_PI, 2.0 * np.pi, HALF_PI, turn) if self.anisotropic else (HALF_PI, HALF_PI, turn)
-
-    def angles(self, wi: Floats, wr: Floats) -> Floats:
-        half = wi + wr
-        half /= np.linalg.norm(half, axis=1, keepdims=True)
-        theta_h, phi_h = _polar(half), _azimuth(half[:, 0], half[:, 1])
-        d = _tilted(_turned(wi, -phi_h), -theta_h)
-        phi_d = _azimuth(d[:, 0], d[:, 1])
-        if self.mirrored:
-            phi_d = _folded(phi_d)
-            phi_d = np.minimum(phi_d, np.pi - phi_d) if self.reciprocal else phi_d
-        elif self.reciprocal:
-            phi_d = phi_d % np.pi
-        theta_d = np.minimum(_polar(d), HALF_PI)
-        return np.stack([theta_h, *([phi_h] if self.anisotropic else []), theta_d, phi_d], axis=1)
-
-    def vectors(self, angles: Floats) -> tuple[Floats, Floats]:
-        from brdfdb.geometry import unit_vector
-
-        theta_h, phi_h, theta_d, phi_d = _four(angles)
-        d = unit_vector(theta_d, phi_d)
-        opposite = d * np.array([-1.0, -1.0, 1.0])
-        return _turned(_tilted(d, theta_h), phi_h), _turned(_tilted(opposite, theta_h), phi_h)
-
-    def directions(self, angles: Floats) -> tuple[Floats, Floats]:
-        theta_h, phi_h, theta_d, phi_d = _four(angles)
-        theta_h = np.minimum(theta_h, self.steepest)
-        # the lower one of the two directions has the cosine length cos(theta_d + inclined) to the normal
-        inclined = np.arctan2(np.sin(theta_h) * np.abs(np.cos(phi_d)), np.cos(theta_h))
-        length = np.hypot(np.cos(theta_h), np.sin(theta_h) * np.cos(phi_d))
-        largest = np.maximum(np.arccos(np.minimum(np.cos(self.steepest) / length, 1.0)) - inclined, 0.0)
-        return self.vectors(np.stack([theta_h, phi_h, np.minimum(theta_d, largest), phi_d], axis=1))
 
 
 def _four(angles: Floats) -> Floats:

@@ -14,21 +14,21 @@ import functools
 import itertools
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.errors import ParameterError
 from brdfdb.formats._angles import HalfDifference, System
-from brdfdb.formats._interface import Option
+from brdfdb.formats._interface import FormatOption
+from brdfdb.formats._node_search import Pace, Trial, finest, smallest, unevenness
 from brdfdb.formats._nodes import weighted
 from brdfdb.parameters import Floats
 
 if TYPE_CHECKING:
     from brdfdb.formats._stated_error import Comparison, FileError
-    from brdfdb.tables.table import Table
 
 _AT_ONCE = 1 << 22  # values that are interpolated, or looked up, at a time
 _FIRST = 8  # intervals of each axis before any is halved
@@ -40,13 +40,14 @@ _MOST = 0.97  # share of the pairs of an interval that its error stands for
 _BALANCES = 2
 _EVERY = 2  # of the pairs, one of so many chooses the nodes
 _DECIMALS = 5  # of nodes in degrees, so that text holds them
-_SEARCHES = 8
+_PACE = Pace(rounds=8, aim=0.9, fastest=8.0, halves=True)
+_LEVELS = 1e-9, 1e6  # range of targets
+_MOST_UNEVEN = 4.0  # largest ratio of the errors of two angles that is evened out at once
 _SAME = 1e-3  # largest p99 between a table and its image under a symmetry
-_NEAR = 0.85  # a grid whose error is above this share of the tolerance is small enough
 _SAMPLE = 20_000  # nodes of the grid that the size of a node in the file is taken from
 _SHRUNK = 0.99  # share of the nodes that should fit, when a file was too large
 
-SIZE = Option(
+SIZE = FormatOption(
     "size",
     16.0,
     "largest file [MB]: a table that needs more is written with the error it has",
@@ -108,8 +109,8 @@ class AngularGrid:
         values = np.empty((len(wi), channels))
         step = max(1, _AT_ONCE // (channels << len(self.nodes)))
         for start in range(0, len(wi), step):
-            some = slice(start, start + step)
-            values[some] = self._interpolated(self.system.angles(wi[some], wr[some]))
+            pairs = slice(start, start + step)
+            values[pairs] = self._interpolated(self.system.angles(wi[pairs], wr[pairs]))
         return values
 
     def _interpolated(self, angles: Floats) -> Floats:
@@ -130,59 +131,65 @@ class AngularGrid:
         return total
 
 
-def filled(table: Table, comparison: Comparison, system: System, nodes: Sequence[Floats]) -> AngularGrid:
-    """Return a grid with f_r of a table, in the channels of the comparison, at nodes [rad] of each angle."""
+class FittedGrid(NamedTuple):
+    """A grid as a file holds it, and its error against the table."""
+
+    grid: AngularGrid
+    error: FileError
+
+
+def filled(comparison: Comparison, system: System, nodes: Sequence[Floats]) -> AngularGrid:
+    """Return a grid with f_r of the table of a comparison, in its channels, at nodes [rad] of each angle."""
     shape = tuple(axis.size for axis in nodes)
     count, channels = math.prod(shape), len(comparison.channels.names)
     values = np.empty((count, channels), np.float32)
     step = max(1, _AT_ONCE // channels)
     for start in range(0, count, step):
-        some = np.arange(start, min(start + step, count))
-        index = np.unravel_index(some, shape)
+        numbers = np.arange(start, min(start + step, count))
+        index = np.unravel_index(numbers, shape)
         angles = np.stack([axis[at] for axis, at in zip(nodes, index, strict=True)], axis=1)
-        values[some] = comparison.channels.values(table, *system.directions(angles))
+        values[numbers] = comparison.channels.values(comparison.table, *system.directions(angles))
     return AngularGrid(system, tuple(nodes), values.reshape(*shape, channels))
 
 
-class Plan:
+class AngularPlan:
     """Densities of nodes on each angle of a system, from which grids of any tolerance are made.
 
-    Each angle is taken alone: the value of a pair is compared with the line between the values at both nodes beside it,
-    where its other angles stay the same. Intervals with errors above `target` are halved.
+    Each angle is taken alone: the value of a pair is compared with the line between the values at the nodes on both
+    sides of it, while its other angles stay the same. Intervals with errors above `target` are halved.
 
     Parameters
     ----------
-    table : Table
-        Table that is exported.
     comparison : Comparison
-        Pairs of directions, and the channels.
+        The table that is exported, pairs of directions, and the channels.
     system : System
         The angles.
     target : float [1]
         Error over each interval.
     """
 
-    def __init__(self, table: Table, comparison: Comparison, system: System, target: float) -> None:
+    def __init__(self, comparison: Comparison, system: System, target: float) -> None:
         above = np.flatnonzero(comparison.wr[:, 2] > 0.0)[::_EVERY]
         self.system = system
-        self.table, self._comparison, self._target = table, comparison, target
+        self.comparison = comparison
+        self.target = target
         self._truth = comparison.truth[above]
         self._angles = system.angles(comparison.wi[above], comparison.wr[above])
         scale = np.maximum(self._truth, comparison.floor)
         self._scale = np.where(scale > 0.0, scale, 1.0)
         self._shares = np.ones(len(system.ends))
-        self._lines = [self._halved(axis, end, target) for axis, end in enumerate(system.ends)]
+        self._intervals = [self._halved(axis, end) for axis, end in enumerate(system.ends)]
         for _ in range(_BALANCES):
             self._balance(self.nodes(target))
 
     def nodes(self, target: float) -> tuple[Floats, ...]:
         """Return nodes [rad] of each angle, between which linear interpolation is wrong by about `target`."""
         axes = []
-        for (edges, errors), share in zip(self._lines, self._shares, strict=True):
-            # the error is proportional to the square of a step
-            steps = np.append(0.0, np.cumsum(np.sqrt(errors * share / target)))
+        for intervals, share in zip(self._intervals, self._shares, strict=True):
+            # The error is proportional to the square of a step
+            steps = np.append(0.0, np.cumsum(np.sqrt(intervals.errors * share / target)))
             count = max(1, math.ceil(steps[-1] - 1e-9))
-            nodes = np.interp(np.linspace(0.0, steps[-1], count + 1), steps, edges)
+            nodes = np.interp(np.linspace(0.0, steps[-1], count + 1), steps, intervals.edges)
             axes.append(np.deg2rad(np.unique(np.round(np.rad2deg(nodes), _DECIMALS))))
         return tuple(axes)
 
@@ -190,208 +197,158 @@ class Plan:
         """Return the number of nodes of the grid of a target."""
         return math.prod(axis.size for axis in self.nodes(target))
 
-    def finest(self, most: int) -> float:
-        """Return the smallest target whose grid has no more than `most` nodes."""
-        low, high = 1e-9, 1e6
-        for _ in range(60):
-            middle = math.sqrt(low * high)
-            low, high = (low, middle) if self.count(middle) <= most else (middle, high)
-        return high
-
-    def steeper(self) -> Plan:
-        """Return the plan with directions of nodes that come closer to the horizon."""
-        return Plan(self.table, self._comparison, self.system.steeper(), self._target)
-
-    def grid(self, target: float, written: Callable[[AngularGrid], AngularGrid]) -> tuple[AngularGrid, FileError]:
-        """Return the grid of a target as a file holds it, and its error."""
-        grid = written(filled(self.table, self._comparison, self.system, self.nodes(target)))
-        return grid, self._comparison.error_of(grid.evaluate)
-
     def _balance(self, nodes: Sequence[Floats]) -> None:
         """Shift nodes between the angles, so that each is wrong by the same: then their product is the smallest."""
-        every = np.arange(len(self._angles))
+        pairs = np.arange(len(self._angles))
         wrong = np.empty(len(nodes))
         for axis, line in enumerate(nodes):
             below = np.clip(np.searchsorted(line, self._angles[:, axis], side="right") - 1, 0, line.size - 2)
-            errors = self._wrong(every, axis, line[below], line[below + 1])
+            errors = self._wrong(pairs, axis, line[below], line[below + 1])
             wrong[axis] = np.partition(errors, int(0.99 * errors.size))[int(0.99 * errors.size)]
-        wrong = np.maximum(wrong, 1e-3 * wrong.max()) + 1e-12
-        self._shares *= np.clip(wrong / np.exp(np.log(wrong).mean()), 1 / 4, 4.0)
+        self._shares *= unevenness(wrong, _MOST_UNEVEN)
 
-    def _wrong(self, some: NDArray[np.intp], axis: int, low: Floats, high: Floats) -> Floats:
-        """Return relative errors of the lines of one angle at some pairs, between `low` and `high` [rad]."""
-        share = ((self._angles[some, axis] - low) / (high - low))[:, np.newaxis]
-        line = (1.0 - share) * self._values(some, axis, low) + share * self._values(some, axis, high)
-        return np.asarray((np.abs(line - self._truth[some]) / self._scale[some]).max(axis=1))
+    def _wrong(self, pairs: NDArray[np.intp], axis: int, low: Floats, high: Floats) -> Floats:
+        """Return relative errors of the lines of one angle at pairs of directions, between `low` and `high` [rad]."""
+        share = ((self._angles[pairs, axis] - low) / (high - low))[:, np.newaxis]
+        line = (1.0 - share) * self._values(pairs, axis, low) + share * self._values(pairs, axis, high)
+        return np.asarray((np.abs(line - self._truth[pairs]) / self._scale[pairs]).max(axis=1))
 
-    def _values(self, some: NDArray[np.intp], axis: int, at: Floats) -> Floats:
-        moved = self._angles[some].copy()
+    def _values(self, pairs: NDArray[np.intp], axis: int, at: Floats) -> Floats:
+        """Return f_r [1/sr] of pairs of directions of which one angle is moved to others [rad]."""
+        moved = self._angles[pairs].copy()
         moved[:, axis] = at
-        return self._comparison.channels.values(self.table, *self.system.directions(moved))
+        return self.comparison.channels.values(self.comparison.table, *self.system.directions(moved))
 
-    def _halved(self, axis: int, end: float, target: float) -> tuple[Floats, Floats]:
-        """Return edges [rad] of intervals from 0 to `end`, and the error over each, by halving."""
+    def _halved(self, axis: int, end: float) -> Intervals:
+        """Return intervals from 0 to `end` [rad], and the error over each, by halving."""
         angle = self._angles[:, axis]
         edges = np.linspace(0.0, end, _FIRST + 1)
         errors = np.full(_FIRST, np.nan)
         for _ in range(_HALVINGS):
             interval = np.clip(np.searchsorted(edges, angle, side="right") - 1, 0, len(errors) - 1)
-            some = np.flatnonzero(np.isnan(errors)[interval])
-            measured = self._wrong(some, axis, edges[interval[some]], edges[interval[some] + 1])
-            counts = np.bincount(interval[some], minlength=len(errors))
-            order = np.lexsort((measured, interval[some]))
+            pairs = np.flatnonzero(np.isnan(errors)[interval])
+            measured = self._wrong(pairs, axis, edges[interval[pairs]], edges[interval[pairs] + 1])
+            counts = np.bincount(interval[pairs], minlength=len(errors))
+            order = np.lexsort((measured, interval[pairs]))
             first = np.append(0, np.cumsum(counts))[:-1]
             for number in np.flatnonzero(np.isnan(errors)):
                 in_order = measured[order[first[number] : first[number] + counts[number]]]
                 errors[number] = in_order[int(_MOST * len(in_order))] if len(in_order) else 0.0
-            split = (errors > target) & (counts >= _FEWEST)
+            split = (errors > self.target) & (counts >= _FEWEST)
             if not split.any():
                 break
             middle = (edges[:-1] + edges[1:])[split] / 2.0
             errors = np.repeat(np.where(split, np.nan, errors), np.where(split, 2, 1))
             edges = np.sort(np.concatenate([edges, middle]))
-        return _graded(edges, np.nan_to_num(errors, nan=target), target)
+        return Intervals(edges, np.nan_to_num(errors, nan=self.target)).graded(self.target)
 
 
-def _graded(edges: Floats, errors: Floats, target: float) -> tuple[Floats, Floats]:
-    """Return intervals none of which is more than twice as long as the next, with errors that are never 0.
+class Intervals(NamedTuple):
+    """Edges [rad] of intervals of an angle, and the error over each."""
 
-    Else a node beside a kink could be the end of a long straight line, which would miss the kink.
-    """
-    longest = (edges[-1] - edges[0]) / _FIRST
-    while True:
-        widths = np.diff(edges)
-        beside = np.minimum(np.append(widths[1:], np.inf), np.append(np.inf, widths[:-1]))
-        split = widths > 2.01 * beside
-        if not split.any():
-            break
-        errors = np.repeat(np.where(split, errors / 4.0, errors), np.where(split, 2, 1))
-        edges = np.sort(np.concatenate([edges, (edges[:-1] + edges[1:])[split] / 2.0]))
-    least = np.where(np.diff(edges) < 0.99 * longest, _LEAST_OF_HALVES, _LEAST)
-    return edges, np.maximum(errors, least * target)
+    edges: Floats
+    errors: Floats
+
+    def graded(self, target: float) -> Intervals:
+        """Return intervals none of which is more than twice as long as the next, with errors that are never 0.
+
+        Otherwise a node next to a kink could be the end of a long straight line, which would miss the kink.
+        """
+        edges, errors = self.edges, self.errors
+        longest = (edges[-1] - edges[0]) / _FIRST
+        while True:
+            widths = np.diff(edges)
+            neighbour = np.minimum(np.append(widths[1:], np.inf), np.append(np.inf, widths[:-1]))
+            split = widths > 2.01 * neighbour
+            if not split.any():
+                break
+            errors = np.repeat(np.where(split, errors / 4.0, errors), np.where(split, 2, 1))
+            edges = np.sort(np.concatenate([edges, (edges[:-1] + edges[1:])[split] / 2.0]))
+        least = np.where(np.diff(edges) < 0.99 * longest, _LEAST_OF_HALVES, _LEAST)
+        return Intervals(edges, np.maximum(errors, least * target))
 
 
 def chosen(
-    table: Table,
     comparison: Comparison,
     systems: Sequence[System],
     tolerance: float,
     size: float,
     write: Callable[[Sink, AngularGrid, FileError], None],
-    written: Callable[[AngularGrid], AngularGrid] = lambda grid: grid,
-) -> tuple[AngularGrid, FileError]:
-    """Return the smallest grid within a tolerance, and its error; if there is none, that of the smallest error.
+    *,
+    as_text: bool = False,
+) -> FittedGrid:
+    """Return the smallest grid within a tolerance, of the system with the fewest nodes; else that of the least error.
 
     Parameters
     ----------
-    table : Table
-        Table that is exported.
-    comparison : Comparison
-        Pairs of directions, and the channels.
-    systems : sequence of System
-        Systems of angles among which the one with the fewest nodes is taken.
-    tolerance : float [1]
-        Largest p99.
     size : float [MB]
         Largest size of the file.
     write : callable
         ``write(sink, grid, error)`` writes the file, from whose bytes its size is known.
-    written : callable
-        Gives the grid as the file holds it, with its rounded numbers.
+    as_text : bool
+        The file holds values with five significant digits.
 
     Raises
     ------
     ParameterError
         If the file of a grid with two nodes an angle is larger.
     """
+    most_bytes = 1e6 * size
 
-    def size_of(grid: AngularGrid, error: FileError) -> int:
+    def size_of(fitted: FittedGrid) -> int:
         counter = _Counter()
-        write(counter, grid, error)
+        write(counter, *fitted)
         return counter.nbytes
 
-    plans = [Plan(table, comparison, system, tolerance / 2.0) for system in systems]
-    plan = min(plans, key=lambda some: some.count(tolerance / 2.0))
-    grid, error = _fitting(plan, tolerance, 1e6 * size, size_of, written)
-    if error.p99 > tolerance:
-        other = _fitting(plan.steeper(), tolerance, 1e6 * size, size_of, written)
-        grid, error = min((grid, error), other, key=lambda some: _rank(some[0], some[1], tolerance))
-    return grid, error
+    def tried(plan: AngularPlan, target: float) -> Trial[FittedGrid]:
+        grid = filled(comparison, plan.system, plan.nodes(target))
+        grid = replace(grid, values=rounded(grid.values)) if as_text else grid
+        fitted = FittedGrid(grid, comparison.error_of(grid.evaluate))
+        return Trial(target, grid.values.size, fitted.error.p99, max(grid.values.shape[:-1]) == 2, fitted)
+
+    def fitting(plan: AngularPlan) -> Trial[FittedGrid]:
+        """Return the best trial of a plan whose file is small enough.
+
+        The size of a file is known only when its numbers are: the number of nodes is reduced until it is small enough.
+        """
+        sample = tried(plan, finest(plan.count, _SAMPLE, *_LEVELS)).grid
+        most = int(sample.grid.count * most_bytes / size_of(sample))
+        while True:
+            least = finest(plan.count, most, *_LEVELS)
+            best = smallest(functools.partial(tried, plan), tolerance / 2.0, least, tolerance, _PACE)
+            nbytes = size_of(best.grid)
+            if nbytes <= most_bytes:
+                return best
+            grid = best.grid.grid
+            if max(grid.values.shape[:-1]) <= 2:
+                needed = f"the smallest file of {comparison.table.name} has {nbytes / 1e6:.3g} MB"
+                raise ParameterError(SIZE.name, f"{size:g} MB are too few: {needed}", most)
+            most = min(grid.count - 1, int(_SHRUNK * grid.count * most_bytes / nbytes))
+
+    plans = [AngularPlan(comparison, system, tolerance / 2.0) for system in systems]
+    plan = min(plans, key=lambda plan: plan.count(tolerance / 2.0))
+    best = fitting(plan)
+    if best.p99 > tolerance:
+        steeper = AngularPlan(comparison, plan.system.steeper(), plan.target)
+        best = min(best, fitting(steeper), key=lambda trial: trial.rank(tolerance))
+    return best.grid
 
 
-def _fitting(
-    plan: Plan,
-    tolerance: float,
-    most_bytes: float,
-    size_of: Callable[[AngularGrid, FileError], int],
-    written: Callable[[AngularGrid], AngularGrid],
-) -> tuple[AngularGrid, FileError]:
-    """Return the smallest grid of a plan within a tolerance, or that of the smallest error, whose file is small enough.
-
-    The size of a file is known only when its numbers are: the number of nodes is reduced until it is small enough.
-    """
-    grid, error = plan.grid(plan.finest(_SAMPLE), written)
-    most = int(grid.count * most_bytes / size_of(grid, error))
-    while True:
-        grid, error = _smallest(plan, tolerance, most, written)
-        nbytes = size_of(grid, error)
-        if nbytes <= most_bytes:
-            return grid, error
-        if max(grid.values.shape[:-1]) <= 2:
-            name, mega = plan.table.name, nbytes / 1e6
-            raise ParameterError(
-                SIZE.name, f"{most_bytes / 1e6:g} MB are too few: the smallest file of {name} has {mega:.3g} MB", most
-            )
-        most = min(grid.count - 1, int(_SHRUNK * grid.count * most_bytes / nbytes))
+def reciprocal(comparison: Comparison) -> bool:
+    """Return True if the table is the same when light and viewer are exchanged, but for rounding."""
+    values = functools.partial(comparison.channels.values, comparison.table)
+    return _same(comparison, lambda wi, wr: np.where(wr[:, 2:] > 0.0, values(_above(wr), wi), 0.0))
 
 
-def _smallest(
-    plan: Plan, tolerance: float, most: int, written: Callable[[AngularGrid], AngularGrid]
-) -> tuple[AngularGrid, FileError]:
-    """Return the smallest grid of a plan within a tolerance, or that of the smallest error, and its error."""
-    finest = plan.finest(most)
-    target = max(tolerance / 2.0, finest)
-    best: tuple[AngularGrid, FileError] | None = None
-    within, beyond = 0.0, math.inf  # targets whose grids are, and are not, within the tolerance
-    for _ in range(_SEARCHES):
-        grid, error = plan.grid(target, written)
-        if best is None or _rank(grid, error, tolerance) < _rank(*best, tolerance):
-            best = grid, error
-        if error.p99 <= tolerance:
-            within = max(within, target)
-        else:
-            beyond = min(beyond, target)
-        if _NEAR * tolerance <= error.p99 <= tolerance or beyond == finest or within > 0.8 * beyond:
-            break
-        if within > 0.0 and beyond < math.inf:
-            target = math.sqrt(within * beyond)
-        else:
-            target *= float(np.clip(0.9 * tolerance / max(error.p99, 1e-9), 0.1, 8.0))
-        target = max(target, finest)
-    assert best is not None
-    return best
-
-
-def _rank(grid: AngularGrid, error: FileError, tolerance: float) -> tuple[bool, float]:
-    beyond = error.p99 > tolerance
-    return beyond, error.p99 if beyond else grid.values.size
-
-
-def reciprocal(table: Table, comparison: Comparison) -> bool:
-    """Return True if a table is the same when light and viewer are exchanged, but for rounding."""
-    values = comparison.channels.values
-    return _same(comparison, lambda wi, wr: np.where(wr[:, 2:] > 0.0, values(table, _above(wr), wi), 0.0))
-
-
-def mirrored(table: Table, comparison: Comparison) -> bool:
-    """Return True if a table is the same when light and viewer are mirrored at the plane of half vector and normal."""
-    values = comparison.channels.values
+def mirrored(comparison: Comparison) -> bool:
+    """Return True if the table is the same when light and viewer are mirrored at the plane of half vector and z."""
+    values = functools.partial(comparison.channels.values, comparison.table)
     system = HalfDifference(anisotropic=True, mirrored=False, reciprocal=False)
 
     def turned(wi: Floats, wr: Floats) -> Floats:
         above = wr[:, 2] > 0.0
         angles = system.angles(wi, _above(wr)) * np.array([1.0, 1.0, 1.0, -1.0])
-        return np.where(above[:, np.newaxis], values(table, *system.directions(angles)), 0.0)
+        return np.where(above[:, np.newaxis], values(*system.directions(angles)), 0.0)
 
     return _same(comparison, turned)
 

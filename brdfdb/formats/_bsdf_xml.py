@@ -33,7 +33,7 @@ _TAIL = "</Layer>\n</Optical>\n</WindowElement>\n"
 
 
 @dataclass(frozen=True)
-class Block:
+class BsdfBlock:
     """Numbers of one channel and one side.
 
     Attributes
@@ -82,7 +82,7 @@ class BsdfFile:
     structure: str
     definition: ElementTree.Element
     record: Mapping[str, Any]
-    blocks: Mapping[str, Block]
+    blocks: Mapping[str, BsdfBlock]
 
 
 def text_of(
@@ -90,21 +90,13 @@ def text_of(
     title: str,
     material: Iterable[str],
     definition: Iterable[str],
-    blocks: Iterable[Block],
+    blocks: Iterable[BsdfBlock],
     record: dict[str, Any],
 ) -> Iterable[str]:
     """Yield the text of a file in pieces.
 
-    Parameters
-    ----------
-    name, title : str
-        Of the material.
-    material, definition : iterable of str
-        Lines of XML on the material, and on the structure of the data.
-    blocks : iterable of Block
-        The numbers.
-    record : dict
-        The record; it goes into the comments of the definition.
+    `material` and `definition` are lines of XML on the material and on the structure of the data. The record goes into
+    the comments of the definition.
     """
     yield _HEAD
     product = f"<ProductName>{escape(one_line(title))}</ProductName>\n" if title else ""
@@ -116,7 +108,7 @@ def text_of(
     yield _TAIL
 
 
-def _text_of_block(block: Block) -> Iterable[str]:
+def _text_of_block(block: BsdfBlock) -> Iterable[str]:
     rows = [
         "<WavelengthData>",
         "<LayerNumber>System</LayerNumber>",
@@ -172,14 +164,14 @@ def read(path: str | os.PathLike[str], side: str = FRONT_OF_RADIANCE) -> BsdfFil
     layer, definition = root.find("{*}Optical/{*}Layer"), root.find("{*}Optical/{*}Layer/{*}DataDefinition")
     if layer is None or definition is None:
         raise FileFormatError(f"{path}: it has no DataDefinition in Optical, Layer")
-    blocks: dict[str, Block] = {}
+    blocks: dict[str, BsdfBlock] = {}
     for entry in layer.findall("{*}WavelengthData"):
         for part in entry.findall("{*}WavelengthDataBlock"):
             if _text(part, "WavelengthDataDirection").lower() == side.lower():
                 wavelength = _text(entry, "Wavelength")
                 basis = _text(part, "AngleBasis") or _text(part, "ColumnAngleBasis")
                 numbers = _text(part, "ScatteringData")
-                blocks[wavelength.lower()] = Block(wavelength, side, basis, _text(part, "RowAngleBasis"), numbers)
+                blocks[wavelength.lower()] = BsdfBlock(wavelength, side, basis, _text(part, "RowAngleBasis"), numbers)
     if VISIBLE.lower() not in blocks:
         of_radiance = ", which is Radiance's front" if side == FRONT_OF_RADIANCE else ""
         raise FileFormatError(f"{path}: it has no {VISIBLE} block of {side}{of_radiance}")

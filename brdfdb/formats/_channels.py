@@ -15,7 +15,10 @@ from brdfdb.parameters import Floats
 if TYPE_CHECKING:
     from brdfdb.tables.table import Table
 
-RGB, XYZ, LUMINOUS = ("R", "G", "B"), ("X", "Y", "Z"), ("Y",)
+RGB = ("R", "G", "B")
+XYZ = ("X", "Y", "Z")
+LUMINOUS = ("Y",)
+GREY = ("grey",)
 _AT_ONCE = 1 << 22  # values of a table that are looked up at a time
 
 
@@ -50,8 +53,8 @@ class Channels:
         values = np.empty((len(wi), len(self.names)))
         step = max(1, _AT_ONCE // (1 if self.wavelength_nm is None else self.wavelength_nm.size))
         for start in range(0, len(wi), step):
-            some = slice(start, start + step)
-            values[some] = self.of_spectra(np.asarray(table.lookup_vectors(wi[some], wr[some], self.wavelength_nm)))
+            pairs = slice(start, start + step)
+            values[pairs] = self.of_spectra(np.asarray(table.lookup_vectors(wi[pairs], wr[pairs], self.wavelength_nm)))
         return values.reshape(*shape, len(self.names))
 
     def of_spectra(self, brdf: Floats, *, absolute: bool = False) -> Floats:
@@ -64,6 +67,11 @@ class Channels:
         if self.weights is None:
             return brdf
         return np.asarray(brdf @ (np.abs(self.weights) if absolute else self.weights))
+
+
+def names_of(wavelength_nm: NDArray[np.float64] | None) -> tuple[str, ...]:
+    """Return the names of channels at wavelengths [nm], such as 550nm; "grey" without wavelengths."""
+    return GREY if wavelength_nm is None else tuple(f"{nm:g}nm" for nm in wavelength_nm)
 
 
 def has_spectrum(table: Table) -> bool:
@@ -92,12 +100,12 @@ def channels_of(table: Table, colour: str = "") -> Channels:
     at = table.wavelength_nm
     if colour == "auto":
         colour = "xyz" if has_spectrum(table) else "grey"
-    names = {"": ("grey",), "rgb": RGB, "xyz": XYZ, "grey": LUMINOUS}[colour]
+    names = {"": GREY, "rgb": RGB, "xyz": XYZ, "grey": LUMINOUS}[colour]
     same = "all channels are the same: the table is grey"
     if at is None:
         return Channels(names, None, None, "grey: the same at all wavelengths", (same,) if len(names) > 1 else ())
     if not colour:
-        return Channels(tuple(f"{value:g}nm" for value in at), at, None, "f_r at each wavelength")
+        return Channels(names_of(at), at, None, "f_r at each wavelength")
     if not has_spectrum(table):
         meaning = f"{'all channels are ' if len(names) > 1 else ''}f_r at {at[0]:g} nm"
         return Channels(names, at, np.ones((1, len(names))), meaning, (meaning,))

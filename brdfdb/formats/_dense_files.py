@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import json
 import math
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,9 +15,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from brdfdb.errors import FileFormatError, ParameterError
-from brdfdb.formats._interface import TOLERANCE, Option
-from brdfdb.formats._json_tables import degrees_of
+from brdfdb.errors import FileFormatError, ParameterError, import_extra
+from brdfdb.formats._channels import names_of
+from brdfdb.formats._input import check_text
+from brdfdb.formats._interface import TOLERANCE, FormatOption
 from brdfdb.formats._nodes import samples_at_angles
 from brdfdb.formats._record import CONVENTION, history_of, record, specular_remark
 from brdfdb.place import path_of
@@ -29,17 +31,18 @@ if TYPE_CHECKING:
     from brdfdb.measurements.samples import Samples
     from brdfdb.tables.table import Table
 
+RESOLUTION = FormatOption(
+    "resolution", 0.0, "distance of nodes on all axes [degrees]; 0: few nodes, where f_r bends", low=0.0, high=45.0
+)
 OPTIONS = (
     TOLERANCE,
-    Option(
+    FormatOption(
         "axes",
         "smallest",
         "angles of the grid: light and viewer, half and difference vector, or those that take fewer values",
         choices=("smallest", "light_viewer", "half_difference"),
     ),
-    Option(
-        "resolution", 0.0, "distance of nodes on all axes [degrees]; 0: few nodes, where f_r bends", low=0.0, high=45.0
-    ),
+    RESOLUTION,
 )
 INTERPOLATION = "linear along all axes; at angles beyond the last node f_r is that of the node; 0 below the horizon"
 _CONTINUED = "where light or viewer is below the horizon f_r is 0; values of such nodes only serve interpolation"
@@ -57,6 +60,25 @@ _TURNED = {
 _MOST_VALUES = 1 << 27  # of a file that is read
 _MOST_NODES = 1 << 22  # of an axis that is read
 _DEGREES, _RADIANS = ("", "degree", "degrees", "deg", "°"), ("rad", "radian", "radians")
+MOST_BYTES = 40_000_000  # size of a file that is written, about
+_MOST_READ = 1 << 29  # of a file that is read
+_DECIMALS = 4  # of angles [degree]: radians in files have six
+
+
+@contextlib.contextmanager
+def opened_netcdf(path: Path) -> Iterator[xr.Dataset]:
+    """Open a netCDF 3 file; FileFormatError if it is damaged, MissingExtraError if SciPy is not installed."""
+    import xarray as xr
+
+    import_extra("scipy.io")
+    try:
+        with xr.open_dataset(path, engine="scipy") as opened:
+            yield opened
+    except (FileFormatError, FileNotFoundError):
+        raise
+    except Exception as error:  # SciPy raises what its parser comes to
+        first = str(error).partition("\n")[0]
+        raise FileFormatError(f"{path}: it is no netCDF 3 file, or is damaged ({first})") from error
 
 
 def dense_record(table: Table, dense: DenseTable, verdict: str | None, *, specular: bool) -> dict[str, Any]:
@@ -116,7 +138,12 @@ def read_dataset(path: Path, opened: xr.Dataset) -> FileTable | Samples:
         raise FileFormatError(
             f"{path}: it has no variable brdf, only {', '.join(map(str, opened.data_vars)) or 'none'}"
         )
-    brdf = _valid(opened["brdf"])
+    brdf = opened["brdf"]
+    # Values outside of the range that the attributes of CF declare valid are holes
+    valid = brdf.attrs
+    low, high = valid.get("valid_range", (valid.get("valid_min", -np.inf), valid.get("valid_max", np.inf)))
+    if not low == -high == -np.inf:
+        brdf = brdf.where((brdf >= low) & (brdf <= high))
     opened = opened.assign(brdf=brdf)
     if "sample" in brdf.dims:
         try:
@@ -139,13 +166,6 @@ def read_dataset(path: Path, opened: xr.Dataset) -> FileTable | Samples:
     at = _in_nm(path, opened["wavelength"]) if spectral else None
     axes = {name: _in_degrees(path, opened[name]) for name in names}
     return file_table(path, axes, values, at, record_of_attributes(opened.attrs))
-
-
-def _valid(brdf: xr.DataArray) -> xr.DataArray:
-    """Return values with nan outside of the range that the attributes of CF declare valid."""
-    known = brdf.attrs
-    low, high = known.get("valid_range", (known.get("valid_min", -np.inf), known.get("valid_max", np.inf)))
-    return brdf if low == -high == -np.inf else brdf.where((brdf >= low) & (brdf <= high))
 
 
 def check_sizes(path: Path, shapes: Mapping[Any, tuple[int, ...]]) -> None:
@@ -211,7 +231,7 @@ def file_table(
         raise FileFormatError(
             f"{path}: brdf holds holes alone, or values that are not finite, or above those of 32 bits"
         )
-    channels = ("grey",) if at is None else tuple(f"{value:g}nm" for value in at)
+    channels = names_of(at)
     name = str(known.get("name") or path_of(path).stem)
 
     def nodes() -> Samples:
@@ -243,20 +263,8 @@ def reading_of_rows(
 ) -> FileTable | Samples:
     """Return f_r of rows of angles [degree]: interpolated linearly if they are a grid without holes, else as samples.
 
-    Parameters
-    ----------
-    path : path
-        The file, for errors and names.
-    angles : mapping of str to array (N,) [degree]
-        A column an axis.
-    values : array (N, C) [1/sr]
-        A column a wavelength, or one.
-    wavelength_nm : array (C,) [nm] or None
-        Wavelengths of the columns.
-    known : mapping
-        The record of the file.
-    nodes : callable, optional
-        Gives the samples of the file (default: `samples_of_rows`).
+    There is a column of angles (N,) for each axis, and one of values (N, C) [1/sr] for each wavelength, or a single
+    one. `known` is the record of the file. `nodes` gives its samples (default: `samples_of_rows`).
 
     Raises
     ------
@@ -291,14 +299,9 @@ def samples_of_rows(
     known: Mapping[str, Any],
     **keywords: Any,
 ) -> Samples:
-    """Return the samples of rows of theta_i, theta_r and their azimuths, or delta_phi [degree].
+    """Return the samples of rows of theta_i, theta_r and their azimuths, or delta_phi [degree], as `reading_of_rows`.
 
-    Parameters
-    ----------
-    path, angles, values, wavelength_nm, known
-        As of `reading_of_rows`.
-    **keywords
-        Those of `samples_at_angles`.
+    Keywords are those of `samples_at_angles`.
     """
     from brdfdb.measurements.samples import RELATIVE
 
@@ -308,7 +311,7 @@ def samples_of_rows(
         known = {**known, "azimuths": RELATIVE}
     phi_r = phi_i + angles["delta_phi"] if "delta_phi" in angles else angles.get("phi_r", zero)
     rows = np.deg2rad(np.stack([angles["theta_i"], phi_i, angles["theta_r"], phi_r], axis=1))
-    channels = ("grey",) if wavelength_nm is None else tuple(f"{value:g}nm" for value in wavelength_nm)
+    channels = names_of(wavelength_nm)
     return samples_at_angles(
         rows, values, str(known.get("name") or path.stem), channels, wavelength_nm, known, **keywords
     )
@@ -322,3 +325,38 @@ def _is_grid(angles: Mapping[str, NDArray[np.float64]], nodes: Mapping[str, NDAr
         return False
     expected = np.meshgrid(*nodes.values(), indexing="ij")
     return all(np.array_equal(grid.reshape(-1), angles[name]) for grid, name in zip(expected, nodes, strict=True))
+
+
+def parsed(path: Path) -> dict[str, Any]:
+    """Return the object in a JSON file; FileFormatError if it holds none, or more than 512 MiB."""
+    check_text(path, _MOST_READ)
+    try:
+        document = json.loads(path.read_bytes())
+    except (ValueError, RecursionError) as error:
+        raise FileFormatError(f"{path}: it is no JSON, or is damaged ({error})") from error
+    if not isinstance(document, dict):
+        raise FileFormatError(f"{path}: it holds no object")
+    return document
+
+
+def column(path: Path, name: str, values: Any, *, holes: bool = False) -> NDArray[np.float64]:
+    """Return a list of numbers, with nan for null if it may have holes; FileFormatError if it holds anything else."""
+    try:
+        numbers = np.array(values, dtype=np.float64)
+    except (ValueError, TypeError, OverflowError):
+        numbers = np.empty((0, 0))
+    if numbers.ndim != 1 or not numbers.size or np.any(np.isinf(numbers) | (np.isnan(numbers) & ~holes)):
+        raise FileFormatError(f"{path}: {name} is not a list of numbers")
+    return numbers
+
+
+def degrees_of(values: NDArray[np.float64], unit: str) -> NDArray[np.float64]:
+    """Return angles [degree] to four decimals; `unit` is "rad" or another word for degrees."""
+    return np.round(np.rad2deg(values) if unit == "rad" else values, _DECIMALS)
+
+
+def title_of(known: Mapping[str, Any]) -> str:
+    """Return what a record says of a file, its error and the audit, in one line."""
+    error = known["error_of_file"]["p99"]
+    text = f"{known['title'] or known['name']}; model {known['model']}; {known['holds']}; audit: {known['audit']}; "
+    return text + f"99 of 100 values are within {error:.3g} of the table, relative, with linear interpolation"

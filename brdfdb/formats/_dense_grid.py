@@ -13,7 +13,7 @@ from __future__ import annotations
 import functools
 import itertools
 import math
-from collections.abc import Iterator
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -22,8 +22,9 @@ from numpy.typing import NDArray
 
 from brdfdb.errors import ParameterError
 from brdfdb.formats._channels import Channels
+from brdfdb.formats._node_search import Pace, Trial, finest, smallest, unevenness
 from brdfdb.formats._stated_error import Comparison, FileError
-from brdfdb.geometry import HALF_PI, radians, unit_vector
+from brdfdb.geometry import HALF_PI, radians, unit_vector, vectors_from_half_difference
 from brdfdb.parameters import Floats
 from brdfdb.tables._interpolation import weights_of_nodes
 from brdfdb.tables.grids import (
@@ -43,10 +44,13 @@ _STEP_DEG = 0.5  # from which second derivatives are taken
 _BINS = 60  # of an axis, with a second derivative each
 _QUANTILE = 0.985  # of the second derivatives in a bin
 _EASED = 0.1  # least density of nodes, relative to its mean
-_LEVEL, _BALANCE = 0.01, 4.0  # error at which the axes are compared, and the largest ratio that is evened out
-_ROUNDS, _CLOSE = 9, 0.85  # steps of the search, and the share of the tolerance at which it ends
+_LEVEL = 0.01  # error at which the axes are compared
+_MOST_UNEVEN = 4.0  # largest ratio of the errors of two axes that is evened out
+_PACE = Pace(rounds=9, aim=0.93, fastest=5.0, halves=False)
+_LEVELS = 1e-8, 1e3  # range of levels
 _LAST_DEG = 89.5  # of light and viewer where f_r has a pole at the horizon
-_POLE_DEG, _STRAIGHT = radians(2.0), 7.5  # continuation: the angle from the horizon where it begins, and most steps
+_POLE = radians(2.0)  # angle from the horizon [rad] where the continuation begins if f_r has a pole there
+_STRAIGHT = 7.5  # steps of such an angle that a straight line continues f_r by at most
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,10 +94,6 @@ def dense_table(
 
     Parameters
     ----------
-    table : Table
-        Table that is exported.
-    tolerance : float [1]
-        Largest p99 of the error against the table.
     axes : str
         "light_viewer": theta_i, theta_r, delta_phi, or theta_i, phi_i, theta_r, phi_r of anisotropic tables.
         "half_difference": theta_h, theta_d, phi_d, or theta_h, phi_h, theta_d, phi_d. "smallest": those that take fewer
@@ -101,41 +101,43 @@ def dense_table(
     resolution : float [degree]
         Distance of the nodes on all axes; 0: as few nodes as the tolerance allows, where f_r bends.
     most_values : int
-        Largest number of values. If it allows no grid within the tolerance, the nearest one is returned.
+        Largest number of values. ParameterError if a regular grid has more; else the nearest smaller grid is returned.
     digits : int
         Significant digits that values are rounded to; 0: float32.
     last_deg : float [degree]
         Last polar angle of light and viewer that the format takes.
-    channels : Channels, optional
-        The channels of the file, by default those of the table.
-
-    Raises
-    ------
-    ParameterError
-        If a regular grid has more values.
     """
-    whole = Comparison(table, channels)
-    few = _at_few_wavelengths(table, whole)
-    names = _names(table)
-    tried = [names[axes]] if axes != "smallest" else list(names.values())
-    plans = [_Plan(table, few, some, last_deg) for some in tried]
+    comparison = Comparison(table, channels)
+    few = _at_few_wavelengths(comparison)
+    kinds: dict[str, tuple[str, ...]] = {"light_viewer": ISOTROPIC_AXES, "half_difference": HALF_DIFFERENCE_AXES}
+    if table.anisotropic:
+        kinds = {"half_difference": ANISOTROPIC_HALF_DIFFERENCE_AXES, "light_viewer": ANISOTROPIC_AXES}
+    plans = [_DensePlan(few, names, last_deg) for kind, names in kinds.items() if axes in (kind, "smallest")]
     if resolution:
         regular = min((plan.regular(resolution) for plan in plans), key=lambda grid: math.prod(grid.shape))
-        size = math.prod(regular.shape) * len(whole.channels.names)
+        size = math.prod(regular.shape) * len(comparison.channels.names)
         if size > most_values:
             raise ParameterError(
                 "resolution", f"{resolution:g} degrees take {size} values; the most are {most_values}", resolution
             )
-        return _tabulated(table, whole, regular, digits)
-    most_nodes = most_values // len(whole.channels.names)
-    chosen = _chosen(plans, tolerance, most_nodes)
-    dense, level = _tabulated(table, whole, chosen.plan.grid(chosen.level), digits), chosen.level
-    while dense.error.p99 > tolerance >= chosen.p99:  # the other wavelengths need more nodes
+        return _tabulated(comparison, regular, digits)
+    most_nodes = most_values // len(comparison.channels.names)
+    trials: list[Trial[_DensePlan]] = []
+    most_of_kind = most_nodes
+    for plan in sorted(plans, key=lambda plan: math.prod(plan.grid(tolerance).shape)):
+        least = finest(plan.count, most_of_kind, *_LEVELS)
+        trials.append(smallest(plan.tried, tolerance, least, tolerance, _PACE))
+        if trials[-1].p99 <= tolerance:
+            most_of_kind = min(most_of_kind, trials[-1].size)
+    best = min(trials, key=lambda trial: trial.rank(tolerance))
+    level = best.level
+    dense = _tabulated(comparison, best.grid.grid(level), digits)
+    while dense.error.p99 > tolerance >= best.p99:  # the other wavelengths need more nodes
         level *= 0.9 * tolerance / dense.error.p99
-        grid = chosen.plan.grid(level)
+        grid = best.grid.grid(level)
         if math.prod(grid.shape) > most_nodes:
             break
-        dense = _tabulated(table, whole, grid, digits)
+        dense = _tabulated(comparison, grid, digits)
     return replace(dense, tolerance=tolerance)
 
 
@@ -157,18 +159,18 @@ def rounded(values: Floats, digits: int) -> NDArray[np.float64]:
 
 def values_at_nodes(table: Table, channels: Channels, grid: Grid) -> NDArray[np.float32]:
     """Return f_r [1/sr] of a table at the nodes of a grid, shape (*axes, C)."""
+    continued = _Continued(table, channels, grid.names)
     values = np.empty((*grid.shape, len(channels.names)), np.float32)
     first, *others = (radians(nodes) for nodes in grid.axes.values())
     for row, node in enumerate(first):
         at = np.meshgrid(np.array([node]), *others, indexing="ij")
-        values[row] = _values(table, channels, grid.names, [column.reshape(-1) for column in at]).reshape(
-            values.shape[1:]
-        )
+        values[row] = continued.at([column.reshape(-1) for column in at]).reshape(values.shape[1:])
     return values
 
 
-def _tabulated(table: Table, comparison: Comparison, grid: Grid, digits: int) -> DenseTable:
-    values = values_at_nodes(table, comparison.channels, grid)
+def _tabulated(comparison: Comparison, grid: Grid, digits: int) -> DenseTable:
+    """Return the table of a comparison on a grid, and its error there."""
+    values = values_at_nodes(comparison.table, comparison.channels, grid)
     if digits:
         values = rounded(values, digits).astype(np.float32)
     reader = interpolated(grid, values, comparison.channels.wavelength_nm)
@@ -177,71 +179,44 @@ def _tabulated(table: Table, comparison: Comparison, grid: Grid, digits: int) ->
     return DenseTable(grid, comparison.channels, values, error)
 
 
-def _names(table: Table) -> dict[str, tuple[str, ...]]:
-    if table.anisotropic:
-        return {"half_difference": ANISOTROPIC_HALF_DIFFERENCE_AXES, "light_viewer": ANISOTROPIC_AXES}
-    return {"light_viewer": ISOTROPIC_AXES, "half_difference": HALF_DIFFERENCE_AXES}
-
-
-def _at_few_wavelengths(table: Table, whole: Comparison) -> Comparison:
-    """Return the comparison at some of the wavelengths, with the same pairs of directions."""
-    channels = whole.channels
+def _at_few_wavelengths(comparison: Comparison) -> Comparison:
+    """Return a comparison at a few of its wavelengths, with the same pairs of directions."""
+    channels = comparison.channels
     at = channels.wavelength_nm
     if at is None or at.size <= _WAVELENGTHS:
-        return whole
-    some = np.unique(np.round(np.linspace(0, at.size - 1, _WAVELENGTHS)).astype(int))
-    return Comparison(table, replace(channels, names=tuple(channels.names[i] for i in some), wavelength_nm=at[some]))
+        return comparison
+    few = np.unique(np.round(np.linspace(0, at.size - 1, _WAVELENGTHS)).astype(int))
+    names = tuple(channels.names[index] for index in few)
+    return Comparison(comparison.table, replace(channels, names=names, wavelength_nm=at[few]))
 
 
 def _has_pole(table: Table) -> bool:
     return table.source is None or table.source.grazing_pole
 
 
-class _Choice(NamedTuple):
-    """A grid of a plan: its level, its number of nodes and its p99 at a few wavelengths."""
-
-    plan: _Plan
-    level: float
-    nodes: int
-    p99: float
-
-
-def _order(choice: _Choice, tolerance: float) -> tuple[float, int]:
-    """Return a sorting key: those within the tolerance first, the smallest of them before the others."""
-    return max(choice.p99, tolerance), choice.nodes
-
-
-def _chosen(plans: list[_Plan], tolerance: float, most_nodes: int) -> _Choice:
-    """Return the smallest grid of the plans that is within the tolerance, or else the nearest."""
-    choices: list[_Choice] = []
-    for plan in sorted(plans, key=lambda plan: math.prod(plan.grid(tolerance).shape)):
-        choices.append(plan.smallest(tolerance, most_nodes))
-        if choices[-1].p99 <= tolerance:
-            most_nodes = min(most_nodes, choices[-1].nodes)
-    return min(choices, key=lambda choice: _order(choice, tolerance))
-
-
-class _Plan:
+class _DensePlan:
     """The nodes that a table needs on axes of one kind, in proportion to a level of error."""
 
-    def __init__(self, table: Table, comparison: Comparison, names: tuple[str, ...], last_deg: float) -> None:
-        self.table, self.comparison, self.names = table, comparison, names
+    def __init__(self, comparison: Comparison, names: tuple[str, ...], last_deg: float) -> None:
+        table = comparison.table
+        self.comparison = comparison
+        self.names = names
+        self.continued = _Continued(table, comparison.channels, names)
         last_deg = min(last_deg, _LAST_DEG) if _has_pole(table) else last_deg
-        ends = {name: _end(table, name, last_deg) for name in names}
-        self.coarsest = Grid({name: np.array([0.0, end]) for name, end in ends.items()})
-        above = comparison.wr[:, 2] > 0.0
-        x = points(self.coarsest, comparison.wi[above], comparison.wr[above])
-        self.x = np.minimum(x, np.array([radians(end) for end in ends.values()])[:, np.newaxis])
-        self.above = above
+        ends = {"theta_i": last_deg, "theta_r": last_deg, "theta_h": 90.0, "theta_d": 90.0}
+        ends |= dict.fromkeys(("phi_i", "phi_h"), 360.0 / table.grid.copies)
+        ends |= {"delta_phi": 180.0, "phi_r": 360.0, "phi_d": 180.0 if table.anisotropic else 90.0}
+        self.coarsest = Grid({name: np.array([0.0, ends[name]]) for name in names})
+        self.above = comparison.wr[:, 2] > 0.0
+        x = points(self.coarsest, comparison.wi[self.above], comparison.wr[self.above])
+        self.x = np.minimum(x, np.array([radians(ends[name]) for name in names])[:, np.newaxis])
 
     @functools.cached_property
     def needs(self) -> list[Floats]:
         """The root of the second derivative of f_r in the bins of each axis [1/rad]."""
         needs = [self._need(axis) for axis in range(len(self.names))]
         wrong = np.array([self._line_error(axis, need) for axis, need in enumerate(needs)])
-        wrong = np.maximum(wrong, 1e-3 * wrong.max()) + 1e-12
-        # the grid is the smallest one if the axes are off by the same, and errors grow with the square of a step
-        shares = np.sqrt(np.clip(wrong / np.exp(np.log(wrong).mean()), 1.0 / _BALANCE, _BALANCE))
+        shares = np.sqrt(unevenness(wrong, _MOST_UNEVEN))  # errors grow with the square of a step
         needs = [need * share for need, share in zip(needs, shares, strict=True)]
         if self.names == ISOTROPIC_AXES:  # reciprocity
             needs[:2] = [np.maximum(needs[0], needs[1])] * 2
@@ -255,7 +230,7 @@ class _Plan:
         line = np.zeros_like(truth)
         for side in (0, 1):
             at = [column if k != axis else nodes[index[:, side]] for k, column in enumerate(self.x)]
-            line += weights[:, side, np.newaxis] * _values(self.table, self.comparison.channels, self.names, at)
+            line += weights[:, side, np.newaxis] * self.continued.at(at)
         scale = np.maximum(truth, self.comparison.floor)
         relative = np.divide(np.abs(line - truth), scale, out=np.zeros_like(line), where=scale > 0.0)
         return float(np.quantile(relative, 0.99, axis=0).max())
@@ -281,16 +256,16 @@ class _Plan:
         three = []
         for shift in (-step, 0.0, step):
             at = [column if k != axis else middle + shift for k, column in enumerate(self.x)]
-            three.append(_values(self.table, self.comparison.channels, self.names, at))
+            three.append(self.continued.at(at))
         bent = np.abs(three[0] - 2.0 * three[1] + three[2]) / step**2
         scale = np.maximum(three[1], self.comparison.floor)
         relative = np.max(np.divide(bent, scale, out=np.zeros_like(bent), where=scale > 0.0), axis=1)
         number = np.minimum((self.x[axis] * (_BINS / end)).astype(int), _BINS - 1)
         known = np.full(_BINS, np.nan)
         for index in range(_BINS):
-            some = relative[number == index]
-            if some.size >= 5:
-                known[index] = np.sqrt(np.quantile(some, _QUANTILE))
+            in_bin = relative[number == index]
+            if in_bin.size >= 5:
+                known[index] = np.sqrt(np.quantile(in_bin, _QUANTILE))
         there = np.flatnonzero(np.isfinite(known))
         need = np.interp(np.arange(_BINS), there, known[there]) if there.size else np.zeros(_BINS)
         share = np.bincount(number, minlength=_BINS) * (_BINS / number.size)
@@ -309,105 +284,71 @@ class _Plan:
         counts = {name: 1 + math.ceil(end / step_deg - 1e-9) for name, end in ends.items()}
         return Grid({name: np.round(np.linspace(0.0, end, counts[name]), 4) for name, end in ends.items()})
 
-    def smallest(self, tolerance: float, most_nodes: int) -> _Choice:
-        """Return the largest level whose p99 is within the tolerance, or else the smallest that is not too large."""
-        least = self._least(most_nodes)
-        level, best = max(tolerance, least), None
-        for _ in range(_ROUNDS):
-            grid = self.grid(level)
-            trial = _Choice(self, level, math.prod(grid.shape), self._p99(grid))
-            if best is None or _order(trial, tolerance) < _order(best, tolerance):
-                best = trial
-            close = _CLOSE * tolerance <= trial.p99 <= tolerance
-            if close or (trial.p99 > tolerance and level == least) or (trial.p99 < tolerance and max(grid.shape) == 2):
-                break
-            level = max(least, level * float(np.clip(0.93 * tolerance / max(trial.p99, 1e-9), 0.1, 5.0)))
-        assert best is not None
-        return best
+    def tried(self, level: float) -> Trial[_DensePlan]:
+        """Return the trial of a level."""
+        grid = self.grid(level)
+        return Trial(level, math.prod(grid.shape), self._p99(grid), max(grid.shape) == 2, self)
 
-    def _least(self, most_nodes: int) -> float:
-        """Return the smallest level whose grid has no more than so many nodes."""
-        low, high = 1e-8, 1e3
-        for _ in range(60):
-            middle = math.sqrt(low * high)
-            low, high = (low, middle) if self._nodes(middle) <= most_nodes else (middle, high)
-        return high
-
-    def _nodes(self, level: float) -> int:
+    def count(self, level: float) -> int:
+        """Return the number of nodes of the grid of a level."""
         return math.prod(self._count(axis, need, level) for axis, need in enumerate(self.needs))
 
     def _p99(self, grid: Grid) -> float:
         """Return the p99 of a grid from the corners of the cells with the pairs: no other nodes are looked up."""
-        channels = self.comparison.channels
         cells = [
             weights_of_nodes(radians(nodes), column, cubic=False)
             for nodes, column in zip(grid.axes.values(), self.x, strict=True)
         ]
-        total: Floats = np.zeros((self.x.shape[1], len(channels.names)))
-        for corner in _corners(len(cells)):
+        total: Floats = np.zeros((self.x.shape[1], len(self.comparison.channels.names)))
+        for corner in itertools.product((0, 1), repeat=len(cells)):
             at: list[Floats] = []
             weight = np.ones(total.shape[0])
             for (index, weights), nodes, side in zip(cells, grid.axes.values(), corner, strict=True):
                 at.append(radians(nodes)[index[:, side]])
                 weight = weight * weights[:, side]
-            total = total + weight[:, np.newaxis] * _values(self.table, channels, self.names, at)
+            total = total + weight[:, np.newaxis] * self.continued.at(at)
         values = np.zeros((len(self.above), total.shape[1]))
         values[self.above] = np.maximum(total, 0.0)
         return self.comparison.error_of(lambda _wi, _wr: values).p99
 
 
-def _corners(axes: int) -> Iterator[tuple[int, ...]]:
-    return itertools.product((0, 1), repeat=axes)
+class _Continued(NamedTuple):
+    """f_r of a table in channels at coordinates on axes, continued beyond the horizon."""
 
+    table: Table
+    channels: Channels
+    names: tuple[str, ...]
 
-def _end(table: Table, name: str, last_deg: float) -> float:
-    """Return the last node of an axis [degree]."""
-    if name in ("theta_i", "theta_r"):
-        return last_deg
-    if name in ("phi_i", "phi_h"):
-        return 360.0 / table.grid.copies
-    if name == "phi_d":
-        return 180.0 if table.anisotropic else 90.0
-    return {"delta_phi": 180.0, "phi_r": 360.0}.get(name, 90.0)
+    def at(self, x: Sequence[Floats]) -> Floats:
+        """Return f_r [1/sr], shape (N, C), at coordinates [rad] of shape (N,)."""
+        if self.names == ISOTROPIC_AXES:
+            return self.channels.values(self.table, unit_vector(x[0], np.zeros(1)), unit_vector(x[1], x[2]))
+        if self.names == ANISOTROPIC_AXES:
+            return self.channels.values(self.table, unit_vector(x[0], x[1]), unit_vector(x[2], x[3]))
+        theta_h, phi_h, theta_d, phi_d = x if len(x) == 4 else (x[0], np.zeros(x[0].shape), x[1], x[2])
+        pole = _has_pole(self.table)
+        lowest = math.sin(_POLE) if pole else 0.0  # cosine of light and viewer
+        theta_h = np.minimum(theta_h, HALF_PI - _POLE if pole else HALF_PI)
+        # cos theta_r = along cos theta_d - across sin theta_d, at phi_d or at the other side
+        along = np.cos(theta_h)
+        across = np.sin(theta_h) * np.abs(np.cos(phi_d))
+        largest = np.arccos(np.minimum(lowest / np.maximum(np.hypot(along, across), 1e-12), 1.0))
+        largest = np.maximum((largest - np.arctan2(across, along)) * (1.0 - 1e-12), 0.0)
+        horizon = np.maximum((HALF_PI - np.arctan2(across, along)) * (1.0 - 1e-12), 0.0)
+        nearest = np.where(theta_d > horizon, np.minimum(theta_d, largest), theta_d)
+        values = self._half_difference(theta_h, phi_h, nearest, phi_d)
+        beyond = np.flatnonzero(theta_d > nearest)
+        if beyond.size:
+            step = np.minimum(_POLE, 0.5 * largest[beyond])
+            before = np.maximum(nearest[beyond] - step, 0.0)
+            slope = values[beyond] - self._half_difference(theta_h[beyond], phi_h[beyond], before, phi_d[beyond])
+            steps = np.minimum((theta_d[beyond] - nearest[beyond]) / np.maximum(step, 1e-9), _STRAIGHT)
+            values[beyond] = np.maximum(values[beyond] + steps[:, np.newaxis] * slope, 0.0)
+        return values
 
-
-def _values(table: Table, channels: Channels, names: tuple[str, ...], at: list[Floats]) -> Floats:
-    """Return f_r [1/sr] at coordinates [rad] of shape (N,), shape (N, C), continued beyond the horizon."""
-    if names == ISOTROPIC_AXES:
-        return channels.values(table, unit_vector(at[0], np.zeros(1)), unit_vector(at[1], at[2]))
-    if names == ANISOTROPIC_AXES:
-        return channels.values(table, unit_vector(at[0], at[1]), unit_vector(at[2], at[3]))
-    theta_h, phi_h, theta_d, phi_d = at if len(at) == 4 else (at[0], np.zeros(at[0].shape), at[1], at[2])
-    pole = _has_pole(table)
-    lowest = math.sin(_POLE_DEG) if pole else 0.0  # cosine of light and viewer
-    theta_h = np.minimum(theta_h, HALF_PI - _POLE_DEG if pole else HALF_PI)
-    # cos theta_r = along cos theta_d - across sin theta_d, at phi_d or at the other side
-    along, across = np.cos(theta_h), np.sin(theta_h) * np.abs(np.cos(phi_d))
-    largest = np.arccos(np.minimum(lowest / np.maximum(np.hypot(along, across), 1e-12), 1.0))
-    largest = np.maximum((largest - np.arctan2(across, along)) * (1.0 - 1e-12), 0.0)
-    horizon = np.maximum((HALF_PI - np.arctan2(across, along)) * (1.0 - 1e-12), 0.0)
-    held = np.where(theta_d > horizon, np.minimum(theta_d, largest), theta_d)
-    values = _half_difference(table, channels, theta_h, phi_h, held, phi_d)
-    past = np.flatnonzero(theta_d > held)
-    if past.size:
-        step = np.minimum(_POLE_DEG, 0.5 * largest[past])
-        some = theta_h[past], phi_h[past], np.maximum(held[past] - step, 0.0), phi_d[past]
-        slope = values[past] - _half_difference(table, channels, *some)
-        share = np.minimum((theta_d[past] - held[past]) / np.maximum(step, 1e-9), _STRAIGHT)
-        values[past] = np.maximum(values[past] + share[:, np.newaxis] * slope, 0.0)
-    return values
-
-
-def _half_difference(
-    table: Table, channels: Channels, theta_h: Floats, phi_h: Floats, theta_d: Floats, phi_d: Floats
-) -> Floats:
-    sin_h, cos_h, turned_x, turned_y = np.sin(theta_h), np.cos(theta_h), np.cos(phi_h), np.sin(phi_h)
-    across, z = np.sin(theta_d), np.cos(theta_d)
-    x, y = across * np.cos(phi_d), across * np.sin(phi_d)
-    pair = []
-    for sign in (1.0, -1.0):  # the viewer is the light turned by half a turn about the half vector
-        along = sign * x * cos_h + z * sin_h
-        up = np.maximum(z * cos_h - sign * x * sin_h, 0.0)  # rounding at the horizon
-        side = sign * y
-        pair.append(np.stack([along * turned_x - side * turned_y, along * turned_y + side * turned_x, up], axis=-1))
-    return channels.values(table, *pair)
+    def _half_difference(self, theta_h: Floats, phi_h: Floats, theta_d: Floats, phi_d: Floats) -> Floats:
+        """Return f_r [1/sr], shape (N, C), at angles of half and difference vectors above the horizon."""
+        pair = vectors_from_half_difference(theta_h, phi_h, theta_d, phi_d)
+        for w in pair:
+            w[..., 2] = np.maximum(w[..., 2], 0.0)  # rounding at the horizon
+        return self.channels.values(self.table, *pair)

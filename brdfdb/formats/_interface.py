@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Option:
+class FormatOption:
     """An option of a format.
 
     Attributes
@@ -44,7 +44,7 @@ class Option:
     most_served: float = math.inf
 
     @property
-    def served(self) -> Option:
+    def served(self) -> FormatOption:
         """The option with the range that a service allows."""
         return replace(self, high=min(self.high, self.most_served))
 
@@ -88,7 +88,7 @@ class Option:
 _KINDS = ((bool, "boolean"), (str, "string"), (object, "number"))
 
 
-def schema_of(of: Mapping[str, Option]) -> tuple[dict[str, Any], str]:
+def schema_of(of: Mapping[str, FormatOption]) -> tuple[dict[str, Any], str]:
     """Return the JSON Schema of an option of one or more formats, with the values that any allows, and its help.
 
     It has no default: generated clients send defaults, and a format refuses options of others.
@@ -106,7 +106,7 @@ def schema_of(of: Mapping[str, Option]) -> tuple[dict[str, Any], str]:
     return schema, ". ".join(f"{', '.join(keys)}: {sentence}" for sentence, keys in words.items())
 
 
-TOLERANCE = Option(
+TOLERANCE = FormatOption(
     "tolerance",
     0.02,
     "largest error against the table that 99 of 100 values may have: the smallest file within it is written",
@@ -119,7 +119,7 @@ FIXED = replace(
     help="largest error against the table that 99 of 100 values may have: a larger one is reported, the grid is fixed",
 )
 
-MEGABYTES = Option(
+MEGABYTES = FormatOption(
     "megabytes",
     64.0,
     "largest file [MB]: a table that needs more is written with the error it has",
@@ -128,11 +128,11 @@ MEGABYTES = Option(
     most_served=64.0,
 )
 
-WAVELENGTH = Option("wavelength", 550.0, "wavelength of a spectral table that is written [nm]", low=1.0, high=1e6)
+WAVELENGTH = FormatOption("wavelength", 550.0, "wavelength of a spectral table that is written [nm]", low=1.0, high=1e6)
 
 
 class Exporter(Protocol):
-    """A format that tables are written to: a module of `brdfdb.formats`, or another object with these names.
+    """A format that tables are written to: a module or folder of `brdfdb.formats`, or another object with these names.
 
     It imports packages other than NumPy, and the tables, only when it writes.
 
@@ -149,13 +149,16 @@ class Exporter(Protocol):
     kinds : tuple of str
         Kinds of files, one file each, that are made of one table: values of the keyword argument `kind`. Empty if one
         file holds the table.
-    options : tuple of Option
+    options : tuple of FormatOption
         All other keyword arguments.
     write : callable
-        ``write(table, path, verdict=None, **options)`` writes the file, and those that stand beside it: whole, or not
-        at all. `verdict` is that of the audit of this revision, or None where the caller knows none. It raises
-        CannotHoldError for a table that the format has no place for. A module without `read` may have `recognises`, as
-        importers do: files with its suffix are then of this format only if it recognises them.
+        ``write(table, path, verdict=None, **options)`` writes the file, and those beside it, completely or not at all;
+        files that exist are replaced. Its options are `options` and `kind`, whose `help` says what they mean. `verdict`
+        is that of the audit of this revision, or None if the caller does not know it. It raises CannotHoldError for a
+        table that the format has no place for (anisotropic, or of wavelengths that give no colour), ParameterError if
+        an option cannot be met (no file is so small, no such wavelength), and WriteError if a file cannot be written.
+        A module without `read` may have `recognises`, as importers do: files with its suffix are then of this format
+        only if it recognises them.
     """
 
     suffix: str
@@ -163,12 +166,12 @@ class Exporter(Protocol):
     summary: str
     tools: str
     kinds: tuple[str, ...]
-    options: tuple[Option, ...]
+    options: tuple[FormatOption, ...]
     write: Callable[..., Written]
 
 
 class Importer(Protocol):
-    """A format that is read: a module of `brdfdb.formats`, or another object with these names.
+    """A format that is read: a module or folder of `brdfdb.formats`, or another object with these names.
 
     Attributes
     ----------
@@ -177,8 +180,9 @@ class Importer(Protocol):
     recognises : callable
         ``recognises(head)`` is true if the first bytes of a file, 4096 of them or all, are those of this format.
     read : callable
-        ``read(path)`` gives f_r as the tools of the format see it, or the samples that the file lists. A module whose
-        `read` takes more has a tuple ``keywords`` with their names. One whose files may hold several materials has
+        ``read(path)`` gives f_r as the tools of the format see it, or the samples that the file lists. It raises
+        FileFormatError if the file is damaged or of another format, and OSError if it cannot be read. A module whose
+        `read` takes more has a tuple ``keywords`` with their names. A module whose files may hold several materials has
         ``members(path)``, which gives the names that its keyword ``member`` takes, none of a file with one material.
     """
 
@@ -187,10 +191,10 @@ class Importer(Protocol):
     read: Callable[..., FileTable | Samples]
 
 
-def options_of(exporter: Exporter) -> dict[str, Option]:
+def options_of(exporter: Exporter) -> dict[str, FormatOption]:
     """Return all options of a format by name, the kind of file among them."""
     kinds = exporter.kinds
-    kind = [Option("kind", kinds[0], "kind of file", choices=kinds)] if kinds else []
+    kind = [FormatOption("kind", kinds[0], "kind of file", choices=kinds)] if kinds else []
     return {option.name: option for option in (*kind, *exporter.options)}
 
 

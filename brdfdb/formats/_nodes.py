@@ -13,7 +13,7 @@ from brdfdb.formats._angles import System
 from brdfdb.parameters import Floats
 
 if TYPE_CHECKING:
-    from brdfdb.measurements.samples import Instrument, Samples
+    from brdfdb.measurements.samples import Samples
 
 _HORIZON = 0.5 * np.pi * (1.0 + 1e-9)  # largest polar angle [rad], with rounding
 _SAME = 1e-6  # difference of coordinates within which directions are the same: angles of files may have 32 bits
@@ -51,25 +51,13 @@ def samples_at_angles(
     record: Mapping[str, Any],
     *,
     uncertainty: Floats | None = None,
-    instrument: Instrument | None = None,
-    provenance: str = "",
+    **origin: Any,
 ) -> Samples:
-    """Return samples without those below the horizon, and without repetitions.
+    """Return samples at theta_i, phi_i, theta_r, phi_r [rad], shape (N, 4), above the horizon and without repetitions.
 
-    Parameters
-    ----------
-    angles : array (N, 4) [rad]
-        theta_i, phi_i, theta_r, phi_r. Polar angles above pi/2 are below the horizon.
-    values : array (N, C) [1/sr]
-        f_r; nan, or one of `FILL_VALUES`, where there is none.
-    name, channels, wavelength_nm, record, uncertainty, instrument, provenance
-        As of `Samples`.
-
-    Returns
-    -------
-    Samples
-        In the order of the rows. Its record counts the rows ``below_the_horizon`` and those ``repeated``: with the same
-        directions and the same values, as at all azimuths of the normal.
+    Values (N, C) [1/sr] are nan, or one of `FILL_VALUES`, where there are none. The other parameters, such as the
+    instrument and the provenance, are those of `Samples`. The record counts the rows ``below_the_horizon`` and those
+    ``repeated``: with the same directions and the same values, as at all azimuths of the normal.
 
     Raises
     ------
@@ -79,7 +67,7 @@ def samples_at_angles(
         If an angle is outside its range, or nan.
     """
     from brdfdb.geometry import check_phi, check_theta
-    from brdfdb.measurements.samples import ANGLES, Instrument, Samples
+    from brdfdb.measurements.samples import ANGLES, Samples
 
     for axis, column in zip(ANGLES, angles.T, strict=True):
         (check_theta if axis.startswith("theta") else check_phi)(axis, column)
@@ -102,27 +90,18 @@ def samples_at_angles(
         wavelength_nm,
         values[kept],
         uncertainty=None if uncertainty is None else uncertainty[kept],
-        instrument=instrument or Instrument(),
-        provenance=provenance,
         record={**record, **{key: count for key, count in counts.items() if count}},
+        **origin,
     )
 
 
 def samples_of_grid(
     system: System, nodes: Sequence[Floats], values: Floats, *arguments: Any, **keywords: Any
 ) -> Samples:
-    """Return samples at all nodes [rad] of the angles of a system, the last angle fastest.
+    """Return samples at all nodes [rad] of the angles of a system; the last angle changes fastest.
 
-    Parameters
-    ----------
-    system : System
-        The angles; of an isotropic one four angles may be given, too. Its lights have an azimuth of 0.
-    nodes : sequence of array (n,) [rad]
-        Nodes of each angle.
-    values : array (n, ..., C) [1/sr]
-        f_r, an axis for each angle and last the channels.
-    *arguments, **keywords
-        Those of `samples_at_angles` after the values.
+    Values (n, ..., C) [1/sr] have an axis for each angle. Four angles may be given of an isotropic system, too. Lights
+    of an isotropic system have an azimuth of 0. The other arguments are those of `samples_at_angles`.
     """
     angles = np.stack([grid.reshape(-1) for grid in np.meshgrid(*nodes, indexing="ij")], axis=1)
     flat = np.asarray(values, dtype=np.float64).reshape(len(angles), -1)
@@ -133,16 +112,14 @@ def samples_of_grid(
 
 
 def _angles_of(wi: Floats, wr: Floats) -> Floats:
-    """Return theta_i, phi_i, theta_r, phi_r [rad] of unit vectors (N, 3), shape (N, 4)."""
-    return np.stack([*_angles(wi), *_angles(wr)], axis=1)
-
-
-def _angles(w: Floats) -> tuple[Floats, Floats]:
-    """Return polar angles and azimuths [rad] of unit vectors (N, 3); azimuths of the normal are 0."""
+    """Return theta_i, phi_i, theta_r, phi_r [rad] of unit vectors (N, 3), shape (N, 4); phi of the normal is 0."""
     from brdfdb.geometry import spherical_angles
 
-    theta, phi = spherical_angles(w)
-    return theta, np.where(np.sin(theta) < _SAME, 0.0, phi)
+    columns = []
+    for w in (wi, wr):
+        theta, phi = spherical_angles(w)
+        columns += [theta, np.where(np.sin(theta) < _SAME, 0.0, phi)]
+    return np.stack(columns, axis=1)
 
 
 def _first_of_each(angles: Floats, values: Floats) -> NDArray[np.intp]:

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from brdfdb.arrays import array_lookup
 from brdfdb.errors import ParameterError
+from brdfdb.formats._record import note
 from brdfdb.geometry import checked_angles, checked_vectors, finished, unit_vector
 from brdfdb.materials.source import FourAngles, Lookups
 from brdfdb.parameters import Floats, check_nanometres
@@ -18,6 +19,11 @@ from brdfdb.tables.table_base import Stated
 
 if TYPE_CHECKING:
     from brdfdb.measurements.samples import Samples
+
+_RANGE_NM = (10.0, 1e6)
+_OPPOSITE = np.array([-1.0, -1.0, 1.0])
+
+Reading = TypeVar("Reading", "FileTable", "Samples")
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +81,7 @@ class FileTable(Lookups):
         ParameterError
             If the file states no error, or none between its wavelengths.
         """
-        from brdfdb.formats._file_statement import FileStatement
+        from brdfdb.formats._stated_error import FileStatement
 
         statement = FileStatement.read(self.record, self.name)
         brdf, at = self.lookup_vectors(wi, wr, wavelength_nm), self.wavelength_nm
@@ -112,3 +118,63 @@ class FileTable(Lookups):
         above = np.minimum(below + 1, stored.size - 1)
         width = np.where(above > below, stored[above] - stored[below], 1.0)
         return np.stack([below, above], axis=-1), (wanted - stored[below]) / width
+
+
+def from_forward(reading: FileTable | Samples) -> FileTable | Samples:
+    """Return f_r of a file whose azimuth of the light is the one into which it travels: 180 degrees from the light."""
+    from brdfdb.measurements.samples import Samples
+
+    if isinstance(reading, Samples):
+        return _turned(reading)
+    evaluate, nodes = reading.evaluate, reading.nodes
+
+    def turned(wi: Floats, wr: Floats) -> Floats:
+        return evaluate(wi * _OPPOSITE, wr)
+
+    return replace(reading, evaluate=turned, nodes=None if nodes is None else lambda: _turned(nodes()))
+
+
+def _turned(samples: Samples) -> Samples:
+    """Return samples with the light on the other side; azimuths that are relative to it stay so."""
+    from brdfdb.measurements.samples import RELATIVE
+
+    of = "phi_r" if samples.record.get("azimuths") == RELATIVE else "phi_i"
+    changed: dict[str, Any] = {of: (getattr(samples, of) + np.pi) % (2.0 * np.pi)}
+    return replace(samples, **changed, record={**samples.record, "azimuth": "forward"})
+
+
+def check_wavelength(wavelength_nm: float) -> None:
+    """Raise ParameterError if a wavelength [nm] that a user states is outside [10, 1e6] nm."""
+    low, high = _RANGE_NM
+    if not low <= wavelength_nm <= high:
+        raise ParameterError(
+            "wavelength_nm", f"{wavelength_nm:g} is outside [{low:g}, {high:g}] nm", wavelength_nm, _RANGE_NM
+        )
+
+
+def at_wavelength(reading: FileTable | Samples, wavelength_nm: float) -> FileTable | Samples:
+    """Return f_r of a file that gives no wavelength, with the one [nm] that the user states.
+
+    Raises
+    ------
+    ParameterError
+        If the wavelength is outside [10, 1e6] nm, or the file states a wavelength or colours.
+    """
+    check_wavelength(wavelength_nm)
+    from brdfdb.measurements.samples import Samples
+
+    if isinstance(reading, Samples):
+        return _named(reading, wavelength_nm)
+    nodes = reading.nodes
+    named = _named(reading, wavelength_nm)
+    return named if nodes is None else replace(named, nodes=lambda: _named(nodes(), wavelength_nm))
+
+
+def _named(reading: Reading, wavelength_nm: float) -> Reading:
+    """Return f_r of one channel at a wavelength [nm]; ParameterError if it states its channels."""
+    if reading.channels != ("grey",) or reading.wavelength_nm is not None:
+        text = f"{reading.name} states its own: {', '.join(reading.channels)[:100]}; leave it out"
+        raise ParameterError("wavelength_nm", text, wavelength_nm)
+    record = dict(reading.record)
+    note(record, f"The wavelength {wavelength_nm:g} nm was stated; the file has none.")
+    return replace(reading, channels=(f"{wavelength_nm:g}nm",), wavelength_nm=np.array([wavelength_nm]), record=record)

@@ -6,6 +6,7 @@ import json
 import re
 from collections.abc import Mapping
 from importlib.metadata import version
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -19,6 +20,7 @@ _FORMULA = re.compile(r'(?<=[,;"])(\s*)([=+@-])')  # where a spreadsheet may cut
 CONVENTION = "f_r [1/sr], the BRDF without the cosine; unit vectors of light and viewer point away from the surface"
 U_AXIS = "that along which the texture coordinate u grows, dp/du; a mesh needs texture coordinates"
 _MEASURED = "refractive index and extinction: refractiveindex.info, CC0 1.0"
+_LARGEST = 1 << 20  # byte of a record
 
 
 def record(
@@ -32,22 +34,11 @@ def record(
 ) -> dict[str, Any]:
     """Return the record of an exported table as JSON: the same keys in every format.
 
-    Parameters
-    ----------
-    table : Table
-        Table that is exported.
-    error : FileError or None
-        Error of the file against the table; None if the file holds values of the table as they are.
-    verdict : str or None
-        Verdict of the audit of this revision; None: not stated.
-    holds : str
-        Quantity, unit and cosine convention of the numbers in the file.
-    remarks : tuple of str
-        Sentences on what the format cannot hold of this table.
-    tolerance : float or None [1]
-        Largest p99 that was asked for.
+    `error` is that of the file against the table, None if the file holds values of the table as they are. `holds` says
+    quantity, unit and cosine convention of the numbers in the file, and `remarks` what the format cannot hold of this
+    table. `tolerance` is the largest p99 that was asked for.
     """
-    from brdfdb.formats._file_statement import of_table
+    from brdfdb.formats._stated_error import of_table
 
     known, statement = table.metadata, of_table(table) if error is None else error.statement
     document = known.model_dump(mode="json", include={"model", "model_version", "parameters", "refractive_index"})
@@ -180,3 +171,19 @@ def of_comments(document: Mapping[str, Any]) -> tuple[Instrument, float | None]:
     from brdfdb.measurements.samples import Instrument
 
     return Instrument(name, spot_mm=spot or None), lengths.pop() if len(lengths) == 1 else None
+
+
+def beside(path: Path) -> Path:
+    """Return the path of the record that goes with a file."""
+    return path.with_name(f"{path.name}.json")
+
+
+def record_beside(path: Path) -> dict[str, Any]:
+    """Return the record beside a file; empty if there is none, or it is not one."""
+    there = beside(path)
+    try:
+        if not there.is_file() or there.stat().st_size > _LARGEST:
+            return {}
+        return document_of(there.read_bytes())
+    except OSError:
+        return {}

@@ -39,35 +39,15 @@ class Language:
 def write_source(
     language: Language, table: Table, path: str | os.PathLike[str], *, verdict: str | None = None
 ) -> Written:
-    """Write the function ``brdf(wi, wr)`` of a table's model: whole, or not at all.
+    """Write the function ``brdf(wi, wr)`` of a table's model in a shading language, with the record as comments.
 
-    Parameters
-    ----------
-    language : Language
-        The shading language.
-    table : Table
-        Table in memory, of a model with a closed form.
-    path : path
-        The file; one that is there is replaced. The record is in its first lines, as comments.
-    verdict : str, optional
-        Verdict of the audit of this revision.
-
-    Returns
-    -------
-    Written
-        The file, with the error of the model, or its fit, against the table.
+    The error compares the model, or its fit, with the table in float64. The source computes in single precision, which
+    is within a hundred-thousandth of the model but next to grazing.
 
     Raises
     ------
     CannotHoldError
         If the table does not say which model it holds, or the model has no closed form here.
-    WriteError
-        If the file cannot be written.
-
-    Notes
-    -----
-    The error compares the model with the table in float64. The source computes in single precision, which is within a
-    hundred-thousandth of the model but next to grazing.
     """
     from brdfdb.formats._stated_error import Comparison
     from brdfdb.models import MODELS
@@ -92,18 +72,9 @@ def write_source(
 
 
 def source(model: str, parameters: Mapping[str, Any], language: Language, name: str) -> str:
-    """Return the functions of a model, without the record.
+    """Return the functions of a model, one of `brdfdb.models.shaders.SHADERS`, without the record.
 
-    Parameters
-    ----------
-    model : str
-        One of `brdfdb.models.shaders.SHADERS`.
-    parameters : mapping
-        The arguments of the model; reflectances may have three numbers.
-    language : Language
-        The shading language.
-    name : str
-        Name of the material.
+    Parameters are the arguments of the model; reflectances may have three numbers.
     """
     from brdfdb.models import MODELS
     from brdfdb.models.shaders import FUNCTIONS, SHADERS

@@ -21,11 +21,11 @@ from numpy.typing import NDArray
 
 from brdfdb.errors import FileFormatError
 from brdfdb.formats._angles import Spherical
-from brdfdb.formats._angular_grid import SIZE, AngularGrid, Sink, chosen, rounded
+from brdfdb.formats._angular_grid import SIZE, AngularGrid, Sink, chosen
+from brdfdb.formats._input import lines_of
 from brdfdb.formats._interface import TOLERANCE
 from brdfdb.formats._nodes import samples_at_angles, without_holes
 from brdfdb.formats._record import lines, of_lines, record, specular_remark
-from brdfdb.formats._text_file import lines_of
 from brdfdb.formats._written import Written, whole
 from brdfdb.place import path_of
 
@@ -58,34 +58,11 @@ def write(
     size: float = 16.0,
     verdict: str | None = None,
 ) -> Written:
-    """Write a table as an ASTM E1392 file: whole, or not at all. The record is in its header.
+    """Write a table as an ASTM E1392 file with the record in its header.
 
-    Parameters
-    ----------
-    table : Table
-        Any.
-    path : path
-        The file; one that is there is replaced.
-    tolerance : float [1]
-        Largest p99.
-    size : float [MB]
-        Largest file.
-    verdict : str, optional
-        Verdict of the audit of this revision.
-
-    Raises
-    ------
-    ParameterError
-        If no file of this table is so small.
-    WriteError
-        If the file cannot be written.
-
-    Notes
-    -----
-    After libbsdf's ``AstmReader.cpp``: polar angles and azimuths [rad] of light and viewer, the channels behind them.
-    The rows form a grid, because libbsdf interpolates linearly over each angle and fills what is missing with the
-    nearest row. Isotropic tables have the viewers of one side, from 0 to pi, and those at 2 pi, which libbsdf would
-    look for.
+    After libbsdf's ``AstmReader.cpp``: polar angles and azimuths [rad] of light and viewer, then the channels. The rows
+    form a grid, because libbsdf interpolates linearly over each angle and fills what is missing with the nearest row.
+    Isotropic tables have the viewers of one side, from 0 to pi, and those at 2 pi, which libbsdf would look for.
     """
     from brdfdb.formats._stated_error import Comparison
 
@@ -98,15 +75,8 @@ def write(
         sink.write(_TITLE + "".join(f"COMMENT {line}\n" for line in lines(document)).encode())
         _write_rows(sink, grid, names)
 
-    grid, error = chosen(
-        table,
-        comparison,
-        [Spherical(table.anisotropic, mirrored=not table.anisotropic)],
-        tolerance,
-        size,
-        write_all,
-        lambda some: AngularGrid(some.system, some.nodes, rounded(some.values)),
-    )
+    system = Spherical(table.anisotropic, mirrored=not table.anisotropic)
+    grid, error = chosen(comparison, [system], tolerance, size, write_all, as_text=True)
     with whole(path) as (file,), file.open("wb") as stream:
         write_all(stream, grid, error)
     return Written((path_of(path),), error, tolerance, remarks)
@@ -121,13 +91,6 @@ def read(path: str | os.PathLike[str]) -> FileTable | Samples:
     """Return f_r of an ASTM E1392 file as libbsdf sees it if its rows are a grid, else its rows.
 
     f_r is nan next to negative numbers, which libbsdf takes for 0.
-
-    Raises
-    ------
-    FileFormatError
-        If the file is not such a file, or damaged.
-    OSError
-        If it cannot be read.
     """
     from brdfdb.formats._readings import FileTable
 

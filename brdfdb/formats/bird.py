@@ -22,9 +22,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.errors import FileFormatError
-from brdfdb.formats._dense_files import dense_record, reading_of_rows, samples_of_rows
-from brdfdb.formats._interface import TOLERANCE, Option
-from brdfdb.formats._json_tables import MOST_BYTES, column, degrees_of, parsed, title_of
+from brdfdb.formats._dense_files import (
+    MOST_BYTES,
+    RESOLUTION,
+    column,
+    degrees_of,
+    dense_record,
+    parsed,
+    reading_of_rows,
+    samples_of_rows,
+    title_of,
+)
+from brdfdb.formats._interface import TOLERANCE
 from brdfdb.formats._record import specular_remark
 from brdfdb.formats._written import Written, whole
 from brdfdb.place import path_of
@@ -39,10 +48,7 @@ media_type = "application/json"
 summary = "universal BRDF JSON of the project BiRD"
 tools = "BiRD view and other programs of the universal BRDF format"
 kinds = ()
-options = (
-    TOLERANCE,
-    Option("resolution", 0.0, "distance of nodes on all axes [degrees]; 0: few, where f_r bends", low=0.0, high=45.0),
-)
+options = (TOLERANCE, RESOLUTION)
 SCHEMA = "https://raw.githubusercontent.com/BiRD-project/BiRD_view/master/BRDF_JSON_schema/brdf_json_schema_v1.0.json"
 _LAST_DEG = 89.99  # polar angles stay below 90
 _DIGITS, _ENTRY_BYTES = 5, 45  # of a number, and of the numbers of one entry
@@ -64,31 +70,12 @@ def write(
     resolution: float = 0.0,
     verdict: str | None = None,
 ) -> Written:
-    """Write f_r on a grid of light and viewer as universal BRDF JSON: whole, or not at all.
+    """Write f_r on a grid of light and viewer as universal BRDF JSON.
 
-    Parameters
-    ----------
-    table : Table
-        Table in memory.
-    path : path
-        The file; one that is there is replaced.
-    tolerance, resolution
-        As of `brdfdb.formats._dense_grid.dense_table`. The file has 40 MB at most, about.
-    verdict : str, optional
-        Verdict of the audit of this revision.
-
-    Raises
-    ------
-    ParameterError
-        If a grid of the resolution is too large.
-    WriteError
-        If the file cannot be written.
-
-    Notes
-    -----
     The lists theta_i, phi_i, theta_r, phi_r [degree], BRDF [1/sr] and, of spectral tables, wavelength_i [nm] have one
-    entry for each direction and wavelength, the wavelength fastest. Isotropic tables have phi_i = 0 and phi_r up to
-    180: the other half is its mirror image. The record is the section adhoc_section.
+    entry for each direction and wavelength; the wavelength changes fastest. Isotropic tables have phi_i = 0 and phi_r
+    up to 180: the other half is its mirror image. The record is the section adhoc_section. The file has about 40 MB at
+    most.
     """
     from brdfdb.formats._dense_grid import dense_table, rounded
 
@@ -127,13 +114,7 @@ def recognises(head: bytes) -> bool:
 
 
 def read(path: str | os.PathLike[str]) -> FileTable | Samples:
-    """Return f_r of a universal BRDF file: interpolated linearly on a grid of light and viewer, else its samples.
-
-    Raises
-    ------
-    FileFormatError
-        If the file is no JSON, or lacks a list, or lists of different lengths stand in it.
-    """
+    """Return f_r of a universal BRDF file: interpolated linearly on a grid of light and viewer, else its samples."""
     path = path_of(path)
     document = parsed(path)
     data, metadata = document.get("data"), document.get("metadata")

@@ -21,11 +21,11 @@ from numpy.typing import NDArray
 
 from brdfdb.errors import FileFormatError
 from brdfdb.formats import text
-from brdfdb.formats._columns import number_of
 from brdfdb.formats._dense_files import OPTIONS, dense_record, reading_of_rows
+from brdfdb.formats._input import lines_of
 from brdfdb.formats._record import lines, of_lines, specular_remark
-from brdfdb.formats._text_file import lines_of
 from brdfdb.formats._written import Written, whole
+from brdfdb.formats.text._columns import number_of
 from brdfdb.place import path_of
 
 if TYPE_CHECKING:
@@ -56,30 +56,11 @@ def write(
     resolution: float = 0.0,
     verdict: str | None = None,
 ) -> Written:
-    """Write f_r on a plain grid of angles as text with commas: whole, or not at all.
+    """Write f_r on a plain grid of angles as text with commas.
 
-    Parameters
-    ----------
-    table : Table
-        Table in memory.
-    path : path
-        The file; one that is there is replaced.
-    tolerance, axes, resolution
-        As of `brdfdb.formats._dense_grid.dense_table`. The file has 40 MB at most, about.
-    verdict : str, optional
-        Verdict of the audit of this revision.
-
-    Raises
-    ------
-    ParameterError
-        If a grid of the resolution is too large.
-    WriteError
-        If the file cannot be written.
-
-    Notes
-    -----
     Lines that begin with # hold the record. The next line names the columns: the angles [degree], then ``brdf`` of a
-    grey table, or wavelengths such as ``550nm``. f_r [1/sr] has five significant digits.
+    grey table, or wavelengths such as ``550nm``. f_r [1/sr] has five significant digits. The file has about 40 MB at
+    most.
     """
     from brdfdb.formats._dense_grid import dense_table, rounded
 
@@ -120,13 +101,8 @@ def recognises(head: bytes) -> bool:
 def read(path: str | os.PathLike[str]) -> FileTable | Samples:
     """Return f_r of a text, interpolated linearly if its rows are those of a grid; else the samples that it lists.
 
-    A text without the line on columns that `write` puts into the record is read by `brdfdb.formats.text` if its
-    columns are angles of light and viewer.
-
-    Raises
-    ------
-    FileFormatError
-        If the columns are not angles [degree] and values, a number cannot be read, or the file has more than 1 GiB.
+    A text without the line on columns that `write` puts into the record is read by `brdfdb.formats.text` if its columns
+    are angles of light and viewer.
     """
     from brdfdb.measurements.samples import Samples
 

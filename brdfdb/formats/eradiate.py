@@ -23,9 +23,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.errors import CannotHoldError, FileFormatError, import_extra
-from brdfdb.formats._channels import at_wavelength
-from brdfdb.formats._dense_files import record_of_attributes
-from brdfdb.formats._interface import TOLERANCE, WAVELENGTH, Option
+from brdfdb.formats._channels import at_wavelength, names_of
+from brdfdb.formats._dense_files import opened_netcdf, record_of_attributes
+from brdfdb.formats._interface import TOLERANCE, WAVELENGTH, FormatOption
 from brdfdb.formats._nodes import samples_at_angles, weighted, without_holes
 from brdfdb.formats._record import history_of, record, specular_remark
 from brdfdb.formats._written import Written, whole
@@ -49,7 +49,7 @@ kinds = ()
 options = (
     TOLERANCE,
     WAVELENGTH,
-    Option(
+    FormatOption(
         "nodes",
         0,
         "number of cosines of light and viewer; 0: as few as the tolerance takes",
@@ -78,38 +78,12 @@ def write(
     nodes: int = 0,
     verdict: str | None = None,
 ) -> Written:
-    """Write f_r at one wavelength for Eradiate's ``mqdiffuse``: whole, or not at all.
+    """Write f_r at one wavelength for Eradiate's ``mqdiffuse``.
 
-    Parameters
-    ----------
-    table : Table
-        Isotropic table in memory.
-    path : path
-        The file; one that is there is replaced.
-    tolerance : float [1]
-        Largest p99 of the error against the table. If a grid of 38 MB is not within it, the nearest one is written.
-    wavelength : float [nm]
-        Wavelength of a table of several.
-    nodes : int
-        Number of cosines of light and viewer, 3 to 513. The azimuths are as many, or one more if that is odd: 513 take
-        541 MB. 0: the smallest grid within the tolerance.
-    verdict : str, optional
-        Verdict of the audit of this revision.
-
-    Raises
-    ------
-    CannotHoldError
-        If the table is anisotropic.
-    ParameterError
-        If the table does not reach the wavelength.
-    WriteError
-        If the file cannot be written.
-
-    Notes
-    -----
     The dimensions are cos_theta_o, phi_d and cos_theta_i: cosines from 0 to 1, and azimuths 2 pi d / N, both in equal
     steps. Eradiate's ``MQDiffuseBSDF`` appends the values of phi_d = 0 at 2 pi before it calls the kernel, whose plugin
-    alone would read node d of N at 2 pi d / (N - 1).
+    alone would read node d of N at 2 pi d / (N - 1). If no grid of 38 MB is within the tolerance, the nearest is
+    written. With `nodes` cosines there are as many azimuths, or one more if the number is odd: 513 take 541 MB.
     """
     from brdfdb.formats._stated_error import Comparison
 
@@ -136,43 +110,25 @@ def recognises(head: bytes) -> bool:
 
 
 def read(path: str | os.PathLike[str]) -> FileTable:
-    """Return f_r of a table of ``mqdiffuse`` as Eradiate's kernel interpolates it.
-
-    Raises
-    ------
-    FileFormatError
-        If the file is damaged, or ``brdf`` is not over the three dimensions in equal steps.
-    """
-    import xarray as xr
-
+    """Return f_r of a table of ``mqdiffuse`` as Eradiate's kernel interpolates it."""
     from brdfdb.formats._readings import FileTable
 
-    import_extra("scipy.io")
     path = path_of(path)
-    try:
-        with xr.open_dataset(path, engine="scipy") as opened:
-            values, known = _checked(opened, path), record_of_attributes(opened.attrs)
-    except (FileFormatError, FileNotFoundError):
-        raise
-    except Exception as error:  # SciPy raises what its parser comes to
-        first = str(error).partition("\n")[0]
-        raise FileFormatError(f"{path}: it is no netCDF 3 file, or is damaged ({first})") from error
-    name, nm = str(known.get("name") or path.stem), known.get("wavelength_nm")
+    with opened_netcdf(path) as opened:
+        values = _checked(opened, path)
+        known = record_of_attributes(opened.attrs)
+    name = str(known.get("name") or path.stem)
+    nm = known.get("wavelength_nm")
     at = np.array([float(nm)]) if isinstance(nm, int | float) else None
-    channels = ("grey",) if at is None else (f"{at[0]:g}nm",)
-    nodes = functools.partial(_samples, values, name, channels, at, known)
-    return FileTable(name, channels, at, functools.partial(_evaluated, values), known, nodes)
 
+    def nodes() -> Samples:
+        axes = (axis for _, axis, _ in _coordinates(values.shape).values())
+        viewer, turn, light = (grid.reshape(-1) for grid in np.meshgrid(*axes, indexing="ij"))
+        zero = np.zeros(values.size)
+        angles = np.stack([np.arccos(light), zero, np.arccos(viewer), -turn % (2.0 * np.pi)], axis=1)
+        return samples_at_angles(angles, values.reshape(-1, 1).astype(np.float64), name, names_of(at), at, known)
 
-def _samples(
-    values: NDArray[Any], name: str, channels: tuple[str, ...], at: NDArray[np.float64] | None, known: dict[str, Any]
-) -> Samples:
-    """Return the values of a file at its nodes."""
-    nodes = (axis for _, axis, _ in _coordinates(values.shape).values())
-    viewer, turn, light = (grid.reshape(-1) for grid in np.meshgrid(*nodes, indexing="ij"))
-    angles = np.stack([np.arccos(light), turn, np.arccos(viewer), np.zeros(values.size)], axis=1)
-    angles[:, 1], angles[:, 3] = 0.0, -turn % (2.0 * np.pi)
-    return samples_at_angles(angles, values.reshape(-1, 1).astype(np.float64), name, channels, at, known)
+    return FileTable(name, names_of(at), at, functools.partial(_evaluated, values), known, nodes)
 
 
 def _smallest(table: Table, comparison: Comparison, tolerance: float) -> tuple[int, int, int]:

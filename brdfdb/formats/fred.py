@@ -24,15 +24,14 @@ from numpy.typing import NDArray
 
 from brdfdb.errors import CannotHoldError, FileFormatError, counted
 from brdfdb.formats._angles import Spherical
-from brdfdb.formats._angular_grid import SIZE, AngularGrid, Sink, chosen, rounded
-from brdfdb.formats._beside import beside, record_beside
-from brdfdb.formats._channels import at_wavelength
+from brdfdb.formats._angular_grid import SIZE, AngularGrid, Sink, chosen
+from brdfdb.formats._channels import at_wavelength, names_of
+from brdfdb.formats._input import lines_of
 from brdfdb.formats._interface import TOLERANCE, WAVELENGTH
 from brdfdb.formats._nodes import samples_at_angles, without_holes
-from brdfdb.formats._record import record, specular_remark
-from brdfdb.formats._text_end import check_last_number, doubt_end, has_open_end
-from brdfdb.formats._text_file import lines_of
+from brdfdb.formats._record import beside, record, record_beside, specular_remark
 from brdfdb.formats._written import Written, whole
+from brdfdb.formats.text._rows import check_last_number, doubt_end, has_open_end
 from brdfdb.place import path_of
 
 if TYPE_CHECKING:
@@ -65,31 +64,9 @@ def write(
     size: float = 16.0,
     verdict: str | None = None,
 ) -> Written:
-    """Write an isotropic table as tabulated scatter of FRED, and its record beside it: whole, or not at all.
+    """Write an isotropic table as tabulated scatter of FRED, and its record as JSON beside it.
 
-    Parameters
-    ----------
-    table : Table
-        Isotropic.
-    path : path
-        The file; one that is there is replaced.
-    tolerance : float [1]
-        Largest p99.
-    wavelength : float [nm]
-        The wavelength of a spectral table that is written.
-    size : float [MB]
-        Largest size of the file and its record.
-    verdict : str, optional
-        Verdict of the audit of this revision.
-
-    Raises
-    ------
-    CannotHoldError
-        If the table is anisotropic: what the azimuth of the light counts from is not published.
-    ParameterError
-        If the wavelength is outside those of the table, or no file of it is so small.
-    WriteError
-        If a file cannot be written.
+    Anisotropic tables are refused: what the azimuth of the light counts from is not published.
     """
     from brdfdb.formats._stated_error import Comparison
 
@@ -108,15 +85,8 @@ def write(
     def write_all(sink: Sink, grid: AngularGrid, error: FileError) -> None:
         sink.write(text_beside(error, _write_blocks(sink, grid)))
 
-    grid, error = chosen(
-        table,
-        comparison,
-        [Spherical(anisotropic=False, mirrored=True)],
-        tolerance,
-        size,
-        write_all,
-        lambda some: AngularGrid(some.system, some.nodes, rounded(some.values)),
-    )
+    system = Spherical(anisotropic=False, mirrored=True)
+    grid, error = chosen(comparison, [system], tolerance, size, write_all, as_text=True)
     with whole(path, beside(path)) as (file, there):
         with file.open("wb") as stream:
             rows = _write_blocks(stream, grid)
@@ -130,15 +100,7 @@ def recognises(head: bytes) -> bool:
 
 
 def read(path: str | os.PathLike[str]) -> FileTable | Samples:
-    """Return f_r of tabulated scatter: linear over each angle if the viewers of all lights are one grid, else samples.
-
-    Raises
-    ------
-    FileFormatError
-        If the file is not such a file, is damaged, or has other units than degrees and f_r.
-    OSError
-        If it cannot be read.
-    """
+    """Return f_r of tabulated scatter: linear over each angle if all lights have one grid of viewers, else samples."""
     from brdfdb.formats._readings import FileTable
 
     path = path_of(path)
@@ -148,7 +110,7 @@ def read(path: str | os.PathLike[str]) -> FileTable | Samples:
         raise FileFormatError(f"{path}: its record says {known['rows']!r:.20} viewers, and it has {len(rows)}")
     name, nm = str(known.get("name") or path.name.partition(".")[0]), known.get("wavelength_nm")
     at = np.array([float(nm)]) if isinstance(nm, int | float) else None
-    channels = ("grey",) if at is None else (f"{at[0]:g}nm",)
+    channels = names_of(at)
     doubt_end(path, rows[:, :2], known)
     grid = _grid(rows)
     angles = np.deg2rad(rows[:, :4])
@@ -174,9 +136,9 @@ def _write_blocks(stream: Sink, grid: AngularGrid) -> int:
         stream.write(f"{angle:.9g}\t0\n".encode())
         for row, theta in enumerate(theta_r):
             values = grid.values[number, row, :, 0]
-            some = [(0.0, columns[0])] if theta == 0.0 else list(zip(azimuths, columns, strict=True))
-            count += len(some)
-            rows = [f"{theta:.9g}\t{phi:.9g}\t{values[column]:.5g}\n" for phi, column in some]
+            viewers = [(0.0, columns[0])] if theta == 0.0 else list(zip(azimuths, columns, strict=True))
+            count += len(viewers)
+            rows = [f"{theta:.9g}\t{phi:.9g}\t{values[column]:.5g}\n" for phi, column in viewers]
             stream.write("".join(rows).encode())
     return count
 
@@ -217,7 +179,7 @@ def _rows(path: Path) -> NDArray[np.float64]:
         raise FileFormatError(f"{path}: line {bare} is a light without viewers: the file was cut")
     if has_open_end(path):
         words = ((number, text.split()) for number, text in lines_of(path) if number > 2)
-        check_last_number(path, ((number, some[2]) for number, some in words if len(some) == 3))
+        check_last_number(path, ((number, fields[2]) for number, fields in words if len(fields) == 3))
     return np.frombuffer(numbers, dtype=np.float64).reshape(-1, 5)
 
 

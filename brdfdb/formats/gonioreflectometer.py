@@ -20,7 +20,7 @@ from brdfdb.formats._written import whole
 from brdfdb.place import path_of
 
 if TYPE_CHECKING:
-    from brdfdb.measurements.gonioreflectometer import Picture
+    from brdfdb.measurements.gonioreflectometer import CameraPicture
     from brdfdb.measurements.samples import Samples
 
 suffix = ".exr"
@@ -31,21 +31,8 @@ _PARTS = ("sample", "standard", "background")
 _MOST_BYTES = 2**30
 
 
-def write_picture(picture: Picture, path: str | os.PathLike[str]) -> None:
-    """Write a picture of the instrument, ZIP compressed: whole, or not at all.
-
-    Parameters
-    ----------
-    picture : Picture
-        A picture, simulated or measured.
-    path : path
-        The file; one that is there is replaced.
-
-    Raises
-    ------
-    WriteError
-        If the file cannot be written.
-    """
+def write_picture(picture: CameraPicture, path: str | os.PathLike[str]) -> None:
+    """Write a simulated or measured picture of the instrument, ZIP compressed; WriteError if it cannot be written."""
     import OpenEXR
 
     from brdfdb.geometry import degrees
@@ -76,20 +63,12 @@ def recognises(head: bytes) -> bool:
     return head.startswith(_MAGIC) and _KEY.encode() in head
 
 
-def read_picture(path: str | os.PathLike[str]) -> Picture:
-    """Return the picture of a file.
-
-    Raises
-    ------
-    FileFormatError
-        If the file is no such picture, or damaged.
-    OSError
-        If it cannot be read.
-    """
+def read_picture(path: str | os.PathLike[str]) -> CameraPicture:
+    """Return the picture of a file; FileFormatError if it is no such picture, or damaged."""
     import OpenEXR
 
     from brdfdb.geometry import radians
-    from brdfdb.measurements.gonioreflectometer import Gonioreflectometer, Picture
+    from brdfdb.measurements.gonioreflectometer import CameraPicture, Gonioreflectometer
 
     path = path_of(path)
     if path.stat().st_size > _MOST_BYTES:
@@ -109,7 +88,7 @@ def read_picture(path: str | os.PathLike[str]) -> Picture:
         theta_i, phi_i = (float(radians(document[name])) for name in ("theta_i_deg", "phi_i_deg"))
         name, provenance = (str(document.get(key, "")) for key in ("name", "provenance"))
         sample, standard, background = (stacks[part] for part in _PARTS)
-        return Picture(settings, theta_i, phi_i, sample, standard, background, name, provenance)
+        return CameraPicture(settings, theta_i, phi_i, sample, standard, background, name, provenance)
     except KeyError as error:
         raise FileFormatError(f"{path}: it has no {error}") from None
     except (ParameterError, TypeError, ValueError) as error:
@@ -117,17 +96,7 @@ def read_picture(path: str | os.PathLike[str]) -> Picture:
 
 
 def read(path: str | os.PathLike[str]) -> Samples:
-    """Return the samples of a picture, as `brdfdb.measurements.gonioreflectometer.reduced` gives them.
-
-    Raises
-    ------
-    FileFormatError
-        If the file is no such picture, or is damaged.
-    ParameterError
-        If no pixel of it can be used.
-    OSError
-        If it cannot be read.
-    """
+    """Return the samples of a picture, as `brdfdb.measurements.gonioreflectometer.reduced` gives them."""
     from brdfdb.measurements.gonioreflectometer import reduced
 
     return reduced(read_picture(path))

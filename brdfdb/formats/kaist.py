@@ -15,25 +15,29 @@ not measured is nan.
 from __future__ import annotations
 
 import json
+import math
 import os
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from brdfdb.errors import CannotHoldError, FileFormatError
+from brdfdb.errors import CannotHoldError, FileFormatError, ParameterError
 from brdfdb.formats._angles import HalfDifference
-from brdfdb.formats._channels import Channels
+from brdfdb.formats._channels import Channels, names_of
 from brdfdb.formats._interface import MEGABYTES, TOLERANCE
 from brdfdb.formats._nodes import samples_of_grid
 from brdfdb.formats._record import document_of, record, specular_remark
-from brdfdb.formats._rgl_tensor import MAGIC, read_tensors, write_tensors
 from brdfdb.formats._written import Written, whole
+from brdfdb.formats.rgl._tensors import MAGIC, read_tensors, write_tensors
+from brdfdb.parameters import Floats
 from brdfdb.place import path_of
 
 if TYPE_CHECKING:
-    from brdfdb.formats._mueller_grid import MuellerGrid
+    from brdfdb.formats._stated_error import FileError
     from brdfdb.measurements.samples import Samples
+    from brdfdb.tables.grids import Grid
     from brdfdb.tables.table import Table
 
 suffix = ".pbsdf"
@@ -55,6 +59,11 @@ _SYSTEM = HalfDifference(anisotropic=False, mirrored=False, reciprocal=False)
 _MOST_WAVELENGTHS = 5  # that Mitsuba reads
 _MOST_NM = 65535  # of 16 bits
 _BESIDE = 20_000  # bytes beside the matrices: the record and the axes
+_ELEMENTS = ((0, 0), (0, 1), (1, 1), (2, 2), (2, 3))  # that are stored; [1, 0], [3, 3] and [3, 2] follow from them
+_BYTES = 16 * 4  # of a matrix
+_COPIES = 4  # of phi_d, of which symmetry leaves a quarter
+_SPLIT = 0.5  # share of the tolerance up to which a cell of theta_d may change the elements of a facet
+_FIRST_DEG, _LEAST_DEG = np.linspace(0.0, 90.0, 10), 0.1
 
 
 def write(
@@ -65,32 +74,11 @@ def write(
     megabytes: float = 64.0,
     verdict: str | None = None,
 ) -> Written:
-    """Write the Mueller matrices of a polarised table: whole, or not at all.
+    """Write the Mueller matrices of a polarised table.
 
-    Parameters
-    ----------
-    table : Table
-        Polarised isotropic table in memory.
-    path : path
-        The file; one that is there is replaced.
-    tolerance : float [1]
-        Largest error against the table that 99 of 100 values of f_r, and of the normalised elements, may have.
-    megabytes : float [1e6 byte]
-        Largest size of the file.
-    verdict : str, optional
-        Verdict of the audit of this revision.
-
-    Raises
-    ------
-    CannotHoldError
-        If the table is unpolarised, or its wavelengths are above 65535 nm.
-    ParameterError
-        If no file of this table is so small.
-    WriteError
-        If the file cannot be written.
+    The tolerance is that of f_r, and of the normalised elements. Unpolarised tables are refused, and wavelengths above
+    65535 nm.
     """
-    from brdfdb.formats._mueller_grid import mueller_grid
-
     if table.facets is None:
         raise CannotHoldError(f"{table.name}: is unpolarised, and the format holds Mueller matrices")
     channels = _channels(table)
@@ -119,7 +107,7 @@ def _channels(table: Table) -> Channels:
     elif at.size == 1 and nm[0] != at[0]:
         remarks = (f"of {at[0]:g} nm, which the file calls {nm[0]:g} nm",)
     known = at if at.size == 1 else nm
-    return Channels(tuple(f"{value:g}nm" for value in nm), known, None, "M at each wavelength", remarks)
+    return Channels(names_of(nm), known, None, "M at each wavelength", remarks)
 
 
 def _tensors(made: MuellerGrid, description: str) -> dict[str, NDArray[np.generic]]:
@@ -147,15 +135,6 @@ def recognises(head: bytes) -> bool:
 def read(path: str | os.PathLike[str]) -> Samples:
     """Return f_r of a file at its own directions above the horizon.
 
-    Raises
-    ------
-    FileFormatError
-        If the file is damaged, or an array is missing or of another shape.
-    OSError
-        If it cannot be read.
-
-    Notes
-    -----
     Names, shapes and directions as in Mitsuba's ``measured_polarized``: the axes of M are phi_d, theta_d, theta_h, the
     wavelength, and those of the Mueller matrix.
     """
@@ -175,9 +154,108 @@ def read(path: str | os.PathLike[str]) -> Samples:
             raise FileFormatError(f"{path}: field {name!r} does not ascend")
     values = np.ascontiguousarray(matrix[..., 0, 0].transpose(2, 1, 0, 3)).astype(np.float64)
     values[np.isinf(values)] = np.nan
-    channels = tuple(f"{nm:g}nm" for nm in at)
     description = tensors.get("description")
     known = {} if description is None else document_of(description.tobytes())
     name = str(known.get("name") or path.stem)
-    samples = samples_of_grid(_SYSTEM, axes[::-1], values, name, channels, at, {**known, "element": "M[0, 0]"})
+    samples = samples_of_grid(_SYSTEM, axes[::-1], values, name, names_of(at), at, {**known, "element": "M[0, 0]"})
     return samples.selected(np.any(samples.known, axis=1))
+
+
+@dataclass(frozen=True, eq=False)
+class MuellerGrid:
+    """Mueller matrices at nodes of theta_h, theta_d and phi_d.
+
+    Attributes
+    ----------
+    grid : Grid
+        Nodes [degree]; phi_d ends at 90.
+    channels : Channels
+        Wavelengths.
+    values : float32 array (theta_h, theta_d, phi_d, L, 4, 4) [1/sr]
+        Matrices between bases of the plane of light and viewer, continued below the horizon.
+    error : FileError
+        Error of f_r against the table.
+    element_p99 : float [1]
+        Limit of 99 of 100 errors of the normalised elements, of the worst element and wavelength.
+    """
+
+    grid: Grid
+    channels: Channels
+    values: NDArray[np.float32]
+    error: FileError
+    element_p99: float
+
+
+def mueller_grid(table: Table, channels: Channels, tolerance: float, nbytes: float) -> MuellerGrid:
+    """Return the smallest grid within a tolerance, of f_r and of the normalised elements, or the nearest of a size.
+
+    Raises
+    ------
+    ParameterError
+        If no grid is so small [byte].
+    """
+    from brdfdb.formats._dense_grid import dense_table
+    from brdfdb.tables.grids import Grid
+
+    facet = _theta_d(table, channels, _SPLIT * tolerance)
+    most = nbytes / (_BYTES * _COPIES)
+    share = 1.0
+    while True:
+        dense = dense_table(table, tolerance, axes="half_difference", most_values=int(share * most), channels=channels)
+        axes = dense.grid.axes
+        grid = Grid({**axes, "theta_d": np.union1d(axes["theta_d"], facet)})
+        size = math.prod(grid.shape) * len(channels.names)
+        if size <= most:
+            return _filled(table, channels, grid)
+        if share * most < 8 * len(channels.names):
+            raise ParameterError("megabytes", f"{nbytes / 1e6:g} MB are too few for any file of {table.name}", nbytes)
+        share *= 0.9 * most / size
+
+
+def _theta_d(table: Table, channels: Channels, tolerance: float) -> NDArray[np.float64]:
+    """Return nodes [degree] of theta_d between which straight lines keep to the elements of a facet."""
+    from brdfdb.geometry import radians
+
+    nodes = _FIRST_DEG
+    while True:
+        at = radians(nodes)
+        middle = 0.5 * (at[1:] + at[:-1])
+        ends, between = (table.facet_mueller(angle, channels.wavelength_nm) for angle in (at, middle))
+        wrong = np.abs(0.5 * (ends[1:] + ends[:-1]) - between).max(axis=(1, 2, 3))
+        split = (wrong > tolerance) & (np.diff(nodes) > _LEAST_DEG)
+        if not split.any():
+            return nodes
+        nodes = np.sort(np.concatenate([nodes, np.rad2deg(middle[split]).round(4)]))
+
+
+def _filled(table: Table, channels: Channels, grid: Grid) -> MuellerGrid:
+    """Return the matrices at the nodes of a grid, with the errors of f_r and of the normalised elements."""
+    from brdfdb.formats._angular_grid import AngularGrid
+    from brdfdb.formats._dense_grid import values_at_nodes
+    from brdfdb.formats._stated_error import Comparison
+    from brdfdb.geometry import radians
+
+    f_r = values_at_nodes(table, channels, grid).astype(np.float64)
+    depolarised = table.depolarised(channels.wavelength_nm)
+    facet = table.facet_mueller(radians(grid.axes["theta_d"]), channels.wavelength_nm)
+    values = (f_r - depolarised)[..., np.newaxis, np.newaxis] * facet[np.newaxis, :, np.newaxis]
+    values[..., 0, 0] = f_r
+    stored = values.astype(np.float32)
+    rows, columns = np.array(_ELEMENTS).T
+    nodes = tuple(radians(axis) for axis in grid.axes.values())
+    elements = stored[..., rows, columns].reshape(*grid.shape, -1)
+    reader = AngularGrid(HalfDifference(anisotropic=False), nodes, elements)
+
+    def evaluate(wi: Floats, wr: Floats) -> Floats:
+        return reader.evaluate(wi, wr).reshape(len(wi), len(channels.names), len(_ELEMENTS))
+
+    comparison = Comparison(table, channels)
+    error = comparison.error_of(lambda wi, wr: np.maximum(evaluate(wi, wr)[..., 0], 0.0))
+    above = comparison.wr[:, 2] > 0.0
+    wi, wr = comparison.wi[above], comparison.wr[above]
+    truth = table.mueller_in_plane(wi, wr, channels.wavelength_nm)[..., rows, columns]
+    read = evaluate(wi, wr)
+    counted = (truth[..., 0] > 0.0) & (read[..., 0] > 0.0)
+    wrong = np.abs(read[counted] / read[counted][:, :1] - truth[counted] / truth[counted][:, :1])
+    element_p99 = float(np.percentile(wrong, 99.0, axis=0).max(initial=0.0))
+    return MuellerGrid(grid, channels, stored, error, element_p99)

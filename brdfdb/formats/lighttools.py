@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.errors import FileFormatError
-from brdfdb.formats._channels import XYZ
+from brdfdb.formats._channels import XYZ, names_of
+from brdfdb.formats._input import Words
 from brdfdb.formats._nodes import samples_of_grid
 from brdfdb.formats._record import of_lines
-from brdfdb.formats._words import Words
 from brdfdb.place import path_of
 
 if TYPE_CHECKING:
@@ -38,15 +38,8 @@ def recognises(head: bytes) -> bool:
 def read(path: str | os.PathLike[str]) -> Samples:
     """Return the samples of the front of a LightTools file.
 
-    The record has the total integrated scatter as "tis", with its angles of incidence as "theta_i_deg".
-
-    Raises
-    ------
-    FileFormatError
-        If the file is damaged, has no block of the front with the type BRDF, or has planes of incidence that differ:
-        what POI counts from is not published.
-    OSError
-        If it cannot be read.
+    The record has the total integrated scatter as "tis", with its angles of incidence as "theta_i_deg". Planes of
+    incidence that differ are refused: what POI counts from is not published.
     """
     from brdfdb.formats._angles import Spherical
 
@@ -134,4 +127,4 @@ def _channels(keys: list[str]) -> tuple[NDArray[np.float64] | None, tuple[str, .
     if np.any(lengths <= 0.0):
         return None, ("grey",)
     lengths = lengths * (1e3 if lengths.max() < 100.0 else 1.0)
-    return lengths, tuple(f"{nm:g}nm" for nm in lengths)
+    return lengths, names_of(lengths)

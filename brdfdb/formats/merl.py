@@ -9,10 +9,9 @@ The file holds linear sRGB. Anisotropic tables are refused, and the specular par
 
 from __future__ import annotations
 
-import functools
 import json
 import os
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,11 +19,10 @@ from numpy.typing import NDArray
 from brdfdb.errors import CannotHoldError, FileFormatError
 from brdfdb.formats._angles import HALF_PI, HalfDifference
 from brdfdb.formats._angular_grid import AngularGrid, reciprocal
-from brdfdb.formats._beside import beside, record_beside
 from brdfdb.formats._channels import RGB, channels_of
-from brdfdb.formats._interface import FIXED, Option
+from brdfdb.formats._interface import FIXED, FormatOption
 from brdfdb.formats._nodes import samples_of_grid, without_holes
-from brdfdb.formats._record import record, specular_remark
+from brdfdb.formats._record import beside, record, record_beside, specular_remark
 from brdfdb.formats._written import Written, whole
 from brdfdb.parameters import Floats
 from brdfdb.place import path_of
@@ -41,7 +39,7 @@ tools = "BRDF Explorer, plugins of Mitsuba and others, libbsdf"
 kinds = ()
 options = (
     FIXED,
-    Option(
+    FormatOption(
         "samples",
         "centres",
         "where values lie: at centres of bins, for readers that look one bin up (BRDF Explorer, Mitsuba plugins), or "
@@ -67,34 +65,12 @@ def write(
     samples: str = "centres",
     verdict: str | None = None,
 ) -> Written:
-    """Write an isotropic table as a MERL file, with its record as JSON beside it: both whole, or none.
+    """Write an isotropic table as a MERL file, with its record as JSON beside it.
 
-    Parameters
-    ----------
-    table : Table
-        Isotropic; spectral ones become linear sRGB.
-    path : path
-        The file; one that is there is replaced.
-    tolerance : float [1]
-        Largest p99. The grid is fixed: a larger error is stated.
-    samples : str
-        "centres" or "edges" of the bins. The error is that of readers of the kind.
-    verdict : str, optional
-        Verdict of the audit of this revision.
-
-    Raises
-    ------
-    CannotHoldError
-        If the table is anisotropic, or its wavelengths give no colour.
-    WriteError
-        If a file cannot be written.
-
-    Notes
-    -----
     Bins and scales as in BRDF Explorer (``BRDFMeasuredMERL.cpp``, ``measured.func``), which looks one bin up; libbsdf
     (``MerlBinaryReader.cpp``) takes the numbers for samples at lower edges of bins, interpolates linearly, and takes
     negative ones for 0. So nodes below the horizon have the value at the horizon where a cell beside them reaches above
-    it, and are negative elsewhere. Colours below 0, outside of sRGB, are 0.
+    it, and are negative elsewhere. Colours below 0, outside of sRGB, are 0. The error is that of readers of the kind.
     """
     from brdfdb.formats._stated_error import Comparison
 
@@ -104,14 +80,14 @@ def write(
     valid, angles = _nodes(samples)
     comparison = Comparison(table, channels)
     planes = np.full((3, *SHAPE), INVALID)
-    half = reciprocal(table, comparison)  # then the numbers at phi_d and pi - phi_d are the same
+    half = reciprocal(comparison)  # then the numbers at phi_d and pi - phi_d are the same
     looked_up = valid & (np.arange(SHAPE[2]) <= SHAPE[2] // 2) if half else valid
     numbers = channels.values(table, *_SYSTEM.directions(angles[looked_up[valid]]))
     planes[:, looked_up] = np.maximum(numbers, 0.0).T / SCALE[:, np.newaxis]
     if half:
         first = 0 if samples == "centres" else 1
         planes[..., SHAPE[2] // 2 :] = planes[..., first : first + SHAPE[2] // 2][..., ::-1]
-    error = comparison.error_of(_Reader(planes, samples))
+    error = comparison.error_of(MerlReader(planes, samples))
     remarks = (*channels.remarks, *specular_remark(table))
     holds = _HOLDS + ("centres of bins" if samples == "centres" else "lower edges of bins")
     document = record(table, error, verdict, holds=holds, remarks=remarks, tolerance=tolerance)
@@ -131,13 +107,6 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     """Return f_r of a MERL file as its readers see it: one bin looked up, or interpolated if its record says edges.
 
     A negative number is a hole: f_r is nan there.
-
-    Raises
-    ------
-    FileFormatError
-        If the file is not a MERL file, or damaged.
-    OSError
-        If it cannot be read.
     """
     from brdfdb.formats._readings import FileTable
 
@@ -152,17 +121,15 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     known = record_beside(path)
     samples = "edges" if known.get("samples") == "edges" else "centres"
     name = str(known.get("name") or path.stem)
-    nodes = functools.partial(_samples, planes, samples, name, known)
-    return FileTable(name, RGB, None, _Reader(planes, samples), known, nodes)
 
+    def nodes() -> Samples:
+        offset = 0.5 if samples == "centres" else 0.0
+        at = [np.arange(count) + offset for count in SHAPE]
+        axes = [np.deg2rad(axis) for axis in (_degrees_h(at[0]), at[1], at[2])]
+        values = np.moveaxis(without_holes(planes), 0, -1) * SCALE
+        return samples_of_grid(_SYSTEM, axes, values, name, RGB, None, known)
 
-def _samples(planes: Floats, samples: str, name: str, known: dict[str, Any]) -> Samples:
-    """Return the values of a file at its bins; negative numbers stand for what was not measured."""
-    offset = 0.5 if samples == "centres" else 0.0
-    at = [np.arange(count) + offset for count in SHAPE]
-    nodes = [np.deg2rad(axis) for axis in (_degrees_h(at[0]), at[1], at[2])]
-    values = np.moveaxis(without_holes(planes), 0, -1) * SCALE
-    return samples_of_grid(_SYSTEM, nodes, values, name, RGB, None, known)
+    return FileTable(name, RGB, None, MerlReader(planes, samples), known, nodes)
 
 
 def _nodes(samples: str) -> tuple[NDArray[np.bool_], Floats]:
@@ -187,7 +154,7 @@ def _degrees_h(index: Floats) -> Floats:
     return np.asarray(index**2 / SHAPE[0])
 
 
-class _Reader:
+class MerlReader:
     """f_r [1/sr], shape (N, 3), at unit vectors (N, 3), of planes of numbers (3, theta_h, theta_d, phi_d)."""
 
     def __init__(self, planes: Floats, samples: str) -> None:

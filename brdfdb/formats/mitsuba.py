@@ -19,9 +19,8 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from brdfdb.formats._beside import beside
-from brdfdb.formats._interface import Option
-from brdfdb.formats._record import U_AXIS, frame_remark, record
+from brdfdb.formats._interface import FormatOption
+from brdfdb.formats._record import U_AXIS, beside, frame_remark, record
 from brdfdb.formats._written import Written, whole
 from brdfdb.place import path_of
 
@@ -36,7 +35,9 @@ tools = "Mitsuba 3 with brdfdb.mitsuba"
 kinds: tuple[str, ...] = ()
 MODEL, TABLE = "model", "table"
 options = (
-    Option("plugin", MODEL, "the plugin of the model, if Mitsuba has one, or that of tables", choices=(MODEL, TABLE)),
+    FormatOption(
+        "plugin", MODEL, "the plugin of the model, if Mitsuba has one, or that of tables", choices=(MODEL, TABLE)
+    ),
 )
 
 VERSION = "3.0.0"
@@ -45,24 +46,7 @@ _DIGITS = 9  # of numbers of a spectrum: float32 has fewer
 
 
 def write(table: Table, path: str | os.PathLike[str], *, plugin: str = MODEL, verdict: str | None = None) -> Written:
-    """Write the plugin of a material for Mitsuba 3: both files whole, or none.
-
-    Parameters
-    ----------
-    table : Table
-        Table in memory.
-    path : path
-        The XML file; the dictionary is beside it. Files that are there are replaced.
-    plugin : str
-        "model" or "table".
-    verdict : str, optional
-        Verdict of the audit of this revision.
-
-    Raises
-    ------
-    WriteError
-        If a file cannot be written.
-    """
+    """Write the plugin of a material for Mitsuba 3 as XML, and as a dictionary beside it."""
     from brdfdb.materials import Material
     from brdfdb.models.mitsuba_plugins import OF_MITSUBA
 

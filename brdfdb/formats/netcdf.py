@@ -12,8 +12,8 @@ from __future__ import annotations
 import os
 from typing import TYPE_CHECKING
 
-from brdfdb.errors import FileFormatError, import_extra
-from brdfdb.formats._dense_files import OPTIONS, dataset, read_dataset
+from brdfdb.errors import import_extra
+from brdfdb.formats._dense_files import OPTIONS, dataset, opened_netcdf, read_dataset
 from brdfdb.formats._written import Written, whole
 from brdfdb.place import path_of
 
@@ -40,32 +40,16 @@ def write(
     resolution: float = 0.0,
     verdict: str | None = None,
 ) -> Written:
-    """Write f_r on a plain grid of angles as netCDF 3 (64-bit offset): whole, or not at all.
+    """Write f_r on a plain grid of angles as netCDF 3 (64-bit offset).
 
-    Parameters
-    ----------
-    table : Table
-        Table in memory.
-    path : path
-        The file; one that is there is replaced.
-    tolerance, axes, resolution
-        As of `brdfdb.formats._dense_grid.dense_table`. The values take 100 MB at most.
-    verdict : str, optional
-        Verdict of the audit of this revision.
+    ``brdf`` [1/sr] is float32 over the angles [degree] and, last, the wavelengths [nm]. ``specular_reflectance`` is the
+    specular part. Units and names follow the CF conventions. The record is in the attributes. The values take 100 MB at
+    most.
 
     Raises
     ------
-    ParameterError
-        If a grid of the resolution is too large.
     MissingExtraError
         If SciPy, which writes netCDF, is not installed.
-    WriteError
-        If the file cannot be written.
-
-    Notes
-    -----
-    ``brdf`` [1/sr] is float32 over the angles [degree] and, last, the wavelengths [nm]. ``specular_reflectance`` is
-    the specular part. Units and names follow the CF conventions. The record is in the attributes.
     """
     from brdfdb.formats._dense_grid import dense_table
 
@@ -82,37 +66,14 @@ def recognises(head: bytes) -> bool:
 
 
 def read(path: str | os.PathLike[str]) -> FileTable | Samples:
-    """Return f_r of a netCDF file with ``brdf`` over angles [degree], interpolated linearly; or samples.
-
-    Raises
-    ------
-    FileFormatError
-        If the file is damaged, or ``brdf`` is not over the axes of a grid.
-    """
-    import xarray as xr
-
-    import_extra("scipy.io")
+    """Return f_r of a netCDF file with ``brdf`` over angles [degree], interpolated linearly; or samples."""
     path = path_of(path)
-    try:
-        with xr.open_dataset(path, engine="scipy") as opened:
-            return read_dataset(path, opened)
-    except (FileFormatError, FileNotFoundError):
-        raise
-    except Exception as error:  # SciPy raises what its parser comes to
-        first = str(error).partition("\n")[0]
-        raise FileFormatError(f"{path}: it is no netCDF 3 file, or is damaged ({first})") from error
+    with opened_netcdf(path) as opened:
+        return read_dataset(path, opened)
 
 
 def write_samples(samples: Samples, path: str | os.PathLike[str]) -> None:
-    """Write samples as netCDF, which `read` gives back: whole, or not at all.
-
-    Raises
-    ------
-    MissingExtraError
-        If SciPy, which writes netCDF, is not installed.
-    WriteError
-        If the file cannot be written.
-    """
+    """Write samples as netCDF, which `read` gives back; errors are those of `write`."""
     import_extra("scipy.io")
     with whole(path) as (half,):
         samples.to_xarray().to_netcdf(half, engine="scipy", format="NETCDF3_64BIT")

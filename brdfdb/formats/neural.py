@@ -53,30 +53,17 @@ def recognises(head: bytes) -> bool:
 
 
 def read(path: str | os.PathLike[str], member: str = "") -> FileTable:
-    """Return f_r of a network.
+    """Return f_r of a network of Keras, or of the `member` of an archive, with or without its folder and suffix.
 
-    Parameters
-    ----------
-    path : path
-        File of Keras, or an archive of them.
-    member : str
-        Name of the file in an archive, with or without its folder and suffix.
+    Layers, input and output are those of the authors' repository (``binary_to_nbrdf.py``, ``nbrdf_npy.cpp``). f_r may
+    be slightly negative.
 
     Raises
     ------
     ParameterError
         If an archive has no such member, or several.
-    FileFormatError
-        If the file is damaged, or is not a network of this kind.
     MissingExtraError
         If h5py is not installed.
-    OSError
-        If it cannot be read.
-
-    Notes
-    -----
-    Layers, input and output are those of the authors' repository (``binary_to_nbrdf.py``, ``nbrdf_npy.cpp``). f_r may
-    be slightly negative.
     """
     from brdfdb.formats._readings import FileTable
 
@@ -115,8 +102,8 @@ def _content(path: Path, member: str) -> tuple[str, bytes]:
         wanted = entries if not member and len(entries) == 1 else wanted
         if len(wanted) != 1:
             shown = ", ".join(sorted(names.values())[:60])
-            some = f"{member!r} is not one of the members" if member else "name one of the members"
-            raise ParameterError("member", f"{some} of {path}: {shown}", member, tuple(names.values()))
+            problem = f"{member!r} is not one of the members" if member else "name one of the members"
+            raise ParameterError("member", f"{problem} of {path}: {shown}", member, tuple(names.values()))
         if wanted[0].file_size > _MOST_BYTES:
             raise FileFormatError(f"{path}: {wanted[0].filename} has {wanted[0].file_size} bytes")
         name = names[wanted[0].filename]
@@ -125,13 +112,7 @@ def _content(path: Path, member: str) -> tuple[str, bytes]:
 
 
 def members(path: str | os.PathLike[str]) -> list[str]:
-    """Return the names of the networks of an archive, without folders where that tells them apart; none of a network.
-
-    Raises
-    ------
-    FileFormatError
-        If the archive is damaged, or holds no network.
-    """
+    """Return the names of the networks of an archive, without folders if these are distinct; none of a network."""
     path = path_of(path)
     with path.open("rb") as file:
         if file.read(len(_ZIP)) != _ZIP:

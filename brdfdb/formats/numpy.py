@@ -47,31 +47,11 @@ def write(
     resolution: float = 0.0,
     verdict: str | None = None,
 ) -> Written:
-    """Write f_r on a plain grid of angles as an .npz archive: whole, or not at all.
+    """Write f_r on a plain grid of angles as an .npz archive.
 
-    Parameters
-    ----------
-    table : Table
-        Table in memory.
-    path : path
-        The file; one that is there is replaced.
-    tolerance, axes, resolution
-        As of `brdfdb.formats._dense_grid.dense_table`. The values take 100 MB at most.
-    verdict : str, optional
-        Verdict of the audit of this revision.
-
-    Raises
-    ------
-    ParameterError
-        If a grid of the resolution is too large.
-    WriteError
-        If the file cannot be written.
-
-    Notes
-    -----
-    ``axes`` lists the dimensions of ``brdf`` [1/sr, float32]; each of them is an array of its own, angles in degrees
-    and ``wavelength`` in nm. ``specular_reflectance`` over ``specular_theta_i`` is the specular part. ``record`` is
-    JSON text. No array is pickled.
+    ``axes`` lists the dimensions of ``brdf`` [1/sr, float32]. Each of them is an array: angles in degrees,
+    ``wavelength`` in nm. ``specular_reflectance`` over ``specular_theta_i`` is the specular part. ``record`` is JSON
+    text. No array is pickled. The values take 100 MB at most.
     """
     from brdfdb.formats._dense_grid import dense_table
 
@@ -99,12 +79,7 @@ def recognises(head: bytes) -> bool:
 def read(path: str | os.PathLike[str]) -> FileTable | Samples:
     """Return f_r of an .npz archive with ``brdf`` and the axes that it lists, interpolated linearly.
 
-    A grid with holes, nan, gives samples.
-
-    Raises
-    ------
-    FileFormatError
-        If the file is damaged, lacks an array, or holds more than 512 MiB of values.
+    A grid with holes, nan, gives samples. The values take 512 MiB at most.
     """
     path = path_of(path)
     try:

@@ -21,9 +21,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.errors import CannotHoldError, FileFormatError
-from brdfdb.formats._dense_files import dense_record, reading_of_rows, samples_of_rows
-from brdfdb.formats._interface import TOLERANCE, Option
-from brdfdb.formats._json_tables import MOST_BYTES, degrees_of, parsed, title_of
+from brdfdb.formats._dense_files import (
+    MOST_BYTES,
+    RESOLUTION,
+    degrees_of,
+    dense_record,
+    parsed,
+    reading_of_rows,
+    samples_of_rows,
+    title_of,
+)
+from brdfdb.formats._interface import TOLERANCE
 from brdfdb.formats._record import specular_remark
 from brdfdb.formats._written import Written, whole
 from brdfdb.place import path_of
@@ -38,10 +46,7 @@ media_type = "application/json"
 summary = "BRDF lookup tables of ASAM OpenMATERIAL 3D"
 tools = "simulators of ASAM OpenMATERIAL 3D"
 kinds = ()
-options = (
-    TOLERANCE,
-    Option("resolution", 0.0, "distance of nodes on all axes [degrees]; 0: few, where f_r bends", low=0.0, high=45.0),
-)
+options = (TOLERANCE, RESOLUTION)
 VERSION = "1.0.0"
 SCHEMA = (
     f"https://raw.githubusercontent.com/asam-ev/OpenMATERIAL-3D/refs/tags/v{VERSION}/schemas/material_brdf_schema.json"
@@ -61,32 +66,12 @@ def write(
     resolution: float = 0.0,
     verdict: str | None = None,
 ) -> Written:
-    """Write f_r as a lookup table of OpenMATERIAL 3D 1.0: whole, or not at all.
+    """Write f_r as a lookup table of OpenMATERIAL 3D 1.0.
 
-    Parameters
-    ----------
-    table : Table
-        Isotropic table in memory.
-    path : path
-        The file; one that is there is replaced.
-    tolerance, resolution
-        As of `brdfdb.formats._dense_grid.dense_table`. The file has 40 MB at most, about.
-    verdict : str, optional
-        Verdict of the audit of this revision, on positive values, reciprocity and energy, which the schema demands.
-
-    Raises
-    ------
-    CannotHoldError
-        If the table is anisotropic.
-    ParameterError
-        If a grid of the resolution is too large.
-    WriteError
-        If the file cannot be written.
-
-    Notes
-    -----
-    Rows are wavelength [m], theta_i, theta_r and phi_r [rad], and f_r [1/sr], sorted. phi_r is counted from the light:
-    0 looks back towards it. Both halves of the azimuth are written. The record is ``metadata.brdfdb``.
+    Rows are wavelength [m], theta_i, theta_r and phi_r [rad], and f_r [1/sr], sorted. phi_r counts from the light: 0
+    looks back towards it. Both halves of the azimuth are written. The record is ``metadata.brdfdb``; the schema demands
+    positive values, reciprocity and energy conservation, on which its verdict of the audit speaks. The file has about
+    40 MB at most.
     """
     from brdfdb.formats._dense_grid import dense_table, rounded
 
@@ -127,13 +112,7 @@ def recognises(head: bytes) -> bool:
 
 
 def read(path: str | os.PathLike[str]) -> FileTable | Samples:
-    """Return f_r of a lookup table: interpolated linearly if it is over the whole hemisphere, else its samples.
-
-    Raises
-    ------
-    FileFormatError
-        If the file is no JSON, or its rows are not five numbers each, or its wavelengths have different directions.
-    """
+    """Return f_r of a lookup table: interpolated linearly if it is over the whole hemisphere, else its samples."""
     from brdfdb.measurements.samples import Instrument
 
     path = path_of(path)

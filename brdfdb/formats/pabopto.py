@@ -15,8 +15,8 @@ import numpy as np
 
 from brdfdb.errors import FileFormatError
 from brdfdb.formats._channels import LUMINOUS, XYZ
+from brdfdb.formats._input import lines_of
 from brdfdb.formats._nodes import samples_at_angles, without_fill_values
-from brdfdb.formats._text_file import lines_of
 from brdfdb.place import path_of
 
 if TYPE_CHECKING:
@@ -35,15 +35,6 @@ def recognises(head: bytes) -> bool:
 def read(path: str | os.PathLike[str]) -> Samples:
     """Return the samples of a file of pab-opto.
 
-    Raises
-    ------
-    FileFormatError
-        If the header lacks the format or the direction of the light, or a row is damaged.
-    OSError
-        If it cannot be read.
-
-    Notes
-    -----
     The lines of the header are those that ``pabopto2bsdf`` of Radiance knows. The side of the light is the front.
     """
     path = path_of(path)

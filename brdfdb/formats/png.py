@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from brdfdb.errors import import_extra
-from brdfdb.formats._interface import Option
+from brdfdb.formats._interface import FormatOption
 from brdfdb.formats._record import record
 from brdfdb.formats._written import Written, whole
 from brdfdb.place import path_of
@@ -31,9 +31,9 @@ summary = "lit spheres and slices of tables as PNG files"
 tools = "every viewer of pictures; the numbers are in the other formats"
 kinds = (SPHERE, "lobe", "half_difference", "in_plane")
 options = (
-    Option("size", 160.0, "pixels across a sphere", low=16.0, high=2048.0, most_served=512.0),
-    Option("theta_i", 45.0, "polar angle of the light of a lobe [degrees]", low=0.0, high=90.0),
-    Option("phi_i", 0.0, "azimuth of the light, or of the half vector [degrees]", low=-720.0, high=720.0),
+    FormatOption("size", 160.0, "pixels across a sphere", low=16.0, high=2048.0, most_served=512.0),
+    FormatOption("theta_i", 45.0, "polar angle of the light of a lobe [degrees]", low=0.0, high=90.0),
+    FormatOption("phi_i", 0.0, "azimuth of the light, or of the half vector [degrees]", low=-720.0, high=720.0),
 )
 
 _TONES = "sRGB of x / (1 + x), x = pi f_r: a white Lambertian surface is half as bright as the brightest light"
@@ -50,35 +50,11 @@ def write(
     phi_i: float = 0.0,
     verdict: str | None = None,
 ) -> Written:
-    """Write a picture of a table as a PNG file of 8 bits: whole, or not at all.
+    """Write a picture of a table as a PNG file of 8 bits.
 
-    Parameters
-    ----------
-    table : Table
-        Table in memory.
-    path : path
-        The file; one that is there is replaced.
-    kind : str
-        "sphere", as `brdfdb.scenes.lit_sphere`; "lobe", "half_difference" or "in_plane", as in `brdfdb.tables.slices`.
-    size : float [pixel]
-        Pixels across a sphere, rounded. Slices have a size of their own.
-    theta_i, phi_i : float [degree]
-        Direction of the light, as of the format exr.
-    verdict : str, optional
-        Verdict of the audit of this revision.
-
-    Raises
-    ------
-    ParameterError
-        If an option is outside its range.
-    WriteError
-        If the file cannot be written.
-
-    Notes
-    -----
-    All tables have the same exposure. Values of slices are compressed, x / (1 + x) of x = pi f_r, so that a diffuse
-    surface and a highlight a thousand times brighter are both seen. Texts in the file are the record, and how its
-    colours were made.
+    The sphere is that of `brdfdb.scenes.lit_sphere`, the slices are those of `brdfdb.tables.slices`. All tables have
+    the same exposure. Values of slices are compressed, x / (1 + x) of x = pi f_r, so that a diffuse surface and a
+    highlight a thousand times brighter are both seen. Texts in the file are the record, and how its colours were made.
     """
     from brdfdb.formats._pictures import rgb_of, slice_of
     from brdfdb.scenes.lit_sphere import lit_sphere

@@ -10,7 +10,11 @@ Anisotropic tables, all wavelengths and the specular part fit.
 from __future__ import annotations
 
 import functools
+import math
+import mmap
 import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -19,13 +23,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.errors import FileFormatError
-from brdfdb.formats import _ssdd_file
 from brdfdb.formats._angles import HalfDifference, Specular, Spherical, System
 from brdfdb.formats._angular_grid import SIZE, AngularGrid, Sink, chosen, mirrored, reciprocal
-from brdfdb.formats._interface import TOLERANCE, Option
+from brdfdb.formats._channels import names_of
+from brdfdb.formats._input import MOST_TEXT, check_size
+from brdfdb.formats._interface import TOLERANCE, FormatOption
 from brdfdb.formats._nodes import samples_of_grid, without_holes
 from brdfdb.formats._record import lines, of_lines, record
 from brdfdb.formats._written import Written, whole
+from brdfdb.parameters import Floats
 from brdfdb.place import path_of
 
 if TYPE_CHECKING:
@@ -40,7 +46,7 @@ tools = "BSDF Processor, libbsdf"
 kinds = ()
 options = (
     TOLERANCE,
-    Option("data", "binary", "form of the values", choices=("binary", "ascii")),
+    FormatOption("data", "binary", "form of the values", choices=("binary", "ascii")),
     SIZE,
 )
 
@@ -50,6 +56,14 @@ _NAMES = {
     Spherical: "spherical_coordinate_system",
 }
 _COLOURS = {"monochrome": ("grey",), "rgb": ("R", "G", "B"), "xyz": ("X", "Y", "Z")}
+_VERSION = "0.3"
+_LISTS = ("PARAM0_LIST", "PARAM1_LIST", "PARAM2_LIST", "PARAM3_LIST")
+_RANGES_DEG = ((0.0, 90.0), (-360.0, 360.0), (0.0, 180.0), (-360.0, 360.0))  # of the lists
+_ROUNDING_DEG = 1e-3
+_TYPES = ("brdf", "btdf", "specular_reflectance", "specular_transmittance")
+_CHANNELS = {"monochrome": 1, "rgb": 3, "xyz": 3}
+_LONGEST = 1 << 24  # bytes of a line of a header: a list of angles or wavelengths
+_SPACES = b" \t\n\v\f\r"
 
 
 def write(
@@ -61,32 +75,8 @@ def write(
     size: float = 16.0,
     verdict: str | None = None,
 ) -> Written:
-    """Write a table as an SSDD file: whole, or not at all. The record is in its comments.
+    """Write a table as an SSDD file with the record in its comments.
 
-    Parameters
-    ----------
-    table : Table
-        Any.
-    path : path
-        The file; one that is there is replaced.
-    tolerance : float [1]
-        Largest p99.
-    data : str
-        "binary" or "ascii".
-    size : float [MB]
-        Largest file.
-    verdict : str, optional
-        Verdict of the audit of this revision.
-
-    Raises
-    ------
-    ParameterError
-        If no file of this table is so small.
-    WriteError
-        If the file cannot be written.
-
-    Notes
-    -----
     After the specification of the format, version 0.3, and libbsdf's ``SsddReader.cpp``. libbsdf interpolates linearly
     over each angle (``LinearInterpolator.cpp``). The angles are those of half and difference vectors, of the viewer
     about the specular direction, or of light and viewer: the ones that need the fewest nodes.
@@ -98,12 +88,13 @@ def write(
 
     def write_all(sink: Sink, grid: AngularGrid, error: FileError) -> None:
         document = record(table, error, verdict, tolerance=tolerance)
-        sink.write(_ssdd_file.header(software, lines(document)))
-        sink.write(_ssdd_file.block(_entries(table, grid), _four(grid), data == "binary"))
+        values = grid.values if table.anisotropic else grid.values[:, np.newaxis]  # over four angles
+        sink.write(encoded_header(software, lines(document)))
+        sink.write(encoded_block(_entries(table, grid), values, data == "binary"))
         if table.specular is not None:
             sink.write(_specular(table, data == "binary"))
 
-    grid, error = chosen(table, comparison, _systems(table, comparison), tolerance, size, write_all)
+    grid, error = chosen(comparison, _systems(comparison), tolerance, size, write_all)
     with whole(path) as (file,), file.open("wb") as stream:
         write_all(stream, grid, error)
     return Written((path_of(path),), error, tolerance)
@@ -115,22 +106,15 @@ def recognises(head: bytes) -> bool:
 
 
 def read(path: str | os.PathLike[str]) -> FileTable:
-    """Return f_r of an SSDD file as libbsdf sees it.
+    """Return f_r of an SSDD file as libbsdf sees it; angles with offsets and distorted ones are refused.
 
     The record has a specular part that the file holds as "specular_reflectance", with its angles as
     "specular_theta_i_deg".
-
-    Raises
-    ------
-    FileFormatError
-        If the file is not an SSDD file with a BRDF, is damaged, or has angles with offsets or distorted ones.
-    OSError
-        If it cannot be read.
     """
     from brdfdb.formats._readings import FileTable
 
     path = path_of(path)
-    comments, blocks = _ssdd_file.parsed(path)
+    comments, blocks = parsed(path)
     by_type = {block.entries["DATA_TYPE"]: block for block in blocks}
     if "brdf" not in by_type:
         raise FileFormatError(f"{path}: not an SSDD file with a block of DATA_TYPE brdf")
@@ -142,18 +126,18 @@ def read(path: str | os.PathLike[str]) -> FileTable:
         document["specular_theta_i_deg"] = dirac.angles[0].tolist()
         document["specular_reflectance"] = dirac.values[:, 0, 0, 0].tolist()
     at = block.wavelength_nm
-    names = _COLOURS[block.entries["COLOR_MODEL"]] if at is None else tuple(f"{value:g}nm" for value in at)
+    names = _COLOURS[block.entries["COLOR_MODEL"]] if at is None else names_of(at)
     name = str(document.get("name") or block.entries.get("NAME") or path.stem)
     angles = [np.deg2rad(axis) for axis in block.angles]
     nodes = functools.partial(samples_of_grid, grid.system, angles, block.values, name, names, at, document)
     return FileTable(name, names, at, grid.evaluate, document, nodes, listed=True)
 
 
-def _systems(table: Table, comparison: Comparison) -> list[System]:
+def _systems(comparison: Comparison) -> list[System]:
     """Return the systems of angles that a table may be written in, with the symmetries that it has."""
-    anisotropic = table.anisotropic
-    both_sides = not anisotropic or mirrored(table, comparison)
-    systems: list[System] = [HalfDifference(anisotropic, both_sides, reciprocal(table, comparison))]
+    anisotropic = comparison.table.anisotropic
+    both_sides = not anisotropic or mirrored(comparison)
+    systems: list[System] = [HalfDifference(anisotropic, both_sides, reciprocal(comparison))]
     if not anisotropic:
         systems += [Specular(anisotropic, mirrored=True), Spherical(anisotropic, mirrored=True)]
     return systems
@@ -166,7 +150,7 @@ def _entries(table: Table, grid: AngularGrid) -> dict[str, str]:
         *(["bilateral_symmetry"] if getattr(system, "mirrored", False) else []),
         *(["reciprocity"] if getattr(system, "reciprocal", False) else []),
     ]
-    names = _ssdd_file.LISTS if len(grid.nodes) == 4 else (_ssdd_file.LISTS[0], *_ssdd_file.LISTS[2:])
+    names = _LISTS if len(grid.nodes) == 4 else (_LISTS[0], *_LISTS[2:])
     return {
         "DATA_TYPE": "brdf",
         **_colour(table),
@@ -187,11 +171,6 @@ def _listed(numbers: NDArray[np.float64]) -> str:
     return " ".join(f"{number:.10g}" for number in numbers)
 
 
-def _four(grid: AngularGrid) -> NDArray[np.float32]:
-    """Return the values of a grid over four angles."""
-    return grid.values if len(grid.nodes) == 4 else grid.values[:, np.newaxis]
-
-
 def _specular(table: Table, binary: bool) -> bytes:
     """Return the block of the specular part."""
     assert table.specular is not None
@@ -202,10 +181,10 @@ def _specular(table: Table, binary: bool) -> bytes:
         "PARAM0_LIST": _listed(at_deg),
         "SOURCE_TYPE": "measured" if table.metadata.measured else "generated",
     }
-    return _ssdd_file.block(entries, table.specular.reshape(at_deg.size, 1, 1, 1, -1), binary)
+    return encoded_block(entries, table.specular.reshape(at_deg.size, 1, 1, 1, -1), binary)
 
 
-def _grid(path: Path, block: _ssdd_file.Block) -> AngularGrid:
+def _grid(path: Path, block: SsddBlock) -> AngularGrid:
     """Return the grid of a block."""
     reductions = block.entries.get("REDUCTION_TYPE", "").split()
     anisotropic, both_sides = block.angles[1].size > 1, "bilateral_symmetry" in reductions
@@ -222,3 +201,129 @@ def _grid(path: Path, block: _ssdd_file.Block) -> AngularGrid:
     if not anisotropic:
         nodes, values = (nodes[0], *nodes[2:]), values[:, 0]
     return AngularGrid(systems[kind], nodes, values)
+
+
+@dataclass(frozen=True, eq=False)
+class SsddBlock:
+    """A block of data.
+
+    Attributes
+    ----------
+    entries : mapping of str
+        The entries before the values, by name.
+    angles : tuple of array [degree]
+        The lists of angles that are there, from PARAM0_LIST on; (0,) for one that is left out.
+    values : float32 array (n0, n1, ..., C)
+        Values over the lists, and last the channels.
+    wavelength_nm : array (C,) [nm] or None
+        Wavelengths of the channels; None if they are none.
+    """
+
+    entries: Mapping[str, str]
+    angles: tuple[NDArray[np.float64], ...]
+    values: NDArray[np.float32]
+    wavelength_nm: NDArray[np.float64] | None
+
+
+def encoded_header(software: str, comments: Sequence[str]) -> bytes:
+    """Return the beginning of a file, with comments."""
+    return "\n".join([f"VERSION {_VERSION}", *(f"# {line}" for line in comments), f"SOFTWARE {software}", ""]).encode()
+
+
+def encoded_block(entries: Mapping[str, str], values: Floats, binary: bool) -> bytes:
+    """Return a block of entries, in their order, and values (n0, n1, ..., C), whose first index runs fastest.
+
+    libbsdf looks for comments after each line, and so at the beginning of binary values too. There a "#" behind bytes
+    that are white space would be taken for one: the first value is changed in its last digit then.
+    """
+    lines = [f"{name} {text}" for name, text in entries.items() if text]
+    channels = values.shape[-1]
+    rows = np.moveaxis(values, -1, 0).T.reshape(-1, channels).astype("<f4")
+    if not binary:
+        text = "%.7g" + " %.7g" * (channels - 1)
+        data = "\n".join([text] * len(rows)) % tuple(rows.reshape(-1).tolist())
+        return "\n".join(["", *lines, "DATA ascii", data, ""]).encode()
+    while rows.reshape(-1)[:64].tobytes().lstrip(_SPACES).startswith(b"#"):
+        rows[0, 0] = np.nextafter(rows[0, 0], np.float32(np.inf))
+    return "\n".join(["", *lines, "DATA binary", ""]).encode() + rows.tobytes() + b"\n"
+
+
+def parsed(path: Path) -> tuple[list[str], list[SsddBlock]]:
+    """Return the comments and the blocks of a file; FileFormatError if it is no SSDD file, or damaged."""
+    check_size(path, MOST_TEXT)
+    with path.open("rb") as file:
+        if not file.read(1):
+            return [], []
+        data = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
+    comments: list[str] = []
+    blocks: list[SsddBlock] = []
+    entries: dict[str, str] = {}
+    at = 0
+    while at < len(data):
+        end = data.find(b"\n", at, at + _LONGEST)
+        end = len(data) if end < 0 else end
+        if data.find(b"\0", at, min(end, at + _LONGEST)) >= 0:
+            raise FileFormatError(f"{path}: byte {at}: a line of its header has a zero byte")
+        if end - at > _LONGEST:
+            raise FileFormatError(f"{path}: byte {at}: a line of its header has more than {_LONGEST} bytes")
+        line = data[at:end].decode("utf-8", "replace").strip()
+        at = end + 1
+        if line.startswith("#"):
+            comments.append(line[1:].strip())
+            continue
+        name, _, text = line.partition(" ")
+        if name == "DATA_TYPE":
+            entries = {}
+        if name:
+            entries[name] = text.strip()
+        if name == "DATA":
+            values, at = _values(path, data, at, entries)
+            blocks.append(values)
+    return comments, blocks
+
+
+def _values(path: Path, data: mmap.mmap, at: int, entries: Mapping[str, str]) -> tuple[SsddBlock, int]:
+    """Return the block whose values begin at a byte, and the byte behind it."""
+    if entries.get("DATA_TYPE") not in _TYPES or "PARAM0_LIST" not in entries:
+        raise FileFormatError(f"{path}: a block of data has no DATA_TYPE of {', '.join(_TYPES)}, or no PARAM0_LIST")
+    try:
+        lists = {name: np.array([float(text) for text in entries.get(name, "0").split()]) for name in _LISTS}
+        model = entries.get("COLOR_MODEL", "")
+        spectral = model == "spectrum"
+        nm = np.array([float(text) for text in entries["WAVELENGTH_LIST"].split()]) if spectral else None
+        channels = _CHANNELS[model] if nm is None else nm.size
+    except (KeyError, ValueError):
+        raise FileFormatError(f"{path}: COLOR_MODEL, or a list of angles or wavelengths, cannot be read") from None
+    angles = tuple(lists.values())
+    if not channels or not all(nodes.size and np.all(np.diff(nodes) > 0.0) for nodes in angles):
+        raise FileFormatError(f"{path}: a list of angles is empty or does not increase")
+    if nm is not None and not (channels and nm[0] > 0.0 and nm[-1] < np.inf and np.all(np.diff(nm) > 0.0)):
+        raise FileFormatError(f"{path}: WAVELENGTH_LIST is not of positive numbers [nm] that increase")
+    for (name, nodes), (low, high) in zip(lists.items(), _RANGES_DEG, strict=True):
+        if not low <= nodes[0] <= nodes[-1] <= high + _ROUNDING_DEG:
+            raise FileFormatError(
+                f"{path}: {name} is from {nodes[0]:g} to {nodes[-1]:g} degrees; allowed is [{low:g}, {high:g}]"
+            )
+    if entries["DATA"] not in ("binary", "ascii"):
+        raise FileFormatError(f"{path}: DATA is {entries['DATA']!r:.40}; allowed are binary and ascii")
+    count = channels * math.prod(nodes.size for nodes in angles)
+    if entries["DATA"] == "binary":
+        end = at + 4 * count
+        if end > len(data):
+            raise FileFormatError(f"{path}: {len(data) - at} bytes of values, its lists of angles need {4 * count}")
+        flat = np.frombuffer(data, "<f4", count, at)
+    else:
+        end = data.find(b"\nDATA_TYPE", at)
+        end = len(data) if end < 0 else end
+        lines = (line for line in data[at:end].split(b"\n") if not line.lstrip().startswith(b"#"))
+        try:
+            flat = np.array(b" ".join(lines).split(), np.float32)
+        except ValueError:
+            raise FileFormatError(f"{path}: a value is not a number") from None
+        if flat.size != count:
+            raise FileFormatError(f"{path}: {flat.size} values, its lists of angles need {count}")
+    if not np.all(np.isfinite(flat)):
+        raise FileFormatError(f"{path}: a value is not finite")
+    shape = tuple(nodes.size for nodes in reversed(angles))
+    values = np.moveaxis(flat.reshape(*shape, channels), -1, 0).T
+    return SsddBlock(dict(entries), angles, np.ascontiguousarray(values), nm), end

@@ -9,21 +9,19 @@ Anisotropic tables fit. Spectral tables become linear sRGB. The specular part is
 
 from __future__ import annotations
 
-import functools
 import json
 import os
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from brdfdb.errors import FileFormatError
 from brdfdb.formats._angles import Spherical
 from brdfdb.formats._angular_grid import AngularGrid, filled
-from brdfdb.formats._beside import beside, record_beside
 from brdfdb.formats._channels import RGB, channels_of
-from brdfdb.formats._interface import FIXED, Option
+from brdfdb.formats._interface import FIXED, FormatOption
 from brdfdb.formats._nodes import samples_of_grid, without_holes
-from brdfdb.formats._record import record, specular_remark
+from brdfdb.formats._record import beside, record, record_beside, specular_remark
 from brdfdb.formats._written import Written, whole
 from brdfdb.parameters import Floats
 from brdfdb.place import path_of
@@ -40,7 +38,7 @@ tools = "readers of UTIA, ALTA"
 kinds = ()
 options = (
     FIXED,
-    Option(
+    FormatOption(
         "encoding",
         "linear",
         "numbers are f_r, as UTIA's own reader and ALTA give them back (linear), or 140 times the sRGB curve of f_r / "
@@ -67,30 +65,8 @@ def write(
     encoding: str = "linear",
     verdict: str | None = None,
 ) -> Written:
-    """Write a table as a UTIA file, with its record as JSON beside it: both whole, or none.
+    """Write a table as a UTIA file, with its record as JSON beside it.
 
-    Parameters
-    ----------
-    table : Table
-        Any; spectral ones become linear sRGB.
-    path : path
-        The file; one that is there is replaced.
-    tolerance : float [1]
-        Largest p99. The grid is fixed: a larger error is stated.
-    encoding : str
-        "linear" or "dj_brdf".
-    verdict : str, optional
-        Verdict of the audit of this revision.
-
-    Raises
-    ------
-    CannotHoldError
-        If the wavelengths of the table give no colour.
-    WriteError
-        If a file cannot be written.
-
-    Notes
-    -----
     Three planes (R, G, B) of 64 bit floats: 6 polar angles of the light in steps of 15 degrees, 48 azimuths in steps of
     7.5, then those of the viewer. UTIA's own reader (``TBDRF.cpp`` of J. Filip) interpolates linearly over the four
     angles and continues the last interval of a polar angle to 90 degrees; it neither scales nor decodes. dj_brdf takes
@@ -100,9 +76,9 @@ def write(
 
     channels = channels_of(table, "rgb")
     comparison = Comparison(table, channels)
-    grid = filled(table, comparison, _SYSTEM, _NODES)
+    grid = filled(comparison, _SYSTEM, _NODES)
     numbers = _encoded(np.maximum(grid.values.astype(np.float64), 0.0), encoding)
-    error = comparison.error_of(_Reader(numbers, encoding))
+    error = comparison.error_of(UtiaReader(numbers, encoding))
     remarks = (*channels.remarks, *specular_remark(table))
     holds = _LINEAR if encoding == "linear" else _DJ
     document = record(table, error, verdict, holds=holds, remarks=remarks, tolerance=tolerance)
@@ -124,15 +100,7 @@ def recognises(head: bytes) -> bool:
 
 
 def read(path: str | os.PathLike[str]) -> FileTable:
-    """Return f_r of a UTIA file as UTIA's own reader sees it, or dj_brdf if its record says so.
-
-    Raises
-    ------
-    FileFormatError
-        If the file does not have the size of a UTIA file, or a number is not finite.
-    OSError
-        If it cannot be read.
-    """
+    """Return f_r of a UTIA file as UTIA's own reader sees it, or dj_brdf if its record says so."""
     from brdfdb.formats._readings import FileTable
 
     path = path_of(path)
@@ -146,14 +114,12 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     numbers = np.pad(np.moveaxis(planes, 0, -1), [(0, 0), (0, 1), (0, 0), (0, 1), (0, 0)], mode="wrap")
     encoding = "dj_brdf" if known.get("encoding") == "dj_brdf" else "linear"
     name = str(known.get("name") or path.stem)
-    nodes = functools.partial(_samples, planes, encoding, name, known)
-    return FileTable(name, RGB, None, _Reader(without_holes(numbers), encoding), known, nodes, listed=True)
 
+    def nodes() -> Samples:
+        axes = [np.deg2rad(step * np.arange(count)) for step, count in zip(STEPS_DEG, SHAPE, strict=True)]
+        return samples_of_grid(_SYSTEM, axes, _decoded(np.moveaxis(planes, 0, -1), encoding), name, RGB, None, known)
 
-def _samples(planes: Floats, encoding: str, name: str, known: dict[str, Any]) -> Samples:
-    """Return the values of a file at its own angles."""
-    nodes = [np.deg2rad(step * np.arange(count)) for step, count in zip(STEPS_DEG, SHAPE, strict=True)]
-    return samples_of_grid(_SYSTEM, nodes, _decoded(np.moveaxis(planes, 0, -1), encoding), name, RGB, None, known)
+    return FileTable(name, RGB, None, UtiaReader(without_holes(numbers), encoding), known, nodes, listed=True)
 
 
 def _encoded(f_r: Floats, encoding: str) -> Floats:
@@ -175,7 +141,7 @@ def _decoded(numbers: Floats, encoding: str) -> Floats:
     return np.asarray(np.maximum(100.0 * curve, 0.0))
 
 
-class _Reader:
+class UtiaReader:
     """f_r [1/sr], shape (N, 3), at unit vectors (N, 3), of numbers on the grid with the first azimuths repeated."""
 
     def __init__(self, numbers: Floats, encoding: str) -> None:

@@ -39,29 +39,9 @@ def write(
     resolution: float = 0.0,
     verdict: str | None = None,
 ) -> Written:
-    """Write f_r on a plain grid of angles as a zarr 3 group, a directory: whole, or not at all.
+    """Write f_r on a plain grid of angles as a zarr 3 group, which is a directory.
 
-    Parameters
-    ----------
-    table : Table
-        Table in memory.
-    path : path
-        The directory; one that is there is replaced.
-    tolerance, axes, resolution
-        As of `brdfdb.formats._dense_grid.dense_table`. The values take 100 MB at most, before compression.
-    verdict : str, optional
-        Verdict of the audit of this revision.
-
-    Raises
-    ------
-    ParameterError
-        If a grid of the resolution is too large.
-    WriteError
-        If the directory cannot be written.
-
-    Notes
-    -----
-    Arrays and attributes are those of the netCDF files.
+    Arrays and attributes are those of the netCDF files. The values take 100 MB at most, before compression.
     """
     from brdfdb.formats._dense_grid import dense_table
 
@@ -77,13 +57,7 @@ def recognises(head: bytes) -> bool:
 
 
 def read(path: str | os.PathLike[str]) -> FileTable | Samples:
-    """Return f_r of a zarr group with ``brdf`` over angles [degree], interpolated linearly; or samples.
-
-    Raises
-    ------
-    FileFormatError
-        If the group is damaged, or ``brdf`` is not over the axes of a grid.
-    """
+    """Return f_r of a zarr group with ``brdf`` over angles [degree], interpolated linearly; or samples."""
     import xarray as xr
     import zarr
 

@@ -12,20 +12,23 @@ from __future__ import annotations
 
 import functools
 import os
+from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.errors import FileFormatError
-from brdfdb.formats import _zemax_file
 from brdfdb.formats._angles import Specular
-from brdfdb.formats._angular_grid import SIZE, AngularGrid, Sink, chosen, rounded
+from brdfdb.formats._angular_grid import SIZE, AngularGrid, Sink, chosen
 from brdfdb.formats._channels import LUMINOUS, XYZ, channels_of
-from brdfdb.formats._interface import TOLERANCE, Option
+from brdfdb.formats._input import Words
+from brdfdb.formats._interface import TOLERANCE, FormatOption
 from brdfdb.formats._nodes import samples_of_grid, without_holes
 from brdfdb.formats._record import CONVENTION, lines, note, of_comments, of_lines, record, specular_remark
 from brdfdb.formats._written import Written, whole
+from brdfdb.parameters import Floats
 from brdfdb.place import path_of
 
 if TYPE_CHECKING:
@@ -43,12 +46,20 @@ tools = "OpticStudio, libbsdf"
 kinds = ()
 options = (
     TOLERANCE,
-    Option("colour", "auto", "CIE XYZ, or its Y alone; auto: XYZ of spectral tables", choices=("auto", "xyz", "grey")),
+    FormatOption(
+        "colour", "auto", "CIE XYZ, or its Y alone; auto: XYZ of spectral tables", choices=("auto", "xyz", "grey")
+    ),
     SIZE,
 )
 
 _TIS_TOLERANCE = 1e-4  # absolute, of an albedo
 _HOLDS = f"{CONVENTION}; the sample is turned by phi_i, and angles of incidence and TIS are those of the table"
+_LISTS = ("SampleRotation", "AngleOfIncidence", "ScatterAzimuth", "ScatterRadial")
+_TITLE = "BSDF Data Interchange file"
+_SYMMETRIES = ("PlaneSymmetrical", "Asymmetrical", "ASymmetrical", "ASymmetrical4D", "Asymmetrical4D")
+_PARTS = {"Monochrome": ("Monochrome",), "XYZ": ("TristimulusX", "TristimulusY", "TristimulusZ")}
+
+_LARGEST = float(np.finfo(np.float32).max)
 
 
 def write(
@@ -60,38 +71,13 @@ def write(
     size: float = 16.0,
     verdict: str | None = None,
 ) -> Written:
-    """Write a table as a Zemax BSDF file: whole, or not at all. The record is in its comments.
+    """Write a table as a Zemax BSDF file with the record in its comments.
 
-    Parameters
-    ----------
-    table : Table
-        Isotropic ones are written as PlaneSymmetrical, anisotropic ones as ASymmetrical4D.
-    path : path
-        The file; one that is there is replaced.
-    tolerance : float [1]
-        Largest p99.
-    colour : str
-        "xyz", "grey" (Y of it), or "auto": CIE XYZ of spectral tables, else one value.
-    size : float [MB]
-        Largest file.
-    verdict : str, optional
-        Verdict of the audit of this revision.
-
-    Raises
-    ------
-    CannotHoldError
-        If the wavelengths of the table give no colour.
-    ParameterError
-        If no file of this table is so small.
-    WriteError
-        If the file cannot be written.
-
-    Notes
-    -----
     After Zemax's article on the format (1500005486801) and libbsdf's ``ZemaxBsdfReader.cpp``: polar angles from the
     specular direction, azimuths from there towards the normal, counter-clockwise from above. The error is that of
     linear interpolation over each angle, as libbsdf does it. TIS is the directional albedo of the table, without its
-    specular part. OpticStudio's own model and libbsdf read files of one rotation only, those of isotropic tables.
+    specular part. Isotropic tables are PlaneSymmetrical, others ASymmetrical4D, of which OpticStudio's model and
+    libbsdf read one rotation only.
     """
     from brdfdb.formats._stated_error import Comparison
     from brdfdb.tables.albedo import directional_albedo
@@ -104,17 +90,9 @@ def write(
     def write_all(sink: Sink, grid: AngularGrid, error: FileError) -> None:
         document = record(table, error, verdict, holds=_HOLDS, remarks=remarks, tolerance=tolerance)
         document["channels"] = list(channels.names)
-        _zemax_file.write(sink, _text(table, channels, albedo, grid, tuple(lines(document))))
+        write_text(sink, _text(table, channels, albedo, grid, tuple(lines(document))))
 
-    grid, error = chosen(
-        table,
-        Comparison(table, channels),
-        [system],
-        tolerance,
-        size,
-        write_all,
-        lambda some: AngularGrid(some.system, some.nodes, rounded(some.values)),
-    )
+    grid, error = chosen(Comparison(table, channels), [system], tolerance, size, write_all, as_text=True)
     with whole(path) as (file,), file.open("wb") as stream:
         write_all(stream, grid, error)
     return Written((path_of(path),), error, tolerance, remarks)
@@ -122,14 +100,14 @@ def write(
 
 def _text(
     table: Table, channels: Channels, albedo: TableAlbedo, grid: AngularGrid, comments: tuple[str, ...]
-) -> _zemax_file.Text:
+) -> ZemaxText:
     """Return the content of the file of a grid."""
     angles = [np.rad2deg(axis) for axis in grid.nodes]
     values = grid.values
     if not table.anisotropic:
         angles.insert(1, np.zeros(1))
         values = values[:, np.newaxis]
-    return _zemax_file.Text(
+    return ZemaxText(
         comments=comments,
         symmetry="ASymmetrical4D" if table.anisotropic else "PlaneSymmetrical",
         content="XYZ" if len(channels.names) == 3 else "Monochrome",
@@ -142,7 +120,7 @@ def _text(
 
 def recognises(head: bytes) -> bool:
     """Return True for the first bytes of a Zemax BSDF file; those of an RGL file, with the same suffix, are binary."""
-    if head.startswith(f"# {_zemax_file.TITLE}\n".encode()):
+    if head.startswith(f"# {_TITLE}\n".encode()):
         return True
     lines_of_words = (line.split() for line in head.split(b"\n") if not line.lstrip().startswith(b"#"))
     first = next((words[0] for words in lines_of_words if words), b"")
@@ -153,18 +131,11 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     """Return f_r of a Zemax BSDF file as libbsdf sees it; an anisotropic one in the same way.
 
     The record has the total integrated scatter as "tis", with its angles of incidence as "theta_i_deg".
-
-    Raises
-    ------
-    FileFormatError
-        If the file is not a Zemax BSDF file of a BRDF, or is damaged.
-    OSError
-        If it cannot be read.
     """
     from brdfdb.formats._readings import FileTable
 
     path = path_of(path)
-    text = _zemax_file.parsed(path)
+    text = parsed(path)
     if text.scatter != "BRDF":
         raise FileFormatError(f"{path}: its ScatterType is {text.scatter!r}; only BRDF is read")
     turns, incidences, azimuths, radials = (np.deg2rad(axis) for axis in text.angles)
@@ -184,7 +155,7 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     return FileTable(name, names, None, grid.evaluate, document, listed, listed=True)
 
 
-def _samples(name: str, names: tuple[str, ...], text: _zemax_file.Text, document: dict[str, Any]) -> Samples:
+def _samples(name: str, names: tuple[str, ...], text: ZemaxText, document: dict[str, Any]) -> Samples:
     """Return the values of a file at their own angles."""
     nodes = [np.deg2rad(text.angles[axis]) for axis in (1, 0, 3, 2)]
     instrument, wavelength_nm = of_comments(document)
@@ -236,3 +207,95 @@ def _albedo(
             for c in range(over_theta.shape[1])
         ]
     ).transpose(0, 2, 1)
+
+
+@dataclass(frozen=True, eq=False)
+class ZemaxText:
+    """Content of a Zemax file.
+
+    Attributes
+    ----------
+    comments : tuple of str
+        The comments.
+    symmetry, content, scatter : str
+        Values of the entries Symmetry, SpectralContent and ScatterType.
+    angles : tuple of array [degree]
+        The four lists: rotations of the sample, angles of incidence, azimuths and radial angles.
+    tis : array (C, rotations, incidences)
+        Total integrated scatter.
+    values : array (C, rotations, incidences, azimuths, radials) [1/sr]
+        f_r.
+    """
+
+    comments: tuple[str, ...]
+    symmetry: str
+    content: str
+    scatter: str
+    angles: tuple[NDArray[np.float64], ...]
+    tis: NDArray[np.float64]
+    values: Floats
+
+
+def write_text(stream: Sink, text: ZemaxText) -> None:
+    """Write a file."""
+    head = [f"# {comment}" for comment in (_TITLE, *text.comments)]
+    head += ["Source Measured", f"Symmetry {text.symmetry}", f"SpectralContent {text.content}"]
+    head += [f"ScatterType {text.scatter}"]
+    for name, nodes in zip(_LISTS, text.angles, strict=True):
+        head += [f"{name} {nodes.size}", " ".join(f"{node:.10g}" for node in nodes)]
+    stream.write("\n".join([*head, "", ""]).encode())
+    line = " ".join(["%.5g"] * text.angles[3].size)
+    rows = "\n".join([line] * text.angles[2].size)
+    for part, every_tis, planes in zip(_PARTS[text.content], text.tis, text.values, strict=True):
+        stream.write(f"{part}\nDataBegin\n".encode())
+        for tis, plane in zip(every_tis.reshape(-1), planes.reshape(-1, *planes.shape[2:]), strict=True):
+            stream.write(f"TIS {tis:.6g}\n{rows % tuple(plane.reshape(-1).tolist())}\n".encode())
+        stream.write(b"DataEnd\n")
+
+
+def parsed(path: Path) -> ZemaxText:
+    """Return the content of a file; FileFormatError if it is no Zemax BSDF file, or damaged."""
+    words = Words(path)
+    entries = {"Source": "", "Symmetry": "", "SpectralContent": "", "ScatterType": ""}
+    angles: dict[str, NDArray[np.float64]] = {}
+    for word in words:
+        if word in entries:
+            entries[word] = words.next(word)
+        elif word in _LISTS:
+            angles[word] = words.numbers(words.count(word), word)
+            if not angles[word].size or np.any(np.diff(angles[word]) <= 0.0):
+                raise words.error(word, "the angles do not increase, or there are none")
+        elif any(word in parts for parts in _PARTS.values()):
+            break
+    content = entries["SpectralContent"]
+    if entries["Symmetry"] not in _SYMMETRIES or content not in _PARTS:
+        raise FileFormatError(f"{path}: its Symmetry or SpectralContent is not that of a Zemax BSDF file")
+    angles.setdefault("SampleRotation", np.zeros(1))
+    missing = [name for name in _LISTS if name not in angles]
+    if missing:
+        raise FileFormatError(f"{path}: {', '.join(missing)} is missing")
+    lists = tuple(angles[name] for name in _LISTS)
+    parts = len(_PARTS[content])
+    blocks = parts * lists[0].size * lists[1].size
+    if blocks > path.stat().st_size:
+        raise FileFormatError(f"{path}: its lists of angles need {blocks} blocks of values, more than the file has")
+    rows, tis = [], np.empty(blocks)
+    for number in range(blocks):
+        for word in words:
+            if word == "TIS":
+                break
+        tis[number] = words.numbers(1, "TIS")[0]
+        rows.append(words.numbers(lists[2].size * lists[3].size, f"block {number + 1} of {blocks}"))
+        if np.any(np.abs(rows[-1]) > _LARGEST):
+            raise words.error("TIS", f"a value is beyond {_LARGEST:g}, the largest one of 32 bits")
+    shape = (parts, *(nodes.size for nodes in lists))
+    values = np.concatenate(rows, dtype=np.float32, casting="same_kind").reshape(shape)
+    return ZemaxText(
+        tuple(words.comments),
+        entries["Symmetry"],
+        content,
+        entries["ScatterType"],
+        lists,
+        tis.reshape(shape[:3]),
+        values,
+    )

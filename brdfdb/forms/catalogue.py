@@ -8,9 +8,10 @@ from typing import Any, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from brdfdb.errors import ParameterError
+from brdfdb.figure import DocumentPart
 from brdfdb.materials import Material, Source, exact_material
 from brdfdb.measurements import MeasuredSource
 from brdfdb.parameters import Floats, FormKind, ModelForm, bytes_of
@@ -26,8 +27,7 @@ from brdfdb.tables.grids import (
 from brdfdb.tables.layout import Layout
 from brdfdb.tables.measured_layout import tabulated
 from brdfdb.tables.planner import check_tolerance, plan
-from brdfdb.tables.table import Table
-from brdfdb.tables.table_source import TableSource
+from brdfdb.tables.table import Table, TableSource
 from brdfdb.tables.tabulation import POLE_END_DEG
 
 Kind = Literal[FormKind, "table"]
@@ -42,53 +42,27 @@ _UNFACTORED = 0.01  # tolerance of the table that is offered with and without a 
 class Form:
     """One way to evaluate f_r of a source at some wavelengths.
 
-    Attributes
-    ----------
-    key : str
-        Lower-case words joined by hyphens, unique among the forms of a source.
-    title : str
-        A name for people, with the equation.
-    kind : str
-        A kind of `brdfdb.parameters.ModelForm`, or "table".
-    python : str
-        The function in Python.
-    evaluate : callable
-        ``evaluate(wi, wr)`` gives f_r [1/sr] of shape (N, L) for unit vectors of shape (N, 3) and of the dtype below.
-        The specular part is left out, because it is the same for all forms.
-    bytes : int
-        Size of the numbers that an evaluation reads: parameters, spectra and constants of kernels, or the values of a
-        table. It is 0 for a function, whose numbers are not known. Memory that an evaluation writes is not counted.
-    dtype : float32 or float64
-        Type of the vectors and of the values.
-    rounded : bool
-        True for a form that repeats another one with float32 vectors and values. It takes as much work, and its error
-        is rounding.
-    layout : Layout or None
-        The layout of a table that was tabulated here.
-    values : array or None
-        All values of such a table: who publishes it need not tabulate again.
-    copied : callable or None
-        For a table, a function without arguments. It returns an evaluation that reads a copy of the values, like
-        another table of this size.
+    ``evaluate(wi, wr)`` gives f_r [1/sr] of shape (N, L) for unit vectors (N, 3) of the dtype. The specular part is
+    left out, because it is the same for all forms. `bytes` is the size of the numbers that an evaluation reads:
+    parameters, spectra and constants of kernels, or the values of a table; 0 for a function, whose numbers are not
+    known.
     """
 
-    key: str
-    title: str
+    key: str  # lower-case words joined by hyphens, unique among the forms of a source
+    title: str  # a name for people, with the equation
     kind: Kind
-    python: str
+    python: str  # the function in Python
     evaluate: Evaluate
     bytes: int
-    dtype: type[np.floating[Any]] = np.float64
-    rounded: bool = False
-    layout: Layout | None = None
-    values: NDArray[np.float32] | None = None
-    copied: Callable[[], Evaluate] | None = None
+    dtype: type[np.floating[Any]] = np.float64  # of vectors and values
+    rounded: bool = False  # True for a form that repeats another one with float32 vectors and values
+    layout: Layout | None = None  # of a table that was tabulated here
+    values: NDArray[np.float32] | None = None  # all values of such a table, which need not be tabulated again
+    copied: Callable[[], Evaluate] | None = None  # returns an evaluation that reads a copy of the values of a table
 
 
-class LeftOut(BaseModel):
+class LeftOut(DocumentPart):
     """A form that cannot be made."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     key: str
     title: str
@@ -146,9 +120,9 @@ def forms(source: Source, wavelength_nm: ArrayLike | None, tolerances: Sequence[
         itself = Form(key, title, "exact", f"source {source.name}", source.brdf_at(at), 0)
         return _offered([itself], _tables(source, source, at, tolerances, "table"))
     listed = list(_of_model(source, at))
-    tabulated = exact_material(source)
-    title = "table" if listed[0].python == f"models.{tabulated.model}" else "table of the fit"
-    return _offered(listed, _tables(source, tabulated, at, tolerances, title))
+    evaluated = exact_material(source)
+    title = "table" if listed[0].python == f"models.{evaluated.model}" else "table of the fit"
+    return _offered(listed, _tables(source, evaluated, at, tolerances, title))
 
 
 def _offered(listed: Sequence[Form], tables: Iterator[Form | LeftOut]) -> Forms[Form]:
@@ -200,7 +174,7 @@ def _single(form: Form) -> Form:
 
 def _tables(
     planned: Source,
-    held: Source,
+    evaluated: Source,
     wavelength_nm: NDArray[np.float64] | None,
     tolerances: Sequence[float],
     table: str,
@@ -221,19 +195,19 @@ def _tables(
             ):
                 layout, _ = tabulated(planned, wavelength_nm, tolerance)
             else:
-                layout = replace(plan(planned, wavelength_nm, tolerance), source=held)
+                layout = replace(plan(planned, wavelength_nm, tolerance), source=evaluated)
         except ParameterError as error:
             yield LeftOut(key=key, title=title, reason=str(error))
             continue
         yield _table(layout, key, title)
         if layout.spectra is not None and tolerance == _UNFACTORED:
-            whole = replace(layout, spectra=None, part_nm=None)
-            yield _table(whole, f"{key}-unfactored", f"the {percent} % table, spectra whole")
+            unfactored = replace(layout, spectra=None, part_nm=None)
+            yield _table(unfactored, f"{key}-unfactored", f"the {percent} % table, spectra whole")
     for halves, key, title in (
         (False, "table-even", "even angles"),
         (True, "table-halves", "half vectors"),
     ):
-        layout = Layout(held, _plain_grid(held, halves=halves), wavelength_nm)
+        layout = Layout(evaluated, _plain_grid(evaluated, halves=halves), wavelength_nm)
         yield _table(layout, key, f"{table}, {title}, linear")
 
 

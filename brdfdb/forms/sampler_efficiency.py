@@ -26,8 +26,10 @@ ROUNDS = 9
 PER_POINT = 4  # samples per point of the sphere; the noise is their variance, not the difference between points
 SEED = 1994
 
-# Radiance of the light on the sphere: a sky that brightens upwards, and a lamp about 20 degrees wide on the right
-_SKY, _LAMP, _SHARPNESS = 0.2, 5.0, 20.0
+# Radiance of the light on the sphere: a sky that brightens upwards, and a lamp on the right
+_SKY = 0.2
+_LAMP = 5.0
+_SHARPNESS = 20.0  # a lamp about 20 degrees wide
 _LAMP_AT = np.array([0.6, 0.4, np.sqrt(1.0 - 0.6**2 - 0.4**2)])
 
 Draw = Callable[[Array, Array, Array], tuple[Array, Array]]
@@ -60,26 +62,10 @@ def works(
 ) -> dict[str, tuple[Work, Work]]:
     """Measure noise and time of samplers for the directional albedo and for the picture of a lit sphere.
 
-    Parameters
-    ----------
-    source : Source
-        A material or a function. It is sampled without the specular part.
-    wavelength_nm : float [nm] or None
-        Wavelength of a spectral source.
-    rounds : int
-        Number of rounds. All samplers share the random numbers of a round.
-    samples : int
-        Samples per estimate and round.
-    clock : callable
-        A function without arguments that gives the time in seconds.
+    For each of `SAMPLERS`, the result has the work of the albedo and that of the sphere. The source is sampled without
+    its specular part, at one wavelength [nm] if it is spectral. All samplers share the random numbers of a round, and
+    take `samples` of them per estimate. `clock()` gives the time in seconds.
 
-    Returns
-    -------
-    dict
-        For each of `SAMPLERS`, the work of the albedo and that of the sphere.
-
-    Notes
-    -----
     The light comes from `THETA_DEG` for the albedo. The sphere is seen from afar under a sky and a lamp. Its variance
     is the mean over points of the variance at a point. Random numbers are drawn before the clock starts. Seeds are
     fixed, so that means and variances are the same in every run.

@@ -30,6 +30,19 @@ _SEED = 1992
 _CACHE_BYTES = 48_000_000  # memory written between rounds: more than the last cache of one processor holds
 
 
+class Quartiles(NamedTuple):
+    """Lower quartile, median and upper quartile."""
+
+    low: float
+    middle: float
+    high: float
+
+
+def quartiles(values: NDArray[np.float64]) -> Quartiles:
+    """Return the quartiles of values."""
+    return Quartiles(*np.percentile(values, [25.0, 50.0, 75.0]).tolist())
+
+
 class Times(NamedTuple):
     """Time of an evaluation: seconds per value of f_r, shape (rounds,), and the number of directions per call."""
 
@@ -37,10 +50,9 @@ class Times(NamedTuple):
     directions: int
 
     @property
-    def quartiles_ns(self) -> tuple[float, float, float]:
+    def quartiles_ns(self) -> Quartiles:
         """Lower quartile, median and upper quartile [ns per value]."""
-        low, middle, high = np.percentile(1e9 * self.seconds, [25.0, 50.0, 75.0]).tolist()
-        return low, middle, high
+        return quartiles(1e9 * self.seconds)
 
 
 def times(
@@ -55,29 +67,11 @@ def times(
 ) -> list[Times]:
     """Measure the times of forms in turns, so that a busy machine slows all of them and ratios in a round stay right.
 
-    Times are processor times, which other programs on the machine do not lengthen. A call with few directions is
-    repeated, so that a turn lasts long enough for the clock.
-
-    Parameters
-    ----------
-    forms : sequence of Form
-        The forms to time, on one thread.
-    wi, wr : arrays of shape (N, 3)
-        Unit vectors to evaluate at, repeated or cut off as needed.
-    most : int
-        Largest number of directions per call. It is smaller where a call takes longer than `RUN_S` or gives more than a
-        million values. 1 times single evaluations from Python.
-    rounds : int
-        Number of turns of each form.
-    clock : callable
-        A function without arguments that gives the time in seconds.
-    tick : callable
-        A function that is called after every round.
-
-    Returns
-    -------
-    list of Times
-        In the order of the forms.
+    Times are processor times on one thread, which other programs on the machine do not lengthen. A call with few
+    directions is repeated, so that a turn lasts long enough for the clock. Unit vectors (N, 3) are repeated or cut off
+    as needed, to `most` directions per call, or fewer where a call takes longer than `RUN_S` or gives more than a
+    million values. 1 times single evaluations from Python. `clock()` gives the time in seconds. `tick` is called after
+    every round.
     """
     runs = []
     for form, count in zip(forms, _counts(forms, wi, wr, most, clock), strict=True):
@@ -107,29 +101,12 @@ def mixed_times(
     rounds: int = MIXED_ROUNDS,
     clock: Callable[[], float] = time.process_time,
 ) -> list[Times]:
-    """Measure the times of forms with many materials in turn, a few directions of each, with nothing cached.
+    """Measure the times of forms with many materials in turn, `FEW` directions of each, with nothing cached.
 
-    Parameters
-    ----------
-    forms : sequence of Form
-        The forms to time, on one thread.
-    wi, wr : arrays of shape (N, 3)
-        Unit vectors to evaluate at, repeated or cut off as needed.
-    rounds : int
-        Number of turns of each form.
-    clock : callable
-        A function without arguments that gives the time in seconds.
-
-    Returns
-    -------
-    list of Times
-        In the order of the forms, for `FEW` directions per call.
-
-    Notes
-    -----
     A renderer with many materials uses forms in this way. In a turn, `MATERIALS` materials of the form are evaluated
     once each, in a random order. Tables are copies with memory of their own. Large tables have fewer copies than
     `MATERIALS`. Before a turn, more memory is written than the caches hold, so that each table is read from memory.
+    Arguments are those of `times`.
     """
     rng = np.random.default_rng(_SEED)
     evict = np.zeros(_CACHE_BYTES // 8)
@@ -188,19 +165,10 @@ def clearly_cheaper(costs: Floats, one: int, other: int) -> bool:
 def front(errors: Sequence[float], costs: Floats) -> list[int]:
     """Return the forms worth having, from the most accurate one down, each clearly cheaper than the one before.
 
-    Parameters
-    ----------
-    errors : sequence of float
-        Error of each form.
-    costs : array of shape (rounds, forms)
-        Cost of each form in each round. Costs without scatter have one round.
-
-    Returns
-    -------
-    list of int
-        Indices of the forms. A less accurate form must be `CHEAPER` times as cheap in three of four rounds. If the
-        errors of two neighbours are within `ALIKE` of each other, the cheaper one stays. So neither the noise of a
-        clock nor a tiny difference of errors decides. Of equal forms the first one given is on the front.
+    `costs` (rounds, forms) may have one round if they do not scatter. A less accurate form must be `CHEAPER` times as
+    cheap in three of four rounds. If the errors of two neighbours are within `ALIKE` of each other, the cheaper one
+    stays. So neither the noise of a clock nor a tiny difference of errors decides. Of equal forms the first one is on
+    the front.
     """
     chosen: list[int] = []
     for one in sorted(range(len(errors)), key=lambda index: errors[index]):

@@ -3,28 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from datetime import datetime
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
+from brdfdb.figure import DocumentPart
 from brdfdb.forms import catalogue, sampler_efficiency, timing
-from brdfdb.forms.catalogue import SPECTRAL_TOLERANCES, Form, of_family
-from brdfdb.forms.tradeoff_document import (
-    Between,
-    Chart,
-    Cost,
-    Curve,
-    Diagnostic,
-    FamilyChart,
-    Fronts,
-    LeftOutOfMember,
-    Point,
-    Sampler,
-    Saving,
-    Work,
-)
+from brdfdb.forms.catalogue import SPECTRAL_TOLERANCES, Form, Kind, LeftOut, of_family
 from brdfdb.materials import Material, Source
+from brdfdb.materials.provenance import Number
+from brdfdb.materials.spectrum import Spectrum
 from brdfdb.parameters import Floats
 from brdfdb.store.family import Family, Sweep
 from brdfdb.tables import error_measurement
@@ -35,7 +26,165 @@ BLOCK = 256  # directions of a call of medium size
 SINGLES = 21  # rounds of calls with one direction, and with `BLOCK` directions
 TIMED = timing.ROUNDS + 2 * SINGLES  # calls of `tick` during the timing
 STEPS = 4 + TIMED  # calls of `tick` for a chart
-SHARE, CONFIDENCE = 0.99, 0.95  # percentile that is charted, and the confidence of its interval
+SHARE = 0.99  # charted percentile
+CONFIDENCE = 0.95  # of the interval of this percentile
+
+
+class Cost(DocumentPart):
+    """Time of an evaluation on one thread of the machine that made the chart."""
+
+    ns: float = Field(description="median over all rounds of the time of a value of f_r: one direction, one wavelength")
+    low: float = Field(description="lower quartile")
+    high: float = Field(description="upper quartile")
+    directions: int = Field(description="number of directions evaluated at once")
+
+
+class ChartedForm(DocumentPart):
+    """A form and its costs."""
+
+    key: str
+    title: str
+    kind: Kind
+    python: str = Field(description="name in Python")
+    dtype: Literal["float64", "float32"]
+    bytes: int = Field(description="size of the numbers that an evaluation reads")
+    batch: Cost = Field(description="cost with 100 000 directions at once; slow forms get fewer")
+    block: Cost = Field(description="cost with 256 directions at once")
+    single: Cost = Field(description="cost with one direction")
+
+
+class Saving(DocumentPart):
+    """A ratio of times within rounds."""
+
+    low: float = Field(description="lower quartile")
+    times: float = Field(description="median")
+    high: float = Field(description="upper quartile")
+
+
+class ChartPoint(ChartedForm):
+    """A form with its errors, which are relative to the truth, at the worst wavelength."""
+
+    l1: float = Field(description="mean of abs(f_r - truth) over the mean of the truth, weighted with the cosine")
+    p99: float = Field(description="99th percentile of abs(f_r - truth) / max(truth, floor)")
+    p99_low: float = Field(description="lower end of the 95 % confidence interval of p99, an order statistic")
+    p99_high: float | None = Field(description="upper end; null if there are too few directions")
+    forward: float = Field(description="l1 for viewers within 45 degrees of the azimuth of the mirror direction")
+    back: float = Field(description="l1 for viewers within 45 degrees of the azimuth of the light")
+    grazing: float = Field(description="l1 where light or viewer is beyond 75 degrees")
+    mixed: Cost = Field(
+        description="cost with 64 materials in turn, 32 directions of each, read from memory and not from caches"
+    )
+    rung: str | None = Field(
+        description="key of the cheapest rung of the truth as accurate in l1 and p99; null for the truth and its rungs"
+    )
+    saving: Saving | None = Field(description="time of that rung over the time of this form, in batches")
+
+
+class SamplerWork(DocumentPart):
+    """Noise and time of a Monte Carlo estimate."""
+
+    variance: float = Field(description="variance of one sample over the square of the mean; median over rounds")
+    ns: float = Field(description="time of one sample; median over rounds")
+    low_ms: float = Field(description="time to a standard deviation of 1 %: lower quartile over rounds")
+    ms: float = Field(description="median")
+    high_ms: float = Field(description="upper quartile")
+
+
+class ChartedSampler(DocumentPart):
+    """A way to draw directions, for the model of the material at its middle wavelength, without the specular part."""
+
+    key: str
+    title: str
+    albedo: SamplerWork = Field(description="work for the directional albedo of light from 60 degrees")
+    sphere: SamplerWork = Field(
+        description="work for the picture of a sphere under a sky and a lamp about 20 degrees wide"
+    )
+
+
+class Fronts(DocumentPart):
+    """Keys of the points worth having, the most accurate (l1) first, each clearly cheaper than the one before.
+
+    Models that are meant to differ are left out, and so are forms with a larger error than black.
+    """
+
+    batch: list[str]
+    single: list[str]
+    bytes: list[str]
+
+
+class Chart(DocumentPart):
+    """One material."""
+
+    material: str
+    title: str
+    model: str
+    parameters: dict[str, Number | Spectrum] = Field(description="angles in degrees, under names that end in _deg")
+    wavelength_nm: list[float] | None
+    directions: int = Field(description="number of directions at which errors are measured")
+    truth: str = Field(description="key of the point that the others are compared with")
+    points: list[ChartPoint]
+    ladder: list[str] = Field(description="keys of the truth and of its rungs, the most accurate (l1) first")
+    fronts: Fronts
+    samplers: list[ChartedSampler]
+    left_out: list[LeftOut] = Field(default=[], description="forms that cannot be made, such as a table too large")
+
+
+class FamilyCurve(ChartedForm):
+    """A form along a family. Errors are those of a point, and bytes and costs are those of one member."""
+
+    timed: str = Field(description="timed member: the one with this form that is nearest the middle of the family")
+    l1: list[float | None] = Field(description="l1 of each member; null where there is no such form")
+    p99: list[float | None]
+
+
+class BetweenMembers(ChartedForm):
+    """Lookups between the members of a family in a store, timed in its middle."""
+
+    l1: float = Field(description="l1 that the family states, over all its parameters")
+    p99: float
+
+
+class FamilyDiagnostic(DocumentPart):
+    """A number that shows the regime of the model of a member, at the middle wavelength."""
+
+    symbol: str
+    title: str
+    values: list[float] = Field(description="value of each member")
+
+
+class LeftOutOfMember(LeftOut):
+    """A form that cannot be made of a member of a family."""
+
+    member: str
+
+
+class FamilyChart(DocumentPart):
+    """A family: the forms worth having at each of its members."""
+
+    family: str
+    title: str
+    model: str
+    axes: dict[str, list[float]] = Field(description="values of each swept parameter, as in the record of a family")
+    members: list[str] = Field(description="names of the materials; the last axis runs fastest")
+    diagnostic: FamilyDiagnostic | None = Field(description="null unless the model names one")
+    wavelength_nm: list[float] | None
+    truth: str = Field(description="key of the curve that the others are compared with")
+    curves: list[FamilyCurve]
+    between: BetweenMembers | None = Field(description="null unless the family is in the store")
+    fronts: list[list[str]] = Field(
+        description="for each member, keys of the curves worth having in bulk, as in a chart, with the costs above"
+    )
+    left_out: list[LeftOutOfMember] = Field(default=[], description="forms that cannot be made of a member")
+
+
+class Charts(DocumentPart):
+    """Charts of materials and families from one run. A file holds one of them."""
+
+    brdfdb: str
+    when: datetime
+    machine: str
+    charts: list[Chart]
+    families: list[FamilyChart]
 
 
 def chart(
@@ -82,7 +231,7 @@ def chart(
     tick()
     middle = None if wavelength_nm is None else float(wavelength_nm[wavelength_nm.size // 2])
     samplers = [
-        Sampler(key=key, title=sampler_efficiency.SAMPLERS[key], albedo=_work(albedo), sphere=_work(sphere))
+        ChartedSampler(key=key, title=sampler_efficiency.SAMPLERS[key], albedo=_work(albedo), sphere=_work(sphere))
         for key, (albedo, sphere) in sampler_efficiency.works(source, middle).items()
     ]
     tick()
@@ -101,7 +250,7 @@ def chart(
         directions=int(np.count_nonzero(drawn.above)),
         truth=forms[0].key,
         points=[
-            Point(
+            ChartPoint(
                 **_described(form, batch[number], block[number], single[number]),
                 **errors[number],
                 **_against(number, rungs, errors, seconds, forms),
@@ -127,21 +276,26 @@ def _against(
     seconds: Floats,
     forms: Sequence[Form],
 ) -> dict[str, Any]:
-    """Return fields of a `Point`: the cheapest rung that is as accurate as a form, and the ratio of their times."""
+    """Return fields of a `ChartPoint`: the cheapest rung as accurate as a form, and the ratio of their times."""
     if forms[number].kind in ("exact", "quadrature"):
         return {"rung": None, "saving": None}
-    own = errors[number]
-    as_good = [rival for rival in rungs if errors[rival]["l1"] <= own["l1"] and errors[rival]["p99"] <= own["p99"]]
+    error = errors[number]
+    as_good = [rival for rival in rungs if errors[rival]["l1"] <= error["l1"] and errors[rival]["p99"] <= error["p99"]]
     rung = min(as_good, key=lambda rival: float(np.median(seconds[:, rival])))
-    ratios = seconds[:, rung] / seconds[:, number]
-    low, middle, high = (float(f"{ratio:.3g}") for ratio in np.percentile(ratios, [25.0, 50.0, 75.0]).tolist())
-    return {"rung": forms[rung].key, "saving": Saving(low=low, times=middle, high=high)}
+    ratios = timing.quartiles(seconds[:, rung] / seconds[:, number])
+    saving = Saving(low=_short(ratios.low), times=_short(ratios.middle), high=_short(ratios.high))
+    return {"rung": forms[rung].key, "saving": saving}
 
 
-def _work(work: sampler_efficiency.Work) -> Work:
-    low, middle, high = np.percentile(1e3 * work.seconds_to_percent, [25.0, 50.0, 75.0]).tolist()
-    numbers = (float(np.median(work.variance)), 1e9 * float(np.median(work.seconds)), low, middle, high)
-    return Work(**dict(zip(Work.model_fields, (float(f"{n:.3g}") for n in numbers), strict=True)))
+def _work(work: sampler_efficiency.Work) -> SamplerWork:
+    times_ms = timing.quartiles(1e3 * work.seconds_to_percent)
+    return SamplerWork(
+        variance=_short(float(np.median(work.variance))),
+        ns=_short(1e9 * float(np.median(work.seconds))),
+        low_ms=_short(times_ms.low),
+        ms=_short(times_ms.middle),
+        high_ms=_short(times_ms.high),
+    )
 
 
 def chart_family(
@@ -183,8 +337,8 @@ def chart_family(
         If a member of `family` was built again since it was recorded.
     """
     tolerances = SPECTRAL_TOLERANCES if tolerances is None else tolerances
-    kept, errors, left_out = _forms_of_members(materials, wavelength_nm, tolerances, tick)
-    timed = [form for _, form in kept.values()]
+    representatives, errors, left_out = _forms_of_members(materials, wavelength_nm, tolerances, tick)
+    timed = [form for _, form in representatives.values()]
     between = None if family is None else of_family(family)
     drawn = error_measurement.draw(materials[len(materials) // 2], wavelength_nm, DIRECTIONS, SEED)
     batch, block, single = _timed([*timed, *([between] if between else [])], drawn, tick)
@@ -204,17 +358,17 @@ def chart_family(
         wavelength_nm=None if wavelength_nm is None else wavelength_nm.tolist(),
         truth=timed[0].key,
         curves=[
-            Curve(
+            FamilyCurve(
                 **_described(form, *costs),
                 timed=sweep.members[number],
                 l1=[member[form.key]["l1"] if form.key in member else None for member in errors],
                 p99=[member[form.key]["p99"] if form.key in member else None for member in errors],
             )
-            for (number, form), *costs in zip(kept.values(), batch, block, single, strict=False)
+            for (number, form), *costs in zip(representatives.values(), batch, block, single, strict=False)
         ],
         between=None
         if family is None or between is None
-        else Between(
+        else BetweenMembers(
             **_described(between, batch[-1], block[-1], single[-1]),
             l1=family.error.overall.l1,
             p99=family.error.overall.p99,
@@ -236,7 +390,7 @@ def _forms_of_members(
     """
     middle = len(materials) // 2
     left_out: list[LeftOutOfMember] = []
-    kept: dict[str, tuple[int, Form]] = {}
+    representatives: dict[str, tuple[int, Form]] = {}
     errors: list[dict[str, dict[str, Any]]] = []
     for number, material in enumerate(materials):
         forms = catalogue.forms(material, wavelength_nm, tolerances)
@@ -244,24 +398,24 @@ def _forms_of_members(
         left_out += [LeftOutOfMember(member=material.name, **out.model_dump()) for out in forms.left_out]
         errors.append(dict(zip((form.key for form in forms), _errors(forms, drawn), strict=True)))
         for form in forms:
-            if form.key not in kept or abs(number - middle) <= abs(kept[form.key][0] - middle):
-                kept[form.key] = number, form
+            if form.key not in representatives or abs(number - middle) <= abs(representatives[form.key][0] - middle):
+                representatives[form.key] = number, form
         tick()
-    return kept, errors, left_out
+    return representatives, errors, left_out
 
 
-def _diagnostic(materials: Sequence[Material], wavelength_nm: NDArray[np.float64] | None) -> Diagnostic | None:
+def _diagnostic(materials: Sequence[Material], wavelength_nm: NDArray[np.float64] | None) -> FamilyDiagnostic | None:
     """Return the diagnostic that the model of a family names, for each member; None if it names none."""
     diagnostic = materials[0].spec.diagnostic
     if diagnostic is None:
         return None
     middle = None if wavelength_nm is None else wavelength_nm[wavelength_nm.size // 2]
-    values = [float(f"{diagnostic.value(material.arguments(middle)):.3g}") for material in materials]
-    return Diagnostic(symbol=diagnostic.symbol, title=diagnostic.title, values=values)
+    values = [_short(diagnostic.value(material.arguments(middle))) for material in materials]
+    return FamilyDiagnostic(symbol=diagnostic.symbol, title=diagnostic.title, values=values)
 
 
 def _timed(
-    forms: Sequence[Form], drawn: error_measurement.Draw, tick: Callable[[], None]
+    forms: Sequence[Form], drawn: error_measurement.RandomPairs, tick: Callable[[], None]
 ) -> tuple[list[timing.Times], list[timing.Times], list[timing.Times]]:
     """Return the times of calls with many directions, with a block of them, and with one."""
     # Directions are shuffled, so that a few of them are as varied as all
@@ -298,17 +452,17 @@ def _described(form: Form, batch: timing.Times, block: timing.Times, single: tim
     }
 
 
-def _errors(forms: Sequence[Form], drawn: error_measurement.Draw) -> list[dict[str, Any]]:
-    """Return the errors of each form against the first one, fields of a `Point` with three digits."""
+def _errors(forms: Sequence[Form], drawn: error_measurement.RandomPairs) -> list[dict[str, Any]]:
+    """Return the errors of each form against the first one, fields of a `ChartPoint` with three digits."""
     truth = forms[0].evaluate(drawn.wi, drawn.wr)
-    classes = error_measurement.classes(drawn)
+    classes = drawn.classes()
     rows = []
     for form in forms:
         given = drawn.wi.astype(form.dtype), drawn.wr.astype(form.dtype)
         values = truth if form is forms[0] else form.evaluate(*given).astype(np.float64)
         overall = error_measurement.compare(values, truth, drawn, SEED).overall
         parts = {
-            name: float(f"{error_measurement.mean_error(values, truth, np.where(some, drawn.weight, 0.0)).max():.3g}")
+            name: _short(error_measurement.mean_error(values, truth, np.where(some, drawn.weight, 0.0)).max())
             for name, some in classes.items()
         }
         low, high = _tail(
@@ -326,26 +480,15 @@ def _tail(errors: Floats) -> tuple[float, float | None]:
     """
     worst = np.sort(errors[:, int(np.argmax(np.percentile(errors, 100.0 * SHARE, axis=0)))])
     low, high = ranks(len(worst), SHARE, CONFIDENCE)
-    at = [None if rank > len(worst) else float(f"{worst[max(rank, 1) - 1]:.3g}") for rank in (low, high)]
+    at = [None if rank > len(worst) else _short(worst[max(rank, 1) - 1]) for rank in (low, high)]
     return at[0] or 0.0, at[1]
 
 
 def ranks(count: int, share: float, confidence: float) -> tuple[int, int]:
     """Return the ranks, from 1, of the order statistics that enclose a quantile with a confidence (binomial law).
 
-    Parameters
-    ----------
-    count : int
-        Number of independent draws.
-    share : float [1]
-        Share of the distribution below the quantile, in (0, 1).
-    confidence : float [1]
-        Least confidence, in (0, 1).
-
-    Returns
-    -------
-    tuple of int
-        Lower and upper rank. Rank 0 stands for no lower bound, and count + 1 for no upper bound.
+    `count` independent draws are taken, and `share` of the distribution is below the quantile. Rank 0 stands for no
+    lower bound, and count + 1 for no upper bound.
     """
     k = np.arange(count + 1)
     log_factorial = np.concatenate([[0.0], np.cumsum(np.log(np.arange(1, count + 1)))])
@@ -361,5 +504,10 @@ def ranks(count: int, share: float, confidence: float) -> tuple[int, int]:
 
 
 def _cost(times: timing.Times) -> Cost:
-    low, middle, high = (float(f"{ns:.3g}") for ns in times.quartiles_ns)
-    return Cost(ns=middle, low=low, high=high, directions=times.directions)
+    ns = times.quartiles_ns
+    return Cost(ns=_short(ns.middle), low=_short(ns.low), high=_short(ns.high), directions=times.directions)
+
+
+def _short(value: float) -> float:
+    """Return a number with three digits."""
+    return float(f"{value:.3g}")

@@ -127,9 +127,9 @@ def reflected(
 
 def polar(cuts: Sequence[Cut]) -> Panel:
     """Return a polar panel of cuts over their values in the mirror direction, eq. 11."""
-    return Panel(
-        kind="polar",
-        x_label="θ_r [degree]",
-        y_label="f_r over f_r in the mirror direction",
-        curves=[cut.curve(cut.mirror) for cut in cuts],
-    )
+    return polar_panel([cut.curve(cut.mirror) for cut in cuts], "f_r over f_r in the mirror direction")
+
+
+def polar_panel(curves: list[Curve], y_label: str, title: str = "") -> Panel:
+    """Return a polar panel over the signed angle of the viewer."""
+    return Panel(kind="polar", title=title, x_label="θ_r [degree]", y_label=y_label, curves=curves)

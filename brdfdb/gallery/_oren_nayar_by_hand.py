@@ -8,7 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-_SLOPES, _AZIMUTHS = 200, 360  # nodes of `facets`, for four digits
+# Nodes of `facets`, for four digits
+_SLOPES = 200
+_AZIMUTHS = 360
 
 
 class Direct(NamedTuple):

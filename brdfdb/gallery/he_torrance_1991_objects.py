@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -14,6 +15,7 @@ from brdfdb.gallery._he_torrance_cuts import (
     cut_of,
     lobe_at,
     parameters_text,
+    polar_panel,
     reflected,
     smooth,
     specular,
@@ -22,7 +24,9 @@ from brdfdb.gallery._he_torrance_cuts import (
 from brdfdb.models import he_torrance, he_torrance_very_rough, lambert
 from brdfdb.parameters import Floats
 
-GREEN_NM, BLUE_NM, RED_NM = 550.0, 450.0, 650.0
+GREEN_NM = 550.0
+BLUE_NM = 450.0
+RED_NM = 650.0
 BY_HAND = 1e-9  # relative difference of a closed form and the model
 THETA_DEG = np.arange(0.0, 90.0)  # angles of incidence of drawn reflectances
 
@@ -70,15 +74,13 @@ def fig_12() -> Figure:
                 y_label="ρ_s",
                 curves=[_over_incidence(cylinder.label, cylinder.image) for cylinder in cylinders],
             ),
-            Panel(
-                kind="polar",
-                title="Directional diffuse, θ_i = 30°",
-                x_label="θ_r [degree]",
-                y_label="f_r over f_r in the mirror direction",
-                curves=[
+            polar_panel(
+                [
                     cylinder.lobe.curve(cylinder.lobe.mirror).model_copy(update={"label": cylinder.label})
                     for cylinder in cylinders
                 ],
+                "f_r over f_r in the mirror direction",
+                "Directional diffuse, θ_i = 30°",
             ),
         ],
         statements=[
@@ -91,7 +93,6 @@ def fig_12() -> Figure:
 
 
 def _diminishing_image(cylinders: list[_Cylinder]) -> Statement:
-    """Return the statement that the specular image diminishes with roughness."""
     at_80 = [float(cylinder.image[80]) for cylinder in cylinders]
     expected = [by_hand.specular(cylinder.surface, 80.0) for cylinder in cylinders]
     falls = np.all(np.diff([cylinder.image for cylinder in cylinders], axis=0) <= 0.0, axis=0)
@@ -109,7 +110,6 @@ def _diminishing_image(cylinders: list[_Cylinder]) -> Statement:
 
 
 def _spreading_lobe(cylinders: list[_Cylinder]) -> list[Statement]:
-    """Return the statements that the lobe spreads out with roughness: all cylinders, and those with one tau."""
     widths = [cylinder.lobe.width_deg for cylinder in cylinders]
     slopes = [cylinder.slope for cylinder in cylinders]
     halves = [cut_of(he_torrance, 0.0, **cylinder.surface).width_deg / 2.0 for cylinder in cylinders]
@@ -143,7 +143,6 @@ def _spreading_lobe(cylinders: list[_Cylinder]) -> list[Statement]:
 
 
 def _specular_edges(cylinders: list[_Cylinder]) -> Statement:
-    """Return the statement that rough cylinders are specular at grazing angles."""
     images = [cylinder.image for cylinder in cylinders]
     return Statement(
         says="The top and lateral edges can appear specular or nearly specular at grazing angles, even when "
@@ -157,7 +156,6 @@ def _specular_edges(cylinders: list[_Cylinder]) -> Statement:
 
 
 def _colour_shift() -> Statement:
-    """Return the statement on the colours of front faces and of specular images."""
     blue, red = (surface_of("aluminum-cylinder-12a", wavelength) for wavelength in (BLUE_NM, RED_NM))
     image = [float(specular(surface, 60.0)) for surface in (blue, red)]
     face = [float(reflected(surface, 60.0, specular=False)) for surface in (blue, red)]
@@ -219,14 +217,12 @@ def fig_13() -> Figure:
         "of (a). The specular part of (b) is a Dirac delta; the second panel has its reflectance. The last panel has "
         "the distances of He and Torrance's model from its two limits at the slope of (a), at 30 degrees.",
         panels=[
-            Panel(
-                kind="polar",
-                x_label="θ_r [degree]",
-                y_label="f_r [1/sr]",
-                curves=[
+            polar_panel(
+                [
                     curve_of(label, lobe.x_deg, lobe.f_r)
                     for label, lobe in (("(a)", cut), ("(a), σ_0/λ → ∞", limit), ("(c)", uniform))
                 ],
+                "f_r [1/sr]",
             ),
             Panel(
                 title="Specular reflectance",
@@ -268,7 +264,6 @@ def _limit_by_hand(rough: Surface, slope: float, theta_r_deg: float) -> float:
 
 
 def _very_rough_cylinder(rough: Surface, slope: float) -> Statement:
-    """Return the statement that cylinder (a) has the limit of very rough surfaces."""
     thetas = (0.0, 30.0, 60.0, 80.0)
     offs = [_off_limit(rough, slope, theta) for theta in thetas]
     off_hand = max(
@@ -287,7 +282,6 @@ def _very_rough_cylinder(rough: Surface, slope: float) -> Statement:
 
 
 def _smooth_cylinder(mirror: Surface) -> Statement:
-    """Return the statement that cylinder (b) has the specular part alone."""
     images = specular(mirror, THETA_DEG)
     fresnel = by_hand.fresnel(THETA_DEG, mirror["n"], mirror["k"])
     directional = float(cut_of(he_torrance, 30.0, **mirror).f_r.max())
@@ -304,7 +298,6 @@ def _smooth_cylinder(mirror: Surface) -> Statement:
 
 
 def _ideal_diffuse_cylinder(cut: Cut, uniform: Cut, limit: float) -> Statement:
-    """Return the statement that cylinder (c) is ideal diffuse; `limit` is that of (a) in the mirror direction."""
     return Statement(
         says="Cylinder (c) is ideal diffuse; note the striking differences between the three cylinders.",
         where="section 5, on Fig. 13",
@@ -318,7 +311,6 @@ def _ideal_diffuse_cylinder(cut: Cut, uniform: Cut, limit: float) -> Statement:
 
 
 def _limits_of_smooth_surfaces(approach: _Approach) -> list[Statement]:
-    """Return the statements on the specular and the directional diffuse part of smooth surfaces."""
     waves, shares, diffuse = approach.waves, approach.from_smooth, approach.diffuse
     expected = -np.expm1(-((4.0 * np.pi * waves[[0, 4]] * np.cos(np.deg2rad(30.0))) ** 2))
     return [
@@ -389,3 +381,10 @@ def fig_14() -> Figure:
             ),
         ],
     )
+
+
+FIGURES: dict[str, Callable[[], Figure]] = {
+    "he-torrance-1991-fig-12": fig_12,
+    "he-torrance-1991-fig-13": fig_13,
+    "he-torrance-1991-fig-14": fig_14,
+}

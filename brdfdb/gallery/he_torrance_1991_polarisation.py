@@ -97,7 +97,6 @@ def in_plane() -> Figure:
 
 
 def _brewster(plastic: Surface) -> Statement:
-    """Return the statement that the facet polarises at Brewster's angle."""
     viewers_deg = np.arange(30.0, 80.0, 0.05)
     polarisation = _relative(_in_plane(plastic, viewers_deg), 0, 1)
     most = int(np.argmax(polarisation))
@@ -122,7 +121,6 @@ def _fresnel(cosine: float, n: float, k: float) -> tuple[complex, complex]:
 
 
 def _favours_s(aluminum: Surface, plastic: Surface) -> Statement:
-    """Return the statement that s is the stronger polarisation, as by Fresnel's coefficients."""
     # Half of the angle between light and viewer
     facet = np.cos(radians(np.abs(LIGHT_DEG + VIEWERS_DEG) / 2.0))
     off, least = [], []
@@ -144,7 +142,6 @@ def _favours_s(aluminum: Surface, plastic: Surface) -> Statement:
 
 
 def _elliptical(aluminum: Surface, plastic: Surface) -> Statement:
-    """Return the statement that circular light becomes linear as by Fresnel's amplitudes."""
     shares, expected = [], []
     for surface in (aluminum, plastic):
         shares.append(float(_relative(_in_plane(surface, np.array([LIGHT_DEG])), 2, 3)[0]))
@@ -167,7 +164,6 @@ def _pairs(theta_deg: Floats, delta_phi_deg: Floats) -> list[Floats]:
 
 
 def _reduces(aluminum: Surface, plastic: Surface) -> Statement:
-    """Return the statement that half of the sum over s and p is f_r of unpolarised light."""
     angles = _pairs(np.arange(5.0, 90.0, 10.0), np.arange(0.0, 181.0, 20.0))
     off = 0.0
     for surface in (aluminum, plastic):
@@ -237,7 +233,6 @@ def out_of_plane() -> Figure:
 
 
 def _crossed(aluminum: Surface, plastic: Surface) -> Statement:
-    """Return the statement on cross-polarisation outside the plane of incidence."""
     angles_deg = [0.0, 45.0, 90.0, 135.0, 180.0]
     shares = [
         _turned(surface["n"], surface["k"], radians(LIGHT_DEG), radians(angles_deg)) for surface in (aluminum, plastic)
@@ -253,7 +248,6 @@ def _crossed(aluminum: Surface, plastic: Surface) -> Statement:
 
 
 def _kept(aluminum: Surface, plastic: Surface) -> Statement:
-    """Return the statement that a field near the normal keeps its direction in space."""
     theta = radians(1.0)
     expected = np.sin(radians(AZIMUTHS_DEG)) ** 2
     off = []
@@ -278,7 +272,6 @@ def _polarisation(M: Floats, stokes: NDArray[np.float64]) -> Floats:
 
 
 def _depolarised(aluminum: Surface, plastic: Surface) -> Statement:
-    """Return the statement on depolarisation, which the first surface does not show."""
     states = [np.array([1.0, *state]) for state in ((1.0, 0.0, 0.0), (0.0, 0.6, 0.8), (-0.6, 0.8, 0.0))]
     matrices = [_around(surface) for surface in (aluminum, plastic)]
     least = min(float(_polarisation(M, state).min()) for M in matrices for state in states)
@@ -295,7 +288,6 @@ def _depolarised(aluminum: Surface, plastic: Surface) -> Statement:
 
 
 def _mirror() -> Statement:
-    """Return the statement that a mirror without absorption reflects every state of polarisation."""
     angles = _pairs(np.arange(5.0, 85.0, 10.0), np.arange(0.0, 181.0, 10.0))
     J = he_torrance_jones(angles[0], 0.0, angles[1], angles[2], **MIRROR)
     values = np.linalg.svd(J, compute_uv=False) ** 2
@@ -310,7 +302,6 @@ def _mirror() -> Statement:
 
 
 def _reciprocal(aluminum: Surface) -> Statement:
-    """Return the statement that the Mueller matrix is reciprocal."""
     angles = _pairs(np.arange(5.0, 90.0, 10.0), np.arange(20.0, 180.0, 20.0))
     forth = he_torrance_mueller(angles[0], 0.0, angles[1], angles[2], **aluminum)
     back = he_torrance_mueller(angles[1], angles[2], angles[0], 0.0, **aluminum)

@@ -6,9 +6,9 @@ from collections.abc import Callable
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from brdfdb.figure import Figure, Panel, Statement, curve_of, listed
-from brdfdb.gallery._gaussian_profiles import profile, reached
 from brdfdb.gallery._he_torrance_cuts import (
     Cut,
     Surface,
@@ -23,6 +23,8 @@ from brdfdb.geometry import radians
 from brdfdb.models import he_torrance, he_torrance_aperture, he_torrance_parts, he_torrance_smooth
 from brdfdb.parameters import Floats
 
+Array = NDArray[np.float64]
+
 GREEN_NM = 550.0
 LOWEST = 1e-3  # least f_r [1/sr] that is drawn
 NARROW_SR = 1e-6  # solid angle of cones in which the lobe is flat
@@ -30,6 +32,30 @@ PARTS_DEG = 60.0  # angle at which all three parts of the table top are seen
 FAR = 10.0  # ratio of f_r for "far from ideal diffuse", our reading
 CONSERVED = 0.01  # share of the light that gentle slopes may lose or gain (section 3.1)
 SMALL = 0.1  # relative change for "somewhat", our reading
+SPACING = 0.05  # distance of points over the autocorrelation length
+POINTS = 2**17  # points of a profile, 6554 autocorrelation lengths
+
+
+def profile(seed: int) -> Array:
+    """Return heights over their rms value [1] along a line of a surface with the autocorrelation exp(-r^2 / tau^2).
+
+    The array has POINTS heights, SPACING tau apart. Every cut through a Gaussian isotropic surface is such a line, so
+    that the shadows along it are those of the surface.
+    """
+    rng = np.random.default_rng(seed)
+    k = 2.0 * np.pi * np.fft.rfftfreq(POINTS, SPACING)
+    # exp(-r^2) has the spectrum exp(-k^2 / 4)
+    z = np.fft.irfft((rng.standard_normal(k.size) + 1j * rng.standard_normal(k.size)) * np.exp(-(k**2) / 8.0), POINTS)
+    return np.asarray(z / z.std())
+
+
+def reached(heights: Array, slope: float, theta: float) -> NDArray[np.bool_]:
+    """Return whether a direction that leans by theta [rad] to the far end of a profile reaches each of its points.
+
+    `slope` is sigma_0 / tau. A point is reached if no later point stands above the ray through it.
+    """
+    above = slope * heights - SPACING * np.arange(heights.size) / np.tan(theta)
+    return np.asarray(above >= np.maximum.accumulate(above[::-1])[::-1])
 
 
 def fig_06() -> Figure:
@@ -40,6 +66,8 @@ def fig_06() -> Figure:
     diffuse = cut_of(he_torrance, PARTS_DEG, **surface)
     uniform = np.full(parts.x_deg.shape, surface["a"] / np.pi)
     heights, shares = _shares()
+    rest = diffuse.f_r - parts.f_r
+    added = float(reflected(surface, PARTS_DEG) - reflected({**surface, "a": 0.0}, PARTS_DEG))
     return Figure(
         key="he-torrance-1991-fig-06",
         paper="he1991",
@@ -65,7 +93,14 @@ def fig_06() -> Figure:
         statements=[
             _contained(surface),
             _far_from_diffuse(surface, parts.f_r),
-            _uniform(surface, diffuse.f_r - parts.f_r),
+            Statement(
+                says="the last part is uniform diffuse (Lambertian)",
+                where="section 3.2, on Fig. 6; a is an albedo by section 4, on Fig. 11",
+                seen=f"It is {rest.min():.4f} to {rest.max():.4f} /sr in the plane of incidence, and {added:.3f} of "
+                f"the light: a = {surface['a']:g}.",
+                threshold_from="the paper's number: a of the table top, as an albedo",
+                holds=bool(np.ptp(rest) < 1e-9) and abs(added - surface["a"]) < 1e-3,
+            ),
             _partition(shares),
         ],
     )
@@ -88,7 +123,6 @@ def _parts_panel(kind: Literal["curves", "polar"], total: Cut, directional: Floa
 
 
 def _contained(surface: Surface) -> Statement:
-    """Return the statement that the specular part lies within its cone."""
     half_angle = float(np.arcsin(np.sqrt(NARROW_SR / np.pi)))
     off = np.linspace(-3.0, 3.0, 25)  # distance of the axes of both cones, in half angles of a cone
     theta = float(radians(PARTS_DEG))
@@ -113,7 +147,6 @@ def _contained(surface: Surface) -> Statement:
 
 
 def _far_from_diffuse(surface: Surface, f_r: Floats) -> Statement:
-    """Return the statement that the directional diffuse part is far from ideal diffuse."""
     mean = float(reflected({**surface, "a": 0.0}, PARTS_DEG, specular=False)) / np.pi
     return Statement(
         says="the diffraction-scattered part shows a directional distribution which is far from ideal diffuse",
@@ -122,19 +155,6 @@ def _far_from_diffuse(surface: Surface, f_r: Floats) -> Statement:
         f"{FAR:.0f}).",
         threshold_from="our reading: far from ideal diffuse is ten times as high",
         holds=bool(f_r.max() > FAR * mean),
-    )
-
-
-def _uniform(surface: Surface, rest: Floats) -> Statement:
-    """Return the statement that the rest of f_r is uniform diffuse."""
-    added = float(reflected(surface, PARTS_DEG) - reflected({**surface, "a": 0.0}, PARTS_DEG))
-    return Statement(
-        says="the last part is uniform diffuse (Lambertian)",
-        where="section 3.2, on Fig. 6; a is an albedo by section 4, on Fig. 11",
-        seen=f"It is {rest.min():.4f} to {rest.max():.4f} /sr in the plane of incidence, and {added:.3f} of the light: "
-        f"a = {surface['a']:g}.",
-        threshold_from="the paper's number: a of the table top, as an albedo",
-        holds=bool(np.ptp(rest) < 1e-9) and abs(added - surface["a"]) < 1e-3,
     )
 
 
@@ -157,7 +177,6 @@ def _shares() -> tuple[Floats, _Shares]:
 
 
 def _partition(shares: _Shares) -> Statement:
-    """Return the statement that roughness partitions the light between both parts."""
     total = shares.specular + shares.diffuse
     return Statement(
         says="the model partitions energy into specular and diffuse-like components according to the roughness of the "
@@ -278,7 +297,6 @@ def effective_roughness() -> Figure:
 
 
 def _smaller(models: dict[str, _Visible]) -> Statement:
-    """Return the statement that the effective roughness is smaller than sigma_0 at grazing angles."""
     index = [int(np.searchsorted(ANGLES_DEG, angle)) for angle in (45.0, 75.0, 89.0)]
     values = {name: model.roughness[index] for name, model in models.items()}
     rows = "; ".join(f"{name}: {listed(row, '.3f')}" for name, row in values.items())
@@ -293,7 +311,6 @@ def _smaller(models: dict[str, _Visible]) -> Statement:
 
 
 def _of_lit_parts(slope: float) -> Statement:
-    """Return the statement that sigma is the roughness of the lit and visible parts."""
     model, (simulated, _) = _of_model(slope, SIMULATED_DEG), _of_profiles(slope, SIMULATED_DEG)
     off = model.roughness / simulated.roughness - 1.0
     return Statement(
@@ -310,7 +327,6 @@ def _of_lit_parts(slope: float) -> Statement:
 
 
 def _smoother(slope: float) -> Statement:
-    """Return the statement that the surface appears somewhat smoother at 75 degrees."""
     ratio = float(_of_model(slope, np.array([75.0])).roughness[0])
     g_0 = float(_g_with_sigma_0(surface_of("roughened-aluminum-500nm"), 75.0))
     return Statement(
@@ -324,7 +340,6 @@ def _smoother(slope: float) -> Statement:
 
 
 def _shadowing(slope: float) -> list[Statement]:
-    """Return the statements on Smith's shadowing, of one direction and of both."""
     model, (simulated, alone) = _of_model(slope, SIMULATED_DEG), _of_profiles(slope, SIMULATED_DEG)
     one = np.sqrt(model.shadowing)
     off = float(np.abs(one - alone).max())

@@ -6,27 +6,28 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from brdfdb.figure import Figure, Map, Panel, Statement, curve_of, listed, rows
-from brdfdb.gallery._oren_nayar_evaluated import evaluated, evaluated_parts
 from brdfdb.gallery._oren_nayar_lines import (
     PAPER,
-    RADIANCE,
     SMALL,
     THETA_R,
-    THETA_R_LABEL,
     VERY_ACCURATE,
     across,
     at,
     curve,
     distance,
+    evaluated,
+    evaluated_parts,
     left_past,
+    line_panel,
     rough,
     to_radiance,
     very_accurate,
 )
-from brdfdb.gallery._v_grooves import bounces
 from brdfdb.geometry import degrees, radians
+from brdfdb.integrals.quadrature import gauss_rule
 from brdfdb.models import (
     oren_nayar,
     oren_nayar_gaussian_parts,
@@ -35,10 +36,90 @@ from brdfdb.models import (
 )
 from brdfdb.parameters import Floats
 
+Array = NDArray[np.float64]
+
 RAPIDLY = 0.5  # ratio of bounces for "diminishes rapidly", our reading: at most half of the bounce before
 SAME = 0.01  # relative error of sums over strips, slopes and azimuths: 0.6 % at 88 degrees
 ORDERS = 5  # bounces 1 to 4, and the sum of all later bounces
 SAMPLES = {"Fig. 8, and wall plaster": (0.9, 30.0), "painted sandpaper": (0.8, 40.0), "white sand": (0.8, 35.0)}
+VIEWERS_DEG = np.arange(-88.0, 89.0, 4.0)
+SLOPE_DEG = 30.0  # slope of the facets of the figure of eq. 44
+GRID_DEG = np.arange(2.5, 90.0, 5.0)
+TURN_DEG = 45.0  # azimuth half way between the planes in which eq. 44 is exact
+
+# V-grooves of Lambertian facets with all bounces of light, by strips and the strings between their edges
+STRIPS = 32  # strips of a facet: more strips change no bounce by 0.2 % of the radiance
+AZIMUTHS = 48  # azimuths of the grooves, spread over half a turn
+SLOPES = 12  # Gauss-Legendre nodes of the slopes
+_REACH = 4.5  # largest slope over sigma; steeper facets have 4e-5 of the weight
+
+
+def view_factors(theta_a: float, strips: int = STRIPS) -> Array:
+    """Return the share of light [1] that a strip of one facet (row) sends to a strip of the other (column).
+
+    Hottel's rule of crossed strings: the share is half of the crossed distances less the straight ones, over the width
+    of the strip. Facets have the slope theta_a [rad] and width 1. Strips count from the bottom of the groove.
+    """
+    edges = np.linspace(0.0, 1.0, strips + 1)
+    x, y = edges[:, None], edges[None, :]
+    distance = np.sqrt(x * x + 2.0 * x * y * np.cos(2.0 * theta_a) + y * y)
+    crossed = distance[:-1, 1:] + distance[1:, :-1] - distance[:-1, :-1] - distance[1:, 1:]
+    return np.asarray(0.5 * strips * crossed)
+
+
+def _met(slope: Array, theta_a: float) -> tuple[Array, Array]:
+    """Return <w, a> over cos(theta) [1] of both facets, (..., 2), and the widths [1] that a direction reaches.
+
+    `slope` is tan(theta) cos(phi - phi_a) of the direction. A direction reaches a facet from its upper edge downwards.
+    The rest lies behind the upper edge of the other facet.
+    """
+    facing = np.cos(theta_a) + np.sin(theta_a) * np.stack([slope, -slope], axis=-1)
+    width = np.minimum(2.0 * np.cos(theta_a) / np.maximum(facing, 1e-300), 1.0)
+    return np.maximum(facing, 0.0), np.where(facing > 0.0, width, 0.0)
+
+
+def _on_strips(facing: Array, width: Array, strips: int) -> Array:
+    """Return <w, a> over cos(theta) [1] on each strip, (..., 2, strips), reduced by the hidden part of the strip."""
+    upper = np.linspace(0.0, 1.0, strips + 1)[1:]
+    return facing[..., None] * np.clip((upper - 1.0 + width[..., None]) * strips, 0.0, 1.0)
+
+
+def bounces(
+    theta_i: float, theta_r: Array, delta_phi: Array, rho: float, sigma: float, orders: int, strips: int = STRIPS
+) -> Array:
+    """Return f_r [1/sr] of Gaussian slopes bounce by bounce, shape (orders, viewers).
+
+    The last row has all later bounces. Angles are radians: the polar angle of the light, those of viewers, and their
+    azimuths from the light. The surface is that of Oren and Nayar 1994 (eqs 8 and 26): long grooves. Each facet is cut
+    into strips, and a strip has one radiosity. The view factors of strips are exact. No equation of the paper for
+    interreflection is used.
+    """
+    azimuth = (np.arange(AZIMUTHS) + 0.5) * np.pi / AZIMUTHS
+    slope_i = np.tan(theta_i) * np.cos(azimuth)
+    slope_r = np.tan(theta_r)[:, None] * np.cos(azimuth - delta_phi[:, None])
+    last = min(_REACH * sigma, np.pi / 2.0)
+    nodes, weights = gauss_rule(SLOPES)
+    slopes = (nodes + 1.0) / 2.0 * last
+    # Eq. (26) with the sine of eq. (8), normalised over the slope
+    weights = weights * np.exp(-0.5 * (slopes / sigma) ** 2) * np.sin(slopes)
+    total = np.zeros((orders, theta_r.size))
+    for theta_a, weight in zip(slopes.tolist(), (weights / weights.sum()).tolist(), strict=True):
+        factors = view_factors(theta_a, strips)
+        lit, seen = _met(slope_i, theta_a), _met(slope_r, theta_a)
+        scale = weight / (2.0 * np.cos(theta_a) * np.pi * AZIMUTHS)
+        # Direct light comes from the part of a facet that is both lit and seen
+        total[0] += scale * rho * np.sum(lit[0] * seen[0] * np.minimum(lit[1], seen[1]), axis=(1, 2))
+        left, viewed = rho * _on_strips(*lit, strips), scale / strips * _on_strips(*seen, strips)
+        for order in range(1, orders - 1):
+            left = rho * left[:, ::-1] @ factors.T
+            total[order] += np.einsum("vafs,afs->v", viewed, left)
+        # All later bounces, by the sum and the difference of both facets: (1 - rho F)^-1 and (1 + rho F)^-1
+        left = rho * left[:, ::-1] @ factors.T
+        sums, differences = (left[:, 0] + left[:, 1]) / 2.0, (left[:, 0] - left[:, 1]) / 2.0
+        even = np.linalg.solve(np.eye(strips) - rho * factors, sums.T).T
+        odd = np.linalg.solve(np.eye(strips) + rho * factors, differences.T).T
+        total[-1] += np.einsum("vafs,afs->v", viewed, np.stack([even + odd, even - odd], axis=1))
+    return total
 
 
 class _Bounces(NamedTuple):
@@ -47,9 +128,6 @@ class _Bounces(NamedTuple):
     summed: Floats
     direct: Floats
     second: Floats
-
-
-VIEWERS_DEG = np.arange(-88.0, 89.0, 4.0)
 
 
 def _bounces(theta_i_deg: float, rho: float, sigma_deg: float) -> _Bounces:
@@ -74,11 +152,8 @@ def two_bounces() -> Figure:
         "view factors; no equation of the paper's interreflection is used. The paper mentions such a simulation but "
         "shows no figure. θ_i = 75° is that of Fig. 8.",
         panels=[
-            Panel(
-                title=f"θ_i = {light:.0f}°",
-                x_label=THETA_R_LABEL,
-                y_label=RADIANCE,
-                curves=[
+            line_panel(
+                [
                     curve_of("all bounces", VIEWERS_DEG, line.summed.sum(axis=0), "truth"),
                     curve_of("two bounces, eqs 10 to 20", VIEWERS_DEG, line.direct + line.second, "ours"),
                     curve_of("second bounce", VIEWERS_DEG, line.summed[1]),
@@ -86,6 +161,7 @@ def two_bounces() -> Figure:
                     curve_of("fourth", VIEWERS_DEG, line.summed[3]),
                     curve_of("fifth and later", VIEWERS_DEG, line.summed[4]),
                 ],
+                title=f"θ_i = {light:.0f}°",
             )
             for light, line in lines.items()
         ],
@@ -94,7 +170,6 @@ def two_bounces() -> Figure:
 
 
 def _diminishes(lines: list[_Bounces], lights_deg: list[float]) -> Statement:
-    """Return the statement that the energy diminishes with each bounce."""
     shares = [line.summed[1:4].mean(axis=1) / line.summed[:3].mean(axis=1) for line in lines]
     ratios = "; ".join(
         f"{listed(share, '.2f')} for θ_i = {light:.0f}°" for share, light in zip(shares, lights_deg, strict=True)
@@ -111,7 +186,6 @@ def _diminishes(lines: list[_Bounces], lights_deg: list[float]) -> Statement:
 
 
 def _good() -> Statement:
-    """Return the statement that two bounces are a good approximation."""
     off, worst = [], []
     for rho, sigma_deg in SAMPLES.values():
         lines = [_bounces(light, rho, sigma_deg) for light in (30.0, 60.0)]
@@ -132,7 +206,6 @@ def _good() -> Statement:
 
 
 def _strips(lines: list[_Bounces], lights_deg: list[float]) -> Statement:
-    """Return the statement that the model has the first and the second bounce of the strips."""
     direct = max(float(np.abs(line.direct / line.summed[0] - 1.0).max()) for line in lines)
     second = max(float(np.abs(line.second / line.summed[1] - 1.0).max()) for line in lines)
     return Statement(
@@ -143,11 +216,6 @@ def _strips(lines: list[_Bounces], lights_deg: list[float]) -> Statement:
         threshold_from="an independent evaluation: strips and their strings, within the error of the sums",
         holds=max(direct, second) < SAME,
     )
-
-
-SLOPE_DEG = 30.0  # slope of the facets of the figure of eq. 44
-GRID_DEG = np.arange(2.5, 90.0, 5.0)
-TURN_DEG = 45.0  # azimuth half way between the planes in which eq. 44 is exact
 
 
 def _integrated(theta_i: Floats, theta_r: Floats, delta_phi: Floats, theta_a: Floats, *, azimuths: int = 90) -> Floats:
@@ -207,7 +275,6 @@ def weighted_sum() -> Figure:
 
 
 def _in_general() -> Statement:
-    """Return the statement that eq. 44 is in general very accurate."""
     slopes_deg = [10.0, 20.0, 30.0, 40.0, 50.0]
     turn = radians(np.arange(7.5, 180.0, 15.0))
     grid = np.meshgrid(radians(GRID_DEG), radians(GRID_DEG), turn, radians(slopes_deg), indexing="ij")
@@ -227,7 +294,6 @@ def _in_general() -> Statement:
 
 
 def _over_estimation() -> list[Statement]:
-    """Return the statements on the place and the size of the over-estimation of eq. 44."""
     turn = radians(np.arange(0.0, 181.0, 15.0))
     grid = np.meshgrid(radians(GRID_DEG), radians(GRID_DEG), turn, radians([SLOPE_DEG]), indexing="ij")
     off = _weighted(*grid) / _integrated(*grid) - 1.0
@@ -259,7 +325,6 @@ def _over_estimation() -> list[Statement]:
 
 
 def _exact_in_planes() -> Statement:
-    """Return the statement that eqs 40 to 43 are exact in their two planes."""
     grid = np.meshgrid(
         radians(GRID_DEG), radians(GRID_DEG), radians([0.0, 90.0, 180.0]), radians([20.0, 40.0]), indexing="ij"
     )
@@ -295,7 +360,6 @@ def _interreflection_factors() -> tuple[Floats, dict[float, Floats], list[float]
 
 
 def _factor(factors: dict[float, Floats], limits: list[float]) -> list[Statement]:
-    """Return the statements on the factor of eq. 48 at both ends of the hidden width."""
     first, last = ([float(ratio[index]) for ratio in factors.values()] for index in (0, -1))
     off = float(np.abs(np.subtract(first, 1.0)).max())
     return [
@@ -336,25 +400,22 @@ def evaluation() -> Figure:
         caption="σ = 30°, ρ = 0.90, plane of incidence: eqs 24 and 49 over Gaussian slopes (eq. 25), which section 4.3 "
         "evaluates, beside the facets with eq. 47 and the functional approximation.",
         panels=[
-            Panel(
-                title="Fig. 8, θ_i = 75°",
-                x_label=THETA_R_LABEL,
-                y_label=RADIANCE,
-                curves=[
+            line_panel(
+                [
                     curve("the paper's own evaluation, eqs 24 and 49", totals[0], "printed"),
                     curve("facet by facet, eq. 47", totals[1], "truth"),
                     curve("direct illumination alone, eq. 24", cosine * own.direct),
                 ],
+                title="Fig. 8, θ_i = 75°",
             ),
             *(
-                Panel(
-                    title=f"Fig. 12, θ_i = {theta_i:.0f}°",
-                    x_label=THETA_R_LABEL,
-                    y_label="f_r [1/sr]",
-                    curves=[
+                line_panel(
+                    [
                         curve("the paper's own evaluation, eqs 24 and 49", numbers, "printed"),
                         curve("functional approximation, eqs 27 and 28", fit, "ours"),
                     ],
+                    title=f"Fig. 12, θ_i = {theta_i:.0f}°",
+                    y_label="f_r [1/sr]",
                 )
                 for theta_i, (fit, numbers) in zip(lights_deg, fits, strict=True)
                 if theta_i in (30.0, 75.0)

@@ -26,23 +26,10 @@ Vectors = Callable[..., Floats]
 
 
 def cylinder(model: Vectors, x: Floats, light_deg: float, **parameters: float) -> Floats:
-    """Return the radiance [1] across an upright cylinder of radius 1, seen from far away.
+    """Return the radiance [1] across an upright cylinder of radius 1 at places x, seen from far away.
 
-    Parameters
-    ----------
-    model : callable
-        A function of `brdfdb.models` that takes unit vectors.
-    x : array [1]
-        Places across the cylinder, from -1, its left limb, to 1.
-    light_deg : float [degree]
-        Angle of the distant light, to the right of the camera.
-    **parameters : float
-        Parameters of the model, in its units.
-
-    Returns
-    -------
-    array [1]
-        Radiance over that of a white Lambertian surface that faces the light.
+    The unit is the radiance of a white Lambertian surface that faces the light. x runs from -1, the left limb, to 1.
+    The distant light is `light_deg` to the right of the camera.
     """
     depth = np.sqrt((1.0 - x) * (1.0 + x))
     viewer, light = (
@@ -175,7 +162,6 @@ def _at(radiance: Floats, x: float) -> float:
 
 
 def _nearly_constant(lines: dict[str, Floats]) -> Statement:
-    """Return the statement that brightness is nearly constant over most of the vase."""
     flat = {name: float(np.mean(_over_largest(line) >= 1.0 - SMALL)) for name, line in lines.items()}
     return Statement(
         says="the brightness of the real vase remains nearly constant over most of the cross-section; the proposed "
@@ -190,7 +176,6 @@ def _nearly_constant(lines: dict[str, Floats]) -> Statement:
 
 
 def _to_zero_at_the_limbs(lines: dict[str, Floats]) -> Statement:
-    """Return the statement that brightness drops to zero at the limbs."""
     limb = {name: _at(line, -0.999) for name, line in lines.items()}
     return Statement(
         says="the brightness of the real vase drops quickly to zero very close to the limbs; the proposed model does "
@@ -205,7 +190,6 @@ def _to_zero_at_the_limbs(lines: dict[str, Floats]) -> Statement:
 
 
 def _asymmetric(lines: dict[str, Floats]) -> Statement:
-    """Return the statement that light from the right makes brightness asymmetric."""
     left, right = _at(lines["functional"], -0.8), _at(lines["functional"], 0.8)
     absolute = [float(np.interp(x, ACROSS, lines["functional"])) for x in (-0.801, 0.801)]
     expected = [by_hand.cylinder(x, ASIDE_DEG, 0.7, 40.0) for x in (-0.801, 0.801)]
@@ -220,7 +204,6 @@ def _asymmetric(lines: dict[str, Floats]) -> Statement:
 
 
 def _right_limb(lines: dict[str, Floats]) -> Statement:
-    """Return the statement on the brightness close to the right limb."""
     limb = {name: _at(line, 0.95) for name, line in lines.items()}
     return Statement(
         says="the Lambertian model forces the brightness close to the right limb of the vase to drop much faster",
@@ -233,7 +216,6 @@ def _right_limb(lines: dict[str, Floats]) -> Statement:
 
 
 def _peaks(lines: dict[str, Floats]) -> Statement:
-    """Return the statement on the place of the brightest point."""
     peak = {name: float(ACROSS[np.argmax(line)]) for name, line in lines.items()}
     return Statement(
         says="the brightness peak predicted by the Lambertian model is significantly away from the actual peak",

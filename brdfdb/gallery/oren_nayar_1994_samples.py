@@ -10,19 +10,19 @@ import numpy as np
 
 from brdfdb.figure import Figure, Panel, Statement, listed
 from brdfdb.gallery import _oren_nayar_by_hand as by_hand
-from brdfdb.gallery._oren_nayar_evaluated import evaluated
 from brdfdb.gallery._oren_nayar_lines import (
     PAPER,
     SMALL,
     THETA_R,
-    THETA_R_LABEL,
     VERY_ACCURATE,
     across,
     at,
     between,
     curve,
     distance,
+    evaluated,
     left_past,
+    line_panel,
     very_accurate,
 )
 from brdfdb.materials import Material, presets
@@ -57,15 +57,14 @@ class _Lines(NamedTuple):
 
 def _panel(theta_i_deg: float, lines: _Lines, where: str = "") -> Panel:
     """Return a panel of all three forms for one light."""
-    return Panel(
-        title=f"θ_i = {theta_i_deg:.0f}°{where}",
-        x_label=THETA_R_LABEL,
-        y_label=NORMALISED,
-        curves=[
+    return line_panel(
+        [
             curve("the paper's own evaluation, eqs 24 and 49", lines.evaluated, "printed"),
             curve("facet by facet, eq. 47", lines.facets, "truth"),
             curve("functional approximation, eqs 27 and 28", lines.functional, "ours"),
         ],
+        title=f"θ_i = {theta_i_deg:.0f}°{where}",
+        y_label=NORMALISED,
     )
 
 
@@ -77,12 +76,10 @@ def _rough(material: Material, theta_i_deg: float, delta_phi_deg: float = 0.0) -
 
 
 def _accurate(lines: list[_Lines], lights_deg: list[float]) -> Statement:
-    """Return the statement that the functional approximation is very accurate."""
     return very_accurate([distance(line.functional, line.evaluated) for line in lines], lights_deg, "section 4.3")
 
 
 def _assumptions(lines: list[_Lines], lights_deg: list[float]) -> Statement:
-    """Return the statement that the paper's evaluation validates its assumptions."""
     off = [distance(line.evaluated, line.facets) for line in lines]
     forward = [line.evaluated[0] / line.facets[0] - 1.0 for line in lines]
     return Statement(
@@ -176,6 +173,7 @@ def _with_surface(number: int, sample: str) -> Figure:
     rho, sigma = material.numbers["rho"], material.numbers["sigma"]
     sums = [across(oren_nayar_body_surface, light, **material.numbers) for light in LIGHTS_DEG]
     bodies = [across(oren_nayar, light, rho=rho, sigma=sigma, interreflection=False) for light in LIGHTS_DEG]
+    left = [left_past(total, light) for light, total in zip(LIGHTS_DEG, sums, strict=True)]
     return Figure(
         key=f"oren-nayar-1994-fig-{number}",
         paper=PAPER,
@@ -183,20 +181,26 @@ def _with_surface(number: int, sample: str) -> Figure:
         caption=f"{_printed(material)}, F = 1, plane of incidence. Eq. 32 with eq. 27 for the body; both curves over "
         "the sum along the normal. The measured dots are not in the text; the angles are those of Fig. 15.",
         panels=[
-            Panel(
-                title=f"θ_i = {light:.0f}°",
-                x_label=THETA_R_LABEL,
-                y_label=NORMALISED,
-                curves=[
+            line_panel(
+                [
                     curve("body and surface", _normalised(total), "ours"),
                     curve("body alone", body / at(total, 0.0)),
                 ],
+                title=f"θ_i = {light:.0f}°",
+                y_label=NORMALISED,
             )
             for light, total, body in zip(LIGHTS_DEG, sums, bodies, strict=True)
         ],
         statements=[
             _approaching(number, sums, material),
-            _cut_off(number, sums),
+            Statement(
+                says="the cut-off in radiance that takes place in the source direction",
+                where=f"section 5, Fig. {number}",
+                seen=f"In the first degree past θ_i of {listed(LIGHTS_DEG, '.0f')}° radiance grows by "
+                f"{listed(left, '.0%')} of its growth in the last degree before.",
+                holds=max(left) < 1.0 - SMALL,
+                threshold_from="our reading: a cut-off leaves less than nine tenths of the slope",
+            ),
             *([_foam(sums, bodies, material), _peak(), _width()] if sample == "foam" else []),
         ],
     )
@@ -215,7 +219,6 @@ def _sigma_deg(material: Material) -> float:
 
 
 def _approaching(number: int, sums: list[Floats], material: Material) -> Statement:
-    """Return the statement that radiance increases towards the source."""
     last = [between(total, light / 2.0, light) for light, total in zip(LIGHTS_DEG, sums, strict=True)]
     grows = [at(total, light) / at(total, 10.0) for light, total in zip(LIGHTS_DEG, sums, strict=True)]
     expected = [_sum_by_hand(material, light, light) / _sum_by_hand(material, light, 10.0) for light in LIGHTS_DEG]
@@ -231,21 +234,7 @@ def _approaching(number: int, sums: list[Floats], material: Material) -> Stateme
     )
 
 
-def _cut_off(number: int, sums: list[Floats]) -> Statement:
-    """Return the statement that radiance is cut off in the direction of the source."""
-    left = [left_past(total, light) for light, total in zip(LIGHTS_DEG, sums, strict=True)]
-    return Statement(
-        says="the cut-off in radiance that takes place in the source direction",
-        where=f"section 5, Fig. {number}",
-        seen=f"In the first degree past θ_i of {listed(LIGHTS_DEG, '.0f')}° radiance grows by {listed(left, '.0%')} "
-        "of its growth in the last degree before.",
-        holds=max(left) < 1.0 - SMALL,
-        threshold_from="our reading: a cut-off leaves less than nine tenths of the slope",
-    )
-
-
 def _foam(sums: list[Floats], bodies: list[Floats], material: Material) -> Statement:
-    """Return the statement that the surface of the foam brightens the forward direction."""
     forward = [at(total, -80.0) / float(between(total, -80.0, 0.0).min()) for total in sums]
     over_normal = [at(total, -80.0) / at(total, 0.0) for total in sums]
     expected = [_sum_by_hand(material, light, -80.0) / _sum_by_hand(material, light, 0.0) for light in LIGHTS_DEG]
@@ -271,7 +260,6 @@ def _lobes(theta_i_deg: float) -> dict[float, Floats]:
 
 
 def _peak() -> Statement:
-    """Return the statement on the direction of the peak of eq. 31."""
     peaks = {light: [float(-THETA_R[np.argmax(lobe)]) for lobe in _lobes(light).values()] for light in LIGHTS_DEG}
     rows = "; ".join(f"{listed(row, '.0f')}° for θ_i = {light:.0f}°" for light, row in peaks.items())
     return Statement(
@@ -292,7 +280,6 @@ def _deviation(lobe: Floats) -> float:
 
 
 def _width() -> Statement:
-    """Return the statement that the lobe of eq. 31 widens with roughness."""
     lobes = {sigma_deg: lobe[1:-1] for sigma_deg, lobe in _lobes(45.0).items()}
     widths = [_deviation(lobe) for lobe in lobes.values()]
     expected = [

@@ -87,7 +87,6 @@ def _ignoring(D: float) -> Array:
 
 
 def _good() -> Statement:
-    """Return the statement that eq. 3 is a good approximation for small D."""
     off = [_off_deg(D) for D in OFFSETS]
     plain = [float(_ignoring(D).max()) for D in OFFSETS]
     return Statement(
@@ -102,7 +101,6 @@ def _good() -> Statement:
 
 
 def _second_order() -> Statement:
-    """Return the statement that the error of eq. 3 is of second order."""
     spread = (0.01, 0.02)
     slope = float(np.diff(np.log([_off_deg(D).max() for D in spread]))[0] / np.log(2.0))
     return Statement(

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from brdfdb.geometry import HALF_PI, unit_vector
-from brdfdb.integrals.quadrature import mirrored_on_rays
+from brdfdb.integrals.quadrature import gauss_rule, mirrored_on_rays
 from brdfdb.lobes import Lobe
-
-Array = NDArray[np.float64]
+from brdfdb.parameters import Array
 
 # The least and the largest width [1] that nodes follow: lobes beyond count as these. A diffuse f_r has the latter
 WIDTHS = 1e-5, 0.5
@@ -40,20 +37,10 @@ class Symmetry(NamedTuple):
 
 
 class View(NamedTuple):
-    """One viewer, and lights that follow the lobe around its mirror direction.
+    """A viewer at theta, phi [rad], and lights that follow the lobe around its mirror direction.
 
-    Attributes
-    ----------
-    theta, phi : float [rad]
-        Direction of the viewer.
-    weight : float [sr]
-        cos theta_r times its solid angle. The sum over all viewers is pi.
-    wr : array (3,)
-        Unit vector of the viewer.
-    wi : array (N, 3)
-        Unit vectors of the lights.
-    weights : array (N,) [sr]
-        cos theta_i times the solid angle of each light. Their sum is close to pi.
+    `wr` (3,) and `wi` (N, 3) are unit vectors. `weight` [sr] is cos theta_r times the solid angle of the viewer: its
+    sum over all viewers is pi. `weights` (N,) [sr] are cos theta_i times those of the lights: their sum is close to pi.
     """
 
     theta: float
@@ -67,21 +54,9 @@ class View(NamedTuple):
 def views(lobe: Callable[[Array], Lobe | None], counts: Counts, symmetry: Symmetry) -> Iterator[View]:
     """Yield viewers over the hemisphere, each with lights over the hemisphere.
 
-    Parameters
-    ----------
-    lobe : callable
-        ``lobe(cos)`` gives the lobe of f_r for directions with that cosine; its widths may be arrays over the
-        wavelength, of which the narrowest counts. None: a diffuse f_r.
-    counts : Counts
-        Numbers of nodes.
-    symmetry : Symmetry
-        Symmetry of f_r, which makes nodes unnecessary.
-
-    Yields
-    ------
-    View
-        The sum of weight * weights * f_r over all of them is the integral of f_r cos theta_i cos theta_r over both
-        hemispheres, pi times the mean albedo.
+    The sum of weight * weights * f_r over all of them is the integral of f_r cos theta_i cos theta_r over both
+    hemispheres, pi times the mean albedo. ``lobe(cos)`` gives the lobe of f_r for directions with that cosine, None for
+    a diffuse f_r; its widths may be arrays over the wavelength, of which the narrowest counts.
 
     Notes
     -----
@@ -90,7 +65,7 @@ def views(lobe: Callable[[Array], Lobe | None], counts: Counts, symmetry: Symmet
     `brdfdb.integrals.quadrature.mirrored_on_rays`, which are stretched so that the lobe and each octave beyond it have
     nodes. An isotropic f_r is the same on both sides of the plane of incidence.
     """
-    thetas, steps = _gauss(counts.theta, 0.0, HALF_PI)
+    thetas, steps = gauss_rule(counts.theta).on(0.0, HALF_PI)
     quarters = 4 if symmetry.anisotropic and not symmetry.elliptical else 1
     around = quarters * counts.phi if symmetry.anisotropic else 1
     phis = (np.arange(around) + 0.5) * (quarters * HALF_PI / around) if symmetry.anisotropic else np.zeros(1)
@@ -110,31 +85,17 @@ def view_of(
 ) -> View:
     """Return one viewer at theta, phi [rad] with its lights; the arguments are those of `views`."""
     wr = unit_vector(theta, phi)
-    alpha_x, alpha_y = _widths(lobe(wr[2]))
-    x, of_x = _gauss(counts.ray, 0.0, 1.0)
+    around = lobe(wr[2])
+    alpha_x = alpha_y = WIDTHS[1]
+    if around is not None:
+        alpha_x, alpha_y = (float(np.clip(np.min(alpha), *WIDTHS)) for alpha in (around.alpha_x, around.alpha_y))
+    x, of_x = gauss_rule(counts.ray).on(0.0, 1.0)
     across = np.arctan2(alpha_x * wr[0], -alpha_y * wr[1]) if theta > 0.0 else HALF_PI
     quarters = 4 if symmetry.anisotropic else 2
-    panels = [_gauss(counts.turn, 0.0, HALF_PI) for _ in range(quarters)]
+    quarter = gauss_rule(counts.turn).on(0.0, HALF_PI)
     first = across + HALF_PI  # a psi in the plane of incidence
-    psi = np.concatenate([first + HALF_PI * number + nodes for number, (nodes, _) in enumerate(panels)])
-    of_psi = np.concatenate([steps for _, steps in panels]) * (4 / quarters)
+    psi = np.concatenate([first + HALF_PI * number + quarter.nodes for number in range(quarters)])
+    of_psi = np.tile(quarter.weights, quarters) * (4 / quarters)
     wi, measure = mirrored_on_rays((wr[0], wr[1], wr[2]), alpha_x, alpha_y, x[:, np.newaxis], psi)
     weights = measure * np.maximum(wi[..., 2], 0.0) * of_x[:, np.newaxis] * of_psi
     return View(theta, phi, float(weight), wr, wi.reshape(-1, 3), weights.reshape(-1))
-
-
-_rule = functools.cache(np.polynomial.legendre.leggauss)  # a millisecond each
-
-
-def _gauss(count: int, low: float, high: float) -> tuple[Array, Array]:
-    """Return nodes and weights of Gauss's rule on an interval."""
-    x, weight = _rule(count)
-    half = 0.5 * (high - low)
-    return low + half * (x + 1.0), half * weight
-
-
-def _widths(lobe: Lobe | None) -> tuple[float, float]:
-    if lobe is None:
-        return WIDTHS[1], WIDTHS[1]
-    alpha_x, alpha_y = (float(np.clip(np.min(alpha), *WIDTHS)) for alpha in (lobe.alpha_x, lobe.alpha_y))
-    return alpha_x, alpha_y

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from brdfdb.parameters import Floats
+from brdfdb.parameters import Array, Floats
 
-Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 Integrand = Callable[[Indices, Array, Array], Array]
 
@@ -74,10 +74,17 @@ def rectangles(first: Floats, second: Floats) -> Array:
     )
 
 
+class Integrals(NamedTuple):
+    """Integrals, and estimates of their errors."""
+
+    values: Array
+    errors: Array
+
+
 def integrated(
     integrand: Integrand, panels: Array, of: Indices, tolerance: float, most_panels: int, width: int = 1
-) -> tuple[Array, Array]:
-    """Return integrals over panels, and estimates of their errors.
+) -> Integrals:
+    """Return integrals over panels, shape (integrals, width), and estimates of their errors (integrals,).
 
     Panels with large errors are halved, until those of each integral add up to less than the tolerance. All integrals
     that still want panels are evaluated in one call.
@@ -87,21 +94,12 @@ def integrated(
     integrand : callable
         ``integrand(of, x, y)`` gives values (P, 15, 15, width) for P panels: the integral to which each belongs (P,),
         and the variables at its nodes, (P, 15, 1) and (P, 1, 15).
-    panels : array (P, 4)
-        Rectangles, as from `rectangles`.
-    of : array (P,)
-        Index of the integral to which each panel belongs. Each integral has a panel at least.
+    panels, of : array (P, 4), array (P,)
+        Rectangles, as from `rectangles`, and the index of the integral of each. Each integral has a panel at least.
     tolerance : float
-        Absolute error to stay below, for the worst of the values of an integral.
+        Absolute error to stay below, for the worst of the `width` values of an integral.
     most_panels : int
         Number of new panels at which an integral stops.
-    width : int
-        Number of values of an integral.
-
-    Returns
-    -------
-    array (integrals, width), array (integrals,)
-        Integrals and errors.
     """
     count = int(of.max(initial=-1)) + 1
     values, errors = _rules(integrand, panels, of, width)
@@ -110,11 +108,13 @@ def integrated(
         total = errors.sum(axis=1)
         wanting = (_sums(of, total, count) > tolerance) & (done < most_panels)
         if not np.any(wanting):
-            return _by_pairs(of, values), _sums(of, total, count)
+            return Integrals(_by_pairs(of, values), _sums(of, total, count))
         chosen = _chosen(total, of, wanting, tolerance)
-        halved, of_halved = _halved(panels[chosen], errors[chosen]), np.tile(of[chosen], 2)
+        halved = _halved(panels[chosen], errors[chosen])
+        of_halved = np.tile(of[chosen], 2)
         new_values, new_errors = _rules(integrand, halved, of_halved, width)
-        panels, of = np.concatenate([panels[~chosen], halved]), np.concatenate([of[~chosen], of_halved])
+        panels = np.concatenate([panels[~chosen], halved])
+        of = np.concatenate([of[~chosen], of_halved])
         values = np.concatenate([values[~chosen], new_values])
         errors = np.concatenate([errors[~chosen], new_errors])
         done += np.bincount(of_halved, minlength=count)
@@ -160,12 +160,13 @@ def _halved(panels: Array, errors: Array) -> Array:
     return np.concatenate([low, high])
 
 
-def _rules(integrand: Integrand, panels: Array, of: Indices, width: int) -> tuple[Array, Array]:
+def _rules(integrand: Integrand, panels: Array, of: Indices, width: int) -> Integrals:
     """Return integrals over each panel, and their largest change with Gauss's rule in the first or second variable.
 
     The integrand gives `width` values per point, in a last axis.
     """
-    values, errors = np.empty((len(panels), width)), np.empty((len(panels), 2))
+    values = np.empty((len(panels), width))
+    errors = np.empty((len(panels), 2))
     step = max(_BATCH // width, _FEWEST)
     for start in range(0, len(panels), step):
         batch = slice(start, start + step)
@@ -177,4 +178,4 @@ def _rules(integrand: Integrand, panels: Array, of: Indices, width: int) -> tupl
         values[batch] = area * (_W_KRONROD @ by_first)
         errors[batch, 0] = _SAFETY * np.max(np.abs(values[batch] - area * (_W_GAUSS @ by_first)), axis=1)
         errors[batch, 1] = _SAFETY * np.max(np.abs(values[batch] - area * (_W_GAUSS @ by_second)), axis=1)
-    return values, errors
+    return Integrals(values, errors)

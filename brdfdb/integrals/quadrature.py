@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import inspect
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
@@ -15,9 +16,7 @@ from brdfdb.geometry import HALF_PI, check_phi, check_theta, unit_vector
 from brdfdb.integrals.panels import Indices, Integrand, integrated, rectangles
 from brdfdb.lobes import Lobe, narrowest
 from brdfdb.models import MODELS
-from brdfdb.parameters import Floats, ModelSpec
-
-Array = NDArray[np.float64]
+from brdfdb.parameters import Array, Floats, ModelSpec
 
 MOST_PANELS = 40_000  # number of panels of a light at which the quadrature stops, whatever its error
 _QUARTERS = HALF_PI * np.arange(5)
@@ -28,6 +27,27 @@ class Albedo(NamedTuple):
 
     albedo: Floats
     error: Floats
+
+
+class GaussRule(NamedTuple):
+    """Nodes and weights of Gauss and Legendre's rule."""
+
+    nodes: Array
+    weights: Array
+
+    def on(self, low: float, high: float) -> GaussRule:
+        """Return the rule of an interval, for the rule on [-1, 1]."""
+        half = 0.5 * (high - low)
+        return GaussRule(low + half * (self.nodes + 1.0), half * self.weights)
+
+
+@functools.cache  # a rule takes a millisecond
+def gauss_rule(count: int) -> GaussRule:
+    """Return Gauss and Legendre's rule of `count` nodes on [-1, 1]; its arrays cannot be written."""
+    rule = GaussRule(*np.polynomial.legendre.leggauss(count))
+    for array in rule:
+        array.flags.writeable = False
+    return rule
 
 
 @array_function
@@ -85,9 +105,11 @@ def directional_albedo(
     spec = spec_of(model)
     parameters = named(spec, parameters)
     _check_tolerance(tolerance)
-    thetas, phis = check_theta("theta_i", theta_i), check_phi("phi_i", phi_i)
+    thetas = check_theta("theta_i", theta_i)
+    phis = check_phi("phi_i", phi_i)
     arrays = np.broadcast_arrays(thetas, phis, *(np.asarray(value) for value in parameters.values()))
-    albedo, error = np.full(arrays[0].shape, np.nan), np.full(arrays[0].shape, np.nan)
+    albedo = np.full(arrays[0].shape, np.nan)
+    error = np.full(arrays[0].shape, np.nan)
     theta, phi, *values = (array.ravel() for array in arrays)
     for one, rows in _alike(parameters, values):
         above = rows[theta[rows] <= HALF_PI]  # nan is not
@@ -95,7 +117,8 @@ def directional_albedo(
         albedo.flat[below], error.flat[below] = 0.0, 0.0
         above = above[np.isfinite(phi[above])]
         integrals = spectral_albedo(spec, theta[above], phi[above], one, tolerance=tolerance, most_panels=MOST_PANELS)
-        albedo.flat[above], error.flat[above] = integrals.albedo[:, 0], integrals.error
+        albedo.flat[above] = integrals.albedo[:, 0]
+        error.flat[above] = integrals.error
     if specular and spec.specular is not None:
         albedo = albedo + spec.specular(thetas, **{name: parameters[name] for name in spec.specular_parameters})
     return Albedo(albedo[()], error[()])
@@ -143,7 +166,8 @@ def reflected_share(
 ) -> Albedo:
     """Return the directional albedo [1] of a function of unit vectors that gives several values of f_r at once.
 
-    All lights are integrated together, each on panels of its own.
+    All lights are integrated together, each on panels of its own. The albedo has the shape (..., width), the error is
+    one for each light; it is above the tolerance where the quadrature stopped early.
 
     Parameters
     ----------
@@ -152,23 +176,11 @@ def reflected_share(
     theta_i, phi_i : array_like [rad]
         Directions of the lights, theta up to pi/2. They broadcast.
     lobe : Lobe or None
-        Lobe that all values of a light share, with widths that are numbers or broadcast with the lights; None if they
-        share none.
-    tolerance : float
-        Absolute error to stay below, for the worst of the values of a light.
-    most_panels : int
-        Number of panels at which the quadrature of a light stops.
-    width : int
-        Number of values that brdf gives for a pair of directions.
+        Lobe that all values of a light share, with widths that are numbers or broadcast with the lights.
+    tolerance, most_panels : float, int
+        Absolute error to stay below, for the worst of the values of a light; number of panels at which it stops.
     mirrored : array_like of bool
-        True if f_r is the same on both sides of the plane of incidence. Only one side is then integrated. It broadcasts
-        with the lights.
-
-    Returns
-    -------
-    Albedo
-        Albedo of shape (..., width), and one estimate of the error for each light. It is above the tolerance where the
-        quadrature stopped early.
+        True if f_r is the same on both sides of the plane of incidence, so that one side is integrated. It broadcasts.
     """
     theta, phi, one_side = np.broadcast_arrays(np.asarray(theta_i, dtype=np.float64), phi_i, mirrored)
     if theta.size == 0:
@@ -184,11 +196,11 @@ def reflected_share(
         return values
 
     if lobe is None:
-        integrand, panels, of = _over_the_hemisphere(reflected, theta.ravel(), phi.ravel(), one_side.ravel())
+        integrals = _over_the_hemisphere(reflected, theta.ravel(), phi.ravel(), one_side.ravel())
     else:
         widths = [np.broadcast_to(alpha, theta.shape).ravel() for alpha in (lobe.alpha_x, lobe.alpha_y)]
-        integrand, panels, of = _over_the_slopes(reflected, lights, np.clip(widths, 1e-9, 10.0), one_side.ravel())
-    albedo, error = integrated(integrand, panels, of, tolerance, most_panels, width)
+        integrals = _over_the_slopes(reflected, lights, np.clip(widths, 1e-9, 10.0), one_side.ravel())
+    albedo, error = integrated(*integrals, tolerance, most_panels, width)
     return Albedo(albedo.reshape(*theta.shape, width), error.reshape(theta.shape)[()])
 
 
@@ -204,26 +216,9 @@ def spectral_albedo(
 ) -> Albedo:
     """Return the directional albedo [1] of a model for several sets of parameters at once, such as wavelengths.
 
-    Parameters
-    ----------
-    spec : ModelSpec
-        The model.
-    theta_i, phi_i : array_like [rad]
-        Directions of the lights, theta up to pi/2. They broadcast.
-    parameters : mapping
-        All parameters of the model: numbers, or arrays of one shape (L,).
-    tolerance, most_panels, mirrored
-        As in `reflected_share`.
-
-    Returns
-    -------
-    Albedo
-        As from `reflected_share`, of width L, or 1 where all parameters are numbers. The specular part is left out.
-
-    Raises
-    ------
-    ParameterError
-        If a parameter is outside its range, or the tolerance outside [1e-13, 1].
+    `parameters` are all of the model: numbers, or arrays of one shape (L,), which make an albedo of width L. All else
+    is as in `reflected_share`. The specular part is left out. ParameterError if a parameter is outside its range, or
+    the tolerance outside [1e-13, 1].
     """
     _check_tolerance(tolerance)
     width = np.broadcast(*parameters.values()).size
@@ -249,9 +244,17 @@ def spectral_albedo(
 _Reflected = Callable[[Indices, Array, Array], Array]
 
 
+class _PanelIntegrals(NamedTuple):
+    """Integrals over panels, as `integrated` takes them: integrand, panels, and the integral of each panel."""
+
+    integrand: Integrand
+    panels: Array
+    of: Indices
+
+
 def _over_the_hemisphere(
     reflected: _Reflected, theta_i: Array, phi_i: Array, one_side: NDArray[np.bool_]
-) -> tuple[Integrand, Array, Indices]:
+) -> _PanelIntegrals:
     """Return the integrand over theta_r and phi_r, and panels that end at the edges of Oren and Nayar's model."""
 
     def integrand(of: Indices, theta: Array, phi: Array) -> Array:
@@ -261,12 +264,12 @@ def _over_the_hemisphere(
     panels = [
         rectangles(np.array([0.0, edge, HALF_PI]), phi + _QUARTERS) for edge, phi in zip(edges, phi_i, strict=True)
     ]
-    return integrand, *_sides(panels, phi_i, one_side)
+    return _panel_integrals(integrand, panels, phi_i, one_side)
 
 
 def _over_the_slopes(
     reflected: _Reflected, lights: Array, widths: Array, one_side: NDArray[np.bool_]
-) -> tuple[Integrand, Array, Indices]:
+) -> _PanelIntegrals:
     """Return the integrand over the slopes of lobes, for lights (L, 3) and widths (2, L), and its panels.
 
     The integrand is a function of x in [0, 1], the position on a ray, and psi, the azimuth on the ellipse of the lobe.
@@ -281,24 +284,33 @@ def _over_the_slopes(
     x_i, y_i = lights[:, 0], lights[:, 1]
     across = np.where(x_i**2 + y_i**2 > 0.0, np.arctan2(widths[0] * x_i, -widths[1] * y_i), HALF_PI)  # p = 0
     panels = [rectangles(np.linspace(0.0, 1.0, 5), begin + _QUARTERS) for begin in across]
-    return integrand, *_sides(panels, across + HALF_PI, one_side)
+    return _panel_integrals(integrand, panels, across + HALF_PI, one_side)
 
 
-def _sides(panels: list[Array], begin: Array, one_side: NDArray[np.bool_]) -> tuple[Array, Indices]:
-    """Return the panels of all lights, and the light of each.
+def _panel_integrals(
+    integrand: Integrand, panels: list[Array], begin: Array, one_side: NDArray[np.bool_]
+) -> _PanelIntegrals:
+    """Return the integrals of all lights over their panels.
 
-    Where `one_side` says so, they cover one side of the plane of incidence, which begins at the azimuth `begin`.
+    Where `one_side` says so, panels cover one side of the plane of incidence, which begins at the azimuth `begin`.
     """
     of = np.repeat(np.arange(len(panels)), [len(some) for some in panels])
     rows = np.concatenate(panels)
     kept = ~one_side[of] | ((rows[:, 1] > begin[of]) & (rows[:, 1] < begin[of] + np.pi))
-    return rows[kept], of[kept]
+    return _PanelIntegrals(integrand, rows[kept], of[kept])
+
+
+class MirroredDirections(NamedTuple):
+    """Unit vectors (..., 3), and the solid angle [sr] (...) of each for dx dpsi."""
+
+    w: Array
+    solid_angle: Array
 
 
 def mirrored_on_rays(
     i: tuple[Floats, Floats, Floats], alpha_x: float | Array, alpha_y: float | Array, x: Array, psi: Array
-) -> tuple[Array, Array]:
-    """Return directions mirrored in half vectors on rays of slopes, and the solid angle [sr] for dx dpsi.
+) -> MirroredDirections:
+    """Return directions mirrored in half vectors on rays of slopes.
 
     Parameters
     ----------
@@ -310,14 +322,11 @@ def mirrored_on_rays(
         Position on the ray, in [0, 1]: 0 is the mirror direction, and 1 the horizon. It is stretched near the lobe.
     psi : array [rad]
         Azimuth of the ray on the ellipse of the lobe.
-
-    Returns
-    -------
-    array (..., 3), array (...)
-        Unit vectors, and their solid angle, in the broadcast shape of the arguments.
     """
     x_i, y_i, cos_i = i
-    s_x, s_y = alpha_x * np.cos(psi), alpha_y * np.sin(psi)  # slopes of the half vector, divided by t
+    # slopes of the half vector, divided by t
+    s_x = alpha_x * np.cos(psi)
+    s_y = alpha_y * np.sin(psi)
     s2 = s_x**2 + s_y**2
     # cos theta_r = 0 at cos_i s2 t^2 - 2 p t - cos_i = 0
     p = x_i * s_x + y_i * s_y
@@ -333,4 +342,4 @@ def mirrored_on_rays(
     for axis, (h, w_i) in enumerate(((t * s_x * cos_h, x_i), (t * s_y * cos_h, y_i), (cos_h, cos_i))):
         wr[..., axis] = 2.0 * h_i * h - w_i
     # d omega_r = 4 (h.i) d omega_h, d omega_h = cos^3 d(slopes), d(slopes) = alpha_x alpha_y t dt dpsi
-    return wr, np.asarray(4.0 * h_i * cos_h**3 * (alpha_x * alpha_y) * t * jacobian)
+    return MirroredDirections(wr, np.asarray(4.0 * h_i * cos_h**3 * (alpha_x * alpha_y) * t * jacobian))

@@ -6,16 +6,14 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from brdfdb.arrays import array_function
 from brdfdb.errors import ParameterError
 from brdfdb.geometry import checked_vectors
 from brdfdb.integrals.quadrature import named, spec_of
 from brdfdb.lobes import Lobe
-from brdfdb.parameters import Floats, ModelSpec
-
-Array = NDArray[np.float64]
+from brdfdb.parameters import Array, Floats, ModelSpec
 
 _TINY = 1e-300  # least u, so that its logarithm is finite
 _FLAT = 1e-70  # z of a half vector up to which the density counts as 0: z^4 is still a number
@@ -99,26 +97,9 @@ def sample(model: ModelSpec | str, u1: ArrayLike, u2: ArrayLike, wi: ArrayLike, 
 
 @array_function
 def pdf(model: ModelSpec | str, wi: ArrayLike, wr: ArrayLike, **parameters: ArrayLike) -> Floats:
-    """Return the density [1/sr] with which `sample` draws `wr` for the light `wi`.
+    """Return the density [1/sr] with which `sample` draws `wr`, anywhere on the sphere, for the light `wi`.
 
-    Parameters
-    ----------
-    model : ModelSpec or str
-        A model, or its name in `brdfdb.models.MODELS`.
-    wi, wr : array_like
-        Unit vectors of shape (..., 3), `wr` anywhere on the sphere.
-    **parameters : array_like
-        Parameters of the model, which broadcast with the vectors.
-
-    Returns
-    -------
-    array [1/sr]
-        In the broadcast shape of all arguments. Its integral over the sphere is 1.
-
-    Raises
-    ------
-    ParameterError
-        If an argument is outside its range.
+    Arguments and errors are those of `sample`. The integral of the density over the sphere is 1.
 
     Examples
     --------
@@ -126,7 +107,8 @@ def pdf(model: ModelSpec | str, wi: ArrayLike, wr: ArrayLike, **parameters: Arra
     0.31831
     """
     vectors = checked_vectors(wi, wr)
-    i, r = vectors.w_i.astype(np.float64), vectors.w_r.astype(np.float64)
+    i = vectors.w_i.astype(np.float64)
+    r = vectors.w_r.astype(np.float64)
     spec = spec_of(model)
     parameters = named(spec, parameters)
     density = mixture_density(lobe_of(spec, i, parameters), i, r) + 0.0 * (i + r).sum(axis=-1)  # nan is passed on
@@ -165,15 +147,18 @@ def directions(lobe: Lobe, u1: Array, u2: Array, i: Array) -> Array:
     angle = 2.0 * np.pi * u2
     mirror = _mirrored_in_visible if lobe.visible else mirrored_in_lobe
     mirrored = mirror(np.clip(stretched, _TINY, 1.0), angle, i, lobe)
-    others = _cosine_weighted(np.clip(stretched, 0.0, 1.0), angle)
+    share = np.clip(stretched, 0.0, 1.0)  # directions that follow the cosine
+    sin_theta = np.sqrt(share)
+    others = (sin_theta * np.cos(angle), sin_theta * np.sin(angle), np.sqrt(1.0 - share))
     chosen = [np.where(in_lobe, mirrored[..., axis], other) for axis, other in enumerate(others)]
     return _vectors(*chosen)
 
 
-def mirrored_in_lobe(u1: Array, angle: Array, i: Array, lobe: Lobe) -> Array:
+def mirrored_in_lobe(u1: Floats, angle: Floats, i: Floats, lobe: Lobe) -> Array:
     """Return the light (..., 3) mirrored in half vectors whose slopes follow the distribution of the lobe."""
     radius = lobe.distribution.radius(u1)
-    s_x, s_y = radius * lobe.alpha_x * np.cos(angle), radius * lobe.alpha_y * np.sin(angle)
+    s_x = radius * lobe.alpha_x * np.cos(angle)
+    s_y = radius * lobe.alpha_y * np.sin(angle)
     return _mirrored((s_x, s_y, np.ones(())), i)
 
 
@@ -187,11 +172,11 @@ def _mirrored_in_visible(u1: Array, angle: Array, i: Array, lobe: Lobe) -> Array
     return _mirrored((lobe.alpha_x * h_x, lobe.alpha_y * h_y, h_z), i)
 
 
-def _stretched_length(i: Array, lobe: Lobe) -> Array:
+def _stretched_length(i: Floats, lobe: Lobe) -> Array:
     return np.asarray(np.sqrt((lobe.alpha_x * i[..., 0]) ** 2 + (lobe.alpha_y * i[..., 1]) ** 2 + i[..., 2] ** 2))
 
 
-def _mirrored(h: tuple[Array, Array, Array], i: Array) -> Array:
+def _mirrored(h: tuple[Floats, Floats, Floats], i: Floats) -> Array:
     """Return the light mirrored in half vectors of any length, of which `h` holds the components."""
     x, y, z = h
     length = np.sqrt(np.maximum(x * x + y * y + z * z, _TINY))
@@ -200,7 +185,7 @@ def _mirrored(h: tuple[Array, Array, Array], i: Array) -> Array:
     return _vectors(*(2.0 * h_i * component - i[..., axis] for axis, component in enumerate(unit)))
 
 
-def _vectors(x: Array, y: Array, z: Array) -> Array:
+def _vectors(x: Floats, y: Floats, z: Floats) -> Array:
     """Return vectors (..., 3) of components, written one by one: arithmetic along an axis of three numbers is slow."""
     vectors = np.empty((*np.broadcast_shapes(x.shape, y.shape, z.shape), 3))
     for axis, component in enumerate((x, y, z)):
@@ -208,12 +193,7 @@ def _vectors(x: Array, y: Array, z: Array) -> Array:
     return vectors
 
 
-def _cosine_weighted(u1: Array, angle: Array) -> tuple[Array, Array, Array]:
-    sin_theta = np.sqrt(u1)
-    return sin_theta * np.cos(angle), sin_theta * np.sin(angle), np.sqrt(1.0 - u1)
-
-
-def mixture_density(lobe: Lobe, i: Array, r: Array) -> Array:
+def mixture_density(lobe: Lobe, i: Floats, r: Floats) -> Array:
     """Return the density [1/sr] of lobe and cosine together, over the whole sphere."""
     cosine = np.maximum(r[..., 2], 0.0) / np.pi
     if not np.any(lobe.share):
@@ -232,7 +212,7 @@ def mixture_density(lobe: Lobe, i: Array, r: Array) -> Array:
     return np.asarray(lobe.share * mirrored + (1.0 - lobe.share) * cosine)
 
 
-def _of_visible(slopes: Floats, length2: Array, z: Array, lobe: Lobe, i: Array) -> Array:
+def _of_visible(slopes: Floats, length2: Floats, z: Floats, lobe: Lobe, i: Floats) -> Array:
     """Return the density [1/sr] of directions mirrored in visible facets, D / (4 projected area)."""
     assert lobe.distribution.area is not None
     stretched = _stretched_length(i, lobe)

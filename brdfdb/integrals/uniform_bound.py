@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from brdfdb.arrays import array_function
 from brdfdb.errors import ParameterError
 from brdfdb.geometry import HALF_PI
 from brdfdb.integrals.quadrature import named, spec_of, spectral_albedo
-from brdfdb.parameters import Floats, ModelSpec
-
-Array = NDArray[np.float64]
+from brdfdb.parameters import Array, Floats, ModelSpec
 
 # Angles of the first search are even in arcsinh(tan theta_i), which is theta_i near 0 and -ln(cos theta_i) near
 # grazing. The reflectance near grazing has its peak where shadowing begins
@@ -25,6 +23,9 @@ _ROUNDS = 12  # rounds of the search around the largest value; each halves the s
 def largest_uniform(model: ModelSpec | str, *, tolerance: float = 1e-6, **parameters: ArrayLike) -> Floats:
     """Return the largest albedo [1] of the uniform part with which a model reflects no more than it receives.
 
+    It is 1 less the largest directional-hemispherical reflectance, specular and directional diffuse, over all angles of
+    incidence from 0 to 90 degrees, and 0 where that reflectance is above 1.
+
     Parameters
     ----------
     model : ModelSpec or str
@@ -33,12 +34,6 @@ def largest_uniform(model: ModelSpec | str, *, tolerance: float = 1e-6, **parame
         Absolute error of the directional albedo, in [1e-13, 1].
     **parameters : array_like
         Parameters of the model except the uniform part. They broadcast, and are integrated together.
-
-    Returns
-    -------
-    array [1]
-        1 less the largest directional-hemispherical reflectance, specular and directional diffuse, over all angles of
-        incidence from 0 to 90 degrees. It is 0 where that reflectance is above 1.
 
     Raises
     ------
@@ -79,27 +74,11 @@ def largest_uniform(model: ModelSpec | str, *, tolerance: float = 1e-6, **parame
 def largest_uniform_beside(
     spec: ModelSpec, theta_i: Array, reflectance: Floats, surfaces: Mapping[str, ArrayLike], tolerance: float
 ) -> Array:
-    """Return `largest_uniform` [1] of surfaces whose reflectance is known at some angles.
+    """Return `largest_uniform` [1], shape (surfaces,), of surfaces whose reflectance is known at some angles.
 
-    Angles between the known ones are searched for a larger reflectance.
-
-    Parameters
-    ----------
-    spec : ModelSpec
-        The model.
-    theta_i : array (angles,) [rad]
-        Increasing angles of incidence up to 90 degrees.
-    reflectance : array (angles, surfaces) [1]
-        Reflectance, specular and directional diffuse.
-    surfaces : mapping
-        Arguments of the model except the uniform part: numbers, or arrays of one shape (surfaces,).
-    tolerance : float
-        As in `largest_uniform`.
-
-    Returns
-    -------
-    array (surfaces,) [1]
-        1 less the largest reflectance, at these angles or between them. It is 0 where that reflectance is above 1.
+    Angles between the known ones are searched for a larger reflectance. `theta_i` (angles,) [rad] increases up to 90
+    degrees; `reflectance` (angles, surfaces) [1] is specular and directional diffuse; `surfaces` are the arguments of
+    the model except the uniform part: numbers, or arrays of one shape (surfaces,).
     """
     below = theta_i < HALF_PI
     peak = _peak(
@@ -135,7 +114,9 @@ def _peak(x: Array, y: Floats, f: Callable[[Array], Array], tolerance: float) ->
         fresh = np.unique([(x[i + side - 1] + x[i + side]) / 2.0 for i in at for side in (0, 1)])
         x, y = np.append(x, fresh), np.concatenate([y, f(fresh)])
         order = np.argsort(x)
-        x, y, before = x[order], y[order], top
+        x = x[order]
+        y = y[order]
+        before = top
         top = tops(x, y)
         moving &= np.abs(top - before) > tolerance
         if not np.any(moving):
@@ -147,7 +128,8 @@ def tops(x: Array, y: Floats) -> Array:
     """Return the tops of the parabolas through the largest values and their neighbours, between these neighbours."""
     middle = np.clip(np.argmax(y, axis=0), 1, x.size - 2)
     column = np.arange(y.shape[1])
-    (x0, x1, x2), (y0, y1, y2) = (x[middle + i] for i in (-1, 0, 1)), (y[middle + i, column] for i in (-1, 0, 1))
+    (x0, x1, x2) = (x[middle + i] for i in (-1, 0, 1))
+    (y0, y1, y2) = (y[middle + i, column] for i in (-1, 0, 1))
     rise, fall = (y1 - y0) / (x1 - x0), (y2 - y1) / (x2 - x1)
     bend = (fall - rise) / (x2 - x0)
     # The parabola is y1 + s (x - x1) + bend (x - x1)^2, with the slope s at x1

@@ -6,9 +6,8 @@ from typing import Any
 from pydantic import ValidationError
 
 from brdfdb.errors import BrdfdbError, sentence_of
-from brdfdb.materials.exact import exact_material
 from brdfdb.materials.function_source import FunctionRecord, FunctionSource
-from brdfdb.materials.material import Material
+from brdfdb.materials.material import Material, exact_material
 from brdfdb.materials.preset_files import PAPERS, libraries, presets
 from brdfdb.materials.source import Source
 from brdfdb.materials.written_parameters import written_name
@@ -28,22 +27,10 @@ __all__ = [
 
 
 def source_of(document: Mapping[str, Any]) -> Material | FunctionRecord:
-    """Return the source that a document describes: a complete material, or a function without its callable.
+    """Return the source in a document of `Source.document`: a complete material, or a function without its callable.
 
-    Parameters
-    ----------
-    document : mapping
-        A result of `Source.document`. Other keys are ignored.
-
-    Returns
-    -------
-    Material or FunctionRecord
-        The material, or the record of the function.
-
-    Raises
-    ------
-    BrdfdbError
-        If the document describes no source, or a material whose model is not installed or has other parameters.
+    Other keys are ignored. BrdfdbError says that the document describes no source, or a material whose model is not
+    installed or has other parameters.
     """
     try:
         if "material" in document:

@@ -1,4 +1,4 @@
-"""Sources that are functions: a callable of the user, and the record of it that a table keeps."""
+"""Sources that are functions: a callable of the user, and its record in a table."""
 
 from __future__ import annotations
 
@@ -23,7 +23,9 @@ from brdfdb.parameters import Floats, check_nanometres
 Function = Callable[[Floats, Floats, NDArray[np.float64] | None], ArrayLike]
 
 _LOBE_SHARE = 0.5  # share of the reflected light in a lobe whose share is unknown; half of the directions follow it
-_CHECKED, _CHECKED_UP_TO_DEG, _SEED = 64, 85.0, 1967  # pairs of directions at which symmetries are checked
+_CHECKED = 64  # pairs of directions at which symmetries are checked
+_CHECKED_UP_TO_DEG = 85.0  # largest angle of these directions from the normal
+_SEED = 1967
 _SAME = 1e-6  # relative difference that rounding may leave between values that a symmetry makes the same
 
 
@@ -176,17 +178,15 @@ class FunctionSource(FunctionRecord, Lookups):
     def brdf_at(self, wavelength_nm: NDArray[np.float64] | None) -> Evaluate:
         """Return f_r [1/sr] at wavelengths (L,) [nm] as a function of unit vectors (N, 3): shape (N, L), L = 1 if grey.
 
-        Raises
-        ------
-        ParameterError
-            If a wavelength is outside the range of the function, or if it needs wavelengths and gets none.
+        ParameterError says that a wavelength is outside the range of the function, or that wavelengths are missing.
         """
         at = self._wavelengths(wavelength_nm)
         return lambda wi, wr: self._values(checked_vectors(wi, wr), wi, wr, at)
 
     def _at_angles(self, angles: FourAngles, wavelength_nm: ArrayLike | None) -> Floats:
         given = checked_angles(*angles)
-        light, viewer = unit_vector(given.theta_i, given.phi_i), unit_vector(given.theta_r, given.phi_r)
+        light = unit_vector(given.theta_i, given.phi_i)
+        viewer = unit_vector(given.theta_r, given.phi_r)
         return self._shaped(given, light, viewer, wavelength_nm)
 
     @array_lookup
@@ -213,7 +213,8 @@ class FunctionSource(FunctionRecord, Lookups):
         if self.wavelengths_nm is None:
             return None
         at = np.array(self.wavelengths_nm) if at is None else at
-        low, high = self.wavelengths_nm[0], self.wavelengths_nm[-1]
+        low = self.wavelengths_nm[0]
+        high = self.wavelengths_nm[-1]
         bad = ~((at >= low) & (at <= high))
         if np.any(bad):
             first = float(at[bad][0])
@@ -239,7 +240,8 @@ class FunctionSource(FunctionRecord, Lookups):
         above = whole & (wi[:, 2] >= 0.0) & (wr[:, 2] >= 0.0)
         count = 1 if at is None else at.size
         values = np.where(whole, 0.0, np.nan)[:, np.newaxis].repeat(count, axis=1)
-        wi, wr = wi[above], wr[above]
+        wi = wi[above]
+        wr = wr[above]
         for w in (wi, wr):
             w[:, 2] = np.maximum(w[:, 2], COS_HORIZON)
         f_r = np.asarray(self.brdf(wi, wr, at))
@@ -271,19 +273,20 @@ class FunctionSource(FunctionRecord, Lookups):
         phi = rng.uniform(0.0, 2.0 * np.pi, (2, _CHECKED))
         turn = rng.uniform(0.0, 2.0 * np.pi, _CHECKED)
 
-        def at(phi_i: Floats, phi_r: Floats) -> tuple[Floats, Floats]:
-            return unit_vector(theta[0], phi_i), unit_vector(theta[1], phi_r)
+        def at(azimuths: Floats) -> tuple[Floats, ...]:
+            return unit_vector(theta[0], azimuths[0]), unit_vector(theta[1], azimuths[1])
 
-        wi, wr = at(*phi)
-        others = {"is not reciprocal, which it does not say: light and viewer exchanged": (wr, wi)}
+        wi, wr = at(phi)
+        exchanged = "is not reciprocal, which it does not say: light and viewer exchanged"
+        others: dict[str, tuple[Floats, ...]] = {exchanged: (wr, wi)}
         if not self.reciprocal:
             others.clear()
         if not self.anisotropic:
-            others["is anisotropic, which it does not say: the surface turned"] = at(*(phi + turn))
+            others["is anisotropic, which it does not say: the surface turned"] = at(phi + turn)
         if self.elliptical:
-            others["has not the symmetry of an ellipse: the surface turned by 180 degrees"] = at(*(phi + np.pi))
+            others["has not the symmetry of an ellipse: the surface turned by 180 degrees"] = at(phi + np.pi)
         if self.elliptical or not self.anisotropic:
-            others["is not its own mirror image: -phi for phi"] = at(*-phi)
+            others["is not its own mirror image: -phi for phi"] = at(-phi)
         brdf = self.brdf_at(None if self.wavelengths_nm is None else np.array(self.wavelengths_nm))
         value = brdf(wi, wr)
         for what, directions in others.items():

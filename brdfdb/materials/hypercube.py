@@ -15,7 +15,7 @@ from brdfdb.parameters import LEAST_NM, Arguments, ModelSpec, Parameter
 
 Array = NDArray[np.float64]
 
-# That a spectral model takes beside its parameters
+# Arguments of a spectral model besides its parameters
 _LIGHT = (
     Parameter("wavelength_nm", "λ", "nm", LEAST_NM, 1e7, "wavelength in vacuum"),
     Parameter("n", "n", "1", 1e-3, 100.0, "refractive index"),
@@ -23,7 +23,7 @@ _LIGHT = (
 )
 _LIGHT_RANGES = (("wavelength_nm", 400.0, 700.0), ("n", 0.2, 3.0), ("k", 0.0, 8.0))
 _DECADE = 10.0  # ratio of the ends of a range from which on it is drawn evenly in its logarithm
-_LEAST_SHARE = 0.01  # of the drawn materials that must keep the condition
+_LEAST_SHARE = 0.01  # of the drawn materials that must satisfy the condition
 _MANY = 1000  # drawn materials from which on that share is judged
 _SPARE = 1.05  # more are drawn than the share of the last draw asks for
 
@@ -50,20 +50,18 @@ class Axis(NamedTuple):
 def axes_of(spec: ModelSpec, ranges: Mapping[str, tuple[float, float]]) -> list[Axis]:
     """Return the drawn parameters of a model: usual ranges, or those given by names as files write them.
 
-    Raises
-    ------
-    ParameterError
-        If a name is unknown, or a range is not within that of the parameter.
+    ParameterError says that a name is unknown, or a range is not within that of the parameter.
     """
     usual = {name: ends for name, *ends in (*spec.draw.ranges, *_LIGHT_RANGES)}
     axes = []
-    for one in (*spec.parameters, *(_LIGHT if spec.spectral else ())):
-        if isinstance(one.default, bool):
+    for parameter in (*spec.parameters, *(_LIGHT if spec.spectral else ())):
+        if isinstance(parameter.default, bool):
             continue
-        low, high = usual.get(one.name, (one.low, one.high))
-        if one.unit == "rad":
-            low, high = round(float(degrees(low)), 12), round(float(degrees(high)), 12)
-        axes.append(Axis(as_written(one), low, high))
+        low, high = usual.get(parameter.name, (parameter.low, parameter.high))
+        if parameter.unit == "rad":
+            low = round(float(degrees(low)), 12)
+            high = round(float(degrees(high)), 12)
+        axes.append(Axis(as_written(parameter), low, high))
     known = [axis.parameter.name for axis in axes]
     for name, (low, high) in ranges.items():
         if name not in known:
@@ -82,12 +80,8 @@ def axes_of(spec: ModelSpec, ranges: Mapping[str, tuple[float, float]]) -> list[
 def materials(spec: ModelSpec, axes: list[Axis], count: int, seed: int) -> dict[str, Array]:
     """Return parameters (count,) of materials, as files write them: a Latin hypercube over the axes.
 
-    Materials that break the condition of the model are left out, and others drawn for them.
-
-    Raises
-    ------
-    ParameterError
-        If hardly any material of the ranges keeps the condition.
+    Materials that break the condition of the model are left out, and others drawn for them. ParameterError says that
+    hardly any material of the ranges satisfies the condition.
     """
     rng = np.random.default_rng(seed)
     drawn = count

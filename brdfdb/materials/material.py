@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,9 +25,16 @@ from brdfdb.arrays import array_lookup
 from brdfdb.errors import MaterialError, ParameterError, sentence_of
 from brdfdb.geometry import degrees
 from brdfdb.lobes import Lobe
-from brdfdb.materials.evaluation import each, evaluations, summed
 from brdfdb.materials.provenance import MOST_NAME, NAME_PATTERN, Assumption, KnownExcess, Number, Text, Words
-from brdfdb.materials.source import Evaluate, FourAngles, Lookups, Lossless, check_wavelengths, no_specular_part
+from brdfdb.materials.source import (
+    Evaluate,
+    FourAngles,
+    Lookups,
+    Lossless,
+    RefractiveIndices,
+    check_wavelengths,
+    no_specular_part,
+)
 from brdfdb.materials.spectrum import Spectrum, assumptions, made_lossless
 from brdfdb.materials.written_parameters import completed, from_file, written_name
 from brdfdb.models import MODELS
@@ -95,10 +103,11 @@ class Material(BaseModel, Lookups):
 
         Parameters, and their names in sources and assumed, are read as `file_parameters` writes them: angles are in
         degrees, under names that end in ``_deg``. A reflectance may be a spectrum, in one of the ways of
-        `brdfdb.materials.written_spectra.spectrum_of`; paths of CSV files begin at `folder`.
+        `brdfdb.materials.spectrum.spectrum_of`; paths of CSV files begin at `folder`.
         """
         fields = {**table, "name": name}
-        model, parameters = table.get("model"), table.get("parameters", {})
+        model = table.get("model")
+        parameters = table.get("parameters", {})
         try:
             if isinstance(model, str) and model in MODELS and isinstance(parameters, Mapping):
                 fields["parameters"] = from_file(MODELS[model], parameters, table.get("wavelengths_nm"), folder)
@@ -118,9 +127,8 @@ class Material(BaseModel, Lookups):
                     fields["assumed"] = assumptions(fields["parameters"]) | dict(stated)
             return cls.model_validate(fields)
         except ValidationError as error:
-            (field, sentence), *others = map(_field_and_sentence, error.errors())
-            sentences = [sentence, *(f"{field}: {sentence}" for field, sentence in others)]
-            raise MaterialError(name, field, "; ".join(sentences)) from None
+            first, *others = map(_parameter_error, error.errors())
+            raise MaterialError(name, first.parameter, "; ".join([first.sentence, *map(str, others)])) from None
         except ParameterError as error:
             raise MaterialError(name, error.parameter, error.sentence, error.value, error.allowed) from None
 
@@ -274,21 +282,9 @@ class Material(BaseModel, Lookups):
     def arguments(self, wavelength_nm: ArrayLike | None = None) -> dict[str, Any]:
         """Return the keyword arguments of the model call, without the angles.
 
-        Parameters
-        ----------
-        wavelength_nm : array_like [nm], optional
-            Wavelengths for a spectral material, by default those of its parameters; grey materials ignore them.
-
-        Returns
-        -------
-        dict
-            The parameters; a spectrum has an array in the shape of the wavelengths. A spectral model also has
-            ``wavelength_nm`` [nm], ``n`` and ``k`` [1], float64 arrays of that shape.
-
-        Raises
-        ------
-        ParameterError
-            If a spectral material has no wavelengths, or its refractive index or a spectrum is not known at one.
+        A spectrum is an array in the shape of the wavelengths [nm], which are by default those of the material; grey
+        materials ignore them. A spectral model also has ``wavelength_nm`` [nm], ``n`` and ``k`` [1] of that shape.
+        ParameterError says that wavelengths are missing, or that n and k or a spectrum are not known at one.
         """
         given = {**self.parameters, **self._changed}
         if not self.spectral:
@@ -335,13 +331,13 @@ class Material(BaseModel, Lookups):
         ParameterError
             If the refractive index or a spectrum is not known at one of the wavelengths.
         """
-        f_r, together = vectors or self.spec.vectors, self.arguments(wavelength_nm)
+        f_r = vectors or self.spec.vectors
+        together = self.arguments(wavelength_nm)
         if wavelength_nm is None:
             return lambda wi, wr: f_r(wi, wr, **together)[:, np.newaxis]
         if self.refractive_index is None:
             of = degree if vectors else self.spec.degree
-            sets, weights = evaluations(self.spec, together, wavelength_nm.size, of)
-            return summed(f_r, sets, weights)
+            return evaluations(self.spec, together, wavelength_nm.size, of).summed(f_r)
         # one row of the kernel a wavelength, because rows share what directions alone decide
         rows = {name: np.broadcast_to(value, wavelength_nm.shape)[:, np.newaxis] for name, value in together.items()}
         return lambda wi, wr: np.moveaxis(f_r(wi, wr, **rows), 0, -1)
@@ -377,7 +373,9 @@ class Material(BaseModel, Lookups):
         given = self.arguments(wavelength_nm)
         used = given if names is None else {name: given[name] for name in names}
         shape = np.shape(self.wavelengths_nm or () if wavelength_nm is None else wavelength_nm)
-        sets = each(used, shape[0]) if shape else [used]
+        sets = [used]
+        if shape:
+            sets = [{name: v[w] if np.ndim(v) else v for name, v in used.items()} for w in range(shape[0])]
         values = [function(*angles, **arguments) for arguments in sets]
         return np.stack(values, axis=-1) if shape else values[0]
 
@@ -385,12 +383,10 @@ class Material(BaseModel, Lookups):
         """Return the lobe for lights with the cosine cos_i, which broadcasts with wavelengths [nm]; None if diffuse."""
         return None if self.spec.lobe is None else self.spec.lobe(cos_i, **self.arguments(wavelength_nm))
 
-    def refractive_indices(
-        self, wavelength_nm: NDArray[np.float64] | None
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+    def refractive_indices(self, wavelength_nm: NDArray[np.float64] | None) -> RefractiveIndices | None:
         """Return n and k [1] at wavelengths [nm]; None if the model is not spectral."""
         arguments = {} if self.refractive_index is None else self.arguments(wavelength_nm)
-        return (arguments["n"], arguments["k"]) if arguments else None
+        return RefractiveIndices(arguments["n"], arguments["k"]) if arguments else None
 
     def file_parameters(self) -> dict[str, Number | Spectrum]:
         """Return the parameters as files write them: angles in degrees, under names ending in ``_deg``."""
@@ -405,7 +401,8 @@ class Material(BaseModel, Lookups):
 
     def attributes(self) -> dict[str, Any]:
         """Return the attributes of the material in its table, with angles in degrees."""
-        spec, written = self.spec, {p.name: written_name(p) for p in self.spec.parameters}
+        spec = self.spec
+        written = {parameter.name: written_name(parameter) for parameter in spec.parameters}
         sources = {n: v.origin for n, v in self.parameters.items() if isinstance(v, Spectrum)} | self.sources
         return {
             "title": self.title,
@@ -448,9 +445,74 @@ class Material(BaseModel, Lookups):
         return {"model_version": self.spec.version, "material": material}
 
 
-def _field_and_sentence(error: ErrorDetails) -> tuple[str, str]:
-    """Return the field and the sentence of an error of pydantic. A ParameterError names the field itself."""
+def _parameter_error(error: ErrorDetails) -> ParameterError:
+    """Return an error of pydantic as one that names the field."""
     ours = error["ctx"]["error"] if error["type"] == "value_error" else sentence_of(error)
-    if isinstance(ours, ParameterError):
-        return ours.parameter, ours.sentence
-    return ".".join(map(str, error["loc"])), str(ours)
+    return ours if isinstance(ours, ParameterError) else ParameterError(".".join(map(str, error["loc"])), str(ours))
+
+
+def exact_material(material: Material) -> Material:
+    """Return the material with the exact model that its own approximates, or itself if the registry has none.
+
+    Statements about parameters that the exact model lacks are left out, and so is a known excess: it belongs to the
+    other model.
+    """
+    exact = None if material.spec.exact_model is None else material.spec.exact_model(material.parameters)
+    if exact is None:
+        return material
+    model, parameters = exact
+    stated = {
+        "sources": {name: source for name, source in material.sources.items() if name in parameters},
+        "assumed": {name: assumption for name, assumption in material.assumed.items() if name in parameters},
+        "known_excess": None,
+    }
+    return material.model_copy(update={"model": model, "parameters": parameters, **stated})
+
+
+class Evaluations(NamedTuple):
+    """Sets of arguments of a model, all numbers, and weights (sets, wavelengths) that make f_r of their values.
+
+    Without weights there is a set for each wavelength.
+    """
+
+    sets: list[dict[str, Any]]
+    weights: NDArray[np.float64] | None
+
+    def summed(self, f_r: Callable[..., Floats]) -> Evaluate:
+        """Return a function of directions that gives f_r at all wavelengths."""
+
+        def brdf(wi: Floats, wr: Floats) -> Floats:
+            values = np.stack([f_r(wi, wr, **arguments) for arguments in self.sets], axis=-1)
+            # a BLAS sums in an order that depends on where a row stands: what was symmetric would not stay it
+            return values if self.weights is None else np.einsum("...e,el->...l", values, self.weights)
+
+        return brdf
+
+
+def evaluations(spec: ModelSpec, arguments: Mapping[str, Any], count: int, degree: int | None) -> Evaluations:
+    """Return the sets of arguments that make f_r at all wavelengths of a model that takes no wavelength itself.
+
+    A model that is a polynomial of a `degree` in its reflectances takes a few calls; None: it is none. `arguments` are
+    numbers, or arrays (L,) of reflectances at `count` wavelengths.
+    """
+    spectra = {name: np.asarray(value) for name, value in arguments.items() if np.ndim(value)}
+    numbers = {name: value for name, value in arguments.items() if name not in spectra}
+    if not spectra:
+        return Evaluations([numbers], np.ones((1, count)))
+    low = {name: spec.parameter(name).low for name in spectra}
+    high = {name: spec.parameter(name).high for name in spectra}
+    share = {name: (value - low[name]) / (high[name] - low[name]) for name, value in spectra.items()}
+    if degree == 1 and count > len(spectra) + 1:
+        corners = [numbers | low, *(numbers | low | {name: high[name]} for name in spectra)]
+        return Evaluations(corners, np.stack([1.0 - sum(share.values()), *share.values()]))
+    pairs = list(itertools.combinations_with_replacement(range(len(spectra) + 1), 2))
+    if degree == 2 and count > len(pairs):
+        # Lagrange's polynomials through the corners of the simplex and the middles between them
+        names = [*spectra]
+        corner = np.eye(len(spectra) + 1)[:, 1:]
+        middles = [dict(zip(names, 0.5 * (corner[a] + corner[b]), strict=True)) for a, b in pairs]
+        sets = [numbers | {name: low[name] + m[name] * (high[name] - low[name]) for name in names} for m in middles]
+        s = np.stack([1.0 - sum(share.values()), *share.values()])
+        weights = [s[a] * (2.0 * s[a] - 1.0) if a == b else 4.0 * s[a] * s[b] for a, b in pairs]
+        return Evaluations(sets, np.stack(weights))
+    return Evaluations([numbers | {name: value[w] for name, value in spectra.items()} for w in range(count)], None)

@@ -89,7 +89,7 @@ class Parameters(BaseModel):
     )
 
     def material(self, spec: ModelSpec) -> Material:
-        """Return the material, without a name; ParameterError if it is none. Files are not read."""
+        """Return the material, named "request"; ParameterError if the fields make no material. Files are not read."""
         for name, value in self.parameters.items():
             if isinstance(value, Mapping) and "csv" in value:
                 raise ParameterError(name, "files are not read over HTTP; give wavelengths_nm and values", value)

@@ -93,6 +93,13 @@ class Lossless(NamedTuple):
     changes: dict[str, float | Spectrum]
 
 
+class RefractiveIndices(NamedTuple):
+    """n and k [1] at wavelengths, arrays (L,)."""
+
+    n: NDArray[np.float64]
+    k: NDArray[np.float64]
+
+
 class Source(Protocol):
     """A source of f_r: a material with a model, or a function.
 
@@ -176,10 +183,7 @@ class Source(Protocol):
     def brdf_at(self, wavelength_nm: NDArray[np.float64] | None) -> Evaluate:
         """Return f_r [1/sr] at wavelengths (L,) [nm] as a function of unit vectors (N, 3): shape (N, L), L = 1 if grey.
 
-        Raises
-        ------
-        ParameterError
-            If the source does not hold at one of the wavelengths.
+        ParameterError says that the source does not hold at one of the wavelengths.
         """
 
     def lookup(
@@ -201,9 +205,7 @@ class Source(Protocol):
     def lobe(self, cos_i: Floats, wavelength_nm: NDArray[np.float64] | None) -> Lobe | None:
         """Return the lobe for lights with the cosine cos_i, which broadcasts with wavelengths [nm]; None if diffuse."""
 
-    def refractive_indices(
-        self, wavelength_nm: NDArray[np.float64] | None
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+    def refractive_indices(self, wavelength_nm: NDArray[np.float64] | None) -> RefractiveIndices | None:
         """Return n and k [1] at wavelengths [nm]; None if f_r does not depend on them."""
 
     def attributes(self) -> dict[str, Any]:

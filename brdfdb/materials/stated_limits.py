@@ -12,10 +12,10 @@ from brdfdb.materials.material import Material
 from brdfdb.parameters import Standing, StatedLimit
 
 _WORDS: dict[Standing, str] = {
-    "outside": "not kept",
+    "outside": "not met",
     "at the edge": "at the edge",
     "unknown": "not known",
-    "inside": "kept",
+    "inside": "met",
 }
 
 
@@ -33,7 +33,11 @@ def counts_of(standings: Sequence[Standing]) -> Iterator[tuple[Standing, str]]:
 
 
 def in_words(standings: Sequence[Standing]) -> str:
-    """Return the number of limits that are kept, at the edge and not kept, in a few words."""
+    """Return whether a material is within the limits of its paper, or the limits of each standing."""
+    count = len(standings)
     if not standings:
-        return "its paper states no limits"
-    return f"its paper states {counted(len(standings), 'limit')}: {', '.join(dict(counts_of(standings)).values())}"
+        return "the paper states no limits"
+    if all(standing == "inside" for standing in standings):
+        limits = {1: "the limit", 2: "both limits"}.get(count, f"all {count} limits")
+        return f"within {limits} that the paper states"
+    return f"{counted(count, 'limit')} that the paper states: {', '.join(dict(counts_of(standings)).values())}"

@@ -10,8 +10,7 @@ from typing import Any
 from brdfdb.errors import ParameterError
 from brdfdb.geometry import degrees, radians
 from brdfdb.materials.provenance import Number
-from brdfdb.materials.spectrum import Spectrum
-from brdfdb.materials.written_spectra import spectrum_of
+from brdfdb.materials.spectrum import Spectrum, spectrum_of
 from brdfdb.parameters import ModelSpec, Parameter
 
 

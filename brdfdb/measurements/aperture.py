@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache, cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,9 +20,16 @@ _AROUND = (6, 12)  # directions of a ring, of one ring and of more
 _RINGS = 3  # of lobes that are narrower than the half angle
 
 
+class DiskRule(NamedTuple):
+    """Points (Q, 2) of a disk of radius 1, the middle first, and their weights (Q,), which add up to 1."""
+
+    points: NDArray[np.float64]
+    weights: NDArray[np.float64]
+
+
 @cache
-def disk(rings: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return points (Q, 2) of a disk of radius 1, the middle first, and their weights (Q,), which add up to 1.
+def disk(rings: int) -> DiskRule:
+    """Return the rule of a disk with so many rings of points around its middle.
 
     Radau's rule in the square of the radius, with equal steps around. One ring has 7 points, and is exact for
     polynomials of degree 5. Three rings have 37, and are exact to degree 11.
@@ -35,8 +43,9 @@ def disk(rings: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     circle = np.stack([np.cos(turns), np.sin(turns)], axis=1)
     points = np.sqrt(0.5 * (1.0 + x))[:, np.newaxis, np.newaxis] * circle
     middle = 1.0 / (rings + 1.0) ** 2
-    return np.concatenate([np.zeros((1, 2)), points.reshape(-1, 2)]), np.array(
-        [middle, *np.repeat(weights / count, count)]
+    return DiskRule(
+        np.concatenate([np.zeros((1, 2)), points.reshape(-1, 2)]),
+        np.array([middle, *np.repeat(weights / count, count)]),
     )
 
 
@@ -49,25 +58,29 @@ def cone(w: Floats, half_angle: float, rings: int = 1) -> Floats:
     u = np.cross(w, helper)
     u /= np.linalg.norm(u, axis=1, keepdims=True)
     v = np.cross(w, u)
-    at = np.tan(half_angle) * disk(rings)[0]
+    at = np.tan(half_angle) * disk(rings).points
     spread = w + at[:, 0, np.newaxis, np.newaxis] * u + at[:, 1, np.newaxis, np.newaxis] * v
     return np.asarray(spread / np.linalg.norm(spread, axis=2, keepdims=True))
 
 
-class View:
-    """Pairs of directions as an instrument sees them.
+class _Around(NamedTuple):
+    """Lights and viewers (Q N, 3) at the points of the aperture besides the middle.
 
-    Parameters
-    ----------
-    w_i, w_r : array (N, 3)
-        Unit vectors of light and viewer, the middles of their solid angles.
-    instrument : Instrument, optional
-        Solid angles that are unknown count as 0. None: f_r at the directions themselves.
+    `weights` (Q, N) are those of the mean; `above` (Q, N) tells the viewers above the horizon.
+    """
 
-    Attributes
-    ----------
-    half_angle : float [rad]
-        Half angle of the disk that light and receiver make together; 0 where neither has a known solid angle.
+    w_i: Floats
+    w_r: Floats
+    weights: Floats
+    above: NDArray[np.bool_]
+
+
+class InstrumentView:
+    """Pairs of directions, unit vectors (N, 3), as an instrument with wide light and receiver sees them.
+
+    Solid angles that are unknown count as 0; without an instrument f_r is that at the directions themselves.
+    `half_angle` [rad] is that of the disk that light and receiver make together; 0 where neither has a known solid
+    angle.
 
     Notes
     -----
@@ -78,18 +91,24 @@ class View:
     """
 
     def __init__(self, w_i: Floats, w_r: Floats, instrument: Instrument | None = None) -> None:
-        self.w_i, self.w_r, self.instrument = w_i, w_r, instrument
+        self.w_i = w_i
+        self.w_r = w_r
+        self.instrument = instrument
         angles = () if instrument is None else (instrument.source_solid_angle_sr, instrument.receiver_solid_angle_sr)
-        self._half_angles = [_half_angle(solid_angle) for solid_angle in angles if solid_angle is not None]
+        self._half_angles = [
+            float(np.arccos(max(1.0 - solid_angle / (2.0 * np.pi), 0.0)))
+            for solid_angle in angles
+            if solid_angle is not None
+        ]
         self.half_angle = float(np.hypot.reduce(self._half_angles)) if self._half_angles else 0.0
-        self._spread: dict[int, tuple[Floats, Floats, Floats, NDArray[np.bool_]]] = {}
+        self._spread: dict[int, _Around] = {}
 
     def __len__(self) -> int:
         return len(self.w_i)
 
-    def selected(self, rows: NDArray[np.int64]) -> View:
+    def selected(self, rows: NDArray[np.int64]) -> InstrumentView:
         """Return the view of some of the pairs."""
-        return View(self.w_i[rows], self.w_r[rows], self.instrument)
+        return InstrumentView(self.w_i[rows], self.w_r[rows], self.instrument)
 
     @cached_property
     def theta_i(self) -> Floats:
@@ -121,51 +140,38 @@ class View:
     def points(self, width: float | None = None) -> int:
         """Return the number of directions that the mean of a lobe takes at each pair; `width` as of `mean`."""
         rings = _rings(self.half_angle, width)
-        return len(disk(rings)[1]) if rings else 1
+        return len(disk(rings).weights) if rings else 1
 
     def mean(self, brdf: Callable[[Floats, Floats], Floats], width: float | None = None) -> Floats:
         """Return f_r [1/sr] averaged over the aperture.
 
-        Parameters
-        ----------
-        brdf : callable
-            f_r [1/sr], shape (M,) or (M, C), at unit vectors (M, 3) of light and viewer.
-        width : float [1], optional
-            Width of its lobe, in slopes: a narrow one takes more points, and a very wide one the middle alone.
+        `brdf` gives f_r [1/sr], shape (M,) or (M, C), at unit vectors (M, 3) of light and viewer. `width` [1] is that
+        of its lobe, in slopes: a narrow lobe takes more points, and a very wide one the middle alone.
         """
         middle = np.asarray(brdf(self.w_i, self.w_r))
         rings = _rings(self.half_angle, width)
         if not rings:
             return middle
         if rings not in self._spread:
-            self._spread[rings] = self._moved(rings)
-        w_i, w_r, weights, above = self._spread[rings]
-        values = np.asarray(brdf(w_i, w_r)).reshape(*above.shape, *middle.shape[1:])
+            spread = cone(self.w_r, self.half_angle, rings)[1:]
+            above = spread[:, :, 2] > 0.0
+            viewers = np.where(above[:, :, np.newaxis], spread, self.w_r)
+            light = np.ascontiguousarray(np.broadcast_to(self.w_i, viewers.shape)).reshape(-1, 3)
+            weights = disk(rings).weights[1:, np.newaxis] * viewers[:, :, 2] / self.w_r[:, 2]
+            self._spread[rings] = _Around(light, viewers.reshape(-1, 3), weights, above)
+        around = self._spread[rings]
+        values = np.asarray(brdf(around.w_i, around.w_r)).reshape(*around.above.shape, *middle.shape[1:])
         further = (...,) + (np.newaxis,) * (middle.ndim - 1)
-        values = np.where(above[further], values, middle)
-        return np.asarray(disk(rings)[1][0] * middle + np.sum(weights[further] * values, axis=0))
-
-    def _moved(self, rings: int) -> tuple[Floats, Floats, Floats, NDArray[np.bool_]]:
-        """Return light and viewers (Q N, 3) of the points besides the middle, their weights and which are above."""
-        spread = cone(self.w_r, self.half_angle, rings)[1:]
-        above = spread[:, :, 2] > 0.0
-        viewers = np.where(above[:, :, np.newaxis], spread, self.w_r)
-        weights = disk(rings)[1][1:, np.newaxis] * viewers[:, :, 2] / self.w_r[:, 2]
-        light = np.broadcast_to(self.w_i, viewers.shape)
-        return np.ascontiguousarray(light).reshape(-1, 3), viewers.reshape(-1, 3), weights, above
+        values = np.where(around.above[further], values, middle)
+        return np.asarray(disk(rings).weights[0] * middle + np.sum(around.weights[further] * values, axis=0))
 
 
 def averaged(brdf: Evaluate, instrument: Instrument) -> Evaluate:
     """Return f_r averaged over the solid angles of an instrument, a function of unit vectors like `brdf`.
 
-    `brdf` gives f_r [1/sr], shape (N, C), at unit vectors (N, 3) of light and viewer. `View` says what is averaged.
+    `brdf` gives f_r [1/sr], shape (N, C), at unit vectors (N, 3) of light and viewer.
     """
-    return lambda w_i, w_r: View(w_i, w_r, instrument).mean(brdf)
-
-
-def _half_angle(solid_angle: float) -> float:
-    """Return half of the angle [rad] of the cone with a solid angle [sr]."""
-    return float(np.arccos(max(1.0 - solid_angle / (2.0 * np.pi), 0.0)))
+    return lambda w_i, w_r: InstrumentView(w_i, w_r, instrument).mean(brdf)
 
 
 def _solid_angle(half_angle: float) -> float:

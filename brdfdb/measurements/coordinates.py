@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,13 +13,27 @@ _FLAT = 1e-6  # spread of the samples along an axis of their hull, relative to t
 _WITHIN = 1e-6  # distance [rad] outside of the hull that rounding makes
 
 
-def half_angles(wi: Floats, wr: Floats) -> tuple[Floats, Floats]:
-    """Return the squared tangent of theta_h, and theta_d [rad], of unit vectors (N, 3) above the horizon."""
+class DirectionPairs(NamedTuple):
+    """Unit vectors (N, 3) of light and viewer."""
+
+    wi: Floats
+    wr: Floats
+
+
+class HalfAngles(NamedTuple):
+    """The squared tangent of theta_h, and theta_d [rad]."""
+
+    tan2_h: Floats
+    theta_d: Floats
+
+
+def half_angles(wi: Floats, wr: Floats) -> HalfAngles:
+    """Return the half and difference angles of unit vectors (N, 3) above the horizon."""
     half = wi + wr
     across = half[:, 0] ** 2 + half[:, 1] ** 2
     length = np.sqrt(across + half[:, 2] ** 2)
     theta_d = np.arctan2(np.linalg.norm(wi - wr, axis=1), length)
-    return across / np.maximum(half[:, 2], 1e-9) ** 2, theta_d
+    return HalfAngles(across / np.maximum(half[:, 2], 1e-9) ** 2, theta_d)
 
 
 def features(wi: Floats, wr: Floats, alpha: float, scales: tuple[float, float, float], *, turned: bool) -> Floats:

@@ -13,12 +13,17 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from brdfdb.errors import ParameterError
 from brdfdb.geometry import HALF_PI, degrees, radians, unit_vector
-from brdfdb.measurements.coordinates import beyond, places
+from brdfdb.measurements.coordinates import DirectionPairs, beyond, places
 from brdfdb.measurements.samples import Samples
 from brdfdb.parameters import Floats
 
-_CELL_DEG, _TURNED_CELL_DEG = 2.5, 7.5  # cells of three coordinates, and of four, which are many more
-_LIGHTS, _VIEWERS, _SCATTERED = 2.0, 4.0, 4.0  # volume of a ball, in those that typically fit between samples
+# cells of three coordinates, and of four, which are many more
+_CELL_DEG = 2.5
+_TURNED_CELL_DEG = 7.5
+# volume of a ball, in those that typically fit between samples
+_LIGHTS = 2.0
+_VIEWERS = 4.0
+_SCATTERED = 4.0
 _THINNED = 400  # samples that the typical ball is measured with
 _LOWEST = radians(89.9)  # polar angle of directions that are drawn, at most
 _LEAST = 1.5  # radius of a ball in cells, at least: smaller ones slip through the cells
@@ -85,7 +90,9 @@ class Extent(BaseModel):
             radii = np.full(lights + 2, _SCATTERED ** (1.0 / (lights + 2)) * _typical(sheared))
         radii = np.maximum(radii / cell, _LEAST)
         at = np.unique(np.rint(x / cell).astype(np.int64), axis=0)
-        at = at if turned else _symmetric(at)
+        if not turned:  # mirror images, and both with the surface turned by 180 degrees
+            at = np.concatenate([at, at * [1, 1, -1]])
+            at = np.unique(np.concatenate([at, -at]), axis=0)
         count = round(HALF_PI / cell)
         whole = np.argwhere(np.ones((2 * count + 1,) * at.shape[1], dtype=bool)) - count
         inside = whole[~beyond(whole.astype(np.float64), at.astype(np.float64))]
@@ -98,14 +105,10 @@ class Extent(BaseModel):
 
     @functools.cached_property
     def measured(self) -> Cells:
-        """The cells, with three or four axes as `cells` has them.
-
-        Raises
-        ------
-        ParameterError
-            If they are damaged.
-        """
-        shape = _shape(round(90.0 / self.cell_deg), turned=self.turned)
+        """The cells, with three or four axes as `cells` has them; ParameterError if they are damaged."""
+        count = round(90.0 / self.cell_deg)
+        both = 2 * count + 1
+        shape = (both,) * 4 if self.turned else (count + 1, both, count + 1)
         size = (int(np.prod(shape)) + 7) // 8
         try:
             packed = zlib.decompressobj().decompress(base64.b64decode(self.cells, validate=True), size + 1)
@@ -124,21 +127,17 @@ class Extent(BaseModel):
         at = np.clip(at + _origin(count, turned=self.turned), 0, np.array(self.measured.shape) - 1)
         return np.asarray(~self.measured[tuple(at.T)])
 
-    def drawn(self, count: int, rng: np.random.Generator) -> tuple[Floats, Floats]:
+    def drawn(self, count: int, rng: np.random.Generator) -> DirectionPairs:
         """Draw pairs of unit vectors (count, 3) above the horizon, evenly over the cells that were measured."""
         cells = np.argwhere(self.measured) - _origin(round(90.0 / self.cell_deg), turned=self.turned)
         x = cells[rng.integers(len(cells), size=count)] + rng.uniform(-0.5, 0.5, (count, cells.shape[1]))
         x = x * radians(self.cell_deg)
         theta_i = np.hypot(x[:, 0], x[:, 1]) if self.turned else np.abs(x[:, 0])
         phi_i = np.arctan2(x[:, 1], x[:, 0]) if self.turned else rng.uniform(0.0, 2.0 * np.pi, count)
-        theta_r, phi_r = np.hypot(x[:, -2], x[:, -1]), np.arctan2(x[:, -1], x[:, -2]) + phi_i * (not self.turned)
+        theta_r = np.hypot(x[:, -2], x[:, -1])
+        phi_r = np.arctan2(x[:, -1], x[:, -2]) + phi_i * (not self.turned)
         theta_i, theta_r = (np.minimum(theta, _LOWEST) for theta in (theta_i, theta_r))
-        return unit_vector(theta_i, phi_i), unit_vector(theta_r, phi_r)
-
-
-def _shape(count: int, *, turned: bool) -> tuple[int, ...]:
-    both = 2 * count + 1
-    return (both,) * 4 if turned else (count + 1, both, count + 1)
+        return DirectionPairs(unit_vector(theta_i, phi_i), unit_vector(theta_r, phi_r))
 
 
 def _origin(count: int, *, turned: bool) -> NDArray[np.int64]:
@@ -151,12 +150,6 @@ def _sheared(x: NDArray[_Number], lights: int) -> NDArray[_Number]:
     moved = x.copy()
     moved[:, lights : 2 * lights] += x[:, :lights]
     return moved
-
-
-def _symmetric(at: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return isotropic places with their mirror images, and both with the surface turned by 180 degrees."""
-    both = np.concatenate([at, at * [1, 1, -1]])
-    return np.unique(np.concatenate([both, -both]), axis=0)
 
 
 def _typical(x: Floats) -> float:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import itertools
 from dataclasses import asdict, dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,8 +20,8 @@ from brdfdb.geometry import degrees, radians, spherical_angles, unit_vector
 from brdfdb.materials.source import Evaluate
 from brdfdb.measurements.aperture import cone, disk
 from brdfdb.measurements.samples import Instrument, Samples
+from brdfdb.parameters import Array
 
-Array = NDArray[np.float64]
 Frames = NDArray[np.float32]
 
 _RANGES = {
@@ -59,7 +59,9 @@ def eq_3(theta_c: Array, phi_c: Array, offset: float) -> Array:
     """
     sine = np.sin(phi_c) * np.sin(theta_c)
     r_c = offset * sine + np.sqrt(offset**2 * sine**2 + 1.0 - offset**2)
-    x, y, z = r_c * np.cos(phi_c) * np.sin(theta_c), r_c * sine - 2.0 * offset, r_c * np.cos(theta_c)
+    x = r_c * np.cos(phi_c) * np.sin(theta_c)
+    y = r_c * sine - 2.0 * offset
+    z = r_c * np.cos(theta_c)
     theta_r = np.arccos(z / np.sqrt(x**2 + y**2 + z**2))
     return unit_vector(theta_r, np.arctan2(y, x))
 
@@ -78,53 +80,37 @@ def traced(theta_c: Array, phi_c: Array, offset: float) -> Array:
     return np.asarray(2.0 * np.sum(out * point, axis=-1, keepdims=True) * point - out)
 
 
+class CameraAngles(NamedTuple):
+    """Polar angles and azimuths [rad] of directions of the camera."""
+
+    theta_c: Array
+    phi_c: Array
+
+
 @dataclass(frozen=True)
 class Gonioreflectometer:
-    """The instrument. The defaults are those of a camera of today; the paper prints few of its numbers.
+    """The instrument. The defaults are those of a camera of today; the paper prints few of its numbers."""
 
-    Attributes
-    ----------
-    width, height : int
-        Pixels of the camera. The paper reduces its pictures to 108 by 80 before it uses them.
-    offset : float [1]
-        D / R: half of the distance of sample and camera over the radius of the hemisphere.
-    field_deg : float [degree]
-        Angle of the lens at the upper edge of the picture. The lens gives all pixels the same solid angle: the distance
-        from the middle is in proportion to the sine of half of the angle.
-    largest_theta_r_deg : float [degree]
-        Largest polar angle of the viewer that is used; the hemisphere ends there.
-    standard_reflectance : float [1]
-        Reflectance of the diffuse standard, rho_standard of eq. 2.
-    light_half_angle_deg : float [degree]
-        Half of the angle of the beam, seen from the sample.
-    blur_px : float [pixel]
-        Standard deviation of the blur of hemisphere and lens.
-    full_well, read_noise : float [electron]
-        Charge at the largest count, and noise of a pixel in the dark.
-    bits : int
-        Bits of a count.
-    exposures : tuple of float [1]
-        Times of exposure, relative to the longest. Their range is that of the measured values.
-    frames : int
-        Number of pictures of the standard and of the background that are averaged.
-    stray : float [1]
-        Stray light in the background, relative to that of a perfect white.
-    """
-
+    #: width, height: pixels of the camera. The paper reduces its pictures to 108 by 80 before it uses them
     width: int = 432
     height: int = 320
-    offset: float = 0.05
+    offset: float = 0.05  #: D / R: half of the distance of sample and camera over the radius of the hemisphere, [1]
+    #: angle of the lens at the upper edge of the picture. The lens gives all pixels the same solid angle: the distance
+    #: from the middle is in proportion to the sine of half of the angle, [degree]
     field_deg: float = 85.0
+    #: largest polar angle of the viewer that is used; the hemisphere ends there, [degree]
     largest_theta_r_deg: float = 75.0
-    standard_reflectance: float = 0.98
-    light_half_angle_deg: float = 0.5
-    blur_px: float = 0.7
+    standard_reflectance: float = 0.98  #: reflectance of the diffuse standard, rho_standard of eq. 2, [1]
+    light_half_angle_deg: float = 0.5  #: half of the angle of the beam, seen from the sample, [degree]
+    blur_px: float = 0.7  #: standard deviation of the blur of hemisphere and lens, [pixel]
+    #: full_well, read_noise: charge at the largest count, and noise of a pixel in the dark, [electron]
     full_well: float = 20000.0
     read_noise: float = 8.0
-    bits: int = 14
+    bits: int = 14  #: bits of a count
+    #: times of exposure, relative to the longest. Their range is that of the measured values, [1]
     exposures: tuple[float, ...] = (1.0, 1.0 / 16.0, 1.0 / 256.0)
-    frames: int = 16
-    stray: float = 0.002
+    frames: int = 16  #: number of pictures of the standard and of the background that are averaged
+    stray: float = 0.002  #: stray light in the background, relative to that of a perfect white, [1]
 
     def __post_init__(self) -> None:
         for name, (low, high) in _RANGES.items():
@@ -150,8 +136,8 @@ class Gonioreflectometer:
         """The largest count."""
         return float(2**self.bits - 1)
 
-    def pixels(self, within: tuple[float, ...] = (0.5,)) -> tuple[Array, Array]:
-        """Return theta_c and phi_c [rad] of the camera, the top row first.
+    def pixels(self, within: tuple[float, ...] = (0.5,)) -> CameraAngles:
+        """Return the angles of the pixels, the top row first.
 
         The shape is (height * K, width * K) for K points along each axis of a pixel, at `within` [pixel] of its corner.
         """
@@ -160,7 +146,7 @@ class Gonioreflectometer:
         )
         right, up = np.meshgrid(x, -y)
         sine = 0.5 * self.pitch * np.hypot(right, up)  # of half of theta_c
-        return 2.0 * np.arcsin(np.minimum(sine, 1.0)), np.arctan2(up, right)
+        return CameraAngles(2.0 * np.arcsin(np.minimum(sine, 1.0)), np.arctan2(up, right))
 
     @cached_property
     def directions(self) -> Array:
@@ -188,20 +174,13 @@ class Gonioreflectometer:
 
 
 @dataclass(frozen=True, eq=False)
-class Picture:
+class CameraPicture:
     """Counts of the camera for one direction of the light.
 
-    Attributes
-    ----------
-    settings : Gonioreflectometer
-        The instrument.
-    theta_i, phi_i : float [rad]
-        The light, in the frame of the sample. Light comes from the right, and the sample is turned by -phi_i.
-    sample, standard, background : array (E, height, width)
-        Counts with the sample, with the standard, and without either, an array an exposure. Standard and background are
-        means of `frames` pictures.
-    name, provenance : str
-        The material, and where the picture comes from.
+    `theta_i`, `phi_i` [rad] is the light in the frame of the sample: light comes from the right, and the sample is
+    turned by -phi_i. `sample`, `standard`, `background` are counts (E, height, width) with the sample, with the
+    standard, and without either, an array an exposure. Standard and background are means of `frames` pictures.
+    `provenance` is where the picture comes from.
     """
 
     settings: Gonioreflectometer
@@ -225,21 +204,11 @@ class Picture:
 
 def photograph(
     brdf: Evaluate, settings: Gonioreflectometer, theta_i: float, phi_i: float, seed: int, name: str = "sample"
-) -> Picture:
+) -> CameraPicture:
     """Return the picture that the instrument takes of a surface: blurred, noisy, and clipped where it saturates.
 
-    Parameters
-    ----------
-    brdf : callable
-        f_r [1/sr], shape (N, 1), at unit vectors (N, 3) of light and viewer.
-    settings : Gonioreflectometer
-        The instrument.
-    theta_i, phi_i : float [rad]
-        The light, in the frame of the sample.
-    seed : int
-        Seed of the noise.
-    name : str
-        Name of the material.
+    `brdf` gives f_r [1/sr], shape (N, 1), at unit vectors (N, 3) of light and viewer. The light at `theta_i`, `phi_i`
+    [rad] is in the frame of the sample. `seed` is that of the noise.
 
     Notes
     -----
@@ -255,7 +224,7 @@ def photograph(
     turned = _turned(wr[above], phi_i)
     f_r = np.zeros(len(wr))
     beam = cone(unit_vector(theta_i, phi_i)[np.newaxis], float(radians(settings.light_half_angle_deg)))
-    for w_i, weight in zip(beam, disk(1)[1], strict=True):
+    for w_i, weight in zip(beam, disk(1).weights, strict=True):
         share = weight * w_i[0, 2] / np.cos(theta_i)
         f_r[above] += share * brdf(np.broadcast_to(w_i, turned.shape), turned)[:, 0]
     light = np.zeros((2, *theta_c.shape))
@@ -268,7 +237,7 @@ def photograph(
     rng = np.random.default_rng(seed)
     parts = (light[0], 1), (light[1], settings.frames), (np.zeros_like(light[0]), settings.frames)
     sample, standard, background = (_counts(part, settings, frames, rng) for part, frames in parts)
-    return Picture(settings, theta_i, phi_i, sample, standard, background, name, "simulated")
+    return CameraPicture(settings, theta_i, phi_i, sample, standard, background, name, "simulated")
 
 
 def _turned(w: Array, phi: float) -> Array:
@@ -290,20 +259,11 @@ def _counts(light: Array, settings: Gonioreflectometer, frames: int, rng: np.ran
     return np.stack(exposed).astype(np.float32)
 
 
-def reduced(picture: Picture, thin: bool = True) -> Samples:
+def reduced(picture: CameraPicture, thin: bool = True) -> Samples:
     """Return the samples of a picture: f_r by eq. 2 at the directions of the pixels, with its standard uncertainty.
 
-    Parameters
-    ----------
-    picture : Picture
-        One that was simulated or measured.
-    thin : bool
-        Leave pixels out where f_r hardly changes, so that the samples are dense at the peak alone.
-
-    Raises
-    ------
-    ParameterError
-        If no pixel can be used: all are dark, saturated or outside.
+    With `thin`, pixels are left out where f_r hardly changes, so that samples are dense at the peak alone.
+    ParameterError if all pixels are dark, saturated or outside.
 
     Notes
     -----
@@ -343,8 +303,15 @@ def reduced(picture: Picture, thin: bool = True) -> Samples:
     )
 
 
-def _unsaturated(counts: Frames, background: Frames, settings: Gonioreflectometer, frames: int) -> tuple[Array, Array]:
-    """Return counts less the background, a unit of time, and their standard uncertainty; nan where all saturate.
+class _Exposed(NamedTuple):
+    """Counts less the background, a unit of time, and their standard uncertainty; nan where all exposures saturate."""
+
+    counts: Array
+    noise: Array
+
+
+def _unsaturated(counts: Frames, background: Frames, settings: Gonioreflectometer, frames: int) -> _Exposed:
+    """Return the counts of the longest exposure in which a pixel does not saturate.
 
     Noise and saturation are judged by counts that are smoothed over some pixels. A pixel that is dark by chance would
     otherwise count as one with less noise, and a fit that weighs by uncertainty would come out too dark.
@@ -354,7 +321,8 @@ def _unsaturated(counts: Frames, background: Frames, settings: Gonioreflectomete
     value = np.full(counts.shape[1:], np.nan)
     noise = np.full(counts.shape[1:], np.nan)
     for time, some, dark in zip(settings.exposures, counts, background, strict=True):
-        smooth, variance = gaussian_filter(some, _SMOOTH), np.zeros(some.shape)
+        smooth = gaussian_filter(some, _SMOOTH)
+        variance = np.zeros(some.shape)
         for part, number in ((smooth, frames), (dark, settings.frames)):
             electrons = (
                 np.maximum(part, 0.0) * settings.electrons + settings.read_noise**2 + settings.electrons**2 / 12.0
@@ -363,7 +331,7 @@ def _unsaturated(counts: Frames, background: Frames, settings: Gonioreflectomete
         used = np.isnan(value) & (smooth < _SATURATED * settings.saturation) & (some < settings.saturation)
         value[used] = (some.astype(np.float64) - dark)[used] / time
         noise[used] = np.sqrt(variance[used]) / time
-    return value, noise
+    return _Exposed(value, noise)
 
 
 def _smoothed(f_r: Array) -> Array:

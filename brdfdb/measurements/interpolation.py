@@ -42,39 +42,25 @@ class _Scales(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Interpolation:
+class SampleInterpolation:
     """f_r of samples everywhere: a base times a smooth ratio.
 
     The logarithm is asinh(f_r / (2 noise)), which is linear where f_r is less than its noise: values below 0 count.
-
-    Attributes
-    ----------
-    base : callable
-        f_r [1/sr] that the ratio is taken to.
-    alpha : float
-        Width [1] of the lobe that the coordinates crowd in.
-    level : array (C,) [1/sr]
-        Noise of small values: their uncertainty, or that of the values below 0, which a few wrong ones do not set.
-    scales : tuple
-        Scales of the coordinates, and the noise of the logarithm that no uncertainty states, relative to its spread.
-    turned : bool
-        True if the samples can tell the azimuth of the light.
-    mean : array (C,)
-        Mean of the logarithm of the ratio.
-    lowest : float
-        Smallest cosine of a light or a viewer that was measured. Directions closer to the horizon have the values
-        there, as in tables: a lobe that is continued may reflect any amount.
-    centres, weights : array (M, D), (M, C)
-        Centres of the radial functions in the coordinates, and their weights.
     """
 
-    base: Base
-    alpha: float
+    base: Base  #: f_r [1/sr] that the ratio is taken to
+    alpha: float  #: width [1] of the lobe that the coordinates crowd in
+    #: noise of small values: their uncertainty, or that of the values below 0, which a few wrong ones do not set, (C,)
+    #: [1/sr]
     level: Floats
+    #: scales of the coordinates, and the noise of the logarithm that no uncertainty states, relative to its spread
     scales: _Scales
-    turned: bool
-    mean: Floats
+    turned: bool  #: True if the samples can tell the azimuth of the light
+    mean: Floats  #: mean of the logarithm of the ratio, (C,)
+    #: smallest cosine of a light or a viewer that was measured. Directions closer to the horizon have the values there,
+    #: as in tables: a lobe that is continued may reflect any amount
     lowest: float
+    #: centres, weights: centres of the radial functions in the coordinates, and their weights, (M, D) (M, C)
     centres: Floats = field(default_factory=lambda: np.empty((0, 0)))
     weights: Floats = field(default_factory=lambda: np.empty((0, 0)))
 
@@ -113,8 +99,25 @@ def _radial(x: Floats, centres: Floats) -> Floats:
     return r
 
 
-def lambert_and_lobe(samples: Samples) -> tuple[Base, float, str]:
-    """Return the base that fits samples best, the width of its lobe [1], and its name in words.
+class LobeBase(NamedTuple):
+    """A base, the width of its lobe [1], and its name in words."""
+
+    f_r: Base
+    alpha: float
+    words: str
+
+
+class _LobeFit(NamedTuple):
+    """Coefficients (3, C) of a base with a lobe of a width [1], and the residual of its fit."""
+
+    residual: float
+    alpha: float
+    tail: bool
+    coefficients: Floats
+
+
+def lambert_and_lobe(samples: Samples) -> LobeBase:
+    """Return the base that fits samples best.
 
     It is Lambert and one lobe in tan theta_h, Gaussian or with a tail, alone and with Schlick's fifth power, over a
     denominator that is never 0; coefficients are not negative. A lobe that a few samples do not lie within could
@@ -124,10 +127,12 @@ def lambert_and_lobe(samples: Samples) -> tuple[Base, float, str]:
 
     wi, wr, values, _ = _listed(samples)
     some = np.random.default_rng(_SEED).permutation(len(wi))[: 4 * _SEARCHED]
-    wi, wr, values = wi[some], wr[some], values[some]
+    wi = wi[some]
+    wr = wr[some]
+    values = values[some]
     weight = 1.0 / (np.abs(values) + FLOOR * np.nanmean(np.abs(values), axis=0))
-    best: tuple[float, float, str, Floats] | None = None
-    tan2 = np.sort(half_angles(wi, wr)[0])
+    best: _LobeFit | None = None
+    tan2 = np.sort(half_angles(wi, wr).tan2_h)
     narrowest = np.sqrt(tan2[min(_SEEN, tan2.size) - 1])
     for alpha, tail in itertools.product(np.append(_ALPHAS[narrowest <= _ALPHAS], _ALPHAS[-1]), (False, True)):
         columns = _columns(wi, wr, alpha, tail=tail)
@@ -136,16 +141,17 @@ def lambert_and_lobe(samples: Samples) -> tuple[Base, float, str]:
             for c in range(values.shape[1])
             for good in [np.isfinite(values[:, c])]
         ]
-        left = sum(residual for _, residual in fits)
-        if best is None or left < best[0]:
-            best = left, float(alpha), "with a tail" if tail else "Gaussian", np.stack([fit for fit, _ in fits], axis=1)
+        residual = float(sum(residual for _, residual in fits))
+        if best is None or residual < best.residual:
+            best = _LobeFit(residual, float(alpha), tail, np.stack([fit for fit, _ in fits], axis=1))
     assert best is not None
-    _, width, kind, coefficients = best
+    chosen = best
 
     def base(wi: Floats, wr: Floats) -> Floats:
-        return np.asarray(_columns(wi, wr, width, tail=kind != "Gaussian") @ coefficients)
+        return np.asarray(_columns(wi, wr, chosen.alpha, tail=chosen.tail) @ chosen.coefficients)
 
-    return base, width, f"Lambert and one {kind} lobe of width {width:.2g}"
+    kind = "with a tail" if chosen.tail else "Gaussian"
+    return LobeBase(base, chosen.alpha, f"Lambert and one {kind} lobe of width {chosen.alpha:.2g}")
 
 
 def _columns(wi: Floats, wr: Floats, alpha: float, *, tail: bool) -> Floats:
@@ -168,14 +174,12 @@ def _listed(samples: Samples) -> tuple[Floats, Floats, Floats, Floats | None]:
 def _check_values(samples: Samples) -> None:
     """Refuse samples of which no value is above 0, or that stand for holes with numbers that noise does not explain.
 
-    Raises
-    ------
-    ParameterError
-        If a value is below minus three times the largest one, or a channel has the same number three times or more,
-        below 0 by three times its noise or the tenth percentile of the values above 0.
+    Such a number is below minus three times the largest value, or occurs three times or more in a channel, and is below
+    0 by three times the noise or the tenth percentile of the values above 0.
     """
     values = samples.values
-    largest, lowest = np.max(values, where=samples.known, initial=0.0), np.min(values, where=samples.known, initial=0.0)
+    largest = np.max(values, where=samples.known, initial=0.0)
+    lowest = np.min(values, where=samples.known, initial=0.0)
     if not largest > 0.0:
         raise ParameterError("values", "no value is above 0, which leaves nothing to tabulate", float(largest))
     if lowest < -_ABSURD * largest:
@@ -224,29 +228,18 @@ def floor_of(samples: Samples) -> Floats:
 
 
 class _Problem(NamedTuple):
-    """Samples as the least-squares problem reads them.
+    """Samples as the least-squares problem reads them."""
 
-    Attributes
-    ----------
-    wi, wr : array (N, 3)
-        Directions.
-    values : array (N, C) [1/sr]
-        f_r; nan in holes.
-    of_base, y : array (N, C)
-        Logarithm of the base, and the number to interpolate: the logarithm of f_r less that of the base.
-    noise : array (N,)
-        Noise of y, relative to its spread.
-    group : array (N,)
-        Groups that are held out together.
-    """
-
+    #: wi, wr: directions, (N, 3)
     wi: Floats
     wr: Floats
-    values: Floats
+    values: Floats  #: f_r; nan in holes, (N, C) [1/sr]
+    #: of_base, y: logarithm of the base, and the number to interpolate: the logarithm of f_r less that of the base, (N,
+    #: C)
     of_base: Floats
     y: Floats
-    noise: Floats
-    group: NDArray[np.int64]
+    noise: Floats  #: noise of y, relative to its spread, (N,)
+    group: NDArray[np.int64]  #: groups that are held out together, (N,)
 
     def some(self, rows: NDArray[Any]) -> _Problem:
         return _Problem(*(part[rows] for part in self))
@@ -255,25 +248,16 @@ class _Problem(NamedTuple):
 class Fitted(NamedTuple):
     """The interpolation of samples, its error at samples that were held out, and its base in words."""
 
-    f_r: Interpolation
+    f_r: SampleInterpolation
     held_out: HeldOut
     base: str
 
 
 def fit(samples: Samples, base: Base | None = None) -> Fitted:
-    """Fit the interpolation of samples.
+    """Fit the interpolation of ten samples or more.
 
-    Parameters
-    ----------
-    samples : Samples
-        Ten or more.
-    base : callable, optional
-        f_r that the ratio is taken to; by default `lambert_and_lobe`, of the same samples.
-
-    Raises
-    ------
-    ParameterError
-        If there are too few samples, no value is above 0, or numbers far below 0 stand for holes.
+    `base` is f_r that the ratio is taken to; by default `lambert_and_lobe`, of the same samples. ParameterError if
+    there are too few samples, no value is above 0, or numbers far below 0 stand for holes.
 
     Notes
     -----
@@ -285,14 +269,17 @@ def fit(samples: Samples, base: Base | None = None) -> Fitted:
     `brdfdb.measurements.extent.Extent` marks. Samples without such a pattern are held out in ten parts, by chance.
     """
     _check_values(samples)
-    own, alpha, words = lambert_and_lobe(samples)
-    f_base = own if base is None else base
+    lobe = lambert_and_lobe(samples)
+    f_base = lobe.f_r if base is None else base
     problem, level, scheme = _problem(samples, f_base)
-    mean, lowest = problem.y.mean(axis=0), float(min(problem.wi[:, 2].min(), problem.wr[:, 2].min()))
+    mean = problem.y.mean(axis=0)
+    lowest = float(min(problem.wi[:, 2].min(), problem.wr[:, 2].min()))
     order = np.random.default_rng(_SEED).permutation(len(problem.wi))
     few = problem.some(order[:_SEARCHED])
     tried = [
-        Interpolation(f_base, alpha, level, _Scales(half * both, both, both, noise), samples.turned, mean, lowest)
+        SampleInterpolation(
+            f_base, lobe.alpha, level, _Scales(half * both, both, both, noise), samples.turned, mean, lowest
+        )
         for half, both, noise in itertools.product((1.0, 2.0), _SCALES, _ROUGHNESS)
     ]
     scores = [np.mean(np.minimum(np.abs(_held_out(one, few, few) - few.y), 3.0)) for one in tried]
@@ -301,7 +288,9 @@ def fit(samples: Samples, base: Base | None = None) -> Fitted:
     held_out = _stated(samples, problem, _held_out(chosen, problem, centres), chosen, scheme)
     at = _x(chosen, centres)
     weights = _solved(*_normal(chosen, problem, _radial(_x(chosen, problem), at)), _radial(at, at))
-    return Fitted(replace(chosen, centres=at, weights=weights), held_out, words if base is None else "the given base")
+    return Fitted(
+        replace(chosen, centres=at, weights=weights), held_out, lobe.words if base is None else "the given base"
+    )
 
 
 def _problem(samples: Samples, base: Base) -> tuple[_Problem, Floats, str]:
@@ -319,7 +308,8 @@ def _problem(samples: Samples, base: Base) -> tuple[_Problem, Floats, str]:
         slope = np.sqrt(values**2 + 4.0 * level**2)
         noise = np.nan_to_num(np.nanmean(uncertainty / slope, axis=1)) / max(float(np.std(y)), 1e-3)
     known = samples.selected(np.flatnonzero(samples.known.any(axis=1)))
-    lights, pairs = int(known.incidence.max()) + 1, int(known.pair.max()) + 1
+    lights = int(known.incidence.max()) + 1
+    pairs = int(known.pair.max()) + 1
     scans = lights > 1 and known.scanned
     rng = np.random.default_rng(_SEED)
     if scans:
@@ -331,11 +321,11 @@ def _problem(samples: Samples, base: Base) -> tuple[_Problem, Floats, str]:
     return _Problem(wi, wr, values, of_base, y, noise, group), level, "incidences" if scans else "folds"
 
 
-def _x(how: Interpolation, problem: _Problem) -> Floats:
+def _x(how: SampleInterpolation, problem: _Problem) -> Floats:
     return features(problem.wi, problem.wr, how.alpha, how.scales[:3], turned=how.turned)
 
 
-def _normal(how: Interpolation, problem: _Problem, phi: Floats) -> tuple[Floats, Floats]:
+def _normal(how: SampleInterpolation, problem: _Problem, phi: Floats) -> tuple[Floats, Floats]:
     """Return the matrix and the right sides of the normal equations of some samples, from radial functions at them."""
     weighted = phi / (problem.noise**2 + how.scales.noise**2)[:, np.newaxis]
     return weighted.T @ phi, weighted.T @ (problem.y - how.mean)
@@ -350,7 +340,7 @@ def _solved(matrix: Floats, right: Floats, smooth: Floats) -> Floats:
     return np.asarray(cho_solve(cho_factor(whole), right))
 
 
-def _held_out(how: Interpolation, problem: _Problem, centres: _Problem) -> Floats:
+def _held_out(how: SampleInterpolation, problem: _Problem, centres: _Problem) -> Floats:
     """Return the numbers (N, C) that the interpolation gives at each group of samples from those of the others.
 
     The centres of radial functions stay: only values tell, not places.
@@ -366,7 +356,7 @@ def _held_out(how: Interpolation, problem: _Problem, centres: _Problem) -> Float
     return predicted
 
 
-def _stated(samples: Samples, problem: _Problem, predicted: Floats, how: Interpolation, scheme: str) -> HeldOut:
+def _stated(samples: Samples, problem: _Problem, predicted: Floats, how: SampleInterpolation, scheme: str) -> HeldOut:
     """Return the error at samples that were held out and lie within the directions of the others."""
     inside = np.ones(len(problem.wi), dtype=bool)
     x = places(problem.wi, problem.wr, turned=samples.turned)

@@ -6,15 +6,14 @@ import itertools
 import re
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.errors import ParameterError, counted
 from brdfdb.geometry import degrees
-from brdfdb.measurements._notes import percent
-from brdfdb.measurements.samples import ANGLES, NODES, RELATIVE, Instrument, Samples
+from brdfdb.measurements.samples import ANGLES, NODES, RELATIVE, Instrument, Samples, percent
 from brdfdb.parameters import Floats
 
 _BETWEEN = " _-.,+"  # signs between the words of a name
@@ -31,13 +30,8 @@ def joined(parts: Sequence[Samples]) -> Samples:
     The name is the words that all names begin with, or all names. The record is that of the first part, with the notes
     and counts of all; instruments and origins are those of all. Where parts hold different values at the same
     directions, a sentence says so in the entry "contradiction" of the record. Uncertainties are left out, with a note,
-    unless all parts state them.
-
-    Raises
-    ------
-    ParameterError
-        If there is none, they have different channels, or their azimuths have no direction in common: those of one
-        part are relative to its light, and lights of another come from other azimuths of the surface than 0.
+    unless all parts state them. ParameterError if there is no part, channels differ, or azimuths have no direction in
+    common: those of one part are relative to its light, and lights of another come from other azimuths of the surface.
     """
     if not parts:
         raise ParameterError("parts", "there are no samples to join", 0)
@@ -124,16 +118,16 @@ def _contradiction(parts: Sequence[Samples]) -> str:
     codes = [_codes(part) for part in parts]
     values = np.concatenate([part.values for part in parts])
     noises = np.concatenate([_noise(part) for part in parts])
-    worst, sentence = 0.0, ""
+    worst = _Difference(0.0, "")
     for number in range(1, len(parts)):
         before = np.concatenate(codes[:number])
         _, one, two = np.intersect1d(before, codes[number], return_indices=True)
         files = "both files have" if len(parts) == 2 else f"{parts[number].name} and files before it have"
-        ratio, text = _difference(values, noises, one, two + len(before), files)
-        if ratio > worst:
-            worst, sentence = ratio, text
-    own = [str(part.record["contradiction"]) for part in parts if "contradiction" in part.record]
-    return sentence or next(iter(own), "")
+        worst = max(
+            worst, _difference(values, noises, one, two + len(before), files), key=lambda difference: difference.ratio
+        )
+    recorded = [str(part.record["contradiction"]) for part in parts if "contradiction" in part.record]
+    return worst.sentence or next(iter(recorded), "")
 
 
 def contradiction_within(samples: Samples) -> str:
@@ -144,35 +138,40 @@ def contradiction_within(samples: Samples) -> str:
     _, first, directions = np.unique(_codes(samples), return_index=True, return_inverse=True)
     one = first[directions]
     again = np.flatnonzero(one != np.arange(one.size))
-    return _difference(samples.values, _noise(samples), one[again], again, "more than one row has")[1]
+    return _difference(samples.values, _noise(samples), one[again], again, "more than one row has").sentence
+
+
+class _Difference(NamedTuple):
+    """The median ratio of values at the same directions, and a sentence; 0 and "" if they do not contradict."""
+
+    ratio: float
+    sentence: str
 
 
 def _difference(
     values: Floats, noises: Floats, one: NDArray[np.intp], two: NDArray[np.intp], holders: str
-) -> tuple[float, str]:
-    """Return the median ratio of rows `one` and `two`, and a sentence; 0 and an empty text if they do not contradict.
+) -> _Difference:
+    """Return the difference of rows `one` and `two` (n,), which have the same directions.
 
-    Parameters
-    ----------
-    values, noises : array (N, C) [1/sr]
-        f_r and its standard uncertainties, 0 where none is stated.
-    one, two : array (n,)
-        Rows with the same directions.
-    holders : str
-        What has the directions, with its verb.
+    `values` and `noises` (N, C) [1/sr] are f_r and its standard uncertainties, 0 where none is stated. `holders` is
+    what has the directions, with its verb.
     """
     positive = np.minimum(values[one], values[two]) > 0.0
     if not positive.any():
-        return 0.0, ""
-    a, b, u = values[one][positive], values[two][positive], np.hypot(noises[one], noises[two])[positive]
+        return _Difference(0.0, "")
+    a = values[one][positive]
+    b = values[two][positive]
+    u = np.hypot(noises[one], noises[two])[positive]
     ratio = float(np.median(np.maximum(a, b) / np.minimum(a, b)))
     stated = (u > 0.0) & np.isfinite(u)
     beyond = stated.any() and float(np.median(np.abs(a - b)[stated] / u[stated])) > _UNLIKELY
     if not (ratio > _RATIO or beyond):
-        return 0.0, ""
+        return _Difference(0.0, "")
     end = ", which is beyond the stated uncertainties" if beyond else ""
     directions = counted(np.unique(one[np.any(positive, axis=1)]).size, "direction")
-    return ratio, f"At {directions} that {holders}, f_r differs by {percent(ratio - 1.0)} in the median{end}."
+    return _Difference(
+        ratio, f"At {directions} that {holders}, f_r differs by {percent(ratio - 1.0)} in the median{end}."
+    )
 
 
 def _noise(part: Samples) -> Floats:

@@ -1,11 +1,11 @@
-"""Measured data as a source: samples that are interpolated, or f_r of a file that is known everywhere."""
+"""Measured data as a source: interpolated samples, or f_r of a file; and changes that make them keep a law."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Callable
 from functools import cached_property
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,9 +13,10 @@ from pydantic import PrivateAttr
 
 from brdfdb.errors import ParameterError
 from brdfdb.geometry import radians, unit_vector
+from brdfdb.integrals.quadrature import gauss_rule
 from brdfdb.materials import FunctionSource
 from brdfdb.materials.source import Evaluate
-from brdfdb.measurements import laws, symmetry
+from brdfdb.measurements import symmetry
 from brdfdb.measurements.colours import rgb_of, spectra_of_colours
 from brdfdb.measurements.extent import Extent
 from brdfdb.measurements.interpolation import Base, fit, floor_of
@@ -25,13 +26,28 @@ from brdfdb.parameters import Floats
 from brdfdb.spectra import PICTURE_NM
 
 _COLOURS = (("R", "G", "B"), ("X", "Y", "Z"))
-_LIGHTS_DEG = (10.0, 20.0, 30.0)  # where the width of a lobe is looked for
-_HALF_DEG = np.append(0.0, np.geomspace(0.02, 60.0, 160))  # the half vectors there, crowded where lobes are narrow
+_LOBE_LIGHTS_DEG = (10.0, 20.0, 30.0)  # lights at which the width of a lobe is measured
+_HALF_DEG = np.append(0.0, np.geomspace(0.02, 60.0, 160))  # half vectors of these lights, dense at narrow lobes
 MARGIN = 0.003  # of the albedo of data that are made to conserve energy: measured tables exceed them by 0.0012
 _NARROWEST = 1e-3  # width [1] of lobes below which grids are those of this width
-_CLEAR = 3.0  # a peak so many times as bright as the surface far from it is a lobe
+_CLEAR = 3.0  # smallest ratio of a peak to f_r far from it that makes a lobe
 _BETWEEN = 0.05  # share of the pairs of directions outside of the extent of a file that lists all: it has corners
 _PROBED = 2000  # pairs at which the share of negative values of a function is counted
+_LIGHTS_DEG = np.concatenate([np.arange(0.0, 80.0, 2.5), np.arange(80.0, 90.0, 1.0), [89.5, 89.9]])
+_AZIMUTHS = 16  # azimuths of the lights of an anisotropic surface
+# Half vectors over which an albedo is summed
+_RINGS = 64
+_SPOKES = 96
+_CROWDED = 8.0  # rings next to the normal are so many e-folds closer than those at the horizon
+_ROUNDS = 40  # iterations of the factors of a reciprocal f_r, each of which counts for light and viewer
+
+
+class _Label(NamedTuple):
+    """Name of a source, its title for people, and the origin of its data in words."""
+
+    name: str
+    title: str
+    provenance: str
 
 
 class MeasuredSource(FunctionSource):
@@ -71,29 +87,20 @@ class MeasuredSource(FunctionSource):
     def of_samples(
         cls, samples: Samples, *, name: str = "", title: str = "", provenance: str = "", base: Base | None = None
     ) -> Self:
-        """Return samples as a source: between them f_r is interpolated as `brdfdb.measurements.interpolation` says.
+        """Return ten samples or more as a source, by the fit of `brdfdb.measurements.interpolation`.
 
-        Parameters
-        ----------
-        samples : Samples
-            Ten or more. f_r is anisotropic if they have several azimuths of the light.
-        name, title, provenance : str
-            By default those of the samples.
-        base : callable, optional
-            f_r [1/sr] (N, C) at unit vectors, such as `Source.brdf_at` of a fit, to which the ratio is interpolated;
-            by default Lambert and one lobe.
-
-        Raises
-        ------
-        ParameterError
-            If there are too few samples, no value is above 0, numbers far below 0 stand for holes, or the name has no
-            letters or digits.
+        f_r is anisotropic if the samples have several azimuths of the light. Name, title and provenance are by default
+        those of the samples. `base` is f_r [1/sr] (N, C) at unit vectors, such as `Source.brdf_at` of a fit, to which
+        the ratio is interpolated; by default Lambert and one lobe. ParameterError if there are too few samples, no
+        value is above 0, numbers far below 0 stand for holes, or the name has no letters or digits.
         """
         fitted = fit(samples, base)
-        noise, uncertainty = None, samples.uncertainty
+        noise = None
+        uncertainty = samples.uncertainty
         if uncertainty is not None:
             relative = (uncertainty / np.maximum(np.abs(samples.values), floor_of(samples)))[samples.known]
-            noise = Noise(**_named(("median", "p95"), np.nanpercentile(relative, [50.0, 95.0])))
+            median, p95 = (float(f"{value:.3g}") for value in np.nanpercentile(relative, [50.0, 95.0]))
+            noise = Noise(median=median, p95=p95)
         some = samples.known.any(axis=1)
         extent = Extent.of(samples, turned=samples.turned)
         known = samples.values[samples.known]
@@ -112,10 +119,9 @@ class MeasuredSource(FunctionSource):
             held_out=fitted.held_out,
             noise=noise,
         )
-        return cls._of(
-            fitted.f_r, samples.channels, samples.wavelength_nm, measured, samples.turned,
-            name or samples.name, title or samples.name, provenance or samples.provenance or "a file of samples",
-        )  # fmt: skip
+        origin = provenance or samples.provenance or "a file of samples"
+        label = _Label(name or samples.name, title or samples.name, origin)
+        return cls._of(fitted.f_r, samples.wavelength_nm, measured, label, turned=samples.turned)
 
     @classmethod
     def of_function(
@@ -158,9 +164,10 @@ class MeasuredSource(FunctionSource):
         if not np.all(np.isfinite(values)):
             raise ParameterError("evaluate", f"{name} has values that are not finite", np.nan)
 
-        def f_r(wi: Floats, wr: Floats) -> Floats:
+        def positive(wi: Floats, wr: Floats) -> Floats:
             return np.maximum(evaluate(wi, wr), 0.0)
 
+        f_r: Evaluate = positive
         known = None if noise is None else 2.6 * noise.p95
         turned = symmetry.is_turned(f_r, known)
         seen = None if turned else symmetry.mirror(f_r, known)
@@ -180,39 +187,41 @@ class MeasuredSource(FunctionSource):
             extent=extent,
             noise=noise,
         )
-        mirrored = _mirrored(f_r) if seen is not None and seen.assumed and _differs(seen) else f_r
-        return cls._of(mirrored, channels, wavelength_nm, measured, turned, name, title, provenance)
+        if seen is not None and seen.assumed and seen.asymmetry is not None and seen.asymmetry.max > 0.0:
+            f_r = _mirrored(f_r)
+        return cls._of(f_r, wavelength_nm, measured, _Label(name, title, provenance), turned=turned)
 
     @classmethod
     def _of(
         cls,
         f_r: Evaluate,
-        channels: tuple[str, ...],
         wavelength_nm: NDArray[np.float64] | None,
         measured: Measured,
+        label: _Label,
+        *,
         turned: bool,
-        name: str,
-        title: str,
-        provenance: str,
     ) -> Self:
+        """Return the source of f_r in the channels of its record, at their wavelengths [nm]."""
+        channels = tuple(measured.channels)
         if channels in _COLOURS:
             wavelength_nm = PICTURE_NM
         elif wavelength_nm is not None:
             order = np.argsort(wavelength_nm)
-            given = f_r
-            f_r, wavelength_nm = (lambda wi, wr: given(wi, wr)[:, order]), wavelength_nm[order]
+            wavelength_nm = wavelength_nm[order]
+            f_r = _ordered(f_r, order)
         width = _width(_mirrored(f_r) if measured.chiral else f_r) if measured.chiral or not turned else None
         source = cls(
             brdf=_brdf_of(f_r, channels, wavelength_nm),
-            name=slug(name),
-            title=title,
-            provenance=provenance,
+            name=slug(label.name),
+            title=label.title,
+            provenance=label.provenance,
             wavelengths_nm=None if wavelength_nm is None else tuple(wavelength_nm.tolist()),
             anisotropic=turned,
             reciprocal=measured.reciprocity.assumed,
             alpha=None if width is None else (width, width),
         )
-        source._measured, source._channels_at = measured, f_r
+        source._measured = measured
+        source._channels_at = f_r
         return source
 
     def extrapolated(self, wi: Floats, wr: Floats) -> NDArray[np.bool_]:
@@ -236,12 +245,7 @@ class MeasuredSource(FunctionSource):
             for each light, the largest up to 1 that keeps the albedo at 1 or below; times that of the viewer, too, if
             it is reciprocal.
         margin : float [1]
-            What the albedo stays below 1: room for the error of a table.
-
-        Raises
-        ------
-        ParameterError
-            If there is no such law.
+            Difference of the albedo from 1: room for the error of a table.
         """
         if law not in ("reciprocal", "conserving"):
             raise ParameterError(
@@ -249,9 +253,9 @@ class MeasuredSource(FunctionSource):
             )
         before = self._channels_at
         if law == "reciprocal":
-            after = laws.reciprocal(before)
+            after = _made_reciprocal(before)
         else:
-            after = laws.conserving(before, reciprocal=self.reciprocal, turned=self.anisotropic, margin=margin)
+            after = _made_conserving(before, reciprocal=self.reciprocal, turned=self.anisotropic, margin=margin)
         wi, wr = symmetry.drawn_pairs()
         old, new = before(wi, wr), after(wi, wr)
         floor = np.maximum(1e-3 * old.mean(axis=0), 1e-12)
@@ -259,15 +263,14 @@ class MeasuredSource(FunctionSource):
             law="reciprocal" if law == "reciprocal" else "conserving",
             changed=symmetry.spread_of(np.abs(new - old) / np.maximum(old, floor)),
         )
-        kept = self._measured.reciprocity
+        reciprocity = self._measured.reciprocity
         if law == "reciprocal":
-            kept = kept.model_copy(update={"assumed": True})
-        measured = self._measured.model_copy(update={"changes": [*self._measured.changes, change], "reciprocity": kept})
-        at = None if self.wavelengths_nm is None else np.array(self.wavelengths_nm)
-        return self._of(
-            after, tuple(measured.channels), at, measured, self.anisotropic,
-            self.name, self.title, self.provenance,
-        )  # fmt: skip
+            reciprocity = reciprocity.model_copy(update={"assumed": True})
+        changes = [*self._measured.changes, change]
+        measured = self._measured.model_copy(update={"changes": changes, "reciprocity": reciprocity})
+        wavelength_nm = None if self.wavelengths_nm is None else np.array(self.wavelengths_nm)
+        label = _Label(self.name, self.title, self.provenance)
+        return self._of(after, wavelength_nm, measured, label, turned=self.anisotropic)
 
     @cached_property
     def has_colours(self) -> bool:
@@ -291,13 +294,8 @@ def _extrapolated(extent: Extent) -> float:
     return float(f"{np.mean(extent.outside(*symmetry.drawn_pairs(up_to_deg=90.0))):.3g}")
 
 
-def _named(names: tuple[str, ...], values: Floats) -> dict[str, float]:
-    return {name: float(f"{value:.3g}") for name, value in zip(names, values, strict=True)}
-
-
 def _brdf_of(f_r: Evaluate, channels: tuple[str, ...], wavelength_nm: NDArray[np.float64] | None) -> Callable[..., Any]:
     """Return f_r at wavelengths as `FunctionSource` takes it: straight lines between those of the data."""
-
     last: list[tuple[Floats, Floats, Floats]] = []  # tables evaluate wavelength after wavelength at the same directions
 
     def evaluated(wi: Floats, wr: Floats) -> Floats:
@@ -320,13 +318,14 @@ def _brdf_of(f_r: Evaluate, channels: tuple[str, ...], wavelength_nm: NDArray[np
     return brdf
 
 
+def _ordered(f_r: Evaluate, order: NDArray[np.intp]) -> Evaluate:
+    """Return f_r with its channels in another order."""
+    return lambda wi, wr: f_r(wi, wr)[:, order]
+
+
 def _mirrored(f_r: Evaluate) -> Evaluate:
     """Return the mean of f_r and that of the mirror image."""
     return lambda wi, wr: 0.5 * (f_r(wi, wr) + f_r(wi * symmetry.MIRROR, wr * symmetry.MIRROR))
-
-
-def _differs(seen: Any) -> bool:
-    return seen.asymmetry is not None and seen.asymmetry.max > 0.0
 
 
 def _mirror_of(samples: Samples, noise: float) -> Any:
@@ -344,11 +343,12 @@ def _mirror_of(samples: Samples, noise: float) -> Any:
 def _width(f_r: Evaluate) -> float | None:
     """Return the width [1] of the lobe around the mirror direction, or None if there is none that is clear."""
     slopes = []
-    for light in _LIGHTS_DEG:
+    for light in _LOBE_LIGHTS_DEG:
         wi = np.broadcast_to(unit_vector(radians(light), 0.0), (_HALF_DEG.size, 3))
         # half vectors across the plane of incidence: the viewer stays above the horizon longest
         theta = radians(_HALF_DEG)
-        along, across = unit_vector(radians(0.0), 0.0), np.array([0.0, 1.0, 0.0])
+        along = unit_vector(radians(0.0), 0.0)
+        across = np.array([0.0, 1.0, 0.0])
         half = np.cos(theta)[:, np.newaxis] * along + np.sin(theta)[:, np.newaxis] * across
         wr = 2.0 * np.sum(wi * half, axis=1, keepdims=True) * half - wi
         above = wr[:, 2] > 0.05
@@ -359,3 +359,85 @@ def _width(f_r: Evaluate) -> float | None:
         below = np.flatnonzero(values - far < (peak - far) * np.exp(-1.0))
         slopes.append(np.tan(theta[below[0]]) if below.size else 1.0)
     return float(np.clip(np.median(slopes), _NARROWEST, 3.0))
+
+
+def _made_reciprocal(f_r: Evaluate) -> Evaluate:
+    """Return the mean of f_r and f_r with light and viewer exchanged: the nearest in the mean square."""
+    return lambda wi, wr: 0.5 * (f_r(wi, wr) + f_r(wr, wi))
+
+
+def _made_conserving(f_r: Evaluate, *, reciprocal: bool, turned: bool, margin: float) -> Evaluate:
+    """Return f_r scaled so that no light has an albedo above 1 - margin: one factor for each polar angle and channel.
+
+    The factor is the largest up to 1, so that the relative change of a light is as small as it can be. Of a reciprocal
+    f_r it is a product of a factor for the light and one for the viewer, each of which is 1 or makes the albedo of its
+    light 1 - margin. f_r of a surface that may not be turned is taken as that of its mirror image, too.
+    """
+    theta = radians(_LIGHTS_DEG)
+    azimuths = np.arange(_AZIMUTHS) * (2.0 * np.pi / _AZIMUTHS) if turned else np.zeros(1)
+    shares = np.stack([_shares(f_r, unit_vector(t, phi), theta, whole=turned) for t in theta for phi in azimuths])
+    limit = 1.0 - margin
+
+    def reflected(of_viewer: Floats) -> Floats:
+        albedo = np.einsum("lkc,kc->lc", shares, of_viewer)
+        return np.asarray(albedo.reshape(theta.size, azimuths.size, -1).max(axis=1))
+
+    factors = np.minimum(1.0, limit / np.maximum(reflected(np.ones(shares.shape[1:])), limit))
+    if reciprocal:
+        for _ in range(_ROUNDS):  # the mean of the old and the new factor, in the logarithm: they would swing otherwise
+            factors = np.minimum(1.0, np.sqrt(factors * limit / np.maximum(reflected(factors), 1e-12)))
+        albedo = factors * reflected(factors)
+        factors *= np.sqrt(np.minimum(1.0, limit / np.maximum(albedo.max(axis=0), 1e-12)))
+
+    def scaled(wi: Floats, wr: Floats) -> Floats:
+        light = _at(factors, theta, np.arccos(np.clip(wi[:, 2], -1.0, 1.0)))
+        viewer = _at(factors, theta, np.arccos(np.clip(wr[:, 2], -1.0, 1.0))) if reciprocal else 1.0
+        return np.asarray(f_r(wi, wr) * light * viewer)
+
+    return scaled
+
+
+def _at(factors: Floats, theta: Floats, wanted: Floats) -> Floats:
+    return np.stack([np.interp(wanted, theta, column) for column in factors.T], axis=1)
+
+
+def _shares(f_r: Evaluate, light: Floats, theta: Floats, *, whole: bool) -> Floats:
+    """Return the shares (K, C) of the albedo of a light (3,) that go to the polar angles (K,) [rad] of the viewer.
+
+    A viewer between two of the angles counts for both, as straight lines between factors at these angles do.
+    """
+    viewers, weight = _viewers(light, whole=whole)
+    reflected = weight[:, np.newaxis] * f_r(np.broadcast_to(light, viewers.shape), viewers)
+    theta_r = np.clip(np.arccos(np.clip(viewers[:, 2], 0.0, 1.0)), theta[0], theta[-1])
+    below = np.clip(np.searchsorted(theta, theta_r, side="right") - 1, 0, theta.size - 2)
+    part = (theta_r - theta[below]) / (theta[below + 1] - theta[below])
+    return np.stack(
+        [
+            np.bincount(below, (1.0 - part) * column, theta.size) + np.bincount(below + 1, part * column, theta.size)
+            for column in reflected.T
+        ],
+        axis=1,
+    )
+
+
+def _viewers(light: Floats, *, whole: bool) -> tuple[Floats, Floats]:
+    """Return viewers (N, 3), and weights (N,) that sum f_r to the albedo of a light (3,); half of them if not `whole`.
+
+    They are the mirror images of the light in half vectors, on spokes from the normal to where the viewer is at the
+    horizon: tan(2 theta_h) = -cos(theta_i) / (sin(theta_i) cos(phi_h - phi_i)). Half vectors crowd around the normal:
+    the rule of Gauss and Legendre in u, for theta_h in proportion to sinh(k u), and that of the midpoint in phi_h. A
+    half vector of d omega_h makes viewers of 4 cos(theta_d) d omega_h.
+    """
+    x, w = gauss_rule(_RINGS)
+    u = 0.5 * (x + 1.0)
+    spokes = _SPOKES if whole else _SPOKES // 2
+    turn = 2.0 * np.pi if whole else np.pi
+    phi_h = (np.arange(spokes) + 0.5) * (turn / spokes) + np.arctan2(light[1], light[0])
+    last = 0.5 * np.arctan2(light[2], -(light[0] * np.cos(phi_h) + light[1] * np.sin(phi_h)))
+    theta_h = np.outer(np.sinh(_CROWDED * u) / np.sinh(_CROWDED), last)
+    width = np.outer(0.5 * w * _CROWDED * np.cosh(_CROWDED * u) / np.sinh(_CROWDED), last)
+    half = unit_vector(theta_h, phi_h)
+    cos_d = half @ light
+    viewers = 2.0 * cos_d[..., np.newaxis] * half - light
+    weight = 4.0 * cos_d * np.maximum(viewers[..., 2], 0.0) * np.sin(theta_h) * width * (2.0 * np.pi / spokes)
+    return viewers.reshape(-1, 3), weight.ravel()

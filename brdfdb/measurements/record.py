@@ -24,7 +24,7 @@ class Spread(BaseModel):
     max: float
 
 
-class Symmetry(BaseModel):
+class MeasuredSymmetry(BaseModel):
     """A symmetry of f_r, and how far the data keep to it: abs(f - f') / (abs(f) + abs(f'))."""
 
     model_config = _STRICT
@@ -88,8 +88,8 @@ class Measured(BaseModel):
     holes: int = Field(default=0, description="number of values that are missing")
     negative: float = Field(description="share of the values below 0; f_r is 0 there")
     interpolation: str = Field(description="the way from samples to f_r everywhere, in words")
-    reciprocity: Symmetry
-    mirror: Symmetry | None = Field(
+    reciprocity: MeasuredSymmetry
+    mirror: MeasuredSymmetry | None = Field(
         description="f_r of an isotropic surface and of its mirror image; null: f_r changes when the surface is turned"
     )
     extrapolated: float | None = Field(

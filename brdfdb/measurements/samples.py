@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.arrays import check_rows, plain
-from brdfdb.errors import ParameterError
+from brdfdb.errors import ParameterError, counted
 from brdfdb.geometry import check_phi, degrees, radians, unit_vector
 from brdfdb.parameters import Floats, check_nanometres
 
@@ -35,22 +35,19 @@ _SAME_DEG = 1e-4  # directions closer than this are the same
 _READ_DEG = 0.25  # cells of directions that encoders read
 _SPREAD_DEG = 1.0  # width of the readings of one direction of the light, at most
 _REGULAR = 8  # viewers of an incidence, and more, make a scan
+_QUANTITIES = {
+    "reflectance_factor": "reflectance factors",
+    "f_r_cos": "values with the cosine of the viewer",
+    "f_r_cos_i": "values with the cosine of the light",
+}
 
 
 @dataclass(frozen=True)
 class Instrument:
-    """The instrument of a measurement. What is not known is None, or an empty text.
+    """The instrument of a measurement; None, or an empty text, where something is not known.
 
-    Attributes
-    ----------
-    name : str
-        What people call it.
-    source_solid_angle_sr, receiver_solid_angle_sr : float [sr] or None
-        Solid angles of the light and of the receiver, as the sample sees them.
-    spot_mm : float [mm] or None
-        Diameter of the spot that is measured.
-    polarisation : str
-        Polarisation of light and receiver, in words.
+    Solid angles [sr] of light and receiver are those that the sample sees. `spot_mm` is the diameter of the spot that
+    is measured, `polarisation` that of light and receiver in words.
     """
 
     name: str = ""
@@ -70,29 +67,6 @@ class Instrument:
 class Samples:
     """f_r at some directions, as an instrument measured it or as a file lists it.
 
-    Attributes
-    ----------
-    name : str
-        Name of the material, or of the file.
-    theta_i, phi_i, theta_r, phi_r : array (N,) [rad]
-        Directions of light and viewer. Polar angles are in [0, pi/2].
-    channels : tuple of str
-        Names of the columns of `values`: ("R", "G", "B"), ("X", "Y", "Z"), ("grey",), or wavelengths as "550nm".
-    wavelength_nm : array (C,) [nm] or None
-        Wavelengths of the channels; None of colours and of grey samples.
-    values : array (N, C) [1/sr]
-        f_r without the cosine. A hole is nan. Noise may make values negative.
-    uncertainty : array (N, C) [1/sr] or None
-        Standard uncertainty of each value, nan where it is not known; None, also of nan alone, if none is known.
-    bandwidth_nm : array (C,) [nm] or None
-        Full width of each band at half of its height; None if it is not known.
-    instrument : Instrument
-        The instrument.
-    provenance : str
-        Where the samples come from, in words.
-    record : mapping
-        What the file says beside its values: its header, or the record of an export.
-
     Raises
     ------
     ParameterError
@@ -100,18 +74,26 @@ class Samples:
         or infinite.
     """
 
-    name: str
+    name: str  #: name of the material, or of the file
+    #: theta_i, phi_i, theta_r, phi_r: directions of light and viewer. Polar angles are in [0, pi/2], (N,) [rad]
     theta_i: Floats = field(repr=False)
     phi_i: Floats = field(repr=False)
     theta_r: Floats = field(repr=False)
     phi_r: Floats = field(repr=False)
+    #: names of the columns of `values`: ("R", "G", "B"), ("X", "Y", "Z"), ("grey",), or wavelengths as "550nm"
     channels: tuple[str, ...]
+    #: wavelengths of the channels; None of colours and of grey samples, (C,) [nm]
     wavelength_nm: NDArray[np.float64] | None
+    #: f_r without the cosine. A hole is nan. Noise may make values negative, (N, C) [1/sr]
     values: Floats = field(repr=False)
+    #: standard uncertainty of each value, nan where it is not known; None, also of nan alone, if none is known, (N, C)
+    #: [1/sr]
     uncertainty: Floats | None = field(default=None, repr=False)
+    #: full width of each band at half of its height; None if it is not known, (C,) [nm]
     bandwidth_nm: NDArray[np.float64] | None = None
-    instrument: Instrument = Instrument()
-    provenance: str = ""
+    instrument: Instrument = Instrument()  #: the instrument
+    provenance: str = ""  #: where the samples come from, in words
+    #: what the file says beside its values: its header, or the record of an export
     record: Mapping[str, Any] = field(default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:
@@ -244,12 +226,8 @@ class Samples:
         """Return the samples of a Dataset as `to_xarray` gives it.
 
         Only the angles theta_i, theta_r and phi_r in degrees or radians (attribute ``units``) and brdf are required.
-        Wavelengths and bandwidths are in nm, um or m, by default nm; brdf and uncertainty are in 1/sr.
-
-        Raises
-        ------
-        ParameterError
-            If a variable is missing or has other units, or the samples are not allowed.
+        Wavelengths and bandwidths are in nm, um or m, by default nm; brdf and uncertainty are in 1/sr. ParameterError
+        if a variable is missing or has other units, or the samples are not allowed.
         """
         brdf = dataset.get("brdf")
         if brdf is None or not {"theta_i", "theta_r", "phi_r"} <= set(dataset.variables):
@@ -307,19 +285,14 @@ def _units(dataset: xr.Dataset, name: str) -> str:
 
 
 def _length_nm(dataset: xr.Dataset, name: str) -> NDArray[np.float64] | None:
-    """Return wavelengths or bandwidths [nm] of a Dataset, shape (C,), in the unit that it states; None if it has none.
-
-    Raises
-    ------
-    ParameterError
-        If the unit is not nm, um or m.
-    """
+    """Return wavelengths or bandwidths [nm] of a Dataset, shape (C,), from nm, um or m; None if it has none."""
     if name not in dataset.variables:
         return None
     units = _units(dataset, name)
     if units not in NM_PER:
         raise ParameterError(name, f"its units are {units!r}; allowed are nm, um and m", units, tuple(NM_PER))
-    lengths, scale = np.asarray(dataset[name], dtype=np.float64).reshape(-1), NM_PER[units]
+    lengths = np.asarray(dataset[name], dtype=np.float64).reshape(-1)
+    scale = NM_PER[units]
     return lengths if scale == 1.0 else np.round(lengths * scale, 9)
 
 
@@ -348,3 +321,39 @@ def _angle(dataset: xr.Dataset, name: str, count: int) -> Floats:
     if units.startswith("rad"):
         return angle
     raise ParameterError(name, f"its units are {units!r}; degree and radian are allowed", units, ("degree", "radian"))
+
+
+def percent(share: float) -> str:
+    """Return a share as text in percent: a plain number, with two digits below 10 %."""
+    return f"{100.0 * share:.0f} %" if not abs(share) < 0.0995 else f"{100.0 * share:.2g} %"
+
+
+def notes_of(record: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return what a reader noted in a record, in sentences."""
+    notes = [str(note) for note in record.get("notes", ())]
+    if text := _QUANTITIES.get(record.get("quantity", "")):
+        notes.append(f"The file holds {text}: f_r was made of them.")
+    if record.get("azimuth") == "forward":
+        notes.append("Azimuths count from the forward direction, as was stated: 180 degrees were added.")
+    elif title := record.get("forward_title"):
+        notes.append(
+            f"Azimuths? A title says {title!r}. If 0 is the direction into which the light travels, import the file "
+            "with --azimuth forward."
+        )
+    if "exchanged" in record:
+        notes.append(f"Letters exchanged: {record['exchanged']}.")
+    if count := record.get("below_the_horizon"):
+        notes.append(f"{counted(count, 'row')} below the horizon {'was' if count == 1 else 'were'} left out.")
+    if count := record.get("repeated"):
+        verb = "repeats the directions and values of another and was"
+        verb = verb if count == 1 else "repeat the directions and values of others and were"
+        notes.append(f"{counted(count, 'row')} {verb} left out.")
+    if sentence := record.get("contradiction"):
+        notes.append(sentence)
+    if left := record.get("columns_left_out"):
+        notes.append(f"Columns left out: {', '.join(left)}.")
+    if side := record.get("side"):
+        notes.append(f"Side: {side}, as the file names it.")
+    if network := record.get("network"):
+        notes.append(f"{network}.")
+    return tuple(notes)

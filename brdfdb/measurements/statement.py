@@ -7,38 +7,40 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from brdfdb.errors import counted
 from brdfdb.geometry import degrees
-from brdfdb.measurements._doubts import azimuths, is_constant, missing, units
-from brdfdb.measurements._incidences import BAND_DEG, PEAK, Incidence, incidences_of
-from brdfdb.measurements._notes import notes_of, percent
-from brdfdb.measurements._swaps import Reciprocity, reciprocity_of
-from brdfdb.measurements.samples import NODES, Samples
+from brdfdb.measurements.incidences import BAND_DEG, PEAK, Incidence, bands, incidences_of, lights
+from brdfdb.measurements.samples import NODES, Samples, notes_of, percent
+from brdfdb.measurements.symmetry import are_bright, asymmetries
+from brdfdb.parameters import Floats
 
-_SAME_DEG = 0.01  # directions of the light closer than this are one
+_SAME_DEG = 0.01  # directions closer than this count as the same
 _ALL_COVERED = 0.999  # share of the disk from which on the rest is not spoken of
 _CLAIM = 0.05  # relative difference of a header from its own values that is stated
 _JUDGED = 1.0 - _CLAIM  # share of the disk from which on viewers tell an albedo well enough for it
 _SHOWN = 6  # incidences in sentences
+_EXCESS = 1.02  # albedo above which the unit is doubted
+_BLACK = 2e-4  # albedo below which the unit is doubted: the blackest coatings reflect more
+_MISSING = np.array([-1.0, -99.0, -999.0, -9999.0])  # numbers that files write for values that are missing
+_FILLED = np.array([9.99, 99.99, 999.99, 99999.0, 1e20, 9.96921e36])  # the same above 0; the last two are of netCDF
+_FAR = 10.0  # times the largest other value is where a number is a mark
+# f_r of a lobe over the median from which on there is one, and below which there is none
+_LOBE = 2.0
+_LEVEL = 1.25
+_ABOUT_DEG = 15.0  # angles to the mirror direction and to the light within which lobes are looked for
+_TILTED_DEG = (20.0, 75.0)  # polar angles of lights that tell the sides apart
+_FEWEST = 5  # viewers of a light
 
 
 @dataclass(frozen=True)
 class Claim:
-    """A total integrated scatter that a header states, and what its own values integrate to.
+    """A total integrated scatter that a header states for a channel, and what its own values integrate to [1].
 
-    Attributes
-    ----------
-    theta_i_deg : float [degree]
-        Polar angle of the light.
-    channel : str
-        Channel.
-    claimed, integrated : float [1]
-        Number of the header, and the albedo of its values.
-    at_least : bool
-        True if viewers surround too little for an albedo: `integrated` is the integral over what they surround.
-    known : bool
-        False if values cannot judge the claim: it is above such an integral, or the lobe is narrower than the steps.
+    With `at_least` viewers surround too little for an albedo: `integrated` is the integral over what they surround.
+    `known` is False if values cannot judge the claim: it is above such an integral, or the lobe is narrower than the
+    steps.
     """
 
     theta_i_deg: float
@@ -55,87 +57,42 @@ class Claim:
 
 
 @dataclass(frozen=True)
-class Statement:
-    """Statement on samples: the angles that they cover, the values that they hold, and what contradicts.
-
-    Attributes
-    ----------
-    name : str
-        Name of the samples.
-    channels : tuple of str
-        Names of the channels.
-    samples : int
-        Number of directions.
-    nodes : bool
-        True if they are nodes of a grid.
-    lights : int
-        Number of directions of the light.
-    theta_i_deg, theta_r_deg : (float, float) [degree]
-        Smallest and largest polar angle of the light and of the viewer.
-    turned : bool
-        True if the light comes from several azimuths.
-    one_side : bool
-        True if the viewers are on one side of the plane of incidence, so that integrals take the other for its mirror
-        image.
-    holes, negative, zeros : int
-        Numbers of values that are missing, below 0, and exactly 0 beside others: many files write 0 for a hole.
-    constant : bool
-        True if f_r of each channel is one number at all directions.
-    largest : float [1/sr]
-        Largest value.
-    largest_at_deg : (float, float, float) [degree]
-        theta_i, theta_r and the difference of the azimuths there.
-    uncertainty : float [1] or None
-        Median of the standard uncertainties over the absolute values; None if none is stated.
-    wavelength_nm : (float, float) [nm] or None
-        Smallest and largest wavelength; None if none is stated.
-    in_bands : bool
-        True if the directions are scattered, and `incidences` are bands of theta_i, as if azimuths did not matter.
-    incidences : tuple of Incidence
-        Directions of the light with viewers enough.
-    reciprocity : Reciprocity or None
-        None if no sample is the swap of another.
-    claims : tuple of Claim
-        Claims of the header that can be compared.
-    notes : tuple of str
-        What the reader did to the file, in sentences.
-    hints : tuple of str
-        What looks wrong, in sentences.
-    """
+class SampleStatement:
+    """Statement on samples: the angles that they cover, the values that they hold, and what contradicts."""
 
     name: str
     channels: tuple[str, ...]
-    samples: int
-    nodes: bool
-    lights: int
-    theta_i_deg: tuple[float, float]
-    theta_r_deg: tuple[float, float]
-    turned: bool
-    one_side: bool
-    holes: int
-    negative: int
-    zeros: int
-    constant: bool
-    largest: float
-    largest_at_deg: tuple[float, float, float]
-    uncertainty: float | None
-    wavelength_nm: tuple[float, float] | None
-    in_bands: bool
-    incidences: tuple[Incidence, ...]
-    reciprocity: Reciprocity | None
-    claims: tuple[Claim, ...]
-    notes: tuple[str, ...]
-    hints: tuple[str, ...]
+    samples: int  #: number of directions
+    nodes: bool  #: True if the directions are nodes of a grid
+    lights: int  #: number of directions of the light
+    theta_i_deg: tuple[float, float]  #: smallest and largest polar angle of the light
+    theta_r_deg: tuple[float, float]  #: smallest and largest polar angle of the viewer
+    turned: bool  #: True if the light comes from several azimuths
+    one_side: bool  #: True if viewers are on one side of the plane of incidence; integrals mirror it to the other
+    holes: int  #: number of values that are missing
+    negative: int  #: number of values below 0
+    zeros: int  #: number of values that are exactly 0 while others are not: many files write 0 for a hole
+    constant: bool  #: True if f_r of each channel is one number at all directions
+    largest: float  #: largest value [1/sr]
+    largest_at_deg: tuple[float, float, float]  #: theta_i, theta_r and the difference of the azimuths there
+    uncertainty: float | None  #: median of the standard uncertainties over the absolute values [1]; None: not stated
+    wavelength_nm: tuple[float, float] | None  #: smallest and largest wavelength; None: not stated
+    in_bands: bool  #: True if directions are scattered, and `incidences` are bands of theta_i at any azimuth
+    incidences: tuple[Incidence, ...]  #: directions of the light with viewers enough
+    reciprocity: ExchangedPairs | None  #: None if no sample is the swap of another
+    claims: tuple[Claim, ...]  #: claims of the header that can be compared
+    notes: tuple[str, ...]  #: sentences on what the reader did to the file
+    hints: tuple[str, ...]  #: sentences on what looks wrong
 
     @property
     def sentences(self) -> tuple[str, ...]:
         """The statement in sentences."""
         return (
-            *_on_angles(self),
-            *_on_values(self),
-            *_on_albedo(self),
-            *_on_pairs(self),
-            *_on_claims(self),
+            *self._on_angles(),
+            *self._on_values(),
+            *self._on_albedo(),
+            *self._on_pairs(),
+            *self._on_claims(),
             *self.notes,
             *self.hints,
         )
@@ -145,22 +102,96 @@ class Statement:
         largest = self.largest if np.isfinite(self.largest) else None
         return {**asdict(self), "largest": largest, "sentences": list(self.sentences)}
 
+    def _on_angles(self) -> list[str]:
+        lights = counted(self.lights, "direction") + " of the light"
+        channels = counted(len(self.channels), "channel")
+        low, high = self.theta_i_deg
+        samples = counted(self.samples, "node" if self.nodes else "sample")
+        around = "from several azimuths" if self.turned else "from one azimuth"
+        text = f"{samples} of {channels}: {lights}, {around}, theta_i {low:.4g} to {high:.4g} degrees"
+        text += f"; theta_r {self.theta_r_deg[0]:.4g} to {self.theta_r_deg[1]:.4g} degrees."
+        side = ["All viewers are on one side of the plane of incidence: the other is taken for its mirror image."]
+        return [text, *(side if self.one_side and self.incidences else [])]
 
-def statement(samples: Samples, progress: Callable[[float], None] | None = None) -> Statement:
+    def _on_values(self) -> list[str]:
+        theta_i, theta_r, turn = self.largest_at_deg
+        where = f"theta_i {theta_i:.4g}, theta_r {theta_r:.4g} and an azimuth of {turn:.4g} degrees from the light"
+        counts = f"{counted(self.holes, 'hole')}, {counted(self.negative, 'negative value')}"
+        lines = [f"{counts}; the largest value is {self.largest:.4g} /sr at {where}."]
+        if self.wavelength_nm is not None:
+            low, high = self.wavelength_nm
+            lines.append(f"Wavelengths: {low:.4g} to {high:.4g} nm." if high > low else f"Wavelength: {low:.4g} nm.")
+        elif self.channels == ("grey",):
+            lines.append("No wavelength is stated; --wavelength-nm states one.")
+        if self.uncertainty is not None:
+            lines.append(f"Standard uncertainties are stated: {percent(self.uncertainty)} of f_r in the median.")
+        if self.constant:
+            of_channel = "f_r of each channel" if len(self.channels) > 1 else "f_r"
+            lines.append(f"{of_channel} is one number at all directions: the samples tell no shape.")
+        if self.zeros:
+            lines.append(f"{counted(self.zeros, 'value')} of exactly 0: integrals and pairs take them for holes.")
+        return lines
+
+    def _on_albedo(self) -> list[str]:
+        if not self.incidences:
+            return ["No albedo: no direction of the light has viewers around the hemisphere."]
+        numbers = np.unique(np.linspace(0, len(self.incidences) - 1, _SHOWN).astype(int))
+        lines = []
+        for some in (self.incidences[number] for number in numbers):
+            azimuth = f", phi_i {some.phi_i_deg:.4g}" if self.turned and not self.in_bands else ""
+            text = f"Albedo at theta_i {some.theta_i_deg:.4g}{azimuth}: {_shown(self.channels, some.albedo)}"
+            if some.covered < _ALL_COVERED:
+                inside = _shown(self.channels, some.measured)
+                text += f"; viewers surround {100.0 * some.covered:.3g} % of the hemisphere, with {inside}"
+            if some.peak > PEAK:
+                text += f"; unknown: one viewer makes {percent(some.peak)} of it, the lobe is narrower than the steps"
+            lines.append(f"{text}.")
+        if self.in_bands:
+            lines.append(
+                f"Directions are scattered: these are lights within {BAND_DEG:g} degree, as if azimuths did not matter."
+            )
+        if len(numbers) < len(self.incidences):
+            lines.append(f"{len(self.incidences)} directions of the light are integrated in all.")
+        return lines
+
+    def _on_pairs(self) -> list[str]:
+        if self.reciprocity is None:
+            return ["Reciprocity: no sample is the swap of another."]
+        pairs = self.reciprocity
+        return [
+            f"Reciprocity: {counted(pairs.pairs, 'pair')} of {'nodes' if self.nodes else 'samples'} "
+            f"with light and viewer exchanged; asymmetry |f - f'| / (|f| + |f'|) of these: "
+            f"median {100.0 * pairs.median:.3g} %, largest {100.0 * pairs.largest:.3g} %."
+        ]
+
+    def _on_claims(self) -> list[str]:
+        lines, agree = [], 0
+        for claim in self.claims:
+            if claim.known and abs(claim.relative) > _CLAIM:
+                size = f"{percent(abs(claim.relative))} {'low' if claim.relative < 0.0 else 'high'}"
+                of_channel = f" ({claim.channel})" if len(self.channels) > 1 else ""
+                text = f"The header claims {claim.claimed:.4g} at theta_i {claim.theta_i_deg:.4g}{of_channel}"
+                least = "at least " if claim.at_least else ""
+                lines.append(
+                    f"{text}, and its own values integrate to {least}{claim.integrated:.4g}: the claim is {size}."
+                )
+            agree += claim.known and abs(claim.relative) <= _CLAIM
+        if agree:
+            lines.append(
+                f"{counted(agree, 'claim')} of the header {'agrees' if agree == 1 else 'agree'} with its values."
+            )
+        if open_ones := sum(not claim.known for claim in self.claims):
+            why = "viewers surround too little of the hemisphere, or steps are wider than the lobe"
+            lines.append(f"{counted(open_ones, 'claim')} of the header cannot be judged: {why}.")
+        return lines
+
+
+def statement(samples: Samples, progress: Callable[[float], None] | None = None) -> SampleStatement:
     """Return what samples cover, what they integrate to, and what looks wrong.
 
-    Parameters
-    ----------
-    samples : Samples
-        Samples. Their record may hold ``tis``, the total integrated scatter that a header claims, with the channels
-        last, over ``theta_i_deg`` before.
-    progress : callable, optional
-        Called with the share [1] that is done.
-
-    Raises
-    ------
-    MissingExtraError
-        If SciPy, which triangulates, is not installed.
+    The record of the samples may hold ``tis``, the total integrated scatter that a header claims, with the channels
+    last, over ``theta_i_deg`` before. `progress` is called with the share [1] that is done. MissingExtraError if SciPy,
+    which triangulates, is not installed.
 
     Notes
     -----
@@ -168,7 +199,8 @@ def statement(samples: Samples, progress: Callable[[float], None] | None = None)
     Delaunay triangles of the points f_r is linear. Between them and the rim of the disk it is that of the point closest
     to the rim. Zeros are taken for holes where less than half of the values are 0.
     """
-    theta_i, theta_r = degrees(samples.theta_i), degrees(samples.theta_r)
+    theta_i = degrees(samples.theta_i)
+    theta_r = degrees(samples.theta_r)
     delta = degrees(samples.phi_r - samples.phi_i) % 360.0
     known = samples.known
     in_plane = (np.abs(delta % 180.0 - 90.0) > 89.99) | (theta_r == 0.0)
@@ -178,8 +210,13 @@ def statement(samples: Samples, progress: Callable[[float], None] | None = None)
     full = replace(samples, values=np.where(zeros, np.nan, samples.values)) if zeros.any() else samples
     integrated, in_bands = incidences_of(full, delta, progress, one_side=one_side)
     at = samples.wavelength_nm
+    uncertainty = None
+    if samples.uncertainty is not None:
+        stated = np.isfinite(samples.uncertainty) & known & (samples.values != 0.0)
+        relative = samples.uncertainty[stated] / np.abs(samples.values[stated])
+        uncertainty = float(np.median(relative)) if stated.any() else None
     peak = np.unravel_index(int(np.argmax(np.where(known, samples.values, -np.inf))), samples.values.shape)[0]
-    return Statement(
+    return SampleStatement(
         name=samples.name,
         channels=samples.channels,
         samples=len(samples),
@@ -195,7 +232,7 @@ def statement(samples: Samples, progress: Callable[[float], None] | None = None)
         constant=is_constant(samples),
         largest=float(np.nanmax(samples.values)) if known.any() else np.nan,
         largest_at_deg=(float(theta_i[peak]), float(theta_r[peak]), float(delta[peak])),
-        uncertainty=_uncertainty(samples),
+        uncertainty=uncertainty,
         wavelength_nm=None if at is None else (float(at.min()), float(at.max())),
         in_bands=in_bands,
         incidences=integrated,
@@ -204,14 +241,6 @@ def statement(samples: Samples, progress: Callable[[float], None] | None = None)
         notes=notes_of(samples.record),
         hints=(*missing(samples), *azimuths(samples, delta), *units(samples, integrated)),
     )
-
-
-def _uncertainty(samples: Samples) -> float | None:
-    """Return the median of the standard uncertainties over the absolute values [1]; None if none is known."""
-    if samples.uncertainty is None:
-        return None
-    stated = np.isfinite(samples.uncertainty) & samples.known & (samples.values != 0.0)
-    return float(np.median(samples.uncertainty[stated] / np.abs(samples.values[stated]))) if stated.any() else None
 
 
 def _claims(samples: Samples, incidences: Sequence[Incidence]) -> tuple[Claim, ...]:
@@ -235,61 +264,6 @@ def _claims(samples: Samples, incidences: Sequence[Incidence]) -> tuple[Claim, .
     return tuple(claims)
 
 
-def _on_angles(known: Statement) -> list[str]:
-    lights = counted(known.lights, "direction") + " of the light"
-    channels = counted(len(known.channels), "channel")
-    low, high = known.theta_i_deg
-    samples = counted(known.samples, "node" if known.nodes else "sample")
-    around = "from several azimuths" if known.turned else "from one azimuth"
-    text = f"{samples} of {channels}: {lights}, {around}, theta_i {low:.4g} to {high:.4g} degrees"
-    text += f"; theta_r {known.theta_r_deg[0]:.4g} to {known.theta_r_deg[1]:.4g} degrees."
-    side = ["All viewers are on one side of the plane of incidence: the other is taken for its mirror image."]
-    return [text, *(side if known.one_side and known.incidences else [])]
-
-
-def _on_values(known: Statement) -> list[str]:
-    theta_i, theta_r, turn = known.largest_at_deg
-    where = f"theta_i {theta_i:.4g}, theta_r {theta_r:.4g} and an azimuth of {turn:.4g} degrees from the light"
-    counts = f"{counted(known.holes, 'hole')}, {counted(known.negative, 'negative value')}"
-    lines = [f"{counts}; the largest value is {known.largest:.4g} /sr at {where}."]
-    if known.wavelength_nm is not None:
-        low, high = known.wavelength_nm
-        lines.append(f"Wavelengths: {low:.4g} to {high:.4g} nm." if high > low else f"Wavelength: {low:.4g} nm.")
-    elif known.channels == ("grey",):
-        lines.append("No wavelength is stated; --wavelength-nm states one.")
-    if known.uncertainty is not None:
-        lines.append(f"Standard uncertainties are stated: {percent(known.uncertainty)} of f_r in the median.")
-    if known.constant:
-        of_channel = "f_r of each channel" if len(known.channels) > 1 else "f_r"
-        lines.append(f"{of_channel} is one number at all directions: the samples tell no shape.")
-    if known.zeros:
-        lines.append(f"{counted(known.zeros, 'value')} of exactly 0: integrals and pairs take them for holes.")
-    return lines
-
-
-def _on_albedo(known: Statement) -> list[str]:
-    if not known.incidences:
-        return ["No albedo: no direction of the light has viewers around the hemisphere."]
-    numbers = np.unique(np.linspace(0, len(known.incidences) - 1, _SHOWN).astype(int))
-    lines = []
-    for some in (known.incidences[number] for number in numbers):
-        azimuth = f", phi_i {some.phi_i_deg:.4g}" if known.turned and not known.in_bands else ""
-        text = f"Albedo at theta_i {some.theta_i_deg:.4g}{azimuth}: {_shown(known.channels, some.albedo)}"
-        if some.covered < _ALL_COVERED:
-            inside = _shown(known.channels, some.measured)
-            text += f"; viewers surround {100.0 * some.covered:.3g} % of the hemisphere, with {inside}"
-        if some.peak > PEAK:
-            text += f"; unknown: one viewer makes {percent(some.peak)} of it, the lobe is narrower than the steps"
-        lines.append(f"{text}.")
-    if known.in_bands:
-        lines.append(
-            f"Directions are scattered: these are lights within {BAND_DEG:g} degree, as if azimuths did not matter."
-        )
-    if len(numbers) < len(known.incidences):
-        lines.append(f"{len(known.incidences)} directions of the light are integrated in all.")
-    return lines
-
-
 def _shown(channels: tuple[str, ...], values: tuple[float, ...]) -> str:
     """Return values of channels as text: all of up to three, else the smallest and the largest."""
     if len(channels) == 1:
@@ -304,30 +278,133 @@ def _digits(value: float) -> str:
     return f"{value:.4f}" if 1e-3 <= abs(value) < 1.0 or value == 0.0 else f"{value:.4g}"
 
 
-def _on_pairs(known: Statement) -> list[str]:
-    if known.reciprocity is None:
-        return ["Reciprocity: no sample is the swap of another."]
-    pairs = known.reciprocity
-    return [
-        f"Reciprocity: {counted(pairs.pairs, 'pair')} of {'nodes' if known.nodes else 'samples'} with light and viewer "
-        f"exchanged; asymmetry |f - f'| / (|f| + |f'|) of these: median {100.0 * pairs.median:.3g} %, largest "
-        f"{100.0 * pairs.largest:.3g} %."
-    ]
+@dataclass(frozen=True)
+class ExchangedPairs:
+    """Asymmetry abs(a - b) / (abs(a) + abs(b)) [1] of samples that are each other's swap of light and viewer."""
+
+    pairs: int
+    median: float
+    largest: float
 
 
-def _on_claims(known: Statement) -> list[str]:
-    lines, agree = [], 0
-    for claim in known.claims:
-        if claim.known and abs(claim.relative) > _CLAIM:
-            size = f"{percent(abs(claim.relative))} {'low' if claim.relative < 0.0 else 'high'}"
-            of_channel = f" ({claim.channel})" if len(known.channels) > 1 else ""
-            text = f"The header claims {claim.claimed:.4g} at theta_i {claim.theta_i_deg:.4g}{of_channel}"
-            least = "at least " if claim.at_least else ""
-            lines.append(f"{text}, and its own values integrate to {least}{claim.integrated:.4g}: the claim is {size}.")
-        agree += claim.known and abs(claim.relative) <= _CLAIM
-    if agree:
-        lines.append(f"{counted(agree, 'claim')} of the header {'agrees' if agree == 1 else 'agree'} with its values.")
-    if open_ones := sum(not claim.known for claim in known.claims):
-        why = "viewers surround too little of the hemisphere, or steps are wider than the lobe"
-        lines.append(f"{counted(open_ones, 'claim')} of the header cannot be judged: {why}.")
-    return lines
+def reciprocity_of(samples: Samples, one_side: bool) -> ExchangedPairs | None:
+    """Return the asymmetry of samples that are each other's swap; None without any."""
+    angles = [degrees(angle) for angle in (samples.theta_i, samples.phi_i, samples.theta_r, samples.phi_r)]
+    theta_i, phi_i, theta_r, phi_r = (np.rint(angle / _SAME_DEG).astype(np.int64) for angle in angles)
+    turn = round(360.0 / _SAME_DEG)
+    if samples.turned:
+        coordinates = theta_i, np.where(theta_i == 0, 0, phi_i % turn), theta_r, np.where(theta_r == 0, 0, phi_r % turn)
+        swapped = coordinates[2], coordinates[3], coordinates[0], coordinates[1]
+    else:
+        delta = np.where((theta_i == 0) | (theta_r == 0), 0, (phi_r - phi_i) % turn)
+        other = np.where(delta == 0, 0, turn - delta)
+        delta, other = (np.minimum(delta, other),) * 2 if one_side else (delta, other)
+        coordinates = (theta_i, theta_r, delta, 0 * delta)
+        swapped = (theta_r, theta_i, other, 0 * delta)
+    code, code_swapped = (((a * turn + b) * turn + c) * turn + d for a, b, c, d in (_wide(coordinates), _wide(swapped)))
+    order = np.argsort(code, kind="stable")
+    place = np.clip(np.searchsorted(code[order], code_swapped), 0, len(order) - 1)
+    partner = order[place]
+    first = np.flatnonzero((code[partner] == code_swapped) & (code < code_swapped))
+    a, b = samples.values[first], samples.values[partner[first]]
+    level = float(np.nanmedian(np.abs(samples.values))) if samples.known.any() else 0.0
+    pairs = int(np.sum(are_bright(a, b, level).any(axis=1)))
+    if not pairs:
+        return None
+    asymmetry = asymmetries(a, b, level)
+    return ExchangedPairs(pairs, float(np.median(asymmetry)), float(asymmetry.max()))
+
+
+def _wide(parts: Sequence[NDArray[np.int64]]) -> list[NDArray[np.uint64]]:
+    """Return four whole numbers of 16 bits as unsigned numbers of 64, whose products do not overflow together."""
+    return [part.astype(np.uint64) for part in parts]
+
+
+def units(samples: Samples, incidences: Sequence[Incidence]) -> tuple[str, ...]:
+    """Return what looks wrong with the unit of the values, in sentences."""
+    if not samples.known.any():
+        return ("There is no value at all.",)
+    sound = [max(some.albedo) for some in incidences if some.peak <= PEAK]
+    if sound:
+        albedo = float(np.median(sound))
+        how = "the values integrate to"
+    else:
+        albedo = float(np.pi * np.nanmedian(samples.values))
+        how = "pi times the median of f_r is"
+    if albedo > _EXCESS:
+        reasons = [f"reflectance factors, which make {albedo / np.pi:.3g} when they are divided by pi"]
+        if albedo / 100.0 > _BLACK and albedo > 10.0:
+            reasons = [
+                f"percent, which make {albedo / 100.0:.3g}",
+                f"reflectance factors in percent ({albedo / 314.16:.3g})",
+            ]
+        return (f"Units? An albedo above 1: {how} {albedo:.4g}. The values may be {', or '.join(reasons)}.",)
+    if 0.0 <= albedo < _BLACK:
+        text = f"Units? Too dark: {how} {albedo:.2g}, and the blackest coatings reflect more."
+        return (f"{text} A thousand times is {1e3 * albedo:.2g}.",)
+    return ()
+
+
+def missing(samples: Samples) -> tuple[str, ...]:
+    """Return whether negative values, or the largest, look like marks of missing ones, in a sentence."""
+    known = samples.values[samples.known]
+    scale = np.pi if samples.record.get("quantity") == "reflectance_factor" else 1.0
+    low = float(known.min(initial=0.0))
+    if low >= 0.0:
+        return _missing_above(known, scale)
+    if not np.any(known > 0.0):
+        return ("Sign? No value is above 0: f_r is not negative, and nothing can be tabulated or fitted.",)
+    number = low * scale
+    marks = np.isclose(known, low, rtol=1e-9, atol=0.0)
+    count, others = int(marks.sum()), known[~marks]
+    if not others.size or (count == 1 and not np.isclose(number, _MISSING).any()):
+        return ()
+    far = low < -float(np.abs(others).max()) and low < 10.0 * min(float(others.min()), 0.0)
+    if far or np.isclose(number, _MISSING).any():
+        verb, they = ("is", "does it") if count == 1 else ("are", "do they")
+        return (f"{counted(count, 'value')} {verb} {number:.4g}: {they} mean missing?",)
+    return ()
+
+
+def _missing_above(known: Floats, scale: float) -> tuple[str, ...]:
+    """Return whether the largest values look like marks of missing ones: nines that are far above the others."""
+    high = float(known.max(initial=0.0))
+    marks = np.isclose(known, high, rtol=1e-9, atol=0.0)
+    count, others = int(marks.sum()), known[~marks]
+    nines = np.isclose(high * scale, -_MISSING).any() or np.isclose(high * scale, _FILLED, rtol=1e-6).any()
+    if not others.size or not nines or high <= _FAR * float(others.max()):
+        return ()
+    verb, they = ("is", "does it") if count == 1 else ("are", "do they")
+    return (f"{counted(count, 'value')} {verb} {high * scale:.4g}: {they} mean missing?",)
+
+
+def is_constant(samples: Samples) -> bool:
+    """Return True if f_r of each channel with a few values is one number at all directions."""
+    seen = samples.known.sum(axis=0) >= _FEWEST
+    values = np.where(samples.known, samples.values, np.nan)[:, seen]
+    return bool(seen.any() and np.all(np.nanmin(values, axis=0) == np.nanmax(values, axis=0)))
+
+
+def azimuths(samples: Samples, delta_deg: Floats) -> tuple[str, ...]:
+    """Return whether a lobe lies at the light and none in the mirror direction, in a sentence.
+
+    `delta_deg` (N,) are azimuths [degree] from the light to the viewer, in [0, 360).
+    """
+    known, theta_i = samples.known, np.degrees(samples.theta_i)
+    f_r = np.where(known, samples.values, 0.0).sum(axis=1) / np.maximum(known.sum(axis=1), 1)
+    low, high = _TILTED_DEG
+    seen = known.any(axis=1) & (theta_i >= low) & (theta_i <= high)
+    level = np.abs(np.degrees(samples.theta_r) - theta_i) <= _ABOUT_DEG
+    back = seen & level & (np.abs((delta_deg + 180.0) % 360.0 - 180.0) <= _ABOUT_DEG)
+    mirror = seen & level & (np.abs(delta_deg - 180.0) <= _ABOUT_DEG)
+    votes = []
+    for rows in lights(samples, _FEWEST) or bands(samples):
+        if back[rows].any():
+            middle = float(np.median(f_r[rows][seen[rows]]))
+            lobe, mirrored = (f_r[rows].max(where=side[rows], initial=0.0) for side in (back, mirror))
+            votes.append(lobe > _LOBE * max(middle, mirrored) and mirrored <= _LEVEL * max(middle, 0.0))
+    if 2 * sum(votes) <= len(votes):
+        return ()
+    other, direction = ("light", "light") if samples.record.get("azimuth") else ("forward", "forward direction")
+    text = "Azimuths? The lobe lies at delta_phi = 0, towards the light, and none lies in the mirror direction."
+    return (f"{text} If the file counts azimuths from the {direction}, import it with --azimuth {other}.",)

@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.geometry import radians, unit_vector
 from brdfdb.materials.source import Evaluate
+from brdfdb.measurements.coordinates import DirectionPairs
 from brdfdb.measurements.extent import Extent
-from brdfdb.measurements.record import Spread, Symmetry
+from brdfdb.measurements.record import MeasuredSymmetry, Spread
 from brdfdb.parameters import Floats
 
 _HALF_TURN = np.array([-1.0, -1.0, 1.0])
 MIRROR = np.array([1.0, -1.0, 1.0])  # of unit vectors, that exchanges left and right of the plane of phi = 0
-_DRAWN, _UP_TO_DEG, _SEED = 4000, 80.0, 1924
+_DRAWN = 4000
+_UP_TO_DEG = 80.0
+_SEED = 1924
 _FAINT = 1e-3  # share of the median of abs(f_r) below which pairs do not count in an asymmetry
 _ROUNDING = 1e-6  # asymmetry that a file in float32 has
 _CONTRADICTED = 0.05  # asymmetry above which data of unknown noise contradict a symmetry
@@ -24,20 +28,28 @@ _IN_OCTAVE = 400
 _WITHIN = 1.2  # times the noise is how large the asymmetry may be, because both are estimates
 
 
-def drawn_pairs(extent: Extent | None = None, up_to_deg: float = _UP_TO_DEG) -> tuple[Floats, Floats]:
+def drawn_pairs(extent: Extent | None = None, up_to_deg: float = _UP_TO_DEG) -> DirectionPairs:
     """Return pairs of unit vectors (N, 3) up to an angle [degree]; with an extent, those within it, also exchanged."""
     rng = np.random.default_rng(_SEED)
     theta = np.arccos(rng.uniform(np.cos(radians(up_to_deg)), 1.0, (2, _DRAWN)))
     phi = rng.uniform(0.0, 2.0 * np.pi, (2, _DRAWN))
     wi, wr = (unit_vector(theta[k], phi[k]) for k in (0, 1))
     if extent is None:
-        return wi, wr
+        return DirectionPairs(wi, wr)
     inside = _inside(extent, wi, wr)
-    return wi[inside], wr[inside]
+    return DirectionPairs(wi[inside], wr[inside])
 
 
-def lobe_pairs(extent: Extent | None = None) -> tuple[Floats, Floats, NDArray[np.int64]]:
-    """Return pairs of unit vectors (N, 3) around the mirror direction and the light, and their octaves (N,).
+class LobePairs(NamedTuple):
+    """Unit vectors (N, 3) of light and viewer, and the octave (N,) of the slope of their half vectors."""
+
+    wi: Floats
+    wr: Floats
+    octave: NDArray[np.int64]
+
+
+def lobe_pairs(extent: Extent | None = None) -> LobePairs:
+    """Return pairs around the mirror direction and the light.
 
     As many pairs have half vectors with slopes of 0.002 to 0.004, as of 0.004 to 0.008, and so on up to 2: a lobe of
     any width has a share of them. The same viewers, turned by 180 degrees, are about the light. Those of samples lie
@@ -48,14 +60,16 @@ def lobe_pairs(extent: Extent | None = None) -> tuple[Floats, Floats, NDArray[np
     slope = _SLOPES[octave] * 2.0 ** rng.uniform(0.0, 1.0, octave.size)
     theta = np.arccos(rng.uniform(np.cos(radians(_UP_TO_DEG)), 1.0, octave.size))
     phi = rng.uniform(0.0, 2.0 * np.pi, (2, octave.size))
-    wi, half = unit_vector(theta, phi[0]), unit_vector(np.arctan(slope), phi[1])
+    wi = unit_vector(theta, phi[0])
+    half = unit_vector(np.arctan(slope), phi[1])
     wr = 2.0 * np.sum(wi * half, axis=1, keepdims=True) * half - wi
-    wi, wr = np.concatenate([wi, wi]), np.concatenate([wr, wr * _HALF_TURN])
+    wi = np.concatenate([wi, wi])
+    wr = np.concatenate([wr, wr * _HALF_TURN])
     octave = np.concatenate([octave, octave + _SLOPES.size])
     inside = wr[:, 2] > np.cos(radians(_UP_TO_DEG))
     if extent is not None:
         inside &= _inside(extent, wi, wr)
-    return wi[inside], wr[inside], octave[inside]
+    return LobePairs(wi[inside], wr[inside], octave[inside])
 
 
 def _inside(extent: Extent, wi: Floats, wr: Floats) -> NDArray[np.bool_]:
@@ -101,34 +115,34 @@ def _floored(f: Floats, other: Floats) -> Spread | None:
     return spread_of(np.abs(f - other) / np.maximum(total, floor))
 
 
-def reciprocity(f_r: Evaluate, extent: Extent | None, noise: float | None) -> Symmetry:
+def reciprocity(f_r: Evaluate, extent: Extent | None, noise: float | None) -> MeasuredSymmetry:
     """Return whether data keep to reciprocity within their noise [1]; it is not assumed where they cannot tell.
 
     Pairs everywhere and `lobe_pairs` decide. The asymmetry is that of pairs everywhere.
     """
     wi, wr = drawn_pairs(extent)
     f, other = (f_r(wi, wr), f_r(wr, wi)) if len(wi) else (np.empty((0, 1)),) * 2
-    in_lobe = lobe_pairs(extent)[:2]
+    lobe = lobe_pairs(extent)
     spreads = [_floored(f, other)] if len(wi) else []
-    spreads += [_floored(f_r(*in_lobe), f_r(*in_lobe[::-1]))] if len(in_lobe[0]) else []
+    spreads += [_floored(f_r(lobe.wi, lobe.wr), f_r(lobe.wr, lobe.wi))] if len(lobe.wi) else []
     p99 = max((one.p99 for one in spreads if one is not None), default=np.inf)
     allowed = _ROUNDING if noise is None else max(_WITHIN * noise, _ROUNDING)
-    return Symmetry(assumed=p99 <= allowed, asymmetry=_spread(f, other), allowed=noise)
+    return MeasuredSymmetry(assumed=p99 <= allowed, asymmetry=_spread(f, other), allowed=noise)
 
 
-def mirror(f_r: Evaluate, noise: float | None) -> Symmetry:
+def mirror(f_r: Evaluate, noise: float | None) -> MeasuredSymmetry:
     """Return whether data everywhere keep to the mirror symmetry that isotropic tables use."""
     wi, wr = drawn_pairs()
     f, other = f_r(wi, wr), f_r(wi * MIRROR, wr * MIRROR)
     seen = _floored(f, other)
     allowed = _CONTRADICTED if noise is None else max(_WITHIN * noise, _CONTRADICTED)
     kept = (seen is None or seen.median <= allowed) and _of_lobes(f_r, lambda w: w * MIRROR) <= allowed
-    return Symmetry(assumed=kept, asymmetry=_spread(f, other), allowed=noise)
+    return MeasuredSymmetry(assumed=kept, asymmetry=_spread(f, other), allowed=noise)
 
 
-def mirror_of_samples(f: Floats, other: Floats, noise: float) -> Symmetry:
+def mirror_of_samples(f: Floats, other: Floats, noise: float) -> MeasuredSymmetry:
     """Return the mirror symmetry that tables of isotropic samples assume, with the asymmetry of samples (N, C)."""
-    return Symmetry(assumed=True, asymmetry=_spread(f, other), allowed=noise)
+    return MeasuredSymmetry(assumed=True, asymmetry=_spread(f, other), allowed=noise)
 
 
 def is_turned(f_r: Evaluate, noise: float | None) -> bool:

@@ -15,7 +15,10 @@ Array = NDArray[np.float64]
 Form = Callable[..., Any]
 Kind = Literal["printed", "customary", "words"]
 
-ORENNAYAR, HE, WARD = "orennayar1994", "he1991", "ward1992"  # keys of references.bib
+# Keys of references.bib
+ORENNAYAR = "orennayar1994"
+HE = "he1991"
+WARD = "ward1992"
 
 
 @dataclass(frozen=True)

@@ -87,14 +87,15 @@ def _rough_mirror_by_eq_71(
     theta_r: Any,
     phi_r: Any,
     *,
-    wavelength_nm: Any,
-    sigma_0_um: Any,
-    tau_um: Any,
     shadowed: bool,
     wave_number: bool,
+    **surface: Any,
 ) -> Any:
     """Return eq. 71 with abs(F)^2 = 1, with S of eq. 23 and 2 pi / lambda in v_xy of eq. 78 or without."""
-    wavelength, slope = wavelength_nm / 1000.0, sigma_0_um / tau_um
+    wavelength = surface["wavelength_nm"] / 1000.0
+    sigma_0_um = surface["sigma_0_um"]
+    tau_um = surface["tau_um"]
+    slope = sigma_0_um / tau_um
     k_i, k_r = propagation(theta_i, phi_i, theta_r, phi_r)
     # Eq. (84)
     v = k_r - k_i

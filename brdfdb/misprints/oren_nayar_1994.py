@@ -9,6 +9,7 @@ import numpy as np
 
 from brdfdb import models
 from brdfdb.geometry import radians, spherical_angles, unit_vector
+from brdfdb.integrals.quadrature import gauss_rule
 from brdfdb.misprints._entry import ORENNAYAR, Array, Misprint, at, part
 
 
@@ -67,7 +68,7 @@ def _bounce_of_visible_widths(
 
 @cache
 def _nodes() -> tuple[Array, Array]:
-    x, w = np.polynomial.legendre.leggauss(400)
+    x, w = gauss_rule(400)
     return np.asarray(x), np.asarray(w)
 
 

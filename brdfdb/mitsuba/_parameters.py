@@ -22,7 +22,7 @@ _BOTH = {"alpha": ("alpha_x", "alpha_y")}
 _ENDS_NM = (300.0, 900.0)  # of spectra in Mitsuba, which are 0 beyond: ours continue as constants
 
 
-class Parameters:
+class PluginParameters:
     """Textures and switches that are read from the properties of a plugin, by the names of the model's parameters.
 
     Reflectances and those of `coloured` have a value for each channel or wavelength. Spectra continue as constants

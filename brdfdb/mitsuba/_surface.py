@@ -1,4 +1,10 @@
-"""The BSDF that all models share: components, their sampler and their density, around the formula of a model."""
+"""The BSDF that all models share: components, their sampler, their density and Mueller matrices, around a formula.
+
+Mitsuba's Stokes vectors have U and V of the opposite sign of `brdfdb.tables.stokes`: its second axis is k x s, ours is
+p = s x k. The lower right block of a facet is the same in both. Matrices of `eval` and `sample` act on light that
+travels along -wo and leaves along si.wi where radiance is carried, the other way round where importance is. They are
+between `mitsuba.mueller.stokes_basis` of both directions of travel, in the frame of the surface.
+"""
 
 from __future__ import annotations
 
@@ -7,16 +13,30 @@ from typing import Any, NamedTuple, Protocol
 import drjit as dr
 import mitsuba as mi
 
-from brdfdb.mitsuba._mueller import Facet, matrix
-from brdfdb.mitsuba._parameters import Parameters
+from brdfdb.mitsuba._parameters import PluginParameters
 
 Values = dict[str, Any]
 
-GLOSSY, DIFFUSE, SPECULAR = "glossy", "diffuse", "specular"
+GLOSSY = "glossy"
+DIFFUSE = "diffuse"
+SPECULAR = "specular"
+
+_COLLINEAR = 1e-12  # square of the sine below which light and viewer are collinear: any plane through both serves
 
 
-class Lobe(Protocol):
-    """The directions around the mirror direction that a sampler prefers, with a share [1] of all samples."""
+class Facet(NamedTuple):
+    """Elements [1] of the Mueller matrix of a facet over its first one, between bases of the plane of light and viewer.
+
+    The others are 0, but for m11 = 1, m10 = m01, m33 = m22 and m32 = -m23.
+    """
+
+    m01: Any
+    m22: Any
+    m23: Any
+
+
+class SampledLobe(Protocol):
+    """Directions around the mirror direction that a sampler prefers."""
 
     @property
     def share(self) -> Any:
@@ -24,7 +44,7 @@ class Lobe(Protocol):
 
     @property
     def alone(self) -> float:
-        """This share if the glossy part is alone."""
+        """The share [1] if the glossy part is alone."""
 
     def draw(self, wi: Any, choice: Any, sample: Any) -> Any:
         """Return directions for a random number and a point in the unit square."""
@@ -41,7 +61,7 @@ class Formula:
 
     components: tuple[str, ...]
     anisotropic = False
-    parameters: Parameters
+    parameters: PluginParameters
 
     def at(self, interaction: Any, active: Any) -> Values:
         """Return the parameters where a ray meets the surface."""
@@ -74,10 +94,10 @@ class Formula:
         return None
 
     def depolarised(self, values: Values) -> Any:  # noqa: ARG002  # of models whose glossy part is all polarised
-        """Return what is depolarised of the glossy part of f_r [1/sr]."""
+        """Return the depolarised part of the glossy f_r [1/sr]."""
         return 0.0
 
-    def lobe(self, values: Values, wi: Any) -> Lobe | None:  # noqa: ARG002  # of a model that is diffuse
+    def lobe(self, values: Values, wi: Any) -> SampledLobe | None:  # noqa: ARG002  # of a model that is diffuse
         """Return the lobe of the glossy part; None if there is no such part."""
         return None
 
@@ -90,7 +110,7 @@ class Formula:
         return 0.0
 
 
-class _Shares(NamedTuple):
+class _SampleShares(NamedTuple):
     """Probabilities [1] of the three ways to draw a direction. Their sum is 1, or 0 where nothing is drawn."""
 
     specular: Any
@@ -168,7 +188,7 @@ class _Methods:
         record = dr.zeros(mi.BSDFSample3f)
         record.wo, record.pdf = (_or_nan(known, active, x) for x in (wo, dr.select(above, pdf, 0.0)))
         record.eta = 1.0
-        record.sampled_type, record.sampled_component = self._kind(ctx, is_specular, in_lobe)
+        self._set_component(record, ctx, is_specular, in_lobe)
         return record, _or_nan(known, active, self._reflected(ctx, values, light, viewer, factor, specular))
 
     def eval_diffuse_reflectance(self, si: Any, active: Any = True) -> Any:
@@ -195,14 +215,14 @@ class _Methods:
         hidden = dr.minimum(glossy, self._formula.depolarised(values))
         mirrored = (glossy - hidden) * factor
         mirrored = mirrored if specular is None else mirrored + specular
-        return matrix(ctx, wi, wo, facet, mirrored, (diffuse + hidden) * factor)
+        return _matrix(ctx, wi, wo, facet, mirrored, (diffuse + hidden) * factor)
 
     def _enabled(self, ctx: Any, part: str) -> float:
         """Return 1 if the context asks for a component, else 0."""
         components = self._formula.components
         return float(part in components and ctx.is_enabled(_flag(part), components.index(part)))
 
-    def _shares(self, ctx: Any, values: Values, lobe: Lobe | None, wi: Any) -> _Shares:
+    def _shares(self, ctx: Any, values: Values, lobe: SampledLobe | None, wi: Any) -> _SampleShares:
         glossy, diffuse = self._enabled(ctx, GLOSSY), self._enabled(ctx, DIFFUSE)
         in_lobe: Any = 0.0
         if lobe is not None and glossy:
@@ -211,17 +231,18 @@ class _Methods:
         if self._enabled(ctx, SPECULAR):
             specular = dr.detach(self._formula.specular_share(values, wi)) if glossy or diffuse else 1.0
         rest = (1.0 - specular) * max(glossy, diffuse)
-        return _Shares(specular, rest * in_lobe, rest * (1.0 - in_lobe))
+        return _SampleShares(specular, rest * in_lobe, rest * (1.0 - in_lobe))
 
-    def _kind(self, ctx: Any, is_specular: Any, in_lobe: Any) -> tuple[Any, Any]:
-        """Return type and number of the component that was drawn. The cosine draws what is diffuse, if anything."""
+    def _set_component(self, record: Any, ctx: Any, is_specular: Any, in_lobe: Any) -> None:
+        """Set type and number of the drawn component in a record. The cosine draws the diffuse one, if there is one."""
         components = self._formula.components
-        kind, number = mi.UInt32(0), mi.UInt32(0)
+        record.sampled_type = record.sampled_component = mi.UInt32(0)
         for part, chosen in ((GLOSSY, True), (DIFFUSE, True), (GLOSSY, in_lobe), (SPECULAR, is_specular)):
             if self._enabled(ctx, part):
-                kind = dr.select(chosen, mi.UInt32(int(_flag(part))), kind)
-                number = dr.select(chosen, mi.UInt32(components.index(part)), number)
-        return kind, number
+                kind = mi.UInt32(int(_flag(part)))
+                number = mi.UInt32(components.index(part))
+                record.sampled_type = dr.select(chosen, kind, record.sampled_type)
+                record.sampled_component = dr.select(chosen, number, record.sampled_component)
 
 
 def surface_class() -> Any:
@@ -266,6 +287,35 @@ def _or_nan(known: Any, active: Any, value: Any) -> Any:
     return dr.select(known, value, unknown)
 
 
-def _density(shares: _Shares, lobe: Lobe | None, wi: Any, wo: Any) -> Any:
+def _density(shares: _SampleShares, lobe: SampledLobe | None, wi: Any, wo: Any) -> Any:
     cosine = shares.cosine * dr.maximum(wo.z, 0.0) * dr.inv_pi
     return cosine if lobe is None else cosine + shares.lobe * lobe.density(wi, wo)
+
+
+def _matrix(ctx: Any, wi: Any, wo: Any, facet: Facet, polarised: Any, depolarised: Any) -> Any:
+    """Return the matrix of a polarised value times a facet, and of a value that is depolarised.
+
+    `wi` and `wo` are those of Mitsuba, `wi` towards the camera where radiance is carried.
+    """
+    nothing = mi.UnpolarizedSpectrum(0.0)
+    m01, m22, m23 = polarised * facet.m01, polarised * facet.m22, polarised * facet.m23
+    rows = (
+        (polarised + depolarised, m01, nothing, nothing),
+        (m01, polarised, nothing, nothing),
+        (nothing, nothing, m22, m23),
+        (nothing, nothing, -m23, m22),
+    )
+    light, viewer = (wo, wi) if ctx.mode == mi.TransportMode.Radiance else (wi, wo)
+    normal = dr.cross(light, viewer)
+    collinear = dr.squared_norm(normal) < _COLLINEAR
+    s_in = _across(light, normal, collinear)
+    s_out = _across(viewer, normal, collinear)
+    basis = mi.mueller.stokes_basis
+    in_plane = mi.Spectrum(*(element for row in rows for element in row))
+    return mi.mueller.rotate_mueller_basis(in_plane, -light, s_in, basis(-light), viewer, s_out, basis(viewer))
+
+
+def _across(w: Any, normal: Any, collinear: Any) -> Any:
+    """Return the normal of the plane, or a unit vector across `w` where light and viewer are collinear."""
+    other = dr.cross(w, dr.select(dr.abs(w.z) < 0.9, mi.Vector3f(0.0, 0.0, 1.0), mi.Vector3f(1.0, 0.0, 0.0)))
+    return dr.normalize(dr.select(collinear, other, normal))

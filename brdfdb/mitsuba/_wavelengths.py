@@ -40,11 +40,7 @@ def projection(props: Any, stored_nm: Array | None) -> Projection | None:
 
     None stands for channels that have a wavelength each: in variants that are not RGB or polarised, for a surface that
     is grey or known at a single wavelength, and where the property `channels` of the plugin is "wavelengths".
-
-    Raises
-    ------
-    ParameterError
-        If the wavelengths make no colour, or for a value of `channels` that is neither "srgb" nor "wavelengths".
+    ParameterError says that the wavelengths make no colour, or that `channels` is neither "srgb" nor "wavelengths".
     """
     channels = props.get("channels", SRGB)
     if channels not in (SRGB, SINGLE):
@@ -65,17 +61,14 @@ def projection(props: Any, stored_nm: Array | None) -> Projection | None:
 
 
 class Columns:
-    """The wavelengths at which numbers of a table are kept: those of the channels, or close together in a spectrum."""
+    """The wavelengths of the columns of a table: those of the channels, or closely spaced in spectral variants."""
 
     def __init__(self, wavelength_nm: Array | None, single_nm: float = 0.0) -> None:
         """Take the wavelengths of the table, None of a grey one, which has one column; one for all channels if not 0.
 
         A table of a single wavelength has one column, too. Spectra continue as constants beyond the wavelengths.
-
-        Raises
-        ------
-        ParameterError
-            If the wavelength of a channel lies outside those of the table, in variants without a spectrum.
+        ParameterError says that the wavelength of a channel lies outside those of the table, in variants without a
+        spectrum.
         """
         if wavelength_nm is None:
             self.at_nm = None

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -11,15 +13,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.errors import ParameterError
-from brdfdb.mitsuba._diffraction_series import diffraction_series, effective_variance
+from brdfdb.mitsuba._buffers import Buffer, polynomial, whole
 from brdfdb.mitsuba._gaussian_lobe import GaussianLobe
-from brdfdb.mitsuba._mueller import Facet
-from brdfdb.mitsuba._parameters import Parameters, spectrum_of
-from brdfdb.mitsuba._surface import DIFFUSE, GLOSSY, SPECULAR, Formula, Values
+from brdfdb.mitsuba._grid import CellPlace
+from brdfdb.mitsuba._parameters import PluginParameters, spectrum_of
+from brdfdb.mitsuba._surface import DIFFUSE, GLOSSY, SPECULAR, Facet, Formula, Values
 from brdfdb.mitsuba._wavelengths import SRGB, channels_nm, projection
 from brdfdb.mitsuba.diffuse import one_less_exp
 from brdfdb.models import MODELS
-from brdfdb.models.he_torrance_1991 import WAVELENGTH_NM, K, N
+from brdfdb.models._diffraction_series import diffraction_series as exact_series
+from brdfdb.models._he_torrance_kernels import variance
+from brdfdb.parameters import WAVELENGTH_NM, K, N
 from brdfdb.spectra import PICTURE_NM, picture_wavelengths
 
 Array = NDArray[np.float64]
@@ -28,10 +32,118 @@ _LEAST_COS = 6.1e-17  # cosine of the horizon: the model is finite there
 _LEAST = 1e-30
 _X_MAX = 9.0  # largest x; erfc(x) and exp(-x^2) are 0 in float32 well below it
 _LARGEST = 1e38  # f_r [1/sr] stays below
-_STEEPEST, _ALPHA_RANGE = 1e-3, (1e-6, 2.0)  # least cosine and range of alpha in the lobe of samples
+_STEEPEST = 1e-3  # least cosine in the lobe of samples
+_ALPHA_RANGE = (1e-6, 2.0)  # of the lobe of samples
+# exp(x^2) erfc(x) times x + 3: Chebyshev's series in (x - 3) / (x + 3), the highest power first
+_ERFCX = (
+    6.78438519e-05,
+    -0.000210922502,
+    -0.000507882505,
+    0.00297335628,
+    -0.00123234629,
+    -0.0268017128,
+    0.119532295,
+    -0.310471714,
+    0.590227962,
+    -0.883394241,
+    1.07400692,
+)
+
+# The table of the sum of eq. 78 holds its logarithm, plus t = V / (10 + g), over ln(g) and t / (t + 10). Its error is
+# below 1e-6 where the sum is above 1e-26 of its largest value. Below the least g the sum is its first term, e^-V, and
+# values that differ are smaller than 1e-8 of it. Above the largest g it is a function of V / g
+_LOG_G_LOW = -18.0
+_LOG_G_HIGH = 18.0
+_OFFSET = 10.0  # of g in t
+_SCALE = 10.0  # of t
+_FARTHEST = 100.0  # largest t
+_G_LOW = math.exp(_LOG_G_LOW)
+_G_HIGH = math.exp(_LOG_G_HIGH)
+_PATCHES_G = 288
+_PATCHES_V = 160
+_LOG_K_HIGH = 37.0  # largest ln(1 + K)
+_PATCHES_K = 256
+
+_DEGREE = 3  # of patches
+_NODES = np.cos(np.pi * (np.arange(_DEGREE + 1) + 0.5) / (_DEGREE + 1))  # Chebyshev's, in [-1, 1]
+_TO_POWERS = np.linalg.inv(np.vander((1.0 + _NODES) / 2.0, increasing=True))  # of a variable in [0, 1]
 
 
-class _Surface(NamedTuple):
+class PatchAxis(NamedTuple):
+    """The range of a variable and the number of patches along it."""
+
+    low: float
+    high: float
+    patches: int
+
+    @property
+    def nodes(self) -> Array:
+        """The places of interpolation, shape (patches, 4)."""
+        size = (self.high - self.low) / self.patches
+        return np.asarray(self.low + size * (np.arange(self.patches)[:, np.newaxis] + (1.0 + _NODES) / 2.0))
+
+    def place(self, x: Any) -> CellPlace:
+        """Return the patch that holds x; beyond an end, the end."""
+        size = (self.high - self.low) / self.patches
+        number = whole((x - self.low) * (1.0 / size), self.patches)
+        return CellPlace(number, dr.clip((x - (self.low + size * number)) * (1.0 / size), 0.0, 1.0))
+
+
+class Patches:
+    """Cubic polynomials in each variable that interpolate a smooth function patch by patch, and are differentiable."""
+
+    def __init__(self, function: Callable[..., Array], *axes: PatchAxis) -> None:
+        self._axes = axes
+        if len(axes) == 1:
+            powers = function(axes[0].nodes) @ _TO_POWERS.T
+        else:
+            values = function(*np.broadcast_arrays(axes[0].nodes[:, :, np.newaxis, np.newaxis], axes[1].nodes))
+            powers = np.einsum("kx,pxqy,ly->pqkl", _TO_POWERS, values, _TO_POWERS)
+        self._rows = Buffer(powers)
+
+    def __call__(self, *variables: Any) -> Any:
+        """Return the function at numbers, or arrays of one number a ray."""
+        places = [axis.place(x) for axis, x in zip(self._axes, variables, strict=True)]
+        size = _DEGREE + 1
+        if len(places) == 1:
+            return polynomial(self._rows.row(places[0].cell, size), places[0].t)
+        row = self._rows.row(places[0].cell * self._axes[1].patches + places[1].cell, size * size)
+        return polynomial([polynomial(row[size * k : size * (k + 1)], places[1].t) for k in range(size)], places[0].t)
+
+
+@functools.cache
+def _series_patches() -> Patches:
+    def logarithm(log_g: Array, share: Array) -> Array:
+        g = np.exp(log_g)
+        t = _SCALE * share / (1.0 - share)
+        return np.asarray(np.log(exact_series(g, (_OFFSET + g) * t)) + t)
+
+    last = _FARTHEST / (_FARTHEST + _SCALE)
+    return Patches(logarithm, PatchAxis(_LOG_G_LOW, _LOG_G_HIGH, _PATCHES_G), PatchAxis(0.0, last, _PATCHES_V))
+
+
+@functools.cache
+def _variance_patches() -> Patches:
+    return Patches(lambda log_K: np.asarray(variance(np.expm1(log_K))), PatchAxis(0.0, _LOG_K_HIGH, _PATCHES_K))
+
+
+def diffraction_series(g: Any, V: Any) -> Any:
+    """Return the sum [1] of eq. 78 divided by g, as `brdfdb.models._diffraction_series.diffraction_series` does.
+
+    It reads a table of the sum that `brdfdb.models` computes: its cost is the same for every g and V.
+    """
+    inside = dr.clip(g, _G_LOW, _G_HIGH)
+    beyond = dr.minimum(_G_HIGH / dr.maximum(g, _G_HIGH), 1.0)
+    t = dr.minimum(V * beyond / (_OFFSET + inside), _FARTHEST)
+    return dr.exp(_series_patches()(dr.log(inside), t / (t + _SCALE)) - t) * dr.square(beyond)
+
+
+def effective_variance(K: Any) -> Any:
+    """Return (sigma / sigma_0)^2 [1] of eqs 80-81 for K = K_i + K_r."""
+    return _variance_patches()(dr.log(1.0 + K))
+
+
+class OpticalSurface(NamedTuple):
     """Factors g / (v_z^2 (sigma / sigma_0)^2) and V / v_xy^2, the ratio sigma_0 / tau, and n and k, all [1]."""
 
     wave: Any
@@ -41,25 +153,28 @@ class _Surface(NamedTuple):
     k: Any
 
 
-def shadowing_and_hidden(w: Any, slope: Any) -> tuple[Any, Any]:
-    """Return S_1(theta) / cos theta [1] of eqs 23-25, and K [1] of eqs 82-83, of a direction above the horizon."""
+class Shadowing(NamedTuple):
+    """S_1(theta) / cos theta [1] of eqs 23-25, and K [1] of eqs 82-83."""
+
+    over_cos: Any
+    K: Any
+
+
+def shadowing(w: Any, slope: Any) -> Shadowing:
+    """Return the shadowing of a direction above the horizon."""
     sin, cos = dr.sqrt(dr.maximum(dr.square(w.x) + dr.square(w.y), _LEAST)), dr.maximum(w.z, _LEAST_COS)
     x = dr.minimum(cos / dr.maximum(2.0 * slope * sin, _LEAST), _X_MAX)
     gaussian = dr.select(x < _X_MAX, dr.exp(-dr.square(x)), 0.0)
     erfc = gaussian * _erfcx(x)
     Q = 1.0 - 0.5 * erfc
-    return Q / (Q * cos + slope * dr.inv_sqrt_pi * sin * gaussian), sin / cos * erfc
+    return Shadowing(Q / (Q * cos + slope * dr.inv_sqrt_pi * sin * gaussian), sin / cos * erfc)
 
 
 def _erfcx(x: Any) -> Any:
     """Return exp(x^2) erfc(x) [1] for x >= 0, within 3e-7 relative."""
     s = (x - 3.0) / (x + 3.0)
-    # (x + 3) erfcx(x), Chebyshev's series
-    p: Any = 6.78438519e-05
-    for coefficient in (
-        *(-0.000210922502, -0.000507882505, 0.00297335628, -0.00123234629, -0.0268017128),
-        *(0.119532295, -0.310471714, 0.590227962, -0.883394241, 1.07400692),
-    ):
+    p: Any = _ERFCX[0]
+    for coefficient in _ERFCX[1:]:
         p = p * s + coefficient
     return p / (x + 3.0)
 
@@ -114,12 +229,12 @@ def _modulus(re: Any, im: Any) -> Any:
     return dr.sqrt(dr.maximum(dr.square(re) + dr.square(im), _LEAST))
 
 
-def directional_diffuse(wi: Any, wo: Any, surface: _Surface) -> Any:
+def directional_diffuse(wi: Any, wo: Any, surface: OpticalSurface) -> Any:
     """Return f_r [1/sr] of eq. 71 for directions above the horizon."""
-    light, K_i = shadowing_and_hidden(wi, surface.slope)
-    viewer, K_r = shadowing_and_hidden(wo, surface.slope)
+    light = shadowing(wi, surface.slope)
+    viewer = shadowing(wo, surface.slope)
     # Eqs (79)-(83)
-    g_over_vz2 = surface.wave * effective_variance(K_i + K_r)
+    g_over_vz2 = surface.wave * effective_variance(light.K + viewer.K)
     v_z2 = dr.square(dr.maximum(wi.z, _LEAST_COS) + dr.maximum(wo.z, _LEAST_COS))
     # Eq. (84): k_r - k_i is the sum of our directions
     v_xy2 = dr.square(wi.x + wo.x) + dr.square(wi.y + wo.y)
@@ -130,11 +245,13 @@ def directional_diffuse(wi: Any, wo: Any, surface: _Surface) -> Any:
     # Eq. (75), at the bisecting angle
     F2 = reflectance(dr.minimum(0.5 * dr.sqrt(v2), 1.0), surface.n, surface.k)
     # Eqs (71) and (76)
-    value = series * F2 * g_over_vz2 * (0.25 / dr.pi) * surface.correlation * (v2 * light) * (v2 * viewer)
+    value = (
+        series * F2 * g_over_vz2 * (0.25 / dr.pi) * surface.correlation * (v2 * light.over_cos) * (v2 * viewer.over_cos)
+    )
     return dr.minimum(value, _LARGEST)
 
 
-class _View(NamedTuple):
+class _WavelengthTriple(NamedTuple):
     """Three wavelengths [nm] of a projection, those of n and k [1] that are spectra, and weights [1] (3, channels)."""
 
     wavelength_nm: list[float]
@@ -158,8 +275,8 @@ class HeTorrance(Formula):
         if self._wavelength_nm:
             WAVELENGTH_NM.check(self._wavelength_nm)
             at_nm = (self._wavelength_nm,)
-        self._views = [] if self._wavelength_nm else _views_of(props)
-        self.parameters = Parameters(props, MODELS["he_torrance"], (N, K), at_nm)
+        self._bands = [] if self._wavelength_nm else _bands_of(props)
+        self.parameters = PluginParameters(props, MODELS["he_torrance"], (N, K), at_nm)
 
     def at(self, interaction: Any, active: Any) -> Values:
         """Return the parameters and the surface as the light of each channel sees it."""
@@ -169,17 +286,17 @@ class HeTorrance(Formula):
 
     def traverse(self, callback: Any) -> None:
         """Show the parameters to the scene, but for the spectra of a projection, which are constants."""
-        self.parameters.traverse(callback, constants=self._views[0].indices if self._views else ())
+        self.parameters.traverse(callback, constants=self._bands[0].indices if self._bands else ())
 
-    def _seen(self, values: Values, function: Callable[[_Surface], Any]) -> Any:
+    def _seen(self, values: Values, function: Callable[[OpticalSurface], Any]) -> Any:
         """Return a function of the surface as each channel sees it, projected on sRGB if the channels are colours."""
-        if not self._views:
+        if not self._bands:
             return function(values["surface"])
         total: list[Any] = [0.0, 0.0, 0.0]
-        for view in self._views:
-            indices = {name: mi.UnpolarizedSpectrum(numbers) for name, numbers in view.indices.items()}
-            spectrum = function(_surface_of(values | indices, mi.UnpolarizedSpectrum(view.wavelength_nm)))
-            for value, weights in zip(spectrum, view.weights, strict=True):
+        for band in self._bands:
+            indices = {name: mi.UnpolarizedSpectrum(numbers) for name, numbers in band.indices.items()}
+            spectrum = function(_surface_of(values | indices, mi.UnpolarizedSpectrum(band.wavelength_nm)))
+            for value, weights in zip(spectrum, band.weights, strict=True):
                 total = [number + value * weight for number, weight in zip(total, weights, strict=True)]
         return mi.UnpolarizedSpectrum(total)
 
@@ -201,18 +318,17 @@ class HeTorrance(Formula):
     def specular(self, values: Values, wi: Any) -> Any:
         """Return the specular reflectance [1], eq. 73."""
 
-        def of_surface(surface: _Surface) -> Any:
-            over_cos, K_i = shadowing_and_hidden(wi, surface.slope)
-            g = 4.0 * dr.square(wi.z) * surface.wave * effective_variance(2.0 * K_i)
-            return reflectance(wi.z, surface.n, surface.k) * dr.exp(-g) * dr.square(over_cos * wi.z)
+        def of_surface(surface: OpticalSurface) -> Any:
+            light = shadowing(wi, surface.slope)
+            g = 4.0 * dr.square(wi.z) * surface.wave * effective_variance(2.0 * light.K)
+            return reflectance(wi.z, surface.n, surface.k) * dr.exp(-g) * dr.square(light.over_cos * wi.z)
 
         return dr.maximum(self._seen(values, of_surface), 0.0)
 
     def specular_share(self, values: Values, wi: Any) -> Any:
         """Return the share [1] of samples in the mirror direction: that of the light, roughly."""
         specular = dr.mean(self.specular(values, wi))
-        directional, uniform = self._diffuse_albedos(values, wi)
-        return specular / dr.maximum(specular + directional + uniform, _LEAST)
+        return specular / dr.maximum(specular + self._directional_albedo(values, wi) + dr.mean(values["a"]), _LEAST)
 
     def lobe(self, values: Values, wi: Any) -> GaussianLobe:
         """Return the lobe of `brdfdb.models.he_torrance`, as wide as that of the widest channel."""
@@ -221,26 +337,26 @@ class HeTorrance(Formula):
         g = surface.wave * dr.square(v_z)
         alpha = dr.max(dr.sqrt(dr.maximum(g, 1.0) / surface.correlation) / v_z)
         alpha = dr.clip(alpha, *_ALPHA_RANGE)
-        directional, uniform = self._diffuse_albedos(values, wi)
-        share = 0.9 * directional / dr.maximum(directional + uniform, _LEAST)
+        directional = self._directional_albedo(values, wi)
+        share = 0.9 * directional / dr.maximum(directional + dr.mean(values["a"]), _LEAST)
         return GaussianLobe.of(share, alpha, alpha)
 
-    def _diffuse_albedos(self, values: Values, wi: Any) -> tuple[Any, Any]:
-        """Return rough albedos [1] of both diffuse parts, the mean over the channels."""
+    def _directional_albedo(self, values: Values, wi: Any) -> Any:
+        """Return an estimate of the albedo [1] of the directional diffuse part, the mean over the channels."""
         surface = values["surface"]
         cos = dr.maximum(wi.z, _STEEPEST)
         scattered = one_less_exp(4.0 * surface.wave * dr.square(cos))
-        return dr.mean(reflectance(cos, surface.n, surface.k) * scattered), dr.mean(values["a"])
+        return dr.mean(reflectance(cos, surface.n, surface.k) * scattered)
 
 
-def _surface_of(values: Values, wavelength_nm: Any) -> _Surface:
+def _surface_of(values: Values, wavelength_nm: Any) -> OpticalSurface:
     wavelength_um = wavelength_nm / 1000.0
     sigma_0, tau = values["sigma_0_um"], values["tau_um"]
     wave, correlation = dr.square(2.0 * dr.pi * sigma_0 / wavelength_um), dr.square(dr.pi * tau / wavelength_um)
-    return _Surface(wave, correlation, sigma_0 / tau, values["n"], values["k"])
+    return OpticalSurface(wave, correlation, sigma_0 / tau, values["n"], values["k"])
 
 
-def _views_of(props: Any) -> list[_View]:
+def _bands_of(props: Any) -> list[_WavelengthTriple]:
     """Return the wavelengths of a projection, three at a time; none if each channel has its own."""
     spectra = {name: spectrum for name in ("n", "k") if (spectrum := spectrum_of(props, name)) is not None}
     ends = [nm[[0, -1]] for nm, _ in spectra.values()] or [PICTURE_NM[[0, -1]]]
@@ -260,6 +376,8 @@ def _views_of(props: Any) -> list[_View]:
     weights = np.concatenate([chosen.weights, np.zeros((lacking, 3))])
     indices = {name: np.interp(nm, *spectrum) for name, spectrum in spectra.items()}
     return [
-        _View(nm[part].tolist(), {name: x[part].tolist() for name, x in indices.items()}, weights[part].tolist())
+        _WavelengthTriple(
+            nm[part].tolist(), {name: x[part].tolist() for name, x in indices.items()}, weights[part].tolist()
+        )
         for part in (slice(first, first + 3) for first in range(0, nm.size, 3))
     ]

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import drjit as dr
 import mitsuba as mi
 
-from brdfdb.mitsuba._parameters import Parameters
+from brdfdb.mitsuba._parameters import PluginParameters
 from brdfdb.mitsuba._surface import GLOSSY, Formula, Values
 from brdfdb.models import MODELS
 
@@ -48,7 +48,7 @@ class StrayLight(Formula):
 
     def __init__(self, props: Any, model: str) -> None:
         self._model = model
-        self.parameters = Parameters(props, MODELS[model])
+        self.parameters = PluginParameters(props, MODELS[model])
 
     def parts(self, values: Values, wi: Any, wo: Any) -> dict[str, Any]:
         """Return f_r [1/sr]."""

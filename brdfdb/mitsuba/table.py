@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import drjit as dr
 import mitsuba as mi
@@ -11,17 +11,14 @@ from numpy.typing import NDArray
 
 from brdfdb.errors import ParameterError
 from brdfdb.geometry import radians, unit_vector
-from brdfdb.mitsuba._buffers import Buffer
-from brdfdb.mitsuba._cells_lobe import CellsLobe
-from brdfdb.mitsuba._grid_axis import GridAxis
-from brdfdb.mitsuba._grid_points import points
-from brdfdb.mitsuba._grid_values import GridValues
-from brdfdb.mitsuba._mueller import Facet
-from brdfdb.mitsuba._surface import DIFFUSE, GLOSSY, SPECULAR, Formula, Values
+from brdfdb.mitsuba._buffers import Buffer, whole
+from brdfdb.mitsuba._grid import CellPlace, GridAxis, GridValues, points
+from brdfdb.mitsuba._surface import DIFFUSE, GLOSSY, SPECULAR, Facet, Formula, Values
 from brdfdb.mitsuba._wavelengths import Columns, projection
-from brdfdb.store.opening import open as open_store
+from brdfdb.store import open as open_store
 from brdfdb.tables._interpolation import prepared, weights_of_nodes
 from brdfdb.tables.polarisation import Facets
+from brdfdb.tables.sampler import LOBE_SHARE, Cells
 from brdfdb.tables.table import Table, table_from
 
 Array = NDArray[np.float64]
@@ -30,7 +27,9 @@ _LEAST_COS = 6.1e-17  # cosine of the horizon, as of `Table.lookup`
 _LARGEST = 1e38  # f_r [1/sr] stays below
 _DRAWN = 256  # directions from which the albedo of the table is estimated, to share samples with the specular part
 _TURN = (np.sqrt(5.0) - 1.0) / 2.0  # the golden section
-_LEAST = 1e-6
+_LEAST = 1e-6  # albedo
+_FLAT = 1e-30  # z of a half vector up to which the density counts as 0
+_LEAST_SQUARE = 1e-20
 
 
 def loaded(name: str, store: str | None) -> Table:
@@ -81,7 +80,7 @@ class TableFormula(Formula):
         self._whole = not mi.is_spectral and not self._mixed and self._spectrum is None
         self._values = GridValues(axes, np.asarray(numbers @ mixing, np.float32) if self._whole else numbers)
         self._rows = Buffer(mixing)
-        self._facets = _Facets(table.facets, table, self._columns) if mi.is_polarized and table.facets else None
+        self._facets = _TableFacets(table.facets, table, self._columns) if mi.is_polarized and table.facets else None
         self._lobe = CellsLobe(table.sampler.cells)
         self.components = (GLOSSY,)
         if table.uniform is not None and np.any(table.uniform > 0.0):
@@ -165,7 +164,7 @@ class TableFormula(Formula):
         return None if self._facets is None else self._facets.at(values["places"], wi, wo)
 
     def depolarised(self, values: Values) -> Any:
-        """Return what is depolarised of the tabulated part [1/sr]: a uniform part that is among its numbers."""
+        """Return the depolarised part [1/sr] of the tabulated one: a uniform part that it includes."""
         return 0.0 if self._facets is None else self._facets.inside(values["places"])
 
     def lobe(self, values: Values, wi: Any) -> CellsLobe:  # noqa: ARG002  # the lobe of other models depends on them
@@ -189,7 +188,7 @@ class TableFormula(Formula):
         specular = dr.mean(self.specular(values, wi))
         return specular / dr.maximum(specular + scattered, _LEAST)
 
-    def _specular_place(self, wi: Any) -> tuple[Any, Any]:
+    def _specular_place(self, wi: Any) -> CellPlace:
         return self._specular_axis.place(dr.atan2(dr.sqrt(dr.square(wi.x) + dr.square(wi.y)), wi.z))
 
     def traverse(self, callback: Any) -> None:
@@ -211,7 +210,7 @@ def _combined(numbers: list[Any], weights: Array) -> Any:
     return sum(number * float(weight) for number, weight in zip(numbers, weights, strict=True) if weight)
 
 
-class _Facets:
+class _TableFacets:
     """The polarisation of a table: `brdfdb.tables.polarisation.Facets`."""
 
     def __init__(self, facets: Facets, table: Table, columns: Columns) -> None:
@@ -234,5 +233,147 @@ class _Facets:
         return Facet(*(mi.UnpolarizedSpectrum([elements[k] for elements in channels]) for k in range(3)))
 
     def inside(self, places: list[Any]) -> Any:
-        """Return what is depolarised [1/sr] and stands among the numbers of the table, not beside them."""
+        """Return the depolarised part [1/sr] that the numbers of the table include."""
         return mi.UnpolarizedSpectrum([self._columns.read(self._inside, 0, place) for place in places])
+
+
+# Samples from the cells of a table: `brdfdb.tables.sampler`, with alias tables in place of searches
+
+
+class _RandomChoice(NamedTuple):
+    """A choice between two by a random number: whether it is the second, and a random number for the next choice."""
+
+    second: Any
+    number: Any
+
+    @classmethod
+    def of(cls, number: Any, weight: Any) -> _RandomChoice:
+        """Choose the second of two with a probability."""
+        second = number < weight
+        low, width = dr.select(second, 0.0, weight), dr.select(second, weight, 1.0 - weight)
+        return cls(second, (number - low) / dr.maximum(width, _LEAST_SQUARE))
+
+
+class _Turn(NamedTuple):
+    """The numbers of the azimuths of lights before and behind a direction, and the weight of the second."""
+
+    before: Any
+    behind: Any
+    weight: Any
+
+
+class _Alias:
+    """Rows of probabilities, from which one number draws a cell and the place in it (Walker 1977)."""
+
+    def __init__(self, probability: Array) -> None:
+        """Take probabilities (rows, cells) whose sums are 1."""
+        rows, self._count = probability.shape
+        left = probability * self._count
+        begin, alias = np.ones_like(left), np.zeros_like(left)
+        settled = np.zeros(left.shape, bool)
+        every = np.arange(rows)
+        for _ in range(self._count):
+            # What a cell lacks to 1 comes from the fullest one
+            poor = np.argmin(np.where(settled, np.inf, left), axis=1)
+            rich = np.argmax(np.where(settled, -np.inf, left), axis=1)
+            begin[every, poor], alias[every, poor] = np.clip(left[every, poor], 0.0, 1.0), rich
+            left[every, rich] -= 1.0 - begin[every, poor]
+            settled[every, poor] = True
+        self._rows = Buffer(np.stack([begin, alias], axis=-1))
+
+    def draw(self, row: Any, u: Any) -> CellPlace:
+        """Return the cell of a row that a random number chooses, and the place in it."""
+        scaled = u * self._count
+        own = whole(scaled, self._count)
+        rest = scaled - own
+        begin, alias = self._rows.row(row * self._count + own, 2)
+        kept = rest < begin
+        place = dr.select(kept, rest, rest - begin) / dr.maximum(dr.select(kept, begin, 1.0 - begin), _LEAST_SQUARE)
+        return CellPlace(dr.select(kept, own, mi.UInt32(alias)), dr.clip(place, 0.0, 1.0))
+
+
+class CellsLobe:
+    """The cells of half vectors of a table as the lobe of a sampler."""
+
+    share = alone = LOBE_SHARE
+
+    def __init__(self, cells: Cells) -> None:
+        lights, self._rings, self._columns = cells.probability.shape
+        self._turns = cells.turns
+        self._theta_i = _axis(cells.theta_i)
+        # Rings are found by the logarithm: those of a narrow lobe differ in size by orders of magnitude
+        self._log_edges = _axis(np.log(np.append(0.5 * cells.edges[1], cells.edges[1:])))
+        self._edges = Buffer(np.stack([cells.edges[:-1], np.diff(cells.edges)], axis=1))
+        self._along_theta = _Alias(cells.rings)
+        self._along_phi = _Alias(cells.along_phi.reshape(-1, self._columns))
+        # The cells of two adjacent lights
+        density = cells.density.reshape(lights // self._turns, self._turns, self._rings, self._columns)
+        self._density = Buffer(np.stack([density[:-1], density[1:]], axis=-1))
+
+    def draw(self, wi: Any, choice: Any, sample: Any) -> Any:
+        """Return the direction `wi` mirrored in a half vector of the cells."""
+        light, weight = self._light(wi)
+        chosen = _RandomChoice.of(choice, weight)
+        row = (light + dr.select(chosen.second, mi.UInt32(1), mi.UInt32(0))) * self._turns
+        if self._turns > 1:
+            turn = self._turn(wi)
+            second = _RandomChoice.of(chosen.number, turn.weight).second
+            row = row + dr.select(second, turn.behind, turn.before)
+        ring, u = self._along_theta.draw(row, sample.x)
+        low, width = self._edges.row(ring, 2)
+        versine = low + width * u
+        column, v = self._along_phi.draw(row * self._rings + ring, sample.y)
+        sin_phi, cos_phi = dr.sincos((mi.Float(column) + v) * (dr.two_pi / self._columns))
+        sin = dr.sqrt(dr.maximum(versine * (2.0 - versine), 0.0))
+        h = self._turned(mi.Vector3f(sin * cos_phi, sin * sin_phi, 1.0 - versine), wi, 1.0)
+        return mi.reflect(wi, h)
+
+    def density(self, wi: Any, wo: Any) -> Any:
+        """Return the density [1/sr] of the directions that `draw` gives, for directions above the horizon."""
+        h = wi + wo
+        inverse = dr.rsqrt(dr.maximum(dr.squared_norm(h), _LEAST_SQUARE))
+        local = self._turned(h * inverse, wi, -1.0)
+        versine = (dr.square(local.x) + dr.square(local.y)) / (1.0 + local.z)
+        ring, _ = self._log_edges.place(dr.log(dr.maximum(versine, _LEAST_SQUARE)))
+        column = whole(_turns(local, self._columns), self._columns)
+        light, weight = self._light(wi)
+        rows: list[tuple[Any, Any]] = [(1.0, mi.UInt32(0))]
+        if self._turns > 1:
+            turn = self._turn(wi)
+            rows = [(1.0 - turn.weight, turn.before), (turn.weight, turn.behind)]
+        total: Any = 0.0
+        for share, row in rows:
+            place = ((light * self._turns + row) * self._rings + ring) * self._columns + column
+            begin, end = self._density.row(place, 2)
+            total = total + share * (begin + weight * (end - begin))
+        return dr.select(h.z > _FLAT, 0.5 * total * inverse, 0.0)
+
+    def _light(self, wi: Any) -> CellPlace:
+        """Return the number of the light before `wi` in theta, and the weight of the light behind it."""
+        return self._theta_i.place(dr.atan2(dr.sqrt(dr.square(wi.x) + dr.square(wi.y)), wi.z))
+
+    def _turn(self, wi: Any) -> _Turn:
+        turn = _turns(wi, self._turns)
+        before = whole(turn, self._turns)
+        behind = dr.select(before >= self._turns - 1, mi.UInt32(0), before + 1)
+        return _Turn(before, behind, dr.clip(turn - before, 0.0, 1.0))
+
+    def _turned(self, h: Any, wi: Any, sign: float) -> Any:
+        """Return half vectors of an isotropic table turned by the azimuth of the light; others stay."""
+        if self._turns > 1:
+            return h
+        sin2 = dr.square(wi.x) + dr.square(wi.y)
+        upright = sin2 < _LEAST_SQUARE
+        inverse = dr.rsqrt(dr.select(upright, 1.0, sin2))
+        cos_phi, sin_phi = dr.select(upright, 1.0, wi.x * inverse), dr.select(upright, 0.0, sign * wi.y * inverse)
+        return mi.Vector3f(h.x * cos_phi - h.y * sin_phi, h.x * sin_phi + h.y * cos_phi, h.z)
+
+
+def _axis(nodes: Array) -> GridAxis:
+    return GridAxis(prepared([nodes], [("open", "open")], cubic=False), 0)
+
+
+def _turns(w: Any, count: int) -> Any:
+    """Return the azimuth in parts of the turn, from 0 to their number."""
+    phi = dr.atan2(w.y, w.x)
+    return dr.select(phi < 0.0, phi + dr.two_pi, phi) * (count / dr.two_pi)

@@ -8,7 +8,7 @@ import drjit as dr
 
 from brdfdb.errors import ParameterError
 from brdfdb.mitsuba._gaussian_lobe import GaussianLobe
-from brdfdb.mitsuba._parameters import Parameters
+from brdfdb.mitsuba._parameters import PluginParameters
 from brdfdb.mitsuba._surface import DIFFUSE, GLOSSY, Formula, Values
 from brdfdb.models import MODELS
 
@@ -57,7 +57,7 @@ class Ward(Formula):
         self._form = props.get("form", "ward")
         if self._form not in FORMS:
             raise ParameterError("form", f"{self._form!r} is none of {', '.join(FORMS)}", self._form, FORMS)
-        self.parameters = Parameters(props, MODELS[self._form])
+        self.parameters = PluginParameters(props, MODELS[self._form])
 
     def parts(self, values: Values, wi: Any, wo: Any) -> dict[str, Any]:
         """Return f_r [1/sr] of the lobe and of the diffuse part."""

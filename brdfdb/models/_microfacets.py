@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,11 +12,10 @@ from numpy.typing import ArrayLike, NDArray
 from brdfdb._elementary import cosine, erfcx, exp
 from brdfdb._numba import inner_loop, kernel, loop
 from brdfdb.fresnel import reflectance_quotient
-from brdfdb.geometry import Angles, checked_angles, checked_vectors, finished
+from brdfdb.geometry import Directions, Vectors
 from brdfdb.lobes import Lobe, SlopeDistribution
-from brdfdb.models._rows import by_rows, by_rows_of_vectors
-from brdfdb.models.he_torrance_1991 import WAVELENGTH_NM, K, N
-from brdfdb.parameters import Floats, Parameter
+from brdfdb.models._rows import RowLoops, by_rows, by_rows_of_vectors
+from brdfdb.parameters import Floats, K, N, Parameter
 
 ALPHA_X = Parameter("alpha_x", "α_x", "1", 1e-6, 2.0, "width of the facets' slopes along x")
 ALPHA_Y = Parameter("alpha_y", "α_y", "1", 1e-6, 2.0, "width of the facets' slopes along y")
@@ -25,9 +24,9 @@ RHO_D = Parameter("rho_d", "ρ_d", "1", 0.0, 1.0, "albedo of the uniform part", 
 
 Rows = NDArray[np.float64]
 
-GGX, BECKMANN = range(2)  # distributions of slopes
-CORRELATED, SEPARABLE = range(2)  # shadowing
-SCHLICK, EXACT = range(2)  # reflectance of a facet
+_GGX, _BECKMANN = range(2)  # distributions of slopes
+_CORRELATED, _SEPARABLE = range(2)  # shadowing
+_SCHLICK, _EXACT = range(2)  # reflectance of a facet
 
 _SQRT_PI = 1.7724538509055160
 _TINY = 1e-100  # guard against 0 / 0 at normal incidence, where nothing is shadowed
@@ -42,14 +41,14 @@ def _reach(distribution: int, shadowing: int, cos: float, t2: float) -> float:
     t is the width of the slopes towards the direction, times its sine: alpha tan(theta) is t / cos. With Smith's
     Lambda, cos (1 + 2 Lambda) of GGX, cos Lambda of Beckmann, or cos / G_1 where the shadowing is separable.
     """
-    if distribution == GGX:
+    if distribution == _GGX:
         # Walter 2007, eq. (34); Heitz 2014: Lambda = (sqrt(1 + 1 / a^2) - 1) / 2
         root = math.sqrt(cos * cos + t2)
-        return root if shadowing == CORRELATED else 0.5 * (cos + root)
+        return root if shadowing == _CORRELATED else 0.5 * (cos + root)
     t = math.sqrt(t2) + _TINY
     a = cos / t
     a = _FLAT if a > _FLAT else a
-    if shadowing == CORRELATED:
+    if shadowing == _CORRELATED:
         # Heitz 2014: Lambda = (erf(a) - 1) / 2 + exp(-a^2) / (2 a sqrt(pi)), without the difference erf(a) - 1
         return 0.5 * exp(-a * a) * (t / _SQRT_PI - cos * erfcx(a))
     # Walter 2007, eq. (27), cos / G_1
@@ -64,7 +63,7 @@ def _reflected(kind: int, u: float, sin2: float, first: float, second: float, ab
     u is the cosine of the angle on the facet and sin2 the square of its sine. There is a single division, because a
     division takes as long as many products.
     """
-    if kind == EXACT:
+    if kind == _EXACT:
         numerator, denominator = reflectance_quotient(u, first, second)
         numerator = denominator if numerator > denominator else numerator  # by rounding
         return numerator * above / (denominator * below)
@@ -102,15 +101,15 @@ def _lobe(
     u = 1.0 if u > 1.0 else u
     s2 = (h_x * u_x) ** 2 + (h_y * u_y) ** 2
     # G / (4 cos_i cos_r)
-    if shadowing == SEPARABLE:
+    if shadowing == _SEPARABLE:
         below = 4.0 * (reach_i * reach_r)
-    elif distribution == GGX:
+    elif distribution == _GGX:
         # Heitz 2014, eq. (99): 1 / (1 + Lambda_i + Lambda_r)
         below = 2.0 * (cos_r * reach_i + cos_i * reach_r)
     else:
         below = 4.0 * (cos_i * cos_r + cos_r * reach_i + cos_i * reach_r)
     # D of the slopes over cos^4 of h
-    if distribution == GGX:
+    if distribution == _GGX:
         q = h_z2 + s2
         above, below = peak, q * q * below
     else:
@@ -162,112 +161,102 @@ def _vector_rows(
 
 @loop
 def _ggx_angles(cos_phi: Rows, sin_phi: Rows, scalars: Rows, f_r: Rows) -> None:
-    _angle_rows(GGX, CORRELATED, EXACT, cos_phi, sin_phi, scalars, f_r)
+    _angle_rows(_GGX, _CORRELATED, _EXACT, cos_phi, sin_phi, scalars, f_r)
 
 
 @loop
 def _ggx_vectors(w_i: Floats, w_r: Floats, scalars: Rows, f_r: Floats) -> None:
-    _vector_rows(GGX, CORRELATED, EXACT, w_i, w_r, scalars, f_r)
+    _vector_rows(_GGX, _CORRELATED, _EXACT, w_i, w_r, scalars, f_r)
 
 
 @loop
 def _ggx_schlick_angles(cos_phi: Rows, sin_phi: Rows, scalars: Rows, f_r: Rows) -> None:
-    _angle_rows(GGX, CORRELATED, SCHLICK, cos_phi, sin_phi, scalars, f_r)
+    _angle_rows(_GGX, _CORRELATED, _SCHLICK, cos_phi, sin_phi, scalars, f_r)
 
 
 @loop
 def _ggx_schlick_vectors(w_i: Floats, w_r: Floats, scalars: Rows, f_r: Floats) -> None:
-    _vector_rows(GGX, CORRELATED, SCHLICK, w_i, w_r, scalars, f_r)
+    _vector_rows(_GGX, _CORRELATED, _SCHLICK, w_i, w_r, scalars, f_r)
 
 
 @loop
 def _beckmann_angles(cos_phi: Rows, sin_phi: Rows, scalars: Rows, f_r: Rows) -> None:
-    _angle_rows(BECKMANN, CORRELATED, EXACT, cos_phi, sin_phi, scalars, f_r)
+    _angle_rows(_BECKMANN, _CORRELATED, _EXACT, cos_phi, sin_phi, scalars, f_r)
 
 
 @loop
 def _beckmann_vectors(w_i: Floats, w_r: Floats, scalars: Rows, f_r: Floats) -> None:
-    _vector_rows(BECKMANN, CORRELATED, EXACT, w_i, w_r, scalars, f_r)
+    _vector_rows(_BECKMANN, _CORRELATED, _EXACT, w_i, w_r, scalars, f_r)
 
 
 @loop
 def _beckmann_schlick_angles(cos_phi: Rows, sin_phi: Rows, scalars: Rows, f_r: Rows) -> None:
-    _angle_rows(BECKMANN, CORRELATED, SCHLICK, cos_phi, sin_phi, scalars, f_r)
+    _angle_rows(_BECKMANN, _CORRELATED, _SCHLICK, cos_phi, sin_phi, scalars, f_r)
 
 
 @loop
 def _beckmann_schlick_vectors(w_i: Floats, w_r: Floats, scalars: Rows, f_r: Floats) -> None:
-    _vector_rows(BECKMANN, CORRELATED, SCHLICK, w_i, w_r, scalars, f_r)
+    _vector_rows(_BECKMANN, _CORRELATED, _SCHLICK, w_i, w_r, scalars, f_r)
 
 
 @loop
 def _ggx_separable_angles(cos_phi: Rows, sin_phi: Rows, scalars: Rows, f_r: Rows) -> None:
-    _angle_rows(GGX, SEPARABLE, EXACT, cos_phi, sin_phi, scalars, f_r)
+    _angle_rows(_GGX, _SEPARABLE, _EXACT, cos_phi, sin_phi, scalars, f_r)
 
 
 @loop
 def _ggx_separable_vectors(w_i: Floats, w_r: Floats, scalars: Rows, f_r: Floats) -> None:
-    _vector_rows(GGX, SEPARABLE, EXACT, w_i, w_r, scalars, f_r)
+    _vector_rows(_GGX, _SEPARABLE, _EXACT, w_i, w_r, scalars, f_r)
 
 
 @loop
 def _beckmann_separable_angles(cos_phi: Rows, sin_phi: Rows, scalars: Rows, f_r: Rows) -> None:
-    _angle_rows(BECKMANN, SEPARABLE, EXACT, cos_phi, sin_phi, scalars, f_r)
+    _angle_rows(_BECKMANN, _SEPARABLE, _EXACT, cos_phi, sin_phi, scalars, f_r)
 
 
 @loop
 def _beckmann_separable_vectors(w_i: Floats, w_r: Floats, scalars: Rows, f_r: Floats) -> None:
-    _vector_rows(BECKMANN, SEPARABLE, EXACT, w_i, w_r, scalars, f_r)
+    _vector_rows(_BECKMANN, _SEPARABLE, _EXACT, w_i, w_r, scalars, f_r)
 
 
-_LOOPS = {
-    (GGX, CORRELATED, EXACT): (_ggx_angles, _ggx_vectors),
-    (GGX, CORRELATED, SCHLICK): (_ggx_schlick_angles, _ggx_schlick_vectors),
-    (BECKMANN, CORRELATED, EXACT): (_beckmann_angles, _beckmann_vectors),
-    (BECKMANN, CORRELATED, SCHLICK): (_beckmann_schlick_angles, _beckmann_schlick_vectors),
-    (GGX, SEPARABLE, EXACT): (_ggx_separable_angles, _ggx_separable_vectors),
-    (BECKMANN, SEPARABLE, EXACT): (_beckmann_separable_angles, _beckmann_separable_vectors),
-}
+GGX_LOOPS = RowLoops(_ggx_angles, _ggx_vectors)
+GGX_SCHLICK_LOOPS = RowLoops(_ggx_schlick_angles, _ggx_schlick_vectors)
+BECKMANN_LOOPS = RowLoops(_beckmann_angles, _beckmann_vectors)
+BECKMANN_SCHLICK_LOOPS = RowLoops(_beckmann_schlick_angles, _beckmann_schlick_vectors)
+GGX_SEPARABLE_LOOPS = RowLoops(_ggx_separable_angles, _ggx_separable_vectors)
+BECKMANN_SEPARABLE_LOOPS = RowLoops(_beckmann_separable_angles, _beckmann_separable_vectors)
 
-Form = tuple[int, int, int]  # distribution, shadowing, reflectance of a facet
-Facets = tuple[Floats, Floats, Floats, Floats, Floats]
+_NONE = np.zeros(())
 
 
-def metal(
-    alpha_x: ArrayLike, alpha_y: ArrayLike, n: ArrayLike, k: ArrayLike, wavelength_nm: ArrayLike | None
-) -> Facets:
-    """Return checked parameters of facets of a material with the index n + ik.
+class FacetParameters(NamedTuple):
+    """The parameters [1] that the loops read: the uniform part, f_0 or n and k, and the widths of the slopes."""
 
-    The wavelength is that of n and k. It is checked, and the formulas do not read it.
-    """
-    if wavelength_nm is not None:
-        WAVELENGTH_NM.check(wavelength_nm)
-    return np.zeros(()), N.check(n), K.check(k), ALPHA_X.check(alpha_x), ALPHA_Y.check(alpha_y)
+    rho_d: Floats
+    f_0_or_n: Floats
+    k: Floats
+    alpha_x: Floats
+    alpha_y: Floats
 
 
-def painted(rho_d: ArrayLike, f_0: ArrayLike, alpha_x: ArrayLike, alpha_y: ArrayLike) -> Facets:
-    """Return checked parameters of facets with Schlick's reflectance over a uniform part."""
-    return RHO_D.check(rho_d), F_0.check(f_0), np.zeros(()), ALPHA_X.check(alpha_x), ALPHA_Y.check(alpha_y)
+def metal(alpha_x: Floats, alpha_y: Floats, n: Floats, k: Floats, _: Floats | None = None) -> FacetParameters:
+    """Return facets of a material with the index n + ik. The formulas do not read its wavelength, the last argument."""
+    return FacetParameters(_NONE, n, k, alpha_x, alpha_y)
 
 
-def by_angles(form: Form, angles: tuple[ArrayLike, ArrayLike, ArrayLike, ArrayLike], facets: Facets) -> Floats:
-    """Return f_r [1/sr] of one form for angles (theta_i, phi_i, theta_r, phi_r) [rad]."""
-    checked = checked_angles(*angles)
-    if checked.scattered:
-        return finished(by_rows_of_vectors(_LOOPS[form][1], checked.vectors, facets), checked)
-    return finished(by_checked_angles(form, checked, facets), checked)
+def painted(rho_d: Floats, f_0: Floats, alpha_x: Floats, alpha_y: Floats) -> FacetParameters:
+    """Return facets with Schlick's reflectance over a uniform part."""
+    return FacetParameters(rho_d, f_0, _NONE, alpha_x, alpha_y)
 
 
-def by_checked_angles(form: Form, checked: Angles, facets: Facets) -> Floats:
-    """Return f_r [1/sr] of one form in float64, with any value below the horizon."""
-    columns = (checked.cosine(checked.phi_r), checked.sine(checked.phi_r))
-    scalars = (checked.x_i, checked.y_i, checked.cos_i, checked.sin_r, checked.cos_r, *facets)
-    return by_rows(_LOOPS[form][0], columns, scalars)
-
-
-def by_vectors(form: Form, wi: ArrayLike, wr: ArrayLike, facets: Facets) -> Floats:
-    """Return f_r [1/sr] of one form for unit vectors."""
-    return by_rows_of_vectors(_LOOPS[form][1], checked_vectors(wi, wr), facets)
+def single_scattering(directions: Directions, f_0: Floats, alpha: Floats) -> Floats:
+    """Return f_r [1/sr] of GGX facets with Schlick's reflectance, with any value below the horizon."""
+    facets = painted(_NONE, f_0, alpha, alpha)
+    if isinstance(directions, Vectors):
+        return by_rows_of_vectors(GGX_SCHLICK_LOOPS.by_vectors, directions, facets)
+    columns = (directions.cos_phi_r, directions.sin_phi_r)
+    scalars = (directions.x_i, directions.y_i, directions.cos_i, directions.sin_r, directions.cos_r, *facets)
+    return by_rows(GGX_SCHLICK_LOOPS.by_angles, columns, scalars)
 
 
 _SHARE = 0.9  # share of samples in the lobe: the rest bounds the weights at grazing

@@ -4,19 +4,62 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import Any
+from operator import attrgetter
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from brdfdb.geometry import Vectors
-from brdfdb.models.large_calls import new_result
+from brdfdb.geometry import Angles, Directions, Vectors, finished
 from brdfdb.parameters import Floats
 
 Loop = Callable[..., None]
+Out = Floats | None  # the array that takes the values of a call, or a part of it
 
 
-def by_rows(loop: Loop, columns: Sequence[Floats], scalars: Sequence[Floats], dtype: DTypeLike = np.float64) -> Floats:
+class RowLoops(NamedTuple):
+    """The two loops of a model, and the features of the directions that the loop by angles reads.
+
+    Attributes
+    ----------
+    by_angles : loop
+        Called as `by_rows` says, with the features `columns`, and with scalars that are the features `polar` and then
+        the parameters.
+    by_vectors : loop
+        Called as `by_rows_of_vectors` says, with the parameters as scalars.
+    columns, polar : callable
+        Functions of `brdfdb.geometry.Angles` that return several of its properties.
+    of_viewers : bool
+        True if a row may run along any viewers. False if it runs along azimuths only.
+    single : bool
+        True if the loop by angles itself writes float32 for directions in float32.
+    """
+
+    by_angles: Loop
+    by_vectors: Loop
+    columns: Callable[[Angles], tuple[Floats, ...]] = attrgetter("cos_phi_r", "sin_phi_r")
+    polar: Callable[[Angles], tuple[Floats, ...]] = attrgetter("x_i", "y_i", "cos_i", "sin_r", "cos_r")
+    of_viewers: bool = False
+    single: bool = False
+
+    def evaluated(self, directions: Directions, out: Out, parameters: Sequence[Floats]) -> Floats:
+        """Return f_r [1/sr] at directions of either kind, written to `out` where it fits."""
+        if isinstance(directions, Vectors):
+            return by_rows_of_vectors(self.by_vectors, directions, parameters, out)
+        if directions.lights_scattered if self.of_viewers else directions.scattered:
+            return finished(by_rows_of_vectors(self.by_vectors, directions.vectors, parameters, out), directions)
+        scalars = (*self.polar(directions), *parameters)
+        dtype = directions.dtype if self.single else np.float64
+        return finished(by_rows(self.by_angles, self.columns(directions), scalars, dtype, out), directions)
+
+
+def by_rows(
+    loop: Loop,
+    columns: Sequence[Floats],
+    scalars: Sequence[Floats],
+    dtype: DTypeLike = np.float64,
+    out: Out = None,
+) -> Floats:
     """Broadcast the arguments, call ``loop(*columns, scalars, values)`` and return the values.
 
     Parameters
@@ -29,6 +72,8 @@ def by_rows(loop: Loop, columns: Sequence[Floats], scalars: Sequence[Floats], dt
         is a row by itself, which is slower and equally right.
     dtype : dtype
         The dtype of the values.
+    out : array, optional
+        It takes the values if it has their shape and dtype.
 
     Returns
     -------
@@ -37,7 +82,7 @@ def by_rows(loop: Loop, columns: Sequence[Floats], scalars: Sequence[Floats], dt
     """
     shape = np.broadcast_shapes(*(np.shape(array) for array in (*columns, *scalars)))
     rows, length, leading = _split(shape, scalars)
-    values: Floats = new_result(shape, dtype).reshape(rows, length)
+    values: Floats = _array_of_values(out, shape, dtype).reshape(rows, length)
     if values.size:
         of_rows = np.empty((len(scalars), *leading))  # grids have many rows, which this order fills three times as fast
         for i, scalar in enumerate(scalars):
@@ -48,7 +93,7 @@ def by_rows(loop: Loop, columns: Sequence[Floats], scalars: Sequence[Floats], dt
 
 
 def by_rows_of_vectors(
-    loop: Loop, directions: Vectors, scalars: Sequence[Floats], several: tuple[int, ...] = ()
+    loop: Loop, directions: Vectors, scalars: Sequence[Floats], out: Out = None, several: tuple[int, ...] = ()
 ) -> Floats:
     """Call ``loop(w_i, w_r, scalars, values)`` as `by_rows` does, with unit vectors of shape (rows or 1, length, 3).
 
@@ -59,12 +104,16 @@ def by_rows_of_vectors(
     w_i, w_r = directions.w_i, directions.w_r
     shape = np.broadcast_shapes(w_i.shape[:-1], w_r.shape[:-1], *(np.shape(array) for array in scalars))
     rows, length, leading = _split(shape, scalars)
-    values: Floats = new_result((*several, *shape), directions.dtype).reshape(*several, rows, length)
+    values: Floats = _array_of_values(out, (*several, *shape), directions.dtype).reshape(*several, rows, length)
     if values.size:
         common = np.result_type(w_i, w_r)  # loops would be compiled anew for float32 beside float64
         both = (_vectors(w.astype(common, copy=False), shape, rows, length) for w in (w_i, w_r))
         loop(*both, _packed(scalars, leading, rows), values)
     return values.reshape((*several, *shape))[()]
+
+
+def _array_of_values(out: Out, shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
+    return out if out is not None and out.shape == shape and out.dtype == dtype else np.empty(shape, dtype)
 
 
 def _split(shape: tuple[int, ...], scalars: Sequence[Floats]) -> tuple[int, int, tuple[int, ...]]:

@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Any
+from operator import attrgetter
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from brdfdb._elementary import exp, log
 from brdfdb._numba import inner_loop, kernel, loop
-from brdfdb.geometry import checked_angles, checked_vectors, finished
 from brdfdb.lobes import GGX, Lobe
-from brdfdb.models._rows import by_rows, by_rows_of_vectors
+from brdfdb.models._rows import RowLoops
 from brdfdb.parameters import Floats
 
 Rows = NDArray[np.float64]
 
-ABG, HARVEY = range(2)
+_ABG, _HARVEY = range(2)
 
 _TINY = 1e-290  # guard against the logarithm of 0 in the mirror direction
 _SHARE = 0.5  # share of samples in the lobe: the tails of most profiles are wider
@@ -26,7 +25,7 @@ _NARROWEST, _WIDEST = 1e-6, 2.0  # widths of the slopes for samplers
 @kernel
 def _profile(form: int, x2: float, first: float, second: float, third: float) -> float:
     """Return f_r [1/sr] at a squared distance x2 between the horizontal parts of viewer and mirror direction."""
-    if form == ABG:
+    if form == _ABG:
         # A / (B + x^g)
         positive = _TINY if x2 < _TINY else x2
         return first / (second + exp(0.5 * third * log(positive)))
@@ -67,42 +66,27 @@ def _vector_rows(form: int, w_i: Floats, w_r: Floats, scalars: Rows, f_r: Floats
 
 @loop
 def _abg_angles(x_r: Rows, y_r: Rows, scalars: Rows, f_r: Rows) -> None:
-    _angle_rows(ABG, x_r, y_r, scalars, f_r)
+    _angle_rows(_ABG, x_r, y_r, scalars, f_r)
 
 
 @loop
 def _abg_vectors(w_i: Floats, w_r: Floats, scalars: Rows, f_r: Floats) -> None:
-    _vector_rows(ABG, w_i, w_r, scalars, f_r)
+    _vector_rows(_ABG, w_i, w_r, scalars, f_r)
 
 
 @loop
 def _harvey_angles(x_r: Rows, y_r: Rows, scalars: Rows, f_r: Rows) -> None:
-    _angle_rows(HARVEY, x_r, y_r, scalars, f_r)
+    _angle_rows(_HARVEY, x_r, y_r, scalars, f_r)
 
 
 @loop
 def _harvey_vectors(w_i: Floats, w_r: Floats, scalars: Rows, f_r: Floats) -> None:
-    _vector_rows(HARVEY, w_i, w_r, scalars, f_r)
+    _vector_rows(_HARVEY, w_i, w_r, scalars, f_r)
 
 
-_ANGLE_LOOPS: tuple[Any, ...] = (_abg_angles, _harvey_angles)
-_VECTOR_LOOPS: tuple[Any, ...] = (_abg_vectors, _harvey_vectors)
-
-Profile = tuple[Floats, Floats, Floats]  # A, B, g or b_0, L, s
-
-
-def by_angles(form: int, angles: tuple[ArrayLike, ArrayLike, ArrayLike, ArrayLike], profile: Profile) -> Floats:
-    """Return f_r [1/sr] of one form for angles (theta_i, phi_i, theta_r, phi_r) [rad]."""
-    checked = checked_angles(*angles)
-    if checked.lights_scattered:
-        return finished(by_rows_of_vectors(_VECTOR_LOOPS[form], checked.vectors, profile), checked)
-    columns, scalars = (checked.x_r, checked.y_r), (checked.x_i, checked.y_i, *profile)
-    return finished(by_rows(_ANGLE_LOOPS[form], columns, scalars), checked)
-
-
-def by_vectors(form: int, wi: ArrayLike, wr: ArrayLike, profile: Profile) -> Floats:
-    """Return f_r [1/sr] of one form for unit vectors."""
-    return by_rows_of_vectors(_VECTOR_LOOPS[form], checked_vectors(wi, wr), profile)
+_LIGHT, _VIEWER = attrgetter("x_i", "y_i"), attrgetter("x_r", "y_r")
+ABG_LOOPS = RowLoops(_abg_angles, _abg_vectors, _VIEWER, _LIGHT, of_viewers=True)
+HARVEY_LOOPS = RowLoops(_harvey_angles, _harvey_vectors, _VIEWER, _LIGHT, of_viewers=True)
 
 
 def lobe(cos_i: Floats, knee: ArrayLike) -> Lobe:

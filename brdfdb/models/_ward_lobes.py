@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import functools
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -12,10 +11,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from brdfdb._elementary import cosine, exp
 from brdfdb._numba import inner_loop, kernel, loop
-from brdfdb.geometry import checked_angles, checked_vectors, finished
 from brdfdb.lobes import Lobe
-from brdfdb.models._rows import by_rows, by_rows_of_vectors
-from brdfdb.parameters import Draw, Floats, Gradient, Parameter
+from brdfdb.models._rows import RowLoops
+from brdfdb.models.declaration import Slopes
+from brdfdb.parameters import Draw, Floats, Parameter
 
 RHO_D = Parameter("rho_d", "ρ_d", "1", 0.0, 1.0, "diffuse reflectance", reflectance=True)
 RHO_S = Parameter(
@@ -24,6 +23,7 @@ RHO_S = Parameter(
 ALPHA_X = Parameter("alpha_x", "α_x", "1", 1e-6, 2.0, "width of the slopes along x, exp(-(s / alpha)^2)")
 ALPHA_Y = Parameter("alpha_y", "α_y", "1", 1e-6, 2.0, "width of the slopes along y")
 
+WARD_PARAMETERS = (RHO_D, RHO_S, ALPHA_X, ALPHA_Y)
 DRAW = Draw(
     (("alpha_x", 0.01, 0.5), ("alpha_y", 0.01, 0.5)),
     lambda given: (given["rho_d"] + given["rho_s"] <= 1.0) & (given["alpha_x"] >= given["alpha_y"]),
@@ -32,7 +32,7 @@ DRAW = Draw(
 
 Rows = NDArray[np.float64]
 
-ELLIPTICAL, HALF_VECTOR, DUER, BOUNDED = range(4)
+_ELLIPTICAL, _HALF_VECTOR, _DUER, _BOUNDED = range(4)
 
 _LARGEST = 1e38  # largest f_r [1/sr] at a pole of second order: float32 holds it, and only exact grazing reaches it
 _WIDE_SHARE = 0.8  # largest share of samples in a lobe that is wider than the Gaussian of slopes
@@ -52,20 +52,20 @@ def _lobe(form: int, h_x: float, h_y: float, h_z: float, cos_cos: float, peak: f
     h_x2, h_y2, h_z2 = h_x * h_x, h_y * h_y, h_z * h_z
     u_x2, u_y2 = u_x * u_x, u_y * u_y
     # Each formula takes a single inverse of a product, because a division takes as long as half of the rest
-    if form == ELLIPTICAL:
+    if form == _ELLIPTICAL:
         root = math.sqrt(cos_cos)
         inverse = 1.0 / (h_z2 * root)
         per_h_z2 = inverse * root
         # Ward 1992, eq. (5a): tan^2(delta) (cos^2(phi) / alpha_x^2 + sin^2(phi) / alpha_y^2)
         return peak * (exp(-(h_x2 * (per_h_z2 * u_x2) + h_y2 * (per_h_z2 * u_y2))) * (inverse * h_z2))
-    if form == HALF_VECTOR:
+    if form == _HALF_VECTOR:
         root = math.sqrt(cos_cos)
         length = math.sqrt(h_x2 + h_y2 + h_z2)
         squared = length * (length + h_z)
         inverse = 1.0 / (squared * root)
         # Eq. (5b), 2 (..) / (1 + h.n) with h / length as the unit vector
         return peak * (exp(-2.0 * (h_x2 * u_x2 + h_y2 * u_y2) * (inverse * root)) * (inverse * squared))
-    if form == DUER:
+    if form == _DUER:
         inverse = 1.0 / (h_z2 * cos_cos)
         per_h_z2 = inverse * cos_cos
         # Duer 2006: 1 / (cos theta_i cos theta_r) in place of its square root
@@ -127,7 +127,7 @@ def _gradient_rows(form: int, w_i: Floats, w_r: Floats, scalars: Rows, values: F
             # All forms are rho_s / (alpha_x alpha_y) exp(-(h_x / alpha_x)^2 / width - (h_y / alpha_y)^2 / width) times
             # a factor without parameters
             width = h_z * h_z
-            if form == HALF_VECTOR:
+            if form == _HALF_VECTOR:
                 length = math.sqrt(h_x * h_x + h_y * h_y + width)
                 width = 0.5 * length * (length + h_z)
             twice = 2.0 / width
@@ -144,125 +144,74 @@ def _gradient_rows(form: int, w_i: Floats, w_r: Floats, scalars: Rows, values: F
 
 @loop
 def _elliptical_angles(cos_phi: Rows, sin_phi: Rows, scalars: Rows, f_r: Floats) -> None:
-    _angle_rows(ELLIPTICAL, cos_phi, sin_phi, scalars, f_r)
+    _angle_rows(_ELLIPTICAL, cos_phi, sin_phi, scalars, f_r)
 
 
 @loop
 def _elliptical_vectors(w_i: Floats, w_r: Floats, scalars: Rows, f_r: Floats) -> None:
-    _vector_rows(ELLIPTICAL, w_i, w_r, scalars, f_r)
+    _vector_rows(_ELLIPTICAL, w_i, w_r, scalars, f_r)
 
 
 @loop
 def _elliptical_gradient(w_i: Floats, w_r: Floats, scalars: Rows, values: Floats) -> None:
-    _gradient_rows(ELLIPTICAL, w_i, w_r, scalars, values)
+    _gradient_rows(_ELLIPTICAL, w_i, w_r, scalars, values)
 
 
 @loop
 def _half_vector_angles(cos_phi: Rows, sin_phi: Rows, scalars: Rows, f_r: Floats) -> None:
-    _angle_rows(HALF_VECTOR, cos_phi, sin_phi, scalars, f_r)
+    _angle_rows(_HALF_VECTOR, cos_phi, sin_phi, scalars, f_r)
 
 
 @loop
 def _half_vector_vectors(w_i: Floats, w_r: Floats, scalars: Rows, f_r: Floats) -> None:
-    _vector_rows(HALF_VECTOR, w_i, w_r, scalars, f_r)
+    _vector_rows(_HALF_VECTOR, w_i, w_r, scalars, f_r)
 
 
 @loop
 def _half_vector_gradient(w_i: Floats, w_r: Floats, scalars: Rows, values: Floats) -> None:
-    _gradient_rows(HALF_VECTOR, w_i, w_r, scalars, values)
+    _gradient_rows(_HALF_VECTOR, w_i, w_r, scalars, values)
 
 
 @loop
 def _duer_angles(cos_phi: Rows, sin_phi: Rows, scalars: Rows, f_r: Floats) -> None:
-    _angle_rows(DUER, cos_phi, sin_phi, scalars, f_r)
+    _angle_rows(_DUER, cos_phi, sin_phi, scalars, f_r)
 
 
 @loop
 def _duer_vectors(w_i: Floats, w_r: Floats, scalars: Rows, f_r: Floats) -> None:
-    _vector_rows(DUER, w_i, w_r, scalars, f_r)
+    _vector_rows(_DUER, w_i, w_r, scalars, f_r)
 
 
 @loop
 def _duer_gradient(w_i: Floats, w_r: Floats, scalars: Rows, values: Floats) -> None:
-    _gradient_rows(DUER, w_i, w_r, scalars, values)
+    _gradient_rows(_DUER, w_i, w_r, scalars, values)
 
 
 @loop
 def _bounded_angles(cos_phi: Rows, sin_phi: Rows, scalars: Rows, f_r: Floats) -> None:
-    _angle_rows(BOUNDED, cos_phi, sin_phi, scalars, f_r)
+    _angle_rows(_BOUNDED, cos_phi, sin_phi, scalars, f_r)
 
 
 @loop
 def _bounded_vectors(w_i: Floats, w_r: Floats, scalars: Rows, f_r: Floats) -> None:
-    _vector_rows(BOUNDED, w_i, w_r, scalars, f_r)
+    _vector_rows(_BOUNDED, w_i, w_r, scalars, f_r)
 
 
 @loop
 def _bounded_gradient(w_i: Floats, w_r: Floats, scalars: Rows, values: Floats) -> None:
-    _gradient_rows(BOUNDED, w_i, w_r, scalars, values)
+    _gradient_rows(_BOUNDED, w_i, w_r, scalars, values)
 
 
-_ANGLE_LOOPS = (_elliptical_angles, _half_vector_angles, _duer_angles, _bounded_angles)
-_VECTOR_LOOPS = (_elliptical_vectors, _half_vector_vectors, _duer_vectors, _bounded_vectors)
-_GRADIENT_LOOPS = (_elliptical_gradient, _half_vector_gradient, _duer_gradient, _bounded_gradient)
+ELLIPTICAL_LOOPS = RowLoops(_elliptical_angles, _elliptical_vectors, single=True)
+HALF_VECTOR_LOOPS = RowLoops(_half_vector_angles, _half_vector_vectors, single=True)
+DUER_LOOPS = RowLoops(_duer_angles, _duer_vectors, single=True)
+BOUNDED_LOOPS = RowLoops(_bounded_angles, _bounded_vectors, single=True)
 
-
-def by_angles(
-    form: int,
-    angles: tuple[ArrayLike, ArrayLike, ArrayLike, ArrayLike],
-    rho_d: ArrayLike,
-    rho_s: ArrayLike,
-    alpha_x: ArrayLike,
-    alpha_y: ArrayLike,
-) -> Floats:
-    """Return f_r [1/sr] of one form for angles (theta_i, phi_i, theta_r, phi_r) [rad]. All arguments are checked."""
-    checked = checked_angles(*angles)
-    parameters = _checked(rho_d, rho_s, alpha_x, alpha_y)
-    if checked.scattered:
-        return finished(by_rows_of_vectors(_VECTOR_LOOPS[form], checked.vectors, parameters), checked)
-    light = (checked.x_i, checked.y_i, checked.cos_i)
-    columns = (np.cos(checked.phi_r), np.sin(checked.phi_r))
-    scalars = (*light, checked.sin_r, checked.cos_r, *parameters)
-    return finished(by_rows(_ANGLE_LOOPS[form], columns, scalars, checked.dtype), checked)
-
-
-def by_vectors(
-    form: int,
-    wi: ArrayLike,
-    wr: ArrayLike,
-    rho_d: ArrayLike,
-    rho_s: ArrayLike,
-    alpha_x: ArrayLike,
-    alpha_y: ArrayLike,
-) -> Floats:
-    """Return f_r [1/sr] of one form for unit vectors. All arguments are checked."""
-    parameters = _checked(rho_d, rho_s, alpha_x, alpha_y)
-    return by_rows_of_vectors(_VECTOR_LOOPS[form], checked_vectors(wi, wr), parameters)
-
-
-def gradient_of(form: int) -> Callable[..., Gradient]:
-    """Return the function that is the gradient of one form."""
-    return functools.partial(_gradient, form)
-
-
-def _gradient(
-    form: int,
-    wi: ArrayLike,
-    wr: ArrayLike,
-    *,
-    rho_d: ArrayLike,
-    rho_s: ArrayLike,
-    alpha_x: ArrayLike,
-    alpha_y: ArrayLike,
-) -> Gradient:
-    names = (RHO_D.name, RHO_S.name, ALPHA_X.name, ALPHA_Y.name)
-    parameters = _checked(rho_d, rho_s, alpha_x, alpha_y)
-    f_r, *derivatives = by_rows_of_vectors(_GRADIENT_LOOPS[form], checked_vectors(wi, wr), parameters, (5,))
-    return Gradient(f_r, dict(zip(names, derivatives, strict=True)))
-
-
-def _checked(rho_d: ArrayLike, rho_s: ArrayLike, alpha_x: ArrayLike, alpha_y: ArrayLike) -> tuple[Floats, ...]:
-    return RHO_D.check(rho_d), RHO_S.check(rho_s), ALPHA_X.check(alpha_x), ALPHA_Y.check(alpha_y)
+_NAMES = tuple(parameter.name for parameter in WARD_PARAMETERS)
+ELLIPTICAL_SLOPES = Slopes(_elliptical_gradient, _NAMES)
+HALF_VECTOR_SLOPES = Slopes(_half_vector_gradient, _NAMES)
+DUER_SLOPES = Slopes(_duer_gradient, _NAMES)
+BOUNDED_SLOPES = Slopes(_bounded_gradient, _NAMES)
 
 
 def lobe(

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from brdfdb._elementary import cosine
 from brdfdb._numba import elementwise, kernel, loop
-from brdfdb.geometry import checked_angles, checked_vectors, finished
-from brdfdb.models._rows import by_rows_of_vectors
-from brdfdb.models.large_calls import for_large_calls
-from brdfdb.parameters import Floats, ModelSpec, Parameter, white
+from brdfdb.geometry import Directions, Vectors, finished
+from brdfdb.models._rows import Out, by_rows_of_vectors
+from brdfdb.models.declaration import DeclaredModel
+from brdfdb.parameters import Floats, Parameter, white
 
 RHO = Parameter("rho", "ρ", "1", 0.0, 1.0, "albedo of the unnormalised lobe", reflectance=True)
 SIGMA = Parameter("sigma", "σ'", "1", 0.0, 1.0, "ratio of the non-diffuse to the diffuse term; 0 is Lambert")
@@ -41,77 +41,29 @@ def _vector_rows(w_i: Floats, w_r: Floats, scalars: NDArray[np.float64], f_r: Fl
             f[j] = value if z_i >= 0.0 and z_r >= 0.0 else 0.0 * (z_i + z_r + s)  # 0, or nan
 
 
-@for_large_calls
-def oren_nayar_fujii(
-    theta_i: ArrayLike,
-    phi_i: ArrayLike,
-    theta_r: ArrayLike,
-    phi_r: ArrayLike,
-    *,
-    rho: ArrayLike,
-    sigma: ArrayLike,
-) -> Floats:
-    """Return the BRDF [1/sr] of Fujii's form of the qualitative Oren-Nayar model, rho (A + B s / t).
-
-    Parameters
-    ----------
-    theta_i, phi_i, theta_r, phi_r : array_like [rad]
-        Directions of light (i) and viewer (r), pointing away from the surface; theta in [0, pi].
-    rho : array_like [1]
-        Scale, in [0, 1].
-    sigma : array_like [1]
-        The mixing ratio B / A, in [0, 1], which is not the deviation of a slope. 0 is Lambert.
-
-    Returns
-    -------
-    array [1/sr]
-        In the broadcast shape of all arguments; 0 below the horizon, nan where an angle is nan.
-
-    Raises
-    ------
-    ParameterError
-        If an argument is outside its range.
-
-    Notes
-    -----
-    The normalisation is the one that the article proposes, A = 1 / (pi + (pi/2 - 2/3) sigma). With it the directional
-    albedo is rho at grazing and less elsewhere. s is sin(theta_i) sin(theta_r) cos(phi_r - phi_i), and t is the larger
-    cosine where s is positive and 1 elsewhere. Unlike eq. 30 of Oren and Nayar, the model stays rough in the mirror
-    half plane. f_r grows as 1 / cos towards exact backscatter at grazing. At 90 degrees it is the finite value at the
-    float64 nearest pi/2.
-
-    References
-    ----------
-    fujii2013
-
-    Examples
-    --------
-    >>> round(float(oren_nayar_fujii(0.3, 0.0, 0.4, 0.0, rho=0.9, sigma=0.5)), 4)
-    0.2655
-    """
-    angles = checked_angles(theta_i, phi_i, theta_r, phi_r)
-    s = angles.sin_i * angles.sin_r * angles.cos_dphi
-    return finished(_evaluate(angles.cos_i, angles.cos_r, s, RHO.check(rho), SIGMA.check(sigma)), angles)
-
-
-@for_large_calls
-def oren_nayar_fujii_vectors(wi: ArrayLike, wr: ArrayLike, *, rho: ArrayLike, sigma: ArrayLike) -> Floats:
-    """Return `oren_nayar_fujii` [1/sr] for unit vectors `wi` (light) and `wr` (viewer) of shape (..., 3)."""
-    parameters = RHO.check(rho), SIGMA.check(sigma)
-    return by_rows_of_vectors(_vector_rows, checked_vectors(wi, wr), parameters)
-
-
-SPEC = ModelSpec(
-    name="oren_nayar_fujii",
-    version=1,
+@DeclaredModel(
     title="Oren-Nayar, Fujii's form",
     equation="proposed formula",
-    reference="fujii2013",
+    references="fujii2013",
     parameters=(RHO, SIGMA),
-    evaluate=oren_nayar_fujii,
-    vectors=oren_nayar_fujii_vectors,
     degree=1,
     grazing_pole=True,
     grazing_power=0.0,
     lossless=white,
 )
+def oren_nayar_fujii(directions: Directions, out: Out, rho: Floats, sigma: Floats) -> Floats:
+    """Return the BRDF [1/sr] of Fujii's form of the qualitative Oren-Nayar model, rho (A + B s / t).
+
+    sigma is the mixing ratio B / A, which is not the deviation of a slope. The normalisation is the one that the
+    article proposes, A = 1 / (pi + (pi/2 - 2/3) sigma). With it the directional albedo is rho at grazing and less
+    elsewhere. s is sin(theta_i) sin(theta_r) cos(phi_r - phi_i), and t is the larger cosine where s is positive and 1
+    elsewhere. Unlike eq. 30 of Oren and Nayar, the model stays rough in the mirror half plane. f_r grows as 1 / cos
+    towards exact backscatter at grazing. At 90 degrees it is the finite value at the float64 nearest pi/2.
+
+    >>> round(float(oren_nayar_fujii(0.3, 0.0, 0.4, 0.0, rho=0.9, sigma=0.5)), 4)
+    0.2655
+    """
+    if isinstance(directions, Vectors):
+        return by_rows_of_vectors(_vector_rows, directions, (rho, sigma), out)
+    s = directions.sin_i * directions.sin_r * directions.cos_dphi
+    return finished(_evaluate(directions.cos_i, directions.cos_r, s, rho, sigma), directions)

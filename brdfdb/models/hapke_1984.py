@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from brdfdb._elementary import arcsin, cosine, exp, log
 from brdfdb._numba import kernel, loop
-from brdfdb.geometry import checked_angles, checked_vectors, finished
-from brdfdb.models._rows import by_rows, by_rows_of_vectors
-from brdfdb.models.large_calls import for_large_calls
-from brdfdb.parameters import Floats, ModelSpec, Parameter
+from brdfdb.geometry import Directions
+from brdfdb.models._rows import Out, RowLoops
+from brdfdb.models.declaration import DeclaredModel
+from brdfdb.parameters import Floats, Parameter
 
 W = Parameter("w", "w", "1", 0.0, 1.0, "albedo of a grain for single scattering", reflectance=True)
 B = Parameter("b", "b", "1", 0.0, 0.95, "asymmetry of both lobes of a grain's phase function")
@@ -150,96 +151,8 @@ def _vector_rows(w_i: Floats, w_r: Floats, scalars: Rows, f_r: Floats) -> None:
             f[j] = value * (0.0 if z_i < 0.0 or z_r < 0.0 else 1.0)  # nan stays nan
 
 
-@for_large_calls
-def hapke(
-    theta_i: ArrayLike,
-    phi_i: ArrayLike,
-    theta_r: ArrayLike,
-    phi_r: ArrayLike,
-    *,
-    w: ArrayLike,
-    b: ArrayLike,
-    c: ArrayLike,
-    b_0: ArrayLike = 0.0,
-    h: ArrayLike = 1.0,
-    theta_bar: ArrayLike = 0.0,
-) -> Floats:
-    """Return the BRDF [1/sr] of Hapke's model of a layer of grains, with hot spot and macroscopic roughness.
-
-    Parameters
-    ----------
-    theta_i, phi_i, theta_r, phi_r : array_like [rad]
-        Directions of light (i) and viewer (r), pointing away from the surface; theta in [0, pi].
-    w : array_like [1]
-        Albedo of a grain for single scattering, in [0, 1].
-    b : array_like [1]
-        Asymmetry of the two lobes of a grain's phase function, in [0, 0.95]; 0 is uniform.
-    c : array_like [1]
-        Share of the lobe that goes back towards the light, in [0, 1]. Papers with a c in [-1, 1] mean 2 c - 1.
-    b_0 : array_like [1]
-        Height B_0 of the hot spot, in [0, 1].
-    h : array_like [1]
-        Width of the hot spot, the tangent of half the phase angle at half its height, in [1e-3, 1].
-    theta_bar : array_like [rad]
-        Mean slope of the surface, in [0, 1.0472]: up to 60 degrees. The paper derives it for small slopes.
-
-    Returns
-    -------
-    array [1/sr]
-        In the broadcast shape of all arguments; 0 below the horizon, nan where an angle is nan.
-
-    Raises
-    ------
-    ParameterError
-        If an argument is outside its range.
-
-    Notes
-    -----
-    f_r = w / (4 pi) / mu_0 mu_0e / (mu_0e + mu_e) (P (1 + B) + H(mu_0e) H(mu_e) - 1) S. The effective cosines and S are
-    those of Hapke 1984, B is that of Hapke 1986, and H the approximation of Hapke 2002. Of the later additions, the
-    coherent hot spot, the filling factor and the scattering of anisotropic grains are left out. Hapke's r is f_r mu_0,
-    and the reflectance factor is pi f_r. f_r has a pole where both directions are at grazing: at any azimuth on a
-    smooth surface, and back towards the light on a rough one. A rough surface loses the light that meets it twice.
-
-    References
-    ----------
-    hapke1984, hapke1986, hapke2002
-
-    Examples
-    --------
-    >>> round(float(hapke(0.5, 0.0, 0.5, 0.0, w=0.526, b=0.187, c=0.6365, b_0=1.0, h=0.083, theta_bar=0.232)), 5)
-    0.07781
-    """
-    checked = checked_angles(theta_i, phi_i, theta_r, phi_r)
-    parameters = _checked(w, b, c, b_0, h, theta_bar)
-    if checked.scattered:
-        return finished(by_rows_of_vectors(_vector_rows, checked.vectors, parameters), checked)
-    columns = (np.cos(checked.phi_r), np.sin(checked.phi_r))
-    light = (np.cos(checked.phi_i), np.sin(checked.phi_i), checked.sin_i, checked.cos_i)
-    scalars = (*light, checked.sin_r, checked.cos_r, *parameters)
-    return finished(by_rows(_angle_rows, columns, scalars), checked)
-
-
-@for_large_calls
-def hapke_vectors(
-    wi: ArrayLike,
-    wr: ArrayLike,
-    *,
-    w: ArrayLike,
-    b: ArrayLike,
-    c: ArrayLike,
-    b_0: ArrayLike = 0.0,
-    h: ArrayLike = 1.0,
-    theta_bar: ArrayLike = 0.0,
-) -> Floats:
-    """Return `hapke` [1/sr] for unit vectors `wi` (light) and `wr` (viewer) of shape (..., 3)."""
-    return by_rows_of_vectors(_vector_rows, checked_vectors(wi, wr), _checked(w, b, c, b_0, h, theta_bar))
-
-
-def _checked(
-    w: ArrayLike, b: ArrayLike, c: ArrayLike, b_0: ArrayLike, h: ArrayLike, theta_bar: ArrayLike
-) -> tuple[Floats, ...]:
-    return W.check(w), B.check(b), C.check(c), B_0.check(b_0), H.check(h), THETA_BAR.check(theta_bar)
+_POLAR = attrgetter("cos_phi_i", "sin_phi_i", "sin_i", "cos_i", "sin_r", "cos_r")
+_LOOPS = RowLoops(_angle_rows, _vector_rows, polar=_POLAR)
 
 
 def lossless(_: Mapping[str, Any]) -> dict[str, float]:
@@ -247,24 +160,32 @@ def lossless(_: Mapping[str, Any]) -> dict[str, float]:
     return {"w": 1.0}
 
 
-_EXCESS = (
-    "Hapke 1984, 1986, 2002: multiple scattering is that of uniform grains, whatever their phase function, and the hot "
-    "spot is added to it. With w = 1 and no roughness the albedo at normal incidence is 0.986 for b = 0, 1.32 for b = "
-    "0.95 and c = 1, and 1.77 with b_0 = 1 and h = 1 as well. Uniform grains with that hot spot reach 1.23 at 89.5 "
-    "degrees"
-)
-
-SPEC = ModelSpec(
-    name="hapke",
-    version=1,
+@DeclaredModel(
     title="Hapke, with roughness",
     equation="eqs 47, 48, 50, 51, with H of Hapke 2002",
-    reference="hapke1984",
+    references="hapke1984, hapke1986, hapke2002",
     parameters=(W, B, C, B_0, H, THETA_BAR),
-    evaluate=hapke,
-    vectors=hapke_vectors,
     grazing_pole=True,
     grazing_power=0.0,
-    excess=_EXCESS,
+    excess="Hapke 1984, 1986, 2002: multiple scattering is that of uniform grains, whatever their phase function, and "
+    "the hot spot is added to it. With w = 1 and no roughness the albedo at normal incidence is 0.986 for b = "
+    "0, 1.32 for b = 0.95 and c = 1, and 1.77 with b_0 = 1 and h = 1 as well. Uniform grains with that hot spot "
+    "reach 1.23 at 89.5 degrees",
     lossless=lossless,
 )
+def hapke(directions: Directions, out: Out, *parameters: Floats) -> Floats:
+    """Return the BRDF [1/sr] of Hapke's model of a layer of grains, with hot spot and macroscopic roughness.
+
+    f_r = w / (4 pi) / mu_0 mu_0e / (mu_0e + mu_e) (P (1 + B) + H(mu_0e) H(mu_e) - 1) S. The effective cosines and S are
+    those of Hapke 1984, B is that of Hapke 1986, and H the approximation of Hapke 2002. Of the later additions, the
+    coherent hot spot, the filling factor and the scattering of anisotropic grains are left out. Hapke's r is f_r mu_0,
+    and the reflectance factor is pi f_r. f_r has a pole where both directions are at grazing: at any azimuth on a
+    smooth surface, and back towards the light on a rough one. A rough surface loses the light that meets it twice.
+
+    With b = 0 grains scatter uniformly. Papers with a c in [-1, 1] mean 2 c - 1. h is the tangent of half the phase
+    angle at which the hot spot has half its height. The paper derives theta_bar, up to 60 degrees, for small slopes.
+
+    >>> round(float(hapke(0.5, 0.0, 0.5, 0.0, w=0.526, b=0.187, c=0.6365, b_0=1.0, h=0.083, theta_bar=0.232)), 5)
+    0.07781
+    """
+    return _LOOPS.evaluated(directions, out, parameters)

@@ -5,144 +5,58 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from brdfdb import fresnel
-from brdfdb.arrays import array_function
-from brdfdb.errors import ParameterError
-from brdfdb.geometry import (
-    Directions,
-    Vectors,
-    checked_angles,
-    checked_vectors,
-    common_solid_angle,
-    finished,
-    versine,
-)
+from brdfdb.geometry import Directions, Vectors, common_solid_angle, finished, versine
 from brdfdb.models import he_torrance_1991 as full
 from brdfdb.models._he_torrance_kernels import hidden, shadowing, variance
-from brdfdb.models.he_torrance_1991_polarised import unit_azimuth
-from brdfdb.models.large_calls import for_large_calls
-from brdfdb.parameters import Floats, Parameter
+from brdfdb.models.declaration import of_directions
+from brdfdb.models.he_torrance_1991 import SIGMA_0_UM, TAU_UM, A
+from brdfdb.parameters import WAVELENGTH_NM, Count, Floats, K, N, Parameter
 
 SIGMA_0_OVER_TAU = Parameter("sigma_0_over_tau", "σ_0/τ", "1", 1e-6, 1e6, "rms roughness over autocorrelation length")
 INCIDENT = Parameter("incident_solid_angle_sr", "ω_i", "sr", 1e-12, 1.0, "solid angle of the cone of light")
 RECEIVED = Parameter("received_solid_angle_sr", "ω_r", "sr", 1e-12, 1.0, "solid angle of the cone that is received")
-RINGS = 8  # largest number of rings of nodes in a cone
+RINGS = Count("rings", "", "1", 0, 8, "number of rings of nodes in each cone; 0 takes the axes alone", default=2)
+
+_SURFACE = (WAVELENGTH_NM, SIGMA_0_UM, TAU_UM, N, K)
 
 
-@for_large_calls
-def he_torrance_very_rough(
-    theta_i: ArrayLike,
-    phi_i: ArrayLike,
-    theta_r: ArrayLike,
-    phi_r: ArrayLike,
-    *,
-    sigma_0_over_tau: ArrayLike,
-    n: ArrayLike,
-    k: ArrayLike,
-    a: ArrayLike = 0.0,
-) -> Floats:
+@of_directions(parameters=(SIGMA_0_OVER_TAU, N, K, A), references="he1991, smith1967, corless1996")
+def he_torrance_very_rough(directions: Directions, sigma_0_over_tau: Floats, n: Floats, k: Floats, a: Floats) -> Floats:
     """Return the BRDF [1/sr] of a very rough surface: `he_torrance` in the limit g -> infinity, geometrical optics.
 
-    Parameters
-    ----------
-    theta_i, phi_i, theta_r, phi_r : array_like [rad]
-        Directions of light (i) and viewer (r), pointing away from the surface; theta in [0, pi].
-    sigma_0_over_tau : array_like [1]
-        Roughness over autocorrelation length, in [1e-6, 1e6]. The rms slope of the surface is sqrt(2) times that. The
-        wavelength enters only through n and k.
-    n, k : array_like [1]
-        Complex refractive index n + ik; n in [1e-3, 100], k in [0, 1e4].
-    a : array_like [1]
-        Albedo of the uniform diffuse part, in [0, 1].
+    The rms slope of the surface is sqrt(2) times sigma_0_over_tau. The wavelength enters only through n and k. The
+    limit has no specular part. Section 4: "For very rough surfaces, only the ratio is required". Cylinder (a) of Fig.
+    13 is an example. The sum of eq. (78) tends to e^-b / g with b = v_xy^2 tau^2 / (4 g) (Beckmann and Spizzichino
+    1963), in which the wave number cancels. The first term that is left out is the share (b^2 / 2 - 2 b + 1) / g of the
+    whole. Shadowing and effective roughness are those of `he_torrance`. g falls with cos^2 towards grazing, where the
+    limit needs rougher surfaces.
 
-    Returns
-    -------
-    array [1/sr]
-        In the broadcast shape of all arguments; 0 below the horizon, nan where an angle is nan. The limit has no
-        specular part.
-
-    Raises
-    ------
-    ParameterError
-        If an argument is outside its range.
-
-    Notes
-    -----
-    Section 4: "For very rough surfaces, only the ratio is required". Cylinder (a) of Fig. 13 is an example. The sum of
-    eq. (78) tends to e^-b / g with b = v_xy^2 tau^2 / (4 g) (Beckmann and Spizzichino 1963), in which the wave number
-    cancels. The first term that is left out is the share (b^2 / 2 - 2 b + 1) / g of the whole. Shadowing and effective
-    roughness are those of `he_torrance`. g falls with cos^2 towards grazing, where the limit needs rougher surfaces.
-
-    References
-    ----------
-    he1991, smith1967, corless1996
-
-    Examples
-    --------
     >>> round(float(he_torrance_very_rough(0.5, 0.0, 0.6, 3.0, sigma_0_over_tau=0.16, n=0.769, k=6.08)), 3)
     0.957
     """
-    directions = checked_angles(theta_i, phi_i, theta_r, phi_r)
-    return _very_rough(
-        directions, SIGMA_0_OVER_TAU.check(sigma_0_over_tau), full.N.check(n), full.K.check(k), full.A.check(a)
-    )
+    return _very_rough(directions, sigma_0_over_tau, n, k, a)
 
 
-@for_large_calls
-def he_torrance_very_rough_vectors(
-    wi: ArrayLike, wr: ArrayLike, *, sigma_0_over_tau: ArrayLike, n: ArrayLike, k: ArrayLike, a: ArrayLike = 0.0
-) -> Floats:
-    """Return `he_torrance_very_rough` [1/sr] for unit vectors `wi` (light) and `wr` (viewer) of shape (..., 3)."""
-    directions = checked_vectors(wi, wr)
-    return _very_rough(
-        directions, SIGMA_0_OVER_TAU.check(sigma_0_over_tau), full.N.check(n), full.K.check(k), full.A.check(a)
-    )
-
-
-@array_function
-def he_torrance_smooth(theta_i: ArrayLike, *, n: ArrayLike, k: ArrayLike) -> Floats:
+@of_directions(
+    parameters=(N, K),
+    references="he1991",
+    returns="""\
+array [1]
+    |F|^2, in [0, 1], in the broadcast shape of all arguments; 0 below the horizon, nan where theta_i is nan. The
+    directional diffuse part is 0 in this limit.""",
+)
+def he_torrance_smooth(light: Directions, n: Floats, k: Floats) -> Floats:
     """Return the specular reflectance [1] of a smooth surface: `he_torrance_specular` as sigma_0 / wavelength -> 0.
 
-    Parameters
-    ----------
-    theta_i : array_like [rad]
-        Angle of incidence, in [0, pi].
-    n, k : array_like [1]
-        Complex refractive index n + ik; n in [1e-3, 100], k in [0, 1e4].
-
-    Returns
-    -------
-    array [1]
-        |F|^2, in [0, 1], in the broadcast shape of all arguments; 0 below the horizon, nan where theta_i is nan. The
-        directional diffuse part is 0 in this limit.
-
-    Raises
-    ------
-    ParameterError
-        If an argument is outside its range.
-
-    Notes
-    -----
     Eq. (10) without its factor 1 / (cos theta_i d omega_i).
 
-    References
-    ----------
-    he1991
-
-    Examples
-    --------
     >>> round(float(he_torrance_smooth(0.0, n=1.5, k=0.0)), 4)
     0.04
     """
-    return _smooth(checked_angles(theta_i, 0.0, 0.0, 0.0), full.N.check(n), full.K.check(k))
-
-
-@array_function
-def he_torrance_smooth_vectors(wi: ArrayLike, *, n: ArrayLike, k: ArrayLike) -> Floats:
-    """Return `he_torrance_smooth` [1] for unit vectors `wi` (light) of shape (..., 3)."""
-    return _smooth(checked_vectors(wi, wi), full.N.check(n), full.K.check(k))
+    return _smooth(light, n, k)
 
 
 class HeTorranceParts(NamedTuple):
@@ -152,125 +66,42 @@ class HeTorranceParts(NamedTuple):
     uniform_diffuse: Floats
 
 
-@array_function
-def he_torrance_parts(
-    theta_i: ArrayLike,
-    phi_i: ArrayLike,
-    theta_r: ArrayLike,
-    phi_r: ArrayLike,
-    *,
-    wavelength_nm: ArrayLike,
-    sigma_0_um: ArrayLike,
-    tau_um: ArrayLike,
-    n: ArrayLike,
-    k: ArrayLike,
-    a: ArrayLike = 0.0,
-) -> HeTorranceParts:
+@of_directions(
+    parameters=(*_SURFACE, A),
+    references="he1991",
+    returns="""\
+HeTorranceParts [1/sr]
+    (directional_diffuse, uniform_diffuse), each in the broadcast shape of all arguments; 0 below the horizon, nan
+    where an angle is nan. Their sum is `he_torrance`.""",
+)
+def he_torrance_parts(directions: Directions, *parameters: Floats) -> HeTorranceParts:
     """Return f_r [1/sr] of the directional diffuse and of the uniform diffuse part of `he_torrance`, separately.
 
     The third part of eq. (5) is the specular part: `he_torrance_specular` gives its reflectance.
 
-    Parameters
-    ----------
-    theta_i, phi_i, theta_r, phi_r : array_like [rad]
-        Directions of light (i) and viewer (r), pointing away from the surface; theta in [0, pi].
-    wavelength_nm, sigma_0_um, tau_um, n, k, a : array_like
-        As in `he_torrance`.
-
-    Returns
-    -------
-    HeTorranceParts [1/sr]
-        (directional_diffuse, uniform_diffuse), each in the broadcast shape of all arguments; 0 below the horizon, nan
-        where an angle is nan. Their sum is `he_torrance`.
-
-    Raises
-    ------
-    ParameterError
-        If an argument is outside its range.
-
-    Notes
-    -----
     Eqs (71) and (72).
 
-    References
-    ----------
-    he1991
-
-    Examples
-    --------
     >>> surface = dict(wavelength_nm=500.0, sigma_0_um=1.45, tau_um=13.2, n=1.745, k=0.0, a=0.9)
     >>> parts = he_torrance_parts(1.0, 0.0, 1.0, 3.14, **surface)
     >>> round(float(parts.directional_diffuse), 2), round(float(parts.uniform_diffuse), 2)
     (0.65, 0.29)
     """
-    surface = full.checked_surface(wavelength_nm, sigma_0_um, tau_um, n, k)
-    return _parts(checked_angles(theta_i, phi_i, theta_r, phi_r), surface, full.A.check(a))
+    *surface, albedo = parameters
+    return _parts(directions, full.surface_of(*surface), albedo)
 
 
-@array_function
-def he_torrance_parts_vectors(
-    wi: ArrayLike,
-    wr: ArrayLike,
-    *,
-    wavelength_nm: ArrayLike,
-    sigma_0_um: ArrayLike,
-    tau_um: ArrayLike,
-    n: ArrayLike,
-    k: ArrayLike,
-    a: ArrayLike = 0.0,
-) -> HeTorranceParts:
-    """Return `he_torrance_parts` [1/sr] for unit vectors `wi` (light) and `wr` (viewer) of shape (..., 3)."""
-    surface = full.checked_surface(wavelength_nm, sigma_0_um, tau_um, n, k)
-    return _parts(checked_vectors(wi, wr), surface, full.A.check(a))
-
-
-@array_function
-def he_torrance_aperture(
-    theta_i: ArrayLike,
-    phi_i: ArrayLike,
-    theta_r: ArrayLike,
-    phi_r: ArrayLike,
-    *,
-    incident_solid_angle_sr: ArrayLike,
-    received_solid_angle_sr: ArrayLike,
-    wavelength_nm: ArrayLike,
-    sigma_0_um: ArrayLike,
-    tau_um: ArrayLike,
-    n: ArrayLike,
-    k: ArrayLike,
-    a: ArrayLike = 0.0,
-    rings: int = 2,
-) -> Floats:
+@of_directions(
+    parameters=(INCIDENT, RECEIVED, *_SURFACE, A, RINGS),
+    references="he1991",
+    returns="""\
+array [1/sr]
+    In the broadcast shape of all arguments; 0 where an axis is below the horizon, nan where an angle is nan.""",
+)
+def he_torrance_aperture(directions: Directions, *parameters: Floats) -> Floats:
     """Return the BRDF [1/sr] that an instrument with a cone of light and a cone of its receiver measures.
 
     All three parts are included, with the specular part spread over the cones.
 
-    Parameters
-    ----------
-    theta_i, phi_i, theta_r, phi_r : array_like [rad]
-        Axes of the cones of light (i) and of the receiver (r), pointing away from the surface; theta in [0, pi].
-    incident_solid_angle_sr, received_solid_angle_sr : array_like [sr]
-        Each in [1e-12, 1]. It is pi sin^2 of half the angle of the circular cone, the area of a round aperture over the
-        square of the distance to its rim. The experiments of the paper have pi / 1024, a half angle of 1.79 degrees.
-    wavelength_nm, sigma_0_um, tau_um, n, k, a : array_like
-        As in `he_torrance`.
-    rings : int
-        Number of rings in each cone over which the diffuse parts are averaged, in [0, 8]. Each ring has 4 `rings`
-        nodes; 0 takes the axes alone. Work grows with the fourth power. 2 is enough where the diffuse lobe is as wide
-        as the cones.
-
-    Returns
-    -------
-    array [1/sr]
-        In the broadcast shape of all arguments; 0 where an axis is below the horizon, nan where an angle is nan.
-
-    Raises
-    ------
-    ParameterError
-        If an argument is outside its range.
-
-    Notes
-    -----
     Section 4, on Fig. 7: "The angular width of the measured specular peak is determined by the solid angles of incident
     and received light in the experiments (d omega_i = d omega_r = pi / 1024). To allow comparisons, the theoretical
     peaks have been averaged over the same solid angles." The averages are as follows.
@@ -283,42 +114,14 @@ def he_torrance_aperture(
     The diffuse parts are averaged over both cones, by equal solid angles. They are 0 in the part of a cone below the
     horizon. The figures show the result divided by its value at theta_r = theta_i, eq. (11).
 
-    References
-    ----------
-    he1991
-
-    Examples
-    --------
     >>> cones = dict(incident_solid_angle_sr=np.pi / 1024, received_solid_angle_sr=np.pi / 1024)
     >>> aluminum = dict(wavelength_nm=2000.0, sigma_0_um=0.28, tau_um=1.77, n=2.15, k=20.7)
     >>> around = np.deg2rad([5.0, 8.0, 10.0, 12.0, 15.0])
     >>> he_torrance_aperture(np.deg2rad(10.0), 0.0, around, np.pi, **cones, **aluminum).round(2).tolist()
     [0.95, 6.27, 17.12, 6.28, 0.97]
     """
-    apertures = _checked_apertures(incident_solid_angle_sr, received_solid_angle_sr, rings)
-    surface = full.checked_surface(wavelength_nm, sigma_0_um, tau_um, n, k)
-    return _aperture(checked_angles(theta_i, phi_i, theta_r, phi_r), apertures, surface, full.A.check(a))
-
-
-@array_function
-def he_torrance_aperture_vectors(
-    wi: ArrayLike,
-    wr: ArrayLike,
-    *,
-    incident_solid_angle_sr: ArrayLike,
-    received_solid_angle_sr: ArrayLike,
-    wavelength_nm: ArrayLike,
-    sigma_0_um: ArrayLike,
-    tau_um: ArrayLike,
-    n: ArrayLike,
-    k: ArrayLike,
-    a: ArrayLike = 0.0,
-    rings: int = 2,
-) -> Floats:
-    """Return `he_torrance_aperture` [1/sr] for unit vectors `wi` (light) and `wr` (viewer) of shape (..., 3)."""
-    apertures = _checked_apertures(incident_solid_angle_sr, received_solid_angle_sr, rings)
-    surface = full.checked_surface(wavelength_nm, sigma_0_um, tau_um, n, k)
-    return _aperture(checked_vectors(wi, wr), apertures, surface, full.A.check(a))
+    incident, received, *surface, albedo, rings = parameters
+    return _aperture(directions, _Apertures(incident, received, int(rings)), full.surface_of(*surface), albedo)
 
 
 def _very_rough(directions: Directions, slope: Floats, n: Floats, k: Floats, albedo: Floats) -> Floats:
@@ -361,12 +164,6 @@ class _Apertures(NamedTuple):
     rings: int
 
 
-def _checked_apertures(incident: ArrayLike, received: ArrayLike, rings: int) -> _Apertures:
-    if isinstance(rings, bool) or not isinstance(rings, int | np.integer) or not 0 <= rings <= RINGS:
-        raise ParameterError("rings", f"{rings!r} is not a whole number in [0, {RINGS}]", rings, (0, RINGS))
-    return _Apertures(INCIDENT.check(incident), RECEIVED.check(received), int(rings))
-
-
 def _aperture(directions: Directions, apertures: _Apertures, surface: full.Surface, albedo: Floats) -> Floats:
     # Eq. (70), with the share of the received cone in the cone of reflection for its Delta
     rho_s = full.rho_s(directions, surface)
@@ -385,7 +182,7 @@ def _averaged(directions: Directions, apertures: _Apertures, surface: full.Surfa
     total: Any = 0.0
     for j, weight in enumerate(weights):
         with np.errstate(all="ignore"):
-            f_r = full.he_torrance_vectors(
+            f_r = full.he_torrance.vectors(
                 light[..., j : j + 1, :],
                 viewers,
                 wavelength_nm=surface.wavelength_um[..., None] * 1000.0,
@@ -404,7 +201,7 @@ def _frame(directions: Directions, which: str) -> tuple[Floats, Floats, Floats]:
     x, y, z, sin = (getattr(directions, f"{name}_{which}") for name in ("x", "y", "cos", "sin"))
     if isinstance(directions, Vectors):
         z = getattr(directions, f"w_{which}")[..., 2].astype(np.float64)  # `cos` is held at 0 below the horizon
-        cos_phi, sin_phi = unit_azimuth(x, y, sin)
+        cos_phi, sin_phi = full.unit_azimuth(x, y, sin)
     else:
         phi = getattr(directions, f"phi_{which}")
         cos_phi, sin_phi = np.cos(phi), np.sin(phi)

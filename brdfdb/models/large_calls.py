@@ -6,24 +6,18 @@ work in blocks, or of two rows if they are long, because an axis of length 1 may
 
 from __future__ import annotations
 
-import functools
-import inspect
 import itertools
 import math
-import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any, ParamSpec, Protocol, cast, overload
+from typing import Any
 
 import numpy as np
-from numpy.typing import DTypeLike, NDArray
+from numpy.typing import NDArray
 
-from brdfdb.arrays import PLAIN_TYPES, entered
 from brdfdb.errors import ParameterError
 from brdfdb.geometry import asked_for
 from brdfdb.parameters import Floats
-
-P = ParamSpec("P")
 
 PART = 1 << 21  # values of a part: the checks of each take 0.1 ms, 5 % of the time of the fastest kernel
 PART_BY_ANGLES = 1 << 16  # of a call by scattered angles: new memory for their vectors takes as long as the call
@@ -31,101 +25,56 @@ STEP = 1024  # a multiple of every block of a kernel
 _VECTORS = ("wi", "wr")
 _DIRECTIONS = ("theta_i", "phi_i", "theta_r", "phi_r", *_VECTORS)
 
-_DOCUMENTED = """
-    out : array, optional
-        Writable, C-contiguous, in the shape and dtype of the result: it is written there and returned.
-    threads : int
-        Number of threads that share a large call, at least 1; by default 1. Values are the same bit for bit.
-"""
 
-
-class LargeCall(Protocol[P]):
-    """A function of directions that takes `out` and `threads`, too."""
-
-    __name__: str
-
-    @overload
-    def __call__(self, *args: P.args, **kwargs: P.kwargs) -> Floats: ...
-
-    @overload
-    def __call__(self, *args: Any, out: Floats | None, threads: int = 1, **kwargs: Any) -> Floats: ...
-
-    @overload
-    def __call__(self, *args: Any, threads: int, **kwargs: Any) -> Floats: ...
-
-
-def for_large_calls(function: Callable[P, Floats], together: str = "") -> LargeCall[P]:
-    """Add the arguments `out` and `threads` to a model, a function of directions whose result is as they broadcast.
-
-    A call with several values of the parameter `together` is whole, because together they decide how each is computed.
-    """
-    signature = inspect.signature(function)
-    names = tuple(signature.parameters)
-
-    @functools.wraps(function)
-    def call(*directions: Any, out: Floats | None = None, threads: int = 1, **parameters: Any) -> Floats:
-        if PLAIN_TYPES.issuperset(map(type, directions)) and PLAIN_TYPES.issuperset(map(type, parameters.values())):
-            return computed(directions, parameters, out, threads)
-        ready = entered(names, directions, parameters)
-        return cast(Floats, ready.finish(computed(ready.args, ready.keywords, out, threads)))
-
-    def computed(directions: tuple[Any, ...], parameters: dict[str, Any], out: Floats | None, threads: int) -> Floats:
-        # theta_i, phi_i, theta_r: a row of azimuths is not scattered
-        scattered = len(directions) > len(_VECTORS) and any(
-            isinstance(angle, np.ndarray) and angle.size > PART_BY_ANGLES for angle in directions[:3]
-        )
-        if out is None and type(threads) is int and threads == 1 and not scattered:
-            return function(*directions, **parameters)
-        given = signature.bind(*directions, **parameters).arguments
-        whole = np.size(given.get(together, ())) > 1
-        return _in_parts(function, given, out, threads, PART_BY_ANGLES if scattered else PART, whole=whole)
-
-    if call.__doc__ and "\n\n    Returns\n" in call.__doc__:
-        call.__doc__ = call.__doc__.replace("\n\n    Returns\n", f"{_DOCUMENTED}\n    Returns\n", 1)
-    return cast(LargeCall[P], call)
-
-
-def for_large_calls_of_one(together: str) -> Callable[[Callable[P, Floats]], LargeCall[P]]:
-    """Return the decorator `for_large_calls` with its argument `together`."""
-    return lambda function: for_large_calls(function, together)
-
-
-def _in_parts(
-    function: Callable[..., Floats],
+def in_parts(
+    evaluate: Callable[[dict[str, Any], Floats | None], Floats],
     given: dict[str, Any],
     out: Floats | None,
     threads: int,
-    part_size: int,
     *,
-    whole: bool,
+    part_size: int,
+    together: str,
 ) -> Floats:
+    """Return the values of a call, computed in parts on threads and written to `out` if it is given.
+
+    Parameters
+    ----------
+    evaluate : callable
+        ``evaluate(arguments, out)`` returns the values for some arguments. They are copied to `out` unless it wrote
+        them there.
+    given : dict
+        The arguments by name, directions first.
+    out, threads
+        As the models take them.
+    part_size : int
+        Number of values of a part.
+    together : str
+        A parameter whose values together decide how each is computed: a call with several of them is not cut.
+    """
     threads = checked_threads(threads)
     try:
         shape = np.broadcast_shapes(
             *(np.shape(value)[: -1 if name in _VECTORS else None] for name, value in given.items())
         )
     except ValueError:
-        return function(**given)  # it says what is wrong
+        return evaluate(given, None)  # it says what is wrong
     result = array_for_result(out, shape, asked_for(*(given[name] for name in _DIRECTIONS if name in given)), given)
     given = {name: np.asarray(value) if isinstance(value, list | tuple) else value for name, value in given.items()}
     axis = next((axis for axis, length in enumerate(shape) if length > 1), None)
-    if axis is None or whole:
-        result[...] = function(**given)
+    if axis is None or np.size(given.get(together, ())) > 1:
+        result[...] = evaluate(given, None)
         return result[()] if out is None else result
     back = len(shape) - axis
     step = STEP if math.prod(shape[axis + 1 :]) < STEP else 2
 
-    def evaluate(part: slice) -> None:
+    def evaluate_part(part: slice) -> None:
         target = result[(*[slice(None)] * axis, part)]
-        _destination.array = target
-        try:
-            values = function(**{name: _part(value, back + (name in _VECTORS), part) for name, value in given.items()})
-        finally:
-            _destination.array = None
+        arguments = {name: _part(value, back + (name in _VECTORS), part) for name, value in given.items()}
+        values = evaluate(arguments, target)
         if not np.may_share_memory(values, target):
             target[...] = values
 
-    on_threads(evaluate, cut(shape[axis], result.size, step, threads, part_size), threads)
+    on_threads(evaluate_part, cut(shape[axis], result.size, step, threads, part_size), threads)
     return result
 
 
@@ -135,21 +84,6 @@ def _part(value: Any, back: int, part: slice) -> Any:
         return value
     index: tuple[Any, ...] = (..., part, *[slice(None)] * (back - 1))
     return np.asarray(value)[index]
-
-
-class _Destination(threading.local):
-    array: Floats | None = None
-
-
-_destination = _Destination()
-
-
-def new_result(shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
-    """Return the array for the values of a call: the part of `out` that this thread fills, or a new one."""
-    given, _destination.array = _destination.array, None
-    if given is not None and given.shape == shape and given.dtype == dtype:
-        return given
-    return np.empty(shape, dtype)
 
 
 def checked_threads(threads: int) -> int:

@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from brdfdb._elementary import arcsin, cosine
 from brdfdb._numba import kernel, loop
-from brdfdb.geometry import checked_angles, checked_vectors, finished
-from brdfdb.models._rows import by_rows, by_rows_of_vectors
-from brdfdb.models.large_calls import for_large_calls
-from brdfdb.parameters import Floats, ModelSpec, Parameter, grows_with
+from brdfdb.geometry import Directions
+from brdfdb.models._rows import Out, RowLoops
+from brdfdb.models.declaration import DeclaredModel
+from brdfdb.parameters import Floats, Parameter, grows_with
 
 F_ISO = Parameter("f_iso", "f_iso", "1", 0.0, 1.0, "weight of the uniform kernel", reflectance=True)
 F_VOL = Parameter("f_vol", "f_vol", "1", 0.0, 1.0, "weight of the Ross-Thick kernel, leaves", reflectance=True)
@@ -72,90 +72,33 @@ def _vector_rows(w_i: Floats, w_r: Floats, scalars: Rows, f_r: Floats) -> None:
             values[j] = value * (0.0 if z_i < 0.0 or z_r < 0.0 else 1.0)  # nan stays nan
 
 
-@for_large_calls
-def ross_li(
-    theta_i: ArrayLike,
-    phi_i: ArrayLike,
-    theta_r: ArrayLike,
-    phi_r: ArrayLike,
-    *,
-    f_iso: ArrayLike,
-    f_vol: ArrayLike,
-    f_geo: ArrayLike,
-) -> Floats:
+_LOOPS = RowLoops(_angle_rows, _vector_rows)
+
+
+@DeclaredModel(
+    title="Ross-Thick, Li-Sparse-Reciprocal (MODIS)",
+    equation="(f_iso + f_vol K_vol + f_geo K_geo) / pi",
+    references="lucht2000, wanner1995",
+    parameters=(F_ISO, F_VOL, F_GEO),
+    grazing_pole=True,
+    grazing_power=grows_with("f_geo", 1.0),
+    excess="Lucht, Schaaf and Strahler 2000: kernels fitted to measured reflectances, not normalised, so f_iso is no "
+    "albedo. The weights of measured land reflect less than 1. The Ross kernel adds up to 1.47 f_vol to the albedo at "
+    "89.5 degrees, and the Li kernel grows as 1 / cos(theta_i): with f_iso = 1, f_vol = 0 and f_geo = 0.5 the albedo "
+    "is 1.88 at 85 degrees and 19.5 at 89.5",
+)
+def ross_li(directions: Directions, out: Out, *parameters: Floats) -> Floats:
     """Return the BRDF [1/sr] of the Ross-Thick and Li-Sparse-Reciprocal kernels, the model of the MODIS product.
 
-    Parameters
-    ----------
-    theta_i, phi_i, theta_r, phi_r : array_like [rad]
-        Directions of light (i) and viewer (r), pointing away from the surface; theta in [0, pi].
-    f_iso, f_vol, f_geo : array_like [1]
-        Weights of the kernels: uniform, in [0, 1]; Ross-Thick, a dense layer of leaves, in [0, 1]; Li-Sparse, crowns
-        and their shadows, in [0, 0.5]. The MODIS product MCD43A1 gives these three for each band.
-
-    Returns
-    -------
-    array [1/sr]
-        In the broadcast shape of all arguments; 0 below the horizon, nan where an angle is nan.
-
-    Raises
-    ------
-    ParameterError
-        If an argument is outside its range.
-
-    Notes
-    -----
     f_r = (f_iso + f_vol K_vol + f_geo K_geo) / pi, with h/b = 2 and b/r = 1 in K_geo, as the product has them. The
-    papers and the product give the reflectance factor, which is pi f_r. Both kernels are 0 where light and viewer are
-    at the normal, and both become negative. The papers let the sum be negative, too. Here it is held at 0, which
-    happens where one direction is close to the horizon. The product's polynomials of the albedo are integrals of
-    kernels that are not held. K_geo has a pole at grazing. The kernels have no narrower hot spot (Maignan 2004).
+    MODIS product MCD43A1 gives the three weights for each band. K_vol stands for a dense layer of leaves, K_geo for
+    crowns and their shadows. The papers and the product give the reflectance factor, which is pi f_r. Both kernels are
+    0 where light and viewer are at the normal, and both become negative. The papers let the sum be negative, too. Here
+    it is held at 0, which happens where one direction is close to the horizon. The product's polynomials of the albedo
+    are integrals of kernels that are not held. K_geo has a pole at grazing. The kernels have no narrower hot spot
+    (Maignan 2004).
 
-    References
-    ----------
-    lucht2000, wanner1995
-
-    Examples
-    --------
     >>> round(float(ross_li(0.5, 0.0, 0.3, 0.0, f_iso=0.2097, f_vol=0.0814, f_geo=0.0041)), 5)
     0.06792
     """
-    checked = checked_angles(theta_i, phi_i, theta_r, phi_r)
-    weights = _checked(f_iso, f_vol, f_geo)
-    if checked.scattered:
-        return finished(by_rows_of_vectors(_vector_rows, checked.vectors, weights), checked)
-    columns = (np.cos(checked.phi_r), np.sin(checked.phi_r))
-    scalars = (checked.x_i, checked.y_i, checked.cos_i, checked.sin_r, checked.cos_r, *weights)
-    return finished(by_rows(_angle_rows, columns, scalars), checked)
-
-
-@for_large_calls
-def ross_li_vectors(wi: ArrayLike, wr: ArrayLike, *, f_iso: ArrayLike, f_vol: ArrayLike, f_geo: ArrayLike) -> Floats:
-    """Return `ross_li` [1/sr] for unit vectors `wi` (light) and `wr` (viewer) of shape (..., 3)."""
-    return by_rows_of_vectors(_vector_rows, checked_vectors(wi, wr), _checked(f_iso, f_vol, f_geo))
-
-
-def _checked(f_iso: ArrayLike, f_vol: ArrayLike, f_geo: ArrayLike) -> tuple[Floats, ...]:
-    return F_ISO.check(f_iso), F_VOL.check(f_vol), F_GEO.check(f_geo)
-
-
-_EXCESS = (
-    "Lucht, Schaaf and Strahler 2000: kernels fitted to measured reflectances, not normalised, so f_iso is no albedo. "
-    "The weights of measured land reflect less than 1. The Ross kernel adds up to 1.47 f_vol to the albedo at 89.5 "
-    "degrees, and the Li kernel grows as 1 / cos(theta_i): with f_iso = 1, f_vol = 0 and f_geo = 0.5 the albedo is "
-    "1.88 at 85 degrees and 19.5 at 89.5"
-)
-
-SPEC = ModelSpec(
-    name="ross_li",
-    version=1,
-    title="Ross-Thick, Li-Sparse-Reciprocal (MODIS)",
-    equation="(f_iso + f_vol K_vol + f_geo K_geo) / pi",
-    reference="lucht2000",
-    parameters=(F_ISO, F_VOL, F_GEO),
-    evaluate=ross_li,
-    vectors=ross_li_vectors,
-    grazing_pole=True,
-    grazing_power=grows_with("f_geo", 1.0),
-    excess=_EXCESS,
-)
+    return _LOOPS.evaluated(directions, out, parameters)

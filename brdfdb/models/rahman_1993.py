@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from brdfdb._elementary import cosine, exp, log
 from brdfdb._numba import kernel, loop
-from brdfdb.geometry import checked_angles, checked_vectors, finished
-from brdfdb.models._rows import by_rows, by_rows_of_vectors
-from brdfdb.models.large_calls import for_large_calls
-from brdfdb.parameters import Floats, ModelSpec, Parameter
+from brdfdb.geometry import Directions
+from brdfdb.models._rows import Out, RowLoops
+from brdfdb.models.declaration import DeclaredModel
+from brdfdb.parameters import Floats, Parameter
 
 RHO_0 = Parameter("rho_0", "ρ_0", "1", 0.0, 1.0, "level of the reflectance", reflectance=True)
 K = Parameter("k", "k", "1", 0.0, 2.0, "1 is flat; below 1 f_r rises towards the horizon, above 1 it falls")
@@ -81,101 +81,36 @@ def _vector_rows(w_i: Floats, w_r: Floats, scalars: Rows, f_r: Floats) -> None:
             f[j] = value * (0.0 if z_i < 0.0 or z_r < 0.0 else 1.0)  # nan stays nan
 
 
-@for_large_calls
-def rpv(
-    theta_i: ArrayLike,
-    phi_i: ArrayLike,
-    theta_r: ArrayLike,
-    phi_r: ArrayLike,
-    *,
-    rho_0: ArrayLike,
-    k: ArrayLike,
-    asymmetry: ArrayLike,
-    rho_c: ArrayLike,
-) -> Floats:
+_LOOPS = RowLoops(_angle_rows, _vector_rows)
+
+
+@DeclaredModel(
+    title="Rahman-Pinty-Verstraete (RPV)",
+    equation="rho_0 M F H / pi",
+    references="rahman1993, widlowski2006 (rho_c)",
+    parameters=(RHO_0, K, ASYMMETRY, RHO_C),
+    degree=2,
+    grazing_pole=True,
+    grazing_power=lambda given: max(1.0 - given["k"], 0.0) if np.any(given["rho_0"]) else 0.0,
+    # With asymmetry 0 and rho_c 1 the albedo for k = 0 is 2 rho_0 ln(1 + 1 / cos) / cos: 1089 rho_0 at 89.5 degrees
+    excess="Rahman, Pinty and Verstraete 1993: a fit to measured reflectances, not normalised, so rho_0 is no albedo. "
+    "For k below 1 it has a pole at grazing: for rho_0 = 1, k = 0.8, asymmetry = 0 and rho_c = 1 the albedo is 1.01 at "
+    "normal incidence, 1.25 at 60 degrees and 3.21 at 89.5. The hot spot and the phase function change it further",
+)
+def rpv(directions: Directions, out: Out, *parameters: Floats) -> Floats:
     """Return the BRDF [1/sr] of the RPV model: a bowl or a bell, a phase function, and a hot spot.
 
-    Parameters
-    ----------
-    theta_i, phi_i, theta_r, phi_r : array_like [rad]
-        Directions of light (i) and viewer (r), pointing away from the surface; theta in [0, pi].
-    rho_0 : array_like [1]
-        Level of the reflectance, in [0, 1]. It is no albedo.
-    k : array_like [1]
-        Exponent, in [0, 2]. 1 is flat. Below 1, f_r rises towards the horizon, a bowl; above 1 it falls, a bell.
-    asymmetry : array_like [1]
-        Asymmetry of Henyey and Greenstein's function, in [-0.99, 0.99]; the paper's Theta. Below 0, more light goes
-        back towards its source.
-    rho_c : array_like [1]
-        Parameter of the hot spot, in [0, 1]. The paper has `rho_0` in its place, and so have fits with three
-        parameters; fits with four have a number of its own. 1 is no hot spot, 0 doubles f_r towards the light.
-
-    Returns
-    -------
-    array [1/sr]
-        In the broadcast shape of all arguments; 0 below the horizon, nan where an angle is nan.
-
-    Raises
-    ------
-    ParameterError
-        If an argument is outside its range.
-
-    Notes
-    -----
     f_r = rho_0 / pi M F H with Minnaert's M = (cos_i cos_r (cos_i + cos_r))^(k - 1), F = (1 - Theta^2) /
     (1 + Theta^2 + 2 Theta cos g)^1.5 for the angle g between light and viewer, and H = 1 + (1 - rho_c) / (1 + G), where
     G^2 = tan_i^2 + tan_r^2 - 2 tan_i tan_r cos(delta_phi). The paper and most programs give the reflectance factor,
-    which is pi f_r. For k below 1, f_r grows without bound at grazing. It stops at 1e38, and at 90 degrees it is the
-    value at the float64 nearest pi/2.
+    which is pi f_r. For k below 1, f_r rises towards the horizon, a bowl, without bound; for k above 1 it falls, a
+    bell. It stops at 1e38, and at 90 degrees it is the value at the float64 nearest pi/2.
 
-    References
-    ----------
-    rahman1993, widlowski2006 (rho_c)
+    rho_0 is no albedo. For an asymmetry below 0, more light goes back towards its source. The paper has rho_0 in the
+    place of rho_c, and so have fits with three parameters; fits with four have a number of its own. With rho_c = 1
+    there is no hot spot; 0 doubles f_r towards the light.
 
-    Examples
-    --------
     >>> round(float(rpv(0.5, 0.0, 0.5, 0.0, rho_0=0.06, k=0.7, asymmetry=-0.2, rho_c=0.06)), 5)
     0.06347
     """
-    checked = checked_angles(theta_i, phi_i, theta_r, phi_r)
-    parameters = _checked(rho_0, k, asymmetry, rho_c)
-    if checked.scattered:
-        return finished(by_rows_of_vectors(_vector_rows, checked.vectors, parameters), checked)
-    columns = (np.cos(checked.phi_r), np.sin(checked.phi_r))
-    scalars = (checked.x_i, checked.y_i, checked.cos_i, checked.sin_r, checked.cos_r, *parameters)
-    return finished(by_rows(_angle_rows, columns, scalars), checked)
-
-
-@for_large_calls
-def rpv_vectors(
-    wi: ArrayLike, wr: ArrayLike, *, rho_0: ArrayLike, k: ArrayLike, asymmetry: ArrayLike, rho_c: ArrayLike
-) -> Floats:
-    """Return `rpv` [1/sr] for unit vectors `wi` (light) and `wr` (viewer) of shape (..., 3)."""
-    return by_rows_of_vectors(_vector_rows, checked_vectors(wi, wr), _checked(rho_0, k, asymmetry, rho_c))
-
-
-def _checked(rho_0: ArrayLike, k: ArrayLike, asymmetry: ArrayLike, rho_c: ArrayLike) -> tuple[Floats, ...]:
-    return RHO_0.check(rho_0), K.check(k), ASYMMETRY.check(asymmetry), RHO_C.check(rho_c)
-
-
-# With asymmetry 0 and rho_c 1 the albedo for k = 0 is 2 rho_0 ln(1 + 1 / cos) / cos: 1089 rho_0 at 89.5 degrees
-_EXCESS = (
-    "Rahman, Pinty and Verstraete 1993: a fit to measured reflectances, not normalised, so rho_0 is no albedo. For k "
-    "below 1 it has a pole at grazing: for rho_0 = 1, k = 0.8, asymmetry = 0 and rho_c = 1 the albedo is 1.01 at "
-    "normal incidence, 1.25 at 60 degrees and 3.21 at 89.5. The hot spot and the phase function change it further"
-)
-
-SPEC = ModelSpec(
-    name="rpv",
-    version=1,
-    title="Rahman-Pinty-Verstraete (RPV)",
-    equation="rho_0 M F H / pi",
-    reference="rahman1993",
-    parameters=(RHO_0, K, ASYMMETRY, RHO_C),
-    evaluate=rpv,
-    vectors=rpv_vectors,
-    degree=2,
-    grazing_pole=True,
-    grazing_power=lambda arguments: max(1.0 - arguments["k"], 0.0) if np.any(arguments["rho_0"]) else 0.0,
-    excess=_EXCESS,
-)
+    return _LOOPS.evaluated(directions, out, parameters)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import importlib.metadata
 import importlib.util
+import inspect
 import math
 import os
 import re
@@ -17,7 +18,7 @@ from brdfdb.errors import BrdfdbError, ParameterError
 from brdfdb.parameters import ModelSpec, Parameter
 from brdfdb.place import path_of
 
-GROUP = "brdfdb.models"  # group of entry points, each of which gives a ModelSpec or an iterable of them
+GROUP = "brdfdb.models"  # group of entry points, each of which gives a model or an iterable of models
 VARIABLE = "BRDFDB_MODELS"  # environment variable with paths of Python files, separated as in PATH
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
@@ -40,25 +41,26 @@ class Registry(dict[str, ModelSpec]):
     def __missing__(self, name: str) -> ModelSpec:
         raise ParameterError("model", f"{name!r} is not one of {', '.join(self)}", name, tuple(self))
 
-    def add(self, specs: Iterable[ModelSpec], origin: str) -> None:
+    def add(self, models: Iterable[Any], origin: str) -> None:
         """Add models: all of them, or none if one cannot be added.
 
         Parameters
         ----------
-        specs : iterable of ModelSpec
-            The models to add.
+        models : iterable
+            Functions that are declared as models, or specifications.
         origin : str
             Package or file that defines them, for messages.
 
         Raises
         ------
         BrdfdbError
-            If one is no ModelSpec, one of its fields is no such thing as a ModelSpec has, or its name is taken.
+            If one is no model, one of its fields is no such thing as a ModelSpec has, or its name is taken.
         """
         new: dict[str, ModelSpec] = {}
-        for spec in specs:
-            if not isinstance(spec, ModelSpec):
-                raise BrdfdbError(f"{origin}: {spec!r:.80} is not a brdfdb.parameters.ModelSpec")
+        for model in models:
+            spec = _spec_of(model)
+            if spec is None:
+                raise BrdfdbError(f"{origin}: {model!r:.80} is not a declared model or a brdfdb.parameters.ModelSpec")
             _check(spec, origin)
             if spec.name in self or spec.name in new:
                 raise BrdfdbError(f"{origin}: the name {spec.name!r} is that of another model; choose another name")
@@ -77,7 +79,7 @@ class Registry(dict[str, ModelSpec]):
             origin = f"entry point {entry.name} = {entry.value}"
             try:
                 given: Any = entry.load()
-                specs = [given] if isinstance(given, ModelSpec) else list(given)
+                specs = [given] if _spec_of(given) else list(given)
             except Exception as error:
                 raise BrdfdbError(f"{origin}: {_message(error)}") from error
             self.add(specs, origin)
@@ -88,8 +90,8 @@ class Registry(dict[str, ModelSpec]):
         Parameters
         ----------
         paths : iterable of path
-            Each file is run once. Every `ModelSpec` among its global names is added, except the ones of this registry
-            that it imports.
+            Each file is run once. Every declared model and every `ModelSpec` among its global names is added, except
+            the ones of this registry that it imports.
 
         Raises
         ------
@@ -127,14 +129,20 @@ class Registry(dict[str, ModelSpec]):
             except (Exception, SystemExit) as error:
                 raise BrdfdbError(f"{file}: {_message(error)}") from error
             ours = {id(spec) for spec in self.values()}
-            specs = {id(spec): spec for spec in vars(module).values() if isinstance(spec, ModelSpec)}
+            specs = {id(spec): spec for spec in map(_spec_of, vars(module).values()) if spec is not None}
             new = [spec for key, spec in specs.items() if key not in ours]
             if not new:
-                raise BrdfdbError(f"{file}: it defines no brdfdb.parameters.ModelSpec")
+                raise BrdfdbError(f"{file}: it declares no model, and no brdfdb.parameters.ModelSpec")
             self.add(new, str(file))
         except BrdfdbError:
             del sys.modules[name]
             raise
+
+
+def _spec_of(model: Any) -> ModelSpec | None:
+    """Return the specification of a declared model, or the specification itself; None of anything else."""
+    spec = getattr(model, "spec", None) if inspect.isfunction(model) else model
+    return spec if isinstance(spec, ModelSpec) else None
 
 
 def _check(spec: ModelSpec, origin: str) -> None:

@@ -11,11 +11,10 @@ from brdfdb._elementary import arcsin, exp
 from brdfdb._numba import elementwise, kernel
 from brdfdb.errors import ParameterError
 from brdfdb.fresnel import unpolarised
-from brdfdb.geometry import Directions, checked_angles, checked_vectors, finished
+from brdfdb.geometry import Directions
 from brdfdb.lobes import Lobe
-from brdfdb.models.he_torrance_1991 import K, N
-from brdfdb.models.large_calls import for_large_calls
-from brdfdb.parameters import Floats, ModelSpec, Parameter
+from brdfdb.models.declaration import DeclaredModel
+from brdfdb.parameters import Floats, K, N, Parameter
 
 SIGMA = Parameter("sigma", "σ", "rad", 0.0, np.pi / 2, "standard deviation of the facets' slope angle")
 
@@ -56,105 +55,52 @@ def _half_angle_cosine(cos_i: float, sin_i: float, cos_r: float, sin_r: float, o
 _evaluate, _cosine = elementwise(_lobe), elementwise(_half_angle_cosine)
 
 
-@for_large_calls
-def torrance_sparrow(
-    theta_i: ArrayLike,
-    phi_i: ArrayLike,
-    theta_r: ArrayLike,
-    phi_r: ArrayLike,
-    *,
-    sigma: ArrayLike,
-    n: ArrayLike | None = None,
-    k: ArrayLike | None = None,
-) -> Floats:
-    """Return the BRDF [1/sr] of mirror-like facets with Gaussian slopes, a lobe of height 1 that is not normalised.
-
-    Parameters
-    ----------
-    theta_i, phi_i, theta_r, phi_r : array_like [rad]
-        Directions of light (i) and viewer (r), pointing away from the surface; theta in [0, pi].
-    sigma : array_like [rad]
-        Standard deviation of the slope angle, in [0, pi/2].
-    n, k : array_like [1], optional
-        Refractive index n + ik of the facets, n in [1e-3, 100] and k in [0, 1e4]. Without n the Fresnel coefficient is
-        1, as in section 5 of the paper. With n and without k the facets are dielectric, k = 0.
-
-    Returns
-    -------
-    array [1/sr]
-        In the broadcast shape of all arguments; 0 below the horizon, nan where an angle is nan.
-
-    Raises
-    ------
-    ParameterError
-        If an argument is outside its range, or k is given without n.
-
-    Notes
-    -----
-    Eq. (31) of Oren and Nayar 1994 with E_0 = 1, divided by cos(theta_i); theta_a is the slope of the half vector. The
-    paper fits the factor k_s in front of it. The lobe by itself is not normalised: with F = 1 its albedo exceeds 1 for
-    sigma above about 12 degrees. In the mirror direction f_r grows as 1 / cos^2 towards grazing. At 90 degrees it is
-    the finite value at the float64 nearest pi/2.
-
-    Departures from the paper: GAF = Min[1, Min[A, B]], not Max, as eq. 33 of the paper requires. The paper prints no
-    E_0, so the unit of the lobe depends on its weight (see `oren_nayar_body_surface`).
-
-    References
-    ----------
-    torrancesparrow1967, orennayar1994
-
-    Examples
-    --------
-    >>> round(float(torrance_sparrow(0.3, 0.0, 0.4, np.pi, sigma=0.3)), 4)
-    1.1222
-    >>> round(float(torrance_sparrow(0.3, 0.0, 0.4, np.pi, sigma=0.3, n=1.5)), 4)
-    0.0452
-    """
-    return _f_r(checked_angles(theta_i, phi_i, theta_r, phi_r), sigma, n, k)
-
-
-@for_large_calls
-def torrance_sparrow_vectors(
-    wi: ArrayLike, wr: ArrayLike, *, sigma: ArrayLike, n: ArrayLike | None = None, k: ArrayLike | None = None
-) -> Floats:
-    """Return `torrance_sparrow` [1/sr] for unit vectors `wi` (light) and `wr` (viewer) of shape (..., 3)."""
-    return _f_r(checked_vectors(wi, wr), sigma, n, k)
-
-
-def _f_r(directions: Directions, sigma: ArrayLike, n: ArrayLike | None, k: ArrayLike | None) -> Floats:
-    pair = directions.cos_i, directions.sin_i, directions.cos_r, directions.sin_r, directions.one_plus_cos_dphi
-    lobe = _evaluate(*pair, SIGMA.check(sigma))
-    if n is not None:
-        lobe = lobe * unpolarised(_cosine(*pair), N.check(n), K.check(0.0 if k is None else k))
-    elif k is not None:
-        raise ParameterError("k", f"{k!r} is given without n, the refractive index is n + ik")
-    return finished(lobe, directions)
-
-
 def lobe(cos_i: Floats, *, sigma: ArrayLike, **_: ArrayLike) -> Lobe:
     """Return the lobe of this model. Its width follows from sigma, and a fifth of the light lies in wider tails."""
     alpha = np.maximum(np.sqrt(2.0) * np.asarray(sigma, dtype=np.float64), 1e-6)
     return Lobe(np.full(np.broadcast_shapes(np.shape(cos_i), alpha.shape), 0.8), alpha, alpha)
 
 
-# The albedo was measured with F = 1 over sigma and theta_i. It reaches 20.14 at a sigma of 90 degrees and a theta_i of
-# 89.99. It exceeds 1 from a sigma of 12 degrees on, near normal incidence too
-_EXCESS = (
-    "Oren and Nayar 1994, eq. 31: the lobe has the height 1 at any sigma and is not normalised; the factor "
-    "k_s of eq. 32 is fitted"
-)
-
-SPEC = ModelSpec(
-    name="torrance_sparrow",
-    version=1,
+@DeclaredModel(
     title="Torrance-Sparrow",
     equation="Oren and Nayar 1994, eq. 31",
-    reference="torrancesparrow1967",
+    references="torrancesparrow1967, orennayar1994",
     parameters=(SIGMA,),
-    evaluate=torrance_sparrow,
-    vectors=torrance_sparrow_vectors,
+    optional=(N, K),
     grazing_pole=True,
     grazing_power=0.0,
     lobe=lobe,
-    excess=_EXCESS,
+    # The albedo was measured with F = 1 over sigma and theta_i. It reaches 20.14 at a sigma of 90 degrees and a theta_i
+    # of 89.99. It exceeds 1 from a sigma of 12 degrees on, near normal incidence too
+    excess="Oren and Nayar 1994, eq. 31: the lobe has the height 1 at any sigma and is not normalised; the factor "
+    "k_s of eq. 32 is fitted",
 )
+def torrance_sparrow(directions: Directions, sigma: Floats, n: Floats | None, k: Floats | None) -> Floats:
+    """Return the BRDF [1/sr] of mirror-like facets with Gaussian slopes, a lobe of height 1 that is not normalised.
+
+    Without n the Fresnel coefficient is 1, as in section 5 of the paper. With n and without k the facets are
+    dielectric, k = 0. Eq. (31) of Oren and Nayar 1994 with E_0 = 1, divided by cos(theta_i); theta_a is the slope of
+    the half vector. The paper fits the factor k_s in front of it. The lobe by itself is not normalised: with F = 1 its
+    albedo exceeds 1 for sigma above about 12 degrees. In the mirror direction f_r grows as 1 / cos^2 towards grazing.
+    At 90 degrees it is the finite value at the float64 nearest pi/2.
+
+    Departures from the paper: GAF = Min[1, Min[A, B]], not Max, as eq. 33 of the paper requires. The paper prints no
+    E_0, so the unit of the lobe depends on its weight (see `oren_nayar_body_surface`).
+
+    >>> round(float(torrance_sparrow(0.3, 0.0, 0.4, np.pi, sigma=0.3)), 4)
+    1.1222
+    >>> round(float(torrance_sparrow(0.3, 0.0, 0.4, np.pi, sigma=0.3, n=1.5)), 4)
+    0.0452
+    """
+    return facets(directions, sigma, n, k)
+
+
+def facets(directions: Directions, sigma: Floats, n: Floats | None, k: Floats | None) -> Floats:
+    """Return f_r [1/sr] of `torrance_sparrow` at checked directions, with any value below the horizon."""
+    pair = directions.cos_i, directions.sin_i, directions.cos_r, directions.sin_r, directions.one_plus_cos_dphi
+    f_r: Floats = _evaluate(*pair, sigma)
+    if n is not None:
+        f_r = f_r * unpolarised(_cosine(*pair), n, np.zeros(()) if k is None else k)
+    elif k is not None:
+        raise ParameterError("k", f"{k} is given without n, the refractive index is n + ik")
+    return f_r

@@ -3,7 +3,7 @@
 Each paper has one module, with the name of its module in `brdfdb.models` and no code in common with it. All functions
 are scalar. They take int, float, str or mpf (a str is read as the exact decimal) and return an mpf of 40 digits, or a
 tuple or matrix of them; ``float()`` makes it a float64. `oren_nayar_1994.gaussian` and
-`he_torrance_1991_aperture.aperture_diffuse`, integrals over two and four angles, are float64 throughout.
+`he_torrance_1991.aperture_diffuse`, integrals over two and four angles, are float64 throughout.
 
 Angles are radians. ``delta_phi = phi_r - phi_i`` is 0 back towards the light and pi in the mirror half plane. Values
 are f_r in 1/sr without a cosine. Directions must be above the horizon, theta in [0, pi/2]: nothing is clipped or

@@ -5,39 +5,47 @@ from __future__ import annotations
 import functools
 import itertools
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import NamedTuple
+from datetime import datetime
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 from scipy import stats
 
 from brdfdb.errors import ParameterError
+from brdfdb.figure import DocumentPart
+from brdfdb.forms.catalogue import Forms, Kind, LeftOut
 from brdfdb.forms.timing import ALIKE, clearly_cheaper
 from brdfdb.geometry import radians
 from brdfdb.parameters import Floats
-from brdfdb.scenes.gbuffer import Points, View
+from brdfdb.scenes.gbuffer import CameraView, VisiblePoints
 from brdfdb.scenes.image import difference
 from brdfdb.scenes.offered_forms import OfferedForm
 from brdfdb.scenes.renderer import Reflector, composed, radiance
 from brdfdb.scenes.scene import Scene, Tolerance
 from brdfdb.scenes.shapes import Array
 
-# Largest angle from the normal at which errors count. Nearer to the horizon models have poles, and a sphere shows only
+# Largest angle from the normal at which errors count. Closer to the horizon models have poles, and a sphere shows only
 # 3e-8 of its area there
 GRAZING_DEG = 89.99
-# Confidence of a statement from samples, over all rounds of checks. A round has fresh places, to which its choices were
+# Confidence of statements on samples, over all rounds of checks. Each round has new places, to which its choices were
 # not fitted. Round j takes 1 / (j (j + 1)) of the probability of error
 CONFIDENCE = 0.95
 DARK = 1e-3  # exposed radiance below which errors are relative to this value
 FINEST = {"relative": 1e-6, "CIEDE2000": 1e-4}  # least tolerances, because integrals over facets are known to 1e-6
+
+THIRD = 1.0 / 3.0  # largest expected cost of a choice, as a share of the truth's cost
+
+Weigh = Literal["time", "bytes", "both"]
 
 
 class InfeasibleError(ParameterError):
     """A tolerance smaller than the error of the truth."""
 
 
-class Left(NamedTuple):
-    """The error over the places of a material: at the percentile of the tolerance, and the largest."""
+class PictureError(NamedTuple):
+    """The error at the places that show a material: at the percentile of the tolerance, and the largest."""
 
     counted: float
     most: float
@@ -50,7 +58,7 @@ class Pick(NamedTuple):
     cheaper: int | None
 
 
-class Sample(NamedTuple):
+class PlaceSample(NamedTuple):
     """A sample of the places of a material: their number, and the errors of the choices there.
 
     `share` is the upper bound, at `CONFIDENCE`, of the share of all such places that exceed the tolerance.
@@ -62,55 +70,27 @@ class Sample(NamedTuple):
 
 
 class Decision(NamedTuple):
-    """The choice for a material, with its error by itself and together with all other choices.
-
-    Attributes
-    ----------
-    pick : Pick
-        The chosen form.
-    left : Left
-        Error of the choice by itself, at the places where forms are compared.
-    cheaper_left : Left or None
-        Error of the next cheaper form, which exceeds the tolerance.
-    refused : bool
-        True if the next cheaper form exceeds the tolerance only at the places where choices are checked.
-    whole : Left
-        Error together with all other choices, at every pixel of the picture and at fresh places.
-    even, edges : Sample or None
-        Fresh places, evenly spread over the picture and at edges. None for a recorded scene.
-    """
+    """The choice for a material, with its error by itself and together with all other choices."""
 
     pick: Pick
-    left: Left
-    cheaper_left: Left | None
-    refused: bool
-    whole: Left
-    even: Sample | None = None
-    edges: Sample | None = None
+    error: PictureError  # of the choice by itself, at the places where forms are compared
+    cheaper_error: PictureError | None  # of the next cheaper form, which exceeds the tolerance
+    refused: bool  # True if the next cheaper form exceeds the tolerance only at the places where choices are checked
+    joint_error: PictureError  # together with all other choices, at every pixel of the picture and at fresh places
+    even: PlaceSample | None = None  # fresh places, evenly spread over the picture; None for a recorded scene
+    edges: PlaceSample | None = None  # fresh places at edges; None for a recorded scene
 
 
 class Seen:
     """A scene at the points of one view: its true picture, and pictures with forms for some materials.
 
-    Parameters
-    ----------
-    scene : Scene
-        The scene.
-    view : View
-        The points of the view.
-    truths : mapping
-        By the name of each material, the form with which the others are compared.
-    materials : mapping
-        The result of `brdfdb.scenes.renderer.reflectors`: mirror and albedo, which are the same for all forms.
-
-    Attributes
-    ----------
-    truth : array (height, width, L)
-        The true picture.
+    `truths` has the form of each material with which the others are compared, by name. `materials`, the result of
+    `brdfdb.scenes.renderer.reflectors`, has mirror and albedo, which are the same for all forms. `truth` (height,
+    width, L) is the true picture.
     """
 
     def __init__(
-        self, scene: Scene, view: View, truths: Mapping[str, OfferedForm], materials: Mapping[str, Reflector]
+        self, scene: Scene, view: CameraView, truths: Mapping[str, OfferedForm], materials: Mapping[str, Reflector]
     ) -> None:
         self.scene, self.view = scene, view
         self._materials = materials
@@ -135,7 +115,7 @@ class Seen:
         shown = [self._at(points) for points in self.view.points if points.material == material]
         return np.setdiff1d(np.concatenate(shown), self._grazing) if shown else np.empty(0, dtype=np.int64)
 
-    def _at(self, points: Points) -> NDArray[np.int64]:
+    def _at(self, points: VisiblePoints) -> NDArray[np.int64]:
         """Return the pixel of each point of a list."""
         return points.at if points.via is None else self.view.points[points.via].at[points.at]
 
@@ -168,23 +148,11 @@ def _differences(scene: Scene, truth: Array, picture: Array) -> Array:
 def pick(costs: Floats, error: Callable[[int], float], tolerance: float) -> Pick:
     """Pick the cheapest form within a tolerance. Of forms with about the same cost, pick the most accurate one.
 
-    Parameters
-    ----------
-    costs : array of shape (rounds, forms)
-        Cost of each form in each round of timing, in one unit. Costs without scatter have one round.
-    error : callable
-        ``error(index)`` gives the error of a form, which is 0 for the truth. It is called in the order of median costs,
-        and not for forms that are clearly costlier than necessary.
-    tolerance : float
-        Largest error.
-
-    Returns
-    -------
-    Pick
-        Two costs are about the same if neither is clearly cheaper (`brdfdb.forms.timing.clearly_cheaper`), as in a
-        chart. Two errors are about the same if their ratio is less than `brdfdb.forms.timing.ALIKE`. Of forms alike in
-        both, the first one given is picked. The next cheaper form is the most accurate of the forms that are clearly
-        cheaper than the choice, all of which exceed the tolerance.
+    `costs` (rounds, forms) are those of each round of timing. `error(index)` gives the error of a form, 0 for the
+    truth. It is called in the order of median costs, and not for forms that are clearly costlier than necessary. Two
+    costs are about the same if neither is clearly cheaper (`brdfdb.forms.timing.clearly_cheaper`), two errors if their
+    ratio is below `brdfdb.forms.timing.ALIKE`. Of forms alike in both, the first one is picked. The next cheaper form
+    is the most accurate of those that are clearly cheaper than the choice, all of which exceed the tolerance.
     """
     errors: dict[int, float] = {}
     least: int | None = None
@@ -194,9 +162,9 @@ def pick(costs: Floats, error: Callable[[int], float], tolerance: float) -> Pick
         errors[index] = error(index)
         if errors[index] <= tolerance and least is None:
             least = index
-    kept = {index: errors[index] for index in sorted(errors) if errors[index] <= tolerance}
-    chosen = next(index for index in kept if kept[index] <= ALIKE * min(kept.values()))
-    cheaper = [index for index in sorted(errors) if index not in kept and clearly_cheaper(costs, index, chosen)]
+    precise = {index: errors[index] for index in sorted(errors) if errors[index] <= tolerance}
+    chosen = next(index for index in precise if precise[index] <= ALIKE * min(precise.values()))
+    cheaper = [index for index in sorted(errors) if index not in precise and clearly_cheaper(costs, index, chosen)]
     return Pick(chosen, min(cheaper, key=lambda index: errors[index], default=None))
 
 
@@ -224,19 +192,19 @@ class Look(NamedTuple):
         }
 
 
-def _left(errors: Sequence[Array], percentile: float) -> Left:
+def _error(errors: Sequence[Array], percentile: float) -> PictureError:
     """Return the error at even places and at edges. Edges count if the tolerance is for all places."""
     most = max(float(values.max(initial=0.0)) for values in errors)
     if percentile == 100.0 or not errors[0].size:
-        return Left(most, most)
-    return Left(float(np.percentile(errors[0], percentile)), most)
+        return PictureError(most, most)
+    return PictureError(float(np.percentile(errors[0], percentile)), most)
 
 
-def _sample(errors: Array, tolerance: float, confidence: float) -> Sample:
+def _sample(errors: Array, tolerance: float, confidence: float) -> PlaceSample:
     """Return a sample with the upper bound of Clopper and Pearson. The bound of an empty sample is 1."""
     beyond, places = int(np.count_nonzero(errors > tolerance)), errors.size
     share = 1.0 if beyond == places else float(stats.beta.ppf(confidence, beyond + 1, places - beyond))
-    return Sample(places, float(errors.max(initial=0.0)), share)
+    return PlaceSample(places, float(errors.max(initial=0.0)), share)
 
 
 def choose(
@@ -275,15 +243,15 @@ def choose(
     """
     check_feasible(planned.even.scene.tolerance)
     tolerance, percentile = planned.even.scene.tolerance.value, planned.even.scene.tolerance.percentile
-    refused: dict[tuple[str, int], Left] = {}
+    refused: dict[tuple[str, int], PictureError] = {}
 
-    def left(look: Look, name: str, index: int) -> Left:
-        return _left(look.errors([name], {name: offered[name][index]})[name], percentile)
+    def alone(look: Look, name: str, index: int) -> PictureError:
+        return _error(look.errors([name], {name: offered[name][index]})[name], percentile)
 
-    alone = functools.cache(functools.partial(left, planned))
+    planned_error = functools.cache(functools.partial(alone, planned))
 
-    def known(name: str, index: int) -> Left:
-        return refused[name, index] if (name, index) in refused else alone(name, index)
+    def known(name: str, index: int) -> PictureError:
+        return refused[name, index] if (name, index) in refused else planned_error(name, index)
 
     def picked(name: str) -> Pick:
         return pick(costs[name], lambda index: known(name, index).counted, tolerance)
@@ -297,31 +265,218 @@ def choose(
         checked = check(number)
         looks = [planned] if checked is None else [planned, checked]
         errors = [look.errors(forms, forms) for look in looks]
-        whole = {
-            name: Left(*np.max([_left(of_look[name], percentile) for of_look in errors], axis=0)) for name in forms
-        }
+        joint = {name: PictureError(*np.max([_error(by[name], percentile) for by in errors], axis=0)) for name in forms}
         tick()
-        if max(whole.values()).counted <= tolerance:
+        if max(joint.values()).counted <= tolerance:
             break
-        own = {name: max(left(look, name, one.chosen) for look in looks) for name, one in picks.items() if one.chosen}
-        for name, broken in _broken(own, max(whole.values()), tolerance).items():
-            refused[name, picks[name].chosen] = broken
+        own = {name: max(alone(look, name, one.chosen) for look in looks) for name, one in picks.items() if one.chosen}
+        # Choices that exceed the tolerance by themselves are refused, else the choice with the largest error
+        broken = {name: error for name, error in own.items() if error.counted > tolerance}
+        for name, error in (broken or {max(own, key=lambda name: own[name]): max(joint.values())}).items():
+            refused[name, picks[name].chosen] = error
             picks[name] = picked(name)
     confidence = 1.0 - (1.0 - CONFIDENCE) / (number * (number + 1))
     return {
         name: Decision(
             one,
-            alone(name, one.chosen),
+            planned_error(name, one.chosen),
             None if one.cheaper is None else known(name, one.cheaper),
             (name, one.cheaper) in refused,
-            whole[name],
+            joint[name],
             *(_sample(values, tolerance, confidence) for fresh in errors[1:] for values in fresh[name]),
         )
         for name, one in picks.items()
     }
 
 
-def _broken(own: Mapping[str, Left], whole: Left, tolerance: float) -> dict[str, Left]:
-    """Return the errors of choices that exceed the tolerance by themselves, else of the one with the largest error."""
-    broke = {name: left for name, left in own.items() if left.counted > tolerance}
-    return broke or {max(own, key=lambda name: own[name]): whole}
+class Price(NamedTuple):
+    """The price of a form: time [ns] of a pair of directions, and the weighed cost in each round of timing."""
+
+    ns: float
+    costs: Floats
+
+    @property
+    def cost(self) -> float:
+        """The median cost."""
+        return float(np.median(self.costs))
+
+
+class Residue(DocumentPart):
+    """Error over the places that show a material, in the unit of the tolerance."""
+
+    counted: float = Field(description="error at the percentile of the tolerance, which must keep to it")
+    most: float = Field(description="largest")
+
+
+class Sampled(DocumentPart):
+    """A sample of the places that show a material. They were not used to choose."""
+
+    places: int = Field(description="number of places")
+    most: float = Field(description="largest error at these places")
+    one_in: int = Field(
+        description="fewer than 1 in so many of all such places exceeds the tolerance, with the stated confidence"
+    )
+
+
+class Option(DocumentPart):
+    """A form of a material, with all others of the scene at their truth."""
+
+    key: str
+    title: str
+    kind: Kind
+    python: str = Field(description="name in Python")
+    dtype: Literal["float64", "float32"]
+    wavelengths_nm: list[float] | None = Field(description="wavelengths of its evaluation; null for a grey form")
+    bytes: int = Field(description="size of the numbers that an evaluation reads")
+    ns: float = Field(description="time of a pair of directions at all wavelengths of the scene, on one thread")
+    share: float = Field(description="weighed cost as a share of the truth's cost")
+    error: Residue
+
+
+class MaterialChoice(DocumentPart):
+    """The choice for a material, and its reason."""
+
+    material: str
+    title: str
+    pixels: int = Field(description="number of pixels that show it, directly or in a mirror")
+    truth: Option
+    choice: Option
+    next_cheaper: Option | None = Field(description="the most accurate of the cheaper forms; null if there are none")
+    refused: bool = Field(
+        description="true if the next cheaper form exceeds the tolerance only where choices are checked"
+    )
+    whole: Residue = Field(description="error of all choices at once: at all pixels of the picture, and all samples")
+    even: Sampled | None = Field(description="places anywhere in the picture, equally likely; null if recorded")
+    edges: Sampled | None = Field(
+        description="places beside limbs, terminators and edges of shadows: each power of ten of the distance, from a "
+        "pixel's width down to a hundred millionth of it, is equally likely; null if recorded"
+    )
+    reason: str
+    revision: str | None = Field(description="revision of the table, if a store was named and a table chosen")
+    left_out: list[LeftOut] = Field(default=[], description="forms that cannot be made, such as a table too large")
+
+
+class SceneChoice(DocumentPart):
+    """The cheapest form of each material within the tolerance of the picture of a scene."""
+
+    brdfdb: str
+    when: datetime
+    machine: str
+    scene: str
+    tolerance: Tolerance
+    weigh: Weigh
+    picture: tuple[int, int] = Field(
+        description="pixels across and down; the choices keep to the tolerance at each of them, seen through its middle"
+    )
+    confidence: float = Field(description="confidence of statements on samples, for each material and kind of sample")
+    grazing_deg: float = Field(description="angle from the normal up to which errors count; nothing is stated beyond")
+    statement: str = Field(description="proven and sampled results in a few sentences")
+    materials: list[MaterialChoice]
+
+
+def within(tolerance: Tolerance) -> str:
+    """Return a tolerance of a picture in words."""
+    share = tolerance.percentile
+    where = "" if share == 100.0 else f" at {share:g} % of the places of each material"
+    return f"within {tolerance.value:g} ({tolerance.unit}){where}"
+
+
+def statement(tolerance: Tolerance, picture: tuple[int, int], materials: Sequence[MaterialChoice]) -> str:
+    """Return the proven results for the choices and the results of samples, with their confidence, in words."""
+    value = f"{tolerance.value:g}"
+    size, share = f"{picture[0]} x {picture[1]}", tolerance.percentile
+    proven = f"Proven: each of the {size} pixels, seen through its middle, is within {value}."
+    if share != 100.0:
+        proven = (
+            f"Proven: {share:g} % of each material's pixels, of {size} seen through their middles, are within {value}."
+        )
+    even = [one.even for one in materials if one.even is not None]
+    edges = [one.edges for one in materials if one.edges is not None]
+    if not even:
+        return f"{proven} The file holds no other places."
+    places, most = sum(one.places for one in (*even, *edges)), max(one.most for one in (*even, *edges))
+    return (
+        f"{proven} Sampled: all other places of the picture, for other widths and offsets of its pixels, at {places} "
+        f"places that were not used to choose; the largest error at them is {most:.2g}. With {100 * CONFIDENCE:g} % "
+        f"confidence for each material, fewer than 1 in {min(one.one_in for one in even)} of its places is beyond "
+        f"{value}, and fewer than 1 in {min(one.one_in for one in edges)} of those beside its edges. "
+        f"What is seen within {90.0 - GRAZING_DEG:.2g} degrees of grazing is left out."
+    )
+
+
+def describe(
+    scene: Scene,
+    chosen: Mapping[str, Decision],
+    offered: Mapping[str, Forms[OfferedForm]],
+    prices: Mapping[str, Sequence[Price]],
+    pixels: Mapping[str, int],
+    revisions: Mapping[str, str],
+) -> list[MaterialChoice]:
+    """Return the choice for each material of a scene, with costs to three digits and reasons."""
+
+    def option(name: str, index: int, error: PictureError) -> Option:
+        one, price = offered[name][index], prices[name][index]
+        form, at = one.form, one.wavelength_nm
+        return Option(
+            key=form.key,
+            title=form.title,
+            kind=form.kind,
+            python=form.python,
+            dtype="float32" if form.dtype is np.float32 else "float64",
+            wavelengths_nm=None if at is None else at.tolist(),
+            bytes=form.bytes,
+            ns=_short(price.ns),
+            share=_short(price.cost / prices[name][0].cost),
+            error=Residue(**error._asdict()),
+        )
+
+    materials = []
+    for name, decision in chosen.items():
+        truth = option(name, 0, PictureError(0.0, 0.0))
+        choice = option(name, decision.pick.chosen, decision.error)
+        cheaper = None
+        if decision.pick.cheaper is not None and decision.cheaper_error is not None:
+            cheaper = option(name, decision.pick.cheaper, decision.cheaper_error)
+        materials.append(
+            MaterialChoice(
+                material=name,
+                title=scene.materials[name].title,
+                pixels=pixels[name],
+                truth=truth,
+                choice=choice,
+                next_cheaper=cheaper,
+                refused=decision.refused,
+                whole=Residue(**decision.joint_error._asdict()),
+                even=_sampled(decision.even),
+                edges=_sampled(decision.edges),
+                reason=_reason(choice, cheaper, decision, scene.tolerance.value),
+                revision=revisions.get(name),
+                left_out=offered[name].left_out,
+            )
+        )
+    return materials
+
+
+def _reason(choice: Option, cheaper: Option | None, decision: Decision, tolerance: float) -> str:
+    """Return the reason for a choice, with a remark if it costs more than a third of the truth."""
+    clause = "is the truth itself" if decision.pick.chosen == 0 else f"leaves {choice.error.counted:.2g}"
+    if decision.pick.chosen != 0 and choice.share > THIRD:
+        clause += f" at {choice.share:.2g} of the truth's cost, more than a third"
+    if cheaper is None:
+        return f"{clause}, and nothing is cheaper"
+    where = " at fresh places" if decision.refused else ""
+    # At least two digits, and enough to show that the error is above the tolerance
+    error = cheaper.error.counted
+    text = next(text for digits in range(2, 18) if float(text := f"{error:.{digits}g}") > tolerance)
+    return f"{clause}; the best of what is cheaper, {cheaper.title}, would leave {text}{where}"
+
+
+def _sampled(sample: PlaceSample | None) -> Sampled | None:
+    """Return the record of a sample, with bounds rounded so that they remain true."""
+    if sample is None:
+        return None
+    return Sampled(places=sample.places, most=sample.most, one_in=int(1.0 / sample.share))
+
+
+def _short(value: float) -> float:
+    return float(f"{value:.3g}")

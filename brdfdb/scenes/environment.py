@@ -18,11 +18,12 @@ from brdfdb.lobes import Lobe
 from brdfdb.materials import Source
 from brdfdb.place import path_of
 from brdfdb.scenes.shapes import STRICT, Array
-from brdfdb.tables.table_source import TableSource
+from brdfdb.tables.table import TableSource
 
-# Least and largest share of directions that follow a lobe. With fewer, a few directions would carry all of a faint
-# gloss. The largest share bounds f_r cos / pdf in the tails, also for other forms at the same directions
-_LEAST, _MOST = 0.25, 0.9
+# Least share of directions that follow a lobe: with fewer, a few directions would carry all of a faint gloss
+_LEAST = 0.25
+# Largest share of them, which bounds f_r cos / pdf in the tails, also for other forms at the same directions
+_MOST = 0.9
 _TURN = (np.sqrt(5.0) - 1.0) / 2.0  # the golden section
 _LUMINANCE = {"R": 0.2126, "G": 0.7152, "B": 0.0722}  # luminance of the primaries of linear sRGB
 
@@ -104,31 +105,15 @@ class Environment(BaseModel):
 
         return np.asarray((1.0 - down) * along(upper) + down * along(lower))
 
-    def drawn(self, source: Source, wavelength_nm: Array, wr: Array, stream: tuple[int, ...]) -> Drawn:
-        """Draw directions for points of a source, from its table or from its lobe, and from the hemisphere.
+    def drawn(self, source: Source, wavelength_nm: Array, wr: Array, stream: tuple[int, ...]) -> DrawnDirections:
+        """Draw `samples` directions for each point of a source, the same in every call.
 
-        Parameters
-        ----------
-        source : Source
-            The source of f_r at the points.
-        wavelength_nm : array (L,) [nm]
-            Wavelengths of the scene. The lobe is that of the wavelength where it is widest.
-        wr : array (N, 3)
-            Unit vectors towards the viewer in the frame of the surface.
-        stream : tuple of int
-            Numbers that identify the points. The turns of other points are independent.
-
-        Returns
-        -------
-        Drawn
-            `samples` directions for each point, the same in every call.
-
-        Notes
-        -----
-        Directions of a table follow its own sampler, as in `Table.sample`, unless its f_r hardly varies. The sampler
-        finds peaks that no lobe states. For others, the lobe around the mirror direction of the viewer equals that of
-        the light by reciprocity. Half vectors follow eq. (7) of Ward 1992 (``ward1992``), with its misprint corrected
-        and weights in place of "uniformly weighted" samples.
+        `wr` (N, 3) are unit vectors towards the viewer in the frame of the surface, `stream` numbers that identify the
+        points: the turns of other points are independent. Directions of a table follow its own sampler, as in
+        `Table.sample`, unless its f_r hardly varies. The sampler finds peaks that no lobe states. For other sources,
+        the lobe around the mirror direction of the viewer equals that of the light by reciprocity, at the wavelength
+        where it is widest. Half vectors follow eq. (7) of Ward 1992 (``ward1992``), with its misprint corrected and
+        weights in place of "uniformly weighted" samples.
         """
         turns = np.random.default_rng([self.seed, *stream]).random((2, 1, len(wr)))
         number = np.arange(self.samples)[:, np.newaxis]
@@ -143,10 +128,10 @@ class Environment(BaseModel):
             wi = directions(lobe, u1, u2, wr)
             density = mixture_density(lobe, wr, wi)
         solid_angle = np.divide(1.0, self.samples * density, where=wi[..., 2] > 0.0, out=np.zeros(density.shape))
-        return Drawn(wi, solid_angle)
+        return DrawnDirections(wi, solid_angle)
 
 
-class Drawn(NamedTuple):
+class DrawnDirections(NamedTuple):
     """Unit vectors (samples, N, 3) in the frame of the surface, and their solid angles (samples, N) [sr].
 
     The sum over samples of f_r times radiance times cosine times solid angle is an unbiased estimate of the reflected
@@ -160,13 +145,8 @@ class Drawn(NamedTuple):
 def widest_lobe(lobe: Lobe | None, count: int) -> Lobe:
     """Return a lobe of shape (count,), no narrower than that of any wavelength.
 
-    Parameters
-    ----------
-    lobe : Lobe or None
-        The lobe of a source around the mirror directions of viewers, (count, 1) or (count, wavelengths). None for a
-        diffuse source.
-    count : int
-        Number of viewers.
+    `lobe` is that of a source around the mirror directions of viewers, (count, 1) or (count, wavelengths); None for a
+    diffuse source.
     """
     share, alpha_x, alpha_y = (
         np.broadcast_to(value, np.broadcast_shapes(np.shape(value), (count, 1))) for value in (lobe or DIFFUSE)[:3]
@@ -191,7 +171,7 @@ def _checked(name: str, picture: Array) -> Array:
 
 @functools.lru_cache(maxsize=4)
 def _read(path: Path, _written: int) -> Array:
-    """Return the picture of a file. It is kept in memory until the file changes, because all lists of points use it."""
+    """Return the picture of a file. It stays in memory until the file changes, because all lists of points use it."""
     picture = _from_exr(path) if path.suffix == ".exr" else _from_numpy(path)
     if picture.ndim != 2 or picture.dtype.kind not in "iuf" or not picture.size:
         raise ParameterError("environment.file", f"{path}: must hold numbers of shape (rows, columns)")

@@ -11,70 +11,54 @@ from numpy.typing import NDArray
 
 from brdfdb.errors import ParameterError
 from brdfdb.geometry import radians
-from brdfdb.scenes.recorded_directions import Recorded
-from brdfdb.scenes.scene import Camera, Object, Scene
-from brdfdb.scenes.shapes import Array, Plane, unit
+from brdfdb.scenes.scene import Camera, Object, Rays, Scene
+from brdfdb.scenes.shapes import Array, PlaneShape, Recorded, unit
 
-# Distance of the origins of shadow and mirror rays from their surface, as a share of the height of the picture there,
-# and as a share of coordinates, which are rounded
-_LIFT, _ROUNDED = 1e-4, 1e-14
+# Distance of the origins of shadow and mirror rays from their surface
+_LIFT = 1e-4  # share of the height of the picture there
+_ROUNDED = 1e-14  # share of coordinates, which are rounded
 _BATCH = 40_000  # shadow rays at a time; fewer are slow because of the calls, and twice as many leave the cache
 # Cosine that separates limbs from backs of surfaces. The smooth normals of cones turn away by half a degree at limbs
 _BEHIND = -0.1
-_WIDEST, _MOST = 8192, 16384  # most pixels and most rays on a side; a spectral picture of 8192 x 6144 takes 16 GB
+_WIDEST = 8192  # most pixels on a side: a spectral picture of 8192 x 6144 takes 16 GB
+_MOST = 16384  # most rays on a side
 _LENGTH_OFF = 0.05  # largest error of the length of a recorded vector; it is 5e-4 in an EXR with 16 bits
 
 
 @dataclass(frozen=True, eq=False)
-class Points:
-    """The points of one object that a camera sees, directly or in the mirror of another object.
+class VisiblePoints:
+    """The N points of one object that a camera sees, directly or in the mirror of another object.
 
-    Attributes
-    ----------
-    name, material : str
-        The object and its material.
-    wr : array (N, 3)
-        Unit vectors towards the viewer in the frame of the surface: x along the grain, z the normal.
-    wi : array (E, N, 3)
-        Unit vectors towards each sample of each light, then towards each drawn direction of the environment.
-    irradiance : array (E, N)
-        Irradiance of the surface by that sample, cosine included; 0 in shadow. It is pi for a light of strength 1 that
-        the surface faces, and is multiplied with the illuminant for spectral irradiance. For the environment, it is
-        radiance times cosine times the solid angle of the direction.
-    beyond : array (N,)
-        Radiance from the mirror direction: that of a light with a solid angle, ambient radiance, and the environment. 0
-        where an object of the list stands there.
-    via : int or None
-        Number of the points of the list in whose mirror these are seen; None if the camera sees them.
-    at : int array (N,)
-        The pixel of each point, counted row by row from the top, or its index among the points of `via`.
+    Irradiance includes the cosine and is 0 in shadow. It is pi for a light of strength 1 that the surface faces, and is
+    multiplied with the illuminant for spectral irradiance. For the environment, it is radiance times cosine times solid
+    angle.
     """
 
-    name: str
+    name: str  # the object
     material: str
-    wr: Array
-    wi: Array
-    irradiance: Array
-    beyond: Array
-    via: int | None
-    at: NDArray[np.int64]
+    wr: Array  # (N, 3), unit vectors towards the viewer; x is along the grain, z the normal
+    wi: Array  # (E, N, 3), unit vectors to each sample of each light, then to each direction of the environment
+    irradiance: Array  # (E, N), by that sample
+    beyond: Array  # (N,), radiance from the mirror direction; 0 where an object of the list stands there
+    via: int | None  # number of the points in whose mirror these are seen; None if the camera sees them
+    at: NDArray[np.int64]  # (N,), pixels, row by row from the top, or indices among the points of `via`
 
 
-class View(NamedTuple):
+class CameraView(NamedTuple):
     """The view of a camera: lists of points. Points seen in a mirror come after the points of the mirror.
 
     `samples` is the number of rays of each of width x height pixels. Rays without a point meet no object.
     `background` (width * height,) is the radiance of the environment along those, summed over the rays of each pixel.
     """
 
-    points: list[Points]
+    points: list[VisiblePoints]
     width: int
     height: int
     samples: int
     background: Array
 
 
-def gather(scene: Scene, width: int, *, across: int = 1) -> View:
+def gather(scene: Scene, width: int, *, across: int = 1) -> CameraView:
     """Trace rays from the camera to the nearest object, from there to the lights, and once into mirrors.
 
     Parameters
@@ -88,7 +72,7 @@ def gather(scene: Scene, width: int, *, across: int = 1) -> View:
 
     Returns
     -------
-    View
+    CameraView
         A list of points for each object, then for each mirror and each object that it shows.
 
     Raises
@@ -110,43 +94,35 @@ def gather(scene: Scene, width: int, *, across: int = 1) -> View:
         pixels = np.arange(width * height).reshape(height, width).repeat(across, axis=0).repeat(across, axis=1)
         rays = scene.camera.rays(width * across, height * across)
         points, background = _traced(scene, rays, pixels.ravel(), width * height)
-        _check_outside(scene, [direct for direct in points if direct.via is None])
+        shapes = {item.name: item.shape for item in scene.objects}
+        for seen in points:
+            flat = isinstance(shapes[seen.name], PlaneShape)
+            if seen.via is None and not flat and np.median(seen.wr[:, 2]) < _BEHIND:
+                raise ParameterError("camera.position", f"is inside {seen.name}, which is black from there")
         unseen = [item.name for item in scene.objects if item.name not in {met.name for met in points}]
         if unseen:
             raise ParameterError("objects", f"no ray of {width} x {height} pixels meets {', '.join(unseen)}")
-        view = View(points, width, height, across**2, background)
+        view = CameraView(points, width, height, across**2, background)
     _check_lights(scene, view.points)
     return view
 
 
-def gather_at(scene: Scene, places: Array) -> View:
-    """Trace single rays through places in the picture.
+def gather_at(scene: Scene, places: Array) -> CameraView:
+    """Trace single rays through places (N, 2) in the picture, as in `brdfdb.scenes.scene.Camera.through`.
 
-    Parameters
-    ----------
-    scene : Scene
-        The scene, which must not be recorded, because a recorded scene has no rays.
-    places : array of shape (N, 2)
-        Places in the picture, as in `brdfdb.scenes.scene.Camera.through`.
-
-    Returns
-    -------
-    View
-        N pixels in one row, in the order of the places.
+    The view has N pixels in one row, in the order of the places. A recorded scene has no rays.
     """
     points, background = _traced(scene, scene.camera.through(places), np.arange(len(places)), len(places))
-    return View(points, len(places), 1, 1, background)
+    return CameraView(points, len(places), 1, 1, background)
 
 
-def _traced(
-    scene: Scene, rays: tuple[Array, Array], pixels: NDArray[np.int64], count: int
-) -> tuple[list[Points], Array]:
+def _traced(scene: Scene, rays: Rays, pixels: NDArray[np.int64], count: int) -> tuple[list[VisiblePoints], Array]:
     """Return the points that rays meet, directly and in mirrors, and the background of each of `count` pixels."""
-    points, surfaces, missed = _seen(scene, *rays, pixels)
+    points, surfaces, missed = _seen(scene, rays, pixels)
     for number, surface in enumerate(surfaces):
         if scene.materials[points[number].material].has_specular:
             points += _mirrored(scene, points, number, surface)
-    return points, _background(scene, rays[1][missed], pixels[missed], count)
+    return points, _background(scene, rays.directions[missed], pixels[missed], count)
 
 
 class _Surface(NamedTuple):
@@ -161,45 +137,44 @@ class _Surface(NamedTuple):
     away: Array
 
 
-def _seen(
-    scene: Scene,
-    origins: Array,
-    directions: Array,
-    at: NDArray[np.int64],
-    via: int | None = None,
-    before: Array | float = 0.0,
-) -> tuple[list[Points], list[_Surface], NDArray[np.int64]]:
-    """Return points of each object that rays meet first, the surfaces that they lie on, and the rays that meet none.
+class _Met(NamedTuple):
+    """Points of each object that rays meet first, the surfaces that they lie on, and the rays that meet none."""
 
-    `before` is the distance of the origins from the camera.
-    """
+    points: list[VisiblePoints]
+    surfaces: list[_Surface]
+    missed: NDArray[np.int64]
+
+
+def _seen(scene: Scene, rays: Rays, at: NDArray[np.int64], via: int | None = None, before: Array | float = 0.0) -> _Met:
+    """Return what rays meet first; `before` is the distance of their origins from the camera."""
+    origins, directions = rays
     distance, nearest = _trace(scene, origins, directions)
     away = before + distance
     points, surfaces = [], []
     for number, item in enumerate(scene.objects):
-        rays = np.flatnonzero((nearest == number) & np.isfinite(distance))
-        if not rays.size or isinstance(item.shape, Recorded):
+        met = np.flatnonzero((nearest == number) & np.isfinite(distance))
+        if not met.size or isinstance(item.shape, Recorded):
             continue
-        position = origins[rays] + distance[rays, np.newaxis] * directions[rays]
-        surface = _Surface(position, _turned(item.shape.frame(position), item.grain_deg), -directions[rays], away[rays])
+        position = origins[met] + distance[met, np.newaxis] * directions[met]
+        surface = _Surface(position, _turned(item.shape.frame(position), item.grain_deg), -directions[met], away[met])
         wr = _viewed(surface)
         wi, irradiance = _lit(scene, item, surface, wr, (number, 0 if via is None else via + 1))
         beyond = _from_afar(scene, _mirror(surface))
-        points.append(Points(item.name, item.material, wr, wi, irradiance, beyond, via, at[rays]))
+        points.append(VisiblePoints(item.name, item.material, wr, wi, irradiance, beyond, via, at[met]))
         surfaces.append(surface)
-    return points, surfaces, np.flatnonzero(~np.isfinite(distance))
+    return _Met(points, surfaces, np.flatnonzero(~np.isfinite(distance)))
 
 
-def _mirrored(scene: Scene, points: list[Points], number: int, surface: _Surface) -> list[Points]:
+def _mirrored(scene: Scene, points: list[VisiblePoints], number: int, surface: _Surface) -> list[VisiblePoints]:
     """Return the points that the mirror of some points shows, and set `beyond` to 0 where the mirror shows one."""
     facing = np.flatnonzero(points[number].wr[:, 2] > 0.0)
-    origins, directions = _lifted(scene.camera, surface)[facing], _mirror(surface)[facing]
-    reflected, surfaces, _ = _seen(scene, origins, directions, facing, number, surface.away[facing])
-    for seen, shown in zip(reflected, surfaces, strict=True):
+    rays = Rays(_lifted(scene.camera, surface)[facing], _mirror(surface)[facing])
+    reflected = _seen(scene, rays, facing, number, surface.away[facing])
+    for seen, shown in zip(reflected.points, reflected.surfaces, strict=True):
         points[number].beyond[seen.at] = 0.0
         if scene.materials[seen.material].has_specular:  # the mirror of a mirrored point is not traced
             seen.beyond[np.isfinite(_trace(scene, _lifted(scene.camera, shown), _mirror(shown))[0])] = 0.0
-    return reflected
+    return reflected.points
 
 
 def _trace(scene: Scene, origins: Array, directions: Array) -> tuple[Array, NDArray[np.int64]]:
@@ -280,13 +255,13 @@ def _viewed(surface: _Surface) -> Array:
     return unit(np.einsum("nij,nj->ni", surface.frame, surface.viewer))
 
 
-def _recorded(scene: Scene, item: Object, shape: Recorded) -> View:
+def _recorded(scene: Scene, item: Object, shape: Recorded) -> CameraView:
     """Return the points of a file of directions."""
     arrays = shape.read()
     height, width = arrays["normal" if "normal" in arrays else "wr"].shape[:2]
-    good = np.all(
-        [_is_unit(light) for array in arrays.values() for light in array.reshape(-1, height * width, 3)], axis=0
-    )
+    vectors = np.concatenate([array.reshape(-1, height * width, 3) for array in arrays.values()])
+    length = np.linalg.norm(np.nan_to_num(vectors, nan=0.0, posinf=0.0, neginf=0.0), axis=-1)
+    good = np.all(np.abs(length - 1.0) < _LENGTH_OFF, axis=0)
     at = np.flatnonzero(good)
     if not at.size:
         raise ParameterError(shape.file, "shows nothing: at every pixel a vector is not finite, or not 1 long")
@@ -310,9 +285,11 @@ def _recorded(scene: Scene, item: Object, shape: Recorded) -> View:
         strength = np.array([light.strength for light in scene.lights])
         irradiance = np.pi * strength[:, np.newaxis] * np.maximum(wi[..., 2], 0.0)
         beyond = np.full(at.size, scene.ambient)
-    directions, none = scene.camera.rays(width, height)[1], np.flatnonzero(~good)
+    directions, none = scene.camera.rays(width, height).directions, np.flatnonzero(~good)
     background = _background(scene, directions[none], none, width * height)
-    return View([Points(item.name, item.material, wr, wi, irradiance, beyond, None, at)], width, height, 1, background)
+    return CameraView(
+        [VisiblePoints(item.name, item.material, wr, wi, irradiance, beyond, None, at)], width, height, 1, background
+    )
 
 
 def _frames(
@@ -326,13 +303,8 @@ def _frames(
     tangent[short] = np.cross(np.cross(normal[short], [1.0, 0.0, 0.0]), normal[short])
     tangent = unit(tangent)
     frame = np.stack([tangent, np.cross(normal, tangent), normal], axis=1)
-    directions = camera.rays(width, height)[1]
+    directions = camera.rays(width, height).directions
     return _Surface(np.zeros_like(normal), _turned(frame, grain_deg), -directions[at], np.zeros(len(normal)))
-
-
-def _is_unit(vectors: Array) -> NDArray[np.bool_]:
-    length = np.linalg.norm(np.nan_to_num(vectors, nan=0.0, posinf=0.0, neginf=0.0), axis=-1)
-    return np.asarray(np.abs(length - 1.0) < _LENGTH_OFF)
 
 
 def _height(camera: Camera, width: int, across: int) -> int:
@@ -355,15 +327,7 @@ def _height(camera: Camera, width: int, across: int) -> int:
     return height
 
 
-def _check_outside(scene: Scene, points: Sequence[Points]) -> None:
-    """Raise a ParameterError if the camera is inside an object, or behind a plane, and sees only black backs."""
-    shapes = {item.name: item.shape for item in scene.objects}
-    for seen in points:
-        if not isinstance(shapes[seen.name], Plane) and np.median(seen.wr[:, 2]) < _BEHIND:
-            raise ParameterError("camera.position", f"is inside {seen.name}, which is black from there")
-
-
-def _check_lights(scene: Scene, points: Sequence[Points]) -> None:
+def _check_lights(scene: Scene, points: Sequence[VisiblePoints]) -> None:
     """Raise a ParameterError if a light falls on nothing visible."""
     start = 0
     for number, light in enumerate(scene.lights):

@@ -100,11 +100,11 @@ def write_channels(
     """Write channels (height, width) as 32 bit floats, ZIP compressed; OSError if that fails."""
     import OpenEXR
 
-    whole = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage, **header}
+    complete = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage, **header}
     # OpenEXR reads a strided array as if it were contiguous, which gives wrong pixels and no error
     arrays = {name: np.ascontiguousarray(array, dtype=np.float32) for name, array in channels.items()}
     try:
-        OpenEXR.File(whole, arrays).write(str(path_of(path)))
+        OpenEXR.File(complete, arrays).write(str(path_of(path)))
     except RuntimeError as error:
         raise WriteError(f"cannot write {path}: {error}") from error
 

@@ -19,7 +19,6 @@ from brdfdb.integrals.sampling import directions, mixture_density
 from brdfdb.materials import FunctionRecord, Source
 from brdfdb.parameters import Floats
 from brdfdb.scenes.environment import widest_lobe
-from brdfdb.scenes.studio import studio
 from brdfdb.spectra import PICTURE_NM, colour_science, picture_wavelengths, refractive_index, srgb_weights
 from brdfdb.tables.table_base import BaseTable
 
@@ -28,38 +27,84 @@ Array = NDArray[np.float64]
 # Radiance [1] that comes from directions (..., 3): x to the right, y upwards, z towards the viewer
 Light = Callable[[Array], Array]
 
-SIZE, MOST_SIZE = 160, 2048  # pixels across a picture
+SIZE = 160  # usual pixels across a picture
+MOST_SIZE = 2048  # most pixels across a picture
 WHITE = 0.8  # linear value of a white Lambertian sphere where it is brightest
 _LAST_DEG = 89.0  # largest angle to the viewer of normals at which reflected light is computed
 _GOLDEN = (np.sqrt(5.0) - 1.0) / 2.0
-# Table of the light: half a degree apart, columns a multiple of azimuths; every eighth row and column is blurred
-_ROWS, _COLUMNS, _COARSE = 385, 768, 8
+# Table of the light, about half a degree apart
+_ROWS = 385
+_COLUMNS = 768  # a multiple of the azimuths
+_COARSE = 8  # every eighth row and column is blurred
 # Standard deviations of the blurred light, and the radius of a sample from which each is used
 _BLURS_DEG = np.array([3.5, 7.0])
 _BLURS_FROM = radians(np.array([1.2, 2.4]))
 _TABULATION = threading.Lock()  # threads that begin together wait for one table: each would take 0.4 s of its own
-_KEPT_SIZE = 512  # largest picture [pixels across] whose weights are kept: 30 MB
+_KEPT_SIZE = 512  # largest picture [pixels across] whose weights stay in memory: 30 MB
 _BLOCK_SIZE = 2**17  # directions of light, or points of pixels, of a block: its arrays stay in the cache
 
 
-class Detail(NamedTuple):
-    """The numbers that decide between the quality of a picture and the time that it takes.
+class _Softbox(NamedTuple):
+    """A rectangle of light far away.
 
-    Attributes
-    ----------
-    thetas, phis : int
-        Normals at which reflected light is computed: angles to the viewer, and azimuths, a multiple of 4.
-    samples, samples_anisotropic : int
-        Directions of light for each normal, multiples of 4. Anisotropic surfaces have many more normals.
-    across : int
-        Points across each pixel, and down. With one, the edge is smoothed by the distance to it.
+    `centre` is the direction of its middle, `width` and `height` are the tangents of half of its angles, `edge` is the
+    part of these over which its radiance falls to 0, and `radiance` is that of its middle.
     """
 
-    thetas: int
-    phis: int
-    samples: int
-    samples_anisotropic: int
-    across: int
+    centre: tuple[float, float, float]
+    width: float
+    height: float
+    edge: float
+    radiance: float
+
+
+# In the frame of the picture: x to the right, y upwards, z towards the viewer
+_KEY = _Softbox((-0.58, 0.64, 0.50), 0.46, 0.46, 0.30, 11.0)
+_STRIP = _Softbox((0.92, 0.10, 0.10), 0.16, 0.80, 0.50, 3.5)
+# Radiance above, at the horizon, and below
+_SKY = 0.48
+_HORIZON = 0.24
+_FLOOR = 0.05
+
+
+def studio(towards: Array) -> Array:
+    """Return the radiance [1] that comes from directions (..., 3) in the frame of the picture.
+
+    The unit is arbitrary; `brdfdb.scenes.lit_sphere` exposes it. x points to the right, y upwards and z towards the
+    viewer.
+    """
+    up = towards[..., 1]
+    above = _HORIZON + (_SKY - _HORIZON) * _smooth(up)
+    sky = _FLOOR + (above - _FLOOR) * _smooth((up + 0.25) / 0.35)
+    return np.asarray(sky + _seen(_KEY, towards) + _seen(_STRIP, towards))
+
+
+def _seen(light: _Softbox, towards: Array) -> Array:
+    """Return the radiance [1] of one light in directions."""
+    axis = np.array(light.centre) / np.linalg.norm(light.centre)
+    right = np.cross((0.0, 1.0, 0.0), axis)
+    right /= np.linalg.norm(right)
+    forward = towards @ axis
+    depth = np.maximum(forward, 1e-6)
+    x, y = np.abs(towards @ right) / depth, np.abs(towards @ np.cross(axis, right)) / depth
+    inside = _smooth((1.0 - x / light.width) / light.edge) * _smooth((1.0 - y / light.height) / light.edge)
+    return np.asarray(np.where(forward > 0.0, light.radiance * inside, 0.0))
+
+
+def _smooth(x: Array) -> Array:
+    """Return the smooth step from 0 at x = 0 to 1 at x = 1."""
+    t = np.clip(x, 0.0, 1.0)
+    return np.asarray(t * t * (3.0 - 2.0 * t))
+
+
+class Detail(NamedTuple):
+    """The numbers that decide between the quality of a picture and the time that it takes."""
+
+    thetas: int  # normals at which reflected light is computed: angles to the viewer
+    phis: int  # azimuths of these normals, a multiple of 4
+    samples: int  # directions of light for each normal, a multiple of 4
+    samples_anisotropic: int  # the same for anisotropic surfaces, which have many more normals
+    across: int  # points across each pixel, and down; with one, the edge is smoothed by the distance to it
 
 
 FINE = Detail(72, 96, 768, 256, 3)
@@ -109,24 +154,13 @@ def lit_sphere(surface: Source | BaseTable, size: int = SIZE, light: Light = stu
 
 
 def sphere_png(surface: Source | BaseTable, size: int = SIZE, detail: Detail = FINE) -> bytes:
-    """Return the picture of `lit_sphere` as a PNG file of 8 bits with transparent corners.
-
-    Parameters
-    ----------
-    surface, size, detail
-        As of `lit_sphere`.
-
-    Raises
-    ------
-    ParameterError
-        If `size` is out of range.
-    """
+    """Return the picture of `lit_sphere` as a PNG file of 8 bits with transparent corners."""
     pixels = np.rint(255.0 * lit_sphere(surface, size, detail=detail)).astype(np.uint8)
     return png_of(pixels, level=1)
 
 
 def thumbnail_png(table: BaseTable, size: int) -> bytes:
-    """Return the bytes of a small picture, drawn as a draft as by `sphere_png`; the last one is kept with its table."""
+    """Return the bytes of a small draft as by `sphere_png`; the last one stays in memory with its table."""
     kept_size, picture = _THUMBNAILS.get(table, (0, b""))
     if kept_size != size:
         picture = sphere_png(table, size, DRAFT)
@@ -145,18 +179,7 @@ def prepare() -> None:
 
 
 def linear_sphere(surface: Source | BaseTable, size: int = SIZE, light: Light = studio, detail: Detail = FINE) -> Array:
-    """Return the picture of `lit_sphere` in linear sRGB (size, size, 4), not clipped, with its coverage at the end.
-
-    Parameters
-    ----------
-    surface, size, light, detail
-        As of `lit_sphere`.
-
-    Raises
-    ------
-    ParameterError
-        If `size` is out of range.
-    """
+    """Return the picture of `lit_sphere` in linear sRGB (size, size, 4), not clipped, with its coverage at the end."""
     if not 1 <= size <= MOST_SIZE:
         raise ParameterError("size", f"{size} is not a number of pixels from 1 to {MOST_SIZE}", size, (1, MOST_SIZE))
     pixels = (_kept_pixels if size <= _KEPT_SIZE else _pixels)(size, light, detail)
@@ -170,16 +193,8 @@ def sphere_radiance(
 ) -> Array:
     """Return the radiance (..., 3) in linear sRGB of points of a sphere, in the unit of the light.
 
-    Parameters
-    ----------
-    surface : Source or BaseTable
-        As of `lit_sphere`.
-    theta : array [rad]
-        Angle between the normal and the viewer, 0 to pi/2.
-    phi : array [rad]
-        Azimuth of the normal in the picture, counter-clockwise from the right.
-    light, detail
-        As of `lit_sphere`.
+    `theta` [rad] is the angle between the normal and the viewer, in [0, pi/2]. `phi` [rad] is the azimuth of the normal
+    in the picture, counter-clockwise from the right.
     """
     theta, phi = np.broadcast_arrays(theta, phi)
     weights = _weights_at(theta.ravel(), phi.ravel(), light, detail)
@@ -283,16 +298,15 @@ class _Shown(NamedTuple):
 
 def _shown(surface: Source | BaseTable) -> _Shown:
     """Return a surface with the wavelengths of its picture: the visible, or the first one that it is known for."""
-    if not isinstance(surface, BaseTable):
-        return _at(surface, surface, surface.evaluated_at(PICTURE_NM))
-    at = surface.wavelength_nm
-    if at is not None:
-        visible = picture_wavelengths(at)
-        at = at[:1] if visible is None else visible
-    return _at(surface, surface.source, at)
-
-
-def _at(surface: Source | BaseTable, source: Source | FunctionRecord | None, at: Array | None) -> _Shown:
+    if isinstance(surface, BaseTable):
+        source: Source | FunctionRecord | None = surface.source
+        at = surface.wavelength_nm
+        if at is not None:
+            visible = picture_wavelengths(at)
+            at = at[:1] if visible is None else visible
+    else:
+        source = surface
+        at = surface.evaluated_at(PICTURE_NM)
     weights = np.ones((1, 1)) if at is None else srgb_weights(tuple(at.tolist()))
     return _Shown(surface, source, at, weights)
 

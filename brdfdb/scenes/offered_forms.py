@@ -67,8 +67,9 @@ def offered_forms(
     """
     if tolerances is None and wavelength_nm is None:
         tolerances = GREY_TOLERANCES
-    whole = _offered(source, wavelength_nm, tolerances)
-    offered, left_out = [OfferedForm(form, wavelength_nm) for form in whole], whole.left_out
+    complete = _offered(source, wavelength_nm, tolerances)
+    offered = [OfferedForm(form, wavelength_nm) for form in complete]
+    left_out = complete.left_out
     for count in SAMPLINGS if wavelength_nm is not None else ():
         assert wavelength_nm is not None
         if count < wavelength_nm.size:
@@ -81,8 +82,8 @@ def offered_forms(
                 )
                 for out in forms.left_out
             ]
-    kept = [one for one in offered if one.form.kind != "other model" and not one.form.rounded]
-    return Forms(kept, left_out)
+    exact = [one for one in offered if one.form.kind != "other model" and not one.form.rounded]
+    return Forms(exact, left_out)
 
 
 def _offered(
@@ -121,10 +122,10 @@ def _between(form: Form, few: Array, wavelength_nm: Array) -> Form:
 
     def evaluate(wi: Floats, wr: Floats) -> Floats:
         values = form.evaluate(wi, wr)
-        whole = np.empty((len(values), wavelength_nm.size), values.dtype)
+        folded = np.empty((len(values), wavelength_nm.size), values.dtype)
         for start in range(0, len(values), _ROWS):
-            np.matmul(values[start : start + _ROWS], weights, out=whole[start : start + _ROWS])
-        return whole
+            np.matmul(values[start : start + _ROWS], weights, out=folded[start : start + _ROWS])
+        return folded
 
     return replace(
         form,

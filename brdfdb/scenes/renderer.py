@@ -14,7 +14,7 @@ from brdfdb.geometry import radians
 from brdfdb.materials import Source
 from brdfdb.materials.source import Lookups
 from brdfdb.parameters import Floats
-from brdfdb.scenes.gbuffer import Points, View
+from brdfdb.scenes.gbuffer import CameraView, VisiblePoints
 from brdfdb.scenes.scene import Scene
 from brdfdb.scenes.shapes import Array
 from brdfdb.tables.albedo import source_albedo
@@ -22,9 +22,10 @@ from brdfdb.tables.albedo import source_albedo
 # (wi, wr, wavelengths [nm]) of shapes (N, 3), (N, 3), (L,) -> f_r [1/sr] of shape (N, L), or (N, 1) without colour
 Brdf = Callable[[Array, Array, Array], Floats]
 
-# Albedos are polynomials of theta_r through this number of angles from 0 to the last, and constant beyond. The error is
-# at most 4e-3 for the metals of the papers. Lines through 17 angles would have an error of 3e-2
-_DEGREE, _LAST = 20, float(radians(89.5))
+# Albedos are polynomials of theta_r through this number of angles. The error is at most 4e-3 for the metals of the
+# papers. Lines through 17 angles would have an error of 3e-2
+_DEGREE = 20
+_LAST = float(radians(89.5))  # last of these angles, beyond which albedos are constant
 # Azimuths of anisotropic materials. The other half turn is the same, because lobes are ellipses and grooves straight
 _PHI = np.pi / 6.0
 _TOLERANCE = 1e-3  # absolute error of these albedos
@@ -35,13 +36,8 @@ _BATCH = 20_000  # pairs of viewer and light at a time; the calls cost little, a
 class Reflector:
     """The reflection of a source in a scene: f_r, the albedo for ambient light, and the mirror.
 
-    Attributes
-    ----------
-    source : Source
-        Material, or table of a store.
-    wavelength_nm : array (L,) [nm] or None
-        Wavelengths of its evaluation: those of the scene, or the first of a source that is stated for too few
-        wavelengths for a colour. None for a grey source.
+    `wavelength_nm` are those of its evaluation: of the scene, or the first of a source that is stated for too few
+    wavelengths for a colour; None for a grey source.
 
     Raises
     ------
@@ -107,14 +103,14 @@ def reflectors(scene: Scene) -> dict[str, Reflector]:
     return {name: Reflector(source, wavelength) for name, source in scene.materials.items()}
 
 
-def radiance(scene: Scene, points: Points, reflector: Reflector, brdf: Brdf | None = None) -> Floats:
+def radiance(scene: Scene, points: VisiblePoints, reflector: Reflector, brdf: Brdf | None = None) -> Floats:
     """Return the spectral radiance of points in multiples of the illuminant; white has 1.
 
     Parameters
     ----------
     scene : Scene
         The scene, for its wavelengths and ambient light.
-    points : Points
+    points : VisiblePoints
         The visible points.
     reflector : Reflector
         The material of the points.
@@ -167,7 +163,7 @@ def radiance(scene: Scene, points: Points, reflector: Reflector, brdf: Brdf | No
 
 def render(
     scene: Scene,
-    view: View,
+    view: CameraView,
     brdfs: Mapping[str, Brdf | Lookups] | None = None,
     *,
     materials: Mapping[str, Reflector] | None = None,
@@ -179,7 +175,7 @@ def render(
     ----------
     scene : Scene
         The scene.
-    view : View
+    view : CameraView
         The points of the view, from `brdfdb.scenes.gbuffer.gather`.
     brdfs : mapping, optional
         By the name of a material, a function, a source or a table that replaces its model.
@@ -232,7 +228,7 @@ def _function(name: str, given: Brdf | Lookups) -> Brdf:
 
 
 def composed(
-    scene: Scene, view: View, lists: Sequence[Floats], materials: Mapping[str, Reflector]
+    scene: Scene, view: CameraView, lists: Sequence[Floats], materials: Mapping[str, Reflector]
 ) -> NDArray[np.float64]:
     """Return the picture (height, width, L) of radiances of each list of points; mirrors add what they show."""
     known, lists = materials, [values.copy() for values in lists]

@@ -30,29 +30,12 @@ def even(width: int, height: int, rng: np.random.Generator) -> Array:
 
 
 def at_edges(scene: Scene, width: int, height: int, count: int, rng: np.random.Generator) -> Array:
-    """Return places near edges, with distances from the edges that are even in their logarithm.
+    """Return places (N, 2) near edges, with distances from the edges that are even in their logarithm.
 
-    Parameters
-    ----------
-    scene : Scene
-        The scene, which must not be recorded.
-    width, height : int
-        Pixels of the picture. Edges are searched between places that are a pixel apart.
-    count : int
-        Number of places to return, if the scene shows edges.
-    rng : numpy.random.Generator
-        Source of random numbers.
-
-    Returns
-    -------
-    array of shape (N, 2)
-        Places, as in `brdfdb.scenes.scene.Camera.through`. N is `count`, or less if there are few edges.
-
-    Notes
-    -----
-    Each place is drawn independently. The draw selects a point on an edge between two neighbours of a grid, across or
-    down, then one of its two sides, and then a distance along the grid. The distance is between the width of a pixel
-    and `DECADES` powers of ten less.
+    Edges are searched between places that are a pixel apart. N is `count`, or less if the scene, which must not be
+    recorded, has few edges. Each place is drawn independently: a point on an edge between two neighbours of a grid,
+    across or down, then one of its two sides, then a distance along the grid, from the width of a pixel down to
+    `DECADES` powers of ten less.
 
     Rays on the two sides of an edge meet different objects, directly or in a mirror, different faces of an object, or
     different lights. Edges are limbs and outlines, terminators and the edges of shadows. At a distance d from its limb
@@ -72,11 +55,11 @@ def at_edges(scene: Scene, width: int, height: int, count: int, rng: np.random.G
 
     corners, axes = _straddling(met, width, height, rng)
     positions = [np.empty((0, 2))]
-    left = count if len(corners) else 0
+    missing = count if len(corners) else 0
     for _ in range(_TRIES):
-        if left <= 0:
+        if missing <= 0:
             break
-        chosen = rng.integers(len(corners), size=2 * left)
+        chosen = rng.integers(len(corners), size=2 * missing)
         near, axis = corners[chosen], axes[chosen]
         rows = np.arange(len(near))
         near[rows, 1 - axis] += rng.random(len(near)) - 0.5  # a random point along the edge in this pixel
@@ -93,8 +76,8 @@ def at_edges(scene: Scene, width: int, height: int, count: int, rng: np.random.G
         away = 10.0 ** (-DECADES * rng.random(len(near)))
         place[np.arange(len(near)), axis] += np.where(before, -away, away)
         place = place[np.all((place >= 0.0) & (place <= size), axis=1)]
-        positions.append(place[:left])
-        left -= len(positions[-1])
+        positions.append(place[:missing])
+        missing -= len(positions[-1])
     return _places(np.concatenate(positions), width, height)
 
 

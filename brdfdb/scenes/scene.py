@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 from pydantic import AfterValidator, BaseModel, Field, field_validator, model_validator
@@ -17,11 +16,10 @@ from brdfdb.materials.provenance import Text
 from brdfdb.parameters import closest
 from brdfdb.place import path_of
 from brdfdb.scenes.environment import Environment
-from brdfdb.scenes.recorded_directions import Recorded
-from brdfdb.scenes.shapes import STRICT, AnyShape, Array, Vector, check_direction, unit
+from brdfdb.scenes.shapes import STRICT, AnyShape, Array, Recorded, Vector, check_direction, unit
 from brdfdb.spectra import ILLUMINANT, OBSERVER, check_illuminant, check_observer, covers_visible
 from brdfdb.store.reader import Store
-from brdfdb.tables.table_source import TableSource, source_of_table
+from brdfdb.tables.table import TableSource, source_of_table
 
 STORED = "store:"  # prefix of the name of a material that is read from the store of the scene
 WAVELENGTHS_NM = [float(wavelength) for wavelength in range(380, 781, 10)]
@@ -62,7 +60,7 @@ class Light(BaseModel):
         return self.intensity / self.solid_angle_sr if self.solid_angle_sr else 0.0
 
     def towards(self) -> Array:
-        """Unit vectors (samples, 3) towards the disc, of equal solid angles."""
+        """Return unit vectors (samples, 3) towards the disc, of equal solid angles."""
         z = unit(np.asarray(self.direction))
         if self.solid_angle_sr == 0.0:
             return z[np.newaxis]
@@ -73,6 +71,13 @@ class Light(BaseModel):
         turn = number * np.pi * (3.0 - np.sqrt(5.0))
         ring = np.cos(turn)[:, np.newaxis] * x + np.sin(turn)[:, np.newaxis] * np.cross(z, x)
         return np.asarray(cos[:, np.newaxis] * z + np.sqrt(1.0 - cos * cos)[:, np.newaxis] * ring)
+
+
+class Rays(NamedTuple):
+    """Origins and unit directions (N, 3) of rays."""
+
+    origins: Array
+    directions: Array
 
 
 class Camera(BaseModel):
@@ -103,15 +108,15 @@ class Camera(BaseModel):
             return np.full_like(distance, self.height)
         return 2.0 * np.tan(radians(self.fov_deg) / 2.0) * distance
 
-    def rays(self, width: int, height: int) -> tuple[Array, Array]:
-        """Return origins and unit directions (height * width, 3) through the middles of pixels, row by row."""
+    def rays(self, width: int, height: int) -> Rays:
+        """Return the rays through the middles of pixels, row by row."""
         x, y = np.meshgrid(
             (2.0 * np.arange(width) + 1.0 - width) / height, 1.0 - (2.0 * np.arange(height) + 1.0) / height
         )
         return self.through(np.stack([x.ravel(), y.ravel()], axis=1))
 
-    def through(self, places: Array) -> tuple[Array, Array]:
-        """Return origins and unit directions (N, 3) of rays through places (N, 2) in the picture.
+    def through(self, places: Array) -> Rays:
+        """Return the rays through places (N, 2) in the picture.
 
         Places are x to the right and y upwards from the middle of the picture, in halves of its height.
         """
@@ -121,8 +126,8 @@ class Camera(BaseModel):
         over = places[:, :1] * right + places[:, 1:] * np.cross(right, forward)
         if self.fov_deg is None:
             assert self.height is not None
-            return eye + 0.5 * self.height * over, np.broadcast_to(forward, over.shape)
-        return np.broadcast_to(eye, over.shape), unit(forward + np.tan(radians(self.fov_deg) / 2.0) * over)
+            return Rays(eye + 0.5 * self.height * over, np.broadcast_to(forward, over.shape))
+        return Rays(np.broadcast_to(eye, over.shape), unit(forward + np.tan(radians(self.fov_deg) / 2.0) * over))
 
 
 class Object(BaseModel):
@@ -271,10 +276,10 @@ class Scene(BaseModel):
 
 @functools.lru_cache(maxsize=64)
 def _stored(root: str, name: str, held_to: tuple[float, ...] | None) -> Source:
-    """Return a material of a store. It is kept in memory, because a scene needs it at every list of points."""
+    """Return a material of a store. It stays in memory, because a scene needs it at every list of points."""
     try:
         return source_of_table(
-            Store(root)[name.removeprefix(STORED)], held_to=None if held_to is None else np.array(held_to)
+            Store(root)[name.removeprefix(STORED)], known_nm=None if held_to is None else np.array(held_to)
         )
     except BrdfdbError as error:
         raise ParameterError(f"material {name}", str(error)) from None
@@ -287,7 +292,8 @@ def _check_range(name: str, source: Source, wavelengths_nm: list[float]) -> None
         return
     outside = [one for one in wavelengths_nm if not at[0] <= one <= at[-1]]
     if outside:
-        within = "give the scene a range within it, or " if covers_visible(_within(at, wavelengths_nm)) else ""
+        inside = [wavelength for wavelength in wavelengths_nm if at[0] <= wavelength <= at[-1]]
+        within = "give the scene a range within it, or " if covers_visible(inside) else ""
         raise ParameterError(
             "wavelengths_nm",
             f"{outside[0]:g} is outside [{at[0]:g}, {at[-1]:g}] nm of {name}; {within}set hold_ends = true, which "
@@ -295,11 +301,6 @@ def _check_range(name: str, source: Source, wavelengths_nm: list[float]) -> None
             outside[0],
             (at[0], at[-1]),
         )
-
-
-def _within(at: Sequence[float], wavelengths_nm: list[float]) -> list[float]:
-    """Return the wavelengths of a scene within the range of a table."""
-    return [one for one in wavelengths_nm if at[0] <= one <= at[-1]]
 
 
 def _materials(scene: Scene) -> dict[str, Source]:

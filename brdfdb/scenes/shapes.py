@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import zipfile
+import zlib
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from functools import partial
+from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
@@ -12,6 +16,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validat
 
 from brdfdb.errors import ParameterError
 from brdfdb.geometry import radians
+from brdfdb.place import path_of
 
 Array = NDArray[np.float64]
 Vector = Annotated[tuple[float, float, float], Field(strict=False)]  # TOML has lists
@@ -20,6 +25,8 @@ Length = Annotated[float, Field(gt=0.0)]
 
 STRICT = ConfigDict(frozen=True, strict=True, extra="forbid", allow_inf_nan=False)
 _FACETS = 24  # cones between two points of a profile; the contour turns by less than a degree from one to the next
+
+WANTED = "neither `normal`, nor `wr` and `wi`, of shape (height, width, 3)"
 
 
 def unit(vectors: Array) -> Array:
@@ -47,7 +54,7 @@ class Shape(BaseModel, ABC):
     turn_deg: float = Field(default=0.0, description="about the axis, counter-clockwise")
 
     @property
-    def _own(self) -> Array:
+    def _axes(self) -> Array:
         """The shape's own x, y and z axes in the scene, as rows."""
         z = unit(np.asarray(self.axis))
         aside = np.eye(3)[0 if abs(z[0]) < 0.9 else 1]
@@ -58,14 +65,14 @@ class Shape(BaseModel, ABC):
 
     def hit(self, origins: Array, directions: Array) -> Array:
         """Return the distance (N,) along each ray to the first hit, in units of its direction; inf without a hit."""
-        own = self._own
-        return self._hit((origins - np.asarray(self.position)) @ own.T, directions @ own.T)
+        axes = self._axes
+        return self._hit((origins - np.asarray(self.position)) @ axes.T, directions @ axes.T)
 
     def frame(self, points: Array) -> Array:
         """Return tangent, bitangent and outward normal at points as the rows of (N, 3, 3)."""
-        own = self._own
-        tangent, normal = self._tangent_and_normal((points - np.asarray(self.position)) @ own.T)
-        return np.stack([tangent, np.cross(normal, tangent), normal], axis=1) @ own
+        axes = self._axes
+        tangent, normal = self._tangent_and_normal((points - np.asarray(self.position)) @ axes.T)
+        return np.stack([tangent, np.cross(normal, tangent), normal], axis=1) @ axes
 
     @abstractmethod
     def _hit(self, o: Array, d: Array) -> Array:
@@ -76,7 +83,7 @@ class Shape(BaseModel, ABC):
         """Return tangent and normal at points, in the shape's own axes."""
 
 
-class Plane(Shape):
+class PlaneShape(Shape):
     """A plane through the origin, its normal along the axis; a rectangle around it if it has a size.
 
     Its tangent is its own x axis.
@@ -169,21 +176,18 @@ class Revolution(Shape):
         c2, c3 = 3.0 * (r1 - r0) - 2.0 * m0 - m1, 2.0 * (r0 - r1) + m0 + m1
         return ((c3 * u + c2) * u + m0) * u + r0, ((3.0 * c3 * u + 2.0 * c2) * u + m0) / h
 
-    def _rings(self) -> tuple[Array, Array]:
-        """Radii and heights where one cone ends and the next begins."""
+    def _hit(self, o: Array, d: Array) -> Array:
+        # Radii and heights where one cone ends and the next begins
         height = np.array(self.profile)[:, 1]
         z = np.interp(np.arange((height.size - 1) * _FACETS + 1) / _FACETS, np.arange(height.size), height)
-        return self.radius_at(z)[0], z
-
-    def _hit(self, o: Array, d: Array) -> Array:
-        radius, z = self._rings()
+        radius = self.radius_at(z)[0]
         t = np.minimum(*(_disc(o, d, radius[end], z[end]) for end in (0, -1)))
         # Only rays that meet the cylinder around all cones, and then the cylinder around some of them, are traced
-        whole = np.flatnonzero(np.isfinite(_cone(o, d, radius.max(), radius.max(), z[0], z[-1])))
+        candidates = np.flatnonzero(np.isfinite(_cone(o, d, radius.max(), radius.max(), z[0], z[-1])))
         for start in range(0, len(z) - 1, _FACETS):
             r_part, z_part = radius[start : start + _FACETS + 1], z[start : start + _FACETS + 1]
-            around = _cone(o[whole], d[whole], r_part.max(), r_part.max(), z_part[0], z_part[-1])
-            near = whole[np.isfinite(around)]
+            around = _cone(o[candidates], d[candidates], r_part.max(), r_part.max(), z_part[0], z_part[-1])
+            near = candidates[np.isfinite(around)]
             o_near, d_near = o[near], d[near]
             for r0, r1, z0, z1 in zip(r_part[:-1], r_part[1:], z_part[:-1], z_part[1:], strict=True):
                 t[near] = np.minimum(t[near], _cone(o_near, d_near, r0, r1, z0, z1, open_ends=True))
@@ -217,7 +221,7 @@ class Cylinder(Shape):
         return flat._tangent_and_normal(p)
 
 
-AnyShape = Annotated[Plane | Sphere | Box | Cylinder | Revolution, Field(discriminator="kind")]
+AnyShape = Annotated[PlaneShape | Sphere | Box | Cylinder | Revolution, Field(discriminator="kind")]
 
 
 def _dot(a: Array, b: Array) -> Array:
@@ -267,3 +271,83 @@ def _around(p: Array) -> Array:
     from_axis = np.hypot(p[:, 0], p[:, 1])
     x, y = (np.divide(p[:, i], from_axis, where=from_axis > 0.0, out=np.full(len(p), 1.0 - i)) for i in (0, 1))
     return np.stack([-y, x, np.zeros(len(p))], axis=1)
+
+
+class Recorded(BaseModel):
+    """A picture of directions in place of a shape. `file` is an EXR or .npz.
+
+    The file holds one of two sets of vectors. The first is ``normal`` and, if the material is anisotropic, ``tangent``,
+    in the frame of the scene. The second is ``wr`` and ``wi``, towards the viewer and towards each light of the scene
+    in the frame of the surface (x the tangent, z the normal), for lights without a solid angle. An .npz has arrays of
+    shape (height, width, 3), and ``wi`` of shape (lights, height, width, 3). An EXR has channels such as ``normal.X``,
+    ``normal.Y`` and ``normal.Z``, and ``wi0.X``, ``wi1.X`` and so on for lights. Pixels where a vector is 0 or not
+    finite show nothing. Nothing casts a shadow.
+    """
+
+    model_config = STRICT
+
+    kind: Literal["recorded"]
+    file: Annotated[str, Field(min_length=1)]
+
+    def resolved(self, folder: Path) -> Recorded:
+        """Return the shape with its file named relative to a folder."""
+        return self.model_copy(update={"file": str(folder / path_of(self.file, "file"))})
+
+    def read(self) -> dict[str, Array]:
+        """Return the arrays of the file, float64, by name; ``wi`` with its axis of lights.
+
+        Raises
+        ------
+        ParameterError
+            If the file does not exist, is not readable, or holds no directions.
+        """
+        path = path_of(self.file, "file")
+        if not path.is_file():
+            raise ParameterError(str(path), "there is no such file")
+        arrays = _from_exr(path) if path.suffix == ".exr" else _from_npz(path)
+        if "normal" not in arrays and not {"wr", "wi"} <= arrays.keys():
+            raise ParameterError(str(path), f"has {WANTED}; it has {', '.join(arrays) or 'no vectors'}")
+        first = "normal" if "normal" in arrays else "wr"
+        pixels = arrays[first].shape[:2]
+        for name, array in arrays.items():
+            lights = array.shape[:1] if name == "wi" else ()
+            if array.shape != (*lights, *pixels, 3):
+                wanted = "(lights, height, width, 3)" if name == "wi" else "(height, width, 3)"
+                sentence = f"{name} has the shape {array.shape}, which is not that of a picture of vectors, {wanted}"
+                if name != first:
+                    sentence += f", of as many pixels as {first} has, {pixels}"
+                raise ParameterError(str(path), sentence, array.shape)
+        return arrays
+
+
+def _from_npz(path: Path) -> dict[str, Array]:
+    try:
+        with np.load(path) as file:
+            arrays = {name: file[name] for name in ("normal", "tangent", "wr", "wi") if name in file}
+    except (ValueError, TypeError, EOFError, zipfile.BadZipFile, zlib.error):
+        raise ParameterError(str(path), "is no .npz of numbers, or a damaged one") from None
+    if any(array.dtype.kind not in "iuf" for array in arrays.values()):
+        raise ParameterError(str(path), f"has {WANTED}: what has these names is not made of numbers")
+    return {name: array.astype(np.float64) for name, array in arrays.items()}
+
+
+def _from_exr(path: Path) -> dict[str, Array]:
+    import OpenEXR
+
+    try:
+        with OpenEXR.File(str(path), separate_channels=True) as file:
+            channels: dict[str, NDArray[np.floating]] = {name: c.pixels for name, c in file.channels().items()}
+    except RuntimeError:
+        raise ParameterError(str(path), "is no OpenEXR file, or a damaged one") from None
+    arrays = {name: vector for name in ("normal", "tangent", "wr") if (vector := _vector(channels, name)) is not None}
+    lights: list[Array] = []
+    while (light := _vector(channels, f"wi{len(lights)}")) is not None:
+        lights.append(light)
+    return {**arrays, "wi": np.stack(lights)} if lights else arrays
+
+
+def _vector(channels: Mapping[str, NDArray[np.floating]], name: str) -> Array | None:
+    names = [f"{name}.{axis}" for axis in "XYZ"]
+    if not all(channel in channels for channel in names):
+        return None
+    return np.stack([channels[channel] for channel in names], axis=-1).astype(np.float64)

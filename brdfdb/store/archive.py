@@ -11,10 +11,10 @@ from typing import Any
 from pydantic import BaseModel
 
 from brdfdb.errors import StoreError, UnknownMaterialError
-from brdfdb.store.manifest import check_manifest
+from brdfdb.store.files import read_json
 from brdfdb.store.paths import METADATA, pinned
 from brdfdb.store.reader import Store
-from brdfdb.store.sealed_json import read_json
+from brdfdb.store.records import check_manifest
 
 ZIP = "application/zip"
 
@@ -22,7 +22,7 @@ _PIECE = 1 << 20
 
 
 class Group(BaseModel):
-    """A zarr group (version 3) with the metadata of all below it."""
+    """A zarr group (version 3) with the metadata of all groups and arrays in it."""
 
     zarr_format: int
     node_type: str
@@ -31,7 +31,7 @@ class Group(BaseModel):
 
 
 def zipped(contents: Iterable[tuple[str, bytes]], compression: int = zipfile.ZIP_DEFLATED) -> Iterator[bytes]:
-    """Yield named contents as a zip archive in pieces, from a temporary file: memory holds one of them at a time."""
+    """Yield named contents as a zip archive in pieces, from a temporary file: memory holds one content at a time."""
     with tempfile.TemporaryFile() as file:
         with zipfile.ZipFile(file, "w") as archive:
             for name, content in contents:
@@ -42,20 +42,17 @@ def zipped(contents: Iterable[tuple[str, bytes]], compression: int = zipfile.ZIP
 
 
 def root_group(store: Store) -> dict[str, Any]:
-    """Return the fields of `Group` for one that holds all current revisions as materials/NAME/REVISION, with digests.
-
-    A material that is damaged is left out.
-    """
+    """Return the fields of `Group`: all current revisions as materials/NAME/REVISION-DIGEST, without damaged ones."""
     metadata: dict[str, Any] = {"materials": _group()}
     for name in store:
         with contextlib.suppress(StoreError, UnknownMaterialError):
             group, digest = store.location(name)
             check_manifest(group, digest, contents=False)
-            whole = read_json(group / METADATA)
-            arrays = whole.pop("consolidated_metadata", {}).get("metadata", {})
+            metadata_of_group = read_json(group / METADATA)
+            arrays = metadata_of_group.pop("consolidated_metadata", {}).get("metadata", {})
             revision = pinned(group.name, digest)
             place = f"materials/{name}/{revision}"
-            metadata |= {f"materials/{name}": _group(revision=revision), place: whole}
+            metadata |= {f"materials/{name}": _group(revision=revision), place: metadata_of_group}
             metadata |= {f"{place}/{key}": array for key, array in arrays.items()}
     consolidated = {"kind": "inline", "must_understand": False, "metadata": metadata}
     return {**_group(), "consolidated_metadata": consolidated}

@@ -16,15 +16,15 @@ from zarr.core.buffer import Buffer
 from zarr.storage import MemoryStore
 
 from brdfdb.errors import StoreError
-from brdfdb.store import chunks
+from brdfdb.store import decoding
 from brdfdb.store.paths import METADATA
 from brdfdb.tables.layout import Layout
-from brdfdb.tables.tabulation import VARIABLES, Frame, Variable
+from brdfdb.tables.tabulation import VARIABLES, Frame, StoredArray
 
 if TYPE_CHECKING:
     import xarray as xr
 
-_CHUNK_VALUES = 1 << 20  # values of a chunk of a dataset that comes as a whole, 4 MB
+_CHUNK_VALUES = 1 << 20  # values of a chunk of a dataset in memory: 4 MB
 
 # crc32c last: without it nearly every flipped bit reads back as a plausible number
 COMPRESSORS = (BloscCodec(cname="zstd", clevel=1, shuffle="shuffle"), Crc32cCodec())
@@ -36,45 +36,35 @@ def chunk_name(layout: Layout, number: int) -> str:
 
 
 def chunk_bytes(values: NDArray[np.floating[Any]], rows: int) -> bytes:
-    """Return the bytes that zarr writes for a chunk in float32 with `COMPRESSORS`, without its event loop.
+    """Return the bytes that zarr writes for a chunk of `rows` rows in float32, without its event loop.
 
-    Parameters
-    ----------
-    values : array
-        The rows of the chunk; fewer than `rows` are filled up with nan, because chunks are of one size.
-    rows : int
-        Rows of a chunk.
+    Missing rows are nan, because all chunks have the same size.
     """
     if len(values) < rows:
-        whole = np.full((rows, *values.shape[1:]), np.nan, dtype=np.float32)
-        whole[: len(values)] = values
-        values = whole
-    data: bytes = chunks.BLOSC.encode(np.ascontiguousarray(values, dtype="<f4"))
+        filled = np.full((rows, *values.shape[1:]), np.nan, dtype=np.float32)
+        filled[: len(values)] = values
+        values = filled
+    data: bytes = decoding.BLOSC.encode(np.ascontiguousarray(values, dtype="<f4"))
     checksum: int = google_crc32c.value(data)
     return data + checksum.to_bytes(4, "little")
 
 
 def decoded(layout: Layout, number: int, data: bytes) -> NDArray[np.float32]:
-    """Return the block that the bytes of a file hold: the inverse of `chunk_bytes`.
-
-    Raises
-    ------
-    StoreError
-        If the checksum is not that of the bytes.
-    """
-    content = chunks.decoded(data)
+    """Return the block in the bytes of a file, the inverse of `chunk_bytes`; StoreError if their checksum is wrong."""
+    content = decoding.decoded(data)
     if content is None:
         raise StoreError(f"{layout.source.name}: the checksum of {chunk_name(layout, number)} is wrong")
     rows = layout.blocks[number]
-    whole = np.frombuffer(content, dtype="<f4").reshape(layout.block_rows, *layout.shape[1:])
-    return whole[: rows.stop - rows.start]
+    block = np.frombuffer(content, dtype="<f4").reshape(layout.block_rows, *layout.shape[1:])
+    return block[: rows.stop - rows.start]
 
 
 def array_metadata(layout: Layout) -> bytes:
     """Return the metadata of the array that holds the blocks."""
     rest = tuple(layout.shape[1:])
     attributes = json.dumps(VARIABLES[layout.variable])
-    shape, chunk = (layout.shape[0], *rest), (layout.block_rows, *rest)
+    shape = (layout.shape[0], *rest)
+    chunk = (layout.block_rows, *rest)
     return array_files(tuple(layout.dims), shape, chunk, "<f4", attributes, None)[METADATA]
 
 
@@ -87,7 +77,7 @@ def array_files(
     attributes: str,
     data: bytes | None,
 ) -> dict[str, bytes]:
-    """Return the files of an array by their path inside it. Kept, since tables share coordinates and zarr is slow."""
+    """Return the files of an array by their path inside it; cached, since tables share coordinates and zarr is slow."""
     files: dict[str, Buffer] = {}
     array = zarr.create_array(
         MemoryStore(files),
@@ -106,13 +96,13 @@ def array_files(
 
 
 def frame_files(layout: Layout, frame: Frame) -> dict[str, bytes]:
-    """Return all files of a revision but the blocks: metadata, coordinates and small variables."""
+    """Return the files of a revision except the blocks: metadata, coordinates and small variables."""
     others = {f"{layout.variable}/{METADATA}": array_metadata(layout)}
     return group_files({**frame.variables, **frame.coordinates}, frame.attrs, others)
 
 
 def _chunks(shape: tuple[int, ...]) -> tuple[int, ...]:
-    """Return the shape of a chunk: whole rows of the first axis, about _CHUNK_VALUES values."""
+    """Return the shape of a chunk: complete rows of the first axis, about _CHUNK_VALUES values."""
     if not shape:
         return ()
     rest = int(np.prod(shape[1:]))
@@ -120,16 +110,16 @@ def _chunks(shape: tuple[int, ...]) -> tuple[int, ...]:
 
 
 def dataset_files(dataset: xr.Dataset) -> dict[str, bytes]:
-    """Return all files of a revision that holds a dataset."""
+    """Return the files of a revision that holds a dataset."""
     variables = {
-        str(name): Variable(tuple(map(str, variable.dims)), np.asarray(variable.values), variable.attrs)
+        str(name): StoredArray(tuple(map(str, variable.dims)), np.asarray(variable.values), variable.attrs)
         for name, variable in dataset.variables.items()
     }
     return group_files(variables, dataset.attrs, {})
 
 
 def group_files(
-    variables: Mapping[str, Variable], attrs: Mapping[str, Any], others: Mapping[str, bytes]
+    variables: Mapping[str, StoredArray], attrs: Mapping[str, Any], others: Mapping[str, bytes]
 ) -> dict[str, bytes]:
     """Return the files of a group of plain arrays; the metadata of the group repeats those of the arrays.
 

@@ -1,53 +1,56 @@
-"""Decoding of a revision: its arrays as a table, and its metadata without its arrays."""
+"""Decoding of a revision: its arrays as a table.
+
+Arrays that this program wrote are read without zarr, whose import takes longer than most tables.
+"""
 
 from __future__ import annotations
 
+import itertools
+import json
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
+import google_crc32c
+import numpy as np
+from numcodecs.blosc import Blosc
 from numpy.typing import NDArray
 
-from brdfdb.errors import (
-    ParameterError,
-    StoreError,
-)
-from brdfdb.store.chunks import Group, read_group
-from brdfdb.store.files import Entry
+from brdfdb.errors import ParameterError, StoreError
+from brdfdb.store.files import FileEntry, regular_bytes
 from brdfdb.store.paths import METADATA
-from brdfdb.store.sealed_json import read_json
+from brdfdb.store.records import check_file
 
 if TYPE_CHECKING:
-    from brdfdb.tables.metadata import TableMetadata
     from brdfdb.tables.table import Table
 
+BLOSC = Blosc(cname="zstd", clevel=1, shuffle=Blosc.SHUFFLE)
 
-def decode(name: str, path: Path, files: Mapping[str, Entry], digest: str) -> Table:
+_CODECS = ["bytes", "blosc", "crc32c"]  # of all arrays that `brdfdb.store.codec` writes
+_TYPES = ("float32", "float64", "bool")
+
+
+class StoredArrays(NamedTuple):
+    """The arrays of a revision, the names of their dimensions, and the attributes of the revision."""
+
+    arrays: dict[str, NDArray[Any]]
+    dims: dict[str, tuple[Any, ...]]
+    attrs: dict[str, Any]
+
+
+def decode(name: str, path: Path, files: Mapping[str, FileEntry], digest: str) -> Table:
     """Return the table of a revision; StoreError if it is damaged, or no table that this program can look up."""
     try:
-        arrays, dims, attrs = read_group(path, files) or _read_by_zarr(path, files)
+        stored = read_group(path, files) or read_by_zarr(path, files)
     except StoreError:
         raise
     except Exception as error:  # codecs raise many kinds; each means that the bytes are damaged
         raise StoreError(f"{name} {path.name} is damaged: its values cannot be decoded") from error
     try:
-        return replace(table_of(name, path.name, arrays, dims, attrs), digest=digest)
+        return replace(table_of(name, path.name, *stored), digest=digest)
     except ValueError as error:  # written by another program
         raise StoreError(f"{name} {path.name} cannot be looked up: {error}") from error
-
-
-def _read_by_zarr(path: Path, files: Mapping[str, Entry]) -> Group:
-    """Return the arrays of a revision that another program wrote, in any encoding that zarr reads."""
-    import numpy as np
-    import zarr
-
-    from brdfdb.store.zarr_store import Whole
-
-    group = zarr.open_group(Whole(path, files), mode="r")
-    stored = dict(group.arrays())
-    dims = {key: array.metadata.dimension_names or () for key, array in stored.items()}  # type: ignore[union-attr]
-    return Group({key: np.asarray(array[...]) for key, array in stored.items()}, dims, dict(group.attrs))
 
 
 def table_of(
@@ -57,18 +60,92 @@ def table_of(
     dims: Mapping[str, tuple[Any, ...]],
     attrs: Mapping[str, Any],
 ) -> Table:
-    """Return the table of arrays, by name with their dimensions; ParameterError if they are none to look up."""
+    """Return the table of arrays, by name with their dimensions; ParameterError if no lookup could read it."""
     from brdfdb.tables.table import table_from
 
     table = table_from(name, revision, arrays, attrs)
-    variable, axes = "brdf" if "brdf" in arrays else "parts", table.grid.names
+    variable = "brdf" if "brdf" in arrays else "parts"
+    axes = table.grid.names
     if dims[variable][: len(axes)] != axes:
         raise ParameterError(variable, f"its dimensions {dims[variable]} must begin with {axes}")
     return table
 
 
-def read_metadata(group: Path) -> TableMetadata:
-    """Return the metadata in the directory of a revision, whose files were checked against its manifest."""
-    from brdfdb.tables.metadata import TableMetadata
+def read_group(group: Path, files: Mapping[str, FileEntry]) -> StoredArrays | None:
+    """Return the arrays of a revision; None if their encoding is not that of `brdfdb.store.codec`.
 
-    return TableMetadata.read(read_json(group / METADATA).get("attributes", {}))
+    StoreError names a file that is missing or changed; files that hold no arrays raise errors of other kinds.
+    """
+    metadata = json.loads(checked_bytes(group, METADATA, files))
+    described = (metadata.get("consolidated_metadata") or {}).get("metadata")
+    if described is None or not all(map(_is_ours, described.values())):
+        return None
+    arrays = {name: _array(group, name, array, files) for name, array in described.items()}
+    dims = {name: tuple(array.get("dimension_names") or ()) for name, array in described.items()}
+    return StoredArrays(arrays, dims, metadata.get("attributes", {}))
+
+
+def read_by_zarr(path: Path, files: Mapping[str, FileEntry]) -> StoredArrays:
+    """Return the arrays of a revision that another program wrote, in any encoding that zarr reads."""
+    import zarr
+
+    from brdfdb.store.zarr_store import CheckedRevision
+
+    group = zarr.open_group(CheckedRevision(path, files), mode="r")
+    stored = dict(group.arrays())
+    dims = {key: array.metadata.dimension_names or () for key, array in stored.items()}  # type: ignore[union-attr]
+    return StoredArrays({key: np.asarray(array[...]) for key, array in stored.items()}, dims, dict(group.attrs))
+
+
+def _is_ours(array: Mapping[str, Any]) -> bool:
+    """Return True if the metadata of an array are those that `brdfdb.store.codec` writes."""
+    return (
+        array.get("node_type") == "array"
+        and array["data_type"] in _TYPES
+        and [codec["name"] for codec in array["codecs"]] == _CODECS
+        and array["codecs"][0].get("configuration", {}).get("endian", "little") == "little"
+        and array["chunk_grid"]["name"] == "regular"
+        and array["chunk_key_encoding"] == {"name": "default", "configuration": {"separator": "/"}}
+        and not array.get("storage_transformers")
+    )
+
+
+def _array(group: Path, name: str, array: Mapping[str, Any], files: Mapping[str, FileEntry]) -> NDArray[Any]:
+    """Return an array [native byte order] from the files of its chunks."""
+    checked_bytes(group, f"{name}/{METADATA}", files)  # not used here, but checked as every file of the revision
+    shape = array["shape"]
+    chunk = array["chunk_grid"]["configuration"]["chunk_shape"]
+    dtype = np.dtype(array["data_type"])
+    values = np.empty(shape, dtype=dtype)
+    for number in itertools.product(*(range(-(-size // step)) for size, step in zip(shape, chunk, strict=True))):
+        data = decoded(checked_bytes(group, "/".join([name, "c", *map(str, number)]), files))
+        if data is None:
+            where = f"{group.parent.name} {group.name}"
+            raise StoreError(f"{where} is damaged: its values cannot be decoded")
+        place = tuple(slice(n * step, (n + 1) * step) for n, step in zip(number, chunk, strict=True))
+        piece = np.frombuffer(data, dtype=dtype.newbyteorder("<")).reshape(chunk)
+        values[place] = piece[tuple(slice(size - at.start) for size, at in zip(shape, place, strict=True))]
+    return values
+
+
+def decoded(data: bytes) -> bytes | None:
+    """Return the decoded bytes of a chunk; None if the checksum at the end of its file is wrong."""
+    if google_crc32c.value(data[:-4]) != int.from_bytes(data[-4:], "little"):
+        return None
+    values: bytes = BLOSC.decode(data[:-4])
+    return values
+
+
+def checked_bytes(group: Path, key: str, files: Mapping[str, FileEntry]) -> bytes:
+    """Return the content of a file of a revision; StoreError if it is missing, cannot be read or changed."""
+    where = f"{group.parent.name} {group.name}"
+    try:
+        value = regular_bytes(group / key)
+    except (FileNotFoundError, NotADirectoryError):
+        value = None
+    except OSError as error:
+        raise StoreError(f"{where} is damaged: {key} cannot be read: {error.strerror}") from error
+    check_file(group, key, value, files)
+    if value is None:  # a chunk that no manifest names
+        raise StoreError(f"{where} is damaged: {key} is missing")
+    return value

@@ -24,8 +24,8 @@ from brdfdb.materials import written_name
 from brdfdb.models import MODELS
 from brdfdb.notebook import card, percent
 from brdfdb.parameters import Floats, Parameter
-from brdfdb.store.sealed_json import read_sealed
-from brdfdb.tables.evaluation import Surface
+from brdfdb.store.files import read_sealed
+from brdfdb.tables.evaluation import LookupSubject
 from brdfdb.tables.grids import Axis
 from brdfdb.tables.stated_error import Error
 from brdfdb.tables.table import Table
@@ -71,10 +71,7 @@ class Sweep(FamilyLine):
         }
 
     def in_model_units(self, written: Mapping[str, float]) -> dict[str, float]:
-        """Return parameters, as files write them, by the names and in the units of the model: angles in radians.
-
-        Raises ParameterError for a name that is not that of a swept parameter.
-        """
+        """Return parameters of files by the names and in the units of the model; ParameterError for another name."""
         swept = self.parameters
         for name, value in written.items():
             if name not in swept:
@@ -132,13 +129,13 @@ class FamilyRecord(Sweep):
 
 
 def read_record(path: Path) -> FamilyRecord:
-    """Read the record of a family; StoreError, naming the family, if it is none that this program reads."""
+    """Return the record of a family in a file; StoreError, naming the family, as by `record_from`."""
     where = f"the family {path.stem}"
     return record_from(read_sealed(path, where), where)
 
 
 def record_from(content: Mapping[str, Any], where: str) -> FamilyRecord:
-    """Return a family from its JSON; StoreError, beginning with `where`, if it is none that this program reads."""
+    """Return a family from its JSON; StoreError, beginning with `where`, if this program cannot read it."""
     if (content.get("format"), content.get("version")) != (FORMAT, FORMAT_VERSION):
         raise StoreError(
             f"{where} is of format {content.get('format')} version {content.get('version')}, "
@@ -155,12 +152,11 @@ def record_from(content: Mapping[str, Any], where: str) -> FamilyRecord:
 
 
 def member_loader(sweep: Sweep, tables: Mapping[str, Table]) -> Callable[[int], Table]:
-    """Return a function that loads a member by its number when it is first needed, and keeps those used last.
+    """Return a function that loads a member by its number, and caches the members used last.
 
-    It raises StoreError for a member that was built anew for another request, and for one at other wavelengths than
-    another one.
+    It raises StoreError for a member that was built anew for another request, or has other wavelengths than another.
     """
-    shared: dict[str, Axis | None] = {}
+    shared: dict[str, Axis] = {}  # wavelengths of the member that was loaded first
 
     @functools.lru_cache(maxsize=2 * math.prod(min(4, len(values)) for values in sweep.axes.values()))
     def load(number: int) -> Table:
@@ -168,7 +164,8 @@ def member_loader(sweep: Sweep, tables: Mapping[str, Table]) -> Callable[[int], 
         table = tables[name]
         if table.metadata.request_sha256 != sweep.request_sha256[number]:
             raise StoreError(stale(sweep.name, name))
-        if not _same(shared.setdefault("wavelength_nm", table.wavelength_nm), table.wavelength_nm):
+        wavelengths = np.empty(0) if table.wavelength_nm is None else table.wavelength_nm
+        if not np.array_equal(shared.setdefault("wavelength_nm", wavelengths), wavelengths):
             raise StoreError(f"the family {sweep.name}: {name} is at other wavelengths than another member")
         return table
 
@@ -183,23 +180,28 @@ def stale(family: str, member: str) -> str:
     )
 
 
-def _same(one: Axis | None, other: Axis | None) -> bool:
-    return one is other if one is None or other is None else np.array_equal(one, other)
+class Stencil(NamedTuple):
+    """The nodes around a value of a parameter: the number of the first, and the weight of each."""
+
+    first: int
+    weights: Floats
 
 
-def stencil(nodes: Axis, value: float, power: int, *, cubic: bool) -> tuple[int, Floats]:
-    """Return the nodes that count for a value of a parameter: the number of the first, and the weight of each.
+def stencil(nodes: Axis, value: float, power: int, *, cubic: bool) -> Stencil:
+    """Return the nodes around a value of a parameter, with their weights.
 
-    Lagrange's polynomial through 2 of them, or 4 (3 if there are no more), in a power of the parameter or its logarithm
+    Lagrange's polynomial through 2 nodes, or 4 (3 if there are no more), in a power of the parameter or its logarithm
     (power 0). At a node its weight is exactly 1, that of others 0.
     """
     width = min(4 if cubic else 2, nodes.size)
     cell = int(np.searchsorted(nodes, value, side="right")) - 1
     first = min(max(cell - (width - 2) // 2, 0), nodes.size - width)
-    some = nodes[first : first + width]
-    x, at = (np.log(some), np.log(value)) if power == 0 else (some ** float(power), value ** float(power))
+    near = nodes[first : first + width]
+    x = np.log(near) if power == 0 else near ** float(power)
+    at = np.log(value) if power == 0 else value ** float(power)
     others = ~np.eye(width, dtype=bool)
-    return first, np.prod(np.divide(at - x, x[:, np.newaxis] - x, out=np.ones((width, width)), where=others), axis=1)
+    factors = np.divide(at - x, x[:, np.newaxis] - x, out=np.ones((width, width)), where=others)
+    return Stencil(first, np.prod(factors, axis=1))
 
 
 def blended(values: Sequence[Floats], weights: Sequence[ArrayLike], offset: float | None) -> Floats:
@@ -223,7 +225,7 @@ class _Part(NamedTuple):
 
 
 class _AtParameters:
-    """A family at some parameters, looked up as a table is."""
+    """A family at given parameters, with the lookups of a table."""
 
     def __init__(self, family: Family, at: dict[str, float]) -> None:
         self.lookup = functools.partial(family.lookup, **at)
@@ -240,13 +242,6 @@ class Family:
         The record in the store: members, interpolation, measured error.
     axes : dict of str to array
         The values of the swept parameters, in the units of the model: angles in radians.
-
-    Parameters
-    ----------
-    record : FamilyRecord
-        Of the family.
-    tables : mapping of str to Table
-        The members by name, such as the store. They are looked at when a lookup needs them, and kept while they do.
     """
 
     def __init__(self, record: FamilyRecord, tables: Mapping[str, Table]) -> None:
@@ -287,9 +282,9 @@ class Family:
         """Wavelengths [nm] of all members; None if they are grey."""
         return self._member(0).wavelength_nm
 
-    def surface(self, written: Mapping[str, float]) -> Surface:
+    def surface(self, written: Mapping[str, float]) -> LookupSubject:
         """Return the family at parameters as files write them; a lookup raises what `lookup` does."""
-        return Surface(_AtParameters(self, self.record.in_model_units(written)), "family", self.wavelength_nm)
+        return LookupSubject(_AtParameters(self, self.record.in_model_units(written)), "family", self.wavelength_nm)
 
     @array_lookup
     def lookup(
@@ -348,7 +343,8 @@ class Family:
         Parameters and errors are those of `lookup`. At the parameters of a member the error is what its table states,
         elsewhere what was measured of the family.
         """
-        parts, given = self._parts(parameters), (theta_i, phi_i, theta_r, phi_r, wavelength_nm)
+        parts = self._parts(parameters)
+        given = (theta_i, phi_i, theta_r, phi_r, wavelength_nm)
         if len(parts) == 1:
             return parts[0].table.lookup_with_error(*given)
         brdf = self._blended(parts, lambda table: table.lookup(*given))
@@ -372,22 +368,8 @@ class Family:
     ) -> Floats:
         """Interpolate the reflectance [1] of the specular part; 0 for models that have none.
 
-        Parameters
-        ----------
-        theta_i, wavelength_nm
-            As in `Table.specular_reflectance`.
-        **parameters : float
-            As in `lookup`.
-
-        Returns
-        -------
-        array [1]
-            Shaped as by `Table.specular_reflectance`; off by up to `record.specular_error`.
-
-        Raises
-        ------
-        ValueError, StoreError
-            As `lookup`.
+        Arguments, shape and errors are those of `Table.specular_reflectance` and `lookup`. The error is at most
+        `record.specular_error`.
         """
         parts = self._parts(parameters)
         values = [part.table.specular_reflectance(theta_i, wavelength_nm) for part in parts]
@@ -396,11 +378,11 @@ class Family:
         return blended(values, [part.weight for part in parts], self.record.interpolation.specular_offset)[()]
 
     def around(self, **parameters: float) -> list[Table]:
-        """Return the members that a lookup at these parameters is made of; parameters and errors as by `lookup`."""
+        """Return the members that a lookup at these parameters interpolates; errors as by `lookup`."""
         return [part.table for part in self._parts(parameters)]
 
     def _blended(self, parts: Sequence[_Part], look: Callable[[Table], Floats]) -> Floats:
-        """Return what `look` finds in the members around a point, weighted; of one member its own values."""
+        """Return the weighted mean of the values that `look` finds in members, or those of a single member."""
         values = [look(part.table) for part in parts]
         if len(parts) == 1:
             return values[0]
@@ -412,7 +394,7 @@ class Family:
         return mean.astype(np.asarray(values[0]).dtype)[()]
 
     def _parts(self, parameters: Mapping[str, Any]) -> list[_Part]:
-        """Return the members that count at a point, with weights that add up to 1."""
+        """Return the members around a point, with weights that add up to 1."""
         names = list(self.axes)
         for name in parameters:
             if name not in names:
@@ -424,8 +406,8 @@ class Family:
             if limits.name not in parameters:
                 needed = f"missing, {self.name} needs a value in {limits.interval}"
                 raise ParameterError(limits.name, needed, None, (limits.low, limits.high))
-            first, weights = stencil(nodes, _checked(limits, nodes, parameters[limits.name]), power, cubic=cubic)
-            around.append([(first + k, w) for k, w in enumerate(weights) if w != 0.0])
+            near = stencil(nodes, _checked(limits, nodes, parameters[limits.name]), power, cubic=cubic)
+            around.append([(near.first + k, weight) for k, weight in enumerate(near.weights) if weight != 0.0])
         shape = [nodes.size for nodes in self.axes.values()]
         parts = []
         for corner in itertools.product(*around):
@@ -435,7 +417,7 @@ class Family:
 
 
 def _checked(limits: Parameter, nodes: Axis, value: Any) -> float:
-    """One number within limits, that of a node if it is one but for rounding, as of degrees to radians."""
+    """Return a number within limits; a number that differs from a node by rounding is that of the node."""
     if np.ndim(value) != 0:
         raise ParameterError(
             limits.name, f"{value!r} is not one number in {limits.interval}", value, (limits.low, limits.high)

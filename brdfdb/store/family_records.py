@@ -27,11 +27,10 @@ from brdfdb.store.family import (
     stale,
     stencil,
 )
-from brdfdb.store.files import sync_directory
+from brdfdb.store.files import sync_directory, write_sealed
 from brdfdb.store.lock import Lock, writing
 from brdfdb.store.paths import family_path
 from brdfdb.store.reader import Store
-from brdfdb.store.sealed_json import write_sealed
 from brdfdb.tables import error_measurement, places
 from brdfdb.tables.layout import PLAIN
 from brdfdb.tables.places import BANDS
@@ -42,16 +41,17 @@ Power = Literal[-2, -1, 0, 1, 2]
 
 SEED = 1991
 POINTS = 256  # parameters at which a family is measured, at least
-_DIRECTIONS = 50  # of a band of theta_i at each of them
-_DIRECTIONS_BETWEEN, _SEARCHED = 10, 40  # between wavelengths; and of one member, to find out where
+_DIRECTIONS = 50  # directions per band of theta_i at each of these parameters
+_DIRECTIONS_BETWEEN = 10  # the same between wavelengths
+_SEARCHED = 40  # directions of one member at which the worst wavelengths are searched
 _FEWEST_DIRECTIONS = 10
 _OF_A_SAMPLE = 2  # pairs of each sample in a place, at each of the points
-_CORNER_VALUES = 10_000_000  # that are held at a time: of more, fewer directions are drawn
-_THETA_I = radians(np.arange(0.0, 90.0, 5.0))  # where the specular part is measured
+_CORNER_VALUES = 10_000_000  # values of members in memory at a time; fewer directions are drawn for more
+_THETA_I = radians(np.arange(0.0, 90.0, 5.0))  # angles [rad] at which the specular part is measured
 _SPECULAR_OFFSET = 1e-6
 _POWERS: tuple[Power, ...] = (-2, -1, 0, 1, 2)
-_MOST_CORNERS = 64  # of a cubic: of more swept parameters than three, it is not tried
-_THINNED = 4  # of so many directions one is looked at to choose powers
+_MOST_CORNERS = 64  # members of a cubic; a family of more than three swept parameters is linear
+_THINNED = 4  # every fourth direction serves to choose powers
 
 
 class _Point(NamedTuple):
@@ -82,7 +82,7 @@ class _Measured(NamedTuple):
     parameters: list[dict[str, float]]  # in the units of the model
     corners: Floats  # f_r of the members that a cubic is made of, of shape (points, corners, directions, wavelengths)
     truth: Floats  # (points, directions, wavelengths)
-    drawn: list[error_measurement.Draw]
+    drawn: list[error_measurement.RandomPairs]
     specular_corners: Floats | None  # (points, corners, angles, wavelengths)
     specular_truth: Floats | None
 
@@ -108,31 +108,20 @@ def parameter_points(shape: tuple[int, ...], seed: int) -> list[_Point]:
 
 
 def measure(sweep: Sweep, tables: Mapping[str, Table], seed: int = SEED) -> FamilyRecord:
-    """Choose the interpolation of a family by what it leaves, and measure its error against the model.
+    """Choose the interpolation of a family by its smallest error, and measure its error against the model.
 
-    Parameters
-    ----------
-    sweep : Sweep
-        The tables, and the parameters that they are swept over.
-    tables : mapping of str to Table
-        The members by name, such as the store.
-    seed : int
-        Of parameters and directions.
-
-    Raises
-    ------
-    StoreError
-        If a member is not the one that the sweep asks for, or members have different wavelengths.
+    `tables` has the members by name; `seed` is that of parameters and directions. StoreError says that a member is not
+    the one that the sweep asks for, or that members have different wavelengths.
     """
     measured = _look(sweep, tables, seed)
-    drawn = error_measurement.Draw(*(np.concatenate(parts) for parts in zip(*measured.drawn, strict=True)))
+    drawn = error_measurement.RandomPairs(*(np.concatenate(parts) for parts in zip(*measured.drawn, strict=True)))
     truth = measured.truth.reshape(-1, measured.truth.shape[-1])
     floor = error_measurement.floor_of(truth, drawn)
     ways = _ways(sweep, measured, drawn, floor)
     best = min(ways, key=lambda way: ways[way])
     pairs = places.draw(_OF_A_SAMPLE * len(measured.points), seed)
-    value = blended(*_weighted(sweep, measured, measured.corners, best), best.offset)
-    specular_offset, specular_error = _specular(sweep, measured, best)
+    value = _interpolated(sweep, measured, measured.corners, best)
+    specular = _specular(sweep, measured, best)
     between = _between(sweep, tables, seed, best, floor) if floor.size > 1 else None
     p99 = [
         float(np.percentile(error_measurement.relative(v, t, floor)[d.above], 99.0, axis=0).max())
@@ -145,7 +134,7 @@ def measure(sweep: Sweep, tables: Mapping[str, Table], seed: int = SEED) -> Fami
             method=best.method,
             powers=dict(zip(sweep.axes, best.powers, strict=True)),
             offset=best.offset,
-            specular_offset=specular_offset,
+            specular_offset=specular.offset,
             reason="; ".join(
                 f"{way.in_words(sweep)}: p99 {left:.3g}" for way, left in sorted(ways.items(), key=lambda item: item[1])
             ),
@@ -158,25 +147,27 @@ def measure(sweep: Sweep, tables: Mapping[str, Table], seed: int = SEED) -> Fami
         ),
         points=len(measured.points),
         worst=WorstPoint(parameters=_written(sweep, measured.parameters[worst]), p99=float(f"{p99[worst]:.3g}")),
-        specular_error=specular_error,
+        specular_error=specular.error,
     )
 
 
 def _between(sweep: Sweep, tables: Mapping[str, Table], seed: int, way: _Way, floor: Floats) -> Between:
     """Measure the error between the wavelengths of the members, at fewer directions."""
     first = member_loader(sweep, tables)(0)
-    material, stored = _material(first), first.wavelength_nm
+    material = _material(first)
+    stored = first.wavelength_nm
     assert stored is not None
     pairs = error_measurement.draw(material, stored, _SEARCHED, seed)
-    wi, wr = pairs.wi[pairs.above], pairs.wr[pairs.above]
     how = replace(PLAIN, wavelengths=first.interpolation.wavelengths)
-    at = error_measurement.worst_wavelengths(material, stored, how, wi, wr, floor)
+    worst = error_measurement.worst_between(material, stored, how, pairs.wi[pairs.above], pairs.wr[pairs.above], floor)
+    at = np.array([place.wavelength_nm for place in worst])
     measured = _look(sweep, tables, seed, at)
-    drawn = error_measurement.Draw(*(np.concatenate(parts) for parts in zip(*measured.drawn, strict=True)))
+    drawn = error_measurement.RandomPairs(*(np.concatenate(parts) for parts in zip(*measured.drawn, strict=True)))
     truth = measured.truth.reshape(-1, at.size)
-    value = blended(*_weighted(sweep, measured, measured.corners, way), way.offset).reshape(truth.shape)
+    value = _interpolated(sweep, measured, measured.corners, way).reshape(truth.shape)
     larger = np.maximum(floor[1:], floor[:-1])
-    error = error_measurement.relative(truth, value, larger)[drawn.above]  # to what a lookup knows
+    # Relative to the interpolated value, which a lookup knows
+    error = error_measurement.relative(truth, value, larger)[drawn.above]
     elsewhere = ~places.anywhere(drawn.wi[drawn.above], drawn.wr[drawn.above])
     few = places.draw(len(measured.points), seed)
     return Between(
@@ -190,14 +181,14 @@ def _between(sweep: Sweep, tables: Mapping[str, Table], seed: int, way: _Way, fl
 def _in_places(sweep: Sweep, way: _Way, measured: _Measured, pairs: places.Pairs, floor: Floats) -> Places:
     """Return the limits of the error near the light and at the horizon, over all points."""
     error = np.empty((len(pairs.wi), measured.truth.shape[-1]))
-    value = blended(*_weighted(sweep, measured, measured.corners, way), way.offset)
+    value = _interpolated(sweep, measured, measured.corners, way)
     for point, rows in enumerate(_shared_out(pairs, len(measured.points))):
         error[rows] = error_measurement.relative(measured.truth[point], value[point], floor)
     return error_measurement.limits_in_places(error, pairs, np.ones(len(error), dtype=bool))
 
 
 def _shared_out(pairs: places.Pairs, points: int) -> NDArray[np.int64]:
-    """Return the pairs of each point, shape (points, N): as many of each sample."""
+    """Return the pairs of each point, shape (points, N), the same number from each sample."""
     rows = np.arange(len(pairs.wi)).reshape(pairs.sample[-1] + 1, -1, points)
     return np.moveaxis(rows, -1, 0).reshape(points, -1)
 
@@ -216,10 +207,10 @@ def _look(
     at_nm: NDArray[np.float64] | None = None,
     pairs: places.Pairs | None = None,
 ) -> _Measured:
-    """Return the model and the members around, at directions of their own at each point.
+    """Return the values of the model and of the members around, at random directions of each point.
 
-    By default they are looked at at the wavelengths of the members, else at those given and fewer directions. `pairs`
-    in places are shared out among the points and take the place of directions over the hemisphere and in the lobe.
+    By default the wavelengths are those of the members; at other wavelengths there are fewer directions. `pairs` in
+    places are shared out among the points and replace directions over the hemisphere and in the lobe.
     """
     nodes = sweep.nodes
     shape = tuple(values.size for values in nodes.values())
@@ -232,22 +223,29 @@ def _look(
     count = max(
         _FEWEST_DIRECTIONS, min(_DIRECTIONS if at_nm is None else _DIRECTIONS_BETWEEN, _CORNER_VALUES // values)
     )
-    parameters, corners, truth, draws, specular_corners, specular_truth = [], [], [], [], [], []
+    parameters = []
+    corners = []
+    truth = []
+    draws = []
+    specular_corners = []
+    specular_truth = []
     for number, (cell, within) in enumerate(points):
         at = {
             name: float(axis[i] + t * (axis[i + 1] - axis[i]))
             for (name, axis), i, t in zip(nodes.items(), cell, within, strict=True)
         }
         material = base.model_copy(update={"parameters": {**base.parameters, **at}})
-        first = [stencil(axis, at[name], 1, cubic=_width(shape) == 4)[0] for name, axis in nodes.items()]
+        first = [stencil(axis, at[name], 1, cubic=_width(shape) == 4).first for name, axis in nodes.items()]
         around = [member(int(np.ravel_multi_index(np.add(first, corner), shape))) for corner in np.ndindex(*stencils)]
         parameters.append(at)
         if pairs is None:
             draws.append(error_measurement.draw(material, wavelength_nm, count, seed + 1 + number))
-            wi, wr = draws[-1].wi, draws[-1].wr
+            wi = draws[-1].wi
+            wr = draws[-1].wr
         else:
             rows = _shared_out(pairs, len(points))[number]
-            wi, wr = pairs.wi[rows], pairs.wr[rows]
+            wi = pairs.wi[rows]
+            wr = pairs.wr[rows]
         truth.append(error_measurement.model_values(material, wavelength_nm, wi, wr))
         corners.append([table.lookup_vectors(wi, wr, at_nm).reshape(truth[-1].shape) for table in around])
         if base.has_specular and at_nm is None and pairs is None:
@@ -271,8 +269,8 @@ def _width(shape: tuple[int, ...]) -> int:
     return 4 if math.prod(min(4, nodes) for nodes in shape) <= _MOST_CORNERS else 2
 
 
-def _ways(sweep: Sweep, measured: _Measured, drawn: error_measurement.Draw, floor: Floats) -> dict[_Way, float]:
-    """Return the best powers of each method, in f_r and in logarithms, with the 99th percentile of their error."""
+def _ways(sweep: Sweep, measured: _Measured, drawn: error_measurement.RandomPairs, floor: Floats) -> dict[_Way, float]:
+    """Return the ways with the best powers, for each method in f_r and in logarithms, with their 99th percentile."""
     above = drawn.above.reshape(measured.truth.shape[:2])
     shape = tuple(map(len, sweep.axes.values()))
     offsets: list[float | None] = [None]
@@ -281,18 +279,20 @@ def _ways(sweep: Sweep, measured: _Measured, drawn: error_measurement.Draw, floo
     methods: list[Literal["linear", "cubic"]] = ["linear", "cubic"]
 
     def left(way: _Way, thinned: int = 1) -> float:
-        some = slice(None, None, thinned)
-        value = blended(*_weighted(sweep, measured, measured.corners[:, :, some], way), way.offset)
-        error = error_measurement.relative(value, measured.truth[:, some], floor)[above[:, some]]
+        thin = slice(None, None, thinned)
+        value = _interpolated(sweep, measured, measured.corners[:, :, thin], way)
+        error = error_measurement.relative(value, measured.truth[:, thin], floor)[above[:, thin]]
         return float(np.percentile(error, 99.0, axis=0).max())
 
     ways: dict[_Way, float] = {}
     for method in methods if _width(shape) == 4 and max(shape) > 2 else methods[:1]:
         for offset in offsets:
-            one: Power = 1
-            best = _Way(method, offset, (one,) * len(shape))
+            straight: Power = 1
+            best = _Way(method, offset, (straight,) * len(shape))
             least = left(best, _THINNED)
-            for axis, values in [*enumerate(sweep.axes.values())] * 2:  # the best of one depends on the others
+            for axis, values in [
+                *enumerate(sweep.axes.values())
+            ] * 2:  # the best power of an axis depends on the others
                 for power in _POWERS if values[0] > 0.0 else (1, 2) if values[0] == 0.0 else (1,):
                     other = best._replace(powers=(*best.powers[:axis], power, *best.powers[axis + 1 :]))
                     if other != best and (there := left(other, _THINNED)) < least:
@@ -301,38 +301,44 @@ def _ways(sweep: Sweep, measured: _Measured, drawn: error_measurement.Draw, floo
     return ways
 
 
-def _weighted(
-    sweep: Sweep, measured: _Measured, corners: Floats, way: _Way
-) -> tuple[list[Floats], list[NDArray[np.float64]]]:
-    """Return the values of the members around the points, corner by corner, and their weights, which broadcast."""
+def _interpolated(sweep: Sweep, measured: _Measured, corners: Floats, way: _Way) -> Floats:
+    """Interpolate the values of the members around the points."""
     nodes = sweep.nodes
     shape = tuple(axis.size for axis in nodes.values())
     rows = []
     for at in measured.parameters:
         weight = np.ones(1)
         for (name, axis), power in zip(nodes.items(), way.powers, strict=True):
-            base, ones = stencil(axis, at[name], 1, cubic=_width(shape) == 4)
-            first, some = stencil(axis, at[name], power, cubic=way.method == "cubic")
-            along = np.zeros(ones.size)
-            along[first - base : first - base + some.size] = some
+            widest = stencil(axis, at[name], 1, cubic=_width(shape) == 4)
+            used = stencil(axis, at[name], power, cubic=way.method == "cubic")
+            along = np.zeros(widest.weights.size)
+            begin = used.first - widest.first
+            along[begin : begin + used.weights.size] = used.weights
             weight = np.outer(weight, along).reshape(-1)
         rows.append(weight)
     weights = np.array(rows)
-    used = np.flatnonzero(np.any(weights != 0.0, axis=0))
+    members = np.flatnonzero(np.any(weights != 0.0, axis=0))
     spread = (slice(None), *(np.newaxis,) * (corners.ndim - 2))
-    return [corners[:, c] for c in used], [weights[:, c][spread] for c in used]
+    return blended([corners[:, c] for c in members], [weights[:, c][spread] for c in members], way.offset)
 
 
-def _specular(sweep: Sweep, measured: _Measured, way: _Way) -> tuple[float | None, float | None]:
-    """Return how the specular part is interpolated, offset or None, and its largest error; None without one."""
+class _SpecularPart(NamedTuple):
+    """The offset with which the specular part is interpolated, and its largest error; None without such a part."""
+
+    offset: float | None
+    error: float | None
+
+
+def _specular(sweep: Sweep, measured: _Measured, way: _Way) -> _SpecularPart:
+    """Choose how to interpolate the specular part."""
     if measured.specular_corners is None or measured.specular_truth is None:
-        return None, None
+        return _SpecularPart(None, None)
     left: dict[float | None, float] = {}
     for offset in (None, _SPECULAR_OFFSET):
-        value = blended(*_weighted(sweep, measured, measured.specular_corners, way), offset)
+        value = _interpolated(sweep, measured, measured.specular_corners, way._replace(offset=offset))
         left[offset] = float(np.abs(value - measured.specular_truth).max())
     best = min(left, key=lambda offset: left[offset])
-    return best, float(f"{left[best]:.3g}")
+    return _SpecularPart(best, float(f"{left[best]:.3g}"))
 
 
 def _written(sweep: Sweep, at: Mapping[str, float]) -> dict[str, float]:
@@ -343,7 +349,7 @@ def _written(sweep: Sweep, at: Mapping[str, float]) -> dict[str, float]:
 
 
 def recorded(root: Path, sweep: Sweep) -> FamilyRecord | None:
-    """Return the record of a family in the store at `root`, if it is there and of these very members; else None."""
+    """Return the record of a family in the store at `root`, if it is of these members; else None."""
     try:
         record = read_record(family_path(root, sweep.name))
     except StoreError:
@@ -354,14 +360,11 @@ def recorded(root: Path, sweep: Sweep) -> FamilyRecord | None:
 def write_family(root: str, sweep: Sweep) -> FamilyRecord:
     """Measure a family whose members are built, and record it, unless that was done: a task for a worker.
 
-    The record appears whole, synced to disk, or not at all.
-
-    Raises
-    ------
-    StoreError
-        If a member is not the one that the sweep asks for, or the record cannot be written.
+    The record is written completely and synced to disk, or not at all. StoreError says that a member is not the one
+    that the sweep asks for, or that the record cannot be written.
     """
-    store, path = Path(root), family_path(Path(root), sweep.name)
+    store = Path(root)
+    path = family_path(store, sweep.name)
     with Lock(store, sweep.name) as lock:
         if (record := recorded(store, sweep)) is not None:
             return record
@@ -375,14 +378,9 @@ def write_family(root: str, sweep: Sweep) -> FamilyRecord:
 
 
 def verify_family(root: Path, name: str) -> int:
-    """Check the record of a family: that it is one, and its members are those that it names; returns its bytes.
-
-    Raises
-    ------
-    StoreError
-        Naming what is wrong first.
-    """
-    store, path = Store(root), family_path(root, name)
+    """Check that the record of a family is one, and that its members are those that it names; return its bytes."""
+    store = Store(root)
+    path = family_path(root, name)
     record = read_record(path)
     if not len(record.members) == len(record.request_sha256) == math.prod(map(len, record.axes.values())):
         raise StoreError(f"the family {name} is damaged: its axes do not make {len(record.members)} members")

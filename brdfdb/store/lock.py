@@ -31,28 +31,17 @@ def writing(root: Path, name: str) -> Iterator[None]:
 
 
 class Lock:
-    """The right to change a material: a context manager; others see it with `held_elsewhere`.
+    """The right to change a material: a context manager.
 
-    Parameters
-    ----------
-    root : Path
-        Directory of the store.
-    name : str
-        Of the material.
-    wait : bool
-        Wait for another holder; otherwise `BusyError` is raised.
-
-    Raises
-    ------
-    BusyError
-        If another process, or another thread of this one, holds it.
-    StoreError
-        If the system has no file locks, or the store cannot be written.
+    While another process or thread has it, wait, or else raise BusyError. StoreError says that the system has no file
+    locks, or the store cannot be written.
     """
 
     def __init__(self, root: Path, name: str, *, wait: bool = True) -> None:
         self.path = staged_path(root, name) / "lock"
-        self.root, self.name, self.wait = root, name, wait
+        self.root = root
+        self.name = name
+        self.wait = wait
         self._handle: IO[bytes] | None = None
 
     def __enter__(self) -> Lock:
@@ -67,7 +56,7 @@ class Lock:
         return self
 
     def _acquired(self) -> IO[bytes] | None:
-        """Return the locked file; None if its holder took it away in the meantime."""
+        """Return the locked file; None if its holder removed it in the meantime."""
         try:
             self.path.parent.mkdir(exist_ok=True)
             handle = self.path.open("ab")
@@ -93,7 +82,7 @@ class Lock:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
-        """Give it back, and take the directory away if nothing is left in it."""
+        """Release the lock, and remove its directory if nothing else is in it."""
         assert self._handle is not None
         try:
             if os.listdir(self.path.parent) == ["lock"]:

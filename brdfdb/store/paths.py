@@ -41,7 +41,7 @@ def revision_path(root: Path, name: str, revision: str) -> Path:
 
 
 def manifest_path(group: Path) -> Path:
-    """Return the path of the manifest of a revision: beside it, since zarr warns of strangers inside."""
+    """Return the path of the manifest of a revision, outside its directory, since zarr warns of other files inside."""
     return group.with_name(f"{group.name}{_MANIFEST}")
 
 

@@ -18,14 +18,11 @@ from brdfdb.errors import (
 from brdfdb.materials import Source
 from brdfdb.measurements import MeasuredSource
 from brdfdb.place import path_of
-from brdfdb.store.decoding import read_metadata, table_of
-from brdfdb.store.files import Entry, sync_directory, write_files
+from brdfdb.store.decoding import table_of
+from brdfdb.store.files import FileEntry, sync_directory, write_files, write_sealed
 from brdfdb.store.lock import Lock, writing
-from brdfdb.store.manifest import Manifest, summary_of
-from brdfdb.store.marker import make_store
 from brdfdb.store.paths import NAME, manifest_path, material_path, staged_path
-from brdfdb.store.pointer import newest, point_to
-from brdfdb.store.sealed_json import write_sealed
+from brdfdb.store.records import Manifest, make_store, newest, point_to, read_metadata, summary_of
 from brdfdb.tables.grids import check_wavelengths
 from brdfdb.tables.layout import Layout
 from brdfdb.tables.measured_layout import tabulated
@@ -38,8 +35,15 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
+class NewRevision(NamedTuple):
+    """The name of a new revision, and its size [byte]."""
+
+    revision: str
+    bytes: int
+
+
 class Published(NamedTuple):
-    """A revision of a store, its size [byte], and the error of its table as measured."""
+    """The name of a new revision, its size [byte], and the measured error of its table."""
 
     revision: str
     bytes: int
@@ -58,7 +62,7 @@ def publish(
 
     This is the way for a `brdfdb.materials.FunctionSource`, which no recipe can name and no other process can read. It
     runs in this process, with the whole table in memory, and starts anew after a crash: a build from a recipe
-    (``brdfdb build``) goes on where it was.
+    (``brdfdb build``) resumes.
 
     Parameters
     ----------
@@ -119,8 +123,8 @@ def publish_layout(
 ) -> Published:
     """Tabulate a layout in memory, measure its error, and publish the table under a name; errors as by `publish`.
 
-    The table keeps the request of a build, if it is given, so that the same request is not built again. `values` are
-    those of all blocks of the layout, where they are known.
+    The table records the request of a build if it is given, so that the same request is not built again. `values` are
+    those of all blocks of the layout, if they are known already.
     """
     root = path_of(root, "root")
     dataset = tabulate(layout, values)
@@ -130,8 +134,8 @@ def publish_layout(
     return Published(*publish_dataset(root, name, dataset.assign_attrs(metadata.attributes())), metadata.error)
 
 
-def publish_dataset(root: str | os.PathLike[str], name: str, dataset: xr.Dataset) -> tuple[str, int]:
-    """Publish a table that is in memory, whoever computed it, as the next revision of a material.
+def publish_dataset(root: str | os.PathLike[str], name: str, dataset: xr.Dataset) -> NewRevision:
+    """Publish a table in memory, of this program or another, as the next revision of a material.
 
     Parameters
     ----------
@@ -145,16 +149,11 @@ def publish_dataset(root: str | os.PathLike[str], name: str, dataset: xr.Dataset
         are float32; float64 is converted. Attributes may be missing. What `Store.dataset` gives is stored as it was:
         ``parts`` take the place of the ``brdf`` that is rebuilt of them.
 
-    Returns
-    -------
-    revision, bytes
-        Such as ``r000003``, and how much it takes.
-
     Raises
     ------
     ParameterError
-        If the name is none of a material, or the dataset is no table that can be looked up: also if ``brdf`` was
-        changed and ``parts`` were not.
+        If the name is not one of a material, or no lookup could read the dataset: also if ``brdf`` was changed and
+        ``parts`` were not.
     StoreError
         If the store cannot be written.
     """
@@ -177,7 +176,7 @@ def publish_dataset(root: str | os.PathLike[str], name: str, dataset: xr.Dataset
 
 
 def checked_dataset(name: str, dataset: xr.Dataset) -> xr.Dataset:
-    """Return a table as a store keeps it, with values in float32; ParameterError if no lookup could read it."""
+    """Return a table as it is stored, with values in float32; ParameterError if no lookup could read it."""
     from brdfdb.tables.xarray_view import stored_attributes, with_brdf  # xarray is slow to import
 
     dataset = dataset.copy()
@@ -198,21 +197,12 @@ def checked_dataset(name: str, dataset: xr.Dataset) -> xr.Dataset:
     return dataset
 
 
-def publish_staged(root: Path, name: str, staging: Path, files: Mapping[str, Entry]) -> tuple[str, int]:
-    """Make a staged table the current revision of its material; the lock must be held. Returns revision and bytes.
+def publish_staged(root: Path, name: str, staging: Path, files: Mapping[str, FileEntry]) -> NewRevision:
+    """Make a staged table the current revision of its material; the caller holds the lock.
 
-    Until the pointer is swapped, as the last step, readers see the revision before. After a crash in between, the
-    revision lies whole in its place and the next build of the request makes it current.
-
-    Parameters
-    ----------
-    files : mapping
-        Every file of the group, by its path inside: what else lies there is removed.
-
-    Raises
-    ------
-    StoreError
-        If it cannot be written.
+    The last step swaps the pointer; until then readers see the revision before. After a crash just before that step,
+    the revision is complete, and the next build of the request makes it current. Files of the group that `files` does
+    not name are removed. StoreError says that it cannot be written.
     """
     material = material_path(root, name)
     table = staging / "table"
@@ -234,4 +224,4 @@ def publish_staged(root: Path, name: str, staging: Path, files: Mapping[str, Ent
         sync_directory(material)
         point_to(material, revision)
         shutil.rmtree(staging, ignore_errors=True)
-    return revision, stored
+    return NewRevision(revision, stored)

@@ -2,7 +2,7 @@
 
 ROOT/brdfdb.json                     format name and version
 ROOT/materials/NAME/r000001/         a self-contained zarr v3 group, never modified
-ROOT/materials/NAME/r000001.MANIFEST.json   size and sha256 of its files; beside it, zarr warns of strangers inside
+ROOT/materials/NAME/r000001.MANIFEST.json   size and sha256 of its files, outside: zarr warns of others inside
 ROOT/materials/NAME/HEAD.json        current revision, digests of the manifests, and what lists show; swapped atomically
 ROOT/families/NAME.json              which materials make a family, and how well it interpolates (`brdfdb.store.family`)
 ROOT/snapshots/NAME.json             a whole database: a revision of each material, families (`brdfdb.store.snapshots`)
@@ -31,9 +31,7 @@ from brdfdb.errors import (
 )
 from brdfdb.notebook import listing, percent
 from brdfdb.place import path_of
-from brdfdb.store.files import regular_bytes
-from brdfdb.store.manifest import check_manifest, read_manifest, whole_revisions
-from brdfdb.store.marker import check_marker
+from brdfdb.store.files import read_sealed, regular_bytes
 from brdfdb.store.paths import (
     HEAD,
     NAME,
@@ -47,9 +45,17 @@ from brdfdb.store.paths import (
     revision_path,
     staged_path,
 )
-from brdfdb.store.pointer import Head, check_summary, head_from
-from brdfdb.store.sealed_json import read_sealed
-from brdfdb.store.snapshot_record import Snapshot, read_snapshot
+from brdfdb.store.records import (
+    Head,
+    Snapshot,
+    check_manifest,
+    check_marker,
+    check_summary,
+    head_from,
+    read_manifest,
+    read_snapshot,
+    whole_revisions,
+)
 from brdfdb.store.summary_words import COLUMNS, colours, energy, formula_error, kind, last_audit
 
 if TYPE_CHECKING:
@@ -60,24 +66,24 @@ if TYPE_CHECKING:
     from brdfdb.tables.table import Table
 
 
-CACHE_BYTES = 256 * 2**20  # of decoded tables that a Store keeps
-_OBJECTS_BYTES = 20_000  # of a decoded table beside its arrays: metadata and what kernels take
+CACHE_BYTES = 256 * 2**20  # largest size of the decoded tables in memory
+_OBJECTS_BYTES = 20_000  # size of a decoded table without its arrays: metadata and arguments of kernels
 
 
 class Store(Mapping[str, "Table"]):
     """A store opened for reading: a mapping from material names to decoded tables of the current revisions.
 
-    Threads may share it. A child of `os.fork` may go on using it, also while threads of the parent read tables, once
-    one table was read before the fork: the first one imports modules, whose locks a child would find taken.
+    Threads may share it. A child of `os.fork` may go on using it, also while threads of the parent read tables, once a
+    table was read before the fork: the first one imports modules, whose locks a child would find taken.
 
     Parameters
     ----------
     root : path
-        Directory of the store; a relative one is taken from the directory that is current now.
+        Directory of the store; a relative path begins at the working directory of the call.
     cache_bytes : int
-        Bytes of decoded tables that are kept; those used last stay, and always the very last.
+        Largest size of the decoded tables in memory; the tables used last stay, at least one.
     snapshot : str, optional
-        Name of a snapshot: the materials, revisions and families that it names are the store, whatever is built later.
+        Name of a snapshot: the store has the materials, revisions and families that it names, whatever is built later.
 
     Raises
     ------
@@ -93,14 +99,15 @@ class Store(Mapping[str, "Table"]):
         self.snapshot: Snapshot | None = None if snapshot is None else read_snapshot(self.root, snapshot)
         self._cache_bytes = cache_bytes
         self._decoded: OrderedDict[tuple[str, str], Table] = OrderedDict()
-        self._pointers: dict[str, _Pointer] = {}
+        self._pointers: dict[str, Pointer] = {}
         self._lock = threading.Lock()
         self._decoding = threading.Lock()
         _OPEN[next(_NUMBERS)] = self
 
     def _repr_html_(self) -> str:
         """Return the store for notebooks: its materials, with their errors and the answers of its last audit."""
-        audits, rows = last_audit(self.root), []
+        audits = last_audit(self.root)
+        rows = []
         for name in self:
             try:
                 head = self.summary(name)
@@ -140,14 +147,15 @@ class Store(Mapping[str, "Table"]):
         return isinstance(name, str) and self._has(name)
 
     def _has(self, name: str) -> bool:
-        """Return whether there is a material of a name, be it one whose pointer was lost."""
+        """Return whether there is a material of a name; its pointer may be lost."""
         return NAME.fullmatch(name) is not None and (
             pointer_path(material_path(self.root, name)).is_file() or self._lost(name)
         )
 
     def _lost(self, name: str) -> bool:
         """Return whether a material has revisions, and no pointer that a first publication is about to write."""
-        material, staged = material_path(self.root, name), staged_path(self.root, name)
+        material = material_path(self.root, name)
+        staged = staged_path(self.root, name)
         revisions = [group.name for group in whole_revisions(material)]
         if not revisions or (revisions == ["r000001"] and any(path.is_dir() for path in staged.glob("*"))):
             return False
@@ -155,73 +163,62 @@ class Store(Mapping[str, "Table"]):
 
     def __getitem__(self, name: str) -> Table:
         while True:
-            group, digest = self.location(name)
+            location = self.location(name)
             try:
-                return self._table(name, group, digest)
+                return self._table(name, location)
             except StoreError:
-                if self.location(name) == (group, digest):
+                if self.location(name) == location:
                     raise
-                # a newer revision was published, and the one we were reading removed: read the newer one
+                # a newer revision was published, and this one removed meanwhile: read the newer one
 
     def table(self, name: str, revision: str) -> Table:
         """Return the decoded table of a revision, current or not: ``r000003``, or ``r000003-0123456789abcdef``.
 
         The second name has the first 16 digits of `Table.digest`, and means the same table in any store.
-
-        Raises
-        ------
-        UnknownMaterialError, UnknownRevisionError
-            If the store has no such material, or it no such revision.
-        StoreError
-            If the revision is damaged.
+        UnknownMaterialError and UnknownRevisionError say that there is none; StoreError, that it is damaged.
         """
-        return self._table(name, *self.located(name, revision))
+        return self._table(name, self.located(name, revision))
 
-    def located(self, name: str, revision: str) -> tuple[Path, str]:
-        """Return the directory of a revision, current or not, and the digest of its manifest; errors as by `table`."""
+    def located(self, name: str, revision: str) -> Location:
+        """Return where a revision lies, current or not; errors as by `table`."""
         number, dash, _ = revision.partition("-")
-        group, digest, head = self.current(name)
+        current = self.current(name)
+        group, digest = current.location
         if number != group.name:
             if number not in self.revisions(name):
                 raise UnknownRevisionError(f"{name} has no revision {revision[:40]!r}; the current one is {group.name}")
             group = group.with_name(number)
-            # one that no pointer knows was left by a crash: it is known by the digest in its first line
-            digest = read_manifest(group, head["manifests"].get(number))[1]
+            # a revision that a crash left is not in the pointer: the seal of its manifest is checked
+            digest = read_manifest(group, current.head["manifests"].get(number)).digest
         if dash and revision != pinned(number, digest):
             raise UnknownRevisionError(f"{name} has no revision {revision[:40]!r}; here it is {pinned(number, digest)}")
-        return group, digest
+        return Location(group, digest)
 
     def revisions(self, name: str) -> list[str]:
-        """Return the revisions of a material that are whole, oldest first; of a snapshot the one it names."""
+        """Return the complete revisions of a material, oldest first; of a snapshot the one that it names."""
         current = self.path(name)
         groups = whole_revisions(current.parent) if self.snapshot is None else [current]
         return [group.name for group in groups]
 
     def held(self, name: str) -> Table | None:
-        """Return the current table of a material if it is decoded already, without waiting; None else.
-
-        Raises
-        ------
-        StoreError
-            As `location` does.
-        """
+        """Return the current table of a material if it is decoded already, without waiting, else None."""
         pointer = self._read_pointer(name)
-        return None if pointer is None else self._used((name, pointer.location[1]))
+        return None if pointer is None else self._used((name, pointer.location.digest))
 
-    def _table(self, name: str, group: Path, digest: str) -> Table:
-        key = name, digest
-        if (held := self._used(key)) is not None:
-            return held
-        with self._decoding:  # who asks for the same table meanwhile waits for it
-            if (held := self._used(key)) is not None:
-                return held
-            files = check_manifest(group, digest, contents=False)["files"]
+    def _table(self, name: str, location: Location) -> Table:
+        key = name, location.digest
+        if (decoded := self._used(key)) is not None:
+            return decoded
+        with self._decoding:  # a thread that asks for the same table waits for it
+            if (decoded := self._used(key)) is not None:
+                return decoded
+            files = check_manifest(*location, contents=False)["files"]
             from brdfdb.store.decoding import decode  # lists need no arrays
 
-            table = decode(name, group, files, digest)
+            table = decode(name, location.group, files, location.digest)
             with self._lock:
                 self._decoded[key] = table
-                size = sum(decoded.nbytes + _OBJECTS_BYTES for decoded in self._decoded.values())
+                size = sum(table.nbytes + _OBJECTS_BYTES for table in self._decoded.values())
                 while size > self._cache_bytes and len(self._decoded) > 1:
                     size -= self._decoded.popitem(last=False)[1].nbytes + _OBJECTS_BYTES
             return table
@@ -234,38 +231,27 @@ class Store(Mapping[str, "Table"]):
             return self._decoded.get(key)
 
     def head(self, name: str) -> str:
-        """Return the current revision of a material, such as ``r000003``, read anew each time.
-
-        Raises
-        ------
-        UnknownMaterialError
-            If the store has no such material.
-        """
+        """Return the current revision of a material, such as ``r000003``, at this moment; errors as by `summary`."""
         return self.path(name).name
 
     def path(self, name: str) -> Path:
         """Return the directory of the current revision: a zarr group that xarray opens."""
-        return self.location(name)[0]
+        return self.location(name).group
 
     def summary(self, name: str) -> Head:
-        """Return what lists show of the current revision: what its pointer says, without a look at the table.
+        """Return the content of the pointer of a material: what lists show of the current revision.
 
-        Raises
-        ------
-        UnknownMaterialError
-            If the store has no such material.
-        StoreError
-            If the pointer is damaged.
+        UnknownMaterialError says that the store has no such material; StoreError, that the pointer is damaged.
         """
-        return self._pointer(name).head
+        return self.current(name).head
 
     def metadata(self, name: str) -> TableMetadata:
         """Return the metadata of the current revision, without decoding its values; errors as by `summary`."""
-        from brdfdb.store.decoding import read_metadata
+        from brdfdb.store.records import read_metadata
 
-        group, digest = self.location(name)
-        check_manifest(group, digest, contents=False)
-        return read_metadata(group)
+        location = self.location(name)
+        check_manifest(*location, contents=False)
+        return read_metadata(location.group)
 
     def families(self) -> list[str]:
         """Return the names of the families, sorted."""
@@ -283,19 +269,14 @@ class Store(Mapping[str, "Table"]):
     def family(self, name: str) -> Family:
         """Return a family: its model at any parameters between those of its members.
 
-        Raises
-        ------
-        UnknownFamilyError
-            If the store has no such family.
-        StoreError
-            If its record cannot be read.
+        UnknownFamilyError says that the store has no such family; StoreError, that its record cannot be read.
         """
         from brdfdb.store.family import Family, record_from
 
         return Family(record_from(self.family_content(name), f"the family {name}"), self)
 
     def family_content(self, name: str) -> dict[str, Any]:
-        """Return the record of a family as JSON, which is all that lists show of it; errors as by `family`."""
+        """Return the record of a family as JSON, for lists; errors as by `family`."""
         path = family_path(self.root, name)
         if self.snapshot is not None and name in self.snapshot["families"]:
             return self.snapshot["families"][name]
@@ -306,35 +287,29 @@ class Store(Mapping[str, "Table"]):
     def dataset(self, name: str, revision: str | None = None) -> xr.Dataset:
         """Return a revision, by default the current one, as a lazy Dataset: see `brdfdb.tables.xarray_view.opened`.
 
-        Raises
-        ------
-        UnknownMaterialError, UnknownRevisionError
-            If the store has no such material, or it no such revision.
-        StoreError
-            If a file of it is missing or changed, also later, while it is read; it names material, revision and file.
+        Errors are those of `table`; StoreError, naming material, revision and file, is also raised later, while the
+        Dataset is read.
         """
-        from brdfdb.store.zarr_store import Whole
+        from brdfdb.store.zarr_store import CheckedRevision
         from brdfdb.tables.xarray_view import opened
 
-        group, digest = self.location(name) if revision is None else self.located(name, revision)
-        files = check_manifest(group, digest, contents=False)["files"]
+        location = self.location(name) if revision is None else self.located(name, revision)
+        files = check_manifest(*location, contents=False)["files"]
         try:
-            return opened(Whole(group, files))
+            return opened(CheckedRevision(location.group, files))
         except ValueError as error:  # written by another program
-            raise StoreError(f"{name} {group.name} is no table: {error}") from error
+            raise StoreError(f"{name} {location.group.name} is no table: {error}") from error
 
     def verify(self, name: str) -> None:
         """Check every file of the current revision against its manifest, and the manifest against the pointer.
 
-        Raises
-        ------
-        StoreError
-            Naming the first file that is missing, of another size or of another content.
+        StoreError names the first file that is missing, of another size or of another content.
         """
-        group, digest, head = self.current(name)
-        check_summary(head, check_manifest(group, digest, contents=True))
+        current = self.current(name)
+        check_summary(current.head, check_manifest(*current.location, contents=True))
 
-    def _pointer(self, name: str) -> _Pointer:
+    def current(self, name: str) -> Pointer:
+        """Return the pointer of a material, from one look at it; errors as by `summary`."""
         pointer = self._read_pointer(name)
         if pointer is not None:
             return pointer
@@ -342,9 +317,10 @@ class Store(Mapping[str, "Table"]):
             raise StoreError(f"{name} is damaged: {HEAD} is missing")
         raise UnknownMaterialError(name, list(self))
 
-    def _pinned(self, name: str, snapshot: Snapshot) -> _Pointer | None:
-        """Return what the snapshot says of a material, as a pointer; None of one that it does not name."""
-        known, pin = self._pointers.get(name), snapshot["materials"].get(name)
+    def _pinned(self, name: str, snapshot: Snapshot) -> Pointer | None:
+        """Return the pointer of a material to the revision that the snapshot names; None if it names none."""
+        known = self._pointers.get(name)
+        pin = snapshot["materials"].get(name)
         if known is None and pin is not None:
             group = revision_path(self.root, name, pin["revision"])
             manifest, digest = read_manifest(group, pin["manifest_sha256"])
@@ -355,10 +331,10 @@ class Store(Mapping[str, "Table"]):
                 "manifests": {group.name: digest},
                 "last": number_of(group.name),
             }
-            known = self._pointers[name] = _pointer((0, 0, 0), pointer_path(group.parent), head)
+            known = self._pointers[name] = Pointer.of((0, 0, 0), pointer_path(group.parent), head)
         return known
 
-    def _read_pointer(self, name: str) -> _Pointer | None:
+    def _read_pointer(self, name: str) -> Pointer | None:
         """Return the pointer of a material, read anew if it changed; None if there is none."""
         if self.snapshot is not None:
             return self._pinned(name, self.snapshot)
@@ -371,48 +347,46 @@ class Store(Mapping[str, "Table"]):
             seen = at.st_ino, at.st_mtime_ns, at.st_size  # a swap gives the file a new inode
             if known is None or known.seen != seen:
                 head = head_from(path, regular_bytes(path))
-                known = self._pointers[name] = _pointer(seen, path, head)
+                known = self._pointers[name] = Pointer.of(seen, path, head)
         except (FileNotFoundError, NotADirectoryError):
             return None
         except OSError as error:
             raise StoreError(f"{name} is damaged: {HEAD} cannot be read: {error.strerror}") from error
         return known
 
-    def location(self, name: str) -> tuple[Path, str]:
-        """Return the directory of the current revision and the digest of its manifest, from one look at the pointer."""
-        return self._pointer(name).location
-
-    def current(self, name: str) -> tuple[Path, str, Head]:
-        """Return what `location` gives, and what else the pointer says, from one look at it."""
-        pointer = self._pointer(name)
-        return *pointer.location, pointer.head
+    def location(self, name: str) -> Location:
+        """Return where the current revision lies, from one look at the pointer; errors as by `summary`."""
+        return self.current(name).location
 
 
-class _Pointer(NamedTuple):
-    """The pointer of a material as it was read, and how to tell that it is another now.
+class Location(NamedTuple):
+    """Where a revision lies: its directory, and the digest of its manifest."""
 
-    `location` is the directory of the revision, and the digest of its manifest: made once, since lookups ask for it.
-    """
+    group: Path
+    digest: str
 
-    seen: tuple[int, int, int]
+
+class Pointer(NamedTuple):
+    """The pointer of a material as it was read, with the state of its file, which a change of the pointer changes."""
+
+    seen: tuple[int, int, int]  # inode, time of the last change [ns], size [byte]
     path: Path
     head: Head
-    location: tuple[Path, str]
+    location: Location  # of the current revision: made once, since each lookup asks for it
 
-
-def _pointer(seen: tuple[int, int, int], path: Path, head: Head) -> _Pointer:
-    revision = head["revision"]
-    return _Pointer(seen, path, head, (path.parent / revision, head["manifests"][revision]))
+    @classmethod
+    def of(cls, seen: tuple[int, int, int], path: Path, head: Head) -> Pointer:
+        """Return the pointer with the content of its file."""
+        revision = head["revision"]
+        return cls(seen, path, head, Location(path.parent / revision, head["manifests"][revision]))
 
 
 _OPEN: weakref.WeakValueDictionary[int, Store] = weakref.WeakValueDictionary()
-
-
 _NUMBERS = itertools.count()
 
 
 def _after_fork() -> None:
-    """Give the stores of a child new locks: a fork copies one thread only, and what others held stays locked.
+    """Give the stores of a child new locks, because a fork copies one thread, and locks of the others stay locked.
 
     The state behind the locks is valid at any moment. Waiting for the threads before a fork fails: they may need locks
     that the fork has taken already, such as that of thread pools.

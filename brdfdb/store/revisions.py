@@ -12,7 +12,6 @@ from typing import Any, Literal
 
 from brdfdb.errors import BusyError, ParameterError, StoreError, UnknownMaterialError
 from brdfdb.store.lock import Lock, writing
-from brdfdb.store.manifest import Summary, check_manifest, read_manifest, whole_revisions
 from brdfdb.store.paths import (
     marker_path,
     material_path,
@@ -23,9 +22,17 @@ from brdfdb.store.paths import (
     revision_path,
     staging_path,
 )
-from brdfdb.store.pointer import known_manifests, point_to
 from brdfdb.store.reader import Store
-from brdfdb.store.snapshot_record import read_snapshot, snapshot_names
+from brdfdb.store.records import (
+    Summary,
+    check_manifest,
+    known_manifests,
+    point_to,
+    read_manifest,
+    read_snapshot,
+    snapshot_names,
+    whole_revisions,
+)
 
 SNAPSHOTS = ".snapshots"  # the lock that snapshots and collections take in turns; no material has such a name
 
@@ -34,14 +41,8 @@ SNAPSHOTS = ".snapshots"  # the lock that snapshots and collections take in turn
 class Standing:
     """The standing of a material towards a request.
 
-    Attributes
-    ----------
-    state : str
-        "current" if the current revision answers it and is undamaged, "adoptable" if another one does, else "missing".
-    revision : str
-        The one that answers it; empty if none does.
-    why : str
-        In a phrase, why the current revision does not.
+    "current" if the current revision answers it and is undamaged, "adoptable" if another one does, else "missing"; the
+    revision that answers it, if any; and in a phrase why the current revision does not.
     """
 
     state: Literal["current", "adoptable", "missing"]
@@ -57,11 +58,11 @@ def standing(root: Path, name: str, request: Mapping[str, Any]) -> Standing:
     store = Store(root)
     why = "new"
     try:
-        if name in store:  # the error of `current` for one that is not compares its name with all others
-            group, _, head = store.current(name)
+        if name in store:  # the error for an unknown material compares its name with all others
+            head = store.summary(name)
             if head["request_sha256"] == wanted:
                 store.verify(name)
-                return Standing("current", group.name)
+                return Standing("current", head["revision"])
             why = difference(store.metadata(name).whole_request, request)
     except StoreError as error:
         why = str(error)
@@ -75,9 +76,9 @@ def adoptable(root: Path, name: str, request_sha256: str) -> str | None:
     known = known_manifests(material)
     for group in reversed(whole_revisions(material)):
         with suppress(StoreError):
-            manifest, digest = read_manifest(group, known.get(group.name))
-            if manifest["summary"]["request_sha256"] == request_sha256:
-                check_manifest(group, digest, contents=True)
+            manifest = read_manifest(group, known.get(group.name))
+            if manifest.content["summary"]["request_sha256"] == request_sha256:
+                check_manifest(group, manifest.digest, contents=True)
                 return group.name
     return None
 
@@ -89,7 +90,8 @@ def difference(old: Mapping[str, Any], new: Mapping[str, Any]) -> str:
     new = json.loads(json.dumps(new))
     changes: list[str] = []
     for key in sorted({*old, *new}):
-        before, after = old.get(key), new.get(key)
+        before = old.get(key)
+        after = new.get(key)
         if before == after:
             continue
         words = key.replace("_", " ")
@@ -113,38 +115,23 @@ class Revision:
 
 
 def history(root: Path, name: str) -> list[Revision]:
-    """Return the revisions of a material that are whole, oldest first.
-
-    Raises
-    ------
-    UnknownMaterialError
-        If the store has no such material.
-    StoreError
-        If a manifest cannot be read.
-    """
-    current, _, head = Store(root).current(name)
-    return [
-        Revision(group.name, read_manifest(group, head["manifests"].get(group.name))[0]["summary"], group == current)
-        for group in whole_revisions(current.parent)
-    ]
+    """Return the complete revisions of a material, oldest first; StoreError if a manifest cannot be read."""
+    head = Store(root).summary(name)
+    revisions = []
+    for group in whole_revisions(material_path(root, name)):
+        manifest = read_manifest(group, head["manifests"].get(group.name)).content
+        revisions.append(Revision(group.name, manifest["summary"], group.name == head["revision"]))
+    return revisions
 
 
 def rollback(root: Path, name: str, revision: str) -> str:
-    """Make an older revision current again, or a newer one; this repairs a pointer that is missing or damaged, too.
+    """Make another revision current, which also repairs a pointer that is missing or damaged.
 
-    Returns
-    -------
-    str
-        The revision that was current; empty if the pointer was missing or damaged.
-
-    Raises
-    ------
-    UnknownMaterialError
-        If the store has no such material.
-    StoreError
-        If the material has no such revision, or it is damaged.
+    Returns the revision that was current; empty if the pointer was missing or damaged. StoreError says that the
+    material has no such revision, or that it is damaged.
     """
-    store, material = Store(root), material_path(root, name)
+    store = Store(root)
+    material = material_path(root, name)
     if name not in store:
         raise UnknownMaterialError(name, list(store))
     with Lock(root, name):
@@ -162,17 +149,7 @@ def rollback(root: Path, name: str, revision: str) -> str:
 
 @dataclass
 class Collected:
-    """The result of a collection.
-
-    Attributes
-    ----------
-    removed : list of str
-        Paths, below the root of the store.
-    busy : list of str
-        Materials that were left alone, since a build is at work on them.
-    freed : int
-        Bytes.
-    """
+    """The result of a collection: removed paths below the root, materials with a build at work, and freed bytes."""
 
     removed: list[str] = field(default_factory=list)
     busy: list[str] = field(default_factory=list)
@@ -180,13 +157,12 @@ class Collected:
 
 
 def collect(root: Path, keep: int = 2, *, damaged: bool = False) -> Collected:
-    """Remove what no reader is served and no build is at work on.
+    """Remove what neither readers nor builds use.
 
-    Staging directories of builds that were broken off (they could have been resumed), revisions that are neither
-    current nor among the newest nor named by a snapshot, and what crashes and others left behind: directories without
-    a manifest, manifests without a directory, temporary files, files in a revision that its manifest does not list. A
-    reader that holds a decoded table keeps it; one that is just reading a revision that goes reads the current one
-    instead, or is told.
+    Staging directories of interrupted builds (they could have been resumed), revisions that are neither current nor
+    among the newest nor named by a snapshot, and the remains of crashes: directories without a manifest, manifests
+    without a directory, temporary files, files in a revision that its manifest does not list. Decoded tables stay
+    usable; a reader of a revision that is removed reads the current one instead, or gets an error.
 
     Parameters
     ----------
@@ -215,7 +191,7 @@ def collect(root: Path, keep: int = 2, *, damaged: bool = False) -> Collected:
 
 
 def pinned(root: Path) -> dict[Path, str]:
-    """Return the revisions that snapshots name, each with the name of one; StoreError if a snapshot is damaged."""
+    """Return the revisions that snapshots name, with the name of a snapshot; StoreError if a snapshot is damaged."""
     groups = {}
     for name in snapshot_names(root):
         for material, pin in read_snapshot(root, name)["materials"].items():
@@ -232,7 +208,8 @@ def _collect(store: Store, keep: int, damaged: bool, collected: Collected) -> No
         raise StoreError(f"nothing is collected, since {error}; remove it with `brdfdb snapshot --remove`") from error
     for path in store.root.glob(f".{marker_path(store.root).name}.*"):
         _remove(store.root, path, collected)
-    staged, materials = staging_path(store.root), materials_path(store.root)
+    staged = staging_path(store.root)
+    materials = materials_path(store.root)
     names = {path.name for directory in (staged, materials) for path in directory.iterdir() if path.is_dir()}
     for name in sorted(names - {SNAPSHOTS}):
         try:
@@ -255,18 +232,19 @@ def _collect(store: Store, keep: int, damaged: bool, collected: Collected) -> No
 def _collect_material(
     store: Store, material: Path, keep: int, damaged: bool, stay: set[Path], collected: Collected
 ) -> None:
-    whole, known = whole_revisions(material), known_manifests(material)
+    revisions = whole_revisions(material)
+    known = known_manifests(material)
     kept: set[Path] = set()
     try:
         current = store.path(material.name)
-        others = [group for group in whole if group != current]
-        # what a snapshot names stays, damaged or not: half of it may be all that is left
+        others = [group for group in revisions if group != current]
+        # a revision that a snapshot names stays, even damaged: it may be the only copy
         kept = {current, *others[max(0, len(others) - (keep - 1)) :], *stay}
     except UnknownMaterialError:  # nothing but what crashes left behind
         current = material
     except StoreError:
         return  # nobody knows what the pointer pointed to: the next build repairs it
-    for group in sorted(kept & set(whole)):
+    for group in sorted(kept & set(revisions)):
         if damaged and group != current and group not in stay:
             try:
                 check_manifest(group, known.get(group.name), contents=True)
@@ -286,7 +264,7 @@ def _collect_material(
 def strangers(group: Path, digest: str | None) -> list[Path]:
     """Return the files in a revision that its manifest does not list; none where the manifest is damaged."""
     try:
-        files = read_manifest(group, digest)[0]["files"]
+        files = read_manifest(group, digest).content["files"]
     except StoreError:
         return []
     return [path for path in group.rglob("*") if path.is_file() and path.relative_to(group).as_posix() not in files]

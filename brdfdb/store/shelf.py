@@ -8,11 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from brdfdb.errors import StoreError, UnknownMaterialError
-from brdfdb.store.catalogue import line_of
-from brdfdb.store.last_audit import AuditFile, Verdict
-from brdfdb.store.manifest import check_manifest
+from brdfdb.store.catalogue import AuditFile, Verdict, line_of
 from brdfdb.store.paths import manifest_path
-from brdfdb.store.reader import CACHE_BYTES, Store
+from brdfdb.store.reader import CACHE_BYTES, Location, Store
+from brdfdb.store.records import check_manifest
 
 if TYPE_CHECKING:
     from brdfdb.tables.table import Table
@@ -21,14 +20,8 @@ if TYPE_CHECKING:
 class Shelf:
     """The materials of a store, as a program shows them that runs while the store changes.
 
-    Parameters
-    ----------
-    root, cache_bytes, snapshot
-        As of `Store`. It is opened when it is first needed, so that there may be none yet.
-    audit_files : sequence of Path
-        What ``brdfdb audit`` wrote as JSON, such as the reports on all materials and on some; each may be missing.
-    store : Store, optional
-        An open one in place of `root`.
+    The store at `root`, or an open one, is opened when it is first needed: there may be none yet. `audit_files` are
+    what ``brdfdb audit`` wrote as JSON, such as the reports on all materials and on some; each may be missing.
     """
 
     def __init__(
@@ -40,7 +33,9 @@ class Shelf:
         store: Store | None = None,
     ) -> None:
         self._root = root.absolute()  # resolved now: the working directory may change
-        self._cache_bytes, self._snapshot, self._store = cache_bytes, snapshot, store
+        self._cache_bytes = cache_bytes
+        self._snapshot = snapshot
+        self._store = store
         self._seen: set[str] = set()
         self._summaries: dict[str, tuple[str, dict[str, Any]]] = {}
         self._audits = [AuditFile(path) for path in audit_files]
@@ -48,13 +43,13 @@ class Shelf:
 
     @property
     def store(self) -> Store:
-        """Open store; StoreError if there is none."""
+        """The open store; StoreError if it does not exist."""
         if self._store is None:
             self._store = Store(self._root, self._cache_bytes, snapshot=self._snapshot)
         return self._store
 
     def held(self, name: str) -> Table | None:
-        """Return the current table of a material if it is decoded already, else None: `table` raises the reason."""
+        """Return the current table of a material if it is decoded already, else None; `table` raises the reason."""
         try:
             return self.store.held(name)
         except StoreError:
@@ -63,12 +58,8 @@ class Shelf:
     def table(self, name: str, revision: str | None = None) -> Table:
         """Return the table of a material, of its current revision or another.
 
-        Raises
-        ------
-        UnknownMaterialError, UnknownRevisionError
-            If there is none.
-        StoreError
-            If it cannot be read, or was there and is gone; the sentence names the material.
+        UnknownMaterialError and UnknownRevisionError say that there is none; StoreError, naming the material, that it
+        cannot be read, or was there and is gone.
         """
         with self._named(name):
             table = self.store[name] if revision is None else self.store.table(name, revision)
@@ -80,14 +71,14 @@ class Shelf:
         with self._named(name):
             return self.store.head(name)
 
-    def located(self, name: str, revision: str | None = None) -> tuple[Path, str]:
-        """Return the directory of a revision, and the digest of its manifest; errors as of `table`."""
+    def located(self, name: str, revision: str | None = None) -> Location:
+        """Return where a revision lies; errors as of `table`."""
         with self._named(name):
-            group, digest = self.store.location(name) if revision is None else self.store.located(name, revision)
-            if not manifest_path(group).is_file():
-                raise StoreError(f"{name} {group.name} is damaged: its manifest is missing")
+            location = self.store.location(name) if revision is None else self.store.located(name, revision)
+            if not manifest_path(location.group).is_file():
+                raise StoreError(f"{name} {location.group.name} is damaged: its manifest is missing")
         self._seen.add(name)
-        return group, digest
+        return location
 
     @contextlib.contextmanager
     def _named(self, name: str) -> Iterator[None]:
@@ -110,11 +101,12 @@ class Shelf:
     def summary(self, name: str) -> dict[str, Any]:
         """Return the line of a material in lists; for a damaged one its name and a sentence."""
         try:
-            group, digest, head = self.store.current(name)
+            current = self.store.current(name)
+            group, digest = current.location
             known = self._summaries.get(name)
             if known is None or known[0] != digest:
                 check_manifest(group, digest, contents=False)
-                known = self._summaries[name] = digest, line_of(name, group, head)
+                known = self._summaries[name] = digest, line_of(name, group, current.head)
         except (UnknownMaterialError, StoreError) as error:
             return {"name": name, "damaged": str(error)}
         verdict = self.verdict(name)
@@ -132,7 +124,7 @@ class Shelf:
             self.warming = False
 
     def verdict(self, name: str) -> Verdict | None:
-        """Return the last audit of a material, of its current revision if there is one; None without a report on it."""
+        """Return the last audit of a material, preferably of its current revision; None without one."""
         reports = [audit.read() for audit in self._audits]
         audits = [(report.by_name[name], report.when) for report in reports if name in report.by_name]
         if not audits:
@@ -140,6 +132,6 @@ class Shelf:
         with self._named(name):
             group, digest = self.store.location(name)
         verdicts = [Verdict(audited, when, audited.is_of(group.name, digest)) for audited, when in audits]
-        # of another table with the number of the current revision, as of a store that was built anew, nothing is said
-        known = [verdict for verdict in verdicts if verdict.current or verdict.finding.revision != group.name]
-        return max(known, key=lambda verdict: (verdict.current, verdict.when), default=None)
+        # leave out a report on another table with the number of the current revision, as of a store that was rebuilt
+        verdicts = [verdict for verdict in verdicts if verdict.current or verdict.finding.revision != group.name]
+        return max(verdicts, key=lambda verdict: (verdict.current, verdict.when), default=None)

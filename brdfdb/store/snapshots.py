@@ -13,49 +13,36 @@ from pathlib import Path
 
 from brdfdb.errors import ParameterError, StoreError
 from brdfdb.store.family import stale
-from brdfdb.store.files import sync_directory
+from brdfdb.store.files import seal_of, sync_directory, write_sealed
 from brdfdb.store.lock import Lock, writing
 from brdfdb.store.paths import NAME, snapshot_path
 from brdfdb.store.reader import Store
+from brdfdb.store.records import SNAPSHOT_FORMAT, SNAPSHOT_VERSION, Pin, Snapshot, read_snapshot
 from brdfdb.store.revisions import SNAPSHOTS
-from brdfdb.store.sealed_json import seal_of, write_sealed
-from brdfdb.store.snapshot_record import SNAPSHOT_FORMAT, SNAPSHOT_VERSION, Pin, Snapshot, read_snapshot
 
 
 def create(root: Path, name: str, advance: Callable[[], None] = lambda: None) -> str:
     """Name the current revisions of all materials, and the families; return the digest of the snapshot.
 
-    Parameters
-    ----------
-    root : Path
-        Directory of the store.
-    name : str
-        Lower-case letters, digits and single hyphens.
-    advance : callable
-        Called after each material, every file of which is read.
-
-    Raises
-    ------
-    ValueError
-        If the name is none.
-    StoreError
-        If the store has a snapshot of this name, or no material; if a material is damaged or a family out of date.
+    Every file of each material is read; `advance` is called after each. StoreError says that the store has a snapshot
+    of this name or no material, that a material is damaged or a family out of date.
     """
     if not NAME.fullmatch(name):
         raise ParameterError(
             "snapshot", f"{name[:60]!r} is not made of lower-case letters, digits and single hyphens", name
         )
-    store, path = Store(root), snapshot_path(root, name)
+    store = Store(root)
+    path = snapshot_path(root, name)
     with Lock(root, SNAPSHOTS) as lock:
         if path.exists():
             raise StoreError(f"the store at {root} has a snapshot {name}, which never changes; take another name")
         materials: dict[str, Pin] = {}
         requests: dict[str, str] = {}
         for material in store:
-            group, digest, head = store.current(material)
+            current = store.current(material)
             store.verify(material)
-            materials[material] = {"revision": group.name, "manifest_sha256": digest}
-            requests[material] = head["request_sha256"]
+            materials[material] = {"revision": current.head["revision"], "manifest_sha256": current.location.digest}
+            requests[material] = current.head["request_sha256"]
             advance()
         if not materials:
             raise StoreError(f"the store at {root} has no material to name")
@@ -82,17 +69,11 @@ def create(root: Path, name: str, advance: Callable[[], None] = lambda: None) ->
 
 
 def remove(root: Path, name: str) -> None:
-    """Remove a snapshot, damaged or not; the revisions stay until they are collected.
-
-    Raises
-    ------
-    StoreError
-        If there is none of this name.
-    """
+    """Remove a snapshot, damaged or not; the revisions stay until they are collected. StoreError if there is none."""
     with Lock(root, SNAPSHOTS):
         path = snapshot_path(root, name)
         if not (NAME.fullmatch(name) and path.is_file()):
-            read_snapshot(root, name)  # says which there are
+            read_snapshot(root, name)  # it raises an error that names the others
         with writing(root, f"the snapshot {name}"):
             path.unlink()
             sync_directory(path.parent)

@@ -29,24 +29,23 @@ from brdfdb.errors import (
     BusyError,
     StoreError,
 )
-from brdfdb.store.files import Entry, sha256_of, write_file, write_files
+from brdfdb.store.files import FileEntry, read_sealed, sealed, sha256_of, write_file, write_files
 from brdfdb.store.lock import Lock, writing
 from brdfdb.store.paths import marker_path, materials_path, request_path, staging_path, store_of_staged
-from brdfdb.store.sealed_json import read_sealed, sealed, write_json
 from brdfdb.tables import tabulation
 from brdfdb.tables.layout import Layout, digest
 
 
 class Block(TypedDict):
-    """A block that is whole: its file inside the group, and whether an earlier build had written it."""
+    """A complete block: its file inside the group, and whether an earlier build wrote it."""
 
     name: str
-    entry: Entry
+    entry: FileEntry
     kept: bool
 
 
 def remove_begun(root: Path) -> None:
-    """Remove a store that was made a moment ago, with what is staged; a material or another build makes it stay."""
+    """Remove a new store and its staged builds, unless it has a material or another build is at work."""
     if any(materials_path(root).glob("*")):
         return
     with suppress(OSError, BusyError, StoreError):
@@ -74,7 +73,7 @@ def prepare(root: Path, name: str, request: Mapping[str, Any], layout: str) -> P
 
 
 def discard(root: Path, name: str, request: Mapping[str, Any]) -> None:
-    """Remove what is staged of a request; the lock must be held."""
+    """Remove the staging directory of a request; the caller holds the lock."""
     shutil.rmtree(request_path(root, name, digest(request)), ignore_errors=True)
 
 
@@ -93,12 +92,9 @@ def planned(root: Path, name: str, request: Mapping[str, Any]) -> str | None:
 
 @lru_cache(maxsize=64)
 def _layout(text: str) -> Layout:
-    """Return a layout from JSON. Kept, since a worker gets many blocks of one.
+    """Return a layout from JSON; the cache serves a worker that gets many blocks of one layout.
 
-    Raises
-    ------
-    StoreError
-        If this program would compute something else than the program that wrote the JSON.
+    StoreError says that the JSON is of another version of this program, which computes something else.
     """
     document = json.loads(text)
     layout = Layout.from_document(document)
@@ -108,23 +104,10 @@ def _layout(text: str) -> Layout:
 
 
 def write_block(staging: str, layout: str, number: int, values: NDArray[np.float32] | None = None) -> Block:
-    """Compute a block and write it, unless it is there already: the task that a build gives to its workers.
+    """Compute a block and write it, unless it is complete already: the task that a build gives to its workers.
 
-    Parameters
-    ----------
-    staging : str
-        The staging directory, on a file system that builder and worker share.
-    layout : str
-        Of the table, as JSON.
-    number : int
-        Of the block.
-    values : float32 array, optional
-        The values of the block, if they are known.
-
-    Raises
-    ------
-    StoreError
-        If it cannot be written.
+    `staging` and `layout` are text: a directory that builder and worker share, and JSON. `values` are those of the
+    block, if they are known already. StoreError says that it cannot be written.
     """
     from brdfdb.store.codec import chunk_bytes, chunk_name
 
@@ -139,8 +122,9 @@ def write_block(staging: str, layout: str, number: int, values: NDArray[np.float
     data = chunk_bytes(values, table.block_rows)
     with writing(store_of_staged(directory), table.source.name):
         entry = write_file(path, data, directory)
-        # `_kept` reads the block, and notices what a power cut left of the marker
-        write_json(marker, {**entry, "layout": _short(layout)}, directory, sync=False)
+        record = {**entry, "layout": _short(layout)}
+        # `_kept` compares the block with its marker, and notices a marker that a power cut damaged
+        write_file(marker, json.dumps(record, indent=1).encode(), directory, sync=False)
     return {"name": name, "entry": entry, "kept": False}
 
 
@@ -148,29 +132,23 @@ def _short(layout: str) -> str:
     return digest({"layout": layout})[:16]
 
 
-def _kept(marker: Path, path: Path, layout: str) -> Entry | None:
-    """Return the entry of a block in its marker, if the block on disk agrees; None else."""
+def _kept(marker: Path, path: Path, layout: str) -> FileEntry | None:
+    """Return the entry of a block in its marker if the block on disk agrees, else None."""
     try:
         content = json.loads(marker.read_bytes())
-        entry: Entry = {"size": content["size"], "sha256": content["sha256"]}
-        whole = (
+        entry: FileEntry = {"size": content["size"], "sha256": content["sha256"]}
+        agrees = (
             content["layout"] == _short(layout)
             and path.stat().st_size == entry["size"]
             and sha256_of(path) == entry["sha256"]
         )
     except (OSError, ValueError, KeyError, TypeError):
         return None
-    return entry if whole else None
+    return entry if agrees else None
 
 
-def write_frame(staging: str, layout: str) -> dict[str, Entry]:
-    """Write all of a table but its blocks, which are there: the last task of a table; returns the files it wrote.
-
-    Raises
-    ------
-    StoreError
-        If they cannot be written.
-    """
+def write_frame(staging: str, layout: str) -> dict[str, FileEntry]:
+    """Write all of a table but its blocks, which exist, as the last task of a table; return the written files."""
     from brdfdb.store.codec import frame_files
     from brdfdb.tables.statements import stated_metadata
 
@@ -188,24 +166,25 @@ def write_frame(staging: str, layout: str) -> dict[str, Entry]:
 def _reader(layout: Layout, table: Path) -> Callable[[slice], NDArray[np.float32]]:
     """Return a function that reads rows of a table from the finished blocks in the group `table`.
 
-    A table whose albedo is integrated is held as a whole, so that each block is decoded once.
+    A small table, whose albedo is integrated, is decoded at once, each block once.
     """
     from brdfdb.store.codec import chunk_name, decoded
-    from brdfdb.tables.formula_measurement import LARGE
+    from brdfdb.tables.statements import LARGE
 
     @lru_cache(maxsize=4)
     def block(number: int) -> NDArray[np.float32]:
         return decoded(layout, number, (table / chunk_name(layout, number)).read_bytes())
 
     def read(rows: slice) -> NDArray[np.float32]:
-        first, last = rows.start // layout.block_rows, (rows.stop - 1) // layout.block_rows
+        first = rows.start // layout.block_rows
+        last = (rows.stop - 1) // layout.block_rows
         start = first * layout.block_rows
         blocks = np.concatenate([block(number) for number in range(first, last + 1)])
         return blocks[rows.start - start : rows.stop - start]
 
     if layout.size > LARGE:
         return read
-    whole = np.empty(layout.shape, dtype=np.float32)
+    values = np.empty(layout.shape, dtype=np.float32)
     for number, rows in enumerate(layout.blocks):
-        whole[rows] = decoded(layout, number, (table / chunk_name(layout, number)).read_bytes())
-    return whole.__getitem__
+        values[rows] = decoded(layout, number, (table / chunk_name(layout, number)).read_bytes())
+    return values.__getitem__

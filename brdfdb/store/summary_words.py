@@ -15,9 +15,8 @@ NOT_MEASURED = "not measured"
 NOT_AUDITED = "not audited"
 # What the two errors of a list are, for the line below it
 ERRORS_EXPLAINED = (
-    "table error: the table against its formula; formula error: the formula against "
-    "the highest rung, which is the form of the same model without an approximation; 0, exact form: the formula is "
-    "that form; of measured tables, the table against the data"
+    "table error: of the table relative to its formula, or to the data if it is measured; formula error: of the "
+    "formula relative to the exact form of the same model; 0, exact form: the formula is exact"
 )
 COLUMNS = ("what the paper says?", "model conserves energy?")  # headings of the two answers
 
@@ -41,7 +40,7 @@ def last_audit(root: Path) -> dict[tuple[str, str], Audited]:
 
 
 def audited_materials(root: Path) -> list[dict[str, Any]]:
-    """Return the entries of the reports that lie in a store: of all materials and of some, the newer report last.
+    """Return the entries of the reports in a store, on all materials and on a part of them, the newer report last.
 
     Entries of other tables are left out, as of a store that was built anew: see `is_of_store`.
     """
@@ -100,7 +99,7 @@ def formula_error(head: Mapping[str, Any], percent: Callable[[float], str]) -> s
         return NOT_MEASURED
     if stated["against"] == "measured":
         return percent(stated["p99"])
-    return "0, exact form" if stated["against"] == "highest rung" else "none known"
+    return "0, exact form" if stated["against"] == "highest rung" else "no exact form"
 
 
 def energy(head: Mapping[str, Any], audited: Audited | None) -> str:
@@ -112,7 +111,7 @@ def energy(head: Mapping[str, Any], audited: Audited | None) -> str:
 
 
 def _beyond(head: Mapping[str, Any]) -> str:
-    """Return the angle beyond those judged where an albedo passes 1, in words; empty if there is none."""
+    """Return in words the grazing angle, beyond those judged, where an albedo passes 1; empty without one."""
     largest = head.get("largest_albedo") or {}
     passes = (largest.get("grazing") or {}).get("passes_1_at_theta_i_deg")
     return "" if passes is None else f"albedo of the {_whose(largest)} passes 1 at {near_90(passes)}°"

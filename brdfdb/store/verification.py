@@ -2,29 +2,34 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from brdfdb.errors import StoreError, UnknownMaterialError
-from brdfdb.store.decoding import read_metadata
-from brdfdb.store.files import Entry
-from brdfdb.store.manifest import check_manifest, read_manifest, whole_revisions
 from brdfdb.store.paths import manifest_path, material_path, revision_path, snapshot_path
-from brdfdb.store.pointer import Head, WrongSummaryError, check_summary
-from brdfdb.store.reader import Store
+from brdfdb.store.reader import Pointer, Store
+from brdfdb.store.records import (
+    WrongSummaryError,
+    check_manifest,
+    check_summary,
+    read_manifest,
+    read_metadata,
+    read_snapshot,
+    snapshot_names,
+    whole_revisions,
+)
 from brdfdb.store.revisions import pinned, strangers
-from brdfdb.store.snapshot_record import read_snapshot, snapshot_names
 
 _BUILD = "`brdfdb build` with its recipe repairs it"
-_BUILD_ANEW = "`brdfdb build` with its recipe makes it anew, then `brdfdb gc --damaged` removes this revision"
 
 
 @dataclass(frozen=True)
-class Finding:
-    """Damage of a material, a family or a snapshot, and the command that repairs it; a remark has no such command."""
+class StoreFinding:
+    """Damage of a material, a family or a snapshot, and the command that repairs it; empty for a remark."""
 
     name: str
     sentence: str
@@ -32,61 +37,67 @@ class Finding:
 
     @property
     def remark(self) -> bool:
-        """True if nothing is damaged: the sentence says what a table does not state of itself."""
+        """True if nothing is damaged, and the sentence names missing metadata of a table."""
         return not self.repair
 
     def __str__(self) -> str:
         return self.sentence if self.remark else f"{self.sentence}; {self.repair}"
 
 
+class Verified(NamedTuple):
+    """The size [byte] of a current revision or of a record, 0 if it is damaged, and the findings on it."""
+
+    bytes: int
+    findings: list[StoreFinding]
+
+
 class WrongTableError(StoreError):
-    """A revision whose files are those of its manifest, and no table: it was written so."""
+    """A revision whose files are those of its manifest, and no table: another program wrote it."""
 
 
-def material(root: Path, name: str) -> tuple[int, list[Finding]]:
-    """Check all of a material; return the bytes of its current revision, and what is wrong.
+def material(root: Path, name: str) -> Verified:
+    """Check a material with all its revisions; UnknownMaterialError if the store has none of this name.
 
-    Of the current revision: sizes and sha256 of its files against the manifest, that against the pointer, what both say
-    of it, and that nothing else lies there; every chunk is decoded, which checks its crc32c; dimensions, types and
-    shapes agree, and the attributes are those of a table. Of the other revisions: manifest, sizes, sha256, strangers.
-    A revision that is superseded and collected meanwhile is not a finding.
-
-    Raises
-    ------
-    UnknownMaterialError
-        If the store has no such material.
+    In the current revision, sizes and sha256 of the files are compared with the manifest, the manifest and its summary
+    with the pointer, and the list of files with the directory. Every chunk is decoded, which checks its crc32c.
+    Dimensions, types, shapes and attributes must be those of a table. In the other revisions, manifest, sizes, sha256
+    and the list of files are checked. A revision that is superseded and collected meanwhile is not a finding.
     """
     store = Store(root)
     while True:
         try:
-            group, digest, head = store.current(name)
+            current = store.current(name)
         except StoreError as error:
-            return 0, [Finding(name, str(error), _pointer_repair(material_path(store.root, name)))]
+            return Verified(0, [StoreFinding(name, str(error), _pointer_repair(material_path(store.root, name)))])
+        group, digest = current.location
         try:
-            size, findings = _current(name, group, digest, head), _remarks(name, group)
+            size = _check_current(name, current)
+            gaps = read_metadata(group).gaps  # a table of another program may lack metadata, and can be looked up still
+            findings = [StoreFinding(name, f"{name} {group.name} {gaps}", "")] if gaps else []
         except StoreError as error:
-            if _moved(store, name, group, digest):
+            if not _is_current(store, name, current):
                 continue
+            size = 0
+            findings = [StoreFinding(name, str(error), _repair(group, error))]
             if isinstance(error, WrongSummaryError):
-                return 0, [Finding(name, str(error), _pointer_repair(group.parent))]
-            repair = (
-                f"`rm {manifest_path(group)}`, then {_BUILD}" if isinstance(error, WrongTableError) else _BUILD_ANEW
-            )
-            size, findings = 0, [Finding(name, str(error), repair)]
-        return size, findings + _strange(name, group, digest) + _others(store, group, head)
+                return Verified(size, findings)
+        return Verified(size, findings + _strange(name, group, digest) + _others(store, current))
 
 
-def _remarks(name: str, group: Path) -> list[Finding]:
-    """Return what the metadata of a revision lacks: a table that another program published can be looked up still."""
-    gaps = read_metadata(group).gaps
-    return [Finding(name, f"{name} {group.name} {gaps}", "")] if gaps else []
+def _is_current(store: Store, name: str, pointer: Pointer) -> bool:
+    """Return False if the current revision was superseded since its pointer was read."""
+    with suppress(StoreError, UnknownMaterialError):
+        return store.location(name) == pointer.location
+    return False
 
 
-def _moved(store: Store, name: str, group: Path, digest: str) -> bool:
-    try:
-        return store.location(name) != (group, digest)
-    except (StoreError, UnknownMaterialError):
-        return True
+def _repair(group: Path, error: StoreError) -> str:
+    """Return the repair of a current revision."""
+    if isinstance(error, WrongSummaryError):
+        return _pointer_repair(group.parent)
+    if isinstance(error, WrongTableError):
+        return f"`rm {manifest_path(group)}`, then {_BUILD}"
+    return "`brdfdb build` with its recipe makes it anew, then `brdfdb gc --damaged` removes this revision"
 
 
 def _pointer_repair(material: Path) -> str:
@@ -100,37 +111,42 @@ def _pointer_repair(material: Path) -> str:
     return _BUILD
 
 
-def _strange(name: str, group: Path, digest: str | None) -> list[Finding]:
+def _strange(name: str, group: Path, digest: str | None) -> list[StoreFinding]:
     try:
         paths = strangers(group, digest)
     except OSError:  # removed while it was looked through
         return []
     return [
-        Finding(name, f"{name} {group.name}: {path.relative_to(group)} does not belong there", "`brdfdb gc` removes it")
+        StoreFinding(
+            name, f"{name} {group.name}: {path.relative_to(group)} does not belong there", "`brdfdb gc` removes it"
+        )
         for path in paths
     ]
 
 
-def _others(store: Store, current: Path, head: Head) -> list[Finding]:
+def _others(store: Store, current: Pointer) -> list[StoreFinding]:
     """Check the revisions that are not current."""
-    findings: list[Finding] = []
-    name = current.parent.name
-    for group in whole_revisions(current.parent):
-        digest = head["manifests"].get(group.name)
-        if group == current:
+    findings: list[StoreFinding] = []
+    name = current.head["material"]
+    manifests = current.head["manifests"]
+    for group in whole_revisions(current.path.parent):
+        digest = manifests.get(group.name)
+        if group == current.location.group:
             continue
         try:
             check_manifest(group, digest, contents=True)
         except StoreError as error:
             if manifest_path(group).is_file():  # else it was collected meanwhile
-                findings.append(Finding(name, f"{error} (not the current revision)", _other_repair(store.root, group)))
+                findings.append(
+                    StoreFinding(name, f"{error} (not the current revision)", _other_repair(store.root, group))
+                )
             continue
         findings += _strange(name, group, digest)
-    for revision in head["manifests"]:
-        group = current.with_name(revision)
+    for revision in manifests:
+        group = current.path.with_name(revision)
         if not group.is_dir() and manifest_path(group).is_file():  # a collection removes the manifest first
             sentence = f"{name} {revision} is damaged: its directory is missing (not the current revision)"
-            findings.append(Finding(name, sentence, _other_repair(store.root, group)))
+            findings.append(StoreFinding(name, sentence, _other_repair(store.root, group)))
     return findings
 
 
@@ -138,23 +154,23 @@ def _other_repair(root: Path, group: Path) -> str:
     try:
         snapshot = pinned(root).get(group)
     except StoreError:
-        snapshot = None  # is a finding of its own
+        snapshot = None  # `snapshots` reports it
     if snapshot is None:
         return "`brdfdb gc --damaged` removes it"
-    return f"copy it from where it is whole, or `brdfdb snapshot --remove {snapshot}` and `brdfdb gc --damaged`"
+    return f"copy it from an undamaged store, or `brdfdb snapshot --remove {snapshot}` and `brdfdb gc --damaged`"
 
 
-def family(root: Path, name: str) -> tuple[int, list[Finding]]:
-    """Check the record of a family; return its bytes, and what is wrong."""
-    from brdfdb.store.family_records import verify_family  # it measures families, which takes more imports
+def family(root: Path, name: str) -> Verified:
+    """Check the record of a family."""
+    from brdfdb.store.family_records import verify_family  # it imports much to measure families
 
     try:
-        return verify_family(root, name), []
+        return Verified(verify_family(root, name), [])
     except StoreError as error:
-        return 0, [Finding(name, str(error), _BUILD)]
+        return Verified(0, [StoreFinding(name, str(error), _BUILD)])
 
 
-def snapshots(root: Path) -> list[Finding]:
+def snapshots(root: Path) -> list[StoreFinding]:
     """Check every snapshot, and the manifests of the revisions that it names; `material` checks their contents."""
     findings = []
     for name in snapshot_names(root):
@@ -163,30 +179,31 @@ def snapshots(root: Path) -> list[Finding]:
             pins = read_snapshot(root, name)["materials"]
         except StoreError as error:
             if snapshot_path(root, name).is_file():  # else it was removed meanwhile
-                again = f"copy it from where it is whole, or {remove} and name the revisions anew"
-                findings.append(Finding(name, str(error), again))
+                again = f"copy it from an undamaged store, or {remove} and name the revisions anew"
+                findings.append(StoreFinding(name, str(error), again))
             continue
         for material, pin in pins.items():
             try:
                 read_manifest(revision_path(root, material, pin["revision"]), pin["manifest_sha256"])
             except StoreError as error:
                 sentence = f"the snapshot {name} is damaged: {error}"
-                findings.append(Finding(name, sentence, f"copy the revision from where it is whole, or {remove}"))
+                findings.append(StoreFinding(name, sentence, f"copy the revision from an undamaged store, or {remove}"))
     return findings
 
 
-def _current(name: str, group: Path, digest: str, head: Head) -> int:
-    """Check the current revision of a material; return its bytes. StoreError names what is damaged first."""
+def _check_current(name: str, current: Pointer) -> int:
+    """Check the current revision of a material; return its size [byte]. StoreError names the first damage."""
     import zarr
 
-    from brdfdb.store.zarr_store import Whole
+    from brdfdb.store.zarr_store import CheckedRevision
 
+    group = current.location.group
     where = f"{name} {group.name}"
-    manifest = check_manifest(group, digest, contents=True)
-    check_summary(head, manifest)
-    files: dict[str, Entry] = manifest["files"]
+    manifest = check_manifest(*current.location, contents=True)
+    check_summary(current.head, manifest)
+    files = manifest["files"]
     try:
-        opened = zarr.open_group(Whole(group, files), mode="r")
+        opened = zarr.open_group(CheckedRevision(group, files), mode="r")
         arrays = dict(opened.arrays())
     except StoreError:
         raise

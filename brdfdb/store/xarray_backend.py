@@ -13,7 +13,7 @@ from xarray.backends import BackendEntrypoint
 
 from brdfdb.errors import ParameterError, StoreError
 from brdfdb.place import is_service, path_of
-from brdfdb.store import opening
+from brdfdb.store import open as open_store
 from brdfdb.store.http_client import RemoteStore
 from brdfdb.store.paths import METADATA, marker_path, number_of, store_of
 from brdfdb.store.reader import Store
@@ -35,7 +35,7 @@ class BrdfdbBackend(BackendEntrypoint):
         revision: str | None = None,
         snapshot: str | None = None,
     ) -> xr.Dataset:
-        """Open a table as a lazy Dataset.
+        """Open a table as a lazy Dataset, as `Store.dataset` gives it.
 
         Parameters
         ----------
@@ -52,11 +52,6 @@ class BrdfdbBackend(BackendEntrypoint):
         snapshot : str, optional
             Name of a snapshot of the store, whose revision of the material is opened.
 
-        Returns
-        -------
-        Dataset
-            As `Store.dataset` gives it.
-
         Raises
         ------
         ParameterError
@@ -66,7 +61,7 @@ class BrdfdbBackend(BackendEntrypoint):
         """
         place = filename_or_obj
         if material is not None:
-            dataset = opening.open(place, snapshot=snapshot).dataset(material, revision)
+            dataset = open_store(place, snapshot=snapshot).dataset(material, revision)
         elif is_service(place):
             service, _, named = place.rstrip("/").partition("/v1/store/materials/")
             material, _, revision = named.partition("/")

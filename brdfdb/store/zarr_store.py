@@ -11,61 +11,45 @@ from zarr.core.buffer import Buffer, BufferPrototype
 from zarr.storage import FsspecStore, LocalStore
 
 from brdfdb.errors import StoreError
-from brdfdb.store.chunks import check_file
-from brdfdb.store.files import Entry
+from brdfdb.store.files import FileEntry
+from brdfdb.store.records import check_file
 
 
-class Whole(LocalStore):
-    """A revision as zarr reads it, but that a file of it that is missing or changed is an error with its name.
+class CheckedRevision(LocalStore):
+    """A revision as zarr reads it; a file of its manifest that is missing or changed raises StoreError."""
 
-    Parameters
-    ----------
-    group : Path
-        Directory of the revision.
-    files : mapping
-        Size and sha256 of each file that belongs there, by its path.
-    """
-
-    def __init__(self, group: Path, files: Mapping[str, Entry]) -> None:
+    def __init__(self, group: Path, files: Mapping[str, FileEntry]) -> None:
         super().__init__(group, read_only=True)
         self._files = dict(files)
 
     async def get(
         self, key: str, prototype: BufferPrototype | None = None, byte_range: ByteRequest | None = None
     ) -> Buffer | None:
-        """Return a file, as `LocalStore.get` does; StoreError for one that should be there, or is another one."""
+        """Return a file, as `LocalStore.get` does; StoreError if it is missing or changed."""
         try:
             value = await super().get(key, prototype, byte_range)
         except OSError as error:
             where = f"{self.root.parent.name} {self.root.name}"
             raise StoreError(f"{where} is damaged: {key} cannot be read: {error.strerror}") from error
         content = None if value is None or key not in self._files else value.to_bytes()
-        check_file(self.root, key, content, self._files, whole=byte_range is None)
+        check_file(self.root, key, content, self._files, complete=byte_range is None)
         return value
 
 
-class WholeRemote(FsspecStore):
-    """A revision at an address: a file that is missing, or not the one of the manifest, is an error with its name.
+class CheckedRemoteRevision(FsspecStore):
+    """A revision at an address, called `where` in errors; a missing or changed file raises StoreError."""
 
-    Parameters
-    ----------
-    url : str
-        Address of the files of the revision.
-    where : str
-        Name of the revision in errors.
-    files : mapping
-        Size and sha256 of each file that belongs there, by its path.
-    """
-
-    def __init__(self, url: str, where: str, files: Mapping[str, Entry]) -> None:
+    def __init__(self, url: str, where: str, files: Mapping[str, FileEntry]) -> None:
         from fsspec.implementations.http import HTTPFileSystem
 
         super().__init__(HTTPFileSystem(asynchronous=True), read_only=True, path=url)
-        self._where, self._files = where, dict(files)
+        self._where = where
+        self._files = dict(files)
 
     async def get(self, key: str, prototype: BufferPrototype, byte_range: ByteRequest | None = None) -> Buffer | None:
-        """Return a file, as `FsspecStore.get` does; StoreError for one that should be there, or is another one."""
-        value, entry = await super().get(key, prototype, byte_range), self._files.get(key)
+        """Return a file, as `FsspecStore.get` does; StoreError if it is missing or changed."""
+        value = await super().get(key, prototype, byte_range)
+        entry = self._files.get(key)
         if entry is None:
             return None
         if value is None:

@@ -8,12 +8,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from brdfdb._elementary import cos, cosine, sine, twice_arctan
 from brdfdb._numba import inner_loop, kernel, loop
-
-Array = NDArray[np.float64]
+from brdfdb.parameters import Array
 
 PI, TURN, HALF_PI = np.pi, 2.0 * np.pi, np.pi / 2.0
 
@@ -120,11 +118,10 @@ def points_of_angles(
 
 @loop
 def points_of_vectors(rule: Rule, ui: Array, ur: Array, count: int, x: Array, mu: Array, scratch: Array) -> None:
-    """Write points on either kind of grid, of unit vectors in flat arrays, and mu = cos theta_i cos theta_r if the rule
-    has a power.
+    """Write points of unit vectors in flat arrays on either kind of grid, and mu if the rule has a power.
 
-    `scratch` holds six rows; the last gets the lower z, nan where a number of the vectors is nan or infinite. One loop
-    for the products and one for each angle: all in one would not vectorise.
+    mu is cos theta_i cos theta_r. `scratch` holds six rows; the last gets the lower z, nan where a number of the
+    vectors is nan or infinite. One loop for the products and one for each angle: all in one would not vectorise.
     """
     if rule.half_difference:
         theta_h, theta_d, phi_d = x[0], x[x.shape[0] - 2], x[x.shape[0] - 1]

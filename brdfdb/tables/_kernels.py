@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 
 from brdfdb._elementary import exp
 from brdfdb._numba import inner_loop, kernel, loop
+from brdfdb.parameters import Array
 from brdfdb.tables._coordinates import PI, Rule, points_of_angles, points_of_vectors, vectors_of_angles
 from brdfdb.tables._interpolation import POINTS, Axes, interpolated, room
-
-Array = NDArray[np.float64]
 
 PHI_USUAL = 4.0 * PI
 

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb._numba import instructions
+from brdfdb.parameters import Array
 
-Array = NDArray[np.float64]
 Index = Any  # an int of Python, or a uint64 of a kernel
 CUBIC_COLUMNS = 16  # of `Axes.lines`: four vectors of four weights
 LANES = 4  # points that are interpolated linearly at once
@@ -97,7 +97,8 @@ def _write_trilinear(
     a = w.add(a, w.mul(along_1, w.sub(b, a)))
     c = w.add(c, w.mul(along_1, w.sub(d, c)))
     a = w.add(a, w.mul(along_0, w.sub(c, a)))
-    before, after = w.shuffle(a, a, (0, 2, 4, 6)), w.shuffle(a, a, (1, 3, 5, 7))
+    before = w.shuffle(a, a, (0, 2, 4, 6))
+    after = w.shuffle(a, a, (1, 3, 5, 7))
     w.store(out, j, w.add(w.mul(w.sub(w.spread(w.one(), LANES), t_2), before), w.mul(t_2, after)))
 
 
@@ -119,7 +120,10 @@ def trilinear_cells(
     further. The shares, in [0, 1], say how much of the cell lies before the point on each axis.
     """
     for point in range(int(j), int(j) + LANES):
-        t_0, t_1, t_2, o = share_0[point], share_1[point], share_2[point], int(first[point])
+        t_0 = share_0[point]
+        t_1 = share_1[point]
+        t_2 = share_2[point]
+        o = int(first[point])
         ends = []
         for k in (o, o + 1):
             a, b, c, d = (float(table[at]) for at in (k, k + row, k + layer, k + layer + row))
@@ -164,7 +168,8 @@ def _write_tricubic(
 
 def _write_weights(w: _Writer, lines: Any, k: Any, t: Any) -> Any:
     builder, double = w.builder, w.ir.DoubleType()
-    two, three = w.ir.Constant(double, 2.0), w.ir.Constant(double, 3.0)
+    two = w.ir.Constant(double, 2.0)
+    three = w.ir.Constant(double, 3.0)
     rest, t2 = w.sub(w.one(), t), w.mul(t, t)
     rise = w.mul(t2, w.sub(three, w.mul(two, t)))
     factors = (

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 from weakref import WeakKeyDictionary
 
@@ -9,36 +10,44 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel, Field
 
-from brdfdb.geometry import radians
+from brdfdb.geometry import degrees, radians
 from brdfdb.integrals.quadrature import MOST_PANELS, Albedo, reflected_share
 from brdfdb.lobes import narrowest
 from brdfdb.materials import FunctionRecord, Source
+from brdfdb.measurements import MeasuredSource
 from brdfdb.parameters import Floats
 from brdfdb.tables.grids import Axis
-from brdfdb.tables.table import Table
+from brdfdb.tables.stated_error import Grazing, LargestAlbedo
+from brdfdb.tables.table import Table, TableSource
 
 # Absolute, of the albedo of a table whose interpolant has no exact integral; its kinks are worth no more
 QUADRATURE_TOLERANCE = 2e-5
 MEASURED_TOLERANCE = 2e-4  # of measured tables: their data are uncertain by more, and it takes a quarter of the time
 # Absolute, of the largest albedo that a table states: three digits are shown, and it takes a third of the time
 LARGEST_TOLERANCE = 1e-3
-_MOST_PANELS = 1000
+_MOST_PANELS = 1000  # of a light
 # Lights for which such a table is integrated [degree]; phi_i up to where the symmetry of its grid begins anew
 THETA_I_DEG = np.array([*range(0, 85, 5), 82.5, 85.0, 87.5, 89.0, 89.5], dtype=np.float64)
 _PHI_I_STEP_DEG = 30.0
+LAST_LIGHT_DEG = 89.9  # largest angle at which the albedo of a source with a pole at the horizon is judged
+_ROUNDS = 4  # of the search for the largest albedo of a source; each halves the steps around it
+# Cosines of the lights that show the growth of an albedo towards 90 degrees
+_NEAR = 1e-4
+_NEARER = 1e-6
+_NEAREST = 1e-8
+_LEAST = 1e-12  # smallest cosine that is tried
+_GRAZING_TOLERANCE = 1e-5  # of those albedos, relative to the albedo at the light before, or to 1
+_PASSING = 1e-3  # relative tolerance of the cosine from which on an albedo exceeds 1
+_FLAT = 1e-4  # rise from light to light, relative to the albedo, up to which it is bounded
+
+AlbedoAt = Callable[[Axis, float], Floats]  # of lights [degree] and a tolerance: albedos (theta_i, wavelengths) [1]
 
 
 class TableAlbedo(NamedTuple):
-    """The directional albedo of a table, without the specular part.
+    """The directional albedo [1] of a table, (theta_i, phi_i, wavelengths), without the specular part, and its lights.
 
-    Attributes
-    ----------
-    theta_i_deg, phi_i_deg : array [degree]
-        The lights; one phi_i, 0, of isotropic tables.
-    albedo : array (theta_i, phi_i, wavelengths) [1]
-        One wavelength of grey tables.
-    error : array (theta_i,) [1]
-        Estimate of its absolute error, over phi_i and wavelengths the largest; 0 where it is exact.
+    `error` (theta_i,) estimates the largest absolute error over phi_i and wavelengths; 0 where the integral is exact.
+    Isotropic tables have one phi_i, 0, and grey ones one wavelength.
     """
 
     theta_i_deg: Axis
@@ -65,25 +74,19 @@ def directional_albedo(
     table : Table
         Any decoded table. Of those that are not f_r, linear over light and viewer, the attributes name the source.
     theta_i_deg : array (theta_i,) [degree], optional
-        The lights, in [0, 90].
+        The lights, in [0, 90]. By default the nodes of theta_i and phi_i where the integral is exact, else
+        `THETA_I_DEG` and every 30 degrees of phi_i; nodes and `THETA_I_DEG` if a planner chose the nodes: the attribute
+        ``reason`` says so. Such nodes are at 90 degrees only if f_r has no pole there.
     tolerance : float [1], optional
         Absolute tolerance of the quadrature, where the integral is not exact; by default `tolerance_of`.
     source : Source, optional
         Source whose lobe the quadrature follows; by default that of the table.
 
-    Returns
-    -------
-    TableAlbedo
-        By default at the nodes of theta_i and phi_i where the integral is exact, else at `THETA_I_DEG` and every 30
-        degrees of phi_i; at nodes and `THETA_I_DEG` if a planner chose the nodes: the attribute ``reason`` says so.
-        Such nodes are at 90 degrees only if f_r has no pole there.
-
     Notes
     -----
     Exact for what `Table.lookup` returns where that is linear in each angle, so that the integral is a sum of the
     stored values with the integrals of the hat functions of their axes as weights. Other tables are looked up, by the
-    quadrature of `brdfdb.integrals.quadrature`, to the tolerance. It follows the lobe of the source if that
-    is known.
+    quadrature of `brdfdb.integrals.quadrature`, to the tolerance.
     """
     if not linear_in_angles(table):
         within = tolerance_of(table) if tolerance is None else tolerance
@@ -120,19 +123,9 @@ def tolerance_of(table: Table) -> float:
 
 
 def hemispherical_albedo(theta_i_deg: Axis, albedo: Floats) -> Floats:
-    """Return the share [1] that is reflected of light that is the same from everywhere.
+    """Return the share [1] of uniform light that is reflected, twice the integral of albedo cos(theta_i) sin(theta_i).
 
-    Parameters
-    ----------
-    theta_i_deg : array (theta_i,) [degree]
-        From 0 on.
-    albedo : array (theta_i, wavelengths) [1]
-        Directional albedo at these angles, taken as linear between them and the same beyond the last.
-
-    Returns
-    -------
-    array (wavelengths,) [1]
-        Twice the integral of albedo cos(theta_i) sin(theta_i).
+    `albedo` (theta_i, wavelengths) is linear between the angles, which begin at 0, and the same beyond the last.
     """
     return np.asarray(2.0 * _theta_weights(radians(theta_i_deg)) @ albedo)
 
@@ -184,13 +177,7 @@ _REFLECTED: WeakKeyDictionary[Table, Reflected] = WeakKeyDictionary()
 
 
 def reflected_by(source: Source, wavelength_nm: Axis | None) -> Reflected:
-    """Return what a source reflects at wavelengths (L,) [nm], or at none if it is grey.
-
-    Raises
-    ------
-    ParameterError
-        If the source does not hold at one of the wavelengths.
-    """
+    """Return what a source reflects at wavelengths (L,) [nm]; ParameterError if it does not hold at one of them."""
     phi_i_deg = azimuths_deg(source)
     angles = radians(THETA_I_DEG)[:, np.newaxis], radians(phi_i_deg)
     albedo, error = source_albedo(source, *angles, wavelength_nm, tolerance=LARGEST_TOLERANCE)
@@ -221,26 +208,11 @@ def source_albedo(
     tolerance: float,
     most_panels: int = MOST_PANELS,
 ) -> Albedo:
-    """Integrate f_r cos theta_r of a source over the hemisphere [1], at all wavelengths at once.
+    """Integrate f_r cos theta_r of a source over the hemisphere [1], at all its wavelengths (L,) [nm] at once.
 
-    Parameters
-    ----------
-    source : Source
-        Material or function.
-    theta_i, phi_i : array_like [rad]
-        Directions of the lights, theta up to pi/2. They broadcast.
-    wavelength_nm : array (L,) [nm], or None
-        For spectral sources, and only for them.
-    tolerance, most_panels
-        As in `brdfdb.integrals.quadrature.reflected_share`.
-
-    Returns
-    -------
-    Albedo
-        Albedo of shape (..., L), or (..., 1) of a grey source, without the specular part; and an estimate of the error
-        for each light.
+    The lights at `theta_i`, `phi_i` [rad], theta up to pi/2, broadcast. All else is as in
+    `brdfdb.integrals.quadrature.reflected_share`. The specular part is left out.
     """
-
     f_r = source.brdf_at(wavelength_nm)
 
     def brdf(wi: Floats, wr: Floats) -> Floats:
@@ -317,3 +289,168 @@ def _theta_weights(nodes: Axis) -> Axis:
     weights[:-1] += slope - F[:-1]
     weights[-1] += 0.5 - F[-1]
     return weights
+
+
+def largest_albedo(table: Table, source: Source | None) -> LargestAlbedo:
+    """Return the largest directional albedo [1] that a table states, specular part included.
+
+    It is that of the model or function that was tabulated, so that it is the same at each tolerance of a table, for
+    lights up to `last_light`. The albedo of measured data, and of a table whose source is not known, is that of the
+    lookups, for the lights of `directional_albedo`.
+    """
+    wavelength_nm = table.wavelength_nm
+    albedo_at = albedo_of(table, source)
+    power = None
+    of_source = source is not None and not _looked_up(source)
+    if source is None or not of_source:
+        integrated = directional_albedo(table, tolerance=LARGEST_TOLERANCE)
+        lights = integrated.theta_i_deg
+        albedos = _with_specular(table, lights, wavelength_nm, integrated.albedo)
+    else:
+        power = source.grazing_power(wavelength_nm)
+        lights = np.append(THETA_I_DEG, np.unique([LAST_LIGHT_DEG, last_light(source)]))
+        lights, albedos = _searched(albedo_at, lights)
+    row, column = np.unravel_index(int(np.argmax(np.where(np.isfinite(albedos), albedos, np.inf))), albedos.shape)
+    largest = float(albedos[row, column])
+    return LargestAlbedo(
+        albedo=float(f"{largest:.4g}") if np.isfinite(largest) else None,
+        theta_i_deg=float(f"{lights[row]:.6g}"),
+        wavelength_nm=None if wavelength_nm is None else float(wavelength_nm[column]),
+        tolerance=LARGEST_TOLERANCE,
+        of="source" if of_source else "table",
+        up_to_theta_i_deg=float(lights[-1]),
+        grazing=_grazing(albedo_at, power, largest, float(lights[-1])),
+    )
+
+
+def albedo_of(table: Table, source: Source | None) -> AlbedoAt:
+    """Return the albedo of which `largest_albedo` finds the largest: that of the source, or of the lookups."""
+    if source is None or _looked_up(source):
+        return _of_table(table)
+    return _of_source(source, table.wavelength_nm)
+
+
+def _looked_up(source: Source | None) -> bool:
+    return source is None or isinstance(source, MeasuredSource | TableSource)
+
+
+def last_light(source: Source) -> float:
+    """Return the largest angle of incidence [degree] up to which the albedo of a source is judged."""
+    return LAST_LIGHT_DEG if source.grazing_pole else 90.0
+
+
+def grazing_of_source(source: Source, wavelength_nm: Axis | None, largest: float) -> Grazing | None:
+    """Return the albedo of a source for lights between `last_light` and 90 degrees; None if it is not finite.
+
+    `largest` is the largest albedo [1] for lights up to there.
+    """
+    power = source.grazing_power(wavelength_nm)
+    return _grazing(_of_source(source, wavelength_nm), power, largest, last_light(source))
+
+
+def grazing_of_table(table: Table, largest: float, up_to_theta_i_deg: float) -> Grazing | None:
+    """Return the albedo of the lookups of a table for lights beyond an angle [degree], whose growth is measured."""
+    return _grazing(_of_table(table), None, largest, up_to_theta_i_deg)
+
+
+def _of_source(source: Source, wavelength_nm: Axis | None) -> AlbedoAt:
+    """Return the albedo of a source with its specular part, largest over the azimuths of the light."""
+    phi_i = radians(azimuths_deg(source))
+
+    def albedo_at(theta_i_deg: Axis, tolerance: float) -> Floats:
+        theta_i = radians(theta_i_deg)[:, np.newaxis]
+        albedo, _ = source_albedo(source, theta_i, phi_i, wavelength_nm, tolerance=tolerance, most_panels=_MOST_PANELS)
+        return _with_specular(source, theta_i_deg, wavelength_nm, albedo)
+
+    return albedo_at
+
+
+def _of_table(table: Table) -> AlbedoAt:
+    """Return the albedo of the lookups of a table with its specular part, largest over the azimuths of the light."""
+    return lambda theta_i_deg, tolerance: _with_specular(
+        table, theta_i_deg, table.wavelength_nm, directional_albedo(table, theta_i_deg, tolerance).albedo
+    )
+
+
+def _with_specular(surface: Table | Source, theta_i_deg: Axis, wavelength_nm: Axis | None, albedo: Floats) -> Floats:
+    """Return albedos (theta_i, wavelengths) [1] with the specular part, from those (theta_i, phi_i, wavelengths)."""
+    specular = np.asarray(surface.specular_reflectance(radians(theta_i_deg), wavelength_nm))
+    return np.asarray(albedo.max(axis=1) + specular.reshape(theta_i_deg.size, -1))
+
+
+class _Albedos(NamedTuple):
+    """Lights [degree], and albedos (lights, wavelengths) [1] with the specular part."""
+
+    theta_i_deg: Axis
+    albedo: Floats
+
+
+def _searched(albedo_at: AlbedoAt, lights: Axis) -> _Albedos:
+    """Return the albedos of lights, and of more lights around each maximum that may be the largest albedo."""
+    albedos = albedo_at(lights, LARGEST_TOLERANCE)
+    for _ in range(_ROUNDS):
+        of_lights = albedos.max(axis=1)
+        between: set[float] = set()
+        for at, albedo in enumerate(of_lights):
+            around = slice(max(at - 1, 0), at + 2)
+            drop = np.ptp(of_lights[around])
+            # between lights the albedo rises by no more than it drops to the next, or the lights are too far apart
+            if albedo == of_lights[around].max() and drop > LARGEST_TOLERANCE / 2.0 and albedo + drop > of_lights.max():
+                between.update((lights[around][1:] + lights[around][:-1]) / 2.0)
+        if not between:
+            break
+        added = np.array(sorted(between))
+        order = np.argsort(np.append(lights, added))
+        albedos = np.concatenate([albedos, albedo_at(added, LARGEST_TOLERANCE)])[order]
+        lights = np.append(lights, added)[order]
+    return _Albedos(lights, albedos)
+
+
+def _grazing(albedo_at: AlbedoAt, declared: float | None, largest: float, up_to_theta_i_deg: float) -> Grazing | None:
+    """Return the growth of an albedo beyond an angle, by quadrature next to 90 degrees; None if it is not finite."""
+
+    def at(cos_i: float, before: float) -> float:
+        theta_i_deg = np.array([90.0 - float(degrees(np.arcsin(cos_i)))])
+        return float(np.max(albedo_at(theta_i_deg, min(_GRAZING_TOLERANCE * max(before, 1.0), 1.0))))
+
+    if not np.isfinite(largest):
+        return None
+    near = at(_NEAR, largest)
+    nearer = at(_NEARER, near)
+    nearest = at(_NEAREST, nearer)
+    if not np.isfinite([near, nearer, nearest]).all():
+        return None
+    power = declared
+    if power is None:  # from differences, of which a constant part drops out
+        rises = nearer - near, nearest - nearer
+        grows = rises[1] > rises[0] > _FLAT * nearest
+        power = round(float(np.log(rises[1] / rises[0]) / np.log(_NEARER / _NEAREST)), 2) if grows else 0.0
+    factor, rest = nearest, 0.0
+    if power > 0.0:  # of an albedo of rest + factor cos^-power
+        factor = max((nearest - nearer) / (_NEAREST**-power - _NEARER**-power), 0.0)
+        rest = nearest - factor * _NEAREST**-power
+    most, passes = max(largest, near, nearer, nearest), None
+    if largest <= 1.0 and (power > 0.0 or most > 1.0 + LARGEST_TOLERANCE):
+        tried = {_NEAR: near, _NEARER: nearer, _NEAREST: nearest, _LEAST: at(_LEAST, nearest)}
+        above = next((cos_i for cos_i, albedo in tried.items() if albedo > 1.0), None)
+        if above is not None:
+            below = float(np.cos(radians(min(up_to_theta_i_deg, LAST_LIGHT_DEG))))
+            if power > 0.0 and factor > 0.0 and rest < 1.0:  # the law of growth is close
+                guess = (factor / (1.0 - rest)) ** (1.0 / power)
+                for tried_cos in (guess * (1.0 + _PASSING), guess * (1.0 - _PASSING)):
+                    if above < tried_cos < below:
+                        below, above = (below, tried_cos) if at(tried_cos, 1.0) > 1.0 else (tried_cos, above)
+            while below > above * (1.0 + _PASSING):
+                between = float(np.sqrt(below * above))
+                below, above = (below, between) if at(between, 1.0) > 1.0 else (between, above)
+        elif factor > 0.0 and rest < 1.0:  # closer than quadrature reaches, by the formula
+            above = (factor / (1.0 - rest)) ** (1.0 / power)
+        if above is not None:
+            passes = 90.0 - float(f"{degrees(np.arcsin(above)):.3g}")
+    return Grazing(
+        power=float(f"{power:.6g}"),
+        origin="measured" if declared is None else "declared",
+        factor=float(f"{factor:.4g}"),
+        max_albedo=float(f"{most:.4g}") if power == 0.0 else None,
+        passes_1_at_theta_i_deg=passes,
+    )

@@ -48,7 +48,9 @@ class Need:
     def __init__(self, layout: Layout, axis: int, numbers: Floats, weight: Floats) -> None:
         order = 4 if layout.interpolation.cubic else 2
         count, size, wavelengths = numbers.shape
-        self.layout, self.axis, self.order = layout, axis, order
+        self.layout = layout
+        self.axis = axis
+        self.order = order
         name = layout.grid.names[axis]
         self.x = _points(name, layout.grid.axes[name][-1], np.linspace(0.0, 1.0, size))
         self.rows = np.moveaxis(numbers, 2, 1).reshape(count * wavelengths, size)
@@ -119,7 +121,7 @@ class Need:
         grid = self.layout.grid
         name = grid.names[self.axis]
         end = grid.axes[name][-1]
-        return np.append(np.round(_points(name, end, _quantiles(self.density, count))[:-1], 4), end)
+        return np.append(np.round(_points(name, end, Quantiles.of(count).places(self.density))[:-1], 4), end)
 
 
 def _points(name: str, end: float, s: Floats) -> Axis:
@@ -148,7 +150,7 @@ class Lines(NamedTuple):
     mu: Floats
 
 
-def lines(layout: Layout, axis: int, drawn: error_measurement.Draw) -> Lines:
+def lines(layout: Layout, axis: int, drawn: error_measurement.RandomPairs) -> Lines:
     """Evaluate a source along lines of one axis of a layout through directions of a draw."""
     grid = layout.grid
     above = np.flatnonzero(drawn.above)
@@ -171,12 +173,19 @@ def lines(layout: Layout, axis: int, drawn: error_measurement.Draw) -> Lines:
     return Lines(at, None, np.minimum(cos_i, cos_r), cos_i * cos_r)
 
 
-def numbers_along(layout: Layout, along: Lines, floor: Floats) -> tuple[Floats, Floats]:
-    """Return the numbers of a layout along lines of one axis, and what an error in them makes of f_r.
+class LineNumbers(NamedTuple):
+    """The numbers of a layout along lines of one axis, and what an error in them makes of f_r.
 
-    Both have the shape (lines, points, L). The second is the error of f_r that an error of one makes, relative to f_r
-    or to its floor [1/sr]; it is 0 below the horizon. Of a mixture, there are parts in place of wavelengths.
+    Both have the shape (lines, points, L). `weight` is the error of f_r that an error of one makes, relative to f_r or
+    to its floor [1/sr]; it is 0 below the horizon. Of a mixture, there are parts in place of wavelengths.
     """
+
+    numbers: Floats
+    weight: Floats
+
+
+def numbers_along(layout: Layout, along: Lines, floor: Floats) -> LineNumbers:
+    """Return the numbers of a layout along lines of one axis, for errors relative to a floor [1/sr]."""
     how = layout.interpolation
     before = None if along.before is None else (how.numbers(*along.before[0]), along.before[1])
     numbers = tabulation.joined(layout.source, how.numbers(*along.values), before)
@@ -194,38 +203,39 @@ def numbers_along(layout: Layout, along: Lines, floor: Floats) -> tuple[Floats, 
         counts = [np.max(_quotient(np.abs(row), mixed), axis=-1) for row in layout.spectra]
         share = slope * np.stack(counts, axis=-1)
     weight = np.where((along.lowest > 1e-3)[..., np.newaxis], share, 0.0)
-    return numbers, weight
+    return LineNumbers(numbers, weight)
+
+
+class Quantiles(NamedTuple):
+    """Quantiles of a density of nodes: the number of each, and the number of the last of the same axis."""
+
+    number: Floats
+    last: Floats
+
+    @classmethod
+    def of(cls, *counts: int) -> Quantiles:
+        """Return those of axes with so many nodes, one axis after the other."""
+        number = [np.arange(float(count)) for count in counts]
+        return cls(np.concatenate(number), np.repeat(np.array(counts) - 1.0, counts))
+
+    def places(self, density: Floats) -> Floats:
+        """Return places s in [0, 1] between which the density of nodes has equal integrals."""
+        steps = 0.5 * (density[1:] + density[:-1])
+        total = np.concatenate([[0.0], np.cumsum(steps)])
+        at = np.where(self.number == self.last, total[-1], self.number * (total[-1] / self.last))
+        return np.asarray(np.interp(at, total, np.linspace(0.0, 1.0, density.size)))
+
+
+_LADDER = Quantiles.of(*_COUNTS)
+_ENDS: NDArray[np.int64] = np.cumsum(_COUNTS)
 
 
 def _spread(density: Floats) -> dict[int, NDArray[np.int64]]:
     """Return the points of a line that are nodes of an axis, by their number; without numbers that repeat a point."""
-    at = np.round(_places(density, _FRACTIONS) * (density.size - 1)).astype(np.int64)
+    at = np.round(_LADDER.places(density) * (density.size - 1)).astype(np.int64)
     repeated = np.append(at[1:] <= at[:-1], False)
     repeated[_ENDS - 1] = False  # there the points for the next number begin
     usable = ~np.logical_or.reduceat(repeated, _ENDS - _COUNTS)
     return {
         count: at[end - count : end] for count, end, is_usable in zip(_COUNTS, _ENDS, usable, strict=True) if is_usable
     }
-
-
-def _quantiles(density: Floats, count: int) -> Floats:
-    """Return places s in [0, 1] between which the density of nodes has equal integrals."""
-    return _places(density, _fractions(count))
-
-
-def _fractions(count: int) -> tuple[Floats, Floats]:
-    """Return for each of so many quantiles its number and the number of the last."""
-    return np.arange(float(count)), np.full(count, count - 1.0)
-
-
-_FRACTIONS = tuple(np.concatenate(parts) for parts in zip(*map(_fractions, _COUNTS), strict=True))
-_ENDS: NDArray[np.int64] = np.cumsum(_COUNTS)
-
-
-def _places(density: Floats, fractions: tuple[Floats, ...]) -> Floats:
-    """Return the places s in [0, 1] of quantiles of a density."""
-    steps = 0.5 * (density[1:] + density[:-1])
-    total = np.concatenate([[0.0], np.cumsum(steps)])
-    number, last = fractions
-    at = np.where(number == last, total[-1], number * (total[-1] / last))
-    return np.asarray(np.interp(at, total, np.linspace(0.0, 1.0, density.size)))

@@ -1,4 +1,4 @@
-"""The error of a table against its model, measured at directions that are not its nodes."""
+"""Measurement of the error of a table against its source, at random directions that are not its nodes."""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ import functools
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb._elementary import COS_HORIZON
-from brdfdb.geometry import radians, unit_vector
+from brdfdb.geometry import degrees, radians, unit_vector
 from brdfdb.integrals.sampling import mirrored_in_lobe, mixture_density
 from brdfdb.lobes import Lobe
 from brdfdb.materials import FunctionRecord, Material, Source
@@ -22,34 +22,43 @@ from brdfdb.models.shared_integrals import sharing
 from brdfdb.parameters import Floats
 from brdfdb.tables import places
 from brdfdb.tables._interpolation import weights_of_nodes
-from brdfdb.tables.grids import Grid
+from brdfdb.tables.grids import Axis, Grid
 from brdfdb.tables.layout import PLAIN, Interpolation, Layout
-from brdfdb.tables.places import BANDS_DEG
-from brdfdb.tables.stated_error import Between, Error, Overall, Places
-from brdfdb.tables.table import Table, points
-from brdfdb.tables.table_source import TableSource
-from brdfdb.tables.worst_pair import worst_pair
+from brdfdb.tables.places import ALONGSIDE_DEG, BANDS_DEG, RINGS_DEG
+from brdfdb.tables.stated_error import Between, Error, Overall, Places, WorstPair
+from brdfdb.tables.table import Table, TableSource, points
 
 FLOOR = 1e-3  # share of the Lambertian BRDF with the albedo of the source
-WIDTHS = (1.0, 2.0)  # widths of the lobes to draw directions from, relative to that of the source
-# Directions in each band of theta_i. Tables of more than _FEW wavelengths use fewer: each wavelength is measured
-DIRECTIONS = 4000
-_FEW, _FEWER_DIRECTIONS = 4, 3000
+WIDTHS = (1.0, 2.0)  # widths of the lobes that viewers are drawn from, relative to the lobe of the source
+DIRECTIONS = 4000  # pairs of directions in each band of theta_i
+# Each wavelength is measured: tables of more than _FEW wavelengths use fewer pairs
+_FEW = 4
+_FEWER_DIRECTIONS = 3000
 SEED = 1991
-# Directions of a sample in a place, and of a band between wavelengths, of those of a band at the wavelengths
-_IN_PLACES, _BETWEEN, _BETWEEN_IN_PLACES = 1 / 10, 1 / 6, 1 / 15
-_WITHIN, _CONFIDENCE = 0.98, 0.98  # share of the values within a limit, and how sure that is
-_SEARCHED, _SEARCHED_AT = (9, 400), 40  # wavelengths of an interval, of all; directions of a band: for the worst
-_THIN = 0.05  # share of the pairs that count below which they are drawn among those that were measured
-_WINDOW = 1 << 21  # values of a table that are held at a time
-_EVALUATED = 1 << 16  # directions at which the source is evaluated at a time
+# Numbers of pairs as shares of those of a band
+_IN_PLACES = 1 / 10  # of a sample in a place
+_BETWEEN = 1 / 6  # of a band, between wavelengths
+_BETWEEN_IN_PLACES = 1 / 15  # of a sample in a place, between wavelengths
+_WITHIN = 0.98  # share of the values within a limit
+_CONFIDENCE = 0.98  # probability that at least this share is within
+# The worst wavelength of an interval is searched at a few pairs of a band
+_SEARCHED_AT = 40
+_SEARCHED_WAVELENGTHS = 9  # smallest number in an interval
+_SEARCHED_IN_ALL = 400
+_THIN = 0.05  # smallest share of random pairs that were measured; pairs of thinner data are drawn within their extent
+_ROUNDING = 1e-5  # relative error that float32 and the bits of a table leave
+_WINDOW = 1 << 21  # number of values of a table in memory
+_EVALUATED = 1 << 16  # number of pairs of directions at which the source is evaluated together
+
+Read = Callable[[slice], NDArray[np.float32]]  # rows of the first axis of a stored array
 
 
-class Draw(NamedTuple):
-    """Pairs of directions: unit vectors (N, 3), the band of theta_i of each, and what an integral weighs it with.
+class RandomPairs(NamedTuple):
+    """Random pairs of directions: unit vectors `wi` of the light and `wr` of the viewer (N, 3).
 
-    `weight` is cos theta_r over the density with which the viewer was drawn; 0 below the horizon. `in_lobe` says which
-    viewers were drawn in the lobe, `measured` which pairs count: of measured data those that are not extrapolated.
+    `band` is the index of the band of theta_i, `weight` cos theta_r over the density of the viewer, as integrals need
+    it, and 0 below the horizon. `in_lobe` is True for viewers that were drawn in the lobe, `measured` False for pairs
+    outside of the directions that measured data cover.
     """
 
     wi: Floats
@@ -64,103 +73,145 @@ class Draw(NamedTuple):
         """Mask of the pairs that count: the viewer is above the horizon, and f_r is not extrapolated."""
         return np.asarray((self.weight > 0.0) & self.measured)
 
-    def above_the_horizon(self) -> Draw:
-        """Return the pairs whose viewer is above the horizon. Means that are weighed stay as they are."""
-        kept = self.weight > 0.0
-        weight = self.weight[kept] * np.mean(kept)
-        return Draw(self.wi[kept], self.wr[kept], self.band[kept], weight, self.in_lobe[kept], self.measured[kept])
-
-
-def draw(
-    source: Source | FunctionRecord | None, wavelength_nm: NDArray[np.float64] | None, count: int, seed: int
-) -> Draw:
-    """Draw `count` pairs of directions a band, half of the viewers over the hemisphere and half in the lobe.
-
-    theta_i is uniform in its band, phi_i in the circle. Over the hemisphere the solid angle is uniform; in the lobe the
-    light is mirrored in half vectors that follow `Source.lobe`, of the wavelengths in turn, or a lobe twice as wide:
-    its own distribution hardly ever reaches the shoulder where the lobe ends. All facets count alike, seen or not.
-    Viewers of a source without a lobe, or of an unknown one, are all drawn over the hemisphere. Where hardly any of
-    these pairs was measured, such as in a single plane, pairs are drawn evenly over those that were.
-    """
-    drawn = _over_all(source, wavelength_nm, count, seed)
-    extent = _extent_of(source)
-    if extent is None or np.count_nonzero(drawn.above) >= _THIN * len(drawn.wi):
-        return drawn
-    wi, wr = extent.drawn(len(drawn.wi), np.random.default_rng(seed))
-    band = np.clip(np.searchsorted(radians(BANDS_DEG), np.arccos(wi[:, 2]), side="right") - 1, 0, BANDS_DEG.size - 2)
-    order = np.argsort(band, kind="stable")
-    wi, wr, band = wi[order], wr[order], band[order]
-    weight = wr[:, 2] * np.sinc(np.arccos(wr[:, 2]) / np.pi)  # drawn evenly in theta (cos phi, sin phi)
-    none = np.zeros(band.size, dtype=bool)
-    return Draw(wi, wr, band, weight * (np.pi / weight.mean()), none, ~none)
-
-
-def _over_all(
-    source: Source | FunctionRecord | None, wavelength_nm: NDArray[np.float64] | None, count: int, seed: int
-) -> Draw:
-    """Draw pairs of directions as `draw` does, everywhere."""
-    wi, over, u, angle, band, among = (array.copy() for array in _directions(count, seed))
-    in_turn = None if wavelength_nm is None else wavelength_nm[np.arange(band.size) % wavelength_nm.size]
-    lobe = None if source is None else source.lobe(wi[:, 2], in_turn)
-    if lobe is None:
-        none = np.zeros(band.size, dtype=bool)
-        return Draw(wi, over, band, over[:, 2] * (2.0 * np.pi), none, _measured(source, wi, over))
-
-    def wider(width: float | Floats) -> Lobe:
-        return lobe._replace(
-            share=np.ones(1), alpha_x=width * lobe.alpha_x, alpha_y=width * lobe.alpha_y, visible=False
+    def some(self, rows: NDArray[np.bool_]) -> RandomPairs:
+        """Return the pairs of a mask."""
+        return RandomPairs(
+            self.wi[rows], self.wr[rows], self.band[rows], self.weight[rows], self.in_lobe[rows], self.measured[rows]
         )
 
-    which = among * 2 * len(WIDTHS)  # one half over the hemisphere, the other among the lobes
-    in_lobe = which < len(WIDTHS)
-    own = np.array(WIDTHS)[np.where(in_lobe, which, 0.0).astype(np.int64)]
-    wr = np.where(in_lobe[:, np.newaxis], mirrored_in_lobe(u, angle, wi, wider(own)), over)
-    density = 0.5 / (2.0 * np.pi) + 0.5 * np.mean([mixture_density(wider(width), wi, wr) for width in WIDTHS], axis=0)
-    weight = np.where(wr[:, 2] > 0.0, wr[:, 2], 0.0) / density
-    return Draw(wi, wr, band, weight, in_lobe, _measured(source, wi, wr))
+    def above_the_horizon(self) -> RandomPairs:
+        """Return the pairs whose viewer is above the horizon. Weighted means do not change."""
+        above = self.weight > 0.0
+        return self.some(above)._replace(weight=self.weight[above] * np.mean(above))
+
+    def classes(self) -> dict[str, NDArray[np.bool_]]:
+        """Return which viewers look forward or back, within 45 degrees of azimuth, and which pairs are near grazing."""
+        along = np.sum(self.wi[:, :2] * self.wr[:, :2], axis=1)
+        across = np.hypot(*self.wi[:, :2].T) * np.hypot(*self.wr[:, :2].T)
+        return {
+            "forward": along < -np.sqrt(0.5) * across,
+            "back": along > np.sqrt(0.5) * across,
+            "grazing": np.minimum(self.wi[:, 2], self.wr[:, 2]) < np.cos(radians(75.0)),
+        }
+
+    def first_of_bands(self, count: int) -> NDArray[np.bool_]:
+        """Return a mask of the pairs that count among the first `count` of each band; of all pairs if none of these."""
+        first = _among_first(self.band, count) & self.above
+        return first if first.any() else self.above
 
 
-@functools.lru_cache(maxsize=4)
-def _directions(count: int, seed: int) -> tuple[NDArray[Any], ...]:
-    """Return what draws of all sources share. Kept, because it takes half of the time of the error of a small table.
+class _RandomDirections(NamedTuple):
+    """Random numbers that the draws of all sources share.
 
-    Lights and viewers over the hemisphere, shape (N, 3); two numbers for a viewer in the lobe, in (0, 1] and in
-    [0, 2 pi); the band of each light; a number in [0, 1) that chooses among lobes and hemisphere.
+    `lights` are uniform in their `band` of theta_i, `viewers` over the hemisphere, unit vectors (N, 3). `u` in (0, 1]
+    and `angle` in [0, 2 pi) are for a viewer in a lobe, `selector` in [0, 1) chooses among hemisphere and lobes.
     """
+
+    lights: Floats
+    viewers: Floats
+    u: Floats
+    angle: Floats
+    band: NDArray[np.int64]
+    selector: Floats
+
+
+@functools.lru_cache(maxsize=4)  # drawing takes half of the time of the error of a small table
+def _random_directions(count: int, seed: int) -> _RandomDirections:
+    """Return `count` random directions in each band of theta_i."""
     rng = np.random.default_rng(seed)
     band = np.repeat(np.arange(BANDS_DEG.size - 1), count)
     theta_i = radians(BANDS_DEG[band] + rng.random(band.size) * np.diff(BANDS_DEG)[band])
-    wi = unit_vector(theta_i, rng.uniform(0.0, 2.0 * np.pi, band.size))
-    u, angle = 1.0 - rng.random(band.size), rng.uniform(0.0, 2.0 * np.pi, band.size)
-    return wi, unit_vector(np.arccos(u), angle), u, angle, band, rng.random(band.size)
+    lights = unit_vector(theta_i, rng.uniform(0.0, 2.0 * np.pi, band.size))
+    u = 1.0 - rng.random(band.size)
+    angle = rng.uniform(0.0, 2.0 * np.pi, band.size)
+    return _RandomDirections(lights, unit_vector(np.arccos(u), angle), u, angle, band, rng.random(band.size))
+
+
+def draw(source: Source | FunctionRecord | None, wavelength_nm: Axis | None, count: int, seed: int) -> RandomPairs:
+    """Draw `count` pairs of directions in each band of theta_i, half of the viewers in the lobe of the source.
+
+    theta_i is uniform in its band, phi_i in the circle. The other viewers are uniform over the solid angle of the
+    hemisphere. In the lobe the light is mirrored in half vectors that follow `Source.lobe`, of the wavelengths in
+    turn, or a lobe twice as wide: the distribution of the lobe hardly ever reaches its shoulder. Masked facets are
+    counted too. All viewers are drawn over the hemisphere if the source has no lobe, or is not known. If less than 5 %
+    of these pairs were measured, for example in a single plane, pairs are drawn evenly over those that were.
+    """
+    pairs = _draw_everywhere(source, wavelength_nm, count, seed)
+    extent = _extent_of(source)
+    if extent is None or np.count_nonzero(pairs.above) >= _THIN * len(pairs.wi):
+        return pairs
+    wi, wr = extent.drawn(len(pairs.wi), np.random.default_rng(seed))
+    band = np.clip(np.searchsorted(radians(BANDS_DEG), np.arccos(wi[:, 2]), side="right") - 1, 0, BANDS_DEG.size - 2)
+    order = np.argsort(band, kind="stable")
+    wi = wi[order]
+    wr = wr[order]
+    band = band[order]
+    weight = wr[:, 2] * np.sinc(np.arccos(wr[:, 2]) / np.pi)  # drawn evenly in theta (cos phi, sin phi)
+    none = np.zeros(band.size, dtype=bool)
+    return RandomPairs(wi, wr, band, weight * (np.pi / weight.mean()), none, ~none)
+
+
+def _draw_everywhere(
+    source: Source | FunctionRecord | None, wavelength_nm: Axis | None, count: int, seed: int
+) -> RandomPairs:
+    """Draw pairs of directions as `draw` does, wherever the data of a measured source lie."""
+    samples = _random_directions(count, seed)
+    lights = samples.lights.copy()  # a caller may write to the pairs
+    viewers = samples.viewers.copy()
+    band = samples.band.copy()
+    in_turn = None if wavelength_nm is None else wavelength_nm[np.arange(band.size) % wavelength_nm.size]
+    lobe = None if source is None else source.lobe(lights[:, 2], in_turn)
+    if lobe is None:
+        none = np.zeros(band.size, dtype=bool)
+        return RandomPairs(
+            lights, viewers, band, viewers[:, 2] * (2.0 * np.pi), none, _measured(source, lights, viewers)
+        )
+
+    # Each viewer comes from the hemisphere (probability 1/2), or from a lobe of one of the widths (1/2 in total)
+    choice = samples.selector * 2 * len(WIDTHS)
+    from_lobe = choice < len(WIDTHS)
+    width = np.array(WIDTHS)[np.where(from_lobe, choice, 0.0).astype(np.int64)]
+    lobe_viewers = mirrored_in_lobe(samples.u, samples.angle, lights, _widened(lobe, width))
+    viewers = np.where(from_lobe[:, np.newaxis], lobe_viewers, viewers)
+
+    hemisphere_pdf = 1.0 / (2.0 * np.pi)
+    lobe_pdf = np.mean([mixture_density(_widened(lobe, width), lights, viewers) for width in WIDTHS], axis=0)
+    pdf = 0.5 * hemisphere_pdf + 0.5 * lobe_pdf
+    weight = np.where(viewers[:, 2] > 0.0, viewers[:, 2], 0.0) / pdf
+    return RandomPairs(lights, viewers, band, weight, from_lobe, _measured(source, lights, viewers))
+
+
+def _widened(lobe: Lobe, width: float | Floats) -> Lobe:
+    """Return a lobe of all facets, masked ones too, with widths that are larger by a factor."""
+    return lobe._replace(share=np.ones(1), alpha_x=width * lobe.alpha_x, alpha_y=width * lobe.alpha_y, visible=False)
 
 
 def _measured(source: Source | FunctionRecord | None, wi: Floats, wr: Floats) -> NDArray[np.bool_]:
-    """Return which pairs of unit vectors (N, 3) count: all, or of measured data those that are not extrapolated."""
+    """Return a mask of pairs of unit vectors (N, 3), False where f_r of measured data is extrapolated."""
     extent = _extent_of(source)
     return np.ones(len(wi), dtype=bool) if extent is None else ~extent.outside(wi, wr)
 
 
 def _extent_of(source: Source | FunctionRecord | None) -> Extent | None:
-    """Return the directions that were measured; None if all are known."""
+    """Return the directions that were measured; None if f_r is known everywhere."""
     measured = source.measured if isinstance(source, MeasuredSource | TableSource) else None
     return None if measured is None else measured.extent
 
 
-def model_values(source: Source, wavelength_nm: NDArray[np.float64] | None, wi: Floats, wr: Floats) -> Floats:
-    """Return f_r [1/sr] of a source, of shape (N, L), L = 1 for a grey one."""
+def model_values(source: Source, wavelength_nm: Axis | None, wi: Floats, wr: Floats) -> Floats:
+    """Return f_r [1/sr] of a source, of shape (N, L), L = 1 for a grey source."""
     brdf = source.brdf_at(wavelength_nm)
     values = np.empty((len(wi), 1 if wavelength_nm is None else wavelength_nm.size))
     with sharing():
         for start in range(0, len(wi), _EVALUATED):
-            some = slice(start, start + _EVALUATED)
-            values[some] = brdf(wi[some], wr[some])
+            rows = slice(start, start + _EVALUATED)
+            values[rows] = brdf(wi[rows], wr[rows])
     return values
 
 
-def floor_of(truth: Floats, drawn: Draw) -> Floats:
+def floor_of(truth: Floats, pairs: RandomPairs) -> Floats:
     """Return the floor [1/sr] of relative errors at each wavelength: `FLOOR` of a Lambertian BRDF as bright."""
-    return np.asarray(FLOOR / np.pi * np.mean(drawn.weight[:, np.newaxis] * truth, axis=0))
+    return np.asarray(FLOOR / np.pi * np.mean(pairs.weight[:, np.newaxis] * truth, axis=0))
 
 
 def relative(values: Floats, truth: Floats, floor: Floats) -> Floats:
@@ -174,118 +225,132 @@ def relative(values: Floats, truth: Floats, floor: Floats) -> Floats:
 
 def mean_error(values: Floats, truth: Floats, weight: Floats) -> Floats:
     """Return the weighted mean of abs(values - truth) over that of truth, for each row of weights and wavelength."""
-    wrong, whole = weight @ np.abs(values - truth), weight @ truth
-    return np.divide(wrong, whole, out=np.zeros_like(wrong), where=whole > 0.0)
+    difference = weight @ np.abs(values - truth)
+    total = weight @ truth
+    return np.divide(difference, total, out=np.zeros_like(difference), where=total > 0.0)
 
 
-def classes(drawn: Draw) -> dict[str, NDArray[np.bool_]]:
-    """Return which viewers of a draw look forward or back, within 45 degrees of azimuth, and which pairs graze."""
-    wi, wr = drawn.wi, drawn.wr
-    along = np.sum(wi[:, :2] * wr[:, :2], axis=1)
-    across = np.hypot(*wi[:, :2].T) * np.hypot(*wr[:, :2].T)
-    return {
-        "forward": along < -np.sqrt(0.5) * across,
-        "back": along > np.sqrt(0.5) * across,
-        "grazing": np.minimum(wi[:, 2], wr[:, 2]) < np.cos(radians(75.0)),
-    }
+def directions_of_a_band(wavelength_nm: Axis | None) -> int:
+    """Return the number of pairs of directions in each band of theta_i for the error of a table, as in every build."""
+    return DIRECTIONS if wavelength_nm is None or wavelength_nm.size <= _FEW else _FEWER_DIRECTIONS
 
 
-def measure(
-    layout: Layout, read: Callable[[slice], NDArray[np.float32]], count: int | None = None, seed: int = SEED
-) -> Error:
-    """Measure the error of a table.
+class _Compared(NamedTuple):
+    """f_r [1/sr] of a table and of its source, shape (N, L)."""
+
+    values: Floats
+    truth: Floats
+
+    def rows(self, rows: slice) -> _Compared:
+        """Return the values of some pairs of directions."""
+        return _Compared(self.values[rows], self.truth[rows])
+
+
+def _compared(
+    layout: Layout, read: Read, wavelength_nm: Axis | None, pairs: RandomPairs | places.Pairs, near: places.Pairs
+) -> _Compared:
+    """Return f_r of a table and of its source, at random pairs and then at those in places."""
+    wi = np.concatenate([pairs.wi, near.wi])
+    wr = np.concatenate([pairs.wr, near.wr])
+    truth = model_values(layout.source, wavelength_nm, wi, wr)
+    return _Compared(_looked_up(layout, read, wi, wr, wavelength_nm), truth)
+
+
+def measure(layout: Layout, read: Read, count: int | None = None, seed: int = SEED) -> Error:
+    """Measure the error of a table in each band and wavelength, overall, in places and between wavelengths.
 
     Parameters
     ----------
     layout : Layout
-        Of the table.
+        Layout of the table. The error of a mixture is that at its worst wavelength alone.
     read : callable
         Gives some rows of the first axis of the stored array. Large tables are read piece by piece.
-    count : int, optional
-        Directions a band of theta_i, by default 4000, or 3000 of more than four wavelengths.
-    seed : int
-        Of the directions.
-
-    Returns
-    -------
-    Error
-        For each band and wavelength, and overall, to three digits; and limits in places and between wavelengths. Of a
-        mixture, at its worst wavelength alone.
+    count, seed : int
+        Number of directions in a band of theta_i, by default 4000, or 3000 for more than four wavelengths; their seed.
     """
     count = directions_of_a_band(layout.wavelength_nm) if count is None else count
-    drawn = draw(layout.source, layout.wavelength_nm, count, seed)
-    pairs = places.draw(math.ceil(count * _IN_PLACES), seed)
-    wi, wr = np.concatenate([drawn.wi, pairs.wi]), np.concatenate([drawn.wr, pairs.wr])
-    truth = model_values(layout.source, layout.wavelength_nm, wi, wr)
-    values = _looked_up(layout, read, wi, wr, layout.wavelength_nm)
-    own = len(drawn.wi)
-    inside = _measured(layout.source, pairs.wi, pairs.wr)
-    error = compare(values[:own], truth[:own], drawn, seed)
+    pairs = draw(layout.source, layout.wavelength_nm, count, seed)
+    near = places.draw(math.ceil(count * _IN_PLACES), seed)
+    compared = _compared(layout, read, layout.wavelength_nm, pairs, near)
+    everywhere = compared.rows(slice(None, len(pairs.wi)))
+    in_places = compared.rows(slice(len(pairs.wi), None))
+    error = compare(everywhere.values, everywhere.truth, pairs, seed)
     floor = np.array(error.floor)  # as it is stated, to three digits
-    worst = worst_pair(
-        np.where(drawn.above[:, np.newaxis], relative(values[:own], truth[:own], floor), -np.inf),
-        truth[:own],
-        floor,
-        drawn.wi,
-        drawn.wr,
-        drawn.in_lobe,
-        layout.source,
-        layout.wavelength_nm,
-    )
+    of_source = relative(everywhere.values, everywhere.truth, floor)
+    of_table = relative(in_places.truth, in_places.values, floor)
     measured = error.model_copy(
         update={
-            "worst": worst,
-            "places": limits_in_places(relative(truth[own:], values[own:], floor), pairs, inside),
-            "between": None if floor.size < 2 else _between(layout, read, drawn, pairs, floor, count),
+            "worst": worst_pair(of_source, everywhere.truth, floor, pairs, layout.source, layout.wavelength_nm),
+            "places": limits_in_places(of_table, near, _measured(layout.source, near.wi, near.wr)),
+            "between": None if floor.size < 2 else _between(layout, read, pairs, near, floor, count),
         }
     )
     return measured if layout.part_nm is None else measured.of_worst_wavelength()
 
 
-def directions_of_a_band(wavelength_nm: NDArray[np.float64] | None) -> int:
-    """Return how many directions of each band of theta_i the error of a table is measured at: those of every build."""
-    return DIRECTIONS if wavelength_nm is None or wavelength_nm.size <= _FEW else _FEWER_DIRECTIONS
+def worst_pair(
+    error: Floats, truth: Floats, floor: Floats, pairs: RandomPairs, source: Source, wavelength_nm: Axis | None
+) -> WorstPair:
+    """Return the pair of directions that counts with the largest relative error (N, L) [1], and why it is large there.
 
-
-def _between(
-    layout: Layout,
-    read: Callable[[slice], NDArray[np.float32]],
-    drawn: Draw,
-    pairs: places.Pairs,
-    floor: Floats,
-    count: int,
-) -> Between:
-    """Measure the error between wavelengths, at some of the directions that it was measured at on them."""
-    assert layout.wavelength_nm is not None
-    few = _some(drawn, min(count, _SEARCHED_AT))
-    how = layout.interpolation
-    if layout.part_nm is not None or how.straight:  # f_r itself is interpolated
-        how = replace(PLAIN, wavelengths=how.wavelengths)
-    at = worst_wavelengths(layout.source, layout.wavelength_nm, how, drawn.wi[few], drawn.wr[few], floor)
-    some = _some(drawn, math.ceil(count * _BETWEEN))
-    fewer = pairs.some(_first(pairs.sample, math.ceil(count * _BETWEEN_IN_PLACES)))
-    wi, wr = np.concatenate([drawn.wi[some], fewer.wi]), np.concatenate([drawn.wr[some], fewer.wr])
-    values, truth = _looked_up(layout, read, wi, wr, at), model_values(layout.source, at, wi, wr)
-    error = relative(truth, values, np.maximum(floor[1:], floor[:-1]))  # to what a lookup knows
-    own = np.count_nonzero(some)
-    elsewhere = ~places.anywhere(wi[:own], wr[:own])
-    return Between(
-        wavelength_nm=at.tolist(),
-        bands=limits_of_bands(error[:own][elsewhere], drawn.band[some][elsewhere]),
-        places=limits_in_places(error[own:], fewer, _measured(layout.source, fewer.wi, fewer.wr)),
-        overall=not_less(limit_of(error[:own])),
+    `truth` (N, L) [1/sr] is f_r of the source. Below `floor` (L,) [1/sr] an error is relative to the floor.
+    """
+    error = np.where(pairs.above[:, np.newaxis], error, -np.inf)
+    row, column = np.unravel_index(int(np.argmax(error)), error.shape)
+    light, viewer = pairs.wi[row], pairs.wr[row]
+    theta_i, theta_r = (float(degrees(np.arccos(np.clip(w[2], -1.0, 1.0)))) for w in (light, viewer))
+    turn = np.arctan2(viewer[1], viewer[0]) - np.arctan2(light[1], light[0])
+    delta_phi = abs((float(degrees(turn)) + 180.0) % 360.0 - 180.0)
+    grazing = sum(theta >= RINGS_DEG[0] for theta in (theta_i, theta_r))
+    steep = "grows without bound" if source.grazing_pole else "changes fast"
+    if error[row, column] < _ROUNDING:
+        why = "it is rounding"
+    elif grazing:
+        which = "both directions are" if grazing == 2 else "one direction is"
+        why = f"{which} near the horizon, where f_r {steep}"
+    elif truth[row, column] <= floor[column]:
+        why = "f_r is less than the floor there, and errors are relative to the floor"
+    elif source.has_lobe and pairs.in_lobe[row]:
+        why = "the viewer is in the lobe, where f_r changes most"
+    elif abs(theta_i - theta_r) <= ALONGSIDE_DEG and delta_phi <= 90.0:
+        why = "the viewer is beside the light, where f_r has a ridge"
+    else:
+        why = "f_r is bent there"
+    return WorstPair(
+        theta_i_deg=round(theta_i, 2),
+        theta_r_deg=round(theta_r, 2),
+        delta_phi_deg=round(delta_phi, 2),
+        wavelength_nm=None if wavelength_nm is None else float(wavelength_nm[column]),
+        why=why,
     )
 
 
-def worst_wavelengths(
-    source: Source, stored: NDArray[np.float64], how: Interpolation, wi: Floats, wr: Floats, floor: Floats
-) -> NDArray[np.float64]:
-    """Return the wavelength [nm] inside each interval where interpolation of the source itself is worst.
-
-    Nine or more wavelengths of an interval are tried, at a few pairs of directions `wi`, `wr`. `floor` is that of the
-    `stored` wavelengths, `how` the interpolation of the table. The nodes of spectra are tried, too.
-    """
-    return np.array([worst.wavelength_nm for worst in worst_between(source, stored, how, wi, wr, floor)])
+def _between(layout: Layout, read: Read, pairs: RandomPairs, near: places.Pairs, floor: Floats, count: int) -> Between:
+    """Measure the error between wavelengths, at some of the directions of the error on wavelengths."""
+    assert layout.wavelength_nm is not None
+    searched = pairs.first_of_bands(min(count, _SEARCHED_AT))
+    interpolation = layout.interpolation
+    if layout.part_nm is not None or interpolation.straight:  # f_r itself is interpolated
+        interpolation = replace(PLAIN, wavelengths=interpolation.wavelengths)
+    worst = worst_between(
+        layout.source, layout.wavelength_nm, interpolation, pairs.wi[searched], pairs.wr[searched], floor
+    )
+    wavelength_nm = np.array([place.wavelength_nm for place in worst])
+    chosen = pairs.first_of_bands(math.ceil(count * _BETWEEN))
+    pairs = pairs.some(chosen)
+    near = near.some(_among_first(near.sample, math.ceil(count * _BETWEEN_IN_PLACES)))
+    compared = _compared(layout, read, wavelength_nm, pairs, near)
+    # The error is relative to what a lookup knows
+    error = relative(compared.truth, compared.values, np.maximum(floor[1:], floor[:-1]))
+    everywhere = error[: len(pairs.wi)]
+    elsewhere = ~places.anywhere(pairs.wi, pairs.wr)
+    measured = _measured(layout.source, near.wi, near.wr)
+    return Between(
+        wavelength_nm=wavelength_nm.tolist(),
+        bands=limits_of_bands(everywhere[elsewhere], pairs.band[elsewhere]),
+        places=limits_in_places(error[len(pairs.wi) :], near, measured),
+        overall=not_less(limit_of(everywhere)),
+    )
 
 
 class WorstBetween(NamedTuple):
@@ -296,32 +361,37 @@ class WorstBetween(NamedTuple):
 
 
 def worst_between(
-    source: Source, stored: NDArray[np.float64], how: Interpolation, wi: Floats, wr: Floats, floor: Floats
+    source: Source, stored_nm: Axis, interpolation: Interpolation, wi: Floats, wr: Floats, floor: Floats
 ) -> list[WorstBetween]:
-    """Return where `worst_wavelengths` finds the largest 95th percentile of the error, and that, for each interval."""
-    intervals = stored.size - 1
-    within = max(_SEARCHED[0], _SEARCHED[1] // intervals)
+    """Return the wavelength inside each interval where interpolation of the source itself is worst.
+
+    The error of a wavelength is the 95th percentile at a few pairs of directions `wi`, `wr`. Nine or more wavelengths
+    of an interval are tried, and the nodes of spectra. `floor` [1/sr] holds for the stored wavelengths,
+    `interpolation` is that of the table.
+    """
+    intervals = stored_nm.size - 1
+    within = max(_SEARCHED_WAVELENGTHS, _SEARCHED_IN_ALL // intervals)
     share = np.arange(1, within + 1) / (within + 1)
-    at = (stored[:-1, np.newaxis] + np.diff(stored)[:, np.newaxis] * share).reshape(-1)
+    tried_nm = (stored_nm[:-1, np.newaxis] + np.diff(stored_nm)[:, np.newaxis] * share).reshape(-1)
     if isinstance(source, Material) and source.spectra:
         kinks = np.unique(np.concatenate([spectrum.wavelengths_nm for spectrum in source.spectra.values()]))
-        kinks = kinks[(kinks > stored[0]) & (kinks < stored[-1])]
-        at = np.union1d(at, kinks[~np.isin(kinks, stored)])
+        kinks = kinks[(kinks > stored_nm[0]) & (kinks < stored_nm[-1])]
+        tried_nm = np.union1d(tried_nm, kinks[~np.isin(kinks, stored_nm)])
     mu = np.maximum(wi[:, 2], COS_HORIZON) * np.maximum(wr[:, 2], COS_HORIZON)
-    numbers = how.numbers(model_values(source, stored, wi, wr), mu)
-    nodes, weight = weights_of_nodes(stored, at, cubic=not how.straight)
-    interval = np.searchsorted(stored, at) - 1
+    numbers = interpolation.numbers(model_values(source, stored_nm, wi, wr), mu)
+    nodes, weight = weights_of_nodes(stored_nm, tried_nm, cubic=not interpolation.straight)
+    interval = np.searchsorted(stored_nm, tried_nm) - 1
     error = relative(  # to what a lookup knows
-        model_values(source, at, wi, wr),
-        np.maximum(how.f_r(np.sum(numbers[:, nodes] * weight, axis=-1), mu), 0.0),
+        model_values(source, tried_nm, wi, wr),
+        np.maximum(interpolation.f_r(np.sum(numbers[:, nodes] * weight, axis=-1), mu), 0.0),
         np.maximum(floor[1:], floor[:-1])[interval],
     )
-    of_each = np.percentile(error, 95.0, axis=0)
+    p95 = np.percentile(error, 95.0, axis=0)
     worst = []
     for number in range(intervals):
         inside = np.flatnonzero(interval == number)
-        most = inside[np.argmax(of_each[inside])]
-        worst.append(WorstBetween(float(at[most]), float(of_each[most])))
+        most = inside[np.argmax(p95[inside])]
+        worst.append(WorstBetween(float(tried_nm[most]), float(p95[most])))
     return worst
 
 
@@ -330,28 +400,21 @@ def limits_of_bands(error: Floats, band: NDArray[np.int64]) -> list[list[float]]
     return [not_less(limit_of(error[band == row])) for row in range(places.BANDS)]
 
 
-def _some(drawn: Draw, count: int) -> NDArray[np.bool_]:
-    """Return which pairs count, of the first `count` of each band; all that do where none of these does."""
-    first = _first(drawn.band, count) & drawn.above
-    return first if first.any() else drawn.above
-
-
-def _first(sample: NDArray[np.int64], count: int) -> NDArray[np.bool_]:
-    """Return which members of samples are among the first `count` of theirs; those of a sample stand together."""
+def _among_first(sample: NDArray[np.int64], count: int) -> NDArray[np.bool_]:
+    """Return a mask of the first `count` members of each sample; the numbers of the samples increase."""
     return np.asarray(np.arange(sample.size) - np.searchsorted(sample, sample) < count)
 
 
-def limits_in_places(error: Floats, pairs: places.Pairs, inside: NDArray[np.bool_]) -> Places:
+def limits_in_places(error: Floats, pairs: places.Pairs, measured: NDArray[np.bool_]) -> Places:
     """Return limits of errors (N, columns) at pairs drawn in places: the largest of the samples of each place.
 
-    `inside` says which pairs count. The limit of a place without any is 0.
+    Pairs that are not `measured` do not count. The limit of a place without any other is 0.
     """
     rows: dict[int, Floats] = {}
-    ends = np.searchsorted(pairs.sample, np.arange(pairs.sample[-1] + 2))  # those of a sample stand together
+    ends = np.searchsorted(pairs.sample, np.arange(pairs.sample[-1] + 2))
     for members in map(slice, ends[:-1], ends[1:]):
         row = int(pairs.row[members][0])
-        rows[row] = np.maximum(rows.get(row, 0.0), limit_of(error[members][inside[members]]))
-
+        rows[row] = np.maximum(rows.get(row, 0.0), limit_of(error[members][measured[members]]))
     limits = {row: not_less(limit) for row, limit in rows.items()}
     return Places(
         alongside=[limits[row] for row in range(places.ALONGSIDE, places.ONE_GRAZING)],
@@ -361,7 +424,7 @@ def limits_in_places(error: Floats, pairs: places.Pairs, inside: NDArray[np.bool
 
 
 def limit_of(error: Floats) -> Floats:
-    """Return the limit that `_WITHIN` of all errors are within, with `_CONFIDENCE`, of a sample (N, columns)."""
+    """Return the limit of 98 of 100 errors, with a confidence of 98 %, of a sample (N, columns)."""
     if len(error) == 0:
         return np.zeros(error.shape[1])
     return np.asarray(np.sort(error, axis=0)[-rank_of_limit(len(error), _WITHIN, _CONFIDENCE)])
@@ -369,12 +432,13 @@ def limit_of(error: Floats) -> Floats:
 
 @functools.cache
 def rank_of_limit(count: int, within: float, confidence: float) -> int:
-    """Return which of so many values, from the largest, 1 or more, bounds the quantile `within` of all values.
+    """Return the rank, from the largest of `count` values, of a bound of the quantile `within` of all values.
 
-    The number of values beyond the quantile is binomial. That fewer than the rank are is the chance of a limit that is
-    too low: at most 1 - `confidence`, unless the values are too few for that.
+    The number of values beyond the quantile is binomial. That it is below the rank is the chance of a limit that is too
+    low: at most 1 - `confidence`, unless the values are too few for that. The rank is at least 1.
     """
-    rank, chance = 0, 0.0  # the chance that no more than `rank` are beyond
+    rank = 0
+    chance = 0.0  # that at most `rank` values are beyond the quantile
     while True:
         ways = math.lgamma(count + 1) - math.lgamma(rank + 1) - math.lgamma(count - rank + 1)
         chance += math.exp(ways + rank * math.log(1.0 - within) + (count - rank) * math.log(within))
@@ -383,43 +447,37 @@ def rank_of_limit(count: int, within: float, confidence: float) -> int:
         rank += 1
 
 
-def compare(values: Floats, truth: Floats, drawn: Draw, seed: int = SEED) -> Error:
-    """Return the error of values of f_r, shape (N, L), against the truth at the directions of a draw that count.
+def compare(values: Floats, truth: Floats, pairs: RandomPairs, seed: int = SEED) -> Error:
+    """Return the error of values of f_r, shape (N, L), against the truth at the random pairs that count.
 
-    A band of theta_i without any, in which nothing was measured, repeats the error of all bands.
+    A band of theta_i without such pairs, in which nothing was measured, repeats the error of all bands.
     """
-    floor = floor_of(truth, drawn)
+    floor = floor_of(truth, pairs)
     count = BANDS_DEG.size - 1
-    above = drawn.above
-    bands_of = [above & (drawn.band == band) for band in range(count)]
+    above = pairs.above
+    bands_of = [above & (pairs.band == band) for band in range(count)]
     chosen = [rows if rows.any() else above for rows in bands_of] + [above]  # each band of theta_i, then all of them
-    l1 = mean_error(values, truth, np.where(chosen, drawn.weight, 0.0))
+    l1 = mean_error(values, truth, np.where(chosen, pairs.weight, 0.0))
     error = np.ascontiguousarray(relative(values, truth, floor).T)
     percentiles = [np.percentile(error[:, rows], [50.0, 95.0, 99.0, 100.0], axis=1) for rows in chosen]
     # [statistic][band][wavelength]
     bands = np.stack([l1[:-1], *np.moveaxis(np.stack(percentiles[:-1]), 1, 0)])
-    worst = np.concatenate([[l1[-1].max()], percentiles[-1].max(axis=-1)])
+    overall = np.concatenate([[l1[-1].max()], percentiles[-1].max(axis=-1)])
     names = tuple(Overall.model_fields)
     return Error.model_validate(
         {
             "theta_i_deg": BANDS_DEG.tolist(),
             "directions": int(np.count_nonzero(above)),
             "seed": seed,
-            "floor": _short(floor),
-            "overall": dict(zip(names, _short(worst), strict=True)),
-            **{name: [_short(row) for row in rows] for name, rows in zip(names, bands, strict=True)},
+            "floor": _three_digits(floor),
+            "overall": dict(zip(names, _three_digits(overall), strict=True)),
+            **{name: [_three_digits(row) for row in rows] for name, rows in zip(names, bands, strict=True)},
         }
     )
 
 
-def _looked_up(
-    layout: Layout,
-    read: Callable[[slice], NDArray[np.float32]],
-    wi: Floats,
-    wr: Floats,
-    wavelength_nm: NDArray[np.float64] | None,
-) -> Floats:
-    """Return values (N, L) of a table at directions, read in windows of rows with one more on either side."""
+def _looked_up(layout: Layout, read: Read, wi: Floats, wr: Floats, wavelength_nm: Axis | None) -> Floats:
+    """Return values (N, L) of a table, read in windows of rows with an extra row on either side."""
     rows = layout.shape[0]
     step = max(2, min(rows, _WINDOW // (layout.size // rows)))
     values = np.zeros((len(wi), 1 if wavelength_nm is None else wavelength_nm.size))
@@ -441,6 +499,6 @@ def not_less(values: Floats) -> list[float]:
     return [float(f"{1.00501 * value:.3g}") for value in values.tolist()]
 
 
-def _short(values: Floats) -> list[float]:
+def _three_digits(values: Floats) -> list[float]:
     """Return numbers to three digits."""
     return [float(f"{value:.3g}") for value in values.tolist()]

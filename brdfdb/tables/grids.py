@@ -51,22 +51,17 @@ class Grid:
     at 180 for surfaces that half a turn leaves the same, or at 90 for those that are also their own mirror image in x.
     Both ends of an axis are nodes; nodes need not be uniform.
 
-    Parameters
-    ----------
-    axes : mapping of str to sequence of float [degree]
-        Nodes of each axis, strictly increasing, in the order of the table's dimensions.
-
     Raises
     ------
     ValueError
         If the axes are not one of the four sets, or an axis does not start, end or increase as it must.
     """
 
-    axes: dict[str, Axis]
+    axes: dict[str, Axis]  #: nodes of each axis, strictly increasing, in the order of the table's dimensions, [degree]
 
     @classmethod
     def part(cls, whole: Grid, rows: slice) -> Grid:
-        """Some rows of the first axis of a grid, which need not begin at 0."""
+        """Return rows of the first axis of a grid, which need not begin at 0."""
         part = object.__new__(cls)
         first, *others = whole.axes
         axes = {first: whole.axes[first][rows], **{name: whole.axes[name] for name in others}}
@@ -172,14 +167,9 @@ def directions(names: tuple[str, ...], nodes: Sequence[Axis]) -> tuple[NDArray[n
 
 
 def axes_among(names: Iterable[Any]) -> tuple[str, ...]:
-    """Return the axes of a grid among the names of arrays or dimensions.
+    """Return the axes of a grid among the names of arrays or dimensions; ParameterError if there are none.
 
     An anisotropic grid of half and difference vectors has the axes of an isotropic one, too.
-
-    Raises
-    ------
-    ValueError
-        If there are none.
     """
     known = set(names)
     for kind in reversed(KINDS):

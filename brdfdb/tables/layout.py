@@ -32,30 +32,19 @@ _BLOCK_VALUES = 1 << 20  # values of a block, 4 MB
 
 @dataclass(frozen=True)
 class Interpolation:
-    """The way from the numbers of a table to f_r between its nodes.
-
-    Attributes
-    ----------
-    method : str
-        "linear", or "cubic": Catmull-Rom, each cell the Hermite cubic with the slopes of parabolas through three nodes.
-    logarithm : bool
-        True if logarithms are tabulated and interpolated.
-    offset : float [1/sr]
-        Number that is added before logarithms are taken: much smaller values take no nodes.
-    power : float
-        f_r is tabulated times (cos theta_i cos theta_r) to this power, in {0, 1/2, 1}: without the pole that a source
-        may have at the horizon.
-    wavelengths : str
-        Between wavelengths, "cubic": Catmull-Rom of the numbers of the table; or "linear": straight lines of f_r, as
-        parameters are joined that a recipe gives at a few wavelengths.
-    """
+    """The way from the numbers of a table to f_r between its nodes."""
 
     __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(extra="forbid")  # where attributes of tables are read
 
+    #: "linear", or "cubic": Catmull-Rom, each cell the Hermite cubic with the slopes of parabolas through three nodes
     method: str = "linear"
-    logarithm: bool = False
-    offset: float = 0.0
+    logarithm: bool = False  #: True if logarithms are tabulated and interpolated
+    offset: float = 0.0  #: number that is added before logarithms are taken: much smaller values take no nodes, [1/sr]
+    #: f_r is tabulated times (cos theta_i cos theta_r) to this power, in {0, 1/2, 1}: without the pole that a source
+    #: may have at the horizon
     power: float = 0.0
+    #: between wavelengths, "cubic": Catmull-Rom of the numbers of the table; or "linear": straight lines of f_r, as
+    #: parameters are joined that a recipe gives at a few wavelengths
     wavelengths: str = "cubic"
 
     def __post_init__(self) -> None:
@@ -108,29 +97,6 @@ class Layout:
     The layout of a material is plain data that travels to workers and into a staging directory. That of a function
     stays in this process.
 
-    Parameters
-    ----------
-    source : Source
-        Material or function to tabulate.
-    grid : Grid
-        Angles [degree]; anisotropic for anisotropic sources.
-    wavelength_nm : array of shape (L,) [nm], optional
-        For spectral sources, and only for them.
-    interpolation : Interpolation
-        The way from the numbers of the table to f_r; by default they are f_r, and linear.
-    spectra : array of shape (parts, L), optional
-        Basis of a factored spectrum. Without `part_nm` its rows are orthonormal and make logarithms: nodes store
-        coefficients. With `part_nm` the rows say how f_r at those wavelengths makes f_r at all.
-    part_nm : array of shape (parts,) [nm], optional
-        Wavelengths of the parts of a table whose spectra mix f_r itself: nodes store the numbers at these wavelengths.
-    facet_theta_d_deg : array of shape (T,) [degree], optional
-        Half angles between light and viewer, from 0 to 90, at which a polarised table stores its Mueller matrix; see
-        `brdfdb.tables.polarisation`.
-    bits : int
-        Bits of the mantissa to keep, in [1, 23].
-    reason : str
-        Reason for the layout, in words.
-
     Raises
     ------
     ValueError
@@ -139,14 +105,21 @@ class Layout:
         degrees where f_r has a pole, Mueller matrices of a source that has none.
     """
 
-    source: Source
-    grid: Grid
-    wavelength_nm: NDArray[np.float64] | None = None
+    source: Source  #: material or function to tabulate
+    grid: Grid  #: angles [degree]; anisotropic for anisotropic sources
+    wavelength_nm: NDArray[np.float64] | None = None  #: wavelengths of spectral sources, and only of them, (L,) [nm]
+    #: the way from the numbers of the table to f_r; by default they are f_r, and linear
     interpolation: Interpolation = PLAIN
+    #: basis of a factored spectrum. Without `part_nm` its rows are orthonormal and make logarithms: nodes store
+    #: coefficients. With `part_nm` the rows say how f_r at those wavelengths makes f_r at all, (parts, L)
     spectra: NDArray[np.float64] | None = None
-    bits: int = 23
-    reason: str = ""
+    bits: int = 23  #: bits of the mantissa to keep, in [1, 23]
+    reason: str = ""  #: reason for the layout, in words
+    #: wavelengths of the parts of a table whose spectra mix f_r itself: nodes store the numbers at these wavelengths,
+    #: (parts,) [nm]
     part_nm: NDArray[np.float64] | None = None
+    #: half angles between light and viewer, from 0 to 90, at which a polarised table stores its Mueller matrix; see
+    #: `brdfdb.tables.polarisation`, (T,) [degree]
     facet_theta_d_deg: NDArray[np.float64] | None = None
 
     def __post_init__(self) -> None:
@@ -179,6 +152,11 @@ class Layout:
     def tabulated(self) -> Source:
         """The source whose f_r is in the table: without its uniform part, unless the stored numbers are f_r itself."""
         return self.source if self.plain else self.source.without_uniform()
+
+    @property
+    def evaluated_nm(self) -> NDArray[np.float64] | None:
+        """The wavelengths [nm] at which nodes are evaluated: those of the parts of a mixture; None: grey."""
+        return self.wavelength_nm if self.part_nm is None else self.part_nm
 
     @property
     def uniform(self) -> NDArray[np.float64] | None:
@@ -240,13 +218,7 @@ class Layout:
 
     @classmethod
     def from_document(cls, document: Mapping[str, Any]) -> Layout:
-        """Return the layout that a document describes.
-
-        Raises
-        ------
-        BrdfdbError
-            If its source is a function, which a document cannot hold.
-        """
+        """Return the layout that a document describes; BrdfdbError for a function, which a document cannot hold."""
         source = source_of(document)
         if not isinstance(source, Material):
             raise BrdfdbError(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,30 +26,35 @@ from brdfdb.tables.grids import (
 from brdfdb.tables.layout import Interpolation, Layout
 from brdfdb.tables.mixture import mixture_of
 from brdfdb.tables.planner import check_tolerance, offset_of
-from brdfdb.tables.table import Table
-from brdfdb.tables.table_source import TableSource
+from brdfdb.tables.table import Table, TableSource
 
 _LADDER = (16, 24, 36, 54, 72)  # nodes of theta_h or theta_i
 _ANISOTROPIC_LADDER = (10, 14, 20)
 _WIDE = 0.5  # width [1] of a lobe beyond which directions of light and viewer suit as well
-_DRAWS, _SEED = 300, 1867
+_DIRECTIONS = 300  # pairs of directions in a band of theta_i
+_SEED = 1867
 _EASED = 0.02  # share of the nodes of theta_h that are spread evenly, so that no two are the same
 _BITS = 14  # rounds a logarithm by less than measured data are uncertain
 # nodes of the other axes, as shares of those of the first
 _SHARES = {"theta_d": 0.6, "phi_d": 0.7, "theta_r": 1.0, "delta_phi": 1.0, "phi_h": 1.2, "phi_i": 1.2, "phi_r": 1.6}
 
 
+class MeasuredLayout(NamedTuple):
+    """The layout of a table of measured data, and its values, which were tabulated to choose it."""
+
+    layout: Layout
+    values: NDArray[np.float32]
+
+
 def tabulated(
     source: MeasuredSource | TableSource, wavelength_nm: NDArray[np.float64] | None, tolerance: float
-) -> tuple[Layout, NDArray[np.float32]]:
-    """Return the layout of a table of measured data, and its values, which were tabulated to choose it.
+) -> MeasuredLayout:
+    """Return the coarsest layout of measured data, or of a table of them, that keeps to a tolerance.
 
     Parameters
     ----------
-    source : MeasuredSource or TableSource
-        Measured data, or a table of them.
-    wavelength_nm : array (L,) [nm], or None
-        For spectral data, and only for them.
+    source, wavelength_nm : MeasuredSource or TableSource, array (L,) [nm] or None
+        Measured data, and the wavelengths of spectral data.
     tolerance : float
         95th percentile of the relative error against the source, and the l1 error, in [1e-4, 0.5]. If the finest grid
         does not keep to it, the grid is taken all the same, and its table states the error that it has: noise, steps
@@ -68,13 +74,15 @@ def tabulated(
     check_tolerance(tolerance)
     offset = offset_of(source, wavelength_nm)
     mixture = mixture_of(source, wavelength_nm)
-    drawn = error_measurement.draw(source, wavelength_nm, _DRAWS, _SEED)
+    drawn = error_measurement.draw(source, wavelength_nm, _DIRECTIONS, _SEED)
     truth = error_measurement.model_values(source, wavelength_nm, drawn.wi, drawn.wr)
     if not np.any(truth > 0.0):
         raise ParameterError("values", "no value is above 0, which leaves nothing to tabulate", 0.0)
     floor = error_measurement.floor_of(truth, drawn)
     weight = np.where(drawn.above, drawn.weight, 0.0)
-    layout, values, reached = None, np.empty(0, np.float32), math.inf
+    layout = None
+    values = np.empty(0, np.float32)
+    reached = math.inf
     chiral = source.measured is not None and source.measured.chiral
     for count in _ANISOTROPIC_LADDER if source.anisotropic and not chiral else _LADDER:
         layout = Layout(
@@ -97,7 +105,7 @@ def tabulated(
     assert layout is not None
     kept = "keeps" if reached <= tolerance else "is the finest grid of measured data, and does not keep"
     reason = f"{math.prod(layout.grid.shape)} nodes; {kept} to a tolerance of {tolerance:g} against the data"
-    return replace(layout, reason=reason), values
+    return MeasuredLayout(replace(layout, reason=reason), values)
 
 
 def _grid(source: Source, count: int, *, chiral: bool) -> Grid:

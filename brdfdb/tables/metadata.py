@@ -11,10 +11,9 @@ from brdfdb.errors import ParameterError, sentence_of
 from brdfdb.materials.provenance import Assumption, KnownExcess
 from brdfdb.materials.spectrum import Spectrum
 from brdfdb.measurements.record import Measured
-from brdfdb.tables.first_numbers import FormulaError, LargestAlbedo
 from brdfdb.tables.layout import Interpolation
-from brdfdb.tables.polarisation_record import Polarisation
-from brdfdb.tables.stated_error import Error
+from brdfdb.tables.stated_error import Error, FormulaError, LargestAlbedo
+from brdfdb.tables.stokes import Polarisation
 
 MANTISSA_BITS = 23  # of a float32 value
 

@@ -1,4 +1,4 @@
-"""Mixtures: f_r at a few wavelengths of a source that make f_r at all of them."""
+"""Wavelengths of a table: few whose f_r makes f_r at all others, or more where lines between those given are wrong."""
 
 from __future__ import annotations
 
@@ -9,23 +9,25 @@ from numpy.typing import NDArray
 
 from brdfdb.materials import Source
 from brdfdb.tables import error_measurement
+from brdfdb.tables.grids import Axis
+from brdfdb.tables.layout import LINEAR, PLAIN, Interpolation, over_wavelengths
 
 MOST_PARTS = 4
-_DRAWS, _SEED = 40, 2026  # directions in each band of theta_i
+_DIRECTIONS = 40  # directions in each band of theta_i
+_SEED = 2026
 _EXACT = 1e-7  # error of a mixture [1], relative to f_r of the direction at its brightest wavelength
+MOST = 400  # largest number of wavelengths of a table, if wavelengths are added
+_SHARE = 0.12  # of the tolerance that lines between wavelengths may take; the error over the angles takes the rest
+_DECIMALS = 2  # of wavelengths that are added
+_REFINED_SEED = 1995
+_STRAIGHT = Interpolation(PLAIN.method, wavelengths=LINEAR)
 
 
 class Mixture(NamedTuple):
-    """A few wavelengths whose f_r, without the uniform part, makes f_r at all wavelengths.
+    """A few wavelengths [nm] whose f_r, without the uniform part, makes f_r at all wavelengths.
 
-    Attributes
-    ----------
-    part_nm : array (parts,) [nm]
-        Wavelengths of the parts.
-    spectra : array (parts, L) [1]
-        f_r at wavelength l is the sum over parts p of spectra[p, l] times f_r at part_nm[p].
-    extremes : int64 array
-        Numbers of the wavelengths where the source is brightest and darkest.
+    f_r at wavelength l is the sum over parts p of spectra[p, l] times f_r at part_nm[p]. `extremes` are the numbers of
+    the wavelengths where the source is brightest and darkest.
     """
 
     part_nm: NDArray[np.float64]
@@ -44,20 +46,42 @@ def mixture_of(source: Source, wavelength_nm: NDArray[np.float64] | None) -> Mix
     if wavelength_nm is None or wavelength_nm.size < 3:
         return None
     rest = source.without_uniform()
-    drawn = error_measurement.draw(source, wavelength_nm, _DRAWS, _SEED)
+    drawn = error_measurement.draw(source, wavelength_nm, _DIRECTIONS, _SEED)
     above = drawn.above
     f_r = error_measurement.model_values(rest, wavelength_nm, drawn.wi[above], drawn.wr[above])
-    whole = error_measurement.model_values(source, wavelength_nm, drawn.wi[above], drawn.wr[above]).mean(axis=0)
-    extremes = np.array([np.argmin(whole), np.argmax(whole)])
+    mean = error_measurement.model_values(source, wavelength_nm, drawn.wi[above], drawn.wr[above]).mean(axis=0)
+    extremes = np.array([np.argmin(mean), np.argmax(mean)])
     brightest = f_r.max(axis=1, keepdims=True)
     columns = np.divide(f_r, brightest, out=np.zeros_like(f_r), where=brightest > 0.0)
     chosen: list[int] = []
-    left = columns
+    unexplained = columns
     for _ in range(min(MOST_PARTS, wavelength_nm.size - 1)):
-        chosen.append(int(np.argmax(np.sum(left**2, axis=0))))
+        chosen.append(int(np.argmax(np.sum(unexplained**2, axis=0))))
         spectra = np.linalg.lstsq(columns[:, chosen], columns, rcond=None)[0]
         spectra[:, chosen] = np.eye(len(chosen))
-        left = columns - columns[:, chosen] @ spectra
-        if np.abs(left).max(initial=0.0) <= _EXACT:
+        unexplained = columns - columns[:, chosen] @ spectra
+        if np.abs(unexplained).max(initial=0.0) <= _EXACT:
             return Mixture(wavelength_nm[chosen], spectra, extremes)
     return None
+
+
+def refined_wavelengths(source: Source, wavelength_nm: Axis | None, tolerance: float) -> Axis | None:
+    """Return wavelengths [nm] between which straight lines follow a source, those given among them.
+
+    Each interval is divided where lines are worst, until the 95th percentile of their error is within a share of the
+    tolerance, or there are `MOST` wavelengths. Only the wavelengths of sources whose parameters are spectra are added
+    to.
+    """
+    if wavelength_nm is None or wavelength_nm.size < 2 or over_wavelengths(source) != LINEAR:
+        return wavelength_nm
+    drawn = error_measurement.draw(source, wavelength_nm, _DIRECTIONS, _REFINED_SEED).above_the_horizon()
+    nodes = wavelength_nm
+    while nodes.size < MOST:
+        floor = error_measurement.floor_of(error_measurement.model_values(source, nodes, drawn.wi, drawn.wr), drawn)
+        worst = error_measurement.worst_between(source, nodes, _STRAIGHT, drawn.wi, drawn.wr, floor)
+        wrong = sorted((place for place in worst if place.error > _SHARE * tolerance), key=lambda place: -place.error)
+        finer = np.union1d(nodes, np.round([place.wavelength_nm for place in wrong[: MOST - nodes.size]], _DECIMALS))
+        if finer.size == nodes.size:
+            break
+        nodes = finer
+    return nodes

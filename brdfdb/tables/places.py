@@ -25,26 +25,20 @@ _SAME_DEG = 1e-9  # an angle that is so little below an edge is on it: unit vect
 BANDS, RINGS = BANDS_DEG.size - 1, len(RINGS_DEG) - 1
 # Rows of a table of errors: bands of theta_i, viewers alongside the light in each band, rings with one direction beyond
 # 85 degrees, and with both
-ALONGSIDE, ONE_GRAZING, BOTH_GRAZING, ROWS = BANDS, 2 * BANDS, 2 * BANDS + RINGS, 2 * BANDS + 2 * RINGS
+ALONGSIDE = BANDS
+ONE_GRAZING = 2 * BANDS
+BOTH_GRAZING = 2 * BANDS + RINGS
+ROWS = 2 * BANDS + 2 * RINGS
 
 
 class Pairs(NamedTuple):
-    """Pairs of directions that were drawn in places.
+    """Pairs of directions that were drawn in places."""
 
-    Attributes
-    ----------
-    wi, wr : float64 arrays (N, 3)
-        Unit vectors of light and viewer, above the horizon.
-    row : int64 array (N,)
-        The place of each.
-    sample : int64 array (N,)
-        Which sample it belongs to: several samples are drawn alongside the light.
-    """
-
+    #: wi, wr: unit vectors of light and viewer, above the horizon, (N, 3)
     wi: Floats
     wr: Floats
-    row: NDArray[np.int64]
-    sample: NDArray[np.int64]
+    row: NDArray[np.int64]  #: the place of each, (N,)
+    sample: NDArray[np.int64]  #: which sample it belongs to: several samples are drawn alongside the light, (N,)
 
     def some(self, chosen: NDArray[np.bool_]) -> Pairs:
         """Return the pairs that are chosen."""
@@ -55,7 +49,8 @@ def rows_of(directions: Directions) -> NDArray[np.int64]:
     """Return the rows that hold for pairs of directions, of shape (3, ...): the band, and places or the band again."""
     theta_i, theta_r = (degrees(np.nan_to_num(theta)) + _SAME_DEG for theta in (directions.theta_i, directions.theta_r))
     band = np.clip(np.searchsorted(BANDS_DEG, theta_i, side="right") - 1, 0, BANDS - 1)
-    higher, lower = np.minimum(theta_i, theta_r), np.maximum(theta_i, theta_r)
+    higher = np.minimum(theta_i, theta_r)
+    lower = np.maximum(theta_i, theta_r)
     near = (lower - higher <= ALONGSIDE_DEG + _SAME_DEG) & (directions.cos_dphi >= -_SAME_DEG)
     alongside = near & (higher < RINGS_DEG[0])
     ring = np.clip(np.searchsorted(RINGS_DEG, lower, side="right") - 1, 0, RINGS - 1)

@@ -34,24 +34,24 @@ class HotSpot(NamedTuple):
     scale: float
 
 
-class Sample(NamedTuple):
+class PlanSample(NamedTuple):
     """Pairs of directions above the horizon, f_r [1/sr] there, shape (N, L), and the floor of relative errors, (L,).
 
     `hot_spot` has pairs near the light if their error has a tolerance of its own.
     """
 
-    drawn: error_measurement.Draw
+    drawn: error_measurement.RandomPairs
     truth: Floats
     floor: Floats
     hot_spot: HotSpot | None = None
 
-    def at(self, wavelengths: NDArray[np.bool_]) -> Sample:
+    def at(self, wavelengths: NDArray[np.bool_]) -> PlanSample:
         """Return the sample at some of its wavelengths."""
         spot = self.hot_spot and self.hot_spot._replace(truth=self.hot_spot.truth[:, wavelengths])
         return self._replace(truth=self.truth[:, wavelengths], floor=self.floor[wavelengths], hot_spot=spot)
 
     @property
-    def for_lines(self) -> error_measurement.Draw:
+    def for_lines(self) -> error_measurement.RandomPairs:
         """The pairs that lines are drawn through: those near the light, too, if their error has a tolerance."""
         if self.hot_spot is None:
             return self.drawn
@@ -59,19 +59,33 @@ class Sample(NamedTuple):
         wi, wr = np.concatenate([self.drawn.wi, pairs.wi]), np.concatenate([self.drawn.wr, pairs.wr])
         order = np.random.default_rng(SEED).permutation(len(wi))
         ones, none = np.ones(len(wi)), np.zeros(len(wi), dtype=bool)
-        return error_measurement.Draw(wi[order], wr[order], np.zeros(len(wi), np.int64), ones, none, ~none)
+        return error_measurement.RandomPairs(wi[order], wr[order], np.zeros(len(wi), np.int64), ones, none, ~none)
+
+
+class TrialErrors(NamedTuple):
+    """Relative errors of a table, of the shape of the truth, and its l1 errors, of shape (L,)."""
+
+    relative: Floats
+    l1: Floats
+
+
+class PlannedTable(NamedTuple):
+    """The layout of a plan, and the values of its table, those of `tabulation.block`; None if none were tabulated."""
+
+    layout: Layout
+    values: NDArray[np.float32] | None
 
 
 def sample_of(
     source: Source, wavelength_nm: NDArray[np.float64] | None, count: int, seed: int, hot_spot: float | None = None
-) -> Sample:
-    """Draw a sample of a source at wavelengths [nm], of `count` pairs a band, and leave out those below the horizon.
+) -> PlanSample:
+    """Draw a sample of a source at wavelengths [nm], of `count` pairs a band above the horizon.
 
     `hot_spot` is the tolerance over that near the light; None: there is none near the light.
     """
     drawn = error_measurement.draw(source, wavelength_nm, count, seed).above_the_horizon()
     truth = error_measurement.model_values(source, wavelength_nm, drawn.wi, drawn.wr)
-    sample = Sample(drawn, truth, error_measurement.floor_of(truth, drawn))
+    sample = PlanSample(drawn, truth, error_measurement.floor_of(truth, drawn))
     if hot_spot is None:
         return sample
     pairs = places.draw(_NEAR_THE_LIGHT, seed)
@@ -80,7 +94,7 @@ def sample_of(
     return sample._replace(hot_spot=HotSpot(pairs, there, hot_spot))
 
 
-def error_of(layout: Layout, values: NDArray[np.float32], sample: Sample) -> float:
+def error_of(layout: Layout, values: NDArray[np.float32], sample: PlanSample) -> float:
     """Return the largest of the errors that are held to the tolerance.
 
     They are the 99th percentile of the relative error at the worst wavelength, the l1 error, as a few values that are
@@ -97,7 +111,7 @@ def error_of(layout: Layout, values: NDArray[np.float32], sample: Sample) -> flo
     return float(worst)
 
 
-def hot_spot_error(layout: Layout, values: NDArray[np.float32], sample: Sample) -> float:
+def hot_spot_error(layout: Layout, values: NDArray[np.float32], sample: PlanSample) -> float:
     """Return the limit of the error near the light, in its worst band, in units of the tolerance; 0 without one."""
     if sample.hot_spot is None:
         return 0.0
@@ -108,15 +122,15 @@ def hot_spot_error(layout: Layout, values: NDArray[np.float32], sample: Sample) 
     return scale * float(error_measurement.limit_of(of_samples.T).max())
 
 
-def _errors(layout: Layout, values: NDArray[np.float32], sample: Sample) -> tuple[Floats, Floats]:
-    """Return the relative errors of a table, of the shape of the truth, and its l1 errors, of shape (L,)."""
+def _errors(layout: Layout, values: NDArray[np.float32], sample: PlanSample) -> TrialErrors:
+    """Return the errors of a table at a sample."""
     drawn, truth, floor, _ = sample
     looked_up = Table.of(layout, values).lookup_vectors(drawn.wi, drawn.wr).reshape(truth.shape)
     error = error_measurement.relative(looked_up, truth, floor)
-    return error, error_measurement.mean_error(looked_up, truth, drawn.weight)
+    return TrialErrors(error, error_measurement.mean_error(looked_up, truth, drawn.weight))
 
 
-def keeps(layout: Layout, values: NDArray[np.float32], sample: Sample, goal: float) -> bool:
+def keeps(layout: Layout, values: NDArray[np.float32], sample: PlanSample, goal: float) -> bool:
     """Return True if `error_of` a table is within a goal. Most tables fail at a few directions.
 
     Errors are counted where `error_of` sorts them, in a tenth of the time.
@@ -152,14 +166,18 @@ def values_of(layout: Layout) -> NDArray[np.float32]:
     return np.concatenate([tabulation.block(layout, rows) for rows in layout.blocks])
 
 
-def final_of(source: Source, wavelength_nm: NDArray[np.float64] | None, hot_spot: float | None = None) -> Sample:
+def final_of(source: Source, wavelength_nm: NDArray[np.float64] | None, hot_spot: float | None = None) -> PlanSample:
     """Return the sample that finished tables of a source are measured at, at all wavelengths [nm]."""
     return sample_of(source, wavelength_nm, _DRAWS, SEED + 1, hot_spot)
 
 
 def finished(
-    layout: Layout, final: Sample, wavelength_nm: NDArray[np.float64] | None, tolerance: float, mixture: Mixture | None
-) -> tuple[Layout, NDArray[np.float32]] | None:
+    layout: Layout,
+    final: PlanSample,
+    wavelength_nm: NDArray[np.float64] | None,
+    tolerance: float,
+    mixture: Mixture | None,
+) -> PlannedTable | None:
     """Return the layout at all wavelengths, with as few coefficients and bits as the error allows, and its values.
 
     None if no number of coefficients and bits keeps to the tolerance.
@@ -200,8 +218,8 @@ def finished(
 
 
 def _rounded(
-    layout: Layout, whole: NDArray[np.float32], numbers: Floats | None, final: Sample, goal: float
-) -> tuple[Layout, NDArray[np.float32]] | None:
+    layout: Layout, whole: NDArray[np.float32], numbers: Floats | None, final: PlanSample, goal: float
+) -> PlannedTable | None:
     """Return the layout with as few bits as the error allows, and its values; None if no number of bits does.
 
     `numbers` are those of the nodes of a spectrum that may be factored: `whole` has the coefficients to the last digits
@@ -215,7 +233,7 @@ def _rounded(
                     _as_values(layout, numbers[rows]) for rows in tabulation.slabs(layout, slice(0, len(numbers)))
                 ]
                 values = tabulation.rounded(np.concatenate(stored), bits)
-            return replace(layout, bits=bits), values
+            return PlannedTable(replace(layout, bits=bits), values)
     return None
 
 

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from brdfdb.errors import ParameterError, counted
 from brdfdb.materials import Material, Source
-from brdfdb.parameters import Floats
 from brdfdb.tables import axis_needs, plan_trials
 from brdfdb.tables.axis_needs import LINE, Need
 from brdfdb.tables.grids import (
@@ -25,7 +24,7 @@ from brdfdb.tables.grids import (
 )
 from brdfdb.tables.layout import Interpolation, Layout, over_wavelengths
 from brdfdb.tables.mixture import Mixture, mixture_of
-from brdfdb.tables.plan_trials import MARGIN, SEED, Sample
+from brdfdb.tables.plan_trials import MARGIN, SEED, PlannedTable, PlanSample
 from brdfdb.tables.tabulation import POLE_END_DEG
 
 if TYPE_CHECKING:
@@ -46,8 +45,21 @@ _BEYOND = 4.0  # safety factor on the node count where the grid extends below th
 _HOPELESS = 8.0  # times the fewest values of another kind: a kind that takes so many is not looked into
 
 
-# Likely number of values, layout at a coarse grid, needs of its axes: none where the number is only a bound
-_TableKind = tuple[float, Layout, dict[str, Need]]
+class _TableKind(NamedTuple):
+    """A kind of table: its likely number of values, its layout at a coarse grid, and the needs of its axes.
+
+    There are no needs where the number is only a bound.
+    """
+
+    size: float
+    layout: Layout
+    needs: dict[str, Need]
+
+    @property
+    def order(self) -> tuple[float, int]:
+        """A sorting key: the fewest values first, then the simplest."""
+        how = self.layout.interpolation
+        return self.size, how.cubic + how.logarithm + (how.power != 0.0)
 
 
 class _Task(NamedTuple):
@@ -58,7 +70,7 @@ class _Task(NamedTuple):
 
     source: Source
     wavelength_nm: NDArray[np.float64] | None
-    sample: Sample
+    sample: PlanSample
     tolerance: float
     mixture: Mixture | None
 
@@ -113,7 +125,7 @@ def plan(
     interpolation, leave of an error; the numbers of nodes are those that leave the same error on each axis. The kinds
     that promise the fewest values are tabulated, measured, and made coarser or finer until they keep to the tolerance.
     """
-    return planned(source, wavelength_nm, tolerance, alike=alike, hot_spot_tolerance=hot_spot_tolerance)[0]
+    return planned(source, wavelength_nm, tolerance, alike=alike, hot_spot_tolerance=hot_spot_tolerance).layout
 
 
 def planned(
@@ -123,11 +135,8 @@ def planned(
     *,
     alike: Source | None = None,
     hot_spot_tolerance: float | None = None,
-) -> tuple[Layout, NDArray[np.float32] | None]:
-    """Return the layout that `plan` describes, and the values of its table, which the plan was measured with.
-
-    The values are those of `tabulation.block`; None where nothing was tabulated.
-    """
+) -> PlannedTable:
+    """Return the layout that `plan` describes, and the values of its table, which the plan was measured with."""
     check_tolerance(tolerance)
     hot_spot = None
     if hot_spot_tolerance is not None:
@@ -138,8 +147,8 @@ def planned(
     task = _task(planned_on, wavelength_nm, tolerance, mixture, hot_spot)
     if not task.sample.truth.any():
         reason = "f_r is 0: all light is in the specular part"
-        return Layout(source, coarsest(source), wavelength_nm, reason=reason), None
-    final: Sample | None = None
+        return PlannedTable(Layout(source, coarsest(source), wavelength_nm, reason=reason), None)
+    final: PlanSample | None = None
     for hopeless in (_HOPELESS, math.inf):  # kinds that promised too many values are looked into if the others fail
         table_kinds = left = list(_table_kinds(task, hopeless))
         while left:
@@ -153,13 +162,13 @@ def planned(
                 layout = replace(layout, source=source)
                 finished = plan_trials.finished(layout, final, wavelength_nm, tolerance, mixture)
                 if finished is not None:
-                    layout, values = finished
-                    return replace(layout, reason=_reason(layout, tolerance, table_kinds)), values
+                    reason = _reason(finished.layout, tolerance, table_kinds)
+                    return finished._replace(layout=replace(finished.layout, reason=reason))
             if not failed:
                 break
             # the kind that failed most often hid the others, which may keep to the tolerance with more nodes
             ((hiding, _),) = failed.most_common(1)
-            left = [kind for kind in left if _kind(kind[1]) != hiding]
+            left = [kind for kind in left if _kind(kind.layout) != hiding]
     if hot_spot_tolerance is not None:
         raise ParameterError(
             "hot_spot_tolerance",
@@ -175,19 +184,15 @@ def planned(
     )
 
 
-def _order(kind: _TableKind) -> tuple[float, int]:
-    """Return a sorting key: the fewest values first, then the simplest."""
-    size, layout, _ = kind
-    how = layout.interpolation
-    return size, how.cubic + how.logarithm + (how.power != 0.0)
-
-
 def _smallest(task: _Task, table_kinds: list[_TableKind]) -> Layout | None:
     """Return the smallest table of some kinds that keeps to the tolerance of the task."""
-    ranked = [kind for kind in sorted(table_kinds, key=_order) if kind[2]]
+    ranked = [kind for kind in sorted(table_kinds, key=lambda kind: kind.order) if kind.needs]
     if not ranked:
         return None
-    for most in (0.5 * _HOPELESS * ranked[0][0], math.inf):  # nodes: a kind that takes many more than it seemed is left
+    for most in (
+        0.5 * _HOPELESS * ranked[0].size,
+        math.inf,
+    ):  # nodes: a kind that takes many more than it seemed is left
         best: Layout | None = None
         tried: Counter[tuple[str, ...]] = Counter()
         for size, layout, needs in ranked:
@@ -205,9 +210,9 @@ def _smallest(task: _Task, table_kinds: list[_TableKind]) -> Layout | None:
 def _reason(layout: Layout, tolerance: float, table_kinds: list[_TableKind]) -> str:
     """Return the reason for a layout: its number of nodes, and those of the other grid and of the simplest table."""
     chosen, clauses = _kind(layout), [first_reason(layout, tolerance)]
-    ranked = sorted(table_kinds, key=_order)
-    simplest = [c for c in ranked if c[1].interpolation.plain and not c[1].interpolation.cubic]
-    others = [c for c in ranked if c[1].grid.names != layout.grid.names][:1] + simplest[:1]
+    ranked = sorted(table_kinds, key=lambda kind: kind.order)
+    simplest = [kind for kind in ranked if kind.layout.interpolation.plain and not kind.layout.interpolation.cubic]
+    others = [kind for kind in ranked if kind.layout.grid.names != layout.grid.names][:1] + simplest[:1]
     for size, other, needs in others:
         if _kind(other) != chosen:
             bound = "about" if needs else "more than"
@@ -266,19 +271,13 @@ def coarsest(source: Source) -> Grid:
 
 def _grid(source: Source, names: tuple[str, ...], *, pole: bool) -> Grid:
     """Return the grid with the two ends of each axis alone; with a pole, light and viewer end before it."""
-    ends = {name: _end(source, name) for name in names}
+    ends = {name: end for name, (end, _) in LINE.items()}
+    # Symmetry leaves out azimuths
+    ends |= dict.fromkeys(("phi_i", "phi_h"), 90.0 if source.elliptical else 360.0)
+    ends["phi_d"] = 90.0 * (1 + source.anisotropic) * (2 - source.reciprocal)
     if pole:
-        ends |= {name: POLE_END_DEG for name in ("theta_i", "theta_r") if name in names}
-    return Grid({name: [0.0, end] for name, end in ends.items()})
-
-
-def _end(source: Source, name: str) -> float:
-    """Return the end of an axis [degree]; symmetry leaves out what it may."""
-    if name in ("phi_i", "phi_h"):
-        return 90.0 if source.elliptical else 360.0
-    if name == "phi_d":
-        return 90.0 * (1 + source.anisotropic) * (2 - source.reciprocal)
-    return LINE[name][0]
+        ends |= dict.fromkeys(("theta_i", "theta_r"), POLE_END_DEG)
+    return Grid({name: [0.0, ends[name]] for name in names})
 
 
 def _table_kinds(task: _Task, hopeless: float = _HOPELESS) -> Iterator[_TableKind]:
@@ -308,7 +307,7 @@ def _table_kinds(task: _Task, hopeless: float = _HOPELESS) -> Iterator[_TableKin
                 layout = Layout(source, grid, task.wavelength_nm, how)
                 if task.mixture is not None:
                     layout = replace(layout, spectra=task.mixture.spectra, part_nm=task.mixture.part_nm)
-                lines: dict[str, tuple[Floats, Floats]] = {}
+                lines: dict[str, axis_needs.LineNumbers] = {}
                 for method in ("cubic", "linear"):
                     chosen = replace(layout, interpolation=replace(layout.interpolation, method=method))
                     needs: dict[str, Need] = {}
@@ -330,7 +329,7 @@ def _table_kinds(task: _Task, hopeless: float = _HOPELESS) -> Iterator[_TableKin
                             needs = {}
                             break
                     fewest = min(fewest, size if needs else math.inf)
-                    yield size, chosen, needs
+                    yield _TableKind(size, chosen, needs)
 
 
 def _with_axes(layout: Layout, needs: dict[str, Need], error: float, finer: Mapping[str, int]) -> Layout | None:
@@ -354,7 +353,9 @@ def _refined(task: _Task, layout: Layout, needs: dict[str, Need], most: float, *
 
     If `probing` and finer axes leave the error as it is, lines misjudge one of them: the one that helps most gets more.
     """
-    goal, error, best = MARGIN * task.tolerance, task.tolerance, None
+    goal = MARGIN * task.tolerance
+    error = task.tolerance
+    best = None
     finer: dict[str, int] = {}  # steps on some axes beyond what lines tell
     known: dict[tuple[int, ...], float] = {}
 
@@ -363,7 +364,11 @@ def _refined(task: _Task, layout: Layout, needs: dict[str, Need], most: float, *
             known[trial.grid.shape] = plan_trials.error_of(trial, plan_trials.values_of(trial), task.sample) / goal
         return known[trial.grid.shape]
 
-    last, stalled, rounds = math.inf, 0, _ROUNDS
+    # The axes, those that share a need together
+    alike = [tuple(name for name in needs if needs[name] is need) for need in dict.fromkeys(needs.values())]
+    last = math.inf
+    stalled = 0
+    rounds = _ROUNDS
     while rounds > 0:
         trial = _with_axes(layout, needs, error, finer)
         if trial is None or trial.size >= most:
@@ -376,7 +381,7 @@ def _refined(task: _Task, layout: Layout, needs: dict[str, Need], most: float, *
         stalled = stalled + 1 if probing and best is None and ratio > _STALLED * last else 0
         last = min(last, ratio)
         if stalled >= _PATIENCE:
-            steps = {axes: _with_axes(layout, needs, error, _finer(finer, axes)) for axes in _alike(needs)}
+            steps = {axes: _with_axes(layout, needs, error, _finer(finer, axes)) for axes in alike}
             some = {axes: trial for axes, trial in steps.items() if trial is not None and trial.size < most}
             if not some:
                 break
@@ -385,11 +390,6 @@ def _refined(task: _Task, layout: Layout, needs: dict[str, Need], most: float, *
             rounds -= 1
             error *= float(np.clip(0.85 / max(ratio, 1e-9), 0.25, 4.0))
     return best
-
-
-def _alike(needs: dict[str, Need]) -> list[tuple[str, ...]]:
-    """Return the axes, those that share a need together."""
-    return [tuple(name for name in needs if needs[name] is need) for need in dict.fromkeys(needs.values())]
 
 
 def _finer(finer: Mapping[str, int], axes: tuple[str, ...]) -> dict[str, int]:

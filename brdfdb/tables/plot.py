@@ -8,22 +8,22 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from brdfdb.errors import ParameterError, import_extra
 from brdfdb.geometry import check_azimuth_deg, radians
 from brdfdb.integrals.quadrature import reflected_share
 from brdfdb.lobes import around_mirror, narrowest
 from brdfdb.materials import FunctionRecord, Material
-from brdfdb.parameters import Floats
+from brdfdb.parameters import Array, Floats
 from brdfdb.tables.shared_axes import (
     COLOURS,
     DASHES,
     GRID,
     INK,
     MUTED,
-    Curve,
     Drawn,
+    DrawnCurve,
     add,
     axes_for,
     drawn_on,
@@ -37,10 +37,9 @@ from brdfdb.tables.slices import Slice, Sliced, half_difference_slice, in_plane_
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-Array = NDArray[np.float64]
-
 _SHOWN_NM = 550.0  # wavelength of a plot by default
 _UNIT = "$f_r$ [1/sr]"
+# Colours [sRGB] of wavelengths: violet, blue, green, orange, red, all dark enough for labels
 _SPECTRUM_NM = (400.0, 450.0, 500.0, 550.0, 600.0, 650.0, 750.0)
 _SPECTRUM = (
     (0.35, 0.10, 0.55),
@@ -53,9 +52,11 @@ _SPECTRUM = (
 )
 
 # Angles of a cut [degree]: even ones up to where poles at the horizon begin, and more around the mirror direction
-_EVEN_DEG, _AROUND_DEG = np.linspace(-89.0, 89.0, 357), np.linspace(-8.0, 8.0, 161)
+_EVEN_DEG = np.linspace(-89.0, 89.0, 357)
+_AROUND_DEG = np.linspace(-8.0, 8.0, 161)
 ALBEDO_DEG = np.array([*range(0, 85, 5), 82.5, 85.0, 87.5, 89.0], dtype=np.float64)
-_TOLERANCE, _MOST_PANELS = 1e-3, 300  # of an albedo; a line is as wide as 0.005
+_TOLERANCE = 1e-3  # of an albedo; a line is as wide as 0.005
+_MOST_PANELS = 300
 
 _SLICES: dict[str, Callable[[Sliced], Slice]] = {"in_plane": in_plane_slice, "half_difference": half_difference_slice}
 
@@ -99,6 +100,9 @@ class Plot:
     ) -> Axes:
         """Draw f_r [1/sr] in the plane of incidence as a polar plot, with the light on the left.
 
+        The radius is f_r, and the angle to the vertical is theta_r: on the right around the mirror direction, on the
+        left back towards the light. ParameterError if an angle or a wavelength is out of range.
+
         Parameters
         ----------
         theta_i_deg : float or sequence [degree]
@@ -109,19 +113,6 @@ class Plot:
             Wavelengths of a spectral table. The default is the one of its range that is closest to 550 nm.
         ax : matplotlib Axes, optional
             Axes to draw on.
-
-        Returns
-        -------
-        Axes
-            The axes. The radius is f_r, and the angle to the vertical is theta_r: on the right around the mirror
-            direction, on the left back towards the light.
-
-        Raises
-        ------
-        ParameterError
-            If an angle or a wavelength is out of range.
-        MissingExtraError
-            If matplotlib is not installed.
         """
         curves, name = self._curves(theta_i_deg, phi_i_deg, wavelength_nm)
         axes = axes_for("lobe", ax, (6.4, 3.9))
@@ -175,34 +166,18 @@ class Plot:
     def albedo(self, phi_i_deg: float = 0.0, wavelength_nm: float | None = None, *, ax: Axes | None = None) -> Axes:
         """Draw the directional albedo [1] over theta_i: the shares of uniform part, lobe and specular part, and 1.
 
-        Parameters
-        ----------
-        phi_i_deg : float [degree]
-            Azimuth of the light. It matters for anisotropic tables only.
-        wavelength_nm : float [nm], optional
-            As of `lobe`.
-        ax : matplotlib Axes, optional
-            Axes to draw on.
-
-        Returns
-        -------
-        Axes
-            The axes. The shares are stacked. The uniform part is shown where the source of the table names it.
-
-        Raises
-        ------
-        ParameterError, MissingExtraError
-            As of `lobe`.
+        The shares are stacked. The uniform part is shown where the source of the table names it. The azimuth of the
+        light matters for anisotropic tables only; `wavelength_nm`, `ax` and errors are those of `lobe`.
         """
         wavelength = self._wavelength(wavelength_nm)
         check_azimuth_deg("phi_i_deg", phi_i_deg)
         axes = axes_for("albedo", ax, (6.4, 3.9))
         shares = albedo_shares(self.table, float(radians(phi_i_deg)), wavelength)
-        kept = {label: share for label, share in shares.items() if np.max(share) > 0.0} or {"reflected": np.zeros(21)}
-        tops = np.cumsum(list(kept.values()), axis=0)
-        colours = [COLOURS[list(shares).index(label) % len(COLOURS)] for label in kept]
-        labels = [*itertools.islice(itertools.accumulate(kept, "{} + {}".format), len(kept) - 1), ""]
-        curves = [Curve(labels[at], ALBEDO_DEG, tops[at], colours[at], "-") for at in reversed(range(len(kept)))]
+        shown = {label: share for label, share in shares.items() if np.max(share) > 0.0} or {"reflected": np.zeros(21)}
+        tops = np.cumsum(list(shown.values()), axis=0)
+        colours = [COLOURS[list(shares).index(label) % len(COLOURS)] for label in shown]
+        labels = [*itertools.islice(itertools.accumulate(shown, "{} + {}".format), len(shown) - 1), ""]
+        curves = [DrawnCurve(labels[at], ALBEDO_DEG, tops[at], colours[at], "-") for at in reversed(range(len(shown)))]
         without_only(axes)
         if not drawn_on(axes):
             axes.axhline(1.0, color=INK, lw=1.2)
@@ -210,7 +185,7 @@ class Plot:
         azimuth = f", $\\phi_i$ = {phi_i_deg:g}°" if self.table.anisotropic else ""
         plots = add(axes, "albedo", f"{self.table.name}{_at(wavelength)}{azimuth}", curves, legend=False)
         if len(plots) == 1:
-            _stack(axes, kept, colours)
+            _stack(axes, shown, colours)
         highest = max(float(curve.y.max()) for plot in plots for curve in plot.curves)
         axes.set(xlim=(0.0, 90.0), ylim=(0.0, max(1.1, 1.05 * highest)), xticks=range(0, 91, 15))
         axes.set_xlabel("$\\theta_i$ [°]", color=MUTED)
@@ -224,35 +199,15 @@ class Plot:
         *,
         ax: Axes | None = None,
     ) -> Axes:
-        """Draw f_r [1/sr] as an image on a logarithmic scale.
+        """Draw f_r [1/sr] as an image on a logarithmic scale, with a colour bar on axes of its own.
 
-        Parameters
-        ----------
-        kind : str
-            "in_plane": theta_i over theta_r in the plane of incidence, as `brdfdb.tables.slices.in_plane_slice`.
-            "half_difference": theta_d over theta_h, as `brdfdb.tables.slices.half_difference_slice`.
-        wavelength_nm : float [nm], optional
-            Of a spectral table. The wavelength of the table that is closest is shown; the default is the closest to
-            550 nm.
-        ax : matplotlib Axes, optional
-            Axes to draw on.
-
-        Returns
-        -------
-        Axes
-            The axes; the colour bar has its own beside them.
-
-        Raises
-        ------
-        ParameterError, MissingExtraError
-            As of `lobe`; also if `kind` is another word.
+        `kind` is "in_plane": theta_i over theta_r in the plane of incidence, as `brdfdb.tables.slices.in_plane_slice`;
+        or "half_difference": theta_d over theta_h, as `brdfdb.tables.slices.half_difference_slice`. The wavelength of
+        the table that is closest to `wavelength_nm` is shown, by default to 550 nm. Errors are those of `lobe`, also
+        for another kind.
         """
-        ways: dict[str, Callable[[Sliced], Slice]] = {
-            "in_plane": in_plane_slice,
-            "half_difference": half_difference_slice,
-        }
-        if kind not in ways:
-            raise ParameterError("kind", f"{kind!r} is not one of {', '.join(ways)}", kind, tuple(ways))
+        if kind not in _SLICES:
+            raise ParameterError("kind", f"{kind!r} is not one of {', '.join(_SLICES)}", kind, tuple(_SLICES))
         wanted = self._wavelength(wavelength_nm)
         axes = axes_for("slices", ax, (6.4, 3.6))
         picture = _SLICES[kind](self.table)
@@ -289,14 +244,15 @@ class Plot:
         theta_i_deg: float | Sequence[float],
         phi_i_deg: float | Sequence[float] | None,
         wavelength_nm: float | Sequence[float] | None,
-    ) -> tuple[list[Curve], str]:
+    ) -> tuple[list[DrawnCurve], str]:
         """Return cuts in the plane of incidence, f_r over theta_r [degree], and the name of the plot.
 
         There is one for each light, azimuth and wavelength. Angles are negative towards the light.
         """
         if phi_i_deg is None:
             phi_i_deg = (0.0, 90.0) if self.table.anisotropic else 0.0
-        lights, azimuths = _numbers("theta_i_deg", theta_i_deg), _numbers("phi_i_deg", phi_i_deg)
+        lights = _numbers("theta_i_deg", theta_i_deg)
+        azimuths = _numbers("phi_i_deg", phi_i_deg)
         check_azimuth_deg("phi_i_deg", azimuths)
         wavelengths = self._wavelengths(wavelength_nm)
         for theta in lights:
@@ -317,10 +273,13 @@ class Plot:
             parts += [f"{wavelength:g} nm"] if len(wavelengths) > 1 else []
             colour: str | tuple[float, ...]
             if wavelength is None or len(wavelengths) == 1:
-                colour, dashes = COLOURS[number % len(COLOURS)], DASHES[row % len(DASHES)]
+                colour = COLOURS[number % len(COLOURS)]
+                dashes = DASHES[row % len(DASHES)]
             else:
-                colour, dashes = _spectral_colour(wavelength), DASHES[number % len(DASHES)]
-            curves.append(Curve(", ".join(parts), signed, brdf, colour, dashes))
+                channels = zip(*_SPECTRUM, strict=True)
+                colour = tuple(float(np.interp(wavelength, _SPECTRUM_NM, channel)) for channel in channels)
+                dashes = DASHES[number % len(DASHES)]
+            curves.append(DrawnCurve(", ".join(parts), signed, brdf, colour, dashes))
         return curves, f"{self.table.name}{_at(wavelengths[0]) if len(wavelengths) == 1 else ''}"
 
     def _views(self, theta: float, wavelength: float | None) -> Array:
@@ -350,14 +309,7 @@ class Plot:
 def albedo_shares(table: Plotted, phi_i: float, wavelength_nm: float | None) -> dict[str, Array]:
     """Return shares [1] of reflected light at `ALBEDO_DEG`: uniform part, rest of f_r, specular part, by their labels.
 
-    Parameters
-    ----------
-    table : Table or RemoteTable
-        The table. Its lookups are integrated to 1e-3.
-    phi_i : float [rad]
-        Azimuth of the light.
-    wavelength_nm : float [nm] or None
-        None for a grey table.
+    Lookups are integrated to 1e-3, for lights at the azimuth `phi_i` [rad]; `wavelength_nm` is None for a grey table.
     """
     source, theta_i = table.source, radians(ALBEDO_DEG)
 
@@ -394,11 +346,6 @@ def _numbers(name: str, given: float | Sequence[float]) -> list[float]:
 
 def _at(wavelength_nm: float | None) -> str:
     return "" if wavelength_nm is None else f" at {wavelength_nm:g} nm"
-
-
-def _spectral_colour(wavelength_nm: float) -> tuple[float, ...]:
-    """Return the colour [sRGB] of a wavelength: violet, blue, green, orange, red, all dark enough for labels."""
-    return tuple(float(np.interp(wavelength_nm, _SPECTRUM_NM, channel)) for channel in zip(*_SPECTRUM, strict=True))
 
 
 def _stack(axes: Axes, shares: Mapping[str, Array], colours: Sequence[str]) -> None:

@@ -30,7 +30,7 @@ from brdfdb.parameters import Floats
 from brdfdb.tables import stokes
 from brdfdb.tables._interpolation import weights_of_nodes
 from brdfdb.tables.layout import Layout
-from brdfdb.tables.polarisation_record import ELEMENTS
+from brdfdb.tables.stokes import ELEMENTS
 from brdfdb.tables.table_base import Located
 
 GRID_TOLERANCE = 1e-3  # of the elements, where a recipe gives grids and no tolerance
@@ -42,16 +42,10 @@ _WITHIN_CELL = np.array([0.25, 0.5, 0.75])  # where a cell between nodes is meas
 
 @dataclass(frozen=True, eq=False)
 class Facets:
-    """The polarisation of a table in memory.
+    """The polarisation of a table in memory, at nodes (T,) of theta_d from 0 to 90 degrees.
 
-    Attributes
-    ----------
-    theta_d_deg : array (T,) [degree]
-        Nodes, from 0 to 90.
-    elements : float32 array (T, L, 3)
-        m01, m22 and m23 over m00 of the facet, between bases of the plane of light and viewer.
-    depolarised : array (1,) or (L,) [1/sr]
-        The depolarised part of f_r.
+    `elements` (T, L, 3) are m01, m22 and m23 over m00 of the facet, between bases of the plane of light and viewer.
+    `depolarised` (1,) or (L,) [1/sr] is the depolarised part of f_r.
     """
 
     theta_d_deg: NDArray[np.float64]
@@ -63,14 +57,14 @@ class Facets:
         """Size [byte] of the arrays."""
         return self.elements.nbytes + self.depolarised.nbytes + self.theta_d_deg.nbytes
 
-    def facet(self, theta_d: Floats, at: Located) -> NDArray[np.float64]:
+    def facet(self, theta_d: Floats, located: Located) -> NDArray[np.float64]:
         """Return the matrix of the facet over its first element at theta_d [rad], (...), shape (..., M, 4, 4)."""
         flat = np.clip(np.asarray(theta_d, np.float64), 0.0, np.pi / 2.0).reshape(-1)
         nodes, weight = weights_of_nodes(radians(self.theta_d_deg), flat)
         # few nodes and wavelengths: all wavelengths of the lookup first, then the angles
-        rows = np.einsum("tmke,mk->tme", self.elements[:, at.nodes], at.weight)
+        rows = np.einsum("tmke,mk->tme", self.elements[:, located.nodes], located.weight)
         values = np.einsum("nkme,nk->nme", rows[nodes], weight)
-        m01, m22, m23 = np.moveaxis(values.reshape(*theta_d.shape, at.size, 3), -1, 0)
+        m01, m22, m23 = np.moveaxis(values.reshape(*theta_d.shape, located.size, 3), -1, 0)
         matrix = np.zeros((*m01.shape, 4, 4))
         matrix[..., 0, 0] = matrix[..., 1, 1] = 1.0
         matrix[..., 0, 1] = matrix[..., 1, 0] = m01
@@ -78,29 +72,30 @@ class Facets:
         matrix[..., 2, 3], matrix[..., 3, 2] = m23, -m23
         return matrix
 
-    def depolarised_at(self, at: Located) -> NDArray[np.float64]:
+    def depolarised_at(self, located: Located) -> NDArray[np.float64]:
         """Return the depolarised part of f_r [1/sr], shape (M,)."""
         uniform = np.broadcast_to(self.depolarised, (self.elements.shape[1],))
-        return np.asarray(np.einsum("mk,mk->m", uniform[at.nodes], at.weight))
+        return np.asarray(np.einsum("mk,mk->m", uniform[located.nodes], located.weight))
 
-    def polarising(self, f_r: Floats, at: Located) -> NDArray[np.float64]:
+    def polarising(self, f_r: Floats, located: Located) -> NDArray[np.float64]:
         """Return the share [0, 1] of f_r (..., M) that is not depolarised; 1 where f_r is 0."""
-        share = np.divide(self.depolarised_at(at), f_r, out=np.zeros(np.shape(f_r)), where=f_r > 0.0)
+        share = np.divide(self.depolarised_at(located), f_r, out=np.zeros(np.shape(f_r)), where=f_r > 0.0)
         return np.asarray(1.0 - np.clip(share, 0.0, 1.0))
 
-    def in_plane(self, theta_d: Floats, f_r: Floats, at: Located) -> NDArray[np.float64]:
+    def in_plane(self, theta_d: Floats, f_r: Floats, located: Located) -> NDArray[np.float64]:
         """Return m_ij / m_00 between bases of the plane, (..., M, 4, 4), at theta_d (...) [rad] and f_r (..., M)."""
-        return self._with_share(self.facet(theta_d, at), f_r, at)
+        return self._with_share(self.facet(theta_d, located), f_r, located)
 
-    def of_surface(self, angles: tuple[ArrayLike, ...], f_r: Floats, at: Located) -> NDArray[np.float64]:
+    def of_surface(self, angles: tuple[ArrayLike, ...], f_r: Floats, located: Located) -> NDArray[np.float64]:
         """Return m_ij / m_00 between bases of the surface, (..., M, 4, 4), at four angles [rad] and f_r (..., M)."""
         plane = stokes.plane(*angles)
-        light, viewer = plane.light[..., np.newaxis, :, :], plane.viewer[..., np.newaxis, :, :]
-        turned = viewer @ self.facet(plane.theta_d, at) @ light
-        return self._with_share(turned, f_r, at)
+        light = plane.light[..., np.newaxis, :, :]
+        viewer = plane.viewer[..., np.newaxis, :, :]
+        turned = viewer @ self.facet(plane.theta_d, located) @ light
+        return self._with_share(turned, f_r, located)
 
-    def _with_share(self, matrix: NDArray[np.float64], f_r: Floats, at: Located) -> NDArray[np.float64]:
-        matrix = matrix * self.polarising(f_r, at)[..., np.newaxis, np.newaxis]
+    def _with_share(self, matrix: NDArray[np.float64], f_r: Floats, located: Located) -> NDArray[np.float64]:
+        matrix = matrix * self.polarising(f_r, located)[..., np.newaxis, np.newaxis]
         matrix[..., 0, 0] = 1.0
         return matrix
 
@@ -124,12 +119,8 @@ def _elements(source: Source, theta_d: Floats, wavelength_nm: NDArray[np.float64
 def planned_theta_d(source: Source, wavelength_nm: NDArray[np.float64], tolerance: float) -> NDArray[np.float64]:
     """Return the nodes [degree] of theta_d at which no element of the facet is off by more than half a tolerance.
 
-    Cells between nodes, in which cubic interpolation is off by more, are halved until none is.
-
-    Raises
-    ------
-    ParameterError
-        If the source has no Mueller matrices, or the tolerance takes more than 10 000 nodes.
+    Cells between nodes, in which cubic interpolation is off by more, are halved until none is. ParameterError if the
+    source has no Mueller matrices, or the tolerance takes more than 10 000 nodes.
     """
     nodes = _FIRST_DEG
     while True:

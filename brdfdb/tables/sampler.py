@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.geometry import radians, unit_vector
+from brdfdb.parameters import Array
 
-Array = NDArray[np.float64]
 # f_r [1/sr] for unit vectors of lights and viewers, in their broadcast shape
 Evaluate = Callable[[Array, Array], Array]
 
@@ -21,31 +21,23 @@ _LIGHTS_DEG = (0, 12, 24, 34, 43, 51, 58, 64, 69, 73, 77, 80, 83, 85.5, 87.5, 88
 _TURNS = 16  # azimuths of lights of an anisotropic table
 THETA_CELLS, PHI_CELLS = 64, 32
 # Angles of half vectors from which the edges of cells are chosen: half of them by the reflected light
-_FINE, _LEAST, _EVEN = 400, 1e-5, 0.35
+_FINE = 400  # number of these angles
+_LEAST = 1e-5  # smallest [rad] above 0
+_EVEN = 0.35  # share of the edges that are spread evenly
 _FLAT = 1e-100  # z of a half vector up to which the density counts as 0
 _GAUSS = (0.5 - 0.5 / np.sqrt(3.0), 0.5 + 0.5 / np.sqrt(3.0))  # places in a cell at which f_r is evaluated
 
 
 class Cells(NamedTuple):
-    """Probabilities of half vectors, constant in each cell.
+    """Probabilities of half vectors, constant in each cell."""
 
-    Attributes
-    ----------
-    theta_i : array (K,) [rad]
-        Polar angles of the lights.
-    turns : int
-        Number of azimuths of the lights, evenly around the circle; 1 of an isotropic table, whose half vectors are
-        turned with the light.
-    edges : array (T + 1,) [1]
-        Edges of cells in 1 - cos(theta_h), from 0 to 1. Edges in phi_h are even from 0 to 2 pi.
-    probability : array (K * turns, T, P) [1]
-        Probability of each cell, lights with their azimuths one after another.
-    """
-
-    theta_i: Array
+    theta_i: Array  #: polar angles of the lights, (K,) [rad]
+    #: number of azimuths of the lights, evenly around the circle; 1 of an isotropic table, whose half vectors are
+    #: turned with the light
     turns: int
+    #: edges of cells in 1 - cos(theta_h), from 0 to 1. Edges in phi_h are even from 0 to 2 pi, (T + 1,) [1]
     edges: Array
-    probability: Array
+    probability: Array  #: probability of each cell, lights with their azimuths one after another, (K * turns, T, P) [1]
 
     @property
     def rings(self) -> Array:
@@ -118,6 +110,20 @@ def _light_by_half_vector(evaluate: Evaluate, lights: Array, h: Array) -> Array:
     return values
 
 
+class _WeightedRow(NamedTuple):
+    """Weights of rows of cells, and their numbers."""
+
+    weight: Array
+    row: NDArray[np.int64]
+
+
+class _CellPlace(NamedTuple):
+    """The share in [0, 1] of a cell that lies before a place, and the number of the cell."""
+
+    share: Array
+    cell: NDArray[np.int64]
+
+
 class Sampler:
     """Directions of viewers drawn from cells and from the cosine, with their density."""
 
@@ -145,7 +151,7 @@ class Sampler:
         lights = self._lights(wi)
         place, ring = _place(self._theta, lights, u1)
         versine = cells.edges[ring] + np.diff(cells.edges)[ring] * place
-        place, column = _place(self._phi, [(weight, row * rings + ring) for weight, row in lights], u2)
+        place, column = _place(self._phi, [_WeightedRow(weight, row * rings + ring) for weight, row in lights], u2)
         phi = (column + place) * (2.0 * np.pi / columns)
         sin = np.sqrt(versine * (2.0 - versine))
         return self._turned(np.stack([sin * np.cos(phi), sin * np.sin(phi), 1.0 - versine], axis=-1), wi, 1.0)
@@ -170,20 +176,20 @@ class Sampler:
         cosine = np.maximum(wr[..., 2], 0.0) / np.pi + 0.0 * length  # nan is passed on
         return np.asarray(LOBE_SHARE * mirrored + (1.0 - LOBE_SHARE) * cosine)
 
-    def _lights(self, wi: Array) -> list[tuple[Array, NDArray[np.int64]]]:
+    def _lights(self, wi: Array) -> list[_WeightedRow]:
         """Return the weights and the rows of the lights around `wi`: two, or four of an anisotropic table."""
         theta_i, turns = self.cells.theta_i, self.cells.turns
         theta = np.arctan2(np.hypot(wi[..., 0], wi[..., 1]), wi[..., 2])
         number = np.clip(np.searchsorted(theta_i, theta, side="right") - 1, 0, theta_i.size - 2)
         weight = np.clip((theta - theta_i[number]) / np.diff(theta_i)[number], 0.0, 1.0)
-        along = [(1.0 - weight, number * turns), (weight, (number + 1) * turns)]
+        along = [_WeightedRow(1.0 - weight, number * turns), _WeightedRow(weight, (number + 1) * turns)]
         if turns == 1:
             return along
         turn = np.arctan2(wi[..., 1], wi[..., 0]) % (2.0 * np.pi) * (turns / (2.0 * np.pi))
         whole = np.clip(np.nan_to_num(np.floor(turn)), 0.0, turns - 1.0).astype(np.int64)
         weight = np.clip(turn - whole, 0.0, 1.0)
         around = [(1.0 - weight, whole), (weight, (whole + 1) % turns)]
-        return [(share * weight, row + turned) for share, row in along for weight, turned in around]
+        return [_WeightedRow(share * weight, row + turned) for share, row in along for weight, turned in around]
 
     def _turned(self, h: Array, wi: Array, sign: float) -> Array:
         """Return half vectors of an isotropic table turned by the azimuth of the light; others stay."""
@@ -203,7 +209,7 @@ def _summed(probability: Array) -> Array:
     return np.concatenate([np.zeros((len(rows), 1)), np.cumsum(rows, axis=1)], axis=1)
 
 
-def _place(sums: Array, lights: list[tuple[Array, NDArray[np.int64]]], u: Array) -> tuple[Array, NDArray[np.int64]]:
+def _place(sums: Array, lights: list[_WeightedRow], u: Array) -> _CellPlace:
     """Return the place in a cell and its number, for a random number in the mixture of rows of sums over 2^m cells."""
     flat, count = sums.ravel(), sums.shape[1] - 1
     starts = [(weight, row * (count + 1)) for weight, row in lights]
@@ -220,4 +226,4 @@ def _place(sums: Array, lights: list[tuple[Array, NDArray[np.int64]]], u: Array)
     low, high = up_to(cell), up_to(cell + 1)
     width = high - low
     place = np.divide(wanted - low, width, out=np.full(width.shape, 0.5), where=width > 0.0)
-    return np.clip(place, 0.0, 1.0), cell
+    return _CellPlace(np.clip(place, 0.0, 1.0), cell)

@@ -24,7 +24,7 @@ _PLOTS = "_brdfdb_plots"  # attribute of axes
 
 
 @dataclass(frozen=True)
-class Curve:
+class DrawnCurve:
     """A curve of a plot, and its look while the plot has the axes for itself."""
 
     label: str
@@ -40,7 +40,7 @@ class Drawn:
 
     kind: str
     name: str
-    curves: Sequence[Curve]
+    curves: Sequence[DrawnCurve]
     artists: Sequence[Any]
 
 
@@ -81,7 +81,7 @@ def drawn_on(axes: Axes) -> list[Drawn]:
     return [plot for plot in vars(axes).get(_PLOTS, ()) if there.issuperset(plot.artists)]
 
 
-def add(axes: Axes, kind: str, name: str, curves: Sequence[Curve], *, legend: bool = True) -> list[Drawn]:
+def add(axes: Axes, kind: str, name: str, curves: Sequence[DrawnCurve], *, legend: bool = True) -> list[Drawn]:
     """Draw the curves of a plot, and return all plots on the axes.
 
     A plot that has the axes for itself has the colours of its curves. Of several, each has a colour, and its curves
@@ -142,7 +142,7 @@ def without_only(axes: Axes) -> None:
             artist.remove()
 
 
-def polar_grid(axes: Axes, curves: Sequence[Curve]) -> float:
+def polar_grid(axes: Axes, curves: Sequence[DrawnCurve]) -> float:
     """Draw half circles at values of f_r [1/sr] and spokes every 30 degrees, and return the radius of the last circle.
 
     It reaches over the lines on the axes and the curves that will be drawn, and replaces the grid that is there.

@@ -35,7 +35,7 @@ class Sliced(Protocol):
 
 
 @dataclass(frozen=True)
-class Axis:
+class SliceAxis:
     """One axis of a slice: `first` and `last` are the pixel centres where `direction` starts and where it ends."""
 
     name: str
@@ -49,34 +49,20 @@ class Axis:
 class Slice:
     """A picture of a table: f_r [1/sr] over two angles, row 0 at the top as in an image file.
 
-    Attributes
-    ----------
-    kind : str
-        "half_difference", "in_plane" or "lobe".
-    description : str
-        Explanation of the axes in words.
-    x, y : Axis
-        Columns and rows.
-    fixed_deg : tuple of (str, float)
-        The angles that are the same in every pixel, by name [degrees].
-    values : float32 array, shape (H, W) or (H, W, L) [1/sr]
-        Without and with a wavelength axis.
-    wavelength_nm : float array, shape (L,), or None
-        The wavelengths of the last axis of `values` [nm].
-
     Raises
     ------
     ValueError
         If the shape of `values` does not fit `wavelength_nm`.
     """
 
-    kind: str
-    description: str
-    x: Axis
-    y: Axis
-    fixed_deg: tuple[tuple[str, float], ...]
-    values: NDArray[np.float32]
-    wavelength_nm: NDArray[Any] | None
+    kind: str  #: "half_difference", "in_plane" or "lobe"
+    description: str  #: explanation of the axes in words
+    #: x, y: columns and rows
+    x: SliceAxis
+    y: SliceAxis
+    fixed_deg: tuple[tuple[str, float], ...]  #: the angles that are the same in every pixel, by name [degrees]
+    values: NDArray[np.float32]  #: without and with a wavelength axis, (H, W) or (H, W, L) [1/sr]
+    wavelength_nm: NDArray[Any] | None  #: the wavelengths of the last axis of `values` [nm], (L,)
 
     def __post_init__(self) -> None:
         spectral = () if self.wavelength_nm is None else self.wavelength_nm.shape
@@ -87,24 +73,13 @@ class Slice:
 
 
 def half_difference_slice(table: Sliced, *, phi_h_deg: float = 0.0, phi_d_deg: float = 90.0) -> Slice:
-    """Return f_r [1/sr] over theta_h (to the right) and theta_d (upwards), one pixel a degree.
+    """Return f_r [1/sr] over theta_h (to the right) and theta_d (upwards), (90, 90[, L]), one pixel a degree.
 
-    Parameters
-    ----------
-    table : Table or RemoteTable
-        The table.
-    phi_h_deg : float [degree]
-        Azimuth of the half vector; matters for anisotropic tables only.
-    phi_d_deg : float [degree]
-        Azimuth of the light about the half vector. At 90 degrees, the usual choice for pictures of measured
-        materials, light and viewer are equally far from the normal and no pixel is below the horizon.
-
-    Returns
-    -------
-    Slice
-        Shape (90, 90) or (90, 90, L) [1/sr]; 0 where light or viewer is below the horizon. Column x is
-        theta_h = x + 0.5 degrees, row y is theta_d = 89.5 - y degrees: the specular lobe is on the left edge, grazing
-        incidence along the top, retroreflection along the bottom.
+    `phi_h_deg` is the azimuth of the half vector; it matters for anisotropic tables only. `phi_d_deg` is the azimuth of
+    the light about the half vector. At 90 degrees, the usual choice for pictures of measured materials, light and
+    viewer are equally far from the normal and no pixel is below the horizon, where f_r is 0. Column x is theta_h = x +
+    0.5 degrees, row y is theta_d = 89.5 - y degrees: the specular lobe is on the left edge, grazing incidence along the
+    top, retroreflection along the bottom.
     """
     theta_h_deg = np.arange(90) + 0.5
     theta_d_deg = theta_h_deg[::-1, np.newaxis]
@@ -114,8 +89,8 @@ def half_difference_slice(table: Sliced, *, phi_h_deg: float = 0.0, phi_d_deg: f
     return Slice(
         kind="half_difference",
         description="specular lobe on the left edge, grazing incidence at the top, retroreflection at the bottom",
-        x=Axis("theta_h", 0.5, 89.5, LEFT_TO_RIGHT),
-        y=Axis("theta_d", 0.5, 89.5, BOTTOM_TO_TOP),
+        x=SliceAxis("theta_h", 0.5, 89.5, LEFT_TO_RIGHT),
+        y=SliceAxis("theta_d", 0.5, 89.5, BOTTOM_TO_TOP),
         fixed_deg=(("phi_h", phi_h_deg), ("phi_d", phi_d_deg)),
         values=np.asarray(table.lookup(*directions), dtype=np.float32),
         wavelength_nm=table.wavelength_nm,
@@ -123,22 +98,12 @@ def half_difference_slice(table: Sliced, *, phi_h_deg: float = 0.0, phi_d_deg: f
 
 
 def in_plane_slice(table: Sliced, *, phi_i_deg: float = 0.0) -> Slice:
-    """Return f_r [1/sr] in the plane of incidence over signed theta_r (to the right) and theta_i (upwards).
+    """Return f_r [1/sr] in the plane of incidence over signed theta_r and theta_i (upwards), (90, 180[, L]).
 
-    Parameters
-    ----------
-    table : Table or RemoteTable
-        The table.
-    phi_i_deg : float [degree]
-        Azimuth of the light; matters for anisotropic tables only.
-
-    Returns
-    -------
-    Slice
-        Shape (90, 180) or (90, 180, L) [1/sr]. Column x is theta_r = x - 89.5 degrees, positive on the mirror side
-        (phi_r = phi_i + 180 degrees) and negative back towards the light (phi_r = phi_i); row y is
-        theta_i = 89.5 - y degrees. The mirror direction is the diagonal from the middle of the bottom edge to the top
-        right corner, retroreflection the one to the top left corner.
+    `phi_i_deg` is the azimuth of the light; it matters for anisotropic tables only. Column x is theta_r = x - 89.5
+    degrees, positive on the mirror side (phi_r = phi_i + 180 degrees) and negative back towards the light (phi_r =
+    phi_i); row y is theta_i = 89.5 - y degrees. The mirror direction is the diagonal from the middle of the bottom edge
+    to the top right corner, retroreflection the one to the top left corner.
     """
     signed_deg = np.arange(180) - 89.5
     theta_i_deg = np.arange(90)[::-1, np.newaxis] + 0.5
@@ -147,8 +112,8 @@ def in_plane_slice(table: Sliced, *, phi_i_deg: float = 0.0) -> Slice:
     return Slice(
         kind="in_plane",
         description="theta_r is positive on the mirror side and negative back towards the light",
-        x=Axis("signed theta_r", -89.5, 89.5, LEFT_TO_RIGHT),
-        y=Axis("theta_i", 0.5, 89.5, BOTTOM_TO_TOP),
+        x=SliceAxis("signed theta_r", -89.5, 89.5, LEFT_TO_RIGHT),
+        y=SliceAxis("theta_i", 0.5, 89.5, BOTTOM_TO_TOP),
         fixed_deg=(("phi_i", phi_i_deg),),
         values=np.asarray(table.lookup(*directions), dtype=np.float32),
         wavelength_nm=table.wavelength_nm,
@@ -156,29 +121,13 @@ def in_plane_slice(table: Sliced, *, phi_i_deg: float = 0.0) -> Slice:
 
 
 def lobe_map(table: Sliced, *, theta_i_deg: float = 45.0, phi_i_deg: float = 0.0) -> Slice:
-    """Return f_r [1/sr] over the hemisphere of viewers for one light, as a disc with the radius theta_r.
+    """Return f_r [1/sr] over the hemisphere of viewers for one light, a disc with the radius theta_r, (256, 256[, L]).
 
-    Parameters
-    ----------
-    table : Table or RemoteTable
-        The table.
-    theta_i_deg : float [degree]
-        Polar angle of the light, 0 to 90.
-    phi_i_deg : float [degree]
-        Azimuth of the light; matters for anisotropic tables only.
-
-    Returns
-    -------
-    Slice
-        Shape (256, 256) or (256, 256, L) [1/sr], 0 outside the disc. The surface is seen from above and turned so that
-        the light comes from the left: the point (x, y) degrees from the centre, x to the right and y upwards, is
-        x = -theta_r cos(phi_r - phi_i), y = -theta_r sin(phi_r - phi_i). Retroreflection is thus theta_i to the left
-        of the centre, the mirror direction theta_i to the right, and phi_r grows counter-clockwise.
-
-    Raises
-    ------
-    ValueError
-        If `theta_i_deg` is outside [0, 90].
+    The surface is seen from above and turned so that the light comes from the left: the point (x, y) degrees from the
+    centre, x to the right and y upwards, is x = -theta_r cos(phi_r - phi_i), y = -theta_r sin(phi_r - phi_i).
+    Retroreflection is thus theta_i to the left of the centre, the mirror direction theta_i to the right, and phi_r
+    grows counter-clockwise. f_r is 0 outside the disc. The azimuth of the light matters for anisotropic tables only.
+    ParameterError if `theta_i_deg` is outside [0, 90].
     """
     if not 0.0 <= theta_i_deg <= 90.0:
         raise ParameterError("theta_i_deg", f"{theta_i_deg:g} is outside [0, 90] degrees", theta_i_deg, (0.0, 90.0))
@@ -193,8 +142,8 @@ def lobe_map(table: Sliced, *, theta_i_deg: float = 45.0, phi_i_deg: float = 0.0
     return Slice(
         kind="lobe",
         description="radius = theta_r, seen from above, light from the left, mirror direction on the right",
-        x=Axis("-theta_r cos(phi_r - phi_i)", -edge, edge, LEFT_TO_RIGHT),
-        y=Axis("-theta_r sin(phi_r - phi_i)", -edge, edge, BOTTOM_TO_TOP),
+        x=SliceAxis("-theta_r cos(phi_r - phi_i)", -edge, edge, LEFT_TO_RIGHT),
+        y=SliceAxis("-theta_r sin(phi_r - phi_i)", -edge, edge, BOTTOM_TO_TOP),
         fixed_deg=(("theta_i", theta_i_deg), ("phi_i", phi_i_deg)),
         values=np.asarray(table.lookup(*directions), dtype=np.float32),
         wavelength_nm=table.wavelength_nm,

@@ -1,4 +1,4 @@
-"""Stokes vectors and their bases: THE convention of polarised light, and rotations between bases.
+"""Stokes vectors: THE convention of polarised light, rotations between bases, and the record of a polarised table.
 
 * The Stokes vector is (I, Q, U, V) of the fields E_s and E_p that travel along k, varying as exp(i k.r - i omega t):
   I = abs(E_s)^2 + abs(E_p)^2, Q = abs(E_s)^2 - abs(E_p)^2, U + iV = 2 E_s conj(E_p). Q > 0 is s-polarised, U > 0 is
@@ -16,6 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from pydantic import BaseModel, ConfigDict, Field
 
 from brdfdb.geometry import unit_vector
 
@@ -27,19 +28,18 @@ CONVENTION = (
 )
 SURFACE_BASIS = "s = z x w / |z x w|, horizontal, for light and viewer"
 PLANE_BASIS = "s = w_i x w_r / |w_i x w_r|, normal to the plane of light and viewer, for both"
+POLARISATION_VERSION = 1  # of the arrays, and of the record, of a polarised table
+ELEMENTS = ("m01", "m22", "m23")
+
+Matrix = list[list[float]]
 
 
 class Plane(NamedTuple):
     """The plane of light and viewer, seen from the basis of the surface.
 
-    Attributes
-    ----------
-    theta_d : array [rad]
-        Half the angle between light and viewer.
-    light, viewer : array (..., 4, 4)
-        Rotations of Stokes vectors: of the light from the basis of the surface to that of the plane, of the viewer from
-        that of the plane to that of the surface. The Mueller matrix between bases of the surface is
-        ``viewer @ M @ light`` of that between bases of the plane.
+    `theta_d` [rad] is half the angle between light and viewer. `light` and `viewer` (..., 4, 4) rotate Stokes vectors:
+    of the light from the basis of the surface to that of the plane, of the viewer back. The Mueller matrix between
+    bases of the surface is ``viewer @ M @ light`` of that between bases of the plane.
     """
 
     theta_d: NDArray[np.float64]
@@ -62,7 +62,8 @@ def rotation(angle: ArrayLike) -> NDArray[np.float64]:
 def plane(theta_i: ArrayLike, phi_i: ArrayLike, theta_r: ArrayLike, phi_r: ArrayLike) -> Plane:
     """Return the plane of light and viewer at angles [rad], which broadcast."""
     angles = np.broadcast_arrays(*(np.asarray(angle, np.float64) for angle in (theta_i, phi_i, theta_r, phi_r)))
-    w_i, w_r = unit_vector(angles[0], angles[1]), unit_vector(angles[2], angles[3])
+    w_i = unit_vector(angles[0], angles[1])
+    w_r = unit_vector(angles[2], angles[3])
     s_i, s_r = horizontal(angles[1]), horizontal(angles[3])
     normal = np.cross(w_i, w_r)
     length = np.linalg.norm(normal, axis=-1, keepdims=True)
@@ -82,7 +83,8 @@ def horizontal(phi: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _to(s: NDArray[np.float64], own: NDArray[np.float64], k: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the rotation to the basis of `s` from that of `own`, unit vectors normal to the direction of travel k."""
-    cos, sin = np.sum(s * own, axis=-1), np.sum(s * np.cross(own, k), axis=-1)
+    cos = np.sum(s * own, axis=-1)
+    sin = np.sum(s * np.cross(own, k), axis=-1)
     return _turned(cos * cos - sin * sin, 2.0 * cos * sin)
 
 
@@ -92,3 +94,60 @@ def _turned(cos: NDArray[np.float64], sin: NDArray[np.float64]) -> NDArray[np.fl
     matrix[..., 1, 1] = matrix[..., 2, 2] = cos
     matrix[..., 1, 2], matrix[..., 2, 1] = sin, -sin
     return matrix
+
+
+class ElementError(BaseModel):
+    """Error of the normalised elements m_ij / m_00 of a table, abs(table - model), each at its worst wavelength."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    directions: int = Field(description="drawn above the horizon, half over the hemisphere and half in the lobe")
+    seed: int
+    p99: Matrix = Field(description="[row][column] of the Mueller matrix, between bases of the surface")
+    max: Matrix = Field(description="[row][column]")
+    between_p99: Matrix | None = Field(
+        description="[row][column], half way between neighbouring wavelengths; null: there is one wavelength"
+    )
+    between_max: Matrix | None = Field(description="[row][column], as between_p99")
+
+    facet: float = Field(
+        description="largest error of the stored elements, between bases of the plane, over theta_d: what physical "
+        "realisability is judged with"
+    )
+    between_facet: float | None = Field(description="as facet, half way between neighbouring wavelengths")
+
+    @property
+    def worst_p99(self) -> float:
+        """Return the largest p99 of all elements."""
+        return float(np.max(self.p99))
+
+
+class Polarisation(BaseModel):
+    """The record of a polarised table: convention, the stored elements, and their error."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    version: int = Field(description="version of the arrays mueller, mueller_theta_d and depolarised")
+    convention: str = Field(description="meaning of Stokes vectors, in words")
+    surface_basis: str = Field(description="basis of lookups and of the error, in words")
+    plane_basis: str = Field(description="basis of the stored elements, in words")
+    elements: list[str] = Field(description="stored elements, m_ij over m_00, of light that is not depolarised")
+    reconstruction: str = Field(description="the way from the arrays to the Mueller matrix, in words")
+    error: ElementError | None = Field(default=None, description="the stated error of the elements; null: not measured")
+
+
+def record(error: ElementError | None = None) -> Polarisation:
+    """Return the record of a polarised table."""
+    return Polarisation(
+        version=POLARISATION_VERSION,
+        convention=CONVENTION,
+        surface_basis=SURFACE_BASIS,
+        plane_basis=PLANE_BASIS,
+        elements=list(ELEMENTS),
+        reconstruction=(
+            "m10 = m01, m11 = 1, m33 = m22, m32 = -m23, others 0, at theta_d, half the angle between light and viewer, "
+            "cubic over theta_d and wavelength; f_r - depolarised times that matrix, between bases of the plane, plus "
+            "depolarised in the first element"
+        ),
+        error=error,
+    )

@@ -5,10 +5,11 @@ from __future__ import annotations
 import functools
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
+from pydantic import PrivateAttr
 
 from brdfdb.arrays import FLOAT_TYPES, PLAIN_TYPES, array_lookup
 from brdfdb.errors import ParameterError
@@ -20,8 +21,12 @@ from brdfdb.geometry import (
     radians,
     shape_of_angles,
     spherical_angles,
+    unit_vector,
 )
-from brdfdb.materials.source import FourAngles, Source
+from brdfdb.materials import FunctionRecord, FunctionSource, Material, Source
+from brdfdb.materials.function_source import Function
+from brdfdb.materials.source import FourAngles
+from brdfdb.measurements.record import Measured
 from brdfdb.models.large_calls import array_for_result, filled
 from brdfdb.notebook import polar_sketch
 from brdfdb.parameters import Floats
@@ -31,68 +36,75 @@ from brdfdb.tables.grids import Axis, Grid, axes_among, check_wavelengths
 from brdfdb.tables.layout import PLAIN, Interpolation, Layout, rebuilt
 from brdfdb.tables.metadata import TableMetadata
 from brdfdb.tables.polarisation import Facets, checked_facets, facets_of
+from brdfdb.tables.sampler import Sampler
 from brdfdb.tables.table_base import BaseTable
 
-# how numbers become f_r, the axes, the numbers, how many a node, how they make up a spectrum, the uniform part
-_Ready = tuple[_coordinates.Rule, Axes, NDArray[np.float32], int, NDArray[np.float64], NDArray[np.float64]]
+# The cut that notebooks show
+_SKETCHED_DEG = np.linspace(-88.0, 88.0, 177)  # angles of the viewer
+_SKETCHED_LIGHT_DEG = 45.0
+_SKETCHED_NM = 550.0
+# Variance of f_r over its mean square, for directions that follow the cosine. Up to it, the cosine has less noise than
+# cells of a table: see docs/results/environments.json
+_EVEN = 0.1
+_LIGHTS_DEG = (0.0, 25.0, 50.0, 70.0)  # lights at which this variance is measured
+_DRAWN = 1024  # directions of each of them
+_TURN = (np.sqrt(5.0) - 1.0) / 2.0  # the golden section
+_BLACK = 1e-100  # least albedo
 
-# Cut that notebooks show: angles of viewer and light, and the wavelength
-_SKETCHED_DEG, _SKETCHED_LIGHT_DEG, _SKETCHED_NM = np.linspace(-88.0, 88.0, 177), 45.0, 550.0
+
+class _Arrays(NamedTuple):
+    """A table as kernels read it.
+
+    `rule` is the way from numbers to f_r. `channels` numbers at each node make up a spectrum by `spectra`. `uniform` is
+    the uniform part [1/sr] of each wavelength.
+    """
+
+    rule: _coordinates.Rule
+    axes: Axes
+    numbers: NDArray[np.float32]
+    channels: int
+    spectra: NDArray[np.float64]
+    uniform: NDArray[np.float64]
+
+
+class _Specular(NamedTuple):
+    """Nodes [rad] of the specular part, and its values there, a row a node."""
+
+    theta_i: NDArray[np.float64]
+    rows: NDArray[np.float32]
 
 
 @dataclass(frozen=True, eq=False)
 class Table(BaseTable):
-    """A decoded table: the values of one revision of one material, in memory.
+    """A decoded table: the values of one revision of one material, in memory."""
 
-    Attributes
-    ----------
-    name, revision : str
-        Name of the material, and its revision.
-    attrs : dict
-        The attributes as stored; `metadata` is the typed record of them.
-    grid : Grid
-        The angular axes, in the order of the dimensions.
-    wavelength_nm : array (L,) [nm] or None
-        Wavelengths of a spectral table; None for a grey one, which holds at any wavelength.
-    values : float32 array
-        Numbers over the angular axes and, last, the wavelengths, or the coefficients of a factored spectrum.
-    specular : float32 array (theta_i[, L]) [1] or None
-        Reflectance of the specular part; None if the source has none.
-    specular_theta_deg : array [degree] or None
-        Its nodes; by default those of the axis theta_i.
-    interpolation : Interpolation
-        The way from the numbers to f_r between nodes; by default they are f_r, interpolated linearly.
-    spectra : array (coefficients, L) or None
-        The basis of a factored spectrum: of logarithms, or of f_r itself if `part_nm` is given.
-    part_nm : array (coefficients,) [nm] or None
-        Wavelengths at which the parts of such a table are f_r.
-    uniform : array (L,) or (1,) [1/sr]
-        The uniform part of f_r, which is not in `values`.
-    digest : str
-        sha256 of the manifest of the revision; empty of a table that was not read from a store.
-    n, k : array (L,) [1] or None
-        Refractive index and extinction coefficient that the store says the table was computed with. Lookups do not
-        read them.
-    facets : Facets or None
-        The polarisation; None of an unpolarised table.
-    """
-
+    #: name, revision: name of the material, and its revision
     name: str
     revision: str
-    attrs: Mapping[str, Any] = field(repr=False)
-    grid: Grid = field(repr=False)
+    attrs: Mapping[str, Any] = field(repr=False)  #: the attributes as stored; `metadata` is the typed record of them
+    grid: Grid = field(repr=False)  #: the angular axes, in the order of the dimensions
+    #: wavelengths of a spectral table; None for a grey one, which holds at any wavelength, (L,) [nm]
     wavelength_nm: Axis | None = field(repr=False)
+    #: numbers over the angular axes and, last, the wavelengths, or the coefficients of a factored spectrum
     values: NDArray[np.float32] = field(repr=False)
+    #: reflectance of the specular part; None if the source has none, (theta_i[, L]) [1]
     specular: NDArray[np.float32] | None = field(repr=False)
+    #: nodes of the specular part; by default those of the axis theta_i, [degree]
     specular_theta_deg: Axis | None = field(default=None, repr=False)
+    #: the way from the numbers to f_r between nodes; by default they are f_r, interpolated linearly
     interpolation: Interpolation = PLAIN
+    #: the basis of a factored spectrum: of logarithms, or of f_r itself if `part_nm` is given, (coefficients, L)
     spectra: NDArray[np.float64] | None = field(default=None, repr=False)
+    #: the uniform part of f_r, which is not in `values`, (L,) or (1,) [1/sr]
     uniform: NDArray[np.float64] | None = field(default=None, repr=False)
-    digest: str = ""
+    digest: str = ""  #: sha256 of the manifest of the revision; empty of a table that was not read from a store
+    #: wavelengths at which the parts of such a table are f_r, (coefficients,) [nm]
     part_nm: Axis | None = field(default=None, repr=False)
+    #: n, k: refractive index and extinction coefficient that the store says the table was computed with. Lookups do not
+    #: read them, (L,) [1]
     n: Axis | None = field(default=None, repr=False)
     k: Axis | None = field(default=None, repr=False)
-    facets: Facets | None = field(default=None, repr=False)
+    facets: Facets | None = field(default=None, repr=False)  #: the polarisation; None of an unpolarised table
 
     @classmethod
     def of(cls, layout: Layout, values: NDArray[np.float32], grid: Grid | None = None) -> Table:
@@ -220,7 +232,7 @@ class Table(BaseTable):
     def _at_angles(
         self, angles: FourAngles, wavelength_nm: ArrayLike | None, out: Floats | None = None, threads: int = 1
     ) -> Floats:
-        at = self._wavelengths(wavelength_nm)
+        located = self._wavelengths(wavelength_nm)
         shape: tuple[int, ...] = ()
         if FLOAT_TYPES.issuperset(map(type, angles)):  # broadcasting takes longer than the lookup of one point
             numbers = np.array(angles).reshape(4, 1)
@@ -237,14 +249,14 @@ class Table(BaseTable):
         unusual = []
 
         def write(part: slice, values: NDArray[Any]) -> None:
-            given = [angle[part] for angle in flat]
+            theta_i, phi_i, theta_r, phi_r = (angle[part] for angle in flat)
             if not _kernels.by_angles(
-                *self._kernel, at.nodes, at.weight, given[0], given[1], given[2], given[3], horizon, values
+                *self._kernel, located.nodes, located.weight, theta_i, phi_i, theta_r, phi_r, horizon, values
             ):
                 unusual.append(part)
 
         arguments = dict(zip(("theta_i", "phi_i", "theta_r", "phi_r"), angles, strict=True))
-        values = filled(write, array_for_result(out, shape + at.tail, dtype, arguments), at.size, threads)
+        values = filled(write, array_for_result(out, shape + located.tail, dtype, arguments), located.size, threads)
         if unusual:
             checked_angles(*angles)  # raises an error or warns
         return values[()] if out is None else values
@@ -263,21 +275,21 @@ class Table(BaseTable):
 
         Wavelengths, `out`, `threads`, result and errors are those of `lookup`.
         """
-        at = self._wavelengths(wavelength_nm)
+        located = self._wavelengths(wavelength_nm)
         vectors = checked_vectors(wi, wr)
         shape = np.broadcast_shapes(vectors.w_i.shape, vectors.w_r.shape)
         w_i, w_r = (_flat(w, shape, vectors.dtype) for w in (vectors.w_i, vectors.w_r))
 
         def write(part: slice, values: NDArray[Any]) -> None:
             numbers = slice(3 * part.start, 3 * part.stop)
-            _kernels.by_vectors(*self._kernel, at.nodes, at.weight, w_i[numbers], w_r[numbers], values)
+            _kernels.by_vectors(*self._kernel, located.nodes, located.weight, w_i[numbers], w_r[numbers], values)
 
-        result = array_for_result(out, shape[:-1] + at.tail, vectors.dtype, {"wi": wi, "wr": wr})
-        values = filled(write, result, at.size, threads)
+        result = array_for_result(out, shape[:-1] + located.tail, vectors.dtype, {"wi": wi, "wr": wr})
+        values = filled(write, result, located.size, threads)
         return values[()] if out is None else values
 
     @functools.cached_property
-    def _kernel(self) -> _Ready:
+    def _kernel(self) -> _Arrays:
         """The table as kernels read it."""
         grid, how = self.grid, self.interpolation
         # a cubic, and what continues beyond the horizon; a sum of positive numbers does not
@@ -298,30 +310,32 @@ class Table(BaseTable):
         spectra = np.empty((0, 0)) if self.spectra is None else np.ascontiguousarray(self.spectra)  # else a kernel more
         count = 1 if self.wavelength_nm is None else self.wavelength_nm.size
         uniform = np.zeros(count) if self.uniform is None else np.broadcast_to(self.uniform, (count,)).copy()
-        return rule, axes, self.values.reshape(-1), channels, spectra, uniform
+        return _Arrays(rule, axes, self.values.reshape(-1), channels, spectra, uniform)
 
     @array_lookup
     def specular_reflectance(self, theta_i: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:
-        at = self._wavelengths(wavelength_nm)
+        located = self._wavelengths(wavelength_nm)
         given = np.asarray(theta_i)
         dtype = asked_for(theta_i)
         if given.dtype.kind not in "iuf":
             checked_angles(theta_i, 0.0, 0.0, 0.0)
-        values = np.zeros(given.size * at.size, dtype)
+        values = np.zeros(given.size * located.size, dtype)
         horizon = float(dtype.type(HALF_PI))
         nodes, rows = self._specular_rows
-        if not _kernels.specular(nodes, rows, at.nodes, at.weight, _flat(given, given.shape, dtype), horizon, values):
+        if not _kernels.specular(
+            nodes, rows, located.nodes, located.weight, _flat(given, given.shape, dtype), horizon, values
+        ):
             checked_angles(theta_i, 0.0, 0.0, 0.0)
-        return values.reshape(given.shape + at.tail)[()]
+        return values.reshape(given.shape + located.tail)[()]
 
     def _mueller_at(self, angles: FourAngles, wavelength_nm: ArrayLike | None) -> Floats:
         facets = self._polarised
-        at = self._wavelengths(wavelength_nm)
+        located = self._wavelengths(wavelength_nm)
         f_r = self._at_angles(angles, wavelength_nm)
-        values = np.asarray(f_r if at.tail else np.asarray(f_r)[..., np.newaxis])
-        normalised = facets.of_surface(angles, values, at)
+        values = np.asarray(f_r if located.tail else np.asarray(f_r)[..., np.newaxis])
+        normalised = facets.of_surface(angles, values, located)
         matrix = np.where(values == 0.0, 0.0, values)[..., np.newaxis, np.newaxis] * normalised
-        return np.asarray(matrix if at.tail else matrix[..., 0, :, :], dtype=np.asarray(f_r).dtype)
+        return np.asarray(matrix if located.tail else matrix[..., 0, :, :], dtype=np.asarray(f_r).dtype)
 
     @array_lookup
     def mueller_vectors(self, wi: ArrayLike, wr: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:
@@ -334,38 +348,30 @@ class Table(BaseTable):
     @array_lookup
     def mueller_in_plane(self, wi: ArrayLike, wr: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:
         """Interpolate the Mueller BRDF [1/sr] between bases of the plane of light and viewer; as `mueller_vectors`."""
-        facets, at = self._polarised, self._wavelengths(wavelength_nm)
+        facets = self._polarised
+        located = self._wavelengths(wavelength_nm)
         vectors = checked_vectors(wi, wr)
         f_r = np.asarray(self.lookup_vectors(wi, wr, wavelength_nm))
-        values = f_r if at.tail else f_r[..., np.newaxis]
+        values = f_r if located.tail else f_r[..., np.newaxis]
         theta_d = stokes.half_angle(*(w.astype(np.float64) for w in (vectors.w_i, vectors.w_r)))
-        matrix = values[..., np.newaxis, np.newaxis] * facets.in_plane(theta_d, values, at)
-        return np.asarray(matrix if at.tail else matrix[..., 0, :, :], dtype=vectors.dtype)
+        matrix = values[..., np.newaxis, np.newaxis] * facets.in_plane(theta_d, values, located)
+        return np.asarray(matrix if located.tail else matrix[..., 0, :, :], dtype=vectors.dtype)
 
     @array_lookup
     def facet_mueller(self, theta_d: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:
         """Interpolate the Mueller matrix [1] of a facet over its first element, between bases of the plane.
 
-        Parameters
-        ----------
-        theta_d : array_like [rad]
-            Half the angle between light and viewer, in [0, pi/2].
-        wavelength_nm : float or array_like (M,) [nm], optional
-            As in `lookup`.
-
-        Returns
-        -------
-        array [1]
-            Shaped as by `lookup`, and (4, 4).
+        `theta_d` [rad] is half the angle between light and viewer, in [0, pi/2]. Shaped as by `lookup`, and (4, 4).
         """
-        facets, at = self._polarised, self._wavelengths(wavelength_nm)
-        matrix = facets.facet(np.asarray(theta_d, np.float64), at)
-        return matrix if at.tail else matrix[..., 0, :, :]
+        facets = self._polarised
+        located = self._wavelengths(wavelength_nm)
+        matrix = facets.facet(np.asarray(theta_d, np.float64), located)
+        return matrix if located.tail else matrix[..., 0, :, :]
 
     def depolarised(self, wavelength_nm: ArrayLike | None = None) -> Floats:
         """Interpolate the depolarised part of f_r [1/sr], which is uniform, shape (M,); () for one wavelength."""
-        at = self._wavelengths(wavelength_nm)
-        return self._polarised.depolarised_at(at).reshape(at.tail)
+        located = self._wavelengths(wavelength_nm)
+        return self._polarised.depolarised_at(located).reshape(located.tail)
 
     @array_lookup
     def specular_mueller(self, theta_i: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:
@@ -387,18 +393,18 @@ class Table(BaseTable):
         return self.facets
 
     @functools.cached_property
-    def _specular_rows(self) -> tuple[NDArray[np.float64], NDArray[np.float32]]:
-        """Nodes [rad] of the specular part, and its values there, a row a node; empty arrays where there is none."""
+    def _specular_rows(self) -> _Specular:
+        """The specular part as kernels read it; empty arrays where there is none."""
         if self.specular is None:
-            return np.empty(0), np.empty((0, 0), np.float32)
-        at_deg = self.specular_theta_deg
-        nodes = radians(self.axes_deg["theta_i"] if at_deg is None else at_deg)
+            return _Specular(np.empty(0), np.empty((0, 0), np.float32))
+        nodes_deg = self.specular_theta_deg
+        nodes = radians(self.axes_deg["theta_i"] if nodes_deg is None else nodes_deg)
         expected = (nodes.size,) if self.wavelength_nm is None else (nodes.size, self.wavelength_nm.size)
         if self.specular.shape != expected or nodes.size < 2:  # kernels do not look
             raise ParameterError(
                 "specular", f"shape {self.specular.shape} of {self.name} is not {expected}, two nodes or more"
             )
-        return nodes, np.ascontiguousarray(self.specular.reshape(nodes.size, -1))
+        return _Specular(nodes, np.ascontiguousarray(self.specular.reshape(nodes.size, -1)))
 
 
 def _flat(array: NDArray[Any], shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
@@ -411,7 +417,9 @@ def _flat(array: NDArray[Any], shape: tuple[int, ...], dtype: DTypeLike) -> NDAr
 
 def points(grid: Grid, wi: Floats, wr: Floats) -> NDArray[np.float64]:
     """Return the coordinates [rad] on a grid, of shape (axes, N), of unit vectors of shape (N, 3)."""
-    x, mu, scratch = np.empty((len(grid.axes), len(wi))), np.empty(len(wi)), np.empty((6, len(wi)))
+    x = np.empty((len(grid.axes), len(wi)))
+    mu = np.empty(len(wi))
+    scratch = np.empty((6, len(wi)))
     rule = _coordinates.Rule(grid.half_difference, grid.reciprocal, grid.copies, False, 0.0, 0.0, False, False, False)
     flat = [_flat(w, np.shape(w), np.float64) for w in (wi, wr)]
     _coordinates.points_of_vectors(rule, flat[0], flat[1], len(wi), x, mu, scratch)
@@ -427,7 +435,8 @@ def table_from(name: str, revision: str, arrays: Mapping[str, NDArray[Any]], att
     if variable not in arrays:
         raise ParameterError("brdf", f"neither it nor parts is among the arrays {', '.join(arrays) or 'none'}")
     grid = Grid({axis: arrays[axis] for axis in axes_among(arrays)})
-    specular, uniform = arrays.get("specular_reflectance"), arrays.get("uniform")
+    specular = arrays.get("specular_reflectance")
+    uniform = arrays.get("uniform")
     wavelength_nm = arrays.get("wavelength")
     part_nm = np.array(metadata.part_wavelengths_nm) if metadata.part_wavelengths_nm else None
     basis = "mixture" if "mixture" in arrays else "spectra"
@@ -461,3 +470,90 @@ def table_from(name: str, revision: str, arrays: Mapping[str, NDArray[Any]], att
         k=arrays.get("k"),
         facets=checked_facets(arrays, 1 if wavelength_nm is None else wavelength_nm.size),
     )
+
+
+class TableSource(FunctionSource):
+    """A table as a source: the values of its lookups are its f_r.
+
+    With `known_nm` (L,) [nm], increasing, the source is known at these wavelengths, too: beyond the range of a table of
+    two or more wavelengths f_r is that of its first or last one. By default the source has the range of the table.
+    """
+
+    _table: Table = PrivateAttr()
+
+    def __init__(self, table: Table, known_nm: NDArray[np.float64] | None = None) -> None:
+        recorded = table.source
+        wavelength_nm, metadata = table.wavelength_nm, table.metadata
+        if known_nm is not None and wavelength_nm is not None and wavelength_nm.size > 1:
+            wavelength_nm = np.union1d(wavelength_nm, known_nm)
+        stated = metadata.source or "source not stated"
+        record: dict[str, Any] = {
+            "name": table.name,
+            "title": metadata.title or table.name,
+            "provenance": f"{stated}; by way of the table {table.name} {table.revision}",
+            "wavelengths_nm": None if wavelength_nm is None else tuple(wavelength_nm.tolist()),
+            "anisotropic": table.anisotropic,
+            "elliptical": table.anisotropic and table.grid.copies == 4,
+        }
+        if isinstance(recorded, FunctionRecord):
+            record |= {name: getattr(recorded, name) for name in ("reciprocal", "grazing_pole", "alpha")}
+        super().__init__(brdf=_brdf_of(table), **record)
+        self._table = table
+
+    @property
+    def measured(self) -> Measured | None:
+        """Return the record of the data if the table is measured, or None."""
+        return self._table.metadata.measured
+
+    @functools.cached_property
+    def sampler(self) -> Sampler | None:
+        """The sampler of the table; None if f_r hardly varies, where the cosine draws directions with less noise."""
+        number = np.arange(_DRAWN)
+        wi = unit_vector(radians(_LIGHTS_DEG)[:, np.newaxis], 0.0)
+        drawn = self._table.sample((number + 0.5) / _DRAWN, number * _TURN % 1.0, wi)
+        weight, pdf = (np.reshape(values, (*drawn.wr.shape[:2], -1)) for values in (drawn.weight, drawn.pdf))
+        mean = weight.mean(axis=-1)
+        density = pdf[..., 0]
+        cosine = np.maximum(drawn.wr[..., 2], 0.0)
+        square = np.divide(np.pi * mean**2 * density, cosine, out=np.zeros(cosine.shape), where=cosine > 0.0)
+        albedo = np.maximum(mean.mean(axis=1), _BLACK)
+        varies = np.mean(square.mean(axis=1) / albedo**2 - 1.0) > _EVEN
+        return self._table.sampler if varies else None
+
+    @property
+    def has_specular(self) -> bool:
+        """Return True if the table holds the reflectance of a specular part."""
+        return self._table.specular is not None
+
+    def evaluated_at(self, wavelength_nm: NDArray[np.float64]) -> NDArray[np.float64] | None:
+        """Return the same wavelengths [nm], or the only one of the table; None if grey."""
+        stored = self._table.wavelength_nm
+        return wavelength_nm if stored is not None and stored.size > 1 else stored
+
+    def specular_reflectance(self, theta_i: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:
+        """Return the reflectance [1] of the specular part at theta_i [rad], 0 without one; shaped as by `lookup`."""
+        return self._table.specular_reflectance(theta_i, _in_range(self._table, wavelength_nm))
+
+    def _check_function(self) -> None:
+        """Take the table as it is: between its nodes the two halves of a symmetry differ by its error."""
+
+
+def _brdf_of(table: Table) -> Function:
+    def brdf(wi: Floats, wr: Floats, wavelength_nm: NDArray[np.float64] | None) -> Floats:
+        return table.lookup_vectors(wi, wr, _in_range(table, wavelength_nm))
+
+    return brdf
+
+
+def _in_range(table: Table, wavelength_nm: ArrayLike | None) -> ArrayLike | None:
+    """Return wavelengths [nm], those outside of the range of a table moved to its end."""
+    stored = table.wavelength_nm
+    return wavelength_nm if wavelength_nm is None or stored is None else np.clip(wavelength_nm, stored[0], stored[-1])
+
+
+def source_of_table(table: Table, known_nm: NDArray[np.float64] | None = None) -> Source:
+    """Return the material that a table was tabulated from, or else the table as a source, as of `TableSource`.
+
+    ParameterError if the table holds what no f_r can be, or its name is not that of a material.
+    """
+    return table.source if isinstance(table.source, Material) else TableSource(table, known_nm)

@@ -27,23 +27,16 @@ from brdfdb.tables.stated_error import Error, stated
 if TYPE_CHECKING:
     from brdfdb.integrals.sampling import Sample
 
-_MOST_KNOWN = 64  # single wavelengths that are remembered
-_SAMPLED = 5  # wavelengths whose mean decides how directions are drawn
+_MOST_KNOWN = 64  # largest number of single wavelengths whose places are cached
+_SAMPLED = 5  # number of wavelengths whose mean decides how directions are drawn
 
 
 class Located(NamedTuple):
     """Wavelengths that are asked for, M of them, on the axis of a table.
 
-    Attributes
-    ----------
-    nodes : int64 array (M, 4)
-        Numbers of the wavelengths of the table that count.
-    weight : float64 array (M, 4)
-        Their weights, as by `weights_of_nodes`.
-    column : int64 array (M,)
-        The column of `Error.limits` for each.
-    tail : tuple of int
-        The shape that the wavelengths add to that of the directions.
+    `nodes` (M, 4) are the numbers of the wavelengths of the table that count, `weight` (M, 4) their weights, as by
+    `weights_of_nodes`. `column` (M,) is the column of `Error.limits` for each. `tail` is the shape that the wavelengths
+    add to that of the directions.
     """
 
     nodes: NDArray[np.int64]
@@ -58,20 +51,13 @@ class Located(NamedTuple):
 
 
 class Stated(NamedTuple):
-    """Values of f_r with the error that their table states for them.
+    """Values of f_r with the error that their table states for them."""
 
-    Attributes
-    ----------
-    brdf : array [1/sr]
-        Values as by `Table.lookup`.
-    error : array [1/sr]
-        In the same shape. At a wavelength of the table 99 of 100 values in this band of theta_i are within that of the
-        source, or of what was measured if it is a measurement, whose uncertainty is added; nan outside of the
-        directions that were measured, where nothing is known. Between wavelengths, and in
-        the places of `brdfdb.tables.stated_error.Places`, 98 of 100 are.
-    """
-
-    brdf: Floats
+    brdf: Floats  #: values as by `Table.lookup`, [1/sr]
+    #: in the same shape. At a wavelength of the table 99 of 100 values in this band of theta_i are within that of the
+    #: source, or of what was measured if it is a measurement, whose uncertainty is added; nan outside of the directions
+    #: that were measured, where nothing is known. Between wavelengths, and in the places of
+    #: `brdfdb.tables.stated_error.Places`, 98 of 100 are, [1/sr]
     error: Floats
 
 
@@ -157,35 +143,22 @@ class BaseTable(Lookups):
     @functools.cached_property
     def sampler(self) -> Sampler:
         """The sampler of `sample`, computed from lookups when it is first used."""
-        at = self.wavelength_nm
-        chosen = None if at is None else at[np.unique(np.linspace(0, at.size - 1, _SAMPLED).astype(np.int64))]
+        wavelength_nm = self.wavelength_nm
+        if wavelength_nm is not None:
+            last = wavelength_nm.size - 1
+            wavelength_nm = wavelength_nm[np.unique(np.linspace(0, last, _SAMPLED).astype(np.int64))]
 
         def mean(wi: NDArray[np.float64], wr: NDArray[np.float64]) -> NDArray[np.float64]:
-            values = np.asarray(self.lookup_vectors(wi, wr, chosen), dtype=np.float64)
-            return values if chosen is None else np.asarray(values.mean(axis=-1))
+            values = np.asarray(self.lookup_vectors(wi, wr, wavelength_nm), dtype=np.float64)
+            return values if wavelength_nm is None else np.asarray(values.mean(axis=-1))
 
         return Sampler(cells_of(mean, anisotropic=self.anisotropic))
 
     @abstractmethod
     def specular_reflectance(self, theta_i: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:
-        """Interpolate the reflectance [1] of the specular part; 0 for a model that has none.
+        """Interpolate the reflectance [1] of the specular part at theta_i [rad] in [0, pi]; 0 without it.
 
-        Parameters
-        ----------
-        theta_i : array_like [rad]
-            Angle of incidence, in [0, pi].
-        wavelength_nm : float or array_like (M,) [nm], optional
-            As in `lookup`.
-
-        Returns
-        -------
-        array [1]
-            Shaped as by `lookup`.
-
-        Raises
-        ------
-        ParameterError, StoreError, UnknownRevisionError
-            As by `lookup`.
+        Wavelengths, shape and errors are those of `lookup`.
         """
 
     @array_lookup
@@ -197,16 +170,11 @@ class BaseTable(Lookups):
         phi_r: ArrayLike,
         wavelength_nm: ArrayLike | None = None,
     ) -> Floats:
-        """Interpolate the Mueller BRDF [1/sr]: f_r times the normalised Mueller matrix.
+        """Interpolate the Mueller BRDF [1/sr], f_r times the normalised Mueller matrix, shaped as by `lookup`, (4, 4).
 
-        Parameters and errors are those of `lookup`; ParameterError, too, if the table is unpolarised.
-
-        Returns
-        -------
-        array [1/sr]
-            Shaped as by `lookup`, and (4, 4). It gives the Stokes vector of the reflected radiance from that of the
-            irradiance, between bases of the surface, in the convention of `brdfdb.tables.stokes`. Element [0, 0] is
-            `lookup`. 0 below the horizon, nan where an angle is nan.
+        It gives the Stokes vector of the reflected radiance from that of the irradiance, between bases of the surface,
+        in the convention of `brdfdb.tables.stokes`. Element [0, 0] is `lookup`. 0 below the horizon, nan where an angle
+        is nan. Parameters and errors are those of `lookup`; ParameterError, too, if the table is unpolarised.
         """
         return self._mueller_at((theta_i, phi_i, theta_r, phi_r), wavelength_nm)
 
@@ -320,28 +288,25 @@ class BaseTable(Lookups):
     ) -> Floats:
         """Return the error [1/sr] that is stated for values, in their shape.
 
-        Raises
-        ------
-        ValueError
-            If a wavelength is between those of the table, and the error was not measured there.
+        ParameterError if a wavelength is between those of the table, and the error was not measured there.
         """
-        at = self._wavelengths(wavelength_nm)
-        if error.between is None and at.size and at.column.max() >= len(error.floor):
+        located = self._wavelengths(wavelength_nm)
+        if error.between is None and located.size and located.column.max() >= len(error.floor):
             assert self.wavelength_nm is not None
-            below = int(at.column.max()) - len(error.floor)
+            below = int(located.column.max()) - len(error.floor)
             raise ParameterError(
                 "error",
                 f"the error of {self.name} was not measured between its wavelengths of "
                 f"{self.wavelength_nm[below]:g} and {self.wavelength_nm[below + 1]:g} nm; build it anew",
             )
-        values = brdf if at.tail else np.asarray(brdf)[..., np.newaxis]
-        errors = stated(error.limits[:, at.column], error.floors[at.column], directions, values)
+        values = brdf if located.tail else np.asarray(brdf)[..., np.newaxis]
+        errors = stated(error.limits[:, located.column], error.floors[located.column], directions, values)
         measured = self.metadata.known_measured()
         if measured is not None and measured.uncertainty is not None:
-            errors = errors + measured.uncertainty * np.maximum(values, error.floors[at.column])
+            errors = errors + measured.uncertainty * np.maximum(values, error.floors[located.column])
         if measured is not None and measured.extent is not None:
             errors = np.where(self._extrapolated(directions)[..., np.newaxis], np.nan, errors)
-        return np.asarray(errors if at.tail else errors[..., 0])[()]
+        return np.asarray(errors if located.tail else errors[..., 0])[()]
 
     def columns_of(self, wavelength_nm: ArrayLike | None) -> NDArray[np.int64]:
         """Return the columns of `Error.limits` for wavelengths [nm], by default those of the table."""
@@ -349,8 +314,8 @@ class BaseTable(Lookups):
 
     @functools.cached_property
     def _all_wavelengths(self) -> Located:
-        stored = np.zeros(1) if self.wavelength_nm is None else self.wavelength_nm
-        return self._on_axis(stored, stored, () if self.wavelength_nm is None else (stored.size,))
+        stored_nm = np.zeros(1) if self.wavelength_nm is None else self.wavelength_nm
+        return self._on_axis(stored_nm, stored_nm, () if self.wavelength_nm is None else (stored_nm.size,))
 
     @functools.cached_property
     def _known_wavelengths(self) -> dict[float, Located]:
@@ -363,31 +328,34 @@ class BaseTable(Lookups):
         if not isinstance(wavelength_nm, float):
             return self._located(wavelength_nm)
         known = self._known_wavelengths  # the checks of one wavelength take as long as the lookup of one point
-        at = known.get(wavelength_nm)
-        if at is None:
-            at = self._located(wavelength_nm)
+        located = known.get(wavelength_nm)
+        if located is None:
+            located = self._located(wavelength_nm)
             if len(known) >= _MOST_KNOWN:
                 known.clear()
-            known[wavelength_nm] = at
-        return at
+            known[wavelength_nm] = located
+        return located
 
     def _located(self, wavelength_nm: ArrayLike) -> Located:
-        stored = self.wavelength_nm
-        wanted = check_nanometres("wavelength_nm", wavelength_nm)
-        if wanted.ndim > 1:
-            raise ParameterError("wavelength_nm", f"{wanted.ndim} axes; allowed are a number and a list of numbers")
-        flat = wanted.reshape(-1)
-        if stored is None:
-            return self._on_axis(np.zeros(1), np.zeros(flat.size), wanted.shape)
-        outside = (flat < stored[0]) | (flat > stored[-1])
+        stored_nm = self.wavelength_nm
+        asked_nm = check_nanometres("wavelength_nm", wavelength_nm)
+        if asked_nm.ndim > 1:
+            raise ParameterError("wavelength_nm", f"{asked_nm.ndim} axes; allowed are a number and a list of numbers")
+        shape = asked_nm.shape
+        asked_nm = asked_nm.reshape(-1)
+        if stored_nm is None:
+            return self._on_axis(np.zeros(1), np.zeros(asked_nm.size), shape)
+        outside = (asked_nm < stored_nm[0]) | (asked_nm > stored_nm[-1])
         if np.any(outside):
-            wrong, low, high = float(flat[outside][0]), float(stored[0]), float(stored[-1])
+            wrong = float(asked_nm[outside][0])
+            low = float(stored_nm[0])
+            high = float(stored_nm[-1])
             range_nm = f"outside [{low:g}, {high:g}] nm of" if low < high else f"not {low:g} nm, the one wavelength of"
             raise ParameterError("wavelength_nm", f"{wrong:.9g} is {range_nm} {self.name}", wrong, (low, high))
-        return self._on_axis(stored, flat, wanted.shape)
+        return self._on_axis(stored_nm, asked_nm, shape)
 
-    def _on_axis(self, stored: NDArray[np.float64], wanted: NDArray[np.float64], tail: tuple[int, ...]) -> Located:
+    def _on_axis(self, stored_nm: Axis, asked_nm: Axis, tail: tuple[int, ...]) -> Located:
         """Locate wavelengths [nm] among those of the table."""
-        below = np.searchsorted(stored, wanted, side="right") - 1
-        column = np.where(stored[below] == wanted, below, stored.size + below)
-        return Located(*weights_of_nodes(stored, wanted, cubic=not self.straight), column, tail)
+        below = np.searchsorted(stored_nm, asked_nm, side="right") - 1
+        column = np.where(stored_nm[below] == asked_nm, below, stored_nm.size + below)
+        return Located(*weights_of_nodes(stored_nm, asked_nm, cubic=not self.straight), column, tail)

@@ -17,21 +17,21 @@ from brdfdb.tables.grids import RECIPROCITY, Axis, Grid
 from brdfdb.tables.layout import TABLE_VERSION, Layout
 from brdfdb.tables.metadata import TableMetadata
 from brdfdb.tables.polarisation import facets_of
-from brdfdb.tables.polarisation_record import record
+from brdfdb.tables.stokes import record
 
 if TYPE_CHECKING:
     import xarray as xr
 
-_SLOPE_STEP = np.deg2rad(2.0)  # from which the slope at the horizon is taken
-POLE_END_DEG = 89.9  # of light and viewer, where the pole of a model is tabulated as it is
-_RISE = 1.0  # largest rise of the stored numbers of measured data beyond the horizon: their slopes there have no reason
-_CONTINUED = 7.5  # how many such steps numbers go on with it beyond the horizon
-# Where the specular part is tabulated, unless on an axis theta_i that somebody gave: a planner has no nodes for it
+_SLOPE_STEP = np.deg2rad(2.0)  # step of the difference that gives the slope at the horizon
+POLE_END_DEG = 89.9  # last angle of light and viewer if the pole of a model is tabulated
+_RISE = 1.0  # largest rise of the stored numbers of measured data beyond the horizon, where their slopes are noise
+_CONTINUED = 7.5  # number of steps up to which numbers are continued beyond the horizon
+# Nodes of the specular part, unless a recipe gives an axis theta_i: planned nodes do not suit it
 SPECULAR_THETA_DEG = np.append(np.arange(0.0, 60.0, 0.5), np.arange(60.0, 90.01, 0.1).round(1))
-_SLAB = 1 << 17  # values evaluated at a time: fewer cost calls, more cost memory
+_SLAB = 1 << 17  # number of values that are evaluated together: fewer cost calls, more cost memory
 
 
-class Variable(NamedTuple):
+class StoredArray(NamedTuple):
     """An array of a table: the names of its axes, its values, and its attributes such as units."""
 
     dims: tuple[str, ...]
@@ -45,22 +45,19 @@ class Frame(NamedTuple):
     Coordinates hold the axes, in degrees and nm. Variables hold the specular part, the basis and refractive indices.
     """
 
-    variables: Mapping[str, Variable]
-    coordinates: Mapping[str, Variable]
+    variables: Mapping[str, StoredArray]
+    coordinates: Mapping[str, StoredArray]
     attrs: Mapping[str, Any]
 
 
 def tabulate(layout: Layout, values: NDArray[np.float32] | None = None) -> xr.Dataset:
-    """Tabulate the BRDF of a source: all blocks of a layout, in memory, or those values of them that are known.
+    """Tabulate the BRDF of a source: all blocks of a layout, in memory, or the values of them if they are known.
 
-    Returns
-    -------
-    Dataset
-        ``brdf`` [1/sr], or ``parts``, from which it is rebuilt as the attribute ``reconstruction`` says: float32, over
-        the axes of the grid and, last, ``wavelength`` or ``part``; for models with a specular part
-        ``specular_reflectance`` [1] over theta_i, or specular_theta_i, and wavelength; for spectral materials ``n`` and
-        ``k`` as used.
-        Coordinates in degrees and nm, with units. Attributes: title, model, parameters, sources and notes.
+    The Dataset has ``brdf`` [1/sr], or ``parts``, from which it is rebuilt as the attribute ``reconstruction`` says:
+    float32, over the axes of the grid and, last, ``wavelength`` or ``part``; for models with a specular part
+    ``specular_reflectance`` [1] over theta_i, or specular_theta_i, and wavelength; for spectral materials ``n`` and
+    ``k`` as used. Coordinates are in degrees and nm, with units. Attributes: title, model, parameters, sources and
+    notes.
     """
     import xarray as xr
 
@@ -73,21 +70,21 @@ def tabulate(layout: Layout, values: NDArray[np.float32] | None = None) -> xr.Da
 def block(layout: Layout, rows: slice) -> NDArray[np.float32]:
     """Return the values of some rows of the first axis of a table: float32, over its other axes, too."""
     values = np.empty((rows.stop - rows.start, *layout.shape[1:]), dtype=np.float32)
-    for some in slabs(layout, rows):
-        at = slice(some.start - rows.start, some.stop - rows.start)
+    for slab in slabs(layout, rows):
+        at = slice(slab.start - rows.start, slab.stop - rows.start)
         if layout.plain and not layout.grid.half_difference:
-            nodes_nm = _node_wavelengths(layout)
+            nodes_nm = layout.evaluated_nm
             for number, wavelength in enumerate([None] if nodes_nm is None else nodes_nm.tolist()):
                 index: tuple[Any, ...] = (at, ...) if wavelength is None else (at, ..., number)
-                values[index] = _evaluated(layout, some, wavelength)
+                values[index] = _evaluated(layout, slab, wavelength)
         else:
-            numbers = stored(layout, node_numbers(layout, some))
-            values[at] = numbers.reshape(some.stop - some.start, *layout.shape[1:])
+            numbers = stored(layout, node_numbers(layout, slab))
+            values[at] = numbers.reshape(slab.stop - slab.start, *layout.shape[1:])
     return rounded(values, layout.bits)
 
 
 def slabs(layout: Layout, rows: slice) -> Iterator[slice]:
-    """Yield rows of the first axis of a table that are evaluated at a time."""
+    """Yield rows of the first axis of a table that are evaluated together."""
     step = max(1, _SLAB // int(np.prod(layout.grid.shape[1:])))
     for start in range(rows.start, rows.stop, step):
         yield slice(start, min(start + step, rows.stop))
@@ -97,22 +94,17 @@ def stored(layout: Layout, numbers: Floats) -> Floats:
     """Return what a table stores of `node_numbers`: the coefficients of a factored spectrum, or the numbers."""
     if layout.spectra is None or layout.part_nm is not None:
         return numbers
-    # a BLAS sums in an order that depends on where a row stands: what was symmetric would not stay it
+    # A BLAS sums in an order that depends on the position of a row, which would break the symmetry of a table
     return np.asarray(np.einsum("...w,pw->...p", numbers, layout.spectra))
 
 
 def rounded(values: NDArray[np.float32], bits: int) -> NDArray[np.float32]:
-    """Return float32 values rounded to so many bits of their mantissa: off by 2**-(bits + 1) of them at most."""
+    """Return float32 values rounded to a number of bits of their mantissa, with an error of 2**-(bits + 1) at most."""
     drop = 23 - bits
     if drop == 0:
         return values
-    whole = np.ascontiguousarray(values, dtype=np.float32).view(np.uint32)
-    return ((whole + np.uint32(1 << (drop - 1))) >> np.uint32(drop) << np.uint32(drop)).view(np.float32)
-
-
-def _node_wavelengths(layout: Layout) -> NDArray[np.float64] | None:
-    """Return the wavelengths [nm] at which nodes are evaluated; None for a grey table."""
-    return layout.wavelength_nm if layout.part_nm is None else layout.part_nm
+    mantissa = np.ascontiguousarray(values, dtype=np.float32).view(np.uint32)
+    return ((mantissa + np.uint32(1 << (drop - 1))) >> np.uint32(drop) << np.uint32(drop)).view(np.float32)
 
 
 def _evaluated(layout: Layout, rows: slice, wavelength_nm: ArrayLike | None) -> Floats:
@@ -128,24 +120,19 @@ def _evaluated(layout: Layout, rows: slice, wavelength_nm: ArrayLike | None) -> 
         return evaluate(*layout.grid.directions(rows))
     theta, _, delta_phi = (radians(nodes) for nodes in layout.grid.axes.values())
     row, column = (index.ravel() for index in np.indices((rows.stop - rows.start, theta.size)))
-    smaller, larger = np.minimum(row + rows.start, column), np.maximum(row + rows.start, column)
-    pairs, pair = np.unique(smaller * theta.size + larger, return_inverse=True)  # of which each is evaluated once
-    light, viewer = theta[pairs // theta.size], theta[pairs % theta.size]
+    smaller = np.minimum(row + rows.start, column)
+    larger = np.maximum(row + rows.start, column)
+    pairs, pair = np.unique(smaller * theta.size + larger, return_inverse=True)  # each pair is evaluated once
+    light = theta[pairs // theta.size]
+    viewer = theta[pairs % theta.size]
     values = evaluate(light[:, np.newaxis], np.zeros(()), viewer[:, np.newaxis], delta_phi)
     return values[pair].reshape(-1, theta.size, *values.shape[1:])
 
 
 def numbers(layout: Layout, wi: Floats, wr: Floats) -> Floats:
-    """Return the numbers of a table at any directions, shape (..., L), before a spectrum of logarithms is factored.
+    """Return the numbers of a table at unit vectors (..., 3), before a spectrum is factored, shape (..., L).
 
     If spectra mix f_r itself, they are those of the parts, shape (..., parts).
-
-    Parameters
-    ----------
-    layout : Layout
-        Layout of the table.
-    wi, wr : arrays of shape (..., 3)
-        Unit vectors, at the horizon or above.
     """
     return layout.interpolation.numbers(*values_at(layout, wi, wr))
 
@@ -157,7 +144,7 @@ def values_at(layout: Layout, wi: Floats, wr: Floats) -> tuple[Floats, Floats]:
     """
     wi, wr = np.broadcast_arrays(wi, wr)
     mu = np.maximum(wi[..., 2], COS_HORIZON) * np.maximum(wr[..., 2], COS_HORIZON)
-    f_r = layout.tabulated.brdf_at(_node_wavelengths(layout))(wi.reshape(-1, 3), wr.reshape(-1, 3))
+    f_r = layout.tabulated.brdf_at(layout.evaluated_nm)(wi.reshape(-1, 3), wr.reshape(-1, 3))
     return f_r.reshape(*mu.shape, -1), mu
 
 
@@ -171,7 +158,7 @@ def node_numbers(layout: Layout, rows: slice) -> Floats:
     if not grid.half_difference:
         angles = grid.directions(rows)
         mu = np.maximum(np.cos(angles[0]), COS_HORIZON) * np.maximum(np.cos(angles[2]), COS_HORIZON)
-        nodes_nm = _node_wavelengths(layout)
+        nodes_nm = layout.evaluated_nm
         f_r = _evaluated(layout, rows, nodes_nm)
         return layout.interpolation.numbers(f_r[..., np.newaxis] if nodes_nm is None else f_r, mu)
     axes = [radians(nodes) for nodes in grid.axes.values()]
@@ -217,7 +204,8 @@ def held(
         end = radians(POLE_END_DEG)
         lowest, theta_h = float(np.cos(end)), np.minimum(theta_h, end)
     # cos theta_r = along cos theta_d - across sin theta_d, at phi_d or at the other side
-    along, across = np.cos(theta_h), np.sin(theta_h) * np.abs(np.cos(phi_d))
+    along = np.cos(theta_h)
+    across = np.sin(theta_h) * np.abs(np.cos(phi_d))
     largest = np.arccos(np.minimum(lowest / np.hypot(along, across), 1.0)) - np.arctan2(across, along)
     largest = np.maximum(largest * (1.0 - 1e-12), 0.0)
     within = np.minimum(theta_d, largest)
@@ -251,45 +239,47 @@ def _half_vectors(theta_h: Floats, phi_h: Floats, theta_d: Floats, phi_d: Floats
 
 def frame(layout: Layout) -> Frame:
     """Return a table without its values: coordinates, specular part, basis, refractive indices and attributes."""
-    source, grid, wavelength_nm = layout.source, layout.grid, layout.wavelength_nm
+    source = layout.source
+    grid = layout.grid
+    wavelength_nm = layout.wavelength_nm
     spectral = () if wavelength_nm is None else ("wavelength",)
     coordinates = {name: _coordinate(name, nodes) for name, nodes in grid.axes.items()}
     variables = {}
     if wavelength_nm is not None:
-        coordinates["wavelength"] = Variable(
+        coordinates["wavelength"] = StoredArray(
             ("wavelength",),
             wavelength_nm,
             {"units": "nm", "long_name": "wavelength in vacuum", "standard_name": "radiation_wavelength"},
         )
     if (indices := source.refractive_indices(wavelength_nm)) is not None:
         for name, meaning, values in zip("nk", ("refractive index", "extinction coefficient"), indices, strict=True):
-            variables[name] = Variable(("wavelength",), np.asarray(values), {"units": "1", "long_name": meaning})
+            variables[name] = StoredArray(("wavelength",), np.asarray(values), {"units": "1", "long_name": meaning})
     if layout.spectra is not None:
         name = "spectra" if layout.part_nm is None else "mixture"
-        variables[name] = Variable(("part", "wavelength"), layout.spectra, VARIABLES[name])
+        variables[name] = StoredArray(("part", "wavelength"), layout.spectra, VARIABLES[name])
     if layout.uniform is not None:
         of_each = layout.uniform.size > 1
         value = layout.uniform if of_each else layout.uniform[0]
         dims = ("wavelength",) if of_each else ()
-        variables["uniform"] = Variable(dims, np.asarray(value), VARIABLES["uniform"])
+        variables["uniform"] = StoredArray(dims, np.asarray(value), VARIABLES["uniform"])
     if source.has_specular:
         theta_i_deg = specular_nodes(layout)
         name = "specular_theta_i" if theta_i_deg is SPECULAR_THETA_DEG else "theta_i"
         coordinates[name] = _coordinate(name, theta_i_deg)
-        variables["specular_reflectance"] = Variable(
+        variables["specular_reflectance"] = StoredArray(
             (name, *spectral),
             np.asarray(source.specular_reflectance(radians(theta_i_deg), wavelength_nm)),
             {"units": "1", "long_name": "reflectance of the specular part, in the exact mirror direction"},
         )
     if isinstance(source, MeasuredSource) and source.measured.extent is not None:
-        variables["extrapolated"] = Variable(grid.names, extrapolated(source, grid), VARIABLES["extrapolated"])
+        variables["extrapolated"] = StoredArray(grid.names, extrapolated(source, grid), VARIABLES["extrapolated"])
     if (facets := facets_of(layout)) is not None:
         coordinates["mueller_theta_d"] = _coordinate("mueller_theta_d", facets.theta_d_deg)
         named = ("mueller_theta_d", "wavelength", "element")
-        variables["mueller"] = Variable(named, facets.elements, VARIABLES["mueller"])
+        variables["mueller"] = StoredArray(named, facets.elements, VARIABLES["mueller"])
         depolarised = facets.depolarised if facets.depolarised.size > 1 else facets.depolarised[0]
         at = ("wavelength",) if facets.depolarised.size > 1 else ()
-        variables["depolarised"] = Variable(at, np.asarray(depolarised), VARIABLES["depolarised"])
+        variables["depolarised"] = StoredArray(at, np.asarray(depolarised), VARIABLES["depolarised"])
     return Frame(variables, coordinates, metadata_of(layout).attributes())
 
 
@@ -306,8 +296,8 @@ def specular_nodes(layout: Layout) -> Axis:
     return layout.grid.axes["theta_i"] if given else SPECULAR_THETA_DEG
 
 
-def _coordinate(name: str, nodes: Axis) -> Variable:
-    return Variable((name,), nodes, {"units": "degree", "long_name": _LONG_NAMES[name]})
+def _coordinate(name: str, nodes: Axis) -> StoredArray:
+    return StoredArray((name,), nodes, {"units": "degree", "long_name": _LONG_NAMES[name]})
 
 
 def _reconstruction(layout: Layout) -> str:

@@ -11,9 +11,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, Field
 
 from brdfdb.tables.albedo import AlbedoDocument
-from brdfdb.tables.evaluation import Output, Values
-from brdfdb.tables.lobe_views import View as ViewName
-from brdfdb.tables.stokes_document import StokesDocument
+from brdfdb.tables.evaluation import Output, StokesDocument, Values, ViewName
 from brdfdb.tables.table import Table
 
 
@@ -42,7 +40,7 @@ class Evaluated(BaseModel):
     )
 
 
-class View(BaseModel):
+class LobeView(BaseModel):
     """One light, and the axes of the values."""
 
     view: ViewName
@@ -70,17 +68,17 @@ class Lookup(Evaluated, OfTable):
     )
 
 
-class Lookups(BaseModel):
+class TableLookups(BaseModel):
     """Values of several materials."""
 
     materials: list[Lookup]
 
 
-class Lobe(Lookup, View):
+class TableLobe(Lookup, LobeView):
     """f_r of a material for one light over viewers, or over half and difference angles."""
 
 
-class Albedo(AlbedoDocument, OfTable):
+class TableAlbedoDocument(AlbedoDocument, OfTable):
     """Directional albedo of a table."""
 
 
@@ -96,7 +94,7 @@ class ModelLookup(Evaluated, OfModel):
     """Values of a model."""
 
 
-class ModelLobe(Evaluated, View, OfModel):
+class ModelLobe(Evaluated, LobeView, OfModel):
     """f_r of a model for one light."""
 
 
@@ -118,7 +116,9 @@ def of_table(table: Table) -> dict[str, Any]:
 
 def values_document(values: Values) -> dict[str, Any]:
     """Return the fields of `Evaluated`, and those of the reflected light if there is some, with numpy arrays."""
-    surface, points, known = values.surface, values.points, values.error is not None and values.surface.kind == "table"
+    surface = values.surface
+    points = values.points
+    known = values.error is not None and values.surface.kind == "table"
     return {
         "source": surface.kind,
         "unit": "1/sr",
@@ -136,7 +136,7 @@ def values_document(values: Values) -> dict[str, Any]:
 def lobe_document(
     values: Values, axes_deg: Mapping[str, Any], view: ViewName, theta_i_deg: float, phi_i_deg: float
 ) -> dict[str, Any]:
-    """Return the fields of `View` and `Evaluated` of a lobe; of half-difference there is no one light."""
+    """Return the fields of `LobeView` and `Evaluated` of a lobe; of half-difference there is no one light."""
     surface, no_light = values.surface, view == "half-difference"
     document = values_document(values)
     if surface.kind == "table" and surface.source.metadata.measured is not None:

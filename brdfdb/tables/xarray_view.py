@@ -23,18 +23,10 @@ CF_VERSION = "CF-1.11"  # of the conventions that units, long_name and standard_
 
 
 def opened(store: Any) -> xr.Dataset:
-    """Open a revision as a lazy Dataset with ``brdf`` [1/sr] over all axes.
+    """Open a revision as a lazy Dataset with ``brdf`` [1/sr] over all axes, and attributes of `plain_attributes`.
 
-    Parameters
-    ----------
-    store : zarr store or str
-        The group of the revision: a zarr store, a directory, or an address that fsspec reads.
-
-    Returns
-    -------
-    Dataset
-        The stored arrays, and ``brdf`` where coefficients are stored in its place. Attributes are those of the table,
-        as `plain_attributes` gives them.
+    `store` is the group of the revision: a zarr store, a directory, or an address that fsspec reads. ``brdf`` is
+    computed where coefficients are stored in its place.
     """
     dataset = with_brdf(xr.open_zarr(store, chunks=None))
     dataset.attrs = plain_attributes(dataset.attrs)

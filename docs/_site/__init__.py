@@ -1,21 +1,22 @@
 """The generated part of the site: pages that are made from the code, a store and its audit before Sphinx reads them.
 
-Each module beside this one writes one kind of page into a folder that git ignores. Pages are written anew at every
-build of the site; a page that did not change keeps its date, so that Sphinx does not read it again.
+Each module of this package writes one kind of page into a folder that git ignores. Pages are written at every build of
+the site; an unchanged page keeps its date, so that Sphinx does not read it again.
 """
 
 from __future__ import annotations
 
 import gc
 import os
+import subprocess
 import sys
 from pathlib import Path
 from typing import Any
 
 from sphinx.application import Sphinx
 
-from _site import api, commands, figures, formats, http, libraries, materials, models, papers, results, schemas, store
-from _site.files import write_page
+from _site import api, commands, figures, formats, http, libraries, materials, models, papers, results, schemas
+from _site.markup import write_page
 
 # Each has write(docs, store)
 _WRITERS = (api, commands, figures, formats, http, libraries, materials, models, papers, results, schemas)
@@ -41,7 +42,7 @@ def setup(app: Sphinx) -> dict[str, Any]:
 
 def _write_pages(app: Sphinx, _: Any) -> None:
     docs = Path(app.srcdir)
-    root = store.made(docs)
+    root = _store(docs)
     os.environ["BRDFDB_STORE"] = str(root)  # for pages with code, which begin with brdfdb.open()
     os.environ["PATH"] = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"  # for their commands
     os.environ["TTY_COMPATIBLE"] = "0"  # rich: these commands write as to a file, without codes that move a cursor
@@ -50,6 +51,19 @@ def _write_pages(app: Sphinx, _: Any) -> None:
     folder = docs / "_build" / "ipython"
     write_page(folder / "profile_default" / "ipython_kernel_config.py", _KERNELS)
     os.environ["IPYTHONDIR"] = str(folder)  # kernels write files there, too
+
+
+def _store(docs: Path) -> Path:
+    """Return the directory of an audited store of all materials.
+
+    It is that of the environment variable ``BRDFDB_STORE``, or ``docs/_build/brdf-store``, which is built and audited
+    where something of it is missing.
+    """
+    root = Path(os.environ.get("BRDFDB_STORE", docs / "_build" / "brdf-store")).absolute()
+    if not (root / "audit.html").exists():
+        for command in ("build", "audit"):
+            subprocess.run([sys.executable, "-m", "brdfdb_pipelines.cli", command, "--store", str(root)], check=True)
+    return root
 
 
 def _free_last_page(*_: object) -> None:

@@ -8,7 +8,7 @@ import pkgutil
 from pathlib import Path
 
 import brdfdb
-from _site.files import remove_others, write_page
+from _site.markup import remove_others, write_page
 
 
 def public_modules() -> list[str]:

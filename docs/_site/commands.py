@@ -8,8 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from unittest import mock
 
-from _site.files import write_page
-from _site.markup import code
+from _site.markup import code, write_page
 from brdfdb_pipelines import cli
 
 _WIDTH = 100  # characters a line

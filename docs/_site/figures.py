@@ -15,8 +15,7 @@ from typing import Any
 import brdfdb.atlas
 import brdfdb.gallery
 from _site import audit
-from _site.files import remove_others, write_page
-from _site.markup import WIDE, Card, cards, code, plain, raw, toctree
+from _site.markup import WIDE, Card, cards, code, plain, raw, remove_others, toctree, write_page
 from _site.papers import PAPERS, Paper, paper_of, reference
 from brdfdb.figure import Figure, Statement
 

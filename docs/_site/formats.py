@@ -5,9 +5,8 @@ from __future__ import annotations
 import inspect
 from pathlib import Path
 
-from _site.files import write_page
-from _site.markup import plain, table
-from brdfdb.formats import EXPORTERS, IMPORTERS, Option, options_of
+from _site.markup import plain, table, write_page
+from brdfdb.formats import EXPORTERS, IMPORTERS, FormatOption, options_of
 
 
 def write(docs: Path, _: Path) -> None:
@@ -55,13 +54,13 @@ def _prose(text: str) -> str:
     return text.replace("``", "`")
 
 
-def _allowed(option: Option) -> str:
+def _allowed(option: FormatOption) -> str:
     if option.choices:
         return ", ".join(f"`{choice}`" for choice in option.choices)
     return "" if isinstance(option.default, bool) else plain(option.allowed)
 
 
-def _default(option: Option) -> str:
+def _default(option: FormatOption) -> str:
     if option.name == "kind":
         return "a file of each kind"
     return f"`{str(option.default).lower()}`" if option.default != "" else ""

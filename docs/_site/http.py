@@ -6,8 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from _site.files import write_page
-from _site.markup import code, plain, table
+from _site.markup import code, plain, table, write_page
 from _site.schemas import described, fields_of, kind_of, limits_of
 
 _DOCUMENT = Path(__file__).parents[2] / "api" / "openapi.json"

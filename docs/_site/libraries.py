@@ -7,10 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from _site.files import write_page
-from _site.markup import plain, table
+from _site.markup import plain, table, write_page
 from brdfdb.materials import PAPERS, libraries
-from brdfdb.materials.computed_libraries import Entry, entries, files
+from brdfdb.materials.preset_files import Entry, entries, files
 from brdfdb.spectra import refractive_index
 
 _AT_NM = 550.0

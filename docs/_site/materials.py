@@ -3,24 +3,37 @@
 from __future__ import annotations
 
 import itertools
+import re
+import tomllib
+import zipfile
+from collections.abc import Iterable
+from functools import cache
+from importlib import resources
 from pathlib import Path
 
+from matplotlib import pyplot, rc_context
+from matplotlib.image import imsave
+
 import brdfdb
-from _site import audit, material_files
-from _site.files import remove_others, write_page
-from _site.markup import WIDE, Card, cards, chip, code, plain, raw, table, toctree
+from _site import audit
+from _site.markup import WIDE, Card, cards, chip, code, plain, raw, remove_others, table, toctree, write_page
 from _site.papers import PAPERS, Paper, cited
 from brdfdb.audit import MaterialAudit
-from brdfdb.audit.answers import AS_PUBLISHED, CONSERVES_ENERGY
 from brdfdb.audit.energy import Energy
 from brdfdb.audit.finding import Sentence
+from brdfdb.audit.report import AS_PUBLISHED, CONSERVES_ENERGY
 from brdfdb.figure import number
+from brdfdb.formats import EXPORTERS
 from brdfdb.geometry import degrees
 from brdfdb.materials import Material
 from brdfdb.materials.provenance import Assumption
+from brdfdb.scenes.lit_sphere import lit_sphere
 from brdfdb.store.reader import Store
 from brdfdb.tables.table import Table
 from brdfdb_pipelines import terminal
+
+_SIZE = 192  # pixels across a picture
+_KIND = "half_difference"  # of slices: the smallest of the three kinds
 
 
 def write(docs: Path, root: Path) -> None:
@@ -30,7 +43,7 @@ def write(docs: Path, root: Path) -> None:
     assert isinstance(store, Store)
     found = audit.read(root)
     materials = brdfdb.presets()
-    material_files.write(folder / "files", store, materials.values())
+    _write_files(folder / "files", store, materials.values())
     for name, material in materials.items():
         page = _page(material, store[name], found.materials[name], found.plots[name])
         write_page(folder / f"{name}.md", page)
@@ -60,7 +73,7 @@ def _paper(material: Material) -> Paper:
 
 
 def _card(material: Material, judged: MaterialAudit) -> Card:
-    size = f'width="{material_files.SIZE}" height="{material_files.SIZE}"'
+    size = f'width="{_SIZE}" height="{_SIZE}"'
     picture = f'<img class="dark-light" src="../../_images/{material.name}.png" alt="" loading="lazy" {size}>'
     grey = "" if material.spectral else ", grey"
     text = f"{material.spec.title}{grey}. As the paper says: {judged.as_published.text}. "
@@ -82,7 +95,7 @@ def _page(material: Material, stored: Table, judged: MaterialAudit, plots: list[
         f"# {plain(material.title)}\n",
         raw(f'<p class="under"><code>{name}</code> {largest}.</p>'),
         raw(_answers(judged)),
-        material_files.pictures(name, material.title),
+        _pictures(name, material.title),
         f"Model: {{py:obj}}`{spec.title} <brdfdb.models.{spec.name}>`, {plain(spec.equation)}, of "
         f"{cited(spec.reference)}.",
         f"Source: {plain(material.source)}.\n",
@@ -92,7 +105,7 @@ def _page(material: Material, stored: Table, judged: MaterialAudit, plots: list[
         *itertools.starmap(_assumption, material.assumed.items()),
         f"**Known excess**: {plain(material.known_excess.citation)}\n" if material.known_excess else "",
         ":::{dropdown} As a recipe writes it",
-        code(material_files.definition(name), "toml"),
+        code(_definition(name), "toml"),
         ":::\n",
         "## Table\n",
         _table(stored),
@@ -100,7 +113,7 @@ def _page(material: Material, stored: Table, judged: MaterialAudit, plots: list[
         "\n".join(f"* {_sentence(sentence)}" for sentence in judged.sentences),
         raw(audit.drawn(plots)),
         "## Files\n",
-        material_files.links(name),
+        _links(name),
         code(
             f'import brdfdb\n\ntable = brdfdb.open()["{name}"]  # in the folder of the store\n'
             f"table.lookup(0.5, 0.0, 0.5, 3.14159)  # f_r [1/sr] at 28.6 degrees, in the mirror direction",
@@ -156,7 +169,7 @@ def _assumption(name: str, assumed: Assumption) -> str:
         lines.append(f"The largest albedo is {assumed.max_albedo:.3f}.")
     for other in assumed.alternatives:
         values = ", ".join(f"`{written} = {value}`" for written, value in other.parameters.items())
-        excess = ", more than arrives" if other.max_albedo > 1.0 else ""
+        excess = ", above 1" if other.max_albedo > 1.0 else ""
         lines.append(f"With {values} it would be {other.max_albedo:.3f}{excess}.")
     return " ".join(lines) + "\n"
 
@@ -168,7 +181,7 @@ def _formula(stored: Table) -> str:
         return "not measured"
     if error.against != "measured":
         return plain(error.in_words())
-    return f"**{terminal.error(error.p99)} of f_r** in 99 of 100 directions, {plain(error.in_words())}"
+    return f"**{terminal.error(error.p99)} of f_r** at 99 % of the directions, {plain(error.in_words())}"
 
 
 def _table(stored: Table) -> str:
@@ -193,7 +206,7 @@ def _table(stored: Table) -> str:
     error = stored.error
     assert error is not None
     overall = error.overall
-    stated = f"{terminal.error(overall.p99)} of f_r in 99 of 100 of {error.directions} directions"
+    stated = f"{terminal.error(overall.p99)} of f_r at 99 % of {error.directions} directions"
     rows.append(("error of the table", f"**{stated}** (median {overall.median:.2g}, largest {overall.max:.2g})"))
     largest = "" if error.worst is None else f" The largest: {plain(error.worst.why)}."
     rows.append(("error of the formula", _formula(stored)))
@@ -205,3 +218,90 @@ def _table(stored: Table) -> str:
     if metadata.reason:
         parts.append(f"Why the planner chose this grid: {plain(metadata.reason)}.\n")
     return "\n".join(parts)
+
+
+def _write_files(folder: Path, store: Store, materials: Iterable[Material]) -> None:
+    """Write the files of all materials; a file that is newer than its table stays."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for material in materials:
+        name = material.name
+        group = store.path(name)
+        write_page(folder / f"{name}.toml", _recipe(name))
+        built = (group / "zarr.json").stat().st_mtime
+        archive, image, ball, plot = (folder / f"{name}{suffix}" for suffix in (".zarr.zip", ".exr", ".png", ".svg"))
+        if not _newer(archive, built):
+            _zip(group, archive)
+        if not _newer(image, built):
+            EXPORTERS["exr"].write(store[name], image, kind=_KIND)
+        if not _newer(ball, built):
+            imsave(ball, lit_sphere(store[name], _SIZE), metadata={"Software": ""})
+        if not _newer(plot, built):
+            with rc_context({"svg.hashsalt": name, "svg.fonttype": "none"}):
+                canvas = store[name].plot.lobe().get_figure()
+                canvas.savefig(plot, metadata={"Date": None})
+                pyplot.close(canvas)
+
+
+def _newer(path: Path, built: float) -> bool:
+    return path.exists() and path.stat().st_mtime > built
+
+
+def _links(name: str) -> str:
+    """Return the list of files on the page of a material."""
+    return "\n".join(
+        [
+            f"* {{download}}`The table <files/{name}.zarr.zip>` as one zip of a zarr group: "
+            '`xarray.open_zarr(zarr.storage.ZipStore(path, mode="r"))`',
+            f"* {{download}}`A slice <files/{name}.exr>` over half and difference angles as OpenEXR, a channel a "
+            f"wavelength; `brdfdb export exr {name}` writes all slices",
+            f"* {{download}}`The plot of the lobe <files/{name}.svg>`; `brdfdb plot {name}` draws others",
+            f"* {{download}}`A recipe <files/{name}.toml>` that builds this material alone: "
+            f"`brdfdb build {name}.toml --store my-store`",
+            "",
+        ]
+    )
+
+
+def _pictures(name: str, title: str) -> str:
+    """Return the sphere and the lobe of a material for its page."""
+    sphere = f"{title}: a sphere under the same light as those of all pages"
+    lobe = f"f_r of {title} in the plane of incidence, as a polar plot"
+    return "\n".join([_image(f"{name}.png", sphere, "dark-light"), _image(f"{name}.svg", lobe, "lobe")])
+
+
+def _image(file: str, text: str, kind: str) -> str:
+    return f":::{{image}} files/{file}\n:alt: {text}\n:class: {kind}\n:::\n"
+
+
+def _recipe(name: str) -> str:
+    """Return a recipe that builds one material as the default recipe does."""
+    default = resources.files("brdfdb_pipelines").joinpath("recipes/default.toml").read_text(encoding="utf-8")
+    fields = tomllib.loads(default)
+    wavelengths = re.findall(r"^wavelengths_nm = .*$", default, flags=re.MULTILINE)
+    lines = [f'title = "{name}, as the default recipe builds it"', f'materials = ["{name}"]', *wavelengths]
+    return "\n".join([*lines, f"tolerance = {fields['tolerance']}", f'forms = "{fields["forms"]}"', ""])
+
+
+@cache
+def _definitions() -> dict[str, str]:
+    """Return the text of every material in the files of the presets."""
+    texts: dict[str, str] = {}
+    for file in resources.files("brdfdb.materials").iterdir():
+        if file.name.endswith(".toml"):
+            for block in re.split(r"\n(?=\[[a-z0-9-]+\]\n)", file.read_text(encoding="utf-8"))[1:]:
+                name = block[1 : block.index("]")]
+                texts[name] = re.split(r"\n\n(?=#)", block)[0]
+    return texts
+
+
+def _definition(name: str) -> str:
+    """Return the definition of a material for a recipe, under a name of its own."""
+    return re.sub(rf"^\[{name}", f"[define.my-{name}", _definitions()[name], flags=re.MULTILINE)
+
+
+def _zip(group: Path, archive: Path) -> None:
+    """Write the files of a table as one zip without compression: its chunks are compressed already."""
+    with zipfile.ZipFile(archive, "w", zipfile.ZIP_STORED) as whole:
+        for path in sorted(path for path in group.rglob("*") if path.is_file()):
+            entry = zipfile.ZipInfo(path.relative_to(group).as_posix(), (1980, 1, 1, 0, 0, 0))
+            whole.writestr(entry, path.read_bytes())

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from _site.files import write_page
-from _site.markup import plain, table
+from _site.markup import plain, table, write_page
 from _site.papers import cited
 from brdfdb.models import MODELS
 from brdfdb.parameters import ModelSpec

@@ -7,8 +7,7 @@ from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
-from _site.files import write_page
-from _site.markup import plain
+from _site.markup import plain, write_page
 
 _BIBLIOGRAPHY = Path(__file__).parents[2] / "references.bib"
 _LETTERS = {r"{\"u}": "ü", r"{\c{c}}": "ç", r"{\'a}": "á", r"{\'o}": "ó", r"\&": "&", "--": "–"}

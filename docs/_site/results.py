@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from _site.files import remove_others, write_page
+from _site.markup import remove_others, write_page
 
 sys.path.append(str(Path(__file__).parents[2]))
 

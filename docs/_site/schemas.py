@@ -6,8 +6,7 @@ import json
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from _site.files import write_page
-from _site.markup import plain, table
+from _site.markup import plain, table, write_page
 
 _SCHEMAS = Path(__file__).parents[2] / "schemas"
 Schema = dict[str, Any]

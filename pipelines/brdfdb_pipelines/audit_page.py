@@ -8,12 +8,12 @@ from itertools import groupby
 from typing import NamedTuple
 
 from brdfdb.audit import FINDINGS, AuditReport, MaterialAudit
-from brdfdb.audit.answers import AS_PUBLISHED, CONSERVES_ENERGY, NO_PAPER, Answer
 from brdfdb.audit.energy import Energy
 from brdfdb.audit.finding import LAST, LEVELS, RANKS, Cell, Finding, NotJudged, NumberTable, Word
+from brdfdb.audit.report import AS_PUBLISHED, CONSERVES_ENERGY, NO_PAPER, Answer
 from brdfdb.audit.validity import Validity
 from brdfdb.figure import Figure
-from brdfdb_pipelines import figure_look, figure_svg, html_page
+from brdfdb_pipelines import figure_svg, html_page
 
 PAPERS = {
     "ward1992": "Ward 1992: Measuring and modeling anisotropic reflection",
@@ -41,7 +41,7 @@ _COUNTED: tuple[Word, ...] = ("conserves", "loses", "gains", "known published ex
 QUESTIONS = (AS_PUBLISHED, CONSERVES_ENERGY)  # headings of the first two columns of terminal and page
 
 
-class Plot(NamedTuple):
+class DrawnPlot(NamedTuple):
     """A drawing as a section shows it."""
 
     kind: str
@@ -63,32 +63,20 @@ def key_of(subject: MaterialAudit | Figure) -> str:
     return f"figure-{subject.key}" if isinstance(subject, Figure) else anchor(subject.material)
 
 
-def plots_of(subject: MaterialAudit | Figure) -> list[Plot]:
+def plots_of(subject: MaterialAudit | Figure) -> list[DrawnPlot]:
     """Return the drawn plots of a material or a figure. This takes most of the time of a page."""
     if isinstance(subject, Figure):
         drawings = subject.panels
     else:
         drawings = [drawing for finding in subject.findings.values() for drawing in finding.figures()]
     return [
-        Plot(drawing.kind, figure_svg.svg(drawing, f"{key_of(subject)}-{n}")) for n, drawing in enumerate(drawings, 1)
+        DrawnPlot(drawing.kind, figure_svg.svg(drawing, f"{key_of(subject)}-{n}"))
+        for n, drawing in enumerate(drawings, 1)
     ]
 
 
-def render(report: AuditReport, plots: Mapping[str, list[Plot]] | None = None) -> str:
-    """Return the page of a report.
-
-    Parameters
-    ----------
-    report : AuditReport
-        Findings of a store.
-    plots : mapping, optional
-        Plots of each material and figure by `key_of`; by default drawn with `plots_of`.
-
-    Returns
-    -------
-    str
-        An HTML document.
-    """
+def render(report: AuditReport, plots: Mapping[str, list[DrawnPlot]] | None = None) -> str:
+    """Return the page of a report as HTML; plots by `key_of` are drawn with `plots_of` if they are not given."""
     environment = html_page.environment()
     environment.filters |= {"level": LEVELS.__getitem__, "mark": _MARKS.__getitem__, "sentence": _sentence}
     environment.globals |= {"anchor": anchor, "key_of": key_of, "rank": RANKS.__getitem__}
@@ -108,7 +96,6 @@ def render(report: AuditReport, plots: Mapping[str, list[Plot]] | None = None) -
         columns=columns(),
         counts=[(word, sum(verdict == word for verdict in energy.values())) for word in _COUNTED],
         gallery=_by_paper(report.gallery),
-        colours=figure_look.VARIABLES,
     )
 
 

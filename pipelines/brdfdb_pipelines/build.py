@@ -2,29 +2,51 @@
 
 from __future__ import annotations
 
+import contextlib
+import gc
+import threading
 import time
 from collections import deque
 from collections.abc import Callable
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
+from brdfdb._numba import is_cached
 from brdfdb.errors import BusyError, ParameterError, StoreError
+from brdfdb.materials import FunctionSource, Material
+from brdfdb.models import MODELS
 from brdfdb.store.family import FamilyRecord, Sweep
 from brdfdb.store.family_records import recorded, write_family
-from brdfdb.store.files import Entry
+from brdfdb.store.files import FileEntry
 from brdfdb.store.lock import Lock, writing
-from brdfdb.store.manifest import read_manifest
-from brdfdb.store.marker import make_store
-from brdfdb.store.paths import material_path, revision_path
-from brdfdb.store.pointer import point_to
+from brdfdb.store.paths import material_path, pointer_path, revision_path
 from brdfdb.store.publication import publish_staged
+from brdfdb.store.records import make_store, point_to, read_manifest
 from brdfdb.store.staging import Block, discard, prepare, remove_begun, write_block, write_frame
-from brdfdb_pipelines import build_resources, workers
+from brdfdb.tables import _kernels
+from brdfdb.tables.layout import Layout
+from brdfdb.tables.planner import coarsest
+from brdfdb.tables.table import Table, points
+from brdfdb.tables.tabulation import block
+from brdfdb_pipelines import workers
 from brdfdb_pipelines.build_progress import Event, Tally
-from brdfdb_pipelines.build_survey import Survey, cost_of_plan, cost_of_table, head_of, survey
-from brdfdb_pipelines.measured_job import MeasuredJob, Tabulated, build_measured
+from brdfdb_pipelines.build_survey import (
+    Survey,
+    check_disk,
+    check_memory,
+    cost_of_plan,
+    cost_of_table,
+    head_of,
+    memory_of_plan,
+    survey,
+)
+from brdfdb_pipelines.measured_job import MeasuredJob, MeasuredResult, build_measured
 from brdfdb_pipelines.recipe_file import Job, Recipe
 from brdfdb_pipelines.workers import Workers, WorkersError
 
@@ -37,22 +59,8 @@ _POLL_S = 0.1  # interval [s] at which a lock of another build is tried again
 class Built:
     """The result of one job.
 
-    Attributes
-    ----------
-    job : Job
-        The request.
-    state : str
-        "published", "adopted" (an existing revision is current again) or "unchanged".
-    revision : str
-        The current revision.
-    stored_bytes : int
-        Size of that revision [byte].
-    why : str
-        Phrase on why the table was not left unchanged; empty for "unchanged".
-    shape : tuple of int
-        Shape of the table; empty unless it was computed.
-    wavelengths : int
-        Number of wavelengths for which it holds; 0 if it is grey.
+    `state` is "published", "adopted" (an existing revision is current again) or "unchanged". `why` says in a phrase why
+    the table is not unchanged. `shape` is empty unless the table was computed; `wavelengths` is 0 if it is grey.
     """
 
     job: Job | MeasuredJob
@@ -73,7 +81,7 @@ class _Table:
     lock: Lock
     staging: Path = Path()
     blocks: deque[int] = field(default_factory=deque)  # not submitted yet
-    files: dict[str, Entry] = field(default_factory=dict)
+    files: dict[str, FileEntry] = field(default_factory=dict)
     waiting_reported: bool = False  # the event that another build holds the lock was sent
 
     @property
@@ -89,36 +97,20 @@ def build(
     *,
     memory: int | None = None,
 ) -> list[Built]:
-    """Build the missing tables of a recipe and measure its families.
+    """Build the missing tables of a recipe and measure its families; return the results in the order of the recipe.
 
-    Parameters
-    ----------
-    recipe : Recipe
-        The recipe.
-    root : Path
-        Directory of the store; made if it does not exist.
-    at : Workers or Executor
-        Executor of the tasks: threads, processes or machines that see `root` under the same path.
-    report : callable
-        Function that takes every event; the README lists them.
-    memory : int, optional
-        Memory of all tasks together [byte].
-
-    Returns
-    -------
-    list of Built
-        In the order of the recipe.
+    The executor works in threads, processes or machines that see `root` under the same path. `report` takes every
+    event; `memory` [byte] is that of all tasks together. Published tables and complete blocks stay after any error: the
+    next build of the same recipe resumes from them. An error of one table is raised after the other tables are built.
 
     Raises
     ------
     RecipeError
         Before anything is written, if the recipe cannot be built.
     ParameterError
-        If a single task exceeds `memory`, or the tables do not fit on the disk. A store that was made for them is
-        removed again.
+        If a single task exceeds `memory`, or the tables do not fit on the disk. A store made for them is removed.
     StoreError
-        If the store cannot be written. Published tables and complete blocks stay: the next build of the same
-        recipe resumes from them. Any other error of a table is raised after the other tables are built.
+        If the store cannot be written.
     """
     jobs = recipe.jobs()
     measured = recipe.measured_jobs()
@@ -225,7 +217,7 @@ class _Builder:
         for job in self.jobs:
             if job.tolerance is not None:
                 wavelengths = 1 if job.wavelength_nm is None else job.wavelength_nm.size
-                self._claim(f"planning {job.material.name}", build_resources.plan_bytes(wavelengths, job.tolerance))
+                self._claim(f"planning {job.material.name}", memory_of_plan(wavelengths, job.tolerance))
         jobs = deque(sorted(self.jobs, key=cost_of_plan, reverse=True))
         while jobs or self.running:
             while jobs and self._room:
@@ -242,14 +234,14 @@ class _Builder:
         self.task_bytes = 1
         for table in missing:
             self._claim(f"a block of {table.name}", table.survey.task_bytes)
-        build_resources.check_disk(sum(table.survey.disk_bytes for table in missing), self.root)
+        check_disk(sum(table.survey.disk_bytes for table in missing), self.root)
         self.tally = Tally(sum(table.survey.size for table in missing))
         self.report({"event": "planned", "tables": len(missing), "values": self.tally.total})
 
     def _claim(self, what: str, need: int) -> None:
         """Raise the memory [byte] per task to that of this one; ParameterError if it alone exceeds what is allowed."""
         self.task_bytes = max(self.task_bytes, need)
-        build_resources.check_memory(what, need, self.memory)
+        check_memory(what, need, self.memory)
 
     def _surveyed(self, job: Job, result: Survey) -> None:
         name = job.material.name
@@ -261,7 +253,7 @@ class _Builder:
 
     def _is_current(self, job: Job, revision: str) -> None:
         name = job.material.name
-        stored = read_manifest(revision_path(self.root, name, revision), None)[0]["summary"]["bytes"]
+        stored = read_manifest(revision_path(self.root, name, revision), None).content["summary"]["bytes"]
         self.built[name] = Built(job, "unchanged", revision, stored)
         self.report({"event": "unchanged", "material": name, "revision": revision})
 
@@ -326,7 +318,7 @@ class _Builder:
             with writing(self.root, name):
                 point_to(material_path(self.root, name), standing.revision)
             discard(self.root, name, job.request)  # the build that made this revision may have been killed
-            stored = read_manifest(revision_path(self.root, name, standing.revision), None)[0]["summary"]["bytes"]
+            stored = read_manifest(revision_path(self.root, name, standing.revision), None).content["summary"]["bytes"]
             self.built[name] = Built(job, "adopted", standing.revision, stored, standing.why)
             self.report({"event": "adopted", "material": name, "revision": standing.revision, "why": standing.why})
         else:
@@ -360,7 +352,7 @@ class _Builder:
         if len(table.files) == len(values):
             self.ready.append(table)
 
-    def _framed(self, table: _Table, future: Future[dict[str, Entry]]) -> None:
+    def _framed(self, table: _Table, future: Future[dict[str, FileEntry]]) -> None:
         if (files := self._result(table.name, future)) is None:
             self._close(table)
             return
@@ -388,7 +380,7 @@ class _Builder:
             while jobs and self._room:
                 job = jobs.popleft()
 
-                def then(future: Future[Tabulated], job: MeasuredJob = job) -> None:
+                def then(future: Future[MeasuredResult], job: MeasuredJob = job) -> None:
                     if (result := self._result(job.name, future)) is not None:
                         self.built[job.name] = Built(job, *result)
                         event = {"event": result.state, "material": job.name, "revision": result.revision}
@@ -448,3 +440,75 @@ class _Builder:
         self.error = self.error or error
         self.report({"event": "failed", "material": name, "error": str(error)})
         return None
+
+
+_UP = np.array([[0.0, 0.0, 1.0], [0.6, 0.0, 0.8], [0.0, 0.6, 0.8]])  # three directions: any will do
+_AZIMUTHS = np.linspace(0.0, np.pi, 16)  # a row for which He-Torrance sums its table of the series
+
+
+def compile_kernels(recipe: Recipe, root: Path, jobs: int, report: Callable[[Event], None]) -> None:
+    """Compile the kernels of a build into numba's cache, where tables are missing and nothing was compiled yet.
+
+    A build compiles what is missing anyway, one kernel after the other; this takes less time and reports it. This
+    process compiles, too: it has imported already what each process imports.
+    """
+    missing = [job for job in recipe.jobs() if not pointer_path(material_path(root, job.material.name)).exists()]
+    if jobs == 1 or not missing or is_cached(_kernels.by_vectors):
+        return
+    models: dict[str, Callable[[], None]] = {}
+    for job in missing:
+        models.setdefault(job.material.model, partial(_compile_model, job.material, job.wavelength_nm))
+    # the longest first: lookups, and kernels of spectral models
+    tasks = deque(
+        [_compile_tables, *(models[name] for name in sorted(models, key=lambda name: not MODELS[name].spectral))]
+    )
+    others = min(jobs, len(tasks)) - 1
+    lock = threading.Lock()
+    report({"event": "compiling", "kernels": len(tasks)})
+
+    def work(run: Callable[[Callable[[], None]], None]) -> None:
+        with contextlib.suppress(IndexError):  # no task is left
+            while True:
+                task = tasks.popleft()
+                with contextlib.suppress(Exception):  # the build meets the error again, and reports it
+                    run(task)
+                with lock:
+                    report({"event": "compiled"})
+
+    with ThreadPoolExecutor(others) as threads, workers.processes(others, patient=False) as pool:
+        helpers = [
+            threads.submit(work, lambda task: pool.executor.submit(_compiled, task).result()) for _ in range(others)
+        ]
+        try:
+            work(_compiled)
+            wait(helpers)
+        finally:
+            tasks.clear()  # no other task begins after Ctrl-C
+
+
+def _compiled(task: Callable[[], None]) -> None:
+    """Run a task without the collector of garbage, which takes a tenth of the time: what numba makes stays in use."""
+    enabled = gc.isenabled()
+    gc.disable()
+    try:
+        task()
+    finally:
+        if enabled:
+            gc.enable()
+
+
+def _compile_tables() -> None:
+    """Compile the kernels of lookups."""
+    white = FunctionSource(brdf=lambda wi, *_: np.full(len(wi), 0.3), name="white", title="White", provenance="none")
+    layout = Layout(white, coarsest(white), None)
+    Table.of(layout, np.zeros(layout.shape, np.float32)).lookup_vectors(_UP, _UP[::-1])
+    points(layout.grid, _UP, _UP[::-1])
+
+
+def _compile_model(material: Material, wavelength_nm: NDArray[np.float64] | None) -> None:
+    """Compile the kernels of the model of a material."""
+    at = None if wavelength_nm is None else wavelength_nm[:2]
+    material.lookup_vectors(_UP, _UP[::-1], at)
+    block(Layout(material, coarsest(material), at), slice(0, 1))
+    material.lookup(0.5, 0.0, 0.5, _AZIMUTHS, at)
+    material.specular_reflectance(0.5, at)

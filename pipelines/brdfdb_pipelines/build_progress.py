@@ -16,14 +16,14 @@ Event = dict[str, Any]
 
 
 class Tally:
-    """The number of values computed so far, their rate, and the time left."""
+    """The number of finished values, the rate, and the remaining time."""
 
     def __init__(self, total: int) -> None:
         self.total, self.done, self._computed = total, 0, 0
         self._start = time.perf_counter()
 
     def add(self, values: int, *, kept: bool) -> Event:
-        """Add values and return the fields of an event; values kept from an earlier build do not count for the rate."""
+        """Add values and return the fields of an event; `kept` values of an earlier build do not count for the rate."""
         self.done += values
         self._computed += 0 if kept else values
         rate = self._computed / max(time.perf_counter() - self._start, 1e-9)
@@ -36,10 +36,10 @@ class Tally:
         }
 
 
-class Lines:
+class JsonLines:
     """Printer of events as JSON; a context manager like `Bars`."""
 
-    def __enter__(self) -> Lines:
+    def __enter__(self) -> JsonLines:
         return self
 
     def __exit__(
@@ -97,9 +97,9 @@ class Bars:
                 )
                 self._progress.update(self._overall, completed=0 if event["values"] else 1, total=event["values"] or 1)
             case "waiting":
-                self._progress.console.print(f"waiting for {event['material']}: another build is at work on it")
+                self._progress.console.print(f"waiting for {event['material']}: another build is building it")
             case "idle":
-                self._progress.console.print("the cluster has no workers; waiting for one, Ctrl-C keeps what is whole")
+                self._progress.console.print("the cluster has no workers; waiting for a worker (Ctrl-C stops)")
             case "failed":
                 self._progress.console.print(
                     f"{event['material']} failed: {event['error']}", markup=False, soft_wrap=True
@@ -128,7 +128,7 @@ class Bars:
                 self._advance(self._measured)
 
     def _log(self, text: str) -> None:
-        """Print what begins now where nobody sees the bar move, as in a file."""
+        """Print what begins now, unless a terminal shows the bar."""
         if not self._progress.console.is_terminal:
             self._progress.console.print(text)
 
@@ -147,7 +147,8 @@ class Bars:
             self._tables[name] = self._progress.add_task(f"  measuring {name}", total=None, rate="")
         elif (task := self._tables.pop(name, None)) is not None:
             self._progress.remove_task(task)
-            text = f"family {name}: {event['members']} tables, {terminal.error(event['error_p99'])} between them (p99)"
+            error = terminal.error(event["error_p99"])
+            text = f"family {name}: {event['members']} tables, error at parameters between them {error} (p99)"
             self._progress.console.print(text, markup=False)
 
     def _block(self, event: Event) -> None:

@@ -1,9 +1,12 @@
-"""The survey of a build: the state of a job in the store, its missing layout, and the resources that it needs."""
+"""The survey of a build: the state of each job in the store, missing layouts, and the memory and disk space."""
 
 from __future__ import annotations
 
 import json
 import math
+import os
+import shutil
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,11 +19,26 @@ from brdfdb.store.paths import material_path, pointer_path, request_path
 from brdfdb.store.revisions import Standing, standing
 from brdfdb.store.staging import planned, prepare, write_block
 from brdfdb.tables.layout import Layout, digest
-from brdfdb_pipelines import build_resources
+from brdfdb_pipelines import terminal
 from brdfdb_pipelines.recipe_file import Job
 
-_THETA_DEG = (0.0, 30.0, 60.0, 85.0)
-_PHI_DEG = (0.0, 90.0, 180.0)
+_THETA_DEG = (0.0, 30.0, 60.0, 85.0)  # polar angles at which a model is tried before it is planned
+_PHI_DEG = (0.0, 90.0, 180.0)  # azimuths of the viewer there
+
+_TASK = 20_000_000  # memory of any task [byte]: the interpreter, and the directions of the error measurement
+# Memory of the planner's layouts [byte]. Measured peaks: copper at 41 wavelengths 119 MB for a tolerance of 0.01 and
+# 377 MB for 0.001; grey foam 49 MB for 0.0001
+_PLAN = 10_000_000  # of any plan
+_PLAN_WAVELENGTH = 3_000_000  # more for each wavelength
+_FINE = 0.005  # tolerance below which a plan takes more memory
+_FINE_TIMES = 4  # factor of the memory of such a plan
+_SLAB = 1 << 17  # directions that a block evaluates at once, or one row of the grid if that is more
+_PLAIN = 40  # memory of intermediates per direction of a slab [byte], over light and viewer; measured: 22 to 36
+_HALF = 250  # the same over half vectors; measured: 237
+_SPECTRUM = 45  # memory per wavelength and direction [byte] of spectra that are evaluated at once; measured: 35 to 44
+_VALUE = 16  # memory per value of a block [byte]: float32, the copy of the codec, the encoded bytes and their copy
+_ROW = 80  # memory of the error measurement per value of a row [byte], for five rows; measured: 60 to 80
+_DRAW = 1_500_000  # memory of the error measurement per wavelength [byte]: the values at the drawn directions
 
 
 @dataclass(frozen=True)
@@ -61,7 +79,7 @@ def survey(root: str, job: Job) -> Survey:
         try:
             with Lock(store, name, wait=False):
                 staging = prepare(store, name, request, text)
-                if values is not None and build_resources.table_bytes(layout) <= build_resources.free_bytes(store):
+                if values is not None and size_on_disk(layout) <= free_bytes(store):
                     for number, rows in enumerate(layout.blocks):
                         write_block(str(staging), text, number, values[rows])
                     tabulated = True
@@ -70,10 +88,10 @@ def survey(root: str, job: Job) -> Survey:
     layout = Layout.from_document(json.loads(text))
     rest = layout.size // layout.shape[0]
     block_values = tuple((rows.stop - rows.start) * rest for rows in layout.blocks)
-    staged = build_resources.stored_bytes([request_path(store, name, digest(request)) / "table"])
-    disk = 0 if tabulated else max(0, build_resources.table_bytes(layout) - staged)
+    staged = stored_bytes([request_path(store, name, digest(request)) / "table"])
+    disk = 0 if tabulated else max(0, size_on_disk(layout) - staged)
     shape, wavelengths = tuple(layout.shape), 0 if layout.wavelength_nm is None else layout.wavelength_nm.size
-    task_bytes = build_resources.task_bytes(layout)
+    task_bytes = memory_of_task(layout)
     return Survey(status, head, text, shape, wavelengths, block_values, task_bytes, disk, tabulated)
 
 
@@ -117,3 +135,65 @@ def head_of(root: Path, name: str) -> str:
         return pointer_path(material_path(root, name)).read_text(encoding="utf-8", errors="replace")
     except OSError:
         return ""
+
+
+def memory_of_plan(wavelengths: int, tolerance: float) -> int:
+    """Return the memory [byte] that the planner takes for a material at a number of wavelengths."""
+    return (_PLAN + _PLAN_WAVELENGTH * wavelengths) * (1 if tolerance >= _FINE else _FINE_TIMES)
+
+
+def memory_of_task(layout: Layout) -> int:
+    """Return the memory [byte] that one task of a table takes: a block, or measuring its error."""
+    wavelengths = 1 if layout.wavelength_nm is None else layout.wavelength_nm.size
+    directions = math.prod(layout.grid.shape[1:])
+    slab = max(directions, min(_SLAB, directions * layout.block_rows))
+    one_by_one = layout.plain and not layout.grid.half_difference
+    spectrum = 0 if one_by_one else _SPECTRUM * wavelengths * slab
+    row = math.prod(layout.shape[1:])
+    block = slab * (_HALF if layout.grid.half_difference else _PLAIN) + spectrum + _VALUE * row * layout.block_rows
+    return _TASK + max(block, _ROW * row + _DRAW * wavelengths)
+
+
+def size_on_disk(layout: Layout) -> int:
+    """Return the largest size [byte] of the values of a table on the disk: rounded bits are zeros and compress."""
+    return layout.size * (9 + layout.bits) // 8
+
+
+def machine_memory() -> int | None:
+    """Return the memory [byte] of this machine; None where the system does not tell."""
+    if not hasattr(os, "sysconf"):
+        return None
+    return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+
+
+def check_memory(what: str, need: int, memory: int | None) -> None:
+    """Raise ParameterError if a task needs more memory [byte] than is allowed; None allows any."""
+    if memory is not None and need > memory:
+        raise ParameterError(
+            "memory", f"{what} takes about {terminal.size(need)}; {terminal.size(memory)} are allowed", memory
+        )
+
+
+def check_disk(need: int, directory: Path) -> None:
+    """Raise ParameterError if the file system of a directory has less than `need` [byte] free; it need not exist."""
+    free = free_bytes(directory)
+    if need > free:
+        raise ParameterError(
+            "disk", f"the tables take up to {terminal.size(need)}, and {directory} has {terminal.size(free)} free"
+        )
+
+
+def free_bytes(directory: Path) -> int:
+    """Return the space [byte] that is free on the file system of a directory, which need not exist."""
+    there = next(path for path in (directory, *directory.absolute().parents) if path.exists())
+    return shutil.disk_usage(there).free
+
+
+def stored_bytes(directories: Sequence[Path]) -> int:
+    """Return the size [byte] of all files below some directories, which need not exist."""
+    return sum(
+        os.lstat(os.path.join(folder, file)).st_size
+        for directory in directories
+        for folder, _, files in os.walk(directory)
+        for file in files
+    )

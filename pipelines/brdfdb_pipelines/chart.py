@@ -16,19 +16,16 @@ from numpy.typing import NDArray
 import brdfdb
 from brdfdb.errors import BrdfdbError, ParameterError
 from brdfdb.forms.catalogue import Form, of_table
-from brdfdb.forms.tradeoff import STEPS, TIMED, chart, chart_family
-from brdfdb.forms.tradeoff_document import Chart, Charts, FamilyChart, Point
+from brdfdb.forms.tradeoff import STEPS, TIMED, Chart, ChartPoint, Charts, FamilyChart, chart, chart_family
 from brdfdb.materials import Material, Source
 from brdfdb.measurements import Measured
 from brdfdb.store.family import Family, Sweep
 from brdfdb.store.family_records import recorded
 from brdfdb.store.reader import Store
 from brdfdb.tables.planner import check_tolerance
-from brdfdb.tables.table import Table
-from brdfdb.tables.table_source import source_of_table
-from brdfdb_pipelines import family_plot, recipe_file, terminal, tradeoff_plot
-from brdfdb_pipelines.named_source import measured_source
-from brdfdb_pipelines.plot_panels import percent
+from brdfdb.tables.table import Table, source_of_table
+from brdfdb_pipelines import chart_picture, recipe_file, terminal
+from brdfdb_pipelines.chart_picture import CLOSE, percent
 
 
 class _Subject(NamedTuple):
@@ -56,30 +53,10 @@ def run(
     recipe_path: Path | None = None,
     tolerances: Sequence[float] | None = None,
 ) -> Charts:
-    """Chart materials and families; write ``NAME.json``, ``NAME.svg`` and ``NAME.png`` for each.
+    """Chart materials and families of recipe or store; write ``NAME.json``, ``NAME.svg`` and ``NAME.png`` of each.
 
-    Parameters
-    ----------
-    names : sequence of str
-        Materials or families of the recipe (by default every preset) or of the store.
-    out : Path
-        Directory to write to; made if it does not exist.
-    store : Path, optional
-        Store whose tables and families are charted as well; it need not exist.
-    recipe_path : Path, optional
-        A recipe that defines materials or families, and the wavelengths of spectral ones.
-    tolerances : sequence of float, optional
-        Tolerances of planned tables: see `brdfdb.forms.catalogue`.
-
-    Returns
-    -------
-    Charts
-        All charts. Each is written to a file of its own, so that another run replaces only what it charts again.
-
-    Raises
-    ------
-    ParameterError
-        If a name is neither in the recipe nor in the store, or a tolerance is out of range.
+    The tables and families of a store are charted as well; the store need not exist. ParameterError if a name is
+    unknown, or a tolerance is out of range.
     """
     for tolerance in tolerances or ():
         check_tolerance(tolerance)
@@ -110,10 +87,10 @@ def run(
     for one in material_charts:
         _write(out / one.material, charts.model_copy(update={"charts": [one], "families": []}), one)
         _print(one)
-    for whole in families:
-        _write(out / whole.family, charts.model_copy(update={"charts": [], "families": [whole]}), whole)
-        _print_family(whole)
-    written = [*(one.material for one in material_charts), *(whole.family for whole in families)]
+    for family in families:
+        _write(out / family.family, charts.model_copy(update={"charts": [], "families": [family]}), family)
+        _print_family(family)
+    written = [*(one.material for one in material_charts), *(family.family for family in families)]
     print(f"{out}: .json, .svg and .png of {', '.join(written)}")
     return charts
 
@@ -121,42 +98,30 @@ def run(
 def _write(stem: Path, document: Charts, drawn: Chart | FamilyChart) -> None:
     """Write a chart as data and as pictures; names of materials have no dots."""
     stem.with_suffix(".json").write_text(document.model_dump_json(indent=1) + "\n", encoding="utf-8")
-    stem.with_suffix(".svg").write_text(tradeoff_plot.svg(drawn), encoding="utf-8")
-    stem.with_suffix(".png").write_bytes(tradeoff_plot.png(drawn))
+    stem.with_suffix(".svg").write_text(chart_picture.svg(drawn), encoding="utf-8")
+    stem.with_suffix(".png").write_bytes(chart_picture.png(drawn))
 
 
 def _subjects(names: Sequence[str], root: Path | None, recipe_path: Path | None) -> list[_Subject | _Family]:
+    """Return what each name means, in the recipe first, and then in the store."""
     recipe = recipe_file.load(recipe_path, to_build=False)
     listed = recipe.jobs()
-    jobs, sweeps = {job.material.name: job for job in listed}, {sweep.name: sweep for sweep in recipe.sweeps(listed)}
-    store: Store | None = brdfdb.open(root) if root is not None and root.exists() else None
+    jobs = {job.material.name: job for job in listed}
+    sweeps = {sweep.name: sweep for sweep in recipe.sweeps(listed)}
     measured = {job.name: job for job in recipe.measured_jobs()}
+    store: Store | None = brdfdb.open(root) if root is not None and root.exists() else None
     subjects: list[_Subject | _Family] = []
     for name in dict.fromkeys(names):
         table = store[name] if store is not None and name in store else None
         if name in jobs:
-            subject = _Subject(jobs[name].material, jobs[name].wavelength_nm)
+            subject = _with_table(_Subject(jobs[name].material, jobs[name].wavelength_nm), table)
         elif name in measured:
-            data, at = measured_source(measured[name])
-            subject = _Subject(data, at)
-            print(f"{name}: it is measured. Errors are those against the data, interpolated.{_trust(data.measured)}")
+            data = measured[name].lawful_source()
+            at = None if data.wavelengths_nm is None else np.array(data.wavelengths_nm)
+            print(f"{name}: measured data. Errors are relative to these data, interpolated.{_trust(data.measured)}")
+            subject = _with_table(_Subject(data, at), table)
         elif table is not None:
-            source = source_of_table(table)
-            subject = _Subject(source, table.wavelength_nm)
-            if table.metadata.measured is not None:
-                print(
-                    f"{name}: it is measured, and the store does not hold the data. Errors are those against the "
-                    f"stored table itself, --recipe FILE reads the data.{_trust(table.metadata.measured)}"
-                )
-                subjects.append(subject)
-                continue
-            if not isinstance(source, Material):
-                print(
-                    f"{name}: its source cannot be evaluated here. A function is not in the store, and a model of your "
-                    "own needs --models. Errors are those against the stored table itself."
-                )
-                subjects.append(subject)
-                continue
+            subject = _of_table(table)
         elif name in sweeps:
             members = [jobs[member] for member in sweeps[name].members]
             materials = [job.material for job in members]
@@ -170,20 +135,47 @@ def _subjects(names: Sequence[str], root: Path | None, recipe_path: Path | None)
             subjects.append(_Family(family.record, materials, family.wavelength_nm, family))
             continue
         else:
-            known = "the recipe" if recipe_path else "the presets; `brdfdb list --presets` names them"
-            raise ParameterError(name, f"no such material or family, neither in the store nor among {known}", name)
-        if table is not None and _fits(table.wavelength_nm, subject.wavelength_nm):
-            title = f"table of the store, {terminal.error(table.error.overall.p99 if table.error else None)}"
-            subject = subject._replace(stored=(of_table(table, "table-stored", title),))
+            others = "the recipe" if recipe_path else "the presets; `brdfdb list --presets` names them"
+            raise ParameterError(name, f"no such material or family, neither in the store nor among {others}", name)
         subjects.append(subject)
     return subjects
+
+
+def _of_table(table: Table) -> _Subject:
+    """Return a table of the store; without a model that can be evaluated, errors are those against the table itself."""
+    source, measured = source_of_table(table), table.metadata.measured
+    subject = _Subject(source, table.wavelength_nm)
+    if measured is not None:
+        print(
+            f"{table.name}: measured data, which the store does not contain. Errors are relative to the stored table; "
+            f"with --recipe FILE they are relative to the data.{_trust(measured)}"
+        )
+        return subject
+    if not isinstance(source, Material):
+        print(
+            f"{table.name}: its source cannot be evaluated here, because the store does not contain functions, and a "
+            "model of your own needs --models. Errors are relative to the stored table."
+        )
+        return subject
+    return _with_table(subject, table)
+
+
+def _with_table(subject: _Subject, table: Table | None) -> _Subject:
+    """Return a subject with its table in the store as a form, if the table has the same wavelengths."""
+    if table is None:
+        return subject
+    stored, wanted = table.wavelength_nm, subject.wavelength_nm
+    if (None if stored is None else stored.tolist()) != (None if wanted is None else wanted.tolist()):
+        return subject
+    title = f"table of the store, {terminal.error(table.error.overall.p99 if table.error else None)}"
+    return subject._replace(stored=(of_table(table, "table-stored", title),))
 
 
 def _trust(measured: Measured) -> str:
     """Return how far measured data are to be trusted, in a sentence; empty if nothing is known."""
     held = measured.held_out
     if held is not None:
-        return f" The data are within {terminal.error(held.p95)} of 95 of 100 samples that were held out."
+        return f" The data are within {terminal.error(held.p95)} of 95 % of the samples left out of the interpolation."
     noise = measured.noise
     return "" if noise is None else f" The noise of the data is below {terminal.error(noise.p95)} in 95 of 100 values."
 
@@ -197,10 +189,6 @@ def _material_of(table: Table) -> Material:
     return table.source
 
 
-def _fits(stored: NDArray[np.float64] | None, wanted: NDArray[np.float64] | None) -> bool:
-    return (None if stored is None else stored.tolist()) == (None if wanted is None else wanted.tolist())
-
-
 def _print(one: Chart) -> None:
     """Print all points as a table, and the front in a sentence."""
     rows = [
@@ -209,11 +197,11 @@ def _print(one: Chart) -> None:
             point.key,
             point.title,
             percent(point.l1),
-            tradeoff_plot.tail(point),
+            chart_picture.tail(point),
             *map(percent, (point.forward, point.back, point.grazing)),
-            tradeoff_plot.quartiles(point.batch),
+            chart_picture.quartiles(point.batch),
             *map(terminal.count, (point.block.ns, point.single.ns, point.mixed.ns)),
-            tradeoff_plot.against(point),
+            chart_picture.against(point),
             terminal.size(point.bytes),
         )
         for point in one.points
@@ -224,14 +212,15 @@ def _print(one: Chart) -> None:
     for out in one.left_out:
         print(f"  left out: {out.title}: {out.reason}")
     points = {point.key: point for point in one.points}
-    print("  worth having: " + "; ".join(_said(points[key]) for key in one.fronts.batch))
+    print("  worth having: " + "; ".join(_in_words(points[key]) for key in one.fronts.batch))
     heads = ("variance", "ns a sample", "ms to 1 %")
     work = tuple(f"{problem}: {head}" for problem in ("albedo", "sphere") for head in heads)
-    rows = [(sampler.title, *tradeoff_plot.works(sampler)) for sampler in one.samplers]
+    rows = [(sampler.title, *chart_picture.works(sampler)) for sampler in one.samplers]
     terminal.print_table(f"{one.material}: samplers, noise and time", ("sampler", *work), rows, numbers=work)
 
 
-def _said(point: Point) -> str:
+def _in_words(point: ChartPoint) -> str:
+    """Return the title of a form with its time, its speed and its error."""
     off = f"{percent(point.l1)} off in the mean, p99 {percent(point.p99)}"
     error = "the truth" if point.l1 == 0.0 else off
     faster = "" if point.saving is None else f", {terminal.count(float(f'{point.saving.times:.2g}'))} times as fast as"
@@ -239,49 +228,49 @@ def _said(point: Point) -> str:
     return f"{point.title} ({terminal.count(point.batch.ns)} ns{rung}, {error})"
 
 
-def _print_family(whole: FamilyChart) -> None:
+def _print_family(family: FamilyChart) -> None:
     """Print the mean error of every form along each parameter, and where each form of the front is worth having."""
-    for axis, values in whole.axes.items():
+    for axis, values in family.axes.items():
         rows = []
-        for curve in whole.curves:
+        for curve in family.curves:
             cells = []
-            for some in family_plot.along(whole, axis):
-                chosen = 2 * sum(curve.key in whole.fronts[index] for index in some) > len(some)
-                middle = family_plot.middle([curve.l1[index] for index in some])
+            for alike in chart_picture.along(family, axis):
+                chosen = 2 * sum(curve.key in family.fronts[index] for index in alike) > len(alike)
+                middle = chart_picture.middle([curve.l1[index] for index in alike])
                 cells.append("-" if middle is None else f"{'*' if chosen else ''}{percent(middle)}")
             rows.append((curve.key, curve.title, terminal.count(curve.batch.ns), *cells))
         columns = [f"{value:g}" for value in values]
-        if whole.diagnostic is not None and len(whole.axes) == 1:
-            rows.insert(0, ("", whole.diagnostic.title, "", *map(terminal.count, whole.diagnostic.values)))
-        title = f"{whole.family}: {whole.title}. Mean error along {axis}; * is worth having"
+        if family.diagnostic is not None and len(family.axes) == 1:
+            rows.insert(0, ("", family.diagnostic.title, "", *map(terminal.count, family.diagnostic.values)))
+        title = f"{family.family}: {family.title}. Mean error along {axis}; * is worth having"
         terminal.print_table(title, ("key", "form", "ns a value", *columns), rows, numbers=("ns a value", *columns))
-    for out in whole.left_out:
+    for out in family.left_out:
         print(f"  left out of {out.member}: {out.title}: {out.reason}")
-    print(f"  times are those of one member, {whole.curves[0].timed} for most")
-    for curve in whole.curves:
-        if where := [index for index, front in enumerate(whole.fronts) if curve.key in front]:
-            print(f"  worth having: {curve.title} ({terminal.count(curve.batch.ns)} ns) {_where(whole, where)}")
-    for curve in whole.curves:
+    print(f"  times are those of one member, {family.curves[0].timed} for most")
+    for curve in family.curves:
+        if where := [index for index, front in enumerate(family.fronts) if curve.key in front]:
+            print(f"  worth having: {curve.title} ({terminal.count(curve.batch.ns)} ns) {_where(family, where)}")
+    for curve in family.curves:
         if curve.kind in ("closed form", "approximation", "customary", "printed"):
-            close = [index for index, error in enumerate(curve.l1) if error is not None and error <= family_plot.CLOSE]
-            where_close = _where(whole, close) if close else "nowhere"
-            print(f"  within {percent(family_plot.CLOSE)} in the mean: {curve.title} {where_close}")
-    if whole.between is not None:
-        off = f"{percent(whole.between.l1)} off in the mean, p99 {percent(whole.between.p99)}"
-        time = f"{terminal.count(whole.between.batch.ns)} ns, {terminal.count(whole.between.single.ns)} of one"
-        print(f"  between members: {off}, as the family states ({time}, {terminal.size(whole.between.bytes)})")
+            close = [index for index, error in enumerate(curve.l1) if error is not None and error <= CLOSE]
+            where_close = _where(family, close) if close else "nowhere"
+            print(f"  within {percent(CLOSE)} in the mean: {curve.title} {where_close}")
+    if family.between is not None:
+        off = f"{percent(family.between.l1)} off in the mean, p99 {percent(family.between.p99)}"
+        time = f"{terminal.count(family.between.batch.ns)} ns, {terminal.count(family.between.single.ns)} of one"
+        print(f"  between members: {off}, as the family states ({time}, {terminal.size(family.between.bytes)})")
 
 
-def _where(whole: FamilyChart, members: Sequence[int]) -> str:
+def _where(family: FamilyChart, members: Sequence[int]) -> str:
     """Return the part of a family that some members lie in, in words."""
-    points = list(itertools.product(*whole.axes.values()))
+    points = list(itertools.product(*family.axes.values()))
     spans = []
-    for number, axis in enumerate(whole.axes):
+    for number, axis in enumerate(family.axes):
         inside = [points[index][number] for index in members]
         least, most = min(inside), max(inside)
         spans.append(f"{axis} {least:g} to {most:g}" if least < most else f"{axis} {least:g}")
-    if whole.diagnostic is not None:
-        symbol, inside = whole.diagnostic.symbol, [whole.diagnostic.values[index] for index in members]
+    if family.diagnostic is not None:
+        symbol, inside = family.diagnostic.symbol, [family.diagnostic.values[index] for index in members]
         least, most = min(inside), max(inside)
         spans.append(f"{symbol} {least:g} to {most:g}" if least < most else f"{symbol} {least:g}")
     return f"at {len(members)} of {len(points)} members, {', '.join(spans)}"

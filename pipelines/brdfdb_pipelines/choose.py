@@ -2,35 +2,88 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from brdfdb.errors import ParameterError
+from brdfdb.errors import ParameterError, StoreError
 from brdfdb.forms import timing
 from brdfdb.scenes import image, sample_positions
-from brdfdb.scenes.choice import CONFIDENCE, GRAZING_DEG, Decision, Look, Seen, check_feasible, choose
-from brdfdb.scenes.choice_document import Choice, Price, Weigh, describe, statement, within
-from brdfdb.scenes.gbuffer import View, gather, gather_at
+from brdfdb.scenes.choice import (
+    CONFIDENCE,
+    GRAZING_DEG,
+    Decision,
+    Look,
+    Price,
+    SceneChoice,
+    Seen,
+    Weigh,
+    check_feasible,
+    choose,
+    describe,
+    statement,
+    within,
+)
+from brdfdb.scenes.gbuffer import CameraView, gather, gather_at
 from brdfdb.scenes.offered_forms import OfferedForm, offered_forms
-from brdfdb.scenes.recorded_directions import Recorded
 from brdfdb.scenes.renderer import Reflector, reflectors
 from brdfdb.scenes.scene import Scene
-from brdfdb.scenes.shapes import Array
-from brdfdb.store.marker import make_store
+from brdfdb.scenes.shapes import Array, Recorded
+from brdfdb.store.publication import publish_layout
+from brdfdb.store.reader import Store
+from brdfdb.store.records import make_store
 from brdfdb.store.staging import remove_begun
+from brdfdb.tables.layout import Layout
+from brdfdb.tables.tabulation import frame
 from brdfdb_pipelines import terminal
-from brdfdb_pipelines.choice_publication import Built, build, with_reason
 from brdfdb_pipelines.scene_file import SceneError, load
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 TIMED = 20_000  # pairs of directions of a material for timing, drawn from those of the scene
 SEED = 1992
 ROUNDS = 7  # rounds of timing
 FINER = 2  # width, relative to the picture, of the finer picture with one checked place per pixel
-EDGES = 4000  # places beside edges where forms are compared, and as many others where choices are checked
+EDGES = 4000  # places near edges where forms are compared, and as many others where choices are checked
+
+TIMES = 2.0  # end of the colour bar, relative to the tolerance
+BEYOND = "#e5341a"  # colour of larger differences
+BAR = 16  # height of the colour bar [pixel]
+_PANEL = 420  # nearest width of a panel [pixel]; each pixel of the scene is a square of whole pixels
+_GAP = 14  # around panels [pixel]
+_TITLE = 30  # above panels [pixel]
+_MORE = 60  # right of the colour bar [pixel]
+_DPI = 128  # a power of two, so that sizes in inches are whole pixels
+_TEXT: dict[str, Any] = {"fontsize": 7}
+
+
+class PublishedChoice(NamedTuple):
+    """The revision that holds the table of a choice, and a sentence on the revision before it."""
+
+    revision: str
+    sentence: str
+
+
+class _Checks(NamedTuple):
+    """The places of a scene where forms are compared, and a function from the number of a check to fresh places."""
+
+    planned: Look
+    fresh: Callable[[int], Look | None]
+
+
+class _Pairs(NamedTuple):
+    """Pairs of directions (n, 3)."""
+
+    wi: Array
+    wr: Array
 
 
 def run(
@@ -41,30 +94,12 @@ def run(
     weigh: Weigh = "time",
     store: Path | None = None,
     tolerances: Sequence[float] | None = None,
-) -> Choice:
+) -> SceneChoice:
     """Choose for a scene; write ``choice.json``, ``NAME.png``, ``NAME-truth.exr`` and ``NAME-choice.exr``.
 
-    Parameters
-    ----------
-    name : str
-        A scene by its file or name.
-    out : Path
-        Directory to write to; made if it is not there.
-    width : int
-        Pixels across the picture where forms are compared. The choice as a whole is checked at fresh places: `FINER`
-        squared times as many, and `EDGES` beside edges. A recorded scene has the size of its file, and no other places.
-    weigh : str
-        Cost to minimise: "time", "bytes", or "both", which is their product.
-    store : Path, optional
-        Store where chosen tables are published, under the names of their materials, each with its error; made if it
-        does not exist.
-    tolerances : sequence of float, optional
-        Tolerances of planned tables: see `brdfdb.scenes.offered_forms`.
-
-    Returns
-    -------
-    Choice
-        The document that was written.
+    Forms are compared in a picture of `width` pixels. The choice is checked at other places: `FINER` squared times as
+    many, and `EDGES` near edges. A recorded scene has the size of its file, and no other places. Chosen tables are
+    published in the store, each with its error, under the names of their materials.
 
     Raises
     ------
@@ -92,7 +127,7 @@ def _run(
     weigh: Weigh,
     store: Path | None,
     tolerances: Sequence[float] | None,
-) -> Choice:
+) -> SceneChoice:
     with terminal.progress(counted=False, transient=True) as bar:
         bar.add_task("tracing rays", total=None)
         view = gather(scene, width)
@@ -103,17 +138,17 @@ def _run(
         for key, reflector in materials.items():
             offered[key] = offered_forms(reflector.source, reflector.wavelength_nm, tolerances)
             bar.advance(task)
-            prices[key] = _prices(offered[key], *_pairs(view, key), weigh)
+            prices[key] = _prices(offered[key], _pairs(view, key), weigh)
             bar.advance(task)
         task = bar.add_task("choosing", total=len(materials) + 1)
-        planned, check = _looks(scene, view, offered, materials)
+        checks = _checks(scene, view, offered, materials)
 
         def checked(number: int) -> Look | None:
             bar.update(task, total=len(materials) + number)
-            return check(number)
+            return checks.fresh(number)
 
         costs = {key: np.stack([one.costs for one in of_forms], axis=1) for key, of_forms in prices.items()}
-        chosen = choose(planned, checked, offered, costs, tick=lambda: bar.advance(task))
+        chosen = choose(checks.planned, checked, offered, costs, tick=lambda: bar.advance(task))
     forms = {key: offered[key][decision.pick.chosen].form for key, decision in chosen.items()}
     wanted = f"{Path(name).stem}, {within(scene.tolerance)}"
     layouts = {
@@ -122,16 +157,16 @@ def _run(
         if form.layout is not None and key not in scene.stored
     }
     values = {key: forms[key].values for key in layouts}
-    built = build(store, layouts, values) if store is not None and layouts else {}
+    built = publish_choices(store, layouts, values) if store is not None and layouts else {}
     described = describe(
         scene,
         chosen,
         offered,
         prices,
-        {key: planned.even.pixels(key).size for key in offered},
+        {key: checks.planned.even.pixels(key).size for key in offered},
         {key: one.revision for key, one in built.items()},
     )
-    choice = Choice(
+    choice = SceneChoice(
         brdfdb=version("brdfdb"),
         when=datetime.now(UTC),
         machine=terminal.machine(),
@@ -147,7 +182,7 @@ def _run(
     out.mkdir(parents=True, exist_ok=True)
     (out / "choice.json").write_text(choice.model_dump_json(indent=1) + "\n", encoding="utf-8")
     left_out = [f"{one.material}: {out.title}" for one in described for out in one.left_out]
-    _draw(out / Path(name).stem, planned.even, offered, chosen, left_out)
+    _draw(out / Path(name).stem, checks.planned.even, offered, chosen, left_out)
     _print(choice, built)
     if store is not None and not built:
         print("nothing to build: no table was chosen")
@@ -155,30 +190,30 @@ def _run(
     return choice
 
 
-def _looks(
-    scene: Scene, view: View, offered: Mapping[str, Sequence[OfferedForm]], materials: Mapping[str, Reflector]
-) -> tuple[Look, Callable[[int], Look | None]]:
-    """Return the scene where forms are compared, and a function from the number of a check to fresh places."""
+def _checks(
+    scene: Scene, view: CameraView, offered: Mapping[str, Sequence[OfferedForm]], materials: Mapping[str, Reflector]
+) -> _Checks:
+    """Return the places of a scene: those of the picture, and for each check others. A recorded scene has no others."""
     truths = {key: forms[0] for key, forms in offered.items()}
     picture = Seen(scene, view, truths, materials)
     if isinstance(scene.objects[0].shape, Recorded):
-        return Look(picture, None), lambda _: None
+        return _Checks(Look(picture, None), lambda _: None)
 
     def at(places: Array) -> Seen:
         return Seen(scene, gather_at(scene, places), truths, materials)
 
-    def beside_edges(number: int) -> Seen:
+    def near_edges(number: int) -> Seen:
         rng = np.random.default_rng([SEED, number, 0])
         return at(sample_positions.at_edges(scene, view.width, view.height, EDGES, rng))
 
     def check(number: int) -> Look:
         rng = np.random.default_rng([SEED, number, 1])
-        return Look(at(sample_positions.even(FINER * view.width, FINER * view.height, rng)), beside_edges(number))
+        return Look(at(sample_positions.even(FINER * view.width, FINER * view.height, rng)), near_edges(number))
 
-    return Look(picture, beside_edges(0)), check
+    return _Checks(Look(picture, near_edges(0)), check)
 
 
-def _pairs(view: View, material: str) -> tuple[Array, Array]:
+def _pairs(view: CameraView, material: str) -> _Pairs:
     """Return pairs of directions (n, 3) at which the scene evaluates a material, shuffled; at least one."""
     pairs = [
         (points.wi[light, point], points.wr[point])
@@ -190,16 +225,17 @@ def _pairs(view: View, material: str) -> tuple[Array, Array]:
     if not len(wi):  # the material is in shadow
         wi = wr = np.array([[0.0, 0.0, 1.0]])
     mixed = np.random.default_rng(SEED).permutation(len(wi))[:TIMED]
-    return wi[mixed], wr[mixed]
+    return _Pairs(wi[mixed], wr[mixed])
 
 
-def _prices(forms: Sequence[OfferedForm], wi: Array, wr: Array, weigh: Weigh) -> list[Price]:
+def _prices(forms: Sequence[OfferedForm], pairs: _Pairs, weigh: Weigh) -> list[Price]:
     """Return the costs of forms at the wavelengths of the scene."""
-    times = timing.times([offered.form for offered in forms], wi, wr, most=TIMED, rounds=ROUNDS)
+    times = timing.times([offered.form for offered in forms], pairs.wi, pairs.wr, most=TIMED, rounds=ROUNDS)
     prices = []
     for offered, time in zip(forms, times, strict=True):
         form = offered.form
-        ns = time.quartiles_ns[1] * form.evaluate(wi[:1].astype(form.dtype), wr[:1].astype(form.dtype)).size
+        wavelengths = form.evaluate(pairs.wi[:1].astype(form.dtype), pairs.wr[:1].astype(form.dtype)).size
+        ns = time.quartiles_ns[1] * wavelengths
         # relative to the exact form in the same round: a busy machine slows both down
         shares = time.seconds / times[0].seconds
         costs = {"time": shares, "bytes": np.full(ROUNDS, float(form.bytes)), "both": shares * form.bytes}
@@ -215,8 +251,6 @@ def _draw(
     left_out: Sequence[str],
 ) -> None:
     """Write the comparison as a picture, and the exact and the chosen one as spectral EXR."""
-    from brdfdb_pipelines import choice_picture
-
     picks = {key: decision.pick for key, decision in chosen.items()}
     choice = seen.picture({key: offered[key][one.chosen] for key, one in picks.items()})
     lesser = {key: offered[key][one.cheaper] for key, one in picks.items() if one.cheaper is not None}
@@ -224,12 +258,12 @@ def _draw(
     for picture, suffix in ((seen.truth, "truth"), (choice, "choice")):
         image.write_exr(stem.with_name(f"{stem.name}-{suffix}.exr"), seen.scene, picture)
     cheaper = seen.picture({**best, **lesser}) if lesser else None
-    stem.with_name(f"{stem.name}.png").write_bytes(choice_picture.png(seen, choice, cheaper, left_out))
+    stem.with_name(f"{stem.name}.png").write_bytes(png(seen, choice, cheaper, left_out))
 
 
-def _print(choice: Choice, built: Mapping[str, Built]) -> None:
+def _print(choice: SceneChoice, built: Mapping[str, PublishedChoice]) -> None:
     """Print the choices as a table, their reasons, and the tables that were published."""
-    numbers = ("alone", "whole", "largest", "ns", "bytes", "share of the truth")
+    numbers = ("alone", "together", "largest", "ns", "bytes", "share of the truth")
     rows = [
         (
             one.material,
@@ -252,3 +286,129 @@ def _print(choice: Choice, built: Mapping[str, Built]) -> None:
         if one.material in built:
             print(f"    {built[one.material].sentence}")
     print(choice.statement)
+
+
+def publish_choices(
+    root: Path, layouts: Mapping[str, Layout], values: Mapping[str, NDArray[np.float32] | None] | None = None
+) -> dict[str, PublishedChoice]:
+    """Publish tables under names of materials, each with its error against the model that it stands for.
+
+    A table that is current already stays. Tables without values are tabulated. StoreError if the store cannot be
+    written.
+    """
+    built = {}
+    with terminal.progress() as bar:
+        task = bar.add_task("building tables", total=len(layouts))
+        for name, layout in layouts.items():
+            built[name] = _published(root, name, layout, (values or {}).get(name))
+            bar.advance(task)
+    return built
+
+
+def _published(root: Path, name: str, layout: Layout, values: NDArray[np.float32] | None) -> PublishedChoice:
+    store = Store(root)
+    if _is_there(store, name, layout):
+        return PublishedChoice(store.head(name), f"{store.head(name)} of the store is this table")
+    if name not in store:
+        before = "is new in the store"
+    else:
+        try:
+            head = store.summary(name)
+            error_before = terminal.error(head.get("error_p99"))
+            before = f"replaces {head['revision']}, of {head['model']}, whose error was {error_before}"
+        except StoreError:
+            before = "replaces a damaged revision"
+    revision, _, error = publish_layout(root, name, layout, values=values)
+    model = layout.source.attributes().get("model", "a function")
+    stated = f"{model}, whose error (p99) is {terminal.error(error.overall.p99)}"
+    return PublishedChoice(revision, f"{revision} is a table of {stated}; it {before}")
+
+
+def _is_there(store: Store, name: str, layout: Layout) -> bool:
+    """Return True if the current table has this layout, for any reason, states its error, and is undamaged."""
+    if name not in store:
+        return False
+    wanted = frame(layout)
+    arrays = {**wanted.variables, **wanted.coordinates}
+    try:
+        store.verify(name)
+        stored, metadata = store.dataset(name), store.metadata(name)
+    except StoreError:
+        return False
+    known = metadata.attributes()
+    return (
+        metadata.error is not None
+        and all(known.get(key) == value for key, value in wanted.attrs.items() if key != "reason")
+        and all(key in stored and np.array_equal(stored[key], array.values) for key, array in arrays.items())
+    )
+
+
+def with_reason(layout: Layout, title: str, wanted: str) -> Layout:
+    """Return a layout whose reason names the scene that it was chosen for."""
+    planned = f"; {layout.reason}" if layout.reason else ""
+    return replace(layout, reason=f"{title}, chosen for {wanted}{planned}")
+
+
+def png(seen: Seen, choice: Array, cheaper: Array | None, left_out: Sequence[str] = ()) -> bytes:
+    """Draw truth, choice and next cheaper forms, and below them a colour bar and the differences of the two.
+
+    The forms that could not be made are listed below the bar. `cheaper` is None if nothing is cheaper.
+    """
+    import matplotlib as mpl
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
+    from matplotlib.figure import Figure
+
+    height, width = seen.truth.shape[:2]
+    times = max(1, round(_PANEL / width))
+    across, down = times * width, times * height
+    wide, high = 3 * across + 4 * _GAP, 2 * (down + _TITLE) + 2 * _GAP
+    canvas = Figure(figsize=(wide / _DPI, high / _DPI), dpi=_DPI, facecolor="white")
+
+    def panel(column: int, row: int, title: str, size: tuple[int, int] = (across, down)) -> Axes:
+        left, top = _GAP + column * (across + _GAP), (row + 1) * _TITLE + row * (down + _GAP)
+        axes = canvas.add_axes((left / wide, 1.0 - (top + size[1]) / high, size[0] / wide, size[1] / high))
+        axes.set_title(title, **_TEXT)
+        return axes
+
+    tolerance = seen.scene.tolerance
+    most = TIMES * tolerance.value
+    scale, colours = Normalize(0.0, most), mpl.colormaps["viridis"].with_extremes(over=BEYOND)
+    last = "nothing is cheaper" if cheaper is None else "next cheaper of each material"
+    images = (("truth", seen.truth), ("choice", choice), (last, cheaper))
+    for column, (title, picture) in enumerate(images):
+        axes = panel(column, 0, title)
+        axes.set_axis_off()
+        if picture is None:
+            continue
+        axes.imshow(image.srgb(seen.scene, picture), interpolation="nearest", aspect="auto")
+        if column > 0:
+            off = seen.differences(picture)
+            below = panel(column, 1, f"off by {off.max():.2g} at most")
+            below.imshow(off, norm=scale, cmap=colours, interpolation="nearest", aspect="auto")
+            below.set_axis_off()
+    unit = "CIEDE2000" if tolerance.unit == "CIEDE2000" else "relative, at the worst wavelength"
+    bar = canvas.colorbar(
+        ScalarMappable(scale, colours),
+        cax=panel(0, 1, f"difference from the truth, {unit}", (across - _MORE, BAR)),
+        orientation="horizontal",
+        extend="max",
+        ticks=[0.0, tolerance.value, most],
+    )
+    bar.ax.set_xticklabels(["0", f"{tolerance.value:g}, the tolerance", f"{most:g}"], **_TEXT)
+    bar.ax.axvline(tolerance.value, color="white", linewidth=2.0)
+    beside: dict[str, Any] = {"xycoords": "axes fraction", "textcoords": "offset pixels", "va": "center"}
+    bar.ax.annotate("more", (1.0, 0.5), (_MORE / 2.0, 0.0), **beside, **_TEXT)
+    if left_out:
+        bar.ax.annotate(
+            "\n".join(["cannot be made:", *left_out]),
+            (0.0, 0.0),
+            (0.0, -3.0 * BAR),
+            xycoords="axes fraction",
+            textcoords="offset pixels",
+            va="top",
+            **_TEXT,
+        )
+    data = io.BytesIO()
+    canvas.savefig(data, format="png", dpi=_DPI, metadata={"Software": None})
+    return data.getvalue()

@@ -21,30 +21,29 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from brdfdb.errors import BrdfdbError, UnknownMaterialError, missing_extra
-from brdfdb_pipelines.commands import commands
+from brdfdb_pipelines.commands import BUG, INTERRUPTED, REFUSED, TERMINATED, VIOLATED, commands
 from brdfdb_pipelines.commands._arguments import place
-from brdfdb_pipelines.exit_codes import BUG, INTERRUPTED, REFUSED, TERMINATED, VIOLATED
 
 # Errors of the operating system that concern the machine, also where they name no file
 _MACHINE = {
     *(errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EIO),
     *(errno.ENOMEM, errno.EAGAIN, errno.EMFILE, errno.ENFILE),
 }
-# Commands that evaluate no model, or one value: importing numba and loading compiled kernels takes longer
+# Commands that evaluate no model, or a single value: compiled kernels would take longer to load
 _WITHOUT_KERNELS = {"gc", "history", "list", "lookup", "rollback", "snapshot", "verify"}
-_TELL = {"audit", "build", "serve"}  # commands that say in their own way that kernels compile
-# Allocations between two searches for garbage: a command allocates modules and tables, which stay. Python's 700 cost it
-# up to a tenth of the time
+_TELL = {"audit", "build", "serve"}  # commands with their own message on the compilation of kernels
+# Allocations between two garbage collections. A command allocates modules and tables that live until its end; with
+# Python's 700, collections take up to a tenth of its time
 _ALLOCATIONS = 50_000
 _MODELS = "files of models"  # begins the names under which parsers keep --models
 _EPILOG = f"""\
 exit codes:
   0    done
-  {VIOLATED}    an audit found a violation that is neither known nor allowed, or export --strict wrote a far file
-  {REFUSED}    refused or impossible, for the reason on stderr: bad input, a damaged store, a full disk, a missing extra
+  {VIOLATED}    audit: an unknown violation, or a table that cannot be judged; export --strict: an inaccurate file
+  {REFUSED}    refused or impossible; stderr has the reason: bad input, a damaged store, a full disk, a missing extra
   {BUG}   a bug of brdfdb; stderr names the file with the traceback
   {INTERRUPTED}  interrupted by Ctrl-C
-  {TERMINATED}  ended by SIGTERM, as cleanly as by Ctrl-C
+  {TERMINATED}  ended by SIGTERM, in the same way as by Ctrl-C
 """
 
 
@@ -56,7 +55,7 @@ class _Parser(argparse.ArgumentParser):
         group = self.add_argument_group("options of every command")
         # A default of a command, or a name that it shares, would replace what stands before the command
         group.add_argument(
-            "--debug", action="store_true", default=argparse.SUPPRESS, help="print the traceback of an error, too"
+            "--debug", action="store_true", default=argparse.SUPPRESS, help="also print the traceback of an error"
         )
         group.add_argument(
             "--models",
@@ -65,8 +64,7 @@ class _Parser(argparse.ArgumentParser):
             dest=f"{_MODELS} of {self.prog}",
             default=argparse.SUPPRESS,
             metavar="FILE",
-            help="a Python file with models of yours, for this command and the processes that it starts; may be "
-            "repeated (default: $BRDFDB_MODELS)",
+            help="a Python file with your own models; may be repeated (default: $BRDFDB_MODELS)",
         )
 
     def _check_value(self, action: argparse.Action, value: Any) -> None:
@@ -113,7 +111,7 @@ def _command(arguments: Sequence[str]) -> str:
 
 @contextlib.contextmanager
 def _sigterm_as_ctrl_c() -> Iterator[list[int]]:
-    """Treat SIGTERM like Ctrl-C, so that no half file is left, and give a list of the signals that came."""
+    """Treat SIGTERM like Ctrl-C, so that no incomplete file remains; yield the list of received signals."""
     received: list[int] = []
 
     def stop(number: int, _: object) -> None:
@@ -159,7 +157,7 @@ def _run(options: argparse.Namespace, arguments: Sequence[str]) -> int:
 
 
 def _telling_of_compilation(command: str) -> contextlib.AbstractContextManager[None]:
-    """Say once when a command compiles a kernel, which takes seconds; not of commands that do so, or compile none."""
+    """Print a message when a command starts to compile kernels, which takes seconds."""
     if command in _WITHOUT_KERNELS | _TELL:
         return contextlib.nullcontext()
     from brdfdb._numba import when_compiling
@@ -172,8 +170,7 @@ def _parser(arguments: Sequence[str] | None = None) -> argparse.ArgumentParser:
     """Return the parser of the commands that the arguments name, with the names of all others; None: of all."""
     parser = _Parser(
         prog="brdfdb",
-        description="Spectral BRDF tables from published surface parameters: build, audit, chart, export, look up, "
-        "serve.",
+        description="Build, audit, chart, export, look up and serve BRDF tables of published surface parameters.",
         epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
@@ -201,7 +198,12 @@ def _refusal(error: Exception) -> str | None:
     """Return the sentence of an error that the user can act on; None for a bug of this program."""
     match error:
         case UnknownMaterialError(kind="material"):
-            return f"{error}{_of_library(error.name)}"
+            from brdfdb.materials import libraries, presets
+
+            library = next((library for library in libraries() if error.name in presets(library)), None)
+            if library is None:
+                return str(error)
+            return f"{error}; it is a preset of the library {library}, and not built in this store"
         case BrdfdbError():
             return str(error)
         case OSError(filename=str() | bytes() | os.PathLike() as file):
@@ -217,28 +219,20 @@ def _refusal(error: Exception) -> str | None:
             return None
 
 
-def _of_library(name: str) -> str:
-    """Return a phrase on the library of presets that a name is in; empty if there is none."""
-    from brdfdb_pipelines.preset_names import library_of
-
-    library = library_of(name)
-    return "" if library is None else f"; it is a preset of the library {library}, and not built in this store"
-
-
 def _bug(error: Exception, arguments: Sequence[str]) -> str:
     """Write the traceback of a bug to a file and return the sentence that says where it is."""
     import brdfdb
 
     text = "".join(traceback.format_exception(error))
     head = f"brdfdb {brdfdb.__version__}, Python {platform.python_version()}, {platform.platform()}"
-    what = "this is a bug of brdfdb, please report it"
+    what = "this is a bug of brdfdb; please report it"
     try:
         descriptor, path = tempfile.mkstemp(prefix="brdfdb-", suffix=".txt", text=True)
         with open(descriptor, "w", encoding="utf-8", errors="backslashreplace") as file:
             file.write(f"{head}\n{shlex.join(['brdfdb', *arguments])}\n{text}")
     except OSError:
         print(text, end="", file=sys.stderr)
-        return f"{what}; its traceback stands above ({type(error).__name__})"
+        return f"{what}; its traceback is printed above ({type(error).__name__})"
     return f"{what}; its traceback is in {path} ({type(error).__name__}: {error})"
 
 

@@ -15,9 +15,9 @@ from pydantic import BaseModel
 from brdfdb.audit import AuditReport
 from brdfdb.conversion.document import Conversion
 from brdfdb.fitting.document import Fits
-from brdfdb.forms.tradeoff_document import Charts
+from brdfdb.forms.tradeoff import Charts
 from brdfdb.materials import Material
-from brdfdb.scenes.choice_document import Choice
+from brdfdb.scenes.choice import SceneChoice
 from brdfdb.scenes.scene import Scene
 from brdfdb.store.family import FamilyRecord
 from brdfdb.tables.metadata import TableMetadata
@@ -26,7 +26,7 @@ from brdfdb_pipelines.recipe_file import Recipe
 SCHEMAS: dict[str, type[BaseModel]] = {
     "audit": AuditReport,
     "chart": Charts,
-    "choice": Choice,
+    "choice": SceneChoice,
     "conversion": Conversion,
     "family": FamilyRecord,
     "fits": Fits,

@@ -39,17 +39,11 @@ def run(
     audit: Path | None,
     jobs: int,
 ) -> bool:
-    """Write the named materials of a store, or all of them, in a format of `EXPORTERS`, and print what was written.
+    """Write the named materials of a store, or all of them, as files; return whether all are accurate enough.
 
     A format with several kinds of files writes one of each, NAME_KIND.SUFFIX, unless the options choose a kind. Of all
     materials, those that the format cannot hold are left out and named. `audit` is the report whose verdicts are
-    written; None: that of the store, if it has one. A few materials are written by `jobs` threads, more by as many
-    processes.
-
-    Returns
-    -------
-    bool
-        True if each file is as near to its table as was asked for.
+    written, by default that of the store. A few materials are written by `jobs` threads, more by as many processes.
 
     Raises
     ------
@@ -114,7 +108,7 @@ def _verdicts(root: Path, audit: Path | None, revisions: Mapping[str, str]) -> d
         ours = [entry for entry in materials if is_of_store(root, entry)]
         given = {(entry["material"], entry["revision"]): entry["verdict"] for entry in ours}
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-        reason = error.strerror if isinstance(error, OSError) else "it is no report of `brdfdb audit`"
+        reason = error.strerror if isinstance(error, OSError) else "it is not a report of `brdfdb audit`"
         raise ParameterError("audit", f"{audit} cannot be read: {reason}", str(audit)) from None
     return {key[0]: given[key] for key in revisions.items() if key in given}
 
@@ -123,19 +117,19 @@ def _report(exports: list[_Export], directory: Path, file_format: str) -> bool:
     """Print what was written, and what is beyond its tolerance; return True if nothing is beyond."""
     written = [(export.name, files) for export in exports for files in export.files]
     beside, total = sum(len(files.paths) - 1 for _, files in written), sum(files.nbytes for _, files in written)
-    others = f" and {beside} beside {'it' if len(written) == 1 else 'them'}" if beside else ""
+    others = f" and {beside} more" if beside else ""
     print(f"{counted(len(written), f'{file_format.upper()} file')}{others}, {terminal.size(total)}, in {directory}")
     stated = [(files.error.document()["p99"], files.paths[0].name) for _, files in written if files.error is not None]
     if stated:
         worst, file = max(stated)
-        print(f"error against the table: 99 of 100 values within {_share(worst)} ({file}), each file states its own")
+        print(f"error relative to the table: 99 % of the values within {_share(worst)} ({file}); files state theirs")
     known = [(files.error.statement, files.paths[0].name) for _, files in written if files.error is not None]
     if statements := [(statement, name) for statement, name in known if statement is not None]:
         whole, file = max(statements, key=lambda item: item[0].p98)
         rows = whole.places
         light, horizon = max(rows.alongside), max(rows.one_grazing + rows.both_grazing)
         print(
-            f"error against {whole.against}, with that of the table: 98 of 100 values within {_share(whole.p98)} "
+            f"error relative to {whole.against}, with that of the table: 98 % of the values within {_share(whole.p98)} "
             f"({file}), near the light {_share(light)}, next to the horizon {_share(horizon)}"
         )
     beyond = [files for _, files in written if not files.within]
@@ -143,7 +137,7 @@ def _report(exports: list[_Export], directory: Path, file_format: str) -> bool:
         assert files.error is not None
         assert files.tolerance is not None
         p99 = files.error.document()["p99"]
-        print(f"{files.paths[0].name}: {_share(p99)}, beyond the tolerance of {_share(files.tolerance)}")
+        print(f"{files.paths[0].name}: {_share(p99)}, above the tolerance of {_share(files.tolerance)}")
     for remark in sorted({remark for _, files in written for remark in files.remarks}):
         names = list(dict.fromkeys(name for name, files in written if remark in files.remarks))
         more = f" and {counted(len(names) - _NAMED, 'other material')}" if len(names) > _NAMED else ""

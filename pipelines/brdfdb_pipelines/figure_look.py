@@ -28,10 +28,10 @@ VARIABLES = {
 }
 
 
-class Look(NamedTuple):
-    """Look of a line, and the lines below it: a thin truth stays visible on a strong line of ours.
+class LineStyle(NamedTuple):
+    """Style of a line; lines of a higher order lie above, so that a thin truth stays visible on a thick line of ours.
 
-    Dashes are in widths of the line.
+    The width is in points, dashes are in widths of the line.
     """
 
     colour: str
@@ -40,15 +40,23 @@ class Look(NamedTuple):
     order: int
 
 
-_LOOKS = {
-    "ours": Look(OURS, 2.2, (), 3),
-    "printed": Look(PRINTED, 1.5, (4, 2), 4),
-    "textbook": Look(TEXTBOOK, 1.6, (1, 1.4), 4),
-    "truth": Look(TRUTH, 0.9, (), 5),
+_STYLES = {
+    "ours": LineStyle(OURS, 2.2, (), 3),
+    "printed": LineStyle(PRINTED, 1.5, (4, 2), 4),
+    "textbook": LineStyle(TEXTBOOK, 1.6, (1, 1.4), 4),
+    "truth": LineStyle(TRUTH, 0.9, (), 5),
 }
 DOT = 3.4  # diameter [point] of a sample
-GRID_WIDTH, FRAME_WIDTH = 0.6, 0.8  # widths [point] of lines of the grid and of axes
+GRID_WIDTH = 0.6  # width [point] of lines of the grid
+FRAME_WIDTH = 0.8  # width [point] of axes
 _OTHER_DASHES = ((), (6, 1.5), (5, 1.5, 1, 1.5), (2, 1), (8, 1.5, 1, 1.5, 1, 1.5), (1, 2.5))
+
+
+class Limits(NamedTuple):
+    """The ends of an axis."""
+
+    low: float
+    high: float
 
 
 class Tick(NamedTuple):
@@ -58,48 +66,49 @@ class Tick(NamedTuple):
     label: str
 
 
-def looks_of(curves: Sequence[Curve]) -> list[Look]:
-    """Return the look of each curve: that of its role, or the next of the cycle."""
-    looks, others = [], 0
-    seen: Counter[Role] = Counter()
+def styles_of(curves: Sequence[Curve]) -> list[LineStyle]:
+    """Return the style of each curve: that of its role, or the next of the cycle."""
+    styles, others = [], 0
+    used: Counter[Role] = Counter()
     for curve in curves:
         if curve.role == "other":
-            look = Look(OTHERS[others % len(OTHERS)], 1.5, _OTHER_DASHES[others % len(OTHERS)], 3)
+            style = LineStyle(OTHERS[others % len(OTHERS)], 1.5, _OTHER_DASHES[others % len(OTHERS)], 3)
             others += 1
         else:
-            look = _LOOKS[curve.role]
-            if seen[curve.role]:  # more of one role: the same colour, other dashes
-                look = look._replace(dashes=_OTHER_DASHES[(seen[curve.role] + 1) % len(_OTHER_DASHES)])
-            seen[curve.role] += 1
-        looks.append(look)
-    return looks
+            style = _STYLES[curve.role]
+            if used[curve.role]:  # more curves of one role: the same colour, other dashes
+                style = style._replace(dashes=_OTHER_DASHES[(used[curve.role] + 1) % len(_OTHER_DASHES)])
+            used[curve.role] += 1
+        styles.append(style)
+    return styles
 
 
-def limits_of(values: Iterable[float | None], which: Literal["x", "y"], *, log: bool) -> tuple[float, float]:
+def limits_of(values: Iterable[float | None], which: Literal["x", "y"], *, log: bool) -> Limits:
     """Return the limits of an axis; they start at 0 where that costs less than half of the height."""
     finite = [v for v in values if v is not None and math.isfinite(v) and (v > 0.0 or not log)]
     low, high = (min(finite), max(finite)) if finite else (0.1, 1.0)
     if log:
         low, high = (low / 2.0, high * 2.0) if low == high else (low, high)
         pad = (high / low) ** (0.04 if which == "y" else 0.0)
-        return low / pad, high * pad
+        return Limits(low / pad, high * pad)
     if low == high:
         low, high = low - 0.5, high + 0.5
     if which == "x":
-        return low, high
+        return Limits(low, high)
     if 0.0 <= low < 0.5 * high:
         low = 0.0
     pad = 0.04 * (high - low)
-    return (low if low == 0.0 else low - pad), high + pad
+    return Limits(low if low == 0.0 else low - pad, high + pad)
 
 
-def ticks_of(low: float, high: float, *, log: bool, powers: bool = False) -> list[Tick]:
+def ticks_of(limits: Limits, *, log: bool, powers: bool = False) -> list[Tick]:
     """Return the ticks of an axis.
 
     With `powers`, logarithmic axes have powers of ten as labels whatever their range, for panels side by side.
     """
     from matplotlib.ticker import LogLocator, MaxNLocator, MultipleLocator  # it takes 0.2 s to load
 
+    low, high = limits
     span = high - low
     if log and high / low > 20.0:
         locator: LogLocator | MaxNLocator | MultipleLocator = LogLocator(numticks=6)

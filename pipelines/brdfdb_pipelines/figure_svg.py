@@ -23,13 +23,14 @@ from brdfdb_pipelines.figure_look import (
     MUTED,
     TRUTH,
     VARIABLES,
-    Look,
+    Limits,
+    LineStyle,
     Tick,
     array_of,
     limits_of,
-    looks_of,
     plain,
     rings_of,
+    styles_of,
     ticks_of,
 )
 
@@ -38,38 +39,37 @@ Drawing = Panel | Map | Picture
 
 PLATE = "#14171c"  # behind pictures, in the dark as in the light
 
-# In points, of which a figure is as wide whatever it shows: rows of figures keep in line
-WIDTH, _PLOT_HEIGHT, _LEFT, _RIGHT, _BELOW, _ROW, _TITLE = 300.0, 150.0, 44.0, 10.0, 34.0, 12.0, 15.0
-_POLAR_HEIGHT, _POLAR_BELOW = 156.0, 18.0
-_MAP_HEIGHT, _MAP_RIGHT, _BAR_GAP, _BAR_WIDTH = 162.0, 62.0, 7.5, 7.5
-_LETTER, _SAMPLE = 4.9, 34.0  # width of a letter of the legend, on average, and of what stands around the text
-_HANDLE = 20.8  # length of the line before a text of the legend
-# Widths of the characters of ticks
-_DIGIT, _SIGN, _POINT, _RAISED = 5.1, 6.7, 2.5, 3.4
+# Lengths in points. All figures have the same width, so that figures in a row are aligned
+WIDTH = 300.0
+_PLOT_HEIGHT = 150.0
+_LEFT = 44.0
+_RIGHT = 10.0
+_BELOW = 34.0
+_ROW = 12.0  # row of a legend
+_TITLE = 15.0
+_POLAR_HEIGHT = 156.0
+_POLAR_BELOW = 18.0
+_MAP_HEIGHT = 162.0
+_MAP_RIGHT = 62.0  # with the colour bar
+_BAR_GAP = 7.5
+_BAR_WIDTH = 7.5
+_LETTER = 4.9  # mean width of a letter of the legend
+_SAMPLE = 34.0  # line of a legend and the space around its text
+_HANDLE = 20.8  # line before a text of the legend
+_DIGIT = 5.1  # width of a digit of a tick
+_SIGN = 6.7  # width of its minus
+_POINT = 2.5  # width of its decimal point
+_RAISED = 3.4  # width of a digit of an exponent
+_FAR = 2000.0  # distance below the axes of values without a logarithm: their line leaves the plot
+
 _COLOURS = 65  # number of colours of the bar beside a map
-_FAR = 2000.0  # distance below the axes of what has no logarithm: its line leaves the plot
 
 
 def svg(drawing: Drawing, key: str) -> str:
-    """Draw a panel, a map or a picture.
+    """Draw a panel, a map or a picture as an ``svg`` element without a size, for a page that defines the `VARIABLES`.
 
-    Parameters
-    ----------
-    drawing : Panel or Map or Picture
-        What to draw.
-    key : str
-        Unique on the page: what the ids in the SVG begin with.
-
-    Returns
-    -------
-    str
-        An ``svg`` element without a size, for a page that defines the `VARIABLES`. Lines of a panel stand in groups
-        with the attribute ``data-curve``, their index.
-
-    Raises
-    ------
-    ValueError
-        If a polar panel asks for logarithmic axes, or has angles beyond -90 to 90 degrees.
+    Ids begin with the key, which is unique on the page. Lines of a panel stand in groups with the attribute
+    ``data-curve``, their index. ValueError if a polar panel has logarithmic axes, or angles beyond -90 to 90 degrees.
     """
     if isinstance(drawing, Picture):
         return _picture(drawing)
@@ -81,15 +81,14 @@ def svg(drawing: Drawing, key: str) -> str:
 class _Axis(NamedTuple):
     """An axis: its limits, and where they lie in the drawing."""
 
-    low: float
-    high: float
+    limits: Limits
     begin: float
     end: float
     log: bool
 
     def at(self, values: Floats) -> Floats:
         """Return the positions of values; what has no logarithm lies far before the beginning."""
-        low, high = self.low, self.high
+        low, high = self.limits
         if self.log:
             low, high = math.log(low), math.log(high)
             with np.errstate(divide="ignore"):
@@ -100,14 +99,17 @@ class _Axis(NamedTuple):
 
     def values_at(self, positions: NDArray[np.floating]) -> Floats:
         """Return the values at positions."""
+        low, high = self.limits
         share = (positions - self.begin) / (self.end - self.begin)
         if self.log:
-            return np.asarray(self.low * (self.high / self.low) ** share)
-        return np.asarray(self.low + (self.high - self.low) * share)
+            return np.asarray(low * (high / low) ** share)
+        return np.asarray(low + (high - low) * share)
 
-    def placed(self, ticks: Sequence[Tick]) -> list[tuple[float, str]]:
-        """Return the positions of ticks, with their labels."""
-        return list(zip(self.at(np.array([tick.at for tick in ticks])).tolist(), (t.label for t in ticks), strict=True))
+    def ticks(self) -> list[Tick]:
+        """Return the ticks at their positions in the drawing."""
+        ticks = ticks_of(self.limits, log=self.log)
+        positions = self.at(np.array([tick.at for tick in ticks])).tolist()
+        return [tick._replace(at=at) for at, tick in zip(positions, ticks, strict=True)]
 
 
 class _Box(NamedTuple):
@@ -127,10 +129,10 @@ class _Box(NamedTuple):
 def _curves(panel: Panel, key: str) -> str:
     box = _box(panel.title, panel.curves, _PLOT_HEIGHT, _BELOW)
     limits = limits_of([x for curve in panel.curves for x in curve.x], "x", log=panel.log_x)
-    x = _Axis(*limits, box.left, box.right, panel.log_x)
+    x = _Axis(limits, box.left, box.right, panel.log_x)
     limits = limits_of([y for curve in panel.curves for y in curve.y], "y", log=panel.log_y)
-    y = _Axis(*limits, box.bottom, box.top, panel.log_y)
-    across, up = (axis.placed(ticks_of(axis.low, axis.high, log=axis.log)) for axis in (x, y))
+    y = _Axis(limits, box.bottom, box.top, panel.log_y)
+    across, up = x.ticks(), y.ticks()
     grid = "".join(f"M{_n(at)} {_n(box.top)}V{_n(box.bottom)}" for at, _ in across)
     grid += "".join(f"M{_n(box.left)} {_n(at)}H{_n(box.right)}" for at, _ in up)
     frame = f"M{_n(box.left)} {_n(box.top)}V{_n(box.bottom)}H{_n(box.right)}"
@@ -194,7 +196,7 @@ def _map(drawn: Map) -> str:
         low, high = (low / 2.0, 2.0 * high) if drawn.log else (low - 0.5, high + 0.5)
     low = low if drawn.low is None else drawn.low
     high = high if drawn.high is None else drawn.high
-    bar = _Axis(low, high, box.bottom, box.top, drawn.log)
+    bar = _Axis(Limits(low, high), box.bottom, box.top, drawn.log)
 
     def pixels(values: Floats) -> NDArray[np.uint8]:
         share = (bar.at(values) - bar.begin) / (bar.end - bar.begin)
@@ -205,14 +207,14 @@ def _map(drawn: Map) -> str:
     # Half of the outermost values would lie beyond the axes
     whole = len(drawn.x) > 1 and len(drawn.y) > 1
     (left, *_, right), (below, *_, above) = (drawn.x, drawn.y) if whole else (x_edges.tolist(), y_edges.tolist())
-    x = _Axis(left, right, box.left, box.right, drawn.log_x)
-    y = _Axis(below, above, box.bottom, box.top, drawn.log_y)
+    x = _Axis(Limits(left, right), box.left, box.right, drawn.log_x)
+    y = _Axis(Limits(below, above), box.bottom, box.top, drawn.log_y)
     columns = _cells(x_edges, x.values_at(box.left + 0.5 + np.arange(round(box.right - box.left))))
     rows = _cells(y_edges, y.values_at(box.top + 0.5 + np.arange(round(box.bottom - box.top))))
     at = box.right + _BAR_GAP
     steps = bar.values_at(box.top + (np.arange(_COLOURS) + 0.5) * ((box.bottom - box.top) / _COLOURS))
     bar_box = box._replace(left=at, right=at + _BAR_WIDTH)
-    across, up, beside = (axis.placed(ticks_of(axis.low, axis.high, log=axis.log)) for axis in (x, y, bar))
+    across, up, beside = x.ticks(), y.ticks(), bar.ticks()
     parts = [
         _image(pixels(values[rows[:, np.newaxis], columns]), box),
         _image(pixels(steps[:, np.newaxis]), bar_box),
@@ -309,24 +311,24 @@ def _legend(curves: Sequence[Curve], above: float) -> str:
     columns = _columns(labels)
     column_of = np.array_split(np.arange(len(curves)), columns)
     lefts = np.cumsum([7.6, *_widths(labels, columns)]).tolist()
-    looks = looks_of(curves)
+    styles = styles_of(curves)
     handles, texts = "", ""
     for left, members in zip(lefts[:-1], column_of, strict=True):
         for row, index in enumerate(members.tolist()):
             y = 12.9 + above + _ROW * row
             path = f"M{_n(left + _HANDLE / 2.0)} {_n(y)}h0" if curves[index].dots else f"M{_n(left)} {_n(y)}h{_HANDLE}"
-            handles += f'<path d="{path}" {_drawn(curves[index], looks[index])}/>'
+            handles += f'<path d="{path}" {_drawn(curves[index], styles[index])}/>'
             texts += _text(left + _HANDLE + 4.0, y + 2.8, labels[index])
     return f'{handles}<g style="font-size:8px;fill:{_colour(TRUTH)}">{texts}</g>' if labels else ""
 
 
 def _lines(curves: Sequence[Curve], points: Sequence[tuple[Floats, Floats]], box: _Box, key: str) -> str:
     """Return the curves inside the axes, those above others last."""
-    looks = looks_of(curves)
+    styles = styles_of(curves)
     lines = [
         f'<g data-curve="{index}"><path d="{_path(*points[index], dots=curves[index].dots)}" '
-        f"{_drawn(curves[index], looks[index])}/></g>"
-        for index in sorted(range(len(curves)), key=lambda index: looks[index].order)
+        f"{_drawn(curves[index], styles[index])}/></g>"
+        for index in sorted(range(len(curves)), key=lambda index: styles[index].order)
     ]
     left, top, width, height = (_n(v) for v in (box.left, box.top, box.right - box.left, box.bottom - box.top))
     inside = f'<clipPath id="{key}-axes"><rect x="{left}" y="{top}" width="{width}" height="{height}"/></clipPath>'
@@ -345,12 +347,12 @@ def _path(x: Floats, y: Floats, *, dots: bool) -> str:
     return "".join(path)
 
 
-def _drawn(curve: Curve, look: Look) -> str:
+def _drawn(curve: Curve, style: LineStyle) -> str:
     """Return the attributes of the path of a curve."""
     if curve.dots:
-        return _line(look.colour, DOT, "round")
-    dashes = ",".join(_n(look.width * dash) for dash in look.dashes)
-    return _line(look.colour, look.width, "" if dashes else "square", dashes)
+        return _line(style.colour, DOT, "round")
+    dashes = ",".join(_n(style.width * dash) for dash in style.dashes)
+    return _line(style.colour, style.width, "" if dashes else "square", dashes)
 
 
 def _line(colour: str, width: float, cap: str = "", dashes: str = "") -> str:
@@ -373,15 +375,15 @@ def _png(pixels: NDArray[np.uint8]) -> str:
     return base64.b64encode(png_of(pixels, level=9)).decode("ascii")
 
 
-def _ticks_below(ticks: Iterable[tuple[float, str]], bottom: float) -> str:
+def _ticks_below(ticks: Iterable[Tick], bottom: float) -> str:
     return _labels("middle", "".join(_text(at, bottom + 9.6, label) for at, label in ticks))
 
 
-def _ticks_beside(ticks: Iterable[tuple[float, str]], x: float, anchor: str) -> str:
+def _ticks_beside(ticks: Iterable[Tick], x: float, anchor: str) -> str:
     return _labels(anchor, "".join(_text(x, at + 3.0, label) for at, label in ticks))
 
 
-def _widest(ticks: Iterable[tuple[float, str]]) -> float:
+def _widest(ticks: Iterable[Tick]) -> float:
     """Return the width [point] of the widest label."""
     widths = {**dict.fromkeys("0123456789", _DIGIT), "−": _SIGN, ".": _POINT}
     return max((sum(widths.get(letter, _RAISED) for letter in label) for _, label in ticks), default=0.0)

@@ -1,9 +1,9 @@
-"""The fit job: fits models to the samples of files, prints their ranking, and writes JSON, a page and a recipe."""
+"""The fit job: it fits models to samples, or lists published fits, and writes JSON, a page and a recipe."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -11,9 +11,12 @@ import numpy as np
 
 from brdfdb import formats
 from brdfdb.errors import BrdfdbError, ParameterError, counted
-from brdfdb.fitting.document import Estimate, Fit, Fits
+from brdfdb.figure import Figure
+from brdfdb.fitting import published
+from brdfdb.fitting.document import Estimate, Fits
 from brdfdb.fitting.figure import figure_of
 from brdfdb.fitting.fit import INTERRUPTED, fits
+from brdfdb.fitting.published import PublishedFit, PublishedFits
 from brdfdb.fitting.residuals import Kind
 from brdfdb.fitting.surface import fitted_by_default
 from brdfdb.geometry import degrees, radians, versine
@@ -25,50 +28,42 @@ from brdfdb_pipelines import terminal
 from brdfdb_pipelines.measured_job import MeasuredTable
 
 _SHOWN = 12  # channels of a number that are printed
-TOLERANCE = 0.05  # of the recipe that is written
-_WIDEST_DEG = 30.0  # full angle of a cone: wider ones are no directions
+_TOLERANCE = 0.05  # tolerance of a recipe that is written
+_WIDEST_DEG = 30.0  # full angle of a cone: wider cones have no direction
 
 
-def run(
-    data: Sequence[Path],
-    models: Sequence[str] | None = None,
-    *,
-    keys: Mapping[str, Any] | None = None,
-    residual: Kind = "log",
-    channel: str | None = None,
-    refractive_index: str | None = None,
-    receiver_deg: float | None = None,
-    source_deg: float | None = None,
-    json: Path | None = None,
-    page: Path | None = None,
-    recipe: Path | None = None,
-) -> Fits:
-    """Fit models to the samples of a file, or of several of one surface, and print the result.
+@dataclass(frozen=True)
+class FitOutputs:
+    """Files that a fit writes: all fits, a page with figures of the best fit, and its recipe."""
 
-    Before the search, what the reader noted and what looks wrong with the samples is printed, as by an import.
-    Ctrl-C ends the search. The models that were finished are ranked and written; `Fits.interrupted` is then true.
+    json: Path | None = None
+    page: Path | None = None
+    recipe: Path | None = None
 
-    Parameters
-    ----------
-    data : sequence of Path
-        Files that `brdfdb.formats.samples` reads. Several are joined, as by `brdfdb.measurements.joined`.
-    models : sequence of str, optional
-        Models and sums, by default all.
-    keys : mapping, optional
-        How the files are read: keys of `brdfdb_pipelines.measured_job.MeasuredTable`, `samples` apart.
-    residual, refractive_index
-        As of `brdfdb.fitting.fit.fits`.
-    channel : str, optional
-        The one channel that is fitted.
-    receiver_deg, source_deg : float [degree], optional
-        Full angles of the cones of receiver and light, as the sample sees them, in place of what the file states.
-    json, page, recipe : Path, optional
-        Files to write: all fits, figures, and the best model of the registry as a recipe.
 
-    Returns
-    -------
-    Fits
-        The document.
+@dataclass(frozen=True)
+class FitSettings:
+    """What is fitted to samples, and how the samples are read.
+
+    By default all models are fitted. `reading` are keys of `MeasuredTable`, without `samples`. Only one channel is
+    fitted if it is given. The full angles [degree] of the cones of receiver and light, seen from the sample, replace
+    those of the file.
+    """
+
+    models: Sequence[str] | None = None
+    reading: Mapping[str, Any] = field(default_factory=dict)
+    residual: Kind = "log"
+    channel: str | None = None
+    refractive_index: str | None = None
+    receiver_deg: float | None = None
+    source_deg: float | None = None
+
+
+def run(data: Sequence[Path], settings: FitSettings, outputs: FitOutputs) -> Fits:
+    """Fit models to the samples of a file, or of several files of one surface, and print the result.
+
+    The notes of the reader, and what looks wrong with the samples, are printed before the search. Ctrl-C ends the
+    search: finished models are ranked and written, and `Fits.interrupted` is true.
 
     Raises
     ------
@@ -77,11 +72,18 @@ def run(
     KeyboardInterrupt
         If no model was finished.
     BrdfdbError
-        If a recipe is asked for and no fit is one model of the registry.
+        If a recipe is asked for and no fit is a single model of the registry.
     """
-    samples = _seen(_read(data, keys or {}, channel), receiver_deg, source_deg)
-    _doubt(samples)
-    count = len(models or fitted_by_default()) + 1
+    table = MeasuredTable(samples=[str(file) for file in data], **settings.reading)
+    samples = joined(
+        [_of_channel(formats.samples(file, table.format, **table.keywords), settings.channel) for file in data]
+    )
+    samples = _with_cones(samples, settings)
+    stated = statement(samples)
+    for sentence in (*stated.notes, *stated.hints):
+        if sentence != samples.record.get("contradiction"):  # a remark of the fits
+            print(terminal.plain(f"{samples.name}: {sentence}"), flush=True)
+    count = len(settings.models or fitted_by_default()) + 1
     with terminal.progress(transient=True) as bar:
         task = bar.add_task("fit", total=count)
 
@@ -90,91 +92,83 @@ def run(
 
         document, fitted = fits(
             samples,
-            models,
-            residual=residual,
-            refractive_index=refractive_index,
+            settings.models,
+            residual=settings.residual,
+            refractive_index=settings.refractive_index,
             tick=tick,
             keep_finished=True,
         )
-    if json is not None:
-        write(json, document.model_dump_json(indent=1) + "\n")
-    if page is not None:
-        from brdfdb_pipelines import fit_page
-
-        write(page, fit_page.render(document, figure_of(document, fitted[0])))
+    if outputs.json is not None:
+        _write(outputs.json, document.model_dump_json(indent=1) + "\n")
+    if outputs.page is not None:
+        _write(outputs.page, _page(document, figure_of(document, fitted[0])))
     print(terminal.plain("\n".join(lines(document))))
-    if recipe is not None:
-        write(recipe, recipe_of(document))
+    if outputs.recipe is not None:
+        _write(outputs.recipe, recipe_of(document))
     return document
 
 
-def _read(data: Sequence[Path], keys: Mapping[str, Any], channel: str | None) -> Samples:
-    """Return the samples of files as one, of one channel or of all."""
-    table = MeasuredTable(samples=[str(file) for file in data], **keys)
-    return joined([_selected(formats.samples(file, table.format, **table.keywords), channel) for file in data])
-
-
-def _doubt(samples: Samples) -> None:
-    """Print what the reader noted and what looks wrong; a contradiction of files is a remark of the fits."""
-    known = statement(samples)
-    for sentence in (*known.notes, *known.hints):
-        if sentence != samples.record.get("contradiction"):
-            print(terminal.plain(f"{samples.name}: {sentence}"), flush=True)
-
-
-def _selected(samples: Samples, channel: str | None) -> Samples:
+def _of_channel(samples: Samples, channel: str | None) -> Samples:
     """Return the samples of one channel, or of all."""
-    if channel is not None:
-        if channel not in samples.channels:
-            hint = closest(channel, samples.channels)
-            raise ParameterError(
-                "channel", f"{channel!r} is not one of {', '.join(samples.channels)}{hint}", channel, samples.channels
-            )
-        column = [samples.channels.index(channel)]
-        samples = replace(
-            samples,
-            channels=(channel,),
-            values=samples.values[:, column],
-            wavelength_nm=None if samples.wavelength_nm is None else samples.wavelength_nm[column],
-            uncertainty=None if samples.uncertainty is None else samples.uncertainty[:, column],
-            bandwidth_nm=None if samples.bandwidth_nm is None else samples.bandwidth_nm[column],
-        )
-    return samples
-
-
-def _seen(samples: Samples, receiver_deg: float | None, source_deg: float | None) -> Samples:
-    """Return samples with the solid angles of the cones that are given."""
-    cones = {
-        "receiver_solid_angle_sr": ("receiver-deg", receiver_deg),
-        "source_solid_angle_sr": ("source-deg", source_deg),
-    }
-    known: dict[str, Any] = {
-        name: _solid_angle(option, angle) for name, (option, angle) in cones.items() if angle is not None
-    }
-    return replace(samples, instrument=replace(samples.instrument, **known))
-
-
-def _solid_angle(option: str, angle_deg: float) -> float:
-    """Return the solid angle [sr] of a cone whose full angle is given."""
-    if not 0.0 < angle_deg <= _WIDEST_DEG:
+    if channel is None:
+        return samples
+    if channel not in samples.channels:
+        hint = closest(channel, samples.channels)
         raise ParameterError(
-            option, f"{angle_deg:g} is outside (0, {_WIDEST_DEG:g}] degrees", angle_deg, (0.0, _WIDEST_DEG)
+            "channel", f"{channel!r} is not one of {', '.join(samples.channels)}{hint}", channel, samples.channels
         )
-    return float(2.0 * np.pi * versine(radians(0.5 * angle_deg)))
+    column = [samples.channels.index(channel)]
+    return replace(
+        samples,
+        channels=(channel,),
+        values=samples.values[:, column],
+        wavelength_nm=None if samples.wavelength_nm is None else samples.wavelength_nm[column],
+        uncertainty=None if samples.uncertainty is None else samples.uncertainty[:, column],
+        bandwidth_nm=None if samples.bandwidth_nm is None else samples.bandwidth_nm[column],
+    )
 
 
-def write(path: Path, text: str) -> None:
-    """Write a text: whole, or not at all. Folders are made."""
+def _with_cones(samples: Samples, settings: FitSettings) -> Samples:
+    """Return samples with the solid angles [sr] of the cones whose full angles are given."""
+    solid_angles: dict[str, Any] = {}
+    for option, name, angle_deg in (
+        ("receiver-deg", "receiver_solid_angle_sr", settings.receiver_deg),
+        ("source-deg", "source_solid_angle_sr", settings.source_deg),
+    ):
+        if angle_deg is None:
+            continue
+        if not 0.0 < angle_deg <= _WIDEST_DEG:
+            raise ParameterError(
+                option, f"{angle_deg:g} is outside (0, {_WIDEST_DEG:g}] degrees", angle_deg, (0.0, _WIDEST_DEG)
+            )
+        solid_angles[name] = float(2.0 * np.pi * versine(radians(0.5 * angle_deg)))
+    return replace(samples, instrument=replace(samples.instrument, **solid_angles))
+
+
+def _write(path: Path, text: str) -> None:
+    """Write a file completely or not at all. Directories are made."""
     path.parent.mkdir(parents=True, exist_ok=True)
     write_file(path, text.encode(), path.parent)
 
 
+def _page(document: Fits, figure: Figure) -> str:
+    """Return the page of fits with the figures of the best fit: one HTML file without any other file."""
+    from brdfdb_pipelines import figure_svg, html_page
+
+    keys = [f"fit-{number}" for number, _ in enumerate(figure.panels, 1)]
+    plots = [(key, panel.kind, figure_svg.svg(panel, key)) for key, panel in zip(keys, figure.panels, strict=True)]
+    cuts, _, maps = figure.caption.partition(". ")
+    captions = {"curves": f"{cuts}.", "map": maps}
+    template = html_page.environment().get_template("fit.html")
+    return template.render(document=document, best=document.fits[0], plots=plots, captions=captions)
+
+
 def recipe_of(document: Fits) -> str:
-    """Return a recipe of the best fit that is one model; BrdfdbError if none is."""
+    """Return a recipe of the best fit that is a single model; BrdfdbError if there is none."""
     best = next((one for one in document.fits if one.recipe is not None), None)
     if best is None or best.material is None or best.recipe is None:
         raise BrdfdbError(f"{document.name}: {_no_recipe(document)}")
-    return f'materials = ["{best.material.name}"]\ntolerance = {TOLERANCE:g}\n\n{best.recipe}'
+    return f'materials = ["{best.material.name}"]\ntolerance = {_TOLERANCE:g}\n\n{best.recipe}'
 
 
 def lines(document: Fits) -> list[str]:
@@ -200,13 +194,13 @@ def lines(document: Fits) -> list[str]:
     for one in document.fits:
         held = "      -" if one.held_out is None else f"{one.held_out.rms:7.3f}"
         alone = "      -" if one.rms_ln is None else f"{one.rms_ln:6.3f}"
-        light = "" if one.albedo.conserves else "  reflects more than arrives"
+        light = "" if one.albedo.conserves else "  above 1"
         text.append(
             f"  {one.model:<{width}}  {held} {alone}   {one.numbers:7d} {one.bic:8.0f}  {one.albedo.value:6.3f}{light}"
         )
-    text.append("  held out, all: rms of ln(model / sample), at incidences left out of the fit, and of all")
+    text.append("  held out, all: rms of ln(model / sample) at the incidences left out of the fit, and at all")
     if document.shared_outlier_count:
-        text.append(f"  both leave out {counted(document.shared_outlier_count, 'value')} far from every fit")
+        text.append(f"  both without {counted(document.shared_outlier_count, 'value')} far from every fit")
     text += [
         f"  not fitted: {reason if reason.startswith(name) else f'{name}, {reason}'}"
         for name, reason in document.skipped.items()
@@ -214,19 +208,22 @@ def lines(document: Fits) -> list[str]:
     ]
     if document.interrupted:
         missing = list(document.skipped.values()).count(INTERRUPTED)
-        text.append(f"  interrupted: {counted(missing, 'model')} not fitted, and intervals are those of the covariance")
+        text.append(f"  interrupted: {counted(missing, 'model')} not fitted, and intervals come from the covariance")
     best = document.fits[0]
     text += ["", f"best: {best.model}", *_numbers(best.estimates)]
     text += [f"  note  {sentence}" for sentence in best.remarks]
     if document.outlier_count:
         farthest = document.outliers[0]
         text.append(
-            f"  {document.outlier_count} taken for outliers; the farthest: f_r {farthest.value:.3g} against "
-            f"{farthest.model:.3g} /sr at theta_i {farthest.theta_i_deg:g}°, theta_r {farthest.theta_r_deg:g}°, "
+            f"  {counted(document.outlier_count, 'outlier')}; the farthest: f_r {farthest.value:.3g} /sr, of the model "
+            f"{farthest.model:.3g} /sr, at theta_i {farthest.theta_i_deg:g}°, theta_r {farthest.theta_r_deg:g}°, "
             f"phi_r {farthest.phi_r_deg:g}°"
         )
     if best.recipe is None:
-        return [*text, *(_alternative(document.fits) or ["", _no_recipe(document)])]
+        single = next((one for one in document.fits if one.recipe is not None), None)
+        if single is None or single.recipe is None:
+            return [*text, "", _no_recipe(document)]
+        return [*text, "", f"best single model of the registry: {single.model}", "", *single.recipe.splitlines()]
     return [*text, "", *best.recipe.splitlines()]
 
 
@@ -238,24 +235,17 @@ def _aperture(document: Fits) -> list[str]:
         for name, known in solid_angles.items()
         if known is not None
     ]
-    return [f"  seen through the aperture: {', '.join(cones)}"] if cones else []
+    return [f"  averaged over the aperture: {', '.join(cones)}"] if cones else []
 
 
 def _no_recipe(document: Fits) -> str:
     """Return a sentence on why no fit is a recipe."""
-    why = "all are sums, or one model with amplitudes of channels that are no spectra"
+    why = "each fit is a sum of models, or has amplitudes of channels without wavelengths"
     if len(document.channels) > 1 and document.wavelengths_nm is None:
-        why = "the channels have no wavelengths; --channel fits one of them"
+        why = "the channels have no wavelengths; fit one of them with --channel"
     elif all("+" in one.model for one in document.fits):
-        why = "all are sums, and a recipe takes one model"
-    return f"no fit is one model of the registry with wavelengths, so that there is no recipe: {why}"
-
-
-def _alternative(ranked: Sequence[Fit]) -> list[str]:
-    single = next((one for one in ranked if one.recipe is not None), None)
-    if single is None or single.recipe is None:
-        return []
-    return ["", f"best model of the registry alone: {single.model}", "", *single.recipe.splitlines()]
+        why = "each fit is a sum, and a recipe takes a single model"
+    return f"no recipe can be written: {why}"
 
 
 def _numbers(estimates: Sequence[Estimate]) -> list[str]:
@@ -269,3 +259,53 @@ def _numbers(estimates: Sequence[Estimate]) -> list[str]:
     if len(estimates) > _SHOWN:
         text.append(f"  and {len(estimates) - _SHOWN} more; --json has them")
     return text
+
+
+def list_published(
+    data: Path, *, channel: str | None = None, json: Path | None = None, recipe: Path | None = None
+) -> PublishedFits:
+    """Print the fits of a file of published fits, and which of them contradict physics.
+
+    The recipe has the fits that are models of the registry, in the channel R, G or B, by default G. FileFormatError if
+    it is no such file; ParameterError if a recipe is asked for and no fit is such a model.
+    """
+    with terminal.progress(counted=False, transient=True) as bar:
+        bar.add_task(data.name, total=None)
+        listed = published.read_published(data)
+    text = None if recipe is None else published.recipe_of(listed, "G" if channel is None else channel)
+    shown = lines_of_published(listed)
+    if recipe is not None and channel is None:
+        shown.append("  note  the recipe has channel G only, as the file states no wavelengths; choose with --channel")
+    print(terminal.plain("\n".join(shown)))
+    if json is not None:
+        _write(json, listed.model_dump_json(indent=1) + "\n")
+    if recipe is not None and text is not None:
+        _write(recipe, text)
+    return listed
+
+
+def lines_of_published(listed: PublishedFits) -> list[str]:
+    """Return a line for each material, the counts, and what the file does not state."""
+    names = list(dict.fromkeys(term.name for one in listed.fits for term in one.terms))
+    unphysical = [one for one in listed.fits if one.flags]
+    ours = [one for one in listed.fits if one.model is not None]
+    text = [f"{listed.name}: {len(listed.fits)} published fits, {' + '.join(names)}"]
+    if listed.comment:
+        text.append(f"  {listed.comment}")
+    width = max(len(one.name) for one in listed.fits)
+    text += [f"  {one.name:<{width}}  {_published_line(one)}" for one in listed.fits]
+    models = ", ".join(sorted({one.model for one in ours if one.model}))
+    counts = f"  {len(unphysical)} of {len(listed.fits)} contradict physics; {len(ours)} are models of the registry"
+    text.append(f"{counts} ({models})" if models else counts)
+    return [*text, *(f"  note  {sentence}" for sentence in listed.sentences)]
+
+
+def _published_line(one: PublishedFit) -> str:
+    """Return the numbers of a published fit, its albedo, and a line for each contradiction to physics."""
+    numbers = "  ".join(
+        f"{name} {'/'.join(f'{value:.3g}' for value in values)}"
+        for term in one.terms
+        for name, values in term.numbers.items()
+    )
+    albedo = "" if one.albedo is None else f"  albedo {one.albedo.value:.3f}"
+    return f"{numbers}{albedo}" + "".join(f"\n    contradicts physics: {sentence}" for sentence in one.flags)

@@ -1,47 +1,142 @@
-"""The import job: reads files of measurements, states what they hold, and makes audited tables of them."""
+"""The import job: it reads files of measurements, states what they contain, and makes audited tables of them."""
 
 from __future__ import annotations
 
 import json as _json
+import math
+import os
 import threading
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from contextlib import AbstractContextManager
+from dataclasses import asdict, dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
 
 from brdfdb import formats
-from brdfdb.errors import BrdfdbError, MissingExtraError, ParameterError
+from brdfdb.errors import BrdfdbError, MissingExtraError, ParameterError, StoreError, counted
 from brdfdb.formats.netcdf import write_samples
+from brdfdb.materials import presets
+from brdfdb.materials.recipe_text import toml_of
+from brdfdb.measurements.joining import common_name
+from brdfdb.measurements.measured_source import slug
 from brdfdb.measurements.samples import Samples
-from brdfdb.measurements.statement import Statement, statement
-from brdfdb_pipelines import import_tables, terminal
-from brdfdb_pipelines.import_tables import Tables, Target
+from brdfdb.measurements.statement import SampleStatement, statement
+from brdfdb.store.files import write_file
+from brdfdb.store.paths import NAME
+from brdfdb.store.reader import Store
+from brdfdb.store.summary_words import REPORT_OF_SOME
+from brdfdb.tables.planner import check_tolerance
+from brdfdb_pipelines import terminal, workers
+from brdfdb_pipelines.build import build
+from brdfdb_pipelines.build_progress import Bars, Event
+from brdfdb_pipelines.build_survey import machine_memory
+from brdfdb_pipelines.measured_job import MeasuredTable, measured_table
+from brdfdb_pipelines.recipe_file import Recipe
+from brdfdb_pipelines.workers import Workers, WorkersError
 
-if TYPE_CHECKING:
+if TYPE_CHECKING:  # the audit takes half a second to load
     from brdfdb.audit import AuditReport
-    from brdfdb_pipelines.import_summary import Line
 
-PATIENCE_S = 2.0  # time [s] after which the bar of progress appears
+PATIENCE_S = 2.0  # time [s] after which the progress bar appears
+TOLERANCE = 0.05  # default tolerance of tables
+NOT_JUDGED = "not judged"
+_LISTED = 12  # materials that a sentence names
+
+
+@dataclass(frozen=True)
+class ImportTarget:
+    """A material to import: its files, the keys of a recipe that say how to read them, and its name in the store."""
+
+    files: tuple[Path, ...]
+    keys: dict[str, Any]
+    name: str = ""
+
+    @property
+    def label(self) -> str:
+        """Return the paths of the files."""
+        return ", ".join(map(str, self.files))
+
+    @property
+    def shown(self) -> str:
+        """Return the paths of the files, and the member of an archive."""
+        member = self.keys.get("member", "")
+        return f"{self.label} ({member})" if member else self.label
+
+    @cached_property
+    def table(self) -> MeasuredTable:
+        """Return the keys, checked."""
+        return measured_table(self.name or "material", {**self.keys, "samples": list(map(str, self.files))})
+
+    def define(self, folder: Path) -> dict[str, Any]:
+        """Return the keys of the material in a recipe in a folder."""
+        paths = []
+        for file in map(Path.absolute, self.files):
+            try:
+                paths.append(Path(os.path.relpath(file, folder.absolute())).as_posix())
+            except ValueError:  # on another drive
+                paths.append(file.as_posix())
+        given = {key: value for key, value in self.keys.items() if value}
+        return {"samples": paths[0] if len(paths) == 1 else paths, **given}
+
+
+@dataclass(frozen=True)
+class Tables:
+    """What is made of imported samples: tables in a store, and the recipe of the same tables.
+
+    Name and title are those of a single material; by default those of the file.
+    """
+
+    store: Path | None
+    recipe: Path | None = None
+    name: str | None = None
+    title: str | None = None
+    tolerance: float = TOLERANCE
+    jobs: int = 1
+
+    def __post_init__(self) -> None:
+        check_tolerance(self.tolerance)
+        if self.recipe is not None and self.recipe.suffix != ".toml":
+            raise ParameterError("--recipe", f"{str(self.recipe)!r} does not end in .toml", str(self.recipe))
 
 
 @dataclass
 class Imported:
-    """The result of an import.
+    """The result of an import: statements on what was read, a sentence on each refusal, and the audit of the tables."""
 
-    Attributes
-    ----------
-    statements : list of (Target, Statement)
-        The materials that were read.
-    refused : list of str
-        A sentence on each file or table that was refused.
-    report : AuditReport or None
-        Audit of the tables; None if no table was built.
-    """
-
-    statements: list[tuple[Target, Statement]] = field(default_factory=list)
+    statements: list[tuple[ImportTarget, SampleStatement]] = field(default_factory=list)
     refused: list[str] = field(default_factory=list)
     report: AuditReport | None = None
+
+
+@dataclass(frozen=True)
+class ImportedTable:
+    """Figures of one imported table; a row of the summary.
+
+    `error_p95` [1] is the relative error of the table against the data that a tolerance bounds. `measured` [1] is the
+    share of all pairs of directions that were measured. The asymmetry [1] is abs(f - f') / (abs(f) + abs(f')) of the
+    interpolated f_r, with light and viewer exchanged in f'; None: unknown. `uncertainty` [1] holds for 99 % of the
+    values; the table is `asymmetric` if that does not explain its asymmetry. `albedo` is the largest directional
+    albedo; None: not finite. Its error includes that at samples that were held out. `verdict` is that of the audit, or
+    "not judged" where the error of the albedo does not tell whether it is above 1.
+    """
+
+    material: str
+    revision: str
+    error_p95: float
+    measured: float
+    asymmetry_median: float | None
+    asymmetry_p99: float | None
+    uncertainty: float | None
+    asymmetric: bool | None
+    albedo: float | None
+    albedo_error: float | None
+    at_theta_i_deg: float
+    above_1: bool
+    verdict: str
 
 
 def run(
@@ -55,28 +150,14 @@ def run(
 ) -> Imported:
     """Read files, print a statement on each, and build and audit tables of them if that is asked for.
 
-    A file that is refused is one sentence on stderr; the others are imported.
-
-    Parameters
-    ----------
-    files : sequence of Path
-        Files of measurements.
-    keys : dict
-        Keys of `brdfdb_pipelines.measured_job.MeasuredTable`, `samples` apart. All materials of an archive are
-        imported unless a `member` is named.
-    join : bool
-        Take all files as one set of samples.
-    json : bool
-        Print one JSON object.
-    out : Path, optional
-        The netCDF file to write the samples of the one material to.
-    tables : Tables, optional
-        What to make of the samples beside statements.
+    A file that is refused is one sentence on stderr; the others are imported. `keys` are those of `MeasuredTable`,
+    without `samples`. All materials of an archive are imported unless a `member` is named. The samples of a single file
+    are written to `out`, as netCDF. With `join`, all files are one set of samples.
 
     Raises
     ------
     ParameterError
-        If options do not go together; before anything is read, unless a file is an archive.
+        If options cannot be combined; before anything is read, unless a file is an archive.
     StoreError
         If the store cannot be written.
     """
@@ -86,66 +167,48 @@ def run(
     targets = _targets(files, keys, join, result)
     count = len(targets) + len(result.refused)
     if out is not None and count != 1:
-        raise ParameterError("--out", f"it takes the samples of one file, and there are {count}", count, 1)
+        raise ParameterError("--out", f"writes the samples of a single file, and there are {count}", count, 1)
     if tables is not None:
-        targets, same = import_tables.named(targets, tables, count)
-        result.refused += same
-        for sentence in same:
-            terminal.say(sentence)
+        targets = _named(targets, tables, count, result)
     start = time.monotonic()
     for number, target in enumerate(targets, 1):
         label = f"{target.label}, {number} of {len(targets)}" if len(targets) > 1 else target.label
         try:
-            samples, known = _read(target, label, PATIENCE_S - (time.monotonic() - start))
+            read = _read(target, label, PATIENCE_S - (time.monotonic() - start))
             if out is not None:
-                write_samples(samples, out)
+                write_samples(read.samples, out)
         except (BrdfdbError, OSError) as error:
             _refuse(result, target, error)
             continue
-        result.statements.append((target, known))
+        result.statements.append((target, read.statement))
         if not json:
-            lines = [f"{target.label}: {known.name}", *(f"  {sentence}" for sentence in known.sentences)]
+            stated = read.statement
+            lines = [f"{target.label}: {stated.name}", *(f"  {sentence}" for sentence in stated.sentences)]
             lines += [f"  written: {out}"] if out is not None else []
             print(terminal.plain("\n".join(lines)), flush=True)
     if count > 1 and (lost := count - len(result.statements)):
         terminal.say(f"{lost} of {count} materials {'was' if lost == 1 else 'were'} not imported")
-    audited: list[Line] = []
+    audited: list[ImportedTable] = []
     if tables is not None and result.statements:
-        made = import_tables.make([target for target, _ in result.statements], tables)
-        result.refused += made.refused
-        result.report = made.report
-        audited = _lines(tables.store, made.report) if made.report and tables.store else []
+        _make([target for target, _ in result.statements], tables, result)
+        if result.report and tables.store:
+            audited = figures_of(tables.store, result.report)
     if json:
-        print(_json.dumps(_document(result, audited), indent=1, ensure_ascii=False, allow_nan=False))
+        document: dict[str, Any] = {
+            "statements": [{"file": target.label, **stated.document()} for target, stated in result.statements],
+            "refused": result.refused,
+        }
+        if result.report is not None:
+            document |= summary(audited, result.report)
+        print(_json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False))
     elif result.report is not None and tables is not None:
-        from brdfdb_pipelines import import_summary
-
-        import_summary.show(audited, result.report, tables.tolerance)
+        _show(audited, result.report, tables.tolerance)
     return result
 
 
-def _lines(store: Path, report: AuditReport) -> list[Line]:
-    from brdfdb_pipelines.import_summary import lines_of  # with the audit, which takes half a second to load
-
-    return lines_of(store, report)
-
-
-def _document(result: Imported, audited: Sequence[Line]) -> dict[str, Any]:
-    """Return the result as JSON."""
-    document: dict[str, Any] = {
-        "statements": [{"file": target.label, **known.document()} for target, known in result.statements],
-        "refused": result.refused,
-    }
-    if result.report is not None:
-        from brdfdb_pipelines import import_summary
-
-        document |= import_summary.document(audited, result.report)
-    return document
-
-
-def _targets(files: Sequence[Path], keys: dict[str, Any], join: bool, result: Imported) -> list[Target]:
+def _targets(files: Sequence[Path], keys: dict[str, Any], join: bool, result: Imported) -> list[ImportTarget]:
     """Return the materials of files, all members of archives; files that cannot be opened are refused."""
-    target = Target(tuple(files), keys)
+    target = ImportTarget(tuple(files), keys)
     if join or keys.get("member"):
         return [target] if join else [replace(target, files=(file,)) for file in files]
     targets = []
@@ -160,7 +223,7 @@ def _targets(files: Sequence[Path], keys: dict[str, Any], join: bool, result: Im
     return targets
 
 
-def _refuse(result: Imported, target: Target, error: BrdfdbError | OSError) -> None:
+def _refuse(result: Imported, target: ImportTarget, error: BrdfdbError | OSError) -> None:
     """Record and print the sentence of an error with the name of its file, unless it was printed before."""
     sentence = str(error)
     if isinstance(error, OSError) and not isinstance(error, BrdfdbError) and error.filename:
@@ -172,14 +235,258 @@ def _refuse(result: Imported, target: Target, error: BrdfdbError | OSError) -> N
         terminal.say(sentence)
 
 
-def _read(target: Target, label: str, patience_s: float) -> tuple[Samples, Statement]:
-    """Return the samples of a material and the statement on them; a bar appears after some time."""
+class _Read(NamedTuple):
+    """Samples of a material, and the statement on them."""
+
+    samples: Samples
+    statement: SampleStatement
+
+
+def _read(target: ImportTarget, label: str, patience_s: float) -> _Read:
+    """Read the samples of a material; a progress bar appears after some time."""
     with terminal.progress(counted=False, transient=True) as bar:
         task = bar.add_task(label, total=1.0, visible=patience_s <= 0.0)
         shown = threading.Timer(max(patience_s, 0.0), lambda: bar.update(task, visible=True))
         shown.start()
         try:
             samples = target.table.joined(target.files)
-            return samples, statement(samples, lambda share: bar.update(task, completed=share))
+            return _Read(samples, statement(samples, lambda share: bar.update(task, completed=share)))
         finally:
             shown.cancel()
+
+
+def _named(targets: Sequence[ImportTarget], tables: Tables, count: int, result: Imported) -> list[ImportTarget]:
+    """Return materials with their names; materials that would have the same name are refused.
+
+    A name is that of the command line, that of the file or the member, as words, or the words that the names of joined
+    files begin with. ParameterError if a name is not allowed.
+    """
+    for option, text in (("--name", tables.name), ("--title", tables.title)):
+        if text is not None and count != 1:
+            raise ParameterError(option, f"names a single material, and there are {count}", text)
+    materials: dict[str, list[ImportTarget]] = {}
+    for target in targets:
+        first, stems = target.files[0], [file.stem for file in target.files]
+        of_files = common_name(stems) or ("" if len(stems) > 1 else first.stem)
+        if not (tables.name or of_files):
+            raise ParameterError("--name", f"{target.label} have no word in common; give a name", None)
+        name = tables.name or slug(target.keys.get("member", "").removesuffix(".h5") or of_files)
+        if not NAME.fullmatch(name):
+            raise ParameterError(
+                "--name", f"{name!r} is not made of lower-case letters, digits and single hyphens, 128 at most", name
+            )
+        if name in presets():
+            raise ParameterError("--name", f"{name!r} is the name of a preset; give {first} another", name)
+        title = {} if tables.title is None else {"title": tables.title}
+        one = replace(target, name=name, keys={**target.keys, **title})
+        assert one.table  # checked before anything is read
+        materials.setdefault(name, []).append(one)
+    for name, same in materials.items():
+        if len(same) > 1:
+            files = " and ".join(one.shown for one in same)
+            sentence = (
+                f"{files} would {'both' if len(same) == 2 else 'all'} be {name!r}; import them one by one, with --name"
+            )
+            result.refused.append(sentence)
+            terminal.say(sentence)
+    return [same[0] for same in materials.values() if len(same) == 1]
+
+
+def _make(targets: Sequence[ImportTarget], tables: Tables, result: Imported) -> None:
+    """Write the recipe of materials, build its tables, and audit them, where that is asked for.
+
+    A table that fails is recorded, and the others are built.
+    """
+    recipe = Recipe.model_validate(_content(targets, tables.tolerance, Path()))
+    recipe.jobs()
+    if tables.recipe is not None:
+        folder = tables.recipe.parent
+        content = _content(targets, tables.tolerance, folder)
+        names = ", ".join(f'"{name}"' for name in content["materials"])
+        parts = [f"materials = [{names}]\ntolerance = {tables.tolerance:g}\n"]
+        parts += [toml_of(name, keys) for name, keys in content["define"].items()]
+        write_file(tables.recipe, "\n".join(parts).encode(), folder)
+    if tables.store is None:
+        return
+    names_built = _build(recipe, tables.store, min(tables.jobs, len(targets)), result)
+    if names_built:
+        from brdfdb_pipelines import audit
+
+        report_path = tables.store / REPORT_OF_SOME
+        jobs = min(tables.jobs, len(names_built))
+        result.report = audit.run(tables.store, names_built, report_path, jobs=jobs, figures=False, shown=False)
+
+
+def _content(targets: Sequence[ImportTarget], tolerance: float, folder: Path) -> dict[str, Any]:
+    """Return the content of a recipe file in a folder."""
+    define = {target.name: target.define(folder) for target in targets}
+    return {"materials": list(define), "tolerance": tolerance, "define": define}
+
+
+def _build(recipe: Recipe, store: Path, jobs: int, result: Imported) -> list[str]:
+    """Build tables; return the names of those that the store contains then."""
+    built: list[str] = []
+    failed: list[str] = []
+    at: AbstractContextManager[Workers] = workers.processes(jobs) if jobs > 1 else workers.threads(1)
+    with at as opened, Bars() as bars:
+
+        def report(event: Event) -> None:
+            if event["event"] == "failed":
+                failed.append(event["error"])
+            elif event["event"] in ("published", "adopted", "unchanged"):
+                built.append(event["material"])
+            bars(event)
+
+        try:
+            build(recipe, store, opened, report, memory=machine_memory())
+        except (StoreError, WorkersError):
+            raise
+        except BrdfdbError:
+            if not failed:
+                raise
+    result.refused += failed
+    names = [job.name for job in recipe.measured_jobs()]
+    return sorted(built, key=names.index)
+
+
+def figures_of(root: Path, report: AuditReport) -> list[ImportedTable]:
+    """Return the figures of the audited tables of a store."""
+    from brdfdb.audit.energy import Energy
+    from brdfdb.audit.reciprocity import Reciprocity
+
+    store = Store(root)
+    tables = []
+    for audited in report.materials:
+        measured, error = store.metadata(audited.material).measured, store[audited.material].error
+        assert measured is not None
+        seen, uncertainty = measured.reciprocity.asymmetry, measured.uncertainty
+        energy, reciprocity = audited.of(Energy).table, audited.of(Reciprocity)
+        wrong = energy.uncertainty
+        if wrong is not None and energy.max_albedo is not None and measured.held_out is not None:
+            wrong += measured.held_out.l1 * energy.max_albedo
+        judged = energy.max_albedo is None or energy.max_albedo + (wrong or 0.0) <= 1.0
+        tables.append(
+            ImportedTable(
+                audited.material,
+                audited.revision,
+                math.nan if error is None else error.overall.p95,
+                1.0 if measured.extrapolated is None else 1.0 - measured.extrapolated,
+                None if seen is None else seen.median,
+                None if seen is None else seen.p99,
+                uncertainty,
+                None if uncertainty is None else reciprocity.verdict == "violates",
+                energy.max_albedo,
+                wrong,
+                energy.max_at_theta_i_deg,
+                energy.exceeds_1_from_theta_i_deg is not None,
+                audited.verdict if judged or audited.verdict != "passes" else NOT_JUDGED,
+            )
+        )
+    return tables
+
+
+def summary(tables: Sequence[ImportedTable], report: AuditReport) -> dict[str, Any]:
+    """Return figures of all tables, and the summary, as JSON."""
+    medians = [table.asymmetry_median for table in tables if table.asymmetry_median is not None]
+    return {
+        "tables": [asdict(table) for table in tables],
+        "summary": {
+            "materials": len(tables),
+            "asymmetry_median": float(np.median(medians)) if medians else None,
+            "asymmetric": [table.material for table in tables if table.asymmetric],
+            "without_uncertainty": sum(table.uncertainty is None for table in tables),
+            "above_1": [table.material for table in tables if table.above_1],
+            "passes": sum(table.verdict == "passes" for table in tables),
+            "not_judged": [table.material for table in tables if table.verdict == NOT_JUDGED],
+            "violates": report.violations,
+        },
+    }
+
+
+def _show(tables: Sequence[ImportedTable], report: AuditReport, tolerance: float) -> None:
+    """Print a row for each table, the problems of tables, and the summary."""
+    print()
+    numbers = ("table error", "measured", "asymmetry, median", "99 of 100", "uncertainty", "albedo up to")
+    terminal.print_table(
+        f"Measured tables in {report.store}",
+        ("material", *numbers, "audit"),
+        [
+            (
+                table.material,
+                *map(
+                    _percent,
+                    (table.error_p95, table.measured, table.asymmetry_median, table.asymmetry_p99, table.uncertainty),
+                ),
+                _albedo(table),
+                table.verdict,
+            )
+            for table in tables
+        ],
+        numbers=numbers,
+    )
+    print("table error: 95 % of the values differ by at most this from the interpolated data, where f_r was measured")
+    print("measured: share of all pairs of directions; elsewhere f_r is extrapolated, and its error is unknown")
+    print("asymmetry: |f - f'| / (|f| + |f'|) of the interpolated f_r, for directions up to 80 degrees; f' is f with")
+    print("light and viewer exchanged; the faintest pairs are left out")
+    print("albedo: largest value of the table, with its uncertainty; not judged if it may be below or above 1")
+    for audited in report.materials:
+        for problem in audited.problems():
+            print(f"{audited.material}: {problem}")
+    for sentence in sentences(tables, tolerance):
+        print(sentence)
+    counts = ", ".join(
+        f"{verdict} {count}"
+        for verdict in ("passes", NOT_JUDGED, *sorted({table.verdict for table in tables} - {"passes", NOT_JUDGED}))
+        if (count := sum(table.verdict == verdict for table in tables)) or verdict == "passes"
+    )
+    print(f"{counted(len(tables), 'table')} audited: {counts}")
+
+
+def sentences(tables: Sequence[ImportedTable], tolerance: float) -> list[str]:
+    """Return the summary of errors, asymmetries and albedos in sentences."""
+    far = [f"{table.material}: {_percent(table.error_p95)}" for table in tables if not table.error_p95 <= tolerance]
+    missed = f"table error above the tolerance of {_percent(tolerance)}, even on the finest grid: {_counted(far)}"
+    medians = [table.asymmetry_median for table in tables if table.asymmetry_median is not None]
+    asymmetry = "reciprocity asymmetry: cannot be computed from these data"
+    if medians:
+        spread = f", from {_percent(min(medians))} to {_percent(max(medians))}" if len(medians) > 1 else ""
+        asymmetry = (
+            f"reciprocity asymmetry of f_r, interpolated: median over materials {_percent(np.median(medians))}{spread}"
+        )
+    beyond = [table.material for table in tables if table.asymmetric]
+    unknown = sum(table.uncertainty is None for table in tables)
+    judged = f"more asymmetric than their uncertainty explains: {_counted(beyond)}"
+    if unknown:
+        judged += f"; {unknown} of {len(tables)} state no uncertainty and are not judged"
+    return [
+        missed,
+        asymmetry,
+        judged,
+        f"albedo above 1: {_counted([table.material for table in tables if table.above_1])}",
+    ]
+
+
+def _albedo(table: ImportedTable) -> str:
+    """Return the largest albedo of a table with its error, and no more digits than this leaves."""
+    if table.albedo is None:
+        return "not finite"
+    where = f"at {table.at_theta_i_deg:g}°"
+    if not table.albedo_error:
+        return f"{table.albedo:.4f} {where}"
+    digits = int(np.clip(math.ceil(-math.log10(table.albedo_error)), 1, 4))
+    return f"{table.albedo:.{digits}f} ± {table.albedo_error:.1g} {where}"
+
+
+def _counted(names: Sequence[str]) -> str:
+    """Return the number of names, and the first of them."""
+    if not names:
+        return "none"
+    more = f" and {len(names) - _LISTED} more" if len(names) > _LISTED else ""
+    return f"{len(names)} ({', '.join(names[:_LISTED])}{more})"
+
+
+def _percent(value: float | np.floating[Any] | None) -> str:
+    """Return a share as text in percent with two digits, a hyphen if it is not known."""
+    if value is None:
+        return "-"
+    return f"{100.0 * value:.2g} %" if value < 0.0995 else f"{100.0 * value:.0f} %"

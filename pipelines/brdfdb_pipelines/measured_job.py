@@ -20,12 +20,11 @@ from brdfdb.measurements import MeasuredSource, Samples, joined
 from brdfdb.measurements.measured_source import MARGIN
 from brdfdb.place import path_of
 from brdfdb.store.lock import Lock, writing
-from brdfdb.store.manifest import read_manifest
 from brdfdb.store.paths import material_path, revision_path
-from brdfdb.store.pointer import point_to
 from brdfdb.store.publication import publish_layout
+from brdfdb.store.records import point_to, read_manifest
 from brdfdb.store.revisions import standing
-from brdfdb.tables.largest_albedo import largest_albedo
+from brdfdb.tables.albedo import largest_albedo
 from brdfdb.tables.layout import TABLE_VERSION, Layout
 from brdfdb.tables.measured_layout import tabulated
 from brdfdb.tables.table import Table
@@ -40,12 +39,11 @@ _ADDED = {"columns", "quantity", "angles", "azimuth", "wavelength_nm", "side"}
 _MARGINS = 3  # tables of data that are made to conserve, each a little darker, until none is above 1
 
 
-def _listed(value: Any) -> Any:
-    """Return a list of the one text that may stand for it."""
-    return [value] if isinstance(value, str) else value
-
-
-Texts = Annotated[list[Annotated[str, Field(min_length=1)]], BeforeValidator(_listed), Field(min_length=1)]
+Texts = Annotated[
+    list[Annotated[str, Field(min_length=1)]],
+    BeforeValidator(lambda value: [value] if isinstance(value, str) else value),
+    Field(min_length=1),
+]
 
 
 class MeasuredTable(BaseModel):
@@ -92,13 +90,7 @@ class MeasuredTable(BaseModel):
         return formats.read(paths[0], self.format, **self.keywords) if len(paths) == 1 else self.joined(paths)
 
     def joined(self, paths: Sequence[Path]) -> Samples:
-        """Return the samples of files as one.
-
-        Raises
-        ------
-        FileFormatError, ParameterError, OSError
-            If a file cannot be read, or files cannot be joined.
-        """
+        """Return the joined samples of files; FileFormatError, ParameterError or OSError for a bad file."""
         return joined([formats.samples(path, self.format, **self.keywords) for path in paths])
 
 
@@ -133,13 +125,7 @@ class MeasuredJob:
         }
 
     def source(self) -> MeasuredSource:
-        """Read the file as a source, without the laws that it is to be made to keep.
-
-        Raises
-        ------
-        FileFormatError, ParameterError, OSError
-            If the file cannot be read, or is not what a table needs.
-        """
+        """Return the data of the files as a source, unchanged; errors as of `MeasuredTable.joined`."""
         read = self.table.read(self.paths)
         title = self.table.title or read.name
         file = f"the file {self.files}" if len(self.paths) == 1 else f"the files {self.files}"
@@ -158,6 +144,14 @@ class MeasuredJob:
             )
         return source.recorded(file=self.files, file_sha256=self.sha256)
 
+    def lawful_source(self) -> MeasuredSource:
+        """Return the data, made reciprocal or energy-conserving if the table asks for it; errors as of `source`."""
+        source = self.source()
+        for law in ("reciprocal", "conserving"):
+            if getattr(self.table, law):
+                source = source.made(law)
+        return source
+
 
 def measured_table(name: str, fields: Mapping[str, Any]) -> MeasuredTable:
     """Return the keys of a measured material of a recipe; RecipeError if one is not what it must be."""
@@ -171,7 +165,7 @@ def measured_table(name: str, fields: Mapping[str, Any]) -> MeasuredTable:
 def measured_job(name: str, fields: Mapping[str, Any], folder: Path | None, tolerance: float | None) -> MeasuredJob:
     """Return the job of a measured material of a recipe; RecipeError if it cannot be built."""
     if tolerance is None:
-        raise RecipeError("tolerance", f"is missing; {name} is measured, and grids are for models")
+        raise RecipeError("tolerance", f"is missing; {name} is measured, and grids are only for models")
     table = measured_table(name, fields)
     paths = tuple((folder or Path()) / path_of(sample, "samples") for sample in table.samples)
     digests = []
@@ -196,8 +190,8 @@ def _sha256(path: Path) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-class Tabulated(NamedTuple):
-    """The result of one job, as `brdfdb_pipelines.build.Built` has it."""
+class MeasuredResult(NamedTuple):
+    """The result of one job, in the fields of `brdfdb_pipelines.build.Built`."""
 
     state: str
     revision: str
@@ -207,7 +201,14 @@ class Tabulated(NamedTuple):
     wavelengths: int = 0
 
 
-def build_measured(root: str, job: MeasuredJob) -> Tabulated:
+class _TabulatedValues(NamedTuple):
+    """The layout of a table, and its values."""
+
+    layout: Layout
+    values: NDArray[np.float32]
+
+
+def build_measured(root: str, job: MeasuredJob) -> MeasuredResult:
     """Build the table of a job unless the store has it: a task for a worker."""
     store, request = Path(root), job.request
     status = standing(store, job.name, request)
@@ -215,9 +216,9 @@ def build_measured(root: str, job: MeasuredJob) -> Tabulated:
         with Lock(store, job.name), writing(store, job.name):
             point_to(material_path(store, job.name), status.revision)
     if status.state != "missing":
-        stored = read_manifest(revision_path(store, job.name, status.revision), None)[0]["summary"]["bytes"]
+        stored = read_manifest(revision_path(store, job.name, status.revision), None).content["summary"]["bytes"]
         state = "unchanged" if status.state == "current" else "adopted"
-        return Tabulated(state, status.revision, stored, status.why)
+        return MeasuredResult(state, status.revision, stored, status.why)
     try:
         layout, values = _tabulated(job)
         published = publish_layout(store, job.name, layout, request, values=values)
@@ -226,28 +227,27 @@ def build_measured(root: str, job: MeasuredJob) -> Tabulated:
     except BrdfdbError as error:
         raise ParameterError(job.name, f"{job.files}: {error}") from None
     wavelengths = 0 if layout.wavelength_nm is None else layout.wavelength_nm.size
-    return Tabulated("published", published.revision, published.bytes, status.why, tuple(layout.shape), wavelengths)
+    shape = tuple(layout.shape)
+    return MeasuredResult("published", published.revision, published.bytes, status.why, shape, wavelengths)
 
 
-def _tabulated(job: MeasuredJob) -> tuple[Layout, NDArray[np.float32]]:
-    """Return the layout of a table, and its values, made to keep the laws that are asked for."""
+def _tabulated(job: MeasuredJob) -> _TabulatedValues:
+    """Tabulate the data, made reciprocal or energy-conserving where the job asks for it.
+
+    Interpolation can raise an albedo above 1 again: the data are then darkened further, in at most `_MARGINS` steps.
+    """
     source = job.source()
-    at = None if source.wavelengths_nm is None else np.array(source.wavelengths_nm)
+    wavelength_nm = None if source.wavelengths_nm is None else np.array(source.wavelengths_nm)
     if job.table.reciprocal:
         source = source.made("reciprocal")
-    return _conserving(source, at, job.tolerance) if job.table.conserving else tabulated(source, at, job.tolerance)
-
-
-def _conserving(
-    source: MeasuredSource, at: NDArray[np.float64] | None, tolerance: float
-) -> tuple[Layout, NDArray[np.float32]]:
-    """Return the layout of a table that conserves energy, and its values."""
+    if not job.table.conserving:
+        return _TabulatedValues(*tabulated(source, wavelength_nm, job.tolerance))
     margin = MARGIN
     for _ in range(_MARGINS):
         made = source.made("conserving", margin)
-        layout, values = tabulated(made, at, tolerance)
+        layout, values = tabulated(made, wavelength_nm, job.tolerance)
         largest = largest_albedo(Table.of(layout, values), made)
         if not largest.above_1:
             break
         margin += 1.1 * ((largest.albedo or 2.0) - 1.0)
-    return layout, values
+    return _TabulatedValues(layout, values)

@@ -6,8 +6,10 @@ import fnmatch
 import functools
 import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from importlib import resources
+from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -23,25 +25,34 @@ from pydantic import (
 )
 
 from brdfdb.errors import MaterialError, ParameterError, sentence_of
-from brdfdb.materials import PAPERS, Material, exact_material, presets, written_name
+from brdfdb.materials import PAPERS, Material, exact_material, libraries, presets, written_name
 from brdfdb.materials.polarised import polarised_source
 from brdfdb.models import MODELS
+from brdfdb.parameters import closest
 from brdfdb.store.family import Sweep
 from brdfdb.store.paths import NAME
 from brdfdb.tables.grids import Axis, Grid, check_wavelengths
 from brdfdb.tables.layout import TABLE_VERSION, Interpolation, Layout, digest, over_wavelengths
+from brdfdb.tables.mixture import refined_wavelengths
 from brdfdb.tables.planner import PLAN_VERSION, coarsest, offset_of, planned
 from brdfdb.tables.polarisation import GRID_TOLERANCE, planned_theta_d
-from brdfdb.tables.polarisation_record import POLARISATION_VERSION
-from brdfdb.tables.wavelengths import refined
-from brdfdb_pipelines import preset_names, toml_file
+from brdfdb.tables.stokes import POLARISATION_VERSION
+from brdfdb_pipelines import toml_file
 from brdfdb_pipelines.measured_job import MeasuredJob, measured_job
 from brdfdb_pipelines.recipe_grids import LIST, STRICT, Grids, Nodes, Range, RecipeError, nodes_of
 
-_MOST_VALUES = 1 << 36  # of a table: 275 GB
-_MOST_PATTERNS = 10_000  # each is compared with every name
-_MOST_MEMBERS = 100_000  # of all families of a recipe
-_MOST_SWEPT = 6  # parameters of a family: a lookup is made of two members for each, 64 in all
+_MOST_VALUES = 1 << 36  # values of a table: 275 GB
+_MOST_PATTERNS = 10_000  # names and patterns of a recipe; each is compared with every name
+_MOST_MEMBERS = 100_000  # members of all families of a recipe
+_MOST_SWEPT = 6  # parameters of a family; a lookup interpolates between two members along each, 64 in all
+
+
+def _known_library(name: str) -> str:
+    """Return the name of a library; ValueError for pydantic if there is none."""
+    names = libraries()
+    if name not in names:
+        raise ValueError(f"{name!r} is not one of {', '.join(names)}")
+    return name
 
 
 @dataclass(frozen=True)
@@ -84,7 +95,7 @@ class Job:
         assert self.tolerance is not None
         given = self.wavelength_nm
         # the members of a family share their wavelengths
-        more = given if self.family is not None else refined(self.material, given, self.tolerance)
+        more = given if self.family is not None else refined_wavelengths(self.material, given, self.tolerance)
         plan = functools.partial(planned, alike=self.planned_on, hot_spot_tolerance=self.hot_spot_tolerance)
         try:
             return plan(self.material, more, self.tolerance)
@@ -101,7 +112,7 @@ class Job:
             polarised_source(self.material)
         if layout.size > _MOST_VALUES:
             shape = " x ".join(map(str, layout.shape))
-            raise RecipeError("", f"{shape} are {layout.size:.3g} values, more than the {_MOST_VALUES:.3g} of a table")
+            raise RecipeError("", f"{shape} nodes are {layout.size:.3g} values; a table has at most {_MOST_VALUES:.3g}")
 
     @property
     def name(self) -> str:
@@ -144,7 +155,7 @@ class Recipe(BaseModel):
     materials: Annotated[list[str], FailFast()] = Field(
         min_length=1, max_length=_MOST_PATTERNS, description="names or shell patterns"
     )
-    library: Annotated[str, AfterValidator(preset_names.checked)] = Field(
+    library: Annotated[str, AfterValidator(_known_library)] = Field(
         default=PAPERS, description="library of presets that the names mean"
     )
     wavelengths_nm: Nodes = Field(default=[], description="of spectral materials that state none themselves")
@@ -183,13 +194,7 @@ class Recipe(BaseModel):
     _checked: list[Job] | None = PrivateAttr(default=None)  # jobs of this recipe, which does not change once it is read
 
     def jobs(self) -> list[Job]:
-        """Return a job for each table of a model that the recipe asks for.
-
-        Raises
-        ------
-        RecipeError
-            If a name matches nothing, or a material, grid or wavelength is not what it must be.
-        """
+        """Return a job for each table of a model that the recipe asks for; RecipeError if the recipe is wrong."""
         if self._checked is None:
             self._checked = self._jobs()
         return [*self._checked]
@@ -201,20 +206,24 @@ class Recipe(BaseModel):
 
     def _jobs(self) -> list[Job]:
         if (self.tolerance is None) == (self.grids is None):
-            raise RecipeError("tolerance, grids", "give one of the two")
+            raise RecipeError("tolerance, grids", "give exactly one of them")
         if self.interpolation is not None and self.grids is None:
-            raise RecipeError("interpolation", "goes with grids; to a tolerance, the planner chooses")
+            raise RecipeError(
+                "interpolation", "is allowed only with grids; with a tolerance, the planner chooses the interpolation"
+            )
         if self.hot_spot_tolerance is not None and self.tolerance is None:
-            raise RecipeError("hot_spot_tolerance", "goes with tolerance; on grids, an error is only stated")
+            raise RecipeError(
+                "hot_spot_tolerance", "is allowed only with tolerance; on grids, the error is measured and stated"
+            )
         given = {} if self.grids is None else {name: grid for name, grid in self.grids if grid is not None}
         grids = {name: self._grid(grid, name) for name, grid in given.items()}
         wavelengths = self._wavelengths()
         jobs = []
         selected = self._selected()
         if self.polarised and self._measured:
-            raise RecipeError("polarised", f"{self._measured[0].name} is measured, and f_r alone is known of it")
+            raise RecipeError("polarised", f"{self._measured[0].name} is measured, and its polarisation is unknown")
         if self.hot_spot_tolerance is not None and self._measured:
-            raise RecipeError("hot_spot_tolerance", f"{self._measured[0].name} is measured; it is for models")
+            raise RecipeError("hot_spot_tolerance", f"is only for models, and {self._measured[0].name} is measured")
         for named, family in selected:
             material = exact_material(named) if self.forms == "exact" and family is None else named
             wavelength_nm = None
@@ -222,7 +231,9 @@ class Recipe(BaseModel):
                 stated = material.wavelengths_nm
                 wavelength_nm = wavelengths if stated is None else np.array(stated)
                 if wavelength_nm is None:
-                    raise RecipeError("wavelengths_nm", f"is missing; {material.name} is spectral and states none")
+                    raise RecipeError(
+                        "wavelengths_nm", f"is missing; {material.name} is spectral and states no wavelengths"
+                    )
             several = wavelength_nm is not None and wavelength_nm.size > 1
             kind = "anisotropic" if material.anisotropic else "spectral" if several else "isotropic"
             if self.grids is not None and kind not in grids:
@@ -286,7 +297,7 @@ class Recipe(BaseModel):
         known = {name: (material, None) for name, material in presets(self.library).items()}
         for name, table in self.define.items():
             if name in known:
-                raise RecipeError(f"define.{name}", "is the name of a preset; give yours another")
+                raise RecipeError(f"define.{name}", "is the name of a preset; choose another name")
             if "samples" in table:
                 if not NAME.fullmatch(name):
                     raise RecipeError(f"define.{name}", "is not made of lower-case letters, digits and single hyphens")
@@ -302,8 +313,7 @@ class Recipe(BaseModel):
             if count > _MOST_MEMBERS:
                 raise RecipeError(
                     f"sweep.{name}.parameters",
-                    f"the lists make {count} members, more than the {_MOST_MEMBERS} that all "
-                    "families of a recipe may have",
+                    f"the lists make {count} members; the families of a recipe have at most {_MOST_MEMBERS} in total",
                 )
         for name, table in self.sweep.items():
             members = {material.name: (material, family) for material, family in _members(name, table, self._folder)}
@@ -322,9 +332,7 @@ class Recipe(BaseModel):
             for family in fnmatch.filter(families, pattern):
                 matches += families[family]
             if not matches and not named:
-                raise RecipeError(
-                    "materials", preset_names.sentence_without(pattern, [*known, *measured, *families], self.library)
-                )
+                raise RecipeError("materials", _no_match(pattern, [*known, *measured, *families], self.library))
             chosen |= {name: known[name] for name in matches}
         self._measured = list(files.values())
         return list(chosen.values())
@@ -336,9 +344,9 @@ def _swept(name: str, table: Mapping[str, Any]) -> dict[str, list[float]]:
     where = f"sweep.{name}.parameters"
     lists = {x: v for x, v in parameters.items() if isinstance(v, list)} if isinstance(parameters, dict) else {}
     if not lists:
-        raise RecipeError(where, "give a list of numbers for one of them at least")
+        raise RecipeError(where, "give a list of numbers for at least one parameter")
     if len(lists) > _MOST_SWEPT:
-        raise RecipeError(where, f"{len(lists)} are lists, at most {_MOST_SWEPT} may be")
+        raise RecipeError(where, f"{len(lists)} parameters are lists; at most {_MOST_SWEPT} are allowed")
     known = [written_name(p) for p in MODELS[model].parameters] if isinstance(model, str) and model in MODELS else []
     axes = {}
     for x in sorted(lists, key=lambda x: known.index(x) if x in known else len(known)):
@@ -386,18 +394,12 @@ def _completed(content: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def load(path: Path | None = None, library: str = PAPERS, *, to_build: bool = True) -> Recipe:
-    """Read a recipe file, by default that of a library of presets, and see that it can be built.
+    """Read a recipe file, by default that of a library of presets, and check that it can be built.
 
     If it is not `to_build`, it may leave out `materials`, which are those that it defines, and `tolerance` or `grids`.
-
-    Raises
-    ------
-    RecipeError
-        If the file cannot be read, is not TOML, or is not a recipe; the message names the file and the field.
-    ParameterError
-        If there is no such library.
+    RecipeError names the file and the field; ParameterError if there is no such library.
     """
-    source = preset_names.recipe_of(library) if path is None else path
+    source = recipe_of(library) if path is None else path
     try:
         content = toml_file.read(source)
         recipe = Recipe.model_validate(content if to_build else _completed(content))
@@ -427,3 +429,21 @@ def _first(error: ValidationError) -> tuple[str, str]:
     field = ".".join(str(part) for part in first["loc"] if part not in ("float", "Range", "plain", "half"))
     hint = "; 0.01 is 1 %" if field == "tolerance" and first["type"] != "missing" else ""
     return field, sentence_of(first) + hint
+
+
+def recipe_of(library: str) -> Traversable:
+    """Return the packaged recipe of a library of presets; ParameterError if there is no such library."""
+    try:
+        name = "default" if _known_library(library) == PAPERS else library
+    except ValueError as error:
+        raise ParameterError("library", str(error), library, tuple(libraries())) from None
+    return resources.files("brdfdb_pipelines") / "recipes" / f"{name}.toml"
+
+
+def _no_match(pattern: str, names: Iterable[str], library: str) -> str:
+    """Return the sentence on a name or pattern that matches none of the names that a recipe can use."""
+    for other in libraries():
+        if other != library and fnmatch.filter(presets(other), pattern):
+            return f'{pattern!r} is in the library {other}; for its materials, write library = "{other}"'
+    option = "" if library == PAPERS else f" --library {library}"
+    return f"{pattern!r} matches no material{closest(pattern, names)}; `brdfdb list --presets{option}` names them"

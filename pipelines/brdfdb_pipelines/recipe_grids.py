@@ -11,17 +11,11 @@ from brdfdb.errors import ParameterError
 from brdfdb.tables.grids import Axis
 
 STRICT = ConfigDict(frozen=True, strict=True, extra="forbid", allow_inf_nan=False)
-_MOST_NODES = 100_000  # of an axis: far above any that is used, far below what fills the memory
+_MOST_NODES = 100_000  # nodes of an axis: far more than any recipe uses, and far less than fills the memory
 
 
 class RecipeError(ParameterError):
-    """A recipe that cannot be built; `parameter` is its field, with the tables around it, and may be "".
-
-    Attributes
-    ----------
-    file : str
-        Path of the recipe; "" of a recipe that was not read from a file.
-    """
+    """A recipe that cannot be built: the file, the field with the tables around it, and a sentence."""
 
     file = ""
 
@@ -42,13 +36,13 @@ class Range(BaseModel):
         """Return the numbers; RecipeError if the step does not lead from start to stop."""
         count = (self.stop - self.start) / self.step
         if count >= _MOST_NODES:
-            raise RecipeError(name, f"steps of {self.step:g} make more than the {_MOST_NODES} nodes an axis may have")
+            raise RecipeError(name, f"steps of {self.step:g} make too many nodes; an axis has at most {_MOST_NODES}")
         if not count >= 0.0 or abs(count - round(count)) > 1e-6:
             raise RecipeError(name, f"steps of {self.step:g} from {self.start:g} do not end at {self.stop:g}")
         return np.linspace(self.start, self.stop, round(count) + 1)
 
 
-# FailFast: pydantic would keep two errors for each wrong number
+# FailFast: otherwise pydantic collects two errors for each wrong number
 Nodes = Annotated[list[float | Range], FailFast(), Field(min_length=1, max_length=_MOST_NODES)]
 LIST: TypeAdapter[list[float | Range]] = TypeAdapter(Nodes, config=ConfigDict(strict=True, allow_inf_nan=False))
 
@@ -60,7 +54,7 @@ def nodes_of(name: str, parts: list[float | Range]) -> Axis:
         pieces.append(part.nodes(name) if isinstance(part, Range) else np.array([part]))
         count += pieces[-1].size
         if count > _MOST_NODES:
-            raise RecipeError(name, f"the list makes more than the {_MOST_NODES} nodes an axis may have")
+            raise RecipeError(name, f"the list has too many nodes; an axis has at most {_MOST_NODES}")
     return np.concatenate(pieces)
 
 

@@ -26,7 +26,7 @@ from brdfdb.place import path_of
 from brdfdb.store.codec import array_files, chunk_bytes, group_files
 from brdfdb.store.files import write_file
 from brdfdb.store.paths import METADATA
-from brdfdb.tables.tabulation import Variable
+from brdfdb.tables.tabulation import StoredArray
 from brdfdb_pipelines import terminal
 
 Array = NDArray[np.float64]
@@ -44,18 +44,8 @@ class SampleError(BrdfdbError):
 class TrainingSet:
     """A training set before its values: the drawn materials and directions.
 
-    Attributes
-    ----------
-    spec : ModelSpec
-        The model.
-    axes : list of Axis
-        Its drawn parameters.
-    written : dict
-        Their values (M,), as files write them.
-    angles : dict
-        Angles (D,) [degree] of light and viewer.
-    gradients : bool
-        True if derivatives by the drawn parameters stand beside f_r.
+    `written` has the drawn parameters (M,) as files write them, `angles` those (D,) [degree] of light and viewer. With
+    `gradients`, derivatives by the drawn parameters are written, too.
     """
 
     spec: ModelSpec
@@ -129,42 +119,28 @@ def run(
     gradients: bool = False,
     jobs: int = 1,
 ) -> None:
-    """Write a training set, or go on with one that was interrupted.
+    """Write a training set, or resume one that was interrupted.
 
-    Parameters
-    ----------
-    model : str
-        A name in `brdfdb.models.MODELS`.
-    out : Path
-        The zarr group to write. Until it is complete its name ends in ``.partial``.
-    count, directions : int
-        Materials, and pairs of directions that all of them share.
-    ranges : mapping of str to (float, float), optional
-        Ranges of parameters in place of the usual ones, by names and in units as files write them.
-    seed : int
-        The same seed draws the same set.
-    gradients : bool
-        Write derivatives by the drawn parameters, too.
-    jobs : int
-        Threads.
+    Until the zarr group is complete its name ends in ``.partial``. Ranges of parameters have the names and units of
+    recipes. The same seed draws the same set.
 
     Raises
     ------
     ParameterError
         If the model is unknown or has no derivatives, or a range is refused.
     SampleError
-        If the group is there already, another process writes it, or another set is half written under its name.
+        If the group exists already, another process writes it, or part of another set has its name.
     """
     out = path_of(out, "out")
     spec = MODELS[model]
     if seed < 0:
-        raise ParameterError("--seed", f"{seed} is not at least 0", seed)
+        raise ParameterError("--seed", f"{seed} is less than 0", seed)
     if gradients and spec.gradient is None:
         known = [one.name for one in MODELS.values() if one.gradient is not None]
-        text = f"{model} has no derivatives; those that have: {', '.join(known)}"
+        text = f"{model} has no derivatives; models with derivatives: {', '.join(known)}"
         raise ParameterError("--gradients", text, model, known)
     if os.path.lexists(out):
-        raise SampleError(f"{out} is there already; remove it, or give another name")
+        raise SampleError(f"{out} exists already; remove it, or give another name")
     axes = axes_of(spec, ranges or {})
     made = TrainingSet(spec, axes, materials(spec, axes, count, seed), pairs(directions, seed), gradients)
     partial = out.with_name(f"{out.name}.partial")
@@ -185,10 +161,10 @@ def _alone(partial: Path, out: Path) -> Iterator[None]:
         if os.path.lexists(out):  # another writer finished it meanwhile
             with contextlib.suppress(OSError):
                 partial.rmdir()
-            raise SampleError(f"{out} is there already; remove it, or give another name")
+            raise SampleError(f"{out} exists already; remove it, or give another name")
         yield
     except BlockingIOError:
-        raise SampleError(f"another process writes {partial}; wait for it, or give another name") from None
+        raise SampleError(f"another process is writing {partial}; wait for it, or give another name") from None
     finally:
         os.close(handle)
 
@@ -199,9 +175,9 @@ def _write(made: TrainingSet, seed: int, partial: Path, jobs: int) -> None:
     last = files.pop(METADATA)
     begun = [partial / name for name in (_LAST, METADATA) if (partial / name).exists()]
     if any(file.read_bytes() != last for file in begun):
-        raise SampleError(f"{partial} is a part of another set; finish that one, or remove it")
+        raise SampleError(f"{partial} is part of another set; finish that set, or remove it")
     if not begun and any(not file.name.startswith(".") for file in partial.iterdir()):
-        raise SampleError(f"{partial} holds files that are of no set; remove them, or give another name")
+        raise SampleError(f"{partial} contains files that do not belong to a set; remove them, or give another name")
     write_file(partial / _LAST, last, partial)
     for name, data in files.items():
         write_file(partial / name, data, partial)
@@ -246,10 +222,10 @@ def _arrays(made: TrainingSet) -> dict[str, bytes]:
     }
 
 
-def _coordinates(made: TrainingSet) -> dict[str, Variable]:
+def _coordinates(made: TrainingSet) -> dict[str, StoredArray]:
     """Return parameters along the materials, and angles along the directions."""
     variables = {
-        axis.parameter.name: Variable(
+        axis.parameter.name: StoredArray(
             _DIMENSIONS[:1],
             made.written[axis.parameter.name],
             {"units": axis.parameter.unit, "long_name": axis.parameter.meaning},
@@ -257,7 +233,7 @@ def _coordinates(made: TrainingSet) -> dict[str, Variable]:
         for axis in made.axes
     }
     return variables | {
-        name: Variable(_DIMENSIONS[1:], angles, {"units": "degree"}) for name, angles in made.angles.items()
+        name: StoredArray(_DIMENSIONS[1:], angles, {"units": "degree"}) for name, angles in made.angles.items()
     }
 
 

@@ -16,15 +16,7 @@ _SHIPPED = resources.files("brdfdb_pipelines") / "scenes"
 
 
 class SceneError(ParameterError):
-    """A scene that cannot be rendered; `parameter` is the field that is at fault, and may be "".
-
-    Parameters
-    ----------
-    scene : str
-        Name or path of the scene, as it was given.
-    parameter, sentence : str
-        As of `ParameterError`.
-    """
+    """A scene that cannot be rendered; `parameter` is the field that is at fault, and may be empty."""
 
     def __init__(self, scene: str, parameter: str, sentence: str) -> None:
         super().__init__(parameter, sentence)
@@ -41,17 +33,12 @@ def shipped() -> list[str]:
 
 
 def load(name: str) -> Scene:
-    """Return a scene from a path that ends in .toml, or the name of a scene that comes with the program.
+    """Return a scene from a path that ends in .toml, or the name of a packaged scene; SceneError if there is none.
 
     File names in a scene are relative to its directory.
-
-    Raises
-    ------
-    SceneError
-        If there is no such scene, or the file is not TOML or not a scene.
     """
     if not name.endswith(".toml") and name not in shipped():
-        sentence = f"is no scene{closest(name, shipped())}; give a path that ends in .toml or one of "
+        sentence = f"is not a scene{closest(name, shipped())}; give a path that ends in .toml, or one of "
         raise SceneError(name, "", sentence + ", ".join(shipped()))
     path = path_of(name, "scene")
     source = path if name.endswith(".toml") else _SHIPPED / f"{name}.toml"

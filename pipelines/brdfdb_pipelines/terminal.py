@@ -98,7 +98,7 @@ def print_table(
     console.print(title, style="bold", soft_wrap=True)
     console.print(table)
     if dropped:
-        print(f"left out, for a wider terminal: {', '.join(dropped)}")
+        print(f"columns left out on this narrow terminal: {', '.join(dropped)}")
 
 
 def _too_many(

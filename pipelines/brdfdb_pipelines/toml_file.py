@@ -22,29 +22,11 @@ _LONG_KEY = re.compile(rf"(?<![\w-])(?:{_PART}[ \t]*+\.[ \t]*+){{{MOST_KEY_PARTS
 
 
 class TomlError(BrdfdbError):
-    """A file that is not the TOML it should be; str() is a phrase without the name of the file."""
+    """A file that is not valid TOML; str() is a phrase without the name of the file."""
 
 
 def read(source: Path | Traversable) -> dict[str, Any]:
-    """Return the content of a TOML file.
-
-    Parameters
-    ----------
-    source : Path or Traversable
-        A file of the user, or one that comes with the program.
-
-    Returns
-    -------
-    dict
-        The content, unchecked.
-
-    Raises
-    ------
-    OSError
-        If the file cannot be read.
-    TomlError
-        If it is no regular file, is larger than `MOST_BYTES`, or is not TOML.
-    """
+    """Return the unchecked content of a TOML file; TomlError or OSError if it cannot be read."""
     data = _bounded(source) if isinstance(source, Path) else source.read_bytes()
     try:
         text = data.decode("utf-8")
@@ -71,15 +53,15 @@ def _check_integers(value: Any) -> None:
 
 
 def _bounded(path: Path) -> bytes:
-    """Return the bytes of a regular file; a pipe or a device is never read, as it may have no end."""
+    """Return the bytes of a regular file; pipes and devices are refused, as they may have no end."""
     descriptor = os.open(path, os.O_RDONLY | NON_BLOCKING)
     with open(descriptor, "rb") as file:
         status = os.fstat(descriptor)
         if stat.S_ISDIR(status.st_mode):
             raise IsADirectoryError(21, "Is a directory", str(path))
         if not stat.S_ISREG(status.st_mode):
-            raise TomlError("is no regular file; give the path of a file on a disk")
+            raise TomlError("is not a regular file; give the path of a file on a disk")
         content = file.read(MOST_BYTES + 1)
     if len(content) > MOST_BYTES:
-        raise TomlError(f"has more than the {MOST_BYTES // 10**6} MB that a file may have")
+        raise TomlError(f"is larger than {MOST_BYTES // 10**6} MB, the limit for a file")
     return content

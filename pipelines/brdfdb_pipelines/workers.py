@@ -72,17 +72,11 @@ def _start_process() -> None:
 def cluster(address: str) -> Iterator[Workers]:
     """Provide the workers of a running dask scheduler; they must see the store under the same path.
 
-    Raises
-    ------
-    WorkersError
-        If nothing answers there; from `slots`, if the scheduler is gone.
-    ParameterError
-        If the address has no port.
-    MissingExtraError
-        If dask is not installed.
+    WorkersError if nothing answers there, or from `slots` if the scheduler is gone. ParameterError for an address
+    without a port; MissingExtraError without dask.
     """
     if ":" not in address:  # dask waits for half a minute, and then prints a traceback of its own
-        raise ParameterError("--scheduler", f"{address!r} is no address, such as tcp://10.0.0.1:8786", address)
+        raise ParameterError("--scheduler", f"{address!r} is not an address such as tcp://10.0.0.1:8786", address)
     distributed: Any = import_extra("distributed")
     # a dead scheduler is one sentence of ours; dask sets levels of its own loggers
     for name in ("distributed", "distributed.client", "distributed.core", "tornado", "asyncio"):
@@ -91,17 +85,18 @@ def cluster(address: str) -> Iterator[Workers]:
         client = distributed.Client(address, timeout=_CONNECT_S, set_as_default=False)
     except (OSError, ValueError) as error:
         raise WorkersError(f"no dask scheduler answers at {address}") from error
-    asked_at, known = -_ASK_S, 1
+    asked_at = -_ASK_S
+    size = 1
 
     def slots() -> int:
-        nonlocal asked_at, known
+        nonlocal asked_at, size
         if time.monotonic() - asked_at >= _ASK_S:
             try:
-                known = sum(client.nthreads().values())
+                size = sum(client.nthreads().values())
             except OSError as error:
                 raise WorkersError(f"the dask scheduler at {address} is gone; build again to resume") from error
             asked_at = time.monotonic()
-        return known
+        return size
 
     with client:
         yield Workers(client.get_executor(pure=False), slots)

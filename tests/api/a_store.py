@@ -4,7 +4,11 @@ from __future__ import annotations
 
 import asyncio
 import io
+import os
+import signal
 import socket
+import subprocess
+import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -24,9 +28,8 @@ from brdfdb.tables.layout import Layout
 from brdfdb.tables.tabulation import tabulate
 from brdfdb_api import server
 from brdfdb_api.http.app import create_app
-from brdfdb_api.http.connection import Connection
-from brdfdb_api.serving.log import flush
-from brdfdb_api.serving.settings import Settings
+from brdfdb_api.log import flush
+from brdfdb_api.settings import Settings
 
 PROBLEM = "application/problem+json"
 NPY = "application/x-npy"
@@ -100,8 +103,8 @@ def serving(root: Path, port: int = 0, **settings: Any) -> Iterator[str]:
     """The address of a service in a thread of this process, at any free port or the one that is given."""
     app = create_app(Settings(store=root, log_level="error", **settings))
     with socket.create_server(("127.0.0.1", port)) as listener:
-        config = uvicorn.Config(app, http=Connection, log_level="error", timeout_graceful_shutdown=1, lifespan="off")
-        service = server.Server(config)
+        config = uvicorn.Config(app, http="httptools", log_level="error", timeout_graceful_shutdown=1, lifespan="off")
+        service = server.DrainingServer(config)
         thread = threading.Thread(target=service.run, kwargs={"sockets": [listener]})
         thread.start()
         try:
@@ -109,6 +112,24 @@ def serving(root: Path, port: int = 0, **settings: Any) -> Iterator[str]:
         finally:
             service.should_exit = True
             thread.join()
+
+
+@contextmanager
+def serving_command(
+    root: Path, *options: str, stderr: Any = subprocess.DEVNULL, **environment: str
+) -> Iterator[tuple[subprocess.Popen[str], int]]:
+    """The process of `brdfdb serve` on a free port, and this port; Ctrl-C ends it, and it must end well."""
+    command = [sys.executable, "-m", "brdfdb_pipelines.cli", "serve", "--store", str(root), "--port", "0", *options]
+    inherited = {key: value for key, value in os.environ.items() if not key.startswith("BRDFDB_")}
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=stderr, text=True, env={**inherited, **environment}
+    ) as process:
+        assert process.stdout is not None
+        try:
+            yield process, int(process.stdout.readline().rsplit(":", 1)[1].strip(" /\n"))
+        finally:
+            process.send_signal(signal.SIGINT)
+    assert process.returncode == 0
 
 
 def read_npy(content: bytes) -> np.ndarray:

@@ -3,12 +3,7 @@
 from __future__ import annotations
 
 import json
-import os
-import re
 import shutil
-import signal
-import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -16,8 +11,7 @@ import pytest
 
 from brdfdb.store.reader import Store
 from brdfdb_pipelines import cli
-from tests.api.a_store import TURNED, Client, client_of, publish, serving
-from tests.api.chromium import SECONDS
+from tests.api.a_store import TURNED, Client, client_of, publish, serving, serving_command
 from tests.api.explored import AUDIT, RECIPE
 
 
@@ -69,18 +63,8 @@ def explored(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="session")
 def address(explored: Path) -> Iterator[str]:
     """Where `brdfdb serve` serves it."""
-    command = [sys.executable, "-m", "brdfdb_pipelines.cli", "serve", "--store", str(explored), "--port", "0"]
-    environment = {key: value for key, value in os.environ.items() if not key.startswith("BRDFDB_")}
-    server = subprocess.Popen(
-        command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env=environment, text=True, encoding="utf-8"
-    )
-    assert server.stdout is not None
-    said = server.stdout.readline()
-    found = re.search(r"http://\S+", said)
-    assert found, said
-    yield found[0]
-    server.send_signal(signal.SIGINT)
-    server.communicate(timeout=SECONDS)
+    with serving_command(explored) as (_, port):
+        yield f"http://127.0.0.1:{port}/"
 
 
 @pytest.fixture

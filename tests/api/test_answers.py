@@ -27,17 +27,19 @@ BINARY = {"Content-Type": NPY}
 # from=model
 
 
-@pytest.mark.parametrize("wavelengths", [None, 455.0, [455.0, 600.0]])
-@pytest.mark.parametrize("name", ["copper-foil", "grey-felt", "brushed-metal"])
-def test_the_model_itself(client: Client, store: Store, name: str, wavelengths: Any) -> None:
-    table = store[name]
-    at = table.wavelength_nm if wavelengths is None else wavelengths
-    params = {**POINT, "from": "model"} | ({} if wavelengths is None else {"wavelength_nm": wavelengths})
-    answer = client.get(f"/v1/materials/{name}/lookup", params=params).json()
-    assert answer["source"] == "model"
-    material = table.source
-    np.testing.assert_allclose(answer["brdf"], material.lookup(*RADIANS, at), **EXACT)
-    np.testing.assert_allclose(answer["specular_reflectance"], material.specular_reflectance(RADIANS[0], at), **EXACT)
+def test_the_model_itself(client: Client, store: Store) -> None:
+    for name in ["copper-foil", "grey-felt", "brushed-metal"]:
+        for wavelengths in [None, 455.0, [455.0, 600.0]]:
+            table = store[name]
+            at = table.wavelength_nm if wavelengths is None else wavelengths
+            params = {**POINT, "from": "model"} | ({} if wavelengths is None else {"wavelength_nm": wavelengths})
+            answer = client.get(f"/v1/materials/{name}/lookup", params=params).json()
+            assert answer["source"] == "model"
+            material = table.source
+            np.testing.assert_allclose(answer["brdf"], material.lookup(*RADIANS, at), **EXACT)
+            np.testing.assert_allclose(
+                answer["specular_reflectance"], material.specular_reflectance(RADIANS[0], at), **EXACT
+            )
 
 
 def test_a_lambertian_model_is_exact(client: Client) -> None:
@@ -111,9 +113,8 @@ def test_colours_may_be_of_more_spectra_than_an_answer_holds(client: Client) -> 
     client.problem("POST", FOIL, 413, json=more, params={"output": "xyz"})
 
 
-@pytest.mark.parametrize(
-    ("address", "query", "parameter"),
-    [
+def test_what_cannot_be_asked_for(client: Client) -> None:
+    for address, query, parameter in [
         (FOIL, {"output": "xyz", "illuminant": "D66"}, "illuminant"),
         (FOIL, {"illuminant": "A"}, "illuminant"),
         (FOIL, {"output": "rgb"}, "output"),
@@ -123,12 +124,10 @@ def test_colours_may_be_of_more_spectra_than_an_answer_holds(client: Client) -> 
         (TILE, {"error": "true"}, "error"),
         (FOIL, {"output": "xyz", "wavelength_nm": [450, 550, 650]}, "wavelength_nm"),
         (FELT, {"output": "xyz", "wavelength_nm": 500}, "wavelength_nm"),
-    ],
-)
-def test_what_cannot_be_asked_for(client: Client, address: str, query: dict[str, Any], parameter: str) -> None:
-    problem = client.problem("GET", address, 422, params={**POINT, **query})
-    assert problem["parameter"] == parameter
-    assert problem["detail"].startswith(f"{parameter}: ")
+    ]:
+        problem = client.problem("GET", address, 422, params={**POINT, **query})
+        assert problem["parameter"] == parameter
+        assert problem["detail"].startswith(f"{parameter}: ")
 
 
 def test_a_colour_of_very_many_wavelengths_is_refused(client: Client) -> None:
@@ -170,27 +169,27 @@ def points(*shape: int) -> np.ndarray:
     return np.random.default_rng(3).uniform(0.0, 90.0, (*shape, 4))
 
 
-@pytest.mark.parametrize("order", ["C", "F"])
-@pytest.mark.parametrize("dtype", [np.float32, np.float64])
-@pytest.mark.parametrize("shape", [(), (1,), (7,), (3, 5)])
-def test_a_npy_body(client: Client, store: Store, shape: tuple[int, ...], dtype: Any, order: Any) -> None:
-    given = np.asarray(points(*shape).astype(dtype), order=order)
-    expected = degrees(store, "brushed-metal", *np.moveaxis(given.astype(np.float64), -1, 0))
-    for accept in (JSON, f"text/html, {JSON}"):
-        answer = client.post(METAL, content=npy(given), headers={**BINARY, "Accept": accept})
-        np.testing.assert_allclose(answer.json()["brdf"], expected, **EXACT)
-    for accept in (NPY, "*/*"):
-        answer = client.post(METAL, content=npy(given), headers={**BINARY, "Accept": accept})
-        assert read_npy(answer.content).shape == shape
+def test_a_npy_body(client: Client, store: Store) -> None:
+    for shape in [(), (1,), (7,), (3, 5)]:
+        for dtype in [np.float32, np.float64]:
+            for order in ["C", "F"]:
+                given = np.asarray(points(*shape).astype(dtype), order=order)
+                expected = degrees(store, "brushed-metal", *np.moveaxis(given.astype(np.float64), -1, 0))
+                for accept in (JSON, f"text/html, {JSON}"):
+                    answer = client.post(METAL, content=npy(given), headers={**BINARY, "Accept": accept})
+                    np.testing.assert_allclose(answer.json()["brdf"], expected, **EXACT)
+                for accept in (NPY, "*/*"):
+                    answer = client.post(METAL, content=npy(given), headers={**BINARY, "Accept": accept})
+                    assert read_npy(answer.content).shape == shape
+                    np.testing.assert_allclose(read_npy(answer.content), expected, **EXACT)
+
+
+def test_a_npy_body_has_its_wavelengths_in_the_query(client: Client, store: Store) -> None:
+    for wavelengths in [None, 455.0, [600.0, 455.0]]:
+        params = {} if wavelengths is None else {"wavelength_nm": wavelengths}
+        answer = client.post(FOIL, content=npy(points(6)), headers={**BINARY, "Accept": NPY}, params=params)
+        expected = degrees(store, "copper-foil", *points(6).T, wavelength_nm=wavelengths)
         np.testing.assert_allclose(read_npy(answer.content), expected, **EXACT)
-
-
-@pytest.mark.parametrize("wavelengths", [None, 455.0, [600.0, 455.0]])
-def test_a_npy_body_has_its_wavelengths_in_the_query(client: Client, store: Store, wavelengths: Any) -> None:
-    params = {} if wavelengths is None else {"wavelength_nm": wavelengths}
-    answer = client.post(FOIL, content=npy(points(6)), headers={**BINARY, "Accept": NPY}, params=params)
-    expected = degrees(store, "copper-foil", *points(6).T, wavelength_nm=wavelengths)
-    np.testing.assert_allclose(read_npy(answer.content), expected, **EXACT)
 
 
 def test_a_json_body_has_its_wavelengths_inside(client: Client) -> None:
@@ -201,9 +200,8 @@ def test_a_json_body_has_its_wavelengths_inside(client: Client) -> None:
 WHOLE = npy(points(4))
 
 
-@pytest.mark.parametrize(
-    ("body", "said"),
-    [
+def test_a_bad_npy_body_is_refused(client: Client) -> None:
+    for body, said in [
         (b"", "not a .npy file"),
         (b"\x93NUMPY", "not a .npy file"),
         (WHOLE[:60], "not a .npy file"),
@@ -225,10 +223,8 @@ WHOLE = npy(points(4))
         (npy(np.full((2, 4), np.nan)), "theta_i: nan is outside [0, 180] degrees"),
         (npy(np.full((2, 4), [0.0, np.inf, 0.0, 0.0])), "phi_i: inf is outside [-720, 720] degrees"),
         (npy(np.full((2, 4), 181.0)), "theta_i: 181.0 is outside [0, 180] degrees"),
-    ],
-)
-def test_a_bad_npy_body_is_refused(client: Client, body: bytes, said: str) -> None:
-    assert said in client.problem("POST", METAL, 422, content=body, headers=BINARY)["detail"]
+    ]:
+        assert said in client.problem("POST", METAL, 422, content=body, headers=BINARY)["detail"]
 
 
 def test_a_npy_body_is_counted_too(client: Client) -> None:

@@ -15,7 +15,7 @@ import brdfdb_api
 from brdfdb.errors import ParameterError, StoreError
 from brdfdb_api.http.app import create_app, openapi_json
 from brdfdb_api.server import ServerError, serve
-from brdfdb_api.serving.settings import Settings
+from brdfdb_api.settings import Settings
 from tests.api.a_store import Client
 
 OPENAPI = Path(__file__).parents[2] / "api" / "openapi.json"
@@ -53,12 +53,13 @@ def test_the_audit_lies_in_the_store_unless_it_is_named(tmp_path: Path) -> None:
     assert Settings(store=tmp_path, audit=Path("other.json")).audit_files == (Path("other.json"),)
 
 
-@pytest.mark.parametrize("variable", ["BRDFDB_MAX_POINTS", "BRDFDB_MAX_BODY_BYTES", "BRDFDB_CACHE_BYTES"])
-@pytest.mark.parametrize("value", ["0", "-1", "1e4", "", "many", "²"])
-def test_a_bad_setting_is_named(monkeypatch: pytest.MonkeyPatch, variable: str, value: str) -> None:
-    monkeypatch.setenv(variable, value)
-    with pytest.raises(ParameterError, match=f"^{variable}: '.*' (is not a whole number|must be greater than 0)$"):
-        create_app()
+def test_a_bad_setting_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    for value in ["0", "-1", "1e4", "", "many", "²"]:
+        for variable in ["BRDFDB_MAX_POINTS", "BRDFDB_MAX_BODY_BYTES", "BRDFDB_CACHE_BYTES"]:
+            with monkeypatch.context() as patch:
+                patch.setenv(variable, value)
+                with pytest.raises(ParameterError, match=f"^{variable}: "):
+                    create_app()
 
 
 def test_an_unknown_level_of_the_log_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -87,9 +88,9 @@ def test_openapi_is_served(client: Client) -> None:
     assert "/openapi.json" in client.get("/docs").text
 
 
-@pytest.mark.parametrize(
-    ("method", "address", "path", "status"),
-    [
+def test_answers_are_as_documented(client: Client) -> None:
+    document = json.loads(OPENAPI.read_text())
+    for method, address, path, status in [
         ("GET", "/healthz", "/healthz", 200),
         ("GET", "/v1/materials", "/v1/materials", 200),
         ("GET", "/v1/materials/copper-foil", "/v1/materials/{name}", 200),
@@ -127,21 +128,18 @@ def test_openapi_is_served(client: Client) -> None:
         ("GET", "/v1/families", "/v1/families", 200),
         ("GET", "/v1/store/zarr.json", "/v1/store/zarr.json", 200),
         ("GET", f"{FOIL}/thumbnail.png", "/v1/materials/{name}/thumbnail.png", 200),
-    ],
-)
-def test_answers_are_as_documented(client: Client, method: str, address: str, path: str, status: int) -> None:
-    document = json.loads(OPENAPI.read_text())
-    operation = document["paths"][path][method.lower()]
-    content = {}
-    if method == "POST":
-        documented = operation["requestBody"]["content"]["application/json"]
-        jsonschema.validate(documented["example"], {**documented["schema"], "components": document["components"]})
-        content = {"json": documented["example"]}
-    answer = client.request(method, address, **content)
-    assert answer.status_code == status
-    media = operation["responses"][str(status)]["content"][answer.headers["content-type"].partition(";")[0]]
-    if "json" in answer.headers["content-type"]:
-        jsonschema.validate(answer.json(), {**media["schema"], "components": document["components"]})
+    ]:
+        operation = document["paths"][path][method.lower()]
+        content = {}
+        if method == "POST":
+            documented = operation["requestBody"]["content"]["application/json"]
+            jsonschema.validate(documented["example"], {**documented["schema"], "components": document["components"]})
+            content = {"json": documented["example"]}
+        answer = client.request(method, address, **content)
+        assert answer.status_code == status
+        media = operation["responses"][str(status)]["content"][answer.headers["content-type"].partition(";")[0]]
+        if "json" in answer.headers["content-type"]:
+            jsonschema.validate(answer.json(), {**media["schema"], "components": document["components"]})
 
 
 def test_serve_needs_a_store(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -158,13 +156,15 @@ def test_serve_on_a_port_that_is_taken(root: Path, monkeypatch: pytest.MonkeyPat
             serve(root, "127.0.0.1", port)
 
 
-@pytest.mark.parametrize("host", ["127.0.0.1", "localhost"])
-def test_serve(root: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], host: str) -> None:
+@pytest.mark.parametrize(("host", "lines"), [("127.0.0.1", 1), ("localhost", 1), ("0.0.0.0", 2)])
+def test_serve(
+    root: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], host: str, lines: int
+) -> None:
     ports = []
 
     def run(server: Any, sockets: list[socket.socket]) -> None:
         (listener,) = sockets
-        assert listener.getsockname()[0] == "127.0.0.1"
+        assert listener.getsockname()[0] in ("127.0.0.1", host)
         # an accepted socket inherits this; asyncio turns the 40 ms delay of small answers off only where it is named
         assert listener.proto == socket.IPPROTO_TCP
         server.config.load()
@@ -175,7 +175,10 @@ def test_serve(root: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.Captu
     monkeypatch.setenv("BRDFDB_STORE", "put back afterwards")
     monkeypatch.setattr("uvicorn.Server.run", run)
     serve(root, host, 0)
-    assert capsys.readouterr().out == f"serving {root} at http://{host}:{ports[0]}/\n"
+    said = capsys.readouterr().out.splitlines()
+    assert said[0] == f"serving {root} at http://{host}:{ports[0]}/"
+    assert len(said) == lines
+    assert all("nginx or Caddy" in line for line in said[1:])
 
 
 def test_serve_on_no_port(tmp_path: Path) -> None:

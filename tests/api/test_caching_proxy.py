@@ -2,12 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import shutil
-import signal
-import socket
-import subprocess
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -21,75 +15,27 @@ from brdfdb.errors import StoreError, UnknownRevisionError
 from brdfdb.store.reader import Store
 from tests.api.a_store import pinned_of, publish, serving
 from tests.api.chromium import SECONDS
+from tests.api.proxies import free_port, nginx
 
-NGINX = shutil.which("nginx", path=f"{os.environ.get('PATH', '')}:/usr/sbin:/usr/local/sbin")
-pytestmark = pytest.mark.skipif(NGINX is None, reason="nginx is not installed: apt-get install nginx-light")
-
-# `proxy_cache_valid` is left out: what is kept, and for how long, is what the service says
-CONFIGURATION = """\
-daemon off;
-master_process off;
-pid {folder}/nginx.pid;
-error_log {folder}/error.log;
-events {{}}
-http {{
-  access_log off;
-  client_body_temp_path {folder}/body;
-  proxy_temp_path {folder}/temp;
-  fastcgi_temp_path {folder}/fastcgi;
-  uwsgi_temp_path {folder}/uwsgi;
-  scgi_temp_path {folder}/scgi;
-  proxy_cache_path {folder}/cache keys_zone=all:1m;
-  server {{
-    listen 127.0.0.1:{port};
-    location / {{
-      proxy_pass http://127.0.0.1:{upstream};
-      proxy_http_version 1.1;
-      proxy_cache all;
-      add_header X-Cache $upstream_cache_status;
-    }}
-  }}
-}}
-"""
+# What is kept, and for how long, is what the service says
+SHOWN = {"proxy_cache brdfdb;": "proxy_cache brdfdb; add_header X-Cache $upstream_cache_status;"}
 ANGLES = np.array([[0.1, 0.4, 0.9], [0.0, 0.1, 0.2], [0.2, 0.5, 1.0], [1.0, 2.0, 3.0]])
 LOOKUP = "lookup?theta_i=10&theta_r=20"
-
-
-def _free_port() -> int:
-    with socket.create_server(("127.0.0.1", 0)) as listener:
-        port: int = listener.getsockname()[1]
-        return port
-
-
-def _answers(port: int) -> bool:
-    with socket.socket() as one:
-        return one.connect_ex(("127.0.0.1", port)) == 0
 
 
 @pytest.fixture
 def upstream() -> int:
     """The port at which the stores are served, one after the other."""
-    return _free_port()
+    return free_port()
 
 
 @pytest.fixture
 def proxy(tmp_path: Path, upstream: int) -> Iterator[str]:
-    """The address of an nginx that caches."""
-    folder, port = tmp_path / "nginx", _free_port()
+    """The address of the nginx of the documentation."""
+    folder = tmp_path / "nginx"
     folder.mkdir()
-    (folder / "nginx.conf").write_text(CONFIGURATION.format(folder=folder, port=port, upstream=upstream))
-    assert NGINX is not None
-    command = [NGINX, "-p", str(folder), "-c", str(folder / "nginx.conf"), "-e", str(folder / "error.log")]
-    with subprocess.Popen(command) as process:
-        try:
-            end = time.monotonic() + SECONDS
-            while not _answers(port):
-                assert process.poll() is None, (folder / "error.log").read_text()
-                assert time.monotonic() < end
-                time.sleep(0.02)
-            yield f"http://127.0.0.1:{port}"
-        finally:
-            process.send_signal(signal.SIGTERM)
+    with nginx(folder, upstream, SHOWN) as port:
+        yield f"http://127.0.0.1:{port}"
 
 
 @pytest.fixture

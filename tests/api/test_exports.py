@@ -22,21 +22,18 @@ FOIL, FELT, TILE, METAL = (
 )
 
 
-@pytest.mark.parametrize(
-    ("query", "highest"),
-    [
+def test_sizes_of_files_have_lower_limits_than_at_the_command_line(client: Client) -> None:
+    for query, highest in [
         ("rgl?megabytes=65", 64),
         ("kaist?megabytes=65", 64),
         ("radiance?cells=600001", 600_000),
         ("png?size=513", 512),
         ("eradiate?nodes=130", 129),
         *((f"{name}?size=17", 16) for name in ("astm", "fred", "ssdd", "zemax")),
-    ],
-)
-def test_sizes_of_files_have_lower_limits_than_at_the_command_line(client: Client, query: str, highest: int) -> None:
-    problem = client.problem("GET", f"{FELT}/export/{query}", 422)
-    assert problem["parameter"] == query.partition("?")[2].partition("=")[0]
-    assert f", {highest:g}]" in problem["detail"]
+    ]:
+        problem = client.problem("GET", f"{FELT}/export/{query}", 422)
+        assert problem["parameter"] == query.partition("?")[2].partition("=")[0]
+        assert f", {highest:g}]" in problem["detail"]
 
 
 def test_few_files_are_made_at_once(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -79,19 +76,16 @@ def test_the_tag_of_a_file_is_weak_and_names_the_program(client: Client) -> None
     assert re.fullmatch(rf'W/"grey-felt-r000001-[0-9a-f]{{16}}-{re.escape(__version__)}-None-csv"', tag)
 
 
-@pytest.mark.parametrize(
-    ("address", "status"),
-    [
+def test_a_client_that_holds_anything_is_told_of_a_bad_request(client: Client) -> None:
+    for address, status in [
         (f"{METAL}/export/fred", 422),
         (f"{FELT}/export/csv", 304),
         (f"{FOIL}/lookup?theta_i=10&theta_r=20&wavelength_nm=9999", 422),
         (f"{FOIL}/lookup?theta_i=10&theta_r=20&wavelength_nm=550", 304),
         (f"{FOIL}/lobe?wavelength_nm=9999", 422),
         (f"{FOIL}/lobe?wavelength_nm=550", 304),
-    ],
-)
-def test_a_client_that_holds_anything_is_told_of_a_bad_request(client: Client, address: str, status: int) -> None:
-    assert client.get(address, headers={"If-None-Match": "*"}).status_code == status
+    ]:
+        assert client.get(address, headers={"If-None-Match": "*"}).status_code == status
 
 
 MANY = {"theta_i": [10.0] * 20, "theta_r": 20}

@@ -67,9 +67,8 @@ def test_a_file_that_is_held_is_not_sent_again(client: Client) -> None:
     assert client.get(f"{STORED}/{CHUNK}", headers={"If-None-Match": tag}).status_code == 200
 
 
-@pytest.mark.parametrize(
-    "address",
-    [
+def test_nothing_but_the_files_of_a_manifest(own: Path) -> None:
+    for address in [
         f"{STORED}/nothing",
         f"{STORED}/",
         f"{STORED}/brdf",
@@ -87,11 +86,9 @@ def test_a_file_that_is_held_is_not_sent_again(client: Client) -> None:
         "/v1/store/materials/%2e%2e/materials/copper-foil/r000001/zarr.json",
         "/v1/store/materials/copper-fool/r000001/zarr.json",
         "/v1/store/brdfdb.json",
-    ],
-)
-def test_nothing_but_the_files_of_a_manifest(own: Path, address: str) -> None:
-    (own / "materials" / "copper-foil" / "r000001" / "stranger.txt").write_text("nobody's")
-    client_of(own).problem("GET", address, 404)
+    ]:
+        (own / "materials" / "copper-foil" / "r000001" / "stranger.txt").write_text("nobody's")
+        client_of(own).problem("GET", address, 404)
 
 
 def test_a_file_that_is_missing_is_an_error_not_nan(own: Path) -> None:

@@ -22,6 +22,8 @@ from brdfdb.audit import FINDINGS
 from tests.api.a_store import npy, serving
 from tests.api.test_views import report
 
+pytest.importorskip("openapi_python_client")
+
 OPENAPI = Path(__file__).parents[2] / "api" / "openapi.json"
 BYTES = ("application/x-npy", "application/x-npz", "application/zip", "image/png")
 CONFIG = {"content_type_overrides": dict.fromkeys(BYTES, "application/octet-stream"), "post_hooks": []}

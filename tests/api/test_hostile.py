@@ -10,7 +10,6 @@ import re
 import socket
 import struct
 import subprocess
-import sys
 import time
 from collections import Counter
 from collections.abc import Iterator
@@ -20,20 +19,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from brdfdb.materials import Material
-from brdfdb.store.publication import publish_dataset
-from brdfdb.tables.grids import Grid
-from brdfdb.tables.layout import Layout
-from brdfdb.tables.tabulation import tabulate
-from brdfdb_api.http.connection import HEAD_BYTES
+from tests.api.a_store import publish, serving_command
 
-GRID = Grid({"theta_i": [0, 30, 60, 85], "theta_r": [0, 30, 60, 85], "delta_phi": [0, 90, 180]})
 LOOKUP = "/v1/materials/white/lookup"
 GONE = "499"
 JSON, NPY = "application/json", "application/x-npy"
 WAIT_S = 300.0  # for what takes a second or two where the machine has nothing else to do
 MEMORY_MB = 700.0  # of the server: 240 before, 390 after the bodies of 64 MiB that it may take
-HEAD_MB = 2.0  # more after a head of 50 MB: 0.3 measured, 70 to 160 where it is kept
 
 
 class Server:
@@ -86,30 +78,6 @@ class Server:
         """The largest that was resident."""
         return self._memory_mb("VmHWM")
 
-    @property
-    def settled_mb(self) -> float:
-        """Its memory once no thread beside the first one works: one loads what pictures share."""
-        idle, deadline = 0, time.monotonic() + WAIT_S
-        while idle < 20:
-            assert time.monotonic() < deadline
-            idle = 0 if self._works() else idle + 1
-            time.sleep(0.02)
-        return self.resident_mb
-
-    def _works(self) -> bool:
-        """Return True if a thread beside the first one runs, waits for the processor or for the disk."""
-        states = set()
-        for thread in Path(f"/proc/{self.process.pid}/task").iterdir():
-            with contextlib.suppress(OSError):  # one that has ended meanwhile
-                if int(thread.name) != self.process.pid:
-                    states.add((thread / "stat").read_text().rpartition(")")[2].split()[0])
-        return not {"R", "D"}.isdisjoint(states)
-
-    @property
-    def resident_mb(self) -> float:
-        """What is resident now."""
-        return self._memory_mb("VmRSS")
-
     def _memory_mb(self, which: str) -> float:
         lines = Path(f"/proc/{self.process.pid}/status").read_text().splitlines()
         return next(float(line.split()[1]) for line in lines if line.startswith(which)) / 1e3
@@ -127,21 +95,13 @@ class Server:
 @contextlib.contextmanager
 def running(folder: Path) -> Iterator[Server]:
     """A server of a store with one white material, until the end."""
-    table = {"title": "White", "model": "lambert", "source": "no paper", "parameters": {"rho": 1.0}}
-    publish_dataset(folder / "store", "white", tabulate(Layout(Material.from_table("white", table), GRID)))
-    command = [sys.executable, "-m", "brdfdb_pipelines.cli", "serve", "--store", str(folder / "store"), "--port", "0"]
-    with (
-        (folder / "log").open("w") as log,
-        subprocess.Popen(command, stdout=subprocess.PIPE, stderr=log, text=True) as process,
-    ):
-        assert process.stdout is not None
-        port = int(process.stdout.readline().rsplit(":", 1)[1].strip(" /\n"))
+    publish(folder / "store", "white", "lambert", rho=1.0)
+    with (folder / "log").open("w") as log, serving_command(folder / "store", stderr=log) as (process, port):
         server, deadline = Server(process, port), time.monotonic() + WAIT_S
         while server.ask("GET", "/readyz")[0] != 200:  # kernels are loaded, or compiled
             assert time.monotonic() < deadline
             time.sleep(0.05)
         yield server
-        process.terminate()
 
 
 @pytest.fixture(scope="module")
@@ -165,35 +125,18 @@ def npy(shape: str, data: bytes = b"", descr: str = "'<f8'", version: bytes = b"
 
 
 BODIES = {
-    "nothing": b"",
-    "not JSON": b"{theta_i: 1}",
     "not UTF-8": b'{"theta_i": "\xff\xfe"}',
-    "a list": b"[1, 2]",
-    "null": b"null",
-    "a nan": b'{"theta_i": NaN, "theta_r": 0}',
-    "an infinity": b'{"theta_i": -Infinity, "theta_r": 0}',
-    "a number past all floats": b'{"theta_i": 1e999, "theta_r": 0}',
     "an integer of a thousand digits": b'{"theta_i": ' + b"9" * 1000 + b', "theta_r": 0}',
     "an integer of a million digits": b'{"theta_i": ' + b"9" * 10**6 + b', "theta_r": 0}',
     "deep lists": b'{"theta_r": 0, "theta_i": ' + b"[" * 900 + b"1" + b"]" * 900 + b"}",
     "deeper lists": b'{"theta_r": 0, "theta_i": ' + b"[" * 200_000 + b"1" + b"]" * 200_000 + b"}",
     "deep objects": b'{"a":' * 100_000 + b"1" + b"}" * 100_000,
-    "lists that do not fit": b'{"theta_i": [1, [2]], "theta_r": 0}',
-    "empty lists": b'{"theta_i": [], "theta_r": [[]]}',
-    "words": b'{"theta_i": "45", "theta_r": 0}',
-    "truth": b'{"theta_i": true, "theta_r": 0}',
-    "objects": b'{"theta_i": {"x": 1}, "theta_r": 0}',
     "an unknown name": b'{"theta_i": 1, "theta_r": 0, "__proto__": 2}',
     "a name of a megabyte": b'{"theta_i": 1, "theta_r": 0, "' + b"x" * 2**20 + b'": 2}',
-    "a polar angle below the surface of the earth": b'{"theta_i": 181, "theta_r": 0}',
-    "wavelengths in lists of lists": b'{"theta_i": 1, "theta_r": 0, "wavelength_nm": [[500]]}',
     "a wavelength of nothing": b'{"theta_i": 1, "theta_r": 0, "wavelength_nm": 0}',
 }
 ARRAYS = {
-    "nothing": b"",
     "no .npy": b"PK\x03\x04" + bytes(100),
-    "only magic": b"\x93NUMPY",
-    "a version of the future": npy("(1, 4)", bytes(32), version=b"\x09\x00"),
     "a header that is code": b"\x93NUMPY\x01\x00"
     + struct.pack("<H", 40)
     + b"__import__('os').system('echo hi')".ljust(40),
@@ -202,52 +145,31 @@ ARRAYS = {
     "a petabyte": npy("(35184372088832, 4)", bytes(64)),
     "a product past 64 bits": npy("(4611686018427387904, 4611686018427387904, 4)", bytes(64)),
     "a negative shape": npy("(-1, 4)", bytes(32)),
-    "fewer numbers": npy("(2, 4)", bytes(32)),
-    "more numbers": npy("(1, 4)", bytes(64)),
-    "objects": npy("(1, 4)", bytes(32), "'|O'"),
     "records": npy("(1, 4)", bytes(32), "[('a', '<f8')]"),
-    "other bytes first": npy("(1, 4)", bytes(32), "'>f8'"),
-    "integers": npy("(1, 4)", bytes(32), "'<i8'"),
-    "three columns": npy("(1, 3)", bytes(24)),
-    "no columns": npy("()", bytes(8)),
-    "no rows": npy("(0, 4)"),
     "no rows, and more of them than 64 bits count": npy("(0, 1000000000000000000000000000000, 4)"),
     "no columns of more than memory": npy("(4611686018427387904, 0, 4)"),
     "seventy axes": npy(f"({'1, ' * 70}4)", bytes(32)),
     "truth for a length": npy("(True, 4)", bytes(32)),
-    "nan": npy("(1, 4)", struct.pack("<4d", float("nan"), 0, 0, 0)),
-    "an infinite azimuth": npy("(1, 4)", struct.pack("<4d", 1, float("inf"), 0, 0)),
 }
 
 
-@pytest.mark.parametrize("body", BODIES.values(), ids=BODIES)
-def test_hostile_json_is_refused_in_a_sentence(server: Server, body: bytes) -> None:
-    server.refused(422, "POST", LOOKUP, body, Content_Type=JSON)
+@pytest.mark.parametrize(("media", "bodies"), [(JSON, BODIES), (NPY, ARRAYS)])
+def test_hostile_bodies_are_refused_in_a_sentence(server: Server, media: str, bodies: dict[str, bytes]) -> None:
+    for body in bodies.values():
+        server.refused(422, "POST", LOOKUP, body, Content_Type=media)
 
 
-@pytest.mark.parametrize("body", ARRAYS.values(), ids=ARRAYS)
-def test_hostile_arrays_are_refused_in_a_sentence(server: Server, body: bytes) -> None:
-    server.refused(422, "POST", LOOKUP, body, Content_Type=NPY)
-
-
-@pytest.mark.parametrize("media", ["text/plain", "application/x-www-form-urlencoded", "application/xml", "", "/;="])
-def test_a_body_that_is_not_said_to_be_an_array_is_json(server: Server, media: str) -> None:
+def test_a_body_that_is_not_said_to_be_an_array_is_json(server: Server) -> None:
     body = b'{"theta_i": 10, "theta_r": 20}'
-    assert server.ask("POST", LOOKUP, body, Content_Type=media)[:2] == (200, JSON)
-    assert "JSON" in server.refused(422, "POST", LOOKUP, npy("(1, 4)", bytes(32)), Content_Type=media)
+    for media in ("text/plain", "application/x-www-form-urlencoded", "application/xml", "", "/;="):
+        assert server.ask("POST", LOOKUP, body, Content_Type=media)[:2] == (200, JSON)
+        assert "JSON" in server.refused(422, "POST", LOOKUP, npy("(1, 4)", bytes(32)), Content_Type=media)
 
 
-@pytest.mark.parametrize("media", [JSON, NPY, "text/plain"])
-def test_a_body_of_100_mb_is_refused_while_it_arrives(server: Server, media: str) -> None:
-    said = server.refused(413, "POST", LOOKUP, bytes(100 * 10**6), Content_Type=media)
-    assert "67108864 bytes" in said
-    assert server.memory_mb < MEMORY_MB
-
-
-def test_chunks_without_a_length_are_counted(server: Server) -> None:
-    said = server.refused(413, "POST", LOOKUP, (bytes(2**20) for _ in range(100)), Content_Type=JSON)
-    assert "67108864 bytes" in said
-    assert server.memory_mb < MEMORY_MB
+def test_a_body_of_100_mb_is_refused_while_it_arrives_with_a_length_or_without(server: Server) -> None:
+    for media, body in ((JSON, bytes(100 * 10**6)), (NPY, bytes(100 * 10**6)), (JSON, (bytes(2**20),) * 100)):
+        assert "67108864 bytes" in server.refused(413, "POST", LOOKUP, body, Content_Type=media)
+        assert server.memory_mb < MEMORY_MB
 
 
 def test_a_body_as_large_as_may_be_is_read_and_refused(server: Server) -> None:
@@ -267,63 +189,44 @@ def test_points_that_broadcast_to_more_than_may_be_are_refused_before_they_are_m
     assert server.memory_mb < MEMORY_MB
 
 
-@pytest.mark.parametrize(
-    "query",
-    [
-        "theta_i=nan&theta_r=0",
-        "theta_i=inf&theta_r=0",
-        "theta_i=1_0&theta_r=0",
-        "theta_i=0x10&theta_r=0",
-        "theta_i=&theta_r=0",
-        "theta_i=1&theta_i=2&theta_r=0",
-        "theta_i=1",
-        "theta_i=-0.1&theta_r=0",
-        "theta_i=1&theta_r=0&wavelength_nm=-5",
-        "theta_i=1&theta_r=0&wavelength_nm=",
-        "theta_i=1&theta_r=0&from=hell",
-        "theta_i=1&theta_r=0&output=xyz&illuminant=%00",
-        "theta_i=1&theta_r=0&output=xyz&illuminant=D66",
-        "theta_i=1&theta_r=0&illuminant=D65",
-        "theta_i=1&theta_r=0&error=perhaps",
-        "theta_i=1&theta_r=0&error=true",
-        "theta_i=1&theta_r=0&format=pickle",
-        "theta_i=1&theta_r=0&%F0%9F%92%A9=1",
-        "theta_i=%ff%fe&theta_r=0",
-        "theta_i=" + "9" * 5000 + "&theta_r=0",
-        "&&&=&",
-    ],
-)
-def test_hostile_queries_are_refused_in_a_sentence(server: Server, query: str) -> None:
-    server.refused(422, "GET", f"{LOOKUP}?{query}")
+QUERIES = [
+    "theta_i=0x10&theta_r=0",
+    "theta_i=1&theta_r=0&output=xyz&illuminant=%00",
+    "theta_i=1&theta_r=0&format=pickle",
+    "theta_i=1&theta_r=0&%F0%9F%92%A9=1",
+    "theta_i=%ff%fe&theta_r=0",
+    "theta_i=" + "9" * 5000 + "&theta_r=0",
+    "&&&=&",
+]
 
 
-@pytest.mark.parametrize(
-    "path",
-    [
-        "/v1/materials/..%2f..%2fetc/lookup?theta_i=1&theta_r=0",
-        "/v1/materials/%2e%2e/lookup?theta_i=1&theta_r=0",
-        "/v1/materials/white%00/lookup?theta_i=1&theta_r=0",
-        "/v1/materials/white%0a/lookup?theta_i=1&theta_r=0",
-        "/v1/materials/" + "x" * 5000,
-        "/v1/materials/white/revisions/..%2fr000001/lookup?theta_i=1&theta_r=0",
-        "/v1/materials/white/revisions/r000001%00",
-        "/v1/materials/white/revisions/r%D9%A3",
-        "/v1/store/materials/white/r000001/../../../brdfdb.json",
-        "/v1/store/materials/white/r000001/%2e%2e/HEAD.json",
-        "/v1/store/materials/white/r000001/..%2fHEAD.json",
-        "/v1/store/materials/white/r000001//etc/passwd",
-        "/v1/store/materials/%2e%2e/materials/white",
-        "/v1/store/materials/white/r000001/zarr.json%00",
-        "/no/such/address",
-    ],
-)
-def test_path_tricks_lead_nowhere(server: Server, path: str) -> None:
-    server.refused(404, "GET", path)
+def test_hostile_queries_are_refused_in_a_sentence(server: Server) -> None:
+    for query in QUERIES:
+        server.refused(422, "GET", f"{LOOKUP}?{query}")
 
 
-@pytest.mark.parametrize("method", ["PUT", "DELETE", "PATCH", "PROPFIND"])
-def test_other_methods_are_refused(server: Server, method: str) -> None:
-    server.refused(405, method, LOOKUP)
+PATHS = [
+    "/v1/materials/..%2f..%2fetc/lookup?theta_i=1&theta_r=0",
+    "/v1/materials/%2e%2e/lookup?theta_i=1&theta_r=0",
+    "/v1/materials/white%00/lookup?theta_i=1&theta_r=0",
+    "/v1/materials/white%0a/lookup?theta_i=1&theta_r=0",
+    "/v1/materials/" + "x" * 5000,
+    "/v1/materials/white/revisions/..%2fr000001/lookup?theta_i=1&theta_r=0",
+    "/v1/materials/white/revisions/r000001%00",
+    "/v1/materials/white/revisions/r%D9%A3",
+    "/v1/store/materials/white/r000001/../../../brdfdb.json",
+    "/v1/store/materials/white/r000001/%2e%2e/HEAD.json",
+    "/v1/store/materials/white/r000001/..%2fHEAD.json",
+    "/v1/store/materials/white/r000001//etc/passwd",
+    "/v1/store/materials/%2e%2e/materials/white",
+    "/v1/store/materials/white/r000001/zarr.json%00",
+    "/no/such/address",
+]
+
+
+def test_path_tricks_lead_nowhere(server: Server) -> None:
+    for path in PATHS:
+        server.refused(404, "GET", path)
 
 
 @pytest.mark.parametrize(
@@ -341,71 +244,6 @@ def test_other_methods_are_refused(server: Server, method: str) -> None:
 def test_what_is_no_http_is_answered_with_4xx_or_not_at_all(server: Server, data: bytes) -> None:
     found = server.raw(data, 2.0)
     assert not found or found.split(b" ", 2)[1][:1] == b"4", found[:200]
-
-
-@pytest.mark.parametrize(
-    "start",
-    [
-        b"GET /no/such/address HTTP/1.1\r\nHost: x\r\nA: ",
-        b"GET /",
-        b"POST " + LOOKUP.encode() + b" HTTP/1.1\r\nHost: x\r\nTransfer-Encoding: chunked\r\n\r\n0\r\nA: ",
-    ],
-    ids=["header", "address", "trailer"],
-)
-def test_a_head_of_50_mb_is_refused_while_it_arrives(server: Server, start: bytes) -> None:
-    before = server.settled_mb
-    taken = 0
-    with socket.create_connection(("127.0.0.1", server.port), timeout=WAIT_S) as connection:
-        connection.sendall(start)
-        with contextlib.suppress(BrokenPipeError, ConnectionResetError):
-            while taken < 50 * 10**6:
-                taken += connection.send(b"b" * 2**16)
-    assert taken < 50 * 10**6
-    assert server.resident_mb < before + HEAD_MB
-
-
-@pytest.mark.parametrize("start", [b"GET /no/such/address HTTP/1.1\r\nHost: x\r\nA: ", b"GET /"])
-def test_a_head_longer_than_may_be_is_answered_with_400(server: Server, start: bytes) -> None:
-    # one byte too many: where more is under way, the connection may be reset before the answer is read
-    found = server.raw(start.ljust(HEAD_BYTES + 1, b"b"), WAIT_S)
-    assert found.startswith(b"HTTP/1.1 400 ")
-    assert json.loads(found.partition(b"\r\n\r\n")[2])["detail"] == "Address and headers are longer than 65536 bytes."
-
-
-def test_an_offer_of_http_2_is_ignored(server: Server) -> None:
-    headers = {"Connection": "Upgrade, HTTP2-Settings", "Upgrade": "h2c", "HTTP2-Settings": "AAMAAABkAAQAAP__"}
-    connection = http.client.HTTPConnection("127.0.0.1", server.port, timeout=WAIT_S)
-    for _ in range(2):
-        connection.request("POST", LOOKUP, b'{"theta_i": 10, "theta_r": 20}', headers)
-        answer = connection.getresponse()
-        assert (answer.status, json.loads(answer.read())["material"]) == (200, "white")
-    connection.close()
-
-
-def test_fields_behind_a_body_are_no_headers(server: Server) -> None:
-    head = f"POST {LOOKUP} HTTP/1.1\r\nHost: x\r\nConnection: close\r\nTransfer-Encoding: chunked\r\n\r\n"
-    body = b'{"theta_i":45,"theta_r":30}'
-    fields = b"Accept: application/x-npy\r\nContent-Encoding: gzip\r\nX-Request-ID: mine\r\n\r\n"
-    with socket.create_connection(("127.0.0.1", server.port), timeout=WAIT_S) as connection:
-        connection.sendall(head.encode() + b"%x\r\n%b\r\n0\r\n" % (len(body), body) + fields)
-        answer = b"".join(iter(lambda: connection.recv(65536), b""))
-    assert answer.startswith(b"HTTP/1.1 200 ")
-    assert b"content-type: application/json" in answer
-    assert b"mine" not in answer
-
-
-def test_heads_are_counted_one_by_one(server: Server) -> None:
-    # more than a head may have in all, of heads and bodies on one connection
-    connection = http.client.HTTPConnection("127.0.0.1", server.port, timeout=WAIT_S)
-    body = json.dumps({"theta_i": [10] * 20_000, "theta_r": 20})
-    for _ in range(5):
-        connection.request("GET", f"{LOOKUP}?theta_i=10&theta_r=20", headers={"A": "b" * 20_000})
-        answer = connection.getresponse()
-        assert (answer.status, len(answer.read()) > 0) == (200, True)
-        connection.request("POST", f"{LOOKUP}?format=npy", body, {"Content-Type": JSON})
-        answer = connection.getresponse()
-        assert (answer.status, len(answer.read()) > 0) == (200, True)
-    connection.close()
 
 
 def test_a_client_that_goes_away_leaves_nothing_behind(server: Server) -> None:

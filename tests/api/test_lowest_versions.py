@@ -4,10 +4,6 @@ from __future__ import annotations
 
 import importlib.metadata
 import os
-import re
-import signal
-import subprocess
-import sys
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
@@ -17,7 +13,7 @@ import pytest
 from packaging.requirements import Requirement
 from packaging.version import Version
 
-from tests.api.a_store import client_of
+from tests.api.a_store import client_of, serving_command
 from tests.api.chromium import SECONDS
 
 PROJECT = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text(encoding="utf-8"))["project"]
@@ -49,17 +45,9 @@ POSTED = {
 @pytest.fixture(scope="module")
 def address(root: Path) -> Iterator[str]:
     """Address of `brdfdb serve` with the lowest versions."""
-    command = [sys.executable, "-m", "brdfdb_pipelines.cli", "serve", "--store", str(root), "--port", "0"]
     path = os.pathsep.join([FOLDER, *filter(None, [os.environ.get("PYTHONPATH", "")])])
-    with subprocess.Popen(
-        command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, env={**os.environ, "PYTHONPATH": path}
-    ) as server:
-        assert server.stdout is not None
-        match = re.search(r"http://\S+[^/\s]", server.stdout.readline())
-        assert match
-        yield match[0]
-        server.send_signal(signal.SIGINT)
-    assert server.returncode == 0
+    with serving_command(root, PYTHONPATH=path) as (_, port):
+        yield f"http://127.0.0.1:{port}"
 
 
 def test_the_folder_holds_what_the_project_states() -> None:
@@ -78,19 +66,19 @@ def test_the_folder_holds_what_the_project_states() -> None:
         assert Version(installed[name.lower()]) == Version(lowest[name]), name
 
 
-@pytest.mark.parametrize("path", ASKED)
-def test_an_address_answers_as_with_the_present_versions(address: str, root: Path, path: str) -> None:
-    present = client_of(root).get(path)
-    answer = httpx.get(f"{address}{path}", timeout=SECONDS)
-    assert (answer.status_code, answer.headers["content-type"]) == (
-        present.status_code,
-        present.headers["content-type"],
-    )
-    assert answer.content == present.content
+def test_an_address_answers_as_with_the_present_versions(address: str, root: Path) -> None:
+    for path in ASKED:
+        present = client_of(root).get(path)
+        answer = httpx.get(f"{address}{path}", timeout=SECONDS)
+        assert (answer.status_code, answer.headers["content-type"]) == (
+            present.status_code,
+            present.headers["content-type"],
+        )
+        assert answer.content == present.content
 
 
-@pytest.mark.parametrize("path", POSTED)
-def test_a_body_is_answered_as_with_the_present_versions(address: str, root: Path, path: str) -> None:
-    present = client_of(root).post(path, json=POSTED[path])
-    answer = httpx.post(f"{address}{path}", json=POSTED[path], timeout=SECONDS)
-    assert (answer.status_code, answer.content) == (present.status_code, present.content)
+def test_a_body_is_answered_as_with_the_present_versions(address: str, root: Path) -> None:
+    for path in POSTED:
+        present = client_of(root).post(path, json=POSTED[path])
+        answer = httpx.post(f"{address}{path}", json=POSTED[path], timeout=SECONDS)
+        assert (answer.status_code, answer.content) == (present.status_code, present.content)

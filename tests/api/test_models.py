@@ -19,8 +19,8 @@ from brdfdb.store import family_records
 from brdfdb.store.family import Sweep
 from brdfdb.store.publication import publish_dataset
 from brdfdb.tables.albedo import source_albedo
+from brdfdb.tables.evaluation import view_directions
 from brdfdb.tables.layout import Layout
-from brdfdb.tables.lobe_views import view_directions
 from brdfdb.tables.tabulation import tabulate
 from tests.api.a_store import GREY, NPY, Client, client_of, publish, read_npy
 
@@ -122,9 +122,8 @@ def pixels(content: bytes) -> np.ndarray:
     return rows[:, 1:].reshape(height, width, 4)
 
 
-@pytest.mark.parametrize(
-    ("path", "body", "status", "said"),
-    [
+def test_what_no_model_is_evaluated_at(client: Client) -> None:
+    for path, body, status, said in [
         ("wrad/lookup", PLASTER, 404, "no model 'wrad'; closest: ward"),
         ("ward/lobe", {"parameters": BRASS["parameters"] | {"rho_s": 2}}, 422, "rho_s: 2 is outside [0, 1]"),
         ("oren_nayar/lobe", {"parameters": {"rho": 0.5, "sigma": 20}}, 422, "sigma: 20 given, but the parameters of"),
@@ -147,12 +146,10 @@ def pixels(content: bytes) -> np.ndarray:
         ("lambert/lookup", {"parameters": {"rho": 0.5}, "theta_i": 3}, 422, "theta_r: is missing"),
         ("lambert/lookup?from=table", {"parameters": {"rho": 0.5}}, 422, "from: unknown parameter"),
         ("lambert/albedo?wavelength_nm=nan", {"parameters": {"rho": 0.5}}, 422, "wavelength_nm: 'nan' is not a finite"),
-    ],
-)
-def test_what_no_model_is_evaluated_at(client: Client, path: str, body: Any, status: int, said: str) -> None:
-    problem = client.problem("POST", f"/v1/models/{path}", status, json=body)
-    assert problem["detail"].startswith(said)
-    assert "request" not in problem["detail"]
+    ]:
+        problem = client.problem("POST", f"/v1/models/{path}", status, json=body)
+        assert problem["detail"].startswith(said)
+        assert "request" not in problem["detail"]
 
 
 def test_a_model_keeps_to_the_limits_of_a_lookup(client: Client) -> None:

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import http.client
 import socket
 import threading
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +14,8 @@ import pytest
 
 import brdfdb
 from brdfdb.errors import StoreError
-from brdfdb.store import http_client, http_service
+from brdfdb.store import http_client
+from tests.api import proxies
 from tests.api.a_store import angles, npy, same, serving
 
 
@@ -35,16 +34,13 @@ def test_a_server_that_is_not_there(tmp_path: Path) -> None:
         brdfdb.open(url)
 
 
-@pytest.mark.parametrize(
-    "url",
-    [
+def test_an_address_that_is_none() -> None:
+    for url in [
         *("http://", "http://host:port", "ftp://host", "http://host/?a=1", "host:8000"),
         *("http://me:secret@host", "http://my host", "http://host/\u00e4", "http://host/\n"),
-    ],
-)
-def test_an_address_that_is_none(url: str) -> None:
-    with pytest.raises(ValueError, match=r"^url: '.*' is not an address"):
-        http_client.RemoteStore(url)
+    ]:
+        with pytest.raises(ValueError, match=r"^url: '.*' is not an address"):
+            http_client.RemoteStore(url)
 
 
 def test_an_address_that_no_name_service_takes() -> None:
@@ -120,7 +116,7 @@ BUSY = answer(b'{"detail": "the server is busy"}', "503 Service Unavailable", "R
 
 def test_a_busy_service_is_asked_again_when_it_says(monkeypatch: pytest.MonkeyPatch) -> None:
     pauses: list[float] = []
-    monkeypatch.setattr(http_service.time, "sleep", pauses.append)
+    monkeypatch.setattr(http_client.time, "sleep", pauses.append)
     with answering(BUSY, READY, BUSY, READY) as (url, asked):  # it is opened, and counts its materials
         assert len(http_client.RemoteStore(url)) == 3
     assert (pauses, len(asked)) == ([1, 1], 4)
@@ -130,7 +126,7 @@ def test_a_busy_service_is_asked_again_when_it_says(monkeypatch: pytest.MonkeyPa
 def test_a_wait_that_is_too_long_is_an_error_at_once(
     monkeypatch: pytest.MonkeyPatch, wait: str, timeout_s: float
 ) -> None:
-    monkeypatch.setattr(http_service.time, "sleep", lambda _: pytest.fail("waits"))
+    monkeypatch.setattr(http_client.time, "sleep", lambda _: pytest.fail("waits"))
     refusal = BUSY.replace(b"Retry-After: 1", f"Retry-After: {wait}".encode())
     with answering(refusal) as (url, _), pytest.raises(StoreError, match=r"^the server is busy$"):
         http_client.RemoteStore(url, timeout_s=timeout_s)
@@ -160,7 +156,7 @@ def test_a_new_connection_that_breaks_is_not_tried_again() -> None:
 def test_an_answer_in_chunks() -> None:
     chunks = b'4\r\n{"ma\r\nb\r\nterials":3}\r\n0\r\n\r\n'
     with answering(b"HTTP/1.1 200 OK\r\nTransfer-Encoding: chunked\r\n\r\n" + chunks) as (url, _):
-        assert http_service.Service(url).document("/readyz") == {"materials": 3}
+        assert http_client.Service(url).document("/readyz") == {"materials": 3}
 
 
 @pytest.mark.parametrize(
@@ -205,7 +201,7 @@ NUMBERS = npy(np.zeros((3, 2)))
 def test_something_else_than_the_array_asked_for(content: bytes) -> None:
     said = "^http://[^ ]+ is no service of brdfdb$"
     with answering(answer(content)) as (url, _), pytest.raises(StoreError, match=said):
-        http_service.Service(url).array("/v1", (3, 2))
+        http_client.Service(url).array("/v1", (3, 2))
 
 
 @pytest.mark.parametrize("status", ["301 Moved Permanently", "302 Found", "307 Temporary Redirect", "308 Permanent"])
@@ -213,7 +209,7 @@ def test_a_redirect_is_told_and_not_followed(status: str) -> None:
     moved = answer(PAGE, status, "Location: https://there.example/brdf/v1?a=1")
     for body in (None, {"theta_i": 0}):
         with answering(moved) as (url, _), pytest.raises(StoreError) as raised:
-            http_service.Service(f"{url}/brdf/").document("/v1?a=1", body)
+            http_client.Service(f"{url}/brdf/").document("/v1?a=1", body)
         where = "https://there.example/brdf/v1; open the address that the service itself has"
         assert str(raised.value) == f"{url}/brdf redirects /v1 to {where}"
 
@@ -223,113 +219,71 @@ def test_a_redirect_is_told_and_not_followed(status: str) -> None:
 
 def test_a_body_that_is_refused_before_it_was_read() -> None:
     with answering(TOO_LARGE, READY, TOO_LARGE, READY) as (url, asked):
-        there = http_service.Service(url)
+        there = http_client.Service(url)
         for _ in range(2):  # the second time, the connection is one that was closed in between
             with pytest.raises(
                 StoreError, match=f"^{url} answered 413 Request Entity Too Large, and does not say why$"
             ):
-                there.content("/v1", FAR_TOO_LARGE, http_service.NPY)
+                there.content("/v1", FAR_TOO_LARGE, http_client.NPY)
             assert there.document("/readyz") == {"materials": 3}
     assert [request[:4] for request in asked] == [b"POST", b"GET ", b"POST", b"GET "]
 
 
 def test_a_connection_on_which_a_body_was_not_sent_whole_is_not_used_again() -> None:
     with answering(answer(PAGE, "413"), READY, close=False) as (url, asked):
-        there = http_service.Service(url, timeout_s=3.0)
+        there = http_client.Service(url, timeout_s=3.0)
         with pytest.raises(StoreError, match=f"^{url} answered 413, and does not say why$"):
-            there.content("/v1", FAR_TOO_LARGE, http_service.NPY)
+            there.content("/v1", FAR_TOO_LARGE, http_client.NPY)
         assert there.document("/readyz") == {"materials": 3}
     assert len(asked) == 2
 
 
-class Proxy(ThreadingHTTPServer):
-    """What nginx is before a service: too large a body is refused unread, with a page, and answers come in chunks.
-
-    `asked` are the sizes of request line and body; lines above 8 kB are refused as well.
-    """
-
-    def __init__(self, service: str) -> None:
-        super().__init__(("127.0.0.1", 0), Passing)
-        self.service, self.url = service.removeprefix("http://"), f"http://127.0.0.1:{self.server_port}"
-        self.most_bytes = 2**20
-        self.asked: list[tuple[int, int]] = []
-
-    def refused(self) -> list[int]:
-        """The sizes of the bodies that were too large."""
-        return [size for _, size in self.asked if size > self.most_bytes]
+@contextmanager
+def behind_nginx(address: str, folder: Path, **limits: str) -> Iterator[str]:
+    """The address of an nginx before a service, with the limits that it has unless it is told otherwise."""
+    of_nginx = {"body": "1m", "headers": "4 8k"} | limits
+    changes = {
+        "client_max_body_size 64m": f"client_max_body_size {of_nginx['body']}",
+        "large_client_header_buffers 4 16k": f"large_client_header_buffers {of_nginx['headers']}",
+    }
+    with proxies.nginx(folder, int(address.rpartition(":")[2]), changes) as port:
+        yield f"http://127.0.0.1:{port}"
 
 
-class Passing(BaseHTTPRequestHandler):
-    """One connection of a `Proxy`."""
-
-    protocol_version = "HTTP/1.1"
-    server: Proxy
-
-    def do_GET(self) -> None:
-        line, size = len(self.raw_requestline), int(self.headers.get("Content-Length", 0))
-        self.server.asked.append((line, size))
-        if size > self.server.most_bytes or line > 8192:
-            self.wfile.write(TOO_LARGE if line <= 8192 else answer(PAGE, "414 Request-URI Too Large"))
-            self.close_connection = True
-            return
-        behind = http.client.HTTPConnection(self.server.service)
-        behind.request(self.command, self.path, self.rfile.read(size) or None, dict(self.headers))
-        response = behind.getresponse()
-        self.send_response(response.status)
-        self.send_header("Transfer-Encoding", "chunked")
-        self.end_headers()
-        while part := response.read(5000):
-            self.wfile.write(b"%x\r\n%b\r\n" % (len(part), part))
-        self.wfile.write(b"0\r\n\r\n")
-        behind.close()
-
-    def do_POST(self) -> None:
-        self.do_GET()
-
-    def log_message(self, *_: Any) -> None: ...
+def refused_by_nginx(folder: Path) -> int:
+    """Return the number of requests that were too large."""
+    log = (folder / "error.log").read_text(encoding="utf-8")
+    return log.count("too large body") + log.count("too long URI")
 
 
-@pytest.fixture
-def proxy(address: str) -> Iterator[Proxy]:
-    with Proxy(address) as server:
-        thread = threading.Thread(target=server.serve_forever, args=(0.01,))
-        thread.start()
-        try:
-            yield server
-        finally:
-            server.shutdown()
-            thread.join()
+def test_a_proxy_passes_as_much_as_is_sent_at_once(address: str, root: Path, tmp_path: Path) -> None:
+    with behind_nginx(address, tmp_path) as url:
+        there, here = brdfdb.open(url)["copper-foil"], brdfdb.open(root)["copper-foil"]
+        given = [np.tile(angle, 100) for angle in angles()]
+        same(there.lookup(*given, 500.5), here.lookup(*given, 500.5))
+        many = np.linspace(400, 700, 1003)
+        same(there.lookup(0.1, 0.2, 0.3, 0.4, many), here.lookup(0.1, 0.2, 0.3, 0.4, many))
+    assert refused_by_nginx(tmp_path) == 0
 
 
-def test_a_proxy_passes_as_much_as_is_sent_at_once(proxy: Proxy, root: Path) -> None:
-    there, here = brdfdb.open(proxy.url)["copper-foil"], brdfdb.open(root)["copper-foil"]
-    given = [np.tile(angle, 100) for angle in angles()]
-    same(there.lookup(*given, 500.5), here.lookup(*given, 500.5))
-    many = np.linspace(400, 700, 1003)
-    same(there.lookup(0.1, 0.2, 0.3, 0.4, many), here.lookup(0.1, 0.2, 0.3, 0.4, many))
-    assert proxy.refused() == []
-    assert max(size for _, size in proxy.asked) > 0.9 * proxy.most_bytes
-    assert 0.7 * 8192 < max(line for line, _ in proxy.asked) < 8192
-
-
-def test_what_is_too_large_for_a_proxy_is_halved(proxy: Proxy, root: Path) -> None:
-    there, here = brdfdb.open(proxy.url)["copper-foil"], brdfdb.open(root)["copper-foil"]
-    proxy.most_bytes = 4000
-    given = angles()
-    same(there.lookup(*given), here.lookup(*given))
-    head = len(npy(np.zeros((1, 4)))) - 32
-    assert proxy.refused() == [head + 32 * points for points in (400, 200)]
-    same(there.specular_reflectance(given[0]), here.specular_reflectance(given[0]))
-    assert len(proxy.refused()) == 3
+def test_what_is_too_large_for_a_proxy_is_halved(address: str, root: Path, tmp_path: Path) -> None:
+    with behind_nginx(address, tmp_path, body="4000") as url:
+        there, here = brdfdb.open(url)["copper-foil"], brdfdb.open(root)["copper-foil"]
+        given = angles()
+        same(there.lookup(*given), here.lookup(*given))
+        assert refused_by_nginx(tmp_path) == 2  # bodies of 400 and 200 points
+        same(there.specular_reflectance(given[0]), here.specular_reflectance(given[0]))
+        assert refused_by_nginx(tmp_path) == 3
 
 
 @pytest.mark.parametrize(("points", "requests"), [(8, 4), (3, 2), (1, 1)])
-def test_one_point_that_is_too_large_for_a_proxy_is_an_error(proxy: Proxy, points: int, requests: int) -> None:
-    there = brdfdb.open(proxy.url)["copper-foil"]
-    proxy.most_bytes = -1
-    theta = np.full(points, 0.3)
-    for ask in (lambda: there.lookup(0.1, 0.2, theta, 0.4), lambda: there.specular_reflectance(theta)):
-        proxy.asked.clear()
-        with pytest.raises(StoreError, match=f"^{proxy.url} answered 413 Request Entity Too Large, and does not say"):
-            ask()
-        assert len(proxy.asked) == requests
+def test_one_point_that_is_too_large_for_a_proxy_is_an_error(points: int, requests: int) -> None:
+    asked = []
+
+    def refuse(rows: slice) -> None:
+        asked.append(rows)
+        raise http_client.TooLargeError("too large")
+
+    with pytest.raises(StoreError, match="too large"):
+        http_client._in_parts(refuse, np.empty(points), 32_000)
+    assert len(asked) == requests

@@ -17,7 +17,7 @@ from brdfdb.audit.reciprocity import Reciprocity
 from brdfdb.audit.sampling import Sampling
 from brdfdb.audit.smoothness import Smoothness
 from brdfdb.audit.table_error import TableError
-from brdfdb.audit.values import Values
+from brdfdb.audit.values import ValueCounts
 from brdfdb.geometry import degrees
 from brdfdb.materials import Material, written_name
 from brdfdb.materials.provenance import KnownExcess
@@ -92,8 +92,8 @@ def verdicts(found: MaterialAudit) -> dict[str, str]:
     every = {
         "energy": found.of(Energy).table.verdict,
         "reciprocity": found.of(Reciprocity).verdict,
-        "positivity": found.of(Values).positivity,
-        "finiteness": found.of(Values).finiteness,
+        "positivity": found.of(ValueCounts).positivity,
+        "finiteness": found.of(ValueCounts).finiteness,
         "smoothness": found.of(Smoothness).verdict,
         "table_error": found.of(TableError).verdict,
         "sampling": found.of(Sampling).verdict,

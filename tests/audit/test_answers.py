@@ -6,10 +6,10 @@ from typing import Any
 
 import pytest
 
-from brdfdb.audit.answers import as_published, conserves_energy
 from brdfdb.audit.energy import Energy
 from brdfdb.audit.finding import LEVELS, NotJudged
 from brdfdb.audit.model_energy import ModelEnergy
+from brdfdb.audit.report import as_published, conserves_energy
 from brdfdb.audit.table_error import TableError
 from brdfdb.audit.validity import Validity
 from tests.pipelines.a_report import material
@@ -119,13 +119,18 @@ def test_a_measured_error_stands_beside_the_stated_one(fresh: Any, stated: Any, 
 @pytest.mark.parametrize(
     ("standings", "cell", "words"),
     [
-        (("outside", "outside"), "2 of 2 limits not kept", "its paper states 2 limits: 2 not kept"),
-        (("at the edge", "inside"), "1 of 2 limits at the edge", "its paper states 2 limits: 1 at the edge, 1 kept"),
-        (("unknown",), "", "its paper states 1 limit: 1 not known"),
-        ((), "", "its paper states no limits"),
+        (("outside", "outside"), "2 of 2 limits not met", "2 limits that the paper states: 2 not met"),
+        (
+            ("at the edge", "inside"),
+            "1 of 2 limits at the edge",
+            "2 limits that the paper states: 1 at the edge, 1 met",
+        ),
+        (("unknown",), "", "1 limit that the paper states: 1 not known"),
+        ((), "", "the paper states no limits"),
+        (("inside", "inside"), "", "within both limits that the paper states"),
     ],
 )
-def test_limits_that_are_not_kept_are_counted_as_such(standings: tuple[Any, ...], cell: str, words: str) -> None:
+def test_limits_that_are_not_met_are_counted_as_such(standings: tuple[Any, ...], cell: str, words: str) -> None:
     validity = material("paint").of(Validity)
     limits = [validity.limits[0].model_copy(update={"standing": standing}) for standing in standings]
     changed = validity.model_copy(update={"limits": limits})

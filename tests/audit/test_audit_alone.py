@@ -15,7 +15,7 @@ from brdfdb.audit.nodes import Nodes
 from brdfdb.audit.reciprocity import Reciprocity
 from brdfdb.audit.smoothness import Smoothness
 from brdfdb.audit.table_error import TableError
-from brdfdb.audit.values import Values
+from brdfdb.audit.values import ValueCounts
 from brdfdb.materials import FunctionSource
 from brdfdb.parameters import Floats
 from brdfdb.tables.layout import Layout
@@ -80,7 +80,7 @@ def test_what_is_wrong_with_a_bare_table_violates() -> None:
     negative[1, 2, 1] = -0.1
     lopsided[1, 2, 1] = 0.1
     assert audit(replace(table, values=bright)).of(Energy).verdict == "violates"
-    assert audit(replace(table, values=negative)).of(Values).verdict == "violates"
+    assert audit(replace(table, values=negative)).of(ValueCounts).verdict == "violates"
     found = audit(replace(table, values=lopsided))
     assert (found.verdict, found.of(Reciprocity).verdict) == ("violates", "violates")
     accepted = audit(replace(table, values=bright), accept_excess=True)  # which is accepted of models

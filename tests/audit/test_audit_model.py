@@ -10,7 +10,6 @@ from typing import Any
 import mpmath
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy import stats
 
 from brdfdb.audit import sampling
@@ -24,11 +23,10 @@ from brdfdb.integrals.sampling import lobe_of
 from brdfdb.lobes import Lobe
 from brdfdb.materials import Material, presets
 from brdfdb.models import MODELS
+from brdfdb.parameters import Array
 from brdfdb.tables import error_measurement
 from brdfdb.tables.table import Table
 from tests.audit.a_table import ANISOTROPIC, ISOTROPIC, PARAMETERS, WAVELENGTHS, lambert, material, tabulated
-
-Array = NDArray[np.float64]
 
 WARD = material("ward", {"rho_d": 0.2, "rho_s": 0.3, "alpha_x": 0.05, "alpha_y": 0.15})
 # The integral of a Gaussian over its bins, by their nodes: worst measured 2e-13

@@ -14,7 +14,7 @@ from brdfdb.audit import MaterialAudit, audit
 from brdfdb.audit.energy import Energy
 from brdfdb.audit.reciprocity import LOOKUP_RECIPROCITY_TOLERANCE, Reciprocity
 from brdfdb.audit.table_energy import _band_means, table_energy_of
-from brdfdb.audit.values import Values
+from brdfdb.audit.values import ValueCounts
 from brdfdb.materials.provenance import KnownExcess
 from brdfdb.tables.layout import Interpolation, Layout
 from brdfdb.tables.table import Table
@@ -61,8 +61,8 @@ def test_planned_tables_pass_and_their_reports_are_valid(kind: str) -> None:
     assert found.of(Energy).table.bands.stated_error == table.attrs["error"]["l1"]
     assert np.max(found.of(Energy).table.bands.excess) == 0.0
     assert np.min(found.of(Energy).table.bands.explained) > 0.0
-    assert found.of(Values).looked_up > 1000
-    assert found.of(Values).count >= table.values.size
+    assert found.of(ValueCounts).looked_up > 1000
+    assert found.of(ValueCounts).count >= table.values.size
     written([found])
 
 
@@ -87,8 +87,8 @@ def test_one_node_of_nan_violates_and_the_report_is_json(kind: str) -> None:
     values = table.values.copy()
     values[(1,) * values.ndim if table.spectra is None else (1,) * (values.ndim - 1)] = np.nan
     found = audit(replace(table, values=values))
-    assert (found.verdict, found.of(Values).finiteness) == ("violates", "violates")
-    assert found.of(Values).not_finite > 0
+    assert (found.verdict, found.of(ValueCounts).finiteness) == ("violates", "violates")
+    assert found.of(ValueCounts).not_finite > 0
     written([found])
 
 
@@ -98,16 +98,16 @@ def test_what_is_stored_beside_the_values_is_audited(name: str) -> None:
     broken = getattr(table, name).copy()
     broken.flat[0] = np.nan
     found = audit(replace(table, **{name: broken}))
-    assert found.of(Values).finiteness == "violates"
+    assert found.of(ValueCounts).finiteness == "violates"
 
 
 def test_a_negative_uniform_part_violates() -> None:
     table = table_of("half-difference")
     assert table.uniform is not None
     found = audit(replace(table, uniform=-table.uniform))
-    assert found.of(Values).positivity == "violates"
-    assert found.of(Values).smallest is not None
-    assert found.of(Values).smallest < 0.0
+    assert found.of(ValueCounts).positivity == "violates"
+    assert found.of(ValueCounts).smallest is not None
+    assert found.of(ValueCounts).smallest < 0.0
 
 
 def test_a_negative_node_violates_even_if_lookups_stop_at_0() -> None:
@@ -116,8 +116,8 @@ def test_a_negative_node_violates_even_if_lookups_stop_at_0() -> None:
     values = dataset["brdf"].values
     values[2, 3, 1] = values[3, 2, 1] = -1e-3
     found = audit(replace(Table.of(cubic, values), attrs=dataset.attrs))
-    assert (found.of(Values).positivity, found.of(Values).negative) == ("violates", 2)
-    assert found.of(Values).smallest == np.float32(-1e-3)
+    assert (found.of(ValueCounts).positivity, found.of(ValueCounts).negative) == ("violates", 2)
+    assert found.of(ValueCounts).smallest == np.float32(-1e-3)
 
 
 @pytest.mark.parametrize("kind", ["polar", "polar-parts"])
@@ -203,12 +203,12 @@ def test_means_over_bands_are_those_of_what_is_linear_between_lights() -> None:
     np.testing.assert_allclose(_band_means(lights[:3], edges) @ lights[:3], [5.0, 10.0], rtol=1e-12)
 
 
-def test_a_limit_that_is_not_kept_is_the_reason_of_an_excess_and_the_table_follows_its_model() -> None:
+def test_a_limit_that_is_not_met_is_the_reason_of_an_excess_and_the_table_follows_its_model() -> None:
     found = audit(planned("ward", {"rho_d": 0.6, "rho_s": 0.45, "alpha_x": 0.1, "alpha_y": 0.1}))
     energy = found.of(Energy)
     assert energy.model is not None
     assert found.verdict == energy.model.verdict == energy.table.verdict == "violates"
-    limit = "(a limit is not kept: rho_d + rho_s is 1.05, valid below 1, at the edge 1; Ward 1992, section 4.2)"
+    limit = "(a limit is not met: rho_d + rho_s is 1.05, valid below 1, at the edge 1; Ward 1992, section 4.2)"
     assert energy.model.reason.endswith(limit)
     assert energy.table.reason.endswith(
         "at 0 degrees: the model itself reflects more than arrives, and the table follows it"

@@ -14,7 +14,6 @@ import scipy.optimize
 from brdfdb import fresnel
 from brdfdb.audit import energy as joined
 from brdfdb.audit import model_energy
-from brdfdb.audit.excess import published_excess
 from brdfdb.audit.model_energy import (
     BOUND_TOLERANCE,
     FINE,
@@ -23,6 +22,7 @@ from brdfdb.audit.model_energy import (
     EnergyVerdict,
     ModelEnergy,
     model_energy_of,
+    published_excess,
 )
 from brdfdb.audit.table_energy import TableEnergy
 from brdfdb.integrals.quadrature import directional_albedo
@@ -377,11 +377,10 @@ def test_a_model_and_its_furnace_over_the_same_directions_have_the_albedos_of_ea
 ) -> None:
     surface = material(model, parameters)
     lights = model_energy._Lights(np.array([0.0, 60.0]), np.zeros(2))
-    white = model_energy._white_of(surface, None)
-    assert white is not None
-    together = model_energy._reflected(model_energy._Model(surface, None, white, LIMITS), lights)
-    for both, alone in zip(together, (surface, white.lossless.source), strict=True):
-        expected, nothing = model_energy._reflected(model_energy._Model(alone, None, None, LIMITS), lights)
+    model = model_energy._Model.of(surface, None, LIMITS)
+    assert model.lossless is not None
+    for both, alone in zip(model.reflected(lights), (surface, model.lossless.source), strict=True):
+        expected, nothing = model._replace(source=alone, lossless=None).reflected(lights)
         assert nothing is None
         assert both is not None
         np.testing.assert_allclose(both.largest, expected.largest, atol=2.0 * TOLERANCE)
@@ -391,10 +390,11 @@ def test_a_model_and_its_furnace_over_the_same_directions_have_the_albedos_of_ea
 def test_an_albedo_is_integrated_again_where_it_is_closer_to_a_limit_than_its_error() -> None:
     surface = material("ward", {"rho_d": 0.1, "rho_s": 0.2, "alpha_x": 0.15, "alpha_y": 0.15})
     lights = model_energy._Lights(np.array([30.0, 80.0]), np.zeros(2))
-    coarse, _ = model_energy._reflected(model_energy._Model(surface, None, None, (2.0,)), lights)
+    model = model_energy._Model(surface, None, None, None, (2.0,))
+    coarse = model.reflected(lights).source
     assert FINE < coarse.error[1, 0] <= TOLERANCE
     limit = float(coarse.largest[1, 0]) + 0.5 * float(coarse.error[1, 0])
-    fine, _ = model_energy._reflected(model_energy._Model(surface, None, None, (limit,)), lights)
+    fine = model._replace(limits=(limit,)).reflected(lights).source
     assert fine.error[1, 0] <= FINE
     assert fine.error[0, 0] == coarse.error[0, 0]
     exact, _ = directional_albedo("ward", np.deg2rad(80.0), tolerance=1e-9, **surface.arguments())

@@ -20,11 +20,10 @@ from brdfdb.audit.record import UNCHECKED, Record, expected_of, record_of
 from brdfdb.audit.table_error import TableError
 from brdfdb.errors import BrdfdbError, StoreError
 from brdfdb.materials import Material, presets
-from brdfdb.store.chunks import read_group
-from brdfdb.store.decoding import table_of
-from brdfdb.store.manifest import SUMMARY_FIELDS, check_manifest
+from brdfdb.store.decoding import read_group, table_of
+from brdfdb.store.files import read_sealed
 from brdfdb.store.reader import Store
-from brdfdb.store.sealed_json import read_sealed
+from brdfdb.store.records import Summary, check_manifest, fields_of
 from brdfdb.tables.table import Table
 from brdfdb_pipelines import audit_page, cli
 from tests.audit.a_table import ANISOTROPIC, tabulated
@@ -85,6 +84,7 @@ def passes(store: Path, name: str, attributes: dict[str, Any], expected: dict[st
         return False
 
 
+@pytest.mark.judge
 @pytest.mark.parametrize("name", KINDS)
 def test_every_attribute_that_is_forged_is_noticed_or_listed(store: Path, name: str) -> None:
     table = brdfdb.open(store)[name]
@@ -99,6 +99,7 @@ def test_every_attribute_that_is_forged_is_noticed_or_listed(store: Path, name: 
     SILENT.setdefault(KINDS[name], set()).update(unnoticed)
 
 
+@pytest.mark.judge
 def test_every_leaf_that_the_page_lists_was_forged_and_not_noticed() -> None:
     """The list has nothing that could be checked: the tests above leave here what they did not notice."""
     if SILENT.keys() < set(KINDS.values()):
@@ -124,7 +125,7 @@ def test_every_leaf_of_a_summary_that_is_forged_is_noticed_or_listed(store: Path
         except StoreError:
             continue
         unnoticed.append(".".join(map(str, path)))
-    assert set(SUMMARY_FIELDS) <= summary.keys()
+    assert {field.name for field in fields_of(Summary)} <= summary.keys()
     assert unnoticed == [each.leaf for each in UNCHECKED if each.where == "pointer and manifest"]
 
 

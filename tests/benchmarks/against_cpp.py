@@ -35,7 +35,7 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 from brdfdb.geometry import spherical_angles, unit_vector
 from brdfdb.materials import Material, presets
 from brdfdb.models import MODELS
-from tests.benchmarks.recording import Column, Run, Table
+from tests.benchmarks.recording import Column, Run, Table, Value
 
 PROCESSOR = os.environ.get("NUMBA_CPU_NAME", "native")  # that both compile for
 FLAGS = ["-std=c++17", "-O3", f"-march={PROCESSOR}", "-ffast-math"]
@@ -137,12 +137,13 @@ class Row:
 def columns() -> list[Column]:
     """Return the columns of `Row`."""
     rates = [
-        Column(name=f"{whose}{name}", unit=unit)
+        Column(name=f"{whose}{name}", unit=unit, recorded=name != ", best" and (whose, name) != ("C++", ", spread"))
         for whose in ("C++", "ours")
         for name, unit in (("", "1e6/s"), (", best", "1e6/s"), (", spread", "%"))
     ]
-    ratios = (Column(name="ratio"), Column(name="ratio of best"), Column(name="floor"), Column(name="verdict"))
-    return [Column(name="case / against", width=56), Column(name="timed"), *rates, *ratios]
+    names = ("ratio", "ratio of best", "floor", "verdict")
+    ratios = [Column(name=name, recorded=name != "ratio of best") for name in names]
+    return [Column(name="case / against", width=56), Column(name="timed", recorded=False), *rates, *ratios]
 
 
 class Cpp:
@@ -408,6 +409,12 @@ def one_core() -> Iterator[None]:
         os.sched_setaffinity(0, cores)
 
 
+def _way(row: list[Value]) -> str:
+    """Return what a row is about, without the material of a table."""
+    case = str(row[0])
+    return case.partition(", ")[2] if "slabs" in case or "one call" in case else case
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Time all sections or those that are named, and print each row as it is known."""
     float32 = [f"{model}_float32" for model in IN_FLOAT32]
@@ -436,6 +443,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         for section in options.section or sections:
             for row in runs[section]:
                 row.add_to(table)
+    run.say(
+        "The page shows public functions, and for tables of He-Torrance the slowest material of each way to fill them."
+    )
+    table.rows = [row for row in table.rows if row[1] == "public"]
+    table.keep_worst("ours", _way, smallest=True)
     run.end()
     return 0
 

@@ -17,7 +17,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 import brdfdb_pipelines
-from brdfdb.scenes.choice_document import Choice
+from brdfdb.scenes.choice import SceneChoice
 from brdfdb_pipelines import choose
 from tests.benchmarks.picture_judge import WIDTHS, judge
 from tests.benchmarks.recording import Column, Run
@@ -62,7 +62,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         Column(name="next cheaper", width=46),
         Column(name="its error", unit="CIEDE2000", digits=2),
     )
-    choices: dict[Path, tuple[Choice, Path]] = {}
+    choices: dict[Path, tuple[SceneChoice, Path]] = {}
     with tempfile.TemporaryDirectory() as folder:
         for number, scene in enumerate(scene_files(options.scenes, Path(folder), options.quick)):
             choices[scene] = chosen(scene, Path(folder, str(number)), options.quick)
@@ -94,7 +94,7 @@ def scene_files(names: Sequence[str], folder: Path, quick: bool) -> list[Path]:
     return [Path(name) if name.endswith(".toml") else SCENES / f"{name}.toml" for name in names]
 
 
-def chosen(scene: Path, out: Path, quick: bool) -> tuple[Choice, Path]:
+def chosen(scene: Path, out: Path, quick: bool) -> tuple[SceneChoice, Path]:
     """Return the choice for a scene, and its file."""
     with contextlib.redirect_stdout(io.StringIO()):  # the job prints tables of its own
         if quick:
@@ -104,7 +104,7 @@ def chosen(scene: Path, out: Path, quick: bool) -> tuple[Choice, Path]:
     return choice, out / "choice.json"
 
 
-def judged(run: Run, choices: dict[Path, tuple[Choice, Path]], most: int | None, quick: bool) -> int:
+def judged(run: Run, choices: dict[Path, tuple[SceneChoice, Path]], most: int | None, quick: bool) -> int:
     """Judge choices by other pictures, and return the number of broken statements."""
     widths, offsets = (QUICK_WIDTHS, QUICK_OFFSETS) if quick else (WIDTHS, OFFSETS)
     table = run.table(

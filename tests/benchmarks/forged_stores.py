@@ -15,10 +15,10 @@ import numpy as np
 from brdfdb.materials import FunctionSource, presets
 from brdfdb.measurements import MeasuredSource
 from brdfdb.parameters import Floats
-from brdfdb.store.manifest import summary_of
+from brdfdb.store.files import read_sealed, write_sealed
 from brdfdb.store.paths import manifest_path, pointer_path
 from brdfdb.store.publication import publish, publish_layout
-from brdfdb.store.sealed_json import read_sealed, write_sealed
+from brdfdb.store.records import summary_of
 from brdfdb.tables.metadata import TableMetadata
 from brdfdb.tables.planner import plan
 from tests.measurements.made_up import scattered

@@ -24,7 +24,7 @@ from brdfdb.materials import Material, presets
 from brdfdb.measurements import Samples, joined
 from brdfdb.measurements.aperture import averaged
 from brdfdb.measurements.gonioreflectometer import Gonioreflectometer, photograph, reduced
-from brdfdb_pipelines.photograph import LIGHTS
+from brdfdb_pipelines.commands.photograph import LIGHTS
 from tests.benchmarks.recording import Column, Run
 
 Array = NDArray[np.float64]

@@ -23,13 +23,13 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 import brdfdb
 from brdfdb.formats import klems, radiance
 from brdfdb.formats._channels import channels_of
-from brdfdb.formats._klems_basis import BASES
 from brdfdb.formats._stated_error import Comparison
 from brdfdb.formats._written import Written
+from brdfdb.formats.klems import BASES
 from brdfdb.geometry import unit_vector
 from brdfdb.tables.table import Table
 from tests.benchmarks.formats import tables
-from tests.benchmarks.recording import Column, Run
+from tests.benchmarks.recording import Column, Run, model_of
 from tests.formats.bsdf_judges import check_bsdf, in_window, klems_total, made, queried, traced, tree_total
 
 REQUIRED = 5e-3  # of totals, relative
@@ -195,6 +195,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     far = max(abs(float(row[2] or 0.0)) for row in balls.rows)
     run.say(f"{len(balls.rows)} pictures of a file differ from plastic2 by {far:.2%} at most in the median pixel.")
     run.say(f"Where both have one formula, bounded Ward, all light together differs by {bounded.whole:.2%}.")
+    run.say("For each model, the page shows the material with the largest error.")
+    trees.keep_worst("p99 of Radiance", model_of)
+    matrices.keep_worst("difference", lambda row: (model_of(row), row[1]))
+    balls.keep_worst("file to plastic2, median", model_of)
     run.end()
     return 0 if worst <= REQUIRED and not beyond and max(far, abs(bounded.whole)) <= 0.01 else 1
 

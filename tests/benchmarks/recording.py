@@ -1,8 +1,8 @@
 """Arguments, printed tables and records of the benchmarks: what every script of this folder shares.
 
 A script makes a `Run`, adds ``--quick`` and ``--record`` to its arguments by it, fills tables that are printed row by
-row, and ends it. With ``--record`` the same tables are written to docs/results/NAME.json, from which the site makes a
-page.
+row, and ends it. With ``--record`` the tables are written to docs/results/NAME.json, from which the site makes a page:
+all of them but for columns that are only printed, and of a long table the worst row of each group.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import os
 import platform
 import shlex
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Hashable, Sequence
 from datetime import UTC, date, datetime
 from importlib.metadata import version
 from pathlib import Path
@@ -39,6 +39,7 @@ class Column(_Record):
     unit: str = ""
     digits: int = 3
     width: int = Field(default=8, exclude=True)  # least characters, where it is printed
+    recorded: bool = Field(default=True, exclude=True)  # False: printed alone
 
     @property
     def heading(self) -> str:
@@ -73,6 +74,21 @@ class Table(_Record):
         cells = [column.cell(value) for column, value in zip(self.columns, row, strict=True)]
         self.rows.append(row)
         print(self._line(cells), flush=True)
+
+    def keep_worst(self, name: str, group: Callable[[list[Value]], Hashable], *, smallest: bool = False) -> None:
+        """Keep of each group of rows the one with the largest number, or the smallest, in a column."""
+        (at,) = [number for number, column in enumerate(self.columns) if column.name == name]
+        sign = -1.0 if smallest else 1.0
+        worst: dict[Hashable, list[Value]] = {}
+        for row in sorted(self.rows, key=lambda row: -np.inf if row[at] is None else sign * float(row[at] or 0.0)):
+            worst[group(row)] = row
+        self.rows = [row for row in self.rows if any(row is kept for kept in worst.values())]
+
+    def recorded(self) -> Table:
+        """Return the table without the columns that are only printed."""
+        kept = [number for number, column in enumerate(self.columns) if column.recorded]
+        rows = [[row[number] for number in kept] for row in self.rows]
+        return Table(title=self.title, columns=[self.columns[number] for number in kept], rows=rows)
 
     def _line(self, cells: Sequence[str]) -> str:
         widths = [max(column.width, len(column.heading)) for column in self.columns]
@@ -190,13 +206,21 @@ class Run:
             quick=self.options.quick,
             load=round(self.load, 1),
             machine=machine(),
-            tables=self.tables,
+            tables=[table.recorded() for table in self.tables],
             sentences=self.sentences,
         )
         FOLDER.mkdir(parents=True, exist_ok=True)
         path = FOLDER / f"{self.name}.json"
-        path.write_text(record.model_dump_json(indent=1) + "\n", encoding="utf-8")
+        path.write_text(record.model_dump_json(indent=1, exclude_defaults=True) + "\n", encoding="utf-8")
         print(f"written: {path.name}")
+
+
+def model_of(row: list[Value]) -> Value:
+    """Return the model of the preset that the first cell of a row names, or the cell."""
+    from brdfdb.materials import presets
+
+    material = presets().get(str(row[0]))
+    return row[0] if material is None else material.model
 
 
 def _plain(value: Any) -> Value:

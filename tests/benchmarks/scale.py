@@ -32,7 +32,7 @@ import httpx
 import brdfdb
 from brdfdb.store.files import sha256_of
 from brdfdb_api.http.app import create_app
-from brdfdb_api.serving.settings import Settings
+from brdfdb_api.settings import Settings
 from brdfdb_pipelines import cli, workers
 from brdfdb_pipelines.build import build
 from brdfdb_pipelines.recipe_file import Recipe

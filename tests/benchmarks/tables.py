@@ -38,6 +38,7 @@ MEASURED = (
     "that they state, the same at other directions, and the size of a uniform grid that is as good."
 )
 Array = NDArray[np.float64]
+SIZES = ("numbers", "numbers stored", "all stored")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -51,13 +52,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     table = run.table(
         f"Tables for a tolerance of {100 * options.tolerance:g} %",
         Column(name="material", width=32),
-        *("nodes", "parts"),
-        *(Column(name=name, unit="kB") for name in ("numbers", "numbers stored", "all stored")),
+        "nodes",
+        Column(name="parts", recorded=False),
+        *(Column(name=name, unit="kB", recorded=name == "all stored") for name in SIZES),
         *(Column(name=name, unit="%") for name in ("stated p99", "fresh p99")),
         Column(name="planning", unit="s"),
         Column(name="nodes of a uniform grid / nodes", digits=2),
-        Column(name="grid", width=34),
-        Column(name="promises"),
+        Column(name="grid", width=34, recorded=False),
+        Column(name="promises", recorded=False),
     )
     broken = 0
     for job in load().jobs():
@@ -125,7 +127,7 @@ def uniform_nodes(layout: Layout, error: float) -> int:
 
 
 def uniform_lookup(
-    material: Material, wavelength_nm: NDArray[np.float64] | None, drawn: error_measurement.Draw, count: int
+    material: Material, wavelength_nm: NDArray[np.float64] | None, drawn: error_measurement.RandomPairs, count: int
 ) -> Array:
     """Multilinear interpolation on `count` nodes a quarter turn, without the table: the model at the nodes around."""
     theta = [np.arccos(np.clip(w[:, 2], -1.0, 1.0)) for w in (drawn.wi, drawn.wr)]

@@ -59,6 +59,7 @@ def test_records_of_the_site_are_valid_and_name_no_machine(name: str) -> None:
     assert not re.search(r'[" ](/[\w.-]+){2}', text)
 
 
+@pytest.mark.judge
 @pytest.mark.parametrize("name", [pytest.param(name, marks=needs.get(name, ())) for name in SCRIPTS])
 def test_a_quick_run_ends_well(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
@@ -75,17 +76,6 @@ def test_a_quick_run_ends_well(
         assert table.title in printed
         for row in table.rows:
             assert all(column.cell(value) in printed for column, value in zip(table.columns, row, strict=True))
-
-
-@pytest.mark.parametrize("name", SCRIPTS)
-def test_help_names_the_arguments(name: str, capsys: pytest.CaptureFixture[str]) -> None:
-    script = importlib.import_module(f"tests.benchmarks.{name}")
-    with pytest.raises(SystemExit) as ended:
-        script.main(["--help"])
-    assert ended.value.code == 0
-    printed = capsys.readouterr().out
-    assert "--quick" in printed
-    assert "--record" in printed
 
 
 def check(record: Record, name: str) -> None:
@@ -125,6 +115,21 @@ def test_a_record_holds_numbers_of_numpy_and_leaves_out_what_is_not_finite() -> 
         "0.25",
         "-",
     ]
+
+
+def test_a_record_has_the_worst_row_of_each_group_and_no_column_that_is_only_printed() -> None:
+    columns = [
+        recording.Column(name="name"),
+        recording.Column(name="error"),
+        recording.Column(name="seconds", recorded=False),
+    ]
+    table = Table(title="A table", columns=columns)
+    for row in (["ab", 1.0, 5.0], ["ac", 3.0, 4.0], ["b", None, 3.0], ["ad", 2.0, 2.0]):
+        table.add(*row)
+    table.keep_worst("error", lambda row: str(row[0])[0])
+    assert table.recorded().rows == [["ac", 3.0], ["b", None]]
+    table.keep_worst("error", lambda _: None, smallest=True)
+    assert table.rows == [["ac", 3.0, 4.0]]
 
 
 @pytest.mark.parametrize(

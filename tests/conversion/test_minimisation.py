@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from brdfdb.conversion.minimisation import downhill
+from brdfdb.conversion.search import downhill
 from brdfdb.fitting.variables import best_apart, spread
 
 Floats = NDArray[np.float64]

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from brdfdb.fitting.fit import fits
 from brdfdb.geometry import unit_vector
 from brdfdb.measurements import Instrument, Samples
-from brdfdb.measurements.aperture import View, averaged, cone
+from brdfdb.measurements.aperture import InstrumentView, averaged, cone
 from brdfdb.models import MODELS, he_torrance_aperture_vectors
 
 Array = NDArray[np.float64]
@@ -64,7 +64,7 @@ def test_one_disk_stands_for_both_cones(alpha: float, off_deg: float) -> None:
     wi = unit_vector(np.deg2rad([40.0]), np.zeros(1))
     wr = unit_vector(np.deg2rad([40.0 + off_deg]), np.full(1, np.pi))
     expected = drawn(brdf, wi[0], wr[0], (np.deg2rad(0.5), np.deg2rad(1.0)))
-    assert View(wi, wr, instrument).mean(brdf, alpha)[0] == pytest.approx(expected, rel=MEAN)
+    assert InstrumentView(wi, wr, instrument).mean(brdf, alpha)[0] == pytest.approx(expected, rel=MEAN)
 
 
 def test_a_mean_over_a_cone_is_that_of_a_function_of_the_second_degree() -> None:
@@ -144,7 +144,7 @@ def test_the_specular_peak_is_that_of_two_cones() -> None:
     wi = np.repeat(unit_vector(np.array([0.5]), np.zeros(1)), 4, axis=0)
     wr = unit_vector(0.5 + np.deg2rad([0.0, 0.5, 0.9, 1.6]), np.full(4, np.pi))
     cones = solid_angle(1.0), solid_angle(2.0)
-    view = View(wi, wr, Instrument(source_solid_angle_sr=cones[0], receiver_solid_angle_sr=cones[1]))
+    view = InstrumentView(wi, wr, Instrument(source_solid_angle_sr=cones[0], receiver_solid_angle_sr=cones[1]))
     given = SMOOTH | {"a": 0.0, "sigma_0_um": 0.0}
     expected = he_torrance_aperture_vectors(
         wi, wr, incident_solid_angle_sr=cones[0], received_solid_angle_sr=cones[1], **given
@@ -153,5 +153,5 @@ def test_the_specular_peak_is_that_of_two_cones() -> None:
     assert specular is not None
     rho = specular(view.theta_i, **{name: given[name] for name in MODELS["he_torrance"].specular_parameters})
     assert view.mirror * rho == pytest.approx(expected, rel=PEAK)
-    alone = View(wi, wr, Instrument(receiver_solid_angle_sr=cones[1]))
+    alone = InstrumentView(wi, wr, Instrument(receiver_solid_angle_sr=cones[1]))
     assert alone.mirror == pytest.approx([1.0 / (cones[1] * w) for w in wr[:3, 2]] + [0.0])

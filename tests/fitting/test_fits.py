@@ -13,11 +13,11 @@ from brdfdb.fitting.estimates import estimates_of
 from brdfdb.fitting.fit import fit, fits
 from brdfdb.fitting.problem import Problem
 from brdfdb.fitting.residuals import Residual
-from brdfdb.fitting.surface import NotDescribedError, Surface, fitted_by_default
+from brdfdb.fitting.surface import NotDescribedError, SearchedSurface, fitted_by_default
 from brdfdb.fitting.uncertainty import NORMAL_95, _root
 from brdfdb.geometry import unit_vector
 from brdfdb.measurements import Instrument, Samples
-from brdfdb.measurements.aperture import View
+from brdfdb.measurements.aperture import InstrumentView
 from brdfdb.models import MODELS
 
 NOISE = 0.03
@@ -64,7 +64,7 @@ WARD = {"rho_d": 0.2, "rho_s": 0.1, "alpha_x": 0.15, "alpha_y": 0.15}
 
 @pytest.mark.parametrize("name", fitted_by_default())
 def test_polynomial_of_a_surface_is_the_model(name: str) -> None:
-    surface = Surface(name, None, 1, turned=True)
+    surface = SearchedSurface(name, None, 1, turned=True)
     theta_i, phi_i, theta_r, phi_r = directions()
     wi, wr = unit_vector(theta_i, phi_i), unit_vector(theta_r, phi_r)
     rng = np.random.default_rng(3)
@@ -74,7 +74,7 @@ def test_polynomial_of_a_surface_is_the_model(name: str) -> None:
     for number, term in enumerate(surface.terms):
         given, scale = surface.in_channel(x, values, number, 0)
         expected += scale * term.spec.vectors(wi, wr, **given)
-    found = surface.f_r(x, values, View(wi, wr))[:, 0]
+    found = surface.f_r(x, values, InstrumentView(wi, wr))[:, 0]
     assert np.max(np.abs(found - expected)) <= ROUNDING * np.max(expected)
 
 
@@ -82,9 +82,9 @@ def test_polynomial_of_a_surface_is_the_model(name: str) -> None:
 @pytest.mark.parametrize("name", ["hapke", "lambert + 2 he_torrance", "ward", "ggx_compensated"])
 def test_points_that_are_evaluated_together_have_the_values_of_each(name: str, aperture_sr: float | None) -> None:
     made = samples(noisy(truth("ward", **WARD)))
-    view = View(made.w_i, made.w_r, Instrument(receiver_solid_angle_sr=aperture_sr))
+    view = InstrumentView(made.w_i, made.w_r, Instrument(receiver_solid_angle_sr=aperture_sr))
     at = np.array([450.0] if name in ("hapke", "ggx_compensated") else [450.0, 650.0])
-    together, alone = (Surface(name, at, len(at), turned=True, entry="constant/1.5/0.1") for _ in range(2))
+    together, alone = (SearchedSurface(name, at, len(at), turned=True, entry="constant/1.5/0.1") for _ in range(2))
     points = np.random.default_rng(5).uniform(0.1, 0.9, (6, len(alone.shape)))
     expected = np.array([alone.basis(x, view) for x in points])
     assert np.max(np.abs(together.bases(points, view) - expected)) <= ROUNDING * np.max(expected)
@@ -94,8 +94,8 @@ def test_points_that_are_evaluated_together_have_the_values_of_each(name: str, a
 
 def test_the_neighbours_of_a_point_are_one_call_of_the_model(monkeypatch: pytest.MonkeyPatch) -> None:
     made = samples(noisy(truth("ward", **WARD)))
-    surface = Surface("hapke", None, 1, turned=False)
-    problem = Problem(surface, View(made.w_i, made.w_r), Residual(made, "log"))
+    surface = SearchedSurface("hapke", None, 1, turned=False)
+    problem = Problem(surface, InstrumentView(made.w_i, made.w_r), Residual(made, "log"))
     point = problem.at(np.full(len(problem.free), 0.4))
     spec, calls = surface.terms[0].spec, []
 
@@ -367,7 +367,9 @@ def test_a_slightly_rough_surface_tells_two_lengths_apart() -> None:
 
 def test_gradient_of_the_projected_problem() -> None:
     made = samples(noisy(truth("ward", **WARD)))
-    problem = Problem(Surface("ward", None, 1, turned=False), View(made.w_i, made.w_r), Residual(made, "log"))
+    problem = Problem(
+        SearchedSurface("ward", None, 1, turned=False), InstrumentView(made.w_i, made.w_r), Residual(made, "log")
+    )
     problem.scale = 0.1
     x, step = np.array([0.8]), 1e-5
     point = problem.at(x)

@@ -85,34 +85,28 @@ def test_the_recipe_has_what_is_not_flagged(published: PublishedFits, tmp_path: 
         recipe_of(published, "X")
 
 
-@pytest.mark.parametrize(
-    ("text", "sentence"),
-    [
-        ("", "it has no line of the form NAME = LOBE"),
-        ("# nothing\n", "it has no line of the form"),
-        ("theta_i,theta_r,f_r\n10,10,0.3\n", "line 1 is not NAME = LOBE"),
-        ("a = Lambertian(albedo = [0.1, 0.2])", "line 1 (a): albedo of Lambertian has 2 values; 1 or 3 finite ones"),
-        ("a = Lambertian(albedo = 1e999)", "albedo of Lambertian has 1 values; 1 or 3 finite ones are read"),
-        (f"a = Lambertian(albedo = {'9' * 400})", "albedo of Lambertian is neither a number"),
-        ("a = Lambertian(albedo = [x, 0.2, 1])", "albedo of Lambertian is neither a number nor a list of numbers"),
-        ("a = Aggregate(Lambertian(albedo = 0.1), 3)", "line 1 (a): it is not LOBE(NUMBER = ...)"),
-        ("\n\na = Aggregate(Lambertian(albedo", "line 3 (a): it is not LOBE(NUMBER = ...)"),
-        ("a = " + "f(" * 1000 + ")" * 1000, "line 1 (a): it is not"),
-        ("a = Lambertian(albedo = 0.1)" + " " * 5000, "line 1 is not NAME"),
-        ("a = Lambertian(**{'albedo': 0.1})", "neither a number"),
-    ],
-)
-def test_other_texts_are_refused_in_a_sentence(text: str, sentence: str, tmp_path: Path) -> None:
+def test_other_texts_are_refused_in_a_sentence(tmp_path: Path) -> None:
     path = tmp_path / "wrong.fit"
-    path.write_text(text, encoding="utf-8")
-    with pytest.raises(FileFormatError) as refused:
-        read_published(path)
-    assert str(refused.value).startswith(f"{path}: ")
-    assert sentence in str(refused.value)
-
-
-def test_bytes_that_are_no_text_are_refused(tmp_path: Path) -> None:
-    path = tmp_path / "wrong.fit"
+    refused = {
+        "": "it has no line",
+        "# nothing\n": "it has no line",
+        "theta_i,theta_r,f_r\n10,10,0.3\n": "line 1 is not",
+        "a = Lambertian(albedo = [0.1, 0.2])": "line 1 (a): albedo of Lambertian has 2 values",
+        "a = Lambertian(albedo = 1e999)": "albedo of Lambertian has 1 values",
+        f"a = Lambertian(albedo = {'9' * 400})": "albedo of Lambertian is neither",
+        "a = Lambertian(albedo = [x, 0.2, 1])": "albedo of Lambertian is neither",
+        "a = Aggregate(Lambertian(albedo = 0.1), 3)": "line 1 (a): it is not",
+        "\n\na = Aggregate(Lambertian(albedo": "line 3 (a): it is not",
+        "a = " + "f(" * 1000 + ")" * 1000: "line 1 (a): it is not",
+        "a = Lambertian(albedo = 0.1)" + " " * 5000: "line 1 is not",
+        "a = Lambertian(**{'albedo': 0.1})": "is neither",
+    }
+    for text, sentence in refused.items():
+        path.write_text(text, encoding="utf-8")
+        with pytest.raises(FileFormatError) as caught:
+            read_published(path)
+        assert str(caught.value).startswith(f"{path}: ")
+        assert sentence in str(caught.value)
     path.write_bytes(b"a = \xff\xfe")
     with pytest.raises(FileFormatError, match="no text in UTF-8"):
         read_published(path)

@@ -14,13 +14,13 @@ import numpy as np
 import pytest
 
 from brdfdb.formats._channels import channels_of
-from brdfdb.formats._klems_basis import Basis
+from brdfdb.formats.klems import Basis
 from brdfdb.materials import Material
 from brdfdb.parameters import Floats
 from brdfdb.tables.albedo import directional_albedo
 from brdfdb.tables.planner import plan
-from brdfdb.tables.table import Table, table_from
-from brdfdb.tables.tabulation import tabulate
+from brdfdb.tables.table import Table
+from tests.formats.small_tables import table_of
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(3)
 _ALBEDO_TOLERANCE = 3e-4
@@ -76,9 +76,7 @@ def made(
     """Return the table of a model, as a store holds it."""
     spectral = {} if wavelength_nm is None or index is None else {"refractive_index": index}
     written = {"title": "Made <up> & down", "model": model, "source": "no paper", "parameters": parameters, **spectral}
-    dataset = tabulate(plan(Material.from_table("made-up", written), wavelength_nm, tolerance))
-    arrays = {str(name): np.asarray(variable.values) for name, variable in dataset.variables.items()}
-    return table_from("made-up", "r000001", arrays, dataset.attrs)
+    return table_of(plan(Material.from_table("made-up", written), wavelength_nm, tolerance))
 
 
 def _environment() -> dict[str, str]:

@@ -52,7 +52,11 @@ def small_table(kind: str, *, fine_spectrum: bool = False) -> Table:
     entries = {"title": kind, "model": model, "source": "no paper", "parameters": parameters, **index}
     power = 0.5 if model == "ward" else 0.0
     interpolation = Interpolation("cubic", True, 1e-4, power)
-    layout = Layout(Material.from_table(kind, entries), Grid(_AXES[kind]), at, interpolation)
+    return table_of(Layout(Material.from_table(kind, entries), Grid(_AXES[kind]), at, interpolation))
+
+
+def table_of(layout: Layout) -> Table:
+    """Return the table of a layout, as a store gives it back."""
     dataset = tabulate(layout)
     arrays = {str(name): np.asarray(variable.values) for name, variable in dataset.variables.items()}
-    return table_from(kind, "r000001", arrays, dataset.attrs)
+    return table_from(layout.source.name, "r000001", arrays, dataset.attrs)

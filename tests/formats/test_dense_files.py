@@ -239,6 +239,7 @@ def test_coordinates_of_netcdf_files_have_no_fill_value(tmp_path: Path) -> None:
             assert not any(hasattr(file.variables[name], "_FillValue") for name in coordinates)
 
 
+@pytest.mark.judge
 @pytest.mark.skipif(CF_CHECKER is None, reason="BRDFDB_CF names no compliance-checker")
 def test_the_checker_of_the_cf_conventions_finds_no_fault(tmp_path: Path) -> None:
     assert CF_CHECKER is not None

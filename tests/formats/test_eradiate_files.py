@@ -56,6 +56,7 @@ def test_each_node_has_its_place_in_the_file(tmp_path: Path) -> None:
         assert brdf[3, 1, 1].item() == brdf[3, 5, 1].item() == pytest.approx(float(expected), rel=1e-6)
 
 
+@pytest.mark.judge
 @pytest.mark.skipif(PYTHON is None, reason="BRDFDB_ERADIATE names no Python with eradiate")
 @pytest.mark.parametrize("kind", [GREY, DIFFUSE])
 def test_eradiate_reads_what_we_read(kind: str, tmp_path: Path) -> None:
@@ -75,6 +76,7 @@ def test_eradiate_reads_what_we_read(kind: str, tmp_path: Path) -> None:
     assert np.abs(back.lookup_vectors(wi, wr) - theirs).max() <= KERNEL_RTOL * theirs.max()
 
 
+@pytest.mark.judge
 @pytest.mark.skipif(PYTHON is None, reason="BRDFDB_ERADIATE names no Python with eradiate")
 @pytest.mark.parametrize("kind", [GREY, DIFFUSE])
 def test_eradiate_sees_the_error_that_the_file_states(kind: str, tmp_path: Path) -> None:

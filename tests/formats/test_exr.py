@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from brdfdb import spectra
 from brdfdb.errors import WriteError
-from brdfdb.formats import _exr_file, exr
+from brdfdb.formats import exr
 from brdfdb.geometry import unit_vector
 from brdfdb.tables import slices
 from brdfdb.tables.metadata import TableMetadata
@@ -120,7 +120,7 @@ def test_every_pixel_of_every_channel_reads_back(
 ) -> None:
     source = table(ward_like, WAVELENGTHS[kind])
     image = make(source)
-    _exr_file.write_slice(tmp_path / "slice.exr", image, source, half=half)
+    exr.write_slice(tmp_path / "slice.exr", image, source, half=half)
     header, channels = read(tmp_path / "slice.exr")
 
     if source.wavelength_nm is None:
@@ -147,7 +147,7 @@ def test_a_strided_and_a_transposed_slice_are_written_right(tmp_path: Path) -> N
     transposed = np.moveaxis(np.ascontiguousarray(np.moveaxis(full.values, -1, 0)), 0, -1)
     for values, wavelength_nm in ((full.values[..., ::2], VISIBLE_NM[::2]), (transposed, VISIBLE_NM)):
         assert not values.flags.c_contiguous
-        _exr_file.write_slice(tmp_path / "slice.exr", slice_of(values, wavelength_nm), table(ward_like))
+        exr.write_slice(tmp_path / "slice.exr", slice_of(values, wavelength_nm), table(ward_like))
         _, channels = read(tmp_path / "slice.exr")
         assert len(channels) == 3 + wavelength_nm.size
         for index, wavelength in enumerate(wavelength_nm):
@@ -156,13 +156,13 @@ def test_a_strided_and_a_transposed_slice_are_written_right(tmp_path: Path) -> N
 
 def test_half_clips_to_the_largest_half_and_counts(tmp_path: Path) -> None:
     values = np.array([[0.1, 65504.0, 65505.0], [1e6, np.inf, np.nan]], dtype=np.float32)
-    _exr_file.write_slice(tmp_path / "half.exr", slice_of(values, None), table(ward_like), half=True)
+    exr.write_slice(tmp_path / "half.exr", slice_of(values, None), table(ward_like), half=True)
     header, channels = read(tmp_path / "half.exr")
     expected = np.array([[0.1, 65504.0, 65504.0], [65504.0, 65504.0, np.nan]], dtype=np.float16)
     np.testing.assert_array_equal(channels["G"], expected)
     assert header["brdf:half"] == "values above 65504 are written as 65504: 9 in all channels"  # 3 pixels in R, G, B
 
-    _exr_file.write_slice(tmp_path / "float.exr", slice_of(values, None), table(ward_like))
+    exr.write_slice(tmp_path / "float.exr", slice_of(values, None), table(ward_like))
     header, channels = read(tmp_path / "float.exr")
     np.testing.assert_array_equal(channels["G"], values)
     assert "brdf:half" not in header
@@ -181,7 +181,7 @@ def test_half_clips_to_the_largest_half_and_counts(tmp_path: Path) -> None:
 )
 def test_channel_names_follow_the_spectral_layout(tmp_path: Path, wavelength_nm: list[float], names: list[str]) -> None:
     source = table(ward_like, np.array(wavelength_nm))
-    _exr_file.write_slice(tmp_path / "slice.exr", slices.in_plane_slice(source), source)
+    exr.write_slice(tmp_path / "slice.exr", slices.in_plane_slice(source), source)
     header, channels = read(tmp_path / "slice.exr")
     assert set(channels) == {*"RGB", *names}
     assert all(re.fullmatch(r"T\.\d+,\d+nm", name) for name in names)
@@ -194,7 +194,7 @@ def test_channels_of_the_file_and_the_attribute_have_the_same_order(tmp_path: Pa
     at = [402.5, 950.0, 1000.0, 1050.0]
     source = table(ward_like, np.array(at), np.array([0.1, 0.2, 0.3, 0.4]))
     image = slices.in_plane_slice(source)
-    _exr_file.write_slice(tmp_path / "slice.exr", image, source)
+    exr.write_slice(tmp_path / "slice.exr", image, source)
     with OpenEXR.File(str(tmp_path / "slice.exr"), separate_channels=True) as file:
         listed = [channel.name for channel in file.header()["channels"]]
         pixels = {name: channel.pixels.copy() for name, channel in file.channels().items()}
@@ -211,14 +211,14 @@ def test_channels_of_the_file_and_the_attribute_have_the_same_order(tmp_path: Pa
 def test_equal_wavelengths_are_refused(tmp_path: Path) -> None:
     source = table(ward_like, np.array([500.0, 550.0, 550.0]))
     with pytest.raises(ValueError, match=r"channel T\.550,0nm occurs twice"):
-        _exr_file.write_slice(tmp_path / "slice.exr", slices.in_plane_slice(source), source)
+        exr.write_slice(tmp_path / "slice.exr", slices.in_plane_slice(source), source)
     assert list(tmp_path.iterdir()) == []
 
 
 def test_a_reddish_spectrum_is_red_and_a_flat_one_is_white(tmp_path: Path) -> None:
     for spectrum in (REDDISH, np.ones(41)):
         source = table(ward_like, VISIBLE_NM, spectrum)
-        _exr_file.write_slice(tmp_path / "slice.exr", slices.in_plane_slice(source), source)
+        exr.write_slice(tmp_path / "slice.exr", slices.in_plane_slice(source), source)
         header, channels = read(tmp_path / "slice.exr")
         assert header["brdf:rgb"] == "linear sRGB, D65"
         if spectrum is REDDISH:
@@ -232,7 +232,7 @@ def test_a_reddish_spectrum_is_red_and_a_flat_one_is_white(tmp_path: Path) -> No
 @pytest.mark.parametrize("kind", ["grey", "one wavelength", "two wavelengths"])
 def test_without_colour_the_file_says_so(tmp_path: Path, kind: str) -> None:
     source = table(ward_like, WAVELENGTHS[kind])
-    _exr_file.write_slice(tmp_path / "slice.exr", slices.in_plane_slice(source), source)
+    exr.write_slice(tmp_path / "slice.exr", slices.in_plane_slice(source), source)
     header, _ = read(tmp_path / "slice.exr")
     assert header["brdf:rgb"].startswith("grey: colour was not measured")
     assert ("mean over the wavelengths" in header["brdf:rgb"]) == (kind != "grey")
@@ -300,7 +300,7 @@ def test_export_writes_three_files_with_their_attributes(tmp_path: Path) -> None
 def test_an_image_says_what_it_leaves_out_of_a_table_with_a_dirac_part(tmp_path: Path) -> None:
     source = table(ward_like)
     cast(Any, source).specular = np.array([0.25, 0.5], dtype=np.float32)
-    _exr_file.write_slice(tmp_path / "lobe.exr", slices.lobe_map(source), source)
+    exr.write_slice(tmp_path / "lobe.exr", slices.lobe_map(source), source)
     header, _ = read(tmp_path / "lobe.exr")
     sentence = "not in the file: the specular part, up to 0.5 of the light in the exact mirror direction"
     assert header["brdf:dirac"] == sentence
@@ -318,7 +318,7 @@ def test_an_image_says_the_error_that_its_table_states(tmp_path: Path) -> None:
         overall=Overall(**overall),
         **dict.fromkeys(overall, numbers),
     )
-    _exr_file.write_slice(tmp_path / "lobe.exr", slices.lobe_map(source), source)
+    exr.write_slice(tmp_path / "lobe.exr", slices.lobe_map(source), source)
     header, _ = read(tmp_path / "lobe.exr")
     assert header["brdf:error_p99"] == "0.0123"
     stated = json.loads(header["brdf:record"])["error"]
@@ -335,7 +335,7 @@ def test_export_in_half_replaces_the_files(tmp_path: Path) -> None:
 
 def test_angles_and_wavelengths_survive_to_the_last_bit(tmp_path: Path) -> None:
     source = table(ward_like, np.array([632.8, 1000.0 / 3.0]))
-    _exr_file.write_slice(tmp_path / "slice.exr", slices.lobe_map(source, theta_i_deg=0.1 + 0.2), source)
+    exr.write_slice(tmp_path / "slice.exr", slices.lobe_map(source, theta_i_deg=0.1 + 0.2), source)
     header, _ = read(tmp_path / "slice.exr")
     assert float(header["brdf:theta_i_deg"]) == 0.1 + 0.2
     assert [float(text) for text in header["brdf:wavelength_nm"].split()] == [632.8, 1000.0 / 3.0]
@@ -349,13 +349,13 @@ def test_a_disk_that_fills_up_leaves_the_old_file_and_no_other(tmp_path: Path) -
     source = table(ward_like)
     image = slices.lobe_map(source)
     path = tmp_path / "slice.exr"
-    _exr_file.write_slice(path, image, source)
+    exr.write_slice(path, image, source)
     before = path.read_bytes()
     limits = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (len(before) // 2, limits[1]))
     try:
         with pytest.raises(OSError, match=r"cannot write .*slice\.exr: "):
-            _exr_file.write_slice(path, replace(image, values=image.values + 1.0), source)
+            exr.write_slice(path, replace(image, values=image.values + 1.0), source)
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, limits)
     assert list(tmp_path.iterdir()) == [path]
@@ -366,8 +366,8 @@ def test_unwritable_places_are_an_os_error(tmp_path: Path) -> None:
     source = table(ward_like)
     image = slices.in_plane_slice(source)
     with pytest.raises(OSError, match=r"cannot write .*nowhere.*slice\.exr: .*No such file"):
-        _exr_file.write_slice(tmp_path / "nowhere" / "slice.exr", image, source)
+        exr.write_slice(tmp_path / "nowhere" / "slice.exr", image, source)
     (tmp_path / "folder").mkdir()
     with pytest.raises(WriteError, match="it is a directory"):
-        _exr_file.write_slice(tmp_path / "folder", image, source)
+        exr.write_slice(tmp_path / "folder", image, source)
     assert list(tmp_path.iterdir()) == [tmp_path / "folder"]

@@ -14,9 +14,8 @@ import pytest
 from brdfdb import formats
 from brdfdb.errors import ParameterError
 from brdfdb.formats._channels import channels_of
-from brdfdb.formats._file_statement import FileStatement, of_table
 from brdfdb.formats._readings import FileTable
-from brdfdb.formats._stated_error import Comparison
+from brdfdb.formats._stated_error import Comparison, FileStatement, of_table
 from brdfdb.geometry import unit_vector
 from brdfdb.materials import Material
 from brdfdb.parameters import Floats

@@ -15,7 +15,7 @@ from brdfdb import formats
 from brdfdb.formats import EXPORTERS, IMPORTERS
 from brdfdb.formats._nodes import FILL_VALUES
 from brdfdb.formats._readings import FileTable
-from brdfdb.formats._rgl_tensor import read_tensors, write_tensors
+from brdfdb.formats.rgl._tensors import read_tensors, write_tensors
 from brdfdb.measurements.samples import Samples
 from tests.formats.round_trip import ROUND_TRIPPED
 from tests.formats.small_tables import DIFFUSE, small_table

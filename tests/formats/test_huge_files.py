@@ -10,6 +10,7 @@ import pytest
 
 from brdfdb import formats
 from brdfdb.errors import FileFormatError
+from tests.formats.refusals import check_refused
 
 GIGABYTE = 10**9
 MOST_KB = 400_000  # of a process that imports the library and reads such a file
@@ -65,24 +66,20 @@ def test_a_gigabyte_of_zeros_is_one_sentence_in_little_memory(tmp_path: Path) ->
     assert int(peak_kb) < MOST_KB
 
 
-@pytest.mark.parametrize("content", [b"", b"\0" * 5000, b"\xff" * 5000, b"\xff\xfe\xff", b"theta_i,theta_r"])
-@pytest.mark.parametrize("suffix", [".csv", ".bsdf", ".xml", ".json", ".h5", ".zip", ".txt"])
-def test_what_is_nothing_is_refused(content: bytes, suffix: str, tmp_path: Path) -> None:
-    path = tmp_path / f"nothing{suffix}"
-    path.write_bytes(content)
-    with pytest.raises(FileFormatError, match="no format recognises it"):
-        formats.samples(path)
+def test_what_is_nothing_is_refused(tmp_path: Path) -> None:
+    for suffix in (".csv", ".bsdf", ".xml", ".json", ".h5", ".zip", ".txt"):
+        for content in (b"", b"\0" * 5000, b"\xff" * 5000, b"\xff\xfe\xff", b"theta_i,theta_r"):
+            path = tmp_path / f"nothing{suffix}"
+            path.write_bytes(content)
+            check_refused(path, "no format recognises it")
 
 
-@pytest.mark.parametrize("name", sorted(formats.IMPORTERS))
-def test_every_reader_refuses_other_files_in_a_sentence(name: str, tmp_path: Path) -> None:
+def test_every_reader_refuses_other_files_in_a_sentence(tmp_path: Path) -> None:
     for number, content in enumerate((b"", b"one two\n", b"\0" * 100, b"\x89PNG\r\n" + bytes(range(256)) * 40)):
         path = tmp_path / f"other{number}"
         path.write_bytes(content)
-        with pytest.raises(FileFormatError) as caught:
-            formats.samples(path, name)
-        assert str(path) in str(caught.value)
-        assert "\n" not in str(caught.value)
+        for name in formats.IMPORTERS:
+            check_refused(path, "", name)
 
 
 def test_xml_that_declares_entities_is_refused(tmp_path: Path) -> None:

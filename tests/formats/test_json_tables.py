@@ -59,15 +59,13 @@ BIRD = _objects(
             },
             others=False,
         ),
-        "data": {
-            **_objects(
-                {
-                    **dict.fromkeys(("theta_i", "theta_r"), _POLAR),
-                    **dict.fromkeys(("phi_i", "phi_r"), _TURN),
-                    "BRDF": _list(["1/sr", "sr^-1"], np.inf),
-                }
-            ),
-        },
+        "data": _objects(
+            {
+                **dict.fromkeys(("theta_i", "theta_r"), _POLAR),
+                **dict.fromkeys(("phi_i", "phi_r"), _TURN),
+                "BRDF": _list(["1/sr", "sr^-1"], np.inf),
+            }
+        ),
     },
     others=False,
 )

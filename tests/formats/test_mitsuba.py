@@ -33,6 +33,7 @@ def f_r(mitsuba: Any, surface: Any) -> Any:
     return np.array(surface.eval(mitsuba.BSDFContext(), place, mitsuba.Vector3f(WR.tolist()))) / WR[2]
 
 
+@pytest.mark.judge
 @pytest.mark.parametrize("kind", KINDS)
 def test_both_files_are_the_model_of_the_material(kind: str, tmp_path: Path) -> None:
     mitsuba = variant("scalar_spectral")
@@ -61,6 +62,7 @@ def test_a_scene_is_only_written_and_other_xml_is_of_no_format(tmp_path: Path) -
         formats.read(path)
 
 
+@pytest.mark.judge
 def test_a_table_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     mitsuba = variant("scalar_spectral")
     publish_dataset(tmp_path / "store", "white", lambert(0.5))
@@ -85,11 +87,11 @@ def test_the_table_is_taken_if_it_is_asked_for(kind: str, tmp_path: Path) -> Non
     assert len(written.remarks) == (kind == ANISOTROPIC)  # the x axis
 
 
+@pytest.mark.judge
 def test_models_with_a_plugin_are_those_that_mitsuba_registers() -> None:
     variant("scalar_rgb")
     from brdfdb.mitsuba import PLUGINS
-    from brdfdb.mitsuba.diffuse import FORMULAS
-    from brdfdb.mitsuba.oren_nayar import FORMS as OREN_NAYAR
+    from brdfdb.mitsuba.diffuse import FORMULAS, OREN_NAYAR
     from brdfdb.mitsuba.stray_light import FORMS as STRAY_LIGHT
     from brdfdb.mitsuba.ward import FORMS as WARD
 

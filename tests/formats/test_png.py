@@ -13,7 +13,7 @@ from PIL import Image
 
 from brdfdb.errors import ParameterError
 from brdfdb.formats import exr, png
-from brdfdb.formats._exr_file import SPHERE
+from brdfdb.formats.exr import SPHERE_PIXELS
 from brdfdb.scenes.lit_sphere import linear_sphere, lit_sphere
 from brdfdb.tables import slices
 from tests.formats.small_tables import ANISOTROPIC, GREY, SPECTRAL, small_table
@@ -71,7 +71,7 @@ def test_the_sphere_in_exr_is_linear_and_not_clipped(half: bool, tmp_path: Path)
     with OpenEXR.File(str(tmp_path / "a.exr"), separate_channels=True) as file:
         channels = {name: channel.pixels.copy() for name, channel in file.channels().items()}
         header = dict(file.header())
-    linear = linear_sphere(table, SPHERE)
+    linear = linear_sphere(table, SPHERE_PIXELS)
     assert sorted(channels) == ["A", "B", "G", "R"]
     assert channels["G"].dtype == (np.float16 if half else np.float32)
     np.testing.assert_allclose(channels["G"], linear[..., 1] * linear[..., 3], rtol=FLOAT16_RTOL, atol=1e-6)

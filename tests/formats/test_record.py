@@ -22,9 +22,9 @@ from brdfdb.materials import Material
 from brdfdb.store.publication import publish_dataset
 from brdfdb.tables.grids import Grid
 from brdfdb.tables.layout import Layout
-from brdfdb.tables.table import Table, table_from
 from brdfdb.tables.tabulation import tabulate
 from tests.api.a_store import client_of
+from tests.formats.small_tables import table_of
 from tests.formats.test_round_trips import POLARISED_ALONE, options_of
 from tests.pipelines.command import run
 
@@ -43,16 +43,10 @@ VALUES = st.recursive(
 DIFFUSE = {"rho": 0.5, "sigma_deg": 20.0}
 
 
-def dataset_of(title: str) -> Any:
+def layout_of(title: str) -> Layout:
     entries = {"title": title, "model": "oren_nayar_qualitative", "source": "no paper", "parameters": DIFFUSE}
     grid = Grid({"theta_i": [0, 45, 89.9], "theta_r": [0, 45, 89.9], "delta_phi": [0, 90, 180]})
-    return tabulate(Layout(Material.from_table("titled", entries), grid))
-
-
-def titled(title: str) -> Table:
-    dataset = dataset_of(title)
-    arrays = {str(name): np.asarray(variable.values) for name, variable in dataset.variables.items()}
-    return table_from("titled", "r000001", arrays, dataset.attrs)
+    return Layout(Material.from_table("titled", entries), grid)
 
 
 def formulas(text: str) -> list[str]:
@@ -78,7 +72,7 @@ def test_lines_are_read_back_exactly_and_begin_no_formula(document: dict[str, An
 @pytest.mark.parametrize("name", [name for name in EXPORTERS if name not in POLARISED_ALONE])
 def test_no_title_breaks_a_file(name: str, title: str, tmp_path: Path) -> None:
     path = tmp_path / f"a{EXPORTERS[name].suffix}"
-    written = formats.write(titled(title), path, name, **({} if name == "png" else options_of(name)))
+    written = formats.write(table_of(layout_of(title)), path, name, **({} if name == "png" else options_of(name)))
     if name in IMPORTERS:
         assert formats.read(path, name).record["title"] == title
     if path.suffix in (".xml", ".mtlx"):
@@ -96,7 +90,7 @@ def test_no_title_breaks_a_file(name: str, title: str, tmp_path: Path) -> None:
 
 def test_no_cell_of_a_csv_is_a_formula_from_command_and_service(tmp_path: Path) -> None:
     """The title `,=HYPERLINK(...)` stood in a cell of its own, which a spreadsheet follows."""
-    publish_dataset(tmp_path / "store", "titled", dataset_of(FORMULA))
+    publish_dataset(tmp_path / "store", "titled", tabulate(layout_of(FORMULA)))
     given = ("--resolution", "45", "--store", tmp_path / "store", "--out", tmp_path)
     assert run("export", "csv", "titled", *given) == 0
     served = client_of(tmp_path / "store").get("/v1/materials/titled/export/csv?resolution=45").content
@@ -109,10 +103,11 @@ def test_no_cell_of_a_csv_is_a_formula_from_command_and_service(tmp_path: Path) 
         assert reading.record["title"] == FORMULA
 
 
+@pytest.mark.judge
 def test_radiance_reads_a_material_whose_file_has_a_space_in_its_name(tmp_path: Path) -> None:
     from tests.formats.bsdf_judges import traced
 
-    radiance.write(titled("a"), tmp_path / "my wall.xml", cells=8)
+    radiance.write(table_of(layout_of("a")), tmp_path / "my wall.xml", cells=8)
     material = (tmp_path / "my wall.rad").read_text(encoding="utf-8")
     light = "void light sun\n0\n0\n3 1e5 1e5 1e5\nsun source disk\n0\n0\n4 0 0 1 0.5\n"
     floor = "titled polygon floor\n0\n0\n12 -1 -1 0 1 -1 0 1 1 0 -1 1 0\n"

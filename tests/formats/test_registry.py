@@ -12,7 +12,7 @@ import pytest
 import brdfdb
 from brdfdb import formats
 from brdfdb.errors import FileFormatError, ParameterError
-from brdfdb.formats import EXPORTERS, Option, options_of, parsed_options, served_options
+from brdfdb.formats import EXPORTERS, FormatOption, options_of, parsed_options, served_options
 from brdfdb.formats._readings import FileTable
 from brdfdb.formats._written import Written
 from brdfdb.materials import Material
@@ -41,7 +41,7 @@ LIST = SimpleNamespace(
     summary="f_r at the nodes of a table as text",
     tools="people",
     kinds=(),
-    options=(Option("digits", 4.0, "significant digits", low=1.0, high=9.0),),
+    options=(FormatOption("digits", 4.0, "significant digits", low=1.0, high=9.0),),
     write=write,
 )
 FIRST = "theta_i,theta_r,delta_phi,brdf\n0,0,0,0.159\n"

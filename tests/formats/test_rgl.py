@@ -17,10 +17,9 @@ from brdfdb import formats
 from brdfdb.errors import FileFormatError, ParameterError, WriteError
 from brdfdb.formats import rgl
 from brdfdb.formats._readings import FileTable
-from brdfdb.formats._rgl_fields import fields_of
-from brdfdb.formats._rgl_tensor import read_tensors, write_tensors
-from brdfdb.formats._rgl_warp import Mixture, Warp
 from brdfdb.formats._stated_error import Comparison
+from brdfdb.formats.rgl._fields import MixedSlices, Warp, fields_of
+from brdfdb.formats.rgl._tensors import read_tensors, write_tensors
 from brdfdb.geometry import unit_vector
 from brdfdb.tables.albedo import directional_albedo
 from tests.formats.small_tables import ANISOTROPIC, DIFFUSE, GREY, SPECTRAL, WAVELENGTHS_NM, small_table
@@ -78,6 +77,7 @@ def seen_by_mitsuba(path: Path, variant: str, wi: Array, wr: Array, wavelength_n
     return np.array(values)
 
 
+@pytest.mark.judge
 @pytest.mark.parametrize("kind", KINDS)
 def test_values_are_those_of_mitsuba(written: dict[str, Path], kind: str) -> None:
     wi, wr = directions(400)
@@ -90,6 +90,7 @@ def test_values_are_those_of_mitsuba(written: dict[str, Path], kind: str) -> Non
     np.testing.assert_allclose(theirs, values[:, [0, 0, 0, 0] if at is None else [0, 1, 2, 2]], rtol=FLOAT32, atol=1e-6)
 
 
+@pytest.mark.judge
 def test_rgb_files_are_those_of_mitsuba(tmp_path: Path) -> None:
     table, path = small_table(SPECTRAL), tmp_path / "rgb.bsdf"
     files = rgl.write(table, path, kind="rgb", tolerance=LOOSE, megabytes=MEGABYTES)
@@ -107,6 +108,7 @@ def test_rgb_files_are_those_of_mitsuba(tmp_path: Path) -> None:
     np.testing.assert_array_equal(spectra[:, :, 0], spectra[:, :, 2])
 
 
+@pytest.mark.judge
 @pytest.mark.parametrize("kind", KINDS)
 def test_samples_of_mitsuba_reflect_the_albedo(written: dict[str, Path], kind: str) -> None:
     mitsuba = mitsuba_of("scalar_spectral")
@@ -126,6 +128,7 @@ def test_samples_of_mitsuba_reflect_the_albedo(written: dict[str, Path], kind: s
         assert np.std(weights) <= NOISE * np.mean(weights)
 
 
+@pytest.mark.judge
 @pytest.mark.parametrize("kind", [ANISOTROPIC, SPECTRAL])
 def test_densities_of_samples_pass_mitsubas_chi2(written: dict[str, Path], kind: str) -> None:
     if "DRJIT_LIBLLVM_PATH" not in os.environ:  # Mitsuba 3.9 ends the process with the LLVM 14 to 16 that it may find
@@ -139,6 +142,7 @@ def test_densities_of_samples_pass_mitsubas_chi2(written: dict[str, Path], kind:
     assert test.run(0.01, 2, quiet=True), test.messages
 
 
+@pytest.mark.judge
 def test_a_light_in_the_plane_of_symmetry_is_read_right(written: dict[str, Path]) -> None:
     _, wr = directions(50)
     inside = np.tile(unit_vector(np.array([1.0]), np.array([-1e-6])), (50, 1))
@@ -190,8 +194,13 @@ def test_the_bytes_of_a_tensor_file(tmp_path: Path) -> None:
     header = b"tensor_file\0\x01\x00\x01\x00\x00\x00" + b"\x02\x00ab\x02\x00\x0a" + struct.pack("<QQQ", 56, 1, 2)
     assert len(header) == 49
     assert path.read_bytes() == header + bytes(7) + struct.pack("<ff", 1.0, 2.0)
-    mitsuba = mitsuba_of("scalar_rgb")
-    del mitsuba
+
+
+@pytest.mark.judge
+def test_mitsuba_reads_the_bytes_of_a_tensor_file(tmp_path: Path) -> None:
+    path = tmp_path / "one.bsdf"
+    write_tensors(path, {"ab": np.array([[1.0, 2.0]], np.float32)})
+    mitsuba_of("scalar_rgb")
     from mitsuba import tensor_io
 
     np.testing.assert_array_equal(tensor_io.read(str(path))["ab"], [[1.0, 2.0]])
@@ -262,13 +271,13 @@ def test_a_warp_and_its_inverse() -> None:
     x, y = warp.forward(9)
     s = np.linspace(0.0, 1.0, 9)
     for number in range(3):
-        alone = Mixture(np.full((1, 81), number), np.ones((1, 81)))
+        alone = MixedSlices(np.full((1, 81), number), np.ones((1, 81)))
         s_x, s_y = warp.inverse(alone, x[number].reshape(-1), y[number].reshape(-1))
         np.testing.assert_allclose(s_x.reshape(9, 9), np.tile(s, (9, 1)), atol=1e-12)
         np.testing.assert_allclose(s_y.reshape(9, 9), np.tile(s, (9, 1)).T, atol=1e-12)
     fine = (np.arange(400) + 0.5) / 400
     everywhere = [axis.reshape(-1) for axis in np.meshgrid(fine, fine)]
-    mixed = Mixture(np.tile([[0], [2]], 160000), np.tile([[0.25], [0.75]], 160000))
+    mixed = MixedSlices(np.tile([[0], [2]], 160000), np.tile([[0.25], [0.75]], 160000))
     assert np.mean(warp.density(mixed, *everywhere)) == pytest.approx(1.0, abs=1e-4)
 
 

@@ -71,6 +71,7 @@ def test_every_model_with_a_source_is_here() -> None:
     assert sorted(PARAMETERS) == sorted(SHADERS)
 
 
+@pytest.mark.judge
 @pytest.mark.usefixtures("machine")
 @pytest.mark.parametrize("model", PARAMETERS)
 def test_glsl_is_the_model(model: str) -> None:
@@ -80,6 +81,7 @@ def test_glsl_is_the_model(model: str) -> None:
     assert_is_model(model, opengl.run(text + judged, wi, wr), wi, wr)
 
 
+@pytest.mark.judge
 @pytest.mark.usefixtures("machine")
 @pytest.mark.parametrize("model", PARAMETERS)
 def test_slang_is_the_model(model: str) -> None:
@@ -123,6 +125,7 @@ int main()
 """
 
 
+@pytest.mark.judge
 @pytest.mark.parametrize("model", ["ward", "oren_nayar_energy_preserving", "ggx_schlick"])
 def test_the_function_of_osl_is_the_model_in_cpp(model: str, tmp_path: Path) -> None:
     """A function of OSL is one of C++ if its two types are given: the values, not the grammar of OSL."""
@@ -139,6 +142,7 @@ def test_the_function_of_osl_is_the_model_in_cpp(model: str, tmp_path: Path) -> 
     assert_is_model(model, np.frombuffer(answer, dtype=np.float32).reshape(-1, 3), wi, wr)
 
 
+@pytest.mark.judge
 @pytest.mark.parametrize("model", PARAMETERS)
 def test_compilers_take_the_source(model: str, tmp_path: Path) -> None:
     compilers = {"glslangValidator": glsl, "oslc": osl}

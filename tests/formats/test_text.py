@@ -10,10 +10,11 @@ import pytest
 
 from brdfdb import formats
 from brdfdb.errors import FileFormatError, ParameterError
-from brdfdb.formats._columns import role_of, wavelength_of
+from brdfdb.formats.text._columns import role_of, wavelength_of
 from brdfdb.measurements import Samples
 from brdfdb.measurements.samples import RELATIVE
 from brdfdb.measurements.statement import statement
+from tests.formats.refusals import check_texts_refused
 
 SR = "sza,vza,raa,brdf [1/sr]\n10,20,180,0.5\n"
 
@@ -24,23 +25,19 @@ def samples(tmp_path: Path, text: str, **keywords: Any) -> Samples:
     return formats.samples(path, **keywords)
 
 
-@pytest.mark.parametrize(
-    ("name", "role"),
-    [
-        *(
-            (name, "theta_i")
-            for name in ("theta_i", "sza", "src_z", "ThetaIn [deg]", "Incident zenith (°)", "AOI", "θi")
-        ),
-        *((name, "theta_r") for name in ("theta_o", "vza", "view_z", "theta_v", "Receiver Zenith", "theta_r_deg")),
-        *((name, "phi_i") for name in ("phi_i", "saa", "src_a", "solar azimuth")),
-        *((name, "phi_r") for name in ("phi_o", "vaa", "view_a", "phi_out")),
-        *((name, "delta_phi") for name in ("raa", "relative azimuth", "delta_phi")),
-        *((name, "values") for name in ("brdf", "f_r [1/sr]", "550nm", "BRF_1.6um", "550", "DSF")),
-        *((name, "") for name in ("row", "temperature", "12", "date")),
-    ],
-)
-def test_names_of_other_programs_are_known(name: str, role: str) -> None:
-    assert role_of(name) == role
+def test_names_of_other_programs_are_known() -> None:
+    names = {
+        "theta_i": ("theta_i", "sza", "src_z", "ThetaIn [deg]", "Incident zenith (°)", "AOI", "θi"),
+        "theta_r": ("theta_o", "vza", "view_z", "theta_v", "Receiver Zenith", "theta_r_deg"),
+        "phi_i": ("phi_i", "saa", "src_a", "solar azimuth"),
+        "phi_r": ("phi_o", "vaa", "view_a", "phi_out"),
+        "delta_phi": ("raa", "relative azimuth", "delta_phi"),
+        "values": ("brdf", "f_r [1/sr]", "550nm", "BRF_1.6um", "550", "DSF"),
+        "": ("row", "temperature", "12", "date"),
+    }
+    assert {name: role_of(name) for of_role in names.values() for name in of_role} == {
+        name: role for role, of_role in names.items() for name in of_role
+    }
 
 
 def test_a_wavelength_may_be_in_micrometres() -> None:
@@ -194,9 +191,8 @@ def test_other_encodings_are_read(encoding: str, tmp_path: Path) -> None:
     assert sheet.known[:, 0].tolist() == [False, True]  # an empty field is a hole
 
 
-@pytest.mark.parametrize(
-    ("text", "sentence"),
-    [
+def test_a_damaged_text_is_refused_with_line_and_field(tmp_path: Path) -> None:
+    damages = [
         ("theta_i,theta_r,raa,brdf\n1,2,3,4\n1,2,3\n", "line 3 has 3 fields, and the first row 4"),
         ("theta_i,theta_r,raa,brdf\n1,2,3,4\n1,2,x,4\n", "line 3, field raa: 'x' is not a number"),
         ("theta_i,theta_r,raa,brdf\n1,2,3,4\n1,2,3,inf\n", "line 3, field brdf: 'inf' is not a number"),
@@ -208,11 +204,22 @@ def test_other_encodings_are_read(encoding: str, tmp_path: Path) -> None:
         ("a,b,c,d\n1,2,3,4\n", "among the columns a, b, c, d is none of theta_i, theta_r, values"),
         ("no numbers at all\n", "line 1: none of the first 1000 lines is a row of numbers"),
         ("theta_i,theta_r,raa,brdf\n1,2,3,4\n" + "5" * 1_100_000 + "\n", "line 3 has more than 1048576 characters"),
-    ],
-)
-def test_a_damaged_text_is_refused_with_line_and_field(text: str, sentence: str, tmp_path: Path) -> None:
-    with pytest.raises(FileFormatError, match=sentence):
-        samples(tmp_path, text, angles="deg")
+    ]
+    check_texts_refused(tmp_path / "sheet.txt", damages, angles="deg")
+
+
+def test_a_damaged_csv_is_refused_with_line_and_name(tmp_path: Path) -> None:
+    damages = [
+        ("theta_h,theta_d,brdf\n1,2,3\n1,2,abc\n", "line 3, field brdf: 'abc' is not a number"),
+        ("theta_h,theta_d,brdf\n1,2,3\n1,2\n", "line 3 has 2 fields, and there are 3 names"),
+        ("theta_h,theta_d,brdf\n1,2\n", "line 2 has 2 fields, and there are 3 names"),
+        ("theta_h,theta_d,brdf\n", "line 1 has the names of columns, and no row follows"),
+        ("theta_h,theta_d,550nm,550nm\n1,2,3,4\n", "line 1: a wavelength stands twice"),
+        ("theta_i,theta_r,delta_phi,550nm,550nm\n1,2,3,4,5\n", "line 1: a wavelength stands twice"),
+        ("theta_i,theta_r,delta_phi,brdf\n1,2,3,4\n1,2,3,abc\n", "line 3, field brdf: 'abc' is not a number"),
+        ("theta_i,theta_r,delta_phi,brdf\n", "line 1 has the names of columns, and no row of numbers follows"),
+    ]
+    check_texts_refused(tmp_path / "sheet.csv", damages)
 
 
 def test_columns_that_do_not_exist_are_refused(tmp_path: Path) -> None:
@@ -277,26 +284,6 @@ def test_rows_that_repeat_are_stated(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "sentence"),
-    [
-        ("theta_h,theta_d,brdf\n1,2,3\n1,2,abc\n", "line 3, field brdf: 'abc' is not a number"),
-        ("theta_h,theta_d,brdf\n1,2,3\n1,2\n", "line 3 has 2 fields, and there are 3 names"),
-        ("theta_h,theta_d,brdf\n1,2\n", "line 2 has 2 fields, and there are 3 names"),
-        ("theta_h,theta_d,brdf\n", "line 1 has the names of columns, and no row follows"),
-        ("theta_h,theta_d,550nm,550nm\n1,2,3,4\n", "line 1: a wavelength stands twice"),
-        ("theta_i,theta_r,delta_phi,550nm,550nm\n1,2,3,4,5\n", "line 1: a wavelength stands twice"),
-        ("theta_i,theta_r,delta_phi,brdf\n1,2,3,4\n1,2,3,abc\n", "line 3, field brdf: 'abc' is not a number"),
-        ("theta_i,theta_r,delta_phi,brdf\n", "line 1 has the names of columns, and no row of numbers follows"),
-    ],
-)
-def test_a_damaged_csv_is_refused_with_line_and_name(text: str, sentence: str, tmp_path: Path) -> None:
-    path = tmp_path / "sheet.csv"
-    path.write_text(text)
-    with pytest.raises(FileFormatError, match=rf"sheet\.csv: {sentence}$"):
-        formats.read(path, "csv")
-
-
-@pytest.mark.parametrize(
     ("name", "shown"),
     [
         ("wavelength_um", "those of the column wavelength_um"),
@@ -314,17 +301,15 @@ def test_wavelengths_in_micrometres_are_channels_in_nm(name: str, shown: str, tm
     assert "Wavelengths: 450 to 550 nm." in statement(sheet).sentences
 
 
-@pytest.mark.parametrize(
-    ("name", "first", "sentence"),
-    [
+def test_wavelengths_without_a_common_unit_are_refused(tmp_path: Path) -> None:
+    damages = [
         ("lambda", "0.45", "line 1, field lambda: 0.45 and 550 have no unit in common; write it into the name"),
         ("lambda [cm-1]", "450", r"line 1, field lambda \[cm-1\]: the unit 'cm-1' is none of wavelengths"),
         ("lambda", "", "line 2, field lambda: a wavelength is missing"),
-    ],
-)
-def test_wavelengths_without_a_common_unit_are_refused(name: str, first: str, sentence: str, tmp_path: Path) -> None:
-    with pytest.raises(FileFormatError, match=sentence):
-        samples(tmp_path, f"sza,vza,raa,{name},brdf\n10,20,180,{first},0.1\n10,20,180,550,0.2\n")
+    ]
+    for name, first, sentence in damages:
+        text = f"sza,vza,raa,{name},brdf\n10,20,180,{first},0.1\n10,20,180,550,0.2\n"
+        check_texts_refused(tmp_path / "sheet.txt", {text: sentence})
 
 
 def test_names_of_a_csv_below_10_are_no_nm(tmp_path: Path) -> None:
@@ -362,18 +347,15 @@ def test_phi_alone_is_the_azimuth_between_light_and_viewer(tmp_path: Path) -> No
 ROLES = {"theta_i": "sun", "theta_r": "view", "delta_phi": "turn", "values": "number"}
 
 
-@pytest.mark.parametrize(
-    ("text", "keywords", "sentence"),
-    [
+def test_a_damaged_first_row_is_no_title(tmp_path: Path) -> None:
+    damages: list[tuple[str, dict[str, str], str]] = [
         ("sza,vza,raa,brdf\n1O,20,180,0.5\n10,20,180,0.5\n", {}, "line 2, field sza: '1O' is not a number"),
         ("sun view turn number\n2O 20 180 0.5\n10 20 180 0.5\n", ROLES, "line 2, field sun: '2O' is not a number"),
         ("sza,vza,raa,brdf\n10,20,180\n10,20,180,0.5\n", {}, "line 2 has 3 fields, and the first whole row 4"),
         ("2O 20 180 0.5\n10 20 180 0.5\n", {"angles": "deg"}, "line 1, field 1: '2O' is not a number"),
-    ],
-)
-def test_a_damaged_first_row_is_no_title(text: str, keywords: dict[str, str], sentence: str, tmp_path: Path) -> None:
-    with pytest.raises(FileFormatError, match=sentence):
-        samples(tmp_path, text, **keywords)
+    ]
+    for text, keywords, sentence in damages:
+        check_texts_refused(tmp_path / "sheet.txt", {text: sentence}, **keywords)
 
 
 def test_units_below_the_names_are_no_damaged_row(tmp_path: Path) -> None:

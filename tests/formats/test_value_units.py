@@ -8,7 +8,7 @@ import pytest
 
 from brdfdb import formats
 from brdfdb.errors import FileFormatError
-from brdfdb.formats._columns import quantity_of
+from brdfdb.formats.text._columns import quantity_of
 from brdfdb.measurements import Samples
 from brdfdb.measurements.statement import statement
 

@@ -17,7 +17,7 @@ from brdfdb.geometry import radians, unit_vector
 from brdfdb.materials import Material, presets
 from brdfdb.materials.provenance import Assumption
 from brdfdb.misprints import MISPRINTS
-from brdfdb.models import oren_nayar_1994_surfaces
+from brdfdb.models import oren_nayar_1994 as model
 from brdfdb.models._oren_nayar_facets import NODES
 from brdfdb.reference import he_torrance_1991, oren_nayar_1994, ward_1992
 from brdfdb.tables import error_measurement
@@ -38,7 +38,7 @@ CLOSED = 1e-3  # relative, 24 slopes less the 400 of the misprint: 4.1e-4
 SHORT = 3e-8  # l1 of ten terms where g stays below 1.3: 2.3e-8; the first one left out is g^10 / (11! 11) of the first
 
 
-def of(material: Material, *tolerances: float) -> tuple[dict[str, Form], error_measurement.Draw]:
+def of(material: Material, *tolerances: float) -> tuple[dict[str, Form], error_measurement.RandomPairs]:
     wavelength_nm = wavelengths(material)
     forms = {form.key: form for form in catalogue.forms(material, wavelength_nm, tolerances)}
     return forms, error_measurement.draw(material, wavelength_nm, 100, 7)
@@ -52,7 +52,7 @@ def values(form: Form, wi: Any, wr: Any) -> Any:
     return form.evaluate(np.asarray(wi, dtype=form.dtype), np.asarray(wr, dtype=form.dtype)).astype(np.float64)
 
 
-def l1(forms: dict[str, Form], drawn: error_measurement.Draw, key: str) -> float:
+def l1(forms: dict[str, Form], drawn: error_measurement.RandomPairs, key: str) -> float:
     truth = values(next(iter(forms.values())), drawn.wi, drawn.wr)
     return float(error_measurement.mean_error(values(forms[key], drawn.wi, drawn.wr), truth, drawn.weight).max())
 
@@ -163,7 +163,7 @@ def test_the_fit_is_a_few_percent_off_and_the_qualitative_model_worse_forward() 
     forms, drawn = of(presets()["wall-plaster"])
     fit, rough, smooth = (l1(forms, drawn, key) for key in ("fit", "qualitative", "lambert"))
     assert 0.01 < fit < 0.04 < rough < smooth
-    forward, back = (error_measurement.classes(drawn)[name] for name in ("forward", "back"))
+    forward, back = (drawn.classes()[name] for name in ("forward", "back"))
     truth = values(forms["facets"], drawn.wi, drawn.wr)
     found = values(forms["qualitative-057"], drawn.wi, drawn.wr)
     ahead, behind = (
@@ -208,13 +208,13 @@ def test_a_form_computes_what_it_shows_and_nothing_else(
     found = set()
 
     def spy(kernel: str, what: Any) -> None:
-        original = getattr(oren_nayar_1994_surfaces, kernel)
+        original = getattr(model, kernel)
 
         def called(*features: Any, **parts: bool) -> Any:
             found.update(what(**parts))
             return original(*features, **parts)
 
-        monkeypatch.setattr(oren_nayar_1994_surfaces, kernel, called)
+        monkeypatch.setattr(model, kernel, called)
 
     def of_facets(lit: bool, bounce: bool, nodes: int) -> list[str]:
         assert nodes == NODES
@@ -281,7 +281,7 @@ def cpu_seconds(*calls: Callable[[], Any]) -> list[float]:
     return [min(taken[number :: len(calls)]) for number in range(len(calls))]
 
 
-def many(form: Form, drawn: error_measurement.Draw, count: int = 20_000) -> Callable[[], Any]:
+def many(form: Form, drawn: error_measurement.RandomPairs, count: int = 20_000) -> Callable[[], Any]:
     """A call of a form at many of the directions that were drawn; what it compiles is there."""
     wi, wr = np.resize(drawn.wi, (count, 3)), np.resize(drawn.wr, (count, 3))
     form.evaluate(wi, wr)

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from brdfdb.forms import catalogue, sampler_efficiency, timing, tradeoff
-from brdfdb.forms.tradeoff_document import Chart
+from brdfdb.forms.tradeoff import Chart
 from brdfdb.models import MODELS
-from brdfdb.scenes.choice_document import Choice, Price
+from brdfdb.scenes.choice import Price, SceneChoice
 from brdfdb.scenes.offered_forms import OfferedForm
 from brdfdb.tables import planner
-from brdfdb_pipelines import chart, choose, cli, tradeoff_plot
+from brdfdb_pipelines import chart, chart_picture, choose, cli
 from tests.benchmarks.every_form import NM, SETS, draws, missing, scene
 
 TOLERANCES = (0.1,)
@@ -41,6 +41,7 @@ def _small_tables(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(choose, "EDGES", 20)
 
 
+@pytest.mark.judge
 @pytest.mark.parametrize("model", MODELS)
 def test_every_model_has_forms_a_chart_and_a_choice(
     model: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -69,7 +70,7 @@ def test_a_table_that_is_too_large_is_left_out_of_a_choice_and_named(
     monkeypatch.setattr(planner, "MOST_VALUES", 1)
     path = scene(draws("ward_bounded", 1)[0], tmp_path)
     assert cli.main(["choose", path, "--width", "8", "--out", str(tmp_path / "out")]) == 0
-    written = Choice.model_validate(json.loads((tmp_path / "out" / "choice.json").read_text(encoding="utf-8")))
+    written = SceneChoice.model_validate(json.loads((tmp_path / "out" / "choice.json").read_text(encoding="utf-8")))
     (one,) = written.materials
     assert [each.key for each in one.left_out] == ["table-10", "table-1", "table-0-05"]
     assert one.left_out[2].reason == "tolerance: 0.0005 takes more than 1 values of drawn; ask for a larger one"
@@ -80,7 +81,7 @@ def test_a_table_that_is_too_large_is_left_out_of_a_chart_and_named(capsys: pyte
     drawn: Chart = tradeoff.chart(draws("abg", 2)[1], None, (0.2, 1e-4))
     assert [each.key for each in drawn.left_out] == ["table-0-01"]
     assert drawn.left_out[0].reason.startswith("tolerance: 0.0001 takes more than 60 values of drawn")
-    assert "cannot be made" in tradeoff_plot.svg(drawn)
+    assert "cannot be made" in chart_picture.svg(drawn)
     chart._print(drawn)
     assert f"left out: {drawn.left_out[0].title}" in capsys.readouterr().out
 

@@ -7,7 +7,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import pytest
 
 from brdfdb.forms import catalogue, timing
 from brdfdb.forms.catalogue import Form
@@ -151,17 +150,26 @@ def costs(*medians: float) -> Any:
     return np.array([1.0, 3.0, 1.5, 1.2])[:, np.newaxis] * np.array(medians)
 
 
-def test_what_is_both_worse_and_dearer_is_not_on_the_front() -> None:
-    assert front([0.0, 0.1, 0.01], costs(100.0, 50.0, 20.0)) == [0, 2]
-
-
-def test_each_step_down_the_front_is_cheaper() -> None:
-    assert front([0.3, 0.1, 0.0], costs(1.0, 10.0, 100.0)) == [2, 1, 0]
-
-
-@pytest.mark.parametrize(("ratio", "expected"), [(1.01 * CHEAPER, [0, 1]), (0.99 * CHEAPER, [0]), (0.5, [0])])
-def test_a_less_accurate_form_has_to_be_clearly_cheaper(ratio: float, expected: list[int]) -> None:
-    assert front([0.0, 0.1], costs(ratio, 1.0)) == expected
+def test_a_step_down_the_front_is_clearly_cheaper() -> None:
+    # Errors and costs of forms, and the expected front
+    cases: list[tuple[list[float], tuple[float, ...], list[int]]] = [
+        ([0.0, 0.1, 0.01], (100.0, 50.0, 20.0), [0, 2]),  # the second is worse and dearer
+        ([0.3, 0.1, 0.0], (1.0, 10.0, 100.0), [2, 1, 0]),
+        ([0.0, 0.1], (1.01 * CHEAPER, 1.0), [0, 1]),
+        ([0.0, 0.1], (0.99 * CHEAPER, 1.0), [0]),
+        ([0.0, 0.1], (0.5, 1.0), [0]),
+        # Of two that are as accurate the clearly cheaper one
+        ([0.0, 0.100, 0.105], (100.0, 50.0, 5.0), [0, 2]),
+        ([0.0, 0.100, 0.115], (100.0, 50.0, 5.0), [0, 1, 2]),
+        # Of equals the first, whatever the clock says
+        ([0.0, 0.1, 0.1], (9.0, 1.0, 0.95), [0, 1]),
+        ([0.0, 0.1, 0.1], (9.0, 0.95, 1.0), [0, 1]),
+        # The third is hardly cheaper than the second, but clearly so than the first
+        ([0.0, 0.1, 0.2], (1.3, 1.1, 1.0), [0, 2]),
+    ]
+    for errors, medians, expected in cases:
+        assert front(errors, costs(*medians)) == expected, (errors, medians)
+    assert front([0.0, 0.1, 0.2], np.array([[100.0, 1000.0, 10.0]])) == [0, 2]  # one round is enough without scatter
 
 
 def test_what_scatters_more_than_it_saves_is_not_on_the_front() -> None:
@@ -176,22 +184,3 @@ def test_a_slow_round_slows_all_and_changes_nothing() -> None:
     noisy = quiet * np.array([1.0, 9.0, 1.0, 2.0, 5.0, 1.0, 3.0, 7.0])[:, np.newaxis]
     errors = [0.0, 0.01, 0.1, 0.2]
     assert front(errors, noisy) == front(errors, quiet) == [0, 1, 2]
-
-
-def test_of_two_as_accurate_the_clearly_cheaper_one_stays() -> None:
-    assert front([0.0, 0.100, 0.105], costs(100.0, 50.0, 5.0)) == [0, 2]
-    assert front([0.0, 0.100, 0.115], costs(100.0, 50.0, 5.0)) == [0, 1, 2]
-
-
-def test_of_equals_the_first_stays_however_the_clock_falls() -> None:
-    errors = [0.0, 0.1, 0.1]
-    assert front(errors, costs(9.0, 1.0, 0.95)) == front(errors, costs(9.0, 0.95, 1.0)) == [0, 1]
-
-
-def test_near_ties_add_up() -> None:
-    # the third is hardly cheaper than the second, but clearly so than the first
-    assert front([0.0, 0.1, 0.2], costs(1.3, 1.1, 1.0)) == [0, 2]
-
-
-def test_costs_that_do_not_scatter_need_one_round() -> None:
-    assert front([0.0, 0.1, 0.2], np.array([[100.0, 1000.0, 10.0]])) == [0, 2]

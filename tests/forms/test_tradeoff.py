@@ -12,12 +12,11 @@ from scipy.stats import binom
 from brdfdb.forms import catalogue, timing
 from brdfdb.forms import tradeoff as charting
 from brdfdb.forms.catalogue import Kind
-from brdfdb.forms.tradeoff import STEPS, chart, chart_family, ranks
-from brdfdb.forms.tradeoff_document import Chart, FamilyChart
+from brdfdb.forms.tradeoff import STEPS, Chart, FamilyChart, chart, chart_family, ranks
 from brdfdb.geometry import unit_vector
 from brdfdb.materials import FunctionSource, Material, presets
 from brdfdb.store.family import Sweep
-from brdfdb.tables.error_measurement import Draw, classes, draw, mean_error
+from brdfdb.tables.error_measurement import RandomPairs, draw, mean_error
 from brdfdb.tables.places import BANDS_DEG
 
 
@@ -155,8 +154,10 @@ def test_samplers_of_a_chart_are_those_of_the_model(brass: Chart) -> None:
 def test_classes_are_told_by_azimuth_and_grazing() -> None:
     theta_i, theta_r = np.deg2rad([30.0, 30.0, 30.0, 80.0, 10.0]), np.deg2rad([30.0, 30.0, 30.0, 10.0, 74.0])
     wi, wr = unit_vector(theta_i, 0.4), unit_vector(theta_r, 0.4 + np.deg2rad([180.0, 20.0, 90.0, 136.0, 44.0]))
-    drawn = Draw(wi, wr, np.zeros(5, dtype=np.int64), np.ones(5), np.zeros(5, dtype=bool), np.ones(5, dtype=bool))
-    found = {name: rows.tolist() for name, rows in classes(drawn).items()}
+    drawn = RandomPairs(
+        wi, wr, np.zeros(5, dtype=np.int64), np.ones(5), np.zeros(5, dtype=bool), np.ones(5, dtype=bool)
+    )
+    found = {name: rows.tolist() for name, rows in drawn.classes().items()}
     assert found == {
         "forward": [True, False, False, True, False],
         "back": [False, True, False, False, True],
@@ -172,7 +173,7 @@ def test_the_mean_error_is_that_of_the_weighted_light() -> None:
 
 def test_a_draw_has_viewers_of_every_class() -> None:
     drawn = draw(presets()["wall-plaster"], None, 50, 1)
-    assert all(rows.sum() > (BANDS_DEG.size - 1) for rows in classes(drawn).values())
+    assert all(rows.sum() > (BANDS_DEG.size - 1) for rows in drawn.classes().values())
 
 
 # Families

@@ -1,28 +1,18 @@
-"""The figures of He et al. 1991: the curves have their captions, and statements hold or fail for a known reason."""
-
-from functools import cache
-from typing import Any
+"""Figs 7 to 14 of He et al. 1991: curves have their captions, and are those of the reference."""
 
 import numba
 import numpy as np
 import pytest
 
 from brdfdb.figure import Curve, Figure, Panel
-from brdfdb.gallery.he_torrance_1991 import FIGURES
 from brdfdb.reference import he_torrance_1991 as reference
-from brdfdb.reference import he_torrance_1991_aperture
-from tests.gallery.figures import curve_of, optics, panel_of, statement_of, value_at
+from tests.gallery.figures import curve_of, figure, optics, panel_of, value_at
 
 pytestmark = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="minutes without compilation")
 
 CONE = np.pi / 1024  # solid angle [sr] of light and receiver, section 4
 DIGITS = 5e-5  # relative error of numbers with five digits: half a unit of the last digit of 1.0000
 SLOPE = 3e-4  # absolute error of slopes. Worst measured: 2.3e-4, from the second terms
-
-
-@cache
-def figure(key: str) -> Figure:
-    return FIGURES[key]()
 
 
 def fig(number: int) -> Figure:
@@ -39,80 +29,6 @@ def curve(number: int, label: str, index: int = 0) -> Curve:
 
 ALUMINUM = {"sigma_0_um": 0.28, "tau_um": 1.77}  # section 4
 CERAMIC = {"sigma_0_um": 1.45, "tau_um": 13.2}
-
-
-@pytest.mark.parametrize("key", FIGURES)
-def test_a_figure_is_whole(key: str) -> None:
-    shown = figure(key)
-    assert shown.key == key
-    assert shown.panels
-    assert shown.statements
-    assert Figure.model_validate_json(shown.model_dump_json()) == shown
-    for index in range(len(shown.panels)):
-        panel = panel_of(shown, index)
-        assert panel.curves
-        assert len({curve.label for curve in panel.curves}) == len(panel.curves)
-        for curve in panel.curves:
-            assert len(curve.x) == len(curve.y) > 1
-            assert np.isfinite(np.array(curve.y, dtype=np.float64)).all()
-            assert (np.diff(curve.x) > 0.0).all()
-            if panel.kind == "polar":
-                assert -90.0 <= curve.x[0] < 0.0 < curve.x[-1] <= 90.0
-
-
-# A fragment of each statement that no other statement of its figure has
-
-STATEMENTS = {
-    7: ("strong specular", "both specular and directional diffuse", "angular width", "wavelength is increased"),
-    8: ("strong directional diffuse", "larger-than-specular", "specular peak emerges"),
-    9: ("nearly uniform", "strong uniform", "emerging peak", "is specular", "upper bound", "Lambertian"),
-    10: ("large reflectance at grazing", "only the ratio", "Maximal values"),
-    11: ("linear combination", "drops out", "0.195"),
-    12: ("specular image diminishes", "(a) to (f)", "(a) to (e)", "lateral edges", "color shift"),
-    13: ("Cylinder (a)", "Cylinder (b)", "Cylinder (c)", "not attenuated", "diminishes to zero"),
-    14: ("cube", "table top"),
-}
-NOT_SEEN = {
-    (
-        9,
-        "is specular",
-    ): "He et al. 1991, Fig. 9: with the printed sigma_0 of 2.9 wavelengths e^-g leaves nothing specular; "
-    "the directional diffuse lobe emerges instead, largest beyond the mirror direction",
-    (
-        9,
-        "upper bound",
-    ): "He et al. 1991, section 3.2.3 against Fig. 9: a = 0.9 and the first surface add up to more than "
-    "1 beyond 54 degrees",
-    (
-        12,
-        "(a) to (f)",
-    ): "He et al. 1991, Fig. 12: cylinder (f) has the largest sigma_0, but its slope, 2.5 / 16, is less "
-    "than that of (e), 0.58 / 3",
-}
-
-
-def case(number: int, fragment: str) -> Any:
-    reason = NOT_SEEN.get((number, fragment))
-    marks = pytest.mark.xfail(strict=True, reason=reason) if reason else ()
-    return pytest.param(number, fragment, marks=marks, id=f"Fig {number}: {fragment}")
-
-
-CASES = [case(number, fragment) for number, fragments in STATEMENTS.items() for fragment in fragments]
-
-
-@pytest.mark.parametrize(("number", "fragment"), CASES)
-def test_a_statement_of_the_paper_holds(number: int, fragment: str) -> None:
-    statement = statement_of(fig(number), fragment)
-    assert statement.holds, statement.seen
-
-
-def test_every_statement_is_tested() -> None:
-    assert [f"he-torrance-1991-fig-{number:02d}" for number in STATEMENTS] == list(FIGURES)
-    for number, fragments in STATEMENTS.items():
-        assert len(fragments) == len(fig(number).statements)
-
-
-# The curves
 
 
 @pytest.mark.parametrize(
@@ -134,8 +50,8 @@ def test_curves_are_over_their_value_in_the_mirror_direction(number: int) -> Non
 def through_apertures(theta_i: float, x: float, surface: dict[str, float], a: float) -> float:
     arguments = np.deg2rad(theta_i), np.deg2rad(abs(x)), np.pi if x > 0.0 else 0.0, CONE, CONE
     return (
-        float(he_torrance_1991_aperture.aperture_specular(*arguments, **surface))
-        + he_torrance_1991_aperture.aperture_diffuse(*arguments, **surface)
+        float(reference.aperture_specular(*arguments, **surface))
+        + reference.aperture_diffuse(*arguments, **surface)
         + a / np.pi
     )
 
@@ -187,7 +103,7 @@ def test_blue_plastic_is_in_absolute_values() -> None:
         assert value_at(drawn, -30.0) == pytest.approx(0.15 / np.pi, rel=DIGITS)
         for x in (theta_i, theta_i + 2.0):
             arguments = np.deg2rad(theta_i), np.deg2rad(x), np.pi, CONE, CONE
-            expected = float(he_torrance_1991_aperture.aperture_specular(*arguments, **smooth)) + 0.15 / np.pi
+            expected = float(reference.aperture_specular(*arguments, **smooth)) + 0.15 / np.pi
             assert value_at(drawn, x) == pytest.approx(expected, rel=DIGITS)
 
 

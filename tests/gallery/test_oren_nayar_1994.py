@@ -1,4 +1,4 @@
-"""The figures of Oren and Nayar 1994: statements hold or fail for a known reason, and curves have their captions."""
+"""The figures of Oren and Nayar 1994: curves have their captions, and are those of the reference."""
 
 from __future__ import annotations
 
@@ -9,89 +9,17 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from brdfdb.figure import Curve, Figure, Panel, Picture
-from brdfdb.gallery.oren_nayar_1994 import FIGURES
+from brdfdb.figure import Curve, Picture
 from brdfdb.reference import mp, oren_nayar_1994
-from tests.gallery.figures import panel_of
+from tests.gallery.figures import figure, panel_of
 
 # Relative errors of the digits that `numbers` leaves, just above the worst measured
 FIVE_DIGITS = 4e-5  # Worst measured: 3.2e-5
 PIXEL = 2.5e-3  # Worst measured: 2.3e-3
 
-COMPUTED = {key: make() for key, make in FIGURES.items()}
-STATEMENTS = [(key, statement) for key, figure in COMPUTED.items() for statement in figure.statements]
-
-# The figure and a phrase of the statements that do not hold, with the reason
-BROKEN = {
-    ("fig-11", "near-Lambertian"): "eq. 43 lets radiance grow by 60 % towards the horizon where shadowing and masking "
-    "overlap, as they do for θ_i = 75°, σ = 40°; for θ_i of 60° and less the sentence holds",
-    ("fig-13", "slight sacrifice"): "eq. 30 is constant in the mirror half plane, where eq. 41 falls to less than "
-    "half, and without C_3 and interreflection it is a third too dark near the horizon across the plane of incidence",
-    ("fig-19", "close to the specular direction"): "eq. 31 has 1 / cos θ_r: for σ of 20° and more its peak is 30 to "
-    "60° beyond the specular direction, where masking begins or at the horizon",
-    ("fig-23", "drops quickly to zero"): "eq. 27 over a cylinder ends at the limb with ρ E_0 C_2 / π, about half of "
-    "the radiance in the middle: the drop is the real vase's, not the model's",
-}
-
-
-def parameter(key: str, statement: Any) -> Any:
-    """Return the test case of a statement."""
-    reasons = [
-        reason for (figure, phrase), reason in BROKEN.items() if key.endswith(figure) and phrase in statement.says
-    ]
-    name = f"{key.removeprefix('oren-nayar-1994-')}: {statement.says[:60]}"
-    return pytest.param(statement, id=name, marks=[pytest.mark.xfail(strict=True, reason=reason) for reason in reasons])
-
-
-@pytest.mark.parametrize("statement", [parameter(key, statement) for key, statement in STATEMENTS])
-def test_a_statement_of_the_paper_holds(statement: Any) -> None:
-    assert statement.holds, statement.seen
-
-
-def test_every_broken_statement_is_one_of_the_figures() -> None:
-    for figure, phrase in BROKEN:
-        assert sum(key.endswith(figure) and phrase in statement.says for key, statement in STATEMENTS) == 1
-
-
-def test_the_figures_are_those_of_the_paper() -> None:
-    numbers = [*range(8, 14), *range(15, 24)]
-    names = [*(f"fig-{number:02d}" for number in numbers), "spheres", "scenes"]
-    assert list(FIGURES) == [f"oren-nayar-1994-{name}" for name in names]
-    assert len({statement.says + key for key, statement in STATEMENTS}) == len(STATEMENTS)
-
-
-@pytest.mark.parametrize("key", FIGURES)
-def test_a_figure_has_finite_curves_and_says_something(key: str) -> None:
-    figure = COMPUTED[key]
-    assert figure.key == key
-    assert figure.paper == "orennayar1994"
-    assert figure.panels
-    assert figure.statements
-    for panel in figure.panels:
-        if isinstance(panel, Picture):
-            assert {len(row) for row in panel.radiance} == {len(panel.radiance)}
-            seen = [pixel for row in panel.radiance for pixel in row if pixel is not None]
-            assert len(seen) > len(panel.radiance) ** 2 / 2
-            assert 0.0 < min(seen) < max(seen) <= 1.0
-        else:
-            assert isinstance(panel, Panel)
-            assert len({curve.label for curve in panel.curves}) == len(panel.curves) >= 1
-            for curve in panel.curves:
-                assert len(curve.x) == len(curve.y) > 100
-                assert np.all(np.diff(curve.x) > 0.0)
-                assert None not in curve.y
-                assert np.all(np.isfinite(np.array(curve.y, dtype=float)))
-
-
-# The curves
-
-
-def figure_of(name: str) -> Figure:
-    return COMPUTED[f"oren-nayar-1994-{name}"]
-
 
 def curves(name: str, panel: int = 0) -> list[Curve]:
-    return panel_of(figure_of(name), panel).curves
+    return panel_of(figure(f"oren-nayar-1994-{name}"), panel).curves
 
 
 def at(curve: Curve, x: float) -> Any:
@@ -164,9 +92,9 @@ def test_the_three_forms_of_figs_12_and_13(name: str, panel: int, delta_phi_deg:
     ],
 )
 def test_samples_have_the_parameters_of_their_captions(number: int, caption: str) -> None:
-    figure = figure_of(f"fig-{number}")
-    assert figure.caption.startswith((f"{caption}. ", f"{caption}, F = 1"))
-    for panel in range(len(figure.panels)):
+    drawn = figure(f"oren-nayar-1994-fig-{number}")
+    assert drawn.caption.startswith((f"{caption}. ", f"{caption}, F = 1"))
+    for panel in range(len(drawn.panels)):
         assert at(curves(f"fig-{number}", panel)[0], 0.0) == 1.0  # normalised along the normal
 
 
@@ -256,7 +184,7 @@ def test_fig_23_b_has_the_light_20_degrees_to_the_right() -> None:
 
 @pytest.mark.parametrize(("panel", "sigma_deg"), [(0, 0.0), (1, 10.0), (2, 20.0), (3, 40.0)])
 def test_spheres_are_lit_from_the_camera_by_eq_27(panel: int, sigma_deg: float) -> None:
-    picture = figure_of("spheres").panels[panel]
+    picture = figure("oren-nayar-1994-spheres").panels[panel]
     assert isinstance(picture, Picture)
     half = len(picture.radiance) // 2
     for row, column in ((half, half), (10, half), (half + 20, 15)):
@@ -267,7 +195,7 @@ def test_spheres_are_lit_from_the_camera_by_eq_27(panel: int, sigma_deg: float) 
 
 
 def test_the_picture_of_the_vase_is_upright() -> None:
-    lambertian, rough = figure_of("fig-22").panels
+    lambertian, rough = figure("oren-nayar-1994-fig-22").panels
     assert isinstance(lambertian, Picture)
     assert isinstance(rough, Picture)
     for picture in (lambertian, rough):

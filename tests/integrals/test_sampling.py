@@ -5,7 +5,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy import stats
 
 from brdfdb import models
@@ -14,6 +13,7 @@ from brdfdb.integrals import sampling
 from brdfdb.integrals.quadrature import directional_albedo
 from brdfdb.integrals.sampling import Sample, pdf, sample
 from brdfdb.models import MODELS
+from brdfdb.parameters import Array
 from brdfdb.reference import ward_1992
 from tests.models.draws import middle
 
@@ -62,8 +62,6 @@ EQ_7 = 2e-15  # samples against eq. 7 as the paper writes it, worst measured: 1.
 
 every_model = pytest.mark.parametrize("name", MODELS)
 every_theta = pytest.mark.parametrize("theta_deg", [0.0, 60.0, 85.0])
-
-Array = NDArray[np.float64]
 
 
 def parameters_of(name: str) -> dict[str, float]:

@@ -10,9 +10,8 @@ import pytest
 from brdfdb.errors import MaterialError, ParameterError
 from brdfdb.geometry import unit_vector
 from brdfdb.materials import Material, source_of
-from brdfdb.materials.evaluation import evaluations
-from brdfdb.materials.spectrum import Spectrum
-from brdfdb.materials.written_spectra import spectrum_of
+from brdfdb.materials.material import evaluations
+from brdfdb.materials.spectrum import Spectrum, spectrum_of
 from brdfdb.models import MODELS
 from brdfdb.spectra import colour_science, linear_srgb
 

@@ -8,15 +8,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from brdfdb import formats, presets
 from brdfdb.errors import FileFormatError, ParameterError
 from brdfdb.formats.gonioreflectometer import read_picture, write_picture
 from brdfdb.measurements.aperture import averaged
-from brdfdb.measurements.gonioreflectometer import Gonioreflectometer, Picture, eq_3, photograph, reduced, traced
+from brdfdb.measurements.gonioreflectometer import CameraPicture, Gonioreflectometer, eq_3, photograph, reduced, traced
 
-Array = NDArray[np.float64]
 SMALL = Gonioreflectometer(width=324, height=240)
 PARAMETERS = ("rho_d", "rho_s", "alpha_x", "alpha_y")
 # Lights [degrees] of the pictures: the grain of an anisotropic sample is seen from both sides
@@ -28,7 +26,7 @@ def brdf_of(name: str) -> Any:
     return presets()[name].brdf_at(None)
 
 
-def taken(name: str, settings: Gonioreflectometer = SMALL, theta_i: float = 30.0, phi_i: float = 40.0) -> Picture:
+def taken(name: str, settings: Gonioreflectometer = SMALL, theta_i: float = 30.0, phi_i: float = 40.0) -> CameraPicture:
     return photograph(brdf_of(name), settings, np.radians(theta_i), np.radians(phi_i), 7, name)
 
 

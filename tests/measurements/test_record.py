@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from brdfdb.measurements.record import Measured, Symmetry
+from brdfdb.measurements.record import Measured, MeasuredSymmetry
 
 
 @pytest.mark.parametrize(
@@ -20,7 +20,7 @@ def test_values_of_a_grid_are_nodes_and_those_of_a_list_samples(samples: int, no
         samples=samples,
         negative=0.0,
         interpolation="as the tools of the file evaluate it",
-        reciprocity=Symmetry(assumed=False, asymmetry=None, allowed=None),
+        reciprocity=MeasuredSymmetry(assumed=False, asymmetry=None, allowed=None),
         mirror=None,
         extrapolated=0.25 if samples else 1.0,
     ).in_words()

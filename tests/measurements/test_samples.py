@@ -107,38 +107,32 @@ def test_a_plain_dataset_of_radians_is_enough() -> None:
     assert some.phi_i.tolist() == [0.0, 0.0]
 
 
-@pytest.mark.parametrize(
-    ("changes", "sentence"),
-    [
-        ({"theta_r": np.radians([0.0, 20.0, 0.0, 95.0])}, "theta_r: 95 degrees is below the horizon"),
-        ({"phi_r": np.array([0.0, np.nan, 0.0, 0.0])}, "phi_r: nan is not an angle"),
-        ({"values": np.ones((4, 3))}, "values: shape"),
-        ({"values": np.full((4, 2), np.inf)}, "values: a value is infinite"),
-        ({"uncertainty": -np.ones((4, 2))}, "uncertainty: -1 is below 0"),
-        ({"theta_i": np.zeros(5)}, "phi_i: shape"),
-        ({"theta_i": np.full(4, -0.1)}, "theta_i: -5.72958 degrees is no polar angle; allowed are 0 to 90 degrees"),
-        ({"theta_i": np.full(4, 4.0)}, "theta_i: 229.183 degrees is below the horizon; allowed are 0 to 90 degrees"),
-        ({"values": None}, "values: it is missing; an array of numbers is needed"),
-        ({"phi_i": None}, "phi_i: it is missing; an array of numbers is needed"),
-        ({"values": "high"}, "values: str is no array of numbers"),
-        ({"theta_i": 0.1}, r"theta_i: shape \(\) is not \(1,\)"),
-    ],
-)
-def test_samples_that_cannot_be_are_refused(changes: dict[str, Any], sentence: str) -> None:
-    with pytest.raises(ParameterError, match=sentence):
-        samples(**changes)
-
-
-def test_a_solid_angle_is_positive() -> None:
-    with pytest.raises(ParameterError, match="source_solid_angle_sr: -1 is not a positive number"):
+def test_samples_that_cannot_be_are_refused_by_parameter() -> None:
+    below = np.radians([0.0, 20.0, 0.0, 95.0])
+    refused: dict[str, tuple[Any, ...]] = {
+        "theta_i": (np.full(4, -0.1), np.full(4, 4.0), 0.1),
+        "theta_r": (below,),
+        "phi_i": (None,),
+        "phi_r": (np.array([0.0, np.nan, 0.0, 0.0]),),
+        "values": (np.ones((4, 3)), np.full((4, 2), np.inf), None, "high"),
+        "uncertainty": (-np.ones((4, 2)), np.full((4, 2), np.inf)),
+    }
+    for name, values in refused.items():
+        for value in values:
+            with pytest.raises(ParameterError, match=f"^{name}: "):
+                samples(**{name: value})
+    with pytest.raises(
+        ParameterError, match=r"^theta_r: 95 degrees is below the horizon; allowed are 0 to 90 degrees$"
+    ):
+        samples(theta_r=below)
+    with pytest.raises(ParameterError, match=r"^phi_i: shape"):
+        samples(theta_i=np.zeros(5))
+    with pytest.raises(ParameterError, match=r"^source_solid_angle_sr: -1 is not a positive number$"):
         Instrument(source_solid_angle_sr=-1.0)
-
-
-def test_a_dataset_without_units_is_refused() -> None:
     bare = {name: ("sample", [0.1]) for name in ("theta_i", "theta_r", "phi_r")}
-    with pytest.raises(ParameterError, match="theta_i: its units are 'missing'"):
+    with pytest.raises(ParameterError, match=r"^theta_i: its units are 'missing'"):
         Samples.from_xarray(xr.Dataset({"brdf": ("sample", [1.0]), **bare}))
-    with pytest.raises(ParameterError, match="dataset: it has no brdf"):
+    with pytest.raises(ParameterError, match=r"^dataset: it has no brdf"):
         Samples.from_xarray(xr.Dataset(bare))
 
 
@@ -190,11 +184,9 @@ def test_joined_files_that_differ_beyond_their_uncertainties_say_so() -> None:
     assert sentence.endswith("f_r differs by 10 % in the median, which is beyond the stated uncertainties.")
 
 
-def test_uncertainty_of_nan_alone_is_not_known_and_an_infinite_one_is_refused() -> None:
+def test_uncertainty_of_nan_alone_is_not_known() -> None:
     assert samples(uncertainty=np.full((4, 2), np.nan)).uncertainty is None
     assert samples(uncertainty=np.where(np.eye(4, 2) > 0.0, 0.1, np.nan)).uncertainty is not None
-    with pytest.raises(ParameterError, match="uncertainty: a value is infinite"):
-        samples(uncertainty=np.full((4, 2), np.inf))
 
 
 def test_joined_files_have_the_name_notes_and_counts_of_all() -> None:

@@ -1,8 +1,9 @@
 """Each plugin in each variant of Mitsuba against the library: ``python -m tests.mitsuba.every_variant [VARIANT ...]``.
 
-Values and densities are compared in float64 at 500 pairs or more: all nodes of a table as float32 with the numbers next
-to them, the horizon, the mirror direction, and directions at random. The weights of samples are f_r cos / density, and
-their directions have a chi-square test with the density of the library. Prints a row for each plugin in each variant.
+Values and densities are compared in float64 at 500 pairs or more (100 in scalar variants): all nodes of a table as
+float32 with the numbers next to them, the horizon, the mirror direction, and directions at random. The weights of
+samples are f_r cos / density, and their directions have a chi-square test with the density of the library. Prints a row
+for each plugin in each variant.
 """
 
 from __future__ import annotations
@@ -36,11 +37,12 @@ from tests.tables.made_up import made_up
 
 Array = NDArray[Any]
 
-PAIRS = 500
+PAIRS, PAIRS_ONE_BY_ONE = 500, 100  # together, and in scalar variants, which take a pair at a time
 MONO_NM, RGB_NM = 549.1, (611.4, 549.1, 464.2)
 THETA_BINS, PHI_BINS, FINE = 8, 16, 48  # bins of a chi-square test, and pieces of each along both sides
 LIGHT = unit_vector(np.deg2rad(50.0), 0.5).astype(np.float32)
-DRAWN, DRAWN_ONE_BY_ONE = 1 << 15, 500
+DRAWN, DRAWN_ONE_BY_ONE = 1 << 15, 100
+JOINED = 4  # bins that are one along both sides where few directions are drawn
 LEAST_DENSITY = 1e-9  # [1/sr] differences of smaller densities are relative to it
 FEWEST = 5.0  # expected directions of a bin; bins with fewer are one
 ROUNDED = 2e-6  # by which float32 moves a direction, which may then lie in the next cell of a sampler
@@ -57,12 +59,16 @@ class Case:
     density: Callable[[Array, Array, Any], Array]  # (N,), in a variant
     table: Table | None = None
 
-    def pairs(self) -> tuple[Array, Array]:
-        """Return vectors of float32 of lights and viewers, 500 or more."""
+    def pairs(self, mitsuba: Any) -> tuple[Array, Array]:
+        """Return vectors of float32 of lights and viewers: 500 or more, and fewer of them in scalar variants."""
         chosen = [_special(), *([] if self.table is None else [_at_nodes(self.table)])]
         count = sum(len(wi) for wi, _ in chosen)
         chosen.append(directions(max(PAIRS - count, 100)))
-        return tuple(np.concatenate(part) for part in zip(*chosen, strict=True))
+        wi, wr = (np.concatenate(part) for part in zip(*chosen, strict=True))
+        if mitsuba.variant().startswith("scalar"):
+            rows = np.linspace(0, len(wi) - 1, PAIRS_ONE_BY_ONE).astype(int)
+            return wi[rows], wr[rows]
+        return wi, wr
 
     def wavelengths_nm(self, mitsuba: Any) -> Array:
         """Return the wavelengths of the channels; those of spectral variants are the ends as float32, and near them."""
@@ -219,7 +225,7 @@ def tabulated(name: str, _: str | None = None) -> Table:
 def measure(mitsuba: Any, case: Case) -> Measured:
     """Return what a plugin is off by in the variant of Mitsuba that is set."""
     surface = mitsuba.load_dict(case.document)
-    wi, wr = case.pairs()
+    wi, wr = case.pairs(mitsuba)
     nm = case.wavelengths_nm(mitsuba)
     value, density = results_of(mitsuba, nm, surface.eval_pdf, wi, wr)
     expected = case.expected(mitsuba, wi, wr)
@@ -332,6 +338,9 @@ def _p_value(case: Case, mitsuba: Any, wo: Array, count: int) -> float:
     row = np.clip((wo[:, 2] * THETA_BINS).astype(int), 0, THETA_BINS - 1)
     column = ((np.arctan2(wo[:, 1], wo[:, 0]) / (2.0 * np.pi)) % 1.0 * PHI_BINS).astype(int) % PHI_BINS
     found = np.bincount(row * PHI_BINS + column, minlength=expected.size).astype(float)
+    if count < DRAWN:
+        blocks = (THETA_BINS // JOINED, JOINED, PHI_BINS // JOINED, JOINED)
+        expected, found = (x.reshape(blocks).sum(axis=(1, 3)).ravel() for x in (expected, found))
     rare = expected < FEWEST
     # Directions below the horizon have no bin; their number is left over
     expected, found = (np.append(x[~rare], [x[rare].sum(), count - x.sum()]) for x in (expected, found))
@@ -346,10 +355,13 @@ def results_of(mitsuba: Any, nm: Array, function: Callable[..., Any], wi: Array,
 
 
 def _at_once(mitsuba: Any, nm: Array, function: Callable[..., Any], wi: Array, other: Array) -> list[Array]:
+    import drjit
+
     place = interaction(mitsuba, wi)
     if mitsuba.is_spectral:
         place.wavelengths = nm.tolist()
     results = function(_context(mitsuba), place, mitsuba.Vector3f(np.ascontiguousarray(other.T, np.float32)))
+    drjit.eval(results)
     return [np.stack([np.broadcast_to(x, len(wi)) for x in _channels(mitsuba, result)], axis=-1) for result in results]
 
 

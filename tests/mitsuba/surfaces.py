@@ -77,13 +77,8 @@ class Subject:
 
     def f_r(self, wi: Array, wr: Array) -> Array:
         """Return f_r [1/sr] of the model for vectors of float32."""
-        return self.model_at(WAVELENGTH_NM, wi, wr)
-
-    def model_at(self, wavelength_nm: float, wi: Array, wr: Array) -> Array:
-        """Return f_r [1/sr] of the model at a wavelength, which matters to some."""
-        at = {"wavelength_nm": wavelength_nm} if self.index else {}
         vectors = MODELS[self.model].vectors
-        return np.asarray(vectors(wi.astype(np.float64), wr.astype(np.float64), **(self.arguments | at)))
+        return np.asarray(vectors(wi.astype(np.float64), wr.astype(np.float64), **self.arguments))
 
     @property
     def floor(self) -> float:

@@ -7,8 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+pytest.importorskip("mitsuba")
+
 import brdfdb.mitsuba.table
-from tests.mitsuba.every_variant import CASES, PAIRS, case_of, measure, tabulated
+from tests.mitsuba.every_variant import CASES, PAIRS, PAIRS_ONE_BY_ONE, case_of, measure, tabulated
 from tests.mitsuba.surfaces import variant
 
 VARIANTS = (
@@ -18,7 +20,7 @@ VARIANTS = (
 )
 # Relative. The largest measured are 2e-5, 4e-6 and 3e-7; tables are steep logarithms, of angles of float32
 OF_TABLES, OF_MODELS, DENSITY, WEIGHT = 5e-5, 5e-6, 1e-5, 2e-6
-SIGNIFICANCE = 1e-3  # of 192 tests together 0.2 reject by chance; the random numbers are always the same
+SIGNIFICANCE = 1e-3  # of 200 cases together 0.2 reject by chance; the random numbers are always the same
 
 GOOD, NAN, INF = (0.6, 0.0, 0.8), np.nan, np.inf
 NOT_FINITE = ((NAN, 0.0, 0.8), (0.6, NAN, 0.8), (0.6, 0.0, NAN), (INF, 0.0, 0.8), (0.6, 0.0, INF), (NAN, NAN, NAN))
@@ -38,16 +40,17 @@ def test_all_plugins_are_judged() -> None:
     assert {case_of(name).document["type"] for name in CASES} == set(brdfdb.mitsuba.PLUGINS)
 
 
-@pytest.mark.parametrize("plugin", CASES)
 @pytest.mark.parametrize("name", VARIANTS)
-def test_values_densities_and_samples_are_those_of_the_library(name: str, plugin: str) -> None:
-    mitsuba, case = variant(name), case_of(plugin)
-    measured = measure(mitsuba, case)
-    assert measured.pairs >= PAIRS
-    assert measured.value <= (OF_MODELS if case.table is None else OF_TABLES)
-    assert measured.density <= DENSITY
-    assert measured.weight <= WEIGHT
-    assert measured.p_value >= SIGNIFICANCE
+def test_values_densities_and_samples_are_those_of_the_library(name: str) -> None:
+    mitsuba = variant(name)
+    for plugin in CASES:
+        case = case_of(plugin)
+        measured = measure(mitsuba, case)
+        assert measured.pairs >= (PAIRS_ONE_BY_ONE if name.startswith("scalar") else PAIRS), plugin
+        assert measured.value <= (OF_MODELS if case.table is None else OF_TABLES), plugin
+        assert measured.density <= DENSITY, plugin
+        assert measured.weight <= WEIGHT, plugin
+        assert measured.p_value >= SIGNIFICANCE, plugin
 
 
 def place_of(mitsuba: Any, wi: tuple[float, ...]) -> Any:
@@ -67,9 +70,10 @@ def numbers(*results: Any) -> Any:
 def test_nan_in_nan_out_and_masked_rays_are_0(name: str) -> None:
     mitsuba = variant(name)
     context = mitsuba.BSDFContext()
+    few = name.startswith("scalar")  # which compute nothing beforehand, and take a ray at a time
     for plugin in CASES:
         surface = mitsuba.load_dict(case_of(plugin).document)
-        for bad in NOT_FINITE:
+        for bad in NOT_FINITE[::3] if few else NOT_FINITE:
             for wi, wo in ((bad, GOOD), (GOOD, bad)):
                 asked = context, place_of(mitsuba, wi), mitsuba.Vector3f(*wo)
                 assert np.all(np.isnan(numbers(surface.eval(*asked), surface.pdf(*asked), *surface.eval_pdf(*asked))))

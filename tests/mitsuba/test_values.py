@@ -1,4 +1,4 @@
-"""Values of the plugins against `brdfdb.models`: random directions, corners of the directions, and all variants."""
+"""Values of the plugins against `brdfdb.models`: random directions, corners of the directions, and parameters."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import pytest
 from brdfdb.geometry import unit_vector
 from brdfdb.models import he_torrance_specular
 from brdfdb.models import ward_vectors as ward
-from tests.mitsuba.surfaces import SUBJECTS, WAVELENGTH_NM, Array, Subject, directions, evaluated, interaction, variant
+from tests.mitsuba.surfaces import SUBJECTS, Array, Subject, directions, evaluated, interaction, variant
 from tests.models.hazard_directions import EXACT, NEAR
 from tests.models.hazards import BY_NAME
 
@@ -61,43 +61,6 @@ def test_no_value_is_nan_at_the_corners(judged: Subject) -> None:
         assert np.all(np.isfinite(density))
         assert np.all(value[(wi[:, 2] <= 0.0) | (wr[:, 2] <= 0.0)] == 0.0)
         drjit.flush_malloc_cache()
-
-
-@pytest.mark.parametrize("name", ["scalar_rgb", "scalar_spectral", "llvm_ad_rgb", "llvm_ad_spectral"])
-def test_each_variant_evaluates_the_same_model(name: str) -> None:
-    mitsuba = variant(name)
-    wi, wr = unit_vector(0.6, 0.4), unit_vector(0.7, 3.4)
-    for subject in (SUBJECTS[0], SUBJECTS[9], SUBJECTS[-1]):
-        place = mitsuba.SurfaceInteraction3f()
-        place.wi = mitsuba.Vector3f(wi.tolist())
-        if name.endswith("spectral"):
-            place.wavelengths = [WAVELENGTH_NM] * 4
-        surface = mitsuba.load_dict(subject.document)
-        viewer = mitsuba.Vector3f(wr.tolist())
-        value, density = surface.eval_pdf(mitsuba.BSDFContext(), place, viewer)
-        channels = np.ravel(value)
-        expected = subject.f_r(np.float32(wi)[np.newaxis], np.float32(wr)[np.newaxis]) * wr[2]
-        np.testing.assert_allclose(channels, np.full(channels.size, expected), rtol=FLOAT32)
-        sample, weight = surface.sample(mitsuba.BSDFContext(), place, 0.7, mitsuba.Point2f(0.3, 0.4))
-        again, at = surface.eval_pdf(mitsuba.BSDFContext(), place, sample.wo)
-        np.testing.assert_allclose(np.ravel(weight) * np.ravel(sample.pdf), np.ravel(again), rtol=1e-4)
-        np.testing.assert_allclose(np.ravel(sample.pdf), np.ravel(at), rtol=1e-4)
-        assert surface.pdf(mitsuba.BSDFContext(), place, viewer) == density
-
-
-def test_channels_of_rgb_have_wavelengths_of_their_own() -> None:
-    mitsuba = variant("llvm_ad_rgb")
-    from brdfdb.mitsuba._wavelengths import WAVELENGTHS_NM
-
-    subject = SUBJECTS[-1]
-    document = {name: value for name, value in subject.document.items() if name != "wavelength_nm"}
-    document["channels"] = "wavelengths"
-    wi, wr = np.array([[0.6, 0.0, 0.8]], np.float32), np.array([[-0.8, 0.0, 0.6]], np.float32)
-    place = mitsuba.SurfaceInteraction3f()
-    place.wi = mitsuba.Vector3f(wi[0].tolist())
-    value = mitsuba.load_dict(document).eval(mitsuba.BSDFContext(), place, mitsuba.Vector3f(wr[0].tolist()))
-    channels = [subject.model_at(wavelength, wi, wr)[0] * wr[0, 2] for wavelength in WAVELENGTHS_NM]
-    np.testing.assert_allclose(np.ravel(value), channels, rtol=FLOAT32)
 
 
 def test_the_specular_part_is_that_of_the_model() -> None:

@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from brdfdb.models import MODELS, he_torrance_1991
-from brdfdb.parameters import ModelSpec, Parameter
+from brdfdb.models import MODELS
+from brdfdb.parameters import WAVELENGTH_NM, K, ModelSpec, N, Parameter
 
 HALF_PI = np.pi / 2
 HORIZON_32 = np.float32(HALF_PI)  # lies above pi/2, and is read as the horizon
 TINY = 1e-280
 ROWS = 1e-11  # 1e-12: rows of He-Torrance share the terms of a table, see test_he_torrance_series
-LIGHT = (he_torrance_1991.WAVELENGTH_NM, he_torrance_1991.N, he_torrance_1991.K)  # of every spectral model
+LIGHT = (WAVELENGTH_NM, N, K)  # of every spectral model
 ANGLES = ("theta_i", "phi_i", "theta_r", "phi_r")
 SLOW = ("oren_nayar_gaussian",)  # an integral, 30 us a value
 
@@ -31,16 +31,6 @@ def parameters_of(spec: ModelSpec) -> tuple[Parameter, ...]:
     signature = inspect.signature(spec.evaluate).parameters
     light = [each for each in LIGHT if spec.spectral and signature[each.name].default is not None]
     return (*spec.parameters, *light)
-
-
-every_parameter = pytest.mark.parametrize(
-    ("spec", "parameter"),
-    [
-        pytest.param(spec, parameter, id=f"{name}-{parameter.name}")
-        for name, spec in MODELS.items()
-        for parameter in parameters_of(spec)
-    ],
-)
 
 
 def drawn(spec: ModelSpec, rng: np.random.Generator, count: int | None = None) -> Arguments:

@@ -32,6 +32,7 @@ CASES: dict[str, tuple[dict[str, float], dict[str, Any]]] = {
 }
 
 
+@pytest.mark.judge
 @pytest.mark.skipif(PYTHON is None, reason="BRDFDB_ERADIATE names no Python with eradiate-mitsuba")
 def test_values_are_those_of_eradiate() -> None:
     rng = np.random.default_rng(1993)

@@ -206,8 +206,13 @@ def test_lobe_axes_make_the_difference(spec: ModelSpec) -> None:
 
 
 @every_model
-@pytest.mark.parametrize("position", range(4), ids=ANGLES)
-def test_nan_goes_through_and_leaves_its_neighbours_alone(spec: ModelSpec, position: int) -> None:
+def test_nan_goes_through_and_leaves_its_neighbours_alone(spec: ModelSpec) -> None:
+    for position in range(len(ANGLES)):
+        check_nan(spec, position)
+
+
+def check_nan(spec: ModelSpec, position: int) -> None:
+    """Assert that nan as one of the angles gives nan, and leaves other values alone."""
     rng = np.random.default_rng(6)
     parameters = drawn(spec, rng)
     clean = [0.4, 0.2, 0.7, 1.9]

@@ -1,6 +1,5 @@
 """What the unit-vector twin of every model promises: the values of its angles, and the same ends."""
 
-import re
 from typing import Any
 
 import numpy as np
@@ -9,20 +8,17 @@ from numpy.typing import NDArray
 
 from brdfdb import models
 from brdfdb.geometry import unit_vector
-from brdfdb.parameters import Floats, ModelSpec, Parameter
+from brdfdb.parameters import Floats, ModelSpec
 from tests.models.draws import (
     HALF_PI,
     ROWS,
     TINY,
     Arguments,
-    beyond,
     corner_parameters,
     drawn,
     drawn_angles,
     every_model,
-    every_parameter,
     every_specular,
-    refused,
     specular,
 )
 
@@ -128,35 +124,6 @@ def test_broadcasts_over_vectors(spec: ModelSpec) -> None:
     for index, row in enumerate(rows):
         alone = {name: value[index, 0] for name, value in several.items()}
         np.testing.assert_allclose(spec.vectors(wi[0], wr, **alone), row, rtol=ROWS)
-
-
-@every_model
-@pytest.mark.parametrize("position", [0, 1], ids=["wi", "wr"])
-@pytest.mark.parametrize(
-    ("wrong", "message"),
-    [
-        ([0.0, 0.0, 1.1], r"\(0, 0, 1\.1\) has the length 1\.1, not 1"),
-        ([[0.0, 0.0, 1.0], [0.0, 0.0, 0.0]], r"\(0, 0, 0\) has the length 0, not 1"),
-        ([np.inf, 0.0, 0.0], r"\(inf, 0, 0\) has the length inf, not 1"),
-        ([0.0, 1.0], r"float64 of shape \(2,\) is not an array of vectors"),
-        (1.0, r"float64 of shape \(\) is not an array of vectors"),
-        ([True, False, False], r"bool of shape \(3,\) is not an array of vectors"),
-        (["a", "b", "c"], r"<U1 of shape \(3,\) is not an array of vectors"),
-        ([0.0, 0.0, 1j], r"complex128 of shape \(3,\) is not an array of vectors"),
-    ],
-)
-def test_refuses_what_is_no_unit_vector(spec: ModelSpec, position: int, wrong: Any, message: str) -> None:
-    vectors: list[Any] = [[0.0, 0.6, 0.8], [0.0, 0.6, 0.8]]
-    vectors[position] = wrong
-    with pytest.raises(ValueError, match=rf"^{('wi', 'wr')[position]}: {message}"):
-        spec.vectors(*vectors, **drawn(spec, np.random.default_rng(27)))
-
-
-@every_parameter
-def test_vectors_refuse_a_parameter_in_the_words_of_the_angles(spec: ModelSpec, parameter: Parameter) -> None:
-    parameters = drawn(spec, np.random.default_rng(28)) | {parameter.name: beyond(parameter)}
-    with pytest.raises(ValueError, match=f"^{re.escape(refused(spec, parameter, beyond(parameter)))}$"):
-        spec.vectors([0.0, 0.6, 0.8], [0.0, 0.6, 0.8], **parameters)
 
 
 def specular_vectors(spec: ModelSpec, wi: Any, parameters: Arguments) -> Any:

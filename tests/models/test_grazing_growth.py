@@ -13,8 +13,8 @@ from brdfdb.integrals.quadrature import spectral_albedo
 from brdfdb.materials import FunctionSource, Material, Source, presets
 from brdfdb.models import MODELS
 from brdfdb.parameters import ModelSpec
-from brdfdb.tables.first_numbers import Grazing
-from brdfdb.tables.largest_albedo import grazing_of_source
+from brdfdb.tables.albedo import grazing_of_source
+from brdfdb.tables.stated_error import Grazing
 from tests.models.draws import Arguments, drawn, every_model, specular
 
 THETA_I_DEG = (89.0, 89.9, 89.99, 89.999)

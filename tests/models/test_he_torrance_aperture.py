@@ -13,7 +13,7 @@ from brdfdb.models import (
     he_torrance_smooth,
     he_torrance_specular,
 )
-from brdfdb.reference import he_torrance_1991, he_torrance_1991_aperture
+from brdfdb.reference import he_torrance_1991
 from tests.models.he_torrance_surfaces import ALUMINUM, CERAMIC, CONE, CONES, HALF_PI, directions
 
 EXCHANGE = 2e-12  # 3.5e-13: the nodes in exchanged cones are summed in another order
@@ -159,7 +159,7 @@ def test_the_spread_specular_part_against_the_reference(
 ) -> None:
     smooth = {"wavelength_nm": 2000.0, "sigma_0_um": 0.0, "tau_um": 1.77, "n": 2.15, "k": 20.7}
     cones = {"incident_solid_angle_sr": CONE, "received_solid_angle_sr": received}
-    expected = float(he_torrance_1991_aperture.aperture_specular(theta_i, theta_r, delta_phi, **cones, **smooth))
+    expected = float(he_torrance_1991.aperture_specular(theta_i, theta_r, delta_phi, **cones, **smooth))
     value = he_torrance_aperture(theta_i, 0.3, theta_r, 0.3 + delta_phi, a=0.3, **cones, **smooth)
     assert value - 0.3 / np.pi == pytest.approx(expected, rel=SPREAD_REFERENCE, abs=1e-15)
     assert (expected > 0.0) == (theta_r < 0.4 or theta_i > 0.4)
@@ -180,8 +180,8 @@ def test_all_parts_through_apertures_against_the_reference(
 ) -> None:
     cones = {"incident_solid_angle_sr": CONE, "received_solid_angle_sr": received}
     arguments = theta_i, theta_r, delta_phi, *cones.values()
-    expected = float(he_torrance_1991_aperture.aperture_specular(*arguments, **surface))
-    expected += he_torrance_1991_aperture.aperture_diffuse(*arguments, **surface) + 0.2 / np.pi
+    expected = float(he_torrance_1991.aperture_specular(*arguments, **surface))
+    expected += he_torrance_1991.aperture_diffuse(*arguments, **surface) + 0.2 / np.pi
     for rings, tolerance in ((4, APERTURE), (2, TWO_RINGS)):
         value = he_torrance_aperture(theta_i, 0.0, theta_r, delta_phi, a=0.2, rings=rings, **cones, **surface)
         assert value == pytest.approx(expected, rel=tolerance)
@@ -189,10 +189,10 @@ def test_all_parts_through_apertures_against_the_reference(
 
 def test_the_diffuse_reference_through_pinholes_is_the_one_of_40_digits() -> None:
     for arguments in ((0.4, 0.5, 2.9), (0.0, 1.2, 1.0)):
-        value = he_torrance_1991_aperture.aperture_diffuse(*arguments, 1e-16, 1e-16, **CERAMIC)
+        value = he_torrance_1991.aperture_diffuse(*arguments, 1e-16, 1e-16, **CERAMIC)
         exact = he_torrance_1991.directional_diffuse(*arguments, **CERAMIC)
         assert value == pytest.approx(float(exact), rel=APERTURE)
-    assert he_torrance_1991_aperture.aperture_diffuse(0.4, 0.5, 2.9, CONE, CONE, **CERAMIC | {"sigma_0_um": 0.0}) == 0.0
+    assert he_torrance_1991.aperture_diffuse(0.4, 0.5, 2.9, CONE, CONE, **CERAMIC | {"sigma_0_um": 0.0}) == 0.0
 
 
 def test_an_ideal_diffuser_looks_the_same_through_any_aperture() -> None:

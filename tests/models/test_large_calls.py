@@ -220,5 +220,5 @@ def test_docstrings_name_both_arguments() -> None:
     for function in (lambert, he_torrance_very_rough):
         document = function.__doc__ or ""
         parameters = document.split("Parameters\n")[1].split("Returns\n")[0]
-        assert "    out : array, optional\n" in parameters
-        assert "    threads : int\n" in parameters
+        assert "\nout : array, optional\n" in parameters
+        assert "\nthreads : int\n" in parameters

@@ -137,7 +137,13 @@ def test_a_file_is_added_once_and_named_to_processes_that_come_later(registry: R
     assert list(registry) == ["rim_light"]
 
 
-CLASH = "from dataclasses import replace\nfrom brdfdb.models.lambert import SPEC\nMINE = replace(SPEC, version=9)\n"
+LAMBERT = "from brdfdb.models.lambert import lambert\n"
+CLASH = f"from dataclasses import replace\n{LAMBERT}MINE = replace(lambert.spec, version=9)\n"
+ARGUMENT = """
+from brdfdb.models.declaration import DeclaredModel
+@DeclaredModel(title="", equation="", references="none", parameters=())
+def mine(cos_i, depth): return depth
+"""
 
 
 @pytest.mark.parametrize(
@@ -146,7 +152,8 @@ CLASH = "from dataclasses import replace\nfrom brdfdb.models.lambert import SPEC
         pytest.param(None, "no such file of models", id="missing"),
         pytest.param("raise RuntimeError('boo\\nhoo')", "RuntimeError: boo", id="raises"),
         pytest.param("x = (", r"SyntaxError: .*", id="syntax"),
-        pytest.param("from brdfdb.models.lambert import SPEC", r"it defines no .*ModelSpec", id="none"),
+        pytest.param(LAMBERT, r"it declares no model, .*ModelSpec", id="none"),
+        pytest.param(ARGUMENT, r"TypeError: mine: its arguments depth are not its parameters none; .*", id="argument"),
         pytest.param(CLASH, "the name 'lambert' is that of another model; choose another name", id="clash"),
     ],
 )
@@ -196,7 +203,7 @@ def test_an_entry_point_that_gives_no_model_is_refused(
     monkeypatch.syspath_prepend(str(tmp_path))
     for value, sentence in (
         ("json:JSONEncoder", r"TypeError: .*"),
-        ("json:__all__", r"'dump' is not a .*ModelSpec"),
+        ("json:__all__", r"'dump' is not a declared model .*ModelSpec"),
         ("nowhere:SPEC", r"ModuleNotFoundError: No module named 'nowhere'"),
     ):
         (about / "entry_points.txt").write_text(f"[brdfdb.models]\nbad = {value}\n", encoding="utf-8")

@@ -14,7 +14,7 @@ from brdfdb.geometry import unit_vector
 from brdfdb.materials import Material
 from brdfdb.models import MODELS
 from brdfdb.models._oren_nayar_facets import gaussian
-from brdfdb.models.oren_nayar_1994_surfaces import PartName, gaussian_part, gaussian_rung, single_slope_mean
+from brdfdb.models.oren_nayar_1994 import PartName, gaussian_part, gaussian_rung, single_slope_mean
 from brdfdb.reference import fujii_2013, mp, oren_nayar_1994, portsmouth_2025, torrance_sparrow_1967
 
 PAPER_VALUES = Path(__file__).parents[1] / "paper_values"

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from brdfdb.audit.answers import as_published, conserves_energy
 from brdfdb.audit.energy import Energy
 from brdfdb.audit.finding import Finding, Verdict
 from brdfdb.audit.model_energy import EnergyVerdict, Furnace, ModelEnergy, UniformBound
@@ -16,15 +15,15 @@ from brdfdb.audit.polarisation import PolarisationFinding
 from brdfdb.audit.reciprocity import Asymmetry, Reciprocity
 from brdfdb.audit.record import Record
 from brdfdb.audit.registry import FINDINGS
-from brdfdb.audit.report import AuditReport, MaterialAudit, explanations
+from brdfdb.audit.report import AuditReport, MaterialAudit, as_published, conserves_energy, explanations
 from brdfdb.audit.sampling import Sampling
 from brdfdb.audit.smoothness import Jump, Smoothness
 from brdfdb.audit.table_energy import TableEnergy
 from brdfdb.audit.table_error import TableError
 from brdfdb.audit.validity import Limit, Validity
-from brdfdb.audit.values import Values
+from brdfdb.audit.values import ValueCounts
 from brdfdb.figure import Curve, Figure, Map, Panel, Picture, Statement, numbers
-from brdfdb.tables.first_numbers import Grazing
+from brdfdb.tables.stated_error import Grazing
 
 THETA = np.linspace(0.0, 89.0, 60)
 ODD = '<b>&"it\'s" $größe$'
@@ -180,7 +179,7 @@ def others() -> tuple[Finding, ...]:
             table_nodes=asymmetry(0.0),
             verdict="passes",
         ),
-        Values(**values, positivity="passes", finiteness="passes", verdict="passes"),
+        ValueCounts(**values, positivity="passes", finiteness="passes", verdict="passes"),
         Nodes(compared=360, count=720, wrong=0, stored=None, expected=None, beside=[], verdict="passes"),
         Smoothness(
             model=[Jump(seam="alpha = 45°", crossings=9, largest=2e-7, where="45°, 45°", tolerance=1e-5)],

@@ -138,7 +138,7 @@ def test_reasons_are_sentences_and_said_once(document: Document) -> None:
     assert "Sampling: passes. The smallest p of 3 lights is below 0.001." in words
     assert "Table error: passes. 99 of 100 fresh values are within 0.91 %, on average off by −0.2 % of the" in words
     assert "Alpha: at the edge. 0.2 (at most 0.2). up to about 0.2 section 4" in words
-    assert "Validity: at the edge. Its paper states 2 limits: 1 at the edge, 1 kept." in words
+    assert "Validity: at the edge. 2 limits that the paper states: 1 at the edge, 1 met." in words
 
 
 def test_the_two_questions_have_answers_on_every_material(document: Document, report: AuditReport) -> None:

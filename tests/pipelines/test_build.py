@@ -23,7 +23,7 @@ from brdfdb.tables import layout as layouts
 from brdfdb.tables import tabulation
 from brdfdb.tables.layout import Layout, digest
 from brdfdb.tables.xarray_view import plain_attributes
-from brdfdb_pipelines import build_resources, cli
+from brdfdb_pipelines import build_survey, cli
 from brdfdb_pipelines.build import build
 from brdfdb_pipelines.recipe_file import Job, Recipe, load
 from brdfdb_pipelines.workers import Workers
@@ -93,7 +93,7 @@ def test_a_build_names_a_material_that_reflects_more_than_it_receives(tmp_path: 
     assert cli.main(["build", str(path), "--store", str(tmp_path / "store"), "--jobs", "1"]) == 0
     said = [line for line in capsys.readouterr().out.splitlines() if "reflects more" in line]
     assert len(said) == 1
-    assert said[0].startswith("b reflects more than it receives: albedo of the model 1.")
+    assert said[0].startswith("b reflects more light than it receives: albedo of the model 1.")
 
 
 OF_A_WAVELENGTH = 100  # bytes that a wavelength adds to a mixture; measured: 80
@@ -304,7 +304,7 @@ def test_memory_bounds_the_tasks_in_flight(recipe: Path, tmp_path: Path, monkeyp
         return values
 
     monkeypatch.setattr(tabulation, "block", counted)
-    most_bytes = max(build_resources.task_bytes(job.layout()) for job in load(recipe).jobs())
+    most_bytes = max(build_survey.memory_of_task(job.layout()) for job in load(recipe).jobs())
     with ThreadPoolExecutor(8) as executor:
         build(load(recipe), tmp_path, Workers(executor, lambda: 8), memory=3 * most_bytes + 100_000)
     assert 2 <= most <= 3

@@ -13,10 +13,10 @@ import pytest
 
 import brdfdb
 from brdfdb.materials import presets
-from brdfdb.store import marker, staging
+from brdfdb.store import records, staging
 from brdfdb.tables.grids import Grid
 from brdfdb.tables.layout import Interpolation, Layout
-from brdfdb_pipelines import build_resources, build_survey, cli
+from brdfdb_pipelines import build_survey, cli
 
 LOG = Interpolation("cubic", True, 1e-4)
 WAVELENGTHS = np.linspace(400.0, 700.0, 31)
@@ -41,7 +41,7 @@ def layout(name: str, half: bool, how: Interpolation, nodes: int, rows: int) -> 
     ],
 )
 def test_a_task_takes_at_most_the_memory_that_is_expected_and_not_a_tenth_of_it(table: Layout, tmp_path: Path) -> None:
-    marker.make_store(tmp_path / "store")
+    records.make_store(tmp_path / "store")
     text = json.dumps(table.document())
     directory = str(staging.prepare(tmp_path / "store", table.source.name, {"asked": "by a test"}, text))
     staging.write_block(directory, text, 0)  # the first time kernels are compiled
@@ -57,18 +57,18 @@ def test_a_task_takes_at_most_the_memory_that_is_expected_and_not_a_tenth_of_it(
     staging.write_frame(directory, text)
     peaks.append(tracemalloc.get_traced_memory()[1])
     tracemalloc.stop()
-    assert 0.1 * build_resources.task_bytes(table) <= max(peaks) <= build_resources.task_bytes(table)
+    assert 0.1 * build_survey.memory_of_task(table) <= max(peaks) <= build_survey.memory_of_task(table)
 
 
 def test_a_disk_that_is_too_small_is_one_sentence_before_anything_is_written(
     recipe: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(build_resources.shutil, "disk_usage", lambda _: SimpleNamespace(free=10_000))
+    monkeypatch.setattr(build_survey.shutil, "disk_usage", lambda _: SimpleNamespace(free=10_000))
     root = tmp_path / "store"
     assert cli.main(["build", str(recipe), "--store", str(root)]) == 2
     said = capsys.readouterr().err.splitlines()[-1]
     assert said.startswith("brdfdb: disk: the tables take up to ")
-    assert said.endswith(f" kB, {root} has 10 kB free")
+    assert said.endswith(f" kB, and {root} has 10 kB free")
     assert not root.exists()
 
 
@@ -78,7 +78,7 @@ def test_a_disk_too_small_for_planned_tables_leaves_nothing(
 ) -> None:
     planned = tmp_path / "planned.toml"
     planned.write_text('materials = ["foam", "rolled-brass"]\ntolerance = 0.01\n', encoding="utf-8")
-    monkeypatch.setattr(build_resources.shutil, "disk_usage", lambda _: SimpleNamespace(free=free))
+    monkeypatch.setattr(build_survey.shutil, "disk_usage", lambda _: SimpleNamespace(free=free))
     names: list[str] = []
 
     def write_block(directory: str, *given: Any) -> staging.Block:
@@ -98,6 +98,6 @@ def test_what_is_staged_already_needs_no_disk_again(
 ) -> None:
     root = tmp_path / "store"
     assert cli.main(["build", str(recipe), "--store", str(root)]) == 0
-    monkeypatch.setattr(build_resources.shutil, "disk_usage", lambda _: SimpleNamespace(free=0))
+    monkeypatch.setattr(build_survey.shutil, "disk_usage", lambda _: SimpleNamespace(free=0))
     assert cli.main(["build", str(recipe), "--store", str(root)]) == 0
     assert brdfdb.open(root).head("foam") == "r000001"

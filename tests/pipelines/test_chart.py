@@ -14,22 +14,22 @@ import pytest
 
 from brdfdb.forms import catalogue, timing
 from brdfdb.forms import tradeoff as charting
-from brdfdb.forms.tradeoff_document import (
-    Between,
+from brdfdb.forms.tradeoff import (
+    BetweenMembers,
     Chart,
+    ChartedSampler,
+    ChartPoint,
     Charts,
     Cost,
-    Curve,
     FamilyChart,
+    FamilyCurve,
     Fronts,
-    Point,
-    Sampler,
+    SamplerWork,
     Saving,
-    Work,
 )
 from brdfdb.materials import presets
 from brdfdb.store import family_records
-from brdfdb_pipelines import cli, family_plot, plot_panels, terminal, tradeoff_plot
+from brdfdb_pipelines import chart_picture, cli, terminal
 from brdfdb_pipelines.recipe_file import load
 from tests.json_schema import validate
 from tests.pipelines.recipes import material
@@ -63,19 +63,19 @@ def family_charted(folder: Path, name: str) -> FamilyChart:
     return whole
 
 
-def point(key: str, l1: float, ns: float, **more: Any) -> Point:
+def point(key: str, l1: float, ns: float, **more: Any) -> ChartPoint:
     time = Cost(ns=ns, low=0.9 * ns, high=1.2 * ns, directions=1)
     errors = dict.fromkeys(("forward", "back", "grazing"), l1) | {"l1": l1, "p99": 5.0 * l1}
     errors |= {"p99_low": 4.0 * l1, "p99_high": 6.0 * l1, "mixed": time, "rung": None, "saving": None}
     fixed = {"title": f"the form {key}", "kind": "table", "python": "none", "dtype": "float64", "bytes": 100}
     costs = {"batch": time, "block": time, "single": time}
-    return Point.model_validate({"key": key, **costs, **errors, **fixed, **more})
+    return ChartPoint.model_validate({"key": key, **costs, **errors, **fixed, **more})
 
 
-WORK = Work(variance=0.25, ns=40.0, low_ms=0.09, ms=0.1, high_ms=0.11)
+WORK = SamplerWork(variance=0.25, ns=40.0, low_ms=0.09, ms=0.1, high_ms=0.11)
 
 
-def made_up(*points: Point) -> Chart:
+def made_up(*points: ChartPoint) -> Chart:
     keys = [each.key for each in points]
     return Chart(
         material="made-up",
@@ -87,7 +87,7 @@ def made_up(*points: Point) -> Chart:
         truth=keys[0],
         points=list(points),
         ladder=[each.key for each in points if each.kind in ("exact", "quadrature")],
-        samplers=[Sampler(key="model", title="the model's lobe", albedo=WORK, sphere=WORK)],
+        samplers=[ChartedSampler(key="model", title="the model's lobe", albedo=WORK, sphere=WORK)],
         fronts=Fronts(batch=keys[:2], single=keys[:1], bytes=keys[:1]),
     )
 
@@ -111,8 +111,8 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture
 def no_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
     """Draw nothing: pictures take more time than the charts of which the test reads the data."""
-    monkeypatch.setattr(tradeoff_plot, "svg", lambda _: "")
-    monkeypatch.setattr(tradeoff_plot, "png", lambda _: b"")
+    monkeypatch.setattr(chart_picture, "svg", lambda _: "")
+    monkeypatch.setattr(chart_picture, "png", lambda _: b"")
 
 
 def test_the_command_writes_the_data_and_a_picture_of_each(tmp_path: Path, capsys: Captured) -> None:
@@ -178,8 +178,8 @@ def test_a_mistake_is_one_sentence_and_writes_nothing(
 def test_another_run_leaves_the_charts_of_others_as_they_were(
     tmp_path: Path, capsys: Captured, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(tradeoff_plot, "svg", lambda chart: f"a picture of {chart.material}")
-    monkeypatch.setattr(tradeoff_plot, "png", lambda chart: f"a picture of {chart.material}".encode())
+    monkeypatch.setattr(chart_picture, "svg", lambda chart: f"a picture of {chart.material}")
+    monkeypatch.setattr(chart_picture, "png", lambda chart: f"a picture of {chart.material}".encode())
     given = ("--store", tmp_path / "none", "--out", tmp_path, "--tolerance", 0.2)
     assert run("rolled-brass", *given) == 0
     before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
@@ -191,7 +191,7 @@ def test_another_run_leaves_the_charts_of_others_as_they_were(
 
 
 def test_a_picture_names_every_point_and_the_front() -> None:
-    text = tradeoff_plot.svg(made_up(*POINTS))
+    text = chart_picture.svg(made_up(*POINTS))
     root = ElementTree.fromstring(text)
     written = [element.text for element in root.iter("{http://www.w3.org/2000/svg}text")]
     assert "Made <up>" in written
@@ -209,29 +209,29 @@ def test_a_picture_draws_the_ladder_and_says_what_a_form_saves_over_its_rung() -
     rung = point("exact-4", 0.01, 100.0, kind="quadrature")
     fit = point("fit", 0.02, 10.0, kind="approximation", rung="exact-4", saving=Saving(low=9.0, times=10.4, high=11.0))
     whole = made_up(POINTS[0], rung, fit)
-    written = [element.text for element in ElementTree.fromstring(tradeoff_plot.svg(whole)).iter() if element.text]
+    written = [element.text for element in ElementTree.fromstring(chart_picture.svg(whole)).iter() if element.text]
     assert "ladder" in written
     assert "quadrature" in written
     assert "10 (exact-4)" in written
     assert "10 % (8-12)" in written  # the 99th percentile and its interval
-    assert "ladder" not in tradeoff_plot.svg(made_up(POINTS[0]))
+    assert "ladder" not in chart_picture.svg(made_up(POINTS[0]))
 
 
 def test_a_picture_shows_the_noise_and_time_of_samplers() -> None:
-    text = tradeoff_plot.svg(made_up(*POINTS))
+    text = chart_picture.svg(made_up(*POINTS))
     written = [element.text for element in ElementTree.fromstring(text).iter("{http://www.w3.org/2000/svg}text")]
     assert "the model's lobe" in written
     assert written.count("0.1 (0.09-0.11)") == 2  # of the albedo and of the sphere
 
 
 def test_a_picture_is_the_same_every_time() -> None:
-    assert tradeoff_plot.svg(made_up(*POINTS)) == tradeoff_plot.svg(made_up(*POINTS))
-    assert tradeoff_plot.png(made_up(*POINTS)) == tradeoff_plot.png(made_up(*POINTS))
-    assert tradeoff_plot.png(made_up(*POINTS)).startswith(PNG)
+    assert chart_picture.svg(made_up(*POINTS)) == chart_picture.svg(made_up(*POINTS))
+    assert chart_picture.png(made_up(*POINTS)) == chart_picture.png(made_up(*POINTS))
+    assert chart_picture.png(made_up(*POINTS)).startswith(PNG)
 
 
 def test_one_point_is_a_picture_too() -> None:
-    ElementTree.fromstring(tradeoff_plot.svg(made_up(POINTS[0])))
+    ElementTree.fromstring(chart_picture.svg(made_up(POINTS[0])))
 
 
 @pytest.mark.parametrize(
@@ -247,7 +247,7 @@ def test_one_point_is_a_picture_too() -> None:
     ],
 )
 def test_errors_are_written_for_people(value: float, text: str) -> None:
-    assert plot_panels.percent(value) == text
+    assert chart_picture.percent(value) == text
 
 
 @pytest.mark.parametrize(("value", "text"), [(4.26, "4.26"), (999.6, "1k"), (34800.0, "34.8k"), (1.3e6, "1.3M")])
@@ -257,15 +257,15 @@ def test_counts_are_written_for_people(value: float, text: str) -> None:
 
 def test_labels_hide_neither_points_nor_each_other_where_there_is_room() -> None:
     frame = (0.0, 0.0, 200.0, 100.0)
-    taken = [(97.0, 47.0, 103.0, 53.0)]
+    taken = [chart_picture.TextBox(97.0, 47.0, 103.0, 53.0)]
     boxes = []
     for _ in range(4):  # four names for one point
         best = min(
-            plot_panels.offsets(30.0),
-            key=lambda offset: plot_panels.hidden(plot_panels.box((100.0, 50.0), offset, 30.0), taken, frame),
+            chart_picture.offsets(30.0),
+            key=lambda offset: chart_picture.TextBox.at((100.0, 50.0), offset, 30.0).hidden(taken, frame),
         )
-        boxes.append(plot_panels.box((100.0, 50.0), best, 30.0))
-        assert plot_panels.hidden(boxes[-1], taken, frame) == 0.0
+        boxes.append(chart_picture.TextBox.at((100.0, 50.0), best, 30.0))
+        assert boxes[-1].hidden(taken, frame) == 0.0
         taken.append(boxes[-1])
     assert len(set(boxes)) == 4
 
@@ -338,7 +338,7 @@ def time(ns: float) -> Cost:
     return Cost(ns=ns, low=ns, high=ns, directions=1)
 
 
-def made_up_family(between: Between | None = None, **axes: list[float]) -> FamilyChart:
+def made_up_family(between: BetweenMembers | None = None, **axes: list[float]) -> FamilyChart:
     """A truth, and a form that gets better along the family."""
     members = [f"member-{number}" for number in range(len([*itertools.product(*axes.values())]))]
     fixed = {"python": "none", "dtype": "float64", "bytes": 8, "timed": members[0]}
@@ -356,7 +356,7 @@ def made_up_family(between: Between | None = None, **axes: list[float]) -> Famil
         wavelength_nm=None,
         truth="exact",
         curves=[
-            Curve.model_validate({**form, **fixed, **timing, "l1": l1, "p99": l1})
+            FamilyCurve.model_validate({**form, **fixed, **timing, "l1": l1, "p99": l1})
             for form, timing, l1 in zip(forms, costs, errors, strict=True)
         ],
         between=between,
@@ -366,35 +366,35 @@ def made_up_family(between: Between | None = None, **axes: list[float]) -> Famil
 
 def test_the_picture_of_a_family_names_every_form_beside_its_curve_and_in_the_table() -> None:
     fixed = {"key": "between", "title": "between members", "kind": "table", "python": "none", "dtype": "float64"}
-    between = Between.model_validate(
+    between = BetweenMembers.model_validate(
         {**fixed, "bytes": 8, **dict.fromkeys(("batch", "block", "single"), time(5.0)), "l1": 0.1, "p99": 1.0}
     )
-    text = tradeoff_plot.svg(made_up_family(between, height=[1.0, 2.0, 4.0, 9.0]))
+    text = chart_picture.svg(made_up_family(between, height=[1.0, 2.0, 4.0, 9.0]))
     written = [element.text for element in ElementTree.fromstring(text).iter("{http://www.w3.org/2000/svg}text")]
     for number, name in enumerate(("the truth", "fit", "between members"), 1):
         assert name in written
         assert f"{number} {name}" in written
     assert "height" in written
     assert "1 of 4" in written  # where the fit is worth having
-    assert text == tradeoff_plot.svg(made_up_family(between, height=[1.0, 2.0, 4.0, 9.0]))
+    assert text == chart_picture.svg(made_up_family(between, height=[1.0, 2.0, 4.0, 9.0]))
 
 
 def test_members_are_told_apart_along_each_parameter() -> None:
     whole = made_up_family(height=[1.0, 2.0], width=[3.0, 4.0, 5.0])
-    assert family_plot.along(whole, "height") == [[0, 1, 2], [3, 4, 5]]
-    assert family_plot.along(whole, "width") == [[0, 3], [1, 4], [2, 5]]
-    assert family_plot.middle([0.1, None, 0.3, 0.2]) == 0.2
-    assert family_plot.middle([None]) is None
+    assert chart_picture.along(whole, "height") == [[0, 1, 2], [3, 4, 5]]
+    assert chart_picture.along(whole, "width") == [[0, 3], [1, 4], [2, 5]]
+    assert chart_picture.middle([0.1, None, 0.3, 0.2]) == 0.2
+    assert chart_picture.middle([None]) is None
 
 
 def test_names_are_moved_apart_and_no_further_than_they_need() -> None:
-    assert family_plot.apart([10.0, 50.0], 9.0, 100.0) == [10.0, 50.0]
-    assert family_plot.apart([10.0, 12.0, 30.0], 9.0, 100.0) == [6.5, 15.5, 30.0]
-    assert family_plot.apart([95.0, 99.0, 120.0], 9.0, 100.0) == [82.0, 91.0, 100.0]
+    assert chart_picture.apart([10.0, 50.0], 9.0, 100.0) == [10.0, 50.0]
+    assert chart_picture.apart([10.0, 12.0, 30.0], 9.0, 100.0) == [6.5, 15.5, 30.0]
+    assert chart_picture.apart([95.0, 99.0, 120.0], 9.0, 100.0) == [82.0, 91.0, 100.0]
 
 
 def test_the_recipe_of_copper_goes_from_smooth_to_rough() -> None:
-    recipe = load(Path(tradeoff_plot.__file__).parent / "recipes" / "copper-roughness.toml")
+    recipe = load(Path(chart_picture.__file__).parent / "recipes" / "copper-roughness.toml")
     (sweep,) = recipe.sweeps(recipe.jobs())
     g = [(4.0 * math.pi * value / 0.55) ** 2 for value in sweep.axes["sigma_0_um"]]  # eq. 79 along the normal
     assert g[0] < 0.1 < 100.0 < g[-1]
@@ -402,11 +402,11 @@ def test_the_recipe_of_copper_goes_from_smooth_to_rough() -> None:
 
 
 def test_cells_of_the_table_of_forms_stand_apart() -> None:
-    canvas = plot_panels.titled(200.0, "", "")
+    sheet = chart_picture.Sheet(200.0, "", "")
     errors = ["≤ 0.0001 %", "0.0002 % (0.00019-0.00022)", "≤ 0.0001 %", "≤ 0.0001 %", "≤ 0.0001 %"]
     cells = ["10", "a title", *errors, "16.29 (15.91-16.81)", "46.2k", "9.87k", "314k", "0.53 (he_torrance)", "717 kB"]
-    before = len(canvas.texts)
-    plot_panels.row_of(canvas, tradeoff_plot.COLUMNS, 1, cells, 50.0, 200.0, fontweight="bold")
-    boxes = [text.get_window_extent() for text in canvas.texts[before:]]
+    before = len(sheet.canvas.texts)
+    sheet.row(chart_picture.COLUMNS, 1, cells, 50.0, fontweight="bold")
+    boxes = [text.get_window_extent() for text in sheet.canvas.texts[before:]]
     assert len(boxes) == len(cells)
     assert all(left.x1 < right.x0 for left, right in itertools.pairwise(boxes))

@@ -14,7 +14,7 @@ from matplotlib.image import imread
 from brdfdb.scenes import image
 from brdfdb.scenes.scene import Scene
 from brdfdb.scenes.shapes import Array
-from brdfdb_pipelines import choice_picture
+from brdfdb_pipelines import choose
 
 TOLERANCE = 0.5
 ROUNDED = 1.01 / 255.0  # of colours in a PNG, twice: the picture and the PNG
@@ -65,34 +65,34 @@ def blocks(picture: Array) -> Array:
 
 def test_pixels_are_squares_of_one_colour(seen: Seen) -> None:
     choice, cheaper = 0.5 * seen.truth, 0.25 * seen.truth
-    drawn = panels(choice_picture.png(seen, choice, cheaper))[:3]
+    drawn = panels(choose.png(seen, choice, cheaper))[:3]
     for panel, picture in zip(drawn, (seen.truth, choice, cheaper), strict=True):
         np.testing.assert_allclose(panel, blocks(image.srgb(seen.scene, picture)), atol=ROUNDED)
 
 
 def test_colours_of_differences_run_to_twice_the_tolerance_and_what_is_more_has_its_own(seen: Seen) -> None:
     colours = mpl.colormaps["viridis"](seen.off / (2.0 * TOLERANCE))[..., :3]
-    colours[seen.off > 2.0 * TOLERANCE] = to_rgb(choice_picture.BEYOND)
-    drawn = panels(choice_picture.png(seen, seen.truth, seen.truth))
+    colours[seen.off > 2.0 * TOLERANCE] = to_rgb(choose.BEYOND)
+    drawn = panels(choose.png(seen, seen.truth, seen.truth))
     for panel in drawn[4:]:
         np.testing.assert_allclose(panel, blocks(colours), atol=ROUNDED)
 
 
 def test_no_difference_has_the_colour_of_none(seen: Seen) -> None:
     seen.off[:] = 0.0
-    below = panels(choice_picture.png(seen, seen.truth, None))[4]
+    below = panels(choose.png(seen, seen.truth, None))[4]
     np.testing.assert_allclose(below, np.broadcast_to(mpl.colormaps["viridis"](0.0)[:3], below.shape), atol=ROUNDED)
 
 
 def test_where_nothing_is_cheaper_nothing_is_shown(seen: Seen) -> None:
-    drawn = panels(choice_picture.png(seen, seen.truth, None))
+    drawn = panels(choose.png(seen, seen.truth, None))
     assert np.all(drawn[2] == 1.0)
     assert np.all(drawn[5] == 1.0)
 
 
 def test_the_bar_marks_the_tolerance_in_the_middle(seen: Seen) -> None:
-    drawn = panels(choice_picture.png(seen, seen.truth, None))[3]
-    row = drawn[choice_picture.BAR // 2]
-    beyond = np.flatnonzero(np.all(np.abs(row - to_rgb(choice_picture.BEYOND)) < ROUNDED, axis=-1))[0]
+    drawn = panels(choose.png(seen, seen.truth, None))[3]
+    row = drawn[choose.BAR // 2]
+    beyond = np.flatnonzero(np.all(np.abs(row - to_rgb(choose.BEYOND)) < ROUNDED, axis=-1))[0]
     mark = np.flatnonzero(np.all(row[:beyond] == 1.0, axis=-1))
     np.testing.assert_allclose(mark.mean(), beyond / 2.0, atol=2.0)  # pixels

@@ -16,7 +16,7 @@ import brdfdb
 from brdfdb.audit.pairs import pairs_of
 from brdfdb.audit.table_error import table_error_of
 from brdfdb.models import oren_nayar_gaussian_vectors
-from brdfdb.scenes.choice_document import Choice, Price
+from brdfdb.scenes.choice import Price, SceneChoice
 from brdfdb.scenes.offered_forms import OfferedForm
 from brdfdb_pipelines import choose, cli, terminal
 from brdfdb_pipelines.documents import schema
@@ -76,7 +76,7 @@ def _made_up_prices(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture(scope="module")
-def done(tmp_path_factory: pytest.TempPathFactory) -> tuple[Choice, Path]:
+def done(tmp_path_factory: pytest.TempPathFactory) -> tuple[SceneChoice, Path]:
     """A sphere that the fit is 1.2 off: a table is what is left."""
     folder = tmp_path_factory.mktemp("choose")
     with pytest.MonkeyPatch.context() as patched:
@@ -85,16 +85,16 @@ def done(tmp_path_factory: pytest.TempPathFactory) -> tuple[Choice, Path]:
     return choice, folder
 
 
-def test_what_is_written_keeps_to_the_schema_and_says_what_was_returned(done: tuple[Choice, Path]) -> None:
+def test_what_is_written_keeps_to_the_schema_and_says_what_was_returned(done: tuple[SceneChoice, Path]) -> None:
     choice, folder = done
     text = (folder / "out" / "choice.json").read_text(encoding="utf-8")
     jsonschema.validate(json.loads(text), json.loads(schema("choice")))
-    assert Choice.model_validate_json(text) == choice
+    assert SceneChoice.model_validate_json(text) == choice
     assert choice.machine == terminal.machine()
 
 
 def test_the_choice_costs_less_than_a_third_of_the_truth_and_what_is_cheaper_breaks_the_tolerance(
-    done: tuple[Choice, Path],
+    done: tuple[SceneChoice, Path],
 ) -> None:
     (one,) = done[0].materials
     assert one.truth.key == "facets"
@@ -107,7 +107,7 @@ def test_the_choice_costs_less_than_a_third_of_the_truth_and_what_is_cheaper_bre
     assert one.next_cheaper.title in one.reason
 
 
-def test_the_chosen_table_is_built(done: tuple[Choice, Path]) -> None:
+def test_the_chosen_table_is_built(done: tuple[SceneChoice, Path]) -> None:
     choice, folder = done
     (one,) = choice.materials
     store = brdfdb.open(folder / "store")
@@ -132,7 +132,7 @@ def test_the_chosen_table_is_built(done: tuple[Choice, Path]) -> None:
     np.testing.assert_allclose(store[one.material].lookup_vectors(wi, wr), truth, rtol=TABLE_OFF)
 
 
-def test_truth_and_choice_are_pictures_that_differ_by_little(done: tuple[Choice, Path]) -> None:
+def test_truth_and_choice_are_pictures_that_differ_by_little(done: tuple[SceneChoice, Path]) -> None:
     choice, folder = done
     images = []
     for name in ("truth", "choice"):
@@ -147,7 +147,7 @@ def test_truth_and_choice_are_pictures_that_differ_by_little(done: tuple[Choice,
 
 
 def test_the_comparison_is_a_picture_of_truth_choice_next_cheaper_and_their_differences(
-    done: tuple[Choice, Path],
+    done: tuple[SceneChoice, Path],
 ) -> None:
     image = imread(done[1] / "out" / "scene.png")
     top, bottom = np.array_split(image[..., :3], 2)
@@ -245,7 +245,7 @@ def test_an_exr_without_directions_is_one_sentence(tmp_path: Path, capsys: pytes
     assert "flat.exr" in capsys.readouterr().err.strip().splitlines()[-1]
 
 
-def test_the_statement_is_about_samples_and_says_how_many(done: tuple[Choice, Path]) -> None:
+def test_the_statement_is_about_samples_and_says_how_many(done: tuple[SceneChoice, Path]) -> None:
     choice, _ = done
     (one,) = choice.materials
     assert one.even is not None

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from brdfdb.figure import Panel, curve_of
 from brdfdb_pipelines import recipe_file
-from brdfdb_pipelines.figure_canvas import curves_on
+from brdfdb_pipelines.convert import curves_on
 from tests.pipelines.command import Captured, run
 
 

@@ -22,7 +22,7 @@ import brdfdb
 from brdfdb import models
 from brdfdb.materials import Material
 from brdfdb_api.http.app import create_app
-from brdfdb_api.serving.settings import Settings
+from brdfdb_api.settings import Settings
 from brdfdb_pipelines import cli
 from brdfdb_pipelines.recipe_file import load
 

@@ -13,16 +13,15 @@ import pytest
 
 from brdfdb.errors import CannotHoldError, ParameterError
 from brdfdb.formats import EXPORTERS
-from brdfdb.formats._file_statement import FileStatement
 from brdfdb.formats._interface import TOLERANCE
-from brdfdb.formats._stated_error import FileError
+from brdfdb.formats._stated_error import FileError, FileStatement
 from brdfdb.formats._written import Written, whole
 from brdfdb.materials import Material
 from brdfdb.store.publication import publish_dataset
 from brdfdb.tables.grids import Grid
 from brdfdb.tables.layout import Layout
 from brdfdb.tables.tabulation import tabulate
-from brdfdb_pipelines.exit_codes import TERMINATED
+from brdfdb_pipelines.commands import TERMINATED
 from tests.pipelines.command import Captured, run
 
 P99 = {"grey": 0.01, "dark": 0.03001}
@@ -83,9 +82,9 @@ def test_all_leaves_out_what_the_format_cannot_hold(store: Path, tmp_path: Path,
     assert run("export", "list", "--all", "--store", store, "--out", out) == 0
     text = capsys.readouterr().out
     assert text.startswith("2 LIST files, ")
-    assert "99 of 100 values within 3.01% (dark.list)" in text  # rounded up as in the file
-    assert "98 of 100 values within 6% (dark.list), near the light 20%, next to the horizon 40%\n" in text
-    assert "dark.list: 3.01%, beyond the tolerance of 2%\n" in text
+    assert "99 % of the values within 3.01% (dark.list)" in text  # rounded up as in the file
+    assert "98 % of the values within 6% (dark.list), near the light 20%, next to the horizon 40%\n" in text
+    assert "dark.list: 3.01%, above the tolerance of 2%\n" in text
     assert "dark: a specular part is not in the file\n" in text
     assert text.endswith("strange: this format holds nothing strange; left out\n")
     assert sorted(path.name for path in out.iterdir()) == ["dark.list", "grey.list"]
@@ -118,7 +117,7 @@ def test_kinds_before_one_that_is_refused_count(
     monkeypatch.setitem(EXPORTERS, "list", kinds)
     assert run("export", "list", "grey", "--store", store, "--out", tmp_path / "out") == 2
     captured = capsys.readouterr()
-    assert captured.out.startswith("1 LIST file and 1 beside it, ")
+    assert captured.out.startswith("1 LIST file and 1 more, ")
     assert captured.err.endswith("\nbrdfdb: grey: wavelength: 900 nm is outside\n")
 
 
@@ -134,7 +133,7 @@ def test_errors_above_all_of_the_value_are_multiples(
 ) -> None:
     monkeypatch.setitem(P99, "dark", 449.3)
     assert run("export", "list", "dark", "--store", store, "--out", tmp_path / "out") == 0
-    assert "\ndark.list: 450 times the value, beyond the tolerance of 2%\n" in capsys.readouterr().out
+    assert "\ndark.list: 450 times the value, above the tolerance of 2%\n" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(("name", "code"), [("grey", 0), ("dark", 1)])
@@ -160,7 +159,7 @@ def test_a_report_that_is_named_must_be_one(store: Path, tmp_path: Path, capsys:
     report, reason = tmp_path / "report.json", "No such file or directory"
     if text is not None:
         report.write_text(text)
-        reason = "it is no report of `brdfdb audit`"
+        reason = "it is not a report of `brdfdb audit`"
     out = tmp_path / "out"
     assert run("export", "list", "grey", "--audit", report, "--store", store, "--out", out) == 2
     assert capsys.readouterr().err == f"brdfdb: audit: {report} cannot be read: {reason}\n"

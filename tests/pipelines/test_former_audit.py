@@ -4,26 +4,35 @@ from __future__ import annotations
 
 import json
 import shutil
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 import brdfdb
-from brdfdb_pipelines import audit, former_audit
+from brdfdb.materials import Material
+from brdfdb.store.publication import publish_dataset
+from brdfdb.tables.grids import Grid
+from brdfdb.tables.layout import Layout
+from brdfdb.tables.tabulation import tabulate
+from brdfdb_pipelines import audit
 from tests.pipelines.command import Captured, run
 
-NAMES = ("blue-plastic", "foam", "mirror")
+NAMES = ("black", "grey", "white")
+
+
+def publish(root: Path, name: str, rho: float) -> None:
+    """Publish a small constant table."""
+    table = {"title": name, "model": "lambert", "source": "no paper", "parameters": {"rho": rho}}
+    grid = Grid({"theta_i": [0, 80], "theta_r": [0, 80], "delta_phi": [0, 90, 180]})
+    publish_dataset(root, name, tabulate(Layout(Material.from_table(name, table), grid)))
 
 
 @pytest.fixture(scope="module")
-def audited(tmp_path_factory: pytest.TempPathFactory, built: Path) -> Path:
+def audited(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A store of three materials that was audited, with its page."""
     root = tmp_path_factory.mktemp("audited") / "store"
-    root.mkdir()
-    shutil.copy(built / "brdfdb.json", root)
-    for name in NAMES:
-        shutil.copytree(built / "materials" / name, root / "materials" / name)
+    for name, rho in zip(NAMES, (0.1, 0.5, 0.9), strict=True):
+        publish(root, name, rho)
     assert run("audit", "--store", root, "--no-figures", "--jobs", 1) == 0
     return root
 
@@ -43,60 +52,44 @@ def test_nothing_new_is_taken_over_and_the_page_stays(store: Path, capsys: Captu
     before, page = json.loads((store / "audit.json").read_bytes()), (store / "audit.html").read_bytes()
     assert before["taken_over"] == []
     assert taken(store) == list(NAMES)
-    assert "3 of 3 taken from the report of " in capsys.readouterr().out
+    assert "3 of 3 results reused from the report of " in capsys.readouterr().out
     after = json.loads((store / "audit.json").read_bytes())
     assert after["materials"] == before["materials"]
     assert (store / "audit.html").read_bytes() == page
 
 
 @pytest.mark.usefixtures("no_plots")
-def test_all_audits_everything(store: Path) -> None:
+def test_a_damaged_or_foreign_report_and_another_program_audit_everything(
+    store: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     assert taken(store, "--all") == []
-
-
-@pytest.mark.usefixtures("no_plots")
-@pytest.mark.parametrize(
-    "harm",
-    [
-        lambda text: text.replace('"passes"', '"violates"', 1),
-        lambda text: text[: len(text) // 2],
-        lambda text: text.replace('"version":8', '"version":7', 1),
-        lambda _: "{}",
-    ],
-    ids=["changed", "cut", "older", "foreign"],
-)
-def test_a_damaged_or_foreign_report_audits_everything(harm: Callable[[str], str], store: Path) -> None:
     report = store / "audit.json"
     text = report.read_text(encoding="utf-8")
-    assert harm(text) != text
-    report.write_text(harm(text), encoding="utf-8")
-    assert taken(store) == []
-
-
-@pytest.mark.usefixtures("no_plots")
-def test_another_program_audits_everything(store: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(former_audit, "program", lambda: "another")
+    changed, older = text.replace('"passes"', '"violates"', 1), text.replace('"version":8', '"version":7', 1)
+    for harmed in (changed, text[: len(text) // 2], older, "{}"):
+        assert harmed != text
+        report.write_text(harmed, encoding="utf-8")
+        assert taken(store) == []
+    monkeypatch.setattr(audit, "program", lambda: "another")
     assert taken(store) == []
 
 
 @pytest.mark.usefixtures("no_plots")
 def test_other_bytes_under_the_same_number_are_audited_again(store: Path) -> None:
-    shutil.rmtree(store / "materials" / "foam")
-    recipe = store.parent / "foam.toml"
-    recipe.write_text('materials = ["foam"]\ntolerance = 0.03\n', encoding="utf-8")
-    assert run("build", recipe, "--store", store, "--jobs", 1) == 0
-    assert brdfdb.open(store).head("foam") == "r000001"
-    assert taken(store) == ["blue-plastic", "mirror"]
+    shutil.rmtree(store / "materials" / "grey")
+    publish(store, "grey", 0.4)
+    assert brdfdb.open(store).head("grey") == "r000001"
+    assert taken(store) == ["black", "white"]
 
 
 @pytest.mark.usefixtures("no_plots")
 def test_a_damaged_table_is_found_though_its_audit_is_known(store: Path) -> None:
-    chunk = next(path for path in (store / "materials" / "foam").rglob("c/**/0") if path.is_file())
+    chunk = next(path for path in (store / "materials" / "grey").rglob("c/**/0") if path.is_file())
     chunk.write_bytes(chunk.read_bytes()[:-1] + b"\0\1")
-    with pytest.raises(brdfdb.errors.StoreError, match="foam"):
+    with pytest.raises(brdfdb.errors.StoreError, match="grey"):
         audit.run(store, [], store / "audit.json", jobs=1, figures=False, shown=False)
     document = json.loads((store / "audit.json").read_bytes())
-    assert document["taken_over"] == ["blue-plastic", "mirror"]
+    assert document["taken_over"] == ["black", "white"]
     assert len(document["damaged"]) == 1
 
 
@@ -109,4 +102,4 @@ def test_a_page_that_is_gone_is_written_again(store: Path) -> None:
 
 @pytest.mark.usefixtures("no_plots")
 def test_materials_whose_excess_is_allowed_are_audited_again(store: Path) -> None:
-    assert taken(store, "--allow", "foam") == ["blue-plastic", "mirror"]
+    assert taken(store, "--allow", "grey") == ["black", "white"]

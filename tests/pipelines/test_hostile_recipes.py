@@ -67,8 +67,8 @@ RECIPES: list[tuple[str, str | bytes, str]] = [
     ("a key of spaced dots", "a . " * 100_000 + "a = 1", "parts between dots"),
     ("an array of tables of dots", "[[" + "a." * 100_000 + "a]]", "parts between dots"),
     ("a key of dots in a table", "x = {" + "a." * 100_000 + "a = 1}", "parts between dots"),
-    ("200 MB of numbers", b"wavelengths_nm = [" + b"500," * 50_000_000 + b"]", "MB that a file may have"),
-    ("5 MB of a comment", "#" * 5_000_000, "MB that a file may have"),
+    ("200 MB of numbers", b"wavelengths_nm = [" + b"500," * 50_000_000 + b"]", "the limit for a file"),
+    ("5 MB of a comment", "#" * 5_000_000, "the limit for a file"),
     ("3.9 MB of a comment", "#" * 3_900_000, "materials"),
     ("3.9 MB of one word", "a" * 3_900_000, "not TOML"),
     ("3.9 MB of quotes", "a = " + '"' * 3_900_000, "not TOML"),
@@ -78,13 +78,13 @@ RECIPES: list[tuple[str, str | bytes, str]] = [
     ("nothing", "", "materials"),
     ("a key of 3 MB", "a" * 3_000_000 + " = 1", "materials: is missing"),
     ("300 000 unknown keys", many(300_000, lambda n: f"k{n} = 1\n"), "materials: is missing"),
-    ("a million wrong numbers", HEAD.replace("[500]", "[" + '"",' * 1_000_000 + "]"), "wavelengths_nm"),
+    ("100 000 wrong numbers", HEAD.replace("[500]", "[" + '"",' * 100_000 + "]"), "wavelengths_nm"),
     ("a million right numbers", HEAD.replace("[500]", "[" + "5,".join(["1"] * 1_000_000) + "]"), "wavelengths_nm"),
-    ("a million materials", GOOD.replace('"foam"', '"x",' * 900_000), "materials"),
+    ("100 000 materials", GOOD.replace('"foam"', '"x",' * 100_000), "materials"),
     ("a million wrong materials", GOOD.replace('"foam"', "1," * 1_500_000), "materials"),
     ("a pattern of stars", GOOD.replace("foam", "*a" * 5000 + "!"), "materials"),
     ("9999 patterns", GOOD.replace('"foam"', many(9999, lambda n: f'"*x{n}",')), "materials"),
-    ("112 ranges of 99 999", GOOD.replace(AXIS, f"theta_i_deg = [{LONG * 112}]"), "nodes an axis may have"),
+    ("112 ranges of 99 999", GOOD.replace(AXIS, f"theta_i_deg = [{LONG * 112}]"), "nodes; an axis has at most"),
     ("a range of 1e300 nodes", GOOD.replace(AXIS, "theta_i_deg = [{ start = 0, stop = 80, step = 1e-298 }]"), "nodes"),
     ("a range of wavelengths", HEAD.replace("[500]", "[{ start = 1, stop = 1e9, step = 1e-9 }]") + COARSE, "nodes"),
     ("112 ranges of wavelengths", GOOD.replace("[500]", f"[{LONG * 112}]"), "nodes"),
@@ -92,11 +92,11 @@ RECIPES: list[tuple[str, str | bytes, str]] = [
     ("a number of 100 000 digits", HEAD.replace("500", "5" * 100_000), "not TOML: Exceeds the limit"),
     ("an exponent of 100 000 digits", HEAD.replace("500", "1e" + "5" * 100_000), "wavelengths_nm"),
     ("a number of 4000 digits", HEAD.replace("500", "5" * 4000), "wavelengths_nm"),
-    ("1e12 values", fine(GOOD, 0.016), "values, more than"),
+    ("1e12 values", fine(GOOD, 0.016), "a table has at most"),
     (
         "axes of 80 001 nodes",
         ranged(ranged(ranged(GOOD, "theta_i", 1e-3), "theta_r", 1e-3), "delta_phi", 9),
-        "values, more",
+        "a table has at most",
     ),
     (
         "246 GB",
@@ -113,9 +113,9 @@ RECIPES: list[tuple[str, str | bytes, str]] = [
     ("a source that rings", MINE.replace('"me"', '"\\u0007"'), "control character"),
     ("a title of nothing", MINE.replace('"T"', '""'), "title"),
     ("a value of 3 MB", MINE.replace("0.5", '"' + "x" * 3_000_000 + '"'), "rho"),
-    ("250 000 sources", MINE + "[define.mine.sources]\n" + many(250_000, lambda n: f"k{n} = 1\n"), "sources"),
-    ("a million assumptions", MINE + "assumed = [" + "1," * 1_000_000 + "]", "assumed"),
-    ("250 000 parameters", MINE.replace("rho = 0.5", many(250_000, lambda n: f"k{n} = 1, ") + "rho = 0.5"), "k0"),
+    ("25 000 sources", MINE + "[define.mine.sources]\n" + many(25_000, lambda n: f"k{n} = 1\n"), "sources"),
+    ("100 000 assumptions", MINE + "assumed = [" + "1," * 100_000 + "]", "assumed"),
+    ("25 000 parameters", MINE.replace("rho = 0.5", many(25_000, lambda n: f"k{n} = 1, ") + "rho = 0.5"), "k0"),
     ("a family of 1e10 members", SWEEP.replace("= 0.1", "= [{ start = 0.1, stop = 0.4, step = 1e-4 }]"), "members"),
     ("20 families of 60 001", GOOD.replace("foam", "fam*") + many(20, lambda n: family(chr(97 + n))), "sweep.fam-"),
     ("a family of 7 lists", SWEEP.replace("rho_d = 0.1", many(7, lambda n: f"p{n} = [1, 2]\n")), "at most 6"),
@@ -135,8 +135,8 @@ def test_there_are_sixty_recipes_and_each_has_a_name_of_its_own() -> None:
 NURSERY = """
 import json, os, resource, shutil, signal, sys
 from types import SimpleNamespace
-from brdfdb_pipelines import build, build_resources, cli
-build_resources.machine_memory = lambda: 24 * 10**9  # whatever this machine has
+from brdfdb_pipelines import build, build_survey, cli
+build_survey.machine_memory = lambda: 24 * 10**9  # whatever this machine has
 shutil.disk_usage = lambda _: SimpleNamespace(free=50 * 10**9)
 for line in sys.stdin:
     recipe, store, said, seconds = json.loads(line)
@@ -173,22 +173,16 @@ def test_sixty_hostile_recipes_are_a_sentence_each(tmp_path: Path) -> None:
     assert not failures, "\n".join(f"{name}: {said}" for name, said in failures.items())
 
 
-@pytest.mark.parametrize("command", [("build",), ("render",), ("chart", "foam", "--recipe")], ids=lambda c: c[0])
-@pytest.mark.parametrize("kind", ["device", "pipe", "directory"])
-def test_what_is_no_file_is_refused(
-    command: tuple[str, ...], kind: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    path = tmp_path / "recipe.toml"
-    if kind == "device":
-        path.symlink_to("/dev/zero")
-    elif kind == "pipe":
-        os.mkfifo(path)
-    else:
-        path.mkdir()
-    out = ["--out", str(tmp_path / "out")] if command[0] != "build" else []
-    store = ["--store", str(tmp_path / "store")] if command[0] != "render" else []
-    assert cli.main([*command, str(path), *out, *store]) == 2
-    said = capsys.readouterr().err.splitlines()[-1]
-    assert said.startswith(f"brdfdb: {path}: ")
-    assert ("Is a directory" if kind == "directory" else "is no regular file") in said
-    assert sorted(tmp_path.iterdir()) == [path]
+def test_what_is_no_file_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    device, pipe, directory = paths = [tmp_path / f"{kind}.toml" for kind in ("device", "pipe", "directory")]
+    device.symlink_to("/dev/zero")
+    os.mkfifo(pipe)
+    directory.mkdir()
+    out, store = ["--out", str(tmp_path / "out")], ["--store", str(tmp_path / "store")]
+    for path in paths:
+        for command in (["build", str(path), *store], ["render", str(path), *out]):
+            assert cli.main(command) == 2
+            assert capsys.readouterr().err.splitlines()[-1].startswith(f"brdfdb: {path}: ")
+        assert cli.main(["chart", "foam", "--recipe", str(path), *out, *store]) == 2
+        assert capsys.readouterr().err.splitlines()[-1].startswith(f"brdfdb: {path}: ")
+    assert sorted(tmp_path.iterdir()) == sorted(paths)

@@ -12,8 +12,7 @@ import pytest
 
 import brdfdb
 from brdfdb.materials import Material, presets
-from brdfdb.store.catalogue import line_of
-from brdfdb.store.material_document import material_document
+from brdfdb.store.catalogue import line_of, material_document
 from brdfdb.store.publication import publish_dataset
 from brdfdb.tables.albedo import directional_albedo
 from brdfdb.tables.grids import Grid
@@ -46,7 +45,7 @@ def test_list_has_a_column_with_the_stated_error(planned: Path, capsys: Captured
     capsys.readouterr()
     assert run("list", "--store", planned) == 0
     _, head, *lines, explained = capsys.readouterr().out.splitlines()
-    assert explained.startswith("table error: the table against its formula; formula error: ")
+    assert explained.startswith("table error: ")
     columns = re.split(r"  +", head)
     assert columns[3:8] == [
         *("colours", "table error (p99)", "formula error (p99)", "what the paper says?", "model conserves energy?")
@@ -59,7 +58,7 @@ def test_list_has_a_column_with_the_stated_error(planned: Path, capsys: Captured
         assert f" {terminal.error(error.overall.p99)}  " in line
     # Ward's model is a fit itself, and He and Torrance's is the sum that others cut short
     assert [re.split(r"  +", line)[3:8:2] for line in lines] == [
-        ["grey", "none known", "not audited: albedo of the model passes 1 at 89.9965°"],
+        ["grey", "no exact form", "not audited: albedo of the model passes 1 at 89.9965°"],
         ["400-700 nm", "0, exact form", "not audited"],
     ]
 
@@ -95,7 +94,7 @@ def test_list_shows_some_materials_in_an_order(
     ("options", "said"),
     [
         (("--sort", "colour"), "--sort: 'colour' is not one of 'name', "),
-        (("--presets", "--model", "ward"), "--model: does not go with --presets"),
+        (("--presets", "--model", "ward"), "--model: "),
     ],
 )
 def test_list_refuses_what_it_cannot_do(planned: Path, capsys: Captured, options: tuple[str, ...], said: str) -> None:
@@ -143,7 +142,7 @@ def test_no_paper_is_cited_for_a_table_without_a_record_of_its_source(tmp_path: 
             any(word in text for word in ("He et al.", "he1991")) for text in (shown, exported, document, line)
         ]
     assert said == {"whole": [True] * 4, "claimed": [False] * 4}
-    assert "  source      not recorded, so that what the table cites is not shown" in shown
+    assert "  source      not recorded" in shown
 
 
 def test_list_goes_on_past_what_is_damaged_and_fails(planned: Path, tmp_path: Path, capsys: Captured) -> None:
@@ -196,20 +195,24 @@ def test_show_tells_grid_numbers_and_error_of_a_planned_table(
     assert table.attrs["reconstruction"] in out
     assert table.error is not None
     assert f"  error       {terminal.error(table.error.overall.p99)} of f_r" in out
-    (reflected,) = re.findall(r"^    reflected +(.*)$", out, flags=re.MULTILINE)
+    (reflected,) = re.findall(r"^    reflected light +(.*)$", out, flags=re.MULTILINE)
     assert re.sub("([<x]) ", r"\1", reflected).split() == in_percent(table.error.l1)
     places = table.error.places
     assert places is not None
-    limits = {"alongside": places.alongside, "one there": places.one_grazing, "both beyond": places.both_grazing}
+    limits = {
+        "near the light": places.alongside,
+        "one direction grazing": places.one_grazing,
+        "both grazing": places.both_grazing,
+    }
     if table.error.between is not None:
-        limits["between"] = table.error.between.bands
-    assert ("between" in limits) == (table.wavelength_nm is not None)
+        limits["between wavelengths"] = table.error.between.bands
+    assert ("between wavelengths" in limits) == (table.wavelength_nm is not None)
     for label, rows in limits.items():
         (printed,) = re.findall(rf"^    {label}  +(.*)$", out, flags=re.MULTILINE)
         assert re.sub("([<x]) ", r"\1", printed).split() == in_percent(rows)
     assert f"; {terminal.error(table.error.overall.l1)} of the reflected light (l1))" in out
-    assert "  validity    its paper states " in out
-    assert ("    not kept    " in out, "    at the edge " in out) == edges
+    assert re.search(r"^  validity    .*that the paper states", out, flags=re.MULTILINE)
+    assert ("    not met     " in out, "    at the edge " in out) == edges
 
 
 def test_lookup_prints_the_stated_error_between_wavelengths(planned: Path, capsys: Captured) -> None:
@@ -268,7 +271,7 @@ def test_angles_like_radians_are_told_and_answered(
     printed = capsys.readouterr()
     assert float(printed.out.split()[0]) > 0.0
     shown = " ".join(f"{angle:g}" for angle in angles)
-    assert printed.err == f"brdfdb: angles are degrees; these look like radians: {shown}\n"
+    assert re.fullmatch(rf"brdfdb: angles .* radians: {re.escape(shown)}\n", printed.err)
 
 
 @pytest.mark.parametrize("angles", [(1, 0, 3, 2), (0.5, 0, 0.5, 3.3), (0, 0, 0, 0), (3.2, 0, 0.1, 0)], ids=repr)

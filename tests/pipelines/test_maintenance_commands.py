@@ -43,9 +43,9 @@ def test_history_is_a_line_a_revision(root: Path, capsys: Captured) -> None:
 
 def test_rollback_says_what_was_current(root: Path, capsys: Captured) -> None:
     assert run(root, "rollback", "foam", "r000001") == 0
-    assert capsys.readouterr().out == "foam: r000001 is current, r000002 was\n"
+    assert capsys.readouterr().out == "foam: r000001 is current now, instead of r000002\n"
     assert run(root, "rollback", "foam", "r000001") == 0
-    assert capsys.readouterr().out == "foam: r000001 stays current\n"
+    assert capsys.readouterr().out == "foam: r000001 was current already\n"
     assert run(root, "rollback", "foam", "r000007") == 2
     assert capsys.readouterr().err == "brdfdb: foam has no revision 'r000007'; it has r000001, r000002\n"
 
@@ -99,8 +99,8 @@ def test_a_snapshot_is_made_listed_read_and_removed(root: Path, capsys: Captured
     assert run(root, "verify") == 0
     capsys.readouterr()
     assert run(root, "snapshot", "--remove", "paper") == 0
-    assert capsys.readouterr().out.startswith("paper is removed; `brdfdb gc` ")
+    assert capsys.readouterr().out.startswith("paper was removed")
     assert run(root, "lookup", "foam", "30", "0", "30", "180", "--snapshot", "paper") == 2
     assert capsys.readouterr().err == f"brdfdb: no snapshot 'paper' in the store at {root}; it has none\n"
     assert run(root, "snapshot", "--remove") == 2
-    assert capsys.readouterr().err == "brdfdb: snapshot: --remove needs the NAME of a snapshot\n"
+    assert capsys.readouterr().err.startswith("brdfdb: snapshot: ")

@@ -12,7 +12,7 @@ import brdfdb
 from brdfdb.measurements import MeasuredSource
 from brdfdb.parameters import Floats
 from brdfdb.store.publication import publish
-from brdfdb.tables.table_source import TableSource
+from brdfdb.tables.table import TableSource
 from tests.pipelines.command import Captured, run
 
 SPECTRUM_NM = np.array([450.0, 550.0, 650.0])

@@ -74,7 +74,7 @@ def test_requests_of_unpolarised_tables_do_not_mention_polarisation(tmp_path: Pa
         ),
         (
             RECIPE.replace('["magnesium-oxide-ceramic"]', '["mine"]') + '[define.mine]\nsamples = "mine.csv"\n',
-            "polarised: mine is measured, and f_r alone is known of it",
+            "polarised: mine ",
         ),
     ],
 )

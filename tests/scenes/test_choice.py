@@ -9,9 +9,20 @@ from brdfdb.forms.timing import ALIKE, CHEAPER
 from brdfdb.materials import presets
 from brdfdb.parameters import Floats
 from brdfdb.scenes import sample_positions
-from brdfdb.scenes.choice import CONFIDENCE, Decision, InfeasibleError, Left, Look, Pick, Seen, choose, pick
-from brdfdb.scenes.choice_document import Price, describe
-from brdfdb.scenes.gbuffer import View, gather, gather_at
+from brdfdb.scenes.choice import (
+    CONFIDENCE,
+    Decision,
+    InfeasibleError,
+    Look,
+    Pick,
+    PictureError,
+    Price,
+    Seen,
+    choose,
+    describe,
+    pick,
+)
+from brdfdb.scenes.gbuffer import CameraView, gather, gather_at
 from brdfdb.scenes.offered_forms import LIMB_DEG, OfferedForm, offered_forms
 from brdfdb.scenes.renderer import reflectors, render
 from brdfdb.scenes.scene import Scene, Tolerance
@@ -102,19 +113,12 @@ def offered_and_seen(scene: Scene, *widths: int) -> tuple[dict[str, list[Offered
     return offered, [Seen(scene, gather(scene, width), truths, materials) for width in widths]
 
 
-@pytest.mark.parametrize(
-    ("tolerance", "expected"),
-    [
-        pytest.param(0.0, Pick(0, 1), id="only-the-truth-keeps"),
-        pytest.param(0.1, Pick(1, 2), id="the-cheapest-that-keeps"),
-        pytest.param(0.3, Pick(2, 4), id="of-two-alike-the-more-accurate"),
-        pytest.param(9.0, Pick(4, None), id="nothing-is-cheaper"),
-    ],
-)
-def test_the_cheapest_that_keeps_to_the_tolerance_is_picked(tolerance: float, expected: Pick) -> None:
+def test_the_cheapest_form_within_the_tolerance_is_picked() -> None:
     costs = [100.0, 50.0, 10.0 * (1.0 + CHEAPER) / 2.0, 10.0, 1.0]  # the third and fourth cost about the same
     errors = [0.0, 0.1, 0.2, 0.3, 1.0]
-    assert pick(np.array([costs]), errors.__getitem__, tolerance) == expected
+    # Only the truth, the cheapest form, the more accurate of two forms that cost about the same, the cheapest of all
+    for tolerance, expected in {0.0: Pick(0, 1), 0.1: Pick(1, 2), 0.3: Pick(2, 4), 9.0: Pick(4, None)}.items():
+        assert pick(np.array([costs]), errors.__getitem__, tolerance) == expected
 
 
 @pytest.mark.parametrize(
@@ -193,7 +197,7 @@ def test_limbs_that_no_pixel_of_the_picture_shows_refuse_a_table(rough: list[Off
     scene = scene_of({"ciede2000": 1.0}, name)
     materials = reflectors(scene)
 
-    def seen(view: View) -> Seen:
+    def seen(view: CameraView) -> Seen:
         return Seen(scene, view, {name: rough[0]}, materials)
 
     def beside_edges(number: int) -> Seen:
@@ -214,7 +218,7 @@ def test_limbs_that_no_pixel_of_the_picture_shows_refuse_a_table(rough: list[Off
     assert keys[one.pick.chosen] == "table-1-true-limbs"
     assert one.even is not None
     assert one.edges is not None
-    assert (one.whole.most <= 1.0, one.even.most <= 1.0, one.edges.most <= 1.0) == (True, True, True)
+    assert (one.joint_error.most <= 1.0, one.even.most <= 1.0, one.edges.most <= 1.0) == (True, True, True)
 
 
 def test_the_last_hundredth_of_a_degree_before_the_horizon_does_not_count() -> None:
@@ -268,7 +272,7 @@ def test_every_place_counts_or_as_many_as_the_tolerance_says(percentile: float, 
     chosen = choose(look(Mostly()), lambda _: look(Mostly()), {"a": [0.0, 5.0]}, {"a": np.array([[9.0, 1.0]])})
     one = chosen["a"]
     assert one.pick.chosen == (1 if kept else 0)
-    assert one.whole == (Left(0.0, 5.0) if kept else Left(0.0, 0.0))
+    assert one.joint_error == (PictureError(0.0, 5.0) if kept else PictureError(0.0, 0.0))
     assert one.even is not None
     # Clopper and Pearson 1934: 0 and 1 of 20, upper limits of two-sided 95 %
     assert one.even.share == pytest.approx(0.2487 if kept else 0.1684, abs=1e-4)
@@ -285,15 +289,15 @@ def test_the_choice_for_a_shipped_scene_keeps_its_tolerance_where_it_was_not_pla
     picture = checked.picture({key: offered[key][one.pick.chosen] for key, one in chosen.items()})
     for key, one in chosen.items():
         assert checked.errors(key, picture).max() <= tolerance
-        assert one.left.most <= tolerance
-        assert one.whole.most <= tolerance
+        assert one.error.most <= tolerance
+        assert one.joint_error.most <= tolerance
         for index, form in enumerate(offered[key]):
             if CHEAPER * costs[key][0, index] < costs[key][0, one.pick.chosen]:
                 broken = [most(seen, key, form) for seen in (planned, checked)]
                 assert max(broken) > tolerance
                 if index == one.pick.cheaper:
-                    assert one.cheaper_left is not None
-                    assert one.cheaper_left.most == (max(broken) if one.refused else broken[0]) > tolerance
+                    assert one.cheaper_error is not None
+                    assert one.cheaper_error.most == (max(broken) if one.refused else broken[0]) > tolerance
 
 
 @pytest.mark.parametrize(
@@ -316,9 +320,9 @@ def test_what_breaks_the_tolerance_at_other_places_is_refused() -> None:
     (one,) = chosen.values()
     forms = [each.form.key for each in offered["rendered-sphere-40deg"]]
     assert forms[one.pick.chosen] == "bounce-49"  # the closed forms cost about the same
-    assert one.whole.most <= 0.8
-    assert one.cheaper_left is not None
-    assert one.cheaper_left.most > 0.8
+    assert one.joint_error.most <= 0.8
+    assert one.cheaper_error is not None
+    assert one.cheaper_error.most > 0.8
     fit = offered["rendered-sphere-40deg"][forms.index("fit")]
     assert most(planned, "rendered-sphere-40deg", fit) <= 0.8
     assert most(checked, "rendered-sphere-40deg", fit) > 0.8
@@ -330,7 +334,7 @@ def test_what_breaks_the_tolerance_only_together_refuses_the_furthest_off() -> N
     chosen = choose(look(Summed()), lambda _: look(Summed()), offered, costs)
     assert {name: one.pick for name, one in chosen.items()} == {"a": Pick(1, 2), "b": Pick(1, None)}
     assert chosen["a"].refused
-    assert chosen["a"].cheaper_left == Left(0.7 + 0.6, 0.7 + 0.6)
+    assert chosen["a"].cheaper_error == PictureError(0.7 + 0.6, 0.7 + 0.6)
     assert not chosen["b"].refused
 
 
@@ -340,7 +344,7 @@ def test_the_truth_is_what_is_left_when_all_else_is_refused() -> None:
     chosen = choose(look(Summed()), lambda _: look(Summed(100.0)), offered, costs)
     assert [one.pick.chosen for one in chosen.values()] == [0, 0]
     assert all(one.refused for one in chosen.values())
-    assert [one.cheaper_left for one in chosen.values()] == [Left(2.0, 2.0), Left(5.0, 5.0)]
+    assert [one.cheaper_error for one in chosen.values()] == [PictureError(2.0, 2.0), PictureError(5.0, 5.0)]
 
 
 def test_each_round_of_checks_costs_confidence() -> None:
@@ -359,58 +363,47 @@ def test_each_round_of_checks_costs_confidence() -> None:
     assert one.even.share == pytest.approx(1.0 - (1.0 - CONFIDENCE) / 6.0)
 
 
-FIT = "the best of what is cheaper, functional fit, eqs 27-29, would leave 1.2"
-
-
-@pytest.mark.parametrize(
-    ("chosen", "cheaper", "share", "reason"),
-    [
-        ("facets", None, 1.0, "is the truth itself, and nothing is cheaper"),
-        ("facets", "fit", 1.0, f"is the truth itself; {FIT}"),
-        ("bounce-49", None, 0.2, "leaves 0.5, and nothing is cheaper"),
-        ("bounce-49", None, 0.9, "leaves 0.5 at 0.9 of the truth's cost, more than a third, and nothing is cheaper"),
-        ("bounce-49", "fit", 0.9, f"leaves 0.5 at 0.9 of the truth's cost, more than a third; {FIT}"),
-    ],
-)
-def test_a_reason_says_each_thing_once(chosen: str, cheaper: str | None, share: float, reason: str) -> None:
+def reasons(cases: list[tuple[str, str | None, float, PictureError, bool]]) -> list[str]:
+    """Return the reasons for choices: key, key of the next cheaper form, cost, error of that form, and if refused."""
     scene = scene_of({"ciede2000": 1.0}, "rendered-sphere-40deg")
     offered, _ = offered_and_seen(scene)
     ((name, forms),) = offered.items()
-    keys = [each.form.key for each in forms]
-    pick = Pick(keys.index(chosen), None if cheaper is None else keys.index(cheaper))
-    left = None if cheaper is None else Left(1.2, 1.2)
-    prices = {name: [Price(1.0, np.array([share if index else 1.0])) for index in range(len(forms))]}
-    decision = Decision(pick, Left(0.5, 0.5), left, False, Left(0.6, 0.6))
-    (one,) = describe(scene, {name: decision}, offered, prices, {name: 1}, {})
-    assert one.reason == reason
+    keys = [form.form.key for form in forms]
+    sentences = []
+    for chosen, cheaper, share, error, refused in cases:
+        pick = Pick(keys.index(chosen), None if cheaper is None else keys.index(cheaper))
+        left = None if cheaper is None else error
+        prices = {name: [Price(1.0, np.array([share if index else 1.0])) for index in range(len(forms))]}
+        decision = Decision(pick, PictureError(0.5, 0.5), left, refused, PictureError(0.6, 0.6))
+        (one,) = describe(scene, {name: decision}, offered, prices, {name: 1}, {})
+        assert one.refused == refused
+        sentences.append(one.reason)
+    return sentences
 
 
-@pytest.mark.parametrize(("refused", "where"), [(True, " at fresh places"), (False, "")])
-def test_the_reason_says_by_how_much_and_where_the_next_cheaper_breaks_the_tolerance(refused: bool, where: str) -> None:
-    scene = scene_of({"ciede2000": 1.0}, "rendered-sphere-40deg")
-    offered, _ = offered_and_seen(scene)
-    ((name, forms),) = offered.items()
-    keys = [each.form.key for each in forms]
-    pick = Pick(keys.index("fit"), keys.index("qualitative"))
-    decision = Decision(pick, Left(0.5, 0.5), Left(1.004, 1.004), refused, Left(0.6, 0.6))
-    prices = {name: [Price(1.0, np.array([0.1 if index else 1.0])) for index in range(len(forms))]}
-    (one,) = describe(scene, {name: decision}, offered, prices, {name: 1}, {})
-    assert one.refused == refused
-    assert one.reason == f"leaves 0.5; the best of what is cheaper, qualitative, eq. 30, would leave 1.004{where}"
+def test_a_reason_has_the_error_the_cost_and_the_next_cheaper_form() -> None:
+    fit, near = PictureError(1.2, 1.2), PictureError(1.004, 1.004)
+    next_fit = "the best of what is cheaper, functional fit, eqs 27-29, would leave 1.2"
+    next_qualitative = "the best of what is cheaper, qualitative, eq. 30, would leave 1.004"
+    dear = "leaves 0.5 at 0.9 of the truth's cost, more than a third"
+    cases = {
+        ("facets", None, 1.0, fit, False): "is the truth itself, and nothing is cheaper",
+        ("facets", "fit", 1.0, fit, False): f"is the truth itself; {next_fit}",
+        ("bounce-49", None, 0.2, fit, False): "leaves 0.5, and nothing is cheaper",
+        ("bounce-49", None, 0.9, fit, False): f"{dear}, and nothing is cheaper",
+        ("bounce-49", "fit", 0.9, fit, False): f"{dear}; {next_fit}",
+        ("fit", "qualitative", 0.1, near, True): f"leaves 0.5; {next_qualitative} at fresh places",
+        ("fit", "qualitative", 0.1, near, False): f"leaves 0.5; {next_qualitative}",
+    }
+    assert reasons(list(cases)) == list(cases.values())
 
 
-@pytest.mark.parametrize(
-    ("tolerance", "said"),
-    [
-        ({"relative": 1e-9}, r"tolerance: 1e-09 \(relative\) is finer than the truth is known, 1e-06"),
-        ({"ciede2000": 1e-6}, r"tolerance: 1e-06 \(CIEDE2000\) is finer than the truth is known, 0.0001"),
-    ],
-)
-def test_a_tolerance_finer_than_the_truth_is_known_is_infeasible(tolerance: dict[str, float], said: str) -> None:
-    scene = scene_of(tolerance, "rendered-sphere-40deg")
-    offered, (seen,) = offered_and_seen(scene, 8)
-    with pytest.raises(InfeasibleError, match=said):
-        choose(look(seen), lambda _: look(seen), offered, made_up_costs(offered))
+def test_a_tolerance_finer_than_the_truth_is_known_is_infeasible() -> None:
+    for tolerance, least in (({"relative": 1e-9}, "1e-06"), ({"ciede2000": 1e-6}, "0.0001")):
+        scene = scene_of(tolerance, "rendered-sphere-40deg")
+        offered, (seen,) = offered_and_seen(scene, 8)
+        with pytest.raises(InfeasibleError, match=f"^tolerance: .*{least}"):
+            choose(look(seen), lambda _, seen=seen: look(seen), offered, made_up_costs(offered))
 
 
 def test_a_tolerance_has_one_value_and_its_unit() -> None:
@@ -425,9 +418,9 @@ def test_with_an_environment_all_forms_meet_the_same_directions() -> None:
     offered, (planned, checked) = offered_and_seen(scene, 24, 37)
     chosen = choose(look(planned), lambda _: look(checked), offered, made_up_costs(offered))
     (one,) = chosen.values()
-    assert one.whole.counted <= 0.03
-    assert one.cheaper_left is not None
-    assert one.cheaper_left.counted > 0.03
+    assert one.joint_error.counted <= 0.03
+    assert one.cheaper_error is not None
+    assert one.cheaper_error.counted > 0.03
     # another 4 directions a point are further off than the tolerance, and than what was chosen
     other = gather(Scene.model_validate({**scene.model_dump(), "environment": {**room, "seed": 1}}), 37)
     noise = checked.differences(render(scene, other)).ravel()[checked.pixels("rendered-sphere-40deg")]

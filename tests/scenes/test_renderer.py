@@ -212,32 +212,21 @@ def test_a_source_or_a_table_can_stand_in_for_a_model() -> None:
         rendered(of, 2, brdfs={"white": 0.3})
 
 
-def test_a_function_for_what_is_no_material_of_the_scene_is_said_so() -> None:
-    of = scene(SPHERE, "clay-vase", lights=[{"direction": [0.0, -1.0, 0.0]}])
-    with pytest.raises(ValueError, match=r"brdfs: 'thing' is not one of the scene's materials: clay-vase$"):
-        rendered(of, 4, brdfs={"thing": lambda wi, _wr, _wavelength_nm: np.ones((len(wi), 1))})
-
-
-def test_a_view_of_another_scene_is_said_so() -> None:
+def test_what_has_no_picture_is_refused() -> None:
     lights = [{"direction": [0.0, -1.0, 0.0]}]
+    vase = scene(SPHERE, "clay-vase", lights=lights)
+    with pytest.raises(ValueError, match=r"brdfs: 'thing' is not one of the scene's materials: clay-vase$"):
+        rendered(vase, 4, brdfs={"thing": lambda wi, _wr, _wavelength_nm: np.ones((len(wi), 1))})
     view = gather(scene(SPHERE, "white", lights=lights), WIDTH)
     with pytest.raises(ParameterError, match=r"^view: it shows white, which is no material of the scene; gather the"):
         render(scene(SPHERE, "clay-vase", define={}, lights=lights), view)
-
-
-@pytest.mark.parametrize("columns", [(), (2,), (16, 1)], ids=str)
-def test_f_r_of_a_wrong_shape_is_said_so(columns: tuple[int, ...]) -> None:
-    of = scene({"kind": "plane"}, "white", camera=ABOVE, lights=[{"direction": [0.0, 0.0, 1.0]}])
-    with pytest.raises(
-        ValueError, match=r"f_r of white: 4 pairs .* gave the shape \(4,.*; must be \(4, 16\) or \(4, 1\)"
-    ):
-        rendered(of, 2, brdfs={"white": lambda wi, _wr, _wavelength_nm: np.ones((len(wi), *columns))})
-
-
-def test_a_material_stated_for_light_that_nobody_sees_has_no_picture() -> None:
-    of = scene(SPHERE, "roughened-aluminum-2000nm", lights=[{"direction": [0.0, -1.0, 0.0]}])
+    plane = scene({"kind": "plane"}, "white", camera=ABOVE, lights=[{"direction": [0.0, 0.0, 1.0]}])
+    shapes = r"f_r of white: 4 pairs .* gave the shape \(4,.*; must be \(4, 16\) or \(4, 1\)"
+    for columns in ((), (2,), (16, 1)):
+        with pytest.raises(ValueError, match=shapes):
+            rendered(plane, 2, brdfs={"white": lambda wi, _wr, _nm, columns=columns: np.ones((len(wi), *columns))})
     with pytest.raises(ValueError, match="stated for 2000 nm, outside the visible, 380 to 780 nm"):
-        rendered(of, 4)
+        rendered(scene(SPHERE, "roughened-aluminum-2000nm", lights=lights), 4)
 
 
 def test_the_back_of_a_plane_is_black_whatever_the_function() -> None:

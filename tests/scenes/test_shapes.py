@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from brdfdb.scenes.shapes import Array, Box, Cylinder, Plane, Revolution, Shape, Sphere
+from brdfdb.scenes.shapes import Array, Box, Cylinder, PlaneShape, Revolution, Shape, Sphere
 
 RANDOM = np.random.default_rng(1)
 ROUNDING = 1e-13  # 6.4e-14 measured: lengths of about 5, and rays that graze
@@ -18,7 +18,7 @@ SLOPE = 2e-10  # of the derivative, by differences over 2e-6: 1.3e-10 measured
 
 VASE = [(0.4, 0.0), (0.5, 0.15), (0.5, 0.85), (0.3, 1.14), (0.34, 1.36)]
 SHAPES: dict[str, Shape] = {
-    "plane": Plane(kind="plane", size=(2.0, 3.0)),
+    "plane": PlaneShape(kind="plane", size=(2.0, 3.0)),
     "sphere": Sphere(kind="sphere", radius=1.0),
     "box": Box(kind="box", size=(1.0, 1.5, 2.0)),
     "cylinder": Cylinder(kind="cylinder", radius=0.7, height=1.5),
@@ -79,25 +79,25 @@ def test_frames_are_right_handed_and_normals_face_the_ray(shape: Shape) -> None:
     assert np.abs(frame @ frame.transpose(0, 2, 1) - np.eye(3)).max() < ROUNDING
     assert np.abs(np.linalg.det(frame) - 1.0).max() < ROUNDING
     facing = np.sum(frame[:, 2] * directions, axis=1) < 0.0
-    if not isinstance(shape, Plane | Revolution):  # a plane has a back; normals of a smooth profile are not its cones'
+    if not isinstance(shape, PlaneShape | Revolution):  # planes have backs; smooth normals are not those of cones
         assert np.all(facing)
-    assert np.mean(facing) > (0.4 if isinstance(shape, Plane) else 0.99)
+    assert np.mean(facing) > (0.4 if isinstance(shape, PlaneShape) else 0.99)
 
 
 @EVERY
 def test_a_shape_that_is_moved_and_turned_is_the_same_shape(shape: Shape) -> None:
-    # the axis towards x, turned by 90 degrees about it: its own z is the scene's x
+    # the axis towards x, turned by 90 degrees about it: the z axis of the shape is the scene's x
     moved = shape.model_copy(update={"position": (0.3, -0.2, 0.1), "axis": (2.0, 0.0, 0.0), "turn_deg": 90.0})
-    own = moved._own
-    assert np.abs(own[2] - [1.0, 0.0, 0.0]).max() < ROUNDING
+    axes = moved._axes
+    assert np.abs(axes[2] - [1.0, 0.0, 0.0]).max() < ROUNDING
     origins, directions = rays(500)
     t = shape.hit(origins, directions)
-    there = moved.hit(origins @ own + [0.3, -0.2, 0.1], directions @ own)
+    there = moved.hit(origins @ axes + [0.3, -0.2, 0.1], directions @ axes)
     assert np.array_equal(np.isfinite(t), np.isfinite(there))
     hit = np.isfinite(t)
     assert np.abs(there[hit] - t[hit]).max() < ROUNDING
     points = origins[hit] + t[hit, np.newaxis] * directions[hit]
-    assert np.abs(moved.frame(points @ own + [0.3, -0.2, 0.1]) - shape.frame(points) @ own).max() < FRAME
+    assert np.abs(moved.frame(points @ axes + [0.3, -0.2, 0.1]) - shape.frame(points) @ axes).max() < FRAME
 
 
 @pytest.mark.parametrize("name", ["sphere", "cylinder", "revolution", "box"])
@@ -107,7 +107,7 @@ def test_tangents_run_around_counter_clockwise(name: str) -> None:
 
 
 def test_a_turn_is_counter_clockwise_about_the_axis() -> None:
-    turned = Plane(kind="plane", turn_deg=90.0).frame(np.zeros((1, 3)))[0]
+    turned = PlaneShape(kind="plane", turn_deg=90.0).frame(np.zeros((1, 3)))[0]
     assert np.abs(turned - [[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]).max() < ROUNDING
 
 

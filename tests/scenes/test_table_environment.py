@@ -18,7 +18,7 @@ from brdfdb.scenes.renderer import render
 from brdfdb.scenes.scene import Scene
 from brdfdb.store.publication import publish
 from brdfdb.tables.sampler import LOBE_SHARE, Sampler
-from brdfdb.tables.table_source import TableSource
+from brdfdb.tables.table import TableSource
 from tests.formats.small_tables import ANISOTROPIC, GREY, SPECTRAL, small_table
 from tests.formats.small_tables import DIFFUSE as ROUGH
 from tests.scenes.test_environment import ROOM, STANDARD_ERRORS, around, reference_radiance

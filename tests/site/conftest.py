@@ -20,6 +20,7 @@ GENERATED = ("_build", "figures", "figures.css", "materials", "api", "generated"
 @pytest.fixture(scope="session")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The built site. It shows the store of BRDFDB_CHECKED_STORE or BRDFDB_STORE, or builds one of its own."""
+    pytest.importorskip("sphinx")
     source = tmp_path_factory.mktemp("site")
     for path in ROOT.iterdir():
         if path.name not in ("docs", "site", ".git"):

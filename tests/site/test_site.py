@@ -15,7 +15,6 @@ from pathlib import Path
 
 import pytest
 from numba.core.dispatcher import Dispatcher
-from sphinx.util.inventory import InventoryFile
 
 import brdfdb
 from brdfdb.atlas import ATLAS
@@ -75,6 +74,8 @@ def test_a_broken_link_is_noticed(tmp_path: Path) -> None:
 
 
 def test_every_public_name_is_on_the_site(site: Path, pages: dict[Path, Page]) -> None:
+    from sphinx.util.inventory import InventoryFile
+
     inventory = InventoryFile.loads((site / "objects.inv").read_bytes(), uri="")
     documented = {}
     for kind, items in inventory.data.items():
@@ -120,7 +121,7 @@ def test_pages_with_code_have_run(site: Path, pages: dict[Path, Page]) -> None:
     executed = [path for path in (ROOT / "docs").rglob("*.md") if "file_format: mystnb" in path.read_text("utf-8")[:99]]
     tutorials = {path for path in (ROOT / "docs" / "tutorials").glob("*.md") if path.stem != "index"}
     assert tutorials <= set(executed)
-    has_llvm = runpy.run_path(str(ROOT / "docs" / "_site" / "llvm.py"))["llvm_path"]() != ""
+    has_llvm = runpy.run_path(str(ROOT / "docs" / "conf.py"))["llvm_path"]() != ""
     for path in executed:
         built = site / path.relative_to(ROOT / "docs").with_suffix(".html")
         page = pages[built]

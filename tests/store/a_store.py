@@ -1,4 +1,4 @@
-"""A store of one white material, and what its directories hold."""
+"""Stores of one white material: its tables, the albedo that tells which one is current, and files of a directory."""
 
 from __future__ import annotations
 
@@ -9,8 +9,10 @@ import xarray as xr
 
 import brdfdb
 from brdfdb.materials import Material
+from brdfdb.store.publication import publish_dataset
+from brdfdb.store.reader import Store
 from brdfdb.tables.grids import Grid
-from brdfdb.tables.layout import Layout
+from brdfdb.tables.layout import Layout, digest
 from brdfdb.tables.tabulation import tabulate
 
 GRID = Grid({"theta_i": [0, 30, 60, 80], "theta_r": [0, 40, 80], "delta_phi": [0, 90, 180]})
@@ -22,13 +24,30 @@ def layout(rho: float) -> Layout:
 
 
 def lambert(rho: float) -> xr.Dataset:
-    """A table whose values tell which one it is."""
+    """Return a table whose values tell which one it is."""
     return tabulate(layout(rho))
 
 
-def rho(root: Path, name: str = "white") -> float:
+def requested(rho: float) -> xr.Dataset:
+    """Return the same table, with a request of its albedo alone."""
+    dataset = lambert(rho)
+    del dataset.attrs["source_record"]
+    return dataset.assign_attrs(request={"rho": rho}, request_sha256=digest({"rho": rho}))
+
+
+def publish(root: Path, **tables: xr.Dataset) -> list[str]:
+    """Publish one revision a table; return the revisions."""
+    return [publish_dataset(root, name, dataset).revision for name, dataset in tables.items()]
+
+
+def rho(store: Path | Store, name: str = "white") -> float:
     """Return the albedo that tells which table is current."""
-    return float(np.round(brdfdb.open(root)[name].brdf[0, 0, 0] * np.pi, 6))
+    opened = brdfdb.open(store) if isinstance(store, Path) else store
+    return float(np.round(opened[name].brdf[0, 0, 0] * np.pi, 6))
+
+
+def pointer(root: Path, name: str = "white") -> Path:
+    return root / "materials" / name / "HEAD.json"
 
 
 def contents(directory: Path) -> dict[str, bytes]:

@@ -12,9 +12,8 @@ import zarr
 
 import brdfdb
 from brdfdb.errors import StoreError
-from brdfdb.store import decoding
-from brdfdb.store.chunks import read_group
 from brdfdb.store.codec import dataset_files
+from brdfdb.store.decoding import read_by_zarr, read_group
 
 
 @pytest.fixture
@@ -57,7 +56,7 @@ def test_other_encodings_are_left_to_zarr(group: Path) -> None:
     foreign = zarr.open_group(group, mode="w")
     foreign.create_array("brdf", data=values, dimension_names=("theta_i", "theta_r"))
     assert read_group(group, {}) is None
-    found = decoding._read_by_zarr(group, {})
+    found = read_by_zarr(group, {})
     np.testing.assert_array_equal(found.arrays["brdf"], values)
     assert found.dims["brdf"] == ("theta_i", "theta_r")
 

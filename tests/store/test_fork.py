@@ -8,13 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from brdfdb.materials import Material
-from brdfdb.store.publication import publish_dataset
-from brdfdb.tables.grids import Grid
-from brdfdb.tables.layout import Layout
-from brdfdb.tables.tabulation import tabulate
+from tests.store.a_store import lambert, publish
 
-GRID = Grid({"theta_i": [0, 30, 60, 80], "theta_r": [0, 40, 80], "delta_phi": [0, 90, 180]})
 WAIT_S = 600.0
 
 FORKING = """
@@ -50,9 +45,7 @@ for thread in threads:
 
 @pytest.fixture
 def root(tmp_path: Path) -> Path:
-    for name, rho in (("white", 1.0), ("black", 0.0)):
-        table = {"title": name, "model": "lambert", "source": "no paper", "parameters": {"rho": rho}}
-        publish_dataset(tmp_path, name, tabulate(Layout(Material.from_table(name, table), GRID)))
+    publish(tmp_path, white=lambert(1.0), black=lambert(0.0))
     return tmp_path
 
 

@@ -13,10 +13,10 @@ import xarray as xr
 
 import brdfdb
 from brdfdb.errors import BusyError
-from brdfdb.store import marker
+from brdfdb.store import records
 from brdfdb.store.lock import Lock
-from brdfdb.store.manifest import check_manifest
 from brdfdb.store.paths import manifest_path
+from brdfdb.store.records import check_manifest
 from tests.store.a_store import staged
 
 # Locks
@@ -67,7 +67,7 @@ def test_stores_that_are_made_at_the_same_moment_are_one(tmp_path: Path) -> None
             barrier.wait()
             try:
                 for _ in range(3):
-                    marker.make_store(root)
+                    records.make_store(root)
             except BaseException as error:
                 errors.append(error)
 

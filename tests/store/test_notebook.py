@@ -8,8 +8,7 @@ from xml.etree import ElementTree
 
 import brdfdb
 from brdfdb.store.reader import Store
-from tests.store.a_store import lambert
-from tests.store.published import pointer, publish
+from tests.store.a_store import lambert, pointer, publish
 
 
 def texts(html: str) -> list[str]:

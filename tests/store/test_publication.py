@@ -19,7 +19,7 @@ from brdfdb.scenes.gbuffer import gather
 from brdfdb.scenes.offered_forms import offered_forms
 from brdfdb.scenes.renderer import reflectors, render
 from brdfdb.store.publication import Published, publish
-from brdfdb.tables.table_source import source_of_table
+from brdfdb.tables.table import source_of_table
 from brdfdb_pipelines import cli, scene_file
 from tests.api.a_store import client_of
 
@@ -106,7 +106,7 @@ def test_a_table_of_a_function_is_listed_shown_and_served(root: Path, capsys: py
     assert cli.main(["show", "gloss", "--store", str(root)]) == 0
     said = capsys.readouterr().out
     assert "Coloured gloss" in said
-    assert " of f_r against its source, in 99 of 100 of " in said
+    assert " of f_r relative to its source, at 99 % of " in said
     client = client_of(root)
     listed = client.get("/v1/materials")
     assert listed.status_code == 200

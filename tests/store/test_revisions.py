@@ -18,14 +18,14 @@ from brdfdb.store.paths import manifest_path
 from brdfdb.store.publication import publish_dataset
 from brdfdb.store.revisions import collect, difference, history, rollback, standing
 from brdfdb.tables.layout import digest
-from tests.store.a_white import lambert, rho
+from tests.store.a_store import requested, rho
 
 
 @pytest.fixture
 def root(tmp_path: Path) -> Path:
     """A store with four revisions of one material: rho = 0.25, 0.5, 0.75, 1."""
     for quarter in range(1, 5):
-        publish_dataset(tmp_path, "white", lambert(quarter / 4))
+        publish_dataset(tmp_path, "white", requested(quarter / 4))
     return tmp_path
 
 
@@ -55,7 +55,7 @@ def test_rollback_goes_back_and_forth_and_numbers_go_on(root: Path) -> None:
     assert rollback(root, "white", "r000003") == "r000002"
     assert rho(root) == 0.75
     brdfdb.open(root).verify("white")
-    assert publish_dataset(root, "white", lambert(0.125))[0] == "r000005"
+    assert publish_dataset(root, "white", requested(0.125))[0] == "r000005"
 
 
 def test_rollback_refuses_what_is_not_there_or_damaged(root: Path) -> None:
@@ -118,7 +118,7 @@ def test_collection_after_a_rollback_keeps_the_current_revision_and_numbers_are_
     assert names(root) == kept(1, 4)
     collect(root, 1)
     assert names(root) == kept(1)
-    assert publish_dataset(root, "white", lambert(0.5))[0] == "r000005"
+    assert publish_dataset(root, "white", requested(0.5))[0] == "r000005"
     with pytest.raises(ValueError, match=r"^keep: 0 is not at least 1"):
         collect(root, 0)
 
@@ -157,7 +157,7 @@ def test_collection_leaves_alone_what_no_pointer_tells_about(root: Path) -> None
 def test_a_revision_that_is_removed_while_it_is_read_is_never_read_as_data(root: Path) -> None:
     store = brdfdb.open(root)
     with store.dataset("white") as lazy:
-        publish_dataset(root, "white", lambert(0.5))
+        publish_dataset(root, "white", requested(0.5))
         collect(root, 1)
         with pytest.raises(StoreError, match=r"^white r000004 was removed while it was read; open the material anew$"):
             lazy["brdf"].load()
@@ -181,7 +181,7 @@ def test_readers_of_a_material_that_is_published_and_collected_all_the_time_see_
     for reader in readers:
         reader.start()
     for number in range(40):
-        publish_dataset(root, "white", lambert(number % 8 / 8))
+        publish_dataset(root, "white", requested(number % 8 / 8))
         revisions.collect(root, 1)
     over.set()
     for reader in readers:

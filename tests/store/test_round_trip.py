@@ -16,9 +16,9 @@ from brdfdb.errors import ParameterError
 from brdfdb.geometry import vectors_from_half_difference
 from brdfdb.materials import FunctionSource, presets
 from brdfdb.measurements.measured_source import MeasuredSource
-from brdfdb.store.manifest import read_manifest
 from brdfdb.store.publication import publish, publish_dataset
 from brdfdb.store.reader import Store
+from brdfdb.store.records import read_manifest
 from brdfdb_pipelines import cli
 from tests.measurements.made_up import scattered
 from tests.store.a_store import lambert

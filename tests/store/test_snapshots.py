@@ -16,33 +16,28 @@ import xarray as xr
 
 import brdfdb
 from brdfdb.errors import StoreError, UnknownFamilyError, UnknownMaterialError, UnknownRevisionError
-from brdfdb.materials import Material
 from brdfdb.store import snapshots, verification
 from brdfdb.store.family import Sweep
 from brdfdb.store.family_records import write_family
 from brdfdb.store.paths import snapshot_path
 from brdfdb.store.publication import publish_dataset
 from brdfdb.store.revisions import collect
-from brdfdb.tables.grids import Grid
-from brdfdb.tables.layout import Layout, digest
+from brdfdb.tables.layout import digest
 from brdfdb.tables.tabulation import tabulate
-
-GRID = Grid({"theta_i": [0, 30, 60, 80], "theta_r": [0, 40, 80], "delta_phi": [0, 90, 180]})
+from tests.store.a_store import layout
 
 
 def lambert(rho: float) -> xr.Dataset:
-    table = {"title": "White", "model": "lambert", "source": "no paper", "parameters": {"rho": rho}}
-    dataset = tabulate(Layout(Material.from_table("white", table), GRID))
-    return dataset.assign_attrs(request=request(rho), request_sha256=digest(request(rho)))
+    """Return a table with the request of a recipe."""
+    return tabulate(layout(rho)).assign_attrs(request=request(rho), request_sha256=digest(request(rho)))
 
 
 def request(rho: float) -> dict[str, Any]:
-    table = {"title": "White", "model": "lambert", "source": "no paper", "parameters": {"rho": rho}}
-    return {"material": Material.from_table("white", table).model_dump(mode="json")}
+    return {"material": layout(rho).source.model_dump(mode="json")}  # type: ignore[attr-defined]
 
 
-def rho(root: Path, name: str = "white", snapshot: str | None = None) -> float:
-    return float(np.round(brdfdb.open(root, snapshot=snapshot)[name].brdf[0, 0, 0] * np.pi, 6))
+def rho(root: Path, snapshot: str | None = None) -> float:
+    return float(np.round(brdfdb.open(root, snapshot=snapshot)["white"].brdf[0, 0, 0] * np.pi, 6))
 
 
 def publish_family(root: Path, *rhos: float) -> None:

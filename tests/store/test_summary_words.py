@@ -11,9 +11,8 @@ import pytest
 
 from brdfdb.errors import StoreError
 from brdfdb.notebook import percent
-from brdfdb.store.manifest import SUMMARY_FIELDS, summary_fields
 from brdfdb.store.reader import Store
-from brdfdb.store.sealed_json import check_fields
+from brdfdb.store.records import Summary, fields_of, record_of
 from brdfdb.store.summary_words import Audited, colours, energy, formula_error, last_audit
 
 ALBEDO = {"albedo": 1.37, "theta_i_deg": 80.0, "wavelength_nm": 550.0, "tolerance": 1e-3}
@@ -32,7 +31,7 @@ def test_a_grey_material_says_so(at: Any, text: str) -> None:
         (None, "not measured"),
         ({"against": "measured", "rung": "facets", "p99": 0.119}, "12 %"),
         ({"against": "highest rung", "rung": "the sum", "p99": 0.0}, "0, exact form"),
-        ({"against": "none known", "rung": "", "p99": None}, "none known"),
+        ({"against": "none known", "rung": "", "p99": None}, "no exact form"),
     ],
 )
 def test_the_formula_stands_apart_from_the_table(stated: Any, text: str) -> None:
@@ -75,11 +74,11 @@ def test_the_audit_of_an_older_program_has_one_verdict(tmp_path: Path) -> None:
 def test_a_pointer_of_an_older_program_is_read_and_a_wrong_one_is_not(root: Path) -> None:
     head = dict(Store(root).summary("white"))
     assert (head["wavelength_range_nm"], head["formula_error"]) == ([], None)  # published without a measurement
-    older = {key: head[key] for key in SUMMARY_FIELDS}
-    check_fields(older, summary_fields(older), "white", "HEAD.json")
+    older = {field.name: head[field.name] for field in fields_of(Summary) if field.required}
+    assert record_of(older, Summary, "white", "HEAD.json") == older
     wrong = older | {"formula_error": 0.1}
     with pytest.raises(StoreError, match=r"HEAD\.json has no valid 'formula_error'"):
-        check_fields(wrong, summary_fields(wrong), "white", "HEAD.json")
+        record_of(wrong, Summary, "white", "HEAD.json")
 
 
 def test_answers_of_a_part_of_a_store_stand_beside_those_of_all(tmp_path: Path) -> None:

@@ -16,13 +16,13 @@ import xarray as xr
 import brdfdb
 from brdfdb.errors import ParameterError, StoreError
 from brdfdb.store import codec, files, publication, snapshots, verification
-from brdfdb.store.marker import make_store
+from brdfdb.store.files import sealed, unsealed
 from brdfdb.store.paths import manifest_path
 from brdfdb.store.publication import publish_dataset
+from brdfdb.store.records import make_store
 from brdfdb.store.revisions import adoptable, collect, history, rollback, standing
-from brdfdb.store.sealed_json import sealed, unsealed
 from brdfdb.tables.layout import digest
-from tests.store.a_white import lambert, rho
+from tests.store.a_store import requested, rho
 
 
 def findings(root: Path) -> list[str]:
@@ -33,7 +33,7 @@ def findings(root: Path) -> list[str]:
 def root(tmp_path: Path) -> Path:
     """A store with three revisions of one material: rho = 0.25, 0.5, 0.75."""
     for quarter in range(1, 4):
-        publish_dataset(tmp_path, "white", lambert(quarter / 4))
+        publish_dataset(tmp_path, "white", requested(quarter / 4))
     return tmp_path
 
 
@@ -79,11 +79,11 @@ def test_a_pointer_that_was_lost_is_missed_and_made_again(root: Path) -> None:
     assert findings(root) == [f"{said}r000003`"]
     assert rollback(root, "white", "r000003") == ""
     assert (findings(root), rho(root)) == ([], 0.75)
-    assert publish_dataset(root, "white", lambert(1.0))[0] == "r000004"
+    assert publish_dataset(root, "white", requested(1.0))[0] == "r000004"
 
 
 def test_a_pointer_that_a_first_publication_is_about_to_write_is_not_missed(tmp_path: Path) -> None:
-    publish_dataset(tmp_path, "white", lambert(0.25))
+    publish_dataset(tmp_path, "white", requested(0.25))
     (tmp_path / "materials" / "white" / "HEAD.json").unlink()
     (tmp_path / ".staging" / "white" / "0123456789abcdef").mkdir(parents=True)  # as if killed before the swap
     store = brdfdb.open(tmp_path)
@@ -161,7 +161,7 @@ def test_a_revision_that_is_superseded_and_collected_while_it_is_verified_is_no_
 
     def overtaken(*arguments: object, **keywords: object) -> object:
         if waiting:
-            publish_dataset(root, "white", lambert(waiting.pop()))
+            publish_dataset(root, "white", requested(waiting.pop()))
             collect(root, 1)
         return check(*arguments, **keywords)  # type: ignore[arg-type]
 
@@ -187,14 +187,14 @@ def test_verify_knows_what_a_table_is(
 ) -> None:
     with monkeypatch.context() as patch:  # another program does not check
         patch.setattr(publication, "checked_dataset", lambda _, dataset: dataset)
-        publish_dataset(root, "white", change(lambert(0.5)))
+        publish_dataset(root, "white", change(requested(0.5)))
     (found,) = findings(root)
     manifest = manifest_path(root / "materials" / "white" / "r000004")
     assert found == f"white r000004 {said}; `rm {manifest}`, then `brdfdb build` with its recipe repairs it"
 
 
 def test_a_dataset_in_float64_is_published_in_float32_and_verified(root: Path) -> None:
-    publish_dataset(root, "white", lambert(0.5).astype(np.float64))
+    publish_dataset(root, "white", requested(0.5).astype(np.float64))
     assert findings(root) == []
     assert rho(root) == 0.5
 
@@ -215,12 +215,12 @@ def test_a_dataset_that_no_lookup_can_read_is_not_published(
     root: Path, change: Callable[[xr.Dataset], xr.Dataset], said: str
 ) -> None:
     with pytest.raises(ParameterError, match=f"^{said}"):
-        publish_dataset(root, "white", change(lambert(0.5)))
+        publish_dataset(root, "white", change(requested(0.5)))
     assert brdfdb.open(root).head("white") == "r000003"
 
 
 def test_verify_remarks_on_what_a_table_does_not_state(root: Path) -> None:
-    publish_dataset(root, "white", lambert(0.5).drop_attrs(deep=False).assign_attrs(title="White", bits=99))
+    publish_dataset(root, "white", requested(0.5).drop_attrs(deep=False).assign_attrs(title="White", bits=99))
     size, (remark,) = verification.material(root, "white")
     assert remark.remark
     assert size > 0
@@ -242,14 +242,14 @@ def test_verify_decodes_every_chunk(root: Path, monkeypatch: pytest.MonkeyPatch)
 
     with monkeypatch.context() as patch:
         patch.setattr(files, "write_file", spoil)
-        publish_dataset(root, "white", lambert(0.5))
+        publish_dataset(root, "white", requested(0.5))
     brdfdb.open(root).verify("white")
     (found,) = findings(root)
     assert found.startswith("white r000004 is damaged: chunk 2 of brdf cannot be decoded: ")
 
 
 def test_a_revision_of_another_material_is_not_adopted(root: Path) -> None:
-    publish_dataset(root, "black", lambert(0.125))
+    publish_dataset(root, "black", requested(0.125))
     white, black = root / "materials" / "white", root / "materials" / "black"
     shutil.copytree(black / "r000001", white / "r000009")
     shutil.copyfile(manifest_path(black / "r000001"), manifest_path(white / "r000009"))

@@ -13,14 +13,14 @@ from brdfdb.forms import catalogue
 from brdfdb.geometry import unit_vector
 from brdfdb.materials import FunctionSource, Material, presets
 from brdfdb.tables import error_measurement
-from brdfdb.tables.first_numbers import LargestAlbedo
-from brdfdb.tables.formula_measurement import DIRECTIONS, SEED, first_numbers, formula_error_of, highest_rung
-from brdfdb.tables.largest_albedo import largest_albedo
+from brdfdb.tables.albedo import largest_albedo
+from brdfdb.tables.error_measurement import RandomPairs, worst_pair
 from brdfdb.tables.layout import Layout
 from brdfdb.tables.planner import coarsest, plan
+from brdfdb.tables.stated_error import LargestAlbedo
+from brdfdb.tables.statements import DIRECTIONS, SEED, first_numbers, formula_error_of, highest_rung
 from brdfdb.tables.table import Table, table_from
 from brdfdb.tables.tabulation import tabulate
-from brdfdb.tables.worst_pair import worst_pair
 
 AT = np.array([460.0])
 
@@ -160,7 +160,8 @@ def test_the_largest_error_has_a_reason(
     )
     error, truth = np.array([[0.1], [0.5]]), np.array([[1.0], [f_r]])
     brass = presets()["rolled-brass"]
-    found = worst_pair(error, truth, np.array([1e-4]), wi, wr, np.array([False, lobe]), brass, None)
+    pairs = RandomPairs(wi, wr, np.zeros(2, int), np.ones(2), np.array([False, lobe]), np.ones(2, bool))
+    found = worst_pair(error, truth, np.array([1e-4]), pairs, brass, None)
     assert (found.theta_i_deg, found.theta_r_deg, found.delta_phi_deg) == (theta_i, theta_r, turn)
     assert found.why == why
 
@@ -168,5 +169,6 @@ def test_the_largest_error_has_a_reason(
 def test_errors_of_rounding_need_no_other_reason() -> None:
     w = unit_vector(np.array([1.5]), 0.0)
     error = np.array([[1e-7]])
-    found = worst_pair(error, error, np.array([1.0]), w, w, np.array([False]), presets()["rolled-brass"], None)
+    pairs = RandomPairs(w, w, np.zeros(1, int), np.ones(1), np.array([False]), np.array([True]))
+    found = worst_pair(error, error, np.array([1.0]), pairs, presets()["rolled-brass"], None)
     assert found.why == "it is rounding"

@@ -79,18 +79,13 @@ def test_arrays_that_make_no_table_are_refused_with_a_sentence(change: dict[str,
         table_from("odd", "r000001", {key: array for key, array in arrays.items() if array is not None}, {})
 
 
-def test_an_interpolation_that_this_program_does_not_know_is_refused() -> None:
+def test_interpolations_and_records_of_measured_data_that_this_program_does_not_know_are_refused() -> None:
+    """Measured data are no table of a model: where nothing was measured, the error is not known."""
     dataset = tabulate(layout("clay-vase"))
     arrays = {str(key): variable.values for key, variable in dataset.variables.items()}
     for how in ({"method": "quintic"}, {"method": "cubic", "knots": 3}):
         with pytest.raises(ValueError, match=r"^interpolation: "):
             table_from("odd", "r000001", arrays, {"interpolation": how})
-
-
-def test_a_record_of_measured_data_that_this_program_does_not_know_is_refused() -> None:
-    """It is no table of a model: where nothing was measured, its error is not known."""
-    dataset = tabulate(layout("clay-vase"))
-    arrays = {str(key): variable.values for key, variable in dataset.variables.items()}
     measured = {
         "channels": ["grey"], "samples": 300, "negative": 0.0, "interpolation": "", "reciprocity": {"assumed": True},
         "mirror": None, "hull": [[0.0, 0.0, 0.0]],

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import matplotlib as mpl
@@ -126,6 +127,8 @@ def test_bad_input_is_refused(grey: Table) -> None:
         grey.plot.lobe(91.0, ax=Figure().add_subplot())
     with pytest.raises(ParameterError, match="kind: 'disc' is not one of in_plane, half_difference"):
         grey.plot.slices("disc")  # type: ignore[arg-type]
+    with pytest.raises(ParameterError, match="theta_i_deg: is an empty list"):
+        grey.plot.cuts([])
     with pytest.raises(ParameterError, match="wavelength_nm: 300 is outside"):
         made_up("isotropic", WAVELENGTHS).plot.cuts(wavelength_nm=300.0, ax=Figure().add_subplot())
 
@@ -144,48 +147,22 @@ def test_tables_load_no_matplotlib() -> None:
 
 
 def test_uniform_part_of_a_material_is_its_share() -> None:
-    source = Material(
-        name="gloss",
-        title="Gloss",
-        model="ward",
-        source="a test",
-        parameters={"rho_d": 0.2, "rho_s": 0.0, "alpha_x": 0.2, "alpha_y": 0.2},
-    )
-    table = made_up("isotropic")
-    flat = Table(
-        "gloss",
-        "r000001",
-        {"source_record": source.document()},
-        table.grid,
-        None,
-        np.full(table.values.shape, 0.2 / np.pi, np.float32),
-        None,
-    )
+    parameters = {"rho_d": 0.2, "rho_s": 0.0, "alpha_x": 0.2, "alpha_y": 0.2}
+    source = Material(name="gloss", title="Gloss", model="ward", source="a test", parameters=parameters)
+    flat = replace(scaled(0.2, "gloss"), attrs={"source_record": source.document()})
     shares = albedo_shares(flat, 0.0, None)
     np.testing.assert_allclose(shares["uniform part"], 0.2, atol=1e-3)
     np.testing.assert_allclose(shares["lobe"], 0.0, atol=1e-3)
 
 
 @pytest.mark.parametrize("kind", ["lobe", "cuts", "albedo", "slices"])
-@pytest.mark.parametrize("wavelengths", [None, WAVELENGTHS], ids=["grey", "spectral"])
-def test_every_plot_refuses_wavelengths_that_lookups_refuse(kind: str, wavelengths: object) -> None:
-    table = made_up("isotropic") if wavelengths is None else made_up("isotropic", WAVELENGTHS)
-    draw = getattr(table.plot, kind)
-    refused = {float("nan"): "positive", -5.0: "positive", "blue": "neither a number nor a list", (): "empty list"}
-    for given, sentence in refused.items():
-        with pytest.raises(ParameterError, match=f"wavelength_nm: .*{sentence}"):
-            draw(wavelength_nm=given, ax=Figure().add_subplot())
-    if wavelengths is not None:
-        with pytest.raises(ParameterError, match="outside"):
-            draw(wavelength_nm=1e9, ax=Figure().add_subplot())
-    if wavelengths is not None and kind in ("albedo", "slices"):
-        with pytest.raises(ParameterError, match="2 numbers; one is shown at a time"):
-            draw(wavelength_nm=list(WAVELENGTHS[:2]), ax=Figure().add_subplot())
-
-
-def test_a_cut_without_a_light_is_refused(grey: Table) -> None:
-    with pytest.raises(ParameterError, match="theta_i_deg: is an empty list"):
-        grey.plot.cuts([])
+def test_every_plot_refuses_wavelengths_that_lookups_refuse(kind: str) -> None:
+    spectral = made_up("isotropic", WAVELENGTHS)
+    wrong = [(table, value) for table in (made_up("isotropic"), spectral) for value in (float("nan"), -5.0, "blue", ())]
+    wrong += [(spectral, 1e9), *([(spectral, list(WAVELENGTHS[:2]))] if kind in ("albedo", "slices") else [])]
+    for table, given in wrong:
+        with pytest.raises(ParameterError, match=r"^wavelength_nm: "):
+            getattr(table.plot, kind)(wavelength_nm=given, ax=Figure().add_subplot())
 
 
 def scaled(factor: float, name: str) -> Table:

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from brdfdb.materials import Material, presets
-from brdfdb.tables import wavelengths
 from brdfdb.tables.grids import Grid
 from brdfdb.tables.layout import LINEAR, Interpolation, Layout, over_wavelengths
 from brdfdb.tables.metadata import TableMetadata
+from brdfdb.tables.mixture import refined_wavelengths
 from brdfdb.tables.planner import plan
 from brdfdb.tables.table import Table, table_from
 from brdfdb.tables.tabulation import block, tabulate
@@ -95,12 +95,12 @@ def test_a_stored_table_says_so_and_is_read_so() -> None:
 def test_n_and_k_of_entries_stay_cubic() -> None:
     copper = presets()["scene-copper-sphere"]
     assert over_wavelengths(copper) == "cubic"
-    assert wavelengths.refined(copper, AT, 0.01) is AT
+    assert refined_wavelengths(copper, AT, 0.01) is AT
 
 
 @pytest.mark.parametrize("tolerance", [0.05, 0.01])
 def test_wavelengths_are_added_until_lines_between_them_follow_the_model(tolerance: float) -> None:
-    found = wavelengths.refined(HAPKE, AT, tolerance)
+    found = refined_wavelengths(HAPKE, AT, tolerance)
     assert found is not None
     assert set(BANDS) <= set(found.tolist())
     between = np.linspace(*BANDS[::5], 4001)
@@ -114,8 +114,8 @@ def test_wavelengths_are_added_until_lines_between_them_follow_the_model(toleran
 
 
 def test_models_that_are_linear_in_their_spectra_take_the_kinks_alone() -> None:
-    np.testing.assert_array_equal(wavelengths.refined(PAINTED, AT, 0.001), AT)
-    np.testing.assert_array_equal(wavelengths.refined(PAINTED, AT[[0, 5]], 1e-4), AT)
+    np.testing.assert_array_equal(refined_wavelengths(PAINTED, AT, 0.001), AT)
+    np.testing.assert_array_equal(refined_wavelengths(PAINTED, AT[[0, 5]], 1e-4), AT)
 
 
 def test_the_error_between_is_measured_of_straight_lines() -> None:

@@ -158,7 +158,7 @@ const data = ({ held_out: left, noise, extrapolated, negative, changes }) => [
 function formula(of) {
   if (!of) return [element("p", {}, "not measured")];
   if (of.against === "none known")
-    return [element("p", {}, "none known: the formula is a fit, or no higher rung is known")];
+    return [element("p", {}, "no more exact form to compare with")];
   if (of.against === "highest rung") return [element("p", {}, `0: it is the exact form, ${of.rung}`)];
   return [
     pairs([

@@ -1,12 +1,14 @@
-// The page: what changes the state, and the one loop that turns the state into pictures.
+// The page in the browser: events change its value, and one loop turns that into pictures.
 
-import { AGAIN_MS, Problem, json } from "./api.js";
+import { answersTo, outdates } from "./answers.js";
+import { AGAIN_MS, Problem } from "./api.js";
 import * as begin from "./begin.js";
 import * as controls from "./controls.js";
 import * as copy from "./copy.js";
 import { byId, element } from "./dom.js";
 import * as facts from "./facts.js";
 import * as list from "./list.js";
+import { after, opened } from "./page.js";
 import * as parameters from "./parameters.js";
 import { seriesOf } from "./series.js";
 import { fromHash, subjectOf, toHash } from "./state.js";
@@ -15,6 +17,7 @@ import { VIEWS } from "./views.js";
 /** @typedef {import("./state.js").State} State */
 /** @typedef {import("./series.js").Series} Series */
 /** @typedef {import("./api.js").Question} Question */
+/** @typedef {import("./page.js").PageEvent} PageEvent */
 /** @typedef {(part: Partial<State>) => void} Choose */
 /** @typedef {{
  *   name: string, title: string, order: number,
@@ -25,114 +28,86 @@ import { VIEWS } from "./views.js";
  *   known?: (each: Series, state: State, series: Series[]) => boolean,
  *   draw?: (into: HTMLElement, series: Series[], answers: any[], state: State, all: Series[]) => string,
  *   begin?: (into: HTMLElement, choose: Choose, now: () => State) => void,
- * }} View parts: views that are shown side by side, or the view itself; idle and also: controls without effect, and
- *   those that few
- *   views have; request: what a copy asks for; answer: what the picture asks for, if that is more; known: the series
- *   that the
- *   service knows there; draw: the picture, and its caption; begin: what hands and keys do in it */
+ * }} View parts: views that are shown side by side, or the view itself; idle: controls without effect; also: controls
+ *   that few views have; request: what a copy asks for; answer: what the picture asks for, if that is more; known: the
+ *   series that the service knows there; draw: the picture, and its caption; begin: what hands and keys do in it */
 
-const [title, message, caption, picture] = [
-  byId("title", HTMLElement),
-  byId("message", HTMLElement),
-  byId("caption", HTMLElement),
-  byId("picture", HTMLElement),
-];
+const title = byId("title", HTMLElement);
+const message = byId("message", HTMLElement);
+const caption = byId("caption", HTMLElement);
+const picture = byId("picture", HTMLElement);
 const SLOW_MS = 200; // after which people are told that a picture is on its way
 const REST_MS = 250; // after which a slider rests
 const LINK_MS = 200; // browsers slow pages down that write their address at every move of a slider
-const MOVED = ["theta_i", "phi_i", "theta_r", "turn", "nm", "exposure"];
 
-let { state, wrong } = fromHash(location.hash, VIEWS); // wrong: what is wrong in the link, until a hand changes something
-/** @type {Series[]} */
-let series = []; // what is shown; emptied when it has to be found anew
-let stop = new AbortController();
-let asked = 0; // when the picture was asked for; the first one when the page was
-let wanted = false,
-  working = false;
-let linked = 0,
-  again = 0;
-let stale = false,
-  fresh = true; // whether parameters have moved; whether the facts are to be shown anew
-let drawn = false, // whether there has been a picture; what is not needed for it waits
-  complete = false; // whether all pictures of a view have been there, for which those of the list wait
-let quick = false,
-  resting = 0; // whether a slider moves; the picture is drawn again, finely, once it rests
-/** @type {Map<string, { key: string, hurried: boolean, answers: any[] }>} */
-const before = new Map(); // the last answers to each view
-/** @type {Map<string, { key: string, problem: Problem }>} */
-const refused = new Map(); // the last questions of each view that were, which are not asked again
-let missing = ""; // why what is compared with is not shown
+let page = opened(fromHash(location.hash, VIEWS));
+let stop = new AbortController(); // of the picture that is being drawn
+let drawing = false;
+/** @type {Map<string, ReturnType<typeof setTimeout>>} */
+const timers = new Map();
 
-/** The views that are drawn for one.
- * @param {string} name */
-const partsOf = (name) => (VIEWS[name].parts ?? [name]).map((part) => VIEWS[part]);
+/** Act later, and once: what waits under the same name is forgotten.
+ * @param {"link" | "rest" | "again"} name
+ * @param {number} ms
+ * @param {() => void} act */
+function later(name, ms, act) {
+  clearTimeout(timers.get(name));
+  timers.set(name, setTimeout(act, ms));
+}
+
+/** Let an event change the page, show that in the controls, and draw what it asks for. A slider's next picture waits
+ * for the present one, any other change stops it.
+ * @param {PageEvent} event */
+function dispatch(event) {
+  const { state, series } = page;
+  page = after(page, event);
+  if (page.series.length && (page.state !== state || page.series !== series)) controls.show(page.state, page.series);
+  if (event.kind === "changed") {
+    clearTimeout(timers.get("rest"));
+    if (page.moving) later("rest", REST_MS, () => dispatch({ kind: "rested", at: performance.now() }));
+    else {
+      stop.abort();
+      stop = new AbortController();
+    }
+  }
+  if (page.asked === null) return;
+  clearTimeout(timers.get("again"));
+  if (!drawing) work();
+}
+
+const redraw = () => dispatch({ kind: "asked", at: performance.now() });
 
 /** Change the state by hand: another material or view can be gone back from, anything else is written over its link.
  * @type {Choose} */
 function choose(part) {
-  const before = toHash(state),
-    from = subjectOf(state.material).base;
-  change(part);
-  clearTimeout(linked);
-  const go = ("view" in part || subjectOf(state.material).base !== from) && toHash(state) !== before;
-  if (go) {
+  const before = toHash(page.state),
+    from = subjectOf(page.state.material).base;
+  dispatch({ kind: "changed", part, at: performance.now() });
+  clearTimeout(timers.get("link"));
+  const link = toHash(page.state);
+  if (("view" in part || subjectOf(page.state.material).base !== from) && link !== before) {
     history.replaceState(null, "", before); // which may wait to be written
-    history.pushState(null, "", toHash(state));
+    history.pushState(null, "", link);
   } else {
-    linked = setTimeout(() => history.replaceState(null, "", toHash(state)), LINK_MS);
+    later("link", LINK_MS, () => history.replaceState(null, "", toHash(page.state)));
   }
 }
 
-/** Change the state: a slider's next picture waits for the one that is being drawn, anything else stops it.
- * @type {Choose} */
-function change(part) {
-  const to = subjectOf(part.material ?? "");
-  const slid = series[0]?.source === "parameters" && to.changes !== null && to.base === subjectOf(state.material).base;
-  const moved = slid || Object.keys(part).every((key) => MOVED.includes(key));
-  state = { ...state, ...part };
-  wrong = [];
-  if ("material" in part || "compare" in part) {
-    if (!slid) series = [];
-    fresh = !slid;
-    missing = "";
-    if (slid) stale = true;
-  }
-  if (!moved) {
-    stop.abort();
-    stop = new AbortController();
-  }
-  if (series.length) controls.show(state, series);
-  quick = moved;
-  clearTimeout(resting);
-  if (moved)
-    resting = setTimeout(() => {
-      quick = false;
-      redraw();
-    }, REST_MS);
-  redraw();
-}
-
-function redraw(at = performance.now()) {
-  asked = at;
-  wanted = true;
-  clearTimeout(again);
-  if (!working) work();
-}
-
+/** Draw pictures until none is asked for. */
 async function work() {
-  working = true;
+  drawing = true;
   picture.ariaBusy = "true";
-  while (wanted) {
-    wanted = false;
-    const now = { ...state, quick },
-      start = asked,
+  while (page.asked !== null) {
+    const now = { ...page.state, quick: page.moving },
+      start = page.asked,
       { signal } = stop;
+    dispatch({ kind: "begun" });
     const slow = setTimeout(() => {
       caption.textContent = "Loading …";
     }, SLOW_MS);
     try {
       await draw(now, start, signal);
-      say([...wrong, missing].filter(Boolean).join(" "));
+      say([...page.wrong, page.missing].filter(Boolean).join(" "));
       picture.dataset.shown = toHash(now);
       picture.dataset.detail = now.quick ? "quick" : "fine";
     } catch (problem) {
@@ -141,44 +116,47 @@ async function work() {
       forget(now);
       say(error instanceof Problem ? error.message : `This cannot be drawn: ${error.message}`);
       if (!(error instanceof Problem)) console.error(error);
-      if (error instanceof Problem && error.passes) again = setTimeout(redraw, AGAIN_MS);
+      if (error instanceof Problem && error.passes) later("again", AGAIN_MS, redraw);
     } finally {
       clearTimeout(slow);
     }
   }
-  working = false;
+  drawing = false;
   picture.ariaBusy = "false";
 }
+
+/** The views that are drawn for one.
+ * @param {string} name */
+const partsOf = (name) => (VIEWS[name].parts ?? [name]).map((part) => VIEWS[part]);
 
 /** @param {State} now
  * @param {number} start
  * @param {AbortSignal} signal */
 async function draw(now, start, signal) {
-  if (series.length && !stale) facts.band(series[0].info, now);
+  if (page.series.length && page.learn === "nothing") facts.band(page.series[0].info, now);
   else await know(now, signal);
   const places = shown(now.view),
     views = partsOf(now.view);
   performance.clearMeasures("first");
   performance.clearMeasures("picture");
   const one = async (/** @type {View} */ view, /** @type {number} */ i) => {
-    const { known, answers } = await answersTo(view, now, signal);
-    signal.throwIfAborted();
-    const said = view.draw?.(places[i], known, answers, now, series) ?? "";
+    const { known, answers } = await currentAnswersTo(view, now, signal);
+    const said = view.draw?.(places[i], known, answers, now, page.series) ?? "";
     if (!performance.getEntriesByName("first").length) performance.measure("first", { start, end: performance.now() });
     return said;
   };
-  const words = drawn ? [] : [await one(views[0], 0)]; // on a slow connection the first picture has no rivals
-  if (!drawn) {
-    drawn = true;
+  const words = page.pictures === "none" ? [await one(views[0], 0)] : []; // on a slow connection it has no rivals
+  if (page.pictures === "none") {
+    dispatch({ kind: "shown", pictures: "first" });
     begin.early.clear();
     parameters.offer(choose).catch((error) => say(error.message));
   }
-  parameters.show(series[0], now);
+  parameters.show(page.series[0], now);
   words.push(...(await Promise.all(views.slice(words.length).map((view, i) => one(view, i + words.length)))));
   signal.throwIfAborted();
   performance.measure("picture", { start, end: performance.now() });
-  if (!complete) list.paint();
-  complete = true;
+  if (page.pictures === "first") list.paint();
+  dispatch({ kind: "shown", pictures: "all" });
   caption.replaceChildren(...words.map((text) => element("p", {}, text)));
 }
 
@@ -198,8 +176,8 @@ function forget(now) {
   shown(null);
   list.paint();
   caption.textContent = "";
-  if (series.length) {
-    parameters.show(series[0], now); // to move away from what was refused
+  if (page.series.length) {
+    parameters.show(page.series[0], now); // to move away from what was refused
     return;
   }
   title.textContent = now.material;
@@ -208,82 +186,47 @@ function forget(now) {
   controls.forget();
 }
 
-/** Learn what is shown.
+/** Learn what is shown; a comparison that is refused is left out.
  * @param {State} now
  * @param {AbortSignal} signal */
 async function know(now, signal) {
+  const anew = page.learn === "everything";
   list.mark(subjectOf(now.material).base);
-  const found = await seriesOf(now, signal).catch((error) => {
+  let missing = "";
+  const series = await seriesOf(now, signal).catch((error) => {
     if (!(error instanceof Problem && !error.passes && now.compare.length)) throw error;
-    return alone(now, signal, error.message);
+    missing = error.message;
+    return seriesOf({ ...now, compare: [] }, signal);
   });
   signal.throwIfAborted();
-  stale = false;
-  series = found;
+  dispatch({ kind: "found", of: now, series, missing });
   const { info } = series[0];
   title.textContent = info.title;
   document.title = `${info.title} – brdfdb explorer`;
-  if (fresh) facts.show(series[0]);
-  fresh = false;
+  if (anew) facts.show(series[0]);
   facts.band(info, now);
-  for (const each of series) if (each.source !== "parameters") list.update(each.info);
-  controls.show(state, series);
+  updateList();
 }
 
-/** The material without what it should be compared with, and why.
- * @param {State} now
- * @param {AbortSignal} signal
- * @param {string} sentence */
-async function alone(now, signal, sentence) {
-  const found = await seriesOf({ ...now, compare: [] }, signal);
-  signal.throwIfAborted();
-  state = { ...state, compare: [] };
-  missing = sentence;
-  return found;
+/** Show in the list what was learnt of tables. */
+function updateList() {
+  for (const each of page.series) if (each.source !== "parameters") list.update(each.info);
 }
 
-/** What the service answers for a view, of the series that it knows there.
+/** Answers of the tables that are known; where a new one was published meanwhile, that is learnt first, once.
  * @param {View} view
  * @param {State} now
- * @param {AbortSignal} signal
- * @returns {Promise<{ known: Series[], answers: any[] }>} */
-async function answersTo(view, now, signal, lastTry = false) {
-  const all = series,
-    knows = view.known ?? (() => true),
-    known = all.filter((each) => knows(each, now, all));
-  const answer = view.answer ?? ((each) => json(view.request?.(each, now, all) ?? "", signal));
-  const hurried = Boolean(now.quick);
-  // what does not change answers is 0
-  const asked = { ...now, quick: 0, exposure: 0, scale: 0, axes: 0, view: 0, compare: 0 };
-  const key = JSON.stringify([
-    known.map(({ text, source, info }) => [text, source, info.digest]),
-    all.some(({ info }) => info.anisotropic),
-    asked,
-  ]);
-  const no = refused.get(view.name);
-  if (no?.key === key) throw no.problem;
-  const kept = before.get(view.name);
-  const answers =
-    kept?.key === key && (hurried || !kept.hurried)
-      ? kept.answers
-      : await Promise.all(known.map((each) => answer(each, now, all, signal))).catch((problem) => {
-          if (problem instanceof Problem && !problem.passes) refused.set(view.name, { key, problem });
-          throw problem;
-        });
+ * @param {AbortSignal} signal */
+async function currentAnswersTo(view, now, signal) {
+  const found = await answersTo(view, now, page.series, signal);
   signal.throwIfAborted();
-  if (answers !== kept?.answers) before.set(view.name, { key, hurried, answers });
-  if (lastTry || !answers.some((found, i) => outdates(found, known[i]))) return { known, answers };
-  fresh = true;
+  if (!found.answers.some((answer, i) => outdates(answer, found.known[i]))) return found;
+  dispatch({ kind: "outdated" });
   await know(now, signal);
-  return answersTo(view, now, signal, true);
+  const again = await answersTo(view, now, page.series, signal);
+  signal.throwIfAborted();
+  return again;
 }
-
-/** Whether an answer is of another table than what is known; what an audit found may be of an old revision.
- * @param {any} answer
- * @param {Series} each */
-const outdates = ({ digest, revision, current, finding }, { info, source }) =>
-  source !== "parameters" &&
-  (finding ? revision !== info.audit.revision || current !== info.audit.current : digest !== info.digest);
 
 /** Tell people: what failed, or in another colour what worked; the names of materials that come closest are links.
  * @param {string} sentence */
@@ -304,57 +247,57 @@ for (const view of Object.values(VIEWS)) {
   place.setAttribute("role", "group");
   place.setAttribute("aria-label", `${view.title}: the picture`);
   byId("stage", HTMLElement).append(place);
-  view.begin?.(place, choose, () => state);
+  view.begin?.(place, choose, () => page.state);
 }
-controls.listen(choose, () => state);
-parameters.listen(choose, () => state, say);
+controls.listen(choose, () => page.state);
+parameters.listen(choose, () => page.state, say);
 copy.listen(
-  () => new URL(toHash(state), location.href),
-  () =>
-    (series.length ? partsOf(state.view).at(-1)?.request?.(series[0], state, series) : null) ?? {
-      path: "v1/materials",
-    },
+  () => new URL(toHash(page.state), location.href),
+  () => {
+    const { state, series } = page,
+      [first] = series;
+    return (first && partsOf(state.view).at(-1)?.request?.(first, state, series)) || { path: "v1/materials" };
+  },
   say,
 );
-addEventListener("popstate", () => clearTimeout(linked)); // it would write its link over the one that is gone to
+addEventListener("popstate", () => clearTimeout(timers.get("link"))); // it would write over the link that is gone to
 addEventListener("hashchange", () => {
   // a link, or the way back
-  const held = fromHash(location.hash, VIEWS);
-  change({ ...held.state, material: held.state.material || state.material });
-  wrong = held.wrong;
+  const { state, wrong } = fromHash(location.hash, VIEWS);
+  const material = state.material || page.state.material;
+  dispatch({ kind: "changed", part: { ...state, material }, wrong, at: performance.now() });
 });
 let width = picture.clientWidth;
 new ResizeObserver(() => {
   if (picture.clientWidth === width) return;
   width = picture.clientWidth;
-  if (series.length) redraw();
+  if (page.series.length) redraw();
 }).observe(picture);
-matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => series.length && redraw());
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => page.series.length && redraw());
 for (const link of document.querySelectorAll("a[href^='#']")) {
   link.addEventListener("click", (event) => {
     event.preventDefault(); // the address holds what is shown
     byId(link.getAttribute("href")?.slice(1) ?? "", HTMLElement).focus();
   });
 }
-shown(state.view); // an empty frame
-if (state.material) redraw(0);
+shown(page.state.view); // an empty frame
+if (page.state.material) dispatch({ kind: "asked", at: 0 });
 list
   .load(
     (material) => choose({ material }),
     (materials) => {
       controls.offer(materials);
-      if (series.length) controls.show(state, series);
-      for (const each of series) if (each.source !== "parameters") list.update(each.info);
-      list.mark(subjectOf(state.material).base);
+      if (page.series.length) controls.show(page.state, page.series);
+      updateList();
+      list.mark(subjectOf(page.state.material).base);
       const first = begin.first(materials);
-      if (!state.material && first) {
-        state = { ...state, material: first.name };
-        redraw(0);
-      } else if (!state.material) {
-        forget(state);
+      if (!page.state.material && first) {
+        dispatch({ kind: "changed", part: { material: first.name }, wrong: page.wrong, at: 0 });
+      } else if (!page.state.material) {
+        forget(page.state);
         say("There is nothing to look at in the store.");
       }
     },
-    () => state.material || forget(state),
+    () => page.state.material || forget(page.state),
   )
   .catch((error) => say(error.message));

@@ -1,4 +1,4 @@
-"""Addresses: how they are added, the parameters that they know, and their answers as OpenAPI describes them."""
+"""Routes of the service, and the descriptions of their answers in the OpenAPI document."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Annotated, Any, TypeVar
 from fastapi import APIRouter, Depends
 from fastapi.routing import APIRoute
 from pydantic import BaseModel, WithJsonSchema
-from pydantic.json_schema import JsonSchemaMode, models_json_schema
+from pydantic.json_schema import GenerateJsonSchema, JsonSchemaMode, models_json_schema
 from starlette.requests import Request
 from starlette.responses import Response
 from starlette.types import Receive, Scope, Send
@@ -18,7 +18,7 @@ from starlette.types import Receive, Scope, Send
 from brdfdb.store.shelf import Shelf
 from brdfdb_api.http.errors import PROBLEM_JSON, RequestError
 from brdfdb_api.http.queries import names_of, parsed, shortened
-from brdfdb_api.http.responses import DIGEST, JSON, NPY, REVISION, Problem, unchanged
+from brdfdb_api.http.responses import DIGEST, JSON, NPY, REVISION, ServedProblem, unchanged
 
 T = TypeVar("T")
 
@@ -71,7 +71,7 @@ Content = Annotated[bytes, Depends(_content)]  # of addresses that run in a thre
 
 
 class Address(APIRoute):
-    """An address that refuses parameters of the query that it does not name, and sends nothing that a client holds."""
+    """A route that refuses unknown query parameters, and answers 304 to a client that has the current answer."""
 
     def __init__(self, path: str, endpoint: Callable[..., Any], **keywords: Any) -> None:
         super().__init__(path, endpoint, **keywords)
@@ -95,9 +95,9 @@ class Address(APIRoute):
 
 
 class Quick(Address):
-    """GET of an address whose endpoint reads its query itself: FastAPI describes it, and does not parse it.
+    """A GET route whose endpoint parses its query itself, because FastAPI takes three times as long to answer.
 
-    To answer it, too, takes FastAPI three times as long.
+    FastAPI describes the parameters in the OpenAPI document.
     """
 
     def __init__(self, path: str, endpoint: Callable[..., Any], **keywords: Any) -> None:
@@ -117,7 +117,7 @@ def addresses() -> APIRouter:
 def both(
     router: APIRouter, path: str, *, method: str = "GET", **keywords: Any
 ) -> Callable[[Callable[..., T]], Callable[..., T]]:
-    """Serve an address of the current revision, and the same of any revision, named with its digest or without."""
+    """Add a route for the current revision of a material, and the same route for a named revision."""
 
     def add(function: Callable[..., T]) -> Callable[..., T]:
         signature = inspect.signature(function, eval_str=True)
@@ -138,13 +138,22 @@ _DESCRIBED: dict[str, tuple[type[BaseModel], JsonSchemaMode]] = {}  # models of 
 
 def _schema(model: type[BaseModel], mode: JsonSchemaMode = "serialization") -> dict[str, Any]:
     """Return a reference to the JSON Schema of a model, which becomes one of the `schemas` of the document."""
-    _DESCRIBED[model.__name__] = model, mode
-    return {"schema": {"$ref": _REFERENCE.format(model=model.__name__)}}
+    name = model.__name__.removeprefix("Served")
+    _DESCRIBED[name] = model, mode
+    return {"schema": {"$ref": _REFERENCE.format(model=name)}}
+
+
+class _SchemaGenerator(GenerateJsonSchema):
+    """Names schemas as clients know them."""
+
+    def normalize_name(self, name: str) -> str:
+        return super().normalize_name(name).removeprefix("Served")
 
 
 def schemas() -> dict[str, Any]:
     """Return the JSON Schemas of all bodies and answers by name."""
-    schemas: dict[str, Any] = models_json_schema([*_DESCRIBED.values()], ref_template=_REFERENCE)[1]["$defs"]
+    _, document = models_json_schema([*_DESCRIBED.values()], ref_template=_REFERENCE, schema_generator=_SchemaGenerator)
+    schemas: dict[str, Any] = document["$defs"]
     return schemas
 
 
@@ -160,7 +169,7 @@ def answers(
     described: dict[int | str, dict[str, Any]] = {200: _answer("Success", *cached, *headers, content=content)}
     for status in (*statuses, 422):
         more = {304: cached, 503: ("Retry-After",)}.get(status, ())
-        problem = {} if status < 400 else {"content": {PROBLEM_JSON: _schema(Problem)}}
+        problem = {} if status < 400 else {"content": {PROBLEM_JSON: _schema(ServedProblem)}}
         described[status] = _answer(_OTHERS[status], *more, **problem)
     return described
 

@@ -28,7 +28,7 @@ from brdfdb_api.http.pages import pages
 from brdfdb_api.http.responses import DIGEST, REVISION
 from brdfdb_api.http.routes import router
 from brdfdb_api.http.views import EXPORTS_AT_ONCE, views
-from brdfdb_api.serving.settings import Settings
+from brdfdb_api.settings import Settings
 
 if TYPE_CHECKING:
     from brdfdb.store.reader import Store

@@ -67,11 +67,15 @@ def refusal_of(finding: Mapping[str, Any]) -> RequestError:
     return RequestError(422, f"{parameter}: {errors.sentence_of(finding)}", parameter)
 
 
-# Classes that the router hands to `handler`. Exception is what the server logs with its traceback, so that the other
-# errors of brdfdb are not named here: in a service they are bugs
+# Classes that the router hands to `handler`. Any other error of brdfdb is a bug of the service, and answered with 500
 HANDLED = (
-    *(errors.UnknownMaterialError, errors.UnknownRevisionError, errors.StoreError),
-    *(RequestError, RequestValidationError, HTTPException, Exception),
+    errors.UnknownMaterialError,
+    errors.UnknownRevisionError,
+    errors.StoreError,
+    RequestError,
+    RequestValidationError,
+    HTTPException,
+    Exception,
 )
 
 
@@ -84,7 +88,7 @@ async def handler(request: Request, error: Exception) -> Response:
 
 
 def _not_routed(request: Request) -> RequestError:
-    """Return the refusal of an address that there is not (404), or not for the method of the request (405)."""
+    """Return the refusal of an unknown address (404), or of a method that the address does not have (405)."""
     routes = [route for route in request.app.state.routes if route.matches(request.scope)[0] is not Match.NONE]
     if not routes:
         return RequestError(404, f"{request.scope['path'][:100]!r} is no address; /docs lists all that there are")
@@ -144,6 +148,6 @@ def _problem(
 
 
 def _shown(text: str, most: int) -> str:
-    """Return what is shown of a text: paths and names may have what is no text, and requests long names."""
+    """Return a text with escapes for bytes that are not text, shortened to `most` characters."""
     text = text.encode(errors="backslashreplace").decode()
     return text if len(text) <= most else f"{text[: most - 1]}…"

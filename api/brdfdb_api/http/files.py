@@ -11,9 +11,9 @@ from starlette.responses import Response, StreamingResponse
 
 from brdfdb import __version__
 from brdfdb.store.archive import ZIP, Group, root_group, zipped
-from brdfdb.store.chunks import checked_bytes
-from brdfdb.store.manifest import check_manifest, read_manifest
+from brdfdb.store.decoding import checked_bytes
 from brdfdb.store.paths import manifest_path, pinned
+from brdfdb.store.records import check_manifest, read_manifest
 from brdfdb_api.http.addresses import Revision, addresses, answers, both, is_pinned, shelf_of
 from brdfdb_api.http.errors import RequestError
 from brdfdb_api.http.responses import JSON, Document, cache_headers, tagged

@@ -1,4 +1,4 @@
-"""Lookups: values of tables, models and families at the points of a request, and the addresses of tables."""
+"""TableLookups: values of tables, models and families at the points of a request, and the addresses of tables."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import asyncio
 import contextlib
 import io
 from collections.abc import AsyncIterator, Callable
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any, NamedTuple, TypeVar
 
 import numpy as np
 from fastapi import Depends
@@ -19,10 +19,9 @@ from starlette.responses import Response
 from brdfdb.errors import ParameterError
 from brdfdb.store.paths import pinned
 from brdfdb.store.shelf import Shelf
-from brdfdb.tables.evaluation import Surface, Values, surface_of
-from brdfdb.tables.points import ANGLES, Points, PointsBody
+from brdfdb.tables.evaluation import ANGLES, LookupPoints, LookupSubject, PointsBody, Values, surface_of
 from brdfdb.tables.table import Table
-from brdfdb.tables.values_document import Lookup, Lookups, arrays_of, npy_bytes, of_table, values_document
+from brdfdb.tables.values_document import Lookup, TableLookups, arrays_of, npy_bytes, of_table, values_document
 from brdfdb_api.http import queries, responses
 from brdfdb_api.http.addresses import (
     NPY_ANSWER,
@@ -43,23 +42,31 @@ T = TypeVar("T")
 
 INLINE_VALUES = 1000  # larger lookups run in a thread, so that the event loop can serve others
 INLINE_BYTES = 96 * 2**10  # larger bodies are read in a thread; 1000 points take about this many bytes
-# Number of larger bodies, or larger answers, that are processed at a time
-LARGE_BYTES, LARGE_VALUES, LARGE_AT_ONCE = 2**20, 100_000, 2
+LARGE_BYTES = 2**20  # larger bodies wait for a turn
+LARGE_VALUES = 100_000  # larger answers wait for a turn
+LARGE_AT_ONCE = 2  # turns at a time
 TURN_S = 10.0  # longest wait for a turn [s]
 LIMITS = {"json": (1, 100), "npy": (100, 400)}  # points and values of one answer, as multiples of max_points
 MATRIX = 16  # elements of the Mueller matrix that a Stokes vector takes
 SPECTRA_OF_COLOURS = 10  # factor on the number of values where only colours are returned
-# Parameters of the library that a request calls the same
-_PARAMETERS = (*ANGLES, "wavelength_nm", *queries.OfTable.model_fields)
+# Parameters with the same name in the library and in requests
+_PARAMETERS = (*ANGLES, "wavelength_nm", *queries.TableOptions.model_fields)
 NPZ = "application/x-npz"
-Asked = tuple[Surface, Points, dict[str, Any]]  # surface and points of a body, and what the answer says of them
 
 lookups = addresses()
 
 
+class RequestedPoints(NamedTuple):
+    """The surface and the points of a request, and the fields that begin its document."""
+
+    surface: LookupSubject
+    points: LookupPoints
+    about: dict[str, Any]
+
+
 @contextlib.asynccontextmanager
 async def turn(turns: asyncio.Semaphore) -> AsyncIterator[None]:
-    """Wait for a turn; RequestError (503) if none comes within `TURN_S`."""
+    """Wait until fewer large requests run; RequestError (503) after `TURN_S`."""
     try:
         async with asyncio.timeout(TURN_S):
             await turns.acquire()
@@ -77,37 +84,36 @@ async def _large(request: Request) -> AsyncIterator[None]:
         yield
 
 
-LARGE = Depends(_large)  # of addresses that take much memory, or much time
+LARGE = Depends(_large)  # for addresses that need much memory or time
 
 
 async def in_thread(state: State, work: Callable[[], T], *, large: bool) -> T:
-    """Return what work returns, done in a thread; large work waits for a turn."""
+    """Run work in a thread and return its result; large work waits for a turn."""
     async with turn(state.large) if large else contextlib.nullcontext():
         return await run_in_threadpool(work)
 
 
-def surface_in(table: Table, options: queries.OfTable) -> Surface:
-    """Return a table, or the model that it was made of; RequestError (422) if it keeps none."""
-    if options.source == "table":
+def surface_in(table: Table, query: queries.TableOptions) -> LookupSubject:
+    """Return a table, or the model that it was made of; RequestError (422) if the table has no model."""
+    if query.source == "table":
         return surface_of(table)
     with refused():
-        return surface_of(table, options.source)
+        return surface_of(table, query.source)
 
 
-def tag_in(table: Table, surface: Surface) -> str:
+def tag_in(table: Table, surface: LookupSubject) -> str:
     """Return the ETag of values of a table, or of its model, whose version it names then."""
     if surface.kind == "table":
         return responses.tag_of(table)
     return responses.tag_of(table, surface.source.material.spec.version)
 
 
-def evaluate(points: Points, options: queries.Options, surface: Surface, *, specular: bool = True) -> Values:
+def evaluate(points: LookupPoints, query: queries.Options, surface: LookupSubject, *, specular: bool = True) -> Values:
     """Look up points; RequestError (422) outside the range of the surface, or where it makes no colour."""
-    error, incident = getattr(options, "error", False), getattr(options, "stokes", None)  # models have neither
+    error = getattr(query, "error", False)  # models state none
+    incident = getattr(query, "stokes", None)  # models have none
     try:
-        return surface.values(
-            points, options.output, options.illuminant, error=error, specular=specular, incident=incident
-        )
+        return surface.values(points, query.output, query.illuminant, error=error, specular=specular, incident=incident)
     except ParameterError as wrong:
         if surface.kind == "table" and wrong.parameter not in _PARAMETERS:
             raise
@@ -115,7 +121,7 @@ def evaluate(points: Points, options: queries.Options, surface: Surface, *, spec
 
 
 def checked_size(
-    max_points: int, points: Points, options: queries.Options, surface: Surface, kind: queries.Format
+    max_points: int, points: LookupPoints, query: queries.Options, surface: LookupSubject, kind: queries.Format
 ) -> int:
     """Return the number of values to look up; RequestError (413) if they are too many for one answer."""
     most_points, most_values = (factor * max_points for factor in LIMITS[kind])
@@ -126,8 +132,8 @@ def checked_size(
         )
     wavelengths = surface.wavelengths(points)
     values = points.count * (1 if wavelengths is None else int(np.size(wavelengths)))
-    values *= 1 if getattr(options, "stokes", None) is None else MATRIX
-    if options.output != "spectrum" and surface.kind == "table":
+    values *= 1 if getattr(query, "stokes", None) is None else MATRIX
+    if query.output != "spectrum" and surface.kind == "table":
         most_values *= SPECTRA_OF_COLOURS
     if values > most_values:
         raise RequestError(413, f"{values} values are more than the {most_values} that one {kind} answer may be of")
@@ -136,43 +142,39 @@ def checked_size(
 
 async def looked_up(
     request: Request,
-    options: queries.Options,
+    query: queries.Options,
     size: int,
-    read: Callable[[], Asked],
+    read: Callable[[], RequestedPoints],
     *,
     binary: bool = False,
     quick: bool = False,
 ) -> Response:
     """Answer a body of `size` bytes: read it, in a thread unless it is `quick`, and look its points up."""
-    state, kind = request.app.state, options.kind(queries.accept_of(request), binary=binary)
-    surface, points, about = read() if quick else await in_thread(state, read, large=size > LARGE_BYTES)
-    headers = responses.value_headers(kind, None, about.get("revision"), about.get("digest"))
-    return await answered(state, points, options, surface, kind, headers, about)
+    state = request.app.state
+    kind = query.kind(queries.accept_of(request), binary=binary)
+    requested = read() if quick else await in_thread(state, read, large=size > LARGE_BYTES)
+    headers = responses.value_headers(kind, None, requested.about.get("revision"), requested.about.get("digest"))
+    return await answered(state, requested, query, kind, headers)
 
 
 async def answered(
-    state: State,
-    points: Points,
-    options: queries.Options,
-    surface: Surface,
-    kind: queries.Format,
-    headers: responses.Encoded,
-    about: Any,
+    state: State, requested: RequestedPoints, query: queries.Options, kind: queries.Format, headers: responses.Encoded
 ) -> Response:
-    """Look the points up and write them as `kind`, in a thread unless that is quick; `about` begins the document."""
-    values = checked_size(state.settings.max_points, points, options, surface, kind)
+    """Look the points up and write them as `kind`, in a thread unless that is quick."""
+    surface, points, about = requested
+    count = checked_size(state.settings.max_points, points, query, surface, kind)
 
     def write() -> Response:
         POINTS.labels(surface.kind).inc(points.count)
-        values = evaluate(points, options, surface, specular=kind == "json")
+        values = evaluate(points, query, surface, specular=kind == "json")
         if kind == "npy":
-            return responses.Answer(npy_bytes(values.array), headers)
-        return responses.Answer(responses.json_bytes(about | values_document(values)), headers)
+            return responses.ValuesResponse(npy_bytes(values.array), headers)
+        return responses.ValuesResponse(responses.json_bytes(about | values_document(values)), headers)
 
-    if values <= INLINE_VALUES and surface.kind == "table" and options.output == "spectrum":
+    if count <= INLINE_VALUES and surface.kind == "table" and query.output == "spectrum":
         return write()
     # a row and a column of angles take few bytes and make many points
-    return await in_thread(state, write, large=values > LARGE_VALUES)
+    return await in_thread(state, write, large=count > LARGE_VALUES)
 
 
 _OF_POINTS = queries.names_of(queries.PointQuery)
@@ -198,21 +200,21 @@ async def lookup_point(
     """
     scope = request.scope
     query = queries.checked(queries.PointQuery, queries.parsed(scope["query_string"], _OF_POINTS))
-    accept = held = ""
+    accept = if_none_match = ""
     for key, value in scope["headers"]:
         if key == b"accept":
             accept += f",{value.decode('latin-1')}"  # the header may come in several lines
         elif key == b"if-none-match":
-            held = value.decode("latin-1")
+            if_none_match = value.decode("latin-1")
     state, kind, points = scope["app"].state, query.kind(accept), query.points
     table = await _table(state.shelf, name, revision)
     surface = surface_in(table, query)
     computed = query.source == "model" or query.output != "spectrum" or query.stokes is not None
     tag, immutable = tag_in(table, surface), is_pinned(revision) and not computed
     headers = responses.value_headers(kind, tag, table.revision, table.digest, immutable=immutable)
-    about = of_table(table)
-    answer = await answered(state, points, query, surface, kind, headers, about)
-    return responses.unchanged(answer, held) if held else answer
+    requested = RequestedPoints(surface, points, of_table(table))
+    answer = await answered(state, requested, query, kind, headers)
+    return responses.unchanged(answer, if_none_match) if if_none_match else answer
 
 
 async def _table(shelf: Shelf, name: str, revision: str | None) -> Table:
@@ -243,13 +245,16 @@ async def lookup_points(
     if query.wavelength_nm and not binary:
         raise RequestError(422, "wavelength_nm: a JSON body holds it, not the query", "wavelength_nm")
     table = await _table(shelf_of(request), name, revision)
-    surface, content = surface_in(table, query), await request.body()
+    surface = surface_in(table, query)
+    content = await request.body()
     about = of_table(table)
 
-    def read() -> Asked:
+    def read() -> RequestedPoints:
         if binary:
-            return surface, queries.from_array(content, query.wavelength_nm), about
-        return surface, queries.from_json(PointsBody, content).points, about
+            points = queries.from_array(content, query.wavelength_nm)
+        else:
+            points = queries.from_json(PointsBody, content).points
+        return RequestedPoints(surface, points, about)
 
     quick = len(content) <= INLINE_BYTES
     return await looked_up(request, query, len(content), read, binary=binary, quick=quick)
@@ -258,16 +263,19 @@ async def lookup_points(
 @lookups.post(
     "/v1/lookup",
     tags=["lookup"],
-    responses=answers(Lookups, 404, 413, 415, 503, media={NPZ: "an array a material, by its name"}),
+    responses=answers(TableLookups, 404, 413, 415, 503, media={NPZ: "an array a material, by its name"}),
     openapi_extra=body(queries.ManyBody),
     dependencies=[LARGE],
 )
 def lookup_many(request: Request, query: Annotated[queries.ManyQuery, InQuery()], content: Content) -> Response:
     """Return the BRDF of several materials at the same pairs of directions (angles in degrees)."""
-    given, shelf = queries.from_json(queries.ManyBody, content), shelf_of(request)
+    given = queries.from_json(queries.ManyBody, content)
+    shelf = shelf_of(request)
     points = given.points
     kind: queries.Format = "npy" if query.format == "npz" else "json"
-    max_points, total, results = request.app.state.settings.max_points, 0, {}
+    max_points = request.app.state.settings.max_points
+    total = 0
+    results = {}
     for name in given.materials:
         table = shelf.table(name)
         surface = surface_in(table, query)
@@ -281,4 +289,4 @@ def lookup_many(request: Request, query: Annotated[queries.ManyQuery, InQuery()]
         np.savez(data, **arrays)
         return Response(data.getvalue(), media_type=NPZ, headers=responses.NO_STORE)
     documents = [of_table(table) | values_document(values) for table, values in results.values()]
-    return responses.Answer(responses.json_bytes({"materials": documents}), responses.value_headers("json"))
+    return responses.ValuesResponse(responses.json_bytes({"materials": documents}), responses.value_headers("json"))

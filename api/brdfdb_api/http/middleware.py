@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import functools
 import io
 import os
@@ -12,7 +11,7 @@ import tempfile
 import time
 import traceback
 from collections.abc import Callable, Sequence
-from typing import IO
+from typing import IO, Any
 
 from prometheus_client import REGISTRY, CollectorRegistry, Counter, Histogram, generate_latest
 from starlette.concurrency import run_in_threadpool
@@ -20,15 +19,14 @@ from starlette.responses import Response
 from starlette.routing import BaseRoute, Router
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from brdfdb_api import log
 from brdfdb_api.http.errors import RequestError
-from brdfdb_api.serving import log
-from brdfdb_api.serving.settings import LogLevel
+from brdfdb_api.settings import LogLevel
 
 GONE = 499  # status of a request whose client went away, as nginx counts it
 SMALL = 64 * 2**10  # size up to which bodies and answers are not counted [byte]
 BODIES = 1  # bodies of the largest size that may be in memory together
-STALLED_S = 10.0  # time that a body may be late [s]: behind `RATE`, the lowest speed at which it may arrive
-RATE = 100_000  # [byte/s]
+RETRY_S = 10  # time after which room may be free again [s]
 PIECE = 256 * 2**10  # size of the pieces of larger answers [byte]
 ROOM = {"memory": 64 * 2**20, "files": 2**31}  # bytes of larger answers that may wait to be read
 _REQUEST_ID = re.compile(rb"[A-Za-z0-9._-]{1,64}")
@@ -44,6 +42,12 @@ SECONDS = Histogram(
 POINTS = Counter("brdfdb_points", "Pairs of directions looked up", ["source"])
 
 LOGGED_FROM: dict[LogLevel, int] = {"info": 0, "warning": 400, "error": 500}  # lowest status that is logged
+
+
+@functools.lru_cache(maxsize=4096)
+def _labelled(metric: Any, *labels: object) -> Any:
+    """Return a metric with its labels, cached: finding them takes as long as a lookup."""
+    return metric.labels(*labels)
 
 
 class Edge:
@@ -103,36 +107,33 @@ class Edge:
             self.bodies -= exchange.counted
             seconds = time.perf_counter() - start
             status = exchange.status or GONE  # no client waits for a cancelled request
-            requests, observed = _counters(getattr(scope.get("route"), "path", "other"), status)
-            requests.inc()
-            observed.observe(seconds)
+            route = getattr(scope.get("route"), "path", "other")
+            _labelled(REQUESTS, route, status).inc()
+            _labelled(SECONDS, route).observe(seconds)
             if status >= self.logged_from:
                 log.write(_about(original_scope, exchange.id) | {"status": status, "ms": round(1e3 * seconds, 3)})
 
 
 class _Exchange:
-    """A request and its answer: room and time for the body, an id, and a large answer sent as it is read."""
+    """A request and its answer: its id, the bytes of its body in memory, and a large answer that waits to be read."""
 
     def __init__(self, edge: Edge, scope: Scope, receive: Receive, send: Send) -> None:
         self.edge, self._receive, self._send = edge, receive, send
         self.id = _request_id(scope)
         self.head = scope["method"] == "HEAD"
         self.size = 0  # bytes of the body so far
-        self.counted = 0  # those that count
-        self.due_at = 0.0  # time when the next piece of the body must have come [s]
-        self.whole = False  # whether the body is
+        self.counted = 0  # bytes of the body that are counted against the limit of all bodies
         self.status = 0  # status of the answer, once there is one
         self.start: Message | None = None  # the head of the answer, which waits for the first piece of the body
         self.large: bytes | None = None  # the body of an answer that is sent once the application has ended
         self.started = self.ended = self.gone = False
 
     async def receive(self) -> Message:
-        message = await (self._receive() if self.whole else self._piece())
+        message = await self._receive()
         if message["type"] == "http.disconnect":
             if not self.ended:
                 self.gone, self.status, self.ended = True, GONE, True
             return message
-        self.whole = not message.get("more_body", False)
         size = len(message.get("body", b""))
         self.size += size
         if self.size > self.edge.limit:
@@ -142,20 +143,7 @@ class _Exchange:
             self.counted = self.size
             if self.edge.bodies > BODIES * self.edge.limit:
                 detail = "the server holds as many large bodies as it can; ask again later"
-                raise RequestError(503, detail, retry_after_s=round(STALLED_S))
-        return message
-
-    async def _piece(self) -> Message:
-        """Return the next piece of the body; RequestError (408) if it does not come in time."""
-        now = asyncio.get_running_loop().time
-        self.due_at = self.due_at or now() + STALLED_S
-        try:
-            async with asyncio.timeout_at(self.due_at):
-                message = await self._receive()
-        except TimeoutError:
-            detail = f"the body did not arrive in time: at {RATE} bytes a second, after the first {STALLED_S:g} s"
-            raise RequestError(408, detail) from None
-        self.due_at = min(now() + STALLED_S, self.due_at + len(message.get("body", b"")) / RATE)
+                raise RequestError(503, detail, retry_after_s=RETRY_S)
         return message
 
     async def send(self, message: Message) -> None:
@@ -191,7 +179,7 @@ class _Exchange:
         place = next((place for place, room in ROOM.items() if unread[place] + size <= room), None)
         if place is None:
             detail = "too many large answers wait to be read; ask again later"
-            raise RequestError(503, detail, retry_after_s=round(STALLED_S))
+            raise RequestError(503, detail, retry_after_s=RETRY_S)
         unread[place] += size
         try:
             in_memory = place == "memory"
@@ -213,12 +201,6 @@ def _in_file(content: bytes) -> IO[bytes]:
     file.write(content)
     file.seek(0)
     return file
-
-
-@functools.lru_cache(maxsize=4096)
-def _counters(route: str, status: int) -> tuple[Counter, Histogram]:
-    """Return the counters of a route and a status, cached: finding labels takes as long as a lookup."""
-    return REQUESTS.labels(route, status), SECONDS.labels(route)
 
 
 def metrics() -> bytes:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from fastapi import Depends
@@ -19,13 +19,12 @@ from brdfdb.parameters import ModelSpec
 from brdfdb.spectra import PICTURE_NM
 from brdfdb.store.family import FamilyLine
 from brdfdb.tables.albedo import reflected_by
-from brdfdb.tables.evaluation import Surface
-from brdfdb.tables.points import PointsBody
+from brdfdb.tables.evaluation import LookupSubject, PointsBody
 from brdfdb.tables.values_document import FamilyLookup, ModelAlbedo, ModelLobe, ModelLookup
 from brdfdb_api.http.addresses import NPY_ANSWER, Content, addresses, answers, body, shelf_of
 from brdfdb_api.http.errors import refused
-from brdfdb_api.http.lookups import LARGE, Asked, looked_up
-from brdfdb_api.http.queries import Flag, Light, Options, Query, Wavelengths, from_json
+from brdfdb_api.http.lookups import LARGE, RequestedPoints, looked_up
+from brdfdb_api.http.queries import Flag, LobeOptions, Options, Query, Wavelengths, from_json
 from brdfdb_api.http.responses import NO_STORE, NPY, Document, Families, Model, Models
 from brdfdb_api.http.views import SPHERE, SphereQuery, lobe_answer, sphere_answer
 
@@ -50,10 +49,6 @@ class FamilyQuery(Options):
     """The query of a lookup in a family."""
 
     error: Flag = Field(default=False, description="the error that the family states beside the values")
-
-
-class LobeOptions(Light, Options):
-    """The query of a lobe of a model."""
 
 
 def _spec(model: str) -> ModelSpec:
@@ -81,8 +76,15 @@ def _with_address(spec: ModelSpec) -> dict[str, Any]:
     return {**document_of(spec), "href": f"/v1/models/{spec.name}"}
 
 
-def _surface(spec: ModelSpec, given: Parameters) -> tuple[Surface, dict[str, Any]]:
-    """Return the material of a request, by default at the wavelengths of pictures, and what answers say of it."""
+class ModelSurface(NamedTuple):
+    """A model at the parameters of a request, and the fields that begin its documents."""
+
+    surface: LookupSubject
+    about: dict[str, Any]
+
+
+def _surface(spec: ModelSpec, given: Parameters) -> ModelSurface:
+    """Return the material of a request, by default at the wavelengths of pictures."""
     with refused():
         material = given.material(spec)
     written = {
@@ -90,7 +92,7 @@ def _surface(spec: ModelSpec, given: Parameters) -> tuple[Surface, dict[str, Any
         for name, value in material.file_parameters().items()
     }
     about = {"model": spec.name, "model_version": spec.version, "parameters": written}
-    return Surface(material, "model", PICTURE_NM if material.spectral else None), about
+    return ModelSurface(LookupSubject(material, "model", PICTURE_NM if material.spectral else None), about)
 
 
 @models.post(
@@ -107,10 +109,10 @@ async def model_lookup(
     A spectral model is evaluated from 420 to 680 nm in steps of 20 nm, unless wavelength_nm says otherwise.
     """
 
-    def read() -> Asked:
+    def read() -> RequestedPoints:
         given = from_json(PointsAt, content)
         surface, about = _surface(spec, given)
-        return surface, given.points, about
+        return RequestedPoints(surface, given.points, about)
 
     return await looked_up(request, query, len(content), read)
 
@@ -127,7 +129,7 @@ def model_lobe(request: Request, spec: Spec, query: Annotated[LobeOptions, InQue
     The first request for a model after an installation may take 20 s, in which its kernels are compiled.
     """
     surface, about = _surface(spec, from_json(Parameters, content))
-    return lobe_answer(request, surface, query, query, about, NO_STORE)
+    return lobe_answer(request, surface, query, about, NO_STORE)
 
 
 class WavelengthQuery(Query):
@@ -185,10 +187,10 @@ async def family_lookup(
 ) -> Response:
     """Return the BRDF of a family at parameters between those of its members, interpolated in their tables."""
 
-    def read() -> Asked:
+    def read() -> RequestedPoints:
         given = from_json(PointsOfFamily, content)
         with refused():
             surface = shelf_of(request).store.family(family).surface(given.parameters)
-        return surface, given.points, {"family": family, "parameters": given.parameters}
+        return RequestedPoints(surface, given.points, {"family": family, "parameters": given.parameters})
 
     return await looked_up(request, query, len(content), read)

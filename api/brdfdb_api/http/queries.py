@@ -24,10 +24,16 @@ from pydantic import (
 from starlette.requests import Request
 
 from brdfdb.geometry import AZIMUTH_MOST_DEG
-from brdfdb.tables.evaluation import Output
-from brdfdb.tables.lobe_views import View
-from brdfdb.tables.points import TURN, Points, PointsBody, fields_of_npy, listed
-from brdfdb.tables.stokes_document import read_stokes
+from brdfdb.tables.evaluation import (
+    TURN,
+    LookupPoints,
+    Output,
+    PointsBody,
+    ViewName,
+    fields_of_npy,
+    listed,
+    read_stokes,
+)
 from brdfdb_api.http.errors import RequestError, refusal_of, refused
 from brdfdb_api.http.responses import JSON, NPY, preferred
 
@@ -41,6 +47,10 @@ def _digits(value: object) -> object:
     if isinstance(value, str) and "_" in value:  # which Python reads as a number
         raise ValueError(f"{shortened(value)!r} is not a finite number")
     return value
+
+
+def _radians(angle: float) -> float:
+    return math.radians(math.fmod(angle, TURN))
 
 
 Finite = Annotated[float, Field(allow_inf_nan=False), BeforeValidator(_digits)]
@@ -83,7 +93,7 @@ class Options(Query):
         return "npy" if preferred(accept, *offers) == NPY else "json"
 
 
-class OfTable(Options):
+class TableOptions(Options):
     """Form of values of a table, or of its model; of a table with its stated errors, and the light that it reflects."""
 
     source: Literal["table", "model"] = Field(
@@ -119,13 +129,13 @@ class OfTable(Options):
         return kind
 
 
-class BodyQuery(OfTable):
+class BodyQuery(TableOptions):
     """The query of a lookup whose points are in the body."""
 
     wavelength_nm: Wavelengths = Field(default=(), description="wavelength [nm] of a .npy body; JSON holds its own")
 
 
-class ManyQuery(OfTable):
+class ManyQuery(TableOptions):
     """The query of a lookup of many materials."""
 
     format: Literal["json", "npz"] = Field(
@@ -133,7 +143,7 @@ class ManyQuery(OfTable):
     )  # type: ignore[assignment]
 
 
-class PointQuery(OfTable):
+class PointQuery(TableOptions):
     """The query of a lookup of one point."""
 
     wavelength_nm: Wavelengths = ()
@@ -145,25 +155,28 @@ class PointQuery(OfTable):
     )
 
     @property
-    def points(self) -> Points:
+    def points(self) -> LookupPoints:
         """The point."""
-        t_i, p_i, t_r, p_r = (
-            math.radians(math.fmod(angle, TURN)) for angle in (self.theta_i, self.phi_i, self.theta_r, self.phi_r)
-        )
-        return Points((t_i, p_i, t_r, p_r), (), listed(self.wavelength_nm))
+        light = (_radians(self.theta_i), _radians(self.phi_i))
+        viewer = (_radians(self.theta_r), _radians(self.phi_r))
+        return LookupPoints((*light, *viewer), (), listed(self.wavelength_nm))
 
 
-class Light(Query):
+class LightQuery(Query):
     """The direction of one light, and the viewers that are looked at."""
 
-    view: View = Field(default="cut", description="the plane of incidence, all viewers, or theta_h and theta_d")
+    view: ViewName = Field(default="cut", description="the plane of incidence, all viewers, or theta_h and theta_d")
     theta_i: Finite = Field(default=45.0, ge=0.0, le=90.0, description="polar angle of the light [degrees]")
     phi_i: Azimuth = Field(default=0.0, description="azimuth of the light [degrees]")
     wavelength_nm: Wavelengths = ()
 
 
-class LobeQuery(Light, OfTable):
+class LobeQuery(LightQuery, TableOptions):
     """The query of a lobe of a table."""
+
+
+class LobeOptions(LightQuery, Options):
+    """The query of a lobe of a model."""
 
 
 def accept_of(request: Request) -> str:
@@ -172,7 +185,7 @@ def accept_of(request: Request) -> str:
 
 
 class ManyBody(PointsBody):
-    """Points that are looked up in several materials."""
+    """LookupPoints that are looked up in several materials."""
 
     model_config = ConfigDict(
         json_schema_extra={"example": {"materials": ["rolled-brass", "foam"], "theta_i": 45, "theta_r": [0, 30, 60]}}
@@ -208,7 +221,7 @@ def from_json(model: type[M], body: bytes) -> M:
     return checked(model, fields)
 
 
-def from_array(body: bytes, wavelengths: Sequence[float]) -> Points:
+def from_array(body: bytes, wavelengths: Sequence[float]) -> LookupPoints:
     """Return the points of a .npy body; RequestError (422) if it is none."""
     with refused():
         fields = fields_of_npy(body)

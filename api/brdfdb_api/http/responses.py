@@ -10,7 +10,7 @@ import re
 from typing import TYPE_CHECKING, Annotated, Any
 
 import orjson
-from pydantic import BaseModel, Field, GetJsonSchemaHandler
+from pydantic import BaseModel, ConfigDict, Field, GetJsonSchemaHandler
 from pydantic_core import CoreSchema
 from starlette.concurrency import run_in_threadpool
 from starlette.datastructures import Headers
@@ -19,9 +19,8 @@ from starlette.types import Receive, Scope, Send
 
 from brdfdb import __version__
 from brdfdb.materials.model_document import ModelDocument
-from brdfdb.store.catalogue import Line
+from brdfdb.store.catalogue import Line, MaterialDocument
 from brdfdb.store.family import FamilyLine
-from brdfdb.store.material_document import MaterialDocument
 
 if TYPE_CHECKING:
     from brdfdb.tables.table import Table
@@ -36,8 +35,10 @@ COMPRESSED_FROM = 1024  # length of a document [byte]
 _QUALITY = re.compile(r"(?<![^\s;])q=(0(?:\.\d*)?|1(?:\.0*)?)\s*(?:;|$)")
 
 
-class Problem(BaseModel):
+class ServedProblem(BaseModel):
     """An error (RFC 9457)."""
+
+    model_config = ConfigDict(title="Problem")
 
     type: str = Field(description="about:blank: the status says which kind of error this is")
     title: str
@@ -54,8 +55,10 @@ class Health(BaseModel):
     materials: int | None = Field(default=None, description="number of materials in the store")
 
 
-class Summary(Line):
+class ServedSummary(Line):
     """One line of the catalogue; of a damaged material only `name`, `damaged` and `href`."""
+
+    model_config = ConfigDict(title="Summary")
 
     href: str
     thumbnail: str | None = Field(default=None, description="address of its picture")
@@ -64,13 +67,15 @@ class Summary(Line):
 class Catalogue(BaseModel):
     """Materials of the store, a page of them."""
 
-    materials: list[Summary]
+    materials: list[ServedSummary]
     total: int = Field(description="materials that the filters let through, on all pages")
     next: str | None = Field(description="address of the next page; null: this is the last")
 
 
-class Material(MaterialDocument):
+class ServedMaterial(MaterialDocument):
     """One material: where its table comes from, where it is sampled, how far to believe it."""
+
+    model_config = ConfigDict(title="Material")
 
     revisions: list[str] = Field(description="that are kept, oldest first")
     links: dict[str, str]
@@ -123,7 +128,7 @@ def json_bytes(document: Any) -> bytes:
 
 @functools.lru_cache(maxsize=1024)
 def preferred(accepted: str, *offers: str) -> str:
-    """Return the offer that a header Accept or Accept-Encoding likes best: the first one if it likes none better."""
+    """Return the offer that an Accept or Accept-Encoding header prefers; the first of the offers if all are equal."""
     known: dict[str, tuple[float, int]] = {}
     for place, part in enumerate(accepted.lower().split(",")):
         name, _, parameters = part.partition(";")
@@ -141,9 +146,10 @@ def preferred(accepted: str, *offers: str) -> str:
 
 
 class Document(Response):
-    """A JSON document, compressed for who takes that. Answers of lookups are not: it takes longer than the lookup.
+    """A JSON document, compressed if the client accepts gzip.
 
-    At level 1 compression takes a quarter of the time of level 5, and saves nearly as many bytes.
+    Lookups are not compressed, because that takes longer than the lookup. Compression at level 1 takes a quarter of the
+    time of level 5 and saves nearly as many bytes.
     """
 
     media_type = JSON
@@ -160,8 +166,8 @@ class Document(Response):
         await super().__call__(scope, receive, send)
 
 
-class Answer(Response):
-    """Values as JSON or .npy, with headers that many answers share: to encode them takes as long as to look them up."""
+class ValuesResponse(Response):
+    """Values as JSON or .npy, with headers that are encoded once: encoding them takes as long as a lookup."""
 
     def __init__(self, content: bytes, headers: Encoded) -> None:
         self.status_code, self.background, self.body = 200, None, content
@@ -197,8 +203,8 @@ def tag_of(table: Table, *more: object) -> str:
 def cache_headers(tag: str, kind: str = "json", *, immutable: bool = False) -> dict[str, str]:
     """Return ETag and Cache-Control: forever for what is stored in a revision. JSON may be compressed: a weak tag."""
     etag = f'W/"{tag}"' if kind == "json" else f'"{tag}-{kind}"'
-    kept = "public, max-age=31536000, immutable" if immutable else "no-cache"
-    return {"ETag": etag, "Cache-Control": kept, "Vary": "Accept"}
+    cache_control = "public, max-age=31536000, immutable" if immutable else "no-cache"
+    return {"ETag": etag, "Cache-Control": cache_control, "Vary": "Accept"}
 
 
 def tagged(document: dict[str, Any], name: str) -> Document:
@@ -207,13 +213,13 @@ def tagged(document: dict[str, Any], name: str) -> Document:
     return Document(content, cache_headers(f"{name}-{hashlib.sha256(content).hexdigest()[:16]}"))
 
 
-def unchanged(answer: Response, held: str | None) -> Response:
-    """Return 304 in place of an answer that a client already holds, by its If-None-Match; ``*`` stands for any."""
+def unchanged(answer: Response, if_none_match: str | None) -> Response:
+    """Return 304 instead of an answer whose tag is in If-None-Match; ``*`` stands for any tag."""
     tag = answer.headers.get("etag")
-    if held is None or tag is None or answer.status_code != 200:
+    if if_none_match is None or tag is None or answer.status_code != 200:
         return answer
-    tags = {one.strip().removeprefix("W/") for one in held.split(",")}
+    tags = {tag.strip().removeprefix("W/") for tag in if_none_match.split(",")}
     if not tags & {"*", tag.removeprefix("W/")}:
         return answer
-    kept = {key: answer.headers[key] for key in ("ETag", "Cache-Control", "Vary") if key in answer.headers}
-    return Response(status_code=304, headers=kept)
+    headers = {key: answer.headers[key] for key in ("ETag", "Cache-Control", "Vary") if key in answer.headers}
+    return Response(status_code=304, headers=headers)

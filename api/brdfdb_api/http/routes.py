@@ -13,14 +13,22 @@ from starlette.requests import Request
 from starlette.responses import Response
 
 from brdfdb.formats import EXPORTERS
-from brdfdb.store.catalogue import Choice
-from brdfdb.store.material_document import material_document
+from brdfdb.store.catalogue import Choice, material_document
 from brdfdb.store.paths import pinned
 from brdfdb_api.http import middleware
 from brdfdb_api.http.addresses import Revision, addresses, answers, both, shelf_of
 from brdfdb_api.http.errors import RequestError, refused
 from brdfdb_api.http.queries import Flag, Query, Wavelengths
-from brdfdb_api.http.responses import Catalogue, Document, Health, Material, cache_headers, json_bytes, tag_of, tagged
+from brdfdb_api.http.responses import (
+    Catalogue,
+    Document,
+    Health,
+    ServedMaterial,
+    cache_headers,
+    json_bytes,
+    tag_of,
+    tagged,
+)
 
 PAGE, MOST = 100, 1000  # materials on a page: default and largest number
 PARTS = ("lookup", "albedo", "lobe", "sphere", "thumbnail.png", "audit", "download.zarr")  # of a material
@@ -98,7 +106,7 @@ def catalogue(request: Request, query: Annotated[CatalogueQuery, InQuery()]) -> 
     return tagged({"materials": lines, "total": len(places), "next": following}, "materials")
 
 
-@both(router, "", tags=["materials"], responses=answers(Material, 304, 404, 503))
+@both(router, "", tags=["materials"], responses=answers(ServedMaterial, 304, 404, 503))
 def material(request: Request, name: str, revision: Revision = None) -> Response:
     """Return the origin of the table of a material, its grid (axes in degrees), and its error."""
     shelf = shelf_of(request)

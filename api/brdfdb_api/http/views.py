@@ -19,14 +19,12 @@ from brdfdb.scenes import lit_sphere
 from brdfdb.store.archive import ZIP
 from brdfdb.store.summary_words import NOT_AUDITED
 from brdfdb.tables.albedo import reflected
-from brdfdb.tables.evaluation import Surface
-from brdfdb.tables.lobe_views import MOST_POINTS, view_directions
-from brdfdb.tables.points import Points, listed
-from brdfdb.tables.values_document import Albedo, Lobe, lobe_document, npy_bytes, of_table
+from brdfdb.tables.evaluation import MOST_POINTS, LookupPoints, LookupSubject, listed, view_directions
+from brdfdb.tables.values_document import TableAlbedoDocument, TableLobe, lobe_document, npy_bytes, of_table
 from brdfdb_api.http.addresses import NPY_ANSWER, Revision, addresses, answers, both, shelf_of
 from brdfdb_api.http.errors import RequestError, refused
 from brdfdb_api.http.lookups import LARGE, checked_size, evaluate, surface_in, tag_in, turn
-from brdfdb_api.http.queries import Light, LobeQuery, Options, Query, accept_of, parsed
+from brdfdb_api.http.queries import LobeOptions, LobeQuery, Query, accept_of, parsed
 from brdfdb_api.http.responses import NPY, Audit, Document, cache_headers, tag_of
 
 SPHERE = {"image/png": "sRGB with transparent corners", NPY: "linear sRGB and coverage (size, size, 4), not clipped"}
@@ -55,7 +53,7 @@ class ThumbnailQuery(Query):
     size: int = Field(default=THUMBNAIL, ge=16, le=MOST, description="pixels across")
 
 
-@both(views, "/albedo", tags=["views"], responses=answers(Albedo, 304, 404, 503))
+@both(views, "/albedo", tags=["views"], responses=answers(TableAlbedoDocument, 304, 404, 503))
 def albedo(request: Request, name: str, revision: Revision = None) -> Response:
     """Return the directional and the hemispherical albedo [1] of the table."""
     table = shelf_of(request).table(name, revision)
@@ -67,7 +65,7 @@ def albedo(request: Request, name: str, revision: Revision = None) -> Response:
     views,
     "/lobe",
     tags=["views"],
-    responses=answers(Lobe, 304, 404, 413, 503, media=NPY_ANSWER),
+    responses=answers(TableLobe, 304, 404, 413, 503, media=NPY_ANSWER),
 )
 def lobe(request: Request, name: str, query: Annotated[LobeQuery, InQuery()], revision: Revision = None) -> Response:
     """Return f_r [1/sr] for one light, in the plane of incidence or over all viewers; or over theta_h and theta_d.
@@ -78,22 +76,26 @@ def lobe(request: Request, name: str, query: Annotated[LobeQuery, InQuery()], re
     surface = surface_in(table, query)
     headers = cache_headers(tag_in(table, surface), query.kind(accept_of(request)))
     about = of_table(table)
-    return lobe_answer(request, surface, query, query, about, headers)
+    return lobe_answer(request, surface, query, about, headers)
 
 
 def lobe_answer(
-    request: Request, surface: Surface, light: Light, options: Options, about: dict[str, Any], headers: dict[str, str]
+    request: Request,
+    surface: LookupSubject,
+    query: LobeQuery | LobeOptions,
+    about: dict[str, Any],
+    headers: dict[str, str],
 ) -> Response:
     """Return the answer with the lobe of a surface; `about` begins the document."""
-    kind = options.kind(accept_of(request))
-    axes, angles = view_directions(light.view, light.theta_i, light.phi_i)
-    points = Points.of(angles, listed(light.wavelength_nm))
+    kind = query.kind(accept_of(request))
+    axes, angles = view_directions(query.view, query.theta_i, query.phi_i)
+    points = LookupPoints.of(angles, listed(query.wavelength_nm))
     # The view fixes the points; the client chooses only the wavelengths. Bytes have the limit of JSON, too
-    checked_size(max(request.app.state.settings.max_points, MOST_POINTS), points, options, surface, "json")
-    values = evaluate(points, options, surface)
+    checked_size(max(request.app.state.settings.max_points, MOST_POINTS), points, query, surface, "json")
+    values = evaluate(points, query, surface)
     if kind == "npy":
         return Response(npy_bytes(values.array), media_type=NPY, headers=headers)
-    return Document(about | lobe_document(values, axes, light.view, light.theta_i, light.phi_i), headers)
+    return Document(about | lobe_document(values, axes, query.view, query.theta_i, query.phi_i), headers)
 
 
 @both(

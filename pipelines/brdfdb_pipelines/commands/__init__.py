@@ -1,8 +1,8 @@
-"""The commands of the program: one module each, under the name of the command.
+"""The commands of the program, one module each under the name of the command, and their exit codes.
 
-A module whose name begins with an underscore is no command. One underscore at its end is left out of the name of the
-command, for words that Python keeps for itself. Importing a command loads nothing heavy, because
-``brdfdb --help`` imports all of them: what a command needs is imported when it runs.
+Modules whose names begin with an underscore are not commands. A final underscore is left out of the name of a command:
+`import` is a reserved word. A command imports what it needs when it runs, because ``brdfdb --help`` imports all
+commands.
 """
 
 from __future__ import annotations
@@ -12,15 +12,15 @@ import importlib
 import pkgutil
 from typing import Protocol, cast
 
+VIOLATED = 1  # a new violation, a table that cannot be judged, or a file that is less accurate than asked for
+REFUSED = 2  # bad input, a damaged store, or a machine that lacks something: one sentence on stderr
+BUG = 70  # an error of this program (EX_SOFTWARE of sysexits.h); its traceback is in a file
+INTERRUPTED = 130  # Ctrl-C: 128 + SIGINT
+TERMINATED = 143  # told to end, as batch systems and containers do: 128 + SIGTERM
+
 
 class Command(Protocol):
-    """The interface of a module of this package.
-
-    Attributes
-    ----------
-    HELP : str
-        The sentence that ``brdfdb --help`` and the help of the command show.
-    """
+    """The interface of a module of this package; `HELP` is the sentence that ``brdfdb --help`` shows."""
 
     HELP: str
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from brdfdb.errors import ParameterError
 from brdfdb.place import path_of
-from brdfdb.store.opening import default_root
+from brdfdb.store import default_root
 
 MOST_JOBS = 1024  # threads or processes
 MOST_WIDTH = 4096  # pixels across a picture: a wider one takes tens of gigabytes
@@ -32,13 +32,13 @@ def add_store(parser: argparse.ArgumentParser) -> None:
         type=place,
         default=default_root(),
         metavar="DIR",
-        help="directory of the store (default: $BRDFDB_STORE or %(default)s)",
+        help="directory of the store (default: $BRDFDB_STORE, or %(default)s)",
     )
 
 
 def add_snapshot(parser: argparse.ArgumentParser) -> None:
     """Add the option --snapshot NAME."""
-    parser.add_argument("--snapshot", metavar="NAME", help="read the revisions that this snapshot of the store names")
+    parser.add_argument("--snapshot", metavar="NAME", help="read the revisions in this snapshot of the store")
 
 
 def add_jobs(parser: argparse.ArgumentParser, workers: str) -> None:
@@ -58,9 +58,9 @@ def processors() -> int:
 
 
 def share_cores() -> None:
-    """Let linear algebra use one thread a worker; call this before numpy is imported.
+    """Let linear algebra use one thread per worker; call this before numpy is imported.
 
-    The workers fill the cores. Threads of linear algebra beside them wait for one another, and take as much time again.
+    The workers use all cores. Additional threads of linear algebra wait for one another, and double the time.
     """
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
@@ -78,7 +78,7 @@ def add_out(parser: argparse.ArgumentParser, directory: str) -> None:
 
 def add_scene(parser: argparse.ArgumentParser) -> None:
     """Add the argument SCENE."""
-    parser.add_argument("scene", metavar="SCENE", help="a .toml file, or a scene that comes with the program")
+    parser.add_argument("scene", metavar="SCENE", help="a .toml file, or the name of a packaged scene")
 
 
 def whole_number(most: int | None = None) -> Callable[[str], int]:
@@ -90,7 +90,7 @@ def whole_number(most: int | None = None) -> Callable[[str], int]:
         except ValueError:
             raise argparse.ArgumentTypeError(f"{text!r} is not a whole number") from None
         if value < 1:
-            raise argparse.ArgumentTypeError(f"{value} is not at least 1")
+            raise argparse.ArgumentTypeError(f"{value} is less than 1")
         if most is not None and value > most:
             raise argparse.ArgumentTypeError(f"{value} is more than {most}")
         return value
@@ -111,7 +111,7 @@ def sheet_file(text: str) -> Path:
 def _file_to_write(text: str, *suffixes: str) -> Path:
     path = place(text)
     if path.is_dir():
-        raise argparse.ArgumentTypeError(f"{text!r} is a directory; name a file in it")
+        raise argparse.ArgumentTypeError(f"{text!r} is a directory; give the path of a file")
     if path.suffix.lower() not in suffixes:
         raise argparse.ArgumentTypeError(f"{text!r} does not end in {' or '.join(suffixes)}")
     return path

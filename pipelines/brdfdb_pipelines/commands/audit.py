@@ -5,12 +5,10 @@ from __future__ import annotations
 import argparse
 import sys
 
+from brdfdb_pipelines.commands import INTERRUPTED, VIOLATED
 from brdfdb_pipelines.commands._arguments import add_jobs, add_store, place, share_cores
-from brdfdb_pipelines.exit_codes import INTERRUPTED, VIOLATED
 
-HELP = (
-    "Audit tables and their models, and all that tables state; exit 1 on a violation, or where nothing can be judged."
-)
+HELP = "Audit tables, their models and all that tables state; exit 1 if a table violates a law or cannot be judged."
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -21,21 +19,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--report",
         type=place,
         metavar="FILE",
-        help="JSON report, which ends in .json (default: DIR/audit.json, or DIR/audit-part.json with names)",
+        help="JSON report, FILE.json; the page is FILE.html (default: DIR/audit.json; with names DIR/audit-part.json)",
     )
-    add_jobs(parser, "processes")
+    add_jobs(parser, "number of processes")
     parser.add_argument(
         "--allow",
         nargs="+",
         action="extend",
         default=[],
         metavar="NAME",
-        help="materials whose models may reflect more than they receive: accepted, and shown as such",
+        help="materials whose models may have an albedo above 1; the report names them as accepted",
     )
     parser.add_argument(
         "--all",
         action="store_true",
-        help="audit everything (default: what the last report says of the same bytes, by the same program, is kept)",
+        help="audit everything again (default: results of the last report are reused for unchanged tables)",
     )
     parser.add_argument("--no-figures", action="store_true", help="leave out the stability atlas and the gallery")
 

@@ -11,38 +11,41 @@ from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from brdfdb_pipelines.commands import INTERRUPTED
 from brdfdb_pipelines.commands._arguments import add_jobs, add_store, byte_count, place, share_cores
-from brdfdb_pipelines.exit_codes import INTERRUPTED
 
 if TYPE_CHECKING:
     from brdfdb_pipelines.build import Built
     from brdfdb_pipelines.workers import Workers
 
-HELP = "Tabulate the materials of a recipe that the store does not have yet."
+HELP = "Build the tables of a recipe that the store does not contain yet."
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the recipe, the store, and where the work is done."""
-    parser.add_argument("recipe", type=place, nargs="?", help="a TOML file (default: every material of the papers)")
     parser.add_argument(
-        "--library", metavar="NAME", help="in place of a file: the recipe of a library of presets, such as metals"
+        "recipe", type=place, nargs="?", help="a TOML file (default: the materials of the three papers)"
+    )
+    parser.add_argument(
+        "--library", metavar="NAME", help="build a library of presets, such as metals, instead of a recipe file"
     )
     add_store(parser)
-    add_jobs(parser, "threads or processes")
+    add_jobs(parser, "number of threads or processes")
     where = parser.add_mutually_exclusive_group()
-    where.add_argument("--processes", action="store_true", help="work in processes instead of threads")
+    where.add_argument("--processes", action="store_true", help="use processes instead of threads")
     where.add_argument(
         "--scheduler",
         metavar="ADDRESS",
-        help="work on the dask cluster of this scheduler, such as tcp://10.0.0.1:8786; its workers must see DIR, too",
+        help="use the dask cluster of this scheduler, such as tcp://10.0.0.1:8786; its workers must see DIR under "
+        "the same path",
     )
     parser.add_argument(
         "--memory",
         type=byte_count,
         metavar="SIZE",
-        help="memory of all tasks together, such as 500MB (default: that of the machine)",
+        help="memory that all tasks may use together, such as 500MB (default: all memory of the machine)",
     )
-    parser.add_argument("--json", action="store_true", help="print progress as JSON, an object a line")
+    parser.add_argument("--json", action="store_true", help="print progress as JSON, one object per line")
 
 
 def run(options: argparse.Namespace) -> int:
@@ -52,7 +55,7 @@ def run(options: argparse.Namespace) -> int:
         _build(options)
     except KeyboardInterrupt:
         print(
-            "brdfdb: interrupted; published tables and complete blocks stay; "
+            "brdfdb: interrupted; published tables and complete blocks are preserved; "
             f"to resume: {shlex.join(['brdfdb', *options.arguments])}",
             file=sys.stderr,
         )
@@ -64,13 +67,15 @@ def _build(options: argparse.Namespace) -> None:
     from brdfdb._numba import when_compiling
     from brdfdb.errors import ParameterError
     from brdfdb.materials import PAPERS
-    from brdfdb_pipelines import build_resources, recipe_file, workers
-    from brdfdb_pipelines.build import build
-    from brdfdb_pipelines.build_progress import Bars, Lines
-    from brdfdb_pipelines.compilation import compile_kernels
+    from brdfdb_pipelines import recipe_file, workers
+    from brdfdb_pipelines.build import build, compile_kernels
+    from brdfdb_pipelines.build_progress import Bars, JsonLines
+    from brdfdb_pipelines.build_survey import machine_memory
 
     if options.recipe is not None and options.library is not None:
-        raise ParameterError("--library", f"goes without a recipe file, and {options.recipe} is given", options.library)
+        raise ParameterError(
+            "--library", f"cannot be combined with a recipe file, and {options.recipe} is given", options.library
+        )
     recipe = recipe_file.load(options.recipe, options.library or PAPERS)
     start = time.perf_counter()
     memory: int | None = options.memory
@@ -78,9 +83,9 @@ def _build(options: argparse.Namespace) -> None:
     if options.scheduler:
         at = workers.cluster(options.scheduler)
     else:
-        memory = build_resources.machine_memory() if memory is None else memory
+        memory = machine_memory() if memory is None else memory
         at = (workers.processes if options.processes else workers.threads)(options.jobs)
-    with at as opened, Lines() if options.json else Bars() as report:
+    with at as opened, JsonLines() if options.json else Bars() as report:
         if not options.scheduler:
             compile_kernels(recipe, options.store, options.jobs, report)
         with when_compiling(lambda: report({"event": "compiling", "kernels": 0})):
@@ -90,7 +95,7 @@ def _build(options: argparse.Namespace) -> None:
 
 
 def _print(built: list[Built], root: Path, seconds: float) -> None:
-    """Print a line for each table that is not as it was before."""
+    """Print a line for each table that changed."""
     from brdfdb.errors import counted
     from brdfdb.store import summary_words
     from brdfdb.store.reader import Store
@@ -123,7 +128,7 @@ def _print(built: list[Built], root: Path, seconds: float) -> None:
     for name in (one.job.name for one in changed):
         excess = summary_words.excess(store.summary(name))
         if excess and store.metadata(name).known_excess is None:
-            print(f"{name} reflects more than it receives: {excess}")
+            print(f"{name} reflects more light than it receives: {excess}")
 
 
 def shape_in_words(shape: tuple[int, ...], wavelengths: int) -> str:

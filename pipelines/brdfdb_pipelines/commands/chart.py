@@ -6,7 +6,7 @@ import argparse
 
 from brdfdb_pipelines.commands._arguments import add_out, add_store, place
 
-HELP = "Chart the cost of every form of a material or family against its error: pictures and JSON."
+HELP = "Chart the error of every form of a material or a family over its cost; write pictures and JSON."
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -27,7 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=float,
         action="append",
         metavar="X",
-        help="tolerance of a planned table; repeat for more tables (default: 0.1, 0.01 and, for grey materials, 0.001)",
+        help="tolerance of a table to compare; may be repeated (default: 0.1, 0.01 and, for grey materials, 0.001)",
     )
 
 

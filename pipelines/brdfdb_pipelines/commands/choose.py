@@ -5,10 +5,10 @@ from __future__ import annotations
 import argparse
 import sys
 
+from brdfdb_pipelines.commands import INTERRUPTED
 from brdfdb_pipelines.commands._arguments import MOST_WIDTH, add_out, add_scene, place, share_cores, whole_number
-from brdfdb_pipelines.exit_codes import INTERRUPTED
 
-HELP = "Choose the cheapest form of each material that a scene cannot tell from the model."
+HELP = "Choose for each material of a scene the cheapest form whose picture looks like that of the exact model."
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -20,7 +20,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=whole_number(MOST_WIDTH),
         default=128,
         metavar="N",
-        help="pixels across the picture; choices are checked at four times as many other places (default: %(default)s)",
+        help="width of the picture [pixel]; choices are checked at 4 times as many other points (default: %(default)s)",
     )
     parser.add_argument(
         "--weigh",
@@ -28,7 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default="time",
         help="cost to minimise; both is the product of time and bytes (default: %(default)s)",
     )
-    parser.add_argument("--build", type=place, metavar="STORE", help="publish the chosen tables in this store")
+    parser.add_argument("--build", type=place, metavar="STORE", help="write the chosen tables to this store")
 
 
 def run(options: argparse.Namespace) -> int:
@@ -41,6 +41,6 @@ def run(options: argparse.Namespace) -> int:
     except KeyboardInterrupt:
         if options.build is None:
             raise
-        print("brdfdb: interrupted; published tables stay", file=sys.stderr)
+        print("brdfdb: interrupted; published tables are preserved", file=sys.stderr)
         return INTERRUPTED
     return 0

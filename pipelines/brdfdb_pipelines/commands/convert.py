@@ -6,11 +6,11 @@ import argparse
 
 from brdfdb_pipelines.commands._arguments import add_store, picture_file, place, share_cores
 
-HELP = "Convert a material to another model: its closest parameters, and the error that is left."
+HELP = "Convert a material to another model: find the closest parameters, and state the remaining error."
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the material, the model, what is kept, and the forms of the answer."""
+    """Add the material, the model, fixed parameters, and the outputs."""
     parser.add_argument("name", metavar="NAME", help="a preset, or a material of the recipe or the store")
     parser.add_argument("--to", required=True, metavar="MODEL", help="the model to convert to")
     add_store(parser)
@@ -25,41 +25,44 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="X=VALUE",
-        help="a parameter that is not searched, as recipes write it; may be repeated",
+        help="set a parameter instead of searching it, with the name and unit of recipes; may be repeated",
     )
     parser.add_argument(
         "--refractive-index",
         metavar="ENTRY",
-        help="shelf/book/page of a model with n and k, or fit (default: that of the material; without one, fit)",
+        help="refractive index for models with n and k: shelf/book/page, or fit to search n and k (default: that of "
+        "the material, else fit)",
     )
     parser.add_argument(
         "--weigh",
         choices=("light", "lightness"),
-        help="what is made least: l1, or a difference of cube roots (default: light, unless it loses the highlight)",
+        help="error to minimise: light is the l1 error, lightness a difference of cube roots (default: light, unless "
+        "it loses the highlight)",
     )
     parser.add_argument("--json", action="store_true", help="print JSON")
-    parser.add_argument(
-        "--picture", type=picture_file, metavar="FILE", help="write a picture of both, FILE.svg or FILE.png"
-    )
+    parser.add_argument("--picture", type=picture_file, metavar="FILE", help="draw both models, FILE.svg or FILE.png")
 
 
 def run(options: argparse.Namespace) -> int:
-    """Search, and print the parameters with what is left."""
+    """Search, and print the parameters with the remaining error."""
     share_cores()
     from brdfdb.errors import import_extra
     from brdfdb_pipelines import convert
 
     if options.picture is not None:
         import_extra("matplotlib")  # before the time is spent
-    convert.run(
-        options.name,
-        options.to,
-        store=options.store,
-        recipe_path=options.recipe,
+    request = convert.ConversionRequest(
+        model=options.to,
         wavelength_nm=options.wavelength_nm,
         fixed=options.fix,
         refractive_index=options.refractive_index,
         weigh=options.weigh,
+    )
+    convert.run(
+        options.name,
+        request,
+        store=options.store,
+        recipe_path=options.recipe,
         json=options.json,
         picture=options.picture,
     )

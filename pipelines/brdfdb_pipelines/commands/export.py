@@ -6,11 +6,11 @@ import argparse
 from typing import TYPE_CHECKING
 
 from brdfdb.errors import ParameterError
+from brdfdb_pipelines.commands import VIOLATED
 from brdfdb_pipelines.commands._arguments import add_jobs, add_out, add_store, place
-from brdfdb_pipelines.exit_codes import VIOLATED
 
 if TYPE_CHECKING:
-    from brdfdb.formats import Option
+    from brdfdb.formats import FormatOption
 
 HELP = "Write tables as files of other formats."
 
@@ -22,38 +22,38 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     # a command a format: argparse takes no NAME after an option that follows another positional argument
     formats = parser.add_subparsers(required=True, metavar="FORMAT", dest="file_format")
     formats.hint = (  # type: ignore[attr-defined]  # read by the parser
-        "; rgl is for Mitsuba 3 and pbrt, netcdf, csv and numpy for everybody"
+        "; rgl is for Mitsuba 3 and pbrt; netcdf, csv and numpy are for any program"
     )
     for name, exporter in EXPORTERS.items():
         sentence = f"Write {exporter.summary}."
         command = formats.add_parser(name, help=sentence, description=sentence)
         command.add_argument("names", nargs="*", metavar="NAME", help="materials")
         add_store(command)
-        command.add_argument("--all", action="store_true", help="every material of the store")
+        command.add_argument("--all", action="store_true", help="export all materials of the store")
         add_out(command, f"brdf-{name}")
         command.add_argument(
             "--audit",
             type=place,
             metavar="FILE",
-            help="report of `brdfdb audit` whose verdicts go into the files (default: those in the store)",
+            help="report of `brdfdb audit` whose verdicts are written to the files (default: the report in the store)",
         )
-        add_jobs(command, "materials that are written at a time")
+        add_jobs(command, "number of materials to write at the same time")
         if "tolerance" in options_of(exporter):
             command.add_argument(
                 "--strict",
                 action="store_true",
-                help="exit with 1 if a file is not within the tolerance that was asked for",
+                help="exit with 1 if the error of a file is above the requested tolerance",
             )
         for option in options_of(exporter).values():
             _add(command, option)
 
 
-def _add(command: argparse.ArgumentParser, option: Option) -> None:
+def _add(command: argparse.ArgumentParser, option: FormatOption) -> None:
     flag, target = f"--{option.name.replace('_', '-')}", f"option_{option.name}"
     if option.default is False:
         command.add_argument(flag, dest=target, action="store_const", const="true", help=option.help)
     elif option.choices:
-        default = option.default if option.name != "kind" else "all of them"
+        default = option.default if option.name != "kind" else "all"
         text = f"{option.help}: {', '.join(option.choices)} (default: {default})"
         command.add_argument(flag, dest=target, metavar=option.name.upper(), help=text)
     else:

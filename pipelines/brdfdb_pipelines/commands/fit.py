@@ -5,11 +5,28 @@ from __future__ import annotations
 import argparse
 import sys
 
+from brdfdb_pipelines.commands import INTERRUPTED
 from brdfdb_pipelines.commands._arguments import place, share_cores
 from brdfdb_pipelines.commands._reading import add_reading, reading_keys
-from brdfdb_pipelines.exit_codes import INTERRUPTED
 
-HELP = "Fit models to measured samples: their parameters with intervals, ranked by the error at incidences left out."
+HELP = "Fit models to measured samples; rank them by their error at incidences left out of the fit."
+
+# Options that only a fit to samples has
+_OF_SAMPLES = (
+    "format",
+    "column",
+    "quantity",
+    "angles",
+    "azimuth",
+    "wavelength_nm",
+    "member",
+    "side",
+    "model",
+    "refractive_index",
+    "receiver_deg",
+    "source_deg",
+    "page",
+)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -19,7 +36,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs="+",
         type=place,
         metavar="DATA",
-        help="a file of samples, or several of one surface; a table of another program; or published fits (NAME.fit)",
+        help="a file of samples, or several files of the same surface; a table of another program; or published fits "
+        "(NAME.fit)",
     )
     add_reading(parser)
     parser.add_argument(
@@ -27,76 +45,68 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="NAME",
-        help="a model, or a sum such as 'A + 2 B'; may be repeated (default: every model, and sums with a uniform f_r)",
+        help="a model, or a sum such as 'A + 2 B'; may be repeated (default: all models, and sums with a uniform f_r)",
     )
     parser.add_argument(
         "--residual",
         choices=("log", "relative", "cosine", "uncertainty"),
         default="log",
-        help="what is made small (default: log, the difference of logarithms)",
+        help="difference to minimise (default: log, the difference of logarithms)",
     )
-    parser.add_argument("--channel", metavar="NAME", help="the channel that is fitted (default: all together)")
+    parser.add_argument("--channel", metavar="NAME", help="fit one channel (default: all channels together)")
     parser.add_argument(
         "--refractive-index",
         metavar="ENTRY",
-        help="shelf/book/page of models with n and k (default: n and k are searched)",
+        help="refractive index for models with n and k: shelf/book/page (default: n and k are fitted)",
     )
     parser.add_argument(
         "--receiver-deg",
         type=float,
         metavar="DEG",
-        help="full angle of the receiver, as the sample sees it: lobes are averaged over it (default: as DATA states)",
+        help="full angle of the receiver, seen from the sample; lobes are averaged over it (default: as DATA states)",
     )
-    parser.add_argument("--source-deg", type=float, metavar="DEG", help="the same of the light")
+    parser.add_argument(
+        "--source-deg", type=float, metavar="DEG", help="full angle of the light source, in the same way"
+    )
     parser.add_argument("--json", type=place, metavar="FILE", help="write all fits as JSON")
     parser.add_argument("--page", type=place, metavar="FILE", help="write a page with figures, FILE.html")
-    parser.add_argument("--recipe", type=place, metavar="FILE", help="write the best model as a recipe, FILE.toml")
+    parser.add_argument(
+        "--recipe", type=place, metavar="FILE", help="write the best single model as a recipe, FILE.toml"
+    )
 
 
 def run(options: argparse.Namespace) -> int:
     """Fit, and print the ranking."""
     share_cores()
-    from brdfdb.errors import counted, import_extra
+    from brdfdb.errors import ParameterError, counted, import_extra
     from brdfdb.fitting.published import SUFFIX
     from brdfdb_pipelines import fit
 
     import_extra("scipy")
+    first, *others = options.data
     if any(file.suffix.lower() == SUFFIX for file in options.data):
-        return _published(options)
+        if others:
+            raise ParameterError("DATA", f"{len(options.data)} files; a file of published fits is listed by itself")
+        for name in _OF_SAMPLES:
+            if getattr(options, name):
+                option = f"--{name.replace('_', '-')}"
+                raise ParameterError(option, f"{first} contains published fits and no samples; leave the option out")
+        fit.list_published(first, channel=options.channel, json=options.json, recipe=options.recipe)
+        return 0
     if options.page is not None:
         import_extra("matplotlib")  # before the time is spent
         import_extra("jinja2")
-    document = fit.run(
-        options.data,
-        options.model or None,
-        keys=reading_keys(options),
+    settings = fit.FitSettings(
+        models=options.model or None,
+        reading=reading_keys(options),
         residual=options.residual,
         channel=options.channel,
         refractive_index=options.refractive_index,
         receiver_deg=options.receiver_deg,
         source_deg=options.source_deg,
-        json=options.json,
-        page=options.page,
-        recipe=options.recipe,
     )
+    document = fit.run(options.data, settings, fit.FitOutputs(options.json, options.page, options.recipe))
     if document.interrupted:
-        print(f"brdfdb: interrupted; {counted(len(document.fits), 'model')} of the search are above", file=sys.stderr)
+        print(f"brdfdb: interrupted; {counted(len(document.fits), 'finished model')} printed above", file=sys.stderr)
         return INTERRUPTED
-    return 0
-
-
-def _published(options: argparse.Namespace) -> int:
-    """List published fits; options of searches are refused."""
-    from brdfdb.errors import ParameterError
-    from brdfdb_pipelines import published_fits
-
-    first, *others = options.data
-    if others:
-        raise ParameterError("DATA", f"{first} and {len(others)} more: published fits are listed one file at a time")
-    of_samples = ("format", "column", "quantity", "angles", "azimuth", "wavelength_nm", "member", "side")
-    for name in (*of_samples, "model", "refractive_index", "receiver_deg", "source_deg", "page"):
-        if getattr(options, name):
-            option = f"--{name.replace('_', '-')}"
-            raise ParameterError(option, f"{first} holds the fits of others and no samples; leave it out")
-    published_fits.run(first, channel=options.channel, json=options.json, recipe=options.recipe)
     return 0

@@ -6,20 +6,20 @@ import argparse
 
 from brdfdb_pipelines.commands._arguments import add_jobs, add_store, sheet_file
 
-HELP = "Draw a contact sheet: a lit sphere of each material, as PNG or EXR."
+HELP = "Draw a contact sheet with a lit sphere of each material, as PNG or EXR."
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the store, the materials and the file."""
     parser.add_argument("names", nargs="*", metavar="NAME", help="materials (default: all of the store)")
     add_store(parser)
-    add_jobs(parser, "threads")
+    add_jobs(parser, "number of threads")
     parser.add_argument(
         "--out",
         type=sheet_file,
         default="brdf-gallery.png",
         metavar="FILE",
-        help="the PNG, or EXR in linear light, to write (default: %(default)s)",
+        help="file to write: PNG, or EXR in linear light (default: %(default)s)",
     )
 
 

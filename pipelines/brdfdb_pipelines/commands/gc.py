@@ -7,9 +7,9 @@ import argparse
 from brdfdb_pipelines.commands._arguments import add_store, whole_number
 
 HELP = (
-    "Remove interrupted builds that could be resumed, revisions that are neither current nor kept, and the remains of "
-    "crashes. What a snapshot names stays, and so does everything of a material that is being built. Readers may be "
-    "running: tables that they hold stay, and a revision that is removed while it is read is never read as data."
+    "Remove old revisions, interrupted builds, which cannot be resumed then, and the remains of crashes. Revisions in "
+    "a snapshot are not removed, nor anything of a material that is being built. Readers may be running: a reader of a "
+    "removed revision gets an error, and never wrong data."
 )
 
 
@@ -21,13 +21,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=whole_number(),
         default=2,
         metavar="N",
-        help="revisions of each material that stay: the current one and the newest others (default: %(default)s)",
+        help="number of revisions to preserve of each material: the current one and the newest others (default: "
+        "%(default)s)",
     )
     parser.add_argument(
         "--damaged",
         action="store_true",
-        help="read all other revisions that stay, and remove those that are damaged and neither current nor in a "
-        "snapshot",
+        help="also read the remaining revisions, and remove damaged ones that are neither current nor in a snapshot",
     )
 
 
@@ -40,6 +40,6 @@ def run(options: argparse.Namespace) -> int:
     for path in collected.removed:
         print(f"removed {path}")
     for name in collected.busy:
-        print(f"left {name} alone: a build is at work on it")
+        print(f"{name} was skipped: it is being built")
     print(f"{terminal.size(collected.freed)} freed in {options.store}")
     return 0

@@ -6,7 +6,7 @@ import argparse
 
 from brdfdb_pipelines.commands._arguments import add_store
 
-HELP = "List the revisions of a material."
+HELP = "List the revisions of a material, the oldest first."
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

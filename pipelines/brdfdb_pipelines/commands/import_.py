@@ -4,42 +4,50 @@ from __future__ import annotations
 
 import argparse
 
+from brdfdb_pipelines.commands import REFUSED, VIOLATED
 from brdfdb_pipelines.commands._arguments import add_jobs, place, share_cores
 from brdfdb_pipelines.commands._reading import add_reading, reading_keys
-from brdfdb_pipelines.exit_codes import REFUSED, VIOLATED
 
-HELP = "Import measurements: state what files of others cover, integrate to and claim, and make audited tables of them."
+HELP = "Import measurements: state their coverage, albedos and metadata, and make audited tables of them."
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the files, what their columns are, and the forms of the answer."""
+    """Add the files, the meaning of their columns, and the outputs."""
     parser.add_argument("files", nargs="+", type=place, metavar="FILE", help="a file of measurements, or a zarr group")
     add_reading(parser)
-    parser.add_argument("--join", action="store_true", help="take all files as one set of samples, of one surface")
+    parser.add_argument("--join", action="store_true", help="join all files to one set of samples of the same surface")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
-    parser.add_argument("--out", type=place, metavar="FILE.nc", help="write the samples of one file as netCDF")
+    parser.add_argument("--out", type=place, metavar="FILE.nc", help="write the samples as netCDF, of a single file")
     tables = parser.add_argument_group("tables")
     tables.add_argument(
-        "--store", type=place, metavar="DIR", help="tabulate the samples in this store, and audit the tables"
+        "--store", type=place, metavar="DIR", help="build tables of the samples in this store, and audit them"
     )
     tables.add_argument(
         "--recipe",
         type=place,
         metavar="FILE.toml",
-        help="write the recipe with which brdfdb build makes the same tables",
+        help="write the recipe with which `brdfdb build` makes the same tables",
     )
     tables.add_argument(
         "--tolerance",
         type=float,
         metavar="E",
-        help="relative error against the data that 95 of 100 values of a table keep to, 0.0001 to 0.5 (default: 0.05)",
+        help="largest relative error of 95 %% of the values of a table, 0.0001 to 0.5 (default: 0.05)",
     )
-    tables.add_argument("--reciprocal", action="store_true", help="tabulate the nearest values that are reciprocal")
-    tables.add_argument("--conserving", action="store_true", help="tabulate the nearest values with no albedo above 1")
-    tables.add_argument("--name", metavar="NAME", help="name of the one material (default: that of the file, as words)")
-    tables.add_argument("--title", metavar="TEXT", help="a line for people (default: the name in the file)")
-    tables.add_argument("--source", metavar="TEXT", help="who measured, where it is published (default: the file's)")
-    add_jobs(parser, "processes")
+    tables.add_argument("--reciprocal", action="store_true", help="change the values to the nearest reciprocal ones")
+    tables.add_argument(
+        "--conserving", action="store_true", help="change the values to the nearest ones without an albedo above 1"
+    )
+    tables.add_argument(
+        "--name",
+        metavar="NAME",
+        help="name of the material, if it is a single one (default: from the name of the file)",
+    )
+    tables.add_argument("--title", metavar="TEXT", help="title of the material (default: the name in the file)")
+    tables.add_argument(
+        "--source", metavar="TEXT", help="who measured it, and where it is published (default: as the file states)"
+    )
+    add_jobs(parser, "number of processes")
 
 
 def run(options: argparse.Namespace) -> int:
@@ -47,24 +55,25 @@ def run(options: argparse.Namespace) -> int:
     share_cores()
     from brdfdb.errors import ParameterError
     from brdfdb_pipelines import import_samples
-    from brdfdb_pipelines.import_tables import TOLERANCE, Tables
 
     keys = reading_keys(options)
     of_table = ("tolerance", "reciprocal", "conserving", "name", "title", "source")
     tables = None
     if options.store is not None or options.recipe is not None:
-        tables = Tables(
+        tables = import_samples.Tables(
             store=options.store,
             recipe=options.recipe,
             name=options.name,
             title=options.title,
-            tolerance=TOLERANCE if options.tolerance is None else options.tolerance,
+            tolerance=import_samples.TOLERANCE if options.tolerance is None else options.tolerance,
             jobs=options.jobs,
         )
     else:
         for name in of_table:
             if getattr(options, name) not in (None, False):
-                raise ParameterError(f"--{name}", "it goes with --store or --recipe", getattr(options, name))
+                raise ParameterError(
+                    f"--{name}", "is allowed only together with --store or --recipe", getattr(options, name)
+                )
     made = {name: True for name in ("reciprocal", "conserving") if getattr(options, name)}
     source = {} if options.source is None else {"source": options.source}
     result = import_samples.run(

@@ -21,24 +21,26 @@ if TYPE_CHECKING:
 HELP = "List the materials and families of the store, or the presets."
 
 _FILTERS = {
-    "model": "list materials of this model only; measured: those of measured data",
-    "paper": "list materials only with this in the key of the paper or in the source",
-    "words": "list materials only with all of these words in name, title, model or source",
+    "model": "list only materials of this model; measured: materials of measured data",
+    "paper": "list only materials with this text in the key of the paper or in the source",
+    "words": "list only materials with all of these words in name, title, model or source",
 }
-_WORDS = 5  # number of words that all sources must share before they are printed once
+_WORDS = 5  # number of words that all sources must share to be printed once
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the store and the choice of presets."""
     add_store(parser)
-    parser.add_argument("--presets", action="store_true", help="list the presets, which recipes can name")
+    parser.add_argument("--presets", action="store_true", help="list the presets that recipes can name")
     parser.add_argument(
-        "--library", metavar="NAME", help="with --presets, the library to list, such as metals (default: papers)"
+        "--library", metavar="NAME", help="with --presets: library to list, such as metals (default: papers)"
     )
     for flag, words in _FILTERS.items():
         parser.add_argument(f"--{flag}", default="", metavar=flag.upper(), help=words)
     parser.add_argument(
-        "--sort", default="name", help="name, error_p99, created or bytes; -error_p99 and so on: the largest first"
+        "--sort",
+        default="name",
+        help="name, error_p99, created or bytes; with a minus, such as -error_p99, the largest first",
     )
     add_snapshot(parser)
 
@@ -48,11 +50,11 @@ def run(options: argparse.Namespace) -> int:
     given = [flag for flag in _FILTERS if getattr(options, flag)]
     if options.presets:
         if given:
-            raise ParameterError(f"--{given[0]}", "does not go with --presets", getattr(options, given[0]))
+            raise ParameterError(f"--{given[0]}", "cannot be combined with --presets", getattr(options, given[0]))
         _print_presets(options.library)
         return 0
     if options.library is not None:
-        raise ParameterError("--library", "goes with --presets", options.library)
+        raise ParameterError("--library", "is allowed only together with --presets", options.library)
     root: Path = options.store
     store = brdfdb.open(root, snapshot=options.snapshot)
     names = _chosen(store, options)

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from brdfdb.store.family import Family
     from brdfdb.tables.table import Table
 
-HELP = "Print f_r [1/sr] of a material, or a family, at one pair of directions."
+HELP = "Print f_r [1/sr] of a material or a family at one pair of directions."
 
 _STOKES = ("reflected", "specular")
 _LIKE_RADIANS = 3.2  # angles below it, with a fraction among them, may be radians
@@ -31,13 +31,27 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     for angle in _ANGLES:
         parser.add_argument(angle, type=float, metavar=angle.upper(), help="degrees")
     add_store(parser)
-    parser.add_argument("--wavelength-nm", type=float, nargs="+", metavar="NM", help="default: all of the table")
     parser.add_argument(
-        "--set", action="append", default=[], metavar="X=VALUE", help="a parameter of a family, as recipes write it"
+        "--wavelength-nm",
+        type=float,
+        nargs="+",
+        metavar="NM",
+        help="wavelengths in nanometres (default: all of the table)",
+    )
+    parser.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="X=VALUE",
+        help="value of a parameter of a family, with the name and unit of recipes; may be repeated",
     )
     parser.add_argument("--json", action="store_true", help="print JSON")
-    parser.add_argument("--with-error", action="store_true", help="print the stated error of each value, too")
-    parser.add_argument("--stokes", metavar="I,Q,U,V", help="incident light: print what is reflected of it")
+    parser.add_argument("--with-error", action="store_true", help="also print the stated error of each value")
+    parser.add_argument(
+        "--stokes",
+        metavar="I,Q,U,V",
+        help="Stokes vector of the incident light: also print that of the reflected light",
+    )
     add_snapshot(parser)
 
 
@@ -58,7 +72,7 @@ def run(options: argparse.Namespace) -> int:
             check_azimuth_deg(angle, value)
     if all(abs(value) < _LIKE_RADIANS for value in angles_deg) and not all(map(float.is_integer, angles_deg)):
         shown = " ".join(f"{value:g}" for value in angles_deg)
-        print(f"brdfdb: angles are degrees; these look like radians: {shown}", file=sys.stderr)
+        print(f"brdfdb: angles are in degrees, but these look like radians: {shown}", file=sys.stderr)
     root: Path = options.store
     store = brdfdb.open(root, snapshot=options.snapshot)
     source: Table | Family
@@ -72,7 +86,9 @@ def run(options: argparse.Namespace) -> int:
     else:
         source = store[options.name]
         if options.set:
-            raise ParameterError(f"--set {options.set[0]}", f"{options.name} is a material, whose parameters are fixed")
+            raise ParameterError(
+                f"--set {options.set[0]}", f"{options.name} is a material; only a family has parameters to set"
+            )
         head = {"material": options.name, "revision": source.revision}
         specular_part = source.specular is not None
     theta_i, phi_i, theta_r, phi_r = radians(angles_deg)
@@ -110,7 +126,7 @@ def run(options: argparse.Namespace) -> int:
     if light is not None:
         print(f"{light['convention']}. {light['basis']}")
     if outside:
-        print("extrapolated: outside of the directions that were measured, where the error is not known")
+        print("extrapolated: these directions were not measured, and the error is unknown")
     return 0
 
 
@@ -119,8 +135,7 @@ def _reflected(source: Table | Family, angles_deg: list[float], options: argpars
     import numpy as np
 
     from brdfdb.geometry import radians
-    from brdfdb.tables.points import Points
-    from brdfdb.tables.stokes_document import read_stokes, stokes_document
+    from brdfdb.tables.evaluation import LookupPoints, read_stokes, stokes_document
     from brdfdb.tables.table import Table
 
     if options.stokes is None:
@@ -129,7 +144,7 @@ def _reflected(source: Table | Family, angles_deg: list[float], options: argpars
     if not isinstance(source, Table):
         raise ParameterError("stokes", f"{options.name} is a family, which has no Mueller matrices", options.stokes)
     at = None if options.wavelength_nm is None else np.array(options.wavelength_nm)
-    document = stokes_document(source, Points.of(tuple(radians(angles_deg)), at), incident)
+    document = stokes_document(source, LookupPoints.of(tuple(radians(angles_deg)), at), incident)
     return {key: np.asarray(value).tolist() if key in _STOKES else value for key, value in document.items()}
 
 
@@ -150,11 +165,11 @@ def _swept(family: Family, settings: Sequence[str]) -> dict[str, float]:
     for name, nodes in axes.items():
         low, high = nodes[0], nodes[-1]
         if name not in values:
-            raise ParameterError("--set", f"{name} is missing, {family.name} needs a value in [{low:g}, {high:g}]")
+            raise ParameterError("--set", f"{name} is missing; give a value in [{low:g}, {high:g}]")
         if not low <= values[name] <= high:
             raise ParameterError(
                 f"--set {name}={values[name]:.9g}",
-                f"outside [{low:g}, {high:g}] of {family.name}",
+                f"is outside [{low:g}, {high:g}], the range of {family.name}",
                 values[name],
                 (low, high),
             )

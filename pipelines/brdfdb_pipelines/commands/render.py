@@ -7,7 +7,7 @@ from pathlib import Path
 
 from brdfdb_pipelines.commands._arguments import MOST_WIDTH, add_out, add_scene, whole_number
 
-HELP = "Render a scene with the models of its materials, as PNG and spectral EXR."
+HELP = "Render a scene with the models of its materials as PNG and spectral EXR."
 
 WIDTH = 256  # pixels across the picture by default
 MOST_ACROSS = 16  # rays across a pixel: more take tens of gigabytes
@@ -19,10 +19,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_out(parser, "brdf-scenes")
     # no defaults: a recorded scene has the pixels of its file
     parser.add_argument(
-        "--width", type=whole_number(MOST_WIDTH), metavar="N", help=f"pixels across the picture (default: {WIDTH})"
+        "--width", type=whole_number(MOST_WIDTH), metavar="N", help=f"width of the picture [pixel] (default: {WIDTH})"
     )
     parser.add_argument(
-        "--across", type=whole_number(MOST_ACROSS), metavar="N", help="rays across each pixel, and down (default: 1)"
+        "--across", type=whole_number(MOST_ACROSS), metavar="N", help="rays across and down each pixel (default: 1)"
     )
 
 
@@ -31,8 +31,8 @@ def run(options: argparse.Namespace) -> int:
     from brdfdb.errors import ParameterError, import_extra
     from brdfdb.scenes import image
     from brdfdb.scenes.gbuffer import gather
-    from brdfdb.scenes.recorded_directions import Recorded
     from brdfdb.scenes.renderer import reflectors, render
+    from brdfdb.scenes.shapes import Recorded
     from brdfdb_pipelines import scene_file, terminal
 
     for module in ("matplotlib.image", "OpenEXR"):  # before the time is spent
@@ -41,7 +41,7 @@ def run(options: argparse.Namespace) -> int:
     scene = scene_file.load(name)
     if isinstance(scene.objects[0].shape, Recorded) and (options.width is not None or options.across is not None):
         raise scene_file.SceneError(
-            name, "", "is recorded, and has the pixels of its file; leave out --width and --across"
+            name, "", "is recorded with a fixed number of pixels; leave out --width and --across"
         )
     try:
         with terminal.progress(counted=False, transient=True) as bar:

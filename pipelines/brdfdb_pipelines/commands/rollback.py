@@ -6,7 +6,7 @@ import argparse
 
 from brdfdb_pipelines.commands._arguments import add_store
 
-HELP = "Make another revision of a material current, after verifying it."
+HELP = "Verify another revision of a material and make it current."
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -23,9 +23,9 @@ def run(options: argparse.Namespace) -> int:
     name, revision = options.name, options.revision
     before = revisions.rollback(options.store, name, revision)
     if not before:
-        print(f"{name}: {revision} is current; its HEAD.json was missing or damaged")
+        print(f"{name}: {revision} is current now; HEAD.json was missing or damaged")
     elif before != revision:
-        print(f"{name}: {revision} is current, {before} was")
+        print(f"{name}: {revision} is current now, instead of {before}")
     else:
-        print(f"{name}: {revision} stays current")
+        print(f"{name}: {revision} was current already")
     return 0

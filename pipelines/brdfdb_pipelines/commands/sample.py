@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from brdfdb_pipelines.commands._arguments import add_jobs, place, whole_number
 
-HELP = "Write a training set: materials drawn over the ranges of a model, times directions, as one zarr group."
+HELP = "Write a training set: f_r of random materials of a model at random directions, as one zarr group."
 _MATERIALS, _DIRECTIONS = 10_000_000, 1_000_000
 
 
@@ -22,23 +22,27 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=whole_number(_DIRECTIONS),
         required=True,
         metavar="N",
-        help="number of pairs of directions, which all materials share",
+        help="number of pairs of directions; all materials have the same pairs",
     )
     parser.add_argument(
-        "--out", type=place, required=True, metavar="SET.zarr", help="the group to write; the same command resumes it"
+        "--out",
+        type=place,
+        required=True,
+        metavar="SET.zarr",
+        help="zarr group to write; repeat the command to resume after an interruption",
     )
     parser.add_argument(
         "--range",
         action="append",
         default=[],
         metavar="NAME=LOW:HIGH",
-        help="range of a parameter in place of the usual one, as recipes write it; may be repeated",
+        help="range of a parameter instead of the usual one, with the name and unit of recipes; may be repeated",
     )
     parser.add_argument(
         "--seed", type=int, default=0, metavar="N", help="the same seed draws the same set (default: %(default)s)"
     )
-    parser.add_argument("--gradients", action="store_true", help="write the derivatives by the parameters, too")
-    add_jobs(parser, "threads")
+    parser.add_argument("--gradients", action="store_true", help="also write the derivatives by the parameters")
+    add_jobs(parser, "number of threads")
 
 
 def run(options: argparse.Namespace) -> int:
@@ -65,7 +69,7 @@ def _ranges(texts: Sequence[str]) -> dict[str, tuple[float, float]]:
     for text in texts:
         name, ends = _range(text)
         if name in ranges:
-            raise ParameterError(f"--range {name}", "a parameter has one range, and this one has two", text)
+            raise ParameterError(f"--range {name}", "is given twice; a parameter has one range", text)
         ranges[name] = ends
     return ranges
 
@@ -78,4 +82,4 @@ def _range(text: str) -> tuple[str, tuple[float, float]]:
     try:
         return name, (float(low), float(high))
     except ValueError:
-        raise ParameterError(f"--range {text}", "NAME=LOW:HIGH is a range, such as alpha_x=0.05:0.3", text) from None
+        raise ParameterError(f"--range {text}", "is not NAME=LOW:HIGH, such as alpha_x=0.05:0.3", text) from None

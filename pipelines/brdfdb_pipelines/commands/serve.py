@@ -6,16 +6,22 @@ import argparse
 
 from brdfdb_pipelines.commands._arguments import MOST_JOBS, add_snapshot, add_store, whole_number
 
-HELP = "Answer lookups over HTTP."
+HELP = "Serve lookups over HTTP."
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the store, the address and the number of processes."""
     add_store(parser)
     parser.add_argument("--host", default="127.0.0.1", help="address to listen on (default: %(default)s)")
-    parser.add_argument("--port", type=int, default=8000, help="port (default: %(default)s)")
     parser.add_argument(
-        "--workers", type=whole_number(MOST_JOBS), default=1, metavar="N", help="processes (default: %(default)s)"
+        "--port", type=int, default=8000, help="port to listen on; 0: any free port (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--workers",
+        type=whole_number(MOST_JOBS),
+        default=1,
+        metavar="N",
+        help="number of processes (default: %(default)s)",
     )
     add_snapshot(parser)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import itertools
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,16 +16,15 @@ if TYPE_CHECKING:
     from brdfdb.materials.provenance import Assumption
     from brdfdb.store.family import Family
     from brdfdb.store.summary_words import Audited
-    from brdfdb.tables.first_numbers import FormulaError
     from brdfdb.tables.grids import Axis
     from brdfdb.tables.metadata import TableMetadata
-    from brdfdb.tables.stated_error import Error, Overall
+    from brdfdb.tables.stated_error import Error, FormulaError, Overall, WorstPair
     from brdfdb.tables.table import Table
-    from brdfdb.tables.worst_pair import WorstPair
 
-HELP = "Show parameters, sources, grid, albedo and files of a material, or a family."
+HELP = "Show parameters, sources, grid, errors, albedo and files of a material or a family."
 
-_VALUE_WIDTH = 9  # of the numbers of parameters; longer values are spectra in words
+_VALUE_WIDTH = 9  # width of the numbers of parameters; longer values are spectra in words
+_LABEL = 22  # width of the labels of errors
 ALBEDO_ANGLES_DEG = (0.0, 30.0, 60.0, 80.0)
 
 
@@ -76,7 +76,7 @@ def _print_family(family: Family) -> None:
     print(terminal.plain(f"{record.name}: {record.title}"))
     print(f"  model       {record.model}")
     print(f"  tables      {len(record.members)}, {record.members[0]} to {record.members[-1]}")
-    print("  over")
+    print("  parameters")
     for written, values in record.axes.items():
         print(f"    {written:<16}{len(values)} values, {values[0]:g} to {values[-1]:g}")
     how = record.interpolation
@@ -86,7 +86,7 @@ def _print_family(family: Family) -> None:
     print(f"  measured    {how.reason}")
     _print_error(family.error, "the model")
     at = ", ".join(f"{x} {value:g}" for x, value in record.worst.parameters.items())
-    print(f"  worst       {terminal.error(record.worst.p99)} at {at}, of {record.points} sets of parameters")
+    print(f"  worst       {terminal.error(record.worst.p99)} at {at}, among {record.points} sets of parameters")
     if record.specular_error is not None:
         print(f"  specular    within {record.specular_error:.3g} of the model's reflectance")
 
@@ -103,14 +103,14 @@ def _origin(metadata: TableMetadata) -> list[str]:
     for parameter, value in metadata.parameters.items():
         note = metadata.parameter_sources.get(parameter, "")
         if parameter in metadata.assumed:
-            note = f"assumed, see {'the note' if metadata.assumed[parameter] is None else 'below'}"
+            note = f"assumed; see {'the note' if metadata.assumed[parameter] is None else 'below'}"
         text = f"{value:.6g}" if isinstance(value, float) else str(value)
         note = f"; {note}" if note and len(text) >= _VALUE_WIDTH else note
         lines.append(f"    {parameter:<16}{text:<{_VALUE_WIDTH}}{note}".rstrip())
     if metadata.source is not None:
         lines.append(f"  source      {metadata.source}")
     if metadata.uncited:
-        lines.append("  source      not recorded, so that what the table cites is not shown; no audit can judge it")
+        lines.append("  source      not recorded; an audit cannot judge the table")
     if metadata.measured is not None:
         lines += [f"  {'measured' if not n else '':<12}{line}" for n, line in enumerate(metadata.measured.in_words())]
     if metadata.refractive_index:
@@ -131,7 +131,7 @@ def _assumption(parameter: str, assumption: Assumption) -> list[str]:
         lines.append(f"    {'largest albedo':<16}{assumption.max_albedo:.3f} as tabulated")
     for other in assumption.alternatives:
         values = ", ".join(f"{name} = {value}" for name, value in other.parameters.items())
-        excess = ", more than arrives" if other.max_albedo > 1.0 else ""
+        excess = ", above 1" if other.max_albedo > 1.0 else ""
         lines.append(f"    {'':<16}{other.max_albedo:.3f} with {values}{excess}")
     return lines
 
@@ -151,9 +151,9 @@ def _print_grid(table: Table) -> None:
     else:
         print(f"    {'wavelength':<16}{wavelength.size} nodes, {wavelength[0]:g} to {wavelength[-1]:g} nm")
     if table.spectra is not None:
-        print(f"    {'parts':<16}{table.spectra.shape[0]}, of which each spectrum is a sum")
+        print(f"    {'parts':<16}{table.spectra.shape[0]}; each spectrum is a weighted sum of them")
     bits = metadata.bits
-    stored = "all 23 bits of their mantissas" if bits == 23 else f"{bits} of 23 bits of their mantissas"
+    stored = f"stored with {'all 23' if bits == 23 else f'{bits} of 23'} bits of the mantissa"
     print(f"    {'values':<16}{table.values.size}, {stored}")
     print(f"    {'interpolation':<16}{_interpolation(table)}")
     if metadata.reason:
@@ -182,42 +182,47 @@ def _print_error(error: Error | None, truth: str, *, measured: bool = False) -> 
         print("  error       not measured")
         return
     overall = error.overall
-    print(f"  error       {terminal.error(overall.p99)} of f_r against {truth}, {_spread(overall, error)}")
+    print(f"  error       {terminal.error(overall.p99)} of f_r relative to {truth}, {_spread(overall, error)}")
     _print_worst(error.worst)
     edges = error.theta_i_deg
-    rows = [("99 of 100", error.p99), ("reflected", error.l1)]
+    rows = [("99 % of f_r", error.p99), ("reflected light", error.l1)]
+    notes = ["99 % of f_r: 99 % of the values differ by at most this; reflected light: l1; x 35: a factor of 35"]
     if error.places is not None:
-        rows.append(("alongside", error.places.alongside))
+        rows.append(("near the light", error.places.alongside))
+        notes.append("near the light: theta_r within 10° of theta_i, delta_phi within 90°; 98 % of the values")
     if error.between is not None:
-        between = error.between.bands  # of a mixture, one row for all bands
-        rows.append(("between", between if len(between) > 1 else between * (len(edges) - 1)))
-    print("    theta_i     " + "".join(f"{f'{a:g}-{b:g}°':>9}" for a, b in itertools.pairwise(edges)))
+        between = error.between.bands  # a mixture has the same error in all bands
+        rows.append(("between wavelengths", between if len(between) > 1 else between * (len(edges) - 1)))
+        notes.append("between wavelengths: at any wavelength between those of the table; 98 % of the values")
+    print(_headings("theta_i", edges))
     for label, bands in rows:
         print(_errors(label, bands, measured=measured))
-    notes = [] if error.places is None else ["alongside: theta_r within 10° of theta_i, delta_phi within 90°"]
-    notes += [] if error.between is None else ["between: any wavelength between those of the table"]
-    if notes:
-        print("    99 of 100: of f_r; reflected: of the reflected light (l1); x 35: a factor of 35")
-        print(f"    {'; '.join(notes)}")
-        print("    98 of 100 values are within these limits, and within those next to the horizon, if given")
-    if error.places is None:
-        return
-    print("    horizon     " + "".join(f"{f'{a:g}-{b:g}°':>9}" for a, b in itertools.pairwise(RINGS_DEG)))
-    for label, rings in (("one there", error.places.one_grazing), ("both beyond", error.places.both_grazing)):
-        print(_errors(label, rings, measured=measured))
+    if error.places is not None:
+        print(_headings("theta next to 90°", RINGS_DEG))
+        print(_errors("one direction grazing", error.places.one_grazing, measured=measured))
+        print(_errors("both grazing", error.places.both_grazing, measured=measured))
+        notes.append(
+            "grazing: theta_i or theta_r is in the range; if both are grazing, the larger one; 98 % of the values"
+        )
+    for note in notes:
+        print(f"    {note}")
+
+
+def _headings(label: str, edges: Sequence[float]) -> str:
+    return f"    {label:<{_LABEL}}" + "".join(f"{f'{a:g}-{b:g}°':>9}" for a, b in itertools.pairwise(edges))
 
 
 def _errors(label: str, bands: list[list[float]], *, measured: bool) -> str:
     """Return a row of errors at their worst wavelengths, in percent or as factors.
 
-    A dash stands where nothing was measured, of which the error of a measured table is 0.
+    A measured table has an error of 0 where nothing was measured: a dash stands for it.
     """
     from brdfdb_pipelines import terminal
 
     worst = [max(row) for row in bands]
     words = ["-" if measured and largest == 0.0 else terminal.error(largest) for largest in worst]
     cells = [text.replace("a factor of ", "x ").replace(" %", "%") for text in words]
-    return f"    {label:<12}" + "".join(f"{cell:>9}" for cell in cells)
+    return f"    {label:<{_LABEL}}" + "".join(f"{cell:>9}" for cell in cells)
 
 
 def _spread(overall: Overall, error: Error | FormulaError) -> str:
@@ -225,7 +230,7 @@ def _spread(overall: Overall, error: Error | FormulaError) -> str:
     from brdfdb_pipelines import terminal
 
     return (
-        f"in 99 of 100 of {error.directions} directions (median {terminal.error(overall.median)}, largest "
+        f"at 99 % of {error.directions} directions (median {terminal.error(overall.median)}, largest "
         f"{terminal.error(overall.max)}; {terminal.error(overall.l1)} of the reflected light (l1))"
     )
 
@@ -244,7 +249,7 @@ def _print_formula_error(error: FormulaError | None) -> None:
     from brdfdb_pipelines import terminal
 
     if error is None:
-        print("  formula     not measured; `brdfdb build` measures it")
+        print("  formula     error not measured; `brdfdb build` measures it")
     elif error.against != "measured" or error.overall is None:
         print(f"  formula     {error.in_words()}")
     else:
@@ -281,7 +286,7 @@ def _source_of(table: Table) -> Material | None:
 
 
 def _print_validity(material: Material | None, wavelength_nm: Axis | None) -> None:
-    """Print how many limits of its paper a material keeps, and each limit that it does not keep."""
+    """Print whether a material is within the limits that its paper states, and each limit that it does not meet."""
     from brdfdb.materials.stated_limits import in_words, limits_of
     from brdfdb_pipelines import terminal
 
@@ -291,8 +296,8 @@ def _print_validity(material: Material | None, wavelength_nm: Axis | None) -> No
     print(f"  validity    {in_words([limit.standing for limit in limits])}")
     for limit in limits:
         if limit.standing in ("at the edge", "outside"):
-            kept = "at the edge" if limit.standing == "at the edge" else "not kept"
-            print(terminal.plain(f"    {kept:<16}{limit.quantity}: {limit.value} ({limit.valid}); {limit.where}"))
+            standing = "at the edge" if limit.standing == "at the edge" else "not met"
+            print(terminal.plain(f"    {standing:<16}{limit.quantity}: {limit.value} ({limit.valid}); {limit.where}"))
 
 
 def _print_albedo(table: Table, material: Material | None) -> None:

@@ -8,17 +8,16 @@ from pathlib import Path
 from brdfdb.errors import ParameterError, counted
 from brdfdb_pipelines.commands._arguments import add_store
 
-HELP = (
-    "Give the current revisions of all materials and families of the store a name that never changes; without a name, "
-    "list the snapshots."
-)
+HELP = "Record the current revisions of all materials and families under a name; without a name, list the snapshots."
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the name and the store."""
     parser.add_argument("name", nargs="?", metavar="NAME", help="lower-case letters, digits and single hyphens")
     add_store(parser)
-    parser.add_argument("--remove", action="store_true", help="remove the snapshot; the revisions stay until gc")
+    parser.add_argument(
+        "--remove", action="store_true", help="remove the snapshot; `brdfdb gc` can remove its revisions then"
+    )
 
 
 def run(options: argparse.Namespace) -> int:
@@ -26,10 +25,12 @@ def run(options: argparse.Namespace) -> int:
     from brdfdb.store import snapshots
 
     if options.remove and options.name is None:
-        raise ParameterError("snapshot", "--remove needs the NAME of a snapshot")
+        raise ParameterError("snapshot", "--remove requires the NAME of a snapshot")
     if options.remove:
         snapshots.remove(options.store, options.name)
-        print(f"{options.name} is removed; `brdfdb gc` removes the revisions that nothing else keeps")
+        print(
+            f"{options.name} was removed; `brdfdb gc` removes revisions that are in no other snapshot and not current"
+        )
     elif options.name is not None:
         _create(options.store, options.name)
     else:
@@ -51,10 +52,10 @@ def _create(root: Path, name: str) -> None:
 
 def _list(root: Path) -> None:
     """Print a line for each snapshot of a store."""
+    from brdfdb.store.files import seal_of
     from brdfdb.store.paths import snapshot_path
     from brdfdb.store.reader import Store
-    from brdfdb.store.sealed_json import seal_of
-    from brdfdb.store.snapshot_record import snapshot_names
+    from brdfdb.store.records import snapshot_names
 
     names = snapshot_names(Store(root).root)
     for name in names:
@@ -64,7 +65,7 @@ def _list(root: Path) -> None:
 
 
 def _contents(root: Path, name: str) -> str:
-    from brdfdb.store.snapshot_record import read_snapshot
+    from brdfdb.store.records import read_snapshot
 
     content = read_snapshot(root, name)
     return f"{name}: {counted(len(content['materials']), 'material')}, {len(content['families'])} families"

@@ -5,11 +5,11 @@ from __future__ import annotations
 import argparse
 import sys
 
+from brdfdb_pipelines.commands import REFUSED
 from brdfdb_pipelines.commands._arguments import add_store
-from brdfdb_pipelines.exit_codes import REFUSED
 
 HELP = (
-    "Verify tables: sizes, sha256, each chunk with its crc32c, dimensions and attributes; families and snapshots. "
+    "Verify the files of tables, families and snapshots: sizes, sha256, crc32c of each chunk, dimensions, attributes. "
     "Print the command that repairs each damage."
 )
 

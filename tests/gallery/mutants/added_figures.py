@@ -9,13 +9,12 @@ import numpy as np
 
 from brdfdb import fresnel
 from brdfdb.gallery import _he_torrance_cuts as cuts
-from brdfdb.gallery import _v_grooves as grooves
+from brdfdb.gallery import oren_nayar_1994_bounces as grooves
 from brdfdb.geometry import unit_vector
 from brdfdb.integrals import sampling
 from brdfdb.measurements import gonioreflectometer
 from brdfdb.models import he_torrance_1991 as he_torrance
-from brdfdb.models import he_torrance_1991_polarised as polarised
-from brdfdb.models import oren_nayar_1994_surfaces as surfaces
+from brdfdb.models import oren_nayar_1994 as surfaces
 from brdfdb.models import ward_vectors
 from tests.gallery.mutants.mutation import Mutant
 
@@ -30,7 +29,7 @@ def closed(
 ) -> dict[Function, Function]:
     """Return eqs 45 and 49 with the mistakes that may be in them."""
 
-    def single_slope(d: Any, rho: Any, theta_a: Any) -> tuple[Any, Any, Any]:
+    def single_slope(d: Any, rho: Any, theta_a: Any) -> Any:
         tan_a, cos = np.tan(theta_a), sign * d.cos_dphi
         tan_i, tan_r = d.sin_i / d.cos_i, d.sin_r / d.cos_r
         a, b = np.maximum(tan_i, tan_r) * tan_a, np.minimum(tan_i, tan_r) * tan_a
@@ -48,7 +47,7 @@ def closed(
         # Eq. (49)
         Z = 2.0 / np.pi * (critical_b + b * (np.sin(critical_a) - np.sin(critical_b))) + both_open
         bounce = bounced * np.cos(theta_a) * (1.0 - np.cos(theta_a)) * (1.0 - cos * Z)
-        return rho / np.pi * direct, rho**2 / np.pi * bounce, d
+        return surfaces.Parts(rho / np.pi * direct, rho**2 / np.pi * bounce)
 
     return {surfaces._single_slope: single_slope}
 
@@ -106,7 +105,7 @@ OREN_NAYAR = (
 
 # He et al.
 
-right_jones, right_amplitudes = polarised._jones, fresnel.half_sum_and_difference
+right_jones, right_amplitudes = he_torrance._jones, fresnel.half_sum_and_difference
 
 
 def printed_minus(*arguments: Any) -> tuple[Any, ...]:
@@ -154,9 +153,9 @@ HE_TORRANCE = (
               altered(sigma_0_um=0.8)),
     Mutant("a of 1", "all light that enters the surface returns", "no publication gives a", altered(a=1.0)),
     Mutant("M_ps without its minus", "eq. 64 as it is printed", "eq. 62 alone has the minus",
-              {polarised._jones: printed_minus}),
+              {he_torrance._jones: printed_minus}),
     Mutant("s and p not turned", "the facet's s and p are taken for those of the mean surface",
-              "they are the same in the plane of incidence", {polarised._jones: not_turned}),
+              "they are the same in the plane of incidence", {he_torrance._jones: not_turned}),
     Mutant("F_s and F_p exchanged", "each polarisation has the amplitude of the other",
               "books differ in the meaning of parallel", {right_amplitudes: exchanged}),
     Mutant("amplitudes of a real index", "k is left out of F_s and F_p", "tables list n, and k in another column",

@@ -78,7 +78,7 @@ class Form:
         value = correlation / (4.0 * np.pi) * shadow * g_over_vz2 * G * self.series(g_over_vz2 * v_z2, V)
         return self.prefactor * value * self.viewer(d.cos_r)
 
-    def f_r(self, directions: Any, surface: Any, a: Any) -> Any:
+    def f_r(self, directions: Any, surface: Any, a: Any, out: Any = None) -> Any:
         """Return f_r [1/sr] without the specular part."""
         F2 = self.reflectance(self.bisecting(directions), surface.n, surface.k)
         uniform = self.uniform * a * self.viewer(directions.cos_r)

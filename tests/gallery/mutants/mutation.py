@@ -62,6 +62,9 @@ def planted(mutant: Mutant) -> Iterator[None]:
     missed = set(mutant.functions.values()) - {wrong for _, _, wrong in places}
     if missed:
         raise LookupError(f"{mutant.name}: no module of brdfdb names the functions that {missed} replaces")
+    for right, wrong in mutant.functions.items():
+        if hasattr(right, "vectors") and not hasattr(wrong, "vectors"):
+            wrong.vectors = mutant.functions.get(right.vectors, right.vectors)
     before = [(space, name, space[name]) for space, name, _ in places]
     specs = dict(MODELS)
     try:

@@ -8,14 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from brdfdb.geometry import checked_angles
+from brdfdb.models import oren_nayar_1994 as surfaces
 from brdfdb.models import (
-    oren_nayar,
-    oren_nayar_qualitative,
-    oren_nayar_qualitative_vectors,
     oren_nayar_single_slope_parts,
-    oren_nayar_vectors,
 )
-from brdfdb.models import oren_nayar_1994_surfaces as surfaces
 from brdfdb.models import torrance_sparrow_1967 as surface_part
 from tests.gallery.mutants import added_figures
 from tests.gallery.mutants.mutation import Mutant
@@ -23,12 +20,13 @@ from tests.gallery.mutants.mutation import Mutant
 PREFIX = "oren-nayar-1994-"
 
 Function = Callable[..., Any]
+Parts = surfaces.Parts
 
 SLOPES, AZIMUTHS = 96, 96  # nodes of the facets
 HORIZON = 6.123233995736766e-17  # cosine of the float64 nearest pi/2
 
 right_facets = surfaces._gaussian
-right_lobe = surface_part._f_r
+right_lobe = surface_part.facets
 
 
 @dataclass(frozen=True)
@@ -40,8 +38,8 @@ class Facets:
     one_side: bool = False  # only the facet that faces the light, in place of both, eq. 22
     bounce_changes: bool = False  # If false, the second bounce is the model's, which takes a tenth of the time
 
-    def gaussian(self, directions: Any, rho: Any, sigma: Any, only: Any = None) -> tuple[Any, Any, Any]:
-        """Return direct and twice reflected f_r [1/sr], with the signature of `oren_nayar_1994_surfaces`."""
+    def gaussian(self, directions: Any, rho: Any, sigma: Any, only: Any = None) -> Parts:
+        """Return direct and twice reflected f_r [1/sr], with the signature of `_gaussian` of the model."""
         d, sigma = directions, float(sigma)
         if sigma == 0.0:
             return right_facets(directions, rho, sigma, only)
@@ -60,8 +58,8 @@ class Facets:
             bounced[at] = P @ self.bounce(p, q, S, C).mean(axis=1) if self.bounce_changes else 0.0
         bounced = rho**2 / np.pi * bounced / P.sum()
         if not self.bounce_changes:
-            bounced = right_facets(directions, rho, sigma, "interreflected")[1]
-        return rho / np.pi * direct / P.sum(), bounced, directions
+            bounced = right_facets(directions, rho, sigma, "interreflected").interreflected
+        return Parts(rho / np.pi * direct / P.sum(), bounced)
 
     def direct(self, p: Any, q: Any, C: Any) -> Any:
         """Return eqs 10 and 11 over E_0 cos(theta_i) rho / pi [1]; p and q are those of `_oren_nayar_facets`."""
@@ -141,19 +139,10 @@ class Fit:
         return surfaces.finished(f_r * (directions.cos_i if self.irradiance else 1.0), directions)
 
     def functions(self) -> dict[Function, Function]:
-        by_angles, by_vectors = surfaces.checked_angles, surfaces.checked_vectors
         return {
-            oren_nayar: lambda *angles, rho, sigma, interreflection=True: self.fit(
-                by_angles(*angles), rho, sigma, interreflection
-            ),
-            oren_nayar_vectors: lambda *vectors, rho, sigma, interreflection=True: self.fit(
-                by_vectors(*vectors), rho, sigma, interreflection
-            ),
-            oren_nayar_qualitative: lambda *angles, rho, sigma, offset=self.offset: self.qualitative(
-                by_angles(*angles), rho, sigma, offset
-            ),
-            oren_nayar_qualitative_vectors: lambda *vectors, rho, sigma, offset=self.offset: self.qualitative(
-                by_vectors(*vectors), rho, sigma, offset
+            surfaces._functional: lambda d, out, *parameters: self.fit(d, *parameters),
+            surfaces._qualitative: lambda d, out, rho, sigma, offset: self.qualitative(
+                d, rho, sigma, np.where(offset == 0.33, self.offset, offset)
             ),
         }
 
@@ -175,16 +164,14 @@ def rougher(factor: float) -> dict[Function, Function]:
 def turned(directions: Any) -> Any:
     """Return the same directions with the light on the other side."""
     angles = thetas(directions)
-    return surfaces.checked_angles(
-        angles[0], 0.0, angles[1], np.arctan2(directions.sin_dphi, directions.cos_dphi) + np.pi
-    )
+    return checked_angles(angles[0], 0.0, angles[1], np.arctan2(directions.sin_dphi, directions.cos_dphi) + np.pi)
 
 
 def from_behind() -> dict[Function, Function]:
     """Return all functions with the light on the other side."""
     return {
         **Fit(sign=-1.0).functions(),
-        right_facets: lambda d, rho, sigma, only=None: (*right_facets(turned(d), rho, sigma, only)[:2], d),
+        right_facets: lambda d, rho, sigma, only=None: right_facets(turned(d), rho, sigma, only),
         right_lobe: lambda d, sigma, n, k: right_lobe(turned(d), sigma, n, k),
     }
 
@@ -192,9 +179,9 @@ def from_behind() -> dict[Function, Function]:
 def facets_scaled(direct: Function, bounce: Function) -> Function:
     """Return the facets with functions of their two parts."""
 
-    def gaussian(d: Any, rho: Any, sigma: Any, only: Any = None) -> tuple[Any, Any, Any]:
-        first, second, _ = right_facets(d, rho, sigma, only)
-        return direct(d, first), bounce(d, second), d
+    def gaussian(d: Any, rho: Any, sigma: Any, only: Any = None) -> Parts:
+        first, second = right_facets(d, rho, sigma, only)
+        return Parts(direct(d, first), bounce(d, second))
 
     return gaussian
 
@@ -224,20 +211,19 @@ def flat() -> dict[Function, Function]:
         return surfaces.finished(rho / np.pi + 0.0 * d.cos_i * d.cos_r * d.cos_dphi, d)
 
     return {
-        oren_nayar: lambda *angles, rho, **_: fit(surfaces.checked_angles(*angles), rho),
-        oren_nayar_vectors: lambda *vectors, rho, **_: fit(surfaces.checked_vectors(*vectors), rho),
-        right_facets: lambda d, rho, sigma, only=None: (fit(d, rho), 0.0 * fit(d, rho), d),
+        surfaces._functional: lambda d, out, rho, *_: fit(d, rho),
+        right_facets: lambda d, rho, sigma, only=None: Parts(fit(d, rho), 0.0 * fit(d, rho)),
     }
 
 
-def fitted(d: Any, rho: Any, sigma: Any, only: Any = None) -> tuple[Any, Any, Any]:
+def fitted(d: Any, rho: Any, sigma: Any, only: Any = None) -> Parts:
     """Return direct and twice reflected f_r [1/sr] of the fit."""
     fit = Fit()
     direct = fit.fit(d, rho, sigma, False)
-    return direct, fit.fit(d, rho, sigma, True) - direct, d
+    return Parts(direct, fit.fit(d, rho, sigma, True) - direct)
 
 
-def bounce_by_eq_48(d: Any, rho: Any, sigma: Any, only: Any = None) -> tuple[Any, Any, Any]:
+def bounce_by_eq_48(d: Any, rho: Any, sigma: Any, only: Any = None) -> Parts:
     """Return the facets with the second bounce of eq. 49, which is eq. 48 integrated, as in the atlas."""
     (theta_i, theta_r), azimuth = thetas(d), np.arctan2(d.sin_dphi, d.cos_dphi)
     angles = [angle[..., None] for angle in np.broadcast_arrays(theta_i, 0.0, theta_r, azimuth)]
@@ -247,7 +233,7 @@ def bounce_by_eq_48(d: Any, rho: Any, sigma: Any, only: Any = None) -> tuple[Any
         return right_facets(d, rho, sigma, only)
     P = w * np.exp(-(theta_a**2) / (2.0 * float(sigma) ** 2)) * np.sin(theta_a)
     one = oren_nayar_single_slope_parts(*angles, rho=float(rho), theta_a=theta_a)
-    return right_facets(d, rho, sigma, only)[0], one.interreflected @ P / P.sum(), d
+    return Parts(right_facets(d, rho, sigma, only).direct, one.interreflected @ P / P.sum())
 
 
 UNCHANGED = (
