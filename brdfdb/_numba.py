@@ -26,7 +26,7 @@ INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
 SHARED = (
     "_numba.py",  # its options decide what is compiled
     "_elementary.py",
-    "tables/_vectors.py",
+    "tables/_simd.py",
     "fresnel.py",
     "tables/_interpolation.py",
     "tables/_coordinates.py",

@@ -1,4 +1,4 @@
-"""Heitz 2014: mirror facets with the slopes of GGX or Beckmann, and Smith's shadowing correlated in height."""
+"""Heitz 2014: mirror facets of GGX or Beckmann slopes, shadowing correlated in height; formulas in `_microfacets`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Walter, Marschner, Li and Torrance 2007: mirror facets with GGX or Beckmann slopes, and separable shadowing."""
+"""Walter et al. 2007: mirror facets of GGX or Beckmann slopes, separable shadowing; formulas in `_microfacets`."""
 
 from __future__ import annotations
 

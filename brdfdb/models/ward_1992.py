@@ -1,4 +1,4 @@
-"""Ward 1992: the elliptical Gaussian model fitted to measured anisotropic surfaces."""
+"""Ward 1992: the elliptical Gaussian model fitted to anisotropic surfaces; its formulas are in `_ward_kernels`."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from brdfdb.geometry import Directions
 from brdfdb.models._rows import Out
-from brdfdb.models._ward_lobes import (
+from brdfdb.models._ward_kernels import (
     DRAW,
     ELLIPTICAL_LOOPS,
     ELLIPTICAL_SLOPES,

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from brdfdb._numba import inner_loop, kernel
 from brdfdb.parameters import Array
-from brdfdb.tables._vectors import CUBIC_COLUMNS, LANES, tricubic_cell, trilinear_cells
+from brdfdb.tables._simd import CUBIC_COLUMNS, LANES, tricubic_cell, trilinear_cells
 
 _AT_END = 4  # first column of `Axes.slopes` for the end of a cell; those for its beginning come first
 POINTS = 1024  # points in a block of a lookup: a block costs as much as 60 points

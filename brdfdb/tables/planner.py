@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from brdfdb.errors import ParameterError, counted
 from brdfdb.materials import Material, Source
-from brdfdb.tables import axis_needs, plan_trials
-from brdfdb.tables.axis_needs import LINE, Need
+from brdfdb.tables import axis_nodes, plan_trials
+from brdfdb.tables.axis_nodes import LINE, Need
 from brdfdb.tables.grids import (
     ANISOTROPIC_AXES,
     ANISOTROPIC_HALF_DIFFERENCE_AXES,
@@ -296,7 +296,7 @@ def _table_kinds(task: _Task, hopeless: float = _HOPELESS) -> Iterator[_TableKin
         if source.grazing_pole:  # over light and viewer it takes many nodes: where a lobe takes few, it is soon dropped
             kinds = kinds[::-1]
     fewest = float(MOST_VALUES)
-    known: dict[tuple[str, bool, bool], axis_needs.Lines] = {}  # of a kind of grid, where f_r is the same
+    known: dict[tuple[str, bool, bool], axis_nodes.Lines] = {}  # of a kind of grid, where f_r is the same
     for names in kinds:
         known.clear()
         for power in (0.5, 1.0, 0.0) if source.grazing_pole else (0.0,):
@@ -307,7 +307,7 @@ def _table_kinds(task: _Task, hopeless: float = _HOPELESS) -> Iterator[_TableKin
                 layout = Layout(source, grid, task.wavelength_nm, how)
                 if task.mixture is not None:
                     layout = replace(layout, spectra=task.mixture.spectra, part_nm=task.mixture.part_nm)
-                lines: dict[str, axis_needs.LineNumbers] = {}
+                lines: dict[str, axis_nodes.LineNumbers] = {}
                 for method in ("cubic", "linear"):
                     chosen = replace(layout, interpolation=replace(layout.interpolation, method=method))
                     needs: dict[str, Need] = {}
@@ -319,8 +319,8 @@ def _table_kinds(task: _Task, hopeless: float = _HOPELESS) -> Iterator[_TableKin
                             if name not in lines:
                                 same = name, power == 0.0, layout.plain
                                 if same not in known:
-                                    known[same] = axis_needs.lines(layout, axis, task.sample.for_lines)
-                                lines[name] = axis_needs.numbers_along(layout, known[same], floor)
+                                    known[same] = axis_nodes.lines(layout, axis, task.sample.for_lines)
+                                lines[name] = axis_nodes.numbers_along(layout, known[same], floor)
                             needs[name] = Need(chosen, axis, *lines[name])
                         size *= needs[name].count(task.tolerance)
                         if name == "theta_h" and power == 0.0:
