@@ -210,7 +210,7 @@ class Vectors:
 
     @property
     def below(self) -> NDArray[np.bool_]:
-        """Which directions lie below the horizon."""
+        """Directions below the horizon: True for each of them."""
         return (self.w_i[..., 2] < 0.0) | (self.w_r[..., 2] < 0.0)
 
     @property

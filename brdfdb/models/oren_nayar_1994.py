@@ -484,7 +484,7 @@ def _single_slope(directions: Directions, rho: Floats, theta_a: Floats) -> Parts
 
 
 class _Features(NamedTuple):
-    """What the closed forms read of the directions: two tangents [1], cos(dphi) and 1 - abs(cos(dphi)) [1]."""
+    """Terms of the directions in the closed forms: two tangents [1], cos(dphi) and 1 - abs(cos(dphi)) [1]."""
 
     tan_i: Floats
     tan_r: Floats

@@ -1,4 +1,4 @@
-"""What lists and services show of a store: the last audit, lines of materials with their filters, and documents."""
+"""The contents of a store for lists and services: the last audit, lines of materials with filters, and documents."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ class AuditSummary(BaseModel):
 
 
 class AuditedMaterial(AuditSummary):
-    """What an audit found on a material, as lists and pages show it; other fields of the report are stored."""
+    """Results of an audit for a material, as lists and pages show them; other fields of the report are stored."""
 
     model_config = ConfigDict(extra="allow")
 

@@ -52,7 +52,7 @@ class FamilyLine(BaseModel):
 
 
 class Sweep(FamilyLine):
-    """Which tables make a family."""
+    """Tables of a family, with the requests that they were built for."""
 
     request_sha256: list[str] = Field(description="of the request that each member was built for")
 

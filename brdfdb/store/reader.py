@@ -360,7 +360,7 @@ class Store(Mapping[str, "Table"]):
 
 
 class Location(NamedTuple):
-    """Where a revision lies: its directory, and the digest of its manifest."""
+    """Location of a revision: its directory, and the digest of its manifest."""
 
     group: Path
     digest: str

@@ -174,7 +174,7 @@ def continued(layout: Layout, theta_h: Floats, phi_h: Floats, theta_d: Floats, p
 
 
 class Beyond(NamedTuple):
-    """Which half and difference angles are beyond the horizon, and the number of steps [1] that each of these is."""
+    """Mask of half and difference angles beyond the horizon, and the number of steps [1] that each of these is."""
 
     mask: NDArray[np.bool_]
     steps: Floats

@@ -53,7 +53,7 @@ _HEAD = 40.0
 
 @dataclass(frozen=True)
 class ConversionRequest:
-    """What a material is converted to: the model, and what its search is given.
+    """Target of a conversion: the model, and the settings of its search.
 
     Wavelengths [nm] replace those of the material. Fixed parameters are ``name=value``, as recipes write them.
     """

@@ -43,7 +43,7 @@ class FitOutputs:
 
 @dataclass(frozen=True)
 class FitSettings:
-    """What is fitted to samples, and how the samples are read.
+    """Settings of a fit: the models, and the reading of the samples.
 
     By default all models are fitted. `reading` are keys of `MeasuredTable`, without `samples`. Only one channel is
     fitted if it is given. The full angles [degree] of the cones of receiver and light, seen from the sample, replace

@@ -85,7 +85,7 @@ class ImportTarget:
 
 @dataclass(frozen=True)
 class Tables:
-    """What is made of imported samples: tables in a store, and the recipe of the same tables.
+    """Outputs of imported samples: tables in a store, and the recipe of the same tables.
 
     Name and title are those of a single material; by default those of the file.
     """
