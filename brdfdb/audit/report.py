@@ -101,10 +101,8 @@ def _short(model: ModelEnergy) -> str:
         judged = zip(model.furnace.theta_i_deg, model.furnace.albedo, strict=True)
         least = [(min(value for value in row if value is not None), at) for at, row in judged if at <= LOSS_UP_TO_DEG]
         albedo, at = min(least)
-        return (
-            f"conserves energy{up_to} {'up to' if bounded else 'but for'} a loss of {_percent(1.0 - albedo)} "
-            f"at {at:.3g}°"
-        )
+        loss = f"{_percent(1.0 - albedo)} at {at:.3g}°"
+        return f"conserves energy up to a loss of {loss}" if bounded else f"conserves energy{up_to}; loses up to {loss}"
     if model.verdict == "gains":
         largest = None if model.furnace is None else model.furnace.largest
         gain = 0.0 if largest is None else largest - 1.0

@@ -45,7 +45,7 @@ def test_each_verdict_on_a_model_is_an_answer_of_its_own(verdict: Any, text: str
     ("verdict", "text"),
     [
         ("conserves", "yes for lights up to 90°"),
-        ("loses", "conserves energy for lights up to 90° but for a loss of 0 % at 0°"),
+        ("loses", "conserves energy for lights up to 90°; loses up to 0 % at 0°"),
         ("gains", "conserves energy for lights up to 90°; would create 20 % if nothing were absorbed"),
     ],
 )
