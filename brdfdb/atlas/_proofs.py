@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.figure import Statement
+from brdfdb.gauss import gauss_rule
 from brdfdb.geometry import unit_vector
-from brdfdb.integrals.quadrature import gauss_rule
 from brdfdb.misprints import Misprint
 
 Array = NDArray[np.float64]

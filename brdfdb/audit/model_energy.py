@@ -11,8 +11,9 @@ from pydantic import BaseModel, Field
 
 from brdfdb.audit.finding import STRICT
 from brdfdb.figure import Numbers, numbers, rows
+from brdfdb.gauss import gauss_rule
 from brdfdb.geometry import radians
-from brdfdb.integrals.quadrature import Albedo, gauss_rule, reflected_share
+from brdfdb.integrals.quadrature import Albedo, reflected_share
 from brdfdb.integrals.uniform_bound import largest_uniform_beside, tops
 from brdfdb.lobes import narrowest
 from brdfdb.materials import Material, Source, presets

@@ -11,8 +11,9 @@ from pydantic import Field
 from brdfdb.audit.finding import Cell, Finding, NumberTable, Sentence, Subject, Verdict
 from brdfdb.audit.pairs import SEED, representative_nm
 from brdfdb.figure import Numbers, number, numbers
+from brdfdb.gauss import GaussRule, gauss_rule
 from brdfdb.geometry import radians, unit_vector
-from brdfdb.integrals.quadrature import GaussRule, gauss_rule, spectral_albedo
+from brdfdb.integrals.quadrature import spectral_albedo
 from brdfdb.integrals.sampling import lobe_of, mixture_density, sample
 from brdfdb.lobes import Lobe
 from brdfdb.materials import Material

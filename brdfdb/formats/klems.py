@@ -462,7 +462,7 @@ def _rule(count: int, *, periodic: bool = False) -> tuple[Floats, Floats]:
 
     Along the second axis of a patch that is a whole ring, `periodic`, they have equal distances.
     """
-    from brdfdb.integrals.quadrature import gauss_rule  # loads numba, which `export --help` does without
+    from brdfdb.gauss import gauss_rule  # loads numba, which `export --help` does without
 
     x, w = gauss_rule(count)
     x, w = 0.5 + 0.5 * x, 0.5 * w

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from brdfdb.figure import Curve, Panel, Role, Statement, curve_of, listed
+from brdfdb.gauss import gauss_rule
 from brdfdb.geometry import radians
-from brdfdb.integrals.quadrature import gauss_rule
 from brdfdb.models import oren_nayar_single_slope_parts
 from brdfdb.models.oren_nayar_1994 import Parts
 from brdfdb.parameters import Floats

@@ -26,8 +26,8 @@ from brdfdb.gallery._oren_nayar_lines import (
     to_radiance,
     very_accurate,
 )
+from brdfdb.gauss import gauss_rule
 from brdfdb.geometry import degrees, radians
-from brdfdb.integrals.quadrature import gauss_rule
 from brdfdb.models import (
     oren_nayar,
     oren_nayar_gaussian_parts,

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from pydantic import PrivateAttr
 
 from brdfdb.errors import ParameterError
+from brdfdb.gauss import gauss_rule
 from brdfdb.geometry import radians, unit_vector
-from brdfdb.integrals.quadrature import gauss_rule
 from brdfdb.materials import FunctionSource
 from brdfdb.materials.source import Evaluate
 from brdfdb.measurements import symmetry
