@@ -316,16 +316,8 @@ SUBJECTS = (
         anisotropic(oren_nayar_1994.unidirectional, "rho", "theta_a", "phi_a"),
         CAVITY_TABLE[3:6],
     ),
-    Subject(
-        "oren_nayar_single_slope",
-        summed(isotropic(single_slope, "rho", "theta_a")),
-        SLOPE_TABLE,
-    ),
-    Subject(
-        "oren_nayar_single_slope_parts",
-        isotropic(single_slope, "rho", "theta_a"),
-        SLOPE_TABLE[3:4],
-    ),
+    Subject("oren_nayar_single_slope", summed(isotropic(single_slope, "rho", "theta_a")), SLOPE_TABLE),
+    Subject("oren_nayar_single_slope_parts", isotropic(single_slope, "rho", "theta_a"), SLOPE_TABLE[3:4]),
     Subject(
         "oren_nayar_gaussian",
         summed(isotropic(oren_nayar_1994.gaussian, "rho", "sigma")),
@@ -371,10 +363,7 @@ SUBJECTS = (
     Subject(
         "torrance_sparrow",
         torrance_sparrow,
-        table(
-            *(f"sigma={sigma}" for sigma in SIGMAS),
-            *(f"sigma=0.3 {index}" for index in INDICES),
-        ),
+        table(*(f"sigma={sigma}" for sigma in SIGMAS), *(f"sigma=0.3 {index}" for index in INDICES)),
     ),
     Subject("ward", anisotropic(ward_1992.elliptical, *WARD), WARD_TABLE),
     Subject("ward_half_vector", anisotropic(ward_1992.half_vector, *WARD), WARD_TABLE),

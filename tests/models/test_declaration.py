@@ -25,44 +25,36 @@ def given(spec: ModelSpec) -> dict[str, Any]:
     return drawn(spec, np.random.default_rng(16))
 
 
+OF_A_SPHERE = r" rad .* is outside \[0, pi\] rad$"
+RESOLVED = r" rad is outside \[-1e\+15, 1e\+15\] rad$"
+WRONG_ANGLES = {
+    "theta": (
+        *((wrong, " is not a number of radians$") for wrong in (True, "0.1", 0.1j, None, [True], ["a"], b"1", {})),
+        *((wrong, OF_A_SPHERE) for wrong in (-1e-300, -0.1, np.nextafter(np.pi, 4.0), 90.0, np.inf, -np.inf)),
+    ),
+    "phi": (
+        *((wrong, " is not a number of radians$") for wrong in (False, np.array([1j]), "1")),
+        *((wrong, RESOLVED) for wrong in (np.inf, -np.inf, 1.1e15, -1e308)),
+    ),
+}
+
+
 @FORMS
-def test_refuses_an_angle_that_is_not_a_real_number(name: str) -> None:
+@pytest.mark.parametrize("position", range(len(ANGLES)), ids=ANGLES)
+def test_refuses_an_angle_that_is_no_number_outside_the_sphere_or_not_resolved(name: str, position: int) -> None:
     spec = MODELS[name]
-    for position, argument in enumerate(ANGLES):
-        for wrong in (True, "0.1", 0.1 + 0.0j, None, [True], ["a"], np.array([1j]), b"1", {}):
+    argument = ANGLES[position]
+    for wrong, words in WRONG_ANGLES[argument.partition("_")[0]]:
+        number = isinstance(wrong, float)
+        message = f"^{argument}: {re.escape(f'{wrong:.9g}') if number else '.*'}{words}"
+        for given_as in (wrong, [0.1, wrong], np.array([[np.nan], [wrong]])) if number else (wrong,):
             angles: list[Any] = [0.1, 0.2, 0.3, 0.4]
-            angles[position] = wrong
-            with pytest.raises(ParameterError, match=rf"^{argument}: .* is not a number of radians$"):
+            angles[position] = given_as
+            with pytest.raises(ParameterError, match=message):
                 spec.evaluate(*angles, **given(spec))
-
-
-@FORMS
-def test_refuses_a_theta_outside_the_sphere(name: str) -> None:
-    spec = MODELS[name]
-    for position in (0, 2):
-        for wrong in (-1e-300, -0.1, np.nextafter(np.pi, 4.0), 90.0, np.inf, -np.inf):
-            message = rf"^{ANGLES[position]}: {re.escape(f'{wrong:.9g}')} rad .* is outside \[0, pi\] rad$"
-            for given_as in (wrong, [0.1, wrong], np.array([[np.nan], [wrong]])):
-                angles: list[Any] = [0.1, 0.2, 0.3, 0.4]
-                angles[position] = given_as
-                with pytest.raises(ParameterError, match=message):
-                    spec.evaluate(*angles, **given(spec))
-            if spec.specular and position == 0:
-                with pytest.raises(ParameterError, match=message):
-                    specular(spec, wrong, given(spec))
-
-
-@FORMS
-def test_refuses_a_phi_that_float64_does_not_resolve(name: str) -> None:
-    spec = MODELS[name]
-    for position in (1, 3):
-        for wrong in (np.inf, -np.inf, 1.1e15, -1e308):
-            message = rf"^{ANGLES[position]}: {re.escape(f'{wrong:.9g}')} rad is outside \[-1e\+15, 1e\+15\] rad$"
-            for given_as in (wrong, [0.1, wrong]):
-                angles: list[Any] = [0.1, 0.2, 0.3, 0.4]
-                angles[position] = given_as
-                with pytest.raises(ParameterError, match=message):
-                    spec.evaluate(*angles, **given(spec))
+        if spec.specular and position == 0:
+            with pytest.raises(ParameterError, match=message):
+                specular(spec, wrong, given(spec))
 
 
 @FORMS
@@ -92,6 +84,8 @@ def test_refuses_a_parameter_in_one_sentence_from_angles_and_from_vectors(name: 
         for wrong in ("0.5", None, 0.5 + 0.0j, np.array([0.5j]), ["a"], {}):
             expected = f"{parameter.name}: {wrong!r} is not a number in {parameter.interval}"
             assert refused(spec, parameter, wrong) == expected
+        for barely in (np.nextafter(parameter.low, -np.inf), np.nextafter(parameter.high, np.inf)):
+            assert refused(spec, parameter, barely).startswith(f"{parameter.name}: ")
         for wrong in (parameter.low - 0.125, beyond(parameter), np.inf, -np.inf, np.nan):
             micrometres = "; is it in micrometres?" if parameter.unit == "nm" and 0.0 < wrong < 1.0 else ""
             expected = f"{parameter.name}: {wrong:.16g} is outside {parameter.interval}{micrometres}"
@@ -148,6 +142,12 @@ def test_three_forms_of_a_function_give_the_same_values() -> None:
     assert (dust.spec.name, dust.spec.reference, dust.spec.spectral) == ("dust", "seeliger1887", False)
     assert dust.spec.evaluate is dust
     assert inspect.signature(dust.vectors).parameters == inspect.signature(dust_of_arrays.vectors).parameters
+    for words in (
+        "\nw : array_like [1]\n    A weight, in [0, 1]; by default 0.5.\n",
+        "\nout : array",
+        "\nthreads : int\n",
+    ):
+        assert words in (dust.__doc__ or "")
     angles = (np.array([0.3, 2.0, np.nan]), 0.0, 0.4, 1.0)
     expected = [0.5 / (np.cos(0.3) + np.cos(0.4)), 0.0, np.nan]
     for function in (dust, dust_of_arrays, dust_of_several):

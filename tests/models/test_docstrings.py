@@ -6,14 +6,11 @@ import re
 from collections.abc import Callable
 from typing import Any
 
-import numpy as np
 import pytest
 
 from brdfdb import models
-from brdfdb.models import MODELS, stub
-from brdfdb.parameters import WAVELENGTH_NM, K, N
+from brdfdb.models import stub
 
-HALF_PI = np.pi / 2
 ANGLES = ("theta_i", "phi_i", "theta_r", "phi_r")
 TWINS = [name for name in models.__all__ if name.endswith("_vectors")]
 FUNCTIONS = [getattr(models, name) for name in models.__all__ if name not in ("MODELS", *TWINS)]
@@ -56,25 +53,6 @@ def test_every_function_of_directions_has_a_twin_with_the_same_parameters() -> N
         arguments = "`wi` (light) and `wr` (viewer)" if len(vectors) == 2 else "`wi` (light)"
         first = rf"Return `{function.__name__}` \[1(/sr)?\] for unit vectors {re.escape(arguments)} of shape"
         assert re.match(first, inspect.getdoc(twin) or ""), twin
-
-
-def test_docstrings_state_the_range_of_every_parameter() -> None:
-    light = [("he_torrance", parameter) for parameter in (WAVELENGTH_NM, N, K)]
-    for name, parameter in [*((n, p) for n, spec in MODELS.items() for p in spec.parameters), *light]:
-        entry = (inspect.getdoc(getattr(models, name)) or "").split(f"\n{parameter.name} : ")[1]
-        entry = " ".join(entry.split("\n    ")[:3])
-        if not isinstance(parameter.default, bool):
-            assert f"[{written(parameter.low)}, {written(parameter.high)}]" in entry, (name, parameter.name)
-            assert entry.startswith(f"array_like [{parameter.unit}]"), (name, parameter.name)
-
-
-def written(end: float) -> str:
-    """A bound as the docstrings write it: pi/2, 1e7, 1e-3."""
-    if end in (np.pi, HALF_PI):
-        return "pi" if end == np.pi else "pi/2"
-    if end and not 0.01 <= abs(end) < 1e4:
-        return f"1e{round(np.log10(end))}"
-    return f"{end:g}"
 
 
 def test_the_stub_has_the_signatures_of_the_models() -> None:

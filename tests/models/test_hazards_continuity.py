@@ -150,8 +150,7 @@ def test_is_continuous_in_its_parameters(subject: Subject, dtype: type) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "at", "moving", "parameters"),
-    [pytest.param(*rest, id=f"{rest[0]}-{what}") for what, *rest in BRANCHES],
+    ("name", "at", "moving", "parameters"), [pytest.param(*rest, id=f"{rest[0]}-{what}") for what, *rest in BRANCHES]
 )
 @every_dtype
 def test_is_continuous_across_its_branches(

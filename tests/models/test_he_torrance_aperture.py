@@ -7,12 +7,7 @@ import pytest
 
 from brdfdb import models
 from brdfdb.geometry import common_solid_angle, unit_vector
-from brdfdb.models import (
-    he_torrance,
-    he_torrance_aperture,
-    he_torrance_smooth,
-    he_torrance_specular,
-)
+from brdfdb.models import he_torrance, he_torrance_aperture, he_torrance_smooth, he_torrance_specular
 from brdfdb.reference import he_torrance_1991
 from tests.models.he_torrance_surfaces import ALUMINUM, CERAMIC, CONE, CONES, HALF_PI, directions
 

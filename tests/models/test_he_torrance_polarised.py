@@ -1,7 +1,6 @@
 """He et al. 1991 in polarised light: published values, the paper's formulas state by state, and what is physical."""
 
 import csv
-import inspect
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +22,6 @@ ROWS = [
 ]
 ALUMINUM: dict[str, float] = {"wavelength_nm": 500.0, "sigma_0_um": 0.28, "tau_um": 1.77}
 Z = np.diag([1.0, -1.0])
-D = np.diag([1.0, 1.0, -1.0, 1.0])
 
 # Each just above the worst measured, which stands behind it
 PUBLISHED = 2e-15  # of 40 rows: 6.7e-16
@@ -31,9 +29,6 @@ AMPLITUDE = 2e-14  # of F, J and M over |F|^2, n above 0.1: 4.4e-15
 CONTRACTED = 1e-13  # of M times a Stokes vector of length up to 20: 4.4e-15
 REFLECTANCE = 1e-14  # relative, n above 0.1: 2.9e-15
 ELEMENT_00 = 5e-13  # relative: 9.7e-14, exponents of either sum are rounded on their own
-REFERENCE = 1e-11  # relative to the first element: 1e-13; the series of eq. 78 is within 5e-12
-RECIPROCITY = 2e-14  # relative to the first element: 3.1e-15
-VECTORS = 5e-14  # relative to the first element: 7.8e-15
 EIGENVALUE = 1e-14  # relative to the first element: -5.7e-16
 
 Complexes = NDArray[np.complex128]
@@ -261,21 +256,6 @@ def test_jones_turns_with_the_surface_and_has_a_mirror_image() -> None:
     assert abs(in_plane[..., [0, 1], [1, 0]]).max() < 1e-15
 
 
-def test_reciprocity() -> None:
-    rng = np.random.default_rng(2)
-    theta_i, phi_i, theta_r, phi_r = directions(rng, 4000)
-    index = indices(rng, 4000)
-    J, swapped = (
-        he_torrance_jones(theta_i, phi_i, theta_r, phi_r, **index),
-        he_torrance_jones(theta_r, phi_r, theta_i, phi_i, **index),
-    )
-    np.testing.assert_allclose(swapped, Z @ np.swapaxes(J, -1, -2) @ Z, atol=1e-15)
-    M = he_torrance_mueller(theta_i, phi_i, theta_r, phi_r, a=0.2, **index, **ALUMINUM)
-    swapped = he_torrance_mueller(theta_r, phi_r, theta_i, phi_i, a=0.2, **index, **ALUMINUM)
-    other = D @ np.swapaxes(M, -1, -2) @ D
-    assert (abs(swapped - other) / M[:, :1, :1]).max() < RECIPROCITY
-
-
 @pytest.mark.parametrize("step", [1e-3, 1e-6, 1e-9])
 def test_jones_is_continuous_where_the_plane_of_reflection_is_not(step: float) -> None:
     index = {"n": 1.5, "k": 1.0}
@@ -302,15 +282,6 @@ def test_at_the_pole_s_and_p_are_the_limit_along_the_azimuth() -> None:
 
 
 # Mueller matrices
-
-
-def test_mueller_against_the_reference() -> None:
-    rng = np.random.default_rng(7)
-    for theta_i, theta_r, delta_phi in rng.uniform([0.0, 0.0, -3.0], [1.5, 1.5, 3.0], (12, 3)):
-        arguments = ALUMINUM | {"n": float(rng.uniform(0.2, 2.0)), "k": float(rng.uniform(0.0, 5.0))}
-        expected = np.array(he_torrance_1991.mueller(theta_i, theta_r, delta_phi, **arguments).tolist(), dtype=float)
-        M = he_torrance_mueller(theta_i, 0.0, theta_r, delta_phi, **arguments)
-        np.testing.assert_allclose(M, expected, atol=REFERENCE * expected[0, 0])
 
 
 def test_first_element_is_the_unpolarised_model() -> None:
@@ -366,39 +337,6 @@ def test_mueller_matrices_are_physical() -> None:
     assert smallest_eigenvalue(np.diag([1.0, 1.0, 1.0, -1.0])) < -0.1
 
 
-# Shapes, types and corners
-
-
-def test_vectors_give_what_angles_give() -> None:
-    rng = np.random.default_rng(9)
-    theta_i, phi_i, theta_r, phi_r = rng.uniform([0.01, -3.0, 0.01, -3.0], [1.57, 3.0, 1.57, 3.0], (2000, 4)).T
-    index = indices(rng, 2000)
-    wi, wr = unit_vector(theta_i, phi_i), unit_vector(theta_r, phi_r)
-    by_angles = he_torrance_jones(theta_i, phi_i, theta_r, phi_r, **index)
-    np.testing.assert_allclose(models.he_torrance_jones_vectors(wi, wr, **index), by_angles, atol=AMPLITUDE)
-    expected = he_torrance_mueller(theta_i, phi_i, theta_r, phi_r, a=0.1, **index, **ALUMINUM)
-    M = models.he_torrance_mueller_vectors(wi, wr, a=0.1, **index, **ALUMINUM)
-    assert (abs(M - expected) / expected[:, :1, :1]).max() < VECTORS
-
-
-def test_specular_vectors_give_what_angles_give() -> None:
-    rng = np.random.default_rng(10)
-    theta_i, phi_i = rng.uniform([0.0, -3.0], [1.57, 3.0], (500, 2)).T
-    theta_i[:2] = 0.0, HALF_PI
-    index, twin = indices(rng, 500), models.he_torrance_specular_mueller_vectors
-    expected = he_torrance_specular_mueller(theta_i, **index, **ALUMINUM)
-    M = twin(unit_vector(theta_i, phi_i), **index, **ALUMINUM)
-    assert M.shape == (500, 4, 4)
-    assert (abs(M - expected) / expected[:, :1, :1]).max() < VECTORS
-    metal = {"n": 0.769, "k": 6.08, **ALUMINUM}
-    below, unknown = twin([[0.6, 0.0, -0.8], [0.0, np.nan, 1.0]], **metal)
-    assert (below == 0.0).all()
-    assert np.isnan(unknown).all()
-    assert twin(np.float32([0.6, 0.0, 0.8]), **metal).dtype == np.float32
-    with pytest.raises(ValueError, match=r"^wi: \(0, 0, 2\) has the length 2, not 1$"):
-        twin([0, 0, 2], **metal)
-
-
 @pytest.mark.filterwarnings("ignore::brdfdb.errors.DegreesWarning")  # azimuths of many turns are meant
 @pytest.mark.parametrize("n", [1e-3, 1.0, 1.5, 100.0])
 @pytest.mark.parametrize("k", [0.0, 1e-3, 1e4])
@@ -412,25 +350,3 @@ def test_is_finite_in_every_corner(n: float, k: float) -> None:
         assert abs(J).max() <= 1.0 + 1e-12
     assert np.isfinite(he_torrance_mueller(*angles, n=n, k=k, **ALUMINUM)).all()
     assert np.isfinite(he_torrance_specular_mueller(theta, n=n, k=k, **ALUMINUM)).all()
-
-
-@pytest.mark.parametrize("function", [he_torrance_jones, he_torrance_mueller, he_torrance_specular_mueller])
-def test_nan_horizon_shape_and_type(function: Any) -> None:
-    arguments: dict[str, Any] = {"n": 1.5, "k": 0.5}
-    size, count = (2, 1) if function is he_torrance_jones else (4, 4)
-    if function is not he_torrance_jones:
-        arguments |= ALUMINUM
-    count = 1 if "theta_r" not in inspect.signature(function).parameters else 4
-    rest = [0.1, 0.5, 2.0][: count - 1]
-    values = function(np.array([0.3, np.nan, 2.0]), *rest, **arguments)
-    assert values.shape == (3, size, size)
-    assert np.isfinite(values[0]).all()
-    assert np.isnan(values[1]).all()
-    assert (values[2] == 0.0).all()
-    arguments["n"] = np.array([[1.3], [1.5]])
-    assert function(np.array([0.3, 0.4, 0.5]), *rest, **arguments).shape == (2, 3, size, size)
-    single = function(np.float32(0.3), *(np.float32(each) for each in rest), **arguments)
-    assert single.dtype == (np.complex64 if function is he_torrance_jones else np.float32)
-    arguments["n"] = 0.0
-    with pytest.raises(ValueError, match=r"n: 0 is outside \[0.001, 100\]"):
-        function(0.3, *rest, **arguments)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from brdfdb.errors import ParameterError
 from brdfdb.geometry import unit_vector
-from brdfdb.models import MODELS, ggx_scaled_vectors, he_torrance_very_rough, lambert, lambert_vectors, ward_vectors
+from brdfdb.models import MODELS, ggx_scaled_vectors, lambert, lambert_vectors, ward_vectors
 from brdfdb.models.large_calls import PART_BY_ANGLES, STEP, cut
 from brdfdb.parameters import ModelSpec
 from tests.models.draws import drawn, every_model
@@ -214,11 +214,3 @@ def test_other_mistakes_are_those_of_an_ordinary_call() -> None:
         lambert(0.0, 0.0, 0.0, 0.0, threads=2)
     with pytest.raises(ParameterError, match="wi"):
         lambert_vectors(np.zeros((5, 2)), np.zeros((5, 3)), rho=0.5, threads=2)
-
-
-def test_docstrings_name_both_arguments() -> None:
-    for function in (lambert, he_torrance_very_rough):
-        document = function.__doc__ or ""
-        parameters = document.split("Parameters\n")[1].split("Returns\n")[0]
-        assert "\nout : array, optional\n" in parameters
-        assert "\nthreads : int\n" in parameters

@@ -222,10 +222,7 @@ def test_the_command_line_takes_files_before_and_after_the_command(
 
 @pytest.mark.parametrize(
     ("name", "text", "words"),
-    [
-        ("leaves.py", "import sys; sys.exit(0)", "SystemExit"),
-        ("a:b.py", "", "separates paths"),
-    ],
+    [("leaves.py", "import sys; sys.exit(0)", "SystemExit"), ("a:b.py", "", "separates paths")],
 )
 def test_a_file_that_ends_the_program_or_splits_its_path_is_refused(
     tmp_path: Path, name: str, text: str, words: str

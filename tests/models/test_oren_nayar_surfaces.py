@@ -1,8 +1,6 @@
 """The surfaces of Oren and Nayar 1994 facet by facet, and their relatives: paper values, reference, limits, energy."""
 
-import csv
 from collections.abc import Callable, Iterator
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,10 +14,7 @@ from brdfdb.models import MODELS
 from brdfdb.models._oren_nayar_facets import gaussian
 from brdfdb.models.oren_nayar_1994 import PartName, gaussian_part, gaussian_rung, single_slope_mean
 from brdfdb.reference import fujii_2013, mp, oren_nayar_1994, portsmouth_2025, torrance_sparrow_1967
-
-PAPER_VALUES = Path(__file__).parents[1] / "paper_values"
-HALF_PI = np.pi / 2
-TINY = 1e-280
+from tests.models.agreement import CORNER_PHIS, CORNER_THETAS, HALF_PI, TINY, check, rows
 
 # Relative errors, each just above the worst measured, which stands behind it.
 # The columns of paper_values:
@@ -33,9 +28,7 @@ ROUNDING = 2e-15  # 1.5e-15 (single slope)
 UNIDIRECTIONAL = 6e-14  # 5.0e-14, next to a facet that turns away; 1.2e-13 in 1500 draws
 TORRANCE_SPARROW = 2e-13  # 6.8e-14, where the lobe is down to 1e-132
 GAUSSIAN = 1.1e-6  # what the docstring promises; 3.1e-7 of 340 draws
-DIRECTIONS = 1e-12  # 3e-13: unit vectors against angles, away from the horizon
-TWIN_PARTS = 3e-13  # 8.8e-14 (Gaussian, second bounce): the same of the parts
-TWIN_SUM = 2e-15  # 4.4e-16: the parts of unit vectors against the whole
+MEAN = 3e-13  # 8.8e-14: the mean over slopes against the closed forms
 FURNACE = 1e-9  # 2e-10 of the quadrature
 FIT = 0.07  # 0.066: "very accurate" in Fig. 12; 0.16 at sigma of 10 degrees
 INTEGRAL = 1e-6  # the mean of parallel cavities over azimuths and slopes
@@ -44,16 +37,8 @@ Model = Callable[..., Any]
 
 
 def read(file: str) -> dict[str, NDArray[np.float64]]:
-    with (PAPER_VALUES / file).open(newline="") as stream:
-        table = list(csv.DictReader(stream))
+    table = rows(file)
     return {name: np.array([float(row[name]) for row in table]) for name in table[0]}
-
-
-def relative_error(value: Any, expected: Any) -> float:
-    expected, value = mp.mpf(expected), mp.mpf(float(value))
-    if abs(expected) < TINY:
-        return 0.0 if abs(value) <= TINY * (1 + 1e-9) else float("inf")
-    return float(abs(value / expected - 1))
 
 
 # Paper values
@@ -93,8 +78,6 @@ def test_every_row_of_the_gaussian_surface() -> None:
 # Reference
 
 
-CORNER_THETAS = (0.0, 1e-9, 0.4, np.pi / 4, 1.2, np.nextafter(HALF_PI, 0.0), HALF_PI)
-CORNER_PHIS = (0.0, 1.1, HALF_PI, np.nextafter(HALF_PI, 2.0), 2.9, np.pi, -np.pi)
 SLOPES = (1e-6, 0.05, 1.0, HALF_PI)
 
 
@@ -109,11 +92,6 @@ def draws(count: int) -> Iterator[tuple[float, float, float, float, float]]:
         else:
             theta_i, theta_r = rng.uniform(0.0, HALF_PI, 2)
             yield float(theta_i), float(theta_r), float(rng.uniform(-np.pi, np.pi)), rho, slope
-
-
-def check(value: Any, expected: Any, tolerance: float, arguments: object) -> None:
-    error = relative_error(value, expected)
-    assert error <= tolerance, f"off by {error:.3g} from {mp.nstr(mp.mpf(expected), 17)} at {arguments}"
 
 
 def test_unidirectional_against_the_reference() -> None:
@@ -205,50 +183,6 @@ def test_the_parts_add_up(name: str, parameters: dict[str, float]) -> None:
 
 
 @every_surface
-def test_the_parts_treat_nan_the_horizon_and_float32_as_the_models_do(name: str, parameters: dict[str, float]) -> None:
-    theta = np.array([0.3, np.nan, 2.0], dtype=np.float32)
-    for part in getattr(models, f"{name}_parts")(theta, 0.0, np.float32(0.5), np.float32(1.0), **parameters):
-        assert part.dtype == np.float32
-        assert part[0] > 0.0
-        assert np.isnan(part[1])
-        assert part[2] == 0.0
-
-
-@every_surface
-def test_the_parts_of_unit_vectors_are_those_of_their_angles(name: str, parameters: dict[str, float]) -> None:
-    twin = getattr(models, f"{name}_parts_vectors")
-    theta_i, phi_i, theta_r, phi_r = directions(50, 1.5)
-    theta_i[:2], theta_r[1:3] = 0.0, 0.0
-    wi, wr = unit_vector(theta_i, phi_i), unit_vector(theta_r, phi_r)
-    several = {each: np.array([[0.5], [1.0]]) * value for each, value in parameters.items()}
-    expected = getattr(models, f"{name}_parts")(theta_i, phi_i, theta_r, phi_r, **several)
-    values = twin(wi, wr, **several)
-    for value, part in zip(values, expected, strict=True):
-        assert value.shape == (2, 50)
-        np.testing.assert_allclose(value, part, rtol=TWIN_PARTS, atol=1e-16)
-    whole = getattr(models, f"{name}_vectors")(wi, wr, **several)
-    np.testing.assert_allclose(sum(values), whole, rtol=TWIN_SUM)
-
-
-@every_surface
-def test_the_parts_treat_vectors_as_the_models_do(name: str, parameters: dict[str, float]) -> None:
-    twin = getattr(models, f"{name}_parts_vectors")
-    wi = np.array([[0.6, 0.0, 0.8], [np.nan, 0.0, 0.8], [0.6, 0.0, -0.8], [1.0, 0.0, 0.0]], dtype=np.float32)
-    wr = np.array([0.0, 0.8, 0.6], dtype=np.float32)
-    for exchanged in ((wi, wr), (wr, wi)):
-        for part in twin(*exchanged, **parameters):
-            assert part.dtype == np.float32
-            assert part[0] > 0.0
-            assert np.isnan(part[1])
-            assert part[2] == 0.0
-            assert 0.0 <= part[3] < np.inf
-    for part in twin([0, 0, 1], [0.0, 0.6, 0.8], **parameters):
-        assert isinstance(part, np.float64)
-    with pytest.raises(ValueError, match=r"^wr: \(0, 0, 2\) has the length 2, not 1$"):
-        twin([0, 0, 1], [0, 0, 2], **parameters)
-
-
-@every_surface
 def test_the_direct_part_is_proportional_to_rho_and_the_other_one_to_its_square(
     name: str, parameters: dict[str, float]
 ) -> None:
@@ -278,21 +212,24 @@ def test_of_a_smooth_mirror_torrance_sparrow_leaves_the_mirror_direction() -> No
 # Limits
 
 
-def test_flat_facets_and_smooth_surfaces_are_lambert() -> None:
-    angles = directions(200)
-    expected = np.full(200, 0.7 / np.pi)
-    for theta_a in (0.0, 1e-30):
-        flat = models.oren_nayar_unidirectional(*angles, rho=0.7, theta_a=theta_a, phi_a=0.3)
-        np.testing.assert_allclose(flat, expected, rtol=4e-16)
-        np.testing.assert_allclose(
-            models.oren_nayar_single_slope(*angles, rho=0.7, theta_a=theta_a), expected, rtol=4e-16
-        )
-    np.testing.assert_allclose(models.oren_nayar_gaussian(*angles, rho=0.7, sigma=0.0), expected, rtol=4e-16)
-    np.testing.assert_allclose(models.oren_nayar_gaussian(*angles, rho=0.7, sigma=1e-20), expected, rtol=1e-7)
-    np.testing.assert_allclose(models.oren_nayar_fujii(*angles, rho=0.7, sigma=0.0), expected, rtol=4e-16)
-    np.testing.assert_allclose(
-        models.oren_nayar_energy_preserving(*angles, rho=0.7, roughness=0.0), expected, rtol=4e-16
-    )
+@pytest.mark.parametrize(
+    ("name", "smooth", "tolerance"),
+    [
+        ("oren_nayar", {"sigma": 0.0}, 4e-16),
+        ("oren_nayar_qualitative", {"sigma": 0.0, "offset": 0.57}, 4e-16),
+        ("oren_nayar_unidirectional", {"theta_a": 0.0, "phi_a": 0.3}, 4e-16),
+        ("oren_nayar_unidirectional", {"theta_a": 1e-30, "phi_a": 0.3}, 4e-16),
+        ("oren_nayar_single_slope", {"theta_a": 0.0}, 4e-16),
+        ("oren_nayar_single_slope", {"theta_a": 1e-30}, 4e-16),
+        ("oren_nayar_gaussian", {"sigma": 0.0}, 4e-16),
+        ("oren_nayar_gaussian", {"sigma": 1e-20}, 1e-7),
+        ("oren_nayar_fujii", {"sigma": 0.0}, 4e-16),
+        ("oren_nayar_energy_preserving", {"roughness": 0.0}, 4e-16),
+    ],
+)
+def test_flat_facets_and_smooth_surfaces_are_lambert(name: str, smooth: dict[str, float], tolerance: float) -> None:
+    values = getattr(models, name)(*directions(200), rho=0.7, **smooth)
+    np.testing.assert_allclose(values, 0.7 / np.pi, rtol=tolerance)
 
 
 def test_gaussian_is_the_mean_of_parallel_cavities() -> None:
@@ -334,7 +271,7 @@ def test_the_mean_over_slopes_is_that_of_the_closed_forms(lit: bool, bounce: boo
     mean = single_slope_mean(wi, wr, rho=0.8, theta_a=slopes, weight=weight, lit=lit, bounce=bounce)
     assert mean[0] == 0.0
     assert np.isnan(mean[1])
-    np.testing.assert_allclose(mean, expected, rtol=TWIN_PARTS)
+    np.testing.assert_allclose(mean, expected, rtol=MEAN)
 
 
 @pytest.mark.parametrize(("sigma", "worst"), [(0.0, 1e-15), (0.17, 0.002), (0.5, 2e-5), (1.2, 1e-5)])

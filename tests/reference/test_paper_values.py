@@ -8,14 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from brdfdb.reference import (
-    he_torrance_1991,
-    minnaert,
-    mp,
-    oren_nayar_1994,
-    torrance_sparrow_1967,
-    ward_1992,
-)
+from brdfdb.reference import he_torrance_1991, minnaert, mp, oren_nayar_1994, torrance_sparrow_1967, ward_1992
 
 PAPER_VALUES = Path(__file__).parents[1] / "paper_values"
 PRINTED = 5e-17  # half a unit of the 17th digit; worst measured over all columns without a name here: 4.58e-17
