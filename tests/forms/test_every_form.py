@@ -87,5 +87,6 @@ def test_a_table_that_is_too_large_is_left_out_of_a_chart_and_named(capsys: pyte
 
 
 def test_a_wrong_tolerance_is_still_refused() -> None:
-    with pytest.raises(ValueError, match=r"^tolerance: 0\.7 is outside"):
-        catalogue.forms(draws("lambert", 1)[0], None, (0.1, 0.7))
+    for wrong in (0.0, 0.7, float("nan")):
+        with pytest.raises(ValueError, match=r"^tolerance: \S+ is outside \[0.0001, 0.5\]$"):
+            catalogue.forms(draws("lambert", 1)[0], None, (0.1, wrong))

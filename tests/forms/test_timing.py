@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -35,12 +36,14 @@ class Machine:
         return times(forms, WI, WI, clock=lambda: self.now, **how)
 
 
-def test_times_are_those_of_a_value() -> None:
+def test_times_are_those_of_a_value_of_many_wavelengths_too() -> None:
     machine = Machine()
     grey, spectral = machine.times(machine.form("a", 20.0), machine.form("b", 5.0, 41, np.float32), rounds=4)
     assert grey.seconds.shape == (4,)
     np.testing.assert_allclose(grey.quartiles_ns, 20.0)
     np.testing.assert_allclose(spectral.quartiles_ns, 5.0)
+    (spectral,) = machine.times(machine.form("a", 1.0, 41), rounds=1)
+    assert 1e5 < spectral.directions * 41 <= 1e6
 
 
 def test_fast_forms_are_timed_at_many_directions_and_slow_ones_at_as_many_as_fit() -> None:
@@ -60,12 +63,6 @@ def test_busy_moments_do_not_make_a_form_slow() -> None:
     assert first.directions == second.directions == 2048
 
 
-def test_many_wavelengths_are_many_values() -> None:
-    machine = Machine()
-    (spectral,) = machine.times(machine.form("a", 1.0, 41), rounds=1)
-    assert 1e5 < spectral.directions * 41 <= 1e6
-
-
 def test_what_a_call_costs_apart_from_its_directions_does_not_make_them_few() -> None:
     machine = Machine()
     plain, called = machine.form("a", 1000.0), machine.form("b", 1000.0)
@@ -78,27 +75,29 @@ def test_what_a_call_costs_apart_from_its_directions_does_not_make_them_few() ->
     assert other.directions == alike.directions
 
 
-def test_one_direction_is_one_direction() -> None:
-    machine = Machine()
-    (one,) = machine.times(machine.form("a", 1.0), most=1, rounds=2)
-    assert one.directions == 1
-    assert {count for _, count in machine.calls} == {1}
-
-
-def test_short_calls_are_repeated_until_the_clock_can_tell() -> None:
+def test_short_calls_of_one_direction_are_repeated_until_the_clock_can_tell() -> None:
     machine = Machine()
     (short,) = machine.times(machine.form("a", 1e4), most=1, rounds=1)  # 10 us
+    assert short.directions == 1
+    assert {count for _, count in machine.calls} == {1}
     assert len(machine.calls) > 20
     np.testing.assert_allclose(short.quartiles_ns, 1e4)
 
 
-def test_materials_in_turn_read_memory_of_their_own() -> None:
-    machine, copies = Machine(), []
+def copies_of(machine: Machine) -> tuple[list[int], Callable[[], Any]]:
+    """The numbers of copies that were made, and the function that makes another."""
+    copies: list[int] = []
 
     def copied() -> Any:
         copies.append(len(copies))
         return machine.form(f"copy {copies[-1]}", 10.0).evaluate
 
+    return copies, copied
+
+
+def test_materials_in_turn_read_memory_of_their_own() -> None:
+    machine = Machine()
+    copies, copied = copies_of(machine)
     table = replace(machine.form("a", 1.0), copied=copied)
     found, plain = timing.mixed_times([table, machine.form("b", 20.0)], WI, WI, rounds=3, clock=lambda: machine.now)
     np.testing.assert_allclose(found.quartiles_ns, 10.0)
@@ -112,12 +111,8 @@ def test_materials_in_turn_read_memory_of_their_own() -> None:
 
 
 def test_large_tables_are_copied_as_often_as_memory_allows() -> None:
-    machine, copies = Machine(), []
-
-    def copied() -> Any:
-        copies.append(1)
-        return machine.form("copy", 10.0).evaluate
-
+    machine = Machine()
+    copies, copied = copies_of(machine)
     table = replace(machine.form("a", 1.0), bytes=timing._COPIES_BYTES // 4, copied=copied)
     timing.mixed_times([table], WI, WI, rounds=1, clock=lambda: machine.now)
     assert len(copies) == 4
