@@ -19,7 +19,7 @@ from brdfdb import formats
 from brdfdb.errors import BrdfdbError, ParameterError
 from brdfdb.materials import presets
 from brdfdb.place import is_service, path_of
-from brdfdb.store.publication import publish, publish_dataset, publish_layout
+from brdfdb.store.publication import publish_dataset
 from brdfdb.tables.table import Table
 from brdfdb_api.settings import Settings
 from brdfdb_pipelines import cli, sample, scene_file
@@ -240,11 +240,7 @@ def test_each_function_that_takes_a_path_refuses_other_schemes(
 
 def test_stores_are_made_nowhere_else(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    clay = presets()["clay-vase"]
     for make in (
-        lambda: publish("s3://b/c", clay, tolerance=0.2),
-        lambda: publish_layout("s3://b/c", "white", layout(0.5)),
-        lambda: publish_dataset(Path("s3://b/c"), "white", lambert(0.5)),
         lambda: sample.run("lambert", Path("s3://b/c"), count=1, directions=1),
         lambda: xr.open_dataset("s3://b/c", engine="brdfdb"),
         lambda: xr.open_dataset("s3://b/c", engine="brdfdb", material="white"),

@@ -25,36 +25,22 @@ def given(spec: ModelSpec) -> dict[str, Any]:
     return drawn(spec, np.random.default_rng(16))
 
 
-OF_A_SPHERE = r" rad .* is outside \[0, pi\] rad$"
-RESOLVED = r" rad is outside \[-1e\+15, 1e\+15\] rad$"
-WRONG_ANGLES = {
-    "theta": (
-        *((wrong, " is not a number of radians$") for wrong in (True, "0.1", 0.1j, None, [True], ["a"], b"1", {})),
-        *((wrong, OF_A_SPHERE) for wrong in (-1e-300, -0.1, np.nextafter(np.pi, 4.0), 90.0, np.inf, -np.inf)),
-    ),
-    "phi": (
-        *((wrong, " is not a number of radians$") for wrong in (False, np.array([1j]), "1")),
-        *((wrong, RESOLVED) for wrong in (np.inf, -np.inf, 1.1e15, -1e308)),
-    ),
-}
-
-
 @FORMS
-@pytest.mark.parametrize("position", range(len(ANGLES)), ids=ANGLES)
-def test_refuses_an_angle_that_is_no_number_outside_the_sphere_or_not_resolved(name: str, position: int) -> None:
+def test_angles_are_checked_as_those_of_geometry(name: str) -> None:
     spec = MODELS[name]
-    argument = ANGLES[position]
-    for wrong, words in WRONG_ANGLES[argument.partition("_")[0]]:
-        number = isinstance(wrong, float)
-        message = f"^{argument}: {re.escape(f'{wrong:.9g}') if number else '.*'}{words}"
-        for given_as in (wrong, [0.1, wrong], np.array([[np.nan], [wrong]])) if number else (wrong,):
+    for position, argument in enumerate(ANGLES):
+        for wrong, words in (
+            ("0.1", "'0.1' is not a number of radians"),
+            (-np.inf, "-inf rad .*is outside"),
+            ([[np.nan], [np.inf]], "inf rad .*is outside"),
+        ):
             angles: list[Any] = [0.1, 0.2, 0.3, 0.4]
-            angles[position] = given_as
-            with pytest.raises(ParameterError, match=message):
+            angles[position] = wrong
+            with pytest.raises(ParameterError, match=f"^{argument}: {words}"):
                 spec.evaluate(*angles, **given(spec))
-        if spec.specular and position == 0:
-            with pytest.raises(ParameterError, match=message):
-                specular(spec, wrong, given(spec))
+            if spec.specular and position == 0:
+                with pytest.raises(ParameterError, match=f"^{argument}: {words}"):
+                    specular(spec, wrong, given(spec))
 
 
 @FORMS
