@@ -1,6 +1,5 @@
 """Importance sampling of every model: samples against their density, weights against the albedo, and Ward's eq. 7."""
 
-import doctest
 from typing import Any
 
 import numpy as np
@@ -318,15 +317,6 @@ def test_ward_weights_do_not_depend_on_how_narrow_the_lobe_is(alpha: float) -> N
     albedo, _ = directional_albedo("ward", np.deg2rad(60.0), **lobe)
     assert np.mean(drawn.weight) == pytest.approx(albedo, abs=2e-3)
     assert drawn.weight.max() < 1.0
-
-
-@pytest.mark.parametrize("function", [sample, pdf], ids=lambda f: f.__name__)
-def test_the_examples_run(function: Any) -> None:
-    runner = doctest.DocTestRunner()
-    for example in doctest.DocTestFinder(recurse=False).find(function, globs=dict(vars(sampling))):
-        runner.run(example)
-    assert runner.summarize(verbose=False).failed == 0
-    assert runner.tries >= 1
 
 
 def test_a_model_is_called_with_its_own_defaults_and_names_itself_when_it_cannot_be() -> None:

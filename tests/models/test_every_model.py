@@ -21,7 +21,6 @@ from tests.models.draws import (
     drawn,
     drawn_angles,
     every_model,
-    every_specular,
     parameters_of,
     specular,
 )
@@ -215,10 +214,3 @@ def test_nan_goes_through_and_leaves_its_neighbours_alone(spec: ModelSpec) -> No
         np.testing.assert_allclose(values[known], evaluate(axis, *clean)[known], rtol=ROWS, err_msg=name)
         # below the horizon, nan is still not a number
         assert np.isnan(evaluate(np.nan, 2.0, 0.2, 0.7, 1.9)), name
-
-
-@every_specular
-def test_specular_nan_goes_through(spec: ModelSpec) -> None:
-    parameters = drawn(spec, np.random.default_rng(7))
-    values = specular(spec, np.array([0.1, np.nan, 1.0]), parameters)
-    np.testing.assert_array_equal(np.isnan(values), [False, True, False])

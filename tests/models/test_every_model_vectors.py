@@ -1,25 +1,19 @@
 """What the unit-vector twin of every model promises: the values of its angles, and the same ends."""
 
-from typing import Any
-
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from brdfdb import models
 from brdfdb.geometry import unit_vector
 from brdfdb.parameters import Floats, ModelSpec
 from tests.models.draws import (
     HALF_PI,
     ROWS,
     TINY,
-    Arguments,
     corner_parameters,
     drawn,
     drawn_angles,
     every_model,
-    every_specular,
-    specular,
 )
 
 TWIN = 1e-14  # 6.0e-15 (He-Torrance), beside what rounding the angles does: unit vectors against angles
@@ -124,41 +118,3 @@ def test_broadcasts_over_vectors(spec: ModelSpec) -> None:
     for index, row in enumerate(rows):
         alone = {name: value[index, 0] for name, value in several.items()}
         np.testing.assert_allclose(spec.vectors(wi[0], wr, **alone), row, rtol=ROWS)
-
-
-def specular_vectors(spec: ModelSpec, wi: Any, parameters: Arguments) -> Any:
-    assert spec.specular is not None
-    twin = getattr(models, f"{spec.specular.__name__}_vectors")
-    return twin(wi, **{name: parameters[name] for name in spec.specular_parameters})
-
-
-@every_specular
-def test_specular_vectors_give_the_values_of_their_angles(spec: ModelSpec) -> None:
-    rng = np.random.default_rng(29)
-    theta_i, phi_i, _, _ = drawn_angles(rng, 4000)
-    parameters = drawn(spec, rng, 4000)
-    expected, step = specular(spec, theta_i, parameters), 1e-9
-    conditioning = np.abs(specular(spec, np.maximum(theta_i - step, 0.0), parameters) - expected) / step
-    error = np.abs(specular_vectors(spec, unit_vector(theta_i, phi_i), parameters) - expected)
-    check_twin(error, expected, conditioning)
-
-
-@every_specular
-def test_specular_vectors_keep_the_rules_of_the_others(spec: ModelSpec) -> None:
-    rng = np.random.default_rng(30)
-    parameters = drawn(spec, rng)
-    wi = drawn_vectors(rng, 50).astype(np.float32)
-    single, double = (specular_vectors(spec, w, parameters) for w in (wi, wi.astype(np.float64)))
-    assert (single.dtype, double.dtype) == (np.float32, np.float64)
-    np.testing.assert_array_equal(single, double.astype(np.float32))
-    corners = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [1.0, 0.0, -1e-30], [0.0, 0.0, -1.0], [np.nan, 0.0, 1.0]])
-    at_the_pole, at_the_horizon, *below, unknown = specular_vectors(spec, corners, parameters)
-    assert at_the_pole == specular(spec, 0.0, parameters)
-    assert 0.0 <= at_the_horizon <= 1.0
-    assert below == [0.0, 0.0]
-    assert np.isnan(unknown)
-    assert isinstance(specular_vectors(spec, [0, 0, 1], parameters), np.float64)
-    several = {name: value[:, None] for name, value in drawn(spec, rng, 3).items()}
-    assert specular_vectors(spec, wi, several).shape == (3, 50)
-    with pytest.raises(ValueError, match=r"^wi: \(0, 0, 2\) has the length 2, not 1$"):
-        specular_vectors(spec, [0, 0, 2], parameters)

@@ -1,7 +1,5 @@
 """He et al. 1991 in its limits, part by part, through apertures, and under the bound of energy conservation."""
 
-import doctest
-
 import numba
 import numpy as np
 import pytest
@@ -152,13 +150,6 @@ def test_a_max_of_a_smooth_surface_is_nothing() -> None:
     assert 0.0 < bound[1] < 0.1
     with pytest.raises(ValueError, match="n: 0 is outside"):
         uniform_bound.largest_uniform("he_torrance", sigma_0_um=0.0, **smooth | {"n": 0.0})
-
-
-@compiled
-def test_the_example_of_a_max_runs() -> None:
-    results = doctest.testmod(uniform_bound)
-    assert results.failed == 0
-    assert results.attempted == 2
 
 
 @compiled

@@ -172,15 +172,6 @@ def test_every_incident_state_is_reflected_as_eqs_59_and_60_say(state: str) -> N
         np.testing.assert_allclose(reflected_s_and_p(wi, wr, n, k, stokes), expected, atol=AMPLITUDE)
 
 
-def test_unpolarised_and_partially_polarised_light_are_sums_of_states() -> None:
-    wi, wr, n, k = unit_vector(0.6, 0.2), unit_vector(1.1, 2.9), 0.769, 6.08
-    s_and_p = {name: abs(literal(wi, wr, n, k) @ np.array(c)) ** 2 for name, (c, _) in STATES.items()}
-    natural = (s_and_p["s"] + s_and_p["p"]) / 2.0
-    np.testing.assert_allclose(reflected_s_and_p(wi, wr, n, k, [1.0, 0.0, 0.0, 0.0]), natural, atol=AMPLITUDE)
-    partly = 0.3 * s_and_p["+45"] + 0.7 * natural
-    np.testing.assert_allclose(reflected_s_and_p(wi, wr, n, k, [1.0, 0.0, 0.3, 0.0]), partly, atol=AMPLITUDE)
-
-
 def test_eq_64_as_printed_would_not_keep_the_energy_of_a_perfect_mirror() -> None:
     wi, wr = unit_vector(0.6, 0.0), unit_vector(0.9, 1.6)
     tilted = np.array(STATES["+45"][0])

@@ -44,6 +44,7 @@ def draws() -> Iterator[tuple[float, float]]:
     yield from ((g, V) for g in (1e-250, 1e-9, 1.0, 9.0, 39.0, 41.0, 745.0, 1e4) for V in (0.0, 1e-9, 1.0, 300.0))
     yield from ((g, 1e6) for g in (1e-3, 1.0, 2e3, 1e4))
     yield from ((1e6, V) for V in (0.0, 1e5, 1e6))
+    yield from ((1e-12, 0.0), (1e-12, 1e3), (40.0, 1e3), (1e7, 1e6))
     yield from ((0.3, 1.0), (1e-289, 600.0), (1e-291, 600.0), (1e-308, 5.0))
     rng = np.random.default_rng(78)
     for _ in range(60):
