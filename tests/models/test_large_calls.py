@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import tracemalloc
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -157,20 +158,18 @@ def test_an_exception_in_a_thread_reaches_the_caller() -> None:
         lambert(*angles(COUNT), rho=np.append(np.zeros(COUNT - 1), 1.5), threads=2)
 
 
-def test_numbers_of_threads_may_be_those_of_numpy() -> None:
-    wi, wr = vectors(4)
-    assert np.array_equal(ward_vectors(wi, wr, **WARD, threads=np.uint8(2)), ward_vectors(wi, wr, **WARD))
-    table = made_up("isotropic")
-    assert np.array_equal(table.lookup_vectors(wi, wr, threads=np.int8(2)), table.lookup_vectors(wi, wr))
+CALLS: tuple[Any, ...] = (partial(ward_vectors, **WARD), made_up("isotropic").lookup_vectors)
 
 
-@pytest.mark.parametrize("threads", [0, -1, 1.5, "2", True, 1.0, None])
-def test_a_number_of_threads_is_a_positive_whole_number(threads: Any) -> None:
-    message = re.escape(f"threads: {threads!r} is not a whole number of at least 1")
-    with pytest.raises(ParameterError, match=message):
-        ward_vectors(*vectors(4), **WARD, threads=threads)
-    with pytest.raises(ParameterError, match=message):
-        made_up("isotropic").lookup_vectors(*vectors(4), threads=threads)
+@pytest.mark.parametrize("call", CALLS, ids=["model", "table"])
+def test_a_number_of_threads_is_a_positive_whole_number_also_of_numpy(call: Any) -> None:
+    given = vectors(4)
+    assert np.array_equal(call(*given, threads=np.uint8(2)), call(*given))
+    for threads in (0, -1, 1.5, "2", True, 1.0, None):
+        with pytest.raises(
+            ParameterError, match=re.escape(f"threads: {threads!r} is not a whole number of at least 1")
+        ):
+            call(*given, threads=threads)
 
 
 def read_only(count: int) -> NDArray[np.float64]:
@@ -193,9 +192,9 @@ def read_only(count: int) -> NDArray[np.float64]:
 )
 def test_an_array_that_the_result_does_not_fit_is_refused(out: Any, state: str) -> None:
     allowed = "allowed is a writable, C-contiguous array of float64 and shape (4,), as the result"
-    for call, more in ((lambert_vectors, {"rho": 0.5}), (made_up("isotropic").lookup_vectors, {})):
+    for call in CALLS:
         with pytest.raises(ParameterError, match="^" + re.escape(f"out: {state}; {allowed}")):
-            call(*vectors(4), **more, out=out)  # type: ignore[operator]
+            call(*vectors(4), out=out)
 
 
 def test_the_result_does_not_share_memory_with_an_argument() -> None:
