@@ -420,7 +420,8 @@ def _timed(
     """Return the times of calls with many directions, with a block of them, and with one."""
     # Directions are shuffled, so that a few of them are as varied as all
     mixed = np.random.default_rng(SEED).permutation(np.flatnonzero(drawn.above))
-    wi, wr = drawn.wi[mixed], drawn.wr[mixed]
+    wi = drawn.wi[mixed]
+    wr = drawn.wr[mixed]
     batch = timing.times(forms, wi, wr, rounds=timing.ROUNDS, tick=tick)
     block, single = (timing.times(forms, wi, wr, most=most, rounds=SINGLES, tick=tick) for most in (BLOCK, 1))
     return batch, block, single

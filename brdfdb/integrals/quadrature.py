@@ -114,7 +114,8 @@ def directional_albedo(
     for one, rows in _alike(parameters, values):
         above = rows[theta[rows] <= HALF_PI]  # nan is not
         below = rows[(theta[rows] > HALF_PI) & np.isfinite(phi[rows])]
-        albedo.flat[below], error.flat[below] = 0.0, 0.0
+        albedo.flat[below] = 0.0
+        error.flat[below] = 0.0
         above = above[np.isfinite(phi[above])]
         integrals = spectral_albedo(spec, theta[above], phi[above], one, tolerance=tolerance, most_panels=MOST_PANELS)
         albedo.flat[above] = integrals.albedo[:, 0]
