@@ -110,17 +110,8 @@ def test_a_nan_in_a_spectrum_is_a_nan_in_its_colour_only():
 def test_covers_visible():
     assert covers_visible(EVERY_10_NM)
     assert covers_visible([420.0, *range(440, 680, 20), 680.0])
-    for wavelength_nm in (
-        np.arange(421.0, 781.0, 10.0),
-        np.arange(380.0, 680.0, 10.0),
-        np.arange(380.0, 781.0, 25.0),
-        EVERY_10_NM[::-1],
-        np.repeat(EVERY_10_NM, 2),
-        [550.0],
-        [],
-        550.0,
-        [380.0, np.nan, 780.0],
-    ):
+    steps = (np.arange(421.0, 781.0, 10.0), np.arange(380.0, 680.0, 10.0), np.arange(380.0, 781.0, 25.0))
+    for wavelength_nm in (*steps, EVERY_10_NM[::-1], np.repeat(EVERY_10_NM, 2), [550.0], [], 550.0, [380, np.nan, 780]):
         assert covers_visible(wavelength_nm) is False
 
 

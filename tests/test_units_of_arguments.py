@@ -65,12 +65,14 @@ def test_every_model_warns_of_degrees_and_answers() -> None:
 
 
 def test_more_functions_of_azimuths_warn() -> None:
-    with pytest.warns(DegreesWarning):
-        derivatives.gradient("ward", *MISTAKEN, rho_d=0.1, rho_s=0.3, alpha_x=0.1, alpha_y=0.1)
-    with pytest.warns(DegreesWarning):
-        directional_albedo("ward", 0.3, 45.0, rho_d=0.1, rho_s=0.3, alpha_x=0.1, alpha_y=0.2)
-    with pytest.warns(DegreesWarning):
-        models.oren_nayar_parts(*MISTAKEN, rho=0.5, sigma=0.3)
+    ward = {"rho_d": 0.1, "rho_s": 0.3, "alpha_x": 0.1, "alpha_y": 0.2}
+    for call in (
+        lambda: derivatives.gradient("ward", *MISTAKEN, **ward),
+        lambda: directional_albedo("ward", 0.3, 45.0, **ward),
+        lambda: models.oren_nayar_parts(*MISTAKEN, rho=0.5, sigma=0.3),
+    ):
+        with pytest.warns(DegreesWarning):
+            call()
 
 
 def test_an_unwrapped_scan_may_filter_the_warning() -> None:

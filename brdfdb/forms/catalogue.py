@@ -199,10 +199,7 @@ def _tables(
         if layout.spectra is not None and tolerance == _UNFACTORED:
             unfactored = replace(layout, spectra=None, part_nm=None)
             yield _table(unfactored, f"{key}-unfactored", f"the {percent} % table, spectra whole")
-    for halves, key, title in (
-        (False, "table-even", "even angles"),
-        (True, "table-halves", "half vectors"),
-    ):
+    for halves, key, title in ((False, "table-even", "even angles"), (True, "table-halves", "half vectors")):
         layout = Layout(evaluated, _plain_grid(evaluated, halves=halves), wavelength_nm)
         yield _table(layout, key, f"{table}, {title}, linear")
 

@@ -270,11 +270,7 @@ def chart(
 
 
 def _against(
-    number: int,
-    rungs: Sequence[int],
-    errors: Sequence[dict[str, Any]],
-    seconds: Floats,
-    forms: Sequence[Form],
+    number: int, rungs: Sequence[int], errors: Sequence[dict[str, Any]], seconds: Floats, forms: Sequence[Form]
 ) -> dict[str, Any]:
     """Return fields of a `ChartPoint`: the cheapest rung as accurate as a form, and the ratio of their times."""
     if forms[number].kind in ("exact", "quadrature"):

@@ -16,13 +16,7 @@ Array = NDArray[np.float64]
 
 
 def unidirectional(
-    theta_i: Number,
-    phi_i: Number,
-    theta_r: Number,
-    phi_r: Number,
-    rho: Number,
-    theta_a: Number,
-    phi_a: Number,
+    theta_i: Number, phi_i: Number, theta_r: Number, phi_r: Number, rho: Number, theta_a: Number, phi_a: Number
 ) -> tuple[Number, Number]:
     """Return both parts of f_r [1/sr] of parallel V-cavities, Eq. (22): direct and interreflected.
 

@@ -6,12 +6,7 @@ from brdfdb.reference.he_torrance_1991 import fresnel_unpolarised
 
 @exact
 def torrance_sparrow(
-    theta_i: Number,
-    theta_r: Number,
-    delta_phi: Number,
-    sigma: Number,
-    n: Number | None = None,
-    k: Number | None = None,
+    theta_i: Number, theta_r: Number, delta_phi: Number, sigma: Number, n: Number | None = None, k: Number | None = None
 ) -> Number:
     """Return f_r [1/sr] by Eq. (31) of Oren and Nayar 1994 over cos theta_i, with E_0 = 1; the lobe is not normalised.
 

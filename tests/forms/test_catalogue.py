@@ -232,16 +232,6 @@ def test_beckmanns_limit_does_where_g_is_large_and_ten_terms_do_not() -> None:
     assert np.all(ten == 0.0)  # e^-g is
 
 
-def test_ten_terms_hold_the_share_that_the_reference_gives() -> None:
-    wavelength_um, height = 0.55, 0.13
-    g = he_torrance_1991.surface_roughness(0.0, 0.0, wavelength_um, height, 1.2)
-    held = sum(g**m / (np.prod(np.arange(1.0, m + 1.0)) * m) for m in range(1, 11)) * np.exp(-float(g))
-    forms, _ = of(presets()["scene-copper-sphere"])
-    normal = np.array([[0.0, 0.0, 1.0]])
-    share = values(forms["ten-terms"], normal, normal)[0, 1] / values(forms["sum"], normal, normal)[0, 1]
-    np.testing.assert_allclose(share, float(held / he_torrance_1991.series(g, 0)), rtol=SUM)
-
-
 def test_beckmanns_limit_is_that_of_very_rough_surfaces() -> None:
     material = presets()["magnesium-oxide-ceramic"]
     forms, drawn = of(material)

@@ -371,6 +371,7 @@ SUBJECTS = (
         table(
             *("sigma_0_over_tau=1e-4 n=1.5 k=0", "sigma_0_over_tau=0.16 n=1 k=1000 a=1"),
             *("sigma_0_over_tau=4.4 n=0.2 k=0", "sigma_0_over_tau=1e3 n=1.000001 k=0"),
+            *("sigma_0_over_tau=1.1e-6 n=0.2 k=0.5 a=0.1", "sigma_0_over_tau=1e6 n=3 k=0.5 a=0.1"),
         ),
     ),
     Subject(

@@ -1,5 +1,6 @@
 """What every model of the registry promises: a model is held to all of it from the day it is registered."""
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -143,51 +144,46 @@ def test_grazing_pole_says_which_models_grow_without_bound(spec: ModelSpec) -> N
 # Symmetry
 
 
-@every_model
-def test_has_the_period_of_the_azimuth(spec: ModelSpec) -> None:
-    rng = np.random.default_rng(3)
+def asymmetry(spec: ModelSpec, seed: int) -> tuple[Callable[..., Any], Callable[..., None]]:
+    """Values of 4000 draws after a turn of light and viewer, and the assertion that a turn changed nothing."""
+    rng = np.random.default_rng(seed)
     theta_i, phi_i, theta_r, phi_r = drawn_angles(rng, 4000)
     parameters = drawn(spec, rng, 4000)
-    value = spec.evaluate(theta_i, phi_i, theta_r, phi_r, **parameters)
+
+    def turned(light: Any, viewer: Any, sign: int = 1, **changed: Any) -> Any:
+        return spec.evaluate(theta_i, sign * phi_i + light, theta_r, sign * phi_r + viewer, **parameters | changed)
+
+    def same(values: Any, **changed: Any) -> None:
+        tolerance = AZIMUTH_OF.get(spec.name, AZIMUTH)
+        np.testing.assert_allclose(values, turned(0.0, 0.0, **changed), rtol=tolerance, atol=TINY)
+
+    return turned, same
+
+
+@every_model
+def test_has_the_period_of_the_azimuth_turns_with_the_surface_and_is_its_mirror_image(spec: ModelSpec) -> None:
+    turned, same = asymmetry(spec, 3)
     for turns_i, turns_r in ((1, 0), (0, 1), (-1, 2)):
-        turned = spec.evaluate(theta_i, phi_i + turns_i * 2 * np.pi, theta_r, phi_r + turns_r * 2 * np.pi, **parameters)
-        np.testing.assert_allclose(turned, value, rtol=AZIMUTH_OF.get(spec.name, AZIMUTH), atol=TINY)
-
-
-@every_model
-def test_turns_with_the_surface_and_is_its_own_mirror_image(spec: ModelSpec) -> None:
-    rng = np.random.default_rng(4)
-    theta_i, phi_i, theta_r, phi_r = drawn_angles(rng, 4000)
-    parameters = drawn(spec, rng, 4000)
-    value = spec.evaluate(theta_i, phi_i, theta_r, phi_r, **parameters)
+        same(turned(turns_i * 2 * np.pi, turns_r * 2 * np.pi))
     anisotropic = spec.lobe_axes is not None or spec.anisotropic is not None
-    turn = np.pi if anisotropic else rng.uniform(-np.pi, np.pi, 4000)
-    turned = spec.evaluate(theta_i, phi_i + turn, theta_r, phi_r + turn, **parameters)
-    np.testing.assert_allclose(turned, value, rtol=AZIMUTH_OF.get(spec.name, AZIMUTH), atol=TINY)
+    turn = np.pi if anisotropic else np.random.default_rng(4).uniform(-np.pi, np.pi, 4000)
+    same(turned(turn, turn))
     if spec.anisotropic is None:
-        mirrored = spec.evaluate(theta_i, -phi_i, theta_r, -phi_r, **parameters)
-        np.testing.assert_allclose(mirrored, value, rtol=AZIMUTH_OF.get(spec.name, AZIMUTH), atol=TINY)
+        same(turned(0.0, 0.0, sign=-1))
 
 
 @pytest.mark.parametrize("spec", [s for s in MODELS.values() if s.lobe_axes], ids=lambda s: s.name)
 def test_lobe_axes_make_the_difference(spec: ModelSpec) -> None:
     assert spec.lobe_axes is not None
-    x, y = spec.lobe_axes
-    rng = np.random.default_rng(5)
-    theta_i, phi_i, theta_r, phi_r = drawn_angles(rng, 4000)
-    parameters = drawn(spec, rng, 4000)
-    value = spec.evaluate(theta_i, phi_i, theta_r, phi_r, **parameters)
-    turned = spec.evaluate(theta_i, phi_i + HALF_PI, theta_r, phi_r + HALF_PI, **parameters)
-    assert np.mean(np.abs(turned - value) > 0.01 * value) > 0.3
-    exchanged = spec.evaluate(
-        theta_i, phi_i + HALF_PI, theta_r, phi_r + HALF_PI, **parameters | {x: parameters[y], y: parameters[x]}
-    )
-    np.testing.assert_allclose(exchanged, value, rtol=AZIMUTH_OF.get(spec.name, AZIMUTH), atol=TINY)
-    parameters[y] = parameters[x]
-    value = spec.evaluate(theta_i, phi_i, theta_r, phi_r, **parameters)
+    turned, same = asymmetry(spec, 5)
+    rng = np.random.default_rng(6)
+    x, y = (spec.parameter(axis) for axis in spec.lobe_axes)
+    first, second = (rng.uniform(axis.low, min(axis.high, 1.0), 4000) for axis in (x, y))
+    value, quarter = (turned(turn, turn, **{x.name: first, y.name: second}) for turn in (0.0, HALF_PI))
+    assert np.mean(np.abs(quarter - value) > 0.01 * value) > 0.3
+    same(turned(HALF_PI, HALF_PI, **{x.name: second, y.name: first}), **{x.name: first, y.name: second})
     turn = rng.uniform(-np.pi, np.pi, 4000)
-    turned = spec.evaluate(theta_i, phi_i + turn, theta_r, phi_r + turn, **parameters)
-    np.testing.assert_allclose(turned, value, rtol=AZIMUTH_OF.get(spec.name, AZIMUTH), atol=TINY)
+    same(turned(turn, turn, **{x.name: first, y.name: first}), **{x.name: first, y.name: first})
 
 
 # nan

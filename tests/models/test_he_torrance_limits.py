@@ -63,24 +63,6 @@ def test_he_torrance_converges_to_the_very_rough_limit(wavelength_nm: float) -> 
     assert abs(value / limit - 1.0)[likely].max() < 10.0 / g.min()
 
 
-def test_very_rough_is_reciprocal_finite_and_not_negative() -> None:
-    rng = np.random.default_rng(8)
-    theta_i, phi_i, theta_r, phi_r = directions(rng, 3000)
-    theta_i[:20], theta_r[10:30], theta_i[30:40] = HALF_PI, HALF_PI, 0.0
-    phi_r[:5] = phi_i[:5] + np.pi
-    arguments = {
-        "sigma_0_over_tau": 10.0 ** rng.uniform(-6.0, 6.0, 3000),
-        "n": rng.uniform(0.2, 3.0, 3000),
-        "k": 0.5,
-        "a": 0.1,
-    }
-    value = he_torrance_very_rough(theta_i, phi_i, theta_r, phi_r, **arguments)
-    assert np.isfinite(value).all()
-    assert (value >= 0.1 / np.pi * (1.0 - 1e-15)).all()
-    swapped = he_torrance_very_rough(theta_r, phi_r, theta_i, phi_i, **arguments)
-    np.testing.assert_allclose(swapped, value, rtol=RECIPROCITY)
-
-
 # Smooth
 
 
