@@ -155,14 +155,6 @@ def test_the_fit_is_a_few_percent_off_and_the_qualitative_model_worse_forward() 
     assert ahead > 3.0 * behind
 
 
-def test_the_weak_link_of_the_closed_forms_is_eq_49() -> None:
-    # ERRATA: eq. 48, and with it 49, is off by about a quarter of the interreflected part at 30 degrees
-    forms, drawn = of(presets()["wall-plaster"])
-    bounce, direct, both = (l1(forms, drawn, key) for key in ("bounce-49", "direct-45", "closed-forms"))
-    assert bounce > 3.0 * direct
-    assert abs(both - bounce) < direct
-
-
 def test_the_closed_forms_over_slopes_are_those_of_the_misprint() -> None:
     (printed,) = [misprint for misprint in MISPRINTS if misprint.key == "interreflection-factor"]
     where = printed.where
@@ -303,14 +295,6 @@ def test_a_few_directions_of_one_wavelength_take_the_loop_of_many() -> None:
     np.testing.assert_allclose(evaluate(more, more)[:256], evaluate(few, few), rtol=SUM)
     of_few, of_one = cpu_seconds(lambda: evaluate(few, few), lambda: evaluate(few[:1], few[:1]))
     assert of_few < 4.0 * of_one
-
-
-def test_the_half_vector_form_is_exact_at_the_peak_only() -> None:
-    forms, drawn = of(presets()["rolled-brass"])
-    mirror = drawn.wi * np.array([-1.0, -1.0, 1.0])
-    exact, half = (values(forms[key], drawn.wi, mirror) for key in ("elliptical", "half-vector"))
-    np.testing.assert_allclose(half, exact, rtol=1e-12)
-    assert l1(forms, drawn, "half-vector") > 0.005
 
 
 @pytest.mark.parametrize("model", ["oren_nayar", "ward_half_vector"])
