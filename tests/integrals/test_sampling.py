@@ -22,8 +22,8 @@ GOLD = {"wavelength_nm": 500.0, "n": 0.9, "k": 1.9}
 WARD = {"rho_d": 0.2, "rho_s": 0.5, "alpha_x": 0.15, "alpha_y": 0.4}
 
 # Parameters, and the heaviest weight of 2^17 samples at each of 0, 60 and 85 degrees, rounded up. Weights of Ward's
-# lobe are rho_s (h.i) cos^3(delta) times sqrt(cos_r / cos_i), 1 / cos_i or, bounded, at most 2 rho_s; Minnaert's grow as
-# cos_r^(k - 1), Oren-Nayar's as far as theta_i lets them. A model without a line is sampled in the middle of its ranges
+# lobe are rho_s (h.i) cos^3(delta) times sqrt(cos_r / cos_i), 1 / cos_i or, bounded, at most 2 rho_s. Minnaert's grow
+# as cos_r^(k - 1), Oren-Nayar's as far as theta_i lets them. Other models are sampled in the middle of their ranges
 CASES: dict[str, tuple[dict[str, float], float]] = {
     "lambert": ({"rho": 0.7}, 0.7 + 1e-12),
     "minnaert": ({"k": 0.7, "rho": 0.8}, 7.2),

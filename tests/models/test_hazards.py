@@ -15,6 +15,7 @@ from brdfdb.reference import mp
 from tests.models import hazard_twins as twins
 from tests.models import hazards
 from tests.models.hazard_directions import EXACT, NEAR, PI, SOME, Directions
+from tests.models.hazards import Arguments, Subject
 
 pytestmark = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="minutes without compilation")
 
@@ -22,12 +23,12 @@ RECIPROCITY = {np.float64: 1e-12, np.float32: 2.0**-22}  # relative; float32: th
 
 
 def disagreement(
-    subject: hazards.Subject,
+    subject: Subject,
     form: str,
     values: twins.Reals,
     given: NDArray[Any],
     dtype: type,
-    parameters: hazards.Arguments,
+    parameters: Arguments,
 ) -> float:
     """The largest relative error of the values of a pair of directions, less what rounding does if it is too large."""
     exact, point = twins.exact_parameters(parameters), twins.point_of(given)
@@ -46,9 +47,7 @@ def disagreement(
 
 
 @functools.cache
-def evaluations(
-    subject: hazards.Subject, form: str, dtype: type
-) -> list[tuple[hazards.Arguments, NDArray[Any], NDArray[Any]]]:
+def evaluations(subject: Subject, form: str, dtype: type) -> list[tuple[Arguments, NDArray[Any], NDArray[Any]]]:
     """Parameters, directions and values of the whole table."""
     rows = [(parameters, twins.given_as(form, directions, dtype)) for parameters, directions in subject.table()]
     return [(parameters, given, twins.evaluated(subject, form, given, parameters)) for parameters, given in rows]
@@ -64,7 +63,7 @@ def test_every_model_is_in_the_table() -> None:
 
 @every_form
 @twins.every_dtype
-def test_is_finite_and_not_negative(subject: hazards.Subject, form: str, dtype: type) -> None:
+def test_is_finite_and_not_negative(subject: Subject, form: str, dtype: type) -> None:
     for parameters, given, values in evaluations(subject, form, dtype):
         assert values.dtype == dtype
         assert np.isfinite(values).all(), parameters
@@ -94,14 +93,14 @@ def test_what_has_no_twin_is_finite(name: str, dtype: type) -> None:
 
 @every_form
 @twins.every_dtype
-def test_agrees_with_its_twin(subject: hazards.Subject, form: str, dtype: type) -> None:
+def test_agrees_with_its_twin(subject: Subject, form: str, dtype: type) -> None:
     for parameters, given, values in evaluations(subject, form, dtype):
         for each, value in zip(given, values, strict=True):
             error = disagreement(subject, form, value, each, dtype, parameters)
             assert error <= subject.agreement[dtype], f"off by {error:.3g}: {value} at {each}, {parameters}"
 
 
-def exchanged(subject: hazards.Subject, values: twins.Reals) -> twins.Reals:
+def exchanged(subject: Subject, values: twins.Reals) -> twins.Reals:
     """The values that belong to light and viewer exchanged."""
     if subject.name == "he_torrance_jones":  # J' = Z J^T Z
         matrix = values.reshape(-1, 2, 2, 2).swapaxes(1, 2)
@@ -114,7 +113,7 @@ def exchanged(subject: hazards.Subject, values: twins.Reals) -> twins.Reals:
 
 @every_form
 @twins.every_dtype
-def test_is_reciprocal(subject: hazards.Subject, form: str, dtype: type) -> None:
+def test_is_reciprocal(subject: Subject, form: str, dtype: type) -> None:
     if subject.of_one_direction:
         return
     for parameters, given, values in evaluations(subject, form, dtype):
