@@ -141,5 +141,5 @@ def test_the_sum_of_he_torrance_has_the_slopes_of_its_limit(g: float) -> None:
 
 
 def test_a_model_without_derivatives_is_refused_with_those_that_have_them() -> None:
-    with pytest.raises(ParameterError, match=r"^model: lambert has no derivatives; those that have: oren_nayar, .*"):
+    with pytest.raises(ParameterError, match=r"^model: lambert has no derivatives; .* oren_nayar, "):
         gradient("lambert", 0.1, 0.0, 0.2, 0.0, rho=0.5)
