@@ -33,9 +33,6 @@ def drawn_directions(count: int = 500) -> tuple[NDArray[np.float64], NDArray[np.
     return np.arccos(rng.uniform(-1.0, 1.0, count)), rng.uniform(-np.pi, np.pi, count)
 
 
-# Units
-
-
 def test_90_degrees_is_the_horizon_to_the_last_bit() -> None:
     assert radians(90.0) == HALF_PI == np.pi / 2
     assert radians(180) == np.pi
@@ -45,9 +42,6 @@ def test_90_degrees_is_the_horizon_to_the_last_bit() -> None:
 def test_degrees_and_radians_are_inverse() -> None:
     angles = np.linspace(-720.0, 720.0, 1441)
     np.testing.assert_allclose(degrees(radians(angles)), angles, rtol=3e-16)
-
-
-# Checks
 
 
 def test_theta_keeps_float32_and_float64_and_widens_the_rest() -> None:
@@ -161,9 +155,6 @@ def test_finished_writes_zero_below_the_horizon_and_nan_where_an_angle_is_nan_in
     assert isinstance(finished(np.float64(1.0), checked_angles(0.0, 0.0, 0.0, 0.0)), np.float64)
 
 
-# Frames
-
-
 def test_unit_vectors_of_the_axes() -> None:
     for theta, phi, axis in ((0.0, 0.0, [0, 0, 1]), (HALF_PI, 0.0, [1, 0, 0]), (HALF_PI, HALF_PI, [0, 1, 0])):
         np.testing.assert_allclose(unit_vector(theta, phi), axis, atol=VECTOR)
@@ -186,9 +177,6 @@ def test_angles_at_the_pole_and_in_every_quadrant() -> None:
     assert spherical_angles([0.0, 0.0, 2.0]) == (0.0, 0.0)
     for x, y, phi in ((1, 1, 0.25), (-1, 1, 0.75), (-1, -1, -0.75), (1, -1, -0.25), (-1, 0, 1.0)):
         assert spherical_angles([x, y, 0.0])[1] == phi * np.pi
-
-
-# Half and difference angles
 
 
 def test_half_vector_is_the_bisector_and_theta_d_half_the_angle_between() -> None:

@@ -165,8 +165,6 @@ def test_a_draw_has_viewers_of_every_class() -> None:
     assert all(rows.sum() > (BANDS_DEG.size - 1) for rows in drawn.classes().values())
 
 
-# Families
-
 SIGMA_0_UM = (0.03, 0.06, 0.09, 0.12, 0.17, 0.24, 0.6, 1.2)  # at 550 nm g is 0.5 to 750
 
 

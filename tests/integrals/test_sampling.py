@@ -238,9 +238,6 @@ def test_refuses_what_is_out_of_range() -> None:
         pdf("ward", up, up, **WARD | {"alpha_x": 0.0})
 
 
-# Ward 1992, eq. 7
-
-
 def equation_7(u1: Array, u2: Array, wi: Array, alpha_x: float, alpha_y: float, *, arctan: bool) -> Array:
     """Directions by eq. 7 as it stands, with the arctan that (7a) needs or, as printed, without."""
     turn = 2.0 * np.pi * u2

@@ -42,9 +42,6 @@ JUMP = {np.float64: 1e-9, np.float32: 2.0**-22}  # float32: the rounding of two 
 Arguments = dict[str, float]
 
 
-# What is tested: every model of the registry, and what else the papers give
-
-
 @dataclass(frozen=True, eq=False)
 class Subject:
     """A function of directions, its twin, and the table of its parameters.

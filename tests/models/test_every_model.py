@@ -22,9 +22,6 @@ AZIMUTH_OF = {"torrance_sparrow": 6e-12, "beckmann": 6e-12, "beckmann_separable"
 AZIMUTH_OF["ross_li"] = 2e-11  # 1.2e-11, where kernels of both signs add up to next to nothing
 
 
-# Values
-
-
 @draws.every_model
 @pytest.mark.parametrize("dtype", [np.float64, np.float32])
 def test_is_finite_and_not_negative_in_every_corner(spec: ModelSpec, dtype: type) -> None:
@@ -129,9 +126,6 @@ def test_grazing_pole_says_which_models_grow_without_bound(spec: ModelSpec) -> N
     assert growth > 1e3 if spec.grazing_pole else growth < 10.0
 
 
-# Symmetry
-
-
 def asymmetry(spec: ModelSpec, seed: int) -> tuple[Callable[..., Any], Callable[..., None]]:
     """Values of 4000 draws after a turn of light and viewer, and the assertion that a turn changed nothing."""
     rng = np.random.default_rng(seed)
@@ -172,9 +166,6 @@ def test_lobe_axes_make_the_difference(spec: ModelSpec) -> None:
     same(turned(draws.HALF_PI, draws.HALF_PI, **{x.name: second, y.name: first}), **{x.name: first, y.name: second})
     turn = rng.uniform(-np.pi, np.pi, 4000)
     same(turned(turn, turn, **{x.name: first, y.name: first}), **{x.name: first, y.name: first})
-
-
-# nan
 
 
 @draws.every_model

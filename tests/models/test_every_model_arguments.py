@@ -8,9 +8,6 @@ from brdfdb.models import MODELS
 from brdfdb.parameters import ModelSpec
 from tests.models import draws
 
-# Shapes and types
-
-
 SHAPES: tuple[tuple[tuple[int, ...], ...], ...] = (
     ((), (), (), ()),
     ((1,), (), (), ()),

@@ -24,9 +24,6 @@ CONTINUOUS = [
 pytestmark = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="minutes without compilation")
 
 
-# Continuity
-
-
 def test_continuity_is_of_the_twins_too() -> None:
     """Between a corner and 1e-32 beside it no twin jumps: what `jump` takes from the twin is a slope."""
     for subject in SUBJECTS:

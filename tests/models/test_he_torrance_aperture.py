@@ -19,9 +19,6 @@ TWO_RINGS = 2e-8  # 1.2e-8: the ceramic near grazing, whose lobe is steep there
 SPREAD = 2e-14  # 4.8e-15, rho_s from the integral of the spread peak
 
 
-# Through apertures
-
-
 def area_by_quadrature(first: float, second: float, apart: float) -> float:
     """The common area of two circles on the sphere, as arcs of the one integrated over the other."""
     x, weight = np.polynomial.legendre.leggauss(100)

@@ -25,9 +25,6 @@ RECIPROCITY = 1e-14  # 0: the formula is symmetric to the last bit
 PARTS = 5e-15  # 8.2e-16
 
 
-# Very rough
-
-
 def test_very_rough_against_the_reference() -> None:
     rng = np.random.default_rng(13)
     for _ in range(200):
@@ -63,9 +60,6 @@ def test_he_torrance_converges_to_the_very_rough_limit(wavelength_nm: float) -> 
     assert abs(value / limit - 1.0)[likely].max() < 10.0 / g.min()
 
 
-# Smooth
-
-
 def test_smooth_is_fresnels_reflectance() -> None:
     theta_i = np.linspace(0.0, HALF_PI, 19)
     for n, k in ((1.5, 0.0), (0.769, 6.08)):
@@ -86,9 +80,6 @@ def test_he_torrance_converges_to_the_smooth_limit(sigma_0_um: float) -> None:
     )
     # eqs 71 and 78: v^4 tau^2 / (16 pi) (2 pi sigma)^2 / lambda^4 at most, with v = 2, over cos^2
     assert diffuse.max() <= (2.0 * np.pi * 3.0 / 0.5) ** 2 * g / np.pi
-
-
-# Part by part
 
 
 def test_parts_add_up() -> None:

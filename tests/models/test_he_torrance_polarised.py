@@ -46,9 +46,6 @@ def indices(rng: np.random.Generator, count: int, lowest: float = 0.1) -> dict[s
     return {"n": 10.0 ** rng.uniform(np.log10(lowest), 2.0, count), "k": k}
 
 
-# Fresnel's amplitudes
-
-
 def test_amplitudes_against_the_reference_and_the_reflectance_of_unpolarised_light() -> None:
     rng = np.random.default_rng(44)
     for _ in range(400):
@@ -75,9 +72,6 @@ def test_amplitudes_have_their_limits() -> None:
     assert fresnel.amplitudes(brewster, 1.5, 0.0)[1] == pytest.approx(0.0, abs=1e-15)
     cos_theta = np.cos(np.linspace(0.0, HALF_PI, 10))
     assert all((each == 0.0).all() for each in fresnel.amplitudes(cos_theta, 1.0, 0.0))
-
-
-# The facet
 
 
 def test_published_reflectances_have_the_reflected_polarisation_first() -> None:
@@ -168,9 +162,6 @@ def test_eq_64_as_printed_would_not_keep_the_energy_of_a_perfect_mirror() -> Non
         assert np.sum(abs(literal(wi, wr, 1.0, 1e4, as_printed=True) @ pure) ** 2) == pytest.approx(1.0, abs=1e-3)
 
 
-# The convention
-
-
 def s_and_p(w: Any, k: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     s = np.cross([0.0, 0.0, 1.0], w)
     s /= np.linalg.norm(s)
@@ -251,9 +242,6 @@ def test_at_the_pole_s_and_p_are_the_limit_along_the_azimuth() -> None:
         np.testing.assert_allclose(at, nearby, atol=1e-8)
     by_vector = models.he_torrance_jones_vectors([0.0, 0.0, 1.0], unit_vector(0.6, 0.4), **index)
     np.testing.assert_allclose(by_vector, he_torrance_jones(0.0, 0.0, 0.6, 0.4, **index), atol=AMPLITUDE)
-
-
-# Mueller matrices
 
 
 def test_first_element_is_the_unpolarised_model() -> None:

@@ -37,9 +37,6 @@ def read(file: str) -> dict[str, NDArray[np.float64]]:
     return {name: np.array([float(row[name]) for row in table]) for name in table[0]}
 
 
-# Paper values
-
-
 def test_every_row_of_the_unidirectional_surface() -> None:
     table = read("oren_nayar_unidirectional.csv")
     direct, inter = table.pop("direct"), table.pop("inter")
@@ -69,9 +66,6 @@ def test_every_row_of_the_gaussian_surface() -> None:
     error = np.abs(parts.interreflected - table["inter"]) / (table["direct"] + table["inter"])
     assert error.max() <= GAUSSIAN_ROWS_OFF
     assert np.sum(error > GAUSSIAN_ROWS) <= 2
-
-
-# Reference
 
 
 SLOPES = (1e-6, 0.05, 1.0, HALF_PI)
@@ -149,9 +143,6 @@ def test_gaussian_keeps_its_promise() -> None:
         assert value == pytest.approx(expected, rel=GAUSSIAN), (theta_i, theta_r, delta_phi, sigma)
 
 
-# Parts and twins
-
-
 SURFACES: list[tuple[str, dict[str, float]]] = [
     ("oren_nayar", {"rho": 0.7, "sigma": 0.5}),
     ("oren_nayar_unidirectional", {"rho": 0.7, "theta_a": 0.6, "phi_a": 0.9}),
@@ -187,9 +178,6 @@ def test_a_refractive_index_is_optional_and_its_imaginary_part_needs_the_real_on
         models.torrance_sparrow(*angles, sigma=0.3, k=0.5)
     with pytest.raises(ValueError, match=r"^n: 0 is outside "):
         models.oren_nayar_body_surface(*angles, rho=0.5, sigma=0.3, k_s=0.1, n=0.0)
-
-
-# Limits
 
 
 @pytest.mark.parametrize(
@@ -261,9 +249,6 @@ def test_the_functional_fit_lies_near_the_integral() -> None:
             truth = models.oren_nayar_gaussian(theta_i, 0.0, theta_r, delta_phi, rho=0.9, sigma=np.pi / 6.0)
             fit = models.oren_nayar(theta_i, 0.0, theta_r, delta_phi, rho=0.9, sigma=np.pi / 6.0)
             assert np.max(np.abs(fit - truth)) <= FIT * truth.max()
-
-
-# Energy
 
 
 def albedo(name: str, theta_deg: float, phi_i: float = 0.0, **parameters: float) -> float:

@@ -99,8 +99,6 @@ def test_blue_plastic_reflects_what_the_paper_measured() -> None:
     assert he_torrance_albedo(0.0, a=0.15, **light) == pytest.approx(0.195, abs=1e-3)
 
 
-# Limits
-
 DIRECTIONS = (
     np.array([0.0, 0.3, 0.7, 1.2, 1.5]),
     0.0,
