@@ -31,19 +31,6 @@ def test_entries_are_in_order_differ_visibly_and_say_something_in_one_line() -> 
         assert not np.allclose(printed, right, rtol=0.05, atol=1e-4), entry.key
 
 
-def test_what_is_a_custom_or_words_alone_is_not_called_printed() -> None:
-    kinds = {kind: {each.key for each in MISPRINTS if each.kind == kind} for kind in ("printed", "customary", "words")}
-    assert kinds["customary"] == {"surface-radiance-as-brdf", "ten-terms", "beckmanns-limit", "root-search"}
-    assert kinds["words"] == {
-        "visible-and-masked-widths",
-        "hemispherical-for-bidirectional",
-        "local-normal-for-z",
-        "deviation-of-slopes",
-        "arctangent-of-7a",
-    }
-    assert sum(map(len, kinds.values())) == len(MISPRINTS)
-
-
 def test_every_misprint_is_tested_for_its_figure() -> None:
     files = Path(__file__).parent.glob("test_*.py")
     names = {name for path in files for name in re.findall(r"^def (test_\w+)", path.read_text(encoding="utf-8"), re.M)}

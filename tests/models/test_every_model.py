@@ -101,18 +101,6 @@ def test_is_zero_just_below_the_horizon(spec: ModelSpec) -> None:
 
 
 @draws.every_model
-def test_float32_horizon_is_the_float64_horizon(spec: ModelSpec) -> None:
-    rng = np.random.default_rng(32)
-    zero, one, half = np.float32(0.0), np.float32(1.0), np.float32(0.5)
-    for _ in range(5):
-        parameters = draws.drawn(spec, rng)
-        for theta_r_32, theta_r in ((half, 0.5), (draws.HORIZON_32, draws.HALF_PI)):
-            single = spec.evaluate(draws.HORIZON_32, zero, theta_r_32, one, **parameters)
-            assert single.dtype == np.float32
-            assert single == np.float32(spec.evaluate(draws.HALF_PI, 0.0, theta_r, 1.0, **parameters))
-
-
-@draws.every_model
 def test_grazing_pole_says_which_models_grow_without_bound(spec: ModelSpec) -> None:
     rng = np.random.default_rng(89)
     parameters = {name: values[:, None] for name, values in draws.drawn(spec, rng, 50).items()}

@@ -69,19 +69,6 @@ def test_smooth_is_fresnels_reflectance() -> None:
         np.testing.assert_allclose(mirror, value, rtol=1e-15)
 
 
-@pytest.mark.parametrize("sigma_0_um", [1e-3, 1e-5, 1e-7])
-def test_he_torrance_converges_to_the_smooth_limit(sigma_0_um: float) -> None:
-    theta, surface = np.linspace(0.0, 1.5, 16), {"wavelength_nm": 500.0, "tau_um": 3.0, "n": 0.769, "k": 6.08}
-    g = (4000.0 * np.pi / 500.0 * sigma_0_um) ** 2  # the largest, at normal incidence
-    left = he_torrance_specular(theta, sigma_0_um=sigma_0_um, **surface) / he_torrance_smooth(theta, n=0.769, k=6.08)
-    assert ((left <= 1.0 + 1e-15) & (left >= 1.0 - g - 1e-15)).all()
-    diffuse = he_torrance(
-        theta[:, None, None], 0.0, theta[:, None], np.linspace(0.0, np.pi, 9), sigma_0_um=sigma_0_um, **surface
-    )
-    # eqs 71 and 78: v^4 tau^2 / (16 pi) (2 pi sigma)^2 / lambda^4 at most, with v = 2, over cos^2
-    assert diffuse.max() <= (2.0 * np.pi * 3.0 / 0.5) ** 2 * g / np.pi
-
-
 def test_parts_add_up() -> None:
     rng = np.random.default_rng(69)
     angles = directions(rng, 500)

@@ -76,20 +76,12 @@ def registry(monkeypatch: pytest.MonkeyPatch) -> Iterator[Registry]:
             del sys.modules[name]
 
 
-# rho, power, rim; light and viewer [degree]; pi f_r, worked out by hand: 0.4 (1 + 2 / 16), and 0.5
-HAND = [((0.4, 2.0, 2.0), (60.0, 60.0), 0.45), ((0.5, 1.0, 4.0), (0.0, 60.0), 0.5)]
-
-
-@pytest.mark.parametrize(("parameters", "theta_deg", "expected"), HAND)
-def test_their_model_has_the_values_that_a_hand_works_out(
-    installed: ModelSpec, parameters: tuple[float, ...], theta_deg: tuple[float, float], expected: float
+def test_a_table_of_their_model_has_its_values_and_those_that_a_hand_works_out(
+    store: Path, installed: ModelSpec
 ) -> None:
-    named = dict(zip(("rho", "power", "rim"), parameters, strict=True))
-    theta_i, theta_r = np.deg2rad(theta_deg)
-    assert np.pi * installed.evaluate(theta_i, 0.0, theta_r, 0.0, **named) == pytest.approx(expected, rel=1e-8)
-
-
-def test_a_table_of_their_model_is_that_of_the_model(store: Path, installed: ModelSpec) -> None:
+    theta = np.deg2rad(60.0)  # 0.4 (1 + 2 / 16)
+    by_hand = installed.evaluate(theta, 0.0, theta, 0.0, rho=0.4, power=2.0, rim=2.0)
+    assert np.pi * by_hand == pytest.approx(0.45, rel=1e-8)
     table = brdfdb.open(store)["peach"]
     angles = np.deg2rad([30.0, 0.0, 60.0, 120.0])
     expected = installed.evaluate(*angles, **PARAMETERS)
