@@ -21,7 +21,6 @@ from tests.models.he_torrance_surfaces import ALUMINUM, CERAMIC, CONES, HALF_PI,
 
 # Relative differences, each just above the worst measured, which stands behind it
 VERY_ROUGH = 1e-12  # 2.1e-13, where exp has a large exponent
-RECIPROCITY = 1e-14  # 0: the formula is symmetric to the last bit
 PARTS = 5e-15  # 8.2e-16
 
 
