@@ -163,13 +163,6 @@ def test_the_diffuse_reference_through_pinholes_is_the_one_of_40_digits() -> Non
     assert he_torrance_1991.aperture_diffuse(0.4, 0.5, 2.9, CONE, CONE, **CERAMIC | {"sigma_0_um": 0.0}) == 0.0
 
 
-def test_an_ideal_diffuser_looks_the_same_through_any_aperture() -> None:
-    nothing = {"wavelength_nm": 500.0, "sigma_0_um": 0.3, "tau_um": 2.0, "n": 1.0, "k": 0.0}
-    theta = np.linspace(0.0, 1.3, 7)
-    value = he_torrance_aperture(theta, 0.0, theta[:, None], 1.0, a=0.7, **CONES, **nothing)
-    np.testing.assert_allclose(value, 0.7 / np.pi, rtol=1e-14)
-
-
 def test_light_and_receiver_exchange_with_their_cones() -> None:
     rng = np.random.default_rng(3)
     theta_i, phi_i, theta_r, phi_r = directions(rng, 50)
