@@ -24,8 +24,8 @@ from brdfdb.tables.layout import Layout
 from brdfdb.tables.table import Table
 from brdfdb.tables.tabulation import tabulate
 from tests.api.a_store import client_of
+from tests.formats.a_file import check_changes_refused, random_pairs
 from tests.formats.bsdf_judges import check_bsdf, in_window, klems_total, made, queried, thermal
-from tests.formats.refusals import check_changes_refused
 from tests.formats.small_tables import ANISOTROPIC, DIFFUSE, GREY, small_table
 from tests.pipelines.command import run
 
@@ -52,12 +52,6 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> dict[tuple[str, str], Pat
     for (material, kind), path in paths.items():
         klems.write(table_of(material), path, kind=kind)
     return paths
-
-
-def drawn(count: int) -> tuple[Floats, Floats]:
-    rng = np.random.default_rng(11)
-    theta, phi = np.arccos(rng.uniform(0.02, 1.0, (2, count))), rng.uniform(-np.pi, np.pi, (2, count))
-    return unit_vector(theta[0], phi[0]), unit_vector(theta[1], phi[1])
 
 
 @pytest.mark.parametrize(("kind", "count"), [("full", 145), ("half", 77), ("quarter", 41)])
@@ -104,14 +98,6 @@ def test_isotropic_averages_are_those_of_all_pairs() -> None:
 
     alike, whole = (averages(brdf, basis, 1, isotropic=isotropic) for isotropic in (True, False))
     assert alike == pytest.approx(whole, rel=1e-4)
-
-
-@FILES
-def test_what_is_read_is_what_the_file_states(files: dict[tuple[str, str], Path], material: str, kind: str) -> None:
-    reading = formats.read(files[material, kind])
-    assert reading.channels == ("Y",)
-    assert reading.record["error_of_file"]["p99"] > 0.0
-    assert any("both sides" in remark for remark in reading.record["remarks"])
 
 
 def test_fixed_patches_report_a_tolerance_that_is_out_of_reach(tmp_path: Path) -> None:
@@ -163,7 +149,7 @@ def test_damaged_files_are_refused_with_a_sentence(tmp_path: Path, files: dict[t
 @pytest.mark.parametrize(("material", "kind"), [(GREY, "full"), (ANISOTROPIC, "half")])
 def test_radiance_sees_the_values_that_are_read(files: dict[tuple[str, str], Path], material: str, kind: str) -> None:
     path = files[material, kind]
-    wi, wr = drawn(1000)
+    wi, wr = random_pairs(1000)
     assert queried(path, wi, wr)[:, 1] == pytest.approx(klems.read(path).lookup_vectors(wi, wr), rel=AS_RADIANCE)
 
 
@@ -173,7 +159,7 @@ def test_radiance_sees_the_colour(tmp_path: Path) -> None:
     klems.write(table_of("spectral"), path, kind="quarter", colour=True)
     reading = klems.read(path)
     assert reading.channels == ("X", "Y", "Z")
-    wi, wr = drawn(1000)
+    wi, wr = random_pairs(1000)
     values = reading.lookup_vectors(wi, wr)
     assert np.max(np.abs(queried(path, wi, wr) - values) / values[:, 1:2]) < AS_RADIANCE_COLOURED
 

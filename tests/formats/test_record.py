@@ -24,8 +24,8 @@ from brdfdb.tables.grids import Grid
 from brdfdb.tables.layout import Layout
 from brdfdb.tables.tabulation import tabulate
 from tests.api.a_store import client_of
+from tests.formats.a_file import POLARISED_ALONE, options_of
 from tests.formats.small_tables import table_of
-from tests.formats.test_round_trips import POLARISED_ALONE, options_of
 from tests.pipelines.command import run
 
 FORMULA = 'Copper,=HYPERLINK("http://a.example","here")'
@@ -72,7 +72,7 @@ def test_lines_are_read_back_exactly_and_begin_no_formula(document: dict[str, An
 @pytest.mark.parametrize("name", [name for name in EXPORTERS if name not in POLARISED_ALONE])
 def test_no_title_breaks_a_file(name: str, title: str, tmp_path: Path) -> None:
     path = tmp_path / f"a{EXPORTERS[name].suffix}"
-    written = formats.write(table_of(layout_of(title)), path, name, **({} if name == "png" else options_of(name)))
+    written = formats.write(table_of(layout_of(title)), path, name, **options_of(name))
     if name in IMPORTERS:
         assert formats.read(path, name).record["title"] == title
     if path.suffix in (".xml", ".mtlx"):
