@@ -12,6 +12,7 @@ import pytest
 from brdfdb import formats
 from brdfdb.errors import FileFormatError
 from brdfdb.formats import EXPORTERS
+from brdfdb.formats._readings import FileTable
 from brdfdb.geometry import unit_vector
 from brdfdb.measurements import Samples
 from brdfdb.measurements.statement import statement
@@ -42,6 +43,13 @@ def exported(folder: Path, name: str, kind: str = DIFFUSE, **options: Any) -> Pa
     """Write a small table as a coarse file `a` with the suffix of a format, and return its path."""
     path = folder / f"a{EXPORTERS[name].suffix}"
     return formats.write(small_table(kind), path, name, **{**options_of(name), **options}).paths[0]
+
+
+def read_table(path: Path, file_format: str = "", **keywords: Any) -> FileTable:
+    """Return what a file holds, which is f_r in all directions."""
+    reading = formats.read(path, file_format, **keywords)
+    assert isinstance(reading, FileTable)
+    return reading
 
 
 def samples_of(folder: Path, text: str, name: str = "sheet.csv", **keywords: Any) -> Samples:

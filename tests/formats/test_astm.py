@@ -7,9 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from brdfdb import formats
-from brdfdb.formats._readings import FileTable
-from tests.formats.a_file import check_texts_refused, exported, samples_of
+from tests.formats.a_file import check_texts_refused, exported, read_table, samples_of
 from tests.formats.small_tables import KINDS, small_table
 
 LOGARITHMS = 1e-10  # of f_r [1/sr] of a table of logarithms of f_r + 1e-4, in float32: worst measured 2e-11
@@ -41,8 +39,7 @@ def test_rows_are_f_r_of_the_table(kind: str, tmp_path: Path) -> None:
 def test_a_grid_by_hand(tmp_path: Path) -> None:
     path = tmp_path / "a.astm"
     path.write_text(HEAD + "\n".join(ROWS[::-1]) + "\n", encoding="utf-8")
-    reading = formats.read(path)
-    assert isinstance(reading, FileTable)
+    reading = read_table(path)
     np.testing.assert_array_equal(reading.wavelength_nm, [400.0, 500.0])
     np.testing.assert_allclose(reading.lookup(1.0, 0.7, 0.5, 0.7), [1, 10], rtol=1e-6)
     np.testing.assert_allclose(reading.lookup(0.0, 0.0, 1.0, 0.0), [2, 20], rtol=1e-6)

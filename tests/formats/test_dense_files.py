@@ -13,11 +13,9 @@ import xarray as xr
 from scipy.io import netcdf_file
 
 import brdfdb
-from brdfdb import formats
 from brdfdb.errors import ParameterError, WriteError
 from brdfdb.formats import eradiate, netcdf
 from brdfdb.formats._dense_grid import dense_table, rounded
-from brdfdb.formats._readings import FileTable
 from brdfdb.geometry import radians
 from brdfdb.materials import Material
 from brdfdb.store.publication import publish_dataset
@@ -30,7 +28,7 @@ from brdfdb.tables.grids import (
 )
 from brdfdb.tables.layout import Layout
 from brdfdb.tables.tabulation import tabulate
-from tests.formats.a_file import exported
+from tests.formats.a_file import exported, read_table
 from tests.formats.small_tables import ANISOTROPIC, DIFFUSE, GREY, SPECTRAL, small_table
 
 CF_CHECKER = os.environ.get("BRDFDB_CF")  # the program compliance-checker
@@ -70,8 +68,7 @@ def test_a_regular_grid_has_the_values_of_the_table_at_its_nodes(
     kind: str, axes: str, name: str, tmp_path: Path
 ) -> None:
     table = small_table(kind)
-    reading = formats.read(exported(tmp_path, name, kind, axes=axes))
-    assert isinstance(reading, FileTable)
+    reading = read_table(exported(tmp_path, name, kind, axes=axes))
     names = {
         "light_viewer": ANISOTROPIC_AXES if kind == ANISOTROPIC else ISOTROPIC_AXES,
         "half_difference": ANISOTROPIC_HALF_DIFFERENCE_AXES if kind == ANISOTROPIC else HALF_DIFFERENCE_AXES,

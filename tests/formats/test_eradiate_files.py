@@ -14,10 +14,9 @@ import xarray as xr
 from brdfdb import formats
 from brdfdb.errors import ParameterError
 from brdfdb.formats import eradiate
-from brdfdb.formats._readings import FileTable
 from brdfdb.formats._stated_error import Comparison
 from brdfdb.parameters import Floats
-from tests.formats.a_file import check_refused, exported, random_pairs
+from tests.formats.a_file import check_refused, exported, random_pairs, read_table
 from tests.formats.small_tables import DIFFUSE, GREY, SPECTRAL, small_table
 
 PYTHON = os.environ.get("BRDFDB_ERADIATE")  # of an environment with the package eradiate
@@ -51,8 +50,7 @@ def test_eradiate_reads_what_we_read(kind: str, tmp_path: Path) -> None:
         xr.Dataset({"brdf": (opened["brdf"].dims, values)}, eradiate._coordinates(values.shape)).to_netcdf(
             path, engine="scipy"
         )
-    back = formats.read(path)
-    assert isinstance(back, FileTable)
+    back = read_table(path)
     wi, wr = random_pairs(500)
     theirs = _through_eradiate(path, wi, wr)
     assert np.abs(back.lookup_vectors(wi, wr) - theirs).max() <= KERNEL_RTOL * theirs.max()

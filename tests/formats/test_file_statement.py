@@ -24,6 +24,7 @@ from brdfdb.tables.planner import planned
 from brdfdb.tables.stated_error import Error
 from brdfdb.tables.table import Table, table_from
 from brdfdb.tables.tabulation import tabulate
+from tests.formats.a_file import read_table
 
 COLOUR_NM, METAL_NM = np.array([420.0, 500.0, 590.0, 680.0]), np.array([450.0, 550.0, 650.0])
 SOIL = {"w": 0.3, "b": 0.24, "c": 0.6, "b_0": 1.0, "h": 0.05, "theta_bar_deg": 20.0}
@@ -78,9 +79,7 @@ def share_within(reading: FileTable, table: Table, kind: str, *wavelength_nm: fl
 
 def written(table: Table, path: Path, file_format: str, **options: Any) -> FileTable:
     files = formats.write(table, path / f"{table.name}{formats.EXPORTERS[file_format].suffix}", file_format, **options)
-    reading = formats.read(files.paths[0], file_format)
-    assert isinstance(reading, FileTable)
-    return reading
+    return read_table(files.paths[0], file_format)
 
 
 @pytest.mark.parametrize("file_format", ["eradiate", "fred"])

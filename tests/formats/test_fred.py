@@ -7,9 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from brdfdb import formats
-from brdfdb.formats._readings import FileTable
-from tests.formats.a_file import check_changes_refused, exported, samples_of
+from tests.formats.a_file import check_changes_refused, exported, read_table, samples_of
 from tests.formats.small_tables import GREY, small_table
 
 # Light at 10 and 50 degrees; bright towards the mirror direction, at azimuth 0
@@ -52,8 +50,7 @@ def test_both_sides_are_written_and_the_normal_once(tmp_path: Path) -> None:
 def test_azimuths_count_from_the_mirror_direction(tmp_path: Path) -> None:
     path = tmp_path / "a.fred.txt"
     path.write_text(BY_HAND, encoding="ascii")
-    reading = formats.read(path)
-    assert isinstance(reading, FileTable)
+    reading = read_table(path)
     light, viewer = np.deg2rad([30.0, 20.0])
     # at theta_i = 30 degrees, half way between both lights, and half way between the normal and 40 degrees; scale 2
     assert reading.lookup(light, 0.0, viewer, np.pi) == pytest.approx((1 + 2 + 3 + 8) / 2, rel=1e-6)

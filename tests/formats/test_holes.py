@@ -17,7 +17,7 @@ from brdfdb.formats._nodes import FILL_VALUES
 from brdfdb.formats._readings import FileTable
 from brdfdb.formats.rgl._tensors import read_tensors, write_tensors
 from brdfdb.measurements.samples import Samples
-from tests.formats.a_file import exported, samples_of
+from tests.formats.a_file import exported, read_table, samples_of
 from tests.formats.round_trip import ROUND_TRIPPED
 
 GREEN = 1
@@ -188,7 +188,6 @@ def test_what_a_netcdf_file_declares_missing_is_a_hole(
 
 
 def test_a_direction_that_is_nan_is_nan_from_a_file(tmp_path: Path) -> None:
-    reading = formats.read(exported(tmp_path, "numpy"))
-    assert isinstance(reading, FileTable)
+    reading = read_table(exported(tmp_path, "numpy"))
     assert np.isnan(reading.lookup([0.2, np.nan], 0.0, 0.3, 1.0)).tolist() == [False, True]
     assert reading.lookup(2.0, 0.0, 0.3, 1.0) == 0.0

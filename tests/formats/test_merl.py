@@ -9,13 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from brdfdb import formats
 from brdfdb.formats import merl
 from brdfdb.formats._channels import channels_of
-from brdfdb.formats._readings import FileTable
 from brdfdb.formats._written import Written
 from brdfdb.geometry import unit_vector
-from tests.formats.a_file import check_refused
+from tests.formats.a_file import check_refused, read_table
 from tests.formats.small_tables import ISOTROPIC, SMOOTH, SPECULAR, small_table
 
 HEADER = 12  # byte
@@ -53,8 +51,7 @@ def test_a_file_is_read_as_brdf_explorer_reads_it(exported: tuple[str, Written])
     assert len(data) == 34992012
     assert np.frombuffer(data, "<i4", 3).tolist() == [90, 90, 180]
     numbers = np.frombuffer(data, "<f8", 3 * PLANE, HEADER)
-    reading = formats.read(written.paths[0])
-    assert isinstance(reading, FileTable)
+    reading = read_table(written.paths[0])
     rng = np.random.default_rng(3)
     for light, viewer in rng.uniform((0, 0), (1.5, 6.2), (40, 2, 2)).tolist():
         expected = looked_up(numbers, light, viewer)

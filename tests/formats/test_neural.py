@@ -13,9 +13,8 @@ import pytest
 
 from brdfdb import formats
 from brdfdb.errors import ParameterError
-from brdfdb.formats._readings import FileTable
 from brdfdb.geometry import unit_vector
-from tests.formats.a_file import check_refused
+from tests.formats.a_file import check_refused, read_table
 
 SHAPES = {"dense_1": (6, 21), "dense_2": (21, 21), "dense_3": (21, 3)}
 
@@ -45,8 +44,7 @@ def network(changes: dict[str, Any] | None = None) -> bytes:
 def test_the_input_is_half_and_difference_vector_and_the_output_f_r(tmp_path: Path) -> None:
     path = tmp_path / "paper.h5"
     path.write_bytes(network())
-    table = formats.read(path)
-    assert isinstance(table, FileTable)
+    table = read_table(path)
     assert table.channels == ("R", "G", "B")
     wi, wr = unit_vector([0.3, 0.3], [1.0, 1.0]), unit_vector([0.7, 0.5], [1.0 + np.pi, 2.5])
     values = table.lookup_vectors(wi, wr)

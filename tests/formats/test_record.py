@@ -16,7 +16,6 @@ from hypothesis import strategies as st
 
 from brdfdb import formats
 from brdfdb.formats import EXPORTERS, IMPORTERS, radiance
-from brdfdb.formats._readings import FileTable
 from brdfdb.formats._record import lines, of_lines
 from brdfdb.materials import Material
 from brdfdb.store.publication import publish_dataset
@@ -24,7 +23,7 @@ from brdfdb.tables.grids import Grid
 from brdfdb.tables.layout import Layout
 from brdfdb.tables.tabulation import tabulate
 from tests.api.a_store import client_of
-from tests.formats.a_file import POLARISED_ALONE, options_of
+from tests.formats.a_file import POLARISED_ALONE, options_of, read_table
 from tests.formats.small_tables import table_of
 from tests.pipelines.command import run
 
@@ -98,8 +97,7 @@ def test_no_cell_of_a_csv_is_a_formula_from_command_and_service(tmp_path: Path) 
         assert b"HYPERLINK" in content
         assert formulas(content.decode("utf-8")) == []
         (tmp_path / "again.csv").write_bytes(content)
-        reading = formats.read(tmp_path / "again.csv")
-        assert isinstance(reading, FileTable)
+        reading = read_table(tmp_path / "again.csv")
         assert reading.record["title"] == FORMULA
 
 

@@ -13,7 +13,6 @@ import brdfdb
 from brdfdb import formats
 from brdfdb.errors import FileFormatError, ParameterError
 from brdfdb.formats import EXPORTERS, FormatOption, parsed_options, served_options
-from brdfdb.formats._readings import FileTable
 from brdfdb.formats._written import Written
 from brdfdb.materials import Material
 from brdfdb.store.publication import publish_dataset
@@ -22,7 +21,7 @@ from brdfdb.tables.layout import Layout
 from brdfdb.tables.tabulation import tabulate
 from brdfdb_api.http.views import EXPORT_OPTIONS
 from tests.api.a_store import client_of
-from tests.formats.a_file import exported
+from tests.formats.a_file import exported, read_table
 from tests.formats.small_tables import ANISOTROPIC, GREY
 from tests.pipelines.command import Captured, run
 
@@ -85,8 +84,7 @@ def test_a_verdict_that_is_not_given_is_not_stated(store: Path, tmp_path: Path) 
     table = brdfdb.open(store)["grey"]
     for verdict, stated in ((None, "not stated"), ("passes", "passes")):
         formats.write(table, tmp_path / "grey.csv", "csv", resolution=45.0, verdict=verdict)
-        reading = formats.read(tmp_path / "grey.csv")
-        assert isinstance(reading, FileTable)
+        reading = read_table(tmp_path / "grey.csv")
         assert reading.record["audit"] == stated
     assert b"audit: not audited" in client_of(store).get("/v1/materials/grey/export/csv?resolution=45").content
 

@@ -12,16 +12,14 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from brdfdb import formats
 from brdfdb.errors import ParameterError
 from brdfdb.formats import rgl
-from brdfdb.formats._readings import FileTable
 from brdfdb.formats._stated_error import Comparison
 from brdfdb.formats.rgl._fields import MixedSlices, Warp, fields_of
 from brdfdb.formats.rgl._tensors import read_tensors, write_tensors
 from brdfdb.geometry import unit_vector
 from brdfdb.tables.albedo import directional_albedo
-from tests.formats.a_file import random_pairs
+from tests.formats.a_file import random_pairs, read_table
 from tests.formats.small_tables import ANISOTROPIC, DIFFUSE, GREY, SPECTRAL, WAVELENGTHS_NM, small_table
 
 # Mitsuba computes in float32; the largest relative difference of f_r measured is 9e-5, where rows of a warp are dark
@@ -74,8 +72,7 @@ def seen_by_mitsuba(path: Path, variant: str, wi: Array, wr: Array, wavelength_n
 @pytest.mark.parametrize("kind", KINDS)
 def test_values_are_those_of_mitsuba(written: dict[str, Path], kind: str) -> None:
     wi, wr = random_pairs(400)
-    ours = formats.read(written[kind])
-    assert isinstance(ours, FileTable)
+    ours = read_table(written[kind])
     at = ours.wavelength_nm
     wavelengths = np.full(4, 300.0) if at is None else np.array([*at, 900.0])  # beyond the last: its values
     theirs = seen_by_mitsuba(written[kind], "scalar_spectral", wi, wr, wavelengths)
@@ -88,8 +85,7 @@ def test_rgb_files_are_those_of_mitsuba(tmp_path: Path) -> None:
     table, path = small_table(SPECTRAL), tmp_path / "rgb.bsdf"
     files = rgl.write(table, path, kind="rgb", tolerance=LOOSE, megabytes=MEGABYTES)
     assert "of the spectrum: linear sRGB under D65" in files.remarks
-    ours = formats.read(path)
-    assert isinstance(ours, FileTable)
+    ours = read_table(path)
     assert ours.channels == ("R", "G", "B")
     wi, wr = random_pairs(200)
     theirs = seen_by_mitsuba(path, "scalar_rgb", wi, wr, None)
@@ -141,8 +137,7 @@ def test_a_light_in_the_plane_of_symmetry_is_read_right(written: dict[str, Path]
     inside = np.tile(unit_vector(np.array([1.0]), np.array([-1e-6])), (50, 1))
     exact = inside * (1.0, 0.0, 1.0)
     values = seen_by_mitsuba(written[ANISOTROPIC], "scalar_spectral", exact, wr, np.full(4, 550.0))
-    ours = formats.read(written[ANISOTROPIC])
-    assert isinstance(ours, FileTable)
+    ours = read_table(written[ANISOTROPIC])
     np.testing.assert_allclose(values[:, :1], ours.evaluate(inside, wr), rtol=1e-3, atol=1e-5)
 
 
@@ -153,8 +148,7 @@ def test_files_with_all_azimuths_are_for_other_readers(tmp_path: Path) -> None:
     assert (phi_i[0], phi_i[-1]) == (np.float32(-np.pi), np.float32(np.pi))  # what pbrt-v4 and RGL's loader ask for
     assert not any("azimuths" in remark for remark in files.remarks)
     assert files.error is not None
-    read_back = formats.read(path)
-    assert isinstance(read_back, FileTable)
+    read_back = read_table(path)
     assert Comparison(table).error_of(read_back.evaluate) == files.error
 
 
@@ -183,8 +177,7 @@ def test_files_of_other_programs_have_no_record(written: dict[str, Path], tmp_pa
     fields = fields_of("file", read_tensors(written[SPECTRAL]))
     path = tmp_path / "lab_spec.bsdf"
     write_tensors(path, replace(fields, description="measured in a laboratory").tensors())
-    read_back = formats.read(path)
-    assert isinstance(read_back, FileTable)
+    read_back = read_table(path)
     assert (read_back.name, dict(read_back.record)) == ("lab_spec", {})
     assert read_back.wavelength_nm is not None
     assert read_back.wavelength_nm.tolist() == WAVELENGTHS_NM

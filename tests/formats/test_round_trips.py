@@ -14,7 +14,7 @@ from brdfdb.materials import Material
 from brdfdb.measurements.samples import Samples
 from brdfdb.tables.grids import Grid
 from brdfdb.tables.layout import Layout
-from tests.formats.a_file import ISOTROPIC_ALONE, POLARISED_ALONE, SIZE, check_refused, exported, options_of
+from tests.formats.a_file import ISOTROPIC_ALONE, POLARISED_ALONE, SIZE, check_refused, exported, options_of, read_table
 from tests.formats.round_trip import ROUND_TRIPPED, round_trip
 from tests.formats.small_tables import ANISOTROPIC, DIFFUSE, KINDS, SMOOTH, SPECTRAL, SPECULAR, small_table, table_of
 
@@ -57,6 +57,22 @@ def test_what_is_read_is_as_near_as_the_file_states(name: str, kind: str, tmp_pa
         assert any("in the exact mirror direction" in remark for remark in record.get("remarks", ())) == without
     if name in SIZED:
         assert trip.nbytes <= 1e6 * SIZE
+    if name != "materialx":  # which is a formula
+        check_samples_are_lookups_at_nodes(tmp_path / f"{kind}{EXPORTERS[name].suffix}", name, kind)
+
+
+def check_samples_are_lookups_at_nodes(path: Path, name: str, kind: str) -> None:
+    """Check that samples of a grid are what the tools of its format see at these directions."""
+    table, samples = read_table(path, name), formats.samples(path, name)
+    assert len(samples) >= 8
+    assert np.all(samples.known)
+    inside = (samples.w_i[:, 2] > 1e-3) & (samples.w_r[:, 2] > 1e-3)  # the horizon itself is nobody's
+    if kind == ANISOTROPIC:  # at the normal all azimuths of the light are one, and RGL's readers mirror the last ones
+        inside &= (samples.theta_i > 1e-6) & ((name != "rgl") | (np.abs(np.degrees(samples.phi_i) + 135.0) < 44.0))
+    some = np.flatnonzero(inside)[:: max(1, inside.sum() // 20_000)]
+    seen = table.evaluate(samples.w_i[some], samples.w_r[some])
+    channels = [samples.channels.index(channel) for channel in table.channels]
+    np.testing.assert_allclose(samples.values[np.ix_(some, channels)], seen, rtol=2e-3, atol=1e-6)
 
 
 def test_wavelengths_have_one_order_in_every_format_that_keeps_them(tmp_path: Path) -> None:

@@ -11,37 +11,10 @@ import pytest
 from brdfdb import formats
 from brdfdb.errors import FileFormatError, ParameterError
 from brdfdb.formats import zemax
-from brdfdb.formats._readings import FileTable
 from brdfdb.formats.netcdf import write_samples
 from brdfdb.formats.rgl._tensors import write_tensors
 from brdfdb.measurements import Instrument, Samples
-from tests.formats.a_file import ISOTROPIC_ALONE, check_changes_refused, check_texts_refused, exported, samples_of
-from tests.formats.small_tables import ANISOTROPIC, DIFFUSE, SPECTRAL
-
-GRIDS = sorted((set(formats.EXPORTERS) & set(formats.IMPORTERS)) - {"materialx", "kaist"})  # tests of their own
-COLOURED = {"merl", "utia", "klems"}  # their colours need more wavelengths than the small table has
-CASES = [
-    (name, kind)
-    for name in GRIDS
-    for kind in (DIFFUSE, ANISOTROPIC, SPECTRAL)
-    if name not in {ANISOTROPIC: ISOTROPIC_ALONE, SPECTRAL: COLOURED}.get(kind, ())
-]
-
-
-@pytest.mark.parametrize(("name", "kind"), CASES)
-def test_values_of_a_grid_are_those_that_its_tools_see_at_the_nodes(name: str, kind: str, tmp_path: Path) -> None:
-    path = exported(tmp_path, name, kind)
-    table, samples = formats.read(path), formats.samples(path)
-    assert isinstance(table, FileTable)
-    assert len(samples) >= 8
-    assert np.all(samples.known)
-    inside = (samples.w_i[:, 2] > 1e-3) & (samples.w_r[:, 2] > 1e-3)  # the horizon itself is nobody's
-    if kind == ANISOTROPIC:  # at the normal all azimuths of the light are one, and RGL's readers mirror the last ones
-        inside &= (samples.theta_i > 1e-6) & ((name != "rgl") | (np.abs(np.degrees(samples.phi_i) + 135.0) < 44.0))
-    some = np.flatnonzero(inside)[:: max(1, inside.sum() // 20_000)]
-    seen = table.evaluate(samples.w_i[some], samples.w_r[some])
-    channels = [samples.channels.index(channel) for channel in table.channels]
-    np.testing.assert_allclose(samples.values[np.ix_(some, channels)], seen, rtol=2e-3, atol=1e-6)
+from tests.formats.a_file import check_changes_refused, check_texts_refused, samples_of
 
 
 def of_zemax(folder: Path, values: np.ndarray[Any, Any]) -> Samples:

@@ -7,10 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from brdfdb import formats
 from brdfdb.formats import ssdd
-from brdfdb.formats._readings import FileTable
-from tests.formats.a_file import check_changes_refused, exported, options_of
+from tests.formats.a_file import check_changes_refused, exported, options_of, read_table
 from tests.formats.round_trip import round_trip
 from tests.formats.small_tables import KINDS, SPECTRAL, small_table
 
@@ -77,8 +75,7 @@ def test_the_first_angle_runs_fastest(tmp_path: Path) -> None:
     path = tmp_path / "a.ssdd"
     text = BY_HAND.format(kind=SPHERICAL, reduction="", azimuths="0 180", values="\n".join(["# PARAM3: 0", *ROWS]))
     path.write_text(text, encoding="utf-8")
-    reading = formats.read(path)
-    assert isinstance(reading, FileTable)
+    reading = read_table(path)
     assert reading.channels == ("R", "G", "B")
     turn = np.deg2rad
     np.testing.assert_allclose(reading.lookup(turn(80.0), 0.0, 0.0, 0.0), [1, 10, 100], rtol=1e-6)

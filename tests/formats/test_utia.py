@@ -9,11 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from brdfdb import formats
 from brdfdb.formats import utia
-from brdfdb.formats._readings import FileTable
 from brdfdb.geometry import unit_vector
-from tests.formats.a_file import check_refused
+from tests.formats.a_file import check_refused, read_table
 from tests.formats.small_tables import ANISOTROPIC, KINDS, SPECTRAL, small_table
 
 PLANE = 288 * 288
@@ -39,8 +37,7 @@ def test_a_file_is_read_as_its_own_reader_reads_it(tmp_path: Path, kind: str) ->
     utia.write(small_table(kind), tmp_path / "a.bin")
     numbers = np.fromfile(tmp_path / "a.bin", "<f8")
     assert numbers.size == 3 * PLANE
-    reading = formats.read(tmp_path / "a.bin")
-    assert isinstance(reading, FileTable)
+    reading = read_table(tmp_path / "a.bin")
     rng = np.random.default_rng(5)
     for angles in rng.uniform(0.0, [1.57, 6.28, 1.57, 6.28], (40, 4)):
         expected = interpolated(numbers, angles)

@@ -7,11 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from brdfdb import formats
 from brdfdb.formats import zemax
-from brdfdb.formats._readings import FileTable
 from brdfdb.tables.albedo import directional_albedo
-from tests.formats.a_file import check_changes_refused, exported
+from tests.formats.a_file import check_changes_refused, exported, read_table
 from tests.formats.small_tables import DIFFUSE, GREY, KINDS, SPECTRAL, small_table
 
 TIS_ATOL = 1e-4  # of the quadrature
@@ -78,8 +76,7 @@ def test_tis_is_the_albedo_of_the_table(file: tuple[str, Path]) -> None:
 def test_a_file_by_hand(tmp_path: Path) -> None:
     path = tmp_path / "other.BSDF"
     path.write_text(BY_HAND.format(symmetry="PlaneSymmetrical", turns="1\n0", blocks=BLOCKS), encoding="utf-8")
-    reading = formats.read(path)
-    assert isinstance(reading, FileTable)
+    reading = read_table(path)
     degrees = np.deg2rad
     assert reading.lookup(degrees(60.0), 1.0, degrees(60.0), 1.0 + np.pi) == pytest.approx(3.0)  # specular
     # 40 degrees from the specular direction towards the normal: azimuth 0
