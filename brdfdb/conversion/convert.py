@@ -226,17 +226,17 @@ def _request(
         raise ParameterError("model", f"{model!r} is unknown{closest(model, MODELS)}", model, tuple(MODELS))
     spec = MODELS[model]
     if isinstance(source, Material) and source.model == model:
-        raise ParameterError("model", f"{source.name} is of the model {model} itself; name another one", model)
+        raise ParameterError("model", f"{source.name} is of the model {model} itself; choose another model", model)
     at = _wavelengths(source, spec, wavelength_nm)
     if entry is not None and not spec.spectral:
-        raise ParameterError("refractive_index", f"the model {model} takes none", entry)
+        raise ParameterError("refractive_index", f"the model {model} has no refractive index", entry)
     if entry is None and spec.spectral and isinstance(source, Material):
         entry = source.refractive_index
     entry = None if entry == FIT else entry
     if spec.spectral and entry is None and at is not None and at.size > 1:
         raise ParameterError(
             "refractive_index",
-            f"missing; {model} takes n and k, which are searched at one wavelength alone, and {at.size} are given",
+            f"missing; n and k of {model} are searched only at a single wavelength, and {at.size} are given",
             entry,
         )
     target = Target(spec, source, at, fixed, entry)
@@ -249,7 +249,7 @@ def _wavelengths(source: Source, other: ModelSpec | Material, wavelength_nm: Arr
     if wavelength_nm is not None:
         at = np.atleast_1d(check_nanometres("wavelength_nm", wavelength_nm))
         if at.ndim != 1 or not at.size or not np.all(np.diff(at) > 0.0):
-            raise ParameterError("wavelength_nm", "they must be positive and increasing", wavelength_nm)
+            raise ParameterError("wavelength_nm", "wavelengths must be positive and increasing", wavelength_nm)
     elif source.spectral and source.wavelengths_nm is not None:
         at = np.array(source.wavelengths_nm, dtype=np.float64)
     elif source.spectral:
@@ -259,7 +259,9 @@ def _wavelengths(source: Source, other: ModelSpec | Material, wavelength_nm: Arr
     if source.spectral or other.spectral:
         return at
     if wavelength_nm is not None:
-        raise ParameterError("wavelength_nm", f"{source.name} and {other.name} have none; leave it out", wavelength_nm)
+        raise ParameterError(
+            "wavelength_nm", f"neither {source.name} nor {other.name} depends on it; leave it out", wavelength_nm
+        )
     return None
 
 
@@ -272,7 +274,8 @@ def _searched(request: _Request, tick: Callable[[], None]) -> _Fit:
     result = search(target, coarse, fitted, columns, _alphas(lobe), tick)
     if result.distance >= REFUSED:
         raise ParameterError(
-            "fixed", f"the lobe of {target.spec.name} is then less than a quarter as wide as that of {source.name}"
+            "fixed",
+            f"with these values the lobe of {target.spec.name} is less than a quarter as wide as that of {source.name}",
         )
     if target.count == columns.size and not target.colours:
         return _Fit(result, np.zeros((target.count, 0)), fitted)
@@ -294,7 +297,7 @@ def _nodes(
         name = request.source.name
         raise ParameterError(
             "source",
-            f"{name} reflects nothing{where} beside the mirror direction, so that no model is close to it",
+            f"{name} reflects no light{where} outside the mirror direction, so no model is close to it",
             name,
         )
     return nodes

@@ -121,7 +121,11 @@ class Target:
                 n, k = refractive_index(entry, wavelength_nm)
                 self.indices = [index | {"n": float(n[w]), "k": float(k[w])} for w, index in enumerate(self.indices)]
         if not self.shape and not self.colours:
-            raise ParameterError("fixed", f"all parameters of {spec.name} are fixed; leave one to search", tuple(fixed))
+            raise ParameterError(
+                "fixed",
+                f"all parameters of {spec.name} are fixed; leave at least one parameter to search",
+                tuple(fixed),
+            )
 
     def numbers(self, shape: Array) -> dict[str, float]:
         """Return the shared parameters at a point of the unit cube, with n and k where they are searched."""

@@ -172,8 +172,8 @@ def read(
         If there is no such format, keyword, column or member, files of the format are only written, or the file states
         the wavelength itself.
     FileFormatError
-        If no format recognises the file, its format is only written, it is damaged, or it is no regular file of at most
-        2 GiB.
+        If no format recognises the file, its format is only written, the file is damaged, or it is not a regular file
+        of at most 2 GiB.
     OSError
         If the file cannot be read.
 
@@ -244,7 +244,7 @@ def samples(path: str | os.PathLike[str], file_format: str = "", **keywords: Any
     if isinstance(reading, Samples):
         return reading
     if reading.nodes is None:
-        raise FileFormatError(f"{path}: it holds a formula, and no values at directions")
+        raise FileFormatError(f"{path}: it holds a formula, and no values at listed directions")
     nodes = reading.nodes()
     return replace(nodes, record={**nodes.record, NODES: True})
 
@@ -267,12 +267,14 @@ def _importer(path: Path, file_format: str, keywords: Mapping[str, Any]) -> Impo
     for name, value in keywords.items():
         if name not in every:
             allowed = ", ".join(sorted(every))
-            raise ParameterError(name, f"no format takes it; there are {allowed}", value, tuple(sorted(every)))
+            raise ParameterError(
+                name, f"no format has this keyword; allowed are {allowed}", value, tuple(sorted(every))
+            )
     text = bool(keywords) and set(keywords) <= set(_MODULES[_TEXT].keywords)
     importer = _chosen(path, file_format or (_TEXT if text else ""))
     for name, value in keywords.items():
         if name not in getattr(importer, "keywords", ()):
-            raise ParameterError(name, f"the format of {path} does not take it", value)
+            raise ParameterError(name, f"the format of {path} does not have this keyword", value)
     return importer
 
 
@@ -281,7 +283,7 @@ def _chosen(path: Path, file_format: str) -> Importer:
     only_written = {name: exporter for name, exporter in EXPORTERS.items() if name not in IMPORTERS}
     if file_format:
         if file_format in only_written:
-            raise ParameterError("file_format", f"files of {file_format} are only written, not read", file_format)
+            raise ParameterError("file_format", f"files of {file_format} can be written, but not read", file_format)
         if file_format not in IMPORTERS:
             raise ParameterError(
                 "file_format", f"{file_format!r} is not one of {', '.join(IMPORTERS)}", file_format, tuple(IMPORTERS)
@@ -296,14 +298,14 @@ def _chosen(path: Path, file_format: str) -> Importer:
     for name, exporter in only_written.items():
         recognises = getattr(exporter, "recognises", None)
         if path.name.endswith(exporter.suffix) and (recognises is None or recognises(head)):
-            raise FileFormatError(f"{path}: files of {name} are only written, not read")
+            raise FileFormatError(f"{path}: files of {name} can be written, but not read")
     from brdfdb.fitting.published import SUFFIX
 
-    known = f"{path}: no format recognises it; there are {', '.join(IMPORTERS)}"
+    known = f"{path}: no format recognises it; known formats are {', '.join(IMPORTERS)}"
     columns = _MODULES[_TEXT].columns_of(head)
     if columns:
         shown = ", ".join(columns)[:_SHOWN]
-        known += f"; as a text it has the columns {shown}: name them, {_MODULES[_TEXT].HOW}"
+        known += f"; read as text it has the columns {shown}: name them with {_MODULES[_TEXT].HOW}"
     if path.name.lower().endswith(SUFFIX):
-        raise FileFormatError(f"{path}: a file of published fits holds no samples; `brdfdb fit` lists them")
+        raise FileFormatError(f"{path}: a file of published fits holds no samples; `brdfdb fit` lists the fits")
     raise FileFormatError(known)

@@ -50,7 +50,7 @@ _SHRUNK = 0.99  # share of the nodes that should fit, when a file was too large
 SIZE = FormatOption(
     "size",
     16.0,
-    "largest file [MB]: a table that needs more is written with the error it has",
+    "largest file [MB]; a table that needs more is written with a larger error, which the file states",
     low=0.1,
     high=1000.0,
     most_served=16.0,

@@ -118,7 +118,9 @@ def dense_table(
         size = math.prod(regular.shape) * len(comparison.channels.names)
         if size > most_values:
             raise ParameterError(
-                "resolution", f"{resolution:g} degrees take {size} values; the most are {most_values}", resolution
+                "resolution",
+                f"{resolution:g} degrees need {size} values; at most {most_values} are allowed",
+                resolution,
             )
         return _tabulated(comparison, regular, digits)
     most_nodes = most_values // len(comparison.channels.names)

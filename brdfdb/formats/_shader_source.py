@@ -117,9 +117,11 @@ def _closed_form(table: Table) -> tuple[str, dict[str, Any], Channels, tuple[str
 
     material = table.source
     if table.metadata.measured is not None:
-        raise CannotHoldError(f"{table.name}: it is measured, and source code is of models; `brdfdb fit` fits one")
+        raise CannotHoldError(
+            f"{table.name}: the table is measured, and source code needs a model; `brdfdb fit` fits one"
+        )
     if not isinstance(material, Material):
-        raise CannotHoldError(f"{table.name}: the table does not say of which model it is, so there is no source of it")
+        raise CannotHoldError(f"{table.name}: the table does not name its model, so no source code can be written")
     several = has_spectrum(table)
     model, changes = FITS.get(material.model, (material.model, {}))
     indexed = MODELS[model].spectral

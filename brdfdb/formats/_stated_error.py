@@ -229,7 +229,7 @@ class FileStatement(BaseModel):
         limits = np.broadcast_to(self.places.limits, (places.ROWS, floor.size))
         if not np.all(on_nodes):
             if self.between is None:
-                raise ParameterError("error", "the file states none between its wavelengths")
+                raise ParameterError("error", "the file states no error between its wavelengths")
             limits = np.where(on_nodes, limits, np.maximum(limits, self.between.limits))
         return stated(limits, floor, directions, brdf)
 

@@ -98,13 +98,13 @@ def whole(*paths: str | os.PathLike[str]) -> Iterator[tuple[Path, ...]]:
 
 
 def _check_zarr_group(path: Path) -> None:
-    """Raise WriteError if a directory is no zarr group, or holds a file that does not belong to one."""
+    """Raise WriteError if a directory is not a zarr group, or contains files that are not part of it."""
     if not (path / "zarr.json").exists():
-        raise WriteError(f"cannot write {path}: it is a directory that is no zarr group")
+        raise WriteError(f"cannot write {path}: it is a directory, but not a zarr group")
     for part in path.rglob("*"):
         of_group = part.is_dir() or _OF_ZARR.fullmatch(part.relative_to(path).as_posix())
         if part.is_symlink() or not of_group:
-            raise WriteError(f"cannot write {path}: it holds {part.name}, which is no part of a zarr group")
+            raise WriteError(f"cannot write {path}: it contains {part.name}, which is not part of a zarr group")
 
 
 def _exchange(half: Path, path: Path) -> None:

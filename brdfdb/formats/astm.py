@@ -147,7 +147,7 @@ def _parsed(path: Path) -> tuple[list[str], tuple[str, ...], NDArray[np.float64]
             break
         comments.append(rest)
     if columns[:4] != _ANGLES or len(columns) < 5:
-        raise FileFormatError(f"{path}: it has no line VARS {','.join(_ANGLES)} with channels behind it")
+        raise FileFormatError(f"{path}: it has no line VARS {','.join(_ANGLES)} that ends with names of channels")
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error")  # an empty file
@@ -155,9 +155,11 @@ def _parsed(path: Path) -> tuple[list[str], tuple[str, ...], NDArray[np.float64]
     except FileFormatError:
         raise
     except (ValueError, UserWarning) as error:
-        raise FileFormatError(f"{path}: a row has no {len(columns)} numbers, or there is none ({error})") from None
+        raise FileFormatError(
+            f"{path}: a row does not have {len(columns)} numbers, or there are no rows ({error})"
+        ) from None
     if rows.shape[1] != len(columns) or not np.all(np.isfinite(rows)):
-        raise FileFormatError(f"{path}: a row has no {len(columns)} finite numbers")
+        raise FileFormatError(f"{path}: a row does not have {len(columns)} finite numbers")
     rows[:, :4] = np.where(rows[:, :4] < 0.0, rows[:, :4] + 2.0 * np.pi, rows[:, :4])
     return comments, columns[4:], rows
 

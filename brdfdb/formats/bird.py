@@ -5,7 +5,7 @@ directions form a grid. The format does not say how to interpolate. The stated e
 angles at once.
 
 Anisotropic tables and all wavelengths fit. The specular part does not. A file has about 40 MB at most: a table that
-needs more is written with the error it has.
+needs more is written with a larger error.
 """
 
 from __future__ import annotations
@@ -126,7 +126,7 @@ def read(path: str | os.PathLike[str]) -> FileTable | Samples:
     if at is not None:
         nodes = np.unique(at)
         if len(values) % nodes.size or not np.array_equal(at, np.tile(nodes, len(values) // nodes.size)):
-            raise FileFormatError(f"{path}: not each direction has the same wavelengths, in order")
+            raise FileFormatError(f"{path}: the directions do not all have the same wavelengths in the same order")
         values, at = values.reshape(-1, nodes.size), nodes
         uncertainty = None if uncertainty is None else uncertainty.reshape(values.shape)
         lists = {name: angle[:: nodes.size] for name, angle in lists.items()}
@@ -158,7 +158,7 @@ def _lists(path: Path, data: dict[str, Any]) -> dict[str, NDArray[np.float64]]:
         lists.setdefault("wavelength_i", lists["wavelength_r"])
         del lists["wavelength_r"]
     if len({values.size for values in lists.values()}) != 1:
-        raise FileFormatError(f"{path}: {', '.join(lists)} are not of the same length")
+        raise FileFormatError(f"{path}: the lists {', '.join(lists)} differ in length")
     return lists
 
 

@@ -5,7 +5,7 @@ record. The axes are polar angles and azimuths of light and viewer, or angles of
 (``--axes``). The cosine is not included. Readers interpolate in straight lines along all axes at once.
 
 Anisotropic tables and all wavelengths fit. The specular part does not. A file has about 40 MB at most: a table that
-needs more is written with the error it has.
+needs more is written with a larger error.
 """
 
 from __future__ import annotations
@@ -128,9 +128,9 @@ def read(path: str | os.PathLike[str]) -> FileTable | Samples:
     at = _wavelengths(names[len(angles) :])
     short = [name for name, nm in zip(names[len(angles) :], () if at is None else at, strict=False) if nm < _LEAST_NM]
     if bare := [name for name in short if not name.endswith("m")]:
-        raise FileFormatError(f"{path}: line {first}: {bare[0]} is no wavelength in nm; write it as 550nm or 0.55um")
+        raise FileFormatError(f"{path}: line {first}: {bare[0]} is not a wavelength in nm; write it as 550nm or 0.55um")
     if at is not None and np.unique(at).size != at.size:
-        raise FileFormatError(f"{path}: line {first}: a wavelength stands twice")
+        raise FileFormatError(f"{path}: line {first}: a wavelength is listed twice")
     columns = {name: numbers[:, index] for index, name in enumerate(angles)}
     values = numbers[:, len(angles) :]
     reading = reading_of_rows(path, columns, values, at, known)
@@ -145,7 +145,7 @@ def _numbers(
     """Return the rows below the names of columns in line `first`, shape (N, columns)."""
     start = next(((number, line) for number, line in numbered if line.strip() and not line.startswith("#")), None)
     if start is None:
-        raise FileFormatError(f"{path}: line {first} has the names of columns, and no row follows")
+        raise FileFormatError(f"{path}: line {first} has the names of columns, but no row follows")
     rows = itertools.chain([start], numbered)
     try:
         numbers = np.loadtxt((line for _, line in rows), delimiter=",", ndmin=2, dtype=np.float64)
@@ -156,7 +156,7 @@ def _numbers(
         raise FileFormatError(f"{path}: {wrong}") from None
     if numbers.shape[1] != len(names):
         raise FileFormatError(
-            f"{path}: line {start[0]} has {numbers.shape[1]} fields, and there are {len(names)} names"
+            f"{path}: line {start[0]} has {numbers.shape[1]} fields, but there are {len(names)} names of columns"
         )
     return numbers
 
@@ -166,7 +166,7 @@ def _wrong_row(names: tuple[str, ...], rows: Iterator[tuple[int, str]]) -> str:
     for number, line in rows:
         fields = [field.strip() for field in line.partition("#")[0].split(",")]
         if len(fields) != len(names) and any(fields):
-            return f"line {number} has {len(fields)} fields, and there are {len(names)} names"
+            return f"line {number} has {len(fields)} fields, but there are {len(names)} names of columns"
         for field, name in zip(fields, names, strict=False):
             if number_of(field or "empty") is None and any(fields):
                 return f"line {number}, field {name}: {field[:40]!r} is not a number"

@@ -52,7 +52,7 @@ options = (
     FormatOption(
         "nodes",
         0,
-        "number of cosines of light and viewer; 0: as few as the tolerance takes",
+        "number of nodes in the cosines of light and viewer; 0 takes the fewest within the tolerance",
         low=3.0,
         high=513.0,
         most_served=129.0,
@@ -89,7 +89,7 @@ def write(
 
     import_extra("scipy.io")
     if table.anisotropic:
-        raise CannotHoldError(f"{table.name}: is anisotropic, and mqdiffuse holds isotropic tables only")
+        raise CannotHoldError(f"{table.name}: the table is anisotropic, and mqdiffuse holds only isotropic tables")
     channels = at_wavelength(table, wavelength)
     comparison = Comparison(table, channels)
     shape = (nodes, nodes + nodes % 2, nodes) if nodes else _smallest(table, comparison, tolerance)
@@ -227,10 +227,10 @@ def _checked(opened: xr.Dataset, path: Path) -> NDArray[Any]:
         raise FileFormatError(f"{path}: it has no variable brdf over {', '.join(_DIMS)}")
     brdf = opened["brdf"].transpose(*_DIMS)
     if brdf.size > _MOST_VALUES or min(brdf.shape) < 2:
-        raise FileFormatError(f"{path}: brdf has the shape {brdf.shape}; it takes at least two nodes an axis")
+        raise FileFormatError(f"{path}: brdf has the shape {brdf.shape}; each axis needs at least two nodes")
     for name, (_, expected, _) in _coordinates(brdf.shape).items():
         if name not in opened.coords or not np.allclose(opened[name], expected):
-            raise FileFormatError(f"{path}: the coordinates {name} are not in the equal steps of mqdiffuse")
+            raise FileFormatError(f"{path}: the coordinates {name} do not have the equal steps that mqdiffuse needs")
     values = brdf.values
     if values.dtype.kind not in "iuf" or not np.all(np.isfinite(values)):
         raise FileFormatError(f"{path}: brdf holds values that are not finite numbers")

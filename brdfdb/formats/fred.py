@@ -71,7 +71,9 @@ def write(
     from brdfdb.formats._stated_error import Comparison
 
     if table.anisotropic:
-        raise CannotHoldError(f"{table.name}: is anisotropic, and this format is written for isotropic tables only")
+        raise CannotHoldError(
+            f"{table.name}: the table is anisotropic, and only isotropic tables are written in this format"
+        )
     comparison = Comparison(table, at_wavelength(table, wavelength))
     path = path_of(path)
     remarks = (*specular_remark(table), *comparison.channels.remarks)
@@ -107,7 +109,7 @@ def read(path: str | os.PathLike[str]) -> FileTable | Samples:
     rows = _rows(path)
     known = record_beside(path)
     if known.get("rows", len(rows)) != len(rows):
-        raise FileFormatError(f"{path}: its record says {known['rows']!r:.20} viewers, and it has {len(rows)}")
+        raise FileFormatError(f"{path}: its record states {known['rows']!r:.20} viewers, but the file has {len(rows)}")
     name, nm = str(known.get("name") or path.name.partition(".")[0]), known.get("wavelength_nm")
     at = np.array([float(nm)]) if isinstance(nm, int | float) else None
     channels = names_of(at)
@@ -155,14 +157,14 @@ def _rows(path: Path) -> NDArray[np.float64]:
     try:
         scale = float(second.partition("scale=")[2].split()[0])
     except (ValueError, IndexError):
-        raise FileFormatError(f"{path}: line 2, field scale: it is no number") from None
+        raise FileFormatError(f"{path}: line 2, field scale: it is not a number") from None
     for number, text in lines:
         try:
             line = [float(word) for word in text.split()]
         except ValueError as error:
-            raise FileFormatError(f"{path}: line {number} holds what is no number ({error})") from None
+            raise FileFormatError(f"{path}: line {number} has text that is not a number ({error})") from None
         if not np.all(np.isfinite(line)):
-            raise FileFormatError(f"{path}: line {number} holds a number that is not finite")
+            raise FileFormatError(f"{path}: line {number} has a number that is not finite")
         if len(line) == 2:
             if bare:
                 raise FileFormatError(f"{path}: line {bare} is a light without viewers")
@@ -172,9 +174,11 @@ def _rows(path: Path) -> NDArray[np.float64]:
             bare = 0
         elif line:
             count = counted(len(line), "number")
-            raise FileFormatError(f"{path}: line {number} has {count}; a light has two, and a viewer below it three")
+            raise FileFormatError(
+                f"{path}: line {number} has {count}; a light has two, and each viewer below it has three"
+            )
     if not numbers:
-        raise FileFormatError(f"{path}: it holds no values")
+        raise FileFormatError(f"{path}: it has no values")
     if bare:
         raise FileFormatError(f"{path}: line {bare} is a light without viewers: the file was cut")
     if has_open_end(path):

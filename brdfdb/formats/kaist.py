@@ -80,7 +80,7 @@ def write(
     65535 nm.
     """
     if table.facets is None:
-        raise CannotHoldError(f"{table.name}: is unpolarised, and the format holds Mueller matrices")
+        raise CannotHoldError(f"{table.name}: the table is unpolarised, and the format holds Mueller matrices")
     channels = _channels(table)
     made = mueller_grid(table, channels, tolerance, 1e6 * megabytes - _BESIDE)
     remarks = (*specular_remark(table), *channels.remarks)
@@ -148,10 +148,10 @@ def read(path: str | os.PathLike[str]) -> Samples:
     shape = (*(axis.size for axis in axes), at.size, 4, 4)
     matrix = tensors["M"]
     if matrix.shape != shape or matrix.dtype != np.float32:
-        raise FileFormatError(f"{path}: field 'M' is {matrix.dtype} of shape {matrix.shape}; its axes say {shape}")
+        raise FileFormatError(f"{path}: field 'M' is {matrix.dtype} of shape {matrix.shape}; its axes give {shape}")
     for name, axis in zip((*_AXES, "wvls"), (*axes, at), strict=True):
         if not axis.size or not np.all(np.isfinite(axis)) or np.any(np.diff(axis) <= 0.0):
-            raise FileFormatError(f"{path}: field {name!r} does not ascend")
+            raise FileFormatError(f"{path}: field {name!r} does not increase")
     values = np.ascontiguousarray(matrix[..., 0, 0].transpose(2, 1, 0, 3)).astype(np.float64)
     values[np.isinf(values)] = np.nan
     description = tensors.get("description")

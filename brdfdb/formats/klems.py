@@ -120,7 +120,7 @@ options = (
         FormatOption(
             f"emissivity_{side}",
             0.0,
-            f"emissivity of the {side} [1]; 0: that of the table if it covers 5 to 40 um, or else 0.9, as assumed",
+            f"emissivity of the {side} [1]; 0 takes that of the table if it covers 5 to 40 um, and 0.9 otherwise",
             low=0.001,
             high=1.0,
         )
@@ -343,9 +343,7 @@ def _matrix(path: str | os.PathLike[str], file: BsdfFile, name: str, viewers: Ba
         raise FileFormatError(f"{path}: block {name}: {error}") from None
     if numbers.size != len(viewers) * len(lights) or not np.all(np.isfinite(numbers)):
         wanted = f"{len(viewers)} x {len(lights)}"
-        raise FileFormatError(
-            f"{path}: block {name} has {numbers.size} numbers instead of {wanted}, all of them finite"
-        )
+        raise FileFormatError(f"{path}: block {name} has {numbers.size} numbers instead of {wanted} finite numbers")
     if file.structure.lower() == "rows":
         return numbers.reshape(len(lights), len(viewers)).T
     return numbers.reshape(len(viewers), len(lights))
@@ -363,7 +361,7 @@ def _defined(path: str | os.PathLike[str], element: ElementTree.Element) -> Basi
         raise FileFormatError(f"{path}: angle basis {name!r}: {error}") from None
     rising = all(low < high for low, high in itertools.pairwise(bounds)) and bounds[-1] == 90.0
     if not (rising and all(count > 0 for count in counts) and len(counts) <= _MOST_RINGS):
-        raise FileFormatError(f"{path}: angle basis {name!r} has no rings of patches that rise to 90 degrees")
+        raise FileFormatError(f"{path}: angle basis {name!r} has no rings of patches up to 90 degrees")
     if sum(counts) > _MOST_PATCHES:
         raise FileFormatError(f"{path}: angle basis {name!r} has {sum(counts)} patches, more than {_MOST_PATCHES}")
     return Basis(name, tuple(bounds), tuple(counts))

@@ -75,7 +75,7 @@ def write(
     from brdfdb.formats._stated_error import Comparison
 
     if table.anisotropic:
-        raise CannotHoldError(f"{table.name}: MERL files are isotropic, and the table is anisotropic")
+        raise CannotHoldError(f"{table.name}: the table is anisotropic, and MERL files hold only isotropic tables")
     channels = channels_of(table, "rgb")
     valid, angles = _nodes(samples)
     comparison = Comparison(table, channels)
@@ -114,7 +114,7 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     with path.open("rb") as file:
         size = os.fstat(file.fileno()).st_size
         if file.read(len(_HEADER)) != _HEADER or size != _BYTES:
-            raise FileFormatError(f"{path}: not a MERL file of {_BYTES} bytes with the dimensions {SHAPE}")
+            raise FileFormatError(f"{path}: it is not a MERL file of {_BYTES} bytes with the dimensions {SHAPE}")
         planes = np.fromfile(file, "<f8").reshape(3, *SHAPE)
     if not np.all(np.isfinite(planes)):
         raise FileFormatError(f"{path}: a number is not finite")

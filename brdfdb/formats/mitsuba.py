@@ -36,7 +36,7 @@ kinds: tuple[str, ...] = ()
 MODEL, TABLE = "model", "table"
 options = (
     FormatOption(
-        "plugin", MODEL, "the plugin of the model, if Mitsuba has one, or that of tables", choices=(MODEL, TABLE)
+        "plugin", MODEL, "plugin of the model where Mitsuba has one, or the plugin of tables", choices=(MODEL, TABLE)
     ),
 )
 

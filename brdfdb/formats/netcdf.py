@@ -4,7 +4,7 @@ The axes are polar angles and azimuths of light and viewer, or angles of the hal
 f_r is in 1/sr, without the cosine. Readers interpolate in straight lines along all axes at once.
 
 Anisotropic tables, all wavelengths and the specular part fit. The specular part has a variable of its own. The values
-take 100 MB at most: a table that needs more is written with the error it has.
+take 100 MB at most: a table that needs more is written with a larger error.
 """
 
 from __future__ import annotations

@@ -4,7 +4,7 @@ The axes are polar angles and azimuths of light and viewer, or angles of the hal
 f_r is in 1/sr, without the cosine. Readers interpolate in straight lines along all axes at once.
 
 Anisotropic tables, all wavelengths and the specular part fit. The specular part has an array of its own. The values
-take 100 MB at most: a table that needs more is written with the error it has.
+take 100 MB at most: a table that needs more is written with a larger error.
 """
 
 from __future__ import annotations
@@ -92,7 +92,7 @@ def read(path: str | os.PathLike[str]) -> FileTable | Samples:
     except OSError:
         raise
     except Exception as error:  # zipfile, zlib and the parser of headers raise what they come to
-        raise FileFormatError(f"{path}: it is no archive of NumPy arrays, or is damaged ({error})") from error
+        raise FileFormatError(f"{path}: it is not an archive of NumPy arrays, or is damaged ({error})") from error
     at = arrays.pop("wavelength", None)
     return file_table(path, arrays, values, at, known)
 

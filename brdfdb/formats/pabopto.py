@@ -51,7 +51,7 @@ def read(path: str | os.PathLike[str]) -> Samples:
             continue
         if len(fields) != count:
             raise FileFormatError(
-                f"{path}: line {line_number} has {len(fields)} fields; theta, phi and values are {count}"
+                f"{path}: line {line_number} has {len(fields)} fields; expected are {count}: theta, phi and values"
             )
         for field in fields:
             try:

@@ -31,7 +31,7 @@ summary = "lit spheres and slices of tables as PNG files"
 tools = "every viewer of pictures; the numbers are in the other formats"
 kinds = (SPHERE, "lobe", "half_difference", "in_plane")
 options = (
-    FormatOption("size", 160.0, "pixels across a sphere", low=16.0, high=2048.0, most_served=512.0),
+    FormatOption("size", 160.0, "width and height of a sphere [pixels]", low=16.0, high=2048.0, most_served=512.0),
     FormatOption("theta_i", 45.0, "polar angle of the light of a lobe [degrees]", low=0.0, high=90.0),
     FormatOption("phi_i", 0.0, "azimuth of the light, or of the half vector [degrees]", low=-720.0, high=720.0),
 )

@@ -106,7 +106,7 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     path = path_of(path)
     size = path.stat().st_size
     if size != _BYTES:
-        raise FileFormatError(f"{path}: {size} bytes are not the {_BYTES} of a UTIA file")
+        raise FileFormatError(f"{path}: it has {size} bytes; a UTIA file has {_BYTES}")
     planes = np.fromfile(path, "<f8").reshape(3, *SHAPE)
     if not np.all(np.isfinite(planes)):
         raise FileFormatError(f"{path}: a number is not finite")

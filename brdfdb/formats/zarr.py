@@ -4,7 +4,7 @@ The axes are polar angles and azimuths of light and viewer, or angles of the hal
 f_r is in 1/sr, without the cosine. Readers interpolate in straight lines along all axes at once.
 
 Anisotropic tables, all wavelengths and the specular part fit. The specular part has an array of its own. The values
-take 100 MB at most, before compression: a table that needs more is written with the error it has.
+take 100 MB at most, before compression: a table that needs more is written with a larger error.
 """
 
 from __future__ import annotations
@@ -72,4 +72,4 @@ def read(path: str | os.PathLike[str]) -> FileTable | Samples:
     except Exception as error:  # codecs and parsers raise what they come to
         if not path.exists():
             raise FileNotFoundError(f"no directory {path}") from None
-        raise FileFormatError(f"{path}: it is no zarr group, or is damaged ({error})") from error
+        raise FileFormatError(f"{path}: it is not a zarr group, or is damaged ({error})") from error

@@ -47,7 +47,7 @@ kinds = ()
 options = (
     TOLERANCE,
     FormatOption(
-        "colour", "auto", "CIE XYZ, or its Y alone; auto: XYZ of spectral tables", choices=("auto", "xyz", "grey")
+        "colour", "auto", "CIE XYZ or Y alone; auto writes XYZ of spectral tables", choices=("auto", "xyz", "grey")
     ),
     SIZE,
 )
@@ -264,7 +264,7 @@ def parsed(path: Path) -> ZemaxText:
         elif word in _LISTS:
             angles[word] = words.numbers(words.count(word), word)
             if not angles[word].size or np.any(np.diff(angles[word]) <= 0.0):
-                raise words.error(word, "the angles do not increase, or there are none")
+                raise words.error(word, "there are no angles, or they do not increase")
         elif any(word in parts for parts in _PARTS.values()):
             break
     content = entries["SpectralContent"]
@@ -287,7 +287,7 @@ def parsed(path: Path) -> ZemaxText:
         tis[number] = words.numbers(1, "TIS")[0]
         rows.append(words.numbers(lists[2].size * lists[3].size, f"block {number + 1} of {blocks}"))
         if np.any(np.abs(rows[-1]) > _LARGEST):
-            raise words.error("TIS", f"a value is beyond {_LARGEST:g}, the largest one of 32 bits")
+            raise words.error("TIS", f"a value exceeds {_LARGEST:g}, the largest 32-bit float")
     shape = (parts, *(nodes.size for nodes in lists))
     values = np.concatenate(rows, dtype=np.float32, casting="same_kind").reshape(shape)
     return ZemaxText(

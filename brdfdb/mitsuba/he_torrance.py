@@ -364,7 +364,7 @@ def _bands_of(props: Any) -> list[_WavelengthTriple]:
     for name in ("n", "k"):
         if name in props and not (isinstance(props[name], int | float) or hasattr(props[name], "wavelengths")):
             if props.get("channels", "") == SRGB:
-                raise ParameterError(name, f"a colour or a texture has no spectrum, which channels = {SRGB} needs")
+                raise ParameterError(name, f"a colour or a texture has no spectrum, and channels = {SRGB} needs one")
             shared = None
     at_nm = None if shared is None else picture_wavelengths(shared)
     chosen = projection(props, shared if at_nm is None else at_nm)

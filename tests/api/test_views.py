@@ -208,7 +208,7 @@ def test_a_file_and_its_record_are_one_archive(client: Client, tmp_path: Path) -
 
 def test_a_table_that_a_format_cannot_hold_is_refused(client: Client) -> None:
     detail = client.problem("GET", f"{METAL}/export/fred", 422)["detail"]
-    assert detail == "brushed-metal: is anisotropic, and this format is written for isotropic tables only"
+    assert detail == "brushed-metal: the table is anisotropic, and only isotropic tables are written in this format"
     assert client.problem("GET", f"{FOIL}/export/fred?wavelength=900", 422)["parameter"] == "wavelength"
 
 

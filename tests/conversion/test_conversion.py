@@ -259,7 +259,7 @@ def test_wrong_arguments_are_refused() -> None:
         (brass, "ggx_schlick", {"fixed": {"alpha": 0.1}}, "^alpha: "),
         (brass, "ggx_schlick", {"fixed": {"f_0": 1.1}}, "^f_0: 1.1 "),
         (brass, "lambert", {"fixed": {"rho": 0.3}}, "^fixed: "),
-        (brass, "ggx_schlick", {"fixed": {"alpha_x": 1e-3}}, "^fixed: the lobe of ggx_schlick"),
+        (brass, "ggx_schlick", {"fixed": {"alpha_x": 1e-3}}, "^fixed: .* the lobe of ggx_schlick"),
         (brass, "lambert", {"wavelength_nm": 550.0}, "^wavelength_nm: "),
         (brass, "lambert", {"refractive_index": "fit"}, "^refractive_index: "),
         (brass, "lambert", {"weigh": "dark"}, "^weigh: 'dark' "),
@@ -284,7 +284,7 @@ def test_examples_print_what_they_say(function: Any) -> None:
 
 def test_a_black_source_is_refused() -> None:
     black = presets()["rolled-brass"].model_copy(update={"parameters": {**BRASS, "rho_d": 0.0, "rho_s": 0.0}})
-    with pytest.raises(ParameterError, match="source: rolled-brass reflects nothing beside the mirror direction"):
+    with pytest.raises(ParameterError, match="source: rolled-brass reflects no light outside the mirror direction"):
         convert(black, "lambert")
-    with pytest.raises(ParameterError, match="13b reflects nothing at 550 nm beside the mirror direction, so that no"):
+    with pytest.raises(ParameterError, match="13b reflects no light at 550 nm outside the mirror direction, so no"):
         convert(presets()["aluminum-cylinder-13b"], "ggx", 550.0)

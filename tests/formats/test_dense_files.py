@@ -111,7 +111,7 @@ def test_rounding_keeps_digits_and_prints_no_more() -> None:
 
 
 def test_what_cannot_be_written_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(ParameterError, match=r"resolution: 0\.1 degrees take .* values; the most are 25000000"):
+    with pytest.raises(ParameterError, match=r"resolution: 0\.1 degrees need .* values; at most 25000000"):
         exported(tmp_path, "netcdf", ANISOTROPIC, resolution=0.1)
     (tmp_path / "file").touch()
     for name in FORMATS:

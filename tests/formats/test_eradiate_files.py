@@ -103,6 +103,6 @@ def test_files_that_eradiate_refuses_are_refused(tmp_path: Path) -> None:
     with xr.open_dataset(path) as opened:
         opened.load()
     opened.assign_coords(phi_d=np.linspace(0.0, 2.0 * np.pi, 6)).to_netcdf(path, engine="scipy")
-    check_refused(path, "coordinates phi_d are not in the equal steps", "eradiate")
+    check_refused(path, "coordinates phi_d do not have the equal steps", "eradiate")
     opened.isel(phi_d=0).to_netcdf(path, engine="scipy")
     check_refused(path, "no variable brdf over cos_theta_o, phi_d, cos_theta_i", "eradiate")

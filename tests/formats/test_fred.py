@@ -69,10 +69,10 @@ def test_directions_that_are_no_grid_are_samples(tmp_path: Path) -> None:
 def test_damage_is_named(tmp_path: Path) -> None:
     changes = [
         ("angles=deg", "angles=rad", "it does not begin with the lines"),
-        ("scale=2", "scale=", "line 2, field scale: it is no number"),
-        ("40\t0\t8", "40\tzero\t8", "line 11 holds what is no number"),
+        ("scale=2", "scale=", "line 2, field scale: it is not a number"),
+        ("40\t0\t8", "40\tzero\t8", "line 11 has text that is not a number"),
         ("40\t0\t8", "40\t0\t8\t9", "line 11 has 4 numbers"),
         ("10\t0\n", "", "line 3 has 3 numbers"),
-        ("40\t0\t8", "40\t0\tnan", "line 11 holds a number that is not finite"),
+        ("40\t0\t8", "40\t0\tnan", "line 11 has a number that is not finite"),
     ]
     check_changes_refused(tmp_path / "a.fred.txt", BY_HAND, changes, "fred")

@@ -227,8 +227,8 @@ def test_a_narrow_lobe_does_not_become_negative() -> None:
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("no xml", "no XML"),
-        ("<materialx/>", "no node open_pbr_surface or standard_surface"),
+        ("no xml", "not XML"),
+        ("<materialx/>", "has no node open_pbr_surface or standard_surface"),
         ('<materialx><open_pbr_surface><input name="coat_weight" value="1"/></open_pbr_surface></materialx>', "coat"),
         ('<materialx><standard_surface><input name="base" value="nan"/></standard_surface></materialx>', "input base"),
         ('<materialx><standard_surface><input name="specular_IOR" value="-1"/></standard_surface></materialx>', "_IOR"),

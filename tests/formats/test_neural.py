@@ -82,7 +82,7 @@ def test_another_network_and_damaged_files_are_refused(tmp_path: Path) -> None:
     for name, content, sentence in (
         ("other.h5", network({KERNEL: np.zeros((21, 20), np.float32)}), r"dense_2/kernel is float32 of shape \(21, 20"),
         ("other.h5", network({BIAS: np.full(3, np.nan, np.float32)}), "a weight is not finite"),
-        ("other.h5", network({"dense_1": None}), "no network of Keras with the layers dense_1, dense_2, dense_3"),
+        ("other.h5", network({"dense_1": None}), "not a network of Keras with the layers dense_1, dense_2, dense_3"),
         ("cut.h5", network()[:900], ""),
         ("cut.zip", b"PK\x03\x04" + b"\0" * 22 + b"\x04\0\0\0x.h5", ""),
     ):

@@ -101,8 +101,8 @@ def test_damaged_trees_and_files_are_refused_with_a_sentence(tmp_path: Path) -> 
         ("{{1}{2}}", "a node has 2 children instead of 8"),
         ("{1 2 3}", "a grid of 3 values is not of the same length along 3 axes"),
         ("{", "a brace is not closed"),
-        ("{1}}", "'}' stands outside of the braces"),
-        ("1", "'1' stands outside of the braces"),
+        ("{1}}", "'}' is outside the braces"),
+        ("1", "'1' is outside the braces"),
         ("{nan}", "a value is not finite"),
         ("{one}", "could not convert string to float"),
         ("{" * 1000, "it has more than 24 levels"),
@@ -120,7 +120,7 @@ def test_damaged_trees_and_files_are_refused_with_a_sentence(tmp_path: Path) -> 
     whole = path.read_text()
     begin, end = whole.index("<ScatteringData>") + 16, whole.index("</ScatteringData>")
     texts = [
-        (whole[:begin] + tree + whole[end:], f"block Visible is no tensor tree: .*{words}") for tree, words in trees
+        (whole[:begin] + tree + whole[end:], f"block Visible is not a tensor tree: .*{words}") for tree, words in trees
     ]
     check_texts_refused(path, texts, "radiance")
     check_changes_refused(path, whole, changes, "radiance")

@@ -93,7 +93,7 @@ def test_a_verdict_that_is_not_given_is_not_stated(store: Path, tmp_path: Path) 
 def test_files_that_are_only_written_are_named(tmp_path: Path, suffix: str) -> None:
     path = tmp_path / f"grey.{suffix}"
     path.write_bytes(b"something")
-    sentence = f"files of {suffix} are only written, not read"
+    sentence = f"files of {suffix} can be written, but not read"
     with pytest.raises(FileFormatError, match=sentence):
         formats.read(path)
     with pytest.raises(ParameterError, match=f"file_format: {sentence}"):

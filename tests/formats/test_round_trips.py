@@ -16,7 +16,17 @@ from brdfdb.tables.grids import Grid
 from brdfdb.tables.layout import Layout
 from tests.formats.a_file import ISOTROPIC_ALONE, POLARISED_ALONE, SIZE, check_refused, exported, options_of, read_table
 from tests.formats.round_trip import ROUND_TRIPPED, round_trip
-from tests.formats.small_tables import ANISOTROPIC, DIFFUSE, KINDS, SMOOTH, SPECTRAL, SPECULAR, small_table, table_of
+from tests.formats.small_tables import (
+    ANISOTROPIC,
+    DIFFUSE,
+    GREY,
+    KINDS,
+    SMOOTH,
+    SPECTRAL,
+    SPECULAR,
+    small_table,
+    table_of,
+)
 
 ERROR_RTOL = 1e-9  # of p99 of a file that is read again to the stated one; worst measured 2e-12
 DECIMAL_ANGLES = {"astm": 1e-6}  # of nine digits: worst measured 3.7e-7
@@ -24,16 +34,22 @@ STATED = 1.01  # of the p99 in the record, three digits that are rounded up, to 
 SIZED = ("astm", "fred", "ssdd", "zemax")
 WITH_SPECULAR_PART = ("netcdf", "numpy", "ssdd", "zarr")
 RGB, XYZ, Y, BANDS = ("R", "G", "B"), ("X", "Y", "Z"), ("Y",), ("400nm", "550nm", "700nm")
-GREY, AT_460, AT_550 = ("grey",), ("460nm",), ("550nm",)
+NO_NAME, AT_460, AT_550 = ("grey",), ("460nm",), ("550nm",)
 # Channels of grey tables, of the table of one wavelength, and of copper; other formats keep those of the table
 CHANNELS = {
     **dict.fromkeys(("merl", "utia"), (RGB, RGB, RGB)),
     **dict.fromkeys(("radiance", "zemax"), (Y, Y, XYZ)),
-    **dict.fromkeys(("eradiate", "fred"), (GREY, AT_460, AT_550)),
+    **dict.fromkeys(("eradiate", "fred"), (NO_NAME, AT_460, AT_550)),
     "klems": (Y, Y, Y),
-    "materialx": (GREY, GREY, RGB),
+    "materialx": (NO_NAME, NO_NAME, RGB),
     "openmaterial": (AT_550, AT_460, BANDS),
 }
+
+
+# Files of dense tables whose nodes are searched; others have regular nodes, which are soon written and far from a table
+SEARCHED = {("netcdf", GREY), ("zarr", ANISOTROPIC), ("csv", SPECTRAL)}
+SEARCHED |= {(name, DIFFUSE) for name in ("bird", "csv", "netcdf", "numpy", "openmaterial", "zarr")}
+NEAR = 0.5  # p99 of searched files, and of a table that is almost diffuse in each format
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -45,19 +61,26 @@ def test_what_is_read_is_as_near_as_the_file_states(name: str, kind: str, tmp_pa
             round_trip(table, tmp_path, name, **options_of(name))
         assert list(tmp_path.iterdir()) == []
         return
-    trip = round_trip(table, tmp_path, name, verdict="passes", **options_of(name))
+    searched = {"tolerance": NEAR} if (name, kind) in SEARCHED else options_of(name)
+    trip = round_trip(table, tmp_path, name, verdict="passes", **searched)
     record = trip.reading.record
+    if kind == DIFFUSE or (name, kind) in SEARCHED:
+        assert trip.stated <= NEAR
     assert trip.measured == pytest.approx(trip.stated, rel=DECIMAL_ANGLES.get(name, ERROR_RTOL))
     assert trip.stated <= record["error_of_file"]["p99"] <= STATED * trip.stated
     assert (record["name"], record["audit"]) == (kind, "passes")
     assert record["parameters"] == table.metadata.model_dump(mode="json")["parameters"]
-    assert trip.reading.channels == CHANNELS.get(name, (GREY, AT_460, BANDS))[(kind == SMOOTH) + 2 * (kind == SPECTRAL)]
+    assert (
+        trip.reading.channels == CHANNELS.get(name, (NO_NAME, AT_460, BANDS))[(kind == SMOOTH) + 2 * (kind == SPECTRAL)]
+    )
     without = kind in SPECULAR and name not in WITH_SPECULAR_PART
     if (name, kind) != ("materialx", SMOOTH):  # whose narrow facets stand for the specular part
         assert any("in the exact mirror direction" in remark for remark in record.get("remarks", ())) == without
     if name in SIZED:
         assert trip.nbytes <= 1e6 * SIZE
-    if name != "materialx":  # which is a formula
+    if name == "materialx" or kind == SMOOTH:  # a formula, and a table of the same value everywhere
+        return
+    if (name, kind) != ("zarr", ANISOTROPIC):  # whose half vectors along the normal have many azimuths
         check_samples_are_lookups_at_nodes(tmp_path / f"{kind}{EXPORTERS[name].suffix}", name, kind)
 
 

@@ -165,10 +165,10 @@ def test_a_damaged_lighttools_file_is_refused_with_line_and_field(tmp_path: Path
     changes = [
         ("0.1 0.4", "0.1 x", "line 16, field TIS of block 1: 'x' is not a number"),
         ("ScatterRadial 2\n0 30", "ScatterRadial 9\n0 30", "line 8, field ScatterRadial: 'DataBegin' is not a number"),
-        ("ScatterAzimuth 2", "ScatterAzimuth 99999", "line 4, field ScatterAzimuth: '99999' is no number of values"),
+        ("ScatterAzimuth 2", "ScatterAzimuth 99999", "line 4, field ScatterAzimuth: '99999' is not a number of values"),
         ("AOI 20\nPOI 0\nSide Front", "AOI up\nPOI 0\nSide Front", "line 14, field AOI: 'up' is not a number"),
-        ("DataEnd\n", "", "field DataEnd: the text ends without it, after 2 blocks"),
-        ("Side Back", "Side Front", "field AOI: 20 degrees stand twice for 550"),
+        ("DataEnd\n", "", "field DataEnd: the file ends without it, after 2 blocks"),
+        ("Side Back", "Side Front", "field AOI: 20 degrees are listed twice for 550"),
     ]
     check_changes_refused(tmp_path / "sheet.bsdf", LIGHTTOOLS, changes, "")
 
@@ -183,7 +183,7 @@ def test_the_cosine_of_a_pab_opto_file_is_divided_out_and_its_back_turned(tmp_pa
     assert samples.values[:, 0] == pytest.approx([0.1])  # the other row is transmitted
     assert samples.record["below_the_horizon"] == 1
     damages = {
-        PABOPTO + "120 30\n": "line 4 has 2 fields; theta, phi and values are 3",
+        PABOPTO + "120 30\n": "line 4 has 2 fields; expected are 3: theta, phi and values",
         PABOPTO + "120 30 much\n": "line 4: 'much' is not a finite number",
         PABOPTO.replace("DSF", "radiance") + "1 2 3\n": "field #format: 'radiance' is not one of dsf",
         PABOPTO.replace("150 20", "150") + "1 2 3\n": "field #incident_angle",
@@ -193,8 +193,8 @@ def test_the_cosine_of_a_pab_opto_file_is_divided_out_and_its_back_turned(tmp_pa
 
 def test_keywords_that_a_format_does_not_have_are_refused(tmp_path: Path) -> None:
     for keywords, sentence in (
-        ({"member": "x"}, r"member: the format of .* does not take it"),
-        ({"file_format": "text", "theta_q": "x"}, "theta_q: no format takes it; there are angles, delta_phi"),
+        ({"member": "x"}, r"member: the format of .* does not have this keyword"),
+        ({"file_format": "text", "theta_q": "x"}, "theta_q: no format has this keyword; allowed are angles, delta_phi"),
         ({"file_format": "paper"}, "file_format: 'paper' is not one of"),
     ):
         with pytest.raises(ParameterError, match=sentence):

@@ -49,7 +49,7 @@ def test_a_directory_is_replaced_by_a_directory_only(tmp_path: Path) -> None:
             (half / "zarr.json").write_text(content)
     assert (path / "zarr.json").read_text() == "new"
     assert list(tmp_path.iterdir()) == [path]
-    for name, words in (("b.bsdf", "it is a directory"), ("c.zarr", "it is a directory that is no zarr group")):
+    for name, words in (("b.bsdf", "it is a directory"), ("c.zarr", "it is a directory, but not a zarr group")):
         (tmp_path / name).mkdir()
         (tmp_path / name / "thesis.txt").write_text("of somebody")
         with pytest.raises(WriteError, match=f"{name}: {words}"), whole(tmp_path / name):
@@ -83,7 +83,7 @@ def test_a_group_with_files_of_somebody_is_not_replaced(tmp_path: Path, name: st
     (path / "theta_i" / "c" / "0").mkdir(parents=True)
     for file in ("zarr.json", "theta_i/zarr.json", "theta_i/c/0/1", name):
         (path / file).write_text("old")
-    with pytest.raises(WriteError, match=f"it holds {Path(name).name}, which is no part"), whole(path):
+    with pytest.raises(WriteError, match=f"it contains {Path(name).name}, which is not part"), whole(path):
         pytest.fail("it is refused before anything is computed")
     (path / name).unlink()
     with whole(path) as (half,):

@@ -77,7 +77,7 @@ def test_a_colour_of_n_stands_for_the_wavelengths_of_the_channels() -> None:
     n, k = refractive_index("main/Au/Johnson", RGB_NM)
     document = metal_of("Au") | {name: {"type": "rgb", "value": x.tolist()} for name, x in (("n", n), ("k", k))}
     np.testing.assert_allclose(f_r(mitsuba, document), [model_of("Au", nm) for nm in RGB_NM], rtol=FLOAT32)
-    with pytest.raises(RuntimeError, match="n: a colour or a texture has no spectrum, which channels = srgb needs"):
+    with pytest.raises(RuntimeError, match="n: a colour or a texture has no spectrum, and channels = srgb needs one"):
         mitsuba.load_dict(document | {"channels": "srgb"})
 
 

@@ -109,7 +109,7 @@ def test_bad_parameters_are_named() -> None:
     for document, sentence in (
         (shiny | {"rho_d": 1.5}, r"rho_d: 1\.5 is outside \[0, 1\]"),
         (shiny | {"alpha": 0.0}, r"alpha_x: 0 is outside \[1e-06, 2\]"),
-        (shiny | {"form": "phong"}, "form: 'phong' is none of ward, ward_half_vector, ward_duer, ward_bounded"),
+        (shiny | {"form": "phong"}, "form: 'phong' is not one of ward, ward_half_vector, ward_duer, ward_bounded"),
         (ward, r"rho_s: a number in \[0, 1\] or a texture is missing"),
         ({"type": "brdfdb_oren_nayar", "rho": 0.5, "sigma_deg": 100.0}, r"sigma_deg: 100 is outside \[0, 90\] degree"),
     ):

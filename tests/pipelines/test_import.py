@@ -62,7 +62,7 @@ def test_samples_are_written_as_netcdf_that_is_imported_again(tile: Path, tmp_pa
     ("options", "sentence"),
     [
         (["--column", "theta_i"], "--column: 'theta_i' is not NAME=HEADER"),
-        (["--column", "theta_q=sun"], "theta_q: no format takes it; there are angles, delta_phi"),
+        (["--column", "theta_q=sun"], "theta_q: no format has this keyword; allowed are angles, delta_phi"),
         ([*OPTIONS, "--out", "tile.txt"], "--out: 'tile.txt' does not end in .nc"),
         (["--format", "paper"], "file_format: 'paper' is not one of astm,"),
         (["--wavelength-nm", "0.5", *OPTIONS], "wavelength_nm: 0.5 is outside [10, 1e+06] nm"),
@@ -86,7 +86,7 @@ def test_one_file_is_written_at_a_time(tile: Path, tmp_path: Path, capsys: Captu
     fits = tmp_path / "ward.fit"
     fits.write_text("# published fits\nbrass = Ward(a = 0.1)\n")
     assert run("import", fits) == 2
-    assert "ward.fit: a file of published fits holds no samples; `brdfdb fit` lists them" in capsys.readouterr().err
+    assert "ward.fit: a file of published fits holds no samples; `brdfdb fit` lists the fits" in capsys.readouterr().err
     assert run("import", tmp_path / "missing.csv") == 2
     assert "missing.csv: No such file or directory" in capsys.readouterr().err
 

@@ -147,7 +147,7 @@ def test_export_says_that_some_values_were_not_measured(folder: Path, capsys: Ca
 
 def test_source_code_of_a_measured_table_is_refused_in_a_sentence(folder: Path, capsys: Captured) -> None:
     assert run("export", "glsl", NAME, "--store", folder / "store", "--out", folder / "out") == 2
-    assert "it is measured, and source code is of models" in capsys.readouterr().err
+    assert "the table is measured, and source code needs a model" in capsys.readouterr().err
 
 
 def test_audit_judges_energy_of_the_data_and_pairs_that_were_measured(folder: Path) -> None:

@@ -36,7 +36,7 @@ tools = "MaterialX and the programs with it: USD, Maya, Houdini, Blender, Arnold
 kinds = (OPEN_PBR, STANDARD)
 options = (
     replace(
-        TOLERANCE, help="largest error against the table that 99 of 100 values may have; the closest surface is written"
+        TOLERANCE, help="largest relative error of 99 % of the values against the table; the closest surface is written"
     ),
 )
 
@@ -113,14 +113,16 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     with path.open("rb") as file:
         text = file.read(_LARGEST + 1)
     if len(text) > _LARGEST:
-        raise FileFormatError(f"{path}: more than {_LARGEST >> 20} MiB are no MaterialX document with one surface")
+        raise FileFormatError(
+            f"{path}: it has more than {_LARGEST >> 20} MiB, too many for a document with one surface"
+        )
     try:
         root = ElementTree.fromstring(text)
     except (ElementTree.ParseError, ValueError, LookupError) as error:
-        raise FileFormatError(f"{path}: no XML: {error}") from None
+        raise FileFormatError(f"{path}: it is not XML: {error}") from None
     node = next((child for child in root if child.tag in kinds), None)
     if root.tag != "materialx" or node is None:
-        raise FileFormatError(f"{path}: no node {' or '.join(kinds)} in the document")
+        raise FileFormatError(f"{path}: the document has no node {' or '.join(kinds)}")
     surface = _surface(path, node)
     material = root.find("surfacematerial")
     document = document_of("" if material is None else material.get("doc", ""))

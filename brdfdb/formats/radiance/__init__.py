@@ -209,7 +209,7 @@ def read(path: str | os.PathLike[str]) -> FileTable:
         try:
             trees.append(parsed(block.numbers, rank))
         except ValueError as error:
-            raise FileFormatError(f"{path}: block {name} is no tensor tree: {error}") from None
+            raise FileFormatError(f"{path}: block {name} is not a tensor tree: {error}") from None
     of_colour = XYZ if len(trees) > 1 else LUMINOUS
 
     def nodes() -> Samples:

@@ -37,7 +37,7 @@ options = (
     FormatOption(
         "azimuth",
         "reduced",
-        "azimuths of the light of anisotropic tables: those that symmetry leaves, for Mitsuba 3, or all",
+        "azimuths of the light in anisotropic tables: a quarter, which Mitsuba 3 completes by symmetry, or all",
         choices=("reduced", "full"),
     ),
 )

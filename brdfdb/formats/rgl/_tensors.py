@@ -46,14 +46,14 @@ def write_tensors(path: Path, arrays: Mapping[str, NDArray[Any]]) -> None:
 
 
 def read_tensors(path: str | os.PathLike[str]) -> dict[str, NDArray[Any]]:
-    """Return the arrays of a tensor file by name; FileFormatError if it is no tensor file or is damaged."""
+    """Return the arrays of a tensor file by name; FileFormatError if it is not a tensor file or is damaged."""
     with path_of(path).open("rb") as file:
         if not file.read(1):
-            raise FileFormatError(f"{path}: it is no tensor file")
+            raise FileFormatError(f"{path}: it is not a tensor file")
         content = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)  # files of Mueller matrices have a gigabyte
     header = _Header(path, content)
     if header.take(len(MAGIC)) != MAGIC:
-        raise FileFormatError(f"{path}: it is no tensor file")
+        raise FileFormatError(f"{path}: it is not a tensor file")
     if header.take(2) != _VERSION:
         raise FileFormatError(f"{path}: its version is {content[12]}.{content[13]}; allowed is 1.0")
     (count,) = header.unpack("<I")

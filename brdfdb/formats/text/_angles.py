@@ -59,7 +59,7 @@ def angles_of_rows(
         if np.any(np.abs(theta) > np.pi * (1.0 + 1e-9)):
             row = int(np.argmax(np.abs(theta)))
             shown, line = np.rad2deg(np.abs(theta[row])), line_of_row(path, layout, row)
-            raise FileFormatError(f"{path}: line {line}: theta_{side} of {shown:g} degrees is no polar angle")
+            raise FileFormatError(f"{path}: line {line}: theta_{side} of {shown:g} degrees is not a polar angle")
     phi_i = given["phi_i"]
     phi_r = given["phi_r"] if "phi_r" in given else phi_i + given["delta_phi"]
     flat = np.abs(np.sin(phi_r - phi_i)) * np.sin(given["theta_r"]) < _FLAT
@@ -104,7 +104,9 @@ def _units(
         units[name] = angle_unit(column)
         if units[name] not in ("", *ANGLE_UNITS):
             where = f"{path}: line {layout.line}, field {column}"
-            raise FileFormatError(f"{where}: the unit {units[name]!r} is none of angles; allowed are deg, rad and mrad")
+            raise FileFormatError(
+                f"{where}: the unit {units[name]!r} is not a unit of angles; allowed are deg, rad and mrad"
+            )
     named = sorted(set(units.values()) - {""})
     unnamed = {name: column for name, column in given.items() if not units[name]}
     titles = [line for line in layout.titles if _OF_ANGLES.search(line)]
