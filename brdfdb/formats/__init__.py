@@ -101,7 +101,8 @@ def write(
             "file_format", f"{file_format!r} is not one of {', '.join(EXPORTERS)}", file_format, tuple(EXPORTERS)
         )
     exporter = EXPORTERS[file_format]
-    parsed = parsed_options(exporter, {name: _text(value) for name, value in options.items()})
+    texts = {name: str(value).lower() if isinstance(value, bool) else str(value) for name, value in options.items()}
+    parsed = parsed_options(exporter, texts)
     return exporter.write(table, path_of(path), verdict=verdict, **parsed)
 
 
@@ -135,11 +136,6 @@ def packed(table: Table, file_format: str, *, verdict: str, **options: Any) -> t
         files = sorted(file for file in folder.rglob("*") if file.is_file())
         contents = ((str(file.relative_to(folder)), file.read_bytes()) for file in files)
         return f"{path.name}.zip", ZIP, b"".join(zipped(contents))
-
-
-def _text(value: Any) -> str:
-    """Return the value of an option as command line and HTTP give it."""
-    return str(value).lower() if isinstance(value, bool) else str(value)
 
 
 def read(

@@ -35,7 +35,8 @@ _FIRST = 8  # intervals of each axis before any is halved
 _HALVINGS = 14
 _FEWEST = 40  # pairs in an interval that is halved: of fewer, the percentile says nothing
 # Smallest error of an interval, as a share of the target: of the first ones, and of those that were halved
-_LEAST, _LEAST_OF_HALVES = 1 / 64, 1 / 4
+_LEAST = 1 / 64
+_LEAST_OF_HALVES = 1 / 4
 _MOST = 0.97  # share of the pairs of an interval that its error stands for
 _BALANCES = 2
 _EVERY = 2  # of the pairs, one of so many chooses the nodes
@@ -141,7 +142,8 @@ class FittedGrid(NamedTuple):
 def filled(comparison: Comparison, system: System, nodes: Sequence[Floats]) -> AngularGrid:
     """Return a grid with f_r of the table of a comparison, in its channels, at nodes [rad] of each angle."""
     shape = tuple(axis.size for axis in nodes)
-    count, channels = math.prod(shape), len(comparison.channels.names)
+    count = math.prod(shape)
+    channels = len(comparison.channels.names)
     values = np.empty((count, channels), np.float32)
     step = max(1, _AT_ONCE // channels)
     for start in range(0, count, step):
@@ -254,7 +256,8 @@ class Intervals(NamedTuple):
 
         Otherwise a node next to a kink could be the end of a long straight line, which would miss the kink.
         """
-        edges, errors = self.edges, self.errors
+        edges = self.edges
+        errors = self.errors
         longest = (edges[-1] - edges[0]) / _FIRST
         while True:
             widths = np.diff(edges)

@@ -63,7 +63,8 @@ _TURNED = {
 }
 _MOST_VALUES = 1 << 27  # of a file that is read
 _MOST_NODES = 1 << 22  # of an axis that is read
-_DEGREES, _RADIANS = ("", "degree", "degrees", "deg", "°"), ("rad", "radian", "radians")
+_DEGREES = ("", "degree", "degrees", "deg", "°")
+_RADIANS = ("rad", "radian", "radians")
 MOST_BYTES = 40_000_000  # size of a file that is written, about
 _MOST_READ = 1 << 29  # of a file that is read
 _DECIMALS = 4  # of angles [degree]: radians in files have six

@@ -105,8 +105,10 @@ class Words:
     """
 
     def __init__(self, path: Path) -> None:
-        self.line, self.comments = 0, list[str]()
-        self._path, self._words = path, self._read()
+        self.line = 0
+        self.comments = list[str]()
+        self._path = path
+        self._words = self._read()
 
     def __iter__(self) -> Iterator[str]:
         return self._words

@@ -40,7 +40,8 @@ def record(
     """
     from brdfdb.formats._stated_error import of_table
 
-    known, statement = table.metadata, of_table(table) if error is None else error.statement
+    known = table.metadata
+    statement = of_table(table) if error is None else error.statement
     document = known.model_dump(mode="json", include={"model", "model_version", "parameters", "refractive_index"})
     origin = known.source or "a source that is not stated"
     licence = f"measured: {origin}" if known.measured else f"computed from parameters published in {origin}"

@@ -65,7 +65,9 @@ def write_source(
     remarks = (*remarks, *channels.remarks, *specular_remark(table), *frame_remark(table, _X))
     document = record(table, error, verdict, holds=CONVENTION, remarks=remarks)
     comments = [*lines(document), f"f_r [1/sr] of the model {model}, {channels.meaning}", _FRAME]
-    text = "".join(f"// {_plain(line)}\n" for line in comments) + "\n" + source(model, parameters, language, table.name)
+    # In ASCII, as old compilers want comments, and without a backslash at the end, which would join the next line
+    comments = [line.encode("ascii", "backslashreplace").decode("ascii").rstrip("\\ ") for line in comments]
+    text = "".join(f"// {line}\n" for line in comments) + "\n" + source(model, parameters, language, table.name)
     with whole(path) as (temporary,):
         temporary.write_text(text, encoding="utf-8")
     return Written((path_of(path),), error, remarks=remarks)
@@ -95,11 +97,6 @@ def source(model: str, parameters: Mapping[str, Any], language: Language, name: 
     identifier = "brdf_" + "".join(letter if letter.isascii() and letter.isalnum() else "_" for letter in name)
     whole_text = "\n".join([*parts, *([language.after] if language.after else [])])
     return Template(whole_text).substitute(vector=language.vector, color=language.color, name=identifier)
-
-
-def _plain(line: str) -> str:
-    """Return a comment in ASCII, as old compilers want it, that does not go on in the next line."""
-    return line.encode("ascii", "backslashreplace").decode("ascii").rstrip("\\ ")
 
 
 def _literal(number: float) -> str:

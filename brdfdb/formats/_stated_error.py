@@ -150,7 +150,8 @@ def _drawn(table: Table) -> tuple[Floats, Floats, Floats, bool]:
     """
     rng = np.random.default_rng(SEED)
     count = 2 * PAIRS
-    wi, over = _cosine_weighted(rng, count), _cosine_weighted(rng, count)
+    wi = _cosine_weighted(rng, count)
+    over = _cosine_weighted(rng, count)
     at = table.wavelength_nm
     in_turn = None if at is None else at[np.arange(count) % at.size]
     lobe = None if table.source is None else table.source.lobe(wi[:, 2], in_turn)
@@ -160,7 +161,8 @@ def _drawn(table: Table) -> tuple[Floats, Floats, Floats, bool]:
         lobe._replace(share=np.ones(1), alpha_x=width * lobe.alpha_x, alpha_y=width * lobe.alpha_y, visible=False)
         for width in WIDTHS
     ]
-    u, angle = 1.0 - rng.random(count), rng.uniform(0.0, 2.0 * np.pi, count)
+    u = 1.0 - rng.random(count)
+    angle = rng.uniform(0.0, 2.0 * np.pi, count)
     wr = over
     for part, drawn in enumerate(lobes):  # the second half, in equal parts
         start = PAIRS + part * PAIRS // len(lobes)
@@ -277,7 +279,8 @@ def of_file(table: Table, channels: Channels, floor: Floats, evaluate: Evaluate)
     drawn = error_measurement.draw(table.source, table.wavelength_nm, OF_A_BAND, _SEED).above_the_horizon()
     pairs = places.draw(IN_PLACES, _SEED)
     wi, wr = np.concatenate([drawn.wi, pairs.wi]), np.concatenate([drawn.wr, pairs.wr])
-    own, inside = len(drawn.wi), ~places.anywhere(drawn.wi, drawn.wr)
+    own = len(drawn.wi)
+    inside = ~places.anywhere(drawn.wi, drawn.wr)
     file = np.asarray(evaluate(wi, wr))
 
     def rows(known: Floats, errors: Floats, of_file: Floats, least: Floats) -> Rows:
@@ -293,7 +296,8 @@ def of_file(table: Table, channels: Channels, floor: Floats, evaluate: Evaluate)
 
     at = channels.wavelength_nm
     brdf, errors = table.lookup_vectors_with_error(wi, wr, at)
-    known, wrong = channels.of_spectra(brdf), channels.of_spectra(errors, absolute=True)
+    known = channels.of_spectra(brdf)
+    wrong = channels.of_spectra(errors, absolute=True)
     column = table.columns_of(at)
     typical = (error.of_all_bands(column) + _uncertainty(table)) * np.maximum(brdf, error.floors[column])
     off = np.abs(file - known) + channels.of_spectra(typical, absolute=True)

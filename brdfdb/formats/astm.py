@@ -112,7 +112,8 @@ def read(path: str | os.PathLike[str]) -> FileTable | Samples:
     anisotropic = nodes[1].size > 1
     one_side = not anisotropic and not np.any((nodes[3] > np.pi + 1e-6) & (nodes[3] < 2.0 * np.pi - 1e-6))
     if not anisotropic:
-        nodes, values = (nodes[0], *nodes[2:]), values[:, 0]
+        nodes = (nodes[0], *nodes[2:])
+        values = values[:, 0]
     if one_side:
         nodes, values = (*nodes[:2], nodes[2][nodes[2] < 4.0]), values[:, :, nodes[2] < 4.0]
     grid = AngularGrid(Spherical(anisotropic, one_side), nodes, values)
@@ -121,7 +122,8 @@ def read(path: str | os.PathLike[str]) -> FileTable | Samples:
 
 def _write_rows(stream: Sink, grid: AngularGrid, names: tuple[str, ...]) -> None:
     """Write the number of rows, the names of the columns, and the rows."""
-    nodes, values = list(grid.nodes), grid.values
+    nodes = list(grid.nodes)
+    values = grid.values
     if len(nodes) == 3:
         nodes = [nodes[0], np.zeros(1), nodes[1], np.append(nodes[2], 2.0 * np.pi)]
         values = np.concatenate([values, values[:, :, :1]], axis=2)[:, np.newaxis]

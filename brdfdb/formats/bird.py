@@ -89,7 +89,8 @@ def write(
         last_deg=_LAST_DEG,
     )
     known = dense_record(table, dense, verdict, specular=False)
-    nodes, values = list(dense.grid.axes.values()), dense.values
+    nodes = list(dense.grid.axes.values())
+    values = dense.values
     for axis, name in enumerate(dense.grid.names):  # 360 degrees are 0 again, and not allowed
         if nodes[axis][-1] == 360.0 and name.startswith("phi"):
             nodes[axis], values = nodes[axis][:-1], np.delete(values, -1, axis)
@@ -117,17 +118,20 @@ def read(path: str | os.PathLike[str]) -> FileTable | Samples:
     """Return f_r of a universal BRDF file: interpolated linearly on a grid of light and viewer, else its samples."""
     path = path_of(path)
     document = parsed(path)
-    data, metadata = document.get("data"), document.get("metadata")
+    data = document.get("data")
+    metadata = document.get("metadata")
     lists = _lists(path, data if isinstance(data, dict) else {})
     known = metadata.get("adhoc_section", {}) if isinstance(metadata, dict) else {}
-    values, at = lists.pop("BRDF")[:, np.newaxis], lists.pop("wavelength_i", None)
+    values = lists.pop("BRDF")[:, np.newaxis]
+    at = lists.pop("wavelength_i", None)
     uncertainty = lists["uBRDF"][:, np.newaxis] if "uBRDF" in lists else None
     lists.pop("uBRDF", None)
     if at is not None:
         nodes = np.unique(at)
         if len(values) % nodes.size or not np.array_equal(at, np.tile(nodes, len(values) // nodes.size)):
             raise FileFormatError(f"{path}: the directions do not all have the same wavelengths in the same order")
-        values, at = values.reshape(-1, nodes.size), nodes
+        values = values.reshape(-1, nodes.size)
+        at = nodes
         uncertainty = None if uncertainty is None else uncertainty.reshape(values.shape)
         lists = {name: angle[:: nodes.size] for name, angle in lists.items()}
     known = known if isinstance(known, dict) else {}

@@ -109,7 +109,8 @@ def read(path: str | os.PathLike[str]) -> FileTable | Samples:
     path = path_of(path)
     comments: list[str] = []
     numbered = lines_of(path)
-    first, line = 0, ""
+    first = 0
+    line = ""
     for number, line in numbered:
         if not line.startswith("#"):
             first = number

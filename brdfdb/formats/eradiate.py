@@ -93,7 +93,9 @@ def write(
     channels = at_wavelength(table, wavelength)
     comparison = Comparison(table, channels)
     shape = (nodes, nodes + nodes % 2, nodes) if nodes else _smallest(table, comparison, tolerance)
-    values = _values(table, channels, shape)
+    azimuths_and_lights = np.ix_(np.arange(shape[1]), np.arange(shape[2]))
+    rows = [_node(table, channels, shape, np.array([row]), *azimuths_and_lights)[..., 0] for row in range(shape[0])]
+    values = np.stack(rows).astype(np.float32)
     error = comparison.error_of(functools.partial(_evaluated, values))
     remarks = (*specular_remark(table), *channels.remarks)
     wanted = None if nodes else tolerance
@@ -167,13 +169,6 @@ def _node(table: Table, channels: Channels, shape: tuple[int, int, int], viewer:
     for w in (wi, wr):
         w[..., 2] = np.maximum(w[..., 2], 0.0)  # rounding at the horizon
     return channels.values(table, wi, wr)
-
-
-def _values(table: Table, channels: Channels, shape: tuple[int, int, int]) -> NDArray[np.float32]:
-    """Return f_r [1/sr] at all nodes of a grid."""
-    nodes = np.arange(shape[1]), np.arange(shape[2])
-    rows = [_node(table, channels, shape, np.array([row]), *np.ix_(*nodes))[..., 0] for row in range(shape[0])]
-    return np.stack(rows).astype(np.float32)
 
 
 def _interpolated(

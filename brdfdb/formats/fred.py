@@ -110,7 +110,8 @@ def read(path: str | os.PathLike[str]) -> FileTable | Samples:
     known = record_beside(path)
     if known.get("rows", len(rows)) != len(rows):
         raise FileFormatError(f"{path}: its record states {known['rows']!r:.20} viewers, but the file has {len(rows)}")
-    name, nm = str(known.get("name") or path.name.partition(".")[0]), known.get("wavelength_nm")
+    name = str(known.get("name") or path.name.partition(".")[0])
+    nm = known.get("wavelength_nm")
     at = np.array([float(nm)]) if isinstance(nm, int | float) else None
     channels = names_of(at)
     doubt_end(path, rows[:, :2], known)
@@ -168,7 +169,8 @@ def _rows(path: Path) -> NDArray[np.float64]:
         if len(line) == 2:
             if bare:
                 raise FileFormatError(f"{path}: line {bare} is a light without viewers")
-            light, bare = line, number
+            light = line
+            bare = number
         elif len(line) == 3 and light is not None:
             numbers.extend([*light, *line[:2], scale * line[2]])
             bare = 0

@@ -63,7 +63,8 @@ _ELEMENTS = ((0, 0), (0, 1), (1, 1), (2, 2), (2, 3))  # that are stored; [1, 0],
 _BYTES = 16 * 4  # of a matrix
 _COPIES = 4  # of phi_d, of which symmetry leaves a quarter
 _SPLIT = 0.5  # share of the tolerance up to which a cell of theta_d may change the elements of a facet
-_FIRST_DEG, _LEAST_DEG = np.linspace(0.0, 90.0, 10), 0.1
+_FIRST_DEG = np.linspace(0.0, 90.0, 10)
+_LEAST_DEG = 0.1
 
 
 def write(

@@ -24,7 +24,8 @@ if TYPE_CHECKING:
     from brdfdb.measurements.samples import Samples
 
 suffix = ".bsdf"
-_SYMMETRY, _LIGHT_DEG = "Asymmetric", 90.0
+_SYMMETRY = "Asymmetric"
+_LIGHT_DEG = 90.0
 _ENTRIES = ("AOI", "POI", "Side", "Wavelength", "ScatterType", "TristimulusValue")
 _TRISTIMULUS = ("TrisX", "TrisY", "TrisZ")
 

@@ -33,7 +33,8 @@ media_type = "application/xml"
 summary = "plugins of Mitsuba 3 with the parameters of materials, as XML and as dictionaries"
 tools = "Mitsuba 3 with brdfdb.mitsuba"
 kinds: tuple[str, ...] = ()
-MODEL, TABLE = "model", "table"
+MODEL = "model"
+TABLE = "table"
 options = (
     FormatOption(
         "plugin", MODEL, "plugin of the model where Mitsuba has one, or the plugin of tables", choices=(MODEL, TABLE)
@@ -59,7 +60,8 @@ def write(table: Table, path: str | os.PathLike[str], *, plugin: str = MODEL, ve
         remarks = ("Mitsuba has no plugin of its model, and reads the table from the store that BRDFDB_STORE names",)
     remarks = (*remarks, *frame_remark(table, U_AXIS))
     known = record(table, None, verdict, holds=HOLDS, remarks=remarks)
-    text, dictionary = _xml(table.name, document, known), json.dumps({"id": table.name, **document}, indent=1)
+    text = _xml(table.name, document, known)
+    dictionary = json.dumps({"id": table.name, **document}, indent=1)
     with whole(path, beside(path_of(path))) as (first, second):
         first.write_text(text, encoding="utf-8")
         second.write_text(dictionary + "\n", encoding="utf-8")

@@ -32,7 +32,8 @@ if TYPE_CHECKING:
 
 suffix = ".h5"
 keywords = ("member",)
-_HDF5, _ZIP = b"\x89HDF\r\n\x1a\n", b"PK\x03\x04"
+_HDF5 = b"\x89HDF\r\n\x1a\n"
+_ZIP = b"PK\x03\x04"
 _LAYERS = ("dense_1", "dense_2", "dense_3")
 _SHAPES = ((6, 21), (21, 21), (21, 3))
 _MOST_BYTES = 1 << 24  # of a file with 675 weights, which has 19 kB

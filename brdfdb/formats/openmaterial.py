@@ -52,7 +52,8 @@ SCHEMA = (
     f"https://raw.githubusercontent.com/asam-ev/OpenMATERIAL-3D/refs/tags/v{VERSION}/schemas/material_brdf_schema.json"
 )
 GREY_NM = 550.0  # at which grey tables are written: the format has no rows without a wavelength
-_DIGITS, _ROW_BYTES = 5, 48
+_DIGITS = 5
+_ROW_BYTES = 48
 _DECIMALS = 6  # of angles [rad], as the largest ones of the schema have: 1.570796 and 6.283185
 _LARGEST = {"polar": 1.570796, "azimuth": 6.283185}
 _SAME = 1e-4  # relative difference of values at an azimuth and its mirror image that count as the same

@@ -39,7 +39,8 @@ def read(path: str | os.PathLike[str]) -> Samples:
     """
     path = path_of(path)
     header: dict[str, str] = {}
-    numbers, count = array("d"), 0
+    numbers = array("d")
+    count = 0
     for line_number, line in lines_of(path):
         if line.startswith("#"):
             name, _, text = line[1:].strip().partition(" ")

@@ -62,7 +62,8 @@ def write(
 
     imsave = import_extra("matplotlib.image").imsave
     if kind == SPHERE:
-        pixels, tones = lit_sphere(table, round(size)), _LIT
+        pixels = lit_sphere(table, round(size))
+        tones = _LIT
     else:
         image = slice_of(table, kind, theta_i, phi_i)
         values, meaning = rgb_of(image)

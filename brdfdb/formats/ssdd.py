@@ -187,7 +187,8 @@ def _specular(table: Table, binary: bool) -> bytes:
 def _grid(path: Path, block: SsddBlock) -> AngularGrid:
     """Return the grid of a block."""
     reductions = block.entries.get("REDUCTION_TYPE", "").split()
-    anisotropic, both_sides = block.angles[1].size > 1, "bilateral_symmetry" in reductions
+    anisotropic = block.angles[1].size > 1
+    both_sides = "bilateral_symmetry" in reductions
     kind = block.entries.get("PARAM_TYPE")
     systems: dict[str, System] = {
         _NAMES[HalfDifference]: HalfDifference(anisotropic, both_sides, "reciprocity" in reductions),
@@ -199,7 +200,8 @@ def _grid(path: Path, block: SsddBlock) -> AngularGrid:
     nodes = tuple(np.deg2rad(axis) for axis in block.angles)
     values = without_holes(block.values)
     if not anisotropic:
-        nodes, values = (nodes[0], *nodes[2:]), values[:, 0]
+        nodes = (nodes[0], *nodes[2:])
+        values = values[:, 0]
     return AngularGrid(systems[kind], nodes, values)
 
 

@@ -142,7 +142,8 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     values = without_holes(text.values.transpose(2, 1, 4, 3, 0)).astype(np.float32)
     both_sides = text.symmetry == "PlaneSymmetrical"
     if both_sides and azimuths[-1] < np.pi:  # the interval around 180 degrees has its mirror image at the other end
-        azimuths, values = np.append(azimuths, np.pi), np.concatenate([values, values[..., -1:, :]], axis=3)
+        azimuths = np.append(azimuths, np.pi)
+        values = np.concatenate([values, values[..., -1:, :]], axis=3)
     anisotropic = turns.size > 1
     nodes = (incidences, turns, radials, azimuths) if anisotropic else (incidences, radials, azimuths)
     grid = AngularGrid(Specular(anisotropic, both_sides), nodes, values if anisotropic else values[:, 0])
@@ -279,7 +280,8 @@ def parsed(path: Path) -> ZemaxText:
     blocks = parts * lists[0].size * lists[1].size
     if blocks > path.stat().st_size:
         raise FileFormatError(f"{path}: its lists of angles need {blocks} blocks of values, more than the file has")
-    rows, tis = [], np.empty(blocks)
+    rows = []
+    tis = np.empty(blocks)
     for number in range(blocks):
         for word in words:
             if word == "TIS":

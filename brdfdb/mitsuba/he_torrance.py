@@ -281,7 +281,9 @@ class HeTorrance(Formula):
     def at(self, interaction: Any, active: Any) -> Values:
         """Return the parameters and the surface as the light of each channel sees it."""
         values = self.parameters.at(interaction, active)
-        values["surface"] = _surface_of(values, self._wavelengths_nm(interaction))
+        of_rays = mi.is_spectral and not self._wavelength_nm
+        wavelengths_nm = interaction.wavelengths if of_rays else self._wavelength_nm or channels_nm()
+        values["surface"] = _surface_of(values, mi.UnpolarizedSpectrum(wavelengths_nm))
         return values
 
     def traverse(self, callback: Any) -> None:
@@ -299,11 +301,6 @@ class HeTorrance(Formula):
             for value, weights in zip(spectrum, band.weights, strict=True):
                 total = [number + value * weight for number, weight in zip(total, weights, strict=True)]
         return mi.UnpolarizedSpectrum(total)
-
-    def _wavelengths_nm(self, interaction: Any) -> Any:
-        if mi.is_spectral and not self._wavelength_nm:
-            return mi.UnpolarizedSpectrum(interaction.wavelengths)
-        return mi.UnpolarizedSpectrum(self._wavelength_nm or channels_nm())
 
     def parts(self, values: Values, wi: Any, wo: Any) -> dict[str, Any]:
         """Return f_r [1/sr] of the directional diffuse and of the uniform diffuse part."""

@@ -19,15 +19,10 @@ from brdfdb.formats.klems import BASES, Basis, averages
 from brdfdb.geometry import unit_vector
 from brdfdb.measurements.statement import statement
 from brdfdb.parameters import Floats
-from brdfdb.store.publication import publish_dataset
-from brdfdb.tables.layout import Layout
 from brdfdb.tables.table import Table
-from brdfdb.tables.tabulation import tabulate
-from tests.api.a_store import client_of
-from tests.formats.a_file import check_changes_refused, random_pairs
+from tests.formats.a_file import check_changes_refused, exported, random_pairs
 from tests.formats.bsdf_judges import check_bsdf, in_window, klems_total, made, queried, thermal
 from tests.formats.small_tables import ANISOTROPIC, DIFFUSE, GREY, small_table
-from tests.pipelines.command import run
 
 WRITTEN = [(GREY, "full"), (GREY, "half"), (GREY, "quarter"), (ANISOTROPIC, "half"), ("spectral", "quarter")]
 FILES = pytest.mark.parametrize(("material", "kind"), WRITTEN)
@@ -232,14 +227,9 @@ def test_the_emissivity_of_a_table_in_the_infrared_is_one_minus_its_albedo(tmp_p
         assert ("assumed" in remark) == (most is not at)
 
 
-def test_the_command_and_the_service_take_an_emissivity(tmp_path: Path) -> None:
-    store = tmp_path / "store"
-    publish_dataset(store, "grey", tabulate(Layout(table_of(DIFFUSE).source, table_of(DIFFUSE).grid)))
-    given = ("--emissivity-back", "0.05")
-    assert run("export", "klems", "grey", "--kind", "quarter", *given, "--store", store, "--out", tmp_path) == 0
-    of_command = (tmp_path / "grey_quarter.xml").read_text(encoding="utf-8")
-    address = "/v1/materials/grey/export/klems?kind=quarter&emissivity_back="
-    for text in (of_command, client_of(store).get(f"{address}0.05").text):
-        assert re.findall(r"<Emissivity(?:Front|Back)>([^<]*)", text) == ["0.9", "0.05"]
-        assert "emissivity 0.9 of the front is assumed" in text
-    assert client_of(store).problem("GET", f"{address}1.2", 422)["parameter"] == "emissivity_back"
+def test_an_emissivity_that_is_not_given_is_assumed(tmp_path: Path) -> None:
+    text = exported(tmp_path, "klems", emissivity_back=0.05).read_text(encoding="utf-8")
+    assert re.findall(r"<Emissivity(?:Front|Back)>([^<]*)", text) == ["0.9", "0.05"]
+    assert "emissivity 0.9 of the front is assumed" in text
+    with pytest.raises(ParameterError, match=r"emissivity_back: '1\.2' is not"):
+        exported(tmp_path, "klems", emissivity_back=1.2)

@@ -18,14 +18,10 @@ from brdfdb import formats
 from brdfdb.formats import EXPORTERS, IMPORTERS, radiance
 from brdfdb.formats._record import lines, of_lines
 from brdfdb.materials import Material
-from brdfdb.store.publication import publish_dataset
 from brdfdb.tables.grids import Grid
 from brdfdb.tables.layout import Layout
-from brdfdb.tables.tabulation import tabulate
-from tests.api.a_store import client_of
-from tests.formats.a_file import POLARISED_ALONE, options_of, read_table
+from tests.formats.a_file import POLARISED_ALONE, options_of
 from tests.formats.small_tables import table_of
-from tests.pipelines.command import run
 
 FORMULA = 'Copper,=HYPERLINK("http://a.example","here")'
 HOSTILE = (
@@ -85,20 +81,6 @@ def test_no_title_breaks_a_file(name: str, title: str, tmp_path: Path) -> None:
         assert "plastic injected" not in [line[5:] for line in text.splitlines() if line.startswith("void ")]
     if name == "csv":
         assert formulas(path.read_text(encoding="utf-8")) == []
-
-
-def test_no_cell_of_a_csv_is_a_formula_from_command_and_service(tmp_path: Path) -> None:
-    """The title `,=HYPERLINK(...)` stood in a cell of its own, which a spreadsheet follows."""
-    publish_dataset(tmp_path / "store", "titled", tabulate(layout_of(FORMULA)))
-    given = ("--resolution", "45", "--store", tmp_path / "store", "--out", tmp_path)
-    assert run("export", "csv", "titled", *given) == 0
-    served = client_of(tmp_path / "store").get("/v1/materials/titled/export/csv?resolution=45").content
-    for content in ((tmp_path / "titled.csv").read_bytes(), served):
-        assert b"HYPERLINK" in content
-        assert formulas(content.decode("utf-8")) == []
-        (tmp_path / "again.csv").write_bytes(content)
-        reading = read_table(tmp_path / "again.csv")
-        assert reading.record["title"] == FORMULA
 
 
 @pytest.mark.judge

@@ -70,7 +70,9 @@ _WAVELENGTHS = (VISIBLE, "CIE-u", "CIE-v")
 _FIRST = 16.0  # cells of the first tree that is compared with the table
 # The error falls with the third to fourth root of the number of cells: with this power the tree does not become larger
 # than needed, and few trees are compared
-_POWER, _LEAST, _MOST = 1.5, 1.15, 8.0
+_POWER = 1.5
+_LEAST = 1.15
+_MOST = 8.0
 # Share of the cells that is spent where all of them would not do: the error falls more slowly than the file grows
 _OUT_OF_REACH = 1.0 / 3.0
 _DARK_LEVEL = 6  # level of the cell without light in coloured trees: one of 262144
@@ -248,14 +250,16 @@ def _plastic(table: Table, name: str) -> list[str]:
     """Return the lines of Radiance's own materials, for models of Ward with grey parameters."""
     from brdfdb.models.shaders import OF_RADIANCE
 
-    model, parameters = table.metadata.model or "", table.metadata.parameters
+    model = table.metadata.model or ""
+    parameters = table.metadata.parameters
     values = [parameters.get(key) for key in _PARAMETERS]
     if model not in OF_RADIANCE or not all(isinstance(value, float | int) for value in values):
         return []
     rho_d, rho_s, alpha_x, alpha_y = (float(value) for value in values)  # type: ignore[arg-type]
     if rho_s >= 1.0:
         return []
-    colour, metal = rho_d / (1.0 - rho_s), rho_d + rho_s
+    colour = rho_d / (1.0 - rho_s)
+    metal = rho_d + rho_s
     share = rho_s / metal if metal > 0.0 else 0.0
     isotropic = alpha_x == alpha_y
     kind, strings = ("", "0") if isotropic else ("2", f"4 {_UP} .")

@@ -43,7 +43,8 @@ options = (
 )
 
 # Bytes beside the values and the record: its error and remarks, headers of fields, angles; and for each wavelength
-_BESIDE, _BESIDE_EACH = 4000, 30
+_BESIDE = 4000
+_BESIDE_EACH = 30
 HOLDS = (
     "spectra * ndf(half vector) / (4 sigma(light)) is f_r cos(theta_r) [1/sr], the cosine included; "
     "half vectors are warped by vndf"

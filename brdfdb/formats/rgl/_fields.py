@@ -145,7 +145,8 @@ class Fields:
             step = min(1, self.theta_i.size - 1)
             return MixedSlices(np.stack([j, j + step]), np.stack([1.0 - v, v]))
         i, u = Interval.between(self.phi_i, places.phi_i)
-        step, count = min(1, self.theta_i.size - 1), self.theta_i.size
+        step = min(1, self.theta_i.size - 1)
+        count = self.theta_i.size
         numbers = [i * count + j, i * count + j + step, (i + 1) * count + j, (i + 1) * count + j + step]
         return MixedSlices(np.stack(numbers), np.stack([(1 - u) * (1 - v), (1 - u) * v, u * (1 - v), u * v]))
 
@@ -206,7 +207,8 @@ def fields_of(path: str | os.PathLike[str], arrays: Mapping[str, NDArray[Any]]) 
         if dtype == np.float32 and not np.all(np.isfinite(arrays[name])):
             raise FileFormatError(f"{path}: field {name!r} has numbers that are not finite")
     slices = (arrays["phi_i"].size, arrays["theta_i"].size)
-    channels, size = (arrays["wavelengths"].size if spectral else 3), arrays["luminance"].shape[-1]
+    channels = arrays["wavelengths"].size if spectral else 3
+    size = arrays["luminance"].shape[-1]
     expected = {
         "vndf": (*slices, *arrays["vndf"].shape[2:]),
         "luminance": (*slices, size, size),
@@ -389,7 +391,8 @@ class Warp:
         part = v[..., np.newaxis]
         columns = (1.0 - part) * self._columns[slices, j] + part * self._columns[slices, j + 1]
         density = (1.0 - part) * self._density[slices, j] + part * self._density[slices, j + 1]
-        flat, wanted = columns.reshape(-1, self.columns), s * columns[..., -1:].reshape(-1, 1)
+        flat = columns.reshape(-1, self.columns)
+        wanted = s * columns[..., -1:].reshape(-1, 1)
         i = _interval_of_lines(flat, wanted)
         lines = np.arange(len(flat))[:, np.newaxis]
         dense = density.reshape(-1, self.columns)

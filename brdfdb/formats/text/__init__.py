@@ -316,7 +316,8 @@ def _values(
         factors.append(factor)
     percent = any(PERCENT.search(name) for name in names["values"])
     if layout.names_percent and not any("[" in name or "(" in name for name in names["values"]):
-        factors, percent = [0.01] * len(factors), True
+        factors = [0.01] * len(factors)
+        percent = True
     if percent:
         note(record, "Values in percent were divided by 100.")
     elif any(factor != 1.0 for factor in factors):
@@ -366,7 +367,8 @@ def _nm(path: Path, lengths: Array, name: str, layout: TextLayout, record: dict[
     if np.any(np.isnan(lengths)):
         line = line_of_row(path, layout, int(np.argmax(np.isnan(lengths))))
         raise FileFormatError(f"{path}: line {line}, field {name}: a wavelength is missing")
-    unit_nm, word = length_unit(name), ""
+    unit_nm = length_unit(name)
+    word = ""
     if unit_nm is None:
         if units := units_in(name):
             raise FileFormatError(
@@ -403,10 +405,12 @@ def uncertainty_of(
     """
     columns = f"column {names[0]}" if len(names) == 1 else f"columns {', '.join(names)}"
     note(record, f"Standard uncertainties were read from the {columns[:_SHOWN]}.")
-    shares, coverages = [], []
+    shares = []
+    coverages = []
     own = np.broadcast_to(factors, len(names)).copy()
     for column, name in enumerate(names):
-        coverage, field = _COVERAGE.search(name), f"{where}, field {name}"
+        coverage = _COVERAGE.search(name)
+        field = f"{where}, field {name}"
         if coverage is None and _PROBABILITY.search(name):
             raise FileFormatError(f"{field}: a probability is not a unit; write the coverage factor, such as U (k=2)")
         coverages.append(1.0 if coverage is None else float(coverage[1]))

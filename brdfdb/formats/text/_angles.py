@@ -58,7 +58,8 @@ def angles_of_rows(
         given[f"theta_{side}"] = np.abs(theta)
         if np.any(np.abs(theta) > np.pi * (1.0 + 1e-9)):
             row = int(np.argmax(np.abs(theta)))
-            shown, line = np.rad2deg(np.abs(theta[row])), line_of_row(path, layout, row)
+            shown = np.rad2deg(np.abs(theta[row]))
+            line = line_of_row(path, layout, row)
             raise FileFormatError(f"{path}: line {line}: theta_{side} of {shown:g} degrees is not a polar angle")
     phi_i = given["phi_i"]
     phi_r = given["phi_r"] if "phi_r" in given else phi_i + given["delta_phi"]
@@ -123,9 +124,11 @@ def _units(
     if other == "deg" and unnamed and may_be_radians:
         if named:
             columns = [layout.names[roles[name][0]] for name in unnamed]
-            subject, verb = f"The column {columns[0]} was", "it gives"
+            subject = f"The column {columns[0]} was"
+            verb = "it gives"
             if len(columns) > 1:
-                subject, verb = f"The columns {' and '.join(columns)} were", "they give"
+                subject = f"The columns {' and '.join(columns)} were"
+                verb = "they give"
             text = f"{subject} taken as degrees, as other columns are, but {verb} no unit and may be radians"
             note(record, f"{text}: names such as {plain_name(columns[0])}_rad say so.")
         else:

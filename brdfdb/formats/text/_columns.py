@@ -29,7 +29,8 @@ _VIEWER = (
     *("r", "o", "out", "outgoing", "refl", "reflected", "scat", "scatter", "scattered"),
     *("v", "view", "viewing", "viewer", "det", "detector", "rec", "receiver", "obs", "observer"),
 )
-_POLAR, _AZIMUTH = ("theta", "zenith", "z", "za", "polar", "th"), ("phi", "azimuth", "a", "az", "aa", "azi", "ph")
+_POLAR = ("theta", "zenith", "z", "za", "polar", "th")
+_AZIMUTH = ("phi", "azimuth", "a", "az", "aa", "azi", "ph")
 _RELATIVE = ("delta_phi", "dphi", "deltaphi", "phi_d", "phid", "raa", "relaz", "relative_azimuth", "rel_azimuth")
 _OTHERS = {"aoi": "theta_i", "angle_of_incidence": "theta_i", "incidence_angle": "theta_i", "incidence": "theta_i"}
 _QUANTITIES = {
@@ -353,7 +354,9 @@ def wavelength_of(name: str) -> float | None:
     if match is None:
         inner = _NM_IN_BRACKETS.search(name)
         return wavelength_of(inner[1]) if inner and _is_quantity(plain_name(name)) else None
-    word, number, unit = match["word"], float(match["number"]), match["unit"]
+    word = match["word"]
+    number = float(match["number"])
+    unit = match["unit"]
     if word and not (_is_quantity(word.rstrip("_")) or word.rstrip("_") in ("r", "reflectance")):
         return None
     if unit is None:
@@ -389,7 +392,8 @@ def quantity_of(name: str, columns: Sequence[str]) -> str:
                 return quantity
         if angle in ("s", "theta_s"):
             return UNKNOWN_COSINE
-        of_viewer, of_light = role_of(angle) == "theta_r" or angle in _VIEWER, role_of(angle) == "theta_i"
+        of_viewer = role_of(angle) == "theta_r" or angle in _VIEWER
+        of_light = role_of(angle) == "theta_i"
         return "f_r_cos" if of_viewer else "f_r_cos_i" if of_light or angle in _LIGHT else UNKNOWN_COSINE
     return next((quantity for quantity, words in _QUANTITIES.items() if word in words), "")
 

@@ -31,7 +31,8 @@ def rows_of(path: Path, layout: TextLayout, *, one_wavelength: bool) -> NDArray[
     FileFormatError if a row is damaged, stands below a comment with other columns, another unit of angles or another
     wavelength, or the file was cut within its last number.
     """
-    numbers, count = array("d"), len(layout.names)
+    numbers = array("d")
+    count = len(layout.names)
     decimals = ""  # the sign before decimals: a comma beside points may be that of thousands
     other = ""  # a sentence on the last comments: rows below them are not as those above
     for line_number, line in _from_first(path, layout):
@@ -114,7 +115,8 @@ def check_last_number(path: Path, fields: Iterable[tuple[int, str]]) -> None:
     It was cut if it has fewer digits behind the decimal point and in the exponent than the last fields of all rows
     before it; `fields` are these, with the numbers of their lines.
     """
-    last, fewest = (0, ""), np.inf
+    last = (0, "")
+    fewest = np.inf
     for field in fields:
         fewest = min(fewest, _digits(last[1])) if last[1] else fewest
         last = field
