@@ -1,4 +1,4 @@
-"""File formats of others: each module or folder of this room whose name begins with no underscore is one.
+"""File formats of other programs: each module or folder of this package without a leading underscore is a format.
 
 A module that writes is an `Exporter`, one that reads an `Importer`; most are both. The command line and HTTP iterate
 over the registry.

@@ -1,9 +1,9 @@
 """ASTM E1392: f_r at pairs of directions as rows of text, in the dialect of Cornell's measurements.
 
 A row holds the polar angles and azimuths of light and viewer, in radians, and f_r in 1/sr at each wavelength. The rows
-form a grid whose nodes are chosen for the tolerance. libbsdf interpolates in straight lines over each angle.
+form a grid whose nodes are chosen for the tolerance. libbsdf interpolates linearly over each angle.
 
-Anisotropic tables and all wavelengths fit. The specular part does not.
+A file can hold anisotropic tables and all wavelengths, but not the specular part.
 """
 
 from __future__ import annotations

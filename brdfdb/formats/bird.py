@@ -1,11 +1,11 @@
-"""BiRD: the universal BRDF format 1.0 of the project BiRD, JSON with one entry a direction and wavelength.
+"""BiRD: the universal BRDF format 1.0 of the project BiRD, JSON with one entry for each direction and wavelength.
 
 The lists hold the polar angles and azimuths of light and viewer, in degrees, f_r in 1/sr and the wavelengths in nm. The
-directions form a grid. The format does not say how to interpolate. The stated error is that of straight lines along all
-angles at once.
+directions form a grid. The format does not say how to interpolate. The stated error is that of linear interpolation
+along all angles at once.
 
-Anisotropic tables and all wavelengths fit. The specular part does not. A file has about 40 MB at most: a table that
-needs more is written with a larger error.
+A file can hold anisotropic tables and all wavelengths, but not the specular part. A file has about 40 MB at most: a
+table that needs more is written with a larger error.
 """
 
 from __future__ import annotations

@@ -1,11 +1,11 @@
-"""CSV: f_r on a plain grid of angles, a row a pair of directions and a column a wavelength.
+"""CSV: f_r on a plain grid of angles, one row for each pair of directions, one column for each wavelength.
 
 The columns are the angles in degrees, then f_r in 1/sr, with five significant digits. Lines that begin with # hold the
 record. The axes are polar angles and azimuths of light and viewer, or angles of the half and difference vectors
-(``--axes``). The cosine is not included. Readers interpolate in straight lines along all axes at once.
+(``--axes``). The cosine is not included. Readers interpolate linearly along all axes at once.
 
-Anisotropic tables and all wavelengths fit. The specular part does not. A file has about 40 MB at most: a table that
-needs more is written with a larger error.
+A file can hold anisotropic tables and all wavelengths, but not the specular part. A file has about 40 MB at most: a
+table that needs more is written with a larger error.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Eradiate: tables of its BSDF ``mqdiffuse``, measured and almost diffuse, as netCDF.
 
 f_r in 1/sr is on a regular grid: the cosines of light and viewer, and the azimuth between them. Eradiate repeats the
-first azimuth behind the last one, and its kernel interpolates in straight lines along all three. Narrow lobes need more
-nodes than a grid can have. A grid that is searched has 193 cosines and 256 azimuths at most, 38 MB.
+first azimuth behind the last one, and its kernel interpolates linearly along all three. Narrow lobes need more nodes
+than a grid can have. A grid that is searched has 193 cosines and 256 azimuths at most, 38 MB.
 
 The file holds one wavelength (``--wavelength``) of an isotropic table. Anisotropic tables are refused. The specular
 part is left out.

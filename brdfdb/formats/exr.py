@@ -1,11 +1,11 @@
-"""OpenEXR: slices of a table as images, with one channel a wavelength, and its lit sphere.
+"""OpenEXR: slices of a table as images, with one channel for each wavelength, and its lit sphere.
 
 A pixel is f_r in 1/sr at one pair of directions. A slice is a lobe for one light, a plane of incidence, or the plane of
 half and difference vectors. Spectral tables have one channel for each wavelength, and linear sRGB for viewers. A file
 is one slice, and not the whole table; no error is stated.
 
-Anisotropic tables and all wavelengths fit, slice by slice. The specular part is not in the picture. The header states
-it.
+Slices of anisotropic tables and all wavelengths can be written. The specular part is not in the picture. The header
+states it.
 """
 
 from __future__ import annotations

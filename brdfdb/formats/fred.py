@@ -3,7 +3,7 @@
 The layout is that of files that laboratories publish for FRED. Each direction of the light has a block. Its first line
 has two angles in degrees, and the lines below it have two angles and f_r in 1/sr for each viewer. The azimuth of a
 viewer counts from the half plane of the mirror direction. FRED does not publish how it interpolates. This reader
-interpolates in straight lines over each angle.
+interpolates linearly over each angle.
 
 The file holds one wavelength (``--wavelength``) of an isotropic table. Anisotropic tables are refused. The specular
 part is left out.

@@ -3,8 +3,8 @@
 A file is one direction of the light. Its channels are counts as 32-bit floats, an array each exposure: ``sample.0``,
 ``standard.0``, ``background.0``, and the same with 1, 2, ... for shorter exposures. The attribute
 ``brdf:gonioreflectometer`` is JSON: ``theta_i_deg`` and ``phi_i_deg`` of the light, ``name``, ``provenance``, and
-``settings``, the attributes of `brdfdb.measurements.gonioreflectometer.Gonioreflectometer`. A measured picture needs
-nothing else. Reading gives samples; the tables of a store are not written in this form.
+``settings``, the attributes of `brdfdb.measurements.gonioreflectometer.Gonioreflectometer`. A measured picture needs no
+other data. Reading gives samples; the tables of a store are not written in this form.
 """
 
 from __future__ import annotations

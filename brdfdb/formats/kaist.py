@@ -1,15 +1,15 @@
 """KAIST: Mueller matrices on half and difference vectors, of which f_r is read (.pbsdf, Baek et al. 2020).
 
 The file is a tensor file of RGL's container. It holds M in 1/sr, without the cosine, over phi_d, theta_d, theta_h and
-wavelength. Readers interpolate in straight lines along all four.
+wavelength. Readers interpolate linearly along all four.
 
 Bases are those of the plane of light and viewer, x along its normal for both, y = z x x with z the direction of travel.
 Q > 0 is s-polarised, as here. U > 0 is linear along x + y, which is s - p: U and V of the file have the opposite sign.
 Both signs together leave the matrix between bases of the plane as it is.
 
-Polarised isotropic tables fit, at no more than five wavelengths in whole nanometres, because Mitsuba reads five. The
-specular part is left out. Of files that are read, f_r of unpolarised light is the first element of the matrix. What was
-not measured is nan.
+A file can hold polarised isotropic tables, at no more than five wavelengths in whole nanometres, because Mitsuba reads
+five. The specular part is left out. A reader of files gets f_r of unpolarised light, the first element of the matrix;
+values that were not measured are nan.
 """
 
 from __future__ import annotations

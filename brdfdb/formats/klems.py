@@ -3,8 +3,8 @@
 The hemisphere is cut into 145, 77 or 41 patches. A number is the average of f_r in 1/sr over a patch of the light and a
 patch of the viewer. Readers do not interpolate. The patches are fixed, and lobes narrower than a patch become wide.
 
-Anisotropic tables fit. The file has one value, CIE Y. With ``--colour`` it has CIE X and Z as well, which Radiance
-reads. The specular part is left out.
+A file can hold anisotropic tables. The file has one value, CIE Y. With ``--colour`` it has CIE X and Z as well, which
+Radiance reads. The specular part is left out.
 """
 
 from __future__ import annotations

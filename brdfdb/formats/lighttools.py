@@ -1,4 +1,4 @@
-"""LightTools BSDF files: f_r about the normal as text, a block a direction of the light.
+"""LightTools BSDF files: f_r about the normal as text, one block for each direction of the light.
 
 After a list of azimuths and polar angles of the viewer each block has an angle of incidence, a side, a wavelength or a
 tristimulus value, the total integrated scatter and f_r in 1/sr. Azimuths are those of the viewer, with the light at 90

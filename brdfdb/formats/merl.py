@@ -1,8 +1,8 @@
 """MERL: isotropic tables in three colours on the fixed grid of half and difference vectors of Matusik et al. (2003).
 
 The grid has 90 x 90 x 180 bins over the half and difference vectors, finer next to the normal. A number is f_r in 1/sr
-times a scale. Some readers look one bin up, and others interpolate in straight lines (``--samples``). The grid is
-fixed. Lobes narrower than a bin come out coarse.
+times a scale. Some readers look one bin up, and others interpolate linearly (``--samples``). The grid is fixed. Lobes
+narrower than a bin are represented coarsely.
 
 The file holds linear sRGB. Anisotropic tables are refused, and the specular part is left out.
 """

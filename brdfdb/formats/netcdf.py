@@ -1,10 +1,10 @@
 """netCDF: f_r on a plain grid of angles, which xarray and every other reader of netCDF opens.
 
 The axes are polar angles and azimuths of light and viewer, or angles of the half and difference vectors (``--axes``).
-f_r is in 1/sr, without the cosine. Readers interpolate in straight lines along all axes at once.
+f_r is in 1/sr, without the cosine. Readers interpolate linearly along all axes at once.
 
-Anisotropic tables, all wavelengths and the specular part fit. The specular part has a variable of its own. The values
-take 100 MB at most: a table that needs more is written with a larger error.
+A file can hold anisotropic tables, all wavelengths and the specular part. The specular part is a separate variable. The
+values take 100 MB at most: a table that needs more is written with a larger error.
 """
 
 from __future__ import annotations

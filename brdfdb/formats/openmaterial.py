@@ -1,10 +1,11 @@
 """ASAM OpenMATERIAL 3D: lookup tables of the BRDF of isotropic materials (.xompt).
 
 A row holds a wavelength in metres, three angles in radians, and f_r in 1/sr. The directions form a grid of light and
-viewer. The format does not say how to interpolate. The stated error is that of straight lines along all angles at once.
+viewer. The format does not say how to interpolate. The stated error is that of linear interpolation along all angles at
+once.
 
-All wavelengths fit. Grey tables are written at 550 nm. Anisotropic tables are refused, and the specular part is left
-out. A file has about 40 MB at most: a table that needs more is written with a larger error.
+A file can hold all wavelengths. Grey tables are written at 550 nm. Anisotropic tables are refused, and the specular
+part is left out. A file has about 40 MB at most: a table that needs more is written with a larger error.
 """
 
 from __future__ import annotations

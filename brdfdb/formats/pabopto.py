@@ -1,4 +1,4 @@
-"""pab-opto: rows of a goniophotometer as text, a file a direction of the light.
+"""pab-opto: rows of a goniophotometer as text, one file for each direction of the light.
 
 The header names the direction of the light and whether rows hold the BSDF, in 1/sr, or the DSF, which includes the
 cosine of the viewer. Light and viewer on the back, with polar angles above 90 degrees, are turned to the front.

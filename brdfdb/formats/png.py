@@ -1,9 +1,9 @@
-"""PNG: pictures for people, the lit sphere of a table and its slices.
+"""PNG: pictures of a table, its lit sphere and its slices.
 
 A picture shows the sphere in the light of one lamp, or a slice of f_r. All tables have the same exposure. The colours
 have 8 bits, so that no values can be read back, and no error is stated.
 
-Spectral tables are shown in sRGB. A slice of an anisotropic one is for one azimuth of the light. The specular part is
+Spectral tables are shown in sRGB. A slice of an anisotropic table has one azimuth of the light. The specular part is
 left out.
 """
 

@@ -1,10 +1,10 @@
-"""SSDD: any table on a grid that is chosen for it, with the specular part in a block of its own (libbsdf).
+"""SSDD: any table on a grid that is chosen for it, with the specular part in a separate block (libbsdf).
 
 The lists of angles are those of half and difference vectors, of the viewer about the specular direction, or of light
-and viewer. The ones that need the fewest nodes are taken. libbsdf interpolates f_r, in 1/sr, in straight lines over
-each angle.
+and viewer. The kind of angles that needs the fewest nodes is used. libbsdf interpolates f_r, in 1/sr, in straight lines
+over each angle.
 
-Anisotropic tables, all wavelengths and the specular part fit.
+A file can hold anisotropic tables, all wavelengths and the specular part.
 """
 
 from __future__ import annotations

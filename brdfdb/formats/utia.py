@@ -1,10 +1,10 @@
 """UTIA: tables in three colours on the fixed anisotropic grid of the UTIA BRDF database (Filip and Vavra 2014).
 
 The grid has steps of 15 degrees in the polar angles of light and viewer, and of 7.5 degrees in their azimuths. A number
-is f_r in 1/sr, or a code of it (``--encoding``). Readers interpolate in straight lines over the four angles. The grid
-is fixed. It is too coarse for glossy surfaces, and the stated error says so.
+is f_r in 1/sr, or a code of it (``--encoding``). Readers interpolate linearly over the four angles. The grid is fixed.
+It is too coarse for glossy surfaces, and the stated error says so.
 
-Anisotropic tables fit. Spectral tables become linear sRGB. The specular part is left out.
+A file can hold anisotropic tables. Spectral tables become linear sRGB. The specular part is left out.
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
 """zarr 3: f_r on a plain grid of angles, a directory that xarray and zarr open.
 
 The axes are polar angles and azimuths of light and viewer, or angles of the half and difference vectors (``--axes``).
-f_r is in 1/sr, without the cosine. Readers interpolate in straight lines along all axes at once.
+f_r is in 1/sr, without the cosine. Readers interpolate linearly along all axes at once.
 
-Anisotropic tables, all wavelengths and the specular part fit. The specular part has an array of its own. The values
-take 100 MB at most, before compression: a table that needs more is written with a larger error.
+A file can hold anisotropic tables, all wavelengths and the specular part. The specular part is a separate array. The
+values take 100 MB at most, before compression: a table that needs more is written with a larger error.
 """
 
 from __future__ import annotations

@@ -1,11 +1,11 @@
 """Zemax (Radiant) BSDF files: f_r about the specular direction as text, one value or CIE XYZ.
 
 For each direction of the light, f_r in 1/sr is listed over the angle from the specular direction and the azimuth about
-it. libbsdf interpolates in straight lines over each angle. The file also holds the total integrated scatter, which is
-the albedo.
+it. libbsdf interpolates linearly over each angle. The file also holds the total integrated scatter, which is the
+albedo.
 
-Anisotropic tables fit, but OpticStudio and libbsdf read isotropic ones only. Spectral tables become CIE XYZ, or its Y
-alone (``--colour``). The specular part is left out.
+A file can hold anisotropic tables, but OpticStudio and libbsdf read only isotropic files. Spectral tables become CIE
+XYZ, or its Y alone (``--colour``). The specular part is left out.
 """
 
 from __future__ import annotations

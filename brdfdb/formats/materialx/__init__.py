@@ -1,10 +1,10 @@
 """MaterialX: the OpenPBR or Standard Surface that comes closest to a table, as a document that states its error.
 
 The file holds the parameters of a surface, which are fitted to the table. Renderers evaluate the surface, so nothing is
-interpolated. Its shapes are those of GGX and Oren-Nayar. Other lobes come out different, and the stated error says how
-much.
+interpolated. Its shapes are those of GGX and Oren-Nayar. Other lobes are represented by these shapes, and the file
+states the error.
 
-Anisotropic highlights fit. Spectral tables become linear sRGB. The specular part is left out, unless the surface is
+The surface can be anisotropic. Spectral tables become linear sRGB. The specular part is left out, unless the surface is
 smooth.
 """
 

@@ -1,11 +1,11 @@
 """Radiance: tensor trees of variable resolution, and the material that scenes include.
 
 A tree cuts the directions of light and viewer into cells, small where f_r varies. A cell holds the average of f_r in
-1/sr. Radiance does not interpolate between cells, so that narrow lobes take many. The file beside the tree is the
-material that scenes include.
+1/sr. Radiance does not interpolate between cells, so that narrow lobes take many. A second file holds the material that
+scenes include.
 
-Anisotropic tables fit. Spectral tables become CIE Y and the chromaticities u' and v'. The specular part is left out: a
-scene can add a mirror for it.
+A file can hold anisotropic tables. Spectral tables become CIE Y and the chromaticities u' and v'. The specular part is
+left out: a scene can add a mirror for it.
 """
 
 from __future__ import annotations

@@ -1,11 +1,11 @@
 """RGL's tensor files: measured materials of Mitsuba 3, pbrt-v4 and RGL's own loader.
 
 The file holds f_r times the cosine, divided by a density of half vectors, on squares that the density warps. Readers
-interpolate in straight lines along both sides of a square, the angles of the light, and the wavelengths. They also draw
+interpolate linearly along both sides of a square, the angles of the light, and the wavelengths. They also draw
 directions with the density.
 
-Anisotropic tables and all wavelengths fit. A file of the kind ``rgb`` holds linear sRGB instead. The specular part is
-left out.
+A file can hold anisotropic tables and all wavelengths. A file of the kind ``rgb`` holds linear sRGB instead. The
+specular part is left out.
 """
 
 from __future__ import annotations

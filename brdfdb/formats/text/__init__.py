@@ -1,4 +1,4 @@
-"""Text of other programs: a row a pair of directions, with commas, tabs, semicolons or spaces.
+"""Text of other programs: one row for each pair of directions, with commas, tabs, semicolons or spaces.
 
 Columns are recognised by their names, such as ``theta_i``, ``sza``, ``view_z``, ``raa`` or ``550nm``, or the caller
 names them. Titles may stand before the names. Values are f_r in 1/sr, reflectance factors (pi f_r), or f_r times the
