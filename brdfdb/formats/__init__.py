@@ -59,14 +59,14 @@ IMPORTERS: dict[str, Importer] = {name: module for name, module in _MODULES.item
 def write(
     table: Table, path: str | os.PathLike[str], file_format: str, *, verdict: str | None = None, **options: Any
 ) -> Written:
-    """Write a table as a file of another format: whole, or not at all.
+    """Write a table as a file of another format: completely, or not at all.
 
     Parameters
     ----------
     table : Table
         Table in memory.
     path : path
-        The file; one that is there is replaced. Some formats write a second file beside it.
+        The file; an existing file is replaced. Some formats write a second file next to it.
     file_format : str
         One of `EXPORTERS`.
     verdict : str, optional
@@ -192,7 +192,7 @@ def read(
             check_nanometres("wavelength_nm", reading.wavelength_nm)
     except FileFormatError:
         raise
-    except ParameterError as error:  # of samples that are none
+    except ParameterError as error:  # of rows that are not valid samples
         if error.parameter in getattr(importer, "keywords", ()):
             raise
         raise FileFormatError(f"{path}: {error}") from error

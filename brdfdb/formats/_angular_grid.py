@@ -157,8 +157,8 @@ def filled(comparison: Comparison, system: System, nodes: Sequence[Floats]) -> A
 class AngularPlan:
     """Densities of nodes on each angle of a system, from which grids of any tolerance are made.
 
-    Each angle is taken alone: the value of a pair is compared with the line between the values at the nodes on both
-    sides of it, while its other angles stay the same. Intervals with errors above `target` are halved.
+    Each angle is treated separately: the value of a pair is compared with the line between the values at the two nodes
+    around it, while its other angles stay the same. Intervals with errors above `target` are halved.
 
     Parameters
     ----------

@@ -225,7 +225,7 @@ class _DensePlan:
         return needs
 
     def _line_error(self, axis: int, need: Floats) -> float:
-        """Return the relative error that 99 of 100 pairs have at most on lines along one axis alone."""
+        """Return the relative error that 99 of 100 pairs have at most on lines along a single axis."""
         nodes = radians(self._nodes_of(axis, need, _LEVEL))
         index, weights = weights_of_nodes(nodes, self.x[axis], cubic=False)
         truth = self.comparison.truth[self.above]

@@ -128,7 +128,7 @@ class Words:
         return int(word)
 
     def numbers(self, count: int, field: str) -> NDArray[np.float64]:
-        """Return the next numbers, finite ones; FileFormatError if one is missing, or is none."""
+        """Return the next finite numbers; FileFormatError if a number is missing or is not finite."""
         if count > self._path.stat().st_size:
             raise self.error(field, f"{count} numbers are more than the file has")
         numbers = array("d")

@@ -60,7 +60,7 @@ class FormatOption:
         return f"{number} in [{self.low:g}, {self.high:g}]{other}"
 
     def parse(self, text: str) -> bool | int | float | str:
-        """Return the value that a text stands for.
+        """Return the value that a text denotes.
 
         Raises
         ------

@@ -41,7 +41,7 @@ class FileTable(Lookups):
     evaluate : callable
         Gives f_r [1/sr], shape (N, C), at unit vectors (N, 3) of light and viewer above the horizon.
     record : mapping
-        The record in the file or beside it; empty of files of other programs.
+        The record in the file or next to it; empty for files of other programs.
     nodes : callable or None
         Gives the values of the file at their own directions above the horizon, unaltered; None of a formula.
     listed : bool

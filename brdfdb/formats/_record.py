@@ -116,7 +116,7 @@ def one_line(text: str) -> str:
 
 
 def document_of(text: str | bytes) -> dict[str, Any]:
-    """Return the record that stands in a text as JSON; empty if there is none, or it is damaged."""
+    """Return the record in a text of JSON; empty if the text is not a JSON object."""
     try:
         document = json.loads(text)
     except (ValueError, RecursionError):
@@ -180,7 +180,7 @@ def beside(path: Path) -> Path:
 
 
 def record_beside(path: Path) -> dict[str, Any]:
-    """Return the record beside a file; empty if there is none, or it is not one."""
+    """Return the record next to a file; empty if it is missing or damaged."""
     there = beside(path)
     try:
         if not there.is_file() or there.stat().st_size > _LARGEST:

@@ -101,7 +101,7 @@ class Comparison:
         self.channels = channels_of(table) if channels is None else channels
         self.wi, self.wr, self._weight, lobe = _drawn(table)
         self._above = self._weight > 0.0
-        # of a draw over the hemisphere all pairs count alike; one in the lobe is weighted by the cosine of the viewer
+        # pairs drawn over the hemisphere have equal weights; those in the lobe are weighted by the cosine of the viewer
         self._share = np.where(self._above, 1.0, 0.0)
         if lobe:
             self._share[PAIRS:] = np.maximum(self.wr[PAIRS:, 2], 0.0)
@@ -237,7 +237,7 @@ class FileStatement(BaseModel):
 
     @classmethod
     def read(cls, record: Mapping[str, Any], name: str) -> FileStatement:
-        """Return the statement in the record of a file; ParameterError if there is none."""
+        """Return the statement in the record of a file; ParameterError if the record has no statement."""
         try:
             return cls.model_validate(record.get("error"))
         except ValidationError:

@@ -1,4 +1,4 @@
-"""Writing of files of others: all files of an export are there whole, or none is."""
+"""Writing of files: an export writes all its files completely, or none."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Written:
     Attributes
     ----------
     paths : tuple of Path
-        The file itself first, then those that stand beside it. A format may write a directory.
+        The file itself, then the files next to it. A format may write a directory.
     error : FileError or None
         Error of the values in the file against those of the table; None of pictures and source code.
     tolerance : float or None [1]
@@ -108,7 +108,7 @@ def _check_zarr_group(path: Path) -> None:
 
 
 def _exchange(half: Path, path: Path) -> None:
-    """Replace what stands at a path by a directory; a failure leaves it as it was."""
+    """Replace a directory by another one; after a failure the old directory is unchanged."""
     aside = half.with_name(f"{half.name}.old")
     os.replace(path, aside)
     try:

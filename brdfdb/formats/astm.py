@@ -167,7 +167,7 @@ def _parsed(path: Path) -> tuple[list[str], tuple[str, ...], NDArray[np.float64]
 
 
 def _wavelengths(names: tuple[str, ...]) -> NDArray[np.float64] | None:
-    """Return the wavelengths [nm] of channels such as 550nm; None if a channel is none."""
+    """Return the wavelengths [nm] of channels such as 550nm; None if a channel is not a wavelength."""
     try:
         return np.array([float(name.removesuffix("nm")) for name in names]) if names[0].endswith("nm") else None
     except ValueError:

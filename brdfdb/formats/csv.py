@@ -43,7 +43,7 @@ _DIGITS = 5
 _LEAST_NM = 10.0  # of wavelengths in names without a unit
 _ANGLE_BYTES, _VALUE_BYTES, _MOST_BYTES = 8, 10, 40_000_000  # of a number in a row, and of a file, about
 _ANGLES = ("theta_i", "phi_i", "theta_r", "phi_r", "delta_phi", "theta_h", "phi_h", "theta_d", "phi_d")
-_ENOUGH = {"theta_i", "theta_r"}  # of a text of others
+_ENOUGH = {"theta_i", "theta_r"}  # angles by which a text of another program is recognised
 _COLUMNS = "columns: angles [degree], then f_r [1/sr], one column a wavelength; the last angle changes fastest"
 
 

@@ -120,7 +120,7 @@ def _write(path: Path, header: dict[str, Any], pixels: dict[str, NDArray[Any]]) 
     with whole(path) as (temporary,):
         try:
             OpenEXR.File(begin | header, channels).write(str(temporary))
-        except RuntimeError as error:  # what OpenEXR raises for a missing directory and for a full disk alike
+        except RuntimeError as error:  # raised by OpenEXR both for a missing directory and for a full disk
             raise WriteError(f"cannot write {path}: {error}") from error
     return Written((path,))
 

@@ -64,7 +64,7 @@ def write(
     size: float = 16.0,
     verdict: str | None = None,
 ) -> Written:
-    """Write an isotropic table as tabulated scatter of FRED, and its record as JSON beside it.
+    """Write an isotropic table as tabulated scatter of FRED, and its record as JSON next to it.
 
     Anisotropic tables are refused: what the azimuth of the light counts from is not published.
     """
@@ -190,7 +190,7 @@ def _rows(path: Path) -> NDArray[np.float64]:
 
 
 def _grid(rows: NDArray[np.float64]) -> AngularGrid | None:
-    """Return the grid of rows; None if they are none, or the azimuth of the light varies."""
+    """Return the grid of rows; None if the rows form no grid, or the azimuth of the light varies."""
     one_side = rows[(rows[:, 2] == 0.0) | (rows[:, 3] <= 180.0)]
     if np.any(rows[:, 1] != 0.0):
         return None

@@ -54,7 +54,7 @@ def write_picture(picture: CameraPicture, path: str | os.PathLike[str]) -> None:
     with whole(path) as (temporary,):
         try:
             OpenEXR.File(header, channels).write(str(temporary))
-        except RuntimeError as error:  # OpenEXR's word for a missing directory and for a full disk alike
+        except RuntimeError as error:  # raised by OpenEXR both for a missing directory and for a full disk
             raise WriteError(f"cannot write {path}: {error}") from error
 
 

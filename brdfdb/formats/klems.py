@@ -72,7 +72,7 @@ class Basis:
 
     @property
     def middles(self) -> Floats:
-        """Unit vectors (patches, 3) at the middles of the patches; of a patch that is a whole ring, at its axis."""
+        """Unit vectors (patches, 3) at the middles of the patches; for a patch that is a complete ring, at its axis."""
         bounds = np.radians(self.bounds_deg)
         theta = np.where(np.array(self.counts) == 1, bounds[:-1], 0.5 * (bounds[:-1] + bounds[1:]))[self.rings]
         counts = np.array(self.counts)

@@ -65,7 +65,7 @@ def write(
     samples: str = "centres",
     verdict: str | None = None,
 ) -> Written:
-    """Write an isotropic table as a MERL file, with its record as JSON beside it.
+    """Write an isotropic table as a MERL file, with its record as JSON next to it.
 
     Bins and scales as in BRDF Explorer (``BRDFMeasuredMERL.cpp``, ``measured.func``), which looks one bin up; libbsdf
     (``MerlBinaryReader.cpp``) takes the numbers for samples at lower edges of bins, interpolates linearly, and takes

@@ -47,7 +47,7 @@ _DIGITS = 9  # of numbers of a spectrum: float32 has fewer
 
 
 def write(table: Table, path: str | os.PathLike[str], *, plugin: str = MODEL, verdict: str | None = None) -> Written:
-    """Write the plugin of a material for Mitsuba 3 as XML, and as a dictionary beside it."""
+    """Write the plugin of a material for Mitsuba 3 as XML, and as a dictionary in a second file."""
     from brdfdb.materials import Material
     from brdfdb.models.mitsuba_plugins import OF_MITSUBA
 

@@ -116,7 +116,7 @@ def recognises(head: bytes) -> bool:
 
 
 def read(path: str | os.PathLike[str]) -> FileTable | Samples:
-    """Return f_r of a lookup table: interpolated linearly if it is over the whole hemisphere, else its samples."""
+    """Return f_r of a lookup table: interpolated linearly if it covers the hemisphere, else its samples."""
     from brdfdb.measurements.samples import Instrument
 
     path = path_of(path)

@@ -218,7 +218,7 @@ class SsddBlock:
     values : float32 array (n0, n1, ..., C)
         Values over the lists, and last the channels.
     wavelength_nm : array (C,) [nm] or None
-        Wavelengths of the channels; None if they are none.
+        Wavelengths of the channels; None if the channels are not wavelengths.
     """
 
     entries: Mapping[str, str]

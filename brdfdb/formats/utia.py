@@ -65,7 +65,7 @@ def write(
     encoding: str = "linear",
     verdict: str | None = None,
 ) -> Written:
-    """Write a table as a UTIA file, with its record as JSON beside it.
+    """Write a table as a UTIA file, with its record as JSON next to it.
 
     Three planes (R, G, B) of 64 bit floats: 6 polar angles of the light in steps of 15 degrees, 48 azimuths in steps of
     7.5, then those of the viewer. UTIA's own reader (``TBDRF.cpp`` of J. Filip) interpolates linearly over the four

@@ -31,7 +31,7 @@ REFUSED: list[tuple[str, dict[str, str], str]] = [
     ("2O 20 180 0.5\n10 20 180 0.5\n", DEGREES, "line 1, field 1: '2O' is not a number"),
     ("sun view turn number\n2O 20 180 0.5\n10 20 180 0.5\n", ROLES, "line 2, field sun: '2O' is not a number"),
     ("sza,vza,raa,brdf\n1O,20,180,0.5\n10,20,180,0.5\n", {}, "line 2, field sza: '1O' is not a number"),
-    ("sza,vza,raa,brdf\n10,20,180\n10,20,180,0.5\n", {}, "line 2 has 3 fields, and the first whole row 4"),
+    ("sza,vza,raa,brdf\n10,20,180\n10,20,180,0.5\n", {}, "line 2 has 3 fields, but the first valid row has 4"),
     (
         "sza\tvza\traa\tbrdf\n10.5\t20\t180\t1,000\n",
         {},

@@ -183,7 +183,7 @@ def _input(parent: ElementTree.Element, name: str, kind: str, value: str) -> Non
 
 
 def _identifier(name: str) -> str:
-    """Return a name of letters, digits and _ alone, as MaterialX has them."""
+    """Return a name that has only letters, digits and _, as MaterialX needs it."""
     return "".join(letter if letter.isascii() and letter.isalnum() else "_" for letter in name)
 
 

@@ -100,7 +100,7 @@ class Growth:
         return True
 
     def _split(self, count: int) -> bool:
-        """Divide `count` leaves with the largest measure; return False if there is none that varies."""
+        """Divide the `count` leaves with the largest measure; return False if f_r varies in no leaf."""
         measure = self._measure[self._leaves]
         count = min(count, len(self._leaves))
         chosen = np.argpartition(-measure, count - 1)[:count]

@@ -176,7 +176,7 @@ class _RglSearch:
         return FittedFields(fields, error)
 
     def _built(self, plan: RglPlan) -> Fields:
-        """Return the fields of a plan with all channels; those of the last few plans are kept."""
+        """Return the fields of a plan with all channels; the fields of the last few plans are cached."""
         if plan not in self._files:
             if len(self._files) >= _REMEMBERED:
                 del self._files[next(iter(self._files))]

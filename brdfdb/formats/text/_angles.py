@@ -117,7 +117,7 @@ def _units(
         note(record, f"Angles were taken as {_WORDS[unit]}: a title says {titles[0].strip()[:_SHOWN]!r}.")
         return dict.fromkeys(given, unit)
     other = named[0] if len(named) == 1 else "deg"  # of columns whose names give none
-    # Angles without a unit may be radians if they are as small as radians are, and not 0 alone
+    # Angles without a unit may be radians if they are in the range of radians and not all 0
     largest = {name: float(np.abs(column).max(initial=0.0)) for name, column in unnamed.items()}
     bounds = {name: (0.5 if name.startswith("theta") else 2.0) * np.pi + 1e-3 for name in unnamed}
     may_be_radians = all(largest[name] <= bounds[name] for name in unnamed) and any(largest.values())

@@ -113,7 +113,7 @@ class TextLayout:
     units : tuple of str
         Units in a line of their own below the names, one a column; () if there is none.
     damaged : str
-        A sentence on a line before it that is a row with fields that are no numbers; empty if there is none.
+        A sentence on an earlier line that looks like a row but has fields that are not numbers; else empty.
     """
 
     delimiter: str | None
@@ -226,7 +226,7 @@ def _is_row(fields: Sequence[str], delimiter: str | None, before: Sequence[_Line
 
 
 def _names(before: Sequence[_Line], delimiter: str | None, count: int) -> tuple[int, tuple[str, ...]]:
-    """Return the line of the names and the names of columns, numbers from 1 and line 0 if there are none.
+    """Return the line and the names of columns; without names, line 0 and numbers from 1.
 
     They are in the last line with as many names, one of which is known, or else in the last line that is no row.
     """
@@ -264,7 +264,7 @@ def _split(text: str, delimiter: str | None, count: int) -> tuple[str, ...]:
 
 
 def _fault(line: _Line, delimiter: str | None, names: Sequence[str]) -> str:
-    """Return a sentence on a line that is a row of numbers, but for some field; empty if it is none."""
+    """Return a sentence on a line that is a row of numbers except for some fields; empty for other lines."""
     fields = fields_of(line.text, delimiter)
     numbers = [number_of(field) for field in fields]
     known = sum(value is not None and value == value for value in numbers)
@@ -273,7 +273,7 @@ def _fault(line: _Line, delimiter: str | None, names: Sequence[str]) -> str:
             if value is None:
                 return f"line {line.number}, field {name}: {field[:40]!r} is not a number"
     if len(fields) != len(names) and len(fields) >= 3 and None not in numbers and known:
-        return f"line {line.number} has {len(fields)} fields, and the first whole row {len(names)}"
+        return f"line {line.number} has {len(fields)} fields, but the first valid row has {len(names)}"
     return ""
 
 

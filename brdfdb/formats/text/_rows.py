@@ -33,7 +33,7 @@ def rows_of(path: Path, layout: TextLayout, *, one_wavelength: bool) -> NDArray[
     """
     numbers = array("d")
     count = len(layout.names)
-    decimals = ""  # the sign before decimals: a comma beside points may be that of thousands
+    decimals = ""  # the sign before decimals: a comma in a file with points may separate thousands
     other = ""  # a sentence on the last comments: rows below them are not as those above
     for line_number, line in _from_first(path, layout):
         if _is_comment(line):
