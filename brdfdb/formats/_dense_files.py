@@ -10,7 +10,7 @@ import os
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,6 +48,16 @@ OPTIONS = (
     ),
     RESOLUTION,
 )
+
+
+class DenseOptions(TypedDict, total=False):
+    """Options of `dense_table` that a format with any grid of angles takes."""
+
+    tolerance: float
+    axes: str
+    resolution: float
+
+
 INTERPOLATION = "linear along all axes; at angles beyond the last node f_r is that of the node; 0 below the horizon"
 _CONTINUED = "where light or viewer is below the horizon f_r is 0; values of such nodes only serve interpolation"
 _TURNED = {

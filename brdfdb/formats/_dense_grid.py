@@ -81,7 +81,7 @@ class DenseTable:
 
 def dense_table(
     table: Table,
-    tolerance: float,
+    tolerance: float = 0.02,
     *,
     axes: str = "smallest",
     resolution: float = 0.0,

@@ -14,14 +14,14 @@ import itertools
 import os
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.errors import FileFormatError
 from brdfdb.formats import text
-from brdfdb.formats._dense_files import OPTIONS, dense_record, reading_of_rows
+from brdfdb.formats._dense_files import OPTIONS, DenseOptions, dense_record, reading_of_rows
 from brdfdb.formats._input import lines_of
 from brdfdb.formats._record import lines, of_lines, specular_remark
 from brdfdb.formats._written import Written, whole
@@ -48,13 +48,7 @@ _COLUMNS = "columns: angles [degree], then f_r [1/sr], one column a wavelength; 
 
 
 def write(
-    table: Table,
-    path: str | os.PathLike[str],
-    *,
-    tolerance: float = 0.02,
-    axes: str = "smallest",
-    resolution: float = 0.0,
-    verdict: str | None = None,
+    table: Table, path: str | os.PathLike[str], *, verdict: str | None = None, **options: Unpack[DenseOptions]
 ) -> Written:
     """Write f_r on a plain grid of angles as text with commas.
 
@@ -67,7 +61,7 @@ def write(
     count = 1 if table.wavelength_nm is None else table.wavelength_nm.size
     row_bytes = _ANGLE_BYTES * (4 if table.anisotropic else 3) + _VALUE_BYTES * count
     most = _MOST_BYTES // row_bytes * count
-    dense = dense_table(table, tolerance, axes=axes, resolution=resolution, most_values=most, digits=_DIGITS)
+    dense = dense_table(table, **options, most_values=most, digits=_DIGITS)
     known = dense_record(table, dense, verdict, specular=False)
     names = dense.channels.names if dense.channels.wavelength_nm is not None else ("brdf",)
     header = [*(f"# {line}" for line in (*lines(known), _COLUMNS)), ",".join((*dense.grid.names, *names))]

@@ -13,13 +13,13 @@ import io
 import json
 import os
 import zipfile
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.errors import FileFormatError
-from brdfdb.formats._dense_files import OPTIONS, dense_record, file_table
+from brdfdb.formats._dense_files import OPTIONS, DenseOptions, dense_record, file_table
 from brdfdb.formats._record import document_of, specular_remark
 from brdfdb.formats._written import Written, whole
 from brdfdb.place import path_of
@@ -39,13 +39,7 @@ _MOST_BYTES, _MOST_OTHER = 1 << 29, 1 << 24  # of the values that are read, and 
 
 
 def write(
-    table: Table,
-    path: str | os.PathLike[str],
-    *,
-    tolerance: float = 0.02,
-    axes: str = "smallest",
-    resolution: float = 0.0,
-    verdict: str | None = None,
+    table: Table, path: str | os.PathLike[str], *, verdict: str | None = None, **options: Unpack[DenseOptions]
 ) -> Written:
     """Write f_r on a plain grid of angles as an .npz archive.
 
@@ -55,7 +49,7 @@ def write(
     """
     from brdfdb.formats._dense_grid import dense_table
 
-    dense = dense_table(table, tolerance, axes=axes, resolution=resolution)
+    dense = dense_table(table, **options)
     at = dense.channels.wavelength_nm
     arrays: dict[str, NDArray[Any]] = dict(dense.grid.axes)
     if at is not None:

@@ -10,10 +10,10 @@ values take 100 MB at most, before compression: a table that needs more is writt
 from __future__ import annotations
 
 import os
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Unpack
 
 from brdfdb.errors import FileFormatError
-from brdfdb.formats._dense_files import OPTIONS, check_sizes, dataset, read_dataset
+from brdfdb.formats._dense_files import OPTIONS, DenseOptions, check_sizes, dataset, read_dataset
 from brdfdb.formats._written import Written, whole
 from brdfdb.place import path_of
 
@@ -31,13 +31,7 @@ options = OPTIONS
 
 
 def write(
-    table: Table,
-    path: str | os.PathLike[str],
-    *,
-    tolerance: float = 0.02,
-    axes: str = "smallest",
-    resolution: float = 0.0,
-    verdict: str | None = None,
+    table: Table, path: str | os.PathLike[str], *, verdict: str | None = None, **options: Unpack[DenseOptions]
 ) -> Written:
     """Write f_r on a plain grid of angles as a zarr 3 group, which is a directory.
 
@@ -45,7 +39,7 @@ def write(
     """
     from brdfdb.formats._dense_grid import dense_table
 
-    dense = dense_table(table, tolerance, axes=axes, resolution=resolution)
+    dense = dense_table(table, **options)
     with whole(path) as (half,):
         dataset(table, dense, verdict).to_zarr(half, mode="w", zarr_format=3, consolidated=False)
     return Written((path_of(path),), dense.error, dense.tolerance)
