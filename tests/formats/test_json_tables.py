@@ -32,74 +32,45 @@ _POLAR, _TURN = _list(["deg"], 90.0), _list(["deg"], 360.0)
 _PLACE = dict.fromkeys(("country", "city", "street", "building_nr", "postal_code"), TEXT)
 _PROVENANCE = {"organization": TEXT, "location": _objects(_PLACE, others=False), "email": TEXT, "contact_person": TEXT}
 _SAMPLE = {"name": TEXT, "type": TEXT, "dimensions": {"type": "object"}, "shape": TEXT, "zero_azimuth_location": TEXT}
-BIRD = _objects(
-    {
-        "metadata": _objects(
-            {
-                "schema": {**TEXT, "format": "uri"},
-                "id": {**TEXT, "format": "uri"},
-                "type": {"const": "BRDF"},
-                "timestamp": {"pattern": r"^\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\+00:00$"},
-                "provenance": _objects(_PROVENANCE),
-                "license": _objects({"type": TEXT, "rights_holder": TEXT}),
-                "description": TEXT,
-                "method": {"enum": ["simulation", "measurement"]},
-                "instrumentation": {"const": "NA"},
-                "software": _objects(
-                    {"name": TEXT, "version": TEXT, "simulation_model": _objects({"name": TEXT, "description": TEXT})}
-                ),
-                "sample": _objects(_SAMPLE),
-                "environment": {"const": "NA"},
-                "adhoc_section": {"type": "object"},
-            },
-            others=False,
-        ),
-        "data": _objects(
-            {
-                **dict.fromkeys(("theta_i", "theta_r"), _POLAR),
-                **dict.fromkeys(("phi_i", "phi_r"), _TURN),
-                "BRDF": _list(["1/sr", "sr^-1"], np.inf),
-            }
-        ),
-    },
-    others=False,
-)
+_URI, _NOT_STATED = {**TEXT, "format": "uri"}, {"const": "NA"}
+_BIRD_METADATA = {
+    **dict.fromkeys(("schema", "id"), _URI),
+    **dict.fromkeys(("instrumentation", "environment"), _NOT_STATED),
+    "type": {"const": "BRDF"},
+    "timestamp": {"pattern": r"^\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\+00:00$"},
+    "provenance": _objects(_PROVENANCE),
+    "license": _objects({"type": TEXT, "rights_holder": TEXT}),
+    "description": TEXT,
+    "method": {"enum": ["simulation", "measurement"]},
+    "software": _objects(
+        {"name": TEXT, "version": TEXT, "simulation_model": _objects({"name": TEXT, "description": TEXT})}
+    ),
+    "sample": _objects(_SAMPLE),
+    "adhoc_section": {"type": "object"},
+}
+_BIRD_DATA = {
+    **dict.fromkeys(("theta_i", "theta_r"), _POLAR),
+    **dict.fromkeys(("phi_i", "phi_r"), _TURN),
+    "BRDF": _list(["1/sr", "sr^-1"], np.inf),
+}
+BIRD = _objects({"metadata": _objects(_BIRD_METADATA, others=False), "data": _objects(_BIRD_DATA)}, others=False)
 # The rules of material_brdf_schema.json of OpenMATERIAL 3D
-_NUMBERS = [(1e-9, 0.01716), (0.0, 1.570796), (0.0, 1.570796), (0.0, 6.283185), (0.0, np.inf)]
-_METRE = {"type": "number", "minimum": 1e-9, "maximum": 0.01716}
-OPENMATERIAL = _objects(
-    {
-        "$schema": {
-            "pattern": r"^https://raw\.githubusercontent\.com/asam-ev/OpenMATERIAL-3D/refs/tags/v\d+\.\d+\.\d+/"
-        },
-        "metadata": _objects(
-            {
-                "name": TEXT,
-                "uuid": {"pattern": r"^[0-9a-fA-F]{8}(-[0-9a-fA-F]{4}){3}-[0-9a-fA-F]{12}$"},
-                "materialVersion": {"pattern": r"^\d+\.\d+\.\d+$"},
-                "openMaterial3dVersion": {"pattern": r"^\d+\.\d+\.\d+$"},
-                "copyrights": {"type": "array", "minItems": 1, "items": TEXT},
-                "license": TEXT,
-                "authors": {"type": "array", "minItems": 1, "items": TEXT},
-                "sources": TEXT,
-            }
-        ),
-        "brdf": _objects(
-            {
-                "wavelengths": {"type": "array", "items": _METRE},
-                "lookupTable": {
-                    "type": "array",
-                    "items": {
-                        "type": "array",
-                        "minItems": 5,
-                        "maxItems": 5,
-                        "prefixItems": [{"type": "number", "minimum": low, "maximum": high} for low, high in _NUMBERS],
-                    },
-                },
-            }
-        ),
-    }
-)
+_METRE, _QUARTER = {"minimum": 1e-9, "maximum": 0.01716}, {"minimum": 0.0, "maximum": 1.570796}
+_NUMBERS = [_METRE, _QUARTER, _QUARTER, {"minimum": 0.0, "maximum": 6.283185}, {"minimum": 0.0, "maximum": np.inf}]
+_ROW = {"minItems": 5, "maxItems": 5, "prefixItems": [{"type": "number", **number} for number in _NUMBERS]}
+_VERSION, _TEXTS = {"pattern": r"^\d+\.\d+\.\d+$"}, {"type": "array", "minItems": 1, "items": TEXT}
+_METADATA = {
+    **dict.fromkeys(("name", "license", "sources"), TEXT),
+    **dict.fromkeys(("materialVersion", "openMaterial3dVersion"), _VERSION),
+    **dict.fromkeys(("copyrights", "authors"), _TEXTS),
+    "uuid": {"pattern": r"^[0-9a-fA-F]{8}(-[0-9a-fA-F]{4}){3}-[0-9a-fA-F]{12}$"},
+}
+_BRDF = {
+    "wavelengths": {"type": "array", "items": {"type": "number", **_METRE}},
+    "lookupTable": {"type": "array", "items": {"type": "array", **_ROW}},
+}
+_TAG = {"pattern": r"^https://raw\.githubusercontent\.com/asam-ev/OpenMATERIAL-3D/refs/tags/v\d+\.\d+\.\d+/"}
+OPENMATERIAL = _objects({"$schema": _TAG, "metadata": _objects(_METADATA), "brdf": _objects(_BRDF)})
 SCHEMAS = {"bird": BIRD, "openmaterial": OPENMATERIAL}
 FILES = [(name, kind) for name in SCHEMAS for kind in KINDS if (name, kind) != ("openmaterial", ANISOTROPIC)]
 
