@@ -152,6 +152,12 @@ def test_files_with_all_azimuths_are_for_other_readers(tmp_path: Path) -> None:
     assert Comparison(table).error_of(read_back.evaluate) == files.error
 
 
+def test_a_smaller_tolerance_is_a_larger_file(tmp_path: Path) -> None:
+    files = [rgl.write(small_table(GREY), tmp_path / f"{t}.bsdf", tolerance=t) for t in (0.5, 0.05)]
+    assert [file.within for file in files] == [True, True]
+    assert files[0].nbytes < files[1].nbytes
+
+
 # The container
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from brdfdb import formats
-from brdfdb.errors import CannotHoldError
+from brdfdb.errors import CannotHoldError, WriteError
 from brdfdb.formats import EXPORTERS, IMPORTERS
 from brdfdb.materials import Material
 from brdfdb.measurements.samples import Samples
@@ -121,6 +121,16 @@ def test_wavelengths_have_one_order_in_every_format_that_keeps_them(tmp_path: Pa
         expected = np.interp(reading.wavelength_nm, at, rho["values"])
         assert np.ravel(values) * np.pi == pytest.approx(expected, rel=0.01), name  # rgl in its coarsest form: 3e-3
     assert {"csv", "netcdf", "numpy", "rgl", "ssdd", "zarr"} <= set(kept)
+
+
+@pytest.mark.parametrize("name", [name for name in EXPORTERS if name not in POLARISED_ALONE])
+def test_nothing_remains_of_a_file_that_cannot_be_written(name: str, tmp_path: Path) -> None:
+    (tmp_path / f"a{EXPORTERS[name].suffix}").mkdir()
+    (tmp_path / "file").touch()
+    for folder in (tmp_path, tmp_path / "file"):
+        with pytest.raises(WriteError, match="cannot write"):
+            exported(folder, name)
+    assert len(list(tmp_path.rglob("*"))) == 2
 
 
 @pytest.mark.parametrize("name", [name for name in ROUND_TRIPPED if name not in POLARISED_ALONE])
