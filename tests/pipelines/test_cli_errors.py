@@ -113,6 +113,8 @@ def test_a_misspelt_choice_is_answered_with_the_closest(capsys: Captured) -> Non
         (("export", "ex"), "argument FORMAT: invalid choice: 'ex'; did you mean exr?"),
         (("choose", "spheres", "--weigh", "byte"), "argument --weigh: invalid choice: 'byte'; did you mean bytes?"),
         (("zzz",), "argument COMMAND: invalid choice: 'zzz'; choose from audit, build, "),
+        (("export", "pdf"), "invalid choice: 'pdf'; choose from astm, bird, "),
+        (("export", "pdf"), "rgl is for Mitsuba 3 and pbrt"),
     ):
         with pytest.raises(SystemExit) as caught:
             run(*arguments)

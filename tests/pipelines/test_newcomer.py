@@ -5,7 +5,6 @@ from __future__ import annotations
 import importlib
 import os
 import re
-import subprocess
 import sys
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -22,7 +21,7 @@ from brdfdb.materials import Material
 from brdfdb.models import MODELS
 from brdfdb.store import lock
 from brdfdb.tables import _kernels
-from brdfdb_pipelines import build, build_survey, cli, recipe_file, terminal, workers
+from brdfdb_pipelines import build, build_survey, recipe_file, terminal, workers
 from brdfdb_pipelines.build_progress import Event
 from brdfdb_pipelines.build_survey import check_values
 from brdfdb_pipelines.commands import _arguments
@@ -56,33 +55,6 @@ def test_a_narrow_terminal_leaves_columns_out_and_names_them(
     assert lines[-1].startswith("columns left out ") == bool(left_out)
     assert [column for column in ("revision", "title") if column not in lines[1]] == left_out
     assert lines[-1].endswith(", ".join(left_out))
-
-
-def test_a_lookup_of_one_value_does_not_load_numba(built: Path) -> None:
-    code = (
-        "import sys; from brdfdb_pipelines.cli import main; code = main(); "
-        "assert not code and 'numba' not in sys.modules"
-    )
-    command = [sys.executable, "-c", code, "lookup", "foam", "30", "0", "30", "180", "--store", str(built)]
-    environment = {name: value for name, value in os.environ.items() if name != "NUMBA_DISABLE_JIT"}
-    done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
-    assert (done.returncode, done.stderr) == (0, "")
-    assert done.stdout.endswith(" /sr\n")
-
-
-def test_a_format_that_does_not_exist_points_to_what_there_is(capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit):
-        cli.main(["export", "pdf"])
-    err = capsys.readouterr().err
-    assert "invalid choice: 'pdf'; choose from astm, bird, " in err
-    assert "rgl is for Mitsuba 3 and pbrt" in err
-
-
-def test_a_material_that_is_misspelt_in_a_recipe_brings_the_closest(tmp_path: Path) -> None:
-    path = tmp_path / "recipe.toml"
-    path.write_text('materials = ["rolled-bras"]\ntolerance = 0.1\n', encoding="utf-8")
-    with pytest.raises(recipe_file.RecipeError, match="'rolled-bras' matches no material; closest: rolled-brass"):
-        recipe_file.load(path)
 
 
 def test_a_scheduler_without_a_port_is_one_sentence() -> None:

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -188,16 +185,3 @@ def test_a_file_that_is_no_recipe_is_one_sentence(tmp_path: Path, capsys: pytest
     for data in (b'title = "Gr\xf6\xdfe"', b"\xff\xfe\x00", b"\x00", b"PK\x03\x04\x00\x00\xe5"):
         path.write_bytes(data)
         refused(path, tmp_path / "store", "not TOML: ", capsys)
-
-
-def test_recipes_are_utf8_whatever_the_locale_is(recipe: Path) -> None:
-    environment = {**os.environ, "LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
-    code = (
-        "import codecs, locale, sys; from pathlib import Path; from brdfdb_pipelines.recipe_file import load\n"
-        "assert codecs.lookup(locale.getpreferredencoding(False)).name == 'ascii'\n"
-        "print(ascii(load(Path(sys.argv[1])).title))"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", code, recipe], env=environment, capture_output=True, text=True, check=False
-    )
-    assert (done.returncode, done.stdout) == (0, ascii("Größe: one of every kind") + "\n"), done.stderr
