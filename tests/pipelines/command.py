@@ -16,6 +16,7 @@ def run(*arguments: object) -> int:
 
 def refused(capsys: Captured, *arguments: object) -> str:
     """Run a command that is refused; return its sentence, the last line of stderr, without "brdfdb: "."""
+    capsys.readouterr()
     assert run(*arguments) == 2
     out, err = capsys.readouterr()
     assert out == ""

@@ -19,7 +19,8 @@ import numpy as np
 import pytest
 
 import brdfdb
-from brdfdb_pipelines import cli
+from tests.pipelines.a_build import changed, staged
+from tests.pipelines.command import run
 from tests.pipelines.recipes import anisotropic, isotropic, material
 
 KILLS = 50
@@ -201,7 +202,7 @@ def test_killed_at_fifty_random_moments_nothing_is_lost_and_every_read_is_whole(
             store = brdfdb.open(root)
             assert {store.metadata(name).parameters["rho"] for name in store} == {number / 128}
             if number % 8 == 0:
-                assert cli.main(["gc", "--keep", "1", "--store", str(root)]) == 0
+                assert run("gc", "--keep", 1, "--store", root) == 0
     finally:
         reader.over.set()
         reader.join(WAIT_S)
@@ -210,14 +211,14 @@ def test_killed_at_fifty_random_moments_nothing_is_lost_and_every_read_is_whole(
     assert reader.reads > 10
     assert resumed > 10
     assert published > 0
-    assert cli.main(["gc", "--keep", "1", "--store", str(root)]) == 0
-    assert not list((root / ".staging").iterdir())
+    assert run("gc", "--keep", 1, "--store", root) == 0
+    assert staged(root) == []
     for name in ("grey", "white"):
         head = brdfdb.open(root).head(name)
         assert sorted(path.name for path in (root / "materials" / name).iterdir()) == [
             "HEAD.json", head, f"{head}.MANIFEST.json"
         ]  # fmt: skip
-    assert cli.main(["verify", "--store", str(root)]) == 0
+    assert run("verify", "--store", root) == 0
 
 
 def command(*arguments: object) -> list[str]:
@@ -251,7 +252,7 @@ def test_ctrl_c_says_how_to_resume_and_the_same_command_does(tmp_path: Path) -> 
     done = subprocess.run(build, capture_output=True, text=True, check=True)
     events = [json.loads(line) for line in done.stdout.splitlines()]
     assert {(e["material"], e["block"]) for e in events if e["event"] == "block" and e["kept"]} == left
-    assert not list((root / ".staging").iterdir())
+    assert staged(root) == []
 
 
 # Runs commands in a process that is somebody else or may do less
@@ -301,50 +302,49 @@ def sentence(code: int, out: str, err: str) -> str:
     return err.splitlines()[-1]
 
 
-def test_a_directory_that_is_read_only_is_one_sentence(recipe_text: str, built: Path, public: Path) -> None:
-    root, recipe, other = public / "store", public / "recipe.toml", public / "other.toml"
+def cannot_write(said: str, root: Path, reason: str) -> str:
+    """Check the sentence of a store that cannot be written; return the name of the material."""
+    assert said.startswith("brdfdb: cannot write ")
+    assert said.endswith(f" to the store at {root}: {reason}")
+    return said.split()[3]
+
+
+def test_a_directory_that_is_read_only_is_one_sentence(recipe: Path, built: Path, public: Path) -> None:
+    root, same = public / "store", public / "recipe.toml"
     shutil.copytree(built, root)
-    recipe.write_text(recipe_text, encoding="utf-8")
+    shutil.copyfile(recipe, same)
     for path in [root, *root.rglob("*")]:
         path.chmod(0o555 if path.is_dir() else 0o444)
-    other.write_text(recipe_text.replace("step = 15", "step = 30"), encoding="utf-8")
     try:
-        changed, unchanged, lookup, new = restricted(
+        of_other, of_same, lookup, new = restricted(
             "nobody",
-            recipe,
-            ["build", other, "--store", root],
-            ["build", recipe, "--store", root],
+            same,
+            ["build", changed(recipe, public / "other.toml"), "--store", root],
+            ["build", same, "--store", root],
             ["lookup", "foam", 0, 0, 0, 0, "--store", root],
-            ["build", recipe, "--store", public / "new"],
+            ["build", same, "--store", public / "new"],
         )
     finally:
         for path in [root, *(path for path in root.rglob("*") if path.is_dir())]:
             path.chmod(0o755)
-    said = sentence(*changed)
-    assert said.startswith("brdfdb: cannot write ")
-    assert said.endswith(f" to the store at {root}: Permission denied")
-    assert (unchanged[0], lookup[0]) == (0, 0)
+    cannot_write(sentence(*of_other), root, "Permission denied")
+    assert (of_same[0], lookup[0]) == (0, 0)
     assert sentence(*new) == f"brdfdb: cannot write a store at {public / 'new'}: Permission denied"
     assert brdfdb.open(root).head("foam") == "r000001"
 
 
 def test_a_limit_on_the_size_of_files_is_one_sentence_and_the_old_revision_is_served(
-    recipe: Path, built: Path, tmp_path: Path
+    recipe: Path, store_copy: Path, tmp_path: Path
 ) -> None:
-    root = tmp_path / "store"
-    shutil.copytree(built, root)
-    other = tmp_path / "other.toml"
-    other.write_text(recipe.read_text(encoding="utf-8").replace("step = 15", "step = 5"), encoding="utf-8")
-    (answer,) = restricted(8000, recipe, ["build", other, "--store", root])
-    said = sentence(*answer)
-    assert said.startswith("brdfdb: cannot write ")
-    assert said.endswith(f" to the store at {root}: File too large")
-    failed = said.split()[3]
-    assert brdfdb.open(root).head(failed) == "r000001"
-    for name in brdfdb.open(root):
-        brdfdb.open(root).verify(name)
-    assert cli.main(["build", str(other), "--store", str(root)]) == 0
-    assert brdfdb.open(root).head(failed) == "r000002"
+    other = changed(recipe, tmp_path / "other.toml", 5)
+    (answer,) = restricted(8000, recipe, ["build", other, "--store", store_copy])
+    failed = cannot_write(sentence(*answer), store_copy, "File too large")
+    store = brdfdb.open(store_copy)
+    assert store.head(failed) == "r000001"
+    for name in store:
+        store.verify(name)
+    assert run("build", other, "--store", store_copy) == 0
+    assert store.head(failed) == "r000002"
 
 
 def test_a_full_disk_is_one_sentence_and_the_old_revision_is_served(recipe: Path, tmp_path: Path) -> None:
@@ -355,27 +355,25 @@ def test_a_full_disk_is_one_sentence_and_the_old_revision_is_served(recipe: Path
     if mounted.returncode != 0:
         pytest.skip("no tmpfs can be mounted here; test_build has a write that fails instead")
     try:
-        root = disk / "store"
-        assert cli.main(["build", str(recipe), "--store", str(root)]) == 0
-        other = tmp_path / "other.toml"
-        text = recipe.read_text(encoding="utf-8")
-        other.write_text(text.replace("step = 15", "step = 0.1"), encoding="utf-8")
-        done = subprocess.run(command("build", other, "--store", root), capture_output=True, text=True, check=False)
+        root, other = disk / "store", tmp_path / "other.toml"
+        build = command("build", other, "--store", root)
+        assert run("build", recipe, "--store", root) == 0
+        changed(recipe, other, 0.1)
+        done = subprocess.run(build, capture_output=True, text=True, check=False)
         assert sentence(done.returncode, done.stdout, done.stderr).startswith("brdfdb: disk: the tables take up to ")
         # room for the values, and not for the small files beside them
-        other.write_text(text.replace("step = 15", "step = 7.5"), encoding="utf-8")
+        changed(recipe, other, 7.5)
         used = shutil.disk_usage(disk).used // 1000
         subprocess.run(["mount", "-o", f"remount,size={used + 40}k", disk], capture_output=True, check=True)
-        done = subprocess.run(command("build", other, "--store", root), capture_output=True, text=True, check=False)
-        said = sentence(done.returncode, done.stdout, done.stderr)
-        assert said.startswith("brdfdb: cannot write ")
-        assert said.endswith(f" to the store at {root}: No space left on device")
-        for name in brdfdb.open(root):
-            brdfdb.open(root).verify(name)
-        assert brdfdb.open(root).head("foam") == "r000001"
+        done = subprocess.run(build, capture_output=True, text=True, check=False)
+        cannot_write(sentence(done.returncode, done.stdout, done.stderr), root, "No space left on device")
+        store = brdfdb.open(root)
+        for name in store:
+            store.verify(name)
+        assert store.head("foam") == "r000001"
         subprocess.run(["mount", "-o", "remount,size=20m", disk], capture_output=True, check=True)
-        assert cli.main(["build", str(other), "--store", str(root)]) == 0
-        assert brdfdb.open(root).head("foam") == "r000002"
+        assert run("build", other, "--store", root) == 0
+        assert store.head("foam") == "r000002"
     finally:
         subprocess.run(["umount", disk], capture_output=True, check=True)
 

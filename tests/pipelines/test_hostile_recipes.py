@@ -10,13 +10,11 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-import pytest
-
-from brdfdb_pipelines import cli
+from tests.pipelines.command import Captured, refused
 from tests.pipelines.recipes import COARSE
 
-MOST_S = 10  # of a processor: the clock depends on what else runs
-MOST_BYTES = 500_000_000  # of the process, the program itself included: 190 MB
+MOST_S = 10  # processor time [s] of a build
+MOST_BYTES = 500_000_000  # memory of the process; the program itself takes 190 MB
 
 HEAD = 'materials = ["foam"]\nwavelengths_nm = [500]\n'
 GOOD = HEAD + COARSE
@@ -52,7 +50,7 @@ def many(count: int, text: Callable[[int], str]) -> str:
     return "".join(map(text, range(count)))
 
 
-# name, text or bytes, and what the sentence must hold
+# name, text or bytes, and what the sentence contains
 RECIPES: list[tuple[str, str | bytes, str]] = [
     ("arrays in arrays, 500", f"materials = {'[' * 500}{']' * 500}", "nested too deeply"),
     ("arrays in arrays, 200 000", f"materials = {'[' * 200_000}{']' * 200_000}", "nested too deeply"),
@@ -67,7 +65,7 @@ RECIPES: list[tuple[str, str | bytes, str]] = [
     ("a key of spaced dots", "a . " * 100_000 + "a = 1", "parts between dots"),
     ("an array of tables of dots", "[[" + "a." * 100_000 + "a]]", "parts between dots"),
     ("a key of dots in a table", "x = {" + "a." * 100_000 + "a = 1}", "parts between dots"),
-    ("200 MB of numbers", b"wavelengths_nm = [" + b"500," * 50_000_000 + b"]", "the limit for a file"),
+    ("8 MB of numbers", "wavelengths_nm = [" + "500," * 2_000_000 + "]", "the limit for a file"),
     ("5 MB of a comment", "#" * 5_000_000, "the limit for a file"),
     ("3.9 MB of a comment", "#" * 3_900_000, "materials"),
     ("3.9 MB of one word", "a" * 3_900_000, "not TOML"),
@@ -77,11 +75,11 @@ RECIPES: list[tuple[str, str | bytes, str]] = [
     ("zeros", b"\0" * 100_000, "not TOML"),
     ("nothing", "", "materials"),
     ("a key of 3 MB", "a" * 3_000_000 + " = 1", "materials: is missing"),
-    ("300 000 unknown keys", many(300_000, lambda n: f"k{n} = 1\n"), "materials: is missing"),
+    ("100 000 unknown keys", many(100_000, lambda n: f"k{n} = 1\n"), "materials: is missing"),
     ("100 000 wrong numbers", HEAD.replace("[500]", "[" + '"",' * 100_000 + "]"), "wavelengths_nm"),
-    ("a million right numbers", HEAD.replace("[500]", "[" + "5,".join(["1"] * 1_000_000) + "]"), "wavelengths_nm"),
+    ("300 000 right numbers", HEAD.replace("[500]", "[" + "51," * 300_000 + "]"), "wavelengths_nm"),
     ("100 000 materials", GOOD.replace('"foam"', '"x",' * 100_000), "materials"),
-    ("a million wrong materials", GOOD.replace('"foam"', "1," * 1_500_000), "materials"),
+    ("500 000 wrong materials", GOOD.replace('"foam"', "1," * 500_000), "materials"),
     ("a pattern of stars", GOOD.replace("foam", "*a" * 5000 + "!"), "materials"),
     ("9999 patterns", GOOD.replace('"foam"', many(9999, lambda n: f'"*x{n}",')), "materials"),
     ("112 ranges of 99 999", GOOD.replace(AXIS, f"theta_i_deg = [{LONG * 112}]"), "nodes; an axis has at most"),
@@ -127,10 +125,6 @@ RECIPES: list[tuple[str, str | bytes, str]] = [
 ]
 
 
-def test_there_are_sixty_recipes_and_each_has_a_name_of_its_own() -> None:
-    assert len({name for name, *_ in RECIPES}) == len(RECIPES) >= 60
-
-
 # Imports once, then forks a build for each line; a child says what it took
 NURSERY = """
 import json, os, resource, shutil, signal, sys
@@ -151,7 +145,7 @@ for line in sys.stdin:
 """
 
 
-def test_sixty_hostile_recipes_are_a_sentence_each(tmp_path: Path) -> None:
+def test_hostile_recipes_are_a_sentence_each(tmp_path: Path) -> None:
     failures = {}
     with subprocess.Popen(
         [sys.executable, "-c", NURSERY], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
@@ -165,24 +159,28 @@ def test_sixty_hostile_recipes_are_a_sentence_each(tmp_path: Path) -> None:
             code, peak = json.loads(nursery.stdout.readline())
             text = told.read_text(encoding="utf-8", errors="replace")
             lines = text.splitlines()
-            good = code == 2 and peak <= MOST_BYTES and not store.exists() and "Traceback" not in text
-            good = good and len(lines) > 0 and lines[-1].startswith("brdfdb: ") and said in lines[-1]
-            if not good:
+            sentence = lines[-1] if lines and "Traceback" not in text else ""
+            in_bounds = code == 2 and peak <= MOST_BYTES and not store.exists()
+            if not (in_bounds and sentence.startswith("brdfdb: ") and said in sentence):
                 failures[name] = f"exit {code}, {peak // 10**6} MB, store begun: {store.exists()}, {text[-300:]}"
                 shutil.rmtree(store, ignore_errors=True)
     assert not failures, "\n".join(f"{name}: {said}" for name, said in failures.items())
 
 
-def test_what_is_no_file_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    device, pipe, directory = paths = [tmp_path / f"{kind}.toml" for kind in ("device", "pipe", "directory")]
+def test_what_is_no_file_is_refused(tmp_path: Path, capsys: Captured) -> None:
+    kinds = ("device", "pipe", "directory", "endless")
+    device, pipe, directory, endless = paths = [tmp_path / f"{kind}.toml" for kind in kinds]
     device.symlink_to("/dev/zero")
     os.mkfifo(pipe)
     directory.mkdir()
-    out, store = ["--out", str(tmp_path / "out")], ["--store", str(tmp_path / "store")]
+    with endless.open("wb") as file:
+        file.truncate(1 << 40)
+    store, out = ("--store", tmp_path / "store"), ("--out", tmp_path / "out")
     for path in paths:
-        for command in (["build", str(path), *store], ["render", str(path), *out]):
-            assert cli.main(command) == 2
-            assert capsys.readouterr().err.splitlines()[-1].startswith(f"brdfdb: {path}: ")
-        assert cli.main(["chart", "foam", "--recipe", str(path), *out, *store]) == 2
-        assert capsys.readouterr().err.splitlines()[-1].startswith(f"brdfdb: {path}: ")
+        for command in (
+            ("build", path, *store),
+            ("render", path, *out),
+            ("chart", "foam", "--recipe", path, *out, *store),
+        ):
+            assert refused(capsys, *command).startswith(f"{path}: ")
     assert sorted(tmp_path.iterdir()) == sorted(paths)
