@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 GOOD = """\
 title = "one"
 materials = ["foam"]
@@ -19,6 +21,26 @@ theta_i_deg = [0, 60]
 phi_i_deg = [0, 180, 360]
 theta_r_deg = [0, 60]
 phi_r_deg = [0, 180, 360]
+"""
+TO_TOLERANCE = "tolerance = 0.05\n" + GOOD[: GOOD.index("[grids")]
+HALF = """\
+title = "one"
+materials = ["glossy-grey-paper", "rolled-brass", "scene-copper-sphere"]
+wavelengths_nm = [500, 550]
+interpolation = "log-cubic"
+[grids.isotropic]
+theta_h_deg = [0, 2, 5, 10, 20, 45, 90]
+theta_d_deg = [0, 45, 90]
+phi_d_deg = [0, 45, 90]
+[grids.spectral]
+theta_i_deg = [0, 40]
+theta_r_deg = [0, 40]
+delta_phi_deg = [0, 90, 180]
+[grids.anisotropic]
+theta_h_deg = [0, 5, 90]
+phi_h_deg = [0, 45, 90]
+theta_d_deg = [0, 90]
+phi_d_deg = [0, 90, 180]
 """
 DEFINED = """\
 [define.mine]
@@ -66,3 +88,10 @@ def material(name: str, title: str, model: str, *parameters: str, table: str = "
 
 
 COARSE = isotropic() + isotropic(kind="spectral") + anisotropic()  # two nodes an axis
+
+
+def recipe_file_of(directory: Path, text: str) -> Path:
+    """Write a recipe into a directory."""
+    path = directory / "recipe.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
