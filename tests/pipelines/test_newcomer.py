@@ -26,15 +26,14 @@ from brdfdb_pipelines.build_progress import Event
 from brdfdb_pipelines.build_survey import check_values
 from brdfdb_pipelines.commands import _arguments
 from brdfdb_pipelines.recipe_file import Job
+from tests.pipelines.command import Captured
 
 COLUMNS = ("material", "title", "model", "error (p99)")
 ROWS = [("latex-semi-gloss-brushed-sheetrock", "Semi-gloss Latex paint, brushed on sheetrock", "ward", "< 0.001 %")]
 
 
 @pytest.mark.parametrize("width", [40, 60, 80, 120])
-def test_a_table_never_cuts_a_name_or_a_number(
-    width: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_table_never_cuts_a_name_or_a_number(width: int, monkeypatch: pytest.MonkeyPatch, capsys: Captured) -> None:
     monkeypatch.setattr(terminal, "Console", partial(Console, force_terminal=True, width=width, no_color=True))
     terminal.print_table("1 material", COLUMNS, ROWS, numbers=("error (p99)",))
     out = capsys.readouterr().out
@@ -45,7 +44,7 @@ def test_a_table_never_cuts_a_name_or_a_number(
 
 @pytest.mark.parametrize(("width", "left_out"), [(200, []), (85, ["revision"]), (62, ["revision", "title"])])
 def test_a_narrow_terminal_leaves_columns_out_and_names_them(
-    width: int, left_out: list[str], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    width: int, left_out: list[str], monkeypatch: pytest.MonkeyPatch, capsys: Captured
 ) -> None:
     monkeypatch.setattr(terminal, "Console", partial(Console, force_terminal=True, width=width, no_color=True))
     columns, rows = (*COLUMNS, "revision"), [(*ROWS[0], "r000001-and-so-on")]
