@@ -17,18 +17,21 @@ import xarray as xr
 from numpy.typing import NDArray
 
 import brdfdb
+from brdfdb import _numba
 from brdfdb.errors import StoreError
 from brdfdb.materials import Material
+from brdfdb.tables import _kernels, tabulation
 from brdfdb.tables import layout as layouts
-from brdfdb.tables import tabulation
 from brdfdb.tables.layout import Layout, digest
 from brdfdb.tables.xarray_view import plain_attributes
-from brdfdb_pipelines import build_survey
+from brdfdb_pipelines import build as builds
+from brdfdb_pipelines import build_survey, workers
 from brdfdb_pipelines.build import build
 from brdfdb_pipelines.recipe_file import Job, load
 from brdfdb_pipelines.workers import Workers
 from tests.pipelines.a_build import OneByOne, chunks, failing, staged, states
 from tests.pipelines.command import Captured, run
+from tests.pipelines.recipes import recipe_file_of
 
 # What is built
 
@@ -150,6 +153,23 @@ def test_a_layout_is_planned_on_a_worker_and_at_most_once(
     monkeypatch.undo()
     monkeypatch.setattr(Job, "planned", lambda _: pytest.fail("planned again"))
     assert {state for state, _, _ in states(build(plan, tmp_path, OneByOne())).values()} <= {"published", "unchanged"}
+
+
+def test_kernels_compile_in_processes_before_the_first_build_only(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    recipe = load(recipe_file_of(tmp_path, 'materials = ["foam", "rolled-brass"]\ntolerance = 0.1\n'))
+    events: list[dict[str, Any]] = []
+    monkeypatch.setattr(workers, "processes", lambda count, **_: workers.threads(count))
+    monkeypatch.setattr(builds, "is_cached", lambda _: False)
+    builds.compile_kernels(recipe, tmp_path, 2, events.append)
+    assert [event["event"] for event in events] == ["compiling", *["compiled"] * 3]
+    assert events[0]["kernels"] == 3
+    events.clear()
+    monkeypatch.setattr(builds, "is_cached", lambda _: True)
+    builds.compile_kernels(recipe, tmp_path, 2, events.append)
+    assert events == []
+    assert _numba.INTERPRETED or _numba.is_cached(_kernels.by_vectors)
 
 
 # What is not built again

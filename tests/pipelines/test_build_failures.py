@@ -9,17 +9,20 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import brdfdb
-from brdfdb.errors import StoreError
-from brdfdb.store import files
+from brdfdb.errors import ParameterError, StoreError
+from brdfdb.materials import Material
+from brdfdb.store import files, lock
 from brdfdb.store.lock import Lock
 from brdfdb.tables import layout as layouts
 from brdfdb.tables import tabulation
 from brdfdb.tables.layout import Layout
 from brdfdb_pipelines.build import build
-from brdfdb_pipelines.recipe_file import Recipe, load
+from brdfdb_pipelines.build_survey import check_values
+from brdfdb_pipelines.recipe_file import Job, Recipe, load
 from brdfdb_pipelines.recipe_grids import RecipeError
 from tests.pipelines.a_build import OneByOne, failing, staged, states
 from tests.pipelines.command import Captured, refused, run
@@ -35,6 +38,26 @@ def test_a_recipe_that_cannot_be_built_is_refused_before_anything_is_written(rec
     with pytest.raises(RecipeError, match=r"^foam on grids\.isotropic: "):
         build(Recipe.model_validate(content), tmp_path / "store", OneByOne())
     assert not (tmp_path / "store").exists()
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -0.1])
+def test_values_that_no_brdf_has_are_refused_with_model_and_parameters(
+    bad: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fields = {"title": "White", "model": "lambert", "source": "me", "parameters": {"rho": 0.5}}
+    job = Job(Material.from_table("white", fields), None, None, 0.1)
+    check_values(job)
+    monkeypatch.setattr(Material, "lookup_vectors", lambda _, wi, *__: np.where(wi[:, 2] < 0.9, bad, 0.1))
+    with pytest.raises(ParameterError) as caught:
+        check_values(job)
+    said = f"white: its model lambert with rho = 0.5 gives {bad:.3g} /sr at theta_i 30, theta_r 0, phi_r 0 degrees"
+    assert str(caught.value) == f"{said}; f_r must be finite and not negative"
+
+
+def test_a_system_without_file_locks_is_told_in_one_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(lock, "fcntl", None)
+    with pytest.raises(StoreError, match="this system has no file locks; use Linux or macOS"), Lock(tmp_path, "foam"):
+        pass
 
 
 def test_a_block_that_does_not_fit_into_the_memory_is_refused(recipe: Path, tmp_path: Path, capsys: Captured) -> None:

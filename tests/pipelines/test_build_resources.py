@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import tracemalloc
 from pathlib import Path
 from types import SimpleNamespace
@@ -17,6 +18,7 @@ from brdfdb.store import records, staging
 from brdfdb.tables.grids import Grid
 from brdfdb.tables.layout import Interpolation, Layout
 from brdfdb_pipelines import build_survey
+from brdfdb_pipelines.commands import _arguments
 from tests.pipelines.command import Captured, refused, run
 
 LOG = Interpolation("cubic", True, 1e-4)
@@ -98,3 +100,10 @@ def test_an_unchanged_recipe_needs_no_free_disk(
     monkeypatch.setattr(build_survey.shutil, "disk_usage", lambda _: SimpleNamespace(free=0))
     assert run("build", recipe, "--store", store_copy) == 0
     assert brdfdb.open(store_copy).head("foam") == "r000001"
+
+
+def test_systems_that_do_not_tell_processors_or_memory_have_defaults(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delattr(os, "sched_getaffinity")
+    monkeypatch.delattr(os, "sysconf")
+    assert _arguments.processors() == os.cpu_count()
+    assert build_survey.machine_memory() is None

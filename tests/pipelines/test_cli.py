@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numba
 import numpy as np
 import pytest
+from rich.console import Console
 
 import brdfdb
 from brdfdb.materials import presets
@@ -176,6 +179,34 @@ def test_tables_print_what_they_are_given(title: str, capsys: Captured) -> None:
     assert [line.rstrip() for line in capsys.readouterr().out.splitlines()] == [
         f"{title} in [a]", "material  title [unit]", f"a         {title}", "b",
     ]  # fmt: skip
+
+
+COLUMNS = ("material", "title", "model", "error (p99)")
+ROWS = [("latex-semi-gloss-brushed-sheetrock", "Semi-gloss Latex paint, brushed on sheetrock", "ward", "< 0.001 %")]
+
+
+@pytest.mark.parametrize("width", [40, 60, 80, 120])
+def test_a_table_never_cuts_a_name_or_a_number(width: int, monkeypatch: pytest.MonkeyPatch, capsys: Captured) -> None:
+    monkeypatch.setattr(terminal, "Console", partial(Console, force_terminal=True, width=width, no_color=True))
+    terminal.print_table("1 material", COLUMNS, ROWS, numbers=("error (p99)",))
+    out = capsys.readouterr().out
+    assert "latex-semi-gloss-brushed-sheetrock" in out
+    assert "< 0.001 %" in out
+    assert "error (p99)" in out
+
+
+@pytest.mark.parametrize(("width", "left_out"), [(200, []), (85, ["revision"]), (62, ["revision", "title"])])
+def test_a_narrow_terminal_leaves_columns_out_and_names_them(
+    width: int, left_out: list[str], monkeypatch: pytest.MonkeyPatch, capsys: Captured
+) -> None:
+    monkeypatch.setattr(terminal, "Console", partial(Console, force_terminal=True, width=width, no_color=True))
+    columns, rows = (*COLUMNS, "revision"), [(*ROWS[0], "r000001-and-so-on")]
+    terminal.print_table("1 material", columns, rows, numbers=("error (p99)",), less=("revision", "title"))
+    lines = re.sub(r"\x1b\[[0-9]*m", "", capsys.readouterr().out).splitlines()
+    assert max(map(len, lines)) <= width
+    assert lines[-1].startswith("columns left out ") == bool(left_out)
+    assert [column for column in ("revision", "title") if column not in lines[1]] == left_out
+    assert lines[-1].endswith(", ".join(left_out))
 
 
 @pytest.mark.parametrize("name", ["foam", "rolled-brass", "scene-copper-sphere", "blue-plastic", "mirror"])

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import errno
 import re
-import subprocess
 import sys
 import tempfile
 from pathlib import Path
@@ -13,8 +12,8 @@ import pytest
 
 import brdfdb
 from brdfdb.errors import ParameterError
-from brdfdb_pipelines.commands import BUG, REFUSED, commands
-from tests.pipelines.command import Captured, run
+from brdfdb_pipelines.commands import BUG, REFUSED
+from tests.pipelines.command import Captured, refused, run
 
 
 def raising(monkeypatch: pytest.MonkeyPatch, error: Exception) -> None:
@@ -77,17 +76,9 @@ def test_what_the_user_can_act_on_is_one_sentence(monkeypatch: pytest.MonkeyPatc
         assert capsys.readouterr() == ("", f"brdfdb: {sentence}\n")
 
 
-def test_options_of_every_command_stand_anywhere(tmp_path: Path, capsys: Captured) -> None:
-    for arguments in (
-        ("--debug", "export", "exr", "foam"),
-        ("export", "--debug", "exr", "foam"),
-        ("export", "exr", "foam", "--debug"),
-    ):
-        assert run(*arguments, "--store", tmp_path) == REFUSED
-        assert capsys.readouterr().err.startswith("Traceback")
-
-
-def test_debug_prints_the_traceback_before_the_sentence(monkeypatch: pytest.MonkeyPatch, capsys: Captured) -> None:
+def test_debug_stands_anywhere_and_prints_the_traceback_before_the_sentence(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: Captured
+) -> None:
     raising(monkeypatch, ParameterError("tolerance", "2 is outside [0, 1]"))
     for arguments in (("--debug", "chart", "foam"), ("chart", "foam", "--debug")):
         assert run(*arguments) == REFUSED
@@ -97,6 +88,8 @@ def test_debug_prints_the_traceback_before_the_sentence(monkeypatch: pytest.Monk
             "brdfdb.errors.ParameterError: tolerance: 2 is outside [0, 1]",
             "brdfdb: tolerance: 2 is outside [0, 1]",
         ]
+    assert run("export", "--debug", "exr", "foam", "--store", tmp_path) == REFUSED
+    assert capsys.readouterr().err.startswith("Traceback")
 
 
 def test_the_version_is_printed(capsys: Captured) -> None:
@@ -129,29 +122,16 @@ def test_the_help_lists_the_exit_codes(capsys: Captured) -> None:
     assert [line[0] for line in lines] == ["0", "1", "2", "70", "130", "143"]
 
 
-def test_every_module_of_the_package_is_a_command_with_one_help_sentence_first() -> None:
-    folder = Path(sys.modules["brdfdb_pipelines.commands"].__path__[0])
-    found = commands()
-    assert sorted(found) == sorted(
-        path.stem.removesuffix("_") for path in folder.glob("*.py") if not path.stem.startswith("_")
-    )
-    for name, command in found.items():
-        assert command.HELP.endswith("."), name
-
-
-def test_a_missing_server_is_one_sentence_that_names_the_extra(built: Path) -> None:
-    code = f"""
-import sys
-sys.modules["uvicorn"] = None
-from brdfdb_pipelines.cli import main
-sys.exit(main(["serve", "--store", {str(built)!r}]))
-"""
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
-    assert done.returncode == REFUSED
-    assert done.stderr == "brdfdb: uvicorn is not installed; it comes with pip install 'brdfdb[serve]'\n"
+def test_a_missing_server_is_one_sentence_that_names_the_extra(
+    built: Path, capsys: Captured, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delitem(sys.modules, "brdfdb_api.server", raising=False)
+    monkeypatch.setitem(sys.modules, "uvicorn", None)
+    said = "uvicorn is not installed; it comes with pip install 'brdfdb[serve]'"
+    assert refused(capsys, "serve", "--store", built) == said
 
 
 def test_a_host_that_is_no_name_is_one_sentence(built: Path, capsys: Captured) -> None:
     for host in ("a..b", "x" * 70 + ".example", "256.256.256.256"):
-        assert run("serve", "--store", built, "--host", host, "--port", 0) == REFUSED
-        assert capsys.readouterr().err.startswith(f"brdfdb: cannot listen on {host}, port 0: ")
+        said = refused(capsys, "serve", "--store", built, "--host", host, "--port", 0)
+        assert said.startswith(f"cannot listen on {host}, port 0: ")

@@ -81,7 +81,7 @@ BAD: list[tuple[str, str, str, str]] = [
     (COPPER, "[500, 550]", "[500, 9e9]", "scene-copper-sphere on grids.spectral: wavelength_nm: "),
     # materials
     (GOOD, '["foam"]', "[]", "materials: "),
-    (GOOD, '["foam"]', '["foam", "fome"]', "materials: 'fome' "),
+    (GOOD, '["foam"]', '["foam", "fome"]', "materials: 'fome' matches no material; closest: foam"),
     (GOOD, '["foam"]', '["../foam"]', "materials: '../foam' "),
     (GOOD + DEFINED, "alpha_y = 0.3", "alpha_y = -1", "define.mine: alpha_y: "),
     (GOOD + DEFINED, '"ward"', '"wart"', "define.mine: model: "),

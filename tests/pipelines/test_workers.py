@@ -17,6 +17,7 @@ from typing import Any
 import pytest
 
 import brdfdb
+from brdfdb.errors import ParameterError
 from brdfdb_pipelines import build as builds
 from brdfdb_pipelines import workers
 from brdfdb_pipelines.build import build
@@ -90,6 +91,11 @@ def test_processes_leave_when_their_builder_was_killed(tmp_path: Path) -> None:
 
 
 # A dask cluster
+
+
+def test_a_scheduler_without_a_port_is_one_sentence() -> None:
+    with pytest.raises(ParameterError, match=r"^--scheduler: 'nope' "), workers.cluster("nope"):
+        pass
 
 
 def dask(*arguments: object) -> subprocess.Popen[str]:
