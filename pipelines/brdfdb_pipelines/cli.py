@@ -132,7 +132,11 @@ def _sigterm_as_ctrl_c() -> Iterator[list[int]]:
 def _run(options: argparse.Namespace, arguments: Sequence[str]) -> int:
     """Run the command and return its exit code; errors become sentences."""
     try:
-        _add_models(options)
+        files = [file for name, files in vars(options).items() if name.startswith(_MODELS) for file in files]
+        if files:  # before or after the command
+            from brdfdb.models import MODELS
+
+            MODELS.add_files(files)
         with _telling_of_compilation(_command(arguments)):
             code: int = options.run(options)
         sys.stdout.flush()  # a reader that left shows here, not at exit
@@ -183,15 +187,6 @@ def _parser(arguments: Sequence[str] | None = None) -> argparse.ArgumentParser:
             command.add_arguments(subparser)
         subparser.set_defaults(run=command.run)
     return parser
-
-
-def _add_models(options: argparse.Namespace) -> None:
-    """Add the models of the files that stand before or after the command."""
-    files = [file for name, files in vars(options).items() if name.startswith(_MODELS) for file in files]
-    if files:
-        from brdfdb.models import MODELS
-
-        MODELS.add_files(files)
 
 
 def _refusal(error: Exception) -> str | None:
