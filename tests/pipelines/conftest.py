@@ -33,12 +33,6 @@ NAMES = ["foam", "rolled-brass", "scene-copper-sphere", "blue-plastic", "mirror"
 
 
 @pytest.fixture(scope="session")
-def recipe_text() -> str:
-    """The recipe above."""
-    return RECIPE
-
-
-@pytest.fixture(scope="session")
 def names() -> list[str]:
     """The materials of the recipe, in its order."""
     return NAMES

@@ -59,6 +59,8 @@ def test_help_of_commands_with_a_store_names_it(capsys: Captured) -> None:
         assert out.startswith(f"usage: brdfdb {command} ")
         assert "--store DIR" in out, command
         assert f"\n    {command.split()[0]} " in listed
+    exit_codes = listed.partition("exit codes:")[2].split("\n")
+    assert [line.split()[0] for line in exit_codes if line] == ["0", "1", "2", "70", "130", "143"]
     for command in ("choose", "render"):
         assert "unrecognized arguments: --store" in usage(capsys, command, "clay-vase", "--store", "somewhere")
         assert "--store" not in help_of(capsys, command)
@@ -110,6 +112,13 @@ def test_a_command_loads_only_what_it_uses(code: str, heavy: set[str], built: Pa
     assert done.stdout.splitlines()[-1] == "set()"
 
 
+def test_the_version_is_printed(capsys: Captured) -> None:
+    with pytest.raises(SystemExit) as caught:
+        run("--version")
+    assert caught.value.code == 0
+    assert capsys.readouterr().out == f"brdfdb {brdfdb.__version__}\n"
+
+
 # Build, list, show
 
 
@@ -150,17 +159,6 @@ def test_build_shows_progress_on_stderr_and_a_table_on_stdout(
 )
 def test_the_shape_says_that_values_serve_many_wavelengths(shape: tuple[int, ...], wavelengths: int, text: str) -> None:
     assert shape_in_words(shape, wavelengths) == text
-
-
-def test_list_names_what_is_in_the_store(built: Path, names: list[str], capsys: Captured) -> None:
-    assert run("list", "--store", built) == 0
-    out, err = capsys.readouterr()
-    lines = out.splitlines()
-    assert lines[0].strip() == f"5 materials in {built}"
-    assert [line.split()[0] for line in lines[2:-1]] == sorted(names)
-    assert all(line.split()[-1] == "r000001" for line in lines[2:-1])
-    assert lines[-1].startswith("table error: ")
-    assert err == ""
 
 
 def test_list_presets_needs_no_store_and_cuts_nothing(tmp_path: Path, capsys: Captured) -> None:
@@ -296,13 +294,6 @@ def test_lookup_as_json(
     }
 
 
-def test_lookup_below_the_horizon_is_0(built: Path, capsys: Captured) -> None:
-    assert run("lookup", "foam", 30, 0, 90.001, 0, "--store", built) == 0
-    assert capsys.readouterr().out == "0 /sr\n"
-    assert run("lookup", "foam", 30, 0, 90, 0, "--store", built) == 0
-    assert capsys.readouterr().out != "0 /sr\n"
-
-
 @pytest.mark.parametrize(
     ("arguments", "parameter"),
     [
@@ -334,6 +325,12 @@ def test_a_bad_number_of_a_lookup_is_named_in_its_unit(
         (("build", "--processes", "--scheduler", "tcp://x"), "argument --scheduler: not allowed with argument --proc"),
         (("gc", "--keep", "0"), "argument --keep: 0 "),
         ((), "the following arguments are required: COMMAND"),
+        (("biuld",), "argument COMMAND: invalid choice: 'biuld'; did you mean build?"),
+        (("export", "ex"), "argument FORMAT: invalid choice: 'ex'; did you mean exr?"),
+        (("choose", "spheres", "--weigh", "byte"), "argument --weigh: invalid choice: 'byte'; did you mean bytes?"),
+        (("zzz",), "argument COMMAND: invalid choice: 'zzz'; choose from audit, build, "),
+        (("export", "pdf"), "invalid choice: 'pdf'; choose from astm, bird, "),
+        (("export", "pdf"), "rgl is for Mitsuba 3 and pbrt"),
     ],
 )
 def test_a_command_line_that_cannot_be_read_is_one_line(

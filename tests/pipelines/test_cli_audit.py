@@ -18,7 +18,7 @@ from brdfdb.tables.layout import Layout
 from brdfdb.tables.tabulation import tabulate
 from tests.json_schema import validate
 from tests.pipelines.command import Captured, refused, run
-from tests.pipelines.recipes import material
+from tests.pipelines.recipes import material, recipe_file_of
 
 SCHEMA = Path(__file__).parent.parent.parent / "schemas" / "audit.schema.json"
 
@@ -120,13 +120,12 @@ THETA = "[{ start = 0, stop = 88, step = 2 }, 89, 89.5]"
 @pytest.mark.usefixtures("no_plots")
 @pytest.mark.parametrize("claim", ["", KNOWN], ids=["nothing", "an excuse"])
 def test_white_oren_nayar_violates_whatever_its_recipe_says_and_can_be_accepted(
-    claim: str, recipe_text: str, tmp_path: Path, capsys: Captured
+    claim: str, recipe: Path, tmp_path: Path, capsys: Captured
 ) -> None:
-    text = recipe_text.replace("[{ start = 0, stop = 80, step = 10 }, 85, 89.5]", THETA)
+    text = recipe.read_text(encoding="utf-8").replace("[{ start = 0, stop = 80, step = 10 }, 85, 89.5]", THETA)
     text = re.sub(r"materials = .*", 'materials = ["mirror", "white"]', text) + WHITE + claim
-    recipe, store = tmp_path / "recipe.toml", tmp_path / "store"
-    recipe.write_text(text, encoding="utf-8")
-    assert run("build", recipe, "--store", store) == 0
+    store = tmp_path / "store"
+    assert run("build", recipe_file_of(tmp_path, text), "--store", store) == 0
     capsys.readouterr()
     assert run("audit", "white", "--store", store) == 1
     out, _ = capsys.readouterr()

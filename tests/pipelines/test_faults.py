@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import random
 import shutil
 import signal
@@ -20,6 +19,7 @@ import pytest
 
 import brdfdb
 from tests.pipelines.a_build import changed, staged
+from tests.pipelines.a_nursery import Nursery
 from tests.pipelines.command import run
 from tests.pipelines.recipes import anisotropic, isotropic, material
 
@@ -43,67 +43,19 @@ def ranged(stop: float, step: float) -> str:
 
 
 SMALL = {"step": 2.0, "viewer": 1.0}  # a quarter of the values, in blocks that are a quarter as large
-# Imports once, then forks a build for each line: a fork is safe while there is one thread
-NURSERY = """
-import os, sys
+# The first call loads a kernel, which takes longer than the rest of a build
+PREPARE = """
 from pathlib import Path
 import numpy, numba, xarray, zarr, zarr.codecs
 from brdfdb.store import codec, staging
 from brdfdb.tables import layout, tabulation
-from brdfdb_pipelines import build, build_survey, cli, recipe_file
+from brdfdb_pipelines import build, build_survey, recipe_file
 layout._BLOCK_VALUES //= 4
-jobs = recipe_file.load(Path(sys.argv[1])).jobs()
-build_survey.check_values(jobs[0])  # the first call loads a kernel, which takes longer than the rest of a build
-tabulation.block(jobs[0].layout(), slice(0, 1))
-tabulation.frame(jobs[0].layout())
-print("warm", flush=True)
-for line in sys.stdin:
-    recipe_path, root, out = line.split()
-    if (child := os.fork()) == 0:
-        os.dup2(os.open(out, os.O_WRONLY | os.O_CREAT | os.O_TRUNC), 1)
-        os.dup2(1, 2)
-        os._exit(cli.main(["build", recipe_path, "--store", root, "--jobs", "2", "--json"]))
-    print(child, flush=True)
-    sys.stdin.readline()  # until then the child's number is its own, dead or alive
-    print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), flush=True)
+job = recipe_file.load(Path({recipe!r})).jobs()[0]
+build_survey.check_values(job)
+tabulation.block(job.layout(), slice(0, 1))
+tabulation.frame(job.layout())
 """
-
-
-class Nursery:
-    """Builds in processes of their own that start within milliseconds."""
-
-    def __init__(self, recipe: Path) -> None:
-        command = [sys.executable, "-c", NURSERY, str(recipe)]
-        self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
-        assert self._line() == "warm"
-
-    def _line(self) -> str:
-        assert self._process.stdout is not None
-        return self._process.stdout.readline().strip()
-
-    def build(self, recipe: Path, root: Path, out: Path, kill_after_s: float | None = None) -> int:
-        """Run a build, and kill it after a time; returns its exit code."""
-        assert self._process.stdin is not None
-        self._process.stdin.write(f"{recipe} {root} {out}\n")
-        self._process.stdin.flush()
-        child = int(self._line())
-        if kill_after_s is not None:
-            time.sleep(kill_after_s)
-            os.kill(child, signal.SIGKILL)
-        self._process.stdin.write("wait\n")
-        self._process.stdin.flush()
-        return int(self._line())
-
-    def close(self) -> None:
-        self._process.communicate(timeout=WAIT_S)
-
-
-@pytest.fixture
-def nursery(tmp_path: Path) -> Iterator[Nursery]:
-    first = write_recipe(tmp_path / "first.toml", 1 / 128, **SMALL)
-    made = Nursery(first)
-    yield made
-    made.close()
 
 
 def write_recipe(path: Path, rho: float, step: float = 1.0, viewer: float = 0.5) -> Path:
@@ -153,13 +105,31 @@ def marked(root: Path) -> set[tuple[str, int]]:
     }
 
 
-def test_killed_at_fifty_random_moments_nothing_is_lost_and_every_read_is_whole(
-    tmp_path: Path, nursery: Nursery
-) -> None:
+def test_killed_at_fifty_random_moments_nothing_is_lost_and_every_read_is_whole(tmp_path: Path) -> None:
     root, out = tmp_path / "store", tmp_path / "out.jsonl"
+    first = write_recipe(tmp_path / "first.toml", 1 / 128, **SMALL)
+    with Nursery(PREPARE.format(recipe=str(first))) as nursery:
+
+        def build(recipe: Path, root: Path, kill_after_s: float | None = None) -> int:
+            command = ("build", recipe, "--store", root, "--jobs", 2, "--json")
+            return nursery.run(*command, told=out, kill_after_s=kill_after_s).code
+
+        assert build(first, tmp_path / "other") == 0
+        assert build(first, root) == 0
+        kill_fifty_times(root, out, build)
+    assert run("gc", "--keep", 1, "--store", root) == 0
+    assert staged(root) == []
+    for name in ("grey", "white"):
+        head = brdfdb.open(root).head(name)
+        assert sorted(path.name for path in (root / "materials" / name).iterdir()) == [
+            "HEAD.json", head, f"{head}.MANIFEST.json"
+        ]  # fmt: skip
+    assert run("verify", "--store", root) == 0
+
+
+def kill_fifty_times(root: Path, out: Path, build: Callable[..., int]) -> None:
+    tmp_path = root.parent
     draw = random.Random(SEED)
-    assert nursery.build(tmp_path / "first.toml", tmp_path / "other", out) == 0
-    assert nursery.build(tmp_path / "first.toml", root, out) == 0
     rhos = {1 / 128, 2 / 128}
     reader = Reader(root, lambda: rhos)
     reader.start()
@@ -169,8 +139,8 @@ def test_killed_at_fifty_random_moments_nothing_is_lost_and_every_read_is_whole(
     try:
         second = write_recipe(tmp_path / "2.toml", 2 / 128, **SMALL)
         started = time.perf_counter()
-        assert nursery.build(second, root, out) == 0
-        whole_s = time.perf_counter() - started  # beside the reader, as all that come
+        assert build(second, root) == 0
+        whole_s = time.perf_counter() - started  # while the reader reads, as in the builds below
         while kills < KILLS:
             number += 1
             rhos.add(number / 128)
@@ -180,7 +150,7 @@ def test_killed_at_fifty_random_moments_nothing_is_lost_and_every_read_is_whole(
                 last = kills == KILLS
                 out.write_bytes(b"")
                 started = time.perf_counter()
-                code = nursery.build(recipe, root, out, None if last else draw.uniform(0.0, 1.2 * whole_s))
+                code = build(recipe, root, None if last else draw.uniform(0.0, 1.2 * whole_s))
                 assert code in (0, -signal.SIGKILL), out.read_text()
                 lines = out.read_text().splitlines(keepends=True)
                 events = [json.loads(line) for line in lines if line.endswith("\n")]
@@ -211,14 +181,6 @@ def test_killed_at_fifty_random_moments_nothing_is_lost_and_every_read_is_whole(
     assert reader.reads > 10
     assert resumed > 10
     assert published > 0
-    assert run("gc", "--keep", 1, "--store", root) == 0
-    assert staged(root) == []
-    for name in ("grey", "white"):
-        head = brdfdb.open(root).head(name)
-        assert sorted(path.name for path in (root / "materials" / name).iterdir()) == [
-            "HEAD.json", head, f"{head}.MANIFEST.json"
-        ]  # fmt: skip
-    assert run("verify", "--store", root) == 0
 
 
 def command(*arguments: object) -> list[str]:

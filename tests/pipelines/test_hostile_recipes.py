@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import json
 import os
 import shutil
-import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
+from tests.pipelines.a_nursery import Nursery
 from tests.pipelines.command import Captured, refused
 from tests.pipelines.recipes import COARSE
 
@@ -125,41 +123,25 @@ RECIPES: list[tuple[str, str | bytes, str]] = [
 ]
 
 
-# Imports once, then forks a build for each line; a child says what it took
-NURSERY = """
-import json, os, resource, shutil, signal, sys
+# Whatever memory and disk this machine has
+PREPARE = """
+import shutil
 from types import SimpleNamespace
-from brdfdb_pipelines import build, build_survey, cli
-build_survey.machine_memory = lambda: 24 * 10**9  # whatever this machine has
+from brdfdb_pipelines import build, build_survey
+build_survey.machine_memory = lambda: 24 * 10**9
 shutil.disk_usage = lambda _: SimpleNamespace(free=50 * 10**9)
-for line in sys.stdin:
-    recipe, store, said, seconds = json.loads(line)
-    child = os.fork()
-    if child == 0:
-        resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds))  # of this child alone
-        signal.alarm(20 * seconds)  # what waits takes no processor
-        os.dup2(os.open(said, os.O_WRONLY | os.O_CREAT | os.O_TRUNC), 2)
-        os._exit(cli.main(["build", recipe, "--store", store, "--jobs", "1"]))
-    _, status, usage = os.wait4(child, 0)
-    print(json.dumps([os.waitstatus_to_exitcode(status), usage.ru_maxrss * 1024]), flush=True)
 """
 
 
 def test_hostile_recipes_are_a_sentence_each(tmp_path: Path) -> None:
     failures = {}
-    with subprocess.Popen(
-        [sys.executable, "-c", NURSERY], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-    ) as nursery:
-        assert nursery.stdin is not None
-        assert nursery.stdout is not None
+    path, store, told = tmp_path / "recipe.toml", tmp_path / "store", tmp_path / "said.txt"
+    with Nursery(PREPARE) as nursery:
         for name, content, said in RECIPES:
-            path, store, told = tmp_path / "recipe.toml", tmp_path / "store", tmp_path / "said.txt"
             path.write_bytes(content.encode() if isinstance(content, str) else content)
-            print(json.dumps([str(path), str(store), str(told), MOST_S]), file=nursery.stdin, flush=True)
-            code, peak = json.loads(nursery.stdout.readline())
+            code, peak = nursery.run("build", path, "--store", store, "--jobs", 1, told=told, cpu_s=MOST_S)
             text = told.read_text(encoding="utf-8", errors="replace")
-            lines = text.splitlines()
-            sentence = lines[-1] if lines and "Traceback" not in text else ""
+            sentence = "" if "Traceback" in text else text.strip().rpartition("\n")[2]
             in_bounds = code == 2 and peak <= MOST_BYTES and not store.exists()
             if not (in_bounds and sentence.startswith("brdfdb: ") and said in sentence):
                 failures[name] = f"exit {code}, {peak // 10**6} MB, store begun: {store.exists()}, {text[-300:]}"

@@ -39,7 +39,8 @@ def planned(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_list_has_a_column_with_the_stated_error(planned: Path, capsys: Captured) -> None:
     capsys.readouterr()
     assert run("list", "--store", planned) == 0
-    _, head, *lines, explained = capsys.readouterr().out.splitlines()
+    title, head, *lines, explained = capsys.readouterr().out.splitlines()
+    assert title.strip() == f"2 materials in {planned}"
     assert explained.startswith("table error: ")
     columns = re.split(r"  +", head)
     assert columns[3:8] == [
