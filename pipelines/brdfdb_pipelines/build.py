@@ -191,7 +191,7 @@ class _Builder:
 
     @property
     def _room(self) -> bool:
-        most = 2 * max(1, self.at.slots())  # so that a worker that finishes has a next task
+        most = 2 * max(1, self.at.slots())  # each worker has a next task when it finishes
         if self.memory is not None:
             most = min(most, self.memory // self.task_bytes)
         return len(self.running) - len(self.publishing) < max(1, most) and len(self.publishing) < _PUBLISHED
@@ -305,7 +305,7 @@ class _Builder:
             self.waiting.append(table)
             return False
         self.open.append(table)
-        if head_of(self.root, name) != table.survey.head:  # another build published meanwhile
+        if head_of(self.root, name) != table.survey.head:  # another build has published a revision since the survey
             table.survey = survey(str(self.root), job)
         standing = table.survey.standing
         if standing.state == "missing":
@@ -420,7 +420,7 @@ class _Builder:
         error: BaseException | None
         try:
             error = future.exception()
-        except CancelledError as cancelled:  # by the cluster, which lost the task
+        except CancelledError as cancelled:  # the cluster lost the task
             error = cancelled
         if error is None:
             return future.result()

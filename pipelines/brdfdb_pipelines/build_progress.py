@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import time
-from types import TracebackType
 from typing import Any
 
 from rich.progress import TaskID
@@ -38,20 +37,9 @@ class Tally:
         }
 
 
-class JsonLines:
-    """Printer of events as JSON; a context manager like `Bars`."""
-
-    def __enter__(self) -> JsonLines:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
-        pass
-
-    def __call__(self, event: Event) -> None:
-        """Print an event."""
-        print(json.dumps(event), flush=True)
+def print_json(event: Event) -> None:
+    """Print an event as one line of JSON."""
+    print(json.dumps(event), flush=True)
 
 
 class Bars:
@@ -69,9 +57,7 @@ class Bars:
         self._progress.start()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._progress.stop()
 
     def __call__(self, event: Event) -> None:

@@ -53,7 +53,7 @@ class _Parser(argparse.ArgumentParser):
     def __init__(self, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **options)
         group = self.add_argument_group("options of every command")
-        # A default of a command, or a name that it shares, would replace what stands before the command
+        # A default, or the same name in the parser of a command, would replace the value given before the command
         group.add_argument(
             "--debug", action="store_true", default=argparse.SUPPRESS, help="also print the traceback of an error"
         )
@@ -78,7 +78,7 @@ class _Parser(argparse.ArgumentParser):
 
 
 class _Version(argparse.Action):
-    """Print the version; the metadata of the distribution is read for this option alone."""
+    """Print the version; only this option reads the metadata of the distribution."""
 
     def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
         import brdfdb
@@ -139,12 +139,12 @@ def _run(options: argparse.Namespace, arguments: Sequence[str]) -> int:
             MODELS.add_files(files)
         with _telling_of_compilation(_command(arguments)):
             code: int = options.run(options)
-        sys.stdout.flush()  # a reader that left shows here, not at exit
+        sys.stdout.flush()  # if the reader of the output has closed it, the error occurs here and not at exit
         return code
     except KeyboardInterrupt:
         print("brdfdb: interrupted", file=sys.stderr)
         return INTERRUPTED
-    except BrokenPipeError:  # the reader of our output has seen enough
+    except BrokenPipeError:  # the reader of the output has closed it
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except Exception as error:
@@ -183,7 +183,7 @@ def _parser(arguments: Sequence[str] | None = None) -> argparse.ArgumentParser:
     for name, command in commands().items():
         first_sentence = command.HELP.partition(". ")[0].rstrip(".")
         subparser = subparsers.add_parser(name, help=f"{first_sentence}.", description=command.HELP)
-        if arguments is None or name in arguments:  # some import a room of the library
+        if arguments is None or name in arguments:  # some of these functions import a part of the library
             command.add_arguments(subparser)
         subparser.set_defaults(run=command.run)
     return parser

@@ -49,7 +49,8 @@ LIST: TypeAdapter[list[float | Range]] = TypeAdapter(Nodes, config=ConfigDict(st
 
 def nodes_of(name: str, parts: list[float | Range]) -> Axis:
     """Return the numbers of a list with ranges; RecipeError if there are more than an axis may have."""
-    pieces, count = [], 0
+    pieces = []
+    count = 0
     for part in parts:
         pieces.append(part.nodes(name) if isinstance(part, Range) else np.array([part]))
         count += pieces[-1].size

@@ -158,7 +158,7 @@ def _alone(partial: Path, out: Path) -> Iterator[None]:
     handle = os.open(partial, os.O_RDONLY)
     try:
         fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        if os.path.lexists(out):  # another writer finished it meanwhile
+        if os.path.lexists(out):  # another process has just finished the set
             with contextlib.suppress(OSError):
                 partial.rmdir()
             raise SampleError(f"{out} exists already; remove it, or give another name")

@@ -7,7 +7,7 @@ import json
 import pytest
 
 from brdfdb_pipelines import build_progress
-from brdfdb_pipelines.build_progress import Bars, JsonLines, Tally
+from brdfdb_pipelines.build_progress import Bars, Tally, print_json
 from tests.pipelines.command import Captured
 
 
@@ -25,8 +25,7 @@ def test_the_rate_is_that_of_what_was_computed_and_tells_the_time_left(monkeypat
 
 
 def test_lines_are_json_and_bars_are_on_stderr(capsys: Captured) -> None:
-    with JsonLines() as lines:
-        lines({"event": "unchanged", "material": "Größe", "revision": "r000001"})
+    print_json({"event": "unchanged", "material": "Größe", "revision": "r000001"})
     out, err = capsys.readouterr()
     assert (json.loads(out), err) == ({"event": "unchanged", "material": "Größe", "revision": "r000001"}, "")
     block = {"event": "block", "blocks": 2, "kept": False, "values_total": 4, "values_per_s": 2e6, "seconds_left": 0.0}

@@ -171,13 +171,13 @@ def test_export_takes_names_or_all_and_its_options_anywhere(
     assert refused(capsys, "export", "exr", "--store", built) == "export: name materials, or give --all"
     said = "export: name materials or give --all, not both"
     assert refused(capsys, "export", "exr", "foam", "--all", "--store", built) == said
-    assert run("export", "exr", "--store", built, "--out", tmp_path / "some", "foam", "mirror") == 0
+    assert run("export", "exr", "--store", built, "--out", tmp_path / "all_kinds", "foam") == 0
     out, err = capsys.readouterr()
-    assert out.startswith("8 EXR files, ")
-    assert out.endswith(f" in {tmp_path / 'some'}\n")
+    assert out.startswith("4 EXR files, ")
+    assert out.endswith(f" in {tmp_path / 'all_kinds'}\n")
     assert "exporting" in err
-    assert len(list((tmp_path / "some").iterdir())) == 8
-    one = ("--jobs", 1)  # a process of its own for more than three tables: a second one imports as much again
+    assert len(list((tmp_path / "all_kinds").iterdir())) == 4
+    one = ("--jobs", 1)  # more than three tables are written by processes, which take time to start
     slices = ("--half", "--kind", "half_difference")
     assert run("export", "exr", "--all", *slices, "--out", tmp_path / "all", "--store", built, *one) == 0
     assert capsys.readouterr().out.startswith("5 EXR files, ")

@@ -6,14 +6,10 @@ from pathlib import Path
 
 import brdfdb
 from tests.pipelines.command import Captured, refused
-from tests.pipelines.recipes import DEFINED, GOOD, HALF, SWEPT, TO_TOLERANCE
+from tests.pipelines.recipes import DEFINED, GOOD, HALF, SWEPT, TO_TOLERANCE, isotropic
 
 COPPER = GOOD.replace("foam", "scene-copper-sphere")
-PLAIN = """\
-theta_i_deg = [{ start = 0, stop = 80, step = 40 }]
-theta_r_deg = [0, 80]
-delta_phi_deg = [0, 180]
-"""
+PLAIN = isotropic("[{ start = 0, stop = 80, step = 40 }]", viewer="[0, 80]")
 
 
 def tree(root: Path) -> dict[str, bytes]:
@@ -40,7 +36,7 @@ BAD: list[tuple[str, str, str, str]] = [
     # missing keys
     (GOOD, 'materials = ["foam"]\n', "", "materials: "),
     (COPPER, "wavelengths_nm = [500, 550]\n", "", "wavelengths_nm: "),
-    (GOOD, "[grids.isotropic]\n" + PLAIN, "", "grids.isotropic: "),
+    (GOOD, PLAIN, "", "grids.isotropic: "),
     (GOOD, ", step = 40", "", "grids.isotropic.theta_i_deg.0.step: "),
     (GOOD + DEFINED, "define.mine", "define.foam", "define.foam: "),
     # another type

@@ -7,7 +7,7 @@ import math
 import shlex
 import sys
 import time
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -69,7 +69,7 @@ def _build(options: argparse.Namespace) -> None:
     from brdfdb.materials import PAPERS
     from brdfdb_pipelines import recipe_file, workers
     from brdfdb_pipelines.build import build, compile_kernels
-    from brdfdb_pipelines.build_progress import Bars, JsonLines
+    from brdfdb_pipelines.build_progress import Bars, print_json
     from brdfdb_pipelines.build_survey import machine_memory
 
     if options.recipe is not None and options.library is not None:
@@ -85,7 +85,7 @@ def _build(options: argparse.Namespace) -> None:
     else:
         memory = machine_memory() if memory is None else memory
         at = (workers.processes if options.processes else workers.threads)(options.jobs)
-    with at as opened, JsonLines() if options.json else Bars() as report:
+    with at as opened, nullcontext(print_json) if options.json else Bars() as report:
         if not options.scheduler:
             compile_kernels(recipe, options.store, options.jobs, report)
         with when_compiling(lambda: report({"event": "compiling", "kernels": 0})):

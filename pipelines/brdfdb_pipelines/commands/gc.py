@@ -14,7 +14,7 @@ HELP = (
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the store and what is kept."""
+    """Add the store, and which revisions stay."""
     add_store(parser)
     parser.add_argument(
         "--keep",

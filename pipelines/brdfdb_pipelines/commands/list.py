@@ -131,7 +131,9 @@ def _print_materials(store: Store, root: Path, names: Sequence[str]) -> list[str
     )
     from brdfdb_pipelines import terminal
 
-    rows, damaged, incomplete = [], [], []
+    rows = []
+    damaged: list[str] = []
+    incomplete: list[str] = []
     audits = last_audit(root)
     for name in names:
         try:
@@ -170,7 +172,8 @@ def _print_families(store: Store) -> list[str]:
     """Print a line for each family from its record alone; return a sentence for each damaged one."""
     from brdfdb_pipelines import terminal
 
-    rows, damaged = [], []
+    rows = []
+    damaged: list[str] = []
     for name in store.families():
         try:
             record = store.family_content(name)

@@ -163,7 +163,8 @@ def _swept(family: Family, settings: Sequence[str]) -> dict[str, float]:
         except ValueError:
             raise ParameterError(f"--set {setting}", f"give a number, such as {name}={axes[name][0]:g}", text) from None
     for name, nodes in axes.items():
-        low, high = nodes[0], nodes[-1]
+        low = nodes[0]
+        high = nodes[-1]
         if name not in values:
             raise ParameterError("--set", f"{name} is missing; give a value in [{low:g}, {high:g}]")
         if not low <= values[name] <= high:

@@ -20,12 +20,9 @@ def run(options: argparse.Namespace) -> int:
     """Make the revision current, and print which one was."""
     from brdfdb.store import revisions
 
-    name, revision = options.name, options.revision
-    before = revisions.rollback(options.store, name, revision)
-    if not before:
-        print(f"{name}: {revision} is current now; HEAD.json was missing or damaged")
-    elif before != revision:
-        print(f"{name}: {revision} is current now, instead of {before}")
-    else:
-        print(f"{name}: {revision} was current already")
+    before = revisions.rollback(options.store, options.name, options.revision)
+    said = f"is current now, instead of {before}" if before else "is current now; HEAD.json was missing or damaged"
+    if before == options.revision:
+        said = "was current already"
+    print(f"{options.name}: {options.revision} {said}")
     return 0

@@ -35,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print what the store, or a snapshot of it, knows of a material or a family."""
+    """Print what the store, or a snapshot of it, states about a material or a family."""
     from brdfdb.store.summary_words import last_audit
 
     root: Path = options.store
@@ -136,7 +136,8 @@ def _print_grid(table: Table) -> None:
     """Print the axes, the number and precision of the stored values, and how f_r is reconstructed from them."""
     from brdfdb_pipelines import terminal
 
-    metadata, wavelength = table.metadata, table.wavelength_nm
+    metadata = table.metadata
+    wavelength = table.wavelength_nm
     print("  grid")
     for axis, nodes in table.axes_deg.items():
         print(f"    {axis:<16}{nodes.size} nodes, {nodes[0]:g} to {nodes[-1]:g} degrees")
@@ -151,22 +152,17 @@ def _print_grid(table: Table) -> None:
     bits = metadata.bits
     stored = f"stored with {'all 23' if bits == 23 else f'{bits} of 23'} bits of the mantissa"
     print(f"    {'values':<16}{table.values.size}, {stored}")
-    print(f"    {'interpolation':<16}{_interpolation(table)}")
-    if metadata.reason:
-        print(terminal.plain(f"    {'reason':<16}{metadata.reason}"))
-    if metadata.reconstruction:
-        print(terminal.plain(f"  f_r         {metadata.reconstruction}"))
-
-
-def _interpolation(table: Table) -> str:
-    """Return the interpolation of a table in words."""
     how = table.interpolation
     what = "f_r" if how.power == 0.0 else f"f_r (cos theta_i cos theta_r)^{how.power:g}"
     if table.uniform is not None:
         what = what.replace("f_r", "(f_r - uniform)", 1)
     if how.logarithm:
         what = f"the logarithm of {what} + {how.offset:.3g}"
-    return f"{how.method}, of {what}"
+    print(f"    {'interpolation':<16}{how.method}, of {what}")
+    if metadata.reason:
+        print(terminal.plain(f"    {'reason':<16}{metadata.reason}"))
+    if metadata.reconstruction:
+        print(terminal.plain(f"  f_r         {metadata.reconstruction}"))
 
 
 def _print_error(error: Error | None, truth: str, *, measured: bool = False) -> None:
@@ -259,9 +255,11 @@ def _print_answers(audited: Audited | None, metadata: TableMetadata) -> None:
     from brdfdb.store.summary_words import NOT_AUDITED
 
     of_paper = metadata.material in presets() and metadata.source_record
-    says, whose = "the paper" if of_paper else "its model", "does the published model"
+    says = "the paper" if of_paper else "its model"
+    whose = "does the published model"
     if metadata.measured is not None:
-        says, whose = "its source", "do the data"
+        says = "its source"
+        whose = "do the data"
     both = (NOT_AUDITED, NOT_AUDITED) if audited is None else audited
     print(f"  audit       is it what {says} says? {both[0]}")
     print(f"              {whose} conserve energy? {both[1]}")
