@@ -18,18 +18,12 @@ import numpy as np
 import pytest
 
 import brdfdb
-from brdfdb import models
-from brdfdb.materials import Material
-from brdfdb_pipelines.recipe_file import load
 from tests.pipelines.a_build import changed
 from tests.pipelines.command import Captured, refused, run
 
 SAME = 1e-12  # HTTP writes what the library returns, digit by digit
-# Between nodes, where the tables are coarse, a lookup is an interpolation; on them it is the model to float32
-FLOAT32 = 1e-6
-
 ANGLES_DEG = (37.0, 12.0, 51.0, 200.5)
-START_SECONDS = 300.0  # for what takes two seconds where the machine has nothing else to do
+START_SECONDS = 300.0  # time limit; it takes two seconds on an idle machine
 
 
 @pytest.fixture(params=["foam", "rolled-brass", "scene-copper-sphere", "blue-plastic", "mirror"])
@@ -49,20 +43,6 @@ def test_the_recipe_has_one_material_of_every_kind(built: Path, names: list[str]
     wavelengths = [table.wavelength_nm for table in tables]
     assert [None if array is None else array.size for array in wavelengths] == [None, None, 16, 1, 16]
     assert [table.specular is not None for table in tables] == [False, False, True, True, True]
-
-
-def test_on_a_node_the_answer_is_the_model(name: str, built: Path, recipe: Path) -> None:
-    (job,) = (job for job in load(recipe).jobs() if job.material.name == name)
-    theta_i, theta_r, azimuth = 40.0, 60.0, 150.0
-    made: Material = job.material
-    arguments = made.arguments(job.wavelength_nm)
-    expected = getattr(models, made.model)(*np.deg2rad([theta_i, 0.0, theta_r, azimuth]), **arguments)
-    found = brdfdb.open(built)[name].lookup(*np.deg2rad([theta_i, 0.0, theta_r, azimuth]))
-    assert found == pytest.approx(expected, rel=FLOAT32)
-    if name == "mirror":
-        assert np.all(found == 0.0)
-    else:
-        assert np.all(found > 0.0)
 
 
 def test_every_table_is_audited(built: Path, names: list[str], tmp_path: Path) -> None:

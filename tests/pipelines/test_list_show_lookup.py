@@ -207,11 +207,6 @@ def test_lookup_tells_the_stated_error_if_asked(planned: Path, capsys: Captured)
     assert answer == without
 
 
-def test_planned_tables_pass_their_audit(planned: Path, capsys: Captured) -> None:
-    assert run("audit", "--no-figures", "--store", planned) == 0
-    assert "2 audited: passes 2" in capsys.readouterr().out
-
-
 def test_a_title_of_a_strange_store_cannot_write_on_the_terminal(tmp_path: Path, capsys: Captured) -> None:
     dataset = tabulate(
         Layout(presets()["foam"], Grid({axis: [0, 80] for axis in ("theta_i", "theta_r")} | {"delta_phi": [0, 180]}))
