@@ -359,9 +359,8 @@ class _Builder:
 
         def published(future: Future[NewRevision]) -> None:
             if (made := self._result(table.name, future)) is not None:
-                found = table.survey
-                why = found.standing.why
-                size = (found.shape, found.wavelengths)
+                why = table.survey.standing.why
+                size = (table.survey.shape, table.survey.wavelengths)
                 self.built[table.name] = Built(table.job, "published", made.revision, made.bytes, why, *size)
                 event = {"event": "published", "material": table.name}
                 self.report({**event, "revision": made.revision, "bytes": made.bytes, "why": why})

@@ -21,8 +21,11 @@ def run(options: argparse.Namespace) -> int:
     from brdfdb.store import revisions
 
     before = revisions.rollback(options.store, options.name, options.revision)
-    said = f"is current now, instead of {before}" if before else "is current now; HEAD.json was missing or damaged"
     if before == options.revision:
-        said = "was current already"
-    print(f"{options.name}: {options.revision} {said}")
+        result = "was current already"
+    elif before:
+        result = f"is current now, instead of {before}"
+    else:
+        result = "is current now; HEAD.json was missing or damaged"
+    print(f"{options.name}: {options.revision} {result}")
     return 0
