@@ -87,6 +87,7 @@ BAD: list[tuple[str, str, str, str]] = [
     (SWEPT, "[0.2, 0.4]", "[0.2]", "sweep.mine.parameters.rho_s: "),
     (SWEPT, "[0.2, 0.4]", "[0.4, 0.2]", "sweep.mine.parameters.rho_s: "),
     (SWEPT, "[0.2, 0.4]", '[0.2, "0.4"]', "sweep.mine.parameters.rho_s.1: "),
+    (SWEPT, "[0.2, 0.4]", "[0.2, nan]", "sweep.mine.parameters.rho_s.1: "),
     (SWEPT, "[0.2, 0.4]", "[0.2, 1.4]", "sweep.mine.parameters.rho_s: "),
     (SWEPT, "[0.2, 0.4]", "{ start = 0.2, stop = 0.4, step = 0.1 }", "sweep.mine.parameters.rho_s: "),
     (SWEPT, "step = 0.1", "step = 0.07", "sweep.mine.parameters.alpha_x: "),
