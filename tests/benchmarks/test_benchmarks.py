@@ -36,10 +36,6 @@ needs = {
         find_spec("mitsuba") is None or "DRJIT_LIBLLVM_PATH" not in os.environ,
         reason="mitsuba is not installed, or DRJIT_LIBLLVM_PATH names no LLVM 19",
     ),
-    "rgl": pytest.mark.skipif(find_spec("mitsuba") is None, reason="mitsuba is not installed"),
-    "radiance": pytest.mark.skipif(
-        None in (find_spec("pyradiance"), find_spec("pywincalc")), reason="pyradiance or pywincalc is not installed"
-    ),
 }
 
 
