@@ -41,25 +41,6 @@ class Brightness(Finding):
         return [Cell(self.verdict, f"{self.largest:.3f}", self.largest)]
 
 
-def test_the_modules_of_the_room_are_the_registry_in_their_order() -> None:
-    assert list(FINDINGS) == [
-        *(
-            "energy",
-            "reciprocity",
-            "values",
-            "nodes",
-            "smoothness",
-            "table_error",
-            "polarisation",
-            "sampling",
-            "validity",
-            "record",
-        )
-    ]
-    for key, kind in FINDINGS.items():
-        assert (kind.key, kind.__module__) == (key, f"brdfdb.audit.{key}")
-
-
 def test_a_finding_of_twenty_lines_is_seen_everywhere(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Captured
 ) -> None:
