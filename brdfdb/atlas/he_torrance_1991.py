@@ -56,7 +56,9 @@ def _jones(theta_i: float, phi_i: float, theta_r: float, phi_r: float, *, n: flo
 
 def _geometry(theta_i: float, phi_i: float, theta_r: float, phi_r: float) -> Any:
     """Return G [1] of eq. 76 without its factor that is 1."""
-    theta_i, theta_r, delta_phi = mp.mpf(theta_i), mp.mpf(theta_r), mp.mpf(phi_r) - mp.mpf(phi_i)
+    theta_i = mp.mpf(theta_i)
+    theta_r = mp.mpf(theta_r)
+    delta_phi = mp.mpf(phi_r) - mp.mpf(phi_i)
     v_z = mp.cos(theta_i) + mp.cos(theta_r)
     v_xy2 = mp.sin(theta_i) ** 2 + mp.sin(theta_r) ** 2
     v_xy2 += 2 * mp.sin(theta_i) * mp.sin(theta_r) * mp.cos(delta_phi)
@@ -157,7 +159,8 @@ def _all_terms(g: Any, V: Any) -> Any:
     Each term is computed from the term before, and the first one from e^-g.
     """
     one = type(g)(1)
-    poisson, total = np.exp(-g), 0 * g
+    poisson = np.exp(-g)
+    total = 0 * g
     if poisson > 0:  # If e^-g underflows, all terms are 0
         for m in range(1, 2 * int(g) + 100):
             poisson = poisson * g / (m * one)

@@ -74,7 +74,8 @@ def _surface(theta_i: Any, phi_i: Any, theta_r: Any, phi_r: Any, *, sigma: float
 
 def _towel(theta_i: float, phi_i: float, theta_r: float, phi_r: float, *, e_0: float) -> Any:
     """Return f_r [1/sr] of the towel of Fig. 20, which does not depend on the irradiance e_0."""
-    sigma, weights = np.deg2rad(42.0), {"k_b": 1, "k_s": mp.mpf(0.085) / mp.mpf(np.pi)}
+    sigma = np.deg2rad(42.0)
+    weights = {"k_b": 1, "k_s": mp.mpf(0.085) / mp.mpf(np.pi)}
     body, _, surface = oren_nayar_1994.body_surface(theta_i, theta_r, phi_r - phi_i, 0.75, sigma, **weights)
     return body + surface + 0 * e_0
 

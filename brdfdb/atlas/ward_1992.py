@@ -64,7 +64,8 @@ def _of_unit_vectors(
 
 def lobe_that_loses_light() -> Figure:
     """Draw the albedos of three forms, and the error of the quadrature against an integral of the reference."""
-    entry, alpha = BY_KEY["lobe-that-loses-light"], 0.05
+    entry = BY_KEY["lobe-that-loses-light"]
+    alpha = 0.05
     theta = np.append(np.linspace(0.0, 85.0, 18), [87.0, 89.0])
     duer = [directional_albedo("ward_duer", np.deg2rad(x), **lobe(alpha)).albedo for x in theta]
     printed, ours = (
@@ -101,7 +102,8 @@ def lobe_that_loses_light() -> Figure:
 def _bounded_albedo(theta_i: float, *, alpha_x: float, **_: float) -> Any:
     """Return the albedo [1] of the bounded lobe by 8 x 8 samples of eq. 7, of which next to none leaves downwards."""
     nodes, weights = np.polynomial.laguerre.laggauss(8)
-    wi, total = unit_vector(theta_i, 0.0), mp.zero
+    wi = unit_vector(theta_i, 0.0)
+    total = mp.zero
     for x, weight in zip(nodes, weights, strict=True):
         for phi in (np.arange(8) + 0.5) * np.pi / 8:  # Half a turn is enough: the other half is its mirror image
             tan = alpha_x * np.sqrt(x)
@@ -283,7 +285,8 @@ def _angles(x: Any, y: Any, z: Any) -> tuple[Any, Any]:
 
 def _slopes(u1: float, u2: float, alpha_x: float, alpha_y: float) -> tuple[Any, Any]:
     """Return the slopes [1] of the half vector along x and y that eq. 7 draws."""
-    size, turn = mp.sqrt(-mp.log(u1)), 2 * mp.pi * mp.mpf(u2)
+    size = mp.sqrt(-mp.log(u1))
+    turn = 2 * mp.pi * mp.mpf(u2)
     return size * alpha_x * mp.cos(turn), size * alpha_y * mp.sin(turn)
 
 

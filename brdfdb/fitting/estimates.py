@@ -109,7 +109,8 @@ def _of_variable(
 
 def _indices(fitted: FittedSurface) -> list[Estimate]:
     """Return n and k where they were searched, whose variance is that of the two variables in their place."""
-    surface, x = fitted.surface, fitted.point.x
+    surface = fitted.surface
+    x = fitted.point.x
     if not surface.searched_index:
         return []
     names = [one.name for one in surface.shape]

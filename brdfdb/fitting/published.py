@@ -162,7 +162,13 @@ def _fit(path: Path, number: int, line: str) -> PublishedFit:
     flags = _flags(terms)
     albedo = None
     if model is not None and not _out_of_range(model, terms):
-        albedo = _albedo(model, terms)
+        # in the channel whose reflectances add up to most
+        given = [_parameters(terms, channel) for channel in range(len(CHANNELS))]
+        sums = [sum(v for name, v in one.items() if MODELS[model].parameter(name).reflectance) for one in given]
+        brightest: dict[str, Any] = dict(given[int(np.argmax(sums))])
+        angles = radians(np.array(ALBEDO_ANGLES_DEG))
+        computed = directional_albedo(model, angles, tolerance=ALBEDO_TOLERANCE, **brightest)
+        albedo = FitAlbedo.largest(ALBEDO_ANGLES_DEG, computed.albedo, computed.error)
         if not albedo.conserves:
             flags.append(f"it reflects {albedo.value:.3g} of the light from {albedo.theta_i_deg:g} degrees")
     elif model is not None:
@@ -248,12 +254,3 @@ def _out_of_range(model: str, terms: list[PublishedLobe]) -> list[str]:
             except ParameterError as error:
                 flags.append(f"{name}: {error.sentence}")
     return list(dict.fromkeys(flags))
-
-
-def _albedo(model: str, terms: list[PublishedLobe]) -> FitAlbedo:
-    """Return the largest directional albedo [1], in the channel whose reflectances add up to most."""
-    given = [_parameters(terms, channel) for channel in range(len(CHANNELS))]
-    bright = [sum(v for name, v in one.items() if MODELS[model].parameter(name).reflectance) for one in given]
-    brightest: dict[str, Any] = dict(given[int(np.argmax(bright))])
-    computed = directional_albedo(model, radians(np.array(ALBEDO_ANGLES_DEG)), tolerance=ALBEDO_TOLERANCE, **brightest)
-    return FitAlbedo.largest(ALBEDO_ANGLES_DEG, computed.albedo, computed.error)

@@ -246,7 +246,8 @@ def _is_bright(spec: ModelSpec, names: tuple[str, ...], fixed: Mapping[str, floa
     """Return True if the model reflects something where its reflectances are 0, as facets do at grazing."""
     middle = {p.name: 0.5 * (p.low + min(p.high, 1.0)) for p in spec.parameters}
     index = {"wavelength_nm": ASSUMED_NM, "n": 1.5, "k": 0.0} if spec.spectral else {}
-    wi, wr = unit_vector(np.full(3, 1.2), np.zeros(3)), unit_vector(np.array([0.1, 0.7, 1.2]), np.full(3, np.pi))
+    wi = unit_vector(np.full(3, 1.2), np.zeros(3))
+    wr = unit_vector(np.array([0.1, 0.7, 1.2]), np.full(3, np.pi))
     return bool(np.any(spec.vectors(wi, wr, **(middle | dict(fixed) | dict.fromkeys(names, 0.0) | index)) > 0.0))
 
 
@@ -281,8 +282,10 @@ class SearchedSurface:
         self, name: str, wavelength_nm: Array | None, channels: int, *, turned: bool, entry: str | None = None
     ) -> None:
         names = _parsed(name)
-        alone, flat = len(names) == 1, flat_model()
-        repeated, seen = Counter(names), Counter[str]()
+        alone = len(names) == 1
+        flat = flat_model()
+        repeated = Counter(names)
+        seen = Counter[str]()
         self.name, self.channels, self.entry = name, channels, entry
         self.terms: list[Term] = []
         for model in names:
@@ -376,7 +379,8 @@ class SearchedSurface:
 
         The terms of a point that was evaluated alone are remembered until the next: its neighbours share some of them.
         """
-        parts, numbers = [], [self.numbers(x) for x in points]
+        parts = []
+        numbers = [self.numbers(x) for x in points]
         several = self.channels if self.indexed else 1
         for number, term in enumerate(self.terms):
             count = several if term.spec.spectral else 1
@@ -390,7 +394,8 @@ class SearchedSurface:
 
     def monomials(self, values: Floats) -> Floats:
         """Return the monomials (M, C) of coefficients (K, C)."""
-        parts, at = [], 0
+        parts = []
+        at = 0
         for term in self.terms:
             count = term.polynomial.exponents.shape[1]
             parts.append(term.polynomial.monomials(self._in_units(values, at, count)))

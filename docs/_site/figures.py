@@ -57,7 +57,8 @@ def _index(key: str, paper: Paper, figures: list[Figure], plots: dict[str, list[
 
 
 def _held(figure: Figure) -> str:
-    held, count = sum(statement.holds for statement in figure.statements), len(figure.statements)
+    held = sum(statement.holds for statement in figure.statements)
+    count = len(figure.statements)
     return f"{held} of {count} statements hold" if count > 1 else ("Its statement holds" if held else "Does not hold")
 
 

@@ -309,7 +309,11 @@ def _families(root: Path, before: Former, jobs: int) -> list[FamilyAudit]:
     tasks: dict[tuple[str, ...], Task] = {}
     audits: dict[str, FamilyAudit] = {}
     for (snapshot, name), opened in subjects.items():
-        sha256 = _family_sha256(opened, name)
+        content: dict[str, Any] = {"name": name}
+        with suppress(StoreError, UnknownMaterialError):
+            content["record"] = opened.family_content(name)
+            content["members"] = {member: opened.location(member).digest for member in content["record"]["members"]}
+        sha256 = digest(content)
         if sha256 in known:
             audits[sha256] = known[sha256]
         elif (sha256,) not in tasks:
@@ -317,15 +321,6 @@ def _families(root: Path, before: Former, jobs: int) -> list[FamilyAudit]:
     for (sha256,), (audited,) in _outcomes(tasks, jobs):
         audits[sha256] = audited
     return [*audits.values()]
-
-
-def _family_sha256(store: Store, name: str) -> str:
-    """Return the digest of a record of a family and of its members."""
-    content: dict[str, Any] = {"name": name}
-    with suppress(StoreError, UnknownMaterialError):
-        content["record"] = store.family_content(name)
-        content["members"] = {member: store.location(member).digest for member in content["record"]["members"]}
-    return digest(content)
 
 
 def _family_audited(root: Path, name: str, snapshot: str, sha256: str) -> list[FamilyAudit]:
@@ -359,19 +354,10 @@ def _drawn(key: str) -> list[Section]:
     return _sections((atlas.get(key) or gallery[key])())
 
 
-def _why(store: Store, name: str) -> str:
-    """Return the reason why the source of a table cannot be evaluated."""
-    if store.metadata(name).measured is not None:
-        return "it is measured, and the table does not contain the data"
-    model = store.metadata(name).model
-    if model is None or model in MODELS:
-        return "its source cannot be evaluated"
-    return f"its model {model} is unknown; add it with --models FILE or $BRDFDB_MODELS"
-
-
 def _print(root: Path, audit_report: AuditReport, report_path: Path) -> None:
     store = Store(root)
-    audits, columns = audit_report.materials, audit_page.columns()
+    audits = audit_report.materials
+    columns = audit_page.columns()
     terminal.print_table(
         f"Audit of {root}, the tables as interpolated",
         ("material", *audit_page.QUESTIONS, *columns),
@@ -389,7 +375,13 @@ def _print(root: Path, audit_report: AuditReport, report_path: Path) -> None:
         for problem in a.problems():
             print(f"{a.material}: {problem}")
         if a.not_judged:
-            print(f"{a.material}: {_why(store, a.material)}; not judged: {', '.join(a.not_judged).lower()}")
+            metadata = store.metadata(a.material)
+            why = "its source cannot be evaluated"
+            if metadata.measured is not None:
+                why = "it is measured, and the table does not contain the data"
+            elif metadata.model is not None and metadata.model not in MODELS:
+                why = f"its model {metadata.model} is unknown; add it with --models FILE or $BRDFDB_MODELS"
+            print(f"{a.material}: {why}; not judged: {', '.join(a.not_judged).lower()}")
     for key, kind in FINDINGS.items():
         for sentence in kind.overview([a.findings[key] for a in audits]):
             print(sentence)

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from brdfdb.audit import FINDINGS, AuditReport, MaterialAudit
 from brdfdb.audit.energy import Energy
-from brdfdb.audit.finding import LAST, LEVELS, RANKS, Cell, Finding, NotJudged, NumberTable, Word
+from brdfdb.audit.finding import LAST, LEVELS, RANKS, Cell, NotJudged, NumberTable, Word
 from brdfdb.audit.report import AS_PUBLISHED, CONSERVES_ENERGY, NO_PAPER, Answer
 from brdfdb.audit.validity import Validity
 from brdfdb.figure import Figure
@@ -81,7 +81,11 @@ def render(report: AuditReport, plots: Mapping[str, list[DrawnPlot]] | None = No
     environment.filters |= {"level": LEVELS.__getitem__, "mark": _MARKS.__getitem__, "sentence": _sentence}
     environment.globals |= {"anchor": anchor, "key_of": key_of, "rank": RANKS.__getitem__}
     energy = {a.material: a.findings[Energy.key].verdict for a in report.materials}
-    rows = [Row(a, anchor(a.material), answers_of(a), cells_of(a), _tables(a)) for a in report.materials]
+    tables = {
+        a.material: [table for finding in a.findings.values() for table in finding.tables() if table.rows]
+        for a in report.materials
+    }
+    rows = [Row(a, anchor(a.material), answers_of(a), cells_of(a), tables[a.material]) for a in report.materials]
     rows.sort(key=lambda row: (RANKS[row.audit.verdict], RANKS[energy[row.audit.material]], row.audit.material))
     if plots is None:
         subjects: list[MaterialAudit | Figure] = [*report.materials, *report.atlas, *report.gallery]
@@ -122,17 +126,11 @@ def answers_of(a: MaterialAudit) -> list[Answer]:
 
 def cells_of(a: MaterialAudit) -> list[Cell]:
     """Return the cells of all findings on a material, in the order of `columns`."""
-    return [cell for key, finding in a.findings.items() for cell in _cells(FINDINGS[key], finding)]
-
-
-def _cells(kind: type[Finding], finding: Finding) -> list[Cell]:
-    if isinstance(finding, NotJudged):
-        return [Cell(finding.verdict, "–", LAST)] * len(kind.columns)
-    return finding.cells()
-
-
-def _tables(a: MaterialAudit) -> list[NumberTable]:
-    return [table for finding in a.findings.values() for table in finding.tables() if table.rows]
+    cells: list[Cell] = []
+    for key, finding in a.findings.items():
+        judged = not isinstance(finding, NotJudged)
+        cells += finding.cells() if judged else [Cell(finding.verdict, "–", LAST)] * len(FINDINGS[key].columns)
+    return cells
 
 
 def _sentence(text: str) -> str:

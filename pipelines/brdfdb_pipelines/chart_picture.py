@@ -326,12 +326,15 @@ def _labelled(axes: Axes, labels: Sequence[_PointLabel]) -> None:
         taken.append(TextBox.at(point, best, width))
         chosen.append(best)
     for index, (label, point, best) in enumerate(zip(labels, at, chosen, strict=True)):
-        text, number, width = label.least, len(at) + index, label.width(label.full)
+        text = label.least
+        number = len(at) + index
+        width = label.width(label.full)
         others = [*taken[:number], *taken[number + 1 :]]
         near = [offset for offset in offsets(width) if abs(offset.y) <= _NEAR]
         free = [offset for offset in near if TextBox.at(point, offset, width).hidden(others, frame) == 0.0]
         if free:
-            text, best = label.full, free[0]
+            text = label.full
+            best = free[0]
             taken[number] = TextBox.at(point, best, width)
         width = label.width(text)
         side = min(max(-best.x / width, 0.0), 1.0)  # side of the text that is next to its point: left, middle or right
@@ -460,7 +463,8 @@ def _panel(axes: Axes, chart: Chart, panel: _CostPanel, *, named: bool) -> None:
         rungs = [(costs[key][1], _height_of(points[key].l1)) for key in chart.ladder]
         axes.plot(*zip(*rungs, strict=True), color=TRUTH, linestyle=(0, (4, 2)), linewidth=1.0, zorder=1.5)
     for key, point in points.items():
-        mark, y = _MARKS[point.kind], _height_of(point.l1)
+        mark = _MARKS[point.kind]
+        y = _height_of(point.l1)
         first, centre, last = costs[key]
         line: dict[str, Any] = {"color": mark.colour, "zorder": 2, "clip_on": False}
         axes.plot([centre, centre], [y, max(y, point.p99)], linewidth=0.7, alpha=0.55, **line)
@@ -536,7 +540,8 @@ def _sweep(
     members = along(family, axis)
     used: Counter[str] = Counter()
     for curve in family.curves:
-        mark, values = _MARKS[curve.kind], errors(curve)
+        mark = _MARKS[curve.kind]
+        values = errors(curve)
         rows = [[v for index in alike if (v := values[index]) is not None] for alike in members]
         drawn = [index for index, row in enumerate(rows) if row]
         at = [x[index] for index in drawn]
@@ -620,7 +625,8 @@ def apart(wanted: Sequence[float], least: float, most: float) -> list[float]:
     """Return increasing heights, moved as little as possible to be `least` apart and between 0 and `most`."""
     blocks: list[tuple[float, int]] = []  # names that touch: position of the first, and their number
     for index, height in enumerate(wanted):
-        start, number = height - least * index, 1
+        start = height - least * index
+        number = 1
         while blocks and blocks[-1][0] > start:
             before, several = blocks.pop()
             start = (before * several + start * number) / (several + number)
@@ -639,7 +645,8 @@ def _family_costs(axes: Axes, family: FamilyChart) -> None:
         forms.append((family.between, [family.between.l1]))
     _cost_axes(axes, [t for form, _ in forms for t in (form.batch.low, form.batch.high)], [_HIGHEST / 2.0])
     for number, (form, values) in enumerate(forms, 1):
-        mark, ns = _MARKS[form.kind], form.batch.ns
+        mark = _MARKS[form.kind]
+        ns = form.batch.ns
         heights = [_height_of(value) for value in values if value is not None]
         y = float(np.median(heights))
         bold = any(form.key in front for front in family.fronts)

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.benchmarks import explorer, recording
+from tests.benchmarks import recording
 from tests.benchmarks.recording import Record, Table
 
 FOLDER = Path(__file__).parent
@@ -29,7 +29,6 @@ SCRIPTS = sorted({path.stem for path in FOLDER.glob("*.py")} - HELPERS)
 SIGNED = {"difference"}  # columns whose numbers may be negative
 
 needs = {
-    "explorer": pytest.mark.skipif(explorer.program() is None, reason="no Chromium is installed"),
     "against_cpp": pytest.mark.skipif(shutil.which("g++") is None, reason="g++ is not installed"),
     "mitsuba_microfacet": pytest.mark.skipif(find_spec("mitsuba") is None, reason="mitsuba is not installed"),
     "mitsuba_plugins": pytest.mark.skipif(
