@@ -1,4 +1,4 @@
-"""Published fits: parameters that others fitted to measured materials, read from text, and judged."""
+"""Published fits: parameters that others fitted to measured materials, read from text and checked."""
 
 from __future__ import annotations
 
@@ -37,8 +37,8 @@ _NAMED = Path(__file__).with_name("published.toml")
 class PublishedLobe(DocumentPart):
     """One term of a published fit."""
 
-    name: str = Field(description="as the file names it")
-    numbers: dict[str, list[float]] = Field(description="its numbers; three are those of R, G and B")
+    name: str = Field(description="name in the file")
+    numbers: dict[str, list[float]] = Field(description="its parameters; three values are those of R, G and B")
 
 
 class PublishedFit(DocumentPart):
@@ -47,9 +47,9 @@ class PublishedFit(DocumentPart):
     name: str
     line: int = Field(description="line of the file")
     terms: list[PublishedLobe]
-    model: str | None = Field(description="the model of the registry with the same formula; null: none, or not known")
+    model: str | None = Field(description="the model of the registry with the same formula; null: no model is known")
     albedo: FitAlbedo | None = Field(description="the largest directional albedo, of R, G or B; null: without a model")
-    flags: list[str] = Field(description="sentences on what is no physics")
+    flags: list[str] = Field(description="sentences on contradictions to physics")
 
 
 class PublishedFits(DocumentPart):
@@ -58,7 +58,7 @@ class PublishedFits(DocumentPart):
     name: str
     comment: str = Field(description="the lines that the file begins with")
     fits: list[PublishedFit]
-    sentences: list[str] = Field(description="what is not known of the conventions of the file")
+    sentences: list[str] = Field(description="conventions of the file that are not known")
 
 
 @cache
@@ -68,7 +68,7 @@ def _named() -> dict[str, dict[str, Any]]:
 
 
 def read_published(path: str | os.PathLike[str]) -> PublishedFits:
-    """Return the fits of a text with a line for each material, and what is no physics in them.
+    """Return the fits of a text with a line for each material, and their contradictions to physics.
 
     A line is ``NAME = Aggregate(Lambertian(albedo = [R, G, B]), LOBE(albedo = [R, G, B], roughness = NUMBER))``, or one
     lobe alone. Lines that begin with # are comments. A scale above 1, a refractive index below 1, a number outside the
@@ -88,7 +88,7 @@ def read_published(path: str | os.PathLike[str]) -> PublishedFits:
     try:
         lines = path.read_text(encoding="utf-8").splitlines()
     except UnicodeDecodeError:
-        raise FileFormatError(f"{path}: it is no text in UTF-8") from None
+        raise FileFormatError(f"{path}: it is not UTF-8 text") from None
     comments = [line.lstrip("# ") for line in lines if line.startswith("#")]
     fits = [
         _fit(path, number, line)
@@ -99,7 +99,7 @@ def read_published(path: str | os.PathLike[str]) -> PublishedFits:
         raise FileFormatError(f"{path}: it has no line of the form NAME = LOBE(NUMBER = ...)")
     names = {term.name for one in fits for term in one.terms} - {_FLAT}
     sentences = [
-        f"{name}: no model of the registry is taken for it, because {_named()[name]['unsure']}."
+        f"{name}: no model of the registry is used for it, because {_named()[name]['unsure']}."
         for name in sorted(names)
         if "unsure" in _named().get(name, {})
     ]

@@ -313,19 +313,20 @@ class SearchedSurface:
             spec = term.spec
             if spec.anisotropic is not None and not turned:
                 raise NotDescribedError(
-                    "model", f"{spec.name} changes when the surface is turned, and the light is in one azimuth alone"
+                    "model",
+                    f"{spec.name} changes when the surface is turned, and the light comes from one azimuth only",
                 )
             if self.channels > 1 and len(self.terms) == 1 and any(p.reflectance for p in term.free):
                 raise NotDescribedError(
                     "model",
-                    f"{spec.name}: f_r is no polynomial in its reflectances, so that spectra of them are not searched; "
+                    f"{spec.name}: f_r is not a polynomial in its reflectances, so spectra of them cannot be fitted; "
                     "choose one channel",
                 )
         if self.searched_index and self.channels > 1:
             raise NotDescribedError(
                 "model",
-                f"{self.name} takes n and k, which are searched at one wavelength alone, and there are {self.channels} "
-                "channels; give a refractive index, or choose one channel",
+                f"{self.name} needs n and k, which can be fitted at one wavelength only, and the samples have "
+                f"{self.channels} channels; give a refractive index, or choose one channel",
             )
 
     @property
@@ -472,7 +473,7 @@ def _parsed(name: str) -> list[str]:
         match = re.fullmatch(r"\s*(?:(\d+)\s+)?([\w-]+)\s*", part)
         if match is None:
             raise ParameterError(
-                "model", f"{name!r} is no model and no sum of models, such as 'A + 2 B'", name, tuple(MODELS)
+                "model", f"{name!r} is neither a model nor a sum of models such as 'A + 2 B'", name, tuple(MODELS)
             )
         model = match[2]
         if model not in MODELS:

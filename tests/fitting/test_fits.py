@@ -12,6 +12,7 @@ from brdfdb.errors import ParameterError
 from brdfdb.fitting.estimates import estimates_of
 from brdfdb.fitting.fit import fit, fits
 from brdfdb.fitting.problem import Problem
+from brdfdb.fitting.remarks import ONE_AZIMUTH
 from brdfdb.fitting.residuals import Residual
 from brdfdb.fitting.surface import NotDescribedError, SearchedSurface, fitted_by_default
 from brdfdb.fitting.uncertainty import NORMAL_95, _root
@@ -22,10 +23,6 @@ from brdfdb.models import MODELS
 
 NOISE = 0.03
 ROUNDING = 1e-9  # measured: 4e-13, of the polynomials of all models
-ONE_AZIMUTH = (
-    "The light comes from one azimuth of the surface: whether the surface is anisotropic cannot be told, and models "
-    "with two widths are fitted with one."
-)
 GRADIENT = 1e-4  # measured: 8e-6, of differences of the cost with a step of 1e-5
 
 Array = NDArray[np.float64]
@@ -376,9 +373,9 @@ def test_what_cannot_be_fitted_is_refused_in_a_sentence() -> None:
     made = samples(noisy(truth("ward", **WARD)))
     with pytest.raises(ParameterError, match="'wrad' is unknown; closest: ward"):
         fit(made, "wrad")
-    with pytest.raises(ParameterError, match="no model and no sum"):
+    with pytest.raises(ParameterError, match="neither a model nor a sum"):
         fit(made, "ward + ")
-    with pytest.raises(NotDescribedError, match="one azimuth alone"):
+    with pytest.raises(NotDescribedError, match="one azimuth only"):
         fit(made, "oren_nayar_unidirectional")
     with pytest.raises(ParameterError, match="has no uncertainties"):
         fit(made, "ward", residual="uncertainty")

@@ -317,7 +317,7 @@ def test_published_fits_are_listed_and_become_a_recipe(tmp_path: Path, capsys: C
         r"physics: the scale of NganHe is 9, .*\n.* physics: the refractive index of NganHe is 0.9", printed
     )
     assert re.search(r"  1 of 2 .* physics; 1 are models of the registry \(ward\)", printed)
-    assert "  note  NganHe: no model of the registry is taken for it" in printed
+    assert "  note  NganHe: no model of the registry is used for it" in printed
     assert [len(one["flags"]) for one in json.loads(out.read_text(encoding="utf-8"))["fits"]] == [0, 2]
     assert "the recipe has channel" not in printed
     assert [job.material.name for job in recipe_file.load(recipe).jobs()] == ["tile-1-tiles-r"]
