@@ -44,6 +44,7 @@ LOOKUPS = (
 )
 NAMES = ("white", "copper", "shade-001", "shade-002")
 QUICK_COUNT = 2
+SEED = 20261122  # of files and bits
 MEASURED = "Bits flipped one at a time in the files of a store: every command must refuse or answer as before."
 _ROUNDS = 6  # of verify and the repairs that it names
 
@@ -196,10 +197,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     bench = Run("bitflips", "accuracy", "Flipped bits in a store", MEASURED)
     parser = bench.parser(__doc__)
     parser.add_argument("--count", type=int, default=300, metavar="N", help="flips (default: %(default)s)")
-    parser.add_argument("--seed", type=int, default=20261122, metavar="N", help="of files and bits")
     options = bench.parse(parser, arguments)
     with tempfile.TemporaryDirectory() as folder:
-        result = flips(QUICK_COUNT if options.quick else options.count, options.seed, Path(folder))
+        result = flips(QUICK_COUNT if options.quick else options.count, SEED, Path(folder))
     table = bench.table("Flips by the kind of file", Column(name="file", width=20), "flips", "named and repaired")
     for name, count in sorted(result.kinds.items()):
         table.add(name, count, result.repaired[name])
