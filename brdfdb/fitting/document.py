@@ -42,7 +42,7 @@ class Correlation(DocumentPart):
 
 
 class HeldOutIncidences(DocumentPart):
-    """Prediction of samples that the fit did not see: one group of incidences after the other is left out."""
+    """Prediction of samples at incidences that were left out of the fit, one group after the other."""
 
     theta_i_deg: list[list[float]] = Field(description="polar angles of the light of each group")
     rms_ln: list[float] = Field(description="root mean square of ln(model / sample) of each group")

@@ -148,7 +148,7 @@ def _indices(fitted: FittedSurface) -> list[Estimate]:
 
 
 def correlations_of(fitted: FittedSurface) -> list[Correlation]:
-    """Return the pairs of numbers with a correlation near 1 or -1, with a sentence on what the samples measure."""
+    """Return the pairs of numbers with a correlation near 1 or -1, with a sentence on what is measured."""
     surface, covariance = fitted.surface, fitted.covariance
     shapes = len(surface.shape)
     single = len(fitted.samples.channels) == 1

@@ -44,7 +44,7 @@ def figure_of(document: Fits, fitted: FittedSurface) -> Figure:
         paper="",
         title=f"{fitted.surface.name}, fitted to {document.name}",
         caption=f"f_r{of} in the plane of incidence, mirror side positive: the fit as a line, samples as dots. Mean of "
-        f"ln(model / sample){of} at the viewers of each light; 0 where the fit has what was measured.",
+        f"ln(model / sample){of} at the viewers of each light; 0 where the fit equals the sample.",
         panels=[*cuts, *maps],
         statements=[],
     )

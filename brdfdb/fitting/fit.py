@@ -143,7 +143,7 @@ def _searched(samples: Samples, surface: SearchedSurface, residual: Kind, hidden
 
 
 def _hidden(fitted: FittedSurface) -> Mask:
-    """Return the samples at which the specular part of a fit counts, where the aperture is not known, shape (N,)."""
+    """Return the samples (N,) at which a specular part is too large to ignore and the aperture is not known."""
     view = fitted.view
     near = (view.from_mirror < _NEAR_MIRROR) & (view.w_r[:, 2] > 0.0)
     if view.half_angle or not near.any() or all(term.spec.specular is None for term in fitted.surface.terms):
@@ -284,7 +284,7 @@ def _searches(
             skipped |= dict.fromkeys(tried[number:], INTERRUPTED)
             break
     if not searches:
-        raise ParameterError("model", f"none can describe {samples.name}: {next(iter(skipped.values()))}")
+        raise ParameterError("model", f"no model can describe {samples.name}: {next(iter(skipped.values()))}")
     if models is None:
         slow = "its values are integrals, which take minutes; name it to fit it"
         skipped |= {name: slow for name in MODELS if name not in tried}
@@ -293,7 +293,7 @@ def _searches(
 
 
 def _check_reach(searches: Sequence[FittedSurface]) -> None:
-    """Raise ParameterError if f_r of the samples is beyond what any of the models can have."""
+    """Raise ParameterError if f_r of the samples is larger than that of every model."""
     for one in searches:
         logs = one.logarithms[np.isfinite(one.logarithms)]
         if not logs.size or np.percentile(logs, 100.0 - _NEARLY_ALL) > np.log(_REACHED):

@@ -264,7 +264,7 @@ class Problem:
         return self.at(best.x[self.free], best.values)
 
     def _brightest_and_others(self, most: int) -> NDArray[np.int64]:
-        """Return some of the samples: half of them the brightest, half of them any."""
+        """Return rows of samples: half of them are the brightest, the others are random."""
         count = len(self.view)
         if count <= most:
             return np.arange(count)

@@ -141,7 +141,7 @@ def recipe_of(published: PublishedFits, channel: str = "G", tolerance: float = 0
         parts[name] = toml_of(name, table)
     if not parts:
         raise ParameterError(
-            "recipe", f"no fit of {published.name} is a model of the registry without a flag", published.name
+            "recipe", f"every fit of {published.name} is flagged or is not a model of the registry", published.name
         )
     listed = ", ".join(f'"{name}"' for name in parts)
     return f"materials = [{listed}]\ntolerance = {tolerance:g}\n\n" + "\n".join(parts.values())
@@ -201,7 +201,7 @@ def _numbers(name: str, word: ast.keyword) -> list[float]:
 
 
 def _model(terms: list[PublishedLobe]) -> str | None:
-    """Return the model of the registry that some terms are, or None."""
+    """Return the model of the registry with the formula of the terms, or None."""
     lobes = [term for term in terms if term.name != _FLAT]
     if not lobes:
         return flat_model() if len(terms) == 1 else None
@@ -212,7 +212,7 @@ def _model(terms: list[PublishedLobe]) -> str | None:
 
 
 def _parameters(terms: list[PublishedLobe], channel: int) -> dict[str, float]:
-    """Return the parameters of the model of some terms in a channel, as recipes write them."""
+    """Return the parameters of the model of the terms in a channel, as recipes write them."""
     model = _model(terms)
     assert model is not None
 

@@ -14,9 +14,9 @@ from brdfdb.measurements import Samples
 from brdfdb.measurements.aperture import RESOLVED
 
 NARROW = 0.05  # width of a lobe, in slopes, below which usual apertures change it
-PATTERN = 0.5  # correlation of neighbouring residuals from which on the rest is a pattern
-UNEVEN = 3.0  # ratio of relative uncertainties, at the ends of the middle 90 %, from which on weights matter
-LEFT_OUT = 0.01  # share of values that are not positive, from which on it matters that they are left out
+PATTERN = 0.5  # larger correlations of neighbouring residuals are a pattern
+UNEVEN = 3.0  # largest ratio of relative uncertainties, at the ends of the middle 90 %, without a remark
+LEFT_OUT = 0.01  # largest share of values that are not positive without a remark
 _SAME_AZIMUTH = 0.01  # degrees
 ONE_AZIMUTH = (
     "The light comes from one azimuth of the surface, so anisotropy cannot be determined, and models with two widths "

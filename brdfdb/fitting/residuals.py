@@ -15,10 +15,10 @@ Kind = Literal["log", "relative", "cosine", "uncertainty"]
 KINDS: tuple[Kind, ...] = ("log", "relative", "cosine", "uncertainty")
 
 _LEAST = 1e-6  # share of the smallest sample that is added to both sides before logarithms: the model may be 0
-_NOTHING = 1e-12  # the same of the largest, for samples that fall beneath what any instrument resolves
+_NOTHING = 1e-12  # the same share of the largest sample, for samples below the resolution of any instrument
 CREDIBLE = 0.01  # share of the median uncertainty, absolute and relative, below which an uncertainty is a mistake
 _LEAST_F_R = 1e-100  # squares of derivatives of logarithms of less than that are too large for numbers
-_HORIZON_COSINE = 1e-4  # directions closer to the horizon are left out: models are 0 there
+_HORIZON_COSINE = 1e-4  # smaller cosines are at the horizon, where models are 0, and are left out
 
 
 class Residual:

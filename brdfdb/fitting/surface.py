@@ -72,7 +72,7 @@ def _is_amplitude(parameter: Parameter) -> bool:
 
 
 def _is_linear(spec: ModelSpec, names: list[str]) -> bool:
-    """Return True if f_r is linear in some parameters together."""
+    """Return True if f_r is linear in the named parameters together."""
     u = spread(_PROBES, 3)
     wi = unit_vector(_STEEPEST * u[:, 0], np.zeros(_PROBES))
     wr = unit_vector(_STEEPEST * u[:, 1], 2.0 * np.pi * u[:, 2])
@@ -124,7 +124,7 @@ class Polynomial:
 
 
 class NotDescribedError(ParameterError):
-    """A model that cannot describe some samples; str() says why."""
+    """Error: a model cannot describe the samples; str() has the reason."""
 
 
 class Coefficient(NamedTuple):

@@ -102,7 +102,7 @@ def _statement(statement: Statement) -> str:
 
 
 def source_of(draw: Callable[[], Figure], key: str) -> tuple[ModuleType, str]:
-    """Return the module of a figure and the source of what draws it: a function, or a row of the table `FIGURES`."""
+    """Return the module of a figure and the source that draws it: a function, or a row of the table `FIGURES`."""
     function: Any = draw.func if isinstance(draw, functools.partial) else draw
     if "<locals>" not in function.__qualname__:
         module = inspect.getmodule(function)

@@ -103,7 +103,7 @@ def _write(stem: Path, document: Charts, drawn: Chart | FamilyChart) -> None:
 
 
 def _subjects(names: Sequence[str], root: Path | None, recipe_path: Path | None) -> list[_Subject | _Family]:
-    """Return what each name means, in the recipe first, and then in the store."""
+    """Return the subject of each name; names in the recipe precede those in the store."""
     recipe = recipe_file.load(recipe_path, to_build=False)
     listed = recipe.jobs()
     jobs = {job.material.name: job for job in listed}
@@ -176,7 +176,7 @@ def _with_table(subject: _Subject, table: Table | None) -> _Subject:
 
 
 def _trust(measured: Measured) -> str:
-    """Return how far measured data are to be trusted, in a sentence; empty if nothing is known."""
+    """Return a sentence on the error of measured data; empty if it is not known."""
     held = measured.held_out
     if held is not None:
         return f" The data are within {terminal.error(held.p95)} of 95 % of the samples left out of the interpolation."
@@ -256,7 +256,7 @@ def _print_family(family: FamilyChart) -> None:
 
 
 def _where(family: FamilyChart, members: Sequence[int]) -> str:
-    """Return the part of a family that some members lie in, in words."""
+    """Return the ranges of the parameters of members in words."""
     points = list(itertools.product(*family.axes.values()))
     spans = []
     for number, axis in enumerate(family.axes):

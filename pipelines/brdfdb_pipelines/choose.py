@@ -52,7 +52,7 @@ TIMED = 20_000  # pairs of directions of a material for timing, drawn from those
 SEED = 1992
 ROUNDS = 7  # rounds of timing
 FINER = 2  # width, relative to the picture, of the finer picture with one checked place per pixel
-EDGES = 4000  # places near edges where forms are compared, and as many others where choices are checked
+EDGES = 4000  # places near edges at which forms are compared; choices are checked at as many other places
 
 TIMES = 2.0  # end of the colour bar, relative to the tolerance
 BEYOND = "#e5341a"  # colour of larger differences
@@ -194,7 +194,7 @@ def _run(
 def _checks(
     scene: Scene, view: CameraView, offered: Mapping[str, Sequence[OfferedForm]], materials: Mapping[str, Reflector]
 ) -> _Checks:
-    """Return the places of a scene: those of the picture, and for each check others. A recorded scene has no others."""
+    """Return the places of the picture, and a function of new places for each check; a recorded scene has none."""
     truths = {key: forms[0] for key, forms in offered.items()}
     picture = Seen(scene, view, truths, materials)
     if isinstance(scene.objects[0].shape, Recorded):
@@ -264,7 +264,7 @@ def _draw(
 
 def _print(choice: SceneChoice, built: Mapping[str, PublishedChoice]) -> None:
     """Print the choices as a table, their reasons, and the tables that were published."""
-    numbers = ("alone", "together", "largest", "ns", "bytes", "share of the truth")
+    numbers = ("error alone", "error together", "largest error", "ns", "bytes", "share of the truth")
     rows = [
         (
             one.material,

@@ -143,7 +143,7 @@ def sheet(papers: Mapping[str, Sequence[BaseTable]], spheres: Mapping[str, Array
 
 
 def colour_known(table: BaseTable) -> str:
-    """Return words for a table whose colour is not known: grey, with its wavelengths; empty for a colour.
+    """Return words for a table without a colour: grey, with its wavelengths; empty for a table with a colour.
 
     A table so dark that its sphere is black has the bound of its albedo in place of "grey".
     """

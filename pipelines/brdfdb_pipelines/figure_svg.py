@@ -87,7 +87,7 @@ class _Axis(NamedTuple):
     log: bool
 
     def at(self, values: Floats) -> Floats:
-        """Return the positions of values; what has no logarithm lies far before the beginning."""
+        """Return the positions of values; values without a logarithm are far before the beginning."""
         low, high = self.limits
         if self.log:
             low, high = math.log(low), math.log(high)
@@ -157,7 +157,7 @@ def _polar(panel: Panel, key: str) -> str:
     box = _box(panel.title, panel.curves, _POLAR_HEIGHT, _POLAR_BELOW)
     box = box._replace(left=6.0, right=WIDTH - 6.0)
     rings = rings_of(max((y for curve in panel.curves for y in curve.y if y is not None), default=0.0))
-    radius = min((box.right - box.left) / 2.2, (box.bottom - box.top) / 1.18)  # what is beside and below has labels
+    radius = min((box.right - box.left) / 2.2, (box.bottom - box.top) / 1.18)  # labels need the space beside and below
     x = box.middle
     y = box.top + 1.1 * radius
     arcs, labels = "", ""

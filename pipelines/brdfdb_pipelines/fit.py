@@ -207,7 +207,7 @@ def lines(document: Fits) -> list[str]:
         )
     text.append("  held out, all: rms of ln(model / sample) at the incidences left out of the fit, and at all")
     if document.shared_outlier_count:
-        text.append(f"  both without {counted(document.shared_outlier_count, 'value')} far from every fit")
+        text.append(f"  both are without {counted(document.shared_outlier_count, 'value')} far from every fit")
     text += [
         f"  not fitted: {reason if reason.startswith(name) else f'{name}, {reason}'}"
         for name, reason in document.skipped.items()
@@ -281,7 +281,7 @@ def list_published(
 
 
 def lines_of_published(listed: PublishedFits) -> list[str]:
-    """Return a line for each material, the counts, and what the file does not state."""
+    """Return a line for each material, the counts, and notes on missing conventions of the file."""
     names = list(dict.fromkeys(term.name for one in listed.fits for term in one.terms))
     unphysical = [one for one in listed.fits if one.flags]
     ours = [one for one in listed.fits if one.model is not None]
