@@ -116,11 +116,6 @@ def _bounded_albedo(theta_i: float, *, alpha_x: float, **_: float) -> Any:
     return total
 
 
-def _rms_slope(*, alpha_x: float, alpha_y: float) -> Any:
-    """Return the root mean square [1] of the slope along x."""
-    return mp.mpf(alpha_x) / mp.sqrt(2) + 0 * alpha_y
-
-
 def _shader_forms() -> list[ComparedForm]:
     """Return eq. 5a, eq. 5b in its place, and eq. 5a by the cosine of the half vector."""
     return [
@@ -269,7 +264,12 @@ def _delta(u1: float, u2: float, *, alpha_x: float, alpha_y: float) -> Any:
 
 def _weight(u1: float, u2: float, wi: Any, *, rho_s: float, alpha_x: float, alpha_y: float) -> Any:
     """Return f_r cos(theta_r) / pdf [1] of the direction that eq. 7 draws."""
-    (x, y, z), (h_x, h_y) = (mp.mpf(component) for component in wi), _slopes(u1, u2, alpha_x, alpha_y)
+    x, y, z = (mp.mpf(component) for component in wi)
+    # Slopes of the half vector
+    size = mp.sqrt(-mp.log(u1))
+    turn = 2 * mp.pi * mp.mpf(u2)
+    h_x = size * alpha_x * mp.cos(turn)
+    h_y = size * alpha_y * mp.sin(turn)
     # omega_r = 2 (h.i) h - i
     twice = 2 * (x * h_x + y * h_y + z) / (1 + h_x**2 + h_y**2)
     r = twice * h_x - x, twice * h_y - y, twice - z
@@ -283,13 +283,6 @@ def _angles(x: Any, y: Any, z: Any) -> tuple[Any, Any]:
     return mp.atan2(mp.hypot(x, y), z), mp.atan2(y, x)
 
 
-def _slopes(u1: float, u2: float, alpha_x: float, alpha_y: float) -> tuple[Any, Any]:
-    """Return the slopes [1] of the half vector along x and y that eq. 7 draws."""
-    size = mp.sqrt(-mp.log(u1))
-    turn = 2 * mp.pi * mp.mpf(u2)
-    return size * alpha_x * mp.cos(turn), size * alpha_y * mp.sin(turn)
-
-
 FIGURES: dict[str, Callable[[], Figure]] = dict(
     (
         ("lobe-that-loses-light", lobe_that_loses_light),
@@ -300,7 +293,7 @@ FIGURES: dict[str, Callable[[], Figure]] = dict(
                 np.logspace(-3.0, 0.0, 19),
                 "alpha",
                 lambda alpha: {"alpha_x": alpha, "alpha_y": alpha},
-                _rms_slope,
+                lambda *, alpha_x, alpha_y: mp.mpf(alpha_x) / mp.sqrt(2) + 0 * alpha_y,
                 log_x=True,
             ),
             caption="Root mean square of the slope along x of samples of the lobe. Truth: alpha_x / sqrt(2), the "

@@ -500,7 +500,7 @@ def _family(family: FamilyChart) -> Canvas:
         family.title,
         f"{subtitle} Large: worth having there. Times are those of one member.",
     )
-    tails = _LEFT + _MEAN + _NAMES
+    tails_left = _LEFT + _MEAN + _NAMES
     for number, axis in enumerate(family.axes):
         top = _FAMILY_ABOVE + number * _FAMILY_ROW
         mean = sheet.axes(_LEFT, top, _MEAN)
@@ -511,15 +511,28 @@ def _family(family: FamilyChart) -> Canvas:
             _headed(mean, "mean error")
         else:
             _diagnostic(mean, family.axes[axis], family.diagnostic)
-        high = sheet.axes(tails, top, _TAIL)
+        high = sheet.axes(tails_left, top, _TAIL)
         _sweep(high, family, axis, lambda curve: curve.p99, None if family.between is None else family.between.p99)
         _headed(high, "99th percentile")
         high.tick_params(labelleft=False)
-    left = tails + _TAIL + 2.0 * _GAP
+    left = tails_left + _TAIL + 2.0 * _GAP
     _family_costs(sheet.axes(left, _FAMILY_ABOVE, _WIDTH - _RIGHT - left), family)
     bar = Line2D([], [], color=MUTED, linewidth=3.0, alpha=0.3, label="from the least to the most of the members")
     sheet.legend({form.kind for form in forms}, [bar], bottom)
-    sheet.table(_FAMILY_COLUMNS, _FAMILY_HEADS, [_family_row(family, form) for form in forms], bottom + _BELOW)
+    rows = []
+    for form in forms:
+        times = terminal.count(form.batch.ns), terminal.count(form.single.ns)
+        if isinstance(form, BetweenMembers):
+            rows.append(_Row(form, ("", percent(form.l1), "", "", percent(form.p99), *times, ""), False))
+            continue
+        means, tails = ([v for v in values if v is not None] for values in (form.l1, form.p99))
+        errors = (percent(min(means)), percent(float(np.median(means))), percent(max(means)))
+        close = sum(v <= CLOSE for v in means)
+        fronts = sum(form.key in front for front in family.fronts)
+        within, worth = (f"{number} of {len(family.members)}" if number else "" for number in (close, fronts))
+        cells = (*errors, within, percent(float(np.median(tails))), *times, worth)
+        rows.append(_Row(form, cells, fronts > 0))
+    sheet.table(_FAMILY_COLUMNS, _FAMILY_HEADS, rows, bottom + _BELOW)
     return sheet.canvas
 
 
@@ -659,15 +672,3 @@ def _family_costs(axes: Axes, family: FamilyChart) -> None:
     axes.set_xlabel("ns a value, many directions at once")
     _headed(axes, "mean error over cost")
     axes.tick_params(labelleft=False)
-
-
-def _family_row(family: FamilyChart, form: FamilyCurve | BetweenMembers) -> _Row:
-    times = terminal.count(form.batch.ns), terminal.count(form.single.ns)
-    if isinstance(form, BetweenMembers):
-        return _Row(form, ("", percent(form.l1), "", "", percent(form.p99), *times, ""), False)
-    means, tails = ([v for v in values if v is not None] for values in (form.l1, form.p99))
-    errors = (percent(min(means)), percent(float(np.median(means))), percent(max(means)))
-    close = sum(v <= CLOSE for v in means)
-    fronts = sum(form.key in front for front in family.fronts)
-    within, worth = (f"{number} of {len(family.members)}" if number else "" for number in (close, fronts))
-    return _Row(form, (*errors, within, percent(float(np.median(tails))), *times, worth), fronts > 0)
