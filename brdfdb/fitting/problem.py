@@ -212,7 +212,12 @@ class Problem:
             columns = self.shape_jacobian(point)
             inner, _ = self.coefficient_jacobian(point)
             weights = 1.0 / np.sqrt(1.0 + (point.residuals / self.scale) ** 2)
-            columns -= _undone(columns, inner, weights)
+            if len(inner):  # less the part that lies in the span of the coefficients, channel by channel
+                of_channels = inner.transpose(2, 0, 1)
+                weighted = of_channels * weights.T[:, np.newaxis, :]
+                normal = weighted @ of_channels.transpose(0, 2, 1)
+                solved = np.linalg.pinv(normal, rcond=1e-12, hermitian=True) @ (weighted @ columns.transpose(2, 1, 0))
+                columns -= (solved.transpose(0, 2, 1) @ of_channels).transpose(1, 2, 0)
             return np.asarray(columns[:, self.residual.used].T)
 
         end = least_squares(
@@ -272,17 +277,6 @@ class Problem:
         order = np.argsort(-brightness, kind="stable")
         others = np.random.default_rng(0).permutation(order[most // 2 :])[: most // 2]
         return np.sort(np.concatenate([order[: most // 2], others]))
-
-
-def _undone(columns: Floats, inner: Floats, weights: Floats) -> Floats:
-    """Return the part (S, N, C) of columns that lies in the span of the inner ones (K, N, C), channel by channel."""
-    if not len(inner):
-        return np.zeros_like(columns)
-    of_channels = inner.transpose(2, 0, 1)
-    weighted = of_channels * weights.T[:, np.newaxis, :]
-    normal = weighted @ of_channels.transpose(0, 2, 1)
-    solved = np.linalg.pinv(normal, rcond=1e-12, hermitian=True) @ (weighted @ columns.transpose(2, 1, 0))
-    return np.asarray((solved.transpose(0, 2, 1) @ of_channels).transpose(1, 2, 0))
 
 
 def _cost_of(residuals: Floats, scale: float) -> Floats:

@@ -156,7 +156,7 @@ class Term:
         if beside_flat and spec.uniform is not None and spec.lobe is not None:
             self.fixed[spec.uniform] = 0.0
             names = tuple(name for name in names if name != spec.uniform)
-        bright = not names or _is_bright(spec, names, self.fixed)
+        bright = not names or self._is_bright(names)
         self.scaled = bright and not alone
         self.linear = () if self.scaled else names
         self.polynomial = (
@@ -166,6 +166,15 @@ class Term:
         self.tied = None if turned else spec.lobe_axes
         out = {*self.fixed, *self.linear, *(self.tied or ())[1:]}
         self.free = [p for p in spec.parameters if p.name not in out]
+
+    def _is_bright(self, names: tuple[str, ...]) -> bool:
+        """Return True if the model reflects light where its reflectances are 0, as facets do at grazing angles."""
+        middle = {p.name: 0.5 * (p.low + min(p.high, 1.0)) for p in self.spec.parameters}
+        index = {"wavelength_nm": ASSUMED_NM, "n": 1.5, "k": 0.0} if self.spec.spectral else {}
+        given = middle | self.fixed | dict.fromkeys(names, 0.0) | index
+        wi = unit_vector(np.full(3, 1.2), np.zeros(3))
+        wr = unit_vector(np.array([0.1, 0.7, 1.2]), np.full(3, np.pi))
+        return bool(np.any(self.spec.vectors(wi, wr, **given) > 0.0))
 
     def coefficients(self, number: int) -> list[Coefficient]:
         """Return the coefficients of this term, whose number is given."""
@@ -240,15 +249,6 @@ class Term:
         return np.asarray(
             self.spec.specular(view.theta_i, **{name: given[name] for name in self.spec.specular_parameters})
         )
-
-
-def _is_bright(spec: ModelSpec, names: tuple[str, ...], fixed: Mapping[str, float]) -> bool:
-    """Return True if the model reflects something where its reflectances are 0, as facets do at grazing."""
-    middle = {p.name: 0.5 * (p.low + min(p.high, 1.0)) for p in spec.parameters}
-    index = {"wavelength_nm": ASSUMED_NM, "n": 1.5, "k": 0.0} if spec.spectral else {}
-    wi = unit_vector(np.full(3, 1.2), np.zeros(3))
-    wr = unit_vector(np.array([0.1, 0.7, 1.2]), np.full(3, np.pi))
-    return bool(np.any(spec.vectors(wi, wr, **(middle | dict(fixed) | dict.fromkeys(names, 0.0) | index)) > 0.0))
 
 
 class SearchedSurface:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from itertools import groupby
 from typing import NamedTuple
 
 from brdfdb.audit import FINDINGS, AuditReport, MaterialAudit
@@ -90,6 +89,9 @@ def render(report: AuditReport, plots: Mapping[str, list[DrawnPlot]] | None = No
     if plots is None:
         subjects: list[MaterialAudit | Figure] = [*report.materials, *report.atlas, *report.gallery]
         plots = {key_of(subject): plots_of(subject) for subject in subjects}
+    papers: dict[str, list[Figure]] = {}  # in the order of their first figures
+    for figure in report.gallery:
+        papers.setdefault(PAPERS.get(figure.paper, figure.paper), []).append(figure)
     return environment.get_template("page.html").render(
         report=report,
         plots=plots,
@@ -99,7 +101,7 @@ def render(report: AuditReport, plots: Mapping[str, list[DrawnPlot]] | None = No
         remarked=remarked(report),
         columns=columns(),
         counts=[(word, sum(verdict == word for verdict in energy.values())) for word in _COUNTED],
-        gallery=_by_paper(report.gallery),
+        gallery=list(papers.items()),
     )
 
 
@@ -136,10 +138,3 @@ def cells_of(a: MaterialAudit) -> list[Cell]:
 def _sentence(text: str) -> str:
     """Return a text with a capital and a full stop."""
     return f"{text[:1].upper()}{text[1:].removesuffix('.')}." if text else ""
-
-
-def _by_paper(figures: list[Figure]) -> list[tuple[str, list[Figure]]]:
-    """Return figures grouped by paper, papers in the order of their first figures."""
-    order = list(dict.fromkeys(figure.paper for figure in figures))
-    grouped = groupby(sorted(figures, key=lambda figure: order.index(figure.paper)), key=lambda figure: figure.paper)
-    return [(PAPERS.get(paper, paper), list(group)) for paper, group in grouped]
