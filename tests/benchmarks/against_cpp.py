@@ -45,7 +45,7 @@ SEED = 1994
 AGREEMENT = {"float64": (1.0, 1e-8), "float32": (0.99, 1e-3)}
 TINY = 1e-30
 ROWS = 2  # of theta_i at a time, as brdfdb.tables.tabulation cuts a grid of this size
-MEASURED = "Million values of f_r a second on one core: our models beside the same arithmetic in C++."
+MEASURED = "Million values of f_r per second on one core: our models, and the same arithmetic in C++."
 
 
 class Size(NamedTuple):

@@ -24,7 +24,7 @@ from tests.benchmarks.sound_materials import materials
 SAMPLES = 2000  # of each sampler: what is planted is in the tables
 COUNT, SEED = 200, 15  # of random sound materials
 QUICK, QUICK_COUNT = ("clay times 1.05", "every statistic a tenth"), 2
-MEASURED = "The audit of tables with one thing wrong each, which it must name, and of sound tables, which it must pass."
+MEASURED = "Audits of tables with one error each, which must be reported, and of correct tables, which must pass."
 
 
 def planted(run: Run, names: Sequence[str]) -> int:

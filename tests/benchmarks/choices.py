@@ -38,8 +38,8 @@ material = "rolled-brass"
 shape = { kind = "sphere", radius = 1 }
 """
 MEASURED = (
-    "The cheapest form of each material that a scene cannot tell from the exact form, its errors in CIEDE2000, and its "
-    "cost as a share of the exact form's."
+    "The cheapest form of each material that the picture of a scene cannot distinguish from the exact form, its "
+    "errors in CIEDE2000, and its cost as a share of the cost of the exact form."
 )
 
 

@@ -24,7 +24,7 @@ SURFACES: tuple[tuple[str, dict[str, float]], ...] = (
     *((name, GREY) for name in ("oren_nayar", "oren_nayar_qualitative")),
     *(("he_torrance", {**COPPER, "sigma_0_um": sigma_0, "tau_um": 5.0 * sigma_0}) for sigma_0 in (0.02, 0.2, 2.0)),
 )
-MEASURED = "Unit vectors spread over both hemispheres, on one core: f_r alone, and f_r with its derivatives."
+MEASURED = "f_r alone, and f_r with its derivatives, at random unit vectors on one core."
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

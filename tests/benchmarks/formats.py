@@ -28,9 +28,10 @@ from tests.benchmarks.recording import Column, Run
 from tests.formats.round_trip import ROUND_TRIPPED, round_trip
 
 MEASURED = (
-    "Size of the files of a table, the error that they state against it, and the time to write and read them, for each "
-    "format and kind of material, at a tolerance of 2 %. The first row is that of the tables, against their models. "
-    "Sizes are compared where a file is within the tolerance: the table is to the model, the file to the table."
+    "Size of the files of a table, the error that they state against it, and the time to write and read them, for "
+    "each format and kind of material, at a tolerance of 2 %. The first row is that of the tables, against their "
+    "models. Sizes are compared for files within the tolerance of their table, which is within the same tolerance of "
+    "its model."
 )
 OWN = "brdfdb"
 ROUNDING = 1.02  # of what is read to what is stated: formats keep float32 or decimals

@@ -29,7 +29,7 @@ from tests.benchmarks.recording import Column, Run, times_of
 REPEATS = 9
 DIRECTIONS, QUICK_DIRECTIONS = 1_000_000, 2000
 STREAMED = 1 << 26  # bytes of an array that no cache holds
-MEASURED = "The directions that one core looks up in a second in tables in memory, and scipy's interpolator beside it."
+MEASURED = "Directions that one core looks up per second in tables in memory, compared with the interpolator of scipy."
 Case = tuple[str, Table, Any, str]
 RNG = np.random.default_rng(1992)
 

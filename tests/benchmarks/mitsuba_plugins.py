@@ -40,7 +40,9 @@ PASSES = 128  # samples of a pixel
 TABLES = ("white-ceramic-tile", "rolled-brass", "clay-vase", "magnesium-oxide-ceramic", "ivory-computer-plastic")
 TOLERANCE = 0.01
 TIMED = (*SUBJECTS[::2], SUBJECTS[-2])  # a surface of most forms; He-Torrance is rough, and smooth as the last one
-MEASURED = "BSDF plugins of Mitsuba 3 against brdfdb.models, their samplers, and their speed beside roughconductor."
+MEASURED = (
+    "BSDF plugins of Mitsuba 3 compared with brdfdb.models: values, samplers, and speed relative to roughconductor."
+)
 
 Array = NDArray[Any]
 
