@@ -94,10 +94,7 @@ GOLD = DEFINED.replace("mine", "gold-satin")
         ('library = 3\nmaterials = ["*"]', "library: 3 is not a text"),
         ('materials = ["gold-satin"]', "materials: 'gold-satin' is in the library metals; for its materials, write "),
         ('library = "metals"\nmaterials = ["foam"]', "materials: 'foam' is in the library papers; for its materials, "),
-        (
-            'library = "metals"\nmaterials = ["gold-stain"]',
-            "materials: 'gold-stain' matches no material; closest: ",
-        ),
+        ('library = "metals"\nmaterials = ["gold-stain"]', "materials: 'gold-stain' matches no material; closest: "),
         (f'library = "metals"\nmaterials = ["*"]\n{GOLD}', "define.gold-satin: is the name of a preset"),
     ],
 )
