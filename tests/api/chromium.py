@@ -17,7 +17,8 @@ from typing import Any, Self
 import numpy as np
 from matplotlib.image import imread
 
-SECONDS = 300.0  # for anything, on a machine that has a hundred other things to do
+from tests.api.connections import WAIT_S
+
 FLAGS = [
     *("--headless", "--no-sandbox", "--no-first-run", "--hide-scrollbars", "--remote-debugging-pipe"),
     *("--disable-gpu", "--force-color-profile=srgb"),  # no page has WebGL, and pictures are cheaper without OpenGL
@@ -106,7 +107,7 @@ class Chromium:
 
     def until(self, script: str) -> Any:
         """The value of an expression as soon as it is one that counts as true."""
-        deadline = time.monotonic() + SECONDS
+        deadline = time.monotonic() + WAIT_S
         while not (found := self.evaluate(script)):
             assert time.monotonic() < deadline, f"never true: {script}; {self.errors}"
             time.sleep(0.02)
@@ -135,7 +136,7 @@ class Chromium:
         return np.asarray(imread(io.BytesIO(shot)))[..., :3].mean(axis=-1)
 
     def _next(self, waiting_for: str) -> dict[str, Any]:
-        deadline = time.monotonic() + SECONDS
+        deadline = time.monotonic() + WAIT_S
         while b"\0" not in self._buffer:
             ready, _, _ = select.select([self._read], [], [], max(0.0, deadline - time.monotonic()))
             assert ready, f"the browser does not answer {waiting_for}"

@@ -45,6 +45,14 @@ def own(root: Path, tmp_path: Path) -> Path:
     return Path(shutil.copytree(root, tmp_path / "store"))
 
 
+@pytest.fixture(scope="module")
+def grey_store(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Directory of a store with one material, `grey`, which the tests of a file may change."""
+    directory = tmp_path_factory.mktemp("grey") / "store"
+    publish(directory, "grey", "lambert", rho=0.25)
+    return directory
+
+
 @pytest.fixture
 def client(root: Path) -> Client:
     return client_of(root, max_points=1000, max_body_bytes=100_000)

@@ -14,7 +14,7 @@ import brdfdb
 from brdfdb.errors import StoreError, UnknownRevisionError
 from brdfdb.store.reader import Store
 from tests.api.a_store import pinned_of, publish, serving
-from tests.api.chromium import SECONDS
+from tests.api.connections import WAIT_S
 from tests.api.proxies import free_port, nginx
 
 # What is kept, and for how long, is what the service says
@@ -53,7 +53,7 @@ def _served(root: Path, upstream: int) -> Iterator[None]:
 
 
 def _state(proxy: str, path: str) -> str:
-    return httpx.get(f"{proxy}{path}", timeout=SECONDS).headers["x-cache"]
+    return httpx.get(f"{proxy}{path}", timeout=WAIT_S).headers["x-cache"]
 
 
 def test_the_cache_keeps_what_has_a_digest_and_asks_for_the_rest(
@@ -80,7 +80,7 @@ def test_lookups_are_those_of_the_store_that_is_served(proxy: str, upstream: int
                 assert table.lookup(*one_point) == pytest.approx(float(here.lookup(*one_point)), rel=1e-12)
                 np.testing.assert_allclose(table.lookup(*ANGLES), here.lookup(*ANGLES), rtol=1e-12)
                 assert dict(table.attrs) == {key: value for key, value in here.attrs.items() if key != "request"}
-            answer = httpx.get(f"{proxy}/v1/materials/tile/revisions/r000001/{LOOKUP}", timeout=SECONDS).json()
+            answer = httpx.get(f"{proxy}/v1/materials/tile/revisions/r000001/{LOOKUP}", timeout=WAIT_S).json()
             expected = here.lookup(*np.deg2rad([10.0, 0.0, 20.0, 0.0]))
             assert answer["brdf"] == pytest.approx(float(expected), rel=1e-12)
     with _served(stores[1], upstream):  # the table of the store before: what the cache has, or no answer

@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from brdfdb.materials import Material
-from tests.api.chromium import SECONDS, Chromium, copied, curve, frame, labels, milliseconds, shown
+from tests.api.chromium import Chromium, copied, curve, frame, labels, milliseconds, shown
+from tests.api.connections import WAIT_S
 
 SLIDER = "document.querySelector('#parameters [name={name}]')"
 
@@ -37,10 +38,10 @@ def test_a_slider_changes_the_picture_to_that_of_the_model(chromium: Chromium, a
     assert not np.array_equal(before, curve(chromium, 0))
     link = unquote(chromium.until("location.hash.includes('rho_d') && location.hash"))
     value = float(link.split("rho_d=")[1].split(")")[0])
-    known = httpx.get(f"{address}v1/materials/rolled-brass", timeout=SECONDS).json()
+    known = httpx.get(f"{address}v1/materials/rolled-brass", timeout=WAIT_S).json()
     parameters = {each["name"]: each["value"] for each in known["parameters"]}
     body = {"parameters": parameters | {"rho_d": value}}
-    answer = httpx.post(f"{address}v1/models/ward/lobe?view=cut&theta_i=45&phi_i=0", json=body, timeout=SECONDS).json()
+    answer = httpx.post(f"{address}v1/models/ward/lobe?view=cut&theta_i=45&phi_i=0", json=body, timeout=WAIT_S).json()
     theta, f_r = np.array(answer["axes_deg"]["theta_r"]), np.array(answer["brdf"])
     kept = np.abs(theta) <= 89.0
     _, top, _, height, low, high = frame(chromium)
@@ -70,7 +71,7 @@ def test_a_link_restores_parameters_and_a_button_those_that_were_published(chrom
 
 
 def test_n_and_k_are_numbers_at_the_wavelength_of_the_picture(chromium: Chromium, address: str) -> None:
-    known = httpx.get(f"{address}v1/materials/scene-copper-sphere", timeout=SECONDS).json()
+    known = httpx.get(f"{address}v1/materials/scene-copper-sphere", timeout=WAIT_S).json()
     for link, nm in (("", 540), ("&nm=640", 640)):
         opened(chromium, f"{address}#material=scene-copper-sphere&view=cut{link}")
         for name in "nk":
@@ -83,7 +84,7 @@ def test_n_and_k_are_numbers_at_the_wavelength_of_the_picture(chromium: Chromium
 
 def test_marks_are_published_values_and_set_them(chromium: Chromium, address: str) -> None:
     opened(chromium, f"{address}#material=rolled-brass&view=cut")
-    model = httpx.get(f"{address}v1/models/ward", timeout=SECONDS).json()
+    model = httpx.get(f"{address}v1/models/ward", timeout=WAIT_S).json()
     published = {each["value"] for each in model["parameters"][0]["published"]}
     marks = "[...document.querySelectorAll('#parameters [data-key=rho_d]')]"
     assert {float(value) for value in chromium.evaluate(f"{marks}.map(each => each.dataset.value)")} == published
@@ -100,7 +101,7 @@ def test_a_recipe_of_moved_parameters_is_one(chromium: Chromium, address: str) -
     recipe = tomllib.loads(chromium.until("document.querySelector('#copied textarea').value"))
     (name,) = recipe["materials"]
     material = Material.from_table(name, recipe["define"][name])
-    known = httpx.get(f"{address}v1/materials/scene-copper-sphere", timeout=SECONDS).json()
+    known = httpx.get(f"{address}v1/materials/scene-copper-sphere", timeout=WAIT_S).json()
     k = known["k"][known["wavelength_nm"].index(540.0)]  # what does not move stays as it was in green
     assert (material.model, material.refractive_index) == ("he_torrance", f"constant/1.5/{k:.4g}")
     assert material.parameters == {"sigma_0_um": 0.05, "tau_um": 1.2, "a": 0.0}
@@ -112,7 +113,7 @@ def test_any_model_can_be_begun_with_and_drawn_in_every_view(chromium: Chromium,
     chromium.open(address)
     shown(chromium)
     names = chromium.until("models.options.length > 9 && [...models.options].slice(1).map(each => each.value)")
-    known = [model["name"] for model in httpx.get(f"{address}v1/models", timeout=SECONDS).json()["models"]]
+    known = [model["name"] for model in httpx.get(f"{address}v1/models", timeout=WAIT_S).json()["models"]]
     assert names == [f"*{name}()" for name in known]
     chromium.evaluate("models.value = '*ward()'; models.dispatchEvent(new Event('change'))")
     shown(chromium, "material=*ward()")

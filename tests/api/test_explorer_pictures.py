@@ -16,7 +16,8 @@ from brdfdb.materials import presets
 from brdfdb.measurements import MeasuredSource
 from brdfdb.store.publication import publish
 from tests.api.a_store import serving
-from tests.api.chromium import SECONDS, Chromium, box, curve, frame, image, labels, shown
+from tests.api.chromium import Chromium, box, curve, frame, image, labels, shown
+from tests.api.connections import WAIT_S
 from tests.measurements.made_up import scans
 
 # What a view has drawn once it is there
@@ -129,7 +130,7 @@ def test_a_table_is_off_by_what_its_stated_error_means(chromium: Chromium, addre
     shown(chromium, "nm=500")
     table = brdfdb.open(explored)["scene-copper-sphere"]
     lobe = f"{address}v1/materials/scene-copper-sphere/lobe?view=half-difference&wavelength_nm=500"
-    answers = [httpx.get(lobe + of, timeout=SECONDS).json()["brdf"] for of in ("&from=table", "&from=model")]
+    answers = [httpx.get(lobe + of, timeout=WAIT_S).json()["brdf"] for of in ("&from=table", "&from=model")]
     tabulated, model = np.array(answers)
     floor = table.error.floor[list(table.wavelength_nm).index(500.0)]
     assert model.min() < floor < model.max()

@@ -19,7 +19,7 @@ from brdfdb.store import snapshots
 from brdfdb.store.reader import Store
 from brdfdb.store.revisions import collect, rollback
 from tests.api.a_store import Client, client_of, pinned_of, publish, serving
-from tests.api.chromium import SECONDS
+from tests.api.connections import WAIT_S
 
 FOIL = "/v1/materials/copper-foil"
 STORED = "/v1/store/materials/copper-foil/r000001"
@@ -149,7 +149,7 @@ def test_a_zip_of_a_revision_is_kept_for_good(own: Path) -> None:
 def test_xarray_reads_over_http(root: Path, store: Store) -> None:
     pytest.importorskip("aiohttp")
     with serving(root) as url:
-        stored = httpx.get(f"{url}{FOIL}", timeout=SECONDS).json()["links"]["store"]
+        stored = httpx.get(f"{url}{FOIL}", timeout=WAIT_S).json()["links"]["store"]
         assert stored == f"/v1/store/materials/copper-foil/{pinned_of(store, 'copper-foil')}"
         with xr.open_zarr(f"{url}{stored}") as found, xr.open_zarr(store.path("copper-foil")) as expected:
             assert found.load().identical(expected.load())

@@ -2,7 +2,7 @@
 
 import { Problem, json } from "./api.js";
 
-/** @typedef {import("./state.js").State} State */
+/** @typedef {import("./link.js").State} State */
 /** @typedef {import("./series.js").Series} Series */
 /** @typedef {import("./main.js").View} View */
 

@@ -2,10 +2,10 @@
 
 import { byId, element } from "./dom.js";
 import { anisotropic, makesColour, nearest } from "./series.js";
-import { CHOICES, ILLUMINANTS, MODEL } from "./state.js";
+import { CHOICES, ILLUMINANTS, MODEL } from "./link.js";
 import { VIEWS } from "./views.js";
 
-/** @typedef {import("./state.js").State} State */
+/** @typedef {import("./link.js").State} State */
 /** @typedef {import("./series.js").Series} Series */
 
 const form = byId("controls", HTMLFormElement),

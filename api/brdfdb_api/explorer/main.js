@@ -8,16 +8,16 @@ import * as copy from "./copy.js";
 import { byId, element } from "./dom.js";
 import * as facts from "./facts.js";
 import * as list from "./list.js";
-import { after, opened } from "./page.js";
+import { after, opened } from "./reducer.js";
 import * as parameters from "./parameters.js";
 import { seriesOf } from "./series.js";
-import { fromHash, subjectOf, toHash } from "./state.js";
+import { fromHash, subjectOf, toHash } from "./link.js";
 import { VIEWS } from "./views.js";
 
-/** @typedef {import("./state.js").State} State */
+/** @typedef {import("./link.js").State} State */
 /** @typedef {import("./series.js").Series} Series */
 /** @typedef {import("./api.js").Question} Question */
-/** @typedef {import("./page.js").PageEvent} PageEvent */
+/** @typedef {import("./reducer.js").PageEvent} PageEvent */
 /** @typedef {(part: Partial<State>) => void} Choose */
 /** @typedef {{
  *   name: string, title: string, order: number,

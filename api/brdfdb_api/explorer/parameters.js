@@ -4,9 +4,9 @@ import { address, json } from "./api.js";
 import { copyText } from "./copy.js";
 import { byId, closest, element, short } from "./dom.js";
 import { check } from "./list.js";
-import { PICTURE_NM, changedText, subjectOf } from "./state.js";
+import { PICTURE_NM, changedText, subjectOf } from "./link.js";
 
-/** @typedef {import("./state.js").State} State */
+/** @typedef {import("./link.js").State} State */
 /** @typedef {import("./series.js").Series} Series */
 /** @typedef {{ name: string, unit: string, low: number, high: number, meaning: string, default: number | boolean |
  *   null,

@@ -4,7 +4,7 @@ import { steps } from "./chart.js";
 import { closest, element, percent, short } from "./dom.js";
 import { makesColour, nearest } from "./series.js";
 
-/** @typedef {import("./state.js").State} State */
+/** @typedef {import("./link.js").State} State */
 /** @typedef {import("./series.js").Series} Series */
 
 const [APART, SHORT] = [0.13, 5]; // share of a colour bar between its marks of so many letters

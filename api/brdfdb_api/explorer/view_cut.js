@@ -5,7 +5,7 @@ import { closest, degrees, element, ink, path, percent, short, svg } from "./dom
 import { RELATIVE, floorOf, relative, scaled, shortOfHorizon, span, specularWords, ticks } from "./scales.js";
 import { against, channelsOf, lobe, quantityWords } from "./series.js";
 
-/** @typedef {import("./state.js").State} State */
+/** @typedef {import("./link.js").State} State */
 /** @typedef {import("./series.js").Series} Series */
 /** @typedef {import("./chart.js").Curve} Curve */
 

@@ -5,7 +5,7 @@ import { element, ink, short } from "./dom.js";
 import { colourBar, mapped, scaled, span, specularWords, ticks } from "./scales.js";
 import { anisotropic, azimuth, lobe, number, quantity, quantityWords, question } from "./series.js";
 
-/** @typedef {import("./state.js").State} State */
+/** @typedef {import("./link.js").State} State */
 /** @typedef {import("./series.js").Series} Series */
 /** @typedef {[number, number, number]} Vector */
 /** @typedef {{ corners: number[], colour?: string, ink?: string, width?: number, depth?: number }} Piece corners are

@@ -5,7 +5,7 @@ import { ink, short } from "./dom.js";
 import { scaled, ticks } from "./scales.js";
 import { azimuth, question } from "./series.js";
 
-/** @typedef {import("./state.js").State} State */
+/** @typedef {import("./link.js").State} State */
 /** @typedef {import("./series.js").Series} Series */
 
 const LEAST_DECADES = 0.2; // of the logarithmic axis of a spectrum: a factor of 1.6

@@ -6,7 +6,7 @@ import { unseenWords } from "./scales.js";
 import { anisotropic, azimuth, quantity, question } from "./series.js";
 import { add, between, lightOf, lune, moments, surroundings } from "./sphere_scene.js";
 
-/** @typedef {import("./state.js").State} State */
+/** @typedef {import("./link.js").State} State */
 /** @typedef {import("./series.js").Series} Series */
 /** @typedef {{ viewers: number[], moments: Float64Array, specular: number[][] | null }} Around */
 

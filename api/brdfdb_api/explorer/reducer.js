@@ -1,8 +1,8 @@
 // The page as one value, and the only function that makes the next one of it.
 
-import { subjectOf } from "./state.js";
+import { subjectOf } from "./link.js";
 
-/** @typedef {import("./state.js").State} State */
+/** @typedef {import("./link.js").State} State */
 /** @typedef {import("./series.js").Series} Series */
 
 /** @typedef {{
