@@ -113,6 +113,30 @@ class Chromium:
             time.sleep(0.02)
         return found
 
+    def texts(self, selector: str) -> list[str]:
+        """The texts of all elements of a selector."""
+        elements = f"[...document.querySelectorAll({json.dumps(selector)})]"
+        return [str(each) for each in self.evaluate(f"{elements}.map(each => each.textContent)")]
+
+    def click(self, selector: str, number: int = 0) -> None:
+        """Click one of the elements of a selector; a negative number counts from the end."""
+        self.evaluate(f"[...document.querySelectorAll({json.dumps(selector)})].at({number}).click()")
+
+    def go(self, link: str) -> None:
+        """Change the link of the page."""
+        self.evaluate(f"location.hash = {json.dumps(link)}")
+
+    def choose(self, name: str, value: float | str) -> None:
+        """Set a control of the form, as a hand does."""
+        control = f"controls.elements.{name}"
+        event = "new Event('input', { bubbles: true })"
+        self.evaluate(f"{control}.value = {json.dumps(value)}; {control}.dispatchEvent({event})")
+
+    def drag(self, x: float, y: float, by: float = 0.0) -> None:
+        """Press the mouse at a point [pixel], move it to the right and release it."""
+        for kind, at in (("mousePressed", x), ("mouseMoved", x + by), ("mouseReleased", x + by)):
+            self.send("Input.dispatchMouseEvent", type=kind, x=at, y=y, button="left", buttons=1, clickCount=1)
+
     def press(self, *keys: str) -> None:
         """Press keys, one after the other."""
         for key in keys:
@@ -181,6 +205,11 @@ def curve(browser: Chromium, kind: str | int, view: str = "cut") -> np.ndarray:
     return np.array([point.split() for point in path[1:].split("L")], dtype=float)
 
 
+def idle(browser: Chromium, *conditions: str) -> Any:
+    """Wait until no picture is being drawn, and for further conditions; return the value of the last one."""
+    return browser.until(" && ".join(["picture.ariaBusy === 'false'", *conditions]))
+
+
 def labels(browser: Chromium) -> list[str]:
     """Labels of the curves of the cut."""
     found = browser.evaluate("[...document.querySelectorAll('#cut > svg path.curve')].map(each => each.dataset.label)")
@@ -212,6 +241,6 @@ def image(browser: Chromium, of: str) -> np.ndarray:
 
 
 def copied(browser: Chromium, kind: str) -> str:
-    browser.evaluate(f"document.querySelector('[data-copy={kind}]').click()")
+    browser.click(f"[data-copy={kind}]")
     browser.until("/Copied|Selected/.test(document.querySelector('#message').textContent)")
     return str(browser.evaluate("document.querySelector('#copied textarea').value"))

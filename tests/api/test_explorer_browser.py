@@ -14,7 +14,7 @@ import pytest
 
 import brdfdb
 from tests.api.a_store import serving
-from tests.api.chromium import Chromium, chosen, copied, curve, milliseconds, shown
+from tests.api.chromium import Chromium, chosen, copied, curve, idle, milliseconds, shown
 
 
 def test_the_first_view_is_a_list_three_pictures_and_what_is_known(chromium: Chromium, address: str) -> None:
@@ -29,7 +29,7 @@ def test_the_first_view_is_a_list_three_pictures_and_what_is_known(chromium: Chr
     assert len(curve(chromium, 0)) > 100
     places = "[...document.querySelectorAll('#stage > div:not([hidden])')].map(each => each.id)"
     assert chromium.evaluate(places) == ["cut", "hemisphere", "sphere"]
-    known = chromium.evaluate("document.querySelector('#facts').textContent")
+    (known,) = chromium.texts("#facts")
     for words in ("He et al. 1991", "sigma_0_um", "99 of 100", "Not audited at this revision", "r000001"):
         assert words in known
     origins = chromium.evaluate("performance.getEntriesByType('resource').map(each => new URL(each.name).origin)")
@@ -42,7 +42,7 @@ def test_keys_alone_search_choose_and_turn(chromium: Chromium, address: str) -> 
     shown(chromium, "material=foam")
     chromium.evaluate("document.querySelector('#search').focus()")
     chromium.type("COPPER fig")
-    assert chromium.evaluate("document.querySelector('#count').textContent") == "1 of 3 materials"
+    assert chromium.texts("#count") == ["1 of 3 materials"]
     chromium.press("Enter")
     shown(chromium, "material=scene-copper-sphere")
     assert chosen(chromium) == "scene-copper-sphere"
@@ -63,19 +63,19 @@ def test_keys_alone_search_choose_and_turn(chromium: Chromium, address: str) -> 
 def test_the_filters_leave_what_they_name(chromium: Chromium, address: str) -> None:
     chromium.open(address)
     shown(chromium)
-    chromium.evaluate("model.value = 'ward'; model.dispatchEvent(new Event('change'))")
-    visible = "[...document.querySelectorAll('#list li:not([hidden])')].map(each => each.dataset.name)"
-    assert chromium.evaluate(visible) == ["rolled-brass"]
-    assert chromium.evaluate("[...verdict.options].map(each => each.value)") == ["", "not audited", "violates"]
-    chromium.evaluate("verdict.value = 'not audited'; verdict.dispatchEvent(new Event('change'))")
-    assert chromium.evaluate(visible) == []
-    chromium.evaluate("model.value = ''; model.dispatchEvent(new Event('change'))")
-    assert chromium.evaluate(visible) == ["foam", "scene-copper-sphere"]
     papers = ["", "Oren and Nayar 1994", "Ward 1992", "He et al. 1991"]
     assert chromium.evaluate("[...paper.options].map(each => each.value)") == papers
-    chromium.evaluate("paper.value = 'He et al. 1991'; paper.dispatchEvent(new Event('change'))")
-    assert chromium.evaluate(visible) == ["scene-copper-sphere"]
-    assert chromium.evaluate("document.querySelector('#count').textContent") == "1 of 3 materials"
+    assert chromium.evaluate("[...verdict.options].map(each => each.value)") == ["", "not audited", "violates"]
+    for of, value, names in [
+        ("model", "ward", ["rolled-brass"]),
+        ("verdict", "not audited", []),
+        ("model", "", ["foam", "scene-copper-sphere"]),
+        ("paper", "He et al. 1991", ["scene-copper-sphere"]),
+    ]:
+        chromium.evaluate(f"{of}.value = '{value}'; {of}.dispatchEvent(new Event('change'))")
+        visible = "[...document.querySelectorAll('#list li:not([hidden])')].map(each => each.dataset.name)"
+        assert chromium.evaluate(visible) == names, (of, value)
+    assert chromium.texts("#count") == ["1 of 3 materials"]
 
 
 def test_a_slider_has_one_request_on_its_way_and_ends_where_it_rests(chromium: Chromium, address: str) -> None:
@@ -138,15 +138,13 @@ def test_what_is_asked_for_early_is_asked_for_once_and_thumbnails_wait(chromium:
     for link, name in (("", "scene-copper-sphere"), ("#material=foam&view=cut", "foam")):
         chromium.open(address + link)
         shown(chromium, f"material={name}")
-        chromium.until("picture.ariaBusy === 'false' && document.querySelector('#list img').src")
-        loaded = chromium.evaluate(
-            "performance.getEntriesByType('resource').map(({ name, startTime }) => [name, startTime])"
-        )
+        idle(chromium, "document.querySelector('#list img').src")
+        entries = "performance.getEntriesByType('resource')"
+        loaded = chromium.evaluate(f"{entries}.map(({{ name, startTime }}) => [name, startTime])")
         for path in ("v1/materials?limit=1000", f"v1/materials/{name}"):
             assert [each for each, _ in loaded].count(address + path) == 1
-        end = chromium.evaluate(
-            "(({ startTime, duration }) => startTime + duration)(performance.getEntriesByName('picture')[0])"
-        )
+        of_picture = "performance.getEntriesByName('picture')[0]"
+        end = chromium.evaluate(f"(({{ startTime, duration }}) => startTime + duration)({of_picture})")
         assert all(start >= end for each, start in loaded if "thumbnail" in each)
         assert chromium.errors == []
 
@@ -159,7 +157,7 @@ def test_a_picture_that_is_on_its_way_is_said_to_be(chromium: Chromium, address:
     chromium.evaluate(
         "(was => { fetch = async (...all) => { await new Promise(go => release = go); return was(...all); }; })(fetch)"
     )
-    chromium.evaluate("location.hash = 'material=foam&view=cut&theta_i=20'")
+    chromium.go("material=foam&view=cut&theta_i=20")
     chromium.until("caption.textContent === 'Loading …' && picture.ariaBusy === 'true'")
     chromium.until("release(), picture.ariaBusy === 'false'")
     assert chromium.evaluate("caption.textContent") == before
@@ -184,55 +182,40 @@ def test_a_link_restores_the_view_and_copies_ask_for_the_same(chromium: Chromium
     exec(copied(chromium, "python"), ran)
     assert ran["answer"].brdf == pytest.approx(brdfdb.open(explored)["rolled-brass"].lookup(*point), rel=1e-12)
     assert re.fullmatch(rf"curl '{address}v1/materials/rolled-brass/lookup\?[\w=&.]+'", copied(chromium, "curl"))
-    chromium.evaluate("location.hash = 'material=foam'")
+    chromium.go("material=foam")
     shown(chromium, "material=foam")
     assert chosen(chromium) == "foam"
     assert chromium.errors == []
 
 
 @pytest.mark.parametrize("view", ["cut", "hemisphere", "slice", "spectrum", "albedo", "sphere"])
-def test_a_copied_curl_runs_in_a_shell_and_answers_with_the_picture(
-    chromium: Chromium, address: str, explored: Path, view: str
-) -> None:
-    chromium.open(f"{address}#material=rolled-brass&view={view}&theta_i=30&phi_i=20")
-    shown(chromium, "theta_i=30")
-    ran = subprocess.run(["sh", "-c", copied(chromium, "curl")], capture_output=True, check=True)
-    answer = json.loads(ran.stdout)
-    light, at = np.deg2rad([30.0, 20.0]), brdfdb.open(explored)["rolled-brass"].lookup
-    axes, f_r = answer.get("axes_deg", {}), answer.get("brdf")
-    found, expected = {
-        "cut": lambda: (f_r[axes["theta_r"].index(60.0)], at(*light, *np.deg2rad([60.0, 200.0]))),
-        "hemisphere": lambda: (
-            f_r[axes["theta_r"].index(60.0)][axes["delta_phi"].index(180.0)],
-            at(*light, *np.deg2rad([60.0, 200.0])),
-        ),
-        "slice": lambda: (np.shape(f_r), (90, 90)),
-        "spectrum": lambda: (f_r, at(*light, *np.deg2rad([45.0, 200.0]))),
-        "albedo": lambda: (answer["theta_i"][0], 0.0),
-        "sphere": lambda: (f_r, at(*light, 0.0, 0.0)),
-    }[view]()
-    assert answer["material"] == "rolled-brass"
-    assert found == pytest.approx(expected, rel=1e-9)
-
-
-@pytest.mark.parametrize("view", ["cut", "hemisphere", "slice", "albedo", "sphere"])
-def test_copied_python_runs_and_looks_up_the_light_of_the_sliders(
+def test_copied_curl_and_python_run_and_answer_with_the_picture(
     chromium: Chromium, address: str, explored: Path, view: str
 ) -> None:
     chromium.open(f"{address}#material=rolled-brass&view={view}&theta_i=30&phi_i=20")
     shown(chromium, f"view={view}")
-    ran: dict[str, Any] = {}
-    exec(copied(chromium, "python"), ran)
-    sixty, at = np.deg2rad(60.0), brdfdb.open(explored)["rolled-brass"].lookup
-    light = np.deg2rad([30.0, 20.0])
-    found, expected = {
-        "cut": lambda of: (of[150], at(*light, sixty, np.deg2rad(200.0))),
-        "hemisphere": lambda of: (of[60, 100], at(*light, sixty, np.deg2rad(200.0))),
-        "slice": lambda of: (of.shape, (90, 90)),
-        "albedo": lambda of: (of["theta_i"][0], 0.0),
-        "sphere": lambda of: (of, at(*light, 0.0, 0.0)),
-    }[view](ran["answer"])
-    assert found == pytest.approx(expected, rel=1e-9)
+    ran = subprocess.run(["sh", "-c", copied(chromium, "curl")], capture_output=True, check=True)
+    answer = json.loads(ran.stdout)
+    python: dict[str, Any] = {}
+    exec(copied(chromium, "python"), python)
+    found = python["answer"]
+    assert answer["material"] == "rolled-brass"
+    if view == "albedo":
+        assert (answer["theta_i"][0], found["theta_i"][0]) == (0.0, 0.0)
+        return
+    axes, f_r = answer.get("axes_deg", {}), np.array(answer["brdf"])
+    if view == "slice":
+        assert (f_r.shape, found.shape) == ((90, 90), (90, 90))
+        return
+    viewer = {"spectrum": (45.0, 200.0), "sphere": (0.0, 0.0)}.get(view, (60.0, 200.0))
+    expected = brdfdb.open(explored)["rolled-brass"].lookup(*np.deg2rad([30.0, 20.0, *viewer]))
+    if "theta_r" in axes:
+        f_r = f_r[axes["theta_r"].index(60.0)]
+        found = found[150] if view == "cut" else found[60, 100]
+    if "delta_phi" in axes:
+        f_r = f_r[axes["delta_phi"].index(180.0)]
+    assert f_r == pytest.approx(expected, rel=1e-9)
+    assert getattr(found, "brdf", found) == pytest.approx(expected, rel=1e-9)
 
 
 def test_what_fails_is_said_in_the_page(chromium: Chromium, address: str) -> None:
@@ -244,7 +227,7 @@ def test_what_fails_is_said_in_the_page(chromium: Chromium, address: str) -> Non
     assert chromium.evaluate(resting) == [True, True, True]
     assert chromium.evaluate("message.getAttribute('role')") == "status"
     assert chromium.evaluate("[title.textContent, facts.textContent, picture.innerText.trim()]") == ["fome", "", ""]
-    chromium.evaluate("document.querySelector('#message a').click()")
+    chromium.click("#message a")
     shown(chromium, "material=foam")
     assert chromium.evaluate("message.textContent") == ""
     assert chromium.evaluate(resting) == [False, False, False]
@@ -255,8 +238,8 @@ def test_an_empty_store_is_said_to_be_one(chromium: Chromium, own: Path) -> None
         shutil.rmtree(material)
     with serving(own) as empty:
         chromium.open(empty)
-        said = chromium.until("document.querySelector('#message')?.textContent")
-        assert said == "There is nothing to look at in the store."
+        told = chromium.until("document.querySelector('#message')?.textContent")
+        assert told == "There is nothing to look at in the store."
         assert chromium.evaluate("[count.textContent, picture.innerText.trim()]") == ["0 materials", ""]
         assert chromium.evaluate("controls.inert")
         assert chromium.errors == []
@@ -287,13 +270,10 @@ def test_a_wrong_comparison_leaves_the_material(chromium: Chromium, address: str
     assert "brsas" in chromium.evaluate("message.textContent")
     assert len(curve(chromium, 0)) > 100
     assert chromium.until("controls.elements.compare.options.length > 3 && beside.children.length === 0")
-    chromium.evaluate("controls.elements.theta_i.value = 20")
-    chromium.evaluate("controls.elements.theta_i.dispatchEvent(new Event('input', { bubbles: true }))")
+    chromium.choose("theta_i", 20)
     shown(chromium, "theta_i=20")
     assert "brsas" in chromium.evaluate("message.textContent")
-    assert (
-        chromium.until("location.hash.includes('theta_i=20') && location.hash") == "#material=foam&view=cut&theta_i=20"
-    )
+    chromium.until("location.hash === '#material=foam&view=cut&theta_i=20'")
 
 
 @pytest.mark.parametrize(
@@ -312,14 +292,13 @@ def test_what_is_wrong_in_a_link_is_said_until_something_moves(
 ) -> None:
     chromium.open(f"{address}#material=rolled-brass{wrong}")
     shown(chromium)
-    assert chromium.until("picture.ariaBusy === 'false' && message.textContent") == said
+    assert idle(chromium, "message.textContent") == said
     assert chromium.evaluate("picture.dataset.shown") == f"#material=rolled-brass{kept}"
     assert chromium.evaluate("title.textContent") == "Rolled brass" + (", changed" if "(" in kept else "")
-    chromium.evaluate("controls.elements.phi_i.value = 20")
-    chromium.evaluate("controls.elements.phi_i.dispatchEvent(new Event('input', { bubbles: true }))")
+    chromium.choose("phi_i", 20)
     shown(chromium, "phi_i=20")
-    assert chromium.until("picture.ariaBusy === 'false' && message.textContent === ''")
-    chromium.evaluate("location.hash = 'material=foam&view=foo'")
+    assert idle(chromium, "message.textContent === ''")
+    chromium.go("material=foam&view=foo")
     shown(chromium, "material=foam")
     assert chromium.until("message.textContent").endswith("sphere, and not 'foo': together is shown.")
     assert chromium.errors == []
@@ -334,7 +313,7 @@ def test_a_refused_parameter_is_asked_for_once_and_can_be_moved_back(chromium: C
         chromium.evaluate("new Promise(go => setTimeout(go, 300))")
     assert len(chromium.errors) == 1
     assert chromium.until("!parameters.hidden && parameters.children.length > 0")
-    chromium.evaluate("document.querySelector('[data-action=reset]').click()")
+    chromium.click("[data-action=reset]")
     shown(chromium, "#material=scene-copper-sphere")
     assert chromium.evaluate("message.textContent") == ""
 
@@ -353,8 +332,7 @@ def test_keys_pass_over_names_to_compare_with_until_enter(chromium: Chromium, ad
     chromium.press("Enter")
     shown(chromium, "compare=foam")
     assert chromium.evaluate("[...beside.children].map(each => each.dataset.text)") == ["foam"]
-    chromium.evaluate("controls.elements.compare.value = ':model'")  # as a click in the open list does
-    chromium.evaluate("controls.elements.compare.dispatchEvent(new Event('input', { bubbles: true }))")
+    chromium.choose("compare", ":model")  # as a click in the open list does
     shown(chromium, "compare=foam&compare=:model")
     assert chromium.errors == []
 
@@ -374,7 +352,7 @@ def test_what_was_away_is_shown_when_it_is_back(chromium: Chromium, address: str
     head = explored / "materials" / "foam" / "HEAD.json"
     kept = head.rename(head.with_suffix(".away"))
     try:
-        chromium.evaluate("location.hash = 'material=foam&theta_i=20'")
+        chromium.go("material=foam&theta_i=20")
         assert "foam" in chromium.until("message.textContent")
         assert chromium.evaluate("cut.hidden")
     finally:
@@ -415,7 +393,7 @@ def test_texts_beside_the_picture_are_wide_enough_to_read(chromium: Chromium, ad
     assert all(each >= 8.0 for each in chromium.evaluate(BROKEN_LINES))
     assert chromium.evaluate("facts.scrollWidth <= facts.clientWidth")
     assert chromium.evaluate("document.documentElement.scrollWidth") <= width
-    chromium.send("Page.removeScriptToEvaluateOnNewDocument", identifier=script["identifier"])
+    chromium.send("Page.removeScriptToEvaluateOnNewDocument", **script)
 
 
 @pytest.mark.parametrize("width", [1280, 390])

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from brdfdb.materials import Material
-from tests.api.chromium import Chromium, copied, curve, frame, labels, milliseconds, shown
+from tests.api.chromium import Chromium, copied, curve, frame, idle, labels, milliseconds, shown
 from tests.api.connections import WAIT_S
 
 SLIDER = "document.querySelector('#parameters [name={name}]')"
@@ -26,7 +26,7 @@ def slide(browser: Chromium, name: str, share: float) -> None:
 def opened(browser: Chromium, link: str) -> None:
     browser.open(link)
     shown(browser)
-    browser.until("!parameters.hidden && parameters.children.length > 0 && picture.ariaBusy === 'false'")
+    idle(browser, "!parameters.hidden", "parameters.children.length > 0")
 
 
 def test_a_slider_changes_the_picture_to_that_of_the_model(chromium: Chromium, address: str) -> None:
@@ -62,9 +62,9 @@ def test_a_link_restores_parameters_and_a_button_those_that_were_published(chrom
         "alpha_y 0.16 width of the slopes along y",
     ]
     assert labels(chromium) == ["Rolled brass, alpha_x 0.3, rho_s 0.2", "Rolled brass"]
-    chromium.evaluate("document.querySelector('[data-action=keep]').click()")
+    chromium.click("[data-action=keep]")
     shown(chromium, "compare=rolled-brass&compare=rolled-brass(alpha_x=0.3,rho_s=0.2)")
-    chromium.evaluate("document.querySelector('[data-action=reset]').click()")
+    chromium.click("[data-action=reset]")
     shown(chromium, "#material=rolled-brass&")
     assert chromium.until(f"{said}[1].startsWith('rho_s 0.33 ')")
     assert chromium.errors == []
@@ -97,7 +97,7 @@ def test_marks_are_published_values_and_set_them(chromium: Chromium, address: st
 
 def test_a_recipe_of_moved_parameters_is_one(chromium: Chromium, address: str) -> None:
     opened(chromium, f"{address}#material=scene-copper-sphere(sigma_0_um=0.05,n=1.5)&view=cut")
-    chromium.evaluate("document.querySelector('[data-action=recipe]').click()")
+    chromium.click("[data-action=recipe]")
     recipe = tomllib.loads(chromium.until("document.querySelector('#copied textarea').value"))
     (name,) = recipe["materials"]
     material = Material.from_table(name, recipe["define"][name])
@@ -118,7 +118,7 @@ def test_any_model_can_be_begun_with_and_drawn_in_every_view(chromium: Chromium,
     chromium.evaluate("models.value = '*ward()'; models.dispatchEvent(new Event('change'))")
     shown(chromium, "material=*ward()")
     for view in ("cut", "hemisphere", "slice", "spectrum", "albedo", "sphere", "sphere&surround=studio"):
-        chromium.evaluate(f"location.hash = 'material=*ward(rho_d=0.4)&view={view}'")
+        chromium.go(f"material=*ward(rho_d=0.4)&view={view}")
         shown(chromium, f"view={view}")
         assert chromium.evaluate("message.textContent") == ""
     assert chromium.errors == []
@@ -130,9 +130,9 @@ def test_the_way_back_is_over_materials_and_not_over_parameters(chromium: Chromi
     start = chromium.evaluate("history.length")
     for share in (0.3, 0.5, 0.7):
         slide(chromium, "rho_s", share)
-        chromium.until("picture.ariaBusy === 'false' && picture.dataset.shown.includes('rho_s')")
+        idle(chromium, "picture.dataset.shown.includes('rho_s')")
     assert chromium.evaluate("history.length") == start
-    chromium.evaluate("document.querySelector('#m-foam').click()")
+    chromium.click("#m-foam")
     shown(chromium, "material=foam")
     chromium.evaluate("history.back()")
     shown(chromium, "rolled-brass(rho_s=")
@@ -148,7 +148,7 @@ def test_sliders_are_those_of_the_last_material_whichever_model_arrives_last(chr
         "}; })(fetch)"
     )
     for name in ("foam", "rolled-brass"):
-        chromium.evaluate(f"location.hash = 'material={name}&view=cut'")
+        chromium.go(f"material={name}&view=cut")
         shown(chromium, f"material={name}")
     chromium.evaluate("release(), new Promise(go => setTimeout(go, 500))")
     assert chromium.evaluate("[...parameters.querySelectorAll('input')].map(each => each.name)") == [

@@ -23,14 +23,6 @@ Response.prototype.clone = function () { return Object.assign(clone.call(this), 
 """  # who reads a copy of an answer gets it a second after those who read the answer; another second is `later`
 
 
-def move(browser: Chromium, name: str, value: float) -> None:
-    """Move a slider, as a hand does."""
-    browser.evaluate(
-        f"controls.elements.{name}.value = {value};"
-        f"controls.elements.{name}.dispatchEvent(new Event('input', {{ bubbles: true }}))"
-    )
-
-
 @pytest.mark.parametrize(
     ("view", "compare"), [("cut", ""), ("sphere", "white-tile"), ("albedo", "%3Amodel"), ("spectrum", "")]
 )
@@ -45,7 +37,7 @@ def test_facts_and_the_line_of_the_list_are_of_the_revision_of_the_picture(
         assert chromium.until(f"document.querySelector('#m-grey-felt') && {LINE}") == "energy: no: albedo 1.2 at 90°"
         assert "revision r000001" in chromium.evaluate("facts.textContent")
         publish(own, "grey-felt", "oren_nayar", rho=0.25, sigma_deg=40.0, error=True)
-        move(chromium, "theta_i", 20)
+        chromium.choose("theta_i", 20)
         shown(chromium, "theta_i=20")
         known = chromium.evaluate("facts.textContent")
         assert "revision r000002" in known
@@ -67,7 +59,7 @@ def test_facts_follow_a_store_that_is_built_anew_with_the_same_numbers(chromium:
         assert publish(anew, "grey-felt", "oren_nayar", rho=0.25, sigma_deg=41.0) == "r000001"
         shutil.rmtree(own / "materials" / "grey-felt")
         (anew / "materials" / "grey-felt").rename(own / "materials" / "grey-felt")
-        move(chromium, "theta_i", 20)
+        chromium.choose("theta_i", 20)
         shown(chromium, "theta_i=20")
         known = chromium.evaluate("facts.textContent")
         assert "revision r000001" in known
@@ -92,7 +84,7 @@ def test_facts_are_of_the_table_again_after_other_parameters(chromium: Chromium,
         chromium.open(f"{address}/#material=grey-felt(rho=0.3)")
         shown(chromium, "material=grey-felt(rho=0.3)")
         assert "parameters of your own" in chromium.evaluate("facts.textContent")
-        chromium.evaluate("location.hash = 'material=grey-felt'")
+        chromium.go("material=grey-felt")
         chromium.until("picture.dataset.shown === '#material=grey-felt'")
         assert "grey-felt, revision r000001" in chromium.evaluate("facts.textContent")
         assert chromium.errors == []
@@ -123,16 +115,16 @@ def test_the_way_back_is_over_materials_and_views_as_they_were_left(chromium: Ch
     shown(chromium, "material=foam")
     chromium.send("Page.resetNavigationHistory")  # full at fifty addresses, those of the tests before counted
     start = chromium.evaluate("history.length")
-    move(chromium, "theta_i", 20)  # not yet in the link when the next material is chosen
-    chromium.evaluate("document.querySelector('#m-rolled-brass').click()")
+    chromium.choose("theta_i", 20)  # not yet in the link when the next material is chosen
+    chromium.click("#m-rolled-brass")
     shown(chromium, "material=rolled-brass", "theta_i=20")
     for theta_i in (30, 40):
-        move(chromium, "theta_i", theta_i)
+        chromium.choose("theta_i", theta_i)
         shown(chromium, f"theta_i={theta_i}")
     chromium.until("location.hash.includes('theta_i=40')")
-    chromium.evaluate("document.querySelector('[value=sphere]').click()")
+    chromium.click("[value=sphere]")
     shown(chromium, "view=sphere")
-    chromium.evaluate("document.querySelector('#m-rolled-brass').click()")  # which is shown already
+    chromium.click("#m-rolled-brass")  # which is shown already
     assert chromium.evaluate("history.length") == start + 2
     sphere, cut, foam = (
         "#material=rolled-brass&view=sphere&theta_i=40",

@@ -16,7 +16,7 @@ from brdfdb.materials import presets
 from brdfdb.measurements import MeasuredSource
 from brdfdb.store.publication import publish
 from tests.api.a_store import serving
-from tests.api.chromium import Chromium, box, curve, frame, image, labels, shown
+from tests.api.chromium import Chromium, box, curve, frame, idle, image, labels, shown
 from tests.api.connections import WAIT_S
 from tests.measurements.made_up import scans
 
@@ -59,9 +59,7 @@ def test_the_pointer_reads_the_cut(chromium: Chromium, address: str, explored: P
     chromium.open(f"{address}#material=foam&view=cut&theta_i=30")
     shown(chromium, "material=foam")
     (x, y), _ = curve(chromium, "mirror")
-    left, top = chromium.evaluate(
-        "(({ left, top }) => [left, top])(document.querySelector('#cut svg').getBoundingClientRect())"
-    )
+    left, top, _, _ = box(chromium, "#cut svg")
     aside = 100.0 * np.tan(np.deg2rad(-40.0))
     chromium.send("Input.dispatchMouseEvent", type="mouseMoved", x=left + x + aside, y=top + y - 100.0)
     value = brdfdb.open(explored)["foam"].lookup(*np.deg2rad([30.0, 0.0, 40.0, 0.0]))
@@ -71,15 +69,14 @@ def test_the_pointer_reads_the_cut(chromium: Chromium, address: str, explored: P
 def test_any_number_of_series_lie_over_one_another(chromium: Chromium, address: str) -> None:
     chromium.open(f"{address}#material=scene-copper-sphere&view=cut")
     shown(chromium)
-    change = "; controls.elements.compare.dispatchEvent(new Event('input', { bubbles: true }))"
     chromium.until("controls.elements.compare.options.length > 3")
-    chromium.evaluate("controls.elements.compare.value = ':model'" + change)
+    chromium.choose("compare", ":model")
     shown(chromium, "compare=:model")
     assert len(curve(chromium, 0)) == len(curve(chromium, 1)) == len(curve(chromium, "off"))
     said = r"able − model, relative to the model, or to the floor .* is larger: \d.* % at most"
     assert re.search(said, chromium.evaluate("caption.textContent"))
     for name in ("foam", "rolled-brass"):
-        chromium.evaluate(f"controls.elements.compare.value = '{name}'" + change)
+        chromium.choose("compare", name)
         shown(chromium, f"compare={name}")
     assert chromium.evaluate("document.querySelectorAll('#cut > svg path.curve').length") == 4
     paths = "[...document.querySelectorAll('#cut > svg path.curve')]"
@@ -87,8 +84,8 @@ def test_any_number_of_series_lie_over_one_another(chromium: Chromium, address: 
     assert len(set(chromium.evaluate(strokes))) == 4
     assert "Foam" in chromium.evaluate("document.querySelector('#cut .legend').textContent")
     assert chromium.evaluate("document.querySelector('#cut path.off')") is None
-    chromium.evaluate("document.querySelectorAll('#beside button')[1].click()")
-    chromium.until("picture.ariaBusy === 'false' && !picture.dataset.shown.includes('foam')")
+    chromium.click("#beside button", 1)
+    idle(chromium, "!picture.dataset.shown.includes('foam')")
     assert "compare=:model&compare=rolled-brass" in chromium.evaluate("picture.dataset.shown")
     assert chromium.errors == []
 
@@ -153,8 +150,7 @@ def test_a_slice_has_half_angles_across_and_a_click_picks_directions(chromium: C
     x, y = left + width * 20.5 / 90.0, top + height * (1.0 - 60.5 / 90.0)
     chromium.send("Input.dispatchMouseEvent", type="mouseMoved", x=x, y=y)
     assert chromium.evaluate(READ).startswith("θh 20.5°, θd 60.5°: ")  # before the click: it draws anew
-    for kind in ("mousePressed", "mouseReleased"):
-        chromium.send("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", clickCount=1)
+    chromium.drag(x, y)
     shown(chromium, "theta_r=")
     names = ("theta_i", "phi_i", "theta_r", "turn")
     theta_i, phi_i, theta_r, turn = np.deg2rad(
@@ -185,11 +181,8 @@ def test_every_view_draws_at_any_width(chromium: Chromium, address: str, view: s
 def test_a_finger_on_a_picture_scrolls_the_page(chromium: Chromium, address: str, view: str) -> None:
     chromium.open(f"{address}#material=foam&view={view}", 390, 844, touch=True)
     shown(chromium, f"view={view}")
-    x, y = chromium.evaluate(
-        "(({ left, top, width, height }) => [left + width / 2, top + height / 2])"
-        f"(document.querySelector('#{view} > svg, #{view} canvas').getBoundingClientRect())"
-    )
-    chromium.swipe(x, y, 100.0)
+    left, top, width, height = box(chromium, f"#{view} > svg, #{view} canvas")
+    chromium.swipe(left + width / 2.0, top + height / 2.0, 100.0)
     chromium.until("scrollY > 50")
 
 
@@ -199,9 +192,7 @@ def test_the_axis_of_a_spectrum_is_wider_than_rounding(chromium: Chromium, addre
     shown(chromium, "view=spectrum")
     _, top, _, height, low, high = frame(chromium, "spectrum")
     assert high - low > np.log10(1.5)
-    assert (
-        len(chromium.evaluate("[...document.querySelectorAll('#spectrum text.end')].map(each => each.textContent)")) > 2
-    )
+    assert len(chromium.texts("#spectrum text.end")) > 2
     ys = np.concatenate([curve(chromium, number, "spectrum")[:, 1] for number in range(2)])
     assert top < ys.min() <= ys.max() < top + height
 
@@ -211,9 +202,15 @@ def test_a_spectrum_over_decades_has_numbers_at_1_2_and_5(chromium: Chromium, ad
     shown(chromium, "view=spectrum")
     low, high = 10.0 ** np.array(frame(chromium, "spectrum")[4:])
     assert high / low > 10.0
-    texts = chromium.evaluate("[...document.querySelectorAll('#spectrum text.end')].map(each => each.textContent)")
+    texts = chromium.texts("#spectrum text.end")
     expected = [mantissa * 10.0**power for power in range(-3, 3) for mantissa in (1, 2, 5)]
     assert [float(each) for each in texts] == [pytest.approx(each) for each in expected if low <= each <= high]
+
+
+def middle(browser: Chromium) -> float:
+    """The mean place of the surface of a hemisphere across the picture, 0 to 1."""
+    surface = painted(browser)
+    return float(np.nonzero(surface)[1].mean() / surface.shape[1])
 
 
 def painted(browser: Chromium) -> np.ndarray:
@@ -237,30 +234,16 @@ def test_the_hemisphere_of_a_white_tile_is_half_a_ball_that_keys_turn(chromium: 
     assert chromium.errors == []
 
 
-def test_a_hand_turns_the_hemisphere(chromium: Chromium, address: str) -> None:
-    chromium.open(f"{address}#material=rolled-brass&view=hemisphere&theta_i=60")
-    shown(chromium, "view=hemisphere")
-    before = painted(chromium)
-    left, top, _, _ = box(chromium, "#hemisphere canvas")
-    half_a_turn = 360  # pixels
-    for kind, x in (("mousePressed", 50), ("mouseMoved", 50 + half_a_turn), ("mouseReleased", 50 + half_a_turn)):
-        chromium.send(
-            "Input.dispatchMouseEvent", type=kind, x=left + x, y=top + 50, button="left", buttons=1, clickCount=1
-        )
-    middles = [np.nonzero(each)[1].mean() / each.shape[1] for each in (before, painted(chromium))]
-    assert middles[0] > 0.55
-    assert middles[1] < 0.45
-
-
-def test_the_lobe_of_the_hemisphere_is_across_from_the_light(chromium: Chromium, address: str) -> None:
-    middles = []
-    for phi in (0, 180):  # the light is at the left, then at the right
+def test_the_lobe_of_a_hemisphere_is_across_from_the_light_and_turns_with_it(
+    chromium: Chromium, address: str
+) -> None:
+    for phi, at_the_right in ((0, True), (180, False)):
         chromium.open(f"{address}#material=rolled-brass&view=hemisphere&theta_i=60&phi_i={phi}")
         shown(chromium, "view=hemisphere")
-        surface = painted(chromium)
-        middles.append(np.nonzero(surface)[1].mean() / surface.shape[1])
-    assert middles[0] > 0.55
-    assert middles[1] < 0.45
+        assert (middle(chromium) > 0.55, middle(chromium) < 0.45) == (at_the_right, not at_the_right)
+    left, top, _, _ = box(chromium, "#hemisphere canvas")
+    chromium.drag(left + 50, top + 50, 360.0)  # half a turn
+    assert middle(chromium) > 0.55
 
 
 @pytest.mark.parametrize("compare", ["", "%3Amodel", "grey-felt"])
@@ -268,12 +251,8 @@ def test_the_spectrum_of_a_table_that_states_no_error_is_drawn_without_one(
     chromium: Chromium, plain: str, compare: str
 ) -> None:
     chromium.open(f"{plain}/#material=white-tile&view=spectrum&compare={compare}")
-    assert (
-        chromium.until(
-            "document.querySelector('#picture')?.dataset.shown && 'shown' || globalThis.message?.textContent"
-        )
-        == "shown"
-    )
+    of_picture = "document.querySelector('#picture')?.dataset.shown"
+    assert chromium.until(f"{of_picture} && 'shown' || globalThis.message?.textContent") == "shown"
     bands = chromium.evaluate("document.querySelectorAll('#spectrum path.band').length")
     assert bands == (compare == "grey-felt")
     assert f"is grey: {1.0 / np.pi:.3g} /sr" in chromium.evaluate("caption.textContent")

@@ -108,18 +108,16 @@ def test_a_mirror_shows_its_surroundings_and_the_light(chromium: Chromium, tmp_p
         drawn = levels(chromium, f"{address}#material=mirror&view=sphere&theta_i=40&phi_i=90&exposure=-2")
         assert "The specular part reflects them and the light" in chromium.evaluate("caption.textContent")
         for view in ("hemisphere", "cut"):
-            chromium.evaluate(f"location.hash = 'material=mirror&view={view}&theta_i=40'")
+            chromium.go(f"material=mirror&view={view}&theta_i=40")
             shown(chromium, f"view={view}")
             assert "The spike is the specular part" in chromium.evaluate("caption.textContent")
         assert chromium.evaluate("document.querySelectorAll('#cut path.spike').length") == 1
         part = 100.0 * table.specular_reflectance(np.deg2rad(40.0), at) @ xyz_weights(tuple(at), "D65")[:, 1]
         for axes in ("polar", "cartesian"):  # the legend names it: in the picture the name would cover something
-            chromium.evaluate(f"location.hash = 'material=mirror&view=cut&theta_i=40&axes={axes}'")
+            chromium.go(f"material=mirror&view=cut&theta_i=40&axes={axes}")
             chromium.until(f"picture.dataset.shown.includes('cartesian') === {str(axes == 'cartesian').lower()}")
-            assert f"specular part {part:.3g} %" in chromium.evaluate(
-                "document.querySelector('#cut .legend').innerText"
-            )
-            assert "specular" not in chromium.evaluate("document.querySelector('#cut > svg').textContent")
+            assert f"specular part {part:.3g} %" in chromium.texts("#cut .legend")[0]
+            assert "specular" not in chromium.texts("#cut > svg")[0]
         assert chromium.errors == []
     normal, _ = normals()
     mirror = 2.0 * normal[:, 2:] * normal - [0.0, 0.0, 1.0]
@@ -138,7 +136,7 @@ def test_a_sphere_that_is_nearly_black_says_so_and_can_be_brightened(chromium: C
     with serving(tmp_path / "store") as address:
         dark = levels(chromium, f"{address}#material=soot&view=sphere")
         assert "Nearly black" in chromium.evaluate("sphere.innerText")
-        chromium.evaluate("document.querySelector('#sphere button').click()")
+        chromium.click("#sphere button")
         shown(chromium, "exposure=8")
         chromium.until("picture.dataset.detail === 'fine' && picture.ariaBusy === 'false'")
         bright = image(chromium, "#sphere canvas")
@@ -152,15 +150,12 @@ def test_a_hand_and_keys_move_the_light_to_where_they_point(chromium: Chromium, 
     shown(chromium, "material=foam")
     left, top, width, _ = box(chromium, "#sphere canvas")
     x, y = left + width * (0.5 + 0.25), top + width * 0.5  # of a normal at 30 degrees: the light is at 60
-    for kind in ("mousePressed", "mouseReleased"):
-        chromium.send("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", buttons=1, clickCount=1)
+    chromium.drag(x, y)
     shown(chromium, "theta_i=60")
     chromium.evaluate("document.querySelector('#sphere').focus()")
     chromium.press("ArrowDown", "ArrowLeft")
     shown(chromium, "theta_i=55", "phi_i=5")
     left, top, width, height = box(chromium, "#cut .lamp")
-    x, y = left + width / 2.0, top + height / 2.0
-    for kind, by in (("mousePressed", 0), ("mouseMoved", 10), ("mouseReleased", 10)):
-        chromium.send("Input.dispatchMouseEvent", type=kind, x=x + by, y=y, button="left", buttons=1, clickCount=1)
+    chromium.drag(left + width / 2.0, top + height / 2.0, 10.0)
     chromium.until("controls.elements.theta_i.value < 55")
     assert chromium.errors == []

@@ -261,7 +261,7 @@ def test_a_worker_that_fails_ends_the_server_with_a_sentence(grey_store: Path, t
         [*command, "--workers", "2"], env=environment, capture_output=True, text=True, timeout=WAIT_S, check=False
     )
     said = ended.stderr.splitlines()
-    assert (ended.returncode, said[-1]) == (2, "brdfdb: a worker ended with status 1; its log says why")
+    assert (ended.returncode, said[-1]) == (2, "brdfdb: a worker ended with status 1; its log has the reason")
     assert "RuntimeError: no such luck" in ended.stderr
     # two workers write at once: a line of the log may begin in the middle of a line of the other's traceback
     warned = [json.loads(line[line.index("{") :])["failed"] for line in said if "UserWarning" in line]
