@@ -234,9 +234,7 @@ def test_the_hemisphere_of_a_white_tile_is_half_a_ball_that_keys_turn(chromium: 
     assert chromium.errors == []
 
 
-def test_the_lobe_of_a_hemisphere_is_across_from_the_light_and_turns_with_it(
-    chromium: Chromium, address: str
-) -> None:
+def test_the_lobe_of_a_hemisphere_is_across_from_the_light_and_turns_with_it(chromium: Chromium, address: str) -> None:
     for phi, at_the_right in ((0, True), (180, False)):
         chromium.open(f"{address}#material=rolled-brass&view=hemisphere&theta_i=60&phi_i={phi}")
         shown(chromium, "view=hemisphere")
