@@ -24,28 +24,11 @@ FLAGS = [
     *("--disable-gpu", "--force-color-profile=srgb"),  # no page has WebGL, and pictures are cheaper without OpenGL
     *(f"--disable-{each}" for each in ("quic", "background-networking", "component-update", "sync", "dev-shm-usage")),
 ]
-KEYS = {
-    "Enter": 13,
-    "ArrowLeft": 37,
-    "ArrowUp": 38,
-    "ArrowRight": 39,
-    "ArrowDown": 40,
-    "Home": 36,
-    "End": 35,
-    "Tab": 9,
-}
+KEYS = {"Tab": 9, "Enter": 13, "Home": 36, "ArrowLeft": 37, "ArrowUp": 38, "ArrowRight": 39, "ArrowDown": 40}  # codes
 
 
 class Chromium:
-    """A browser process; one page at a time.
-
-    Parameters
-    ----------
-    binary : str
-        The program.
-    profile : Path
-        A directory of its own.
-    """
+    """A process of the program `binary` with one page; `profile` is a new directory."""
 
     def __init__(self, binary: str, profile: Path) -> None:
         # the protocol wants descriptors 3 and 4: ends from 10 on never are in the way of those

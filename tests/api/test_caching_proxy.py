@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import httpx
@@ -46,12 +45,6 @@ def stores(tmp_path: Path) -> tuple[Path, Path]:
     return tmp_path / "first", tmp_path / "second"
 
 
-@contextmanager
-def _served(root: Path, upstream: int) -> Iterator[None]:
-    with serving(root, port=upstream):
-        yield
-
-
 def _state(proxy: str, path: str) -> str:
     return httpx.get(f"{proxy}{path}", timeout=WAIT_S).headers["x-cache"]
 
@@ -60,7 +53,7 @@ def test_the_cache_keeps_what_has_a_digest_and_asks_for_the_rest(
     proxy: str, upstream: int, stores: tuple[Path, Path]
 ) -> None:
     pinned = pinned_of(Store(stores[0]), "tile")
-    with _served(stores[0], upstream):
+    with serving(stores[0], port=upstream):
         for path in (f"materials/tile/revisions/{{}}/{LOOKUP}", "store/materials/tile/{}/brdf/c/0/0/0"):
             for _ in range(2):
                 assert _state(proxy, f"/v1/{path.format('r000001')}") == "MISS"
@@ -73,7 +66,7 @@ def test_lookups_are_those_of_the_store_that_is_served(proxy: str, upstream: int
     tables = []
     for root in stores:
         here = brdfdb.open(root)["tile"]
-        with _served(root, upstream):
+        with serving(root, port=upstream):
             table = brdfdb.open(proxy)["tile"]
             tables.append(table)
             for _ in range(2):
@@ -83,7 +76,7 @@ def test_lookups_are_those_of_the_store_that_is_served(proxy: str, upstream: int
             answer = httpx.get(f"{proxy}/v1/materials/tile/revisions/r000001/{LOOKUP}", timeout=WAIT_S).json()
             expected = here.lookup(*np.deg2rad([10.0, 0.0, 20.0, 0.0]))
             assert answer["brdf"] == pytest.approx(float(expected), rel=1e-12)
-    with _served(stores[1], upstream):  # the table of the store before: what the cache has, or no answer
+    with serving(stores[1], port=upstream):  # the table of the store before: what the cache has, or no answer
         first = float(brdfdb.open(stores[0])["tile"].lookup(*one_point))
         assert tables[0].lookup(*one_point) == pytest.approx(first, rel=1e-12)
         with pytest.raises(UnknownRevisionError, match=r"^tile has no revision 'r000001-"):
@@ -93,13 +86,13 @@ def test_lookups_are_those_of_the_store_that_is_served(proxy: str, upstream: int
 def test_a_dataset_is_of_one_store(proxy: str, upstream: int, stores: tuple[Path, Path]) -> None:
     pytest.importorskip("aiohttp")
     for root in stores:
-        with _served(root, upstream):
+        with serving(root, port=upstream):
             for there in (brdfdb.open(proxy).dataset("tile"), brdfdb.open(proxy).dataset("tile", "r000001")):
                 assert there.load().identical(brdfdb.open(root).dataset("tile").load())
-    with _served(stores[0], upstream):
+    with serving(stores[0], port=upstream):
         cached = brdfdb.open(proxy).dataset("tile")
         direct = brdfdb.open(f"http://127.0.0.1:{upstream}").dataset("tile")
-    with _served(stores[1], upstream):  # what was opened before: the same table, or no answer
+    with serving(stores[1], port=upstream):  # what was opened before: the same table, or no answer
         assert cached.load().identical(brdfdb.open(stores[0]).dataset("tile").load())
         with pytest.raises(StoreError, match=r"^tile r000001 of http.* was removed or replaced while it was read"):
             direct["brdf"].load()
@@ -109,18 +102,17 @@ def test_a_cache_that_mixes_two_stores_all_the_same_is_noticed(
     proxy: str, upstream: int, stores: tuple[Path, Path], tmp_path: Path
 ) -> None:
     pytest.importorskip("aiohttp")
-    with _served(stores[0], upstream):
+    with serving(stores[0], port=upstream):
         brdfdb.open(proxy).dataset("tile").load()
-    kept = [path for path in (tmp_path / "nginx" / "cache").rglob("*") if b"/brdf/c/0/0/0" in path.read_bytes()]
-    (chunk,) = kept
+    cached = (tmp_path / "nginx" / "cache").rglob("*")
+    (chunk,) = (path for path in cached if b"/brdf/c/0/0/0" in path.read_bytes())
     content = chunk.read_bytes()
-    second = (stores[1] / "materials" / "tile" / "r000001" / "brdf" / "c" / "0" / "0" / "0").read_bytes()
-    first = (stores[0] / "materials" / "tile" / "r000001" / "brdf" / "c" / "0" / "0" / "0").read_bytes()
+    first, second = ((root / "materials/tile/r000001/brdf/c/0/0/0").read_bytes() for root in stores)
     assert content.endswith(first)
     padded = (second + bytes(len(first)))[: len(first)]
     chunk.write_bytes(content.replace(first, padded))
     with (
-        _served(stores[0], upstream),
+        serving(stores[0], port=upstream),
         pytest.raises(StoreError, match=r"brdf/c/0/0/0 is another one than its manifest names"),
     ):
         brdfdb.open(proxy).dataset("tile")["brdf"].load()

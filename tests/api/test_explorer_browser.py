@@ -106,7 +106,7 @@ def test_a_verdict_is_a_sentence_and_its_details_are_folded(chromium: Chromium, 
     chromium.open(f"{address}#material=rolled-brass&view=albedo&compare=%3Amodel")
     shown(chromium, "view=albedo")
     sentence = chromium.evaluate("document.querySelector('#facts .verdict').innerText")
-    assert sentence.startswith("violates It is what the paper says: the table keeps within")
+    assert sentence.startswith("violates It is what the paper says: the table is within")
     assert sentence.endswith("It does not conserve energy: albedo 1.2 at 90°.")
     assert "reflects 1.2 at 90 degrees" not in chromium.evaluate("facts.innerText")
     chromium.evaluate("document.querySelectorAll('#facts details').forEach(each => { each.open = true; })")
@@ -121,7 +121,7 @@ def test_a_verdict_is_a_sentence_and_its_details_are_folded(chromium: Chromium, 
     assert table[-1, 1] < limit[-1, 1] < table[0, 1]  # 1.2, 1 and 0.5, from the top
     chromium.open(f"{address}#material=scene-copper-sphere")
     shown(chromium, "material=scene-copper-sphere")
-    assert "This is of revision r000009, not of the current one." in chromium.evaluate("facts.textContent")
+    assert "This audit is of revision r000009" in chromium.evaluate("facts.textContent")
 
 
 def test_the_list_has_pictures_and_marks_only_what_is_wrong(chromium: Chromium, address: str) -> None:
@@ -239,7 +239,7 @@ def test_an_empty_store_is_said_to_be_one(chromium: Chromium, own: Path) -> None
     with serving(own) as empty:
         chromium.open(empty)
         told = chromium.until("document.querySelector('#message')?.textContent")
-        assert told == "There is nothing to look at in the store."
+        assert told == "The store has no material to show."
         assert chromium.evaluate("[count.textContent, picture.innerText.trim()]") == ["0 materials", ""]
         assert chromium.evaluate("controls.inert")
         assert chromium.errors == []
@@ -279,12 +279,12 @@ def test_a_wrong_comparison_leaves_the_material(chromium: Chromium, address: str
 @pytest.mark.parametrize(
     ("wrong", "said", "kept"),
     [
-        ("(rho_d=abc)", "rho_d is a number, and not 'abc': the published value is shown.", ""),
-        ("(rho_d=)", "rho_d is a number, and not '': the published value is shown.", ""),
-        ("(rho_d=NaN,rho_s=0.2)", "rho_d is a number, and not 'NaN': the published value is shown.", "(rho_s=0.2)"),
-        ("&theta_i=500", "theta_i is a number from 0 to 89.5, and not '500': 89.5 is shown.", "&theta_i=89.5"),
-        ("&theta_i=x", "theta_i is a number from 0 to 89.5, and not 'x': 45 is shown.", ""),
-        ("&axes=foo", "axes is one of polar, cartesian, and not 'foo': polar is shown.", ""),
+        ("(rho_d=abc)", "rho_d: 'abc' is not a number; the published value is shown.", ""),
+        ("(rho_d=)", "rho_d: '' is not a number; the published value is shown.", ""),
+        ("(rho_d=NaN,rho_s=0.2)", "rho_d: 'NaN' is not a number; the published value is shown.", "(rho_s=0.2)"),
+        ("&theta_i=500", "theta_i: '500' is not a number from 0 to 89.5; 89.5 is shown.", "&theta_i=89.5"),
+        ("&theta_i=x", "theta_i: 'x' is not a number from 0 to 89.5; 45 is shown.", ""),
+        ("&axes=foo", "axes: 'foo' is not one of polar, cartesian; polar is shown.", ""),
     ],
 )
 def test_what_is_wrong_in_a_link_is_said_until_something_moves(
@@ -300,7 +300,7 @@ def test_what_is_wrong_in_a_link_is_said_until_something_moves(
     assert idle(chromium, "message.textContent === ''")
     chromium.go("material=foam&view=foo")
     shown(chromium, "material=foam")
-    assert chromium.until("message.textContent").endswith("sphere, and not 'foo': together is shown.")
+    assert chromium.until("message.textContent").endswith("sphere; together is shown.")
     assert chromium.errors == []
 
 

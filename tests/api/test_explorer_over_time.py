@@ -41,7 +41,7 @@ def test_facts_and_the_line_of_the_list_are_of_the_revision_of_the_picture(
         shown(chromium, "theta_i=20")
         known = chromium.evaluate("facts.textContent")
         assert "revision r000002" in known
-        assert "This is of revision r000001, not of the current one." in known
+        assert "This audit is of revision r000001" in known
         error = brdfdb.open(own)["grey-felt"].error
         assert error is not None
         assert f"within {100.0 * error.overall.p99:.3g} %" in known
@@ -83,7 +83,7 @@ def test_facts_are_of_the_table_again_after_other_parameters(chromium: Chromium,
     with serving(own) as address:
         chromium.open(f"{address}/#material=grey-felt(rho=0.3)")
         shown(chromium, "material=grey-felt(rho=0.3)")
-        assert "parameters of your own" in chromium.evaluate("facts.textContent")
+        assert "your own parameters" in chromium.evaluate("facts.textContent")
         chromium.go("material=grey-felt")
         chromium.until("picture.dataset.shown === '#material=grey-felt'")
         assert "grey-felt, revision r000001" in chromium.evaluate("facts.textContent")

@@ -272,6 +272,6 @@ def test_what_a_measured_table_extrapolates_is_dashed(chromium: Chromium, tmp_pa
             assert "3, 4" in pieces
             path = chromium.evaluate("[...document.querySelectorAll('#cut > svg path.curve')].at(-1).getAttribute('d')")
             assert (len(re.findall("[ML]", path)) > 150) is dashed  # at 80 degrees nothing was measured
-            assert "Dashed is what was not measured" in chromium.evaluate("caption.textContent")
+            assert "Dashed lines are extrapolated" in chromium.evaluate("caption.textContent")
             assert chromium.evaluate("parameters.hidden")
         assert chromium.errors == []

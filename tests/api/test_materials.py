@@ -133,12 +133,15 @@ def test_the_catalogue_follows_the_store(own: Path) -> None:
     assert len(names) == 4
     shutil.rmtree(own / "materials" / names[1])  # the next page begins after a material that is gone
     assert names_on_pages(client, following) == names[2:]
+    group = {"If-None-Match": client.get("/v1/store/zarr.json").headers["etag"]}
+    assert client.get("/v1/store/zarr.json", headers=group).status_code == 304
     held = {"If-None-Match": client.get("/v1/materials").headers["etag"]}
     again = client.get("/v1/materials", headers=held)
     assert (again.status_code, again.content, again.headers["cache-control"]) == (304, b"", "no-cache")
     for query in ("?q=foil", "?limit=2"):
         assert client.get(f"/v1/materials{query}", headers=held).status_code == 200
     publish(own, "copper-foil", "lambert", rho=0.5)
+    assert client.get("/v1/store/zarr.json", headers=group).status_code == 200
     newer = client.get("/v1/materials", headers=held)
     revisions = {line["name"]: line["revision"] for line in newer.json()["materials"]}
     assert (newer.status_code, revisions["copper-foil"]) == (200, Store(own).head("copper-foil"))

@@ -85,7 +85,7 @@ function cut(into, series, answers, state) {
       ? ` ${state.axes === "polar" ? "Below, to 89°, t" : "T"}able − model, ${RELATIVE}: ${percent(worstOf(off))} at most.`
       : "") +
     (answers.some(({ extrapolated }) => extrapolated?.includes(true))
-      ? " Dashed is what was not measured but extrapolated."
+      ? " Dashed lines are extrapolated from the measured directions."
       : "") +
     specularWords(series, specular)
   );

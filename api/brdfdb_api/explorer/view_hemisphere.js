@@ -139,7 +139,7 @@ function hemisphere(into, series, answers, state) {
   return (
     `${quantityWords(series[0], state)} in 1/sr over all viewers to θᵣ = ${LAST}°: ` +
     `the distance from the centre is ${scale}. ` +
-    "Drag the light, or anything else to turn the picture; arrow keys turn it, too." +
+    "Drag the light to move it, or any other point to turn the picture; arrow keys turn it, too." +
     specularWords(series, specular)
   );
 }

@@ -45,7 +45,8 @@ class Application(FastAPI):
     """A FastAPI application behind `Edge`, with the schemas of all answers in its OpenAPI document."""
 
     def build_middleware_stack(self) -> ASGIApp:
-        given, inner = self.state.settings, super().build_middleware_stack()
+        given = self.state.settings
+        inner = super().build_middleware_stack()
         quick = [route for route in lookups.routes if isinstance(route, Quick)]
         edge = Edge(inner, given.max_body_bytes, quick, self.state.failed, given.log_level)
         if not given.cors_origins:
