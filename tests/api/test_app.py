@@ -65,17 +65,19 @@ def test_a_bad_setting_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
                     create_app()
 
 
-def test_openapi_document_is_the_reviewed_one() -> None:
-    assert json.loads(openapi_json()) == json.loads(OPENAPI.read_text()), (
-        "the HTTP interface changed; review it, then: python -m brdfdb_api.http.app > api/openapi.json"
-    )
-
-
-def test_openapi_is_served(client: Client) -> None:
-    document = client.get("/openapi.json").json()
-    assert document == json.loads(OPENAPI.read_text())
-    assert client.get("/openapi.json").json() == document
-    assert "/openapi.json" in client.get("/docs").text
+def test_openapi_document_is_the_reviewed_one_and_has_a_page_without_scripts(client: Client) -> None:
+    document = json.loads(OPENAPI.read_text())
+    changed = "the HTTP interface changed; review it, then: python -m brdfdb_api.http.app > api/openapi.json"
+    assert json.loads(openapi_json()) == document, changed
+    assert client.get("/openapi.json").json() == client.get("/openapi.json").json() == document
+    page = client.get("/docs").text
+    for path, methods in document["paths"].items():
+        for method in methods:
+            assert f"<h2>{method.upper()} {path}</h2>" in page
+    assert "<code>family</code> (path): name of a family</li>" in page
+    assert ": </li>" not in page  # each parameter is explained
+    assert "<script" not in page
+    assert "//" not in page.replace("<!doctype", "")  # nothing comes from other servers
 
 
 def test_answers_are_as_documented(client: Client) -> None:

@@ -75,13 +75,6 @@ def test_the_page_is_at_the_root_and_asks_for_one_script_after_early_requests() 
     assert sum(int(size) for size in sizes) < 45_000  # a second of a slow connection
 
 
-def test_the_list_of_operations_has_words_for_each_parameter_and_an_icon() -> None:
-    page = get("/docs").text
-    assert "<code>family</code> (path): name of a family</li>" in page
-    assert ": </li>" not in page
-    assert '<link rel="icon" href="data:,">' in page
-
-
 def test_the_script_has_every_module_after_those_that_it_imports() -> None:
     script = get("/explorer/explorer.js").text
     order = re.findall(r"^modules\['(.*?)'\] = ", script, re.MULTILINE)

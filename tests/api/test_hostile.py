@@ -33,17 +33,14 @@ class Server:
 
     def ask(self, method: str, path: str, body: Any = None, **headers: str) -> tuple[int, str, bytes]:
         """Status, media type and body of an answer."""
-        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=WAIT_S)
-        try:
-            named = {key.replace("_", "-"): value for key, value in headers.items()}
-            chunked = not isinstance(body, bytes | str | None)
-            # refused before all of the body was read, the answer is there
+        named = {key.replace("_", "-"): value for key, value in headers.items()}
+        chunked = not isinstance(body, bytes | str | None)
+        with contextlib.closing(http.client.HTTPConnection("127.0.0.1", self.port, timeout=WAIT_S)) as connection:
+            # A body may be refused before all of it was read; the answer is there then
             with contextlib.suppress(BrokenPipeError, ConnectionResetError):
                 connection.request(method, path, body, named, encode_chunked=chunked)
             answer = connection.getresponse()
             return answer.status, answer.headers["content-type"] or "", answer.read()
-        finally:
-            connection.close()
 
     def refused(self, status: int, method: str, path: str, body: Any = None, **headers: str) -> str:
         """Ask what must be refused; its sentence."""

@@ -22,16 +22,17 @@ POINT = f"{FELT}/lookup?theta_i=10&theta_r=20"
 
 
 def test_pages_of_other_origins_may_ask_only_where_that_is_set(root: Path) -> None:
-    origin = {"Origin": "https://a.example"}
+    origin, other = {"Origin": "https://a.example"}, {"Origin": "https://b.example"}
     asked = {**origin, "Access-Control-Request-Method": "POST", "Access-Control-Request-Headers": "content-type"}
     assert "access-control-allow-origin" not in client_of(root).get(POINT, headers=origin).headers
     client = client_of(root, cors_origins=("https://a.example",))
     answer = client.get(POINT, headers=origin)
     assert answer.headers["access-control-allow-origin"] == "https://a.example"
     assert "ETag" in answer.headers["access-control-expose-headers"]
+    assert "access-control-allow-origin" not in client.get(POINT, headers=other).headers
     assert client.request("OPTIONS", f"{FELT}/lookup", headers=asked).status_code == 200
-    other = client.get(POINT, headers={"Origin": "https://b.example"})
-    assert "access-control-allow-origin" not in other.headers
+    for wrong, reason in [(other, "origin"), ({"Access-Control-Request-Method": "DELETE"}, "method")]:
+        assert reason in client.problem("OPTIONS", f"{FELT}/lookup", 400, headers=asked | wrong)["detail"]
 
 
 ADDRESSES = [POINT, FELT, "/healthz", "/nothing", "/v1/materials/grey-fell", f"{FELT}/lookup?theta_i=900&theta_r=1"]
