@@ -170,6 +170,12 @@ def shown(browser: Chromium, *parts: str) -> None:
     browser.until(" && ".join([f"{of} !== ''", *(f"{of}.includes('{part}')" for part in parts)]))
 
 
+def visit(browser: Chromium, link: str, *parts: str) -> None:
+    """Open a link, and wait for a picture of the state whose link has these parts."""
+    browser.open(link)
+    shown(browser, *parts)
+
+
 def chosen(browser: Chromium) -> str:
     return str(browser.evaluate("document.querySelector('[aria-selected=true]').dataset.name"))
 

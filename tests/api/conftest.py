@@ -75,6 +75,14 @@ def address(explored: Path) -> Iterator[str]:
         yield f"http://127.0.0.1:{port}/"
 
 
+@pytest.fixture(autouse=True)
+def _no_page_has_errors(request: pytest.FixtureRequest) -> Iterator[None]:
+    """Fail a test that leaves a page with an error in the console of the browser."""
+    yield
+    if "chromium" in request.fixturenames:
+        assert request.getfixturevalue("chromium").errors == []
+
+
 @pytest.fixture
 def plain(root: Path) -> Iterator[str]:
     """Where the store of the other tests is served: of its tables only two state an error."""

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.api.chromium import Chromium, box, idle, shown
+from tests.api.chromium import Chromium, box, idle, shown, visit
 
 AXE = Path(os.environ.get("BRDFDB_NODE", "node_modules/.bin")).parent / "axe-core" / "axe.min.js"
 VIEWS = ("together", "cut&axes=cartesian&curves=rgb", "slice", "spectrum", "albedo", "sphere")
@@ -33,8 +33,7 @@ def test_axe_finds_no_violation(chromium: Chromium, address: str, scheme: str, w
 
 
 def test_every_control_has_a_name_and_can_be_reached_by_keys(chromium: Chromium, address: str) -> None:
-    chromium.open(f"{address}#material=rolled-brass&compare=foam")
-    shown(chromium)
+    visit(chromium, f"{address}#material=rolled-brass&compare=foam")
     idle(chromium, "parameters.children.length > 0")
     controls = "[...document.querySelectorAll('input, select, textarea, button:not([aria-hidden])')]"
     unnamed = "each => !each.closest('[hidden]') && !(each.labels?.[0] ?? each).innerText.trim()"
@@ -54,8 +53,7 @@ def test_every_control_has_a_name_and_can_be_reached_by_keys(chromium: Chromium,
 
 
 def test_arrow_keys_read_curves(chromium: Chromium, address: str) -> None:
-    chromium.open(f"{address}#material=foam&view=cut")
-    shown(chromium)
+    visit(chromium, f"{address}#material=foam&view=cut")
     chromium.evaluate("document.querySelector('#cut').focus()")
     for keys, theta_r in ((["ArrowRight"], "1"), (["ArrowLeft", "ArrowLeft"], "−1")):
         chromium.press(*keys)
