@@ -55,18 +55,6 @@ class Server:
         assert "Traceback" not in sentence
         return sentence
 
-    def raw(self, data: bytes, silent_s: float) -> bytes:
-        """Send bytes as they are; what comes back until the server closes, resets or is silent for some seconds."""
-        with connected(self.port) as connection:
-            connection.settimeout(silent_s)
-            found = b""
-            # refused before all was sent, or never answered
-            with contextlib.suppress(BrokenPipeError, ConnectionResetError, TimeoutError):
-                connection.sendall(data)
-                while part := connection.recv(65536):
-                    found += part
-            return found
-
     @property
     def memory_mb(self) -> float:
         """Largest resident memory so far [MB]."""
@@ -213,23 +201,6 @@ def test_hostile_queries_and_paths_are_refused_in_a_sentence(server: Server) -> 
         server.refused(422, "GET", f"{LOOKUP}?{query}")
     for path in PATHS:
         server.refused(404, "GET", path)
-
-
-@pytest.mark.parametrize(
-    "data",
-    [
-        b"GET / HTTP/9.9\r\n\r\n",
-        b"\x00\x01\x02\x03\r\n\r\n",
-        b"GET " + b"/" * 100_000 + b" HTTP/1.1\r\nHost: x\r\n\r\n",
-        b"GET /no/such/address HTTP/1.1\r\nHost: x\r\n" + b"A: " + b"b" * 200_000 + b"\r\n\r\n",
-        b"POST " + LOOKUP.encode() + b" HTTP/1.1\r\nHost: x\r\nContent-Length: -5\r\n\r\n",
-        b"POST " + LOOKUP.encode() + b" HTTP/1.1\r\nHost: x\r\nTransfer-Encoding: chunked\r\n\r\nzz\r\n",
-    ],
-    ids=["version", "bytes", "address", "header", "length", "chunk"],
-)
-def test_what_is_no_http_is_answered_with_4xx_or_not_at_all(server: Server, data: bytes) -> None:
-    found = server.raw(data, 2.0)
-    assert not found or found.split(b" ", 2)[1][:1] == b"4", found[:200]
 
 
 def test_a_client_that_goes_away_leaves_nothing_behind(server: Server) -> None:
