@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import contextlib
 import socket
+import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 WAIT_S = 300.0  # for anything that takes a second or two on an idle machine
 LOOKUP = "/v1/materials/grey/lookup"  # of the fixture `grey_store`
@@ -21,6 +22,17 @@ def wait_until(true: Callable[[], bool]) -> None:
     while not true():
         assert time.monotonic() < deadline
         time.sleep(0.02)
+
+
+@contextlib.contextmanager
+def in_threads(work: Callable[[], None], count: int) -> Iterator[None]:
+    """Begin a block after `work` has begun in some threads; at its end, wait for them."""
+    threads = [threading.Thread(target=work) for _ in range(count)]
+    for thread in threads:
+        thread.start()
+    yield
+    for thread in threads:
+        thread.join()
 
 
 def connected(port: int, data: bytes = b"", room: int | None = None) -> socket.socket:

@@ -49,9 +49,7 @@ def _state(proxy: str, path: str) -> str:
     return httpx.get(f"{proxy}{path}", timeout=WAIT_S).headers["x-cache"]
 
 
-def test_the_cache_keeps_what_has_a_digest_and_asks_for_the_rest(
-    proxy: str, upstream: int, stores: tuple[Path, Path]
-) -> None:
+def test_the_cache_keeps_answers_with_a_digest(proxy: str, upstream: int, stores: tuple[Path, Path]) -> None:
     pinned = pinned_of(Store(stores[0]), "tile")
     with serving(stores[0], port=upstream):
         for path in (f"materials/tile/revisions/{{}}/{LOOKUP}", "store/materials/tile/{}/brdf/c/0/0/0"):
@@ -98,9 +96,7 @@ def test_a_dataset_is_of_one_store(proxy: str, upstream: int, stores: tuple[Path
             direct["brdf"].load()
 
 
-def test_a_cache_that_mixes_two_stores_all_the_same_is_noticed(
-    proxy: str, upstream: int, stores: tuple[Path, Path], tmp_path: Path
-) -> None:
+def test_a_cache_that_mixes_two_stores(proxy: str, upstream: int, stores: tuple[Path, Path], tmp_path: Path) -> None:
     pytest.importorskip("aiohttp")
     with serving(stores[0], port=upstream):
         brdfdb.open(proxy).dataset("tile").load()

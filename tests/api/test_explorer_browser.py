@@ -173,9 +173,7 @@ def test_a_link_restores_the_view_and_copies_ask_for_the_same(chromium: Chromium
 
 
 @pytest.mark.parametrize("view", ["cut", "hemisphere", "slice", "spectrum", "albedo", "sphere"])
-def test_copied_curl_and_python_run_and_answer_with_the_picture(
-    chromium: Chromium, address: str, explored: Path, view: str
-) -> None:
+def test_copied_requests_run(chromium: Chromium, address: str, explored: Path, view: str) -> None:
     visit(chromium, f"{address}#material=rolled-brass&view={view}&theta_i=30&phi_i=20", f"view={view}")
     ran = subprocess.run(["sh", "-c", copied(chromium, "curl")], capture_output=True, check=True)
     answer = json.loads(ran.stdout)
@@ -227,9 +225,7 @@ def test_an_empty_store_is_said_to_be_one(chromium: Chromium, own: Path) -> None
         assert chromium.evaluate("controls.inert")
 
 
-def test_the_error_between_two_wavelengths_is_the_one_stated_there(
-    chromium: Chromium, address: str, explored: Path
-) -> None:
+def test_the_stated_error_between_two_wavelengths(chromium: Chromium, address: str, explored: Path) -> None:
     table = brdfdb.open(explored)["scene-copper-sphere"]
     assert table.error is not None
     p99 = np.array(table.error.p99)
@@ -268,9 +264,7 @@ def test_a_wrong_comparison_leaves_the_material(chromium: Chromium, address: str
         ("&axes=foo", "axes: 'foo' is not one of polar, cartesian; polar is shown.", ""),
     ],
 )
-def test_what_is_wrong_in_a_link_is_said_until_something_moves(
-    chromium: Chromium, address: str, wrong: str, said: str, kept: str
-) -> None:
+def test_wrong_links(chromium: Chromium, address: str, wrong: str, said: str, kept: str) -> None:
     visit(chromium, f"{address}#material=rolled-brass{wrong}")
     assert idle(chromium, "message.textContent") == said
     assert chromium.evaluate("picture.dataset.shown") == f"#material=rolled-brass{kept}"
@@ -374,9 +368,7 @@ def test_texts_beside_the_picture_are_wide_enough_to_read(chromium: Chromium, ad
 
 
 @pytest.mark.parametrize("width", [1280, 390])
-def test_the_explorer_is_ink_on_paper_and_dark_where_that_is_asked_for(
-    chromium: Chromium, address: str, width: int
-) -> None:
+def test_light_and_dark_pages(chromium: Chromium, address: str, width: int) -> None:
     chromium.open(f"{address}#material=foam", width)
     shown(chromium)
     light = chromium.picture()

@@ -26,9 +26,7 @@ Response.prototype.clone = function () { return Object.assign(clone.call(this), 
 @pytest.mark.parametrize(
     ("view", "compare"), [("cut", ""), ("sphere", "white-tile"), ("albedo", "%3Amodel"), ("spectrum", "")]
 )
-def test_facts_and_the_line_of_the_list_are_of_the_revision_of_the_picture(
-    chromium: Chromium, own: Path, view: str, compare: str
-) -> None:
+def test_facts_follow_a_new_revision(chromium: Chromium, own: Path, view: str, compare: str) -> None:
     found = FOUND | {"material": "grey-felt"}
     (own / "audit.json").write_text(json.dumps(AUDIT | {"materials": [found]}), encoding="utf-8")
     with serving(own) as address:
@@ -48,7 +46,7 @@ def test_facts_and_the_line_of_the_list_are_of_the_revision_of_the_picture(
         assert chromium.evaluate("[...verdict.options].map(each => each.value)") == ["", "not audited", "violates"]
 
 
-def test_facts_follow_a_store_that_is_built_anew_with_the_same_numbers(chromium: Chromium, own: Path) -> None:
+def test_facts_follow_a_store_that_is_built_anew(chromium: Chromium, own: Path) -> None:
     with serving(own) as address:
         visit(chromium, f"{address}/#material=grey-felt&view=cut", "material=grey-felt")
         assert "Test grey-felt" in chromium.evaluate("document.title")
@@ -83,9 +81,7 @@ def test_facts_are_of_the_table_again_after_other_parameters(chromium: Chromium,
 
 
 @pytest.mark.parametrize("link", ["", "#material=grey-felt&compare=white-tile"])
-def test_a_page_that_was_opened_while_the_store_was_away_is_there_when_it_is_back(
-    chromium: Chromium, own: Path, link: str
-) -> None:
+def test_a_page_that_is_opened_while_the_store_is_away(chromium: Chromium, own: Path, link: str) -> None:
     away = own.rename(own.with_name("away"))
     with serving(own) as address:
         chromium.open(f"{address}/{link}")

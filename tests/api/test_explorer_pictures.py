@@ -12,13 +12,9 @@ import pytest
 
 import brdfdb
 from brdfdb.geometry import unit_vector
-from brdfdb.materials import presets
-from brdfdb.measurements import MeasuredSource
-from brdfdb.store.publication import publish
 from tests.api.a_store import serving
 from tests.api.chromium import Chromium, box, curve, frame, idle, image, labels, shown, visit
 from tests.api.connections import WAIT_S
-from tests.measurements.made_up import scans
 
 # What a view has drawn once it is there
 DRAWN = {
@@ -87,9 +83,7 @@ def test_any_number_of_series_lie_over_one_another(chromium: Chromium, address: 
 
 
 @pytest.mark.parametrize("scale", ["linear", "log"])
-def test_a_chart_of_the_cut_shows_the_numbers_of_the_table(
-    chromium: Chromium, address: str, explored: Path, scale: str
-) -> None:
+def test_a_chart_has_the_numbers_of_the_table(chromium: Chromium, address: str, explored: Path, scale: str) -> None:
     link = f"{address}#material=scene-copper-sphere&view=cut&axes=cartesian&curves=wavelengths&scale={scale}"
     visit(chromium, link, "view=cut")
     left, top, width, height, low, high = frame(chromium)
@@ -233,9 +227,7 @@ def test_the_lobe_of_a_hemisphere_is_across_from_the_light_and_turns_with_it(chr
 
 
 @pytest.mark.parametrize("compare", ["", "%3Amodel", "grey-felt"])
-def test_the_spectrum_of_a_table_that_states_no_error_is_drawn_without_one(
-    chromium: Chromium, plain: str, compare: str
-) -> None:
+def test_the_spectrum_of_a_table_without_a_stated_error(chromium: Chromium, plain: str, compare: str) -> None:
     chromium.open(f"{plain}/#material=white-tile&view=spectrum&compare={compare}")
     of_picture = "document.querySelector('#picture')?.dataset.shown"
     assert chromium.until(f"{of_picture} && 'shown' || globalThis.message?.textContent") == "shown"
@@ -245,12 +237,8 @@ def test_the_spectrum_of_a_table_that_states_no_error_is_drawn_without_one(
     assert ("with the band" in chromium.evaluate("caption.textContent")) == (compare == "grey-felt")
 
 
-def test_what_a_measured_table_extrapolates_is_dashed(chromium: Chromium, tmp_path: Path) -> None:
-    clay, store = presets()["clay-vase"], tmp_path / "store"
-    samples = scans(clay.brdf_at(None), np.array([10.0, 35.0, 60.0]), 0.03, step_deg=15.0)
-    source = MeasuredSource.of_samples(samples, name="my-clay", title="Clay", provenance="run 12")
-    publish(store, source.recorded(file="clay.csv", file_sha256="0" * 64), tolerance=0.1)
-    with serving(store) as address:
+def test_what_a_measured_table_extrapolates_is_dashed(chromium: Chromium, measured: Path) -> None:
+    with serving(measured) as address:
         for theta_i, dashed in ((35, False), (80, True)):
             link = f"{address}/#material=my-clay&view=cut&axes=cartesian&theta_i={theta_i}"
             visit(chromium, link, f"theta_i={theta_i}")

@@ -40,9 +40,7 @@ def levels(browser: Chromium, link: str) -> np.ndarray:
 
 
 @pytest.mark.parametrize(("phi_i", "axis", "side", "words"), [(0, 1, 1, "right (+x)"), (90, 0, -1, "top (+y)")])
-def test_the_light_of_a_sphere_is_where_its_caption_says(
-    chromium: Chromium, address: str, phi_i: int, axis: int, side: int, words: str
-) -> None:
+def test_the_light_of_a_sphere(chromium: Chromium, address: str, phi_i: int, axis: int, side: int, words: str) -> None:
     visit(chromium, f"{address}#material=foam&view=sphere&theta_i=60&phi_i={phi_i}&surround=dark", "view=sphere")
     bright = image(chromium, "#sphere canvas")[..., 0].astype(float)  # rows from the top
     middle = np.sum(np.nonzero(bright)[axis] * bright[bright > 0]) / np.sum(bright)
@@ -60,9 +58,7 @@ def test_a_mirror_is_spoken_of_where_there_is_one(chromium: Chromium, address: s
     ("name", "illuminant"),
     [("foam", "D65"), ("rolled-brass", "D65"), ("scene-copper-sphere", "D65"), ("scene-copper-sphere", "A")],
 )
-def test_the_sphere_has_the_radiance_of_the_table(
-    chromium: Chromium, address: str, explored: Path, name: str, illuminant: str
-) -> None:
+def test_the_radiance_of_a_sphere(chromium: Chromium, address: str, explored: Path, name: str, illuminant: str) -> None:
     theta, phi, at = 50.0, 70.0, np.arange(420.0, 681.0, 20.0)
     link = f"{address}#material={name}&view=sphere&theta_i={theta}&phi_i={phi}&illuminant={illuminant}&surround=dark"
     drawn, (normal, _) = levels(chromium, link), normals()

@@ -107,9 +107,7 @@ def called(package: types.ModuleType, address: str, tag: str, name: str, argumen
 
 
 @pytest.mark.parametrize(("tag", "name"), OPERATIONS)
-def test_every_operation_is_generated_and_answers(
-    generated: types.ModuleType, service: str, tag: str, name: str
-) -> None:
+def test_every_operation_answers(generated: types.ModuleType, service: str, tag: str, name: str) -> None:
     if name == "family_lookup":  # the store has no family: the refusal is read, too
         body = {"parameters": {"sigma_deg": 3.0}, **LIGHT}
         answer = called(generated, service, tag, name, {"family": "none", "PointsOfFamily": body})

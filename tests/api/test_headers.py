@@ -179,9 +179,7 @@ def test_a_compressed_body_is_refused(client: Client) -> None:
         assert answer.json()["detail"].startswith("Content-Encoding: 'gzip'")
 
 
-def test_each_503_says_when_to_ask_again_and_not_where_the_store_lies(
-    own: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_each_503_has_a_time_and_no_path(own: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     missing = client_of(tmp_path / "a b" / "nothing")
     for address in ("/readyz", "/v1/materials", FOIL, f"{FOIL}/{POINT}", f"{FOIL}/albedo", "/v1/families"):
         detail = missing.problem("GET", address, 503)["detail"]

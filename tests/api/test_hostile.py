@@ -108,12 +108,9 @@ BODIES = {
     "deep lists": b'{"theta_r": 0, "theta_i": ' + b"[" * 900 + b"1" + b"]" * 900 + b"}",
     "deeper lists": b'{"theta_r": 0, "theta_i": ' + b"[" * 200_000 + b"1" + b"]" * 200_000 + b"}",
     "deep objects": b'{"a":' * 100_000 + b"1" + b"}" * 100_000,
-    "an unknown name": b'{"theta_i": 1, "theta_r": 0, "__proto__": 2}',
     "a name of a megabyte": b'{"theta_i": 1, "theta_r": 0, "' + b"x" * 2**20 + b'": 2}',
-    "a wavelength of nothing": b'{"theta_i": 1, "theta_r": 0, "wavelength_nm": 0}',
 }
 ARRAYS = {
-    "no .npy": b"PK\x03\x04" + bytes(100),
     "a header that is code": b"\x93NUMPY\x01\x00"
     + struct.pack("<H", 40)
     + b"__import__('os').system('echo hi')".ljust(40),
@@ -121,7 +118,6 @@ ARRAYS = {
     "deep brackets": b"\x93NUMPY\x01\x00" + struct.pack("<H", 4000) + b"(" * 4000,
     "a petabyte": header_of("(35184372088832, 4)", bytes(64)),
     "a product past 64 bits": header_of("(4611686018427387904, 4611686018427387904, 4)", bytes(64)),
-    "a negative shape": header_of("(-1, 4)", bytes(32)),
     "records": header_of("(1, 4)", bytes(32), "[('a', '<f8')]"),
     "no rows, and more of them than 64 bits count": header_of("(0, 1000000000000000000000000000000, 4)"),
     "no columns of more than memory": header_of("(4611686018427387904, 0, 4)"),

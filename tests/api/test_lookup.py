@@ -118,7 +118,7 @@ def test_npy_has_the_numbers_of_json(client: Client) -> None:
 
 
 @pytest.mark.parametrize(("points", "in_main_thread"), [(1000, True), (1001, False)])
-def test_many_values_are_looked_up_in_a_thread(
+def test_many_values_take_a_thread(
     root: Path, points: int, in_main_thread: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     threads = []
@@ -209,6 +209,7 @@ def test_a_bad_body_names_the_parameter_and_is_not_echoed(client: Client) -> Non
         ('{"theta_i": 1, "theta_r": 2, "wavelength_nm": []}', "wavelength_nm"),
         ('{"theta_i": 1, "theta_r": 2, "wavelength_nm": [[500]]}', "wavelength_nm"),
         ('{"theta_i": 1, "theta_r": 2, "wavelength_nm": "500"}', "wavelength_nm"),
+        ('{"theta_i": 1, "theta_r": 2, "wavelength_nm": 0}', "wavelength_nm"),
         ('{"theta_i": 1, "theta_r": 2, "wavelength_nm": NaN}', "wavelength_nm"),
         ('{"theta_i": 1, "theta_r": 2, "wavelength_nm": [500, 399]}', "wavelength_nm"),
         *((body, "body") for body in (b"", b"theta_i=1", b"[1, 2]", b"null", b'{"theta_i": 1', b"\xff\xfe{")),
@@ -230,7 +231,7 @@ def test_a_bad_body_names_the_parameter_and_is_not_echoed(client: Client) -> Non
         ParameterError("specular", "shape (3,) is not (2,)"),  # no client names this parameter
     ],
 )
-def test_an_error_about_no_parameter_of_the_request_is_a_failure_of_the_service(
+def test_an_error_about_no_parameter_of_a_request(
     error: Exception, client: Client, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def fail(*_: Any, **__: Any) -> Any:

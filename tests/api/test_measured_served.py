@@ -12,28 +12,14 @@ from brdfdb import formats
 from brdfdb.formats._readings import FileTable
 from brdfdb.geometry import radians, unit_vector
 from brdfdb.materials import presets
-from brdfdb.measurements import MeasuredSource
 from brdfdb.store import http_client
 from brdfdb.store.publication import publish
 from brdfdb.store.reader import Store
 from brdfdb.store.revisions import rollback
 from tests.api.a_store import Client, client_of, serving
-from tests.measurements.made_up import scans
 
 CLAY = "/v1/materials/my-clay"
 INSIDE, OUTSIDE = {"theta_i": 30, "theta_r": 20, "phi_r": 120}, {"theta_i": 80, "theta_r": 20, "phi_r": 120}
-
-
-@pytest.fixture(scope="module")
-def measured(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Directory of a store with a measured table, lights of 10 to 60 degrees, beside one of a model."""
-    root = tmp_path_factory.mktemp("measured") / "store"
-    clay = presets()["clay-vase"]
-    samples = scans(clay.brdf_at(None), np.array([10.0, 35.0, 60.0]), 0.03, step_deg=15.0)
-    source = MeasuredSource.of_samples(samples, name="my-clay", title="Clay", provenance="run 12")
-    publish(root, source.recorded(file="clay.csv", file_sha256="0" * 64), tolerance=0.1)
-    publish(root, clay, tolerance=0.3)
-    return root
 
 
 @pytest.fixture

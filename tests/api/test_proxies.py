@@ -16,7 +16,7 @@ import pytest
 
 from tests.api import proxies
 from tests.api.a_store import serving
-from tests.api.connections import BODY, LOOKUP, MILLION_POINTS, POINT, WAIT_S, all_of, connected, post
+from tests.api.connections import BODY, LOOKUP, MILLION_POINTS, POINT, WAIT_S, all_of, connected, in_threads, post
 
 # Deadlines of 10 s and more, made short
 NGINX = {" 10s;": " 1s;"}
@@ -43,11 +43,9 @@ def _others_are_served(port: int) -> Iterator[None]:
         while not stop.wait(0.02):
             found[_get(port)] += 1
 
-    client = threading.Thread(target=ask)
-    client.start()
-    yield
-    stop.set()
-    client.join()
+    with in_threads(ask, 1):
+        yield
+        stop.set()
     found[_get(port)] += 1
     assert set(found) == {200}
 

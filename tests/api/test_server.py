@@ -20,7 +20,7 @@ import pytest
 
 from tests.api import proxies
 from tests.api.a_store import publish
-from tests.api.connections import BODY, LOOKUP, POINT, WAIT_S, all_of, connected, post, wait_until
+from tests.api.connections import BODY, LOOKUP, POINT, WAIT_S, all_of, connected, in_threads, post, wait_until
 
 COUNTED = re.compile(r'^brdfdb_requests_total{route="/v1/materials/{name}/lookup",status="200"} (\d+)', re.MULTILINE)
 CLIENTS = 24
@@ -193,11 +193,8 @@ def test_lines_of_the_log_are_whole_under_load(pair: Serving) -> None:
     def found() -> Counter[object]:
         return Counter(line.get("query", line.get("failed")) for line in pair.logged())
 
-    threads = [threading.Thread(target=load) for _ in range(4)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
+    with in_threads(load, 4):
+        pass
     with connected(pair.port) as connection:
         connection.sendall(b"no HTTP\r\n\r\n")
         assert connection.recv(65536).startswith(b"HTTP/1.1 400 ")
@@ -206,7 +203,7 @@ def test_lines_of_the_log_are_whole_under_load(pair: Serving) -> None:
 
 
 @pytest.mark.parametrize(("workers", "word"), [(1, signal.SIGTERM), (2, signal.SIGINT)])
-def test_told_to_stop_what_was_let_in_is_answered_and_nobody_waits(
+def test_requests_are_answered_after_a_signal(
     grey_store: Path, tmp_path: Path, workers: int, word: signal.Signals
 ) -> None:
     with serving(grey_store, tmp_path / "log", workers, last_s=LAST_S) as served:
@@ -227,16 +224,12 @@ def test_told_to_stop_what_was_let_in_is_answered_and_nobody_waits(
         while not first.endswith(b"}"):
             first += used.recv(65536)
         half.sendall(post(BODY[:10], length=len(BODY)))
-        threads = [threading.Thread(target=ask) for _ in range(4)]
-        for thread in threads:
-            thread.start()
-        time.sleep(0.1)
-        children = served.workers
-        served.process.send_signal(word)
-        idle.sendall(request)
-        used.sendall(request)
-        for thread in threads:
-            thread.join()
+        with in_threads(ask, 4):
+            time.sleep(0.1)
+            children = served.workers
+            served.process.send_signal(word)
+            idle.sendall(request)
+            used.sendall(request)
         half.sendall(BODY[10:])  # when nobody is let in any more
         for connection in (idle, used, half):
             answer = all_of(connection)
@@ -331,19 +324,15 @@ def test_workers_are_replaced_one_by_one_behind_a_proxy_without_a_lost_request(
                     client.close()
             client.close()
 
-        clients = [threading.Thread(target=ask) for _ in range(CLIENTS)]
-        for client in clients:
-            client.start()
-        for worker in sorted(served.workers):
-            others = served.workers
-            os.kill(worker, signal.SIGTERM)
-            wait_until(lambda others=others: len(served.workers - others) == 1)
-            (new,) = served.workers - others
-            with served.alone(new):
-                wait_until(lambda: served.get("/readyz")[0] == 200)
-        stop.set()
-        for client in clients:
-            client.join()
+        with in_threads(ask, CLIENTS):
+            for worker in sorted(served.workers):
+                others = served.workers
+                os.kill(worker, signal.SIGTERM)
+                wait_until(lambda others=others: len(served.workers - others) == 1)
+                (new,) = served.workers - others
+                with served.alone(new):
+                    wait_until(lambda: served.get("/readyz")[0] == 200)
+            stop.set()
         assert set(statuses) == {200}
 
 

@@ -26,6 +26,7 @@ from brdfdb.tables.albedo import directional_albedo
 from brdfdb.tables.table import Table
 from brdfdb_pipelines import cli
 from tests.api.a_store import NPY, VISIBLE_NM, Client, client_of, degrees, pinned_of, publish, read_npy
+from tests.api.explored import FOUND
 
 FOIL, FELT, TILE, METAL = (
     f"/v1/materials/{name}" for name in ("copper-foil", "grey-felt", "white-tile", "brushed-metal")
@@ -197,17 +198,8 @@ ANSWERS = {
 
 def report(root: Path, revision: str = "r000001", when: str = "2026-11-21T12:00:00Z", **more: Any) -> dict[str, Any]:
     """Write what an audit of the white tile would, as far as the service reads it."""
-    sentence = {"finding": "energy", "title": "Energy", "word": "conserves", "text": "it reflects 1 at all angles"}
-    finding = {
-        "material": "white-tile",
-        "revision": revision,
-        "model": "lambert",
-        "verdict": "passes",
-        "findings": {"energy": {"verdict": "conserves"}},
-        "sentences": [sentence],
-        **ANSWERS,
-        **more,
-    }
+    about = {"material": "white-tile", "model": "lambert", "revision": revision, "verdict": "passes"}
+    finding = FOUND | about | {"findings": {"energy": {"verdict": "conserves"}}, **ANSWERS, **more}
     document = {"format": "brdfdb-audit", "when": when, "materials": [finding]}
     (root / "audit.json").write_text(json.dumps(document), encoding="utf-8")
     return finding
