@@ -110,6 +110,8 @@ def test_a_bad_page_names_the_parameter(client: Client) -> None:
         parameter = query.partition("=")[0]
         assert problem["parameter"] == parameter
         assert problem["detail"].startswith(f"{parameter}: ")
+        allowed = {"model=phong": "abg, beckmann", "verdict=good": "'passes'", "paper=he1992": "he1991"}
+        assert allowed.get(query, "") in problem["detail"]
 
 
 def test_the_catalogue_is_sorted_and_what_is_unknown_comes_last(own: Path) -> None:
