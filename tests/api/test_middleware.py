@@ -54,6 +54,10 @@ def test_head_is_get_without_the_body(client: Client) -> None:
         assert (asked.status_code, asked.content) == (got.status_code, b"")
         for name in ("content-type", "content-length", "etag", "cache-control"):
             assert asked.headers.get(name) == got.headers.get(name)
+    send = AsyncMock()  # the client of these tests would drop a body
+    scope = {"type": "http", "http_version": "1.1", "method": "HEAD", "path": FELT, "query_string": b"", "headers": []}
+    asyncio.run(client.app(scope, AsyncMock(return_value={"type": "http.request", "body": b""}), send))
+    assert [message.args[0].get("body") for message in send.await_args_list] == [None, b""]
 
 
 def test_a_server_is_ready_when_its_kernels_are_loaded(client: Client) -> None:
