@@ -13,20 +13,17 @@ from scipy.interpolate import RegularGridInterpolator
 
 from brdfdb.errors import ParameterError
 from brdfdb.geometry import unit_vector
-from brdfdb.materials import Material
 from brdfdb.tables import _coordinates, _kernels
 from brdfdb.tables import table as table_module
 from brdfdb.tables.grids import Grid
-from brdfdb.tables.layout import Interpolation, Layout
+from brdfdb.tables.layout import Interpolation
 from brdfdb.tables.table import Table, points
-from brdfdb.tables.tabulation import tabulate
 from tests.tables.made_up import (
     AXES,
     INTERPOLATION_TOLERANCE,
     KINDS,
     WAVELENGTHS,
     made_up,
-    random_directions,
     scipys_cubic,
 )
 
@@ -56,8 +53,8 @@ def test_shapes_are_those_of_the_angles_then_of_the_wavelengths(
     assert np.shape(table.lookup(0.1, 0.2, 0.3, 0.4, asked)) == adds
     assert np.shape(table.lookup(np.full((3, 1), 0.1), 0.2, np.full(5, 0.3), 0.4, asked)) == (3, 5, *adds)
     assert np.shape(table.lookup(0.1, np.zeros(2), 0.3, np.zeros((2, 1)), asked)) == (2, 2, *adds)
-    assert np.shape(table.lookup([], 0.2, 0.3, 0.4, asked)) == (0, *adds)
     assert np.shape(table.lookup(np.zeros((2, 0)), 0.2, np.zeros((2, 1)), 0.4, asked)) == (2, 0, *adds)
+    assert np.shape(table.lookup_vectors(np.empty((0, 3)), [0.0, 0.0, 1.0], asked)) == (0, *adds)
     assert np.shape(table.specular_reflectance(0.1, asked)) == adds
     assert np.shape(table.specular_reflectance(np.full((3, 5), 0.1), asked)) == (3, 5, *adds)
     assert np.shape(table.specular_reflectance([], asked)) == (0, *adds)
@@ -241,24 +238,3 @@ def test_the_dirac_part_is_interpolated_over_theta_and_wavelength() -> None:
 def test_a_model_without_a_dirac_part_reflects_nothing_there() -> None:
     np.testing.assert_array_equal(made_up("isotropic", WAVELENGTHS).specular_reflectance([0.1, 0.2]), np.zeros((2, 4)))
     assert made_up("anisotropic").specular_reflectance(0.1) == 0.0
-
-
-def test_the_two_kinds_of_table_of_one_material_agree() -> None:
-    turning = np.arange(0.0, 361.0, 20.0)
-    theta = {"theta_i": [0, 25, 50, 75], "theta_r": [0, 30, 60, 80]}
-    iso = Grid(theta | {"delta_phi": turning[:10]})
-    aniso = Grid({"theta_i": theta["theta_i"], "phi_i": turning, "theta_r": theta["theta_r"], "phi_r": turning})
-    parameters = {"rho": 0.8, "sigma_deg": 30}
-    plaster = Material.from_table(
-        "plaster", {"title": "Plaster", "model": "oren_nayar", "source": "no paper", "parameters": parameters}
-    )
-    tables = []
-    for grid in (iso, aniso):
-        dataset = tabulate(Layout(plaster, grid))
-        tables.append(Table("plaster", "r000001", dataset.attrs, grid, None, dataset["brdf"].values, None))
-    assert [table.anisotropic for table in tables] == [False, True]
-    theta_i, _, theta_r, phi_r = random_directions(300)
-    # with the light on a node the two interpolate between the same values, but for their rounding to float32
-    for phi_i in np.deg2rad(turning):
-        one, other = (table.lookup(theta_i, phi_i, theta_r, phi_r) for table in tables)
-        np.testing.assert_allclose(one, other, rtol=2e-7)
