@@ -88,12 +88,6 @@ def test_shares_add_up_to_the_albedo_of_the_table(grey: Table) -> None:
     np.testing.assert_allclose(shares["specular part"], table.specular_reflectance(radians(ALBEDO_DEG)))
 
 
-def test_albedo_is_stacked_below_a_line_at_one(grey: Table) -> None:
-    axes = grey.plot.albedo(ax=Figure().add_subplot())
-    assert list(np.asarray(axes.lines[0].get_ydata())) == [1.0, 1.0]
-    assert {text.get_text() for text in axes.texts} == {"reflected", "1: everything is reflected"}
-
-
 @pytest.mark.parametrize("kind", ["in_plane", "half_difference"])
 def test_slice_is_shown_with_a_colour_bar(grey: Table, kind: str) -> None:
     figure = Figure()
@@ -212,6 +206,8 @@ def test_cuts_of_a_peak_and_a_flat_table_share_a_logarithmic_axis() -> None:
 def test_albedos_of_two_tables_are_lines_where_one_is_stacked(grey: Table) -> None:
     axes = Figure().add_subplot()
     scaled(0.3, "dim").plot.albedo(ax=axes)
+    assert np.asarray(axes.lines[0].get_ydata()).tolist() == [1.0, 1.0]
+    assert {text.get_text() for text in axes.texts} == {"reflected", "1: everything is reflected"}
     assert len(axes.collections) == 1
     grey.plot.albedo(ax=axes)
     assert len(axes.collections) == 0

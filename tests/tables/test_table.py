@@ -9,14 +9,7 @@ import pytest
 from scipy.interpolate import RegularGridInterpolator
 
 from brdfdb.tables.table import Table
-from tests.tables.made_up import (
-    INTERPOLATION_TOLERANCE,
-    KINDS,
-    WAVELENGTHS,
-    made_up,
-    random_directions,
-    scipys_cubic,
-)
+from tests.tables.made_up import INTERPOLATION_TOLERANCE, KINDS, WAVELENGTHS, made_up, random_directions, scipys_cubic
 
 pytestmark = pytest.mark.filterwarnings("ignore::brdfdb.errors.DegreesWarning")  # full turns are meant
 

@@ -18,14 +18,7 @@ from brdfdb.tables import table as table_module
 from brdfdb.tables.grids import Grid
 from brdfdb.tables.layout import Interpolation
 from brdfdb.tables.table import Table, points
-from tests.tables.made_up import (
-    AXES,
-    INTERPOLATION_TOLERANCE,
-    KINDS,
-    WAVELENGTHS,
-    made_up,
-    scipys_cubic,
-)
+from tests.tables.made_up import AXES, INTERPOLATION_TOLERANCE, KINDS, WAVELENGTHS, made_up, scipys_cubic
 
 
 @KINDS

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -94,19 +93,6 @@ def test_a_spectral_table_holds_the_model_with_the_wavelength_last(
     np.testing.assert_array_equal(table["n"].values, n)
     np.testing.assert_array_equal(table["k"].values, k)
     assert table["n"].dims == table["k"].dims == ("wavelength",)
-
-
-@pytest.mark.parametrize("grid", [ISOTROPIC, ANISOTROPIC], ids=["isotropic", "anisotropic"])
-@pytest.mark.parametrize("position", range(4))
-def test_every_axis_reaches_the_model_as_what_it_is_called(
-    position: int, grid: Grid, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def angle(*angles: Any, rho: float) -> Any:
-        return rho * angles[position] + sum(np.zeros_like(a) for a in angles)
-
-    monkeypatch.setitem(models.MODELS, "lambert", replace(models.MODELS["lambert"], evaluate=angle))
-    found = tabulate(Layout(GREY[0], grid))["brdf"].values
-    np.testing.assert_array_equal(found, (0.5 * directions(grid)[position]).astype(np.float32))
 
 
 @pytest.mark.parametrize("rows", [1, 2, 3, 100])
