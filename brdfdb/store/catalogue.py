@@ -98,7 +98,7 @@ class Verdict(NamedTuple):
 
 
 class LastAudit(NamedTuple):
-    """The report of an audit: its date, and what it found on each material."""
+    """The report of an audit: its date, and its findings on each material."""
 
     when: str
     by_name: dict[str, AuditedMaterial]

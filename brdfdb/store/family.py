@@ -19,7 +19,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from brdfdb.arrays import array_lookup
 from brdfdb.errors import ParameterError, StoreError, sentence_of
-from brdfdb.geometry import checked_angles, checked_vectors, radians
+from brdfdb.geometry import checked_angles, checked_vectors, degrees, radians
 from brdfdb.materials import written_name
 from brdfdb.models import MODELS
 from brdfdb.notebook import card, percent
@@ -79,6 +79,13 @@ class Sweep(FamilyLine):
         return {
             swept[name].name: float(radians(value)) if swept[name].unit == "rad" else value
             for name, value in written.items()
+        }
+
+    def in_file_units(self, at: Mapping[str, float]) -> dict[str, float]:
+        """Return parameters of the model by the names and in the units of files, to six digits."""
+        return {
+            written: float(f"{degrees(at[parameter.name]) if parameter.unit == 'rad' else at[parameter.name]:.6g}")
+            for written, parameter in self.parameters.items()
         }
 
 
@@ -175,7 +182,7 @@ def member_loader(sweep: Sweep, tables: Mapping[str, Table]) -> Callable[[int], 
 def stale(family: str, member: str) -> str:
     """Return the sentence about a family whose member is not the one that its record was made of."""
     return (
-        f"the family {family} is out of date: {member} is another table than it was measured with; "
+        f"the family {family} is out of date: {member} was rebuilt since the error of the family was measured; "
         "build its recipe again"
     )
 

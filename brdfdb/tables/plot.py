@@ -211,11 +211,13 @@ class Plot:
         wanted = self._wavelength(wavelength_nm)
         axes = axes_for("slices", ax, (6.4, 3.6))
         picture = _SLICES[kind](self.table)
-        values, stored = picture.values, self.table.wavelength_nm
+        values = picture.values
+        stored = self.table.wavelength_nm
         at = None
         if stored is not None:
             index = int(np.argmin(np.abs(stored - (_SHOWN_NM if wanted is None else wanted))))
-            values, at = values[..., index], float(stored[index])
+            values = values[..., index]
+            at = float(stored[index])
         positive = values[values > 0.0]
         high = float(positive.max()) if positive.size else 1.0
         low = max(float(positive.min()) if positive.size else 0.1, 1e-6 * high)
@@ -311,7 +313,8 @@ def albedo_shares(table: Plotted, phi_i: float, wavelength_nm: float | None) -> 
 
     Lookups are integrated to 1e-3, for lights at the azimuth `phi_i` [rad]; `wavelength_nm` is None for a grey table.
     """
-    source, theta_i = table.source, radians(ALBEDO_DEG)
+    source = table.source
+    theta_i = radians(ALBEDO_DEG)
 
     def brdf(wi: Floats, wr: Floats) -> Floats:
         return np.asarray(table.lookup_vectors(wi, wr, wavelength_nm))[..., np.newaxis]

@@ -339,7 +339,8 @@ def test_verify_looks_at_families_too(grey: Path, capsys: Captured) -> None:
     assert capsys.readouterr().out.startswith("0 materials and 1 family verified, ")
     built(grey, GREY.replace('["grey", "foam"]', '["grey-002"]').replace("rho = 0.5", "rho = 0.6"))
     assert run(grey, "verify") == 2
-    said = "the family grey is out of date: grey-002 is another table than it was measured with; build its recipe again"
+    why = "grey-002 was rebuilt since the error of the family was measured; build its recipe again"
+    said = f"the family grey is out of date: {why}"
     assert f"brdfdb: {said}; `brdfdb build` with its recipe repairs it" in capsys.readouterr().err.splitlines()
     assert run(grey, "lookup", "grey", 0, 0, 0, 0, "--set", "sigma_deg=5") == 2
     assert capsys.readouterr().err.startswith(f"brdfdb: {said}")

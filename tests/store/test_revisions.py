@@ -90,7 +90,7 @@ def test_how_a_material_stands_to_a_request(root: Path) -> None:
         ({"grid": {"a": [1.0]}}, {"grid": {"a": [2.0]}}, "grid changed"),
         ({"material": {"parameters": 1, "source": "x"}}, {"material": {"parameters": 2, "source": "x"}},
          "parameters changed"),
-        ({}, {"grid": 1}, "the current table does not say what was asked for"),
+        ({}, {"grid": 1}, "the current table does not record its request"),
     ],
 )  # fmt: skip
 def test_a_difference_is_a_phrase(old: dict[str, object], new: dict[str, object], said: str) -> None:
@@ -155,7 +155,7 @@ def test_a_revision_that_is_removed_while_it_is_read_is_never_read_as_data(root:
     with store.dataset("white") as lazy:
         publish_dataset(root, "white", requested(0.5))
         collect(root, 1)
-        with pytest.raises(StoreError, match=r"^white r000004 was removed while it was read; open the material anew$"):
+        with pytest.raises(StoreError, match=r"^white r000004 was removed while it was read; open the material again$"):
             lazy["brdf"].load()
 
 

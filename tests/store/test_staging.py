@@ -106,9 +106,7 @@ def test_a_store_that_cannot_be_made_is_one_sentence(tmp_path: Path, monkeypatch
 
 @pytest.mark.parametrize("call", ["replace", "rename", "fsync"])
 @pytest.mark.parametrize("error", [OSError(errno.ENOSPC, "No space left on device"), OSError("the disk is gone")])
-def test_a_write_that_fails_leaves_the_old_revision_served(
-    root: Path, monkeypatch: pytest.MonkeyPatch, call: str, error: OSError
-) -> None:
+def test_failed_writes_change_nothing(root: Path, monkeypatch: pytest.MonkeyPatch, call: str, error: OSError) -> None:
     def fail(*_: Any) -> None:
         raise error
 
@@ -126,9 +124,7 @@ def test_a_write_that_fails_leaves_the_old_revision_served(
     assert rho(root) == 0.75
 
 
-def test_all_of_a_revision_is_synced_before_the_pointer_is_swapped(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_revisions_are_synced_before_the_pointer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     synced: list[int] = []
     sync, replace = os.fsync, os.replace
     before: list[set[int]] = []
@@ -198,9 +194,7 @@ def killed() -> Iterator[Callable[[Path, str], int]]:
              "publication write_sealed", "Path rename", "publication point_to", "records swap_sealed",
              "files sync_directory"],
 )  # fmt: skip
-def test_a_killed_write_changes_nothing_for_readers_and_takes_no_number_twice(
-    root: Path, step: str, killed: Callable[[Path, str], int]
-) -> None:
+def test_killed_writes_change_nothing(root: Path, step: str, killed: Callable[[Path, str], int]) -> None:
     assert killed(root, step) == -signal.SIGKILL
     store = brdfdb.open(root)
     if step == "files sync_directory":  # the pointer is swapped; only that it outlasts a power cut is not certain
@@ -325,9 +319,7 @@ def test_a_layout_is_kept_for_the_next_build(tmp_path: Path, four_blocks: str) -
     assert planned(tmp_path, "white", REQUEST) is None
 
 
-def test_a_block_that_cannot_be_written_is_one_sentence(
-    tmp_path: Path, four_blocks: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_failed_blocks_are_one_sentence(tmp_path: Path, four_blocks: str, monkeypatch: pytest.MonkeyPatch) -> None:
     where = staged_table(tmp_path, four_blocks)
     other = staged_blocks(tmp_path / "other", four_blocks)
     monkeypatch.setattr(os, "fsync", full)

@@ -135,9 +135,7 @@ def test_the_marker_of_a_store_with_tables_is_written_anew(root: Path, damage: C
     assert (findings(root), rho(root)) == ([], 0.75)
 
 
-def test_a_revision_that_is_superseded_and_collected_while_it_is_verified_is_no_alarm(
-    root: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_revision_superseded_during_verification_is_no_finding(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     check, waiting = verification.check_manifest, [1.0, 0.125]
 
     def overtaken(*arguments: object, **keywords: object) -> object:

@@ -41,9 +41,7 @@ def opened(place: Any, **keywords: Any) -> xr.Dataset:
 
 
 @pytest.mark.parametrize("name", LAYOUTS)
-def test_all_ways_to_a_revision_give_brdf_over_all_axes_lazily_and_files_keep_it(
-    name: str, root: Path, tmp_path: Path
-) -> None:
+def test_all_ways_to_a_revision_give_brdf_lazily(name: str, root: Path, tmp_path: Path) -> None:
     store = brdfdb.open(root)
     table = store[name]
     copy = shutil.copytree(store.path(name), tmp_path / "copy")
@@ -107,9 +105,7 @@ def test_variables_say_what_they_are_as_cf_does(root: Path) -> None:
         assert "parts" not in opened(root, material="copper", drop_variables=["parts", "spectra"])
 
 
-def test_what_is_no_table_is_refused_with_a_sentence(
-    root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_other_places_are_refused(root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     place: Path
     for place, keywords, error, said in (
         (root, {}, ParameterError, "material: .* is a store; name one of its materials, such as brass"),
@@ -124,7 +120,7 @@ def test_what_is_no_table_is_refused_with_a_sentence(
         publish_dataset(tmp_path / "other", "odd", xr.Dataset({"rho": ("theta", [0.5, 0.25])}))
     material = tmp_path / "other" / "materials" / "odd"
     for place in (material, shutil.copytree(material / "r000001", tmp_path / "copy")):
-        with pytest.raises(StoreError, match=r"is no table: brdf: neither it nor parts is among the arrays rho$"):
+        with pytest.raises(StoreError, match=r"is not a table: brdf: neither it nor parts is among the arrays rho$"):
             opened(place)
 
 

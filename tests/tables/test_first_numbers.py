@@ -79,9 +79,7 @@ def test_half_vectors_of_ward_are_measured_against_his_ellipse() -> None:
 
 
 @pytest.mark.parametrize(("name", "largest"), [("blue-plastic", 1.15), ("aluminum-cylinder-13b", 1.0)])
-def test_the_largest_albedo_of_a_build_is_that_of_the_audit_of_the_table_and_of_its_model(
-    name: str, largest: float
-) -> None:
+def test_the_largest_albedo_is_that_of_the_audit(name: str, largest: float) -> None:
     layout = plan(presets()[name], AT, 0.01)
     stated = largest_of(layout)
     audited = table_energy_of(read_back(tabulate(layout)), None)

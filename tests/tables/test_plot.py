@@ -161,9 +161,7 @@ def curves(axes: Axes) -> dict[str, Line2D]:
 
 @pytest.mark.parametrize("order", [(0.1, 0.8), (0.8, 0.1)])
 @pytest.mark.parametrize("kind", ["lobe", "cuts"])
-def test_two_tables_on_the_same_axes_have_one_scale_a_colour_each_and_a_legend(
-    kind: str, order: tuple[float, float]
-) -> None:
+def test_two_tables_on_the_same_axes_share_a_scale(kind: str, order: tuple[float, float]) -> None:
     """Each was drawn to its own scale as a lobe, and the taller of two cuts was cut off by the second."""
     axes = Figure().add_subplot()
     for factor in order:

@@ -39,9 +39,7 @@ from tests.tables.made_up import AXES, INTERPOLATION_TOLERANCE, KINDS, WAVELENGT
         (WAVELENGTHS[:1], [400.0, 400.0], (2,)),
     ],
 )
-def test_shapes_are_those_of_the_angles_then_of_the_wavelengths(
-    kind: str, wavelengths: Any, asked: Any, adds: tuple[int, ...]
-) -> None:
+def test_shapes_of_angles_and_wavelengths(kind: str, wavelengths: Any, asked: Any, adds: tuple[int, ...]) -> None:
     table = made_up(kind, wavelengths, dirac=True)
     assert np.shape(table.lookup(0.1, 0.2, 0.3, 0.4, asked)) == adds
     assert np.shape(table.lookup(np.full((3, 1), 0.1), 0.2, np.full(5, 0.3), 0.4, asked)) == (3, 5, *adds)
@@ -70,9 +68,7 @@ def test_broadcasting_is_looking_up_one_by_one() -> None:
         assert specular[index, 0, 0, 0, m] == table.specular_reflectance(theta_i[index, 0, 0, 0], asked[m])
 
 
-def test_kernels_see_arguments_of_one_type_whether_lookups_are_of_arrays_or_numbers(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_kernels_are_compiled_for_one_type_of_arguments(monkeypatch: pytest.MonkeyPatch) -> None:
     # they are compiled for each type, and what may be written to is another
     seen: dict[str, set[Any]] = {}
 

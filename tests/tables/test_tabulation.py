@@ -79,9 +79,7 @@ def test_every_node_holds_the_model_rounded_once(made_up: Material, grid: Grid) 
 
 @pytest.mark.parametrize("grid", [ISOTROPIC, RECIPROCAL, ANISOTROPIC], ids=["isotropic", "reciprocal", "anisotropic"])
 @pytest.mark.parametrize("wavelengths", [WAVELENGTHS, WAVELENGTHS[:1]], ids=["three", "one"])
-def test_a_spectral_table_holds_the_model_with_the_wavelength_last(
-    grid: Grid, wavelengths: NDArray[np.float64]
-) -> None:
+def test_a_spectral_table_holds_the_model(grid: Grid, wavelengths: NDArray[np.float64]) -> None:
     table = tabulate(Layout(rough_copper(), grid, wavelengths))
     n, k = refractive_index(COPPER, wavelengths)
     expected = models.he_torrance(
@@ -212,9 +210,7 @@ HORIZON_OF_VIEWER = HORIZON | {"theta_i": [0, 80], "theta_r": [0, 90]}
         (rough_copper(), ISOTROPIC, np.array([]), "wavelengths_nm: must be positive and increase strictly"),
     ],
 )
-def test_what_does_not_suit_is_refused_in_one_sentence(
-    made_up: Material, grid: Grid, wavelengths: Any, sentence: str
-) -> None:
+def test_unsuitable_grids_are_refused(made_up: Material, grid: Grid, wavelengths: Any, sentence: str) -> None:
     with pytest.raises(ValueError, match=f"^{re.escape(sentence)}"):
         Layout(made_up, grid, wavelengths)
 
