@@ -141,10 +141,17 @@ class Service:
     def content(self, path: str, body: bytes | None, media: str) -> bytes:
         """Return the bytes of an answer.
 
-        StoreError says that no service answers, that it cannot read its store, or that it fails; errors of the store
-        itself are raised as it raised them.
+        If the service is busy for a short time that it names, ask again after that time. StoreError says that no
+        service answers, that it cannot read its store, or that it fails; errors of the store itself are raised as it
+        raised them.
         """
-        response, answer = self._answer(path, body, media)
+        end = time.monotonic() + min(self.timeout_s, PATIENCE_S)
+        while True:
+            response, answer = self._exchanged(path, body, media)
+            wait = response.getheader("Retry-After", "") if response.status == 503 else ""
+            if not wait.isdecimal() or time.monotonic() + int(wait) > end:
+                break
+            time.sleep(int(wait))
         status = response.status
         location = response.getheader("Location")
         if status == 200:
@@ -169,16 +176,6 @@ class Service:
         why = f": {detail}" if detail else " without a reason"
         sentence = f"{self.url} answered {status} {response.reason}".rstrip() + why
         raise TooLargeError(sentence) if status == 413 else StoreError(sentence)
-
-    def _answer(self, path: str, body: bytes | None, media: str) -> _Answer:
-        """Return an answer; if the service is busy for a short time that it names, wait and ask again."""
-        end = time.monotonic() + min(self.timeout_s, PATIENCE_S)
-        while True:
-            answer = self._exchanged(path, body, media)
-            wait = answer.response.getheader("Retry-After", "") if answer.response.status == 503 else ""
-            if not wait.isdecimal() or time.monotonic() + int(wait) > end:
-                return answer
-            time.sleep(int(wait))
 
     def _exchanged(self, path: str, body: bytes | None, media: str) -> _Answer:
         headers = {"Accept": media} if body is None else {"Accept": media, "Content-Type": media}

@@ -143,21 +143,17 @@ class Sampler:
         sin = np.sqrt(first)
         angle = 2.0 * np.pi * u2
         cosine = np.stack(np.broadcast_arrays(sin * np.cos(angle), sin * np.sin(angle), np.sqrt(1.0 - first)), axis=-1)
-        h = self._half_vector(first, u2, wi)
-        mirrored = 2.0 * np.sum(h * wi, axis=-1, keepdims=True) * h - wi
-        return np.asarray(np.where(in_lobe[..., np.newaxis], mirrored, cosine + 0.0 * mirrored))
-
-    def _half_vector(self, u1: Array, u2: Array, wi: Array) -> Array:
-        cells = self.cells
-        _, rings, columns = cells.probability.shape
         # Cumulative numbers are mixed, not lights drawn: numbers that are even stay even over half vectors
+        _, rings, columns = self.cells.probability.shape
         lights = self._lights(wi)
-        place, ring = _place(self._theta, lights, u1)
-        versine = cells.edges[ring] + np.diff(cells.edges)[ring] * place
+        place, ring = _place(self._theta, lights, first)
+        versine = self.cells.edges[ring] + np.diff(self.cells.edges)[ring] * place
         place, column = _place(self._phi, [_WeightedRow(weight, row * rings + ring) for weight, row in lights], u2)
         phi = (column + place) * (2.0 * np.pi / columns)
         sin = np.sqrt(versine * (2.0 - versine))
-        return self._turned(np.stack([sin * np.cos(phi), sin * np.sin(phi), 1.0 - versine], axis=-1), wi, 1.0)
+        h = self._turned(np.stack([sin * np.cos(phi), sin * np.sin(phi), 1.0 - versine], axis=-1), wi, 1.0)
+        mirrored = 2.0 * np.sum(h * wi, axis=-1, keepdims=True) * h - wi
+        return np.asarray(np.where(in_lobe[..., np.newaxis], mirrored, cosine + 0.0 * mirrored))
 
     def density(self, wi: Array, wr: Array) -> Array:
         """Return the density [1/sr] of `draw` over the sphere, for unit vectors (..., 3)."""

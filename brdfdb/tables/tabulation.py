@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -186,6 +186,13 @@ class Beyond(NamedTuple):
 Evaluated = TypeVar("Evaluated")
 
 
+class HorizonValues(NamedTuple, Generic[Evaluated]):
+    """Values up to the horizon and, for the angles beyond it, the values a step before it with these angles."""
+
+    values: Evaluated
+    before: tuple[Evaluated, Beyond] | None
+
+
 def evaluated_to_horizon(
     layout: Layout,
     theta_h: Floats,
@@ -193,14 +200,8 @@ def evaluated_to_horizon(
     theta_d: Floats,
     phi_d: Floats,
     evaluate: Callable[[Layout, Floats, Floats], Evaluated],
-) -> tuple[Evaluated, tuple[Evaluated, Beyond] | None]:
-    """Evaluate a layout at half and difference angles [rad], with theta_d limited to its largest value.
-
-    Returns
-    -------
-    tuple
-        The values; and, for the angles beyond the horizon, the values a step before it with these angles, or None.
-    """
+) -> HorizonValues[Evaluated]:
+    """Evaluate a layout at half and difference angles [rad], with theta_d limited to its largest value."""
     lowest = 0.0  # cosine of light and viewer
     if layout.source.grazing_pole and layout.interpolation.power == 0.0:
         end = radians(POLE_END_DEG)
@@ -219,8 +220,9 @@ def evaluated_to_horizon(
     *angles, steps = np.broadcast_arrays(theta_h, phi_h, before, phi_d, steps)
     mask = steps > 0.0
     if not mask.any():
-        return values, None
-    return values, (evaluate(layout, *_half_vectors(*(angle[mask] for angle in angles))), Beyond(mask, steps[mask]))
+        return HorizonValues(values, None)
+    before_horizon = evaluate(layout, *_half_vectors(*(angle[mask] for angle in angles)))
+    return HorizonValues(values, (before_horizon, Beyond(mask, steps[mask])))
 
 
 def extended(source: Source, values: Floats, before: tuple[Floats, Beyond] | None) -> Floats:

@@ -95,12 +95,15 @@ def test_an_anisotropic_function_is_tabulated_over_light_and_viewer_and_audited_
 
 
 @pytest.mark.usefixtures("published")
-def test_a_table_of_a_function_is_shown_and_served(root: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_table_of_a_function_is_listed_shown_and_served(root: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["list", "--store", str(root)]) == 0
+    assert "Coloured gloss" in capsys.readouterr().out
     assert cli.main(["show", "gloss", "--store", str(root)]) == 0
     said = capsys.readouterr().out
     assert "Coloured gloss" in said
     assert " of f_r relative to its source, at 99 % of " in said
     client = client_of(root)
+    assert "gloss" in [material["name"] for material in client.get("/v1/materials").json()["materials"]]
     assert client.get("/v1/materials/gloss").status_code == 200
     at = {"theta_i": 30, "theta_r": 40, "phi_r": 180, "wavelength_nm": 500}
     answer = client.get("/v1/materials/gloss/lookup", params=at)

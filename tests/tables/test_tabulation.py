@@ -166,6 +166,7 @@ def test_coordinates_and_variables_have_units() -> None:
     units = {name: spectral[name].attrs["units"] for name in ("wavelength", "brdf", "specular_reflectance", "n", "k")}
     assert units == {"wavelength": "nm", "brdf": "sr-1", "specular_reflectance": "1", "n": "1", "k": "1"}
     assert all(variable.attrs["long_name"] for variable in spectral.variables.values())
+    assert spectral["wavelength"].attrs["standard_name"] == "radiation_wavelength"
 
 
 def test_attributes_say_where_every_number_comes_from() -> None:
