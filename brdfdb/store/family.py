@@ -54,7 +54,7 @@ class FamilyLine(BaseModel):
 class Sweep(FamilyLine):
     """Tables of a family, with the requests that they were built for."""
 
-    request_sha256: list[str] = Field(description="of the request that each member was built for")
+    request_sha256: list[str] = Field(description="sha256 of the request of each member")
 
     @property
     def parameters(self) -> dict[str, Parameter]:
@@ -102,14 +102,14 @@ class Blend(BaseModel):
         description="of each swept parameter, in which these are polynomials; 0: its logarithm"
     )
     offset: float | None = Field(
-        description="1/sr; what is interpolated is the logarithm of f_r plus this. null: f_r itself"
+        description="1/sr; the logarithm of f_r plus this number is interpolated; null: f_r itself"
     )
-    specular_offset: float | None = Field(description="the same of the specular part")
-    reason: str = Field(description="what this and the other ways were measured to leave")
+    specular_offset: float | None = Field(description="the same for the specular part, without unit")
+    reason: str = Field(description="measured errors of this and of the other interpolations")
 
 
 class WorstPoint(BaseModel):
-    """The parameters, of those measured at, where the interpolation is worst."""
+    """The measured parameters at which the interpolation is worst."""
 
     model_config = _STRICT
 
@@ -124,11 +124,11 @@ class FamilyRecord(Sweep):
     version: Literal[2] = FORMAT_VERSION
     interpolation: Blend
     error: Error = Field(
-        description="of interpolated f_r against the model, over directions and parameters: all points pooled, as many "
-        "in each cell between members, spread evenly in it; of more than 256 cells one point in each of 256 drawn at "
-        "random. 99 of 100 values of the family are within p99; places are measured at the same points"
+        description="error of interpolated f_r against the model, over all directions and parameters together. The "
+        "parameters are spread evenly over the cells between members, the same number in each; of more than 256 cells, "
+        "256 random ones have one each. 99 of 100 values are within p99; places are measured at the same parameters"
     )
-    points: int = Field(description="parameters at which the error was measured")
+    points: int = Field(description="number of parameters at which the error was measured")
     worst: WorstPoint
     specular_error: float | None = Field(
         description="largest absolute error of the specular part at the same parameters"

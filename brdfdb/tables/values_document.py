@@ -57,7 +57,9 @@ class OfTable(BaseModel):
 
     material: str
     revision: str
-    digest: str = Field(description="sha256 of the manifest of the revision: stores number their revisions alike")
+    digest: str = Field(
+        description="sha256 of the manifest of the revision; other stores use the same numbers for other tables"
+    )
 
 
 class Lookup(Evaluated, OfTable):
