@@ -49,11 +49,8 @@ def test_curves_are_over_their_value_in_the_mirror_direction(number: int) -> Non
 
 def through_apertures(theta_i: float, x: float, surface: dict[str, float], a: float) -> float:
     arguments = np.deg2rad(theta_i), np.deg2rad(abs(x)), np.pi if x > 0.0 else 0.0, CONE, CONE
-    return (
-        float(reference.aperture_specular(*arguments, **surface))
-        + reference.aperture_diffuse(*arguments, **surface)
-        + a / np.pi
-    )
+    specular = float(reference.aperture_specular(*arguments, **surface))
+    return specular + reference.aperture_diffuse(*arguments, **surface) + a / np.pi
 
 
 @pytest.mark.parametrize(
