@@ -11,11 +11,10 @@ from brdfdb.audit import MaterialAudit, audit
 from brdfdb.audit.energy import Energy
 from brdfdb.audit.reciprocity import Reciprocity
 from brdfdb.materials import presets
-from brdfdb.materials.source import Evaluate
 from brdfdb.measurements import MeasuredSource
 from brdfdb.parameters import Floats
 from brdfdb.store.publication import publish
-from tests.measurements.made_up import scattered
+from tests.measurements.made_up import scattered, source_of
 
 
 def _audited(root: Path, source: MeasuredSource) -> MaterialAudit:
@@ -23,16 +22,12 @@ def _audited(root: Path, source: MeasuredSource) -> MaterialAudit:
     return audit(brdfdb.open(root)[source.name])
 
 
-def _of(name: str, f_r: Evaluate) -> MeasuredSource:
-    return MeasuredSource.of_function(f_r, ("grey",), None, name=name, title=name, provenance="x")
-
-
 def _bright(wi: Floats, wr: Floats) -> Floats:
     return np.asarray(0.4 * (1.0 + wi[:, 2:]) + 0.0 * wr[:, 2:])
 
 
 def test_asymmetry_of_unknown_uncertainty_is_reported_and_not_judged(tmp_path: Path) -> None:
-    audited = _audited(tmp_path, _of("bright", _bright))
+    audited = _audited(tmp_path, source_of(_bright, name="bright"))
     finding = audited.of(Reciprocity)
     assert finding.verdict == "passes"
     assert 0.05 < finding.table_random.median < finding.table_random.p99 < 0.4
@@ -41,7 +36,7 @@ def test_asymmetry_of_unknown_uncertainty_is_reported_and_not_judged(tmp_path: P
 
 
 def test_laws_are_kept_by_tables_that_are_made_to_keep_them(tmp_path: Path) -> None:
-    audited = _audited(tmp_path, _of("bright", _bright).made("reciprocal").made("conserving"))
+    audited = _audited(tmp_path, source_of(_bright, name="bright").made("reciprocal").made("conserving"))
     assert audited.verdict == "passes"
     assert audited.of(Reciprocity).table_random.max < 1e-6
     # each light reflects too much before, and nearly all of it afterwards
@@ -71,4 +66,4 @@ def test_albedo_above_1_by_less_than_the_uncertainty_passes(tmp_path: Path) -> N
     audited = _audited(tmp_path, MeasuredSource.of_samples(samples, name="white"))
     assert (audited.of(Energy).table.max_albedo or 0.0) > 1.0
     assert audited.of(Energy).table.verdict == "passes"
-    assert _audited(tmp_path, _of("exact", white)).of(Energy).table.verdict == "violates"
+    assert _audited(tmp_path, source_of(white, name="exact")).of(Energy).table.verdict == "violates"
