@@ -21,7 +21,8 @@ from brdfdb.tables.table import Table
 
 SAMPLES = 100_000  # number of samples for each light
 FEWER_SAMPLES = 4000  # number of samples if the values of the model are integrals
-THETA_I_DEG, PHI_I_DEG = (10.0, 45.0, 80.0), 30.0
+THETA_I_DEG = (10.0, 45.0, 80.0)
+PHI_I_DEG = 30.0
 LEAST_CHANCE = 1e-6  # smallest p of a sound sampler
 STANDARD_ERRORS = 6.0  # allowed difference of the albedos, in standard errors; chance exceeds it once in 500 million
 _ROUNDING = 1e-12  # rounding error of a mean of equal weights

@@ -88,7 +88,7 @@ class TableError(Finding):
         wrong = [f"its stated error contradicts itself: {sentence}" for sentence in self.contradictions]
         if self.worst:
             worst = "; ".join(disagreement.text for disagreement in self.worst)
-            wrong.append(f"{self.disagreements} numbers of its stated error are not those of fresh directions: {worst}")
+            wrong.append(f"{self.disagreements} numbers of its stated error disagree with fresh directions: {worst}")
         if self.likeness:
             wrong.append(f"the table agrees with {self.likeness}")
         return [self.sentence(self.verdict, "; ".join([f"{fresh}{bias}; the table {stated}{mirror}", *wrong]))]

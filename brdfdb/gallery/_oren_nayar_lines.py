@@ -122,7 +122,8 @@ def evaluated_parts(
     starts = [np.zeros(cot_i.shape), *(np.arctan(cot) for cot in (cot_i, cot_r, np.hypot(cot_i, cot_r)))]
     edges = np.sort(np.minimum([*starts, np.full(cot_i.shape, last)], last), axis=0)
     x, w = gauss_rule(_NODES)
-    u, w = (x + 1.0) / 2.0, w / 2.0
+    u = (x + 1.0) / 2.0
+    w = w / 2.0
     direct = bounce = total = np.zeros(cot_i.shape)
     for low, high in pairwise(edges):
         theta_a = low[..., None] + (high - low)[..., None] * u**2

@@ -116,12 +116,8 @@ class Material(BaseModel, Lookups):
                 for field in ("sources", "assumed"):
                     if isinstance(stated := table.get(field), Mapping):
                         if len(stated) > most:  # pydantic would keep an error for each of a million
-                            raise ParameterError(
-                                field,
-                                f"{len(stated)} are given, {model} has {most} values at most",
-                                len(stated),
-                                (0, most),
-                            )
+                            text = f"{len(stated)} are given, {model} has {most} values at most"
+                            raise ParameterError(field, text, len(stated), (0, most))
                         fields[field] = {own.get(written, written): value for written, value in stated.items()}
                 if isinstance(stated := fields.get("assumed", {}), Mapping):
                     fields["assumed"] = assumptions(fields["parameters"]) | dict(stated)
@@ -136,9 +132,8 @@ class Material(BaseModel, Lookups):
     @classmethod
     def _check_model(cls, model: str) -> str:
         if model not in MODELS:
-            raise ParameterError(
-                "model", f"{model!r} is not one of {', '.join(MODELS)}; --models FILE adds yours", model, tuple(MODELS)
-            )
+            text = f"{model!r} is not one of {', '.join(MODELS)}; --models FILE adds your models"
+            raise ParameterError("model", text, model, tuple(MODELS))
         return model
 
     @field_validator("parameters")
@@ -159,9 +154,8 @@ class Material(BaseModel, Lookups):
         if not self.spec.spectral and self.refractive_index is not None:
             raise ParameterError("refractive_index", f"the model {self.model} takes none")
         if not self.spectral and self.wavelengths_nm is not None:
-            raise ParameterError(
-                "wavelengths_nm", f"the model {self.model} is grey, and no parameter is a spectrum; leave them out"
-            )
+            text = f"the model {self.model} is grey, and no parameter is a spectrum; leave them out"
+            raise ParameterError("wavelengths_nm", text)
         for name, spectrum_of_it in self.spectra.items():
             if self.wavelengths_nm is not None:
                 spectrum_of_it.at(name, np.array(self.wavelengths_nm))

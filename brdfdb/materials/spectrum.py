@@ -56,9 +56,8 @@ class Spectrum(BaseModel):
         if np.any(np.diff(check_nanometres("wavelengths_nm", self.wavelengths_nm)) <= 0.0):
             raise ParameterError("wavelengths_nm", "those of a spectrum must be positive and increase strictly")
         if len(self.values) != len(self.wavelengths_nm):
-            raise ParameterError(
-                "values", f"{len(self.values)} are given for {len(self.wavelengths_nm)} wavelengths of a spectrum"
-            )
+            text = f"{len(self.values)} are given for {len(self.wavelengths_nm)} wavelengths of a spectrum"
+            raise ParameterError("values", text)
         return self
 
     def at(self, name: str, wavelength_nm: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -72,12 +71,8 @@ class Spectrum(BaseModel):
         if np.any(outside):
             hint = "; are they micrometres? A spectrum is in nm" if high < _LEAST_NM else ""
             wrong = float(np.atleast_1d(wavelength_nm)[np.atleast_1d(outside)][0])
-            raise ParameterError(
-                "wavelength_nm",
-                f"{wrong:g} has no {name}, whose spectrum covers [{low:g}, {high:g}] nm{hint}",
-                wrong,
-                (low, high),
-            )
+            text = f"{wrong:g} has no {name}, whose spectrum covers [{low:g}, {high:g}] nm{hint}"
+            raise ParameterError("wavelength_nm", text, wrong, (low, high))
         return np.asarray(np.interp(wavelength_nm, self.wavelengths_nm, self.values))
 
     def __str__(self) -> str:
@@ -172,9 +167,8 @@ def spectrum_of(name: str, written: Any, wavelengths_nm: Any = None, folder: Pat
     if {"wavelengths_nm", "values"} <= fields <= {"wavelengths_nm", "values", "origin"}:
         origin = written.get("origin", "listed with the material")
         return _spectrum(name, written["wavelengths_nm"], written["values"], origin)
-    raise ParameterError(
-        name, f"a spectrum with {', '.join(sorted(map(str, fields))) or 'nothing'}; give one of: {WAYS}", dict(written)
-    )
+    text = f"a spectrum with {', '.join(sorted(map(str, fields))) or 'nothing'}; give one of: {WAYS}"
+    raise ParameterError(name, text, dict(written))
 
 
 def _spectrum(name: str, wavelengths_nm: Any, values: Any, origin: Any) -> Spectrum:

@@ -248,9 +248,8 @@ class MeasuredSource(FunctionSource):
             Difference of the albedo from 1: room for the error of a table.
         """
         if law not in ("reciprocal", "conserving"):
-            raise ParameterError(
-                "law", f"{law!r} is neither reciprocal nor conserving", law, ("reciprocal", "conserving")
-            )
+            text = f"{law!r} is neither reciprocal nor conserving"
+            raise ParameterError("law", text, law, ("reciprocal", "conserving"))
         before = self._channels_at
         if law == "reciprocal":
             after = _made_reciprocal(before)
@@ -353,7 +352,8 @@ def _width(f_r: Evaluate) -> float | None:
         wr = 2.0 * np.sum(wi * half, axis=1, keepdims=True) * half - wi
         above = wr[:, 2] > 0.05
         values = f_r(wi[above], wr[above]).mean(axis=1)
-        far, peak = float(values.min()), float(values[0])
+        far = float(values.min())
+        peak = float(values[0])
         if not peak > _CLEAR * far:
             return None
         below = np.flatnonzero(values - far < (peak - far) * np.exp(-1.0))

@@ -171,18 +171,17 @@ def test_one_value_that_is_not_finite_violates_and_its_albedo_is_null_in_the_rep
     count = 1 if table.wavelength_nm is None else 3
     assert (found.verdict, found.of(ValueCounts).finiteness) == ("violates", "violates")
     assert (found.of(ValueCounts).not_finite, found.of(ValueCounts).negative) == (count, 0)
-    energy = found.of(Energy).table
+    (entry,) = written([found])["materials"]
     if value == -np.inf:  # the albedo is the largest over azimuths of the light
-        written([found])
         return
+    energy = found.of(Energy).table
     assert (energy.verdict, energy.max_albedo) == ("violates", None)
     at = f"{table.axes_deg['theta_i'][1]:g} degrees"
     at += "" if table.wavelength_nm is None else f" and {table.wavelength_nm[0]:g} nm"
     assert energy.reason == f"reflects no finite share of what arrives at {at}"
-    assert energy.albedo[1] == [None] * count
-    (entry,) = written([found])["materials"]
-    assert entry["findings"]["energy"]["table"]["albedo"][1] == [None] * count
-    assert None not in entry["findings"]["energy"]["table"]["albedo"][0]
+    albedo = entry["findings"]["energy"]["table"]["albedo"]
+    assert albedo[1] == energy.albedo[1] == [None] * count
+    assert None not in albedo[0]
 
 
 def test_a_table_of_nan_alone_has_no_smallest_value() -> None:

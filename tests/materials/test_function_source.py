@@ -54,12 +54,12 @@ def test_a_spectral_function_is_called_with_the_wavelengths_and_has_them_last() 
         ({"elliptical": True}, "elliptical: an isotropic function has more symmetry than an ellipse; leave it out"),
         ({"wavelengths_nm": (700.0, 400.0)}, "wavelengths_nm: [700.0, 400.0] must be positive and increasing"),
         ({"colour": "red"}, "colour: unknown key"),
-        ({"brdf": lambda wi, wr, _: wi[:, 2] * 2.0 + wr[:, 2]}, "brdf: made-up is not reciprocal, which it"),
-        ({"brdf": lambda wi, wr, _: 2.0 + wi[:, 0] * wr[:, 0]}, "brdf: made-up is anisotropic, which it does not say"),
+        ({"brdf": lambda wi, wr, _: wi[:, 2] * 2.0 + wr[:, 2]}, "brdf: made-up is not reciprocal; set"),
+        ({"brdf": lambda wi, wr, _: 2.0 + wi[:, 0] * wr[:, 0]}, "brdf: made-up is anisotropic; set"),
         (
             {"brdf": lambda wi, wr, _: 2.0 + wi[:, 0] * wr[:, 1] + wi[:, 1] * wr[:, 0], "anisotropic": True}
             | {"elliptical": True},
-            "brdf: made-up is not its own mirror image: ",
+            "brdf: made-up lacks mirror symmetry: ",
         ),
         ({"brdf": lambda wi, wr, _: wi[:, 2] * wr[:, 2] - 0.5}, "brdf: made-up gave -0."),
         ({"brdf": lambda wi, _wr, _: np.full(len(wi), np.inf)}, "brdf: made-up gave inf for the light ("),

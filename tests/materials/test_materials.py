@@ -1,7 +1,6 @@
 """The presets against the numbers of the papers, typed again here, and what a wrong material is told."""
 
 import re
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -210,7 +209,7 @@ def test_the_excess_of_a_smooth_plastic_is_fresnel_plus_a(name):
 
 
 def test_the_excess_of_magnesium_oxide():
-    # albedo from an independent evaluation of the model: 0.977 at 30, 1.016 at 60, 1.116 at 85 degrees, 1 at about 54
+    # albedo from an independent evaluation of the model: 1.116 at 85 degrees, 1 at about 54
     excess = preset("magnesium-oxide-ceramic").known_excess
     assert 1.11 < excess.max_albedo < 1.13
     assert 53.0 < excess.from_theta_i_deg < 54.0
@@ -252,12 +251,6 @@ def test_presets_can_be_taken_apart_without_harm():
     assert len(presets()) == 59
     with pytest.raises(ValidationError, match="frozen"):
         preset("rolled-brass").title = "Gold"
-
-
-def test_the_papers_of_the_models_are_in_the_bibliography():
-    bibliography = (Path(__file__).parents[2] / "references.bib").read_text(encoding="utf-8")
-    keys = set(re.findall(r"^@\w+\{(\w+),$", bibliography, flags=re.MULTILINE))
-    assert {preset(name).spec.reference for name in presets()} <= keys
 
 
 EXCESS = {"max_albedo": 1.1, "from_theta_i_deg": 80, "citation": "Fig. 1"}

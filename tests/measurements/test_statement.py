@@ -168,9 +168,9 @@ def test_numbers_that_may_mean_missing_are_stated(number: float, count: int, sen
 
 def test_values_of_one_number_and_values_below_0_are_stated() -> None:
     sheet = samples()
-    assert "f_r is one number at all directions: the samples tell no shape." in statement(sheet).sentences
+    assert "f_r is the same at all directions: the samples do not show its shape." in statement(sheet).sentences
     varied = replace(sheet, values=sheet.values * np.linspace(0.9, 1.1, len(sheet))[:, np.newaxis])
-    assert not any("one number" in sentence for sentence in statement(varied).sentences)
+    assert not any("do not show its shape" in sentence for sentence in statement(varied).sentences)
     assert any(hint.startswith("Sign?") for hint in statement(replace(varied, values=-varied.values)).hints)
 
 
@@ -223,7 +223,7 @@ def test_a_lobe_at_the_light_is_doubted(values: Any, doubted: bool) -> None:
 
 def test_shares_are_plain_numbers() -> None:
     known = statement(samples(lambda i, r, delta: 1e4 * _in_mirror(i, r, delta) + 1e-9))
-    assert any("unknown: one viewer makes 100 % of it" in sentence for sentence in known.sentences)
+    assert any("unknown: one viewer contributes 100 % of it" in sentence for sentence in known.sentences)
 
 
 def _in_mirror(theta_i: Any, theta_r: Any, delta: Any) -> Any:

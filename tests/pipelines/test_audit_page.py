@@ -129,7 +129,7 @@ def test_reasons_are_sentences_and_said_once(document: Document) -> None:
     assert (
         "White furnace: conserves. Rho = 1; the albedo is between 0.8 at 0° and 1.2 at 89°, in uniform light" in words
     )
-    assert "Uniform diffuse part: inside. The material's own a(λ) keeps to the largest that conserves energy." in words
+    assert "Uniform diffuse part: inside. The a(λ) of the material keeps to the largest that conserves energy." in words
     assert "Energy of the model: loses. Reflects" in words
     assert "Energy of the table: passes. As the model; in uniform light the model reflects 0.7, the table" in words
     assert "Reciprocity: passes. Asymmetry up to 3·10⁻¹³, of 1·10⁻¹¹ allowed." in words

@@ -253,7 +253,7 @@ def test_every_leaf_of_a_family_that_is_forged_is_noticed(grey: Path, capsys: Ca
     assert "family grey: error.p99.3.0 is " in capsys.readouterr().out
     write_sealed(path, record)
     assert cli.main(arguments) == 0
-    said = f"family grey: all {len(leaves(record))} numbers and words of its record are those of a new measurement"
+    said = f"family grey: all {len(leaves(record))} numbers and words of its record agree with a new measurement"
     assert said in capsys.readouterr().out
 
 

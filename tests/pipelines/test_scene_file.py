@@ -94,7 +94,7 @@ def test_the_scenes_of_the_papers_are_there() -> None:
         ("[0, -1, 0]", "[0, 0, 0]", "lights.0.direction: [0.0, 0.0, 0.0] points nowhere"),
         ("[0, -1, 0]", "[0, 1]", "lights.0.direction.2: is missing"),
         ("height = 2.5", "height = 2.5, fov_deg = 3", "camera.fov_deg, height: give one of the two"),
-        ("[0, -5, 0]", "[0, 0, 5]", "camera.target: the camera must look at another place"),
+        ("[0, -5, 0]", "[0, 0, 5]", "camera.target: the camera must look neither at its own position"),
         ("ambient = 0.1\nlights = [{ direction = [0, -1, 0] }]", "", "lights, ambient, environment: there is no light"),
         ('title = "one"', "tolerance = {}", "tolerance.relative, ciede2000: give one of the two"),
         ('title = "one"', "tolerance = { relative = -1 }", "tolerance.relative: -1 must be greater than 0"),
@@ -138,7 +138,7 @@ def test_the_command_line_renders_a_scene(tmp_path: Path, capsys: pytest.Capture
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ("[0, -1, 0]", "[0, 1, 0]", "lights.0: falls on nothing that is seen"),
+        ("[0, -1, 0]", "[0, 1, 0]", "lights.0: lights no visible point"),
         ("radius = 1", "radius = 1, position = [0, -9, 0]", "objects: no ray of 256 x 192 pixels meets ball"),
         ('kind = "sphere", radius = 1', 'kind = "recorded", file = "no.exr"', "there is no such file"),
         (

@@ -346,8 +346,8 @@ def reasons(cases: list[tuple[str, str | None, float, PictureError, bool]]) -> l
 
 def test_a_reason_has_the_error_the_cost_and_the_next_cheaper_form() -> None:
     fit, near = PictureError(1.2, 1.2), PictureError(1.004, 1.004)
-    next_fit = "the best of what is cheaper, functional fit, eqs 27-29, would leave 1.2"
-    next_qualitative = "the best of what is cheaper, qualitative, eq. 30, would leave 1.004"
+    next_fit = "the most accurate cheaper form, functional fit, eqs 27-29, would leave 1.2"
+    next_qualitative = "the most accurate cheaper form, qualitative, eq. 30, would leave 1.004"
     dear = "leaves 0.5 at 0.9 of the truth's cost, more than a third"
     cases = {
         ("facets", None, 1.0, fit, False): "is the truth itself, and nothing is cheaper",

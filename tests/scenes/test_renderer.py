@@ -64,28 +64,6 @@ def test_the_vase_is_shaded_as_the_reference_says(aside_deg: float) -> None:
         assert abs(found[column] - expected) < KERNEL
 
 
-def test_the_vase_is_flat_and_drops_at_the_limbs_where_lambert_falls_all_the_way() -> None:
-    # Section 6 with Fig. 23 (a): "nearly constant over most of the cross-section and drops quickly to zero very close
-    # to the limbs"
-    vase, lambert = across(CYLINDER, "clay-vase"), across(CYLINDER, "white")
-    assert np.abs(lambert - np.sqrt(1.0 - X * X)).max() < ROUNDING
-    flat = [np.mean(line >= 0.9 * line.max()) for line in (vase, lambert)]
-    assert flat[0] > 0.7  # of the width: 0.76
-    assert abs(flat[1] - np.sqrt(1.0 - 0.9**2)) < 1.0 / WIDTH
-    limb, inside = vase[[0, 5]] / vase.max()  # at 0.98 of the radius and at 0.78
-    assert limb < 0.7 < 0.85 < inside
-
-
-def test_the_vase_is_asymmetric_with_the_light_aside_and_lambert_drops_faster_on_the_right() -> None:
-    # Section 6 with Fig. 23 (b): light 20 degrees to the right of the camera
-    light = (np.sin(np.radians(20.0)), -np.cos(np.radians(20.0)), 0.0)
-    vase, lambert = (across(CYLINDER, material, light) for material in ("clay-vase", "white"))
-    vase, lambert = vase / vase.max(), lambert / lambert.max()
-    assert vase[45] - vase[4] > 0.1
-    assert vase[48] - lambert[48] > 0.1
-    assert abs(X[np.argmax(lambert)] - np.sin(np.radians(20.0))) < 2.0 / WIDTH
-
-
 def test_a_surface_along_the_grain_is_shaded_as_the_reference_says() -> None:
     brass = presets()["rolled-brass"].parameters
     plane = {"kind": "plane", "turn_deg": 30.0}
@@ -95,16 +73,6 @@ def test_a_surface_along_the_grain_is_shaded_as_the_reference_says() -> None:
         phi_i = -np.radians(30.0 + grain_deg)
         expected = ward_1992.elliptical(np.arccos(0.96), phi_i, 0.0, 0.0, *brass.values())
         assert np.abs(found / (1.5 * np.pi * 0.96 * float(expected)) - 1.0).max() < KERNEL
-
-
-def test_a_highlight_is_drawn_out_across_the_grain() -> None:
-    camera = {"position": [0.0, 0.0, 2.0], "up": [0.0, 1.0, 0.0], "fov_deg": 60.0, "aspect": 1.0}
-    for grain_deg, along in ((0.0, 0), (90.0, 1)):
-        lights = [{"direction": [0.0, 0.0, 1.0]}]
-        image = rendered(scene("rolled-brass", {"kind": "plane"}, camera=camera, grain_deg=grain_deg, lights=lights))
-        bright = np.argwhere(image[..., 0] > 0.5 * image.max())
-        extent = np.ptp(bright, axis=0)
-        assert extent[along] > 2.0 * extent[1 - along]  # alpha is 0.05 along the grain, 0.16 across
 
 
 def test_a_white_sphere_cannot_be_seen_in_uniform_light() -> None:
@@ -194,7 +162,7 @@ def test_what_has_no_picture_is_refused() -> None:
     with pytest.raises(ValueError, match=r"brdfs: 'thing' is not one of the scene's materials: clay-vase$"):
         rendered(vase, 4, brdfs={"thing": lambda wi, _wr, _wavelength_nm: np.ones((len(wi), 1))})
     view = gather(scene("white", SPHERE, lights=lights), WIDTH)
-    with pytest.raises(ParameterError, match=r"^view: it shows white, which is no material of the scene; gather the"):
+    with pytest.raises(ParameterError, match=r"^view: it shows white, which is not a material of the scene; gather"):
         render(scene("clay-vase", SPHERE, lights=lights), view)
     plane = scene("white", {"kind": "plane"}, camera=ABOVE, lights=[{"direction": [0.0, 0.0, 1.0]}])
     shapes = r"f_r of white: 4 pairs .* gave the shape \(4,.*; must be \(4, 16\) or \(4, 1\)"

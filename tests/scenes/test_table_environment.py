@@ -21,11 +21,10 @@ from tests.formats.small_tables import ANISOTROPIC, GREY, SPECTRAL, small_table
 from tests.formats.small_tables import DIFFUSE as ROUGH
 from tests.measurements.made_up import source_of
 from tests.scenes.a_scene import scene
-from tests.scenes.test_environment import FAR, ROOM, STANDARD_ERRORS, around, reference_radiance
+from tests.scenes.test_environment import FAR, ROOM, STANDARD_ERRORS, WAVELENGTH, around, estimates, reference_radiance
 
 Array = NDArray[np.float64]
 
-WAVELENGTH = np.array([400.0, 550.0, 700.0])
 POINTS, SAMPLES = 600, 16
 GRID = 3e-4  # of the quadrature over a grid of directions, relative; measured 2.2e-4
 PRECISE = 0.006  # standard error of the mean of all points, relative; measured 0.0049
@@ -60,13 +59,9 @@ def store(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def estimates(source: TableSource, wr: Array, drawn_by: Source | None = None) -> Array:
-    """Return the radiance (N, L) of surfaces that face up in a room towards viewers (N, 3), by drawn directions."""
-    environment = around(ROOM, samples=SAMPLES)
-    drawn = environment.drawn(drawn_by or source, WAVELENGTH, wr, (0,))
-    weight = environment.radiance(drawn.wi) * np.maximum(drawn.wi[..., 2], 0.0) * drawn.solid_angle
-    f_r = source.brdf_at(source.evaluated_at(WAVELENGTH))(drawn.wi.reshape(-1, 3), np.tile(wr, (len(drawn.wi), 1)))
-    return np.asarray(np.sum(f_r.reshape(*weight.shape, -1) * weight[..., np.newaxis], axis=0))
+def in_room(source: TableSource, wr: Array, drawn_by: Source | None = None) -> Array:
+    """Return the radiance (N, L) in a room, by drawn directions."""
+    return estimates(source, wr, around(ROOM, samples=SAMPLES), drawn_by)
 
 
 def integral(source: TableSource, wr: Array) -> Array:
@@ -88,7 +83,7 @@ def table_source(kind: str, store: Path) -> TableSource:
 @pytest.mark.parametrize("theta_deg", [10.0, 65.0])
 def test_a_room_is_reflected_as_by_a_grid_over_the_hemisphere(kind: str, theta_deg: float, store: Path) -> None:
     source, wr = table_source(kind, store), unit_vector(np.radians(theta_deg), 0.7)
-    found = estimates(source, np.tile(wr, (POINTS, 1)))
+    found = in_room(source, np.tile(wr, (POINTS, 1)))
     expected = integral(source, wr)
     standard_error = found.std(axis=0, ddof=1) / np.sqrt(POINTS)
     assert np.all(standard_error < PRECISE * expected)
@@ -105,7 +100,7 @@ def test_a_wrong_density_is_noticed(store: Path, monkeypatch: pytest.MonkeyPatch
 
     monkeypatch.setattr(Sampler, "density", shared_wrongly)
     source, wr = table_source("half-mirror", store), unit_vector(0.2, 0.7)
-    found = estimates(source, np.tile(wr, (POINTS, 1)))
+    found = in_room(source, np.tile(wr, (POINTS, 1)))
     standard_error = found.std(ddof=1) / np.sqrt(POINTS)
     assert abs(found.mean() - integral(source, wr)) > BIASED * standard_error
 
@@ -114,7 +109,7 @@ def test_a_peak_without_a_lobe_has_little_noise(store: Path) -> None:
     source, wr = table_source("road-sign", store), np.tile(unit_vector(0.6, 0.7), (POINTS, 1))
     assert not source.has_lobe
     cosine = presets()["aluminum-cylinder-13c"]  # of Lambert's model
-    assert estimates(source, wr).std() < SHINY * estimates(source, wr, cosine).std()
+    assert in_room(source, wr).std() < SHINY * in_room(source, wr, cosine).std()
 
 
 def picture(store: Path, material: str, rows: Array | None, **fields: int) -> Array:

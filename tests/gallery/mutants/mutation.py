@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cache, wraps
@@ -58,7 +58,7 @@ def planted(mutant: Mutant) -> Iterator[None]:
         for title, module in list(sys.modules.items())
         if title.split(".")[0] == "brdfdb" and not title.startswith(_UNTOUCHED)
         for name, value in list(vars(module).items())
-        if callable(value) and _hashable(value) and value in mutant.functions
+        if callable(value) and isinstance(value, Hashable) and value in mutant.functions
     ]
     missed = set(mutant.functions.values()) - {wrong for _, _, wrong in places}
     if missed:
@@ -80,10 +80,6 @@ def planted(mutant: Mutant) -> Iterator[None]:
         for space, name, right in before:
             space[name] = right
         MODELS.update(specs)
-
-
-def _hashable(value: object) -> bool:
-    return type(value).__hash__ is not None
 
 
 class Sentence(NamedTuple):

@@ -69,18 +69,7 @@ class Facets:
 
     def bounce(self, p: Any, q: Any, S: Any, C: Any) -> Any:
         """Return eqs 15 to 20 over E_0 cos(theta_i) rho^2 / pi [1], for light on the adjacent facet."""
-        s_b, v_a = C - p, C + q
-        lit = (s_b > 0.0) & (v_a > 0.0)
-        m_v = np.clip(-(C - q) / np.where(lit, v_a, 1.0), 0.0, 1.0)
-        m_s = np.clip(-(C + p) / np.where(lit, s_b, 1.0), 0.0, 1.0)
-        cos2 = C * C - S * S
-
-        def d(x: Any, y: Any) -> Any:
-            return np.sqrt(np.maximum(x * x + 2.0 * x * y * cos2 + y * y, 0.0))
-
-        # Eq. (47), over pi
-        factor = 0.5 * (d(1.0, m_v) + d(1.0, m_s) - d(m_s, m_v) - d(1.0, 1.0))
-        return np.where(lit, s_b * v_a / C * factor, 0.0)
+        return added_figures.facet(p, q, S, C)
 
     def functions(self) -> dict[Function, Function]:
         return {right_facets: self.gaussian}
