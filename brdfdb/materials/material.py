@@ -306,24 +306,10 @@ class Material(BaseModel, Lookups):
     ) -> Evaluate:
         """Return f_r [1/sr] of the model as a function of directions alone, with the refractive index looked up once.
 
-        Parameters
-        ----------
-        wavelength_nm : array of shape (L,) [nm], or None
-            Wavelengths of a spectral material, and only of such a one.
-        vectors : callable, optional
-            A function with the arguments of the model that replaces it, such as an approximation.
-        degree : int, optional
-            Its degree as a polynomial in the reflectances, if it is one, as `ModelSpec.degree`.
-
-        Returns
-        -------
-        callable
-            ``brdf(wi, wr)`` gives f_r [1/sr] of shape (N, L) for unit vectors (N, 3). L is 1 for a grey material.
-
-        Raises
-        ------
-        ParameterError
-            If the refractive index or a spectrum is not known at one of the wavelengths.
+        ``brdf(wi, wr)`` gives f_r of shape (N, L) for unit vectors (N, 3). `wavelength_nm` (L,) [nm] is None for a grey
+        material, whose L is 1. `vectors` replaces the model, for example by an approximation with the same arguments,
+        and `degree` is its degree as a polynomial in the reflectances, as `ModelSpec.degree`. ParameterError if the
+        refractive index or a spectrum is not known at one of the wavelengths.
         """
         f_r = vectors or self.spec.vectors
         together = self.arguments(wavelength_nm)

@@ -121,30 +121,15 @@ def assumptions(parameters: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def spectrum_of(name: str, written: Any, wavelengths_nm: Any = None, folder: Path | None = None) -> Spectrum:
-    """Return the spectrum that a file writes as the value of a parameter.
+    """Return the spectrum that a file writes as the value of the parameter `name`.
 
-    Parameters
-    ----------
-    name : str
-        The parameter, for messages.
-    written : list or mapping
-        A list has one value for each of `wavelengths_nm`. A mapping has ``wavelengths_nm`` and ``values``, with
-        ``origin`` if it is known; or ``csv``, a file of lines ``wavelength_nm, value``; or ``srgb``, three numbers in
-        [0, 1] or ``"#rrggbb"``, encoded as displays take them; or ``measured``, ``CHECKER/PATCH`` of colour-science.
-    wavelengths_nm : list of float [nm]
-        Wavelengths of the material, for a list.
-    folder : Path
-        Folder that a relative path of a CSV file begins at; by default the working directory.
+    A list has one value for each of `wavelengths_nm`. A mapping has ``wavelengths_nm`` and ``values``, with ``origin``
+    if it is known; or ``csv``, a file of lines ``wavelength_nm, value``; or ``srgb``, three numbers in [0, 1] or
+    ``"#rrggbb"``, encoded as displays take them; or ``measured``, ``CHECKER/PATCH`` of colour-science. The relative
+    path of a CSV file begins at `folder`, by default the working directory.
 
-    Returns
-    -------
-    Spectrum
-        It is checked for order and number, not yet for the range of the parameter.
-
-    Raises
-    ------
-    ParameterError
-        If the value is written in another way, a file cannot be read, or a name is unknown.
+    Order and number of the values are checked, their range is not yet. ParameterError if the value is written in
+    another way, a file cannot be read, or a name is unknown.
     """
     if isinstance(written, list | tuple):
         if not isinstance(wavelengths_nm, list | tuple) or len(wavelengths_nm) != len(written):

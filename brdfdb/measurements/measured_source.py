@@ -138,26 +138,12 @@ class MeasuredSource(FunctionSource):
     ) -> Self:
         """Return measured f_r that is known everywhere, such as that of a file, as a source.
 
-        Parameters
-        ----------
-        evaluate : callable
-            f_r [1/sr] (N, C) at unit vectors (N, 3) of light and viewer above the horizon.
-        channels : tuple of str
-            ("R", "G", "B"), ("X", "Y", "Z"), ("grey",), or wavelengths.
-        wavelength_nm : array (C,) [nm] or None
-            Wavelengths of the channels; None of colours and of grey data.
-        name, title, provenance : str
-            A slug, a line for people, and where the data come from.
-        noise : Noise, optional
-            Uncertainty of the values.
-        nodes : Samples, optional
-            Values at the directions that were measured: f_r outside of their `Extent` is marked as extrapolated. By
-            default f_r is known everywhere, as it is where nearly all directions lie within.
-
-        Raises
-        ------
-        ParameterError
-            If a value is not finite.
+        `evaluate` gives f_r [1/sr] (N, C) at unit vectors (N, 3) of light and viewer above the horizon; ParameterError
+        if a value is not finite. Channels are ("R", "G", "B"), ("X", "Y", "Z"), ("grey",), or wavelengths, with
+        `wavelength_nm` (C,) [nm]. Name, title and provenance are a slug, a line for people, and the origin of the data.
+        `noise` is the uncertainty of the values. f_r outside of the `Extent` of `nodes`, the values at the measured
+        directions, is marked as extrapolated; by default f_r is known everywhere, as it is if nearly all directions lie
+        within.
         """
         wi, wr = symmetry.drawn_pairs()
         values = np.asarray(evaluate(wi[:_PROBED], wr[:_PROBED]))
@@ -238,14 +224,9 @@ class MeasuredSource(FunctionSource):
     def made(self, law: str, margin: float = MARGIN) -> Self:
         """Return the nearest source that keeps a law; its record says what was changed.
 
-        Parameters
-        ----------
-        law : str
-            "reciprocal": the mean of f_r and f_r with light and viewer exchanged. "conserving": f_r times one number
-            for each light, the largest up to 1 that keeps the albedo at 1 or below; times that of the viewer, too, if
-            it is reciprocal.
-        margin : float [1]
-            Difference of the albedo from 1: room for the error of a table.
+        "reciprocal" is the mean of f_r and f_r with light and viewer exchanged. "conserving" is f_r times one number
+        for each light, the largest up to 1 that keeps the albedo at most 1 - `margin`; times that of the viewer, too,
+        if f_r is reciprocal. The margin [1] is room for the error of a table.
         """
         if law not in ("reciprocal", "conserving"):
             text = f"{law!r} is neither reciprocal nor conserving"

@@ -67,11 +67,8 @@ class Instrument:
 class Samples:
     """f_r at some directions, as an instrument measured it or as a file lists it.
 
-    Raises
-    ------
-    ParameterError
-        If shapes do not fit, an angle is outside its range, a value is infinite, or an uncertainty is negative
-        or infinite.
+    ParameterError if shapes do not fit, an angle is outside its range, a value is infinite, or an uncertainty is
+    negative or infinite.
     """
 
     name: str  #: name of the material, or of the file

@@ -217,30 +217,13 @@ def choose(
 ) -> dict[str, Decision]:
     """Choose a form for each material of a scene, and check all of them together.
 
-    Parameters
-    ----------
-    planned : Look
-        Picture, and places near edges, where each form is compared with the truth, all other materials at their truth.
-    check : callable
-        ``check(round)`` gives the scene at fresh places for a round from 1 on, or None if it has no other places.
-    offered : mapping
-        Forms of each material by its name, the truth first.
-    costs : mapping
-        Costs of the forms of each material, of shape (rounds, forms).
-    tick : callable
-        A function that is called for each material, and for each round of checks.
+    `planned` is where each form is compared with the truth, all other materials at their truth. ``check(round)`` gives
+    the scene at fresh places for a round from 1 on, or None if it has no other places. `offered` has the forms of each
+    material, the truth first, and `costs` theirs, of shape (rounds, forms). `tick` is called for each material, and for
+    each round of checks. InfeasibleError if the tolerance is smaller than the error of the truth.
 
-    Returns
-    -------
-    dict
-        A decision for each material. If all choices together exceed the tolerance, the choices that exceed it by
-        themselves are refused. If none does, the choice with the largest error is refused. The truth is never refused.
-        Then the next round checks other places.
-
-    Raises
-    ------
-    InfeasibleError
-        If the tolerance is smaller than the error of the truth.
+    If all choices together exceed the tolerance, the choices that exceed it by themselves are refused. If none does,
+    the choice with the largest error is refused. The truth is never refused. Then the next round checks other places.
     """
     check_feasible(planned.even.scene.tolerance)
     tolerance, percentile = planned.even.scene.tolerance.value, planned.even.scene.tolerance.percentile

@@ -76,11 +76,8 @@ class Environment(BaseModel):
     def picture(self) -> Array:
         """The radiance (rows, columns), in multiples of the illuminant.
 
-        Raises
-        ------
-        ParameterError
-            If the file does not exist, is not readable, or holds no picture. If radiance is negative, not finite, or
-            nowhere above 0.
+        ParameterError if the file does not exist, is not readable, or holds no picture, or if radiance is negative, not
+        finite, or nowhere above 0.
         """
         if self.file is None:
             return np.array(self.rows, dtype=np.float64)

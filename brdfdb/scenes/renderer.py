@@ -37,12 +37,8 @@ class Reflector:
     """The reflection of a source in a scene: f_r, the albedo for ambient light, and the mirror.
 
     `wavelength_nm` are those of its evaluation: of the scene, or the first of a source that is stated for too few
-    wavelengths for a colour; None for a grey source.
-
-    Raises
-    ------
-    ParameterError
-        If the source is stated for invisible light, or is not known at the wavelengths of the scene.
+    wavelengths for a colour; None for a grey source. ParameterError if the source is stated for invisible light, or is
+    not known at the wavelengths of the scene.
     """
 
     def __init__(self, source: Source, wavelength_nm: Array) -> None:
@@ -105,28 +101,10 @@ def reflectors(scene: Scene) -> dict[str, Reflector]:
 
 
 def radiance(scene: Scene, points: VisiblePoints, reflector: Reflector, brdf: Brdf | None = None) -> Floats:
-    """Return the spectral radiance of points in multiples of the illuminant; white has 1.
+    """Return the spectral radiance (N, L) of points in multiples of the illuminant; white has 1.
 
-    Parameters
-    ----------
-    scene : Scene
-        The scene, for its wavelengths and ambient light.
-    points : VisiblePoints
-        The visible points.
-    reflector : Reflector
-        The material of the points.
-    brdf : callable, optional
-        f_r in place of the model's: ``brdf(wi, wr, wavelength_nm)`` gives (N, L) or (N, 1) [1/sr].
-
-    Returns
-    -------
-    array (N, L)
-        Radiance without the mirror images of other objects, which `render` adds.
-
-    Raises
-    ------
-    ParameterError
-        If `brdf` returns another shape.
+    Mirror images of other objects are left out; `render` adds them. `brdf` stands in for f_r of the reflector:
+    ``brdf(wi, wr, wavelength_nm)`` gives (N, L) or (N, 1) [1/sr]; ParameterError if its result has another shape.
 
     Notes
     -----

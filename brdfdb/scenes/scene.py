@@ -245,10 +245,7 @@ class Scene(BaseModel):
     def materials(self) -> dict[str, Source]:
         """The sources of the objects by name, each once.
 
-        Raises
-        ------
-        ParameterError
-            If the store of the scene cannot be read, or has no such material.
+        ParameterError if the store of the scene cannot be read, or has no such material.
         """
         sources = _materials(self)
         for name in self.stored:

@@ -301,10 +301,7 @@ class Recorded(BaseModel):
     def read(self) -> dict[str, Array]:
         """Return the arrays of the file, float64, by name; ``wi`` with its axis of lights.
 
-        Raises
-        ------
-        ParameterError
-            If the file does not exist, is not readable, or holds no directions.
+        ParameterError if the file does not exist, is not readable, or holds no directions.
         """
         path = path_of(self.file, "file")
         if not path.is_file():
