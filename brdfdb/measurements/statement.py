@@ -72,7 +72,7 @@ class SampleStatement:
     holes: int  #: number of values that are missing
     negative: int  #: number of values below 0
     zeros: int  #: number of values that are exactly 0 while others are not: many files write 0 for a hole
-    constant: bool  #: True if f_r of each channel is one number at all directions
+    constant: bool  #: True if f_r of each channel is the same at all directions
     largest: float  #: largest value [1/sr]
     largest_at_deg: tuple[float, float, float]  #: theta_i, theta_r and the difference of the azimuths there
     uncertainty: float | None  #: median of the standard uncertainties over the absolute values [1]; None: not stated
@@ -384,7 +384,7 @@ def _missing_above(known: Floats, scale: float) -> tuple[str, ...]:
 
 
 def is_constant(samples: Samples) -> bool:
-    """Return True if f_r of each channel with a few values is one number at all directions."""
+    """Return True if f_r of each channel with a few values is the same at all directions."""
     seen = samples.known.sum(axis=0) >= _FEWEST
     values = np.where(samples.known, samples.values, np.nan)[:, seen]
     return bool(seen.any() and np.all(np.nanmin(values, axis=0) == np.nanmax(values, axis=0)))

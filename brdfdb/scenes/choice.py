@@ -298,7 +298,7 @@ class Sampled(DocumentPart):
     places: int = Field(description="number of places")
     most: float = Field(description="largest error at these places")
     one_in: int = Field(
-        description="fewer than 1 in so many of all such places exceeds the tolerance, with the stated confidence"
+        description="fewer than 1 in this number of all such places exceeds the tolerance, with the stated confidence"
     )
 
 
@@ -332,12 +332,14 @@ class MaterialChoice(DocumentPart):
     whole: Residue = Field(description="error of all choices at once: at all pixels of the picture, and all samples")
     even: Sampled | None = Field(description="places anywhere in the picture, equally likely; null if recorded")
     edges: Sampled | None = Field(
-        description="places beside limbs, terminators and edges of shadows: each power of ten of the distance, from a "
+        description="places near limbs, terminators and edges of shadows: each power of ten of the distance, from a "
         "pixel's width down to a hundred millionth of it, is equally likely; null if recorded"
     )
     reason: str
     revision: str | None = Field(description="revision of the table, if a store was named and a table chosen")
-    left_out: list[LeftOut] = Field(default=[], description="forms that cannot be made, such as a table too large")
+    left_out: list[LeftOut] = Field(
+        default=[], description="forms that cannot be made, for example because a table would be too large"
+    )
 
 
 class SceneChoice(DocumentPart):
@@ -350,10 +352,10 @@ class SceneChoice(DocumentPart):
     tolerance: Tolerance
     weigh: Weigh
     picture: tuple[int, int] = Field(
-        description="pixels across and down; the choices keep to the tolerance at each of them, seen through its middle"
+        description="pixels across and down; at the centre of each of them, the error is within the tolerance"
     )
     confidence: float = Field(description="confidence of statements on samples, for each material and kind of sample")
-    grazing_deg: float = Field(description="angle from the normal up to which errors count; nothing is stated beyond")
+    grazing_deg: float = Field(description="largest angle from the normal at which errors count")
     statement: str = Field(description="proven and sampled results in a few sentences")
     materials: list[MaterialChoice]
 

@@ -45,7 +45,7 @@ class Environment(BaseModel):
     model_config = STRICT
 
     rows: list[list[float]] | None = Field(default=None, description="from the zenith to the nadir")
-    file: str | None = Field(default=None, min_length=1, description="EXR, .npz or .npy; lies beside the scene")
+    file: str | None = Field(default=None, min_length=1, description="EXR, .npz or .npy, in the directory of the scene")
     samples: int = Field(
         default=32, ge=1, le=4096, description="directions for each point, drawn from its lobe or table"
     )

@@ -172,7 +172,7 @@ def render(
     Raises
     ------
     ParameterError
-        If `brdfs` has a key that is no material of the scene, or one of them is no function or returns a wrong shape.
+        If a key of `brdfs` is not a material of the scene, or a value is not a function or returns a wrong shape.
         If a material is stated for invisible light, or the view is that of another scene.
     """
     for points in view.points:

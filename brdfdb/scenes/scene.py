@@ -41,7 +41,7 @@ class Light(BaseModel):
     strength: float = Field(default=1.0, gt=0.0)
     solid_angle_sr: float = Field(default=0.0, ge=0.0, le=1.0)
     samples: int = Field(
-        default=16, ge=1, le=1024, description="over the solid angle; much narrower lobes show them one by one"
+        default=16, ge=1, le=1024, description="over the solid angle; much narrower lobes show single samples"
     )
 
     @property
@@ -199,15 +199,15 @@ class Scene(BaseModel):
     wavelengths_nm: list[float] = WAVELENGTHS_NM
     hold_ends: bool = Field(
         default=False,
-        description="true: beyond the wavelengths of a table of the store f_r is that of its first or last wavelength",
+        description="true: outside the wavelengths of a table of the store, f_r is that of its nearest wavelength",
     )
     tolerance: Tolerance = Tolerance(ciede2000=1.0)
     define: dict[str, dict[str, Any]] = Field(default={}, description="materials of your own, as in the preset files")
     store: Text | None = Field(
         default=None,
         min_length=1,
-        description="directory of a store, beside the scene, for materials store:NAME: the model that the table NAME "
-        "was tabulated from, or the table itself where that was a function or is not known",
+        description="directory of a store, relative to the scene, for materials store:NAME: the model that the table "
+        "NAME was tabulated from, or the table itself if its source was a function or is unknown",
     )
 
     @field_validator("illuminant")
