@@ -103,7 +103,7 @@ def test_oren_nayar_with_rho_1_violates_unless_it_is_accepted() -> None:
 @pytest.mark.parametrize(
     ("rho_d", "alpha", "limit", "general"), [(0.0, 1.0, False, True), (0.1, 1.0, True, True), (0.1, 0.1, True, False)]
 )
-def test_a_model_gives_its_general_reason_unless_only_a_limit_of_energy_is_left(
+def test_a_general_reason_follows_unless_only_energy_is_broken(
     rho_d: float, alpha: float, limit: bool, general: bool
 ) -> None:
     ward = {"rho_d": rho_d, "rho_s": 1.0, "alpha_x": alpha, "alpha_y": alpha}

@@ -187,7 +187,7 @@ def test_lossless_gentle_slopes_never_reflect_more_than_they_receive() -> None:
         ("minnaert", {"k": 0.6, "rho": 1.0}, 89.9, COS_LAST**-0.4, "degrees; grows as cos^-0.4; this model does so"),
     ],
 )
-def test_an_excess_that_a_model_has_by_itself_is_explained_and_violates_unless_it_is_accepted(
+def test_an_excess_of_the_model_itself_violates_unless_accepted(
     model: str, parameters: dict[str, float], theta_i_deg: float, albedo: float, where: str
 ) -> None:
     surface = material(model, parameters)
@@ -340,9 +340,7 @@ def test_bounds_of_many_surfaces_at_once_are_those_of_each() -> None:
         ("ward", {"rho_d": 0.1, "rho_s": 0.2, "alpha_x": 0.1, "alpha_y": 0.3}),
     ],
 )
-def test_a_model_and_its_furnace_over_the_same_directions_have_the_albedos_of_each(
-    model: str, parameters: dict[str, float]
-) -> None:
+def test_a_model_and_its_furnace_have_the_albedos_of_each(model: str, parameters: dict[str, float]) -> None:
     surface = material(model, parameters)
     lights = model_energy._Lights(np.array([0.0, 60.0]), np.zeros(2))
     model = model_energy._Model.of(surface, None, LIMITS)

@@ -41,9 +41,7 @@ def found_in(table: Table, change: Change | None = None) -> list[Disagreement]:
 
 @pytest.mark.parametrize("quantile", QUANTILES.values())
 @pytest.mark.parametrize(("stated", "fresh"), [(3600, 2700), (2700, 900), (500, 900), (600, 25_000)])
-def test_the_limits_of_a_count_are_those_of_the_beta_binomial_distribution(
-    stated: int, fresh: int, quantile: float
-) -> None:
+def test_the_limits_of_a_count_are_beta_binomial(stated: int, fresh: int, quantile: float) -> None:
     least, most = limits(stated, fresh, quantile)
     # the share of a population above an order statistic of a sample is beta distributed
     rank = int(quantile * (stated - 1)) + 1

@@ -64,9 +64,7 @@ def through_apertures(theta_i: float, x: float, surface: dict[str, float], a: fl
         (9, 10.0, -20.0, CERAMIC | optics("main/MgO/Stephens-vis", 500.0), 0.9),
     ],
 )
-def test_curves_through_apertures_against_the_reference(
-    number: int, theta_i: float, x: float, surface: dict[str, float], a: float
-) -> None:
+def test_curves_through_apertures(number: int, theta_i: float, x: float, surface: dict[str, float], a: float) -> None:
     expected = through_apertures(theta_i, x, surface, a) / through_apertures(theta_i, theta_i, surface, a)
     assert value_at(curve(number, f"θ_i = {theta_i:g}°"), x) == pytest.approx(expected, rel=DIGITS)
 

@@ -105,9 +105,7 @@ def test_the_cheapest_form_within_the_tolerance_is_picked() -> None:
         pytest.param([1.0, 0.79, 0.99], [0.0, 2.0, 1.0], Pick(0, 1), id="what-is-cheaper-and-not-what-is-nearer"),
     ],
 )
-def test_of_what_is_alike_in_cost_and_error_the_first_is_picked(
-    costs: list[float], errors: list[float], expected: Pick
-) -> None:
+def test_of_equal_forms_the_first_is_picked(costs: list[float], errors: list[float], expected: Pick) -> None:
     assert pick(np.array([costs]), errors.__getitem__, 0.75) == expected
 
 
