@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 
 suffix = ".fred.txt"
 media_type = "text/plain"
-summary = "tabulated scatter of FRED at one wavelength, isotropic tables"
+summary = "tabulated scatter of FRED, for isotropic tables at one wavelength"
 tools = "FRED (Photon Engineering)"
 kinds = ()
 options = (

@@ -17,7 +17,7 @@ from brdfdb.formats._shader_source import Language, write_source
 
 suffix = ".glsl"
 media_type = "text/plain"
-summary = "closed-form models, or the published fit of one, as source code of GLSL"
+summary = "closed-form models, or the published fit of a model, as source code in GLSL"
 tools = "OpenGL, Vulkan, Blender, Houdini and other programs with shaders in GLSL"
 kinds: tuple[str, ...] = ()
 options = ()

@@ -17,7 +17,7 @@ from brdfdb.formats._shader_source import Language, write_source
 
 suffix = ".osl"
 media_type = "text/plain"
-summary = "closed-form models, or the published fit of one, as source code of OSL"
+summary = "closed-form models, or the published fit of a model, as source code in OSL"
 tools = "renderers with the Open Shading Language: Cycles, Arnold, RenderMan, V-Ray"
 kinds: tuple[str, ...] = ()
 options = ()

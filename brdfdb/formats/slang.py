@@ -17,7 +17,7 @@ from brdfdb.formats._shader_source import Language, write_source
 
 suffix = ".slang"
 media_type = "text/plain"
-summary = "closed-form models, or the published fit of one, as source code of Slang"
+summary = "closed-form models, or the published fit of a model, as source code in Slang"
 tools = "Slang and the programs that compile it: Falcor, RTX Kit, Vulkan, CUDA; HLSL has the same text"
 kinds: tuple[str, ...] = ()
 options = ()

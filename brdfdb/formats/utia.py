@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 suffix = ".bin"
 media_type = "application/octet-stream"
-summary = "RGB on the fixed UTIA grid of 15 by 7.5 degrees, anisotropic tables too"
+summary = "RGB on the fixed UTIA grid of 15 by 7.5 degrees, also for anisotropic tables"
 tools = "readers of UTIA, ALTA"
 kinds = ()
 options = (

@@ -39,7 +39,7 @@ _MODELS = "files of models"  # begins the names under which parsers keep --model
 _EPILOG = f"""\
 exit codes:
   0    done
-  {VIOLATED}    audit: an unknown violation, or a table that cannot be judged; export --strict: an inaccurate file
+  {VIOLATED}    a new violation (audit, import), an unjudged table (audit), or an inaccurate file (export --strict)
   {REFUSED}    refused or impossible; stderr has the reason: bad input, a damaged store, a full disk, a missing extra
   {BUG}   a bug of brdfdb; stderr names the file with the traceback
   {INTERRUPTED}  interrupted by Ctrl-C

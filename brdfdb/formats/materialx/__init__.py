@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 suffix = ".mtlx"
 media_type = "application/mtlx+xml"
-summary = "surfaces of MaterialX that come closest to tables"
+summary = "surfaces of MaterialX whose parameters are fitted to tables"
 tools = "MaterialX and the programs with it: USD, Maya, Houdini, Blender, Arnold, RenderMan"
 kinds = (OPEN_PBR, STANDARD)
 options = (

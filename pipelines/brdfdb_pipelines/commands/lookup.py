@@ -27,7 +27,7 @@ _ANGLES = ("theta_i", "phi_i", "theta_r", "phi_r")
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the material, the directions, the wavelengths and the form of the answer."""
-    parser.add_argument("name", metavar="NAME")
+    parser.add_argument("name", metavar="NAME", help="material or family")
     for angle in _ANGLES:
         parser.add_argument(angle, type=float, metavar=angle.upper(), help="degrees")
     add_store(parser)

@@ -16,7 +16,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("name", nargs="?", metavar="NAME", help="lower-case letters, digits and single hyphens")
     add_store(parser)
     parser.add_argument(
-        "--remove", action="store_true", help="remove the snapshot; `brdfdb gc` can remove its revisions then"
+        "--remove", action="store_true", help="remove the snapshot; `brdfdb gc` can then remove its revisions"
     )
 
 
