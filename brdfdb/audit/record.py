@@ -46,16 +46,16 @@ class Unchecked(NamedTuple):
 _NO_DATA = "the store does not hold the data"
 _NO_FUNCTION = "the store does not hold the function, which an audit can be given"
 UNCHECKED = (
-    Unchecked("pointer and manifest", "created", "no clock is stored beside it"),
-    Unchecked("pointer", "last", "it may be higher than any revision: those that were collected leave nothing"),
-    Unchecked("table", "reason", "what other kinds of tables were expected to take; its first clause is compared"),
-    Unchecked("table", "error.worst.*", "where all errors are rounding, the largest has no place"),
+    Unchecked("pointer and manifest", "created", "there is no other record of the time"),
+    Unchecked("pointer", "last", "revisions with higher numbers may have been removed, and leave no trace"),
+    Unchecked("table", "reason", "expected sizes of other kinds of tables; only its first clause is compared"),
+    Unchecked("table", "error.worst.*", "if all errors are due to rounding, the place of the largest is arbitrary"),
     Unchecked("table of a function", "error.*", f"{_NO_FUNCTION}; it must not contradict itself"),
     Unchecked("table of a function", "largest_albedo.*", f"{_NO_FUNCTION}; the albedo is near that of the lookups"),
-    Unchecked("table of a function", "source_record.function.*", "its author says so"),
+    Unchecked("table of a function", "source_record.function.*", "only the author of the function knows"),
     Unchecked("table of measured data", "error.*", f"{_NO_DATA}; it must not contradict itself"),
     Unchecked("table of measured data", "measured.*", _NO_DATA),
-    Unchecked("table of measured data", "source_record.function.*", "what an import read in the data"),
+    Unchecked("table of measured data", "source_record.function.*", "the import took it from the data"),
 )
 
 
@@ -80,12 +80,12 @@ class Record(Finding):
     key = "record"
     order = 9
     explanation = (
-        "All that a table states of itself is made again, by the functions of a build: title, parameters and "
-        "citations from the record of the source, which a digest covers; the stated error, also in places and between "
-        "wavelengths, the error of the formula and the largest albedo by measurements at the same directions. Each "
-        "number and each word is compared: numbers to rounding. Materials that have the name of a preset, or cite what "
-        "a preset cites, have the parameters of a preset. Of tables of functions and measured data, what their arrays "
-        "decide is compared."
+        "The metadata of a table are computed again, as in a build. Title, parameters and citations follow from the "
+        "record of the source, which a digest protects. The stated error (also in places and between wavelengths), the "
+        "error of the formula and the largest albedo are measured at the same directions. All numbers must agree to "
+        "rounding, and all texts exactly. Materials that have the name of a preset, or cite the same place as one, "
+        "must have the parameters of a preset. For tables of functions and of measured data, only metadata that follow "
+        "from the arrays are compared."
     )
 
     compared: int = Field(description="number of leaves of the attributes that were compared")

@@ -85,9 +85,9 @@ class Smoothness(Finding):
     key = "smoothness"
     order = 5
     explanation = (
-        "The jumps of f_r where the formula of the model changes, and at the seams of the table: its nodes, the poles, "
-        "and both ends of a turn of azimuth. A table may jump by its stated error, and one of measured data by "
-        "their uncertainty; where that is not known, jumps are those of the data and are not judged."
+        "Jumps of f_r where the formula of the model changes, and at the seams of the table: its nodes, the poles, and "
+        "the ends of its azimuths. A table may jump by its stated error. A table of measured data may jump by the "
+        "uncertainty of the data; if it is unknown, the jumps are not judged."
     )
 
     model: list[Jump] = Field(description="empty: the source is not known")
