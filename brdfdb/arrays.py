@@ -59,12 +59,14 @@ def plain(name: str, value: Any) -> Any:
             raise ParameterError(name, "its lists have unequal lengths") from None
         return whole if any(isinstance(part, np.ndarray) for part in parts) else parts
     if isinstance(value, np.ma.MaskedArray):
-        mask, data = np.ma.getmaskarray(value), np.asarray(value.data)
+        mask = np.ma.getmaskarray(value)
+        data = np.asarray(value.data)
         if not mask.any():
             return data
         return np.where(mask, np.nan, data).astype(data.dtype if data.dtype.kind == "f" else np.float64)
     if _has(value, "unit") or _has(value, "magnitude"):
-        raise ParameterError(name, f"it bears the unit {_unit(value)}; give numbers in the documented unit")
+        unit = getattr(value, "unit", None) or getattr(value, "units", "")
+        raise ParameterError(name, f"it bears the unit {unit}; give numbers in the documented unit")
     if isinstance(value, np.generic):
         return value
     if not any(hasattr(value, way) for way in ("__array__", "__dlpack__")):
@@ -160,7 +162,9 @@ class _Labels:
     """The dimensions that labelled arguments broadcast to by name, with their coordinates."""
 
     def __init__(self, template: Any, dims: tuple[str, ...], *, alike: bool) -> None:
-        self.template, self.dims, self.alike = template, dims, alike
+        self.template = template
+        self.dims = dims
+        self.alike = alike
 
     @classmethod
     def of(cls, given: Mapping[str, Any]) -> _Labels | None:
@@ -181,7 +185,8 @@ class _Labels:
                 _check_same_labels(other, part, name, whole)
             parts[name] = whole
         template = functools.reduce(operator.or_, (p.copy(data=np.zeros(p.shape, np.bool_)) for p in parts.values()))
-        template.name, template.attrs = None, {}
+        template.name = None
+        template.attrs = {}
         return cls(template, template.dims, alike=all(part.dims == template.dims for part in parts.values()))
 
     def aligned(self, name: str, value: Any) -> Any:
@@ -211,7 +216,8 @@ class _Labels:
         last = values.shape[len(self.dims) :]
         new = {}
         if added and last[:1] == tuple(map(len, added.values())):
-            new, last = dict(added), last[1:]
+            new = dict(added)
+            last = last[1:]
         names = _TRAILING.get(last, tuple(f"axis_{axis}" for axis in range(len(last))))
         if taken := {*new, *names} & set(self.dims):
             raise ParameterError(taken.pop(), "the result adds this dimension, which an argument has; rename it")
@@ -292,10 +298,6 @@ def _converted(name: str, value: Any) -> NDArray[Any]:
 
 def _has(value: Any, attribute: str) -> bool:
     return hasattr(value, "__array__") and hasattr(type(value), attribute)
-
-
-def _unit(value: Any) -> str:
-    return str(getattr(value, "unit", None) or getattr(value, "units", ""))
 
 
 def _listed(names: Iterable[Any]) -> str:

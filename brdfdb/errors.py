@@ -36,7 +36,10 @@ class ParameterError(BrdfdbError, ValueError):
 
     def __init__(self, parameter: str, sentence: str, value: object = None, allowed: object = None) -> None:
         super().__init__(parameter, sentence, value, allowed)
-        self.parameter, self.sentence, self.value, self.allowed = parameter, sentence, value, allowed
+        self.parameter = parameter
+        self.sentence = sentence
+        self.value = value
+        self.allowed = allowed
 
     def __str__(self) -> str:
         return f"{self.parameter}: {self.sentence}"
@@ -48,9 +51,11 @@ class DegreesWarning(UserWarning):
 
 def warn_of_degrees(name: str, sentence: str) -> None:
     """Warn that an angle [rad] looks like degrees, at the line that called this package."""
-    level, frame = 1, sys._getframe()
+    level = 1
+    frame = sys._getframe()
     while frame.f_back is not None and frame.f_globals.get("__name__", "").partition(".")[0] == "brdfdb":
-        level, frame = level + 1, frame.f_back
+        level += 1
+        frame = frame.f_back
     warnings.warn(f"{name}: {sentence}", DegreesWarning, stacklevel=level)
 
 
@@ -111,7 +116,8 @@ class UnknownMaterialError(BrdfdbError, KeyError):
         Up to five names that are close to it.
     """
 
-    kind, place = "material", " in the store"
+    kind = "material"
+    place = " in the store"
 
     def __init__(self, name: str, names: Iterable[str] = ()) -> None:
         super().__init__(name)
@@ -135,7 +141,8 @@ class UnknownFamilyError(UnknownMaterialError):
 class UnknownModelError(UnknownMaterialError):
     """A name that is not that of a model."""
 
-    kind, place = "model", ""
+    kind = "model"
+    place = ""
 
 
 class UnknownRevisionError(BrdfdbError, KeyError):
@@ -216,7 +223,8 @@ _PATTERNS = {
 
 def sentence_of(error: Mapping[str, Any]) -> str:
     """Return the sentence on a finding of pydantic, without the name of its field: the value and what is allowed."""
-    kind, context = error["type"], error.get("ctx", {})
+    kind = error["type"]
+    context = error.get("ctx", {})
     if kind == "missing":
         return "is missing"
     if kind == "extra_forbidden":

@@ -13,7 +13,9 @@ Array = NDArray[np.floating[Any]]
 
 _EXPONENT = 700.0  # largest t^2; beyond, the Gaussian counts as 0 and no half vector is drawn
 # Plots of a lobe: largest slope in its widths, directions on either side of the mirror direction, last angle [degree]
-_OCTAVES, _ACROSS, _LAST_DEG = 20.0, 40, 89.0
+_OCTAVES = 20.0
+_ACROSS = 40
+_LAST_DEG = 89.0
 
 
 @dataclass(frozen=True)

@@ -48,7 +48,8 @@ def path_of(place: str | os.PathLike[str], parameter: str = "path") -> Path:
         if parts.netloc not in ("", "localhost") or not parts.path.startswith("/"):
             raise ParameterError(parameter, f"{place!r} is not an address such as file:///data/store", place)
         if parts.query or parts.fragment or "%00" in parts.path:
-            raise ParameterError(parameter, f"{place!r} has parts that paths lack; ? is written %3F and # %23", place)
+            sentence = f"{place!r} has a query, a fragment or %00, which no path has; write %3F for ? and %23 for #"
+            raise ParameterError(parameter, sentence, place)
         return Path(url2pathname(parts.path))
     if scheme in _SERVICES:
         sentence = f"{text!r} is the address of a service, which brdfdb.open reads; a path is needed here"

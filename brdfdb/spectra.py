@@ -213,7 +213,8 @@ def check_observer(name: str) -> str:
 def illuminant_spectrum(name: str, wavelength_nm: ArrayLike) -> NDArray[np.float64]:
     """Return relative spectral power [1] of an illuminant of colour-science: 1 at 560 nm, linear between samples."""
     spectrum = colour_science().SDS_ILLUMINANTS[check_illuminant(name)]
-    at, power = spectrum.wavelengths, spectrum.values
+    at = spectrum.wavelengths
+    power = spectrum.values
     return np.asarray(np.interp(np.asarray(wavelength_nm), at, power) / np.interp(560.0, at, power))
 
 

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import importlib.metadata
-import inspect
 import os
 import re
 import subprocess
 import tomllib
 import venv
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -28,47 +26,30 @@ from brdfdb.store.publication import publish_dataset
 ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 EXTRAS: dict[str, list[str]] = PROJECT["optional-dependencies"]
-# Packages with an upper bound that follows a reason; "<next major" alone needs none
-CAPPED = ("numba",)
 
 
-def _numba_is_used_inside() -> None:
-    compiled = _numba.loop(_square)
-    file = compiled._cache._cache_file  # type: ignore[attr-defined]
-    assert file._source_stamp.endswith(_numba._shared_digest())
-    assert "_source_stamp" in inspect.getsource(_numba)
-    part: Any = _numba.kernel(_square)
-    assert part is _square  # for Python; numba asks for the attribute `_numba_type_`
-    assert numba.typeof(part) == numba.typeof(part.dispatcher)
-
-
-def _square(x: float) -> float:
-    return x * x
-
-
-REASONS: dict[str, Callable[[], None]] = {"numba": _numba_is_used_inside}
-
-
-def _requirements() -> list[Requirement]:
+def test_numba_alone_has_a_cap_below_the_next_major_version() -> None:
     extras = EXTRAS.keys() - {"test", "judges"}
     lines = [*PROJECT["dependencies"], *(line for name in extras for line in EXTRAS[name])]
-    return [Requirement(line) for line in lines]
-
-
-def test_every_cap_below_the_next_major_version_has_a_reason() -> None:
-    capped = {
+    requirements = map(Requirement, lines)
+    assert {
         requirement.name
-        for requirement in _requirements()
+        for requirement in requirements
         for specifier in requirement.specifier
         if specifier.operator == "<" and "." in specifier.version
-    }
-    assert capped == set(REASONS) == set(CAPPED)
+    } == {"numba"}
 
 
-@pytest.mark.parametrize("name", CAPPED)
-def test_the_reason_for_a_cap_still_stands(name: str) -> None:
+def test_the_reason_for_the_cap_still_stands() -> None:
     # a newer version that passes here may be allowed; one whose inside is no longer used needs no cap
-    REASONS[name]()
+    def square(x: float) -> float:
+        return x * x
+
+    file = _numba.loop(square)._cache._cache_file  # type: ignore[attr-defined]
+    assert file._source_stamp.endswith(_numba._shared_digest())
+    part: Any = _numba.kernel(square)
+    assert part is square  # for Python; numba asks for the attribute `_numba_type_`
+    assert numba.typeof(part) == numba.typeof(part.dispatcher)
 
 
 def test_all_is_every_extra() -> None:

@@ -97,9 +97,7 @@ def test_sentences_name_what_is_wrong() -> None:
     assert str(RECIPE_ERROR) == "a.toml: grids.isotropic.theta_i_deg: must start at 0"
     assert str(SceneError("spheres", "", "is recorded")) == "spheres: is recorded"
     assert str(UnknownMaterialError("fome", ["foam", "brass"])) == "no material 'fome' in the store; closest: foam"
-
-
-def test_a_parameter_error_is_a_value_error_and_an_unknown_name_a_key_error() -> None:
+    assert [counted(number, "table") for number in (0, 1, 2)] == ["0 tables", "1 table", "2 tables"]
     assert issubclass(ParameterError, ValueError)
     assert issubclass(UnknownMaterialError, KeyError)
     assert issubclass(UnknownRevisionError, KeyError)
@@ -155,10 +153,6 @@ def test_a_finding_of_pydantic_is_said_in_our_words() -> None:
         with pytest.raises(ValidationError) as caught:
             Fields.model_validate({field: value})
         assert sentence_of(caught.value.errors()[0]) == sentence
-
-
-def test_a_number_of_one_has_no_plural() -> None:
-    assert [counted(number, "table") for number in (0, 1, 2)] == ["0 tables", "1 table", "2 tables"]
 
 
 def test_a_wrong_name_is_compared_with_those_next_to_it_among_very_many(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -62,10 +62,10 @@ def test_at_brewsters_angle_only_s_is_reflected() -> None:
     assert fresnel.unpolarised(1.0 / np.sqrt(1.0 + n**2), n, 0.0) == pytest.approx(s_only, rel=1e-14)
 
 
-@pytest.mark.parametrize("n", [1e-3, 0.1, 0.5, 0.9])
-def test_reflects_everything_past_the_critical_angle(n: float) -> None:
-    cos_theta = np.linspace(0.0, np.sqrt(1.0 - n**2), 1000)[1:-1]
-    assert fresnel.unpolarised(cos_theta, n, 0.0) == pytest.approx(np.ones(998), rel=1e-15)
+def test_reflects_everything_past_the_critical_angle() -> None:
+    for n in (1e-3, 0.1, 0.5, 0.9):
+        cos_theta = np.linspace(0.0, np.sqrt(1.0 - n**2), 1000)[1:-1]
+        assert fresnel.unpolarised(cos_theta, n, 0.0) == pytest.approx(np.ones(998), rel=1e-15), n
 
 
 def test_tends_to_one_at_grazing_and_without_bound_of_k() -> None:

@@ -1,6 +1,5 @@
 """The translators between kinds of roughness: round trips, refusals, and the lobes of the models they speak of."""
 
-import doctest
 import inspect
 from collections.abc import Callable
 from typing import Any
@@ -107,12 +106,3 @@ def test_refuses_what_is_no_roughness(function: Function) -> None:
             arguments = {each: known[each].low or 0.0 for each in names} | {name: wrong}
             with pytest.raises(ValueError, match=rf"^{name}: .* is outside \["):
                 function(**arguments)
-
-
-@pytest.mark.parametrize("function", FUNCTIONS, ids=lambda f: f.__name__)
-def test_the_examples_run(function: Function) -> None:
-    runner = doctest.DocTestRunner()
-    for example in doctest.DocTestFinder(recurse=False).find(function, globs=dict(vars(roughness))):
-        runner.run(example)
-    assert runner.summarize(verbose=False).failed == 0
-    assert runner.tries >= 1

@@ -65,12 +65,14 @@ def test_every_model_warns_of_degrees_and_answers() -> None:
 
 
 def test_more_functions_of_azimuths_warn() -> None:
-    with pytest.warns(DegreesWarning):
-        derivatives.gradient("ward", *MISTAKEN, rho_d=0.1, rho_s=0.3, alpha_x=0.1, alpha_y=0.1)
-    with pytest.warns(DegreesWarning):
-        directional_albedo("ward", 0.3, 45.0, rho_d=0.1, rho_s=0.3, alpha_x=0.1, alpha_y=0.2)
-    with pytest.warns(DegreesWarning):
-        models.oren_nayar_parts(*MISTAKEN, rho=0.5, sigma=0.3)
+    ward = {"rho_d": 0.1, "rho_s": 0.3, "alpha_x": 0.1, "alpha_y": 0.2}
+    for call in (
+        lambda: derivatives.gradient("ward", *MISTAKEN, **ward),
+        lambda: directional_albedo("ward", 0.3, 45.0, **ward),
+        lambda: models.oren_nayar_parts(*MISTAKEN, rho=0.5, sigma=0.3),
+    ):
+        with pytest.warns(DegreesWarning):
+            call()
 
 
 def test_an_unwrapped_scan_may_filter_the_warning() -> None:
@@ -129,16 +131,13 @@ def test_a_wavelength_in_micrometres_is_refused_with_the_hint() -> None:
                 function(wrong)
 
 
-def test_a_recipe_in_micrometres_is_refused_with_the_hint(tmp_path: Path) -> None:
+def test_a_recipe_or_a_file_in_micrometres_is_refused_with_the_hint(tmp_path: Path) -> None:
     path = tmp_path / "copper.toml"
     path.write_text('materials = ["rolled-brass"]\nwavelengths_nm = [0.45, 0.55]\ntolerance = 0.02\n')
     with pytest.raises(BrdfdbError, match=r"wavelengths_nm: 0\.45 is below 1 nm; is it in micrometres"):
         load(path)
     with pytest.raises(ParameterError, match=r"wavelengths_nm: 0\.55 is below 1 nm; is it in micrometres"):
         Material.from_table("rod", {**COPPER_TABLE, "wavelengths_nm": [0.55]})
-
-
-def test_a_file_in_micrometres_is_refused_with_the_hint(tmp_path: Path) -> None:
     axes = {"theta_i": [0.0, 60.0], "theta_r": [0.0, 60.0], "delta_phi": [0.0, 180.0], "wavelength": [0.45, 0.55]}
     np.savez(tmp_path / "some.npz", **axes, axes=list(axes), brdf=np.ones((2, 2, 2, 2)))
     with pytest.raises(BrdfdbError, match=r"some\.npz: .*0\.45 is below 1 nm; is it in micrometres\?"):

@@ -1,10 +1,11 @@
-"""The log: lines of JSON on standard error, written by a thread, which alone waits for their reader."""
+"""The log: lines of JSON on standard error. A thread writes them, so that no request waits for their reader."""
 
 from __future__ import annotations
 
 import atexit
 import contextlib
 import functools
+import itertools
 import logging
 import os
 import threading
@@ -13,10 +14,10 @@ from collections import deque
 
 import orjson
 
-LINE = 4096  # length of a line [byte] beyond which pipes mix the lines of several workers
-MOST = 10_000  # lines that may wait; further ones are counted, and dropped
-BATCH_S = 0.05  # time in which lines gather before they are written [s]
-LAST_S = 1.0  # time that the last lines have to be written when the process ends [s]
+LINE = 4096  # largest length of a line [byte]: pipes mix longer lines of several workers
+MOST = 10_000  # lines in the queue; further lines are counted and dropped
+BATCH_S = 0.05  # time between two writes [s]
+LAST_S = 1.0  # time for the last lines when the process ends [s]
 SHOWN = 100  # characters of a path, and of a query, in a shortened line
 KEPT = {"path": slice(SHOWN), "query": slice(SHOWN), "failed": slice(SHOWN), "traceback": slice(-1000, None)}
 _STDERR = 2
@@ -28,11 +29,11 @@ _hurry = threading.Event()
 
 
 def write(record: dict[str, object]) -> None:
-    """Add a line with a time to the log; a long one is shortened. It is written a little later."""
+    """Add a line with the time to the queue of the log; a long line is shortened."""
     global _dropped
     record = {"time": round(time.time(), 3), **record}
     line = orjson.dumps(record, option=orjson.OPT_APPEND_NEWLINE)
-    if len(line) > LINE:  # an escaped character takes six at most
+    if len(line) > LINE:
         short = {key: str(record[key])[part] for key, part in KEPT.items() if key in record}
         line = orjson.dumps(record | short, option=orjson.OPT_APPEND_NEWLINE)
     if len(_waiting) >= MOST:
@@ -45,7 +46,7 @@ def write(record: dict[str, object]) -> None:
 
 
 def flush() -> None:
-    """Wait until all lines are written, but not longer than `LAST_S`."""
+    """Wait until all lines are written, for at most `LAST_S`."""
     end = time.monotonic() + LAST_S
     _hurry.set()
     while _waiting and time.monotonic() < end:
@@ -64,7 +65,7 @@ class Handler(logging.Handler):
 
 
 def ascii_of(text: str) -> str:
-    """Return ASCII text, which orjson writes and terminals show: other characters, lone surrogates too, are escaped."""
+    """Return text with all characters escaped that are not ASCII, lone surrogates included."""
     return text.encode("ascii", "backslashreplace").decode()
 
 
@@ -84,16 +85,17 @@ def _run() -> None:
 
 
 def _write_some() -> None:
-    """Write lines in one call, as many as pipes do not mix; they wait until they are written."""
+    """Write lines in one call, at most `LINE` bytes, and then remove them from the queue."""
     global _dropped
     size = count = 0
     while count < len(_waiting) and (count == 0 or size + len(_waiting[count]) <= LINE):
-        size, count = size + len(_waiting[count]), count + 1
-    lines = b"".join(_waiting[number] for number in range(count))
-    with contextlib.suppress(OSError):  # the reader has gone
+        size += len(_waiting[count])
+        count += 1
+    lines = b"".join(itertools.islice(_waiting, count))
+    with contextlib.suppress(OSError):  # nobody reads the log any more
         os.write(_STDERR, lines)
     for _ in range(count):
         _waiting.popleft()
     if _dropped and len(_waiting) < MOST // 2:
-        dropped, _dropped = _dropped, 0
-        write({"failed": f"{dropped} lines of the log were dropped, because nothing read them"})
+        write({"failed": f"{_dropped} lines of the log were dropped, because nothing read them"})
+        _dropped = 0

@@ -1,4 +1,4 @@
-"""`brdfdb serve`: a socket, one or more worker processes, and an end that lets requests finish."""
+"""`brdfdb serve`: a socket, one or more worker processes, and an end after the last answer."""
 
 from __future__ import annotations
 
@@ -26,16 +26,16 @@ from brdfdb_api import log
 from brdfdb_api.settings import Settings
 
 PAUSE_S = 1.0  # time before a failed worker is replaced [s]
-LAST_S = 0.5  # time after the signal to stop in which requests on connections that are open are answered [s]
-GRACE_S = 10  # time for requests in flight when the server stops [s]
-STOPPED_S = LAST_S + GRACE_S + 3.0  # time after which a worker that was told to stop is killed [s]
-BEAT_S = 1  # time between signs of life of a worker [s]
-HALTED_S = 15.0  # time without one after which a worker is replaced [s]
-COUNTS_BYTES = 2**20  # room for the counts of one kind of a worker; all addresses and statuses take a tenth
-LOADED_S = 120.0  # time until the first one: packages are loaded [s]
+LAST_S = 0.5  # time after the signal to stop in which open connections may send further requests [s]
+GRACE_S = 10  # time for requests in flight when the service stops [s]
+STOPPED_S = LAST_S + GRACE_S + 3.0  # time after which a worker that does not stop is killed [s]
+BEAT_S = 1  # time between two heartbeats of a worker [s]
+HALTED_S = 15.0  # time without a heartbeat after which a worker is replaced [s]
+LOADED_S = 120.0  # time until the first heartbeat, in which packages are loaded [s]
+COUNTS_BYTES = 2**20  # size of a file of counters; all addresses and statuses take a tenth of it
 
-OPEN_ADDRESS = "other computers reach this address: put nginx or Caddy in front, with a file of 'Serving on a network'"
-COMPILES: dict[str, object] = {"compiles": "kernels, once after an installation: the first answers wait"}
+OPEN_ADDRESS = "other computers can reach this address: put nginx or Caddy in front of it (see 'Serving on a network')"
+COMPILES: dict[str, object] = {"compiles": "kernels, once after an installation; the first answers take longer"}
 OTHERS = ("uvicorn", "py.warnings")  # loggers of other packages
 
 
@@ -44,20 +44,7 @@ class ServerError(BrdfdbError):
 
 
 def serve(store_dir: Path, host: str, port: int, workers: int = 1, snapshot: str | None = None) -> None:
-    """Serve a store over HTTP until interrupted.
-
-    Parameters
-    ----------
-    store_dir : Path
-        Directory that ``brdfdb build --store`` wrote.
-    host : str
-        Name or address to listen on.
-    port : int
-        0 to 65535; 0 takes any free port.
-    workers : int
-        Processes that answer, each with tables of its own in memory.
-    snapshot : str, optional
-        Name of the snapshot that is served whatever is built later; by default ``BRDFDB_SNAPSHOT``, or none.
+    """Serve a store, or a snapshot of it, over HTTP until interrupted; port 0 is any free port.
 
     Raises
     ------
@@ -66,11 +53,11 @@ def serve(store_dir: Path, host: str, port: int, workers: int = 1, snapshot: str
     ParameterError
         If the port is out of range, or a variable ``BRDFDB_*`` has a value that is not allowed.
     ServerError
-        If `host` is not an address of this machine or the port is taken; or if a worker fails.
+        If `host` is not an address of this machine, the port is taken, or a worker fails.
     """
     if not 0 <= port <= 65535:
         raise ParameterError("port", f"{port} is outside [0, 65535]", port, (0, 65535))
-    os.environ["BRDFDB_STORE"] = str(store_dir)  # the workers read it
+    os.environ["BRDFDB_STORE"] = str(store_dir)  # for the workers
     if snapshot is not None:
         os.environ["BRDFDB_SNAPSHOT"] = snapshot
     settings = Settings.from_environment()
@@ -86,37 +73,38 @@ def serve(store_dir: Path, host: str, port: int, workers: int = 1, snapshot: str
             stack.enter_context(when_compiling(lambda: log.write(COMPILES)))
             DrainingServer(_config()).run(sockets=[listener])
         else:
-            # directory where workers write their counts, so that each can report all of them
-            place = tempfile.TemporaryDirectory(prefix="brdfdb-metrics-", ignore_cleanup_errors=True)
-            counts = stack.enter_context(place)
+            # Directory of the counters of all workers, so that each worker can report their sums
+            directory = tempfile.TemporaryDirectory(prefix="brdfdb-metrics-", ignore_cleanup_errors=True)
+            counts = stack.enter_context(directory)
             asyncio.run(_keep(workers, listener, counts))
 
 
 class DrainingServer(uvicorn.Server):
-    """A server that answers requests on open connections for `LAST_S` after it has stopped accepting new ones."""
+    """A server that still answers requests on open connections for `LAST_S` after the signal to stop."""
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         for server in self.servers:
             server.close()
-        self.server_state.default_headers.append((b"connection", b"close"))  # clients send no more requests
+        self.server_state.default_headers.append((b"connection", b"close"))  # so that clients send no further request
         await asyncio.sleep(LAST_S)
         await super().shutdown(sockets)
 
 
 async def _keep(workers: int, listener: socket.socket, counts: str) -> None:
-    """Keep a number of workers running until a signal; ServerError if one ends with an error of its own."""
-    loop, stopping = asyncio.get_running_loop(), asyncio.Event()
+    """Keep a number of workers running until a signal; ServerError if a worker fails."""
+    loop = asyncio.get_running_loop()
+    stopping = asyncio.Event()
     command = (sys.executable, "-P", "-m", "brdfdb_api.server", str(listener.fileno()))
     environment = {**os.environ, "PROMETHEUS_MULTIPROC_DIR": counts}
 
     def stop() -> None:
-        listener.close()  # before the workers close theirs: it would accept connections that nobody answers
+        listener.close()  # before the workers close it: it would accept connections that nobody answers
         stopping.set()
         for number in (signal.SIGINT, signal.SIGTERM):
             loop.remove_signal_handler(number)  # a second signal ends this process at once
 
     async def worker() -> int:
-        # In a process group of its own: Ctrl-C goes to this process only. The worker stops when its stdin ends.
+        # In a separate process group, so that Ctrl-C reaches this process only. The worker stops when its stdin ends.
         process = await asyncio.create_subprocess_exec(
             *command,
             stdin=asyncio.subprocess.PIPE,
@@ -131,7 +119,7 @@ async def _keep(workers: int, listener: socket.socket, counts: str) -> None:
         await asyncio.wait(ends, return_when=asyncio.FIRST_COMPLETED)
         if not stopping.is_set():
             if ends[0].result() == "halted":
-                log.write({"failed": f"worker {process.pid} gave no sign of life for {HALTED_S:g} s"})
+                log.write({"failed": f"worker {process.pid} did not respond for {HALTED_S:g} s"})
                 process.kill()
             log.write({"failed": f"worker {process.pid} ended with status {await process.wait()}"})
         process.stdin.close()
@@ -146,7 +134,7 @@ async def _keep(workers: int, listener: socket.socket, counts: str) -> None:
         status = 0
         while not stopping.is_set():
             status = await worker()
-            if status > 0 and not stopping.is_set():  # it would fail again; a killed worker is replaced
+            if status > 0 and not stopping.is_set():  # it would fail again; only killed workers are replaced
                 stop()
             with contextlib.suppress(TimeoutError):
                 await asyncio.wait_for(stopping.wait(), PAUSE_S)
@@ -157,14 +145,14 @@ async def _keep(workers: int, listener: socket.socket, counts: str) -> None:
     status = max(await asyncio.gather(*(place() for _ in range(workers))))
     log.flush()
     if status > 0:
-        raise ServerError(f"a worker ended with status {status}; its log says why")
+        raise ServerError(f"a worker ended with status {status}; its log has the reason")
 
 
-async def _ended(signs: asyncio.StreamReader) -> str:
-    """Wait until a worker ends or halts."""
+async def _ended(heartbeats: asyncio.StreamReader) -> str:
+    """Wait until a worker ends or halts; return which."""
     limit = LOADED_S
     try:
-        while await asyncio.wait_for(signs.read(64), limit):
+        while await asyncio.wait_for(heartbeats.read(64), limit):
             limit = HALTED_S
     except TimeoutError:
         return "halted"
@@ -172,31 +160,31 @@ async def _ended(signs: asyncio.StreamReader) -> str:
 
 
 def _work(descriptor: int) -> None:
-    """Run a worker on the socket that the parent listens on, until stdin ends; signs of life go to stdout."""
-    signs = os.dup(sys.stdout.fileno())
+    """Run a worker on the socket of the parent until stdin ends; heartbeats go to stdout."""
+    heartbeats = os.dup(sys.stdout.fileno())
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
-    os.set_blocking(signs, False)
+    os.set_blocking(heartbeats, False)
 
     async def beat() -> None:
         with contextlib.suppress(OSError):  # nobody reads any more
-            os.write(signs, b".")
+            os.write(heartbeats, b".")
 
     server = DrainingServer(_config(callback_notify=beat, timeout_notify=BEAT_S))
 
     counts = Path(os.environ["PROMETHEUS_MULTIPROC_DIR"])
-    for kind in ("counter", "histogram"):  # files that are memory: without their blocks a full disk kills the process
+    for kind in ("counter", "histogram"):  # mapped files: without their blocks, a full disk kills the process
         try:
             with (counts / f"{kind}_{os.getpid()}.db").open("wb") as file:
                 os.posix_fallocate(file.fileno(), 0, COUNTS_BYTES)
         except FileNotFoundError:  # the parent was killed
             return
-        except OSError as error:  # no room: the next worker tries again
+        except OSError as error:  # the disk is full: the next worker tries again
             log.write({"failed": f"a worker cannot start: {error.strerror}: {counts}"})
             return
 
     def wait() -> None:
         os.read(sys.stdin.fileno(), 1)
-        shutil.rmtree(counts, ignore_errors=True)  # all workers stop; the parent may have been killed
+        shutil.rmtree(counts, ignore_errors=True)  # all workers stop, and the parent may have been killed
         if not server.started:
             os._exit(0)  # there is nothing to answer
         server.should_exit = True
@@ -228,7 +216,7 @@ def _config(**keywords: Any) -> uvicorn.Config:
 
 @contextlib.contextmanager
 def _ended_by_signals() -> Iterator[None]:
-    """Treat SIGTERM like Ctrl-C, and neither as an error: uvicorn raises them again after the last answer."""
+    """Treat SIGTERM like Ctrl-C, and neither as an error: uvicorn repeats them after the last answer."""
     before = signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         with contextlib.suppress(KeyboardInterrupt):
@@ -238,9 +226,9 @@ def _ended_by_signals() -> Iterator[None]:
 
 
 def _listening(host: str, port: int) -> socket.socket:
-    """Return a socket that listens; ServerError where that is not possible."""
+    """Return a listening socket; ServerError if the address cannot be used."""
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
-    # asyncio sets TCP_NODELAY only on a socket that names its protocol; without it, each small answer takes 40 ms.
+    # asyncio sets TCP_NODELAY only if the socket names its protocol; without it, a small answer takes 40 ms
     listener = socket.socket(family, socket.SOCK_STREAM, socket.IPPROTO_TCP)
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
@@ -248,7 +236,7 @@ def _listening(host: str, port: int) -> socket.socket:
         listener.listen(1024)
     except (OSError, UnicodeError) as error:  # UnicodeError: a label of the name is empty or too long
         listener.close()
-        reason = error.strerror if isinstance(error, OSError) else "not the name of a machine"
+        reason = error.strerror if isinstance(error, OSError) else "not a host name"
         raise ServerError(f"cannot listen on {host}, port {port}: {reason}") from error
     return listener
 

@@ -1,4 +1,4 @@
-"""Settings of the HTTP layer: a store, limits, who may ask; all read from `BRDFDB_*`."""
+"""Settings of the HTTP layer from the environment variables `BRDFDB_*`: the store, limits, origins and the log."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from brdfdb.store.summary_words import REPORT_OF_ALL, REPORT_OF_SOME
 LogLevel = Literal["info", "warning", "error"]
 
 
-def _origins(value: Any) -> Any:
+def _separated(value: Any) -> Any:
     return tuple(filter(None, map(str.strip, value.split(",")))) if isinstance(value, str) else value
 
 
@@ -25,40 +25,41 @@ Origin = Annotated[str, Field(pattern=r"^(\*|https?://[^/]+)$")]
 
 
 class Settings(BaseSettings):
-    """Settings of one application; each has an environment variable of its name, ``BRDFDB_STORE`` and so on."""
+    """Settings of an application; each has an environment variable, such as ``BRDFDB_STORE``."""
 
     model_config = SettingsConfigDict(env_prefix="BRDFDB_", frozen=True)
 
     store: Place = Field(default=Path("brdf-store"), description="directory that ``brdfdb build --store`` wrote")
-    audit: Place | None = Field(default=None, description="what ``brdfdb audit`` wrote as JSON; None: where it puts it")
-    max_points: Positive = Field(default=10_000, description="points in one JSON answer; .npy holds 100 times as many")
+    audit: Place | None = Field(default=None, description="file that ``brdfdb audit`` wrote; None: that in the store")
+    max_points: Positive = Field(
+        default=10_000, description="points in one JSON answer; .npy may have 100 times as many"
+    )
     max_body_bytes: Positive = Field(default=64 * 2**20, description="largest body [bytes]: a million points as .npy")
-    cache_bytes: Positive = Field(default=256 * 2**20, description="decoded tables that each worker keeps [bytes]")
-    cors_origins: Annotated[tuple[Origin, ...], NoDecode, BeforeValidator(_origins)] = Field(
-        default=(), description="pages of these origins may ask, ``*`` for all; separated by commas in the environment"
+    cache_bytes: Positive = Field(default=256 * 2**20, description="memory of each worker for decoded tables [bytes]")
+    cors_origins: Annotated[tuple[Origin, ...], NoDecode, BeforeValidator(_separated)] = Field(
+        default=(), description="origins whose pages may send requests, separated by commas; ``*``: all"
     )
     log_level: LogLevel = Field(
-        default="info", description='"info" logs each request, "warning" those refused, "error" those that failed here'
+        default="info", description='"info" logs all requests, "warning" refused and failed ones, "error" failed ones'
     )
     snapshot: Annotated[str | None, AfterValidator(lambda name: name or None)] = Field(
-        default=None, description="name of the snapshot of the store that is served; None: what is current"
+        default=None, description="name of the snapshot to serve; None: the current revisions"
     )
 
     @property
     def audit_files(self) -> tuple[Path, ...]:
-        """Paths of the audit reports: the one that was named, or those on all materials and on some in the store."""
+        """Paths of the audit reports: the given one, or those in the store on all and on some materials."""
         in_store = (self.store / REPORT_OF_ALL, self.store / REPORT_OF_SOME)
         return in_store if self.audit is None else (self.audit,)
 
     @classmethod
     def from_environment(cls) -> Self:
-        """Read the environment; what it does not name keeps its default.
+        """Return the settings of the environment.
 
         Raises
         ------
         ParameterError
-            If a limit is not a positive whole number, the level of the log none, or an origin none; the sentence names
-            the variable.
+            If a variable has a value that is not allowed; the sentence names the variable.
         """
         try:
             return cls()

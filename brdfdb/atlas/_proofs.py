@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.figure import Statement
+from brdfdb.gauss import gauss_rule
 from brdfdb.geometry import unit_vector
-from brdfdb.integrals.quadrature import gauss_rule
 from brdfdb.misprints import Misprint
 
 Array = NDArray[np.float64]
@@ -107,12 +107,14 @@ def albedo(form: Form, theta_i: float, polar: int, azimuths: int, **arguments: A
 def _facet(x: Array, towards: Array, theta_a: float, phi_a: float) -> Array:
     """Return whether rays in a direction leave a facet of width 1 from distances x to the bottom of its groove."""
     across = np.array([np.cos(phi_a), np.sin(phi_a), 0.0])
-    d_u, d_z = towards @ across, towards[2]
+    d_u = towards @ across
+    d_z = towards[2]
     c, s = np.cos(theta_a), np.sin(theta_a)
     # The ray x (-c, s) + t (d_u, d_z) meets the opposite facet at y (c, s)
     det = d_z * c - d_u * s
     with np.errstate(all="ignore"):
-        t, y = -2.0 * x * c * s / det, -x * (d_u * s + d_z * c) / det
+        t = -2.0 * x * c * s / det
+        y = -x * (d_u * s + d_z * c) / det
     blocked = (t > 0.0) & (y >= 0.0) & (y <= 1.0)
     return np.asarray((d_u * s + d_z * c > 0.0) & ~blocked)
 
@@ -124,11 +126,14 @@ def traced(theta_i: float, theta_r: float, phi_r: float, theta_a: float, phi_a: 
     Rays from points across both facets show which points are lit and which are seen. With `points` on each facet the
     light is reflected twice: it bounces between the facets by their form factors.
     """
-    s, v = unit_vector(theta_i, 0.0), unit_vector(theta_r, phi_r)
+    s = unit_vector(theta_i, 0.0)
+    v = unit_vector(theta_r, phi_r)
     count = points or _RAYS
-    x, total = (np.arange(count) + 0.5) / count, 0.0
+    x = (np.arange(count) + 0.5) / count
+    total = 0.0
     for turn in (phi_a, phi_a + np.pi):
-        a, b = unit_vector(theta_a, turn), unit_vector(theta_a, turn + np.pi)
+        a = unit_vector(theta_a, turn)
+        b = unit_vector(theta_a, turn + np.pi)
         seen = _facet(x, v, theta_a, turn) * (v @ a)
         if points:
             lit = _facet(x, s, theta_a, turn + np.pi) * (s @ b)
@@ -142,7 +147,8 @@ def traced(theta_i: float, theta_r: float, phi_r: float, theta_a: float, phi_a: 
 def _exchange(x: Array, edges: Array, theta_a: float) -> Array:
     """Return the form factors [1] from points x of a facet to strips of the other: half of the sines that they span."""
     c, s = np.cos(theta_a), np.sin(theta_a)
-    along, up = (x[:, np.newaxis] + edges) * c, (edges - x[:, np.newaxis]) * s
+    along = (x[:, np.newaxis] + edges) * c
+    up = (edges - x[:, np.newaxis]) * s
     sines = (up * s - along * c) / np.hypot(along, up)
     return np.asarray(0.5 * np.abs(np.diff(sines, axis=1)))
 
@@ -187,7 +193,8 @@ def _jump_on_the_horizon(form: Form) -> float:
 
     def f_r(height: float) -> Any:
         across = np.cos(height)
-        wi, wr = [across, 0.0, np.sin(height)], [-across, 0.0, np.sin(height)]
+        wi = [across, 0.0, np.sin(height)]
+        wr = [-across, 0.0, np.sin(height)]
         return form(wi=[wi], wr=[wr], rho=0.5, sigma=0.5)
 
     return largest(
@@ -226,7 +233,8 @@ def _image(theta_i: float, phi_i: float, theta_r: float, phi_r: float) -> Array:
     The mirror is the facet that bisects light and viewer. s and p refer to the surface whose normal is z. Eqs 61 to 64
     are this field with the opposite sign, which no intensity shows.
     """
-    k_i, k_r = -unit_vector(theta_i, phi_i), unit_vector(theta_r, phi_r)
+    k_i = -unit_vector(theta_i, phi_i)
+    k_r = unit_vector(theta_r, phi_r)
     n = (k_r - k_i) / np.linalg.norm(k_r - k_i)
     bases = []
     for k in (k_i, k_r):
@@ -252,7 +260,9 @@ def _seen(theta: float, slope: float) -> tuple[float, float]:
 
     The slopes along the direction are Gaussian, with the deviation sqrt(2) sigma_0 / tau of the correlation of eq. 48.
     """
-    deviation, cos, sin = math.sqrt(2.0) * slope, math.cos(theta), math.sin(theta)
+    deviation = math.sqrt(2.0) * slope
+    cos = math.cos(theta)
+    sin = math.sin(theta)
     top = 10.0 * deviation if cos >= 10.0 * deviation * sin else cos / sin
     p = np.linspace(-10.0 * deviation, top, 20_001)
     density = np.exp(-0.5 * (p / deviation) ** 2) / (math.sqrt(2.0 * math.pi) * deviation)
@@ -290,7 +300,8 @@ def _spread(theta_i: float, phi_i: float, theta_r: float, phi_r: float) -> float
     """Return G [1] by the change of the mirrored direction with the slopes of a facet."""
     w_i, w_r = unit_vector(theta_i, phi_i), unit_vector(theta_r, phi_r)
     h = w_i + w_r
-    center, step = -h[:2] / h[2], 1e-5
+    center = -h[:2] / h[2]
+    step = 1e-5
 
     def reflected(slopes: Array) -> Array:
         normal = np.array([-slopes[0], -slopes[1], 1.0]) / math.sqrt(1.0 + slopes @ slopes)
@@ -387,9 +398,11 @@ def _not_all_reflected(form: Form) -> float:
 
 def _off_gaussian(form: Form) -> float:
     """Return the difference [1] of the logarithm of the lobe from -tan^2(delta) / alpha^2, light along the normal."""
-    delta, alpha = np.deg2rad([5.0, 10.0, 20.0, 30.0]), 0.2
+    delta = np.deg2rad([5.0, 10.0, 20.0, 30.0])
+    alpha = 0.2
     lobe = {"theta_i": 0.0, "phi_i": 0.0, "phi_r": 0.0, "rho_d": 0.0, "rho_s": 1.0, "alpha_x": alpha, "alpha_y": alpha}
-    peak, shoulder = form(theta_r=0.0, **lobe), form(theta_r=2.0 * delta, **lobe) * np.sqrt(np.cos(2.0 * delta))
+    peak = form(theta_r=0.0, **lobe)
+    shoulder = form(theta_r=2.0 * delta, **lobe) * np.sqrt(np.cos(2.0 * delta))
     return largest([np.log(shoulder / peak) + np.tan(delta) ** 2 / alpha**2])
 
 
@@ -435,7 +448,8 @@ def _mean_weight(form: Form) -> float:
 def _lobe_albedo(wi: Array) -> float:
     """Return the albedo [1] of eq. 5a by a sum over slopes of the half vector."""
     slopes = np.linspace(-6.0 * _ALPHA, 6.0 * _ALPHA, 301)
-    p, q = slopes[:, np.newaxis], slopes
+    p = slopes[:, np.newaxis]
+    q = slopes
     h_z = 1.0 / np.sqrt(1.0 + p**2 + q**2)
     i_h = (p * wi[0] + q * wi[1] + wi[2]) * h_z
     cos_r = 2.0 * i_h * h_z - wi[2]

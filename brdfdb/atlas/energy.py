@@ -12,8 +12,9 @@ from brdfdb import fresnel
 from brdfdb.atlas._errors import lobe
 from brdfdb.figure import Curve, Figure, Panel, Role, Statement, curve_of
 from brdfdb.gallery.ward_1992 import FORMS
+from brdfdb.gauss import gauss_rule
 from brdfdb.geometry import radians, unit_vector
-from brdfdb.integrals.quadrature import directional_albedo, gauss_rule
+from brdfdb.integrals.quadrature import directional_albedo
 from brdfdb.integrals.sampling import sample
 from brdfdb.integrals.uniform_bound import largest_uniform
 from brdfdb.materials import presets

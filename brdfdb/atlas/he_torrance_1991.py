@@ -56,7 +56,9 @@ def _jones(theta_i: float, phi_i: float, theta_r: float, phi_r: float, *, n: flo
 
 def _geometry(theta_i: float, phi_i: float, theta_r: float, phi_r: float) -> Any:
     """Return G [1] of eq. 76 without its factor that is 1."""
-    theta_i, theta_r, delta_phi = mp.mpf(theta_i), mp.mpf(theta_r), mp.mpf(phi_r) - mp.mpf(phi_i)
+    theta_i = mp.mpf(theta_i)
+    theta_r = mp.mpf(theta_r)
+    delta_phi = mp.mpf(phi_r) - mp.mpf(phi_i)
     v_z = mp.cos(theta_i) + mp.cos(theta_r)
     v_xy2 = mp.sin(theta_i) ** 2 + mp.sin(theta_r) ** 2
     v_xy2 += 2 * mp.sin(theta_i) * mp.sin(theta_r) * mp.cos(delta_phi)
@@ -107,11 +109,6 @@ def four_dot_products() -> Figure:
 # The whole
 
 
-def _smooth(theta_i: float, *, n: float, k: float, wavelength_nm: float) -> Any:
-    """Return the specular reflectance [1] of a smooth surface."""
-    return he_torrance_1991.specular_reflectance(theta_i, wavelength_nm, 0, 1, n, k)
-
-
 def _over_the_mirror_direction(theta_i: float, phi_i: float, theta_r: float, phi_r: float, **surface: float) -> Any:
     """Return the directional diffuse f_r [1] over its value in the mirror direction."""
     values = [surface[name] for name in ("wavelength_nm", "sigma_0_um", "tau_um", "n", "k")]
@@ -157,17 +154,13 @@ def _all_terms(g: Any, V: Any) -> Any:
     Each term is computed from the term before, and the first one from e^-g.
     """
     one = type(g)(1)
-    poisson, total = np.exp(-g), 0 * g
+    poisson = np.exp(-g)
+    total = 0 * g
     if poisson > 0:  # If e^-g underflows, all terms are 0
         for m in range(1, 2 * int(g) + 100):
             poisson = poisson * g / (m * one)
             total = total + poisson / (m * one) * np.exp(-V / (m * one))
     return total
-
-
-def _all_terms_in_float32(g: Any, V: Any) -> Any:
-    """Return `_all_terms` [1] in 32-bit arithmetic."""
-    return _all_terms(np.float32(g), np.float32(V))
 
 
 def _corrected_limit(g: float, V: float) -> Any:
@@ -385,6 +378,9 @@ def in_float32() -> Figure:
         angles = {"theta_i": 0.6, "phi_i": 0.0, "theta_r": 0.7, "phi_r": 3.0}
         return {name: np.float32(x) for name, x in angles.items()} | _GLOSSY | {"wavelength_nm": wavelength}
 
+    def plainly_in_float32(**given: Any) -> Any:
+        return _plainly(**given, total=lambda g, V: _all_terms(np.float32(g), np.float32(V)))
+
     return figure(
         "he-torrance-float32",
         HE,
@@ -395,9 +391,7 @@ def in_float32() -> Figure:
         [
             FormSweep(np.logspace(3.5, 1.5, 21), "wavelength [nm]", arguments, _directional, log_x=True).panel(
                 [
-                    ComparedForm(
-                        "all terms, in float32", "textbook", functools.partial(_plainly, total=_all_terms_in_float32)
-                    ),
+                    ComparedForm("all terms, in float32", "textbook", plainly_in_float32),
                     ComparedForm("ours, float32 in and out", "ours", models.he_torrance),
                 ]
             )
@@ -430,7 +424,14 @@ FIGURES: dict[str, Callable[[], Figure]] = dict(
         misprint(
             "two-pi-in-the-cone",
             "Light that a mirror sends into its cone",
-            FormSweep(np.linspace(0.0, 85.0, 18), LIGHT, lambda theta: {"theta_i": np.deg2rad(theta)}, _smooth),
+            FormSweep(
+                np.linspace(0.0, 85.0, 18),
+                LIGHT,
+                lambda theta: {"theta_i": np.deg2rad(theta)},
+                lambda theta_i, n, k, wavelength_nm: he_torrance_1991.specular_reflectance(
+                    theta_i, wavelength_nm, 0, 1, n, k
+                ),
+            ),
             caption=f"A smooth surface, n of 1.5: the specular reflectance. {TRUTH}",
         ),
         misprint(

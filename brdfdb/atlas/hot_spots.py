@@ -42,7 +42,9 @@ def _rpv_plainly(
     rho_c: float,
 ) -> Any:
     """Return f_r [1/sr] of RPV by the formulas of the paper in float64."""
-    cos_i, cos_r, delta_phi = np.cos(theta_i), np.cos(theta_r), phi_r - phi_i
+    cos_i = np.cos(theta_i)
+    cos_r = np.cos(theta_r)
+    delta_phi = phi_r - phi_i
     cos_g = cos_i * cos_r + np.sin(theta_i) * np.sin(theta_r) * np.cos(delta_phi)
     F = (1.0 - asymmetry**2) / (1.0 + asymmetry**2 + 2.0 * asymmetry * cos_g) ** 1.5
     G = np.sqrt(_distance2(theta_i, theta_r, delta_phi))
@@ -53,9 +55,12 @@ def _ross_li_plainly(
     theta_i: float, phi_i: float, theta_r: float, phi_r: float, *, f_iso: float, f_vol: float, f_geo: float
 ) -> Any:
     """Return f_r [1/sr] of the Ross-Li kernels by the formulas of the papers in float64."""
-    cos_i, cos_r, delta_phi = np.cos(theta_i), np.cos(theta_r), phi_r - phi_i
+    cos_i = np.cos(theta_i)
+    cos_r = np.cos(theta_r)
+    delta_phi = phi_r - phi_i
     cos_xi = cos_i * cos_r + np.sin(theta_i) * np.sin(theta_r) * np.cos(delta_phi)
-    xi, sec = np.arccos(cos_xi), 1.0 / cos_i + 1.0 / cos_r
+    xi = np.arccos(cos_xi)
+    sec = 1.0 / cos_i + 1.0 / cos_r
     k_vol = ((np.pi / 2.0 - xi) * cos_xi + np.sin(xi)) / (cos_i + cos_r) - np.pi / 4.0
     across = np.tan(theta_i) * np.tan(theta_r) * np.sin(delta_phi)
     t = np.arccos(np.minimum(1.0, 2.0 * np.sqrt(_distance2(theta_i, theta_r, delta_phi) + across**2) / sec))

@@ -67,14 +67,10 @@ def _towards_the_horizon(x: float) -> dict[str, Any]:
     return {"wi": [sine, 0.0, cosine], "wr": [-sine, 0.0, cosine]}
 
 
-def _surface(theta_i: Any, phi_i: Any, theta_r: Any, phi_r: Any, *, sigma: float) -> Any:
-    """Return f_r [1/sr] of mirror-like facets."""
-    return torrance_sparrow(theta_i, theta_r, phi_r - phi_i, sigma)
-
-
 def _towel(theta_i: float, phi_i: float, theta_r: float, phi_r: float, *, e_0: float) -> Any:
     """Return f_r [1/sr] of the towel of Fig. 20, which does not depend on the irradiance e_0."""
-    sigma, weights = np.deg2rad(42.0), {"k_b": 1, "k_s": mp.mpf(0.085) / mp.mpf(np.pi)}
+    sigma = np.deg2rad(42.0)
+    weights = {"k_b": 1, "k_s": mp.mpf(0.085) / mp.mpf(np.pi)}
     body, _, surface = oren_nayar_1994.body_surface(theta_i, theta_r, phi_r - phi_i, 0.75, sigma, **weights)
     return body + surface + 0 * e_0
 
@@ -169,7 +165,12 @@ FIGURES: dict[str, Callable[[], Figure]] = dict(
         misprint(
             "surface-radiance-as-brdf",
             "A radiance is no BRDF",
-            FormSweep(np.linspace(0.0, 89.0, 30), LIGHT, lambda theta: directions(theta, 30.0, 180.0), _surface),
+            FormSweep(
+                np.linspace(0.0, 89.0, 30),
+                LIGHT,
+                lambda theta: directions(theta, 30.0, 180.0),
+                lambda theta_i, phi_i, theta_r, phi_r, sigma: torrance_sparrow(theta_i, theta_r, phi_r - phi_i, sigma),
+            ),
             caption=f"Facets with sigma of 20 degrees, seen from 30 degrees in the mirror half plane: f_r. {TRUTH}",
         ),
         misprint(

@@ -114,7 +114,7 @@ class Energy(Finding):
                 preset = f" of {number(bound.preset[0], 4)}"
                 largest = f" of {number(bound.largest[0], 4)}"
             keeps = "keeps to" if bound.keeps else "is above"
-            text = f"the material's own a(λ){preset} {keeps} the largest that conserves energy{largest}"
+            text = f"the a(λ) of the material{preset} {keeps} the largest that conserves energy{largest}"
             sentences.append(self.sentence("inside" if bound.keeps else "outside", text, title="Uniform diffuse part"))
         return sentences
 
@@ -157,9 +157,8 @@ class Energy(Finding):
             count = sum(energy.verdict == verdict for energy in energies)
             if count:
                 does = f"a model that {verdict} light" if count == 1 else f"models that {verdict[:-1]} light"
-                sentences.append(
-                    f"{counted(count, 'table')} of {does} where nothing absorbs it: the report says how much, and where"
-                )
+                of_model = f"{counted(count, 'table')} of {does} where nothing absorbs it"
+                sentences.append(f"{of_model}: the report gives the amount and the angle")
         return sentences
 
 

@@ -60,7 +60,7 @@ LAST = 1e300  # sort key of cells without a number: it sorts after every number
 
 
 class Cell(NamedTuple):
-    """A verdict on one table in the table of all materials: its word, the text beside it, and the number to sort by."""
+    """A verdict on one table in the table of all materials: its word, its text, and the number to sort by."""
 
     word: Word
     text: str

@@ -11,8 +11,9 @@ from pydantic import BaseModel, Field
 
 from brdfdb.audit.finding import STRICT
 from brdfdb.figure import Numbers, numbers, rows
+from brdfdb.gauss import gauss_rule
 from brdfdb.geometry import radians
-from brdfdb.integrals.quadrature import Albedo, gauss_rule, reflected_share
+from brdfdb.integrals.quadrature import Albedo, reflected_share
 from brdfdb.integrals.uniform_bound import largest_uniform_beside, tops
 from brdfdb.lobes import narrowest
 from brdfdb.materials import Material, Source, presets
@@ -282,7 +283,7 @@ class _Model(NamedTuple):
         evaluated = [form.brdf_at(nm) for form, nm in forms]
 
         def brdf(wi: Floats, wr: Floats) -> Floats:
-            with np.errstate(all="ignore"):  # nodes lie in every corner; what is finite is tested, not flagged
+            with np.errstate(all="ignore"):  # extreme directions may overflow; values are tested later
                 # f_r of a lossless form may be the same at all wavelengths, and have one column
                 values = [
                     np.broadcast_to(f_r(wi, wr), (len(wi), width)) for f_r, width in zip(evaluated, widths, strict=True)
@@ -475,7 +476,7 @@ def _judged(
 
 def _furnace(lossless: Lossless, wavelength_nm: Axis | None, lights: _Lights, reflected: _Reflected) -> Furnace:
     """Return the white furnace of a source from the albedos of its lossless form."""
-    # Albedos that differ by less than their error are alike, and the smallest of their angles stands for them
+    # Albedos that differ by less than their error count as equal; the smallest of their angles is reported
     alike = np.round(reflected.largest, SURE_DECIMALS)
     low, high = (np.unravel_index(extreme(alike), alike.shape) for extreme in (np.argmin, np.argmax))
     return Furnace(
@@ -500,7 +501,8 @@ def _bound(source: Source, wavelength_nm: Axis | None, lights: _Lights, reflecte
     """
     if not isinstance(source, Material):
         return None
-    spec, arguments = source.spec, source.arguments(wavelength_nm)
+    spec = source.spec
+    arguments = source.arguments(wavelength_nm)
     if spec.uniform_bound_cosine is None or spec.uniform is None:
         return None
     nm = np.ravel(arguments["wavelength_nm"])

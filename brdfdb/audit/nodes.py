@@ -20,8 +20,8 @@ from brdfdb.tables.tabulation import block, rounded, specular_nodes
 # some rows of their first axis, evenly spread. A value of the integral over facets takes 30 us, other values 0.2 us
 MOST_VALUES = 1 << 20
 _MOST_SLOW = 1 << 15
-# Rounding error of float64 sums on another processor, relative to the largest number of the table. It is allowed beside
-# the rounding to the stored bits
+# Rounding error of float64 sums on another processor, relative to the largest number of the table. It is allowed in
+# addition to the rounding to the stored bits
 _ROUNDING = 1e-11
 # Relative tolerance of n, k and the uniform part, which are stored as float64
 SAME = 1e-9
@@ -85,14 +85,11 @@ def nodes_of(table: Table, source: Source) -> Nodes:
 
     ParameterError if no layout of the source has the shape of the table.
     """
-    bits, layout = table.metadata.bits, table.laid_out(source)
+    bits = table.metadata.bits
+    layout = table.laid_out(source)
     if layout.shape != table.values.shape:
-        raise ParameterError(
-            layout.variable,
-            f"shape {table.values.shape} is not {layout.shape}, that of its axes",
-            table.values.shape,
-            layout.shape,
-        )
+        text = f"shape {table.values.shape} is not {layout.shape}, that of its axes"
+        raise ParameterError(layout.variable, text, table.values.shape, layout.shape)
     rows = 0
     wrong = 0
     worst = _Wrong(0.0, 0.0, 0.0)
@@ -146,12 +143,8 @@ def _refraction(table: Table, source: Source) -> Iterator[str]:
         if stored is None:
             continue
         if stored.shape != expected.shape:
-            raise ParameterError(
-                name,
-                f"shape {stored.shape} is not {expected.shape}, that of the wavelengths",
-                stored.shape,
-                expected.shape,
-            )
+            text = f"shape {stored.shape} is not {expected.shape}, that of the wavelengths"
+            raise ParameterError(name, text, stored.shape, expected.shape)
         off = np.where(np.isfinite(stored), np.abs(stored - expected), np.inf) / scale
         if np.any(off > SAME):
             worst = int(np.argmax(off))

@@ -13,7 +13,7 @@ from brdfdb.tables.table import Table
 
 SEED = 1967  # differs from the seeds of build and planner, which the table was fitted to
 # Directions per band of theta_i, half of them in the lobe. Tables with more than `_FEW` wavelengths use fewer, because
-# their wavelengths vary alike, and so do tables of slow models
+# their wavelengths vary in the same way. Tables of slow models use fewer, too
 DIRECTIONS = 3000
 _FEW = 4
 _FEWER_DIRECTIONS = 1000

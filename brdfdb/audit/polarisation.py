@@ -32,9 +32,9 @@ class PolarisationFinding(Finding):
     order = 7
     explanation = (
         "A Mueller matrix is physically realisable if no eigenvalue of its coherency matrix is negative (Cloude 1986): "
-        "it is then a sum of Jones matrices. Eigenvalues are shown over the trace. They may be negative by the stated "
-        "error of the elements of a facet, because interpolation goes beyond what its nodes keep to. Unpolarised "
-        "tables have no such matrices."
+        "it is then a sum of Jones matrices. Eigenvalues are divided by the trace. Negative values up to the stated "
+        "error of the elements of a facet are allowed, because interpolated matrices may break the condition even if "
+        "those at the nodes obey it. Unpolarised tables have no such matrices."
     )
 
     lookups: int = Field(description="directions and wavelengths at which the table was looked up; 0: unpolarised")

@@ -211,7 +211,7 @@ def _asymmetry(f: Floats, exchanged: Floats, tolerance: float | None, *, measure
     differs = f != exchanged  # True for nan. Few nodes differ, and only they are computed
     values = f[differs].astype(np.float64)
     others = exchanged[differs].astype(np.float64)
-    with np.errstate(invalid="ignore"):  # what is not finite counts as 1
+    with np.errstate(invalid="ignore"):  # values that are not finite count as 1
         relative = np.abs(values - others) / (np.abs(values) + np.abs(others) + _TINY)
     relative = np.where(np.isfinite(relative), relative, 1.0)
     smallest = float(relative.min(initial=1.0)) if differs.all() else 0.0

@@ -44,18 +44,18 @@ class Unchecked(NamedTuple):
 
 
 _NO_DATA = "the store does not hold the data"
-_NO_FUNCTION = "the store does not hold the function, which an audit can be given"
+_NO_FUNCTION = "the store does not hold the function, but an audit accepts it as an argument"
 UNCHECKED = (
-    Unchecked("pointer and manifest", "created", "no clock is stored beside it"),
-    Unchecked("pointer", "last", "it may be higher than any revision: those that were collected leave nothing"),
-    Unchecked("table", "reason", "what other kinds of tables were expected to take; its first clause is compared"),
-    Unchecked("table", "error.worst.*", "where all errors are rounding, the largest has no place"),
+    Unchecked("pointer and manifest", "created", "there is no other record of the time"),
+    Unchecked("pointer", "last", "revisions with higher numbers may have been removed, and leave no trace"),
+    Unchecked("table", "reason", "expected sizes of other kinds of tables; only its first clause is compared"),
+    Unchecked("table", "error.worst.*", "if all errors are due to rounding, the place of the largest is arbitrary"),
     Unchecked("table of a function", "error.*", f"{_NO_FUNCTION}; it must not contradict itself"),
     Unchecked("table of a function", "largest_albedo.*", f"{_NO_FUNCTION}; the albedo is near that of the lookups"),
-    Unchecked("table of a function", "source_record.function.*", "its author says so"),
+    Unchecked("table of a function", "source_record.function.*", "only the author of the function knows"),
     Unchecked("table of measured data", "error.*", f"{_NO_DATA}; it must not contradict itself"),
     Unchecked("table of measured data", "measured.*", _NO_DATA),
-    Unchecked("table of measured data", "source_record.function.*", "what an import read in the data"),
+    Unchecked("table of measured data", "source_record.function.*", "the import took it from the data"),
 )
 
 
@@ -80,12 +80,12 @@ class Record(Finding):
     key = "record"
     order = 9
     explanation = (
-        "All that a table states of itself is made again, by the functions of a build: title, parameters and "
-        "citations from the record of the source, which a digest covers; the stated error, also in places and between "
-        "wavelengths, the error of the formula and the largest albedo by measurements at the same directions. Each "
-        "number and each word is compared: numbers to rounding. Materials that have the name of a preset, or cite what "
-        "a preset cites, have the parameters of a preset. Of tables of functions and measured data, what their arrays "
-        "decide is compared."
+        "The metadata of a table are computed again, as in a build. Title, parameters and citations follow from the "
+        "record of the source, which a digest protects. The stated error (also in places and between wavelengths), the "
+        "error of the formula and the largest albedo are measured at the same directions. All numbers must agree to "
+        "rounding, and all texts exactly. Materials that have the name of a preset, or cite the same place as one, "
+        "must have the parameters of a preset. For tables of functions and of measured data, only metadata that follow "
+        "from the arrays are compared."
     )
 
     compared: int = Field(description="number of leaves of the attributes that were compared")
@@ -102,7 +102,7 @@ class Record(Finding):
 
     def sentences(self) -> list[Sentence]:
         """Return a sentence on the number of leaves, or on those that differ."""
-        text = f"all {self.compared} numbers and words that were compared are those of its record and of a measurement"
+        text = f"all {self.compared} compared numbers and words agree with its record and with a new measurement"
         if self.wrong:
             named = "; ".join(difference.text for difference in self.worst[:_SHOWN])
             text = f"{counted(self.wrong, 'statement')} of {self.compared} wrong: {named}"
@@ -209,7 +209,7 @@ def _allowed(stated: Any, expected: Any, path: tuple[str, ...]) -> float:
     largest = max(numbers, default=0.0)
     if largest == 0.0 or not math.isfinite(largest):
         return _SAME
-    if words and words[-1].startswith("passes_1"):  # three digits of what is left to 90 degrees
+    if words and words[-1].startswith("passes_1"):  # three digits of the distance to 90 degrees
         return _SAME + _PASSES * abs(90.0 - largest) / largest
     if words and words[-1].endswith(("_deg", "_nm")):
         return _SAME_PLACE / largest if "worst" in words else _SAME
@@ -220,7 +220,8 @@ def _same(stated: Any, expected: Any, allowed: float) -> bool:
     numbers = [value for value in (stated, expected) if isinstance(value, int | float) and not isinstance(value, bool)]
     if len(numbers) < 2:
         return type(stated) is type(expected) and bool(stated == expected)
-    off, largest = abs(stated - expected), max(map(abs, numbers))
+    off = abs(stated - expected)
+    largest = max(map(abs, numbers))
     return bool(off <= allowed * largest) or stated == expected or all(map(math.isnan, numbers))
 
 
@@ -229,7 +230,7 @@ def _written(value: Any) -> str:
 
 
 def _tied(table: Table, albedo_at: AlbedoAt, difference: Difference, stated: Any, expected: Any) -> bool:
-    """Return whether a place is one of several where what is largest is equally large: rounding decides among them."""
+    """Return True if a place is one of several with equally large values, among which rounding decides."""
     path = difference.leaf.split(".")
     if "worst" in path and path[-1] != "why":
         return _is_rounding(stated) and _is_rounding(expected)
@@ -321,7 +322,8 @@ def _of_function(table: Table) -> Iterator[Difference]:
 
 def _of_bits(table: Table) -> Iterator[Difference]:
     """Yield the stated number of bits if the stored values have another."""
-    bits, values = table.metadata.bits, table.values
+    bits = table.metadata.bits
+    values = table.values
     stored = np.array_equal(rounded(values, bits), values, equal_nan=True)
     fewer = bits > 1 and np.array_equal(rounded(values, bits - 1), values, equal_nan=True)
     if not stored or (fewer and np.unique(values).size > _DISTINCT):

@@ -42,7 +42,8 @@ def as_published(findings: Mapping[str, Finding]) -> Answer:
         for key, finding in findings.items()
         if key != Energy.key and finding.verdict == "violates"
     ]
-    if isinstance(energy, Energy) and energy.table.verdict == "violates" and not _model_violates(energy):
+    model_violates = isinstance(energy, Energy) and energy.model is not None and energy.model.verdict == "violates"
+    if isinstance(energy, Energy) and energy.table.verdict == "violates" and not model_violates:
         failing.insert(0, "energy of the table")
     if failing:
         named = ", ".join(failing)
@@ -52,9 +53,8 @@ def as_published(findings: Mapping[str, Finding]) -> Answer:
         return Answer(word="violates", text=f"no: {named}", reason=f"the table differs from its source in: {named}")
     error = findings[TableError.key]
     if isinstance(error, NotJudged):
-        return Answer(
-            word="not judged", text="measured" if _is_measured(findings) else "not judged", reason=error.reason
-        )
+        text = "measured" if _is_measured(findings) else "not judged"
+        return Answer(word="not judged", text=text, reason=error.reason)
     reason = "the table keeps to the formulas of its source within the error that it states"
     return Answer(word="passes", text="yes", reason=reason)
 
@@ -75,10 +75,6 @@ def conserves_energy(findings: Mapping[str, Finding]) -> Answer:
         return Answer(word="not judged", text="not judged", reason="no model of this table can be evaluated")
     model = energy.model
     return Answer(word=model.verdict, text=_short(model), reason=model.reason)
-
-
-def _model_violates(energy: Energy) -> bool:
-    return energy.model is not None and energy.model.verdict == "violates"
 
 
 def _is_measured(findings: Mapping[str, Finding]) -> bool:
@@ -207,7 +203,7 @@ class FamilyAudit(BaseModel):
     def text(self) -> str:
         """The verdict in a sentence."""
         if self.verdict == "passes":
-            return f"all {self.compared} numbers and words of its record are those of a new measurement"
+            return f"all {self.compared} numbers and words of its record agree with a new measurement"
         return self.damage or "; ".join(difference.text for difference in self.wrong)
 
 

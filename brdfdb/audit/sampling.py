@@ -11,8 +11,9 @@ from pydantic import Field
 from brdfdb.audit.finding import Cell, Finding, NumberTable, Sentence, Subject, Verdict
 from brdfdb.audit.pairs import SEED, representative_nm
 from brdfdb.figure import Numbers, number, numbers
+from brdfdb.gauss import GaussRule, gauss_rule
 from brdfdb.geometry import radians, unit_vector
-from brdfdb.integrals.quadrature import GaussRule, gauss_rule, spectral_albedo
+from brdfdb.integrals.quadrature import spectral_albedo
 from brdfdb.integrals.sampling import lobe_of, mixture_density, sample
 from brdfdb.lobes import Lobe
 from brdfdb.materials import Material
@@ -21,7 +22,8 @@ from brdfdb.tables.table import Table
 
 SAMPLES = 100_000  # number of samples for each light
 FEWER_SAMPLES = 4000  # number of samples if the values of the model are integrals
-THETA_I_DEG, PHI_I_DEG = (10.0, 45.0, 80.0), 30.0
+THETA_I_DEG = (10.0, 45.0, 80.0)
+PHI_I_DEG = 30.0
 LEAST_CHANCE = 1e-6  # smallest p of a sound sampler
 STANDARD_ERRORS = 6.0  # allowed difference of the albedos, in standard errors; chance exceeds it once in 500 million
 _ROUNDING = 1e-12  # rounding error of a mean of equal weights

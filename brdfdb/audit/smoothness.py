@@ -85,9 +85,9 @@ class Smoothness(Finding):
     key = "smoothness"
     order = 5
     explanation = (
-        "The jumps of f_r where the formula of the model changes, and at the seams of the table: its nodes, the poles, "
-        "and both ends of a turn of azimuth. A table may jump by its stated error, and one of measured data by "
-        "their uncertainty; where that is not known, jumps are those of the data and are not judged."
+        "Jumps of f_r where the formula of the model changes, and at the seams of the table: its nodes, the poles, and "
+        "the ends of its azimuths. A table may jump by its stated error. A table of measured data may jump by the "
+        "uncertainty of the data; if it is unknown, the jumps are not judged."
     )
 
     model: list[Jump] = Field(description="empty: the source is not known")
@@ -170,7 +170,7 @@ def _stated(error: Error | None, wi: Array, wr: Array) -> Floats:
     theta, _ = spherical_angles(np.stack([wi, wr]))
     band = np.searchsorted(error.theta_i_deg, degrees(np.max(theta, axis=0)), side="right") - 1
     allowed = np.array(error.p99)[np.clip(band, 0, len(error.p99) - 1)]
-    if error.places is not None:  # the band pools all viewers: both directions at the horizon have a limit of their own
+    if error.places is not None:  # a band pools all viewers; pairs that are both near the horizon have another limit
         lower = np.searchsorted(RINGS_DEG, degrees(np.max(theta, axis=0)), side="right") - 1
         rings = np.array(error.places.both_grazing)[np.clip(lower, 0, RINGS - 1)]
         both = degrees(np.min(theta, axis=0)) >= RINGS_DEG[0]
@@ -261,7 +261,7 @@ def _between_methods(source: Source, wavelength_nm: Array | None, floor: Floats)
 
 def _relative(before: Floats, after: Floats, floor: Floats) -> Floats:
     """Return the jumps [1] between values (N, L), relative to the larger value or the floor."""
-    with np.errstate(invalid="ignore"):  # what is not finite counts as 1
+    with np.errstate(invalid="ignore"):  # values that are not finite count as 1
         relative = np.abs(after - before) / np.maximum(np.maximum(np.abs(after), np.abs(before)), floor)
     return np.where(np.isfinite(relative), relative, 1.0)
 

@@ -161,7 +161,8 @@ def table_energy_of(
     elif (
         known is not None and np.isfinite(largest) and not np.any(judge.unexplained(certain, limit_of(known, theta_i)))
     ):
-        verdict, reason = excused, f"{reason}: {known.citation}"
+        verdict = excused
+        reason = f"{reason}: {known.citation}"
     else:
         verdict = "violates"
         if bands is not None:

@@ -47,8 +47,7 @@ class TableError(Finding):
         "is less. 99 of 100 values are below the number shown. The error measured at fresh directions comes first, "
         "then the stated error of the table. Two samples differ by chance. The stated mean, median, 95th and 99th "
         "percentile and maximum of each band of theta_i and each wavelength are compared with the fresh ones. A stated "
-        "number violates if a "
-        "sound table would differ as much with a probability below 10⁻⁹."
+        "number violates if a correct table would differ as much with a probability below 10⁻⁹."
     )
 
     stated_p99: float | None = Field(description="null: the table states no error, and need not state one")
@@ -88,7 +87,7 @@ class TableError(Finding):
         wrong = [f"its stated error contradicts itself: {sentence}" for sentence in self.contradictions]
         if self.worst:
             worst = "; ".join(disagreement.text for disagreement in self.worst)
-            wrong.append(f"{self.disagreements} numbers of its stated error are not those of fresh directions: {worst}")
+            wrong.append(f"{self.disagreements} numbers of its stated error disagree with fresh directions: {worst}")
         if self.likeness:
             wrong.append(f"the table agrees with {self.likeness}")
         return [self.sentence(self.verdict, "; ".join([f"{fresh}{bias}; the table {stated}{mirror}", *wrong]))]

@@ -32,7 +32,7 @@ class Validity(Finding):
     key = "validity"
     order = 8
     explanation = (
-        "The standing of the parameters in the limits that the paper states for its model. If the paper says “gentle” "
+        "The parameters are compared with the limits that the paper states for its model. If the paper says “gentle” "
         "or “much less” without a number, values up to a tenth are inside, and values up to 1 at the edge. Validity "
         "does not count for the verdict on a table, because the papers themselves go beyond these limits."
     )

@@ -35,7 +35,8 @@ class ValueCounts(Finding):
     def judge(cls, subject: Subject) -> ValueCounts:
         """Return the counts of values of a table that are negative or not finite."""
         # A linear interpolant is never below its nodes
-        pairs, linear = subject.pairs, linear_in_angles(subject.table)
+        pairs = subject.pairs
+        linear = linear_in_angles(subject.table)
         return values_of(subject.table, None if linear else pairs.table[pairs.drawn.above])
 
     def sentences(self) -> list[Sentence]:

@@ -137,7 +137,13 @@ def convert(
         return least
     request = request._replace(weigh="lightness")
     other = _measured(request, _searched(request, tick))
-    return least if _is_lost(source, other) else _with_highlight(other, least)
+    if _is_lost(source, other):
+        return least
+    sentence = (
+        f"Cube roots of f_r were compared, because the least l1, {percent(least.l1)}, is without the highlight: f_r in "
+        f"the mirror direction at {least.peak.theta_deg:g} degrees is {least.peak.after:.3g} /sr there."
+    )
+    return other.model_copy(update={"remarks": [sentence, *other.remarks]})
 
 
 class MaterialDifference(NamedTuple):
@@ -226,17 +232,17 @@ def _request(
         raise ParameterError("model", f"{model!r} is unknown{closest(model, MODELS)}", model, tuple(MODELS))
     spec = MODELS[model]
     if isinstance(source, Material) and source.model == model:
-        raise ParameterError("model", f"{source.name} is of the model {model} itself; name another one", model)
+        raise ParameterError("model", f"{source.name} is of the model {model} itself; choose another model", model)
     at = _wavelengths(source, spec, wavelength_nm)
     if entry is not None and not spec.spectral:
-        raise ParameterError("refractive_index", f"the model {model} takes none", entry)
+        raise ParameterError("refractive_index", f"the model {model} has no refractive index", entry)
     if entry is None and spec.spectral and isinstance(source, Material):
         entry = source.refractive_index
     entry = None if entry == FIT else entry
     if spec.spectral and entry is None and at is not None and at.size > 1:
         raise ParameterError(
             "refractive_index",
-            f"missing; {model} takes n and k, which are searched at one wavelength alone, and {at.size} are given",
+            f"missing; n and k of {model} are searched only at a single wavelength, and {at.size} are given",
             entry,
         )
     target = Target(spec, source, at, fixed, entry)
@@ -249,7 +255,7 @@ def _wavelengths(source: Source, other: ModelSpec | Material, wavelength_nm: Arr
     if wavelength_nm is not None:
         at = np.atleast_1d(check_nanometres("wavelength_nm", wavelength_nm))
         if at.ndim != 1 or not at.size or not np.all(np.diff(at) > 0.0):
-            raise ParameterError("wavelength_nm", "they must be positive and increasing", wavelength_nm)
+            raise ParameterError("wavelength_nm", "wavelengths must be positive and increasing", wavelength_nm)
     elif source.spectral and source.wavelengths_nm is not None:
         at = np.array(source.wavelengths_nm, dtype=np.float64)
     elif source.spectral:
@@ -259,20 +265,25 @@ def _wavelengths(source: Source, other: ModelSpec | Material, wavelength_nm: Arr
     if source.spectral or other.spectral:
         return at
     if wavelength_nm is not None:
-        raise ParameterError("wavelength_nm", f"{source.name} and {other.name} have none; leave it out", wavelength_nm)
+        raise ParameterError(
+            "wavelength_nm", f"neither {source.name} nor {other.name} depends on it; leave it out", wavelength_nm
+        )
     return None
 
 
 def _searched(request: _Request, tick: Callable[[], None]) -> _Fit:
     """Search the shared parameters at a few wavelengths, then the colours at all of them."""
-    source, target, columns = request.source, request.target, request.columns
+    source = request.source
+    target = request.target
+    columns = request.columns
     some = None if request.before is None else request.before[columns]
     lobe = lobe_of(source, some)
     coarse, fitted = (_nodes(request, lobe, counts, some) for counts in (COARSE, request.counts))
     result = search(target, coarse, fitted, columns, _alphas(lobe), tick)
     if result.distance >= REFUSED:
         raise ParameterError(
-            "fixed", f"the lobe of {target.spec.name} is then less than a quarter as wide as that of {source.name}"
+            "fixed",
+            f"with these values the lobe of {target.spec.name} is less than a quarter as wide as that of {source.name}",
         )
     if target.count == columns.size and not target.colours:
         return _Fit(result, np.zeros((target.count, 0)), fitted)
@@ -286,7 +297,8 @@ def _nodes(
     request: _Request, lobe: Callable[[Array], Lobe | None], counts: Counts, wavelength_nm: Array | None
 ) -> TruthNodes:
     """Return the truth at nodes, of a source that reflects something at each wavelength."""
-    f_r, mirror = request.source.brdf_at(wavelength_nm), specular_of(request.source, wavelength_nm)
+    f_r = request.source.brdf_at(wavelength_nm)
+    mirror = specular_of(request.source, wavelength_nm)
     nodes = TruthNodes(lobe, counts, request.symmetry, f_r, mirror, request.weigh)
     dark = ~(np.max(nodes.truth, axis=0) > 0.0)
     if np.any(dark):
@@ -294,7 +306,7 @@ def _nodes(
         name = request.source.name
         raise ParameterError(
             "source",
-            f"{name} reflects nothing{where} beside the mirror direction, so that no model is close to it",
+            f"{name} reflects no light{where} outside the mirror direction, so no model is close to it",
             name,
         )
     return nodes
@@ -308,7 +320,8 @@ def _alphas(lobe: Callable[[Array], Lobe | None]) -> Array:
 
 def _measured(request: _Request, fit: _Fit) -> Conversion:
     """Return the conversion to the parameters that the search ended at, with its errors at more nodes."""
-    source, target = request.source, request.target
+    source = request.source
+    target = request.target
     spec = target.spec
     table = _table(request, fit, f"converted from {source.name}")
     name = f"{source.name}-as-{spec.name.replace('_', '-').lower()}"[:MOST_NAME].rstrip("-")
@@ -359,7 +372,8 @@ def _measured(request: _Request, fit: _Fit) -> Conversion:
 
 def _table(request: _Request, fit: _Fit, origin: str) -> dict[str, Any]:
     """Return the material as a recipe writes it, with rounded parameters."""
-    target, at = request.target, request.at
+    target = request.target
+    at = request.at
     values: dict[str, Any] = {}
     for parameter in target.spec.parameters:
         name = parameter.name
@@ -406,7 +420,8 @@ def _peak_of(sides: Sides) -> Peak:
 def _p99_of(source: Source, wavelength_nm: Array | None, sides: Sides) -> float:
     """Return the 99th percentile of the relative error [1], at directions drawn as charts draw them."""
     drawn = error_measurement.draw(source, wavelength_nm, DIRECTIONS, SEED)
-    truth, values = sides.truth(drawn.wi, drawn.wr), sides.model(drawn.wi, drawn.wr)
+    truth = sides.truth(drawn.wi, drawn.wr)
+    values = sides.model(drawn.wi, drawn.wr)
     return error_measurement.compare(values, truth, drawn).overall.p99
 
 
@@ -451,18 +466,10 @@ def _is_lost(source: Source, conversion: Conversion) -> bool:
     return source.has_lobe and conversion.peak.after < _LOST * conversion.peak.before
 
 
-def _with_highlight(conversion: Conversion, least: Conversion) -> Conversion:
-    """Return a conversion that keeps the highlight, with a sentence on the one with the least l1, which loses it."""
-    sentence = (
-        f"Cube roots of f_r were compared, because the least l1, {percent(least.l1)}, is without the highlight: f_r in "
-        f"the mirror direction at {least.peak.theta_deg:g} degrees is {least.peak.after:.3g} /sr there."
-    )
-    return conversion.model_copy(update={"remarks": [sentence, *conversion.remarks]})
-
-
 def _at_an_end(conversion: Conversion) -> list[str]:
     """Return the numbers that ended at a limit of their range, with the values, as recipes write them."""
-    in_file, ends = conversion.material.file_parameters(), []
+    in_file = conversion.material.file_parameters()
+    ends = []
     for parameter in MODELS[conversion.model].parameters:
         value = conversion.parameters[parameter.name]
         if parameter.name in conversion.fixed or parameter.reflectance or not isinstance(value, float):
@@ -475,7 +482,8 @@ def _at_an_end(conversion: Conversion) -> list[str]:
 
 def _remarks(source: Source, conversion: Conversion) -> list[str]:
     """Return sentences on how far the model is, what it lacks of the source, a lost highlight, and an inexact l1."""
-    spec, made = MODELS[conversion.model], conversion.material
+    spec = MODELS[conversion.model]
+    made = conversion.material
     sentences = []
     if conversion.l1 >= _NOT_NEAR:
         sentences.append(

@@ -17,7 +17,7 @@ class WorstView(DocumentPart):
 
     theta_r_deg: float
     phi_r_deg: float
-    l1: float = Field(description="as the l1 of all viewers, of this one alone")
+    l1: float = Field(description="l1 of this viewer, defined as the l1 of all viewers")
     wavelength_nm: float | None = Field(description="null: grey")
     theta_i_deg: float = Field(description="direction of the light whose reflection differs most")
     phi_i_deg: float
@@ -76,5 +76,5 @@ class Conversion(DocumentPart):
 
 
 def percent(share: float) -> str:
-    """Return a share as text in percent: whole from 10 % on, of two digits below."""
+    """Return a share as text in percent: without decimals from 10 % on, with two digits below."""
     return f"{100.0 * share:.0f} %" if share >= 0.0995 else f"{100.0 * share:.2g} %"

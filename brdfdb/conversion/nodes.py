@@ -32,7 +32,7 @@ def specular_of(source: Source, wavelength_nm: Array | None) -> Specular | None:
 
 
 def lobe_of(source: Source, wavelength_nm: Array | None) -> Callable[[Array], Lobe | None]:
-    """Return the lobe of a source at wavelengths [nm] as a function of the cosine alone."""
+    """Return the lobe of a source at wavelengths [nm] as a function of the cosine."""
     return lambda cosine: source.lobe(cosine, wavelength_nm) if source.has_lobe else None
 
 

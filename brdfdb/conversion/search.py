@@ -64,14 +64,16 @@ def downhill(
 
     close = tolerance * max(abs(function(begin)), _NOTHING)
     limits = {"fatol": close, "xatol": _EXTENT * tolerance, "maxfev": most}
-    best, value = begin, np.inf
+    best = begin
+    value = np.inf
     for _ in range(2):  # again, because a simplex collapses on the surface of the cube
         towards = np.where(best <= 0.5, size, -size)  # the side with more room
         corners = np.clip(np.vstack([best, best + np.diag(towards)]), 0.0, 1.0)
         options = {"initial_simplex": corners, **limits}
         end = minimize(function, best, method="Nelder-Mead", bounds=[(0.0, 1.0)] * begin.size, options=options)
         if end.fun < value:
-            best, value = np.asarray(end.x), float(end.fun)
+            best = np.asarray(end.x)
+            value = float(end.fun)
     return Minimum(best, value)
 
 
@@ -91,7 +93,9 @@ class Target:
         fixed: Mapping[str, float],
         entry: str | None,
     ) -> None:
-        self.spec, self.wavelength_nm, self.entry = spec, wavelength_nm, entry
+        self.spec = spec
+        self.wavelength_nm = wavelength_nm
+        self.entry = entry
         self.count = 1 if wavelength_nm is None else wavelength_nm.size
         self.fixed = {**switches(spec), **_checked(spec, fixed)}
         self.tied = None
@@ -121,7 +125,11 @@ class Target:
                 n, k = refractive_index(entry, wavelength_nm)
                 self.indices = [index | {"n": float(n[w]), "k": float(k[w])} for w, index in enumerate(self.indices)]
         if not self.shape and not self.colours:
-            raise ParameterError("fixed", f"all parameters of {spec.name} are fixed; leave one to search", tuple(fixed))
+            raise ParameterError(
+                "fixed",
+                f"all parameters of {spec.name} are fixed; leave at least one parameter to search",
+                tuple(fixed),
+            )
 
     def numbers(self, shape: Array) -> dict[str, float]:
         """Return the shared parameters at a point of the unit cube, with n and k where they are searched."""
@@ -205,7 +213,9 @@ class Distance:
     """
 
     def __init__(self, target: Target, nodes: TruthNodes, columns: NDArray[np.int64], alphas: Array) -> None:
-        self.target, self.nodes, self.columns = target, nodes, columns
+        self.target = target
+        self.nodes = nodes
+        self.columns = columns
         free = not set(target.spec.lobe_axes or ()) & set(target.fixed)
         low, high = _SAME_HIGHLIGHT if nodes.weigh == "lightness" and free else (_NARROWEST, np.inf)
         self.narrowest = low * np.where(np.isnan(alphas), WIDTHS[1], alphas)
@@ -237,7 +247,8 @@ class Distance:
 
         `row` is the column of the truth at the nodes, `column` the wavelength of the target.
         """
-        nodes, target = self.nodes, self.target
+        nodes = self.nodes
+        target = self.target
         f_r = target.coloured(numbers, column, nodes.wi, nodes.wr)
 
         def distance(colours: Array) -> float:

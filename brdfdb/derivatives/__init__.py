@@ -67,7 +67,9 @@ def gradient_vectors(model: str, wi: ArrayLike, wr: ArrayLike, **parameters: Arr
     spec: ModelSpec = MODELS[model]
     if spec.gradient is None:
         known = [one.name for one in MODELS.values() if one.gradient is not None]
-        raise ParameterError("model", f"{model} has no derivatives; those that have: {', '.join(known)}", model, known)
+        raise ParameterError(
+            "model", f"{model} has no derivatives; models with derivatives are {', '.join(known)}", model, known
+        )
     return spec.gradient(wi, wr, **parameters)
 
 

@@ -22,13 +22,13 @@ class Estimate(DocumentPart):
     channel: str | None = Field(description="channel of a number that each channel has; null: shared by all")
     unit: str
     value: float
-    standard_error: float | None = Field(description="null: at an end of its range, or fixed by the data not at all")
+    standard_error: float | None = Field(description="null: at an end of its range, or not determined by the samples")
     low: float = Field(description="lower end of the 95 % interval, within the range of the model")
     high: float
     method: Literal["covariance", "profile", "end of range"] = Field(
         description="covariance: from the derivatives at the best point. profile: where the cost of the best fit with "
-        "this number held rises by 3.84 times its noise. end of range: the best value is the end of what the model "
-        "allows, and no profile was made"
+        "this number fixed rises by 3.84 times its noise. end of range: the best value is an end of the range of the "
+        "model, and no profile was computed"
     )
 
 
@@ -42,7 +42,7 @@ class Correlation(DocumentPart):
 
 
 class HeldOutIncidences(DocumentPart):
-    """Prediction of samples that the fit did not see: one group of incidences after the other is left out."""
+    """Prediction of samples at incidences that were left out of the fit, one group after the other."""
 
     theta_i_deg: list[list[float]] = Field(description="polar angles of the light of each group")
     rms_ln: list[float] = Field(description="root mean square of ln(model / sample) of each group")
@@ -75,7 +75,7 @@ class FitAlbedo(DocumentPart):
 
 
 class Outlier(DocumentPart):
-    """A sample that the best fit is far from."""
+    """A sample with a large residual of the best fit."""
 
     theta_i_deg: float
     phi_i_deg: float
@@ -97,13 +97,13 @@ class Fit(DocumentPart):
     )
     median_ln: float | None = Field(description="median of its absolute value")
     sigma: float = Field(description="robust standard deviation of the residuals: 1.4826 times their median size")
-    held_out: HeldOutIncidences | None = Field(description="null: the light has one direction alone")
+    held_out: HeldOutIncidences | None = Field(description="null: the light has one direction only")
     numbers: int = Field(description="numbers that were searched")
     aic: float = Field(description="Akaike's criterion, N ln(2 cost / N) + 2 p, of the robust cost")
     bic: float = Field(description="Schwarz's criterion, N ln(2 cost / N) + p ln N")
     pattern: float = Field(
         description="correlation of each residual with that of the nearest sample: 0 for noise, 1 for a model that is "
-        "wrong in a smooth way"
+        "wrong by a smooth function"
     )
     at_mirror: int = Field(
         description="samples near the mirror direction that are left out: the fit has a specular part there, and the "
@@ -133,7 +133,7 @@ class Fits(DocumentPart):
 
     name: str
     provenance: str
-    samples: int = Field(description="values that count")
+    samples: int = Field(description="number of values that the fits use")
     incidences: int
     channels: list[str]
     wavelengths_nm: list[float] | None
@@ -149,10 +149,10 @@ class Fits(DocumentPart):
     outliers: list[Outlier] = Field(description="the farthest samples of the best fit, farthest first")
     outlier_count: int = Field(description="samples farther than 6 robust standard deviations from the best fit")
     shared_outlier_count: int = Field(
-        description="samples farther than that from every fit, which the errors and the ranking leave out; 0 where "
-        "they are more than 2 % of all: then they are no accident"
+        description="samples farther than that from every fit, which the errors and the ranking leave out; 0 if they "
+        "are more than 2 % of all samples, because they are then not accidents"
     )
     skipped: dict[str, str] = Field(description="models that were not fitted, with the reason")
     interrupted: bool = Field(
-        description="true: the search was ended before all models, or the intervals of the best, were done"
+        description="true: the search ended before all models, or the intervals of the best model, were computed"
     )

@@ -109,7 +109,8 @@ def _of_variable(
 
 def _indices(fitted: FittedSurface) -> list[Estimate]:
     """Return n and k where they were searched, whose variance is that of the two variables in their place."""
-    surface, x = fitted.surface, fitted.point.x
+    surface = fitted.surface
+    x = fitted.point.x
     if not surface.searched_index:
         return []
     names = [one.name for one in surface.shape]
@@ -147,7 +148,7 @@ def _indices(fitted: FittedSurface) -> list[Estimate]:
 
 
 def correlations_of(fitted: FittedSurface) -> list[Correlation]:
-    """Return the pairs of numbers with a correlation near 1 or -1, with a sentence on what the samples measure."""
+    """Return the pairs of numbers with a correlation near 1 or -1, with a sentence on what is measured."""
     surface, covariance = fitted.surface, fitted.covariance
     shapes = len(surface.shape)
     single = len(fitted.samples.channels) == 1

@@ -44,7 +44,7 @@ def figure_of(document: Fits, fitted: FittedSurface) -> Figure:
         paper="",
         title=f"{fitted.surface.name}, fitted to {document.name}",
         caption=f"f_r{of} in the plane of incidence, mirror side positive: the fit as a line, samples as dots. Mean of "
-        f"ln(model / sample){of} at the viewers of each light; 0 where the fit has what was measured.",
+        f"ln(model / sample){of} at the viewers of each light; 0 where the fit equals the sample.",
         panels=[*cuts, *maps],
         statements=[],
     )
@@ -56,9 +56,11 @@ def _turned(fitted: FittedSurface, chosen: NDArray[np.int64]) -> Array:
 
 
 def _cut(fitted: FittedSurface, chosen: NDArray[np.int64], channel: int, title: str) -> Panel | None:
-    samples, phi = fitted.samples, _turned(fitted, chosen)
+    samples = fitted.samples
+    phi = _turned(fitted, chosen)
     theta = degrees(samples.theta_r[chosen])
-    mirror, back = np.abs(phi - 180.0) < _PLANE_DEG, np.minimum(phi, 360.0 - phi) < _PLANE_DEG
+    mirror = np.abs(phi - 180.0) < _PLANE_DEG
+    back = np.minimum(phi, 360.0 - phi) < _PLANE_DEG
     inside = (mirror | back | (theta == 0.0)) & samples.known[chosen, channel]
     if inside.sum() < 2:
         return None

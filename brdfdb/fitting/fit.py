@@ -135,14 +135,15 @@ def _searched(samples: Samples, surface: SearchedSurface, residual: Kind, hidden
     for _ in range(_SCALES):
         problem.scale = max(ROBUST * sigma, _LEAST_SCALE)
         point = problem.descend(point.x[problem.free], _EVALUATIONS)
-        last, sigma = sigma, _sigma(problem, point)
+        last = sigma
+        sigma = _sigma(problem, point)
         if abs(sigma - last) <= _SETTLED * last:
             break
     return FittedSurface(samples, problem, point, sigma, rows, hidden)
 
 
 def _hidden(fitted: FittedSurface) -> Mask:
-    """Return the samples at which the specular part of a fit counts, where the aperture is not known, shape (N,)."""
+    """Return the samples (N,) at which a specular part is too large to ignore and the aperture is not known."""
     view = fitted.view
     near = (view.from_mirror < _NEAR_MIRROR) & (view.w_r[:, 2] > 0.0)
     if view.half_angle or not near.any() or all(term.spec.specular is None for term in fitted.surface.terms):
@@ -203,9 +204,12 @@ def fits(
     searches, skipped = _searches(samples, models, residual, refractive_index, tick, keep_finished)
     interrupted = INTERRUPTED in skipped.values()
     shared = _shared_outliers([search.fitted for search in searches])
-    ranked = sorted(((_document(search, shared), search.fitted) for search in searches), key=lambda fit: _rank(fit[0]))
-    records = [record for record, _ in ranked]
-    surfaces = [fitted for _, fitted in ranked]
+    every = [_document(search, shared) for search in searches]
+    # by the held-out error to three digits, then by BIC, which outliers hardly change
+    keys = [(float(f"{fit.held_out.rms:.3g}") if fit.held_out else 0.0, fit.bic) for fit in every]
+    order = sorted(range(len(every)), key=keys.__getitem__)
+    records = [every[index] for index in order]
+    surfaces = [searches[index].fitted for index in order]
     if profiles and not interrupted:
         try:
             tick("intervals")
@@ -228,7 +232,12 @@ def fits(
         refractive_index=refractive_index,
         source_solid_angle_sr=samples.instrument.source_solid_angle_sr,
         receiver_solid_angle_sr=samples.instrument.receiver_solid_angle_sr,
-        left_out=_unused(samples, counting),
+        left_out=UnusedSamples(
+            below_horizon=int(samples.record.get("below_the_horizon", 0)),
+            holes=counting.holes,
+            at_horizon=counting.at_horizon,
+            unusable=counting.left_out,
+        ),
         remarks=remarks_on_samples(samples, counting),
         ranked_by="BIC" if records[0].held_out is None else "held-out rms of ln",
         fits=records,
@@ -239,15 +248,6 @@ def fits(
         interrupted=interrupted,
     )
     return document, surfaces
-
-
-def _unused(samples: Samples, counting: Residual) -> UnusedSamples:
-    return UnusedSamples(
-        below_horizon=int(samples.record.get("below_the_horizon", 0)),
-        holes=counting.holes,
-        at_horizon=counting.at_horizon,
-        unusable=counting.left_out,
-    )
 
 
 class _FittedModel(NamedTuple):
@@ -284,7 +284,7 @@ def _searches(
             skipped |= dict.fromkeys(tried[number:], INTERRUPTED)
             break
     if not searches:
-        raise ParameterError("model", f"none can describe {samples.name}: {next(iter(skipped.values()))}")
+        raise ParameterError("model", f"no model can describe {samples.name}: {next(iter(skipped.values()))}")
     if models is None:
         slow = "its values are integrals, which take minutes; name it to fit it"
         skipped |= {name: slow for name in MODELS if name not in tried}
@@ -293,7 +293,7 @@ def _searches(
 
 
 def _check_reach(searches: Sequence[FittedSurface]) -> None:
-    """Raise ParameterError if f_r of the samples is beyond what any of the models can have."""
+    """Raise ParameterError if f_r of the samples is larger than that of every model."""
     for one in searches:
         logs = one.logarithms[np.isfinite(one.logarithms)]
         if not logs.size or np.percentile(logs, 100.0 - _NEARLY_ALL) > np.log(_REACHED):
@@ -313,11 +313,6 @@ def _shared_outliers(searches: Sequence[FittedSurface]) -> Mask:
     hidden = [one.hidden[:, np.newaxis] for one in searches]
     far = np.any(of_fits, axis=0) & np.all([a | b for a, b in zip(of_fits, hidden, strict=True)], axis=0)
     return far if far.sum() <= max(_MANY * searches[0].samples.known.sum(), 1.0) else np.zeros_like(far)
-
-
-def _rank(one: Fit) -> tuple[float, float]:
-    """Return the rank of a fit: its held-out error to three digits, then BIC, which outliers hardly change."""
-    return (0.0 if one.held_out is None else float(f"{one.held_out.rms:.3g}"), one.bic)
 
 
 def _document(search: _FittedModel, shared: Mask) -> Fit:

@@ -1,4 +1,4 @@
-"""The best point of a surface, with its covariance and what it leaves of the samples."""
+"""The best point of a surface, with its covariance and its residuals."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class FittedSurface:
     point: Point
     sigma: float  # robust standard deviation of the residuals
     rows: NDArray[np.int64]  # samples that count: those of the problem
-    hidden: Mask  # samples (N,) that are left out: a specular part is seen there through an aperture that is not known
+    hidden: Mask  # samples (N,) that are left out, because they may contain a specular part in an unknown aperture
 
     @property
     def surface(self) -> SearchedSurface:

@@ -99,11 +99,61 @@ class Problem:
         x = self.placed(free)
         if basis is None:
             basis = self.surface.basis(x, self.view)
-        begin = self.begin if start is None else start
-        values = _project(self.surface, basis, self.residual, self.scale, (self.low, self.high), begin, tolerance)
+        values = self._coefficients(basis, self.begin if start is None else start, tolerance)
         f_r = total(basis, self.surface.monomials(values))
         residuals = self.residual.of(f_r)
         return Point(x, values, basis, f_r, residuals, float(np.sum(_cost_of(residuals, self.scale))))
+
+    def _coefficients(self, basis: Floats, start: Array, tolerance: float) -> Array:
+        """Return the coefficients (K, C) within their bounds that make the robust cost of residuals least.
+
+        `basis` (M, N, C) or (M, N, 1) has the factors [1/sr] of the monomials. Coefficients with equal bounds are
+        fixed. The steps are those of Gauss and Newton with Levenberg's damping, and end where the relative change of
+        the cost is below `tolerance`. A coefficient at a bound stays there if its step would leave the range. Channels
+        are independent, and each has its own damping.
+        """
+        surface = self.surface
+        residual = self.residual
+        low, high = self.low, self.high
+        values = np.clip(start, low, high)
+        if not len(values):
+            return values
+        span = np.where(high > low, high - low, 1.0)
+        f_r = total(basis, surface.monomials(values))
+        residuals = residual.of(f_r)
+        cost = _cost_of(residuals, self.scale)
+        damping = np.full(cost.shape, _FIRST_DAMPING)
+        diagonal = np.arange(len(values))
+        for _ in range(MOST if tolerance < COARSE else _FEW):
+            jacobian = _slopes_of(surface, basis, values) * residual.slope(f_r)
+            weights = 1.0 / np.sqrt(1.0 + (residuals / self.scale) ** 2)
+            columns = np.ascontiguousarray(jacobian.transpose(2, 0, 1))  # (C, K, N): products of matrices are quick
+            weighted = columns * weights.T[:, np.newaxis, :]
+            gradient = np.einsum("ckn,cn->ck", weighted, residuals.T)
+            normal = weighted @ columns.transpose(0, 2, 1)
+            stays = ((values <= low + _EDGE * span) & (gradient.T > 0.0)) | (
+                (values >= high - _EDGE * span) & (gradient.T < 0.0)
+            )
+            stays |= high <= low
+            size = np.sqrt(np.maximum(normal[:, diagonal, diagonal], 1e-300))
+            normal = normal / (size[:, :, np.newaxis] * size[:, np.newaxis, :])
+            normal = np.where(stays.T[:, :, np.newaxis] | stays.T[:, np.newaxis, :], 0.0, normal)
+            normal[:, diagonal, diagonal] = 1.0 + damping[:, np.newaxis]
+            step = np.linalg.solve(normal, np.where(stays.T, 0.0, gradient / size)[..., np.newaxis])[..., 0] / size
+            tried = np.clip(values - step.T, low, high)
+            f_tried = total(basis, surface.monomials(tried))
+            r_tried = residual.of(f_tried)
+            cost_tried = _cost_of(r_tried, self.scale)
+            better = cost_tried <= cost
+            gain = np.where(better, cost - cost_tried, 0.0)
+            done = np.where(better, gain <= tolerance * cost, damping > 1e8)
+            values = np.where(better, tried, values)
+            f_r, residuals = np.where(better, f_tried, f_r), np.where(better, r_tried, residuals)
+            cost = np.where(better, cost_tried, cost)
+            damping = np.where(better, np.maximum(0.1 * damping, _LEAST_DAMPING), 10.0 * np.maximum(damping, 1e-6))
+            if np.all(done):
+                break
+        return values
 
     def shape_jacobian(self, point: Point) -> Floats:
         """Return the derivatives (S, N, C) of residuals by the free shape variables, at fixed coefficients.
@@ -162,7 +212,12 @@ class Problem:
             columns = self.shape_jacobian(point)
             inner, _ = self.coefficient_jacobian(point)
             weights = 1.0 / np.sqrt(1.0 + (point.residuals / self.scale) ** 2)
-            columns -= _undone(columns, inner, weights)
+            if len(inner):  # less the part that lies in the span of the coefficients, channel by channel
+                of_channels = inner.transpose(2, 0, 1)
+                weighted = of_channels * weights.T[:, np.newaxis, :]
+                normal = weighted @ of_channels.transpose(0, 2, 1)
+                solved = np.linalg.pinv(normal, rcond=1e-12, hermitian=True) @ (weighted @ columns.transpose(2, 1, 0))
+                columns -= (solved.transpose(0, 2, 1) @ of_channels).transpose(1, 2, 0)
             return np.asarray(columns[:, self.residual.used].T)
 
         end = least_squares(
@@ -214,7 +269,7 @@ class Problem:
         return self.at(best.x[self.free], best.values)
 
     def _brightest_and_others(self, most: int) -> NDArray[np.int64]:
-        """Return some of the samples: half of them the brightest, half of them any."""
+        """Return rows of samples: half of them are the brightest, the others are random."""
         count = len(self.view)
         if count <= most:
             return np.arange(count)
@@ -224,79 +279,10 @@ class Problem:
         return np.sort(np.concatenate([order[: most // 2], others]))
 
 
-def _undone(columns: Floats, inner: Floats, weights: Floats) -> Floats:
-    """Return the part (S, N, C) of columns that lies in the span of the inner ones (K, N, C), channel by channel."""
-    if not len(inner):
-        return np.zeros_like(columns)
-    of_channels = inner.transpose(2, 0, 1)
-    weighted = of_channels * weights.T[:, np.newaxis, :]
-    normal = weighted @ of_channels.transpose(0, 2, 1)
-    solved = np.linalg.pinv(normal, rcond=1e-12, hermitian=True) @ (weighted @ columns.transpose(2, 1, 0))
-    return np.asarray((solved.transpose(0, 2, 1) @ of_channels).transpose(1, 2, 0))
-
-
 def _cost_of(residuals: Floats, scale: float) -> Floats:
     """Return half of the sum (C,) over rows of s^2 rho((r / s)^2), rho(z) = 2 (sqrt(1 + z) - 1)."""
     z = (residuals / scale) ** 2
     return np.asarray(scale**2 * np.sum(np.sqrt(1.0 + z) - 1.0, axis=0))
-
-
-def _project(
-    surface: SearchedSurface,
-    basis: Floats,
-    residual: Residual,
-    scale: float,
-    bounds: tuple[Array, Array],
-    start: Array,
-    tolerance: float = FINE,
-) -> Array:
-    """Return the coefficients (K, C) between bounds (K, C) that make the robust cost of residuals least.
-
-    `basis` (M, N, C) or (M, N, 1) has the factors [1/sr] of the monomials. Coefficients with equal bounds are fixed.
-    The steps are those of Gauss and Newton with Levenberg's damping, and end where the relative change of the cost is
-    below `tolerance`. A coefficient at a bound stays there if its step would leave the range. Channels are independent,
-    and each has its own damping.
-    """
-    low, high = bounds
-    values = np.clip(start, low, high)
-    if not len(values):
-        return values
-    span = np.where(high > low, high - low, 1.0)
-    f_r = total(basis, surface.monomials(values))
-    residuals = residual.of(f_r)
-    cost = _cost_of(residuals, scale)
-    damping = np.full(cost.shape, _FIRST_DAMPING)
-    diagonal = np.arange(len(values))
-    for _ in range(MOST if tolerance < COARSE else _FEW):
-        jacobian = _slopes_of(surface, basis, values) * residual.slope(f_r)
-        weights = 1.0 / np.sqrt(1.0 + (residuals / scale) ** 2)
-        columns = np.ascontiguousarray(jacobian.transpose(2, 0, 1))  # (C, K, N): products of matrices are quick
-        weighted = columns * weights.T[:, np.newaxis, :]
-        gradient = np.einsum("ckn,cn->ck", weighted, residuals.T)
-        normal = weighted @ columns.transpose(0, 2, 1)
-        stays = ((values <= low + _EDGE * span) & (gradient.T > 0.0)) | (
-            (values >= high - _EDGE * span) & (gradient.T < 0.0)
-        )
-        stays |= high <= low
-        size = np.sqrt(np.maximum(normal[:, diagonal, diagonal], 1e-300))
-        normal = normal / (size[:, :, np.newaxis] * size[:, np.newaxis, :])
-        normal = np.where(stays.T[:, :, np.newaxis] | stays.T[:, np.newaxis, :], 0.0, normal)
-        normal[:, diagonal, diagonal] = 1.0 + damping[:, np.newaxis]
-        step = np.linalg.solve(normal, np.where(stays.T, 0.0, gradient / size)[..., np.newaxis])[..., 0] / size
-        tried = np.clip(values - step.T, low, high)
-        f_tried = total(basis, surface.monomials(tried))
-        r_tried = residual.of(f_tried)
-        cost_tried = _cost_of(r_tried, scale)
-        better = cost_tried <= cost
-        gain = np.where(better, cost - cost_tried, 0.0)
-        done = np.where(better, gain <= tolerance * cost, damping > 1e8)
-        values = np.where(better, tried, values)
-        f_r, residuals = np.where(better, f_tried, f_r), np.where(better, r_tried, residuals)
-        cost = np.where(better, cost_tried, cost)
-        damping = np.where(better, np.maximum(0.1 * damping, _LEAST_DAMPING), 10.0 * np.maximum(damping, 1e-6))
-        if np.all(done):
-            break
-    return values
 
 
 def _slopes_of(surface: SearchedSurface, basis: Floats, values: Array) -> Floats:
@@ -369,8 +355,10 @@ def _moves(
 def _term_slopes(term: Term, view: InstrumentView, given: Mapping[str, float], names: set[str]) -> dict[str, Floats]:
     """Return the derivatives (M, N) [1/sr] of the factors of a term by some of its parameters."""
     assert term.spec.gradient is not None
-    model, ordered = term.spec.gradient, sorted(names)
-    arguments, count = columns([{**given, **node} for node in term.nodes]), len(term.nodes)
+    model = term.spec.gradient
+    ordered = sorted(names)
+    arguments = columns([{**given, **node} for node in term.nodes])
+    count = len(term.nodes)
     width = term.widths([given]) if view.half_angle else None
 
     def derivatives(wi: Floats, wr: Floats) -> Floats:

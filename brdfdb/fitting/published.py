@@ -1,4 +1,4 @@
-"""Published fits: parameters that others fitted to measured materials, read from text, and judged."""
+"""Published fits: parameters that others fitted to measured materials, read from text and checked."""
 
 from __future__ import annotations
 
@@ -37,8 +37,8 @@ _NAMED = Path(__file__).with_name("published.toml")
 class PublishedLobe(DocumentPart):
     """One term of a published fit."""
 
-    name: str = Field(description="as the file names it")
-    numbers: dict[str, list[float]] = Field(description="its numbers; three are those of R, G and B")
+    name: str = Field(description="name in the file")
+    numbers: dict[str, list[float]] = Field(description="its parameters; three values are those of R, G and B")
 
 
 class PublishedFit(DocumentPart):
@@ -47,9 +47,9 @@ class PublishedFit(DocumentPart):
     name: str
     line: int = Field(description="line of the file")
     terms: list[PublishedLobe]
-    model: str | None = Field(description="the model of the registry with the same formula; null: none, or not known")
+    model: str | None = Field(description="the model of the registry with the same formula; null: no model is known")
     albedo: FitAlbedo | None = Field(description="the largest directional albedo, of R, G or B; null: without a model")
-    flags: list[str] = Field(description="sentences on what is no physics")
+    flags: list[str] = Field(description="sentences on contradictions to physics")
 
 
 class PublishedFits(DocumentPart):
@@ -58,7 +58,7 @@ class PublishedFits(DocumentPart):
     name: str
     comment: str = Field(description="the lines that the file begins with")
     fits: list[PublishedFit]
-    sentences: list[str] = Field(description="what is not known of the conventions of the file")
+    sentences: list[str] = Field(description="conventions of the file that are not known")
 
 
 @cache
@@ -68,7 +68,7 @@ def _named() -> dict[str, dict[str, Any]]:
 
 
 def read_published(path: str | os.PathLike[str]) -> PublishedFits:
-    """Return the fits of a text with a line for each material, and what is no physics in them.
+    """Return the fits of a text with a line for each material, and their contradictions to physics.
 
     A line is ``NAME = Aggregate(Lambertian(albedo = [R, G, B]), LOBE(albedo = [R, G, B], roughness = NUMBER))``, or one
     lobe alone. Lines that begin with # are comments. A scale above 1, a refractive index below 1, a number outside the
@@ -88,7 +88,7 @@ def read_published(path: str | os.PathLike[str]) -> PublishedFits:
     try:
         lines = path.read_text(encoding="utf-8").splitlines()
     except UnicodeDecodeError:
-        raise FileFormatError(f"{path}: it is no text in UTF-8") from None
+        raise FileFormatError(f"{path}: it is not UTF-8 text") from None
     comments = [line.lstrip("# ") for line in lines if line.startswith("#")]
     fits = [
         _fit(path, number, line)
@@ -99,7 +99,7 @@ def read_published(path: str | os.PathLike[str]) -> PublishedFits:
         raise FileFormatError(f"{path}: it has no line of the form NAME = LOBE(NUMBER = ...)")
     names = {term.name for one in fits for term in one.terms} - {_FLAT}
     sentences = [
-        f"{name}: no model of the registry is taken for it, because {_named()[name]['unsure']}."
+        f"{name}: no model of the registry is used for it, because {_named()[name]['unsure']}."
         for name in sorted(names)
         if "unsure" in _named().get(name, {})
     ]
@@ -141,7 +141,7 @@ def recipe_of(published: PublishedFits, channel: str = "G", tolerance: float = 0
         parts[name] = toml_of(name, table)
     if not parts:
         raise ParameterError(
-            "recipe", f"no fit of {published.name} is a model of the registry without a flag", published.name
+            "recipe", f"every fit of {published.name} is flagged or is not a model of the registry", published.name
         )
     listed = ", ".join(f'"{name}"' for name in parts)
     return f"materials = [{listed}]\ntolerance = {tolerance:g}\n\n" + "\n".join(parts.values())
@@ -162,7 +162,13 @@ def _fit(path: Path, number: int, line: str) -> PublishedFit:
     flags = _flags(terms)
     albedo = None
     if model is not None and not _out_of_range(model, terms):
-        albedo = _albedo(model, terms)
+        # in the channel whose reflectances add up to most
+        given = [_parameters(terms, channel) for channel in range(len(CHANNELS))]
+        sums = [sum(v for name, v in one.items() if MODELS[model].parameter(name).reflectance) for one in given]
+        brightest: dict[str, Any] = dict(given[int(np.argmax(sums))])
+        angles = radians(np.array(ALBEDO_ANGLES_DEG))
+        computed = directional_albedo(model, angles, tolerance=ALBEDO_TOLERANCE, **brightest)
+        albedo = FitAlbedo.largest(ALBEDO_ANGLES_DEG, computed.albedo, computed.error)
         if not albedo.conserves:
             flags.append(f"it reflects {albedo.value:.3g} of the light from {albedo.theta_i_deg:g} degrees")
     elif model is not None:
@@ -195,7 +201,7 @@ def _numbers(name: str, word: ast.keyword) -> list[float]:
 
 
 def _model(terms: list[PublishedLobe]) -> str | None:
-    """Return the model of the registry that some terms are, or None."""
+    """Return the model of the registry with the formula of the terms, or None."""
     lobes = [term for term in terms if term.name != _FLAT]
     if not lobes:
         return flat_model() if len(terms) == 1 else None
@@ -206,7 +212,7 @@ def _model(terms: list[PublishedLobe]) -> str | None:
 
 
 def _parameters(terms: list[PublishedLobe], channel: int) -> dict[str, float]:
-    """Return the parameters of the model of some terms in a channel, as recipes write them."""
+    """Return the parameters of the model of the terms in a channel, as recipes write them."""
     model = _model(terms)
     assert model is not None
 
@@ -248,12 +254,3 @@ def _out_of_range(model: str, terms: list[PublishedLobe]) -> list[str]:
             except ParameterError as error:
                 flags.append(f"{name}: {error.sentence}")
     return list(dict.fromkeys(flags))
-
-
-def _albedo(model: str, terms: list[PublishedLobe]) -> FitAlbedo:
-    """Return the largest directional albedo [1], in the channel whose reflectances add up to most."""
-    given = [_parameters(terms, channel) for channel in range(len(CHANNELS))]
-    bright = [sum(v for name, v in one.items() if MODELS[model].parameter(name).reflectance) for one in given]
-    brightest: dict[str, Any] = dict(given[int(np.argmax(bright))])
-    computed = directional_albedo(model, radians(np.array(ALBEDO_ANGLES_DEG)), tolerance=ALBEDO_TOLERANCE, **brightest)
-    return FitAlbedo.largest(ALBEDO_ANGLES_DEG, computed.albedo, computed.error)

@@ -1,4 +1,4 @@
-"""Sentences on what a fit cannot carry, and on what its numbers do not mean."""
+"""Sentences on the limits of a fit and of its samples."""
 
 from __future__ import annotations
 
@@ -14,10 +14,14 @@ from brdfdb.measurements import Samples
 from brdfdb.measurements.aperture import RESOLVED
 
 NARROW = 0.05  # width of a lobe, in slopes, below which usual apertures change it
-PATTERN = 0.5  # correlation of neighbouring residuals from which on the rest is a pattern
-UNEVEN = 3.0  # ratio of relative uncertainties, at the ends of the middle 90 %, from which on weights matter
-LEFT_OUT = 0.01  # share of values that are not positive, from which on it matters that they are left out
+PATTERN = 0.5  # larger correlations of neighbouring residuals are a pattern
+UNEVEN = 3.0  # largest ratio of relative uncertainties, at the ends of the middle 90 %, without a remark
+LEFT_OUT = 0.01  # largest share of values that are not positive without a remark
 _SAME_AZIMUTH = 0.01  # degrees
+ONE_AZIMUTH = (
+    "The light comes from one azimuth of the surface, so anisotropy cannot be determined, and models with two widths "
+    "are fitted with one."
+)
 
 
 def sees_anisotropy(samples: Samples) -> bool:
@@ -31,7 +35,7 @@ def sees_anisotropy(samples: Samples) -> bool:
 
 
 def remarks_of(fit: Fit, fitted: FittedSurface) -> list[str]:
-    """Return sentences on light from nothing, a pattern in the residuals, ends of ranges, and pairs of numbers."""
+    """Return sentences on an albedo above 1, patterns in residuals, ends of ranges, and pairs of parameters."""
     surface, samples = fitted.surface, fitted.samples
     sentences = _of_aperture(fit, fitted)
     if not fit.albedo.conserves:
@@ -41,8 +45,8 @@ def remarks_of(fit: Fit, fitted: FittedSurface) -> list[str]:
         )
     if fit.pattern > PATTERN:
         sentences.append(
-            f"The residuals of neighbouring samples are correlated by {fit.pattern:.2f}: what is left is a pattern and "
-            "no noise, and the intervals are too narrow."
+            f"The residuals of neighbouring samples are correlated by {fit.pattern:.2f}: they form a pattern and are "
+            "not noise, so the intervals are too narrow."
         )
     ends = [
         f"{one.name} = {one.value:.4g}" + (f" ({one.channel})" if one.channel else "")
@@ -56,32 +60,28 @@ def remarks_of(fit: Fit, fitted: FittedSurface) -> list[str]:
     if surface.indexed and samples.wavelength_nm is None and any(p.unit == "µm" for t in surface.terms for p in t.free):
         sentences.append("The samples state no wavelength; lengths are those at 550 nm, and scale with it.")
     if len(surface.terms) > 1:
-        sentences.append("A sum is no model of the registry: it takes a source that is a function.")
+        sentences.append("A sum is not a model of the registry; a table of it needs a source that is a function.")
     return sentences
 
 
 def remarks_on_samples(samples: Samples, residual: Residual) -> list[str]:
-    """Return sentences on lights that cannot tell anisotropy, uncertainties not followed, files that contradict."""
+    """Return sentences on missing azimuths of the light, on uncertainties, and on files that contradict each other."""
     sentences = _on_uncertainties(samples, residual)
     if "contradiction" in samples.record:
         sentences.append(str(samples.record["contradiction"]))
     if sees_anisotropy(samples):
         return sentences
-    return [
-        "The light comes from one azimuth of the surface: whether the surface is anisotropic cannot be told, and "
-        "models with two widths are fitted with one.",
-        *sentences,
-    ]
+    return [ONE_AZIMUTH, *sentences]
 
 
 def _on_uncertainties(samples: Samples, residual: Residual) -> list[str]:
-    """Return a sentence on uncertainties that are no credible ones, or that the residual does not follow."""
+    """Return a sentence on uncertainties that are not credible, or that the residual does not use."""
     used = residual.used
     if residual.raised:
         verb = "uncertainty is" if residual.raised == 1 else "uncertainties are"
         return [
-            f"{residual.raised} {verb} below {100.0 * CREDIBLE:g} % of the median and of the median relative to f_r, "
-            "and taken for the lower of the two."
+            f"{residual.raised} {verb} below {100.0 * CREDIBLE:g} % of the median and of the median relative to f_r; "
+            "the lower of the two is used instead."
         ]
     if residual.kind == "uncertainty" or samples.uncertainty is None:
         return []
@@ -99,20 +99,21 @@ def _on_uncertainties(samples: Samples, residual: Residual) -> list[str]:
         )
     elif residual.left_out > LEFT_OUT * (residual.count + residual.left_out):
         sentences.append(
-            f"{residual.left_out} values that are not positive are left out, which makes the rest too bright. {advice}"
+            f"{residual.left_out} values that are not positive are left out, so the other values are too high on "
+            f"average. {advice}"
         )
     return sentences
 
 
 def _of_aperture(fit: Fit, fitted: FittedSurface) -> list[str]:
-    """Return sentences on what an aperture hides, or one that is not known."""
+    """Return sentences on a specular part or a lobe that the aperture changes."""
     width = float(np.min(fitted.surface.widths(fitted.point.x[np.newaxis]), initial=math.inf))
     half_angle = fitted.view.half_angle
     sentences = []
     if fit.at_mirror:
         sentences.append(
-            f"{fit.at_mirror} samples near the mirror direction are left out: it has a specular part there, and the "
-            "solid angle of the receiver is not known."
+            f"{fit.at_mirror} samples near the mirror direction are left out, because the model has a specular part "
+            "there and the solid angle of the receiver is not known."
         )
     if half_angle and width < RESOLVED * half_angle:
         sentences.append(

@@ -15,10 +15,10 @@ Kind = Literal["log", "relative", "cosine", "uncertainty"]
 KINDS: tuple[Kind, ...] = ("log", "relative", "cosine", "uncertainty")
 
 _LEAST = 1e-6  # share of the smallest sample that is added to both sides before logarithms: the model may be 0
-_NOTHING = 1e-12  # the same of the largest, for samples that fall beneath what any instrument resolves
+_NOTHING = 1e-12  # the same share of the largest sample, for samples below the resolution of any instrument
 CREDIBLE = 0.01  # share of the median uncertainty, absolute and relative, below which an uncertainty is a mistake
 _LEAST_F_R = 1e-100  # squares of derivatives of logarithms of less than that are too large for numbers
-_HORIZON_COSINE = 1e-4  # directions closer to the horizon are left out: models are 0 there
+_HORIZON_COSINE = 1e-4  # smaller cosines are at the horizon, where models are 0, and are left out
 
 
 class Residual:
@@ -56,13 +56,15 @@ class Residual:
             raise ParameterError(
                 "residual", f"{samples.name} has no uncertainties; choose log, relative or cosine", kind, KINDS
             )
-        self.kind, self.truth = kind, samples.values
+        self.kind = kind
+        self.truth = samples.values
         cosines = np.cos(samples.theta_i) * np.cos(samples.theta_r)
         above = np.minimum(np.cos(samples.theta_i), np.cos(samples.theta_r)) > _HORIZON_COSINE
         known = samples.known
         horizon = known & ~above[:, np.newaxis]
         self.used = known & above[:, np.newaxis]
-        self.holes, self.at_horizon = int(np.sum(~known)), int(np.sum(horizon))
+        self.holes = int(np.sum(~known))
+        self.at_horizon = int(np.sum(horizon))
         with np.errstate(invalid="ignore"):
             positive = self.truth > 0.0
             if kind in ("log", "relative"):
@@ -90,7 +92,8 @@ class Residual:
         self.raised = 0
         self.floor = least if kind == "log" else 0.0
         if kind == "log":
-            self.weight, self.goal = np.where(self.used, 1.0, 0.0), np.log(y + self.floor)
+            self.weight = np.where(self.used, 1.0, 0.0)
+            self.goal = np.log(y + self.floor)
             return
         if kind == "relative":
             weight = 1.0 / y
@@ -102,8 +105,10 @@ class Residual:
             stated = np.where(self.used, samples.uncertainty, 1.0)
             usual = _usual_uncertainty(y, stated, self.used)
             low = self.used & (stated < CREDIBLE * usual)
-            self.raised, weight = int(low.sum()), 1.0 / np.where(low, usual, stated)
-        self.weight, self.goal = np.where(self.used, weight, 0.0), y
+            self.raised = int(low.sum())
+            weight = 1.0 / np.where(low, usual, stated)
+        self.weight = np.where(self.used, weight, 0.0)
+        self.goal = y
 
     @property
     def count(self) -> int:
@@ -137,7 +142,8 @@ def _usual_uncertainty(y: Floats, stated: Floats, used: NDArray[np.bool_]) -> Fl
     Constant noise is far below the median relative to y in highlights, and noise in proportion to y is far below the
     median in the dark. Hence it is the lower of the two. A sample of 0 counts as the dimmest of the others.
     """
-    median, sizes = float(np.median(stated[used])), np.abs(y)
+    median = float(np.median(stated[used]))
+    sizes = np.abs(y)
     others = used & (sizes > 0.0)
     if not others.any():
         return np.full_like(stated, median)

@@ -72,7 +72,7 @@ def _is_amplitude(parameter: Parameter) -> bool:
 
 
 def _is_linear(spec: ModelSpec, names: list[str]) -> bool:
-    """Return True if f_r is linear in some parameters together."""
+    """Return True if f_r is linear in the named parameters together."""
     u = spread(_PROBES, 3)
     wi = unit_vector(_STEEPEST * u[:, 0], np.zeros(_PROBES))
     wr = unit_vector(_STEEPEST * u[:, 1], 2.0 * np.pi * u[:, 2])
@@ -124,7 +124,7 @@ class Polynomial:
 
 
 class NotDescribedError(ParameterError):
-    """A model that cannot describe some samples; str() says why."""
+    """Error: a model cannot describe the samples; str() has the reason."""
 
 
 class Coefficient(NamedTuple):
@@ -156,7 +156,7 @@ class Term:
         if beside_flat and spec.uniform is not None and spec.lobe is not None:
             self.fixed[spec.uniform] = 0.0
             names = tuple(name for name in names if name != spec.uniform)
-        bright = not names or _is_bright(spec, names, self.fixed)
+        bright = not names or self._is_bright(names)
         self.scaled = bright and not alone
         self.linear = () if self.scaled else names
         self.polynomial = (
@@ -166,6 +166,15 @@ class Term:
         self.tied = None if turned else spec.lobe_axes
         out = {*self.fixed, *self.linear, *(self.tied or ())[1:]}
         self.free = [p for p in spec.parameters if p.name not in out]
+
+    def _is_bright(self, names: tuple[str, ...]) -> bool:
+        """Return True if the model reflects light where its reflectances are 0, as facets do at grazing angles."""
+        middle = {p.name: 0.5 * (p.low + min(p.high, 1.0)) for p in self.spec.parameters}
+        index = {"wavelength_nm": ASSUMED_NM, "n": 1.5, "k": 0.0} if self.spec.spectral else {}
+        given = middle | self.fixed | dict.fromkeys(names, 0.0) | index
+        wi = unit_vector(np.full(3, 1.2), np.zeros(3))
+        wr = unit_vector(np.array([0.1, 0.7, 1.2]), np.full(3, np.pi))
+        return bool(np.any(self.spec.vectors(wi, wr, **given) > 0.0))
 
     def coefficients(self, number: int) -> list[Coefficient]:
         """Return the coefficients of this term, whose number is given."""
@@ -242,14 +251,6 @@ class Term:
         )
 
 
-def _is_bright(spec: ModelSpec, names: tuple[str, ...], fixed: Mapping[str, float]) -> bool:
-    """Return True if the model reflects something where its reflectances are 0, as facets do at grazing."""
-    middle = {p.name: 0.5 * (p.low + min(p.high, 1.0)) for p in spec.parameters}
-    index = {"wavelength_nm": ASSUMED_NM, "n": 1.5, "k": 0.0} if spec.spectral else {}
-    wi, wr = unit_vector(np.full(3, 1.2), np.zeros(3)), unit_vector(np.array([0.1, 0.7, 1.2]), np.full(3, np.pi))
-    return bool(np.any(spec.vectors(wi, wr, **(middle | dict(fixed) | dict.fromkeys(names, 0.0) | index)) > 0.0))
-
-
 class SearchedSurface:
     """A model, or a sum of models, whose numbers are searched.
 
@@ -281,8 +282,10 @@ class SearchedSurface:
         self, name: str, wavelength_nm: Array | None, channels: int, *, turned: bool, entry: str | None = None
     ) -> None:
         names = _parsed(name)
-        alone, flat = len(names) == 1, flat_model()
-        repeated, seen = Counter(names), Counter[str]()
+        alone = len(names) == 1
+        flat = flat_model()
+        repeated = Counter(names)
+        seen = Counter[str]()
         self.name, self.channels, self.entry = name, channels, entry
         self.terms: list[Term] = []
         for model in names:
@@ -310,19 +313,20 @@ class SearchedSurface:
             spec = term.spec
             if spec.anisotropic is not None and not turned:
                 raise NotDescribedError(
-                    "model", f"{spec.name} changes when the surface is turned, and the light is in one azimuth alone"
+                    "model",
+                    f"{spec.name} changes when the surface is turned, and the light comes from one azimuth only",
                 )
             if self.channels > 1 and len(self.terms) == 1 and any(p.reflectance for p in term.free):
                 raise NotDescribedError(
                     "model",
-                    f"{spec.name}: f_r is no polynomial in its reflectances, so that spectra of them are not searched; "
+                    f"{spec.name}: f_r is not a polynomial in its reflectances, so spectra of them cannot be fitted; "
                     "choose one channel",
                 )
         if self.searched_index and self.channels > 1:
             raise NotDescribedError(
                 "model",
-                f"{self.name} takes n and k, which are searched at one wavelength alone, and there are {self.channels} "
-                "channels; give a refractive index, or choose one channel",
+                f"{self.name} needs n and k, which can be fitted at one wavelength only, and the samples have "
+                f"{self.channels} channels; give a refractive index, or choose one channel",
             )
 
     @property
@@ -376,7 +380,8 @@ class SearchedSurface:
 
         The terms of a point that was evaluated alone are remembered until the next: its neighbours share some of them.
         """
-        parts, numbers = [], [self.numbers(x) for x in points]
+        parts = []
+        numbers = [self.numbers(x) for x in points]
         several = self.channels if self.indexed else 1
         for number, term in enumerate(self.terms):
             count = several if term.spec.spectral else 1
@@ -390,7 +395,8 @@ class SearchedSurface:
 
     def monomials(self, values: Floats) -> Floats:
         """Return the monomials (M, C) of coefficients (K, C)."""
-        parts, at = [], 0
+        parts = []
+        at = 0
         for term in self.terms:
             count = term.polynomial.exponents.shape[1]
             parts.append(term.polynomial.monomials(self._in_units(values, at, count)))
@@ -467,7 +473,7 @@ def _parsed(name: str) -> list[str]:
         match = re.fullmatch(r"\s*(?:(\d+)\s+)?([\w-]+)\s*", part)
         if match is None:
             raise ParameterError(
-                "model", f"{name!r} is no model and no sum of models, such as 'A + 2 B'", name, tuple(MODELS)
+                "model", f"{name!r} is neither a model nor a sum of models such as 'A + 2 B'", name, tuple(MODELS)
             )
         model = match[2]
         if model not in MODELS:

@@ -49,10 +49,13 @@ def covariance(problem: Problem, point: Point) -> Covariance:
     inside = np.array([_END < point.x[j] < 1.0 - _END for j in problem.free], dtype=bool)
     searched = int(inside.sum() + free.sum())
     factor, noise = noise_of(problem, point.residuals, searched)
-    some, count, shapes = columns[inside], len(inner), len(problem.surface.shape)
+    some = columns[inside]
+    count = len(inner)
+    shapes = len(problem.surface.shape)
     of_channels = []
     for c in range(point.f_r.shape[1]):
-        outer, of_inner = some[:, :, c], inner[free[:, c], :, c]
+        outer = some[:, :, c]
+        of_inner = inner[free[:, c], :, c]
         of_channels.append((outer @ outer.T, outer @ of_inner.T, of_inner @ of_inner.T))
     reduced = np.zeros((len(some), len(some)))
     for a, b, d in of_channels:
@@ -102,14 +105,20 @@ class Profile:
         shape: int | None = None,
         coefficient: int | None = None,
     ) -> None:
-        self.problem, self.point, self.noise = problem, point, known.noise
+        self.problem = problem
+        self.point = point
+        self.noise = known.noise
         self.shape, self.coefficient = shape, coefficient
         if shape is not None:
-            self.low, self.high, self.best = 0.0, 1.0, float(point.x[shape])
+            self.low = 0.0
+            self.high = 1.0
+            self.best = float(point.x[shape])
         else:
             assert coefficient is not None
             one = problem.surface.coefficients[coefficient]
-            self.low, self.high, self.best = one.low, one.high, float(point.values[coefficient, 0])
+            self.low = one.low
+            self.high = one.high
+            self.best = float(point.values[coefficient, 0])
         shapes = len(problem.surface.shape)
         index = shape if shape is not None else shapes + int(coefficient or 0)
         along = np.nan_to_num(known.both[:shapes, index] / known.both[index, index])
@@ -147,7 +156,8 @@ class Profile:
 
     def _end(self, step: float) -> float:
         bound = self.low if step < 0.0 else self.high
-        inner, inner_deviation = self.best, 0.0
+        inner = self.best
+        inner_deviation = 0.0
         while True:
             outer = self.best + step
             if (outer - bound) * step >= 0.0:
@@ -157,7 +167,9 @@ class Profile:
                 return _root(self.deviation, inner, inner_deviation, outer, deviation)
             if outer == bound:
                 return bound
-            inner, inner_deviation, step = outer, deviation, 2.0 * step
+            inner = outer
+            inner_deviation = deviation
+            step = 2.0 * step
 
 
 def _root(function: Callable[[float], float], inner: float, below: float, outer: float, above: float) -> float:

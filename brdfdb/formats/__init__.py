@@ -1,4 +1,4 @@
-"""File formats of others: each module or folder of this room whose name begins with no underscore is one.
+"""File formats of other programs: each module or folder of this package without a leading underscore is a format.
 
 A module that writes is an `Exporter`, one that reads an `Importer`; most are both. The command line and HTTP iterate
 over the registry.
@@ -59,14 +59,14 @@ IMPORTERS: dict[str, Importer] = {name: module for name, module in _MODULES.item
 def write(
     table: Table, path: str | os.PathLike[str], file_format: str, *, verdict: str | None = None, **options: Any
 ) -> Written:
-    """Write a table as a file of another format: whole, or not at all.
+    """Write a table as a file of another format: completely, or not at all.
 
     Parameters
     ----------
     table : Table
         Table in memory.
     path : path
-        The file; one that is there is replaced. Some formats write a second file beside it.
+        The file; an existing file is replaced. Some formats write a second file next to it.
     file_format : str
         One of `EXPORTERS`.
     verdict : str, optional
@@ -101,7 +101,8 @@ def write(
             "file_format", f"{file_format!r} is not one of {', '.join(EXPORTERS)}", file_format, tuple(EXPORTERS)
         )
     exporter = EXPORTERS[file_format]
-    parsed = parsed_options(exporter, {name: _text(value) for name, value in options.items()})
+    texts = {name: str(value).lower() if isinstance(value, bool) else str(value) for name, value in options.items()}
+    parsed = parsed_options(exporter, texts)
     return exporter.write(table, path_of(path), verdict=verdict, **parsed)
 
 
@@ -137,11 +138,6 @@ def packed(table: Table, file_format: str, *, verdict: str, **options: Any) -> t
         return f"{path.name}.zip", ZIP, b"".join(zipped(contents))
 
 
-def _text(value: Any) -> str:
-    """Return the value of an option as command line and HTTP give it."""
-    return str(value).lower() if isinstance(value, bool) else str(value)
-
-
 def read(
     path: str | os.PathLike[str],
     file_format: str = "",
@@ -172,8 +168,8 @@ def read(
         If there is no such format, keyword, column or member, files of the format are only written, or the file states
         the wavelength itself.
     FileFormatError
-        If no format recognises the file, its format is only written, it is damaged, or it is no regular file of at most
-        2 GiB.
+        If no format recognises the file, its format is only written, the file is damaged, or it is not a regular file
+        of at most 2 GiB.
     OSError
         If the file cannot be read.
 
@@ -196,7 +192,7 @@ def read(
             check_nanometres("wavelength_nm", reading.wavelength_nm)
     except FileFormatError:
         raise
-    except ParameterError as error:  # of samples that are none
+    except ParameterError as error:  # of rows that are not valid samples
         if error.parameter in getattr(importer, "keywords", ()):
             raise
         raise FileFormatError(f"{path}: {error}") from error
@@ -244,7 +240,7 @@ def samples(path: str | os.PathLike[str], file_format: str = "", **keywords: Any
     if isinstance(reading, Samples):
         return reading
     if reading.nodes is None:
-        raise FileFormatError(f"{path}: it holds a formula, and no values at directions")
+        raise FileFormatError(f"{path}: it holds a formula, and no values at listed directions")
     nodes = reading.nodes()
     return replace(nodes, record={**nodes.record, NODES: True})
 
@@ -267,12 +263,14 @@ def _importer(path: Path, file_format: str, keywords: Mapping[str, Any]) -> Impo
     for name, value in keywords.items():
         if name not in every:
             allowed = ", ".join(sorted(every))
-            raise ParameterError(name, f"no format takes it; there are {allowed}", value, tuple(sorted(every)))
+            raise ParameterError(
+                name, f"no format has this keyword; allowed are {allowed}", value, tuple(sorted(every))
+            )
     text = bool(keywords) and set(keywords) <= set(_MODULES[_TEXT].keywords)
     importer = _chosen(path, file_format or (_TEXT if text else ""))
     for name, value in keywords.items():
         if name not in getattr(importer, "keywords", ()):
-            raise ParameterError(name, f"the format of {path} does not take it", value)
+            raise ParameterError(name, f"the format of {path} does not have this keyword", value)
     return importer
 
 
@@ -281,7 +279,7 @@ def _chosen(path: Path, file_format: str) -> Importer:
     only_written = {name: exporter for name, exporter in EXPORTERS.items() if name not in IMPORTERS}
     if file_format:
         if file_format in only_written:
-            raise ParameterError("file_format", f"files of {file_format} are only written, not read", file_format)
+            raise ParameterError("file_format", f"files of {file_format} can be written, but not read", file_format)
         if file_format not in IMPORTERS:
             raise ParameterError(
                 "file_format", f"{file_format!r} is not one of {', '.join(IMPORTERS)}", file_format, tuple(IMPORTERS)
@@ -296,14 +294,14 @@ def _chosen(path: Path, file_format: str) -> Importer:
     for name, exporter in only_written.items():
         recognises = getattr(exporter, "recognises", None)
         if path.name.endswith(exporter.suffix) and (recognises is None or recognises(head)):
-            raise FileFormatError(f"{path}: files of {name} are only written, not read")
+            raise FileFormatError(f"{path}: files of {name} can be written, but not read")
     from brdfdb.fitting.published import SUFFIX
 
-    known = f"{path}: no format recognises it; there are {', '.join(IMPORTERS)}"
+    known = f"{path}: no format recognises it; known formats are {', '.join(IMPORTERS)}"
     columns = _MODULES[_TEXT].columns_of(head)
     if columns:
         shown = ", ".join(columns)[:_SHOWN]
-        known += f"; as a text it has the columns {shown}: name them, {_MODULES[_TEXT].HOW}"
+        known += f"; read as text it has the columns {shown}: name them with {_MODULES[_TEXT].HOW}"
     if path.name.lower().endswith(SUFFIX):
-        raise FileFormatError(f"{path}: a file of published fits holds no samples; `brdfdb fit` lists them")
+        raise FileFormatError(f"{path}: a file of published fits holds no samples; `brdfdb fit` lists the fits")
     raise FileFormatError(known)

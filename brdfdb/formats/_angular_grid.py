@@ -35,7 +35,8 @@ _FIRST = 8  # intervals of each axis before any is halved
 _HALVINGS = 14
 _FEWEST = 40  # pairs in an interval that is halved: of fewer, the percentile says nothing
 # Smallest error of an interval, as a share of the target: of the first ones, and of those that were halved
-_LEAST, _LEAST_OF_HALVES = 1 / 64, 1 / 4
+_LEAST = 1 / 64
+_LEAST_OF_HALVES = 1 / 4
 _MOST = 0.97  # share of the pairs of an interval that its error stands for
 _BALANCES = 2
 _EVERY = 2  # of the pairs, one of so many chooses the nodes
@@ -50,7 +51,7 @@ _SHRUNK = 0.99  # share of the nodes that should fit, when a file was too large
 SIZE = FormatOption(
     "size",
     16.0,
-    "largest file [MB]: a table that needs more is written with the error it has",
+    "largest file [MB]; a table that needs more is written with a larger error, which the file states",
     low=0.1,
     high=1000.0,
     most_served=16.0,
@@ -141,7 +142,8 @@ class FittedGrid(NamedTuple):
 def filled(comparison: Comparison, system: System, nodes: Sequence[Floats]) -> AngularGrid:
     """Return a grid with f_r of the table of a comparison, in its channels, at nodes [rad] of each angle."""
     shape = tuple(axis.size for axis in nodes)
-    count, channels = math.prod(shape), len(comparison.channels.names)
+    count = math.prod(shape)
+    channels = len(comparison.channels.names)
     values = np.empty((count, channels), np.float32)
     step = max(1, _AT_ONCE // channels)
     for start in range(0, count, step):
@@ -155,8 +157,8 @@ def filled(comparison: Comparison, system: System, nodes: Sequence[Floats]) -> A
 class AngularPlan:
     """Densities of nodes on each angle of a system, from which grids of any tolerance are made.
 
-    Each angle is taken alone: the value of a pair is compared with the line between the values at the nodes on both
-    sides of it, while its other angles stay the same. Intervals with errors above `target` are halved.
+    Each angle is treated separately: the value of a pair is compared with the line between the values at the two nodes
+    around it, while its other angles stay the same. Intervals with errors above `target` are halved.
 
     Parameters
     ----------
@@ -254,7 +256,8 @@ class Intervals(NamedTuple):
 
         Otherwise a node next to a kink could be the end of a long straight line, which would miss the kink.
         """
-        edges, errors = self.edges, self.errors
+        edges = self.edges
+        errors = self.errors
         longest = (edges[-1] - edges[0]) / _FIRST
         while True:
             widths = np.diff(edges)

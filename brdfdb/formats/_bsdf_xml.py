@@ -161,7 +161,8 @@ def read(path: str | os.PathLike[str], side: str = FRONT_OF_RADIANCE) -> BsdfFil
         raise
     except (ElementTree.ParseError, ValueError, LookupError) as error:
         raise FileFormatError(f"{path}: it is not XML: {error}") from None
-    layer, definition = root.find("{*}Optical/{*}Layer"), root.find("{*}Optical/{*}Layer/{*}DataDefinition")
+    layer = root.find("{*}Optical/{*}Layer")
+    definition = root.find("{*}Optical/{*}Layer/{*}DataDefinition")
     if layer is None or definition is None:
         raise FileFormatError(f"{path}: it has no DataDefinition in Optical, Layer")
     blocks: dict[str, BsdfBlock] = {}
@@ -187,7 +188,8 @@ def read(path: str | os.PathLike[str], side: str = FRONT_OF_RADIANCE) -> BsdfFil
 def _root(path: Path) -> ElementTree.Element:
     """Return the root of a document, which is parsed in pieces: the first one that is no XML ends it."""
     check_size(path, _MOST_BYTES)
-    parser, end = ElementTree.XMLParser(), b""
+    parser = ElementTree.XMLParser()
+    end = b""
     with path.open("rb") as file:
         if not is_window_element(file.read(_HEAD_BYTES)):
             raise FileFormatError(f"{path}: line 1: it does not begin with a WindowElement")

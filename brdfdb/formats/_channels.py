@@ -117,12 +117,15 @@ def channels_of(table: Table, colour: str = "") -> Channels:
         )
     key = tuple(wavelengths.tolist())
     if colour == "rgb":
-        weights, meaning = spectra.srgb_weights(key), "linear sRGB under D65"
+        weights = spectra.srgb_weights(key)
+        meaning = "linear sRGB under D65"
     else:
-        weights, meaning = spectra.xyz_weights(key, "E"), "CIE XYZ, 2 degree observer, equal-energy illuminant"
+        weights = spectra.xyz_weights(key, "E")
+        meaning = "CIE XYZ, 2 degree observer, equal-energy illuminant"
         weights = weights / weights.sum(axis=0)
     if colour == "grey":
-        weights, meaning = weights[:, 1:2], "luminous: CIE Y under the equal-energy illuminant"
+        weights = weights[:, 1:2]
+        meaning = "luminous: CIE Y under the equal-energy illuminant"
     return Channels(names, wavelengths, weights, meaning, (f"of the spectrum: {meaning}",))
 
 

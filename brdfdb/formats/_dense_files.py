@@ -10,7 +10,7 @@ import os
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,18 +32,32 @@ if TYPE_CHECKING:
     from brdfdb.tables.table import Table
 
 RESOLUTION = FormatOption(
-    "resolution", 0.0, "distance of nodes on all axes [degrees]; 0: few nodes, where f_r bends", low=0.0, high=45.0
+    "resolution",
+    0.0,
+    "distance [degrees] of nodes on all axes; 0 places few nodes where f_r is curved",
+    low=0.0,
+    high=45.0,
 )
 OPTIONS = (
     TOLERANCE,
     FormatOption(
         "axes",
         "smallest",
-        "angles of the grid: light and viewer, half and difference vector, or those that take fewer values",
+        "angles of the grid: those of light and viewer, of half and difference vectors, or whichever need fewer values",
         choices=("smallest", "light_viewer", "half_difference"),
     ),
     RESOLUTION,
 )
+
+
+class DenseOptions(TypedDict, total=False):
+    """Options of `dense_table` that a format with any grid of angles takes."""
+
+    tolerance: float
+    axes: str
+    resolution: float
+
+
 INTERPOLATION = "linear along all axes; at angles beyond the last node f_r is that of the node; 0 below the horizon"
 _CONTINUED = "where light or viewer is below the horizon f_r is 0; values of such nodes only serve interpolation"
 _TURNED = {
@@ -59,7 +73,8 @@ _TURNED = {
 }
 _MOST_VALUES = 1 << 27  # of a file that is read
 _MOST_NODES = 1 << 22  # of an axis that is read
-_DEGREES, _RADIANS = ("", "degree", "degrees", "deg", "°"), ("rad", "radian", "radians")
+_DEGREES = ("", "degree", "degrees", "deg", "°")
+_RADIANS = ("rad", "radian", "radians")
 MOST_BYTES = 40_000_000  # size of a file that is written, about
 _MOST_READ = 1 << 29  # of a file that is read
 _DECIMALS = 4  # of angles [degree]: radians in files have six
@@ -78,7 +93,7 @@ def opened_netcdf(path: Path) -> Iterator[xr.Dataset]:
         raise
     except Exception as error:  # SciPy raises what its parser comes to
         first = str(error).partition("\n")[0]
-        raise FileFormatError(f"{path}: it is no netCDF 3 file, or is damaged ({first})") from error
+        raise FileFormatError(f"{path}: it is not a netCDF 3 file, or is damaged ({first})") from error
 
 
 def dense_record(table: Table, dense: DenseTable, verdict: str | None, *, specular: bool) -> dict[str, Any]:
@@ -156,7 +171,9 @@ def read_dataset(path: Path, opened: xr.Dataset) -> FileTable | Samples:
         raise FileFormatError(f"{path}: {error}") from None
     spectral = ("wavelength",) if "wavelength" in brdf.dims else ()
     if set(brdf.dims) != {*names, *spectral} or not set(brdf.dims) <= set(opened.coords):
-        raise FileFormatError(f"{path}: brdf over {', '.join(map(str, brdf.dims))} lacks axes or has too many")
+        raise FileFormatError(
+            f"{path}: the dimensions of brdf, {', '.join(map(str, brdf.dims))}, are not those of a table"
+        )
     check_sizes(path, {name: opened[name].shape for name in ("brdf", *brdf.dims)})
     from brdfdb.measurements.samples import PER_SR
 
@@ -173,7 +190,7 @@ def check_sizes(path: Path, shapes: Mapping[Any, tuple[int, ...]]) -> None:
     for name, shape in shapes.items():
         most = _MOST_NODES if len(shape) == 1 else _MOST_VALUES
         if math.prod(shape) > most:
-            raise FileFormatError(f"{path}: {math.prod(shape)} numbers of {name} are more than {most}")
+            raise FileFormatError(f"{path}: {name} has {math.prod(shape)} numbers; at most {most} are read")
 
 
 def _unit(variable: xr.DataArray) -> str:
@@ -229,7 +246,7 @@ def file_table(
         stored = values.astype(np.float32)
     if np.any(np.isinf(stored)) or np.all(np.isnan(stored)):
         raise FileFormatError(
-            f"{path}: brdf holds holes alone, or values that are not finite, or above those of 32 bits"
+            f"{path}: brdf has only holes, or values that are infinite or too large for 32-bit floats"
         )
     channels = names_of(at)
     name = str(known.get("name") or path_of(path).stem)
@@ -274,7 +291,9 @@ def reading_of_rows(
     from brdfdb.formats._readings import FileTable
 
     if values.shape[1] != (1 if wavelength_nm is None else wavelength_nm.size):
-        raise FileFormatError(f"{path}: {values.shape[1]} columns of values are neither one nor wavelengths")
+        raise FileFormatError(
+            f"{path}: it has {values.shape[1]} columns of values; expected is one, or one for each wavelength"
+        )
     of_axes = {name: np.unique(column) for name, column in angles.items()}
     shape = tuple(column.size for column in of_axes.values())
     of_vectors = {"theta_i", "theta_r"} <= set(angles)
@@ -287,7 +306,7 @@ def reading_of_rows(
         table = file_table(path, of_axes, ordered[..., 0] if wavelength_nm is None else ordered, wavelength_nm, known)
         return replace(table, nodes=nodes) if isinstance(table, FileTable) and nodes is not None else table
     if nodes is None:
-        raise FileFormatError(f"{path}: rows over {', '.join(angles)} are not those of a grid")
+        raise FileFormatError(f"{path}: the rows over {', '.join(angles)} do not form a grid")
     return nodes()
 
 
@@ -333,9 +352,9 @@ def parsed(path: Path) -> dict[str, Any]:
     try:
         document = json.loads(path.read_bytes())
     except (ValueError, RecursionError) as error:
-        raise FileFormatError(f"{path}: it is no JSON, or is damaged ({error})") from error
+        raise FileFormatError(f"{path}: it is not JSON, or is damaged ({error})") from error
     if not isinstance(document, dict):
-        raise FileFormatError(f"{path}: it holds no object")
+        raise FileFormatError(f"{path}: it is not a JSON object")
     return document
 
 

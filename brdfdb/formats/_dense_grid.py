@@ -81,7 +81,7 @@ class DenseTable:
 
 def dense_table(
     table: Table,
-    tolerance: float,
+    tolerance: float = 0.02,
     *,
     axes: str = "smallest",
     resolution: float = 0.0,
@@ -118,7 +118,9 @@ def dense_table(
         size = math.prod(regular.shape) * len(comparison.channels.names)
         if size > most_values:
             raise ParameterError(
-                "resolution", f"{resolution:g} degrees take {size} values; the most are {most_values}", resolution
+                "resolution",
+                f"{resolution:g} degrees need {size} values; at most {most_values} are allowed",
+                resolution,
             )
         return _tabulated(comparison, regular, digits)
     most_nodes = most_values // len(comparison.channels.names)
@@ -223,7 +225,7 @@ class _DensePlan:
         return needs
 
     def _line_error(self, axis: int, need: Floats) -> float:
-        """Return the relative error that 99 of 100 pairs have at most on lines along one axis alone."""
+        """Return the relative error that 99 of 100 pairs have at most on lines along a single axis."""
         nodes = radians(self._nodes_of(axis, need, _LEVEL))
         index, weights = weights_of_nodes(nodes, self.x[axis], cubic=False)
         truth = self.comparison.truth[self.above]

@@ -21,7 +21,7 @@ _MARKS = {b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16", b"\xef\xbb\xbf": "utf-8-
 
 
 def check_file(path: Path) -> None:
-    """Raise FileFormatError if a path is no regular file, no directory of a zarr group, or too large to be read.
+    """Raise FileFormatError if a path is neither a regular file nor a zarr group, or is too large to be read.
 
     Raises
     ------
@@ -30,14 +30,14 @@ def check_file(path: Path) -> None:
     """
     directory = path.is_dir()
     if directory and not (path / "zarr.json").exists():
-        raise FileFormatError(f"{path}: it is a directory that is no zarr group")
+        raise FileFormatError(f"{path}: it is a directory, but not a zarr group")
     size = 0
     for part in path.rglob("*") if directory else (path,):
         status = part.stat()
         if stat.S_ISDIR(status.st_mode):
             continue
         if not stat.S_ISREG(status.st_mode):
-            raise FileFormatError(f"{part}: it is no regular file")
+            raise FileFormatError(f"{part}: it is not a regular file")
         if directory and part.name == "zarr.json":
             check_size(part, _MOST_METADATA)
         size += status.st_size
@@ -64,7 +64,7 @@ def check_text(path: Path, most: int = MOST_TEXT) -> str:
         head = file.read(_HEAD)
     encoding = next((name for mark, name in _MARKS.items() if head.startswith(mark)), "utf-8")
     if encoding != "utf-16" and b"\0" in head:
-        raise FileFormatError(f"{path}: line 1: it is no text: it has a zero byte")
+        raise FileFormatError(f"{path}: line 1: it is not text: it has a zero byte")
     return encoding
 
 
@@ -82,7 +82,7 @@ def lines_of(path: Path) -> Iterator[tuple[int, str]]:
         while line := file.readline(_LONGEST):
             number += 1
             if "\0" in line:
-                raise FileFormatError(f"{path}: line {number}: it is no text: it has a zero byte")
+                raise FileFormatError(f"{path}: line {number}: it is not text: it has a zero byte")
             if len(line) == _LONGEST:
                 raise FileFormatError(f"{path}: line {number} has more than {_LONGEST} characters")
             yield number, line
@@ -105,8 +105,10 @@ class Words:
     """
 
     def __init__(self, path: Path) -> None:
-        self.line, self.comments = 0, list[str]()
-        self._path, self._words = path, self._read()
+        self.line = 0
+        self.comments = list[str]()
+        self._path = path
+        self._words = self._read()
 
     def __iter__(self) -> Iterator[str]:
         return self._words
@@ -115,20 +117,20 @@ class Words:
         """Return the next word, which is the value of a field; FileFormatError at the end of the text."""
         word = next(self._words, None)
         if word is None:
-            raise self.error(field, "the text ends before its value")
+            raise self.error(field, "the file ends before the value of this field")
         return word
 
     def count(self, field: str) -> int:
         """Return the number that the next word is, of things that the text lists."""
         word = self.next(field)
         if not word.isdecimal() or int(word) > self._path.stat().st_size:
-            raise self.error(field, f"{word[:40]!r} is no number of values that the file has room for")
+            raise self.error(field, f"{word[:40]!r} is not a number of values that fit into the file")
         return int(word)
 
     def numbers(self, count: int, field: str) -> NDArray[np.float64]:
-        """Return the next numbers, finite ones; FileFormatError if one is missing, or is none."""
+        """Return the next finite numbers; FileFormatError if a number is missing or is not finite."""
         if count > self._path.stat().st_size:
-            raise self.error(field, f"its {count} numbers are more than the file has")
+            raise self.error(field, f"{count} numbers are more than the file has")
         numbers = array("d")
         for word in self._words:
             try:
@@ -140,7 +142,7 @@ class Words:
             if len(numbers) == count:
                 break
         if len(numbers) < count:
-            raise self.error(field, f"the text ends after {len(numbers)} of its {count} numbers")
+            raise self.error(field, f"the file ends after {len(numbers)} of {count} numbers")
         return np.frombuffer(numbers, dtype=np.float64) if count else np.empty(0)
 
     def error(self, field: str, sentence: str) -> FileFormatError:

@@ -60,7 +60,7 @@ class FormatOption:
         return f"{number} in [{self.low:g}, {self.high:g}]{other}"
 
     def parse(self, text: str) -> bool | int | float | str:
-        """Return the value that a text stands for.
+        """Return the value that a text denotes.
 
         Raises
         ------
@@ -109,26 +109,28 @@ def schema_of(of: Mapping[str, FormatOption]) -> tuple[dict[str, Any], str]:
 TOLERANCE = FormatOption(
     "tolerance",
     0.02,
-    "largest error against the table that 99 of 100 values may have: the smallest file within it is written",
+    "largest relative error of 99 % of the values against the table; the smallest file within it is written",
     low=1e-4,
     high=1.0,
 )
 
 FIXED = replace(
     TOLERANCE,
-    help="largest error against the table that 99 of 100 values may have: a larger one is reported, the grid is fixed",
+    help="largest relative error of 99 % of the values against the table; the grid is fixed, a larger one is reported",
 )
 
 MEGABYTES = FormatOption(
     "megabytes",
     64.0,
-    "largest file [MB]: a table that needs more is written with the error it has",
+    "largest file [MB]; a table that needs more is written with a larger error, which the file states",
     low=0.1,
     high=2000.0,
     most_served=64.0,
 )
 
-WAVELENGTH = FormatOption("wavelength", 550.0, "wavelength of a spectral table that is written [nm]", low=1.0, high=1e6)
+WAVELENGTH = FormatOption(
+    "wavelength", 550.0, "wavelength [nm] at which a spectral table is written", low=1.0, high=1e6
+)
 
 
 class Exporter(Protocol):

@@ -27,9 +27,11 @@ def slice_of(table: Table, kind: str, theta_i: float, phi_i: float) -> Slice:
 def rgb_of(image: Slice) -> tuple[NDArray[np.float32], str]:
     """Return R, G, B of a slice, shape (H, W, 3), and their meaning in words."""
     if image.wavelength_nm is None:
-        grey, meaning = image.values, RGB_GREY
+        grey = image.values
+        meaning = RGB_GREY
     elif spectra.covers_visible(image.wavelength_nm):
         return np.asarray(spectra.linear_srgb(image.wavelength_nm, image.values), dtype=np.float32), RGB_COLOUR
     else:
-        grey, meaning = image.values.mean(axis=-1, dtype=np.float64).astype(np.float32), RGB_MEAN
+        grey = image.values.mean(axis=-1, dtype=np.float64).astype(np.float32)
+        meaning = RGB_MEAN
     return np.repeat(grey[..., np.newaxis], 3, axis=-1), meaning

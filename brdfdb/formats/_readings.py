@@ -41,7 +41,7 @@ class FileTable(Lookups):
     evaluate : callable
         Gives f_r [1/sr], shape (N, C), at unit vectors (N, 3) of light and viewer above the horizon.
     record : mapping
-        The record in the file or beside it; empty of files of other programs.
+        The record in the file or next to it; empty for files of other programs.
     nodes : callable or None
         Gives the values of the file at their own directions above the horizon, unaltered; None of a formula.
     listed : bool
@@ -69,7 +69,8 @@ class FileTable(Lookups):
         if self.wavelength_nm is None and len(self.channels) == 1:
             values = values[..., 0]
         elif self.wavelength_nm is not None and wavelength_nm is not None:
-            values = self._between(values, wavelength_nm)
+            nodes, share = self._around(wavelength_nm)
+            values = values[..., nodes[..., 0]] * (1.0 - share) + values[..., nodes[..., 1]] * share
         return finished(values, vectors, trailing=values.ndim - len(shape) + 1)
 
     @array_lookup
@@ -84,7 +85,8 @@ class FileTable(Lookups):
         from brdfdb.formats._stated_error import FileStatement
 
         statement = FileStatement.read(self.record, self.name)
-        brdf, at = self.lookup_vectors(wi, wr, wavelength_nm), self.wavelength_nm
+        brdf = self.lookup_vectors(wi, wr, wavelength_nm)
+        at = self.wavelength_nm
         directions = checked_vectors(wi, wr)
         shape = np.broadcast_shapes(np.shape(wi), np.shape(wr))[:-1]
         values = np.asarray(brdf).reshape(*shape, -1)
@@ -101,14 +103,10 @@ class FileTable(Lookups):
         values = np.asarray(self.lookup_vectors(wi, wr, wavelength_nm))
         return finished(values, given, trailing=values.ndim - np.broadcast(*given.given).ndim)
 
-    def _between(self, values: Floats, wavelength_nm: ArrayLike) -> Floats:
-        """Return values at wavelengths [nm] by straight lines between those of the file."""
-        nodes, share = self._around(wavelength_nm)
-        return np.asarray(values[..., nodes[..., 0]] * (1.0 - share) + values[..., nodes[..., 1]] * share)
-
     def _around(self, wavelength_nm: ArrayLike) -> tuple[NDArray[np.int64], Floats]:
         """Return the two channels next to wavelengths [nm], shape (..., 2), and the place between them in [0, 1]."""
-        stored, wanted = self.wavelength_nm, check_nanometres("wavelength_nm", wavelength_nm)
+        stored = self.wavelength_nm
+        wanted = check_nanometres("wavelength_nm", wavelength_nm)
         assert stored is not None
         if not np.all((wanted >= stored[0]) & (wanted <= stored[-1])):
             raise ParameterError(
@@ -126,7 +124,8 @@ def from_forward(reading: FileTable | Samples) -> FileTable | Samples:
 
     if isinstance(reading, Samples):
         return _turned(reading)
-    evaluate, nodes = reading.evaluate, reading.nodes
+    evaluate = reading.evaluate
+    nodes = reading.nodes
 
     def turned(wi: Floats, wr: Floats) -> Floats:
         return evaluate(wi * _OPPOSITE, wr)

@@ -40,7 +40,8 @@ def record(
     """
     from brdfdb.formats._stated_error import of_table
 
-    known, statement = table.metadata, of_table(table) if error is None else error.statement
+    known = table.metadata
+    statement = of_table(table) if error is None else error.statement
     document = known.model_dump(mode="json", include={"model", "model_version", "parameters", "refractive_index"})
     origin = known.source or "a source that is not stated"
     licence = f"measured: {origin}" if known.measured else f"computed from parameters published in {origin}"
@@ -115,7 +116,7 @@ def one_line(text: str) -> str:
 
 
 def document_of(text: str | bytes) -> dict[str, Any]:
-    """Return the record that stands in a text as JSON; empty if there is none, or it is damaged."""
+    """Return the record in a text of JSON; empty if the text is not a JSON object."""
     try:
         document = json.loads(text)
     except (ValueError, RecursionError):
@@ -179,7 +180,7 @@ def beside(path: Path) -> Path:
 
 
 def record_beside(path: Path) -> dict[str, Any]:
-    """Return the record beside a file; empty if there is none, or it is not one."""
+    """Return the record next to a file; empty if it is missing or damaged."""
     there = beside(path)
     try:
         if not there.is_file() or there.stat().st_size > _LARGEST:

@@ -65,7 +65,9 @@ def write_source(
     remarks = (*remarks, *channels.remarks, *specular_remark(table), *frame_remark(table, _X))
     document = record(table, error, verdict, holds=CONVENTION, remarks=remarks)
     comments = [*lines(document), f"f_r [1/sr] of the model {model}, {channels.meaning}", _FRAME]
-    text = "".join(f"// {_plain(line)}\n" for line in comments) + "\n" + source(model, parameters, language, table.name)
+    # In ASCII, as old compilers want comments, and without a backslash at the end, which would join the next line
+    comments = [line.encode("ascii", "backslashreplace").decode("ascii").rstrip("\\ ") for line in comments]
+    text = "".join(f"// {line}\n" for line in comments) + "\n" + source(model, parameters, language, table.name)
     with whole(path) as (temporary,):
         temporary.write_text(text, encoding="utf-8")
     return Written((path_of(path),), error, remarks=remarks)
@@ -97,11 +99,6 @@ def source(model: str, parameters: Mapping[str, Any], language: Language, name: 
     return Template(whole_text).substitute(vector=language.vector, color=language.color, name=identifier)
 
 
-def _plain(line: str) -> str:
-    """Return a comment in ASCII, as old compilers want it, that does not go on in the next line."""
-    return line.encode("ascii", "backslashreplace").decode("ascii").rstrip("\\ ")
-
-
 def _literal(number: float) -> str:
     """Return a number with the digits of single precision, and a point, as all these languages read it."""
     text = f"{number:.9g}"
@@ -117,9 +114,11 @@ def _closed_form(table: Table) -> tuple[str, dict[str, Any], Channels, tuple[str
 
     material = table.source
     if table.metadata.measured is not None:
-        raise CannotHoldError(f"{table.name}: it is measured, and source code is of models; `brdfdb fit` fits one")
+        raise CannotHoldError(
+            f"{table.name}: the table is measured, and source code needs a model; `brdfdb fit` fits one"
+        )
     if not isinstance(material, Material):
-        raise CannotHoldError(f"{table.name}: the table does not say of which model it is, so there is no source of it")
+        raise CannotHoldError(f"{table.name}: the table does not name its model, so no source code can be written")
     several = has_spectrum(table)
     model, changes = FITS.get(material.model, (material.model, {}))
     indexed = MODELS[model].spectral

@@ -101,7 +101,7 @@ class Comparison:
         self.channels = channels_of(table) if channels is None else channels
         self.wi, self.wr, self._weight, lobe = _drawn(table)
         self._above = self._weight > 0.0
-        # of a draw over the hemisphere all pairs count alike; one in the lobe is weighted by the cosine of the viewer
+        # pairs drawn over the hemisphere have equal weights; those in the lobe are weighted by the cosine of the viewer
         self._share = np.where(self._above, 1.0, 0.0)
         if lobe:
             self._share[PAIRS:] = np.maximum(self.wr[PAIRS:, 2], 0.0)
@@ -150,7 +150,8 @@ def _drawn(table: Table) -> tuple[Floats, Floats, Floats, bool]:
     """
     rng = np.random.default_rng(SEED)
     count = 2 * PAIRS
-    wi, over = _cosine_weighted(rng, count), _cosine_weighted(rng, count)
+    wi = _cosine_weighted(rng, count)
+    over = _cosine_weighted(rng, count)
     at = table.wavelength_nm
     in_turn = None if at is None else at[np.arange(count) % at.size]
     lobe = None if table.source is None else table.source.lobe(wi[:, 2], in_turn)
@@ -160,7 +161,8 @@ def _drawn(table: Table) -> tuple[Floats, Floats, Floats, bool]:
         lobe._replace(share=np.ones(1), alpha_x=width * lobe.alpha_x, alpha_y=width * lobe.alpha_y, visible=False)
         for width in WIDTHS
     ]
-    u, angle = 1.0 - rng.random(count), rng.uniform(0.0, 2.0 * np.pi, count)
+    u = 1.0 - rng.random(count)
+    angle = rng.uniform(0.0, 2.0 * np.pi, count)
     wr = over
     for part, drawn in enumerate(lobes):  # the second half, in equal parts
         start = PAIRS + part * PAIRS // len(lobes)
@@ -229,13 +231,13 @@ class FileStatement(BaseModel):
         limits = np.broadcast_to(self.places.limits, (places.ROWS, floor.size))
         if not np.all(on_nodes):
             if self.between is None:
-                raise ParameterError("error", "the file states none between its wavelengths")
+                raise ParameterError("error", "the file states no error between its wavelengths")
             limits = np.where(on_nodes, limits, np.maximum(limits, self.between.limits))
         return stated(limits, floor, directions, brdf)
 
     @classmethod
     def read(cls, record: Mapping[str, Any], name: str) -> FileStatement:
-        """Return the statement in the record of a file; ParameterError if there is none."""
+        """Return the statement in the record of a file; ParameterError if the record has no statement."""
         try:
             return cls.model_validate(record.get("error"))
         except ValidationError:
@@ -277,7 +279,8 @@ def of_file(table: Table, channels: Channels, floor: Floats, evaluate: Evaluate)
     drawn = error_measurement.draw(table.source, table.wavelength_nm, OF_A_BAND, _SEED).above_the_horizon()
     pairs = places.draw(IN_PLACES, _SEED)
     wi, wr = np.concatenate([drawn.wi, pairs.wi]), np.concatenate([drawn.wr, pairs.wr])
-    own, inside = len(drawn.wi), ~places.anywhere(drawn.wi, drawn.wr)
+    own = len(drawn.wi)
+    inside = ~places.anywhere(drawn.wi, drawn.wr)
     file = np.asarray(evaluate(wi, wr))
 
     def rows(known: Floats, errors: Floats, of_file: Floats, least: Floats) -> Rows:
@@ -293,7 +296,8 @@ def of_file(table: Table, channels: Channels, floor: Floats, evaluate: Evaluate)
 
     at = channels.wavelength_nm
     brdf, errors = table.lookup_vectors_with_error(wi, wr, at)
-    known, wrong = channels.of_spectra(brdf), channels.of_spectra(errors, absolute=True)
+    known = channels.of_spectra(brdf)
+    wrong = channels.of_spectra(errors, absolute=True)
     column = table.columns_of(at)
     typical = (error.of_all_bands(column) + _uncertainty(table)) * np.maximum(brdf, error.floors[column])
     off = np.abs(file - known) + channels.of_spectra(typical, absolute=True)

@@ -1,4 +1,4 @@
-"""Writing of files of others: all files of an export are there whole, or none is."""
+"""Writing of files: an export writes all its files completely, or none."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Written:
     Attributes
     ----------
     paths : tuple of Path
-        The file itself first, then those that stand beside it. A format may write a directory.
+        The file itself, then the files next to it. A format may write a directory.
     error : FileError or None
         Error of the values in the file against those of the table; None of pictures and source code.
     tolerance : float or None [1]
@@ -98,17 +98,17 @@ def whole(*paths: str | os.PathLike[str]) -> Iterator[tuple[Path, ...]]:
 
 
 def _check_zarr_group(path: Path) -> None:
-    """Raise WriteError if a directory is no zarr group, or holds a file that does not belong to one."""
+    """Raise WriteError if a directory is not a zarr group, or contains files that are not part of it."""
     if not (path / "zarr.json").exists():
-        raise WriteError(f"cannot write {path}: it is a directory that is no zarr group")
+        raise WriteError(f"cannot write {path}: it is a directory, but not a zarr group")
     for part in path.rglob("*"):
         of_group = part.is_dir() or _OF_ZARR.fullmatch(part.relative_to(path).as_posix())
         if part.is_symlink() or not of_group:
-            raise WriteError(f"cannot write {path}: it holds {part.name}, which is no part of a zarr group")
+            raise WriteError(f"cannot write {path}: it contains {part.name}, which is not part of a zarr group")
 
 
 def _exchange(half: Path, path: Path) -> None:
-    """Replace what stands at a path by a directory; a failure leaves it as it was."""
+    """Replace a directory by another one; after a failure the old directory is unchanged."""
     aside = half.with_name(f"{half.name}.old")
     os.replace(path, aside)
     try:

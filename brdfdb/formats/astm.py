@@ -1,9 +1,9 @@
 """ASTM E1392: f_r at pairs of directions as rows of text, in the dialect of Cornell's measurements.
 
 A row holds the polar angles and azimuths of light and viewer, in radians, and f_r in 1/sr at each wavelength. The rows
-form a grid whose nodes are chosen for the tolerance. libbsdf interpolates in straight lines over each angle.
+form a grid whose nodes are chosen for the tolerance. libbsdf interpolates linearly over each angle.
 
-Anisotropic tables and all wavelengths fit. The specular part does not.
+A file can hold anisotropic tables and all wavelengths, but not the specular part.
 """
 
 from __future__ import annotations
@@ -112,7 +112,8 @@ def read(path: str | os.PathLike[str]) -> FileTable | Samples:
     anisotropic = nodes[1].size > 1
     one_side = not anisotropic and not np.any((nodes[3] > np.pi + 1e-6) & (nodes[3] < 2.0 * np.pi - 1e-6))
     if not anisotropic:
-        nodes, values = (nodes[0], *nodes[2:]), values[:, 0]
+        nodes = (nodes[0], *nodes[2:])
+        values = values[:, 0]
     if one_side:
         nodes, values = (*nodes[:2], nodes[2][nodes[2] < 4.0]), values[:, :, nodes[2] < 4.0]
     grid = AngularGrid(Spherical(anisotropic, one_side), nodes, values)
@@ -121,7 +122,8 @@ def read(path: str | os.PathLike[str]) -> FileTable | Samples:
 
 def _write_rows(stream: Sink, grid: AngularGrid, names: tuple[str, ...]) -> None:
     """Write the number of rows, the names of the columns, and the rows."""
-    nodes, values = list(grid.nodes), grid.values
+    nodes = list(grid.nodes)
+    values = grid.values
     if len(nodes) == 3:
         nodes = [nodes[0], np.zeros(1), nodes[1], np.append(nodes[2], 2.0 * np.pi)]
         values = np.concatenate([values, values[:, :, :1]], axis=2)[:, np.newaxis]
@@ -147,7 +149,7 @@ def _parsed(path: Path) -> tuple[list[str], tuple[str, ...], NDArray[np.float64]
             break
         comments.append(rest)
     if columns[:4] != _ANGLES or len(columns) < 5:
-        raise FileFormatError(f"{path}: it has no line VARS {','.join(_ANGLES)} with channels behind it")
+        raise FileFormatError(f"{path}: it has no line VARS {','.join(_ANGLES)} that ends with names of channels")
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error")  # an empty file
@@ -155,15 +157,17 @@ def _parsed(path: Path) -> tuple[list[str], tuple[str, ...], NDArray[np.float64]
     except FileFormatError:
         raise
     except (ValueError, UserWarning) as error:
-        raise FileFormatError(f"{path}: a row has no {len(columns)} numbers, or there is none ({error})") from None
+        raise FileFormatError(
+            f"{path}: a row does not have {len(columns)} numbers, or there are no rows ({error})"
+        ) from None
     if rows.shape[1] != len(columns) or not np.all(np.isfinite(rows)):
-        raise FileFormatError(f"{path}: a row has no {len(columns)} finite numbers")
+        raise FileFormatError(f"{path}: a row does not have {len(columns)} finite numbers")
     rows[:, :4] = np.where(rows[:, :4] < 0.0, rows[:, :4] + 2.0 * np.pi, rows[:, :4])
     return comments, columns[4:], rows
 
 
 def _wavelengths(names: tuple[str, ...]) -> NDArray[np.float64] | None:
-    """Return the wavelengths [nm] of channels such as 550nm; None if a channel is none."""
+    """Return the wavelengths [nm] of channels such as 550nm; None if a channel is not a wavelength."""
     try:
         return np.array([float(name.removesuffix("nm")) for name in names]) if names[0].endswith("nm") else None
     except ValueError:

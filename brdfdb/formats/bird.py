@@ -1,11 +1,11 @@
-"""BiRD: the universal BRDF format 1.0 of the project BiRD, JSON with one entry a direction and wavelength.
+"""BiRD: the universal BRDF format 1.0 of the project BiRD, JSON with one entry for each direction and wavelength.
 
 The lists hold the polar angles and azimuths of light and viewer, in degrees, f_r in 1/sr and the wavelengths in nm. The
-directions form a grid. The format does not say how to interpolate. The stated error is that of straight lines along all
-angles at once.
+directions form a grid. The format does not say how to interpolate. The stated error is that of linear interpolation
+along all angles at once.
 
-Anisotropic tables and all wavelengths fit. The specular part does not. A file has about 40 MB at most: a table that
-needs more is written with the error it has.
+A file can hold anisotropic tables and all wavelengths, but not the specular part. A file has about 40 MB at most: a
+table that needs more is written with a larger error.
 """
 
 from __future__ import annotations
@@ -89,7 +89,8 @@ def write(
         last_deg=_LAST_DEG,
     )
     known = dense_record(table, dense, verdict, specular=False)
-    nodes, values = list(dense.grid.axes.values()), dense.values
+    nodes = list(dense.grid.axes.values())
+    values = dense.values
     for axis, name in enumerate(dense.grid.names):  # 360 degrees are 0 again, and not allowed
         if nodes[axis][-1] == 360.0 and name.startswith("phi"):
             nodes[axis], values = nodes[axis][:-1], np.delete(values, -1, axis)
@@ -117,17 +118,20 @@ def read(path: str | os.PathLike[str]) -> FileTable | Samples:
     """Return f_r of a universal BRDF file: interpolated linearly on a grid of light and viewer, else its samples."""
     path = path_of(path)
     document = parsed(path)
-    data, metadata = document.get("data"), document.get("metadata")
+    data = document.get("data")
+    metadata = document.get("metadata")
     lists = _lists(path, data if isinstance(data, dict) else {})
     known = metadata.get("adhoc_section", {}) if isinstance(metadata, dict) else {}
-    values, at = lists.pop("BRDF")[:, np.newaxis], lists.pop("wavelength_i", None)
+    values = lists.pop("BRDF")[:, np.newaxis]
+    at = lists.pop("wavelength_i", None)
     uncertainty = lists["uBRDF"][:, np.newaxis] if "uBRDF" in lists else None
     lists.pop("uBRDF", None)
     if at is not None:
         nodes = np.unique(at)
         if len(values) % nodes.size or not np.array_equal(at, np.tile(nodes, len(values) // nodes.size)):
-            raise FileFormatError(f"{path}: not each direction has the same wavelengths, in order")
-        values, at = values.reshape(-1, nodes.size), nodes
+            raise FileFormatError(f"{path}: the directions do not all have the same wavelengths in the same order")
+        values = values.reshape(-1, nodes.size)
+        at = nodes
         uncertainty = None if uncertainty is None else uncertainty.reshape(values.shape)
         lists = {name: angle[:: nodes.size] for name, angle in lists.items()}
     known = known if isinstance(known, dict) else {}
@@ -158,7 +162,7 @@ def _lists(path: Path, data: dict[str, Any]) -> dict[str, NDArray[np.float64]]:
         lists.setdefault("wavelength_i", lists["wavelength_r"])
         del lists["wavelength_r"]
     if len({values.size for values in lists.values()}) != 1:
-        raise FileFormatError(f"{path}: {', '.join(lists)} are not of the same length")
+        raise FileFormatError(f"{path}: the lists {', '.join(lists)} differ in length")
     return lists
 
 

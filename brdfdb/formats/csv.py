@@ -1,11 +1,11 @@
-"""CSV: f_r on a plain grid of angles, a row a pair of directions and a column a wavelength.
+"""CSV: f_r on a plain grid of angles, one row for each pair of directions, one column for each wavelength.
 
 The columns are the angles in degrees, then f_r in 1/sr, with five significant digits. Lines that begin with # hold the
 record. The axes are polar angles and azimuths of light and viewer, or angles of the half and difference vectors
-(``--axes``). The cosine is not included. Readers interpolate in straight lines along all axes at once.
+(``--axes``). The cosine is not included. Readers interpolate linearly along all axes at once.
 
-Anisotropic tables and all wavelengths fit. The specular part does not. A file has about 40 MB at most: a table that
-needs more is written with the error it has.
+A file can hold anisotropic tables and all wavelengths, but not the specular part. A file has about 40 MB at most: a
+table that needs more is written with a larger error.
 """
 
 from __future__ import annotations
@@ -14,14 +14,14 @@ import itertools
 import os
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.errors import FileFormatError
 from brdfdb.formats import text
-from brdfdb.formats._dense_files import OPTIONS, dense_record, reading_of_rows
+from brdfdb.formats._dense_files import OPTIONS, DenseOptions, dense_record, reading_of_rows
 from brdfdb.formats._input import lines_of
 from brdfdb.formats._record import lines, of_lines, specular_remark
 from brdfdb.formats._written import Written, whole
@@ -43,18 +43,12 @@ _DIGITS = 5
 _LEAST_NM = 10.0  # of wavelengths in names without a unit
 _ANGLE_BYTES, _VALUE_BYTES, _MOST_BYTES = 8, 10, 40_000_000  # of a number in a row, and of a file, about
 _ANGLES = ("theta_i", "phi_i", "theta_r", "phi_r", "delta_phi", "theta_h", "phi_h", "theta_d", "phi_d")
-_ENOUGH = {"theta_i", "theta_r"}  # of a text of others
+_ENOUGH = {"theta_i", "theta_r"}  # angles by which a text of another program is recognised
 _COLUMNS = "columns: angles [degree], then f_r [1/sr], one column a wavelength; the last angle changes fastest"
 
 
 def write(
-    table: Table,
-    path: str | os.PathLike[str],
-    *,
-    tolerance: float = 0.02,
-    axes: str = "smallest",
-    resolution: float = 0.0,
-    verdict: str | None = None,
+    table: Table, path: str | os.PathLike[str], *, verdict: str | None = None, **options: Unpack[DenseOptions]
 ) -> Written:
     """Write f_r on a plain grid of angles as text with commas.
 
@@ -67,7 +61,7 @@ def write(
     count = 1 if table.wavelength_nm is None else table.wavelength_nm.size
     row_bytes = _ANGLE_BYTES * (4 if table.anisotropic else 3) + _VALUE_BYTES * count
     most = _MOST_BYTES // row_bytes * count
-    dense = dense_table(table, tolerance, axes=axes, resolution=resolution, most_values=most, digits=_DIGITS)
+    dense = dense_table(table, **options, most_values=most, digits=_DIGITS)
     known = dense_record(table, dense, verdict, specular=False)
     names = dense.channels.names if dense.channels.wavelength_nm is not None else ("brdf",)
     header = [*(f"# {line}" for line in (*lines(known), _COLUMNS)), ",".join((*dense.grid.names, *names))]
@@ -109,7 +103,8 @@ def read(path: str | os.PathLike[str]) -> FileTable | Samples:
     path = path_of(path)
     comments: list[str] = []
     numbered = lines_of(path)
-    first, line = 0, ""
+    first = 0
+    line = ""
     for number, line in numbered:
         if not line.startswith("#"):
             first = number
@@ -128,9 +123,9 @@ def read(path: str | os.PathLike[str]) -> FileTable | Samples:
     at = _wavelengths(names[len(angles) :])
     short = [name for name, nm in zip(names[len(angles) :], () if at is None else at, strict=False) if nm < _LEAST_NM]
     if bare := [name for name in short if not name.endswith("m")]:
-        raise FileFormatError(f"{path}: line {first}: {bare[0]} is no wavelength in nm; write it as 550nm or 0.55um")
+        raise FileFormatError(f"{path}: line {first}: {bare[0]} is not a wavelength in nm; write it as 550nm or 0.55um")
     if at is not None and np.unique(at).size != at.size:
-        raise FileFormatError(f"{path}: line {first}: a wavelength stands twice")
+        raise FileFormatError(f"{path}: line {first}: a wavelength is listed twice")
     columns = {name: numbers[:, index] for index, name in enumerate(angles)}
     values = numbers[:, len(angles) :]
     reading = reading_of_rows(path, columns, values, at, known)
@@ -145,7 +140,7 @@ def _numbers(
     """Return the rows below the names of columns in line `first`, shape (N, columns)."""
     start = next(((number, line) for number, line in numbered if line.strip() and not line.startswith("#")), None)
     if start is None:
-        raise FileFormatError(f"{path}: line {first} has the names of columns, and no row follows")
+        raise FileFormatError(f"{path}: line {first} has the names of columns, but no row follows")
     rows = itertools.chain([start], numbered)
     try:
         numbers = np.loadtxt((line for _, line in rows), delimiter=",", ndmin=2, dtype=np.float64)
@@ -156,7 +151,7 @@ def _numbers(
         raise FileFormatError(f"{path}: {wrong}") from None
     if numbers.shape[1] != len(names):
         raise FileFormatError(
-            f"{path}: line {start[0]} has {numbers.shape[1]} fields, and there are {len(names)} names"
+            f"{path}: line {start[0]} has {numbers.shape[1]} fields, but there are {len(names)} names of columns"
         )
     return numbers
 
@@ -166,7 +161,7 @@ def _wrong_row(names: tuple[str, ...], rows: Iterator[tuple[int, str]]) -> str:
     for number, line in rows:
         fields = [field.strip() for field in line.partition("#")[0].split(",")]
         if len(fields) != len(names) and any(fields):
-            return f"line {number} has {len(fields)} fields, and there are {len(names)} names"
+            return f"line {number} has {len(fields)} fields, but there are {len(names)} names of columns"
         for field, name in zip(fields, names, strict=False):
             if number_of(field or "empty") is None and any(fields):
                 return f"line {number}, field {name}: {field[:40]!r} is not a number"

@@ -1,8 +1,8 @@
 """Eradiate: tables of its BSDF ``mqdiffuse``, measured and almost diffuse, as netCDF.
 
 f_r in 1/sr is on a regular grid: the cosines of light and viewer, and the azimuth between them. Eradiate repeats the
-first azimuth behind the last one, and its kernel interpolates in straight lines along all three. Narrow lobes need more
-nodes than a grid can have. A grid that is searched has 193 cosines and 256 azimuths at most, 38 MB.
+first azimuth behind the last one, and its kernel interpolates linearly along all three. Narrow lobes need more nodes
+than a grid can have. A grid that is searched has 193 cosines and 256 azimuths at most, 38 MB.
 
 The file holds one wavelength (``--wavelength``) of an isotropic table. Anisotropic tables are refused. The specular
 part is left out.
@@ -52,7 +52,7 @@ options = (
     FormatOption(
         "nodes",
         0,
-        "number of cosines of light and viewer; 0: as few as the tolerance takes",
+        "number of nodes in the cosines of light and viewer; 0 takes the fewest within the tolerance",
         low=3.0,
         high=513.0,
         most_served=129.0,
@@ -89,11 +89,13 @@ def write(
 
     import_extra("scipy.io")
     if table.anisotropic:
-        raise CannotHoldError(f"{table.name}: is anisotropic, and mqdiffuse holds isotropic tables only")
+        raise CannotHoldError(f"{table.name}: the table is anisotropic, and mqdiffuse holds only isotropic tables")
     channels = at_wavelength(table, wavelength)
     comparison = Comparison(table, channels)
     shape = (nodes, nodes + nodes % 2, nodes) if nodes else _smallest(table, comparison, tolerance)
-    values = _values(table, channels, shape)
+    azimuths_and_lights = np.ix_(np.arange(shape[1]), np.arange(shape[2]))
+    rows = [_node(table, channels, shape, np.array([row]), *azimuths_and_lights)[..., 0] for row in range(shape[0])]
+    values = np.stack(rows).astype(np.float32)
     error = comparison.error_of(functools.partial(_evaluated, values))
     remarks = (*specular_remark(table), *channels.remarks)
     wanted = None if nodes else tolerance
@@ -169,13 +171,6 @@ def _node(table: Table, channels: Channels, shape: tuple[int, int, int], viewer:
     return channels.values(table, wi, wr)
 
 
-def _values(table: Table, channels: Channels, shape: tuple[int, int, int]) -> NDArray[np.float32]:
-    """Return f_r [1/sr] at all nodes of a grid."""
-    nodes = np.arange(shape[1]), np.arange(shape[2])
-    rows = [_node(table, channels, shape, np.array([row]), *np.ix_(*nodes))[..., 0] for row in range(shape[0])]
-    return np.stack(rows).astype(np.float32)
-
-
 def _interpolated(
     shape: tuple[int, int, int], node: Callable[[Any, Any, Any], Floats], wi: Floats, wr: Floats
 ) -> Floats:
@@ -227,10 +222,10 @@ def _checked(opened: xr.Dataset, path: Path) -> NDArray[Any]:
         raise FileFormatError(f"{path}: it has no variable brdf over {', '.join(_DIMS)}")
     brdf = opened["brdf"].transpose(*_DIMS)
     if brdf.size > _MOST_VALUES or min(brdf.shape) < 2:
-        raise FileFormatError(f"{path}: brdf has the shape {brdf.shape}; it takes at least two nodes an axis")
+        raise FileFormatError(f"{path}: brdf has the shape {brdf.shape}; each axis needs at least two nodes")
     for name, (_, expected, _) in _coordinates(brdf.shape).items():
         if name not in opened.coords or not np.allclose(opened[name], expected):
-            raise FileFormatError(f"{path}: the coordinates {name} are not in the equal steps of mqdiffuse")
+            raise FileFormatError(f"{path}: the coordinates {name} do not have the equal steps that mqdiffuse needs")
     values = brdf.values
     if values.dtype.kind not in "iuf" or not np.all(np.isfinite(values)):
         raise FileFormatError(f"{path}: brdf holds values that are not finite numbers")

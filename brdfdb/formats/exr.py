@@ -1,11 +1,11 @@
-"""OpenEXR: slices of a table as images, with one channel a wavelength, and its lit sphere.
+"""OpenEXR: slices of a table as images, with one channel for each wavelength, and its lit sphere.
 
 A pixel is f_r in 1/sr at one pair of directions. A slice is a lobe for one light, a plane of incidence, or the plane of
 half and difference vectors. Spectral tables have one channel for each wavelength, and linear sRGB for viewers. A file
 is one slice, and not the whole table; no error is stated.
 
-Anisotropic tables and all wavelengths fit, slice by slice. The specular part is not in the picture. The header states
-it.
+Slices of anisotropic tables and all wavelengths can be written. The specular part is not in the picture. The header
+states it.
 """
 
 from __future__ import annotations
@@ -120,7 +120,7 @@ def _write(path: Path, header: dict[str, Any], pixels: dict[str, NDArray[Any]]) 
     with whole(path) as (temporary,):
         try:
             OpenEXR.File(begin | header, channels).write(str(temporary))
-        except RuntimeError as error:  # what OpenEXR raises for a missing directory and for a full disk alike
+        except RuntimeError as error:  # raised by OpenEXR both for a missing directory and for a full disk
             raise WriteError(f"cannot write {path}: {error}") from error
     return Written((path,))
 

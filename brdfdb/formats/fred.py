@@ -3,7 +3,7 @@
 The layout is that of files that laboratories publish for FRED. Each direction of the light has a block. Its first line
 has two angles in degrees, and the lines below it have two angles and f_r in 1/sr for each viewer. The azimuth of a
 viewer counts from the half plane of the mirror direction. FRED does not publish how it interpolates. This reader
-interpolates in straight lines over each angle.
+interpolates linearly over each angle.
 
 The file holds one wavelength (``--wavelength``) of an isotropic table. Anisotropic tables are refused. The specular
 part is left out.
@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 
 suffix = ".fred.txt"
 media_type = "text/plain"
-summary = "tabulated scatter of FRED at one wavelength, isotropic tables"
+summary = "tabulated scatter of FRED, for isotropic tables at one wavelength"
 tools = "FRED (Photon Engineering)"
 kinds = ()
 options = (
@@ -64,14 +64,16 @@ def write(
     size: float = 16.0,
     verdict: str | None = None,
 ) -> Written:
-    """Write an isotropic table as tabulated scatter of FRED, and its record as JSON beside it.
+    """Write an isotropic table as tabulated scatter of FRED, and its record as JSON next to it.
 
     Anisotropic tables are refused: what the azimuth of the light counts from is not published.
     """
     from brdfdb.formats._stated_error import Comparison
 
     if table.anisotropic:
-        raise CannotHoldError(f"{table.name}: is anisotropic, and this format is written for isotropic tables only")
+        raise CannotHoldError(
+            f"{table.name}: the table is anisotropic, and only isotropic tables are written in this format"
+        )
     comparison = Comparison(table, at_wavelength(table, wavelength))
     path = path_of(path)
     remarks = (*specular_remark(table), *comparison.channels.remarks)
@@ -107,8 +109,9 @@ def read(path: str | os.PathLike[str]) -> FileTable | Samples:
     rows = _rows(path)
     known = record_beside(path)
     if known.get("rows", len(rows)) != len(rows):
-        raise FileFormatError(f"{path}: its record says {known['rows']!r:.20} viewers, and it has {len(rows)}")
-    name, nm = str(known.get("name") or path.name.partition(".")[0]), known.get("wavelength_nm")
+        raise FileFormatError(f"{path}: its record states {known['rows']!r:.20} viewers, but the file has {len(rows)}")
+    name = str(known.get("name") or path.name.partition(".")[0])
+    nm = known.get("wavelength_nm")
     at = np.array([float(nm)]) if isinstance(nm, int | float) else None
     channels = names_of(at)
     doubt_end(path, rows[:, :2], known)
@@ -155,26 +158,29 @@ def _rows(path: Path) -> NDArray[np.float64]:
     try:
         scale = float(second.partition("scale=")[2].split()[0])
     except (ValueError, IndexError):
-        raise FileFormatError(f"{path}: line 2, field scale: it is no number") from None
+        raise FileFormatError(f"{path}: line 2, field scale: it is not a number") from None
     for number, text in lines:
         try:
             line = [float(word) for word in text.split()]
         except ValueError as error:
-            raise FileFormatError(f"{path}: line {number} holds what is no number ({error})") from None
+            raise FileFormatError(f"{path}: line {number} has text that is not a number ({error})") from None
         if not np.all(np.isfinite(line)):
-            raise FileFormatError(f"{path}: line {number} holds a number that is not finite")
+            raise FileFormatError(f"{path}: line {number} has a number that is not finite")
         if len(line) == 2:
             if bare:
                 raise FileFormatError(f"{path}: line {bare} is a light without viewers")
-            light, bare = line, number
+            light = line
+            bare = number
         elif len(line) == 3 and light is not None:
             numbers.extend([*light, *line[:2], scale * line[2]])
             bare = 0
         elif line:
             count = counted(len(line), "number")
-            raise FileFormatError(f"{path}: line {number} has {count}; a light has two, and a viewer below it three")
+            raise FileFormatError(
+                f"{path}: line {number} has {count}; a light has two, and each viewer below it has three"
+            )
     if not numbers:
-        raise FileFormatError(f"{path}: it holds no values")
+        raise FileFormatError(f"{path}: it has no values")
     if bare:
         raise FileFormatError(f"{path}: line {bare} is a light without viewers: the file was cut")
     if has_open_end(path):
@@ -184,7 +190,7 @@ def _rows(path: Path) -> NDArray[np.float64]:
 
 
 def _grid(rows: NDArray[np.float64]) -> AngularGrid | None:
-    """Return the grid of rows; None if they are none, or the azimuth of the light varies."""
+    """Return the grid of rows; None if the rows form no grid, or the azimuth of the light varies."""
     one_side = rows[(rows[:, 2] == 0.0) | (rows[:, 3] <= 180.0)]
     if np.any(rows[:, 1] != 0.0):
         return None

@@ -3,8 +3,8 @@
 A file is one direction of the light. Its channels are counts as 32-bit floats, an array each exposure: ``sample.0``,
 ``standard.0``, ``background.0``, and the same with 1, 2, ... for shorter exposures. The attribute
 ``brdf:gonioreflectometer`` is JSON: ``theta_i_deg`` and ``phi_i_deg`` of the light, ``name``, ``provenance``, and
-``settings``, the attributes of `brdfdb.measurements.gonioreflectometer.Gonioreflectometer`. A measured picture needs
-nothing else. Reading gives samples; the tables of a store are not written in this form.
+``settings``, the attributes of `brdfdb.measurements.gonioreflectometer.Gonioreflectometer`. A measured picture needs no
+other data. Reading gives samples; the tables of a store are not written in this form.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ def write_picture(picture: CameraPicture, path: str | os.PathLike[str]) -> None:
     with whole(path) as (temporary,):
         try:
             OpenEXR.File(header, channels).write(str(temporary))
-        except RuntimeError as error:  # OpenEXR's word for a missing directory and for a full disk alike
+        except RuntimeError as error:  # raised by OpenEXR both for a missing directory and for a full disk
             raise WriteError(f"cannot write {path}: {error}") from error
 
 

@@ -1,15 +1,15 @@
 """KAIST: Mueller matrices on half and difference vectors, of which f_r is read (.pbsdf, Baek et al. 2020).
 
 The file is a tensor file of RGL's container. It holds M in 1/sr, without the cosine, over phi_d, theta_d, theta_h and
-wavelength. Readers interpolate in straight lines along all four.
+wavelength. Readers interpolate linearly along all four.
 
 Bases are those of the plane of light and viewer, x along its normal for both, y = z x x with z the direction of travel.
 Q > 0 is s-polarised, as here. U > 0 is linear along x + y, which is s - p: U and V of the file have the opposite sign.
 Both signs together leave the matrix between bases of the plane as it is.
 
-Polarised isotropic tables fit, at no more than five wavelengths in whole nanometres, because Mitsuba reads five. The
-specular part is left out. Of files that are read, f_r of unpolarised light is the first element of the matrix. What was
-not measured is nan.
+A file can hold polarised isotropic tables, at no more than five wavelengths in whole nanometres, because Mitsuba reads
+five. The specular part is left out. A reader of files gets f_r of unpolarised light, the first element of the matrix;
+values that were not measured are nan.
 """
 
 from __future__ import annotations
@@ -63,7 +63,8 @@ _ELEMENTS = ((0, 0), (0, 1), (1, 1), (2, 2), (2, 3))  # that are stored; [1, 0],
 _BYTES = 16 * 4  # of a matrix
 _COPIES = 4  # of phi_d, of which symmetry leaves a quarter
 _SPLIT = 0.5  # share of the tolerance up to which a cell of theta_d may change the elements of a facet
-_FIRST_DEG, _LEAST_DEG = np.linspace(0.0, 90.0, 10), 0.1
+_FIRST_DEG = np.linspace(0.0, 90.0, 10)
+_LEAST_DEG = 0.1
 
 
 def write(
@@ -80,7 +81,7 @@ def write(
     65535 nm.
     """
     if table.facets is None:
-        raise CannotHoldError(f"{table.name}: is unpolarised, and the format holds Mueller matrices")
+        raise CannotHoldError(f"{table.name}: the table is unpolarised, and the format holds Mueller matrices")
     channels = _channels(table)
     made = mueller_grid(table, channels, tolerance, 1e6 * megabytes - _BESIDE)
     remarks = (*specular_remark(table), *channels.remarks)
@@ -148,10 +149,10 @@ def read(path: str | os.PathLike[str]) -> Samples:
     shape = (*(axis.size for axis in axes), at.size, 4, 4)
     matrix = tensors["M"]
     if matrix.shape != shape or matrix.dtype != np.float32:
-        raise FileFormatError(f"{path}: field 'M' is {matrix.dtype} of shape {matrix.shape}; its axes say {shape}")
+        raise FileFormatError(f"{path}: field 'M' is {matrix.dtype} of shape {matrix.shape}; its axes give {shape}")
     for name, axis in zip((*_AXES, "wvls"), (*axes, at), strict=True):
         if not axis.size or not np.all(np.isfinite(axis)) or np.any(np.diff(axis) <= 0.0):
-            raise FileFormatError(f"{path}: field {name!r} does not ascend")
+            raise FileFormatError(f"{path}: field {name!r} does not increase")
     values = np.ascontiguousarray(matrix[..., 0, 0].transpose(2, 1, 0, 3)).astype(np.float64)
     values[np.isinf(values)] = np.nan
     description = tensors.get("description")

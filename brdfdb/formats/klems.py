@@ -3,8 +3,8 @@
 The hemisphere is cut into 145, 77 or 41 patches. A number is the average of f_r in 1/sr over a patch of the light and a
 patch of the viewer. Readers do not interpolate. The patches are fixed, and lobes narrower than a patch become wide.
 
-Anisotropic tables fit. The file has one value, CIE Y. With ``--colour`` it has CIE X and Z as well, which Radiance
-reads. The specular part is left out.
+A file can hold anisotropic tables. The file has one value, CIE Y. With ``--colour`` it has CIE X and Z as well, which
+Radiance reads. The specular part is left out.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ class Basis:
 
     @property
     def middles(self) -> Floats:
-        """Unit vectors (patches, 3) at the middles of the patches; of a patch that is a whole ring, at its axis."""
+        """Unit vectors (patches, 3) at the middles of the patches; for a patch that is a complete ring, at its axis."""
         bounds = np.radians(self.bounds_deg)
         theta = np.where(np.array(self.counts) == 1, bounds[:-1], 0.5 * (bounds[:-1] + bounds[1:]))[self.rings]
         counts = np.array(self.counts)
@@ -120,7 +120,7 @@ options = (
         FormatOption(
             f"emissivity_{side}",
             0.0,
-            f"emissivity of the {side} [1]; 0: that of the table if it covers 5 to 40 um, or else 0.9, as assumed",
+            f"emissivity of the {side} [1]; 0 takes that of the table if it covers 5 to 40 um, and 0.9 otherwise",
             low=0.001,
             high=1.0,
         )
@@ -128,7 +128,9 @@ options = (
     ),
 )
 
-SOLAR, CIE_X, CIE_Z = "Solar", "CIE-X", "CIE-Z"
+SOLAR = "Solar"
+CIE_X = "CIE-X"
+CIE_Z = "CIE-Z"
 _ONE_SHEET = "both sides reflect alike and nothing is transmitted; thickness and conductivity are placeholders"
 _SOLAR = "the block of solar light repeats that of visible light"
 _HOLDS = (
@@ -152,7 +154,8 @@ _AROUND = 2  # halvings of the patch that is a whole ring
 _AT_LEAST = 4  # halvings at the mirror direction
 _NEXT = 1.3  # radii of a cell from its middle to the mirror direction, at which its nodes may miss the lobe
 # A cell is divided if its nodes differ by more than a share of their average, and by more than a share of the albedo
-_STEEP, _NEGLIGIBLE = 0.15, 3e-4
+_STEEP = 0.15
+_NEGLIGIBLE = 3e-4
 
 
 def write(
@@ -176,7 +179,8 @@ def write(
     from brdfdb.formats._record import record, specular_remark
     from brdfdb.formats._stated_error import Comparison
 
-    basis, channels = BASES[kind], channels_of(table, "auto" if colour else "grey")
+    basis = BASES[kind]
+    channels = channels_of(table, "auto" if colour else "grey")
 
     def brdf(wi: Floats, wr: Floats) -> Floats:
         return np.maximum(channels.values(table, wi, wr), 0.0)
@@ -203,7 +207,8 @@ def _completed(table: Table, emissivity: dict[str, float]) -> tuple[str, ...]:
     sides = [side for side, value in emissivity.items() if value == 0.0]
     if not sides:
         return ()
-    of_table, at = _ASSUMED, table.wavelength_nm
+    of_table = _ASSUMED
+    at = table.wavelength_nm
     reason = f"is assumed: {_EFFECT}"
     if at is not None and at[0] <= 1e3 * _INFRARED_UM[0] and at[-1] >= 1e3 * _INFRARED_UM[1]:
         from brdfdb.tables.albedo import reflected
@@ -343,9 +348,7 @@ def _matrix(path: str | os.PathLike[str], file: BsdfFile, name: str, viewers: Ba
         raise FileFormatError(f"{path}: block {name}: {error}") from None
     if numbers.size != len(viewers) * len(lights) or not np.all(np.isfinite(numbers)):
         wanted = f"{len(viewers)} x {len(lights)}"
-        raise FileFormatError(
-            f"{path}: block {name} has {numbers.size} numbers instead of {wanted}, all of them finite"
-        )
+        raise FileFormatError(f"{path}: block {name} has {numbers.size} numbers instead of {wanted} finite numbers")
     if file.structure.lower() == "rows":
         return numbers.reshape(len(lights), len(viewers)).T
     return numbers.reshape(len(viewers), len(lights))
@@ -354,7 +357,8 @@ def _matrix(path: str | os.PathLike[str], file: BsdfFile, name: str, viewers: Ba
 def _defined(path: str | os.PathLike[str], element: ElementTree.Element) -> Basis:
     """Return a basis that a file defines."""
     name = (element.findtext("{*}AngleBasisName") or "").strip()
-    bounds, counts = [0.0], []
+    bounds = [0.0]
+    counts = []
     try:
         for ring in element.findall("{*}AngleBasisBlock"):
             bounds.append(float(ring.findtext("{*}ThetaBounds/{*}UpperTheta") or "nan"))
@@ -363,7 +367,7 @@ def _defined(path: str | os.PathLike[str], element: ElementTree.Element) -> Basi
         raise FileFormatError(f"{path}: angle basis {name!r}: {error}") from None
     rising = all(low < high for low, high in itertools.pairwise(bounds)) and bounds[-1] == 90.0
     if not (rising and all(count > 0 for count in counts) and len(counts) <= _MOST_RINGS):
-        raise FileFormatError(f"{path}: angle basis {name!r} has no rings of patches that rise to 90 degrees")
+        raise FileFormatError(f"{path}: angle basis {name!r} has no rings of patches up to 90 degrees")
     if sum(counts) > _MOST_PATCHES:
         raise FileFormatError(f"{path}: angle basis {name!r} has {sum(counts)} patches, more than {_MOST_PATCHES}")
     return Basis(name, tuple(bounds), tuple(counts))
@@ -462,7 +466,7 @@ def _rule(count: int, *, periodic: bool = False) -> tuple[Floats, Floats]:
 
     Along the second axis of a patch that is a whole ring, `periodic`, they have equal distances.
     """
-    from brdfdb.integrals.quadrature import gauss_rule  # loads numba, which `export --help` does without
+    from brdfdb.gauss import gauss_rule  # loads numba, which `export --help` does without
 
     x, w = gauss_rule(count)
     x, w = 0.5 + 0.5 * x, 0.5 * w
@@ -472,7 +476,8 @@ def _rule(count: int, *, periodic: bool = False) -> tuple[Floats, Floats]:
 
 def _alike(basis: Basis, viewer: Index, incident: Index) -> tuple[Index, Index]:
     """Return pairs of which no two are turned or mirrored into each other, and the number among them of each pair."""
-    rings, counts = basis.rings, np.array(basis.counts)
+    rings = basis.rings
+    counts = np.array(basis.counts)
     whole = int(np.lcm.reduce(counts))
     azimuth = np.concatenate([np.arange(count) * (whole // count) for count in counts])
     apart = (azimuth[viewer] - azimuth[incident]) % whole
@@ -483,7 +488,8 @@ def _alike(basis: Basis, viewer: Index, incident: Index) -> tuple[Index, Index]:
 
 def _next_to_mirror(basis: Basis) -> NDArray[np.bool_]:
     """Return, by viewer and light, whether the patches are the same one or touch."""
-    rings, counts = basis.rings, np.array(basis.counts)
+    rings = basis.rings
+    counts = np.array(basis.counts)
     middle = np.concatenate([np.arange(count) / count for count in counts])
     half = 0.5 / counts[rings]
     apart = np.abs((middle[:, np.newaxis] - middle + 0.5) % 1.0 - 0.5)

@@ -1,4 +1,4 @@
-"""LightTools BSDF files: f_r about the normal as text, a block a direction of the light.
+"""LightTools BSDF files: f_r about the normal as text, one block for each direction of the light.
 
 After a list of azimuths and polar angles of the viewer each block has an angle of incidence, a side, a wavelength or a
 tristimulus value, the total integrated scatter and f_r in 1/sr. Azimuths are those of the viewer, with the light at 90
@@ -24,7 +24,8 @@ if TYPE_CHECKING:
     from brdfdb.measurements.samples import Samples
 
 suffix = ".bsdf"
-_SYMMETRY, _LIGHT_DEG = "Asymmetric", 90.0
+_SYMMETRY = "Asymmetric"
+_LIGHT_DEG = 90.0
 _ENTRIES = ("AOI", "POI", "Side", "Wavelength", "ScatterType", "TristimulusValue")
 _TRISTIMULUS = ("TrisX", "TrisY", "TrisZ")
 
@@ -49,7 +50,9 @@ def read(path: str | os.PathLike[str]) -> Samples:
     blocks = _blocks(words, lists["ScatterAzimuth"].size * lists["ScatterRadial"].size)
     kept = [block for block in blocks if block["Side"] == "Front" and block["ScatterType"] == "BRDF"]
     if not kept or len({block["POI"] for block in kept}) > 1:
-        raise FileFormatError(f"{path}: it has no block of Side Front, ScatterType BRDF; or they differ in POI")
+        raise FileFormatError(
+            f"{path}: it has no block with Side Front and ScatterType BRDF, or these blocks differ in POI"
+        )
     incidences = sorted({float(block["AOI"]) for block in kept})
     keys = [key for key in _TRISTIMULUS if any(block["TristimulusValue"] == key for block in kept)]
     keys = keys or sorted({block["Wavelength"] for block in kept}, key=float)
@@ -58,11 +61,11 @@ def read(path: str | os.PathLike[str]) -> Samples:
         key = float(block["AOI"]), block["TristimulusValue"] or block["Wavelength"]
         if key in grid:
             raise FileFormatError(
-                f"{path}: line {block['line']}, field AOI: {key[0]:g} degrees stand twice for {key[1]}"
+                f"{path}: line {block['line']}, field AOI: {key[0]:g} degrees are listed twice for {key[1]}"
             )
         grid[key] = block
     if len(grid) != len(incidences) * len(keys):
-        raise FileFormatError(f"{path}: not each angle of incidence has blocks of {', '.join(keys)}")
+        raise FileFormatError(f"{path}: an angle of incidence lacks a block of {', '.join(keys)}")
     shape = (lists["ScatterAzimuth"].size, lists["ScatterRadial"].size)
     values = np.stack([[grid[aoi, key]["values"].reshape(shape) for key in keys] for aoi in incidences])
     at, channels = _channels(keys)
@@ -92,7 +95,7 @@ def _lists(words: Words) -> dict[str, NDArray[np.float64]]:
             break
     for name in ("ScatterAzimuth", "ScatterRadial"):
         if name not in lists or not lists[name].size:
-            raise words.error(name, "it does not stand before DataBegin")
+            raise words.error(name, "it is missing before DataBegin")
     return lists
 
 
@@ -116,7 +119,7 @@ def _blocks(words: Words, count: int) -> list[dict[str, Any]]:
             block = dict(empty)
         elif word == "DataEnd":
             return blocks
-    raise words.error("DataEnd", f"the text ends without it, after {len(blocks)} blocks")
+    raise words.error("DataEnd", f"the file ends without it, after {len(blocks)} blocks")
 
 
 def _channels(keys: list[str]) -> tuple[NDArray[np.float64] | None, tuple[str, ...]]:

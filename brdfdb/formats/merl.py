@@ -1,8 +1,8 @@
 """MERL: isotropic tables in three colours on the fixed grid of half and difference vectors of Matusik et al. (2003).
 
 The grid has 90 x 90 x 180 bins over the half and difference vectors, finer next to the normal. A number is f_r in 1/sr
-times a scale. Some readers look one bin up, and others interpolate in straight lines (``--samples``). The grid is
-fixed. Lobes narrower than a bin come out coarse.
+times a scale. Some readers look one bin up, and others interpolate linearly (``--samples``). The grid is fixed. Lobes
+narrower than a bin are represented coarsely.
 
 The file holds linear sRGB. Anisotropic tables are refused, and the specular part is left out.
 """
@@ -65,7 +65,7 @@ def write(
     samples: str = "centres",
     verdict: str | None = None,
 ) -> Written:
-    """Write an isotropic table as a MERL file, with its record as JSON beside it.
+    """Write an isotropic table as a MERL file, with its record as JSON next to it.
 
     Bins and scales as in BRDF Explorer (``BRDFMeasuredMERL.cpp``, ``measured.func``), which looks one bin up; libbsdf
     (``MerlBinaryReader.cpp``) takes the numbers for samples at lower edges of bins, interpolates linearly, and takes
@@ -75,7 +75,7 @@ def write(
     from brdfdb.formats._stated_error import Comparison
 
     if table.anisotropic:
-        raise CannotHoldError(f"{table.name}: MERL files are isotropic, and the table is anisotropic")
+        raise CannotHoldError(f"{table.name}: the table is anisotropic, and MERL files hold only isotropic tables")
     channels = channels_of(table, "rgb")
     valid, angles = _nodes(samples)
     comparison = Comparison(table, channels)
@@ -114,7 +114,7 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     with path.open("rb") as file:
         size = os.fstat(file.fileno()).st_size
         if file.read(len(_HEADER)) != _HEADER or size != _BYTES:
-            raise FileFormatError(f"{path}: not a MERL file of {_BYTES} bytes with the dimensions {SHAPE}")
+            raise FileFormatError(f"{path}: it is not a MERL file of {_BYTES} bytes with the dimensions {SHAPE}")
         planes = np.fromfile(file, "<f8").reshape(3, *SHAPE)
     if not np.all(np.isfinite(planes)):
         raise FileFormatError(f"{path}: a number is not finite")

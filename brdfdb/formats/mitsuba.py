@@ -33,10 +33,11 @@ media_type = "application/xml"
 summary = "plugins of Mitsuba 3 with the parameters of materials, as XML and as dictionaries"
 tools = "Mitsuba 3 with brdfdb.mitsuba"
 kinds: tuple[str, ...] = ()
-MODEL, TABLE = "model", "table"
+MODEL = "model"
+TABLE = "table"
 options = (
     FormatOption(
-        "plugin", MODEL, "the plugin of the model, if Mitsuba has one, or that of tables", choices=(MODEL, TABLE)
+        "plugin", MODEL, "plugin of the model where Mitsuba has one, or the plugin of tables", choices=(MODEL, TABLE)
     ),
 )
 
@@ -46,7 +47,7 @@ _DIGITS = 9  # of numbers of a spectrum: float32 has fewer
 
 
 def write(table: Table, path: str | os.PathLike[str], *, plugin: str = MODEL, verdict: str | None = None) -> Written:
-    """Write the plugin of a material for Mitsuba 3 as XML, and as a dictionary beside it."""
+    """Write the plugin of a material for Mitsuba 3 as XML, and as a dictionary in a second file."""
     from brdfdb.materials import Material
     from brdfdb.models.mitsuba_plugins import OF_MITSUBA
 
@@ -59,7 +60,8 @@ def write(table: Table, path: str | os.PathLike[str], *, plugin: str = MODEL, ve
         remarks = ("Mitsuba has no plugin of its model, and reads the table from the store that BRDFDB_STORE names",)
     remarks = (*remarks, *frame_remark(table, U_AXIS))
     known = record(table, None, verdict, holds=HOLDS, remarks=remarks)
-    text, dictionary = _xml(table.name, document, known), json.dumps({"id": table.name, **document}, indent=1)
+    text = _xml(table.name, document, known)
+    dictionary = json.dumps({"id": table.name, **document}, indent=1)
     with whole(path, beside(path_of(path))) as (first, second):
         first.write_text(text, encoding="utf-8")
         second.write_text(dictionary + "\n", encoding="utf-8")

@@ -1,19 +1,19 @@
 """netCDF: f_r on a plain grid of angles, which xarray and every other reader of netCDF opens.
 
 The axes are polar angles and azimuths of light and viewer, or angles of the half and difference vectors (``--axes``).
-f_r is in 1/sr, without the cosine. Readers interpolate in straight lines along all axes at once.
+f_r is in 1/sr, without the cosine. Readers interpolate linearly along all axes at once.
 
-Anisotropic tables, all wavelengths and the specular part fit. The specular part has a variable of its own. The values
-take 100 MB at most: a table that needs more is written with the error it has.
+A file can hold anisotropic tables, all wavelengths and the specular part. The specular part is a separate variable. The
+values take 100 MB at most: a table that needs more is written with a larger error.
 """
 
 from __future__ import annotations
 
 import os
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Unpack
 
 from brdfdb.errors import import_extra
-from brdfdb.formats._dense_files import OPTIONS, dataset, opened_netcdf, read_dataset
+from brdfdb.formats._dense_files import OPTIONS, DenseOptions, dataset, opened_netcdf, read_dataset
 from brdfdb.formats._written import Written, whole
 from brdfdb.place import path_of
 
@@ -32,13 +32,7 @@ _MAGIC = (b"CDF\x01", b"CDF\x02")
 
 
 def write(
-    table: Table,
-    path: str | os.PathLike[str],
-    *,
-    tolerance: float = 0.02,
-    axes: str = "smallest",
-    resolution: float = 0.0,
-    verdict: str | None = None,
+    table: Table, path: str | os.PathLike[str], *, verdict: str | None = None, **options: Unpack[DenseOptions]
 ) -> Written:
     """Write f_r on a plain grid of angles as netCDF 3 (64-bit offset).
 
@@ -54,7 +48,7 @@ def write(
     from brdfdb.formats._dense_grid import dense_table
 
     import_extra("scipy.io")
-    dense = dense_table(table, tolerance, axes=axes, resolution=resolution)
+    dense = dense_table(table, **options)
     with whole(path) as (half,):
         dataset(table, dense, verdict).to_netcdf(half, engine="scipy", format="NETCDF3_64BIT")
     return Written((path_of(path),), dense.error, dense.tolerance)

@@ -32,7 +32,8 @@ if TYPE_CHECKING:
 
 suffix = ".h5"
 keywords = ("member",)
-_HDF5, _ZIP = b"\x89HDF\r\n\x1a\n", b"PK\x03\x04"
+_HDF5 = b"\x89HDF\r\n\x1a\n"
+_ZIP = b"PK\x03\x04"
 _LAYERS = ("dense_1", "dense_2", "dense_3")
 _SHAPES = ((6, 21), (21, 21), (21, 3))
 _MOST_BYTES = 1 << 24  # of a file with 675 weights, which has 19 kB
@@ -89,9 +90,9 @@ def _content(path: Path, member: str) -> tuple[str, bytes]:
         magic = file.read(len(_HDF5))
     if not magic.startswith(_ZIP):
         if member:
-            raise ParameterError("member", f"{path} is no archive", member)
+            raise ParameterError("member", f"{path} is not an archive", member)
         if magic != _HDF5 or path.stat().st_size > _MOST_BYTES:
-            raise FileFormatError(f"{path}: it is no HDF5 file of up to {_MOST_BYTES} bytes")
+            raise FileFormatError(f"{path}: it is not an HDF5 file of at most {_MOST_BYTES} bytes")
         return path.stem, path.read_bytes()
     with _opened(path) as archive:
         entries = _entries(archive)
@@ -128,7 +129,7 @@ def members(path: str | os.PathLike[str]) -> list[str]:
 @contextlib.contextmanager
 def _opened(path: Path) -> Iterator[zipfile.ZipFile]:
     """Open an archive; FileFormatError if it is damaged."""
-    with _sound(f"{path}: it is no archive, or"), zipfile.ZipFile(path) as archive:
+    with _sound(f"{path}: it is not an archive, or"), zipfile.ZipFile(path) as archive:
         yield archive
 
 
@@ -167,7 +168,7 @@ def _layers(path: str, content: bytes) -> list[tuple[Floats, Floats]]:
         raise
     except Exception as error:  # h5py raises what its parser comes to
         wanted = ", ".join(_LAYERS)
-        raise FileFormatError(f"{path}: it is no network of Keras with the layers {wanted} ({error})") from error
+        raise FileFormatError(f"{path}: it is not a network of Keras with the layers {wanted} ({error})") from error
     if not all(np.all(np.isfinite(part)) for layer in layers for part in layer):
         raise FileFormatError(f"{path}: a weight is not finite")
     return layers

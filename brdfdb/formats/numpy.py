@@ -1,10 +1,10 @@
 """NumPy: f_r on a plain grid of angles as an .npz archive of arrays.
 
 The axes are polar angles and azimuths of light and viewer, or angles of the half and difference vectors (``--axes``).
-f_r is in 1/sr, without the cosine. Readers interpolate in straight lines along all axes at once.
+f_r is in 1/sr, without the cosine. Readers interpolate linearly along all axes at once.
 
-Anisotropic tables, all wavelengths and the specular part fit. The specular part has an array of its own. The values
-take 100 MB at most: a table that needs more is written with the error it has.
+A file can hold anisotropic tables, all wavelengths and the specular part. The specular part is a separate array. The
+values take 100 MB at most: a table that needs more is written with a larger error.
 """
 
 from __future__ import annotations
@@ -13,13 +13,13 @@ import io
 import json
 import os
 import zipfile
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.errors import FileFormatError
-from brdfdb.formats._dense_files import OPTIONS, dense_record, file_table
+from brdfdb.formats._dense_files import OPTIONS, DenseOptions, dense_record, file_table
 from brdfdb.formats._record import document_of, specular_remark
 from brdfdb.formats._written import Written, whole
 from brdfdb.place import path_of
@@ -39,13 +39,7 @@ _MOST_BYTES, _MOST_OTHER = 1 << 29, 1 << 24  # of the values that are read, and 
 
 
 def write(
-    table: Table,
-    path: str | os.PathLike[str],
-    *,
-    tolerance: float = 0.02,
-    axes: str = "smallest",
-    resolution: float = 0.0,
-    verdict: str | None = None,
+    table: Table, path: str | os.PathLike[str], *, verdict: str | None = None, **options: Unpack[DenseOptions]
 ) -> Written:
     """Write f_r on a plain grid of angles as an .npz archive.
 
@@ -55,7 +49,7 @@ def write(
     """
     from brdfdb.formats._dense_grid import dense_table
 
-    dense = dense_table(table, tolerance, axes=axes, resolution=resolution)
+    dense = dense_table(table, **options)
     at = dense.channels.wavelength_nm
     arrays: dict[str, NDArray[Any]] = dict(dense.grid.axes)
     if at is not None:
@@ -92,7 +86,7 @@ def read(path: str | os.PathLike[str]) -> FileTable | Samples:
     except OSError:
         raise
     except Exception as error:  # zipfile, zlib and the parser of headers raise what they come to
-        raise FileFormatError(f"{path}: it is no archive of NumPy arrays, or is damaged ({error})") from error
+        raise FileFormatError(f"{path}: it is not an archive of NumPy arrays, or is damaged ({error})") from error
     at = arrays.pop("wavelength", None)
     return file_table(path, arrays, values, at, known)
 

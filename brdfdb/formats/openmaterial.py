@@ -1,10 +1,11 @@
 """ASAM OpenMATERIAL 3D: lookup tables of the BRDF of isotropic materials (.xompt).
 
 A row holds a wavelength in metres, three angles in radians, and f_r in 1/sr. The directions form a grid of light and
-viewer. The format does not say how to interpolate. The stated error is that of straight lines along all angles at once.
+viewer. The format does not say how to interpolate. The stated error is that of linear interpolation along all angles at
+once.
 
-All wavelengths fit. Grey tables are written at 550 nm. Anisotropic tables are refused, and the specular part is left
-out. A file has about 40 MB at most: a table that needs more is written with the error it has.
+A file can hold all wavelengths. Grey tables are written at 550 nm. Anisotropic tables are refused, and the specular
+part is left out. A file has about 40 MB at most: a table that needs more is written with a larger error.
 """
 
 from __future__ import annotations
@@ -52,7 +53,8 @@ SCHEMA = (
     f"https://raw.githubusercontent.com/asam-ev/OpenMATERIAL-3D/refs/tags/v{VERSION}/schemas/material_brdf_schema.json"
 )
 GREY_NM = 550.0  # at which grey tables are written: the format has no rows without a wavelength
-_DIGITS, _ROW_BYTES = 5, 48
+_DIGITS = 5
+_ROW_BYTES = 48
 _DECIMALS = 6  # of angles [rad], as the largest ones of the schema have: 1.570796 and 6.283185
 _LARGEST = {"polar": 1.570796, "azimuth": 6.283185}
 _SAME = 1e-4  # relative difference of values at an azimuth and its mirror image that count as the same
@@ -76,7 +78,9 @@ def write(
     from brdfdb.formats._dense_grid import dense_table, rounded
 
     if table.anisotropic:
-        raise CannotHoldError(f"{table.name}: is anisotropic, and OpenMATERIAL 3D holds isotropic tables only")
+        raise CannotHoldError(
+            f"{table.name}: the table is anisotropic, and OpenMATERIAL 3D holds only isotropic tables"
+        )
     most = MOST_BYTES // (2 * _ROW_BYTES)
     dense = dense_table(table, tolerance, axes="light_viewer", resolution=resolution, most_values=most, digits=_DIGITS)
     at = dense.channels.wavelength_nm
@@ -112,7 +116,7 @@ def recognises(head: bytes) -> bool:
 
 
 def read(path: str | os.PathLike[str]) -> FileTable | Samples:
-    """Return f_r of a lookup table: interpolated linearly if it is over the whole hemisphere, else its samples."""
+    """Return f_r of a lookup table: interpolated linearly if it covers the hemisphere, else its samples."""
     from brdfdb.measurements.samples import Instrument
 
     path = path_of(path)
@@ -127,10 +131,10 @@ def read(path: str | os.PathLike[str]) -> FileTable | Samples:
         raise FileFormatError(f"{path}: brdf.lookupTable is not a list of rows of five numbers")
     at, first = np.unique(np.round(rows[:, 0] * 1e9, 6), return_index=True)
     if len(rows) % at.size or not np.array_equal(first, np.arange(at.size) * (len(rows) // at.size)):
-        raise FileFormatError(f"{path}: the rows are not sorted, or wavelengths have different numbers of them")
+        raise FileFormatError(f"{path}: the rows are not sorted, or the wavelengths have different numbers of rows")
     blocks = rows.reshape(at.size, -1, 5)
     if not np.array_equal(np.broadcast_to(blocks[0, :, 1:4], blocks[:, :, 1:4].shape), blocks[:, :, 1:4]):
-        raise FileFormatError(f"{path}: wavelengths have different directions")
+        raise FileFormatError(f"{path}: the wavelengths have different directions")
     names = ("theta_i", "theta_r", "delta_phi")
     angles = {name: degrees_of(blocks[0, :, 1 + index], "rad") for index, name in enumerate(names)}
     known = metadata.get("brdfdb")

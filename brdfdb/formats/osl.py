@@ -5,8 +5,8 @@ nothing is interpolated. Tables of Oren and Nayar's integrals over facets are th
 functional fit of their paper, up to 14 % off for presets, and the remarks of the file say so. The stated error is that
 of the function against the table. A shader that calls the function stands below it.
 
-Anisotropic models fit, and colours in linear sRGB. Other models with integrals, and spectra of refractive indices, have
-no closed form, and are refused. The specular part is left out.
+Anisotropic models can be written, and colours in linear sRGB. Other models with integrals, and spectra of refractive
+indices, have no closed form, and are refused. The specular part is left out.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from brdfdb.formats._shader_source import Language, write_source
 
 suffix = ".osl"
 media_type = "text/plain"
-summary = "closed-form models, or the published fit of one, as source code of OSL"
+summary = "closed-form models, or the published fit of a model, as source code in OSL"
 tools = "renderers with the Open Shading Language: Cycles, Arnold, RenderMan, V-Ray"
 kinds: tuple[str, ...] = ()
 options = ()

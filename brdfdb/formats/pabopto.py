@@ -1,4 +1,4 @@
-"""pab-opto: rows of a goniophotometer as text, a file a direction of the light.
+"""pab-opto: rows of a goniophotometer as text, one file for each direction of the light.
 
 The header names the direction of the light and whether rows hold the BSDF, in 1/sr, or the DSF, which includes the
 cosine of the viewer. Light and viewer on the back, with polar angles above 90 degrees, are turned to the front.
@@ -39,7 +39,8 @@ def read(path: str | os.PathLike[str]) -> Samples:
     """
     path = path_of(path)
     header: dict[str, str] = {}
-    numbers, count = array("d"), 0
+    numbers = array("d")
+    count = 0
     for line_number, line in lines_of(path):
         if line.startswith("#"):
             name, _, text = line[1:].strip().partition(" ")
@@ -51,7 +52,7 @@ def read(path: str | os.PathLike[str]) -> Samples:
             continue
         if len(fields) != count:
             raise FileFormatError(
-                f"{path}: line {line_number} has {len(fields)} fields; theta, phi and values are {count}"
+                f"{path}: line {line_number} has {len(fields)} fields; expected are {count}: theta, phi and values"
             )
         for field in fields:
             try:

@@ -1,9 +1,9 @@
-"""PNG: pictures for people, the lit sphere of a table and its slices.
+"""PNG: pictures of a table, its lit sphere and its slices.
 
 A picture shows the sphere in the light of one lamp, or a slice of f_r. All tables have the same exposure. The colours
 have 8 bits, so that no values can be read back, and no error is stated.
 
-Spectral tables are shown in sRGB. A slice of an anisotropic one is for one azimuth of the light. The specular part is
+Spectral tables are shown in sRGB. A slice of an anisotropic table has one azimuth of the light. The specular part is
 left out.
 """
 
@@ -31,7 +31,7 @@ summary = "lit spheres and slices of tables as PNG files"
 tools = "every viewer of pictures; the numbers are in the other formats"
 kinds = (SPHERE, "lobe", "half_difference", "in_plane")
 options = (
-    FormatOption("size", 160.0, "pixels across a sphere", low=16.0, high=2048.0, most_served=512.0),
+    FormatOption("size", 160.0, "width and height of a sphere [pixels]", low=16.0, high=2048.0, most_served=512.0),
     FormatOption("theta_i", 45.0, "polar angle of the light of a lobe [degrees]", low=0.0, high=90.0),
     FormatOption("phi_i", 0.0, "azimuth of the light, or of the half vector [degrees]", low=-720.0, high=720.0),
 )
@@ -62,7 +62,8 @@ def write(
 
     imsave = import_extra("matplotlib.image").imsave
     if kind == SPHERE:
-        pixels, tones = lit_sphere(table, round(size)), _LIT
+        pixels = lit_sphere(table, round(size))
+        tones = _LIT
     else:
         image = slice_of(table, kind, theta_i, phi_i)
         values, meaning = rgb_of(image)

@@ -1,10 +1,10 @@
-"""SSDD: any table on a grid that is chosen for it, with the specular part in a block of its own (libbsdf).
+"""SSDD: any table on a grid that is chosen for it, with the specular part in a separate block (libbsdf).
 
 The lists of angles are those of half and difference vectors, of the viewer about the specular direction, or of light
-and viewer. The ones that need the fewest nodes are taken. libbsdf interpolates f_r, in 1/sr, in straight lines over
-each angle.
+and viewer. The kind of angles that needs the fewest nodes is used. libbsdf interpolates f_r, in 1/sr, in straight lines
+over each angle.
 
-Anisotropic tables, all wavelengths and the specular part fit.
+A file can hold anisotropic tables, all wavelengths and the specular part.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ tools = "BSDF Processor, libbsdf"
 kinds = ()
 options = (
     TOLERANCE,
-    FormatOption("data", "binary", "form of the values", choices=("binary", "ascii")),
+    FormatOption("data", "binary", "encoding of the values", choices=("binary", "ascii")),
     SIZE,
 )
 
@@ -117,7 +117,7 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     comments, blocks = parsed(path)
     by_type = {block.entries["DATA_TYPE"]: block for block in blocks}
     if "brdf" not in by_type:
-        raise FileFormatError(f"{path}: not an SSDD file with a block of DATA_TYPE brdf")
+        raise FileFormatError(f"{path}: it is not an SSDD file with a block of DATA_TYPE brdf")
     block = by_type["brdf"]
     grid = _grid(path, block)
     document = of_lines(comments)
@@ -187,7 +187,8 @@ def _specular(table: Table, binary: bool) -> bytes:
 def _grid(path: Path, block: SsddBlock) -> AngularGrid:
     """Return the grid of a block."""
     reductions = block.entries.get("REDUCTION_TYPE", "").split()
-    anisotropic, both_sides = block.angles[1].size > 1, "bilateral_symmetry" in reductions
+    anisotropic = block.angles[1].size > 1
+    both_sides = "bilateral_symmetry" in reductions
     kind = block.entries.get("PARAM_TYPE")
     systems: dict[str, System] = {
         _NAMES[HalfDifference]: HalfDifference(anisotropic, both_sides, "reciprocity" in reductions),
@@ -195,11 +196,12 @@ def _grid(path: Path, block: SsddBlock) -> AngularGrid:
         _NAMES[Spherical]: Spherical(anisotropic, both_sides),
     }
     if kind not in systems or "PARAM4_LIST" in block.entries:
-        raise FileFormatError(f"{path}: PARAM_TYPE is {kind}; {', '.join(systems)} are read, without PARAM4_LIST")
+        raise FileFormatError(f"{path}: PARAM_TYPE is {kind}; {', '.join(systems)} are read, and no PARAM4_LIST")
     nodes = tuple(np.deg2rad(axis) for axis in block.angles)
     values = without_holes(block.values)
     if not anisotropic:
-        nodes, values = (nodes[0], *nodes[2:]), values[:, 0]
+        nodes = (nodes[0], *nodes[2:])
+        values = values[:, 0]
     return AngularGrid(systems[kind], nodes, values)
 
 
@@ -216,7 +218,7 @@ class SsddBlock:
     values : float32 array (n0, n1, ..., C)
         Values over the lists, and last the channels.
     wavelength_nm : array (C,) [nm] or None
-        Wavelengths of the channels; None if they are none.
+        Wavelengths of the channels; None if the channels are not wavelengths.
     """
 
     entries: Mapping[str, str]
@@ -298,7 +300,7 @@ def _values(path: Path, data: mmap.mmap, at: int, entries: Mapping[str, str]) ->
     if not channels or not all(nodes.size and np.all(np.diff(nodes) > 0.0) for nodes in angles):
         raise FileFormatError(f"{path}: a list of angles is empty or does not increase")
     if nm is not None and not (channels and nm[0] > 0.0 and nm[-1] < np.inf and np.all(np.diff(nm) > 0.0)):
-        raise FileFormatError(f"{path}: WAVELENGTH_LIST is not of positive numbers [nm] that increase")
+        raise FileFormatError(f"{path}: WAVELENGTH_LIST is not a list of positive, increasing numbers [nm]")
     for (name, nodes), (low, high) in zip(lists.items(), _RANGES_DEG, strict=True):
         if not low <= nodes[0] <= nodes[-1] <= high + _ROUNDING_DEG:
             raise FileFormatError(
@@ -310,7 +312,9 @@ def _values(path: Path, data: mmap.mmap, at: int, entries: Mapping[str, str]) ->
     if entries["DATA"] == "binary":
         end = at + 4 * count
         if end > len(data):
-            raise FileFormatError(f"{path}: {len(data) - at} bytes of values, its lists of angles need {4 * count}")
+            raise FileFormatError(
+                f"{path}: it has {len(data) - at} bytes of values; its lists of angles need {4 * count}"
+            )
         flat = np.frombuffer(data, "<f4", count, at)
     else:
         end = data.find(b"\nDATA_TYPE", at)
@@ -321,7 +325,7 @@ def _values(path: Path, data: mmap.mmap, at: int, entries: Mapping[str, str]) ->
         except ValueError:
             raise FileFormatError(f"{path}: a value is not a number") from None
         if flat.size != count:
-            raise FileFormatError(f"{path}: {flat.size} values, its lists of angles need {count}")
+            raise FileFormatError(f"{path}: it has {flat.size} values; its lists of angles need {count}")
     if not np.all(np.isfinite(flat)):
         raise FileFormatError(f"{path}: a value is not finite")
     shape = tuple(nodes.size for nodes in reversed(angles))

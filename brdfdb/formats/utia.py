@@ -1,10 +1,10 @@
 """UTIA: tables in three colours on the fixed anisotropic grid of the UTIA BRDF database (Filip and Vavra 2014).
 
 The grid has steps of 15 degrees in the polar angles of light and viewer, and of 7.5 degrees in their azimuths. A number
-is f_r in 1/sr, or a code of it (``--encoding``). Readers interpolate in straight lines over the four angles. The grid
-is fixed. It is too coarse for glossy surfaces, and the stated error says so.
+is f_r in 1/sr, or a code of it (``--encoding``). Readers interpolate linearly over the four angles. The grid is fixed.
+It is too coarse for glossy surfaces, and the stated error says so.
 
-Anisotropic tables fit. Spectral tables become linear sRGB. The specular part is left out.
+A file can hold anisotropic tables. Spectral tables become linear sRGB. The specular part is left out.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 suffix = ".bin"
 media_type = "application/octet-stream"
-summary = "RGB on the fixed UTIA grid of 15 by 7.5 degrees, anisotropic tables too"
+summary = "RGB on the fixed UTIA grid of 15 by 7.5 degrees, also for anisotropic tables"
 tools = "readers of UTIA, ALTA"
 kinds = ()
 options = (
@@ -65,7 +65,7 @@ def write(
     encoding: str = "linear",
     verdict: str | None = None,
 ) -> Written:
-    """Write a table as a UTIA file, with its record as JSON beside it.
+    """Write a table as a UTIA file, with its record as JSON next to it.
 
     Three planes (R, G, B) of 64 bit floats: 6 polar angles of the light in steps of 15 degrees, 48 azimuths in steps of
     7.5, then those of the viewer. UTIA's own reader (``TBDRF.cpp`` of J. Filip) interpolates linearly over the four
@@ -106,7 +106,7 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     path = path_of(path)
     size = path.stat().st_size
     if size != _BYTES:
-        raise FileFormatError(f"{path}: {size} bytes are not the {_BYTES} of a UTIA file")
+        raise FileFormatError(f"{path}: it has {size} bytes; a UTIA file has {_BYTES}")
     planes = np.fromfile(path, "<f8").reshape(3, *SHAPE)
     if not np.all(np.isfinite(planes)):
         raise FileFormatError(f"{path}: a number is not finite")

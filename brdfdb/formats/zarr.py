@@ -1,19 +1,19 @@
 """zarr 3: f_r on a plain grid of angles, a directory that xarray and zarr open.
 
 The axes are polar angles and azimuths of light and viewer, or angles of the half and difference vectors (``--axes``).
-f_r is in 1/sr, without the cosine. Readers interpolate in straight lines along all axes at once.
+f_r is in 1/sr, without the cosine. Readers interpolate linearly along all axes at once.
 
-Anisotropic tables, all wavelengths and the specular part fit. The specular part has an array of its own. The values
-take 100 MB at most, before compression: a table that needs more is written with the error it has.
+A file can hold anisotropic tables, all wavelengths and the specular part. The specular part is a separate array. The
+values take 100 MB at most, before compression: a table that needs more is written with a larger error.
 """
 
 from __future__ import annotations
 
 import os
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Unpack
 
 from brdfdb.errors import FileFormatError
-from brdfdb.formats._dense_files import OPTIONS, check_sizes, dataset, read_dataset
+from brdfdb.formats._dense_files import OPTIONS, DenseOptions, check_sizes, dataset, read_dataset
 from brdfdb.formats._written import Written, whole
 from brdfdb.place import path_of
 
@@ -31,13 +31,7 @@ options = OPTIONS
 
 
 def write(
-    table: Table,
-    path: str | os.PathLike[str],
-    *,
-    tolerance: float = 0.02,
-    axes: str = "smallest",
-    resolution: float = 0.0,
-    verdict: str | None = None,
+    table: Table, path: str | os.PathLike[str], *, verdict: str | None = None, **options: Unpack[DenseOptions]
 ) -> Written:
     """Write f_r on a plain grid of angles as a zarr 3 group, which is a directory.
 
@@ -45,7 +39,7 @@ def write(
     """
     from brdfdb.formats._dense_grid import dense_table
 
-    dense = dense_table(table, tolerance, axes=axes, resolution=resolution)
+    dense = dense_table(table, **options)
     with whole(path) as (half,):
         dataset(table, dense, verdict).to_zarr(half, mode="w", zarr_format=3, consolidated=False)
     return Written((path_of(path),), dense.error, dense.tolerance)
@@ -72,4 +66,4 @@ def read(path: str | os.PathLike[str]) -> FileTable | Samples:
     except Exception as error:  # codecs and parsers raise what they come to
         if not path.exists():
             raise FileNotFoundError(f"no directory {path}") from None
-        raise FileFormatError(f"{path}: it is no zarr group, or is damaged ({error})") from error
+        raise FileFormatError(f"{path}: it is not a zarr group, or is damaged ({error})") from error

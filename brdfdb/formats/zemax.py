@@ -1,11 +1,11 @@
 """Zemax (Radiant) BSDF files: f_r about the specular direction as text, one value or CIE XYZ.
 
 For each direction of the light, f_r in 1/sr is listed over the angle from the specular direction and the azimuth about
-it. libbsdf interpolates in straight lines over each angle. The file also holds the total integrated scatter, which is
-the albedo.
+it. libbsdf interpolates linearly over each angle. The file also holds the total integrated scatter, which is the
+albedo.
 
-Anisotropic tables fit, but OpticStudio and libbsdf read isotropic ones only. Spectral tables become CIE XYZ, or its Y
-alone (``--colour``). The specular part is left out.
+A file can hold anisotropic tables, but OpticStudio and libbsdf read only isotropic files. Spectral tables become CIE
+XYZ, or its Y alone (``--colour``). The specular part is left out.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ kinds = ()
 options = (
     TOLERANCE,
     FormatOption(
-        "colour", "auto", "CIE XYZ, or its Y alone; auto: XYZ of spectral tables", choices=("auto", "xyz", "grey")
+        "colour", "auto", "CIE XYZ or Y alone; auto writes XYZ of spectral tables", choices=("auto", "xyz", "grey")
     ),
     SIZE,
 )
@@ -142,7 +142,8 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     values = without_holes(text.values.transpose(2, 1, 4, 3, 0)).astype(np.float32)
     both_sides = text.symmetry == "PlaneSymmetrical"
     if both_sides and azimuths[-1] < np.pi:  # the interval around 180 degrees has its mirror image at the other end
-        azimuths, values = np.append(azimuths, np.pi), np.concatenate([values, values[..., -1:, :]], axis=3)
+        azimuths = np.append(azimuths, np.pi)
+        values = np.concatenate([values, values[..., -1:, :]], axis=3)
     anisotropic = turns.size > 1
     nodes = (incidences, turns, radials, azimuths) if anisotropic else (incidences, radials, azimuths)
     grid = AngularGrid(Specular(anisotropic, both_sides), nodes, values if anisotropic else values[:, 0])
@@ -264,7 +265,7 @@ def parsed(path: Path) -> ZemaxText:
         elif word in _LISTS:
             angles[word] = words.numbers(words.count(word), word)
             if not angles[word].size or np.any(np.diff(angles[word]) <= 0.0):
-                raise words.error(word, "the angles do not increase, or there are none")
+                raise words.error(word, "there are no angles, or they do not increase")
         elif any(word in parts for parts in _PARTS.values()):
             break
     content = entries["SpectralContent"]
@@ -279,7 +280,8 @@ def parsed(path: Path) -> ZemaxText:
     blocks = parts * lists[0].size * lists[1].size
     if blocks > path.stat().st_size:
         raise FileFormatError(f"{path}: its lists of angles need {blocks} blocks of values, more than the file has")
-    rows, tis = [], np.empty(blocks)
+    rows = []
+    tis = np.empty(blocks)
     for number in range(blocks):
         for word in words:
             if word == "TIS":
@@ -287,7 +289,7 @@ def parsed(path: Path) -> ZemaxText:
         tis[number] = words.numbers(1, "TIS")[0]
         rows.append(words.numbers(lists[2].size * lists[3].size, f"block {number + 1} of {blocks}"))
         if np.any(np.abs(rows[-1]) > _LARGEST):
-            raise words.error("TIS", f"a value is beyond {_LARGEST:g}, the largest one of 32 bits")
+            raise words.error("TIS", f"a value exceeds {_LARGEST:g}, the largest 32-bit float")
     shape = (parts, *(nodes.size for nodes in lists))
     values = np.concatenate(rows, dtype=np.float32, casting="same_kind").reshape(shape)
     return ZemaxText(

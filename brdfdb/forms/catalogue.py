@@ -112,12 +112,11 @@ def forms(source: Source, wavelength_nm: ArrayLike | None, tolerances: Sequence[
         tolerances = SPECTRAL_TOLERANCES if source.spectral else TOLERANCES
     at = None if wavelength_nm is None else np.atleast_1d(np.asarray(wavelength_nm, dtype=np.float64))
     if not isinstance(source, Material):
-        key, title = "function", source.title
-        if isinstance(source, TableSource):  # its own source cannot be evaluated
-            key, title = "table-itself", f"{source.title}: the stored table itself"
+        itself = Form("function", source.title, "exact", f"source {source.name}", source.brdf_at(at), 0)
+        if isinstance(source, TableSource):  # its source cannot be evaluated
+            itself = replace(itself, key="table-itself", title=f"{source.title}: the stored table itself")
         elif isinstance(source, MeasuredSource):
-            key, title = "data", f"{source.title}: the data, interpolated"
-        itself = Form(key, title, "exact", f"source {source.name}", source.brdf_at(at), 0)
+            itself = replace(itself, key="data", title=f"{source.title}: the data, interpolated")
         return _offered([itself], _tables(source, source, at, tolerances, "table"))
     listed = list(_of_model(source, at))
     evaluated = exact_material(source)
@@ -138,7 +137,8 @@ def _of_model(material: Material, wavelength_nm: NDArray[np.float64] | None) -> 
 
     Some are yielded a second time with float32 vectors and values. Their arithmetic is float64, too.
     """
-    spec, arguments = material.spec, material.arguments(wavelength_nm)
+    spec = material.spec
+    arguments = material.arguments(wavelength_nm)
     itself = ModelForm(
         "model",
         f"{spec.title}, {spec.equation}",
@@ -154,19 +154,14 @@ def _of_model(material: Material, wavelength_nm: NDArray[np.float64] | None) -> 
         double = Form(form.key, form.title, form.kind, form.python, evaluate, form.bytes)
         yield double
         if form.single:
-            yield _single(double)
-
-
-def _single(form: Form) -> Form:
-    """Return a form with float32 vectors and values."""
-    return replace(
-        form,
-        key=f"{form.key}-float32",
-        title=f"{form.title}, float32 in and out",
-        python=f"{form.python}, float32 vectors",
-        dtype=np.float32,
-        rounded=True,
-    )
+            yield replace(
+                double,
+                key=f"{form.key}-float32",
+                title=f"{form.title}, float32 in and out",
+                python=f"{form.python}, float32 vectors",
+                dtype=np.float32,
+                rounded=True,
+            )
 
 
 # Tables
@@ -188,7 +183,8 @@ def _tables(
         return
     for tolerance in dict.fromkeys(tolerances):
         percent = f"{100.0 * tolerance:g}"
-        key, title = f"table-{percent.replace('.', '-')}", f"{table}, planned for {percent} %"
+        key = f"table-{percent.replace('.', '-')}"
+        title = f"{table}, planned for {percent} %"
         try:
             if isinstance(planned, MeasuredSource) or (
                 isinstance(planned, TableSource) and planned.measured is not None
@@ -203,10 +199,7 @@ def _tables(
         if layout.spectra is not None and tolerance == _UNFACTORED:
             unfactored = replace(layout, spectra=None, part_nm=None)
             yield _table(unfactored, f"{key}-unfactored", f"the {percent} % table, spectra whole")
-    for halves, key, title in (
-        (False, "table-even", "even angles"),
-        (True, "table-halves", "half vectors"),
-    ):
+    for halves, key, title in ((False, "table-even", "even angles"), (True, "table-halves", "half vectors")):
         layout = Layout(evaluated, _plain_grid(evaluated, halves=halves), wavelength_nm)
         yield _table(layout, key, f"{table}, {title}, linear")
 
@@ -260,7 +253,8 @@ def _plain_grid(source: Source, *, halves: bool) -> Grid:
     anisotropic = source.anisotropic
     turn = 90.0 if source.elliptical else 360.0
     if halves:
-        theta_h, sides = 90.0 * np.linspace(0.0, 1.0, 31) ** 2, 2 - source.reciprocal
+        theta_h = 90.0 * np.linspace(0.0, 1.0, 31) ** 2
+        sides = 2 - source.reciprocal
         if anisotropic:
             nodes = (
                 theta_h,

@@ -123,7 +123,8 @@ def _albedo(draw: Draw, u: Array) -> Array:
 def _sphere(draw: Draw, u: Array) -> Array:
     """Return samples (points, `PER_POINT`) of the radiance of points of a sphere, seen along z from afar."""
     points = u.shape[1] // PER_POINT
-    radius, angle = np.sqrt(u[2, :points]), 2.0 * np.pi * u[3, :points]
+    radius = np.sqrt(u[2, :points])
+    angle = 2.0 * np.pi * u[3, :points]
     n = np.stack([radius * np.cos(angle), radius * np.sin(angle), np.sqrt(1.0 - radius**2)], axis=-1)
     # The tangent is horizontal around the sphere
     level = np.hypot(n[:, 0], n[:, 2])

@@ -270,11 +270,7 @@ def chart(
 
 
 def _against(
-    number: int,
-    rungs: Sequence[int],
-    errors: Sequence[dict[str, Any]],
-    seconds: Floats,
-    forms: Sequence[Form],
+    number: int, rungs: Sequence[int], errors: Sequence[dict[str, Any]], seconds: Floats, forms: Sequence[Form]
 ) -> dict[str, Any]:
     """Return fields of a `ChartPoint`: the cheapest rung as accurate as a form, and the ratio of their times."""
     if forms[number].kind in ("exact", "quadrature"):
@@ -420,7 +416,8 @@ def _timed(
     """Return the times of calls with many directions, with a block of them, and with one."""
     # Directions are shuffled, so that a few of them are as varied as all
     mixed = np.random.default_rng(SEED).permutation(np.flatnonzero(drawn.above))
-    wi, wr = drawn.wi[mixed], drawn.wr[mixed]
+    wi = drawn.wi[mixed]
+    wr = drawn.wr[mixed]
     batch = timing.times(forms, wi, wr, rounds=timing.ROUNDS, tick=tick)
     block, single = (timing.times(forms, wi, wr, most=most, rounds=SINGLES, tick=tick) for most in (BLOCK, 1))
     return batch, block, single

@@ -17,7 +17,8 @@ def fresnel(theta_deg: float | Floats, n: float, k: float) -> Floats:
     cos = np.cos(np.deg2rad(np.asarray(theta_deg, dtype=np.float64)))
     index2 = complex(n, k) ** 2
     q = np.sqrt(index2 - (1.0 - cos**2) + 0j)
-    s, p = (cos - q) / (cos + q), (index2 * cos - q) / (index2 * cos + q)
+    s = (cos - q) / (cos + q)
+    p = (index2 * cos - q) / (index2 * cos + q)
     value: Floats = 0.5 * (np.abs(s) ** 2 + np.abs(p) ** 2)
     return value
 
@@ -37,7 +38,8 @@ def share_of_variance(theta_i_deg: float, theta_r_deg: float, slope: float) -> f
     for theta_deg in (theta_i_deg, theta_r_deg):
         tan = math.tan(math.radians(theta_deg))
         K += tan * math.erfc(1.0 / (2.0 * slope * tan)) / 4.0 if tan > 0.0 else 0.0
-    low, high = 0.0, 1.0 + K  # bounds of z = z_0 / sigma_0, with sqrt(pi / 2) z = K exp(-z^2 / 2)
+    low = 0.0
+    high = 1.0 + K  # bounds of z = z_0 / sigma_0, with sqrt(pi / 2) z = K exp(-z^2 / 2)
     for _ in range(80):
         middle = 0.5 * (low + high)
         rising = math.sqrt(math.pi / 2.0) * middle > K * math.exp(-0.5 * middle * middle)
@@ -61,8 +63,10 @@ def very_rough(slope: float, n: float, k: float, theta_i_deg: float, theta_r_deg
     `slope` is sigma_0 / tau [1]. The viewer is in the plane of incidence, and its angle is positive on the mirror side.
     """
     i, r = math.radians(theta_i_deg), math.radians(theta_r_deg)
-    v_x, v_z = math.sin(i) - math.sin(r), math.cos(i) + math.cos(r)
-    tan2, bisecting_deg = (v_x / v_z) ** 2, math.degrees(math.acos(min(0.5 * math.hypot(v_x, v_z), 1.0)))
+    v_x = math.sin(i) - math.sin(r)
+    v_z = math.cos(i) + math.cos(r)
+    tan2 = (v_x / v_z) ** 2
+    bisecting_deg = math.degrees(math.acos(min(0.5 * math.hypot(v_x, v_z), 1.0)))
     slope2 = slope**2 * share_of_variance(abs(theta_i_deg), abs(theta_r_deg), slope)
     lobe = math.exp(-tan2 / (4.0 * slope2)) / (16.0 * math.pi * slope2) * (1.0 + tan2) ** 2
     shadow = smith(abs(theta_i_deg), slope) * smith(abs(theta_r_deg), slope)

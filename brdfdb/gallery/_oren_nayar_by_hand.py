@@ -59,7 +59,8 @@ def facets(theta_i_deg: float, theta_r_deg: float, rho: float, sigma_deg: float)
 
 def fit(theta_i_deg: float, theta_r_deg: float, rho: float, sigma_deg: float) -> Direct:
     """Return f_r [1/sr] of the functional approximation, eqs 27 and 28; directions are those of `facets`."""
-    s2, cos = math.radians(sigma_deg) ** 2, 1.0 if theta_i_deg * theta_r_deg >= 0.0 else -1.0
+    s2 = math.radians(sigma_deg) ** 2
+    cos = 1.0 if theta_i_deg * theta_r_deg >= 0.0 else -1.0
     beta, alpha = sorted((math.radians(abs(theta_i_deg)), math.radians(abs(theta_r_deg))))
     C_1 = 1.0 - 0.5 * s2 / (s2 + 0.33)
     C_2 = 0.45 * s2 / (s2 + 0.09) * (math.sin(alpha) - (0.0 if cos > 0.0 else (2.0 * beta / math.pi) ** 3))
@@ -70,7 +71,8 @@ def fit(theta_i_deg: float, theta_r_deg: float, rho: float, sigma_deg: float) ->
 def surface(theta_i_deg: float, theta_r_deg: float, sigma_deg: float) -> float:
     """Return f_r [1/sr] of mirror-like facets, eq. 31 with F = 1 and E_0 = 1; directions are those of `facets`."""
     i, r = math.radians(theta_i_deg), math.radians(theta_r_deg)
-    theta_a, cos_half = abs(0.5 * (i + r)), math.cos(0.5 * (i - r))
+    theta_a = abs(0.5 * (i + r))
+    cos_half = math.cos(0.5 * (i - r))
     GAF = min(1.0, 2.0 * math.cos(theta_a) * min(math.cos(i), math.cos(r)) / cos_half)
     gaussian = math.exp(-(theta_a**2) / (2.0 * math.radians(sigma_deg) ** 2))
     return GAF * gaussian / (math.cos(i) * math.cos(r) * math.cos(theta_a))

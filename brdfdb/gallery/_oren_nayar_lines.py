@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from brdfdb.figure import Curve, Panel, Role, Statement, curve_of, listed
+from brdfdb.gauss import gauss_rule
 from brdfdb.geometry import radians
-from brdfdb.integrals.quadrature import gauss_rule
 from brdfdb.models import oren_nayar_single_slope_parts
 from brdfdb.models.oren_nayar_1994 import Parts
 from brdfdb.parameters import Floats
@@ -122,7 +122,8 @@ def evaluated_parts(
     starts = [np.zeros(cot_i.shape), *(np.arctan(cot) for cot in (cot_i, cot_r, np.hypot(cot_i, cot_r)))]
     edges = np.sort(np.minimum([*starts, np.full(cot_i.shape, last)], last), axis=0)
     x, w = gauss_rule(_NODES)
-    u, w = (x + 1.0) / 2.0, w / 2.0
+    u = (x + 1.0) / 2.0
+    w = w / 2.0
     direct = bounce = total = np.zeros(cot_i.shape)
     for low, high in pairwise(edges):
         theta_a = low[..., None] + (high - low)[..., None] * u**2

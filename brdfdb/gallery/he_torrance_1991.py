@@ -41,10 +41,12 @@ def fig_07() -> Figure:
     surface = surface_of("roughened-aluminum-2000nm")
     thetas = np.array([10.0, 45.0, 75.0])
     cuts = measured_cuts(surface, thetas)
-    rho_s, diffuse = specular(surface, thetas), reflected(surface, thetas, specular=False)
+    rho_s = specular(surface, thetas)
+    diffuse = reflected(surface, thetas, specular=False)
     of_peaks = [specular_of_peak(surface, cut) for cut in cuts]
     short = specular(surface_of("roughened-aluminum-500nm"), thetas)
-    expected, fresnel = by_hand.specular(surface, 10.0), float(by_hand.fresnel(10.0, surface["n"], surface["k"]))
+    expected = by_hand.specular(surface, 10.0)
+    fresnel = float(by_hand.fresnel(10.0, surface["n"], surface["k"]))
     first_surface = float(rho_s[0] + diffuse[0])
     lobes = [cut_of(he_torrance, theta, **surface) for theta in thetas.tolist()]
     widths = [cut._replace(f_r=cut.f_r - lobe.f_r).width_deg for cut, lobe in zip(cuts, lobes, strict=True)]
@@ -108,7 +110,8 @@ def fig_08() -> Figure:
         [f_r(surface, theta, peak) / f_r(surface, theta, theta) for theta, peak in peaks]
         for f_r in (lobe_at, by_hand.directional_diffuse)
     )
-    rho_s, diffuse = specular(surface, thetas), reflected(surface, thetas, specular=False)
+    rho_s = specular(surface, thetas)
+    diffuse = reflected(surface, thetas, specular=False)
     of_last = specular_of_peak(surface, last)
     return Figure(
         key="he-torrance-1991-fig-08",

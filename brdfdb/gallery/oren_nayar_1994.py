@@ -128,7 +128,8 @@ def _cut_off() -> Statement:
 
 
 def _scaled_tangent(total: Floats) -> Statement:
-    low, high = -45.0, GRAZING_LIGHT
+    low = -45.0
+    high = GRAZING_LIGHT
     middle = between(total, low, high)
     basis = np.stack([np.ones_like(middle), np.tan(radians(between(THETA_R, low, high)))], axis=1)
     (offset, scale), *_ = np.linalg.lstsq(basis, middle)
@@ -272,7 +273,8 @@ def fig_10() -> Figure:
 
 def fig_11() -> Figure:
     """Draw Fig. 11: radiance outside the plane of incidence."""
-    lights_deg, azimuths_deg = [60.0, GRAZING_LIGHT], [0.0, 30.0, 60.0, 90.0]
+    lights_deg = [60.0, GRAZING_LIGHT]
+    azimuths_deg = [0.0, 30.0, 60.0, 90.0]
     lines = {
         light: [
             to_radiance(light) * across(oren_nayar_gaussian, light, azimuth, **rough(40.0)) for azimuth in azimuths_deg
@@ -385,7 +387,8 @@ def fig_12() -> Figure:
 
 def _twice_reflected() -> Statement:
     dark, bright = 0.45, 0.9
-    angles, sigma = (0.5, 0.0, 0.9, 2.5), float(radians(30.0))
+    angles = (0.5, 0.0, 0.9, 2.5)
+    sigma = float(radians(30.0))
     ratios = []
     for parts in (oren_nayar_parts, oren_nayar_gaussian_parts):
         low, high = (parts(*angles, rho=rho, sigma=sigma).interreflected for rho in (dark, bright))
@@ -450,7 +453,9 @@ def _third_coefficient() -> Statement:
     folded = theta_i, 0.0, theta_r, np.minimum(delta_phi, np.pi - delta_phi)
     term = oren_nayar(*folded, **rough(30.0), interreflection=False) - oren_nayar_qualitative(*folded, **rough(30.0))
     share = float(np.sum(term * weight) / np.sum(total * weight))
-    alpha, beta, s2 = np.maximum(theta_i, theta_r), np.minimum(theta_i, theta_r), radians(30.0) ** 2
+    alpha = np.maximum(theta_i, theta_r)
+    beta = np.minimum(theta_i, theta_r)
+    s2 = radians(30.0) ** 2
     C_3 = 0.125 * s2 / (s2 + 0.09) * (4.0 * alpha * beta / np.pi**2) ** 2
     printed = RHO / np.pi * (1.0 - np.abs(np.cos(delta_phi))) * C_3 * np.tan((alpha + beta) / 2.0)
     expected = float(np.sum(printed * weight) / np.sum(total * weight))

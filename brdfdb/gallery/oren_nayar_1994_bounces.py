@@ -26,8 +26,8 @@ from brdfdb.gallery._oren_nayar_lines import (
     to_radiance,
     very_accurate,
 )
+from brdfdb.gauss import gauss_rule
 from brdfdb.geometry import degrees, radians
-from brdfdb.integrals.quadrature import gauss_rule
 from brdfdb.models import (
     oren_nayar,
     oren_nayar_gaussian_parts,
@@ -61,7 +61,8 @@ def view_factors(theta_a: float, strips: int = STRIPS) -> Array:
     of the strip. Facets have the slope theta_a [rad] and width 1. Strips count from the bottom of the groove.
     """
     edges = np.linspace(0.0, 1.0, strips + 1)
-    x, y = edges[:, None], edges[None, :]
+    x = edges[:, None]
+    y = edges[None, :]
     distance = np.sqrt(x * x + 2.0 * x * y * np.cos(2.0 * theta_a) + y * y)
     crossed = distance[:-1, 1:] + distance[1:, :-1] - distance[:-1, :-1] - distance[1:, 1:]
     return np.asarray(0.5 * strips * crossed)
@@ -109,13 +110,15 @@ def bounces(
         scale = weight / (2.0 * np.cos(theta_a) * np.pi * AZIMUTHS)
         # Direct light comes from the part of a facet that is both lit and seen
         total[0] += scale * rho * np.sum(lit[0] * seen[0] * np.minimum(lit[1], seen[1]), axis=(1, 2))
-        left, viewed = rho * _on_strips(*lit, strips), scale / strips * _on_strips(*seen, strips)
+        left = rho * _on_strips(*lit, strips)
+        viewed = scale / strips * _on_strips(*seen, strips)
         for order in range(1, orders - 1):
             left = rho * left[:, ::-1] @ factors.T
             total[order] += np.einsum("vafs,afs->v", viewed, left)
         # All later bounces, by the sum and the difference of both facets: (1 - rho F)^-1 and (1 + rho F)^-1
         left = rho * left[:, ::-1] @ factors.T
-        sums, differences = (left[:, 0] + left[:, 1]) / 2.0, (left[:, 0] - left[:, 1]) / 2.0
+        sums = (left[:, 0] + left[:, 1]) / 2.0
+        differences = (left[:, 0] - left[:, 1]) / 2.0
         even = np.linalg.solve(np.eye(strips) - rho * factors, sums.T).T
         odd = np.linalg.solve(np.eye(strips) + rho * factors, differences.T).T
         total[-1] += np.einsum("vafs,afs->v", viewed, np.stack([even + odd, even - odd], axis=1))
@@ -133,7 +136,8 @@ class _Bounces(NamedTuple):
 def _bounces(theta_i_deg: float, rho: float, sigma_deg: float) -> _Bounces:
     """Return the radiance [E_0] by bounce in the plane of incidence."""
     theta_i, sigma = float(radians(theta_i_deg)), float(radians(sigma_deg))
-    theta_r, delta_phi = radians(np.abs(VIEWERS_DEG)), np.where(VIEWERS_DEG < 0.0, np.pi, 0.0)
+    theta_r = radians(np.abs(VIEWERS_DEG))
+    delta_phi = np.where(VIEWERS_DEG < 0.0, np.pi, 0.0)
     cosine = np.cos(theta_i)
     parts = oren_nayar_gaussian_parts(theta_i, 0.0, theta_r, delta_phi, rho=rho, sigma=sigma)
     summed = cosine * bounces(theta_i, theta_r, delta_phi, rho, sigma, ORDERS)

@@ -117,7 +117,8 @@ def fig_22() -> Figure:
 
 def fig_23() -> Figure:
     """Draw Fig. 23: brightness across the clay vase."""
-    front, aside = _vase(0.0), _vase(ASIDE_DEG)
+    front = _vase(0.0)
+    aside = _vase(ASIDE_DEG)
     names: dict[str, tuple[str, Role]] = {
         "integrated": ("integrated", "truth"),
         "functional": ("functional approximation", "ours"),
@@ -190,7 +191,8 @@ def _to_zero_at_the_limbs(lines: dict[str, Floats]) -> Statement:
 
 
 def _asymmetric(lines: dict[str, Floats]) -> Statement:
-    left, right = _at(lines["functional"], -0.8), _at(lines["functional"], 0.8)
+    left = _at(lines["functional"], -0.8)
+    right = _at(lines["functional"], 0.8)
     absolute = [float(np.interp(x, ACROSS, lines["functional"])) for x in (-0.801, 0.801)]
     expected = [by_hand.cylinder(x, ASIDE_DEG, 0.7, 40.0) for x in (-0.801, 0.801)]
     return Statement(

@@ -208,7 +208,8 @@ def _with_surface(number: int, sample: str) -> Figure:
 
 def _sum_by_hand(material: Material, theta_i_deg: float, theta_r_deg: float) -> float:
     """Return f_r [1/sr] of eq. 32 by hand in the plane of incidence, with k_b = 1 and E_0 = pi."""
-    printed, sigma_deg = material.numbers, _sigma_deg(material)
+    printed = material.numbers
+    sigma_deg = _sigma_deg(material)
     body = by_hand.fit(theta_i_deg, theta_r_deg, printed["rho"], sigma_deg).direct
     return body + printed["k_s"] * by_hand.surface(theta_i_deg, theta_r_deg, sigma_deg) / np.pi
 

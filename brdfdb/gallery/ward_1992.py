@@ -208,7 +208,8 @@ def _tails(*models: str) -> list[float]:
 
 
 def _other_tail() -> Statement:
-    alpha, delta = TAIL["alpha_x"], radians(TAIL_DEG) / 2.0
+    alpha = TAIL["alpha_x"]
+    delta = radians(TAIL_DEG) / 2.0
     half_vector, ward = _tails("ward_half_vector", "ward")
     peak = 1.0 / (4.0 * np.pi * alpha**2 * np.sqrt(np.cos(radians(TAIL_DEG))))
     expected = [
@@ -428,7 +429,8 @@ def _asymmetry(material: Material) -> float:
     """Return the largest relative change [1] of f_r when light and viewer are exchanged."""
     theta = radians(SLICES_DEG)
     theta_i, theta_r, phi_r = np.meshgrid(theta, theta, radians(np.arange(0.0, 360.0, 15.0)), indexing="ij")
-    forth, back = f_r_of(material, theta_i, 0.4, theta_r, phi_r), f_r_of(material, theta_r, phi_r, theta_i, 0.4)
+    forth = f_r_of(material, theta_i, 0.4, theta_r, phi_r)
+    back = f_r_of(material, theta_r, phi_r, theta_i, 0.4)
     return float(np.max(np.abs(forth - back) / forth))
 
 
@@ -480,9 +482,11 @@ def _bend(material: Material) -> tuple[float, float]:
 
     At the ends the brightest point of a column of the image has half the peak.
     """
-    across, up = np.linspace(-0.4, 0.4, 81), np.linspace(0.1, 0.9, 4001)
+    across = np.linspace(-0.4, 0.4, 81)
+    up = np.linspace(0.1, 0.9, 4001)
     radiance = _sphere(material, *np.meshgrid(across, up, indexing="ij"))
-    ridge, brightest = up[radiance.argmax(axis=1)], radiance.max(axis=1)
+    ridge = up[radiance.argmax(axis=1)]
+    brightest = radiance.max(axis=1)
     first, *_, last = np.flatnonzero(brightest > 0.5 * brightest.max())
     middle = radiance[len(across) // 2]
     bright = up[middle > 0.5 * middle.max()]

@@ -42,7 +42,8 @@ def fig_03() -> Figure:
     without = np.array([float(_ignoring(D).max()) for D in spread.tolist()])
     axis = np.linspace(-75.0, 75.0, 31)
     x, y = np.meshgrid(axis, axis)
-    theta_c, phi_c = radians(np.hypot(x, y)), np.arctan2(y, x)
+    theta_c = radians(np.hypot(x, y))
+    phi_c = np.arctan2(y, x)
     inside = np.hypot(x, y) <= 75.0
     seen = np.where(inside, theta_c, 0.0)
     off = _apart_deg(eq_3(seen, phi_c, SMALL), traced(seen, phi_c, SMALL))

@@ -73,7 +73,7 @@ def points_at(across: Array, up: Array) -> SpherePoints:
 
 def _radiance(x: Array, y: Array, swing_deg: float, alphas: tuple[float, float]) -> Array:
     """Return the radiance [irradiance / sr] of points of the lid under all four lights, eq. 6 without its samples."""
-    surface = presets()["rolled-brass"].numbers
+    surface = presets()["rolled-brass"].numbers | {"alpha_x": alphas[0], "alpha_y": alphas[1]}
     points = np.stack([x, y, np.zeros(x.shape)], axis=-1)
     turn = np.asarray(radians(swing_deg) * np.sin(np.pi * WAVES * x))  # azimuth of the x axis of the lobe
     along = np.stack([np.cos(turn), np.sin(turn), np.zeros(x.shape)], axis=-1)
@@ -90,15 +90,7 @@ def _radiance(x: Array, y: Array, swing_deg: float, alphas: tuple[float, float])
     for light, strength in zip((*CANDLES, OVERHEAD, 1e6 * MOON), STRENGTHS, strict=True):
         wi = local(light)
         fall = np.sum(light**2) / np.sum((light - points) ** 2, axis=-1)
-        f_r = ward_vectors(
-            wi,
-            local(CAMERA),
-            rho_d=surface["rho_d"],
-            rho_s=surface["rho_s"],
-            alpha_x=alphas[0],
-            alpha_y=alphas[1],
-        )
-        total += strength * fall * f_r * np.maximum(wi[..., 2], 0.0)
+        total += strength * fall * ward_vectors(wi, local(CAMERA), **surface) * np.maximum(wi[..., 2], 0.0)
     return total
 
 
@@ -192,12 +184,6 @@ def _lobe() -> dict[str, Any]:
     return {name: surface[name] for name in ("rho_s", "alpha_x", "alpha_y")}
 
 
-def _surroundings(points: SpherePoints, directions: Array) -> Array:
-    """Return the radiance [1/sr] in directions of a frame: twelve upright stripes, for an irradiance of 1."""
-    world = np.einsum("...ij,...i->...j", points.frame, directions)
-    return np.where(np.sin(6.0 * np.arctan2(world[..., 1], world[..., 0])) > 0.0, STRIPES, AMBIENT)
-
-
 def _random(seed: int, count: int, shape: tuple[int, ...]) -> tuple[Array, Array]:
     """Return two arrays of random numbers in [0, 1), of the shape (count, *shape)."""
     rng = np.random.default_rng(seed)
@@ -215,7 +201,10 @@ class _Rays(NamedTuple):
 def _followed(points: SpherePoints, directions: Array, weight: Array) -> _Rays:
     """Return the rays that leave points in directions of their frames."""
     met = np.sum(directions * points.light, axis=-1) > np.cos(radians(HALF_ANGLE_DEG))
-    around = np.where(met, 0.0, weight * _surroundings(points, directions))
+    # Twelve upright stripes surround the sphere
+    world = np.einsum("...ij,...i->...j", points.frame, directions)
+    stripes = np.where(np.sin(6.0 * np.arctan2(world[..., 1], world[..., 0])) > 0.0, STRIPES, AMBIENT)
+    around = np.where(met, 0.0, weight * stripes)
     return _Rays(around, np.where(met, weight / SOLID_ANGLE, 0.0), met)
 
 
@@ -382,7 +371,8 @@ def _unbiased(met: float) -> Statement:
     line = points_at(np.full(up.shape, 0.02), up)
     lit = np.flatnonzero(_closed(line) > 0.5 * _closed(line).max())[::3]
     points = SpherePoints(*(values[lit] for values in line))
-    rays, closed = _by_eq_7(points, 30000, 1992).disc, float(_closed(points).sum())
+    rays = _by_eq_7(points, 30000, 1992).disc
+    closed = float(_closed(points).sum())
     ratio = float(rays.mean(axis=0).sum()) / closed
     error = float(np.sqrt((rays.var(axis=0) / len(rays)).sum())) / closed
     return Statement(

@@ -7,8 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from brdfdb.gauss import gauss_rule
 from brdfdb.geometry import HALF_PI, unit_vector
-from brdfdb.integrals.quadrature import gauss_rule, mirrored_on_rays
+from brdfdb.integrals.quadrature import mirrored_on_rays
 from brdfdb.lobes import Lobe
 from brdfdb.parameters import Array
 

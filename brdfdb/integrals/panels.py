@@ -58,7 +58,8 @@ _W_GAUSS = np.concatenate([_GAUSS[:0:-1], _GAUSS])
 _SAFETY = 4.0
 # Panels evaluated at a time, of 225 points each: fewer where a point has several values, but enough for a model that is
 # faster in one row of 2000 points or more
-_BATCH, _FEWEST = 200, 64
+_BATCH = 200
+_FEWEST = 64
 
 
 def rectangles(first: Floats, second: Floats) -> Array:
@@ -108,7 +109,12 @@ def integrated(
         total = errors.sum(axis=1)
         wanting = (_sums(of, total, count) > tolerance) & (done < most_panels)
         if not np.any(wanting):
-            return Integrals(_by_pairs(of, values), _sums(of, total, count))
+            # numpy sums contiguous numbers by pairs
+            order = np.argsort(of, kind="stable")
+            ends = np.flatnonzero(np.diff(of[order])) + 1
+            columns = np.split(np.ascontiguousarray(values[order].T), ends, axis=1)
+            sums = np.stack([np.ascontiguousarray(column).sum(axis=1) for column in columns])
+            return Integrals(sums, _sums(of, total, count))
         chosen = _chosen(total, of, wanting, tolerance)
         halved = _halved(panels[chosen], errors[chosen])
         of_halved = np.tile(of[chosen], 2)
@@ -122,13 +128,6 @@ def integrated(
 
 def _sums(of: Indices, terms: Array, count: int) -> Array:
     return np.asarray(np.bincount(of, weights=terms, minlength=count), dtype=np.float64)
-
-
-def _by_pairs(of: Indices, values: Array) -> Array:
-    """Return the sums of the values (P, width) of each integral; numpy sums contiguous numbers by pairs."""
-    order = np.argsort(of, kind="stable")
-    some = np.split(np.ascontiguousarray(values[order].T), np.flatnonzero(np.diff(of[order])) + 1, axis=1)
-    return np.stack([np.ascontiguousarray(columns).sum(axis=1) for columns in some])
 
 
 def _chosen(total: Array, of: Indices, wanting: NDArray[np.bool_], tolerance: float) -> NDArray[np.bool_]:
@@ -152,7 +151,8 @@ def _halved(panels: Array, errors: Array) -> Array:
     """Return each panel cut in two, across the variable in which its rules differ most."""
     axis = np.argmax(errors, axis=1)
     row = np.arange(len(panels))
-    low, high = panels.copy(), panels.copy()
+    low = panels.copy()
+    high = panels.copy()
     half = panels[row, 2 + axis] / 2.0
     for child, sign in ((low, -1.0), (high, 1.0)):
         child[row, axis] += sign * half

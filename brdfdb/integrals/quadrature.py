@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import inspect
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
@@ -27,27 +26,6 @@ class Albedo(NamedTuple):
 
     albedo: Floats
     error: Floats
-
-
-class GaussRule(NamedTuple):
-    """Nodes and weights of Gauss and Legendre's rule."""
-
-    nodes: Array
-    weights: Array
-
-    def on(self, low: float, high: float) -> GaussRule:
-        """Return the rule of an interval, for the rule on [-1, 1]."""
-        half = 0.5 * (high - low)
-        return GaussRule(low + half * (self.nodes + 1.0), half * self.weights)
-
-
-@functools.cache  # a rule takes a millisecond
-def gauss_rule(count: int) -> GaussRule:
-    """Return Gauss and Legendre's rule of `count` nodes on [-1, 1]; its arrays cannot be written."""
-    rule = GaussRule(*np.polynomial.legendre.leggauss(count))
-    for array in rule:
-        array.flags.writeable = False
-    return rule
 
 
 @array_function
@@ -114,7 +92,8 @@ def directional_albedo(
     for one, rows in _alike(parameters, values):
         above = rows[theta[rows] <= HALF_PI]  # nan is not
         below = rows[(theta[rows] > HALF_PI) & np.isfinite(phi[rows])]
-        albedo.flat[below], error.flat[below] = 0.0, 0.0
+        albedo.flat[below] = 0.0
+        error.flat[below] = 0.0
         above = above[np.isfinite(phi[above])]
         integrals = spectral_albedo(spec, theta[above], phi[above], one, tolerance=tolerance, most_panels=MOST_PANELS)
         albedo.flat[above] = integrals.albedo[:, 0]

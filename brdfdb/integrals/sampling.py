@@ -80,7 +80,8 @@ def sample(model: ModelSpec | str, u1: ArrayLike, u2: ArrayLike, wi: ArrayLike, 
     """
     spec = spec_of(model)
     parameters = named(spec, parameters)
-    v1, v2 = check_uniform("u1", u1), check_uniform("u2", u2)
+    v1 = check_uniform("u1", u1)
+    v2 = check_uniform("u2", u2)
     i = checked_vectors(wi, wi).w_i.astype(np.float64)
     lobe = lobe_of(spec, i, parameters)
     wr = directions(lobe, v1, v2, i)

@@ -112,10 +112,10 @@ def _peak(x: Array, y: Floats, f: Callable[[Array], Array], tolerance: float) ->
     for _ in range(_ROUNDS):
         at = np.unique(np.clip(np.argmax(y[:, moving], axis=0), 1, x.size - 2))
         fresh = np.unique([(x[i + side - 1] + x[i + side]) / 2.0 for i in at for side in (0, 1)])
-        x, y = np.append(x, fresh), np.concatenate([y, f(fresh)])
+        x = np.append(x, fresh)
         order = np.argsort(x)
         x = x[order]
-        y = y[order]
+        y = np.concatenate([y, f(fresh)])[order]
         before = top
         top = tops(x, y)
         moving &= np.abs(top - before) > tolerance
@@ -130,7 +130,8 @@ def tops(x: Array, y: Floats) -> Array:
     column = np.arange(y.shape[1])
     (x0, x1, x2) = (x[middle + i] for i in (-1, 0, 1))
     (y0, y1, y2) = (y[middle + i, column] for i in (-1, 0, 1))
-    rise, fall = (y1 - y0) / (x1 - x0), (y2 - y1) / (x2 - x1)
+    rise = (y1 - y0) / (x1 - x0)
+    fall = (y2 - y1) / (x2 - x1)
     bend = (fall - rise) / (x2 - x0)
     # The parabola is y1 + s (x - x1) + bend (x - x1)^2, with the slope s at x1
     s = rise + bend * (x1 - x0)

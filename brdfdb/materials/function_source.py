@@ -218,9 +218,8 @@ class FunctionSource(FunctionRecord, Lookups):
         bad = ~((at >= low) & (at <= high))
         if np.any(bad):
             first = float(at[bad][0])
-            raise ParameterError(
-                "wavelength_nm", f"{first:g} is outside [{low:g}, {high:g}] nm of {self.name}", first, (low, high)
-            )
+            text = f"{first:g} is outside [{low:g}, {high:g}] nm of {self.name}"
+            raise ParameterError("wavelength_nm", text, first, (low, high))
         return at
 
     def _shaped(self, given: Directions, light: Floats, viewer: Floats, wavelength_nm: ArrayLike | None) -> Floats:
@@ -247,21 +246,18 @@ class FunctionSource(FunctionRecord, Lookups):
         f_r = np.asarray(self.brdf(wi, wr, at))
         allowed = [(len(wi), count)] + ([(len(wi),)] if at is None else [])
         if f_r.shape not in allowed or f_r.dtype.kind not in "iuf":
-            raise ParameterError(
-                "brdf",
-                f"{self.name} gave {f_r.dtype} of shape {f_r.shape} for {len(wi)} pairs of directions"
-                f"{'' if at is None else f' at {count} wavelengths'}; numbers of shape {allowed[0]} are needed",
-            )
+            pairs = f"{len(wi)} pairs of directions" + ("" if at is None else f" at {count} wavelengths")
+            text = f"{self.name} gave {f_r.dtype} of shape {f_r.shape} for {pairs}; allowed is {allowed[0]}"
+            raise ParameterError("brdf", text)
         f_r = f_r.astype(np.float64).reshape(len(wi), count)
         bad = ~(np.isfinite(f_r) & (f_r >= 0.0))
         if np.any(bad):
             row, column = np.argwhere(bad)[0]
-            raise ParameterError(
-                "brdf",
+            text = (
                 f"{self.name} gave {f_r[row, column]:g} for the light {_vector(wi[row])} and the viewer "
-                f"{_vector(wr[row])}; f_r must be finite and not below 0",
-                f_r[row, column],
+                f"{_vector(wr[row])}; f_r must be finite and not below 0"
             )
+            raise ParameterError("brdf", text, f_r[row, column])
         values[above] = f_r
         return finished(values.reshape(*light.shape[:-1], count), given, trailing=1)
 
@@ -277,16 +273,18 @@ class FunctionSource(FunctionRecord, Lookups):
             return unit_vector(theta[0], azimuths[0]), unit_vector(theta[1], azimuths[1])
 
         wi, wr = at(phi)
-        exchanged = "is not reciprocal, which it does not say: light and viewer exchanged"
+        exchanged = "is not reciprocal; set reciprocal=False: light and viewer exchanged"
         others: dict[str, tuple[Floats, ...]] = {exchanged: (wr, wi)}
         if not self.reciprocal:
             others.clear()
         if not self.anisotropic:
-            others["is anisotropic, which it does not say: the surface turned"] = at(phi + turn)
+            others["is anisotropic; set anisotropic=True: the surface turned"] = at(phi + turn)
         if self.elliptical:
-            others["has not the symmetry of an ellipse: the surface turned by 180 degrees"] = at(phi + np.pi)
+            others["lacks the symmetry of an ellipse; leave elliptical out: the surface turned by 180 degrees"] = at(
+                phi + np.pi
+            )
         if self.elliptical or not self.anisotropic:
-            others["is not its own mirror image: -phi for phi"] = at(-phi)
+            others["lacks mirror symmetry: -phi for phi"] = at(-phi)
         brdf = self.brdf_at(None if self.wavelengths_nm is None else np.array(self.wavelengths_nm))
         value = brdf(wi, wr)
         for what, directions in others.items():
@@ -294,11 +292,9 @@ class FunctionSource(FunctionRecord, Lookups):
             bad = np.abs(other - value) > _SAME * np.maximum(other, value)
             if np.any(bad):
                 row, column = np.argwhere(bad)[0]
-                raise ParameterError(
-                    "brdf",
-                    f"{self.name} {what} gives {other[row, column]:.6g} 1/sr in place of {value[row, column]:.6g} for "
-                    f"the light {_vector(wi[row])} and the viewer {_vector(wr[row])}",
-                )
+                values = f"{other[row, column]:.6g} 1/sr in place of {value[row, column]:.6g}"
+                pair = f"the light {_vector(wi[row])} and the viewer {_vector(wr[row])}"
+                raise ParameterError("brdf", f"{self.name} {what} gives {values} for {pair}")
 
 
 def _vector(w: Floats) -> str:

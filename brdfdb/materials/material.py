@@ -116,12 +116,8 @@ class Material(BaseModel, Lookups):
                 for field in ("sources", "assumed"):
                     if isinstance(stated := table.get(field), Mapping):
                         if len(stated) > most:  # pydantic would keep an error for each of a million
-                            raise ParameterError(
-                                field,
-                                f"{len(stated)} are given, {model} has {most} values at most",
-                                len(stated),
-                                (0, most),
-                            )
+                            text = f"{len(stated)} are given, {model} has {most} values at most"
+                            raise ParameterError(field, text, len(stated), (0, most))
                         fields[field] = {own.get(written, written): value for written, value in stated.items()}
                 if isinstance(stated := fields.get("assumed", {}), Mapping):
                     fields["assumed"] = assumptions(fields["parameters"]) | dict(stated)
@@ -136,9 +132,8 @@ class Material(BaseModel, Lookups):
     @classmethod
     def _check_model(cls, model: str) -> str:
         if model not in MODELS:
-            raise ParameterError(
-                "model", f"{model!r} is not one of {', '.join(MODELS)}; --models FILE adds yours", model, tuple(MODELS)
-            )
+            text = f"{model!r} is not one of {', '.join(MODELS)}; --models FILE adds your models"
+            raise ParameterError("model", text, model, tuple(MODELS))
         return model
 
     @field_validator("parameters")
@@ -159,9 +154,8 @@ class Material(BaseModel, Lookups):
         if not self.spec.spectral and self.refractive_index is not None:
             raise ParameterError("refractive_index", f"the model {self.model} takes none")
         if not self.spectral and self.wavelengths_nm is not None:
-            raise ParameterError(
-                "wavelengths_nm", f"the model {self.model} is grey, and no parameter is a spectrum; leave them out"
-            )
+            text = f"the model {self.model} is grey, and no parameter is a spectrum; leave them out"
+            raise ParameterError("wavelengths_nm", text)
         for name, spectrum_of_it in self.spectra.items():
             if self.wavelengths_nm is not None:
                 spectrum_of_it.at(name, np.array(self.wavelengths_nm))
@@ -312,24 +306,10 @@ class Material(BaseModel, Lookups):
     ) -> Evaluate:
         """Return f_r [1/sr] of the model as a function of directions alone, with the refractive index looked up once.
 
-        Parameters
-        ----------
-        wavelength_nm : array of shape (L,) [nm], or None
-            Wavelengths of a spectral material, and only of such a one.
-        vectors : callable, optional
-            A function with the arguments of the model that replaces it, such as an approximation.
-        degree : int, optional
-            Its degree as a polynomial in the reflectances, if it is one, as `ModelSpec.degree`.
-
-        Returns
-        -------
-        callable
-            ``brdf(wi, wr)`` gives f_r [1/sr] of shape (N, L) for unit vectors (N, 3). L is 1 for a grey material.
-
-        Raises
-        ------
-        ParameterError
-            If the refractive index or a spectrum is not known at one of the wavelengths.
+        ``brdf(wi, wr)`` gives f_r of shape (N, L) for unit vectors (N, 3). `wavelength_nm` (L,) [nm] is None for a grey
+        material, whose L is 1. `vectors` replaces the model, for example by an approximation with the same arguments,
+        and `degree` is its degree as a polynomial in the reflectances, as `ModelSpec.degree`. ParameterError if the
+        refractive index or a spectrum is not known at one of the wavelengths.
         """
         f_r = vectors or self.spec.vectors
         together = self.arguments(wavelength_nm)

@@ -56,9 +56,8 @@ class Spectrum(BaseModel):
         if np.any(np.diff(check_nanometres("wavelengths_nm", self.wavelengths_nm)) <= 0.0):
             raise ParameterError("wavelengths_nm", "those of a spectrum must be positive and increase strictly")
         if len(self.values) != len(self.wavelengths_nm):
-            raise ParameterError(
-                "values", f"{len(self.values)} are given for {len(self.wavelengths_nm)} wavelengths of a spectrum"
-            )
+            text = f"{len(self.values)} are given for {len(self.wavelengths_nm)} wavelengths of a spectrum"
+            raise ParameterError("values", text)
         return self
 
     def at(self, name: str, wavelength_nm: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -72,12 +71,8 @@ class Spectrum(BaseModel):
         if np.any(outside):
             hint = "; are they micrometres? A spectrum is in nm" if high < _LEAST_NM else ""
             wrong = float(np.atleast_1d(wavelength_nm)[np.atleast_1d(outside)][0])
-            raise ParameterError(
-                "wavelength_nm",
-                f"{wrong:g} has no {name}, whose spectrum covers [{low:g}, {high:g}] nm{hint}",
-                wrong,
-                (low, high),
-            )
+            text = f"{wrong:g} has no {name}, whose spectrum covers [{low:g}, {high:g}] nm{hint}"
+            raise ParameterError("wavelength_nm", text, wrong, (low, high))
         return np.asarray(np.interp(wavelength_nm, self.wavelengths_nm, self.values))
 
     def __str__(self) -> str:
@@ -126,30 +121,15 @@ def assumptions(parameters: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def spectrum_of(name: str, written: Any, wavelengths_nm: Any = None, folder: Path | None = None) -> Spectrum:
-    """Return the spectrum that a file writes as the value of a parameter.
+    """Return the spectrum that a file writes as the value of the parameter `name`.
 
-    Parameters
-    ----------
-    name : str
-        The parameter, for messages.
-    written : list or mapping
-        A list has one value for each of `wavelengths_nm`. A mapping has ``wavelengths_nm`` and ``values``, with
-        ``origin`` if it is known; or ``csv``, a file of lines ``wavelength_nm, value``; or ``srgb``, three numbers in
-        [0, 1] or ``"#rrggbb"``, encoded as displays take them; or ``measured``, ``CHECKER/PATCH`` of colour-science.
-    wavelengths_nm : list of float [nm]
-        Wavelengths of the material, for a list.
-    folder : Path
-        Folder that a relative path of a CSV file begins at; by default the working directory.
+    A list has one value for each of `wavelengths_nm`. A mapping has ``wavelengths_nm`` and ``values``, with ``origin``
+    if it is known; or ``csv``, a file of lines ``wavelength_nm, value``; or ``srgb``, three numbers in [0, 1] or
+    ``"#rrggbb"``, encoded as displays take them; or ``measured``, ``CHECKER/PATCH`` of colour-science. The relative
+    path of a CSV file begins at `folder`, by default the working directory.
 
-    Returns
-    -------
-    Spectrum
-        It is checked for order and number, not yet for the range of the parameter.
-
-    Raises
-    ------
-    ParameterError
-        If the value is written in another way, a file cannot be read, or a name is unknown.
+    Order and number of the values are checked, their range is not yet. ParameterError if the value is written in
+    another way, a file cannot be read, or a name is unknown.
     """
     if isinstance(written, list | tuple):
         if not isinstance(wavelengths_nm, list | tuple) or len(wavelengths_nm) != len(written):
@@ -172,9 +152,8 @@ def spectrum_of(name: str, written: Any, wavelengths_nm: Any = None, folder: Pat
     if {"wavelengths_nm", "values"} <= fields <= {"wavelengths_nm", "values", "origin"}:
         origin = written.get("origin", "listed with the material")
         return _spectrum(name, written["wavelengths_nm"], written["values"], origin)
-    raise ParameterError(
-        name, f"a spectrum with {', '.join(sorted(map(str, fields))) or 'nothing'}; give one of: {WAYS}", dict(written)
-    )
+    text = f"a spectrum with {', '.join(sorted(map(str, fields))) or 'nothing'}; give one of: {WAYS}"
+    raise ParameterError(name, text, dict(written))
 
 
 def _spectrum(name: str, wavelengths_nm: Any, values: Any, origin: Any) -> Spectrum:

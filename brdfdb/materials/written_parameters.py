@@ -61,12 +61,8 @@ def completed(spec: ModelSpec, parameters: Mapping[str, Any]) -> dict[str, Numbe
     for name, value in parameters.items():
         if name not in names:
             hint = "; wavelength_nm, n and k come from refractive_index" if spec.spectral else ""
-            raise ParameterError(
-                name,
-                f"{value!r} given, but the parameters of {spec.name} are {', '.join(names)}{hint}",
-                value,
-                tuple(names),
-            )
+            text = f"{value!r} given, but the parameters of {spec.name} are {', '.join(names)}{hint}"
+            raise ParameterError(name, text, value, tuple(names))
     complete: dict[str, Number | Spectrum] = {}
     for parameter in spec.parameters:
         value = parameters.get(parameter.name, parameter.default)

@@ -130,7 +130,8 @@ class InstrumentView:
         """
         if not self._half_angles:
             return np.zeros(len(self))
-        first, last = self._half_angles[0], self._half_angles[-1]
+        first = self._half_angles[0]
+        last = self._half_angles[-1]
         shared = common_solid_angle(np.asarray(first), np.asarray(last), self.from_mirror)
         if len(self._half_angles) == 1:  # the other is a point
             shared = np.where(self.from_mirror < first, _solid_angle(first), 0.0)

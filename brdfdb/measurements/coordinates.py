@@ -61,7 +61,8 @@ def beyond(at: Floats, x: Floats) -> NDArray[np.bool_]:
     _, spread, axes = np.linalg.svd(np.linalg.qr(x - centre, mode="r"), full_matrices=True)
     spread = np.pad(spread, (0, x.shape[1] - spread.size))
     wide = spread > _FLAT * max(spread[0], 1e-12)
-    along, across = axes[wide], axes[~wide]
+    along = axes[wide]
+    across = axes[~wide]
     inside = (x - centre) @ along.T
     if inside.shape[1] > 1:
         planes = ConvexHull(inside).equations

@@ -77,7 +77,8 @@ class Extent(BaseModel):
         cell = float(radians(_TURNED_CELL_DEG if turned else _CELL_DEG))
         x = np.asarray(places(samples.w_i, samples.w_r, turned=turned), dtype=np.float64)
         lights = 2 if turned else 1
-        light, sheared = x[:, :lights], _sheared(x, lights)
+        light = x[:, :lights]
+        sheared = _sheared(x, lights)
         if samples.scanned:
             incidence = samples.incidence
             centres = np.stack([np.bincount(incidence, column) for column in light.T], axis=1)

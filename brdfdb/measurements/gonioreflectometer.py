@@ -197,7 +197,7 @@ class CameraPicture:
         for name in ("sample", "standard", "background"):
             counts = getattr(self, name)
             if counts.shape != shape or not np.all(np.isfinite(counts)):
-                raise ParameterError(name, f"counts of shape {counts.shape} are not finite ones of shape {shape}")
+                raise ParameterError(name, f"counts of shape {counts.shape}; they must be finite and of shape {shape}")
         if not 0.0 <= self.theta_i < 0.5 * np.pi:
             raise ParameterError("theta_i", f"{degrees(self.theta_i):g} degrees is not in [0, 90)", self.theta_i)
 
@@ -383,7 +383,8 @@ def _chosen(f_r: Array, uncertainty: Array) -> NDArray[np.bool_]:
     variance = np.where(np.isfinite(mean), np.pad(uncertainty, padding, constant_values=np.nan) ** 2, 0.0)
     count = np.isfinite(mean).astype(np.float64)  # known pixels of a block
     known = np.isfinite(mean)
-    kept, merged = known.copy(), np.ones(mean.shape, dtype=bool)
+    kept = known.copy()
+    merged = np.ones(mean.shape, dtype=bool)
     block = 1
     while block < _LARGEST_BLOCK:
         means, variances, counts = (_fours(array) for array in (mean, variance, count))
@@ -398,7 +399,8 @@ def _chosen(f_r: Array, uncertainty: Array) -> NDArray[np.bool_]:
         centre = np.zeros((block, block), dtype=bool)
         centre[block // 2, block // 2] = True
         kept = np.where(np.kron(merged, np.ones((block, block), dtype=bool)), np.kron(merged, centre), kept)
-        mean, count = np.where(weight > 0.0, middle, np.nan), weight
+        mean = np.where(weight > 0.0, middle, np.nan)
+        count = weight
         variance = np.sum(shares**2 * variances, axis=-1)
     return np.asarray((kept & known)[:height, :width])
 

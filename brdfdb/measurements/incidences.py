@@ -133,7 +133,8 @@ def incidences_of(
 
 def lights(samples: Samples, fewest: int = _FEWEST_VIEWERS) -> list[NDArray[np.intp]]:
     """Return the rows of each direction of the light that has viewers enough, by theta_i."""
-    number, theta_i = samples.incidence, degrees(samples.theta_i)
+    number = samples.incidence
+    theta_i = degrees(samples.theta_i)
     counts = np.bincount(number)
     enough = np.flatnonzero(counts >= fewest)
     if not enough.size:

@@ -181,11 +181,10 @@ def _check_values(samples: Samples) -> None:
     largest = np.max(values, where=samples.known, initial=0.0)
     lowest = np.min(values, where=samples.known, initial=0.0)
     if not largest > 0.0:
-        raise ParameterError("values", "no value is above 0, which leaves nothing to tabulate", float(largest))
+        raise ParameterError("values", "no value is above 0: there is nothing to tabulate", float(largest))
     if lowest < -_ABSURD * largest:
-        raise ParameterError(
-            "values", f"{lowest:g} is no f_r, of which the largest is {largest:g}; a hole is nan", lowest
-        )
+        text = f"{lowest:g} is not a possible f_r, whose largest value is {largest:g}; a hole must be nan"
+        raise ParameterError("values", text, lowest)
     for channel, column in zip(samples.channels, values.T, strict=True):
         numbers, counts = np.unique(column[column < 0.0], return_counts=True)
         often = numbers[counts >= _OFTEN]
@@ -346,7 +345,8 @@ def _held_out(how: SampleInterpolation, problem: _Problem, centres: _Problem) ->
     The centres of radial functions stay: only values tell, not places.
     """
     at = _x(how, centres)
-    phi, smooth = _radial(_x(how, problem), at), _radial(at, at)
+    phi = _radial(_x(how, problem), at)
+    smooth = _radial(at, at)
     matrix, right = _normal(how, problem, phi)
     predicted = np.empty_like(problem.y)
     for group in np.unique(problem.group):
@@ -366,7 +366,8 @@ def _stated(samples: Samples, problem: _Problem, predicted: Floats, how: SampleI
         inside[own] = ~beyond(x[own], others)
     counted = inside if inside.any() else ~inside
     f_r = np.maximum(2.0 * how.level * np.sinh(problem.of_base + predicted), 0.0)[counted]
-    values, floor = problem.values[counted], floor_of(samples)
+    values = problem.values[counted]
+    floor = floor_of(samples)
     known = np.isfinite(values)
     off = np.abs(f_r - values)
     error = (off / np.maximum(f_r, floor))[known]

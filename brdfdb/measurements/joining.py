@@ -41,11 +41,8 @@ def joined(parts: Sequence[Samples]) -> Samples:
         _check_channels(first, other)
         of_surface = other.record.get("azimuths") != RELATIVE and np.any((other.theta_i > 0.0) & (other.phi_i != 0.0))
         if relative is not None and of_surface:
-            raise ParameterError(
-                "parts",
-                f"azimuths of {relative.name} are relative to the light, and those of {other.name} to the surface",
-                other.name,
-            )
+            text = f"azimuths of {relative.name} are relative to the light, and those of {other.name} to the surface"
+            raise ParameterError("parts", text, other.name)
     arrays: dict[str, Any] = {
         name: np.concatenate([getattr(part, name) for part in parts]) for name in (*ANGLES, "values")
     }

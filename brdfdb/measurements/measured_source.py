@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from pydantic import PrivateAttr
 
 from brdfdb.errors import ParameterError
+from brdfdb.gauss import gauss_rule
 from brdfdb.geometry import radians, unit_vector
-from brdfdb.integrals.quadrature import gauss_rule
 from brdfdb.materials import FunctionSource
 from brdfdb.materials.source import Evaluate
 from brdfdb.measurements import symmetry
@@ -138,26 +138,12 @@ class MeasuredSource(FunctionSource):
     ) -> Self:
         """Return measured f_r that is known everywhere, such as that of a file, as a source.
 
-        Parameters
-        ----------
-        evaluate : callable
-            f_r [1/sr] (N, C) at unit vectors (N, 3) of light and viewer above the horizon.
-        channels : tuple of str
-            ("R", "G", "B"), ("X", "Y", "Z"), ("grey",), or wavelengths.
-        wavelength_nm : array (C,) [nm] or None
-            Wavelengths of the channels; None of colours and of grey data.
-        name, title, provenance : str
-            A slug, a line for people, and where the data come from.
-        noise : Noise, optional
-            Uncertainty of the values.
-        nodes : Samples, optional
-            Values at the directions that were measured: f_r outside of their `Extent` is marked as extrapolated. By
-            default f_r is known everywhere, as it is where nearly all directions lie within.
-
-        Raises
-        ------
-        ParameterError
-            If a value is not finite.
+        `evaluate` gives f_r [1/sr] (N, C) at unit vectors (N, 3) of light and viewer above the horizon; ParameterError
+        if a value is not finite. Channels are ("R", "G", "B"), ("X", "Y", "Z"), ("grey",), or wavelengths, with
+        `wavelength_nm` (C,) [nm]. Name, title and provenance are a slug, a line for people, and the origin of the data.
+        `noise` is the uncertainty of the values. f_r outside of the `Extent` of `nodes`, the values at the measured
+        directions, is marked as extrapolated; by default f_r is known everywhere, as it is if nearly all directions lie
+        within.
         """
         wi, wr = symmetry.drawn_pairs()
         values = np.asarray(evaluate(wi[:_PROBED], wr[:_PROBED]))
@@ -238,19 +224,13 @@ class MeasuredSource(FunctionSource):
     def made(self, law: str, margin: float = MARGIN) -> Self:
         """Return the nearest source that keeps a law; its record says what was changed.
 
-        Parameters
-        ----------
-        law : str
-            "reciprocal": the mean of f_r and f_r with light and viewer exchanged. "conserving": f_r times one number
-            for each light, the largest up to 1 that keeps the albedo at 1 or below; times that of the viewer, too, if
-            it is reciprocal.
-        margin : float [1]
-            Difference of the albedo from 1: room for the error of a table.
+        "reciprocal" is the mean of f_r and f_r with light and viewer exchanged. "conserving" is f_r times one number
+        for each light, the largest up to 1 that keeps the albedo at most 1 - `margin`; times that of the viewer, too,
+        if f_r is reciprocal. The margin [1] is room for the error of a table.
         """
         if law not in ("reciprocal", "conserving"):
-            raise ParameterError(
-                "law", f"{law!r} is neither reciprocal nor conserving", law, ("reciprocal", "conserving")
-            )
+            text = f"{law!r} is neither reciprocal nor conserving"
+            raise ParameterError("law", text, law, ("reciprocal", "conserving"))
         before = self._channels_at
         if law == "reciprocal":
             after = _made_reciprocal(before)
@@ -353,7 +333,8 @@ def _width(f_r: Evaluate) -> float | None:
         wr = 2.0 * np.sum(wi * half, axis=1, keepdims=True) * half - wi
         above = wr[:, 2] > 0.05
         values = f_r(wi[above], wr[above]).mean(axis=1)
-        far, peak = float(values.min()), float(values[0])
+        far = float(values.min())
+        peak = float(values[0])
         if not peak > _CLEAR * far:
             return None
         below = np.flatnonzero(values - far < (peak - far) * np.exp(-1.0))

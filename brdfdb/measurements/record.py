@@ -8,7 +8,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from brdfdb.measurements.extent import Extent
 
-_FEW = 1e-3  # share of directions that is not told from 0: a few of those that it is counted with
+_FEW = 1e-3  # smallest share of directions that is shown: it is counted with a few thousand directions
 _SHOWN = 12  # digits of a digest
 
 _STRICT = ConfigDict(frozen=True, extra="forbid")
@@ -31,8 +31,8 @@ class MeasuredSymmetry(BaseModel):
 
     assumed: bool = Field(description="true if the table makes use of it")
     asymmetry: Spread | None = Field(
-        description="of f_r that the table is made of, interpolated between samples, over directions up to 80 degrees; "
-        "of mirror images of samples those that are pairs; null: the data cannot tell"
+        description="of the f_r that is tabulated, interpolated between samples, over directions up to 80 degrees; "
+        "of mirror images: of pairs of samples; null: the data cannot show it"
     )
     allowed: float | None = Field(description="largest asymmetry that their noise explains; null: not known")
 
@@ -152,8 +152,8 @@ class Measured(BaseModel):
             share = 1.0 - self.extrapolated
             words = f"{100.0 * share:.3g} %" if share >= _FEW else f"less than {100.0 * _FEW:g} %"
             lines.append(
-                f"{words} of all pairs of directions were measured; beyond, and in holes, f_r is extrapolated, and its "
-                "error not known"
+                f"{words} of all pairs of directions were measured; elsewhere f_r is extrapolated, and its error is "
+                "unknown"
             )
         if self.negative > 0.0:
             lines.append(f"{100.0 * self.negative:.3g} % of the values are below 0: f_r is 0 there")

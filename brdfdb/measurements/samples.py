@@ -67,11 +67,8 @@ class Instrument:
 class Samples:
     """f_r at some directions, as an instrument measured it or as a file lists it.
 
-    Raises
-    ------
-    ParameterError
-        If shapes do not fit, an angle is outside its range, a value is infinite, or an uncertainty is negative
-        or infinite.
+    ParameterError if shapes do not fit, an angle is outside its range, a value is infinite, or an uncertainty is
+    negative or infinite.
     """
 
     name: str  #: name of the material, or of the file
@@ -120,11 +117,11 @@ class Samples:
         if self.wavelength_nm is not None:
             check_nanometres("wavelength_nm", self.wavelength_nm)
         if np.any(np.isinf(self.values)):
-            raise ParameterError("values", "a value is infinite; a hole is nan", np.inf)
+            raise ParameterError("values", "a value is infinite; a hole must be nan", np.inf)
         if self.uncertainty is not None and np.any(self.uncertainty < 0.0):
             raise ParameterError("uncertainty", f"{np.nanmin(self.uncertainty):g} is below 0", None, (0.0, np.inf))
         if self.uncertainty is not None and np.any(np.isinf(self.uncertainty)):
-            raise ParameterError("uncertainty", "a value is infinite; what is not known is nan", np.inf)
+            raise ParameterError("uncertainty", "a value is infinite; an unknown value must be nan", np.inf)
         if self.uncertainty is not None and np.all(np.isnan(self.uncertainty)):
             object.__setattr__(self, "uncertainty", None)
 

@@ -72,7 +72,7 @@ class SampleStatement:
     holes: int  #: number of values that are missing
     negative: int  #: number of values below 0
     zeros: int  #: number of values that are exactly 0 while others are not: many files write 0 for a hole
-    constant: bool  #: True if f_r of each channel is one number at all directions
+    constant: bool  #: True if f_r of each channel is the same at all directions
     largest: float  #: largest value [1/sr]
     largest_at_deg: tuple[float, float, float]  #: theta_i, theta_r and the difference of the azimuths there
     uncertainty: float | None  #: median of the standard uncertainties over the absolute values [1]; None: not stated
@@ -110,7 +110,7 @@ class SampleStatement:
         around = "from several azimuths" if self.turned else "from one azimuth"
         text = f"{samples} of {channels}: {lights}, {around}, theta_i {low:.4g} to {high:.4g} degrees"
         text += f"; theta_r {self.theta_r_deg[0]:.4g} to {self.theta_r_deg[1]:.4g} degrees."
-        side = ["All viewers are on one side of the plane of incidence: the other is taken for its mirror image."]
+        side = ["All viewers are on one side of the plane of incidence; the other is assumed to be its mirror image."]
         return [text, *(side if self.one_side and self.incidences else [])]
 
     def _on_values(self) -> list[str]:
@@ -127,9 +127,9 @@ class SampleStatement:
             lines.append(f"Standard uncertainties are stated: {percent(self.uncertainty)} of f_r in the median.")
         if self.constant:
             of_channel = "f_r of each channel" if len(self.channels) > 1 else "f_r"
-            lines.append(f"{of_channel} is one number at all directions: the samples tell no shape.")
+            lines.append(f"{of_channel} is the same at all directions: the samples do not show its shape.")
         if self.zeros:
-            lines.append(f"{counted(self.zeros, 'value')} of exactly 0: integrals and pairs take them for holes.")
+            lines.append(f"{counted(self.zeros, 'value')} of exactly 0: integrals and pairs treat them as holes.")
         return lines
 
     def _on_albedo(self) -> list[str]:
@@ -144,7 +144,8 @@ class SampleStatement:
                 inside = _shown(self.channels, some.measured)
                 text += f"; viewers surround {100.0 * some.covered:.3g} % of the hemisphere, with {inside}"
             if some.peak > PEAK:
-                text += f"; unknown: one viewer makes {percent(some.peak)} of it, the lobe is narrower than the steps"
+                text += f"; unknown: one viewer contributes {percent(some.peak)} of it"
+                text += ", because the lobe is narrower than the steps"
             lines.append(f"{text}.")
         if self.in_bands:
             lines.append(
@@ -165,7 +166,8 @@ class SampleStatement:
         ]
 
     def _on_claims(self) -> list[str]:
-        lines, agree = [], 0
+        lines = []
+        agree = 0
         for claim in self.claims:
             if claim.known and abs(claim.relative) > _CLAIM:
                 size = f"{percent(abs(claim.relative))} {'low' if claim.relative < 0.0 else 'high'}"
@@ -306,7 +308,8 @@ def reciprocity_of(samples: Samples, one_side: bool) -> ExchangedPairs | None:
     place = np.clip(np.searchsorted(code[order], code_swapped), 0, len(order) - 1)
     partner = order[place]
     first = np.flatnonzero((code[partner] == code_swapped) & (code < code_swapped))
-    a, b = samples.values[first], samples.values[partner[first]]
+    a = samples.values[first]
+    b = samples.values[partner[first]]
     level = float(np.nanmedian(np.abs(samples.values))) if samples.known.any() else 0.0
     pairs = int(np.sum(are_bright(a, b, level).any(axis=1)))
     if not pairs:
@@ -323,7 +326,7 @@ def _wide(parts: Sequence[NDArray[np.int64]]) -> list[NDArray[np.uint64]]:
 def units(samples: Samples, incidences: Sequence[Incidence]) -> tuple[str, ...]:
     """Return what looks wrong with the unit of the values, in sentences."""
     if not samples.known.any():
-        return ("There is no value at all.",)
+        return ("The samples have no values.",)
     sound = [max(some.albedo) for some in incidences if some.peak <= PEAK]
     if sound:
         albedo = float(np.median(sound))
@@ -353,10 +356,11 @@ def missing(samples: Samples) -> tuple[str, ...]:
     if low >= 0.0:
         return _missing_above(known, scale)
     if not np.any(known > 0.0):
-        return ("Sign? No value is above 0: f_r is not negative, and nothing can be tabulated or fitted.",)
+        return ("Sign? No value is above 0, but f_r is never negative: these values cannot be tabulated or fitted.",)
     number = low * scale
     marks = np.isclose(known, low, rtol=1e-9, atol=0.0)
-    count, others = int(marks.sum()), known[~marks]
+    count = int(marks.sum())
+    others = known[~marks]
     if not others.size or (count == 1 and not np.isclose(number, _MISSING).any()):
         return ()
     far = low < -float(np.abs(others).max()) and low < 10.0 * min(float(others.min()), 0.0)
@@ -370,7 +374,8 @@ def _missing_above(known: Floats, scale: float) -> tuple[str, ...]:
     """Return whether the largest values look like marks of missing ones: nines that are far above the others."""
     high = float(known.max(initial=0.0))
     marks = np.isclose(known, high, rtol=1e-9, atol=0.0)
-    count, others = int(marks.sum()), known[~marks]
+    count = int(marks.sum())
+    others = known[~marks]
     nines = np.isclose(high * scale, -_MISSING).any() or np.isclose(high * scale, _FILLED, rtol=1e-6).any()
     if not others.size or not nines or high <= _FAR * float(others.max()):
         return ()
@@ -379,7 +384,7 @@ def _missing_above(known: Floats, scale: float) -> tuple[str, ...]:
 
 
 def is_constant(samples: Samples) -> bool:
-    """Return True if f_r of each channel with a few values is one number at all directions."""
+    """Return True if f_r of each channel with a few values is the same at all directions."""
     seen = samples.known.sum(axis=0) >= _FEWEST
     values = np.where(samples.known, samples.values, np.nan)[:, seen]
     return bool(seen.any() and np.all(np.nanmin(values, axis=0) == np.nanmax(values, axis=0)))
@@ -390,7 +395,8 @@ def azimuths(samples: Samples, delta_deg: Floats) -> tuple[str, ...]:
 
     `delta_deg` (N,) are azimuths [degree] from the light to the viewer, in [0, 360).
     """
-    known, theta_i = samples.known, np.degrees(samples.theta_i)
+    known = samples.known
+    theta_i = np.degrees(samples.theta_i)
     f_r = np.where(known, samples.values, 0.0).sum(axis=1) / np.maximum(known.sum(axis=1), 1)
     low, high = _TILTED_DEG
     seen = known.any(axis=1) & (theta_i >= low) & (theta_i <= high)

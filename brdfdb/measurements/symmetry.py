@@ -133,7 +133,8 @@ def reciprocity(f_r: Evaluate, extent: Extent | None, noise: float | None) -> Me
 def mirror(f_r: Evaluate, noise: float | None) -> MeasuredSymmetry:
     """Return whether data everywhere keep to the mirror symmetry that isotropic tables use."""
     wi, wr = drawn_pairs()
-    f, other = f_r(wi, wr), f_r(wi * MIRROR, wr * MIRROR)
+    f = f_r(wi, wr)
+    other = f_r(wi * MIRROR, wr * MIRROR)
     seen = _floored(f, other)
     allowed = _CONTRADICTED if noise is None else max(_WITHIN * noise, _CONTRADICTED)
     kept = (seen is None or seen.median <= allowed) and _of_lobes(f_r, lambda w: w * MIRROR) <= allowed

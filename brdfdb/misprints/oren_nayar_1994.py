@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from brdfdb import models
+from brdfdb.gauss import gauss_rule
 from brdfdb.geometry import radians, spherical_angles, unit_vector
-from brdfdb.integrals.quadrature import gauss_rule
 from brdfdb.misprints._entry import ORENNAYAR, Array, Misprint, at, part
 
 

@@ -46,12 +46,7 @@ def _deviation_of_samples(*, alpha_x: Any, alpha_y: Any) -> Any:
     The quadrature of Gauss and Laguerre in -log(u1) and eight azimuths is exact for a square of the slope.
     """
     x, weights = np.polynomial.laguerre.laggauss(4)
-    wr = _sample(
-        np.exp(-x)[:, np.newaxis],
-        (np.arange(8.0) + 0.5) / 8.0,
-        alpha_x=alpha_x,
-        alpha_y=alpha_y,
-    ).wr
+    wr = _sample(np.exp(-x)[:, np.newaxis], (np.arange(8.0) + 0.5) / 8.0, alpha_x=alpha_x, alpha_y=alpha_y).wr
     slope = wr[..., 0] / (1.0 + wr[..., 2])  # of the half vector of wr and the normal
     return np.sqrt(weights @ np.mean(slope**2, axis=-1))
 

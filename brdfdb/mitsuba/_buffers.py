@@ -8,7 +8,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 _SEVERAL = {"Float": "ArrayXf", "Float64": "ArrayXf64"}
 _LINE = 64  # bytes: an address that is a multiple of it lets Dr.Jit load several numbers at once
@@ -28,7 +28,11 @@ class Buffer:
     """A flat array of numbers, loaded once into each variant that reads it."""
 
     def __init__(self, numbers: ArrayLike) -> None:
-        self.numbers = _aligned(np.asarray(numbers, dtype=np.float32).ravel())
+        values = np.asarray(numbers, dtype=np.float32).ravel()
+        room = np.empty(values.size + _LINE // 4, np.float32)
+        first = -room.ctypes.data % _LINE // 4
+        self.numbers = room[first : first + values.size]
+        self.numbers[:] = values
         self._arrays: dict[str | None, Any] = {}
 
     def at(self, index: Any) -> Any:
@@ -69,14 +73,6 @@ class Buffer:
     def replace(self, numbers: Any) -> None:
         """Take other numbers, an array of the variant that may have derivatives."""
         self._arrays[mi.variant()] = numbers
-
-
-def _aligned(numbers: NDArray[np.float32]) -> NDArray[np.float32]:
-    room = np.empty(numbers.size + _LINE // 4, np.float32)
-    first = -room.ctypes.data % _LINE // 4
-    aligned = room[first : first + numbers.size]
-    aligned[:] = numbers
-    return aligned
 
 
 def polynomial(coefficients: Any, x: Any) -> Any:

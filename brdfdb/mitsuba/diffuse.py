@@ -253,5 +253,5 @@ class OrenNayar(Diffuse):
     def __init__(self, props: Any) -> None:
         form = props.get("form", "oren_nayar")
         if form not in OREN_NAYAR:
-            raise ParameterError("form", f"{form!r} is none of {', '.join(OREN_NAYAR)}", form, tuple(OREN_NAYAR))
+            raise ParameterError("form", f"{form!r} is not one of {', '.join(OREN_NAYAR)}", form, tuple(OREN_NAYAR))
         super().__init__(props, form)

@@ -281,7 +281,9 @@ class HeTorrance(Formula):
     def at(self, interaction: Any, active: Any) -> Values:
         """Return the parameters and the surface as the light of each channel sees it."""
         values = self.parameters.at(interaction, active)
-        values["surface"] = _surface_of(values, self._wavelengths_nm(interaction))
+        of_rays = mi.is_spectral and not self._wavelength_nm
+        wavelengths_nm = interaction.wavelengths if of_rays else self._wavelength_nm or channels_nm()
+        values["surface"] = _surface_of(values, mi.UnpolarizedSpectrum(wavelengths_nm))
         return values
 
     def traverse(self, callback: Any) -> None:
@@ -299,11 +301,6 @@ class HeTorrance(Formula):
             for value, weights in zip(spectrum, band.weights, strict=True):
                 total = [number + value * weight for number, weight in zip(total, weights, strict=True)]
         return mi.UnpolarizedSpectrum(total)
-
-    def _wavelengths_nm(self, interaction: Any) -> Any:
-        if mi.is_spectral and not self._wavelength_nm:
-            return mi.UnpolarizedSpectrum(interaction.wavelengths)
-        return mi.UnpolarizedSpectrum(self._wavelength_nm or channels_nm())
 
     def parts(self, values: Values, wi: Any, wo: Any) -> dict[str, Any]:
         """Return f_r [1/sr] of the directional diffuse and of the uniform diffuse part."""
@@ -364,7 +361,7 @@ def _bands_of(props: Any) -> list[_WavelengthTriple]:
     for name in ("n", "k"):
         if name in props and not (isinstance(props[name], int | float) or hasattr(props[name], "wavelengths")):
             if props.get("channels", "") == SRGB:
-                raise ParameterError(name, f"a colour or a texture has no spectrum, which channels = {SRGB} needs")
+                raise ParameterError(name, f"a colour or a texture has no spectrum, and channels = {SRGB} needs one")
             shared = None
     at_nm = None if shared is None else picture_wavelengths(shared)
     chosen = projection(props, shared if at_nm is None else at_nm)

@@ -56,7 +56,7 @@ class Ward(Formula):
     def __init__(self, props: Any) -> None:
         self._form = props.get("form", "ward")
         if self._form not in FORMS:
-            raise ParameterError("form", f"{self._form!r} is none of {', '.join(FORMS)}", self._form, FORMS)
+            raise ParameterError("form", f"{self._form!r} is not one of {', '.join(FORMS)}", self._form, FORMS)
         self.parameters = PluginParameters(props, MODELS[self._form])
 
     def parts(self, values: Values, wi: Any, wo: Any) -> dict[str, Any]:

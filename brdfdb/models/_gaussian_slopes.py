@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from brdfdb._elementary import cos, exp, log, sine
 from brdfdb._numba import inner_loop, kernel
+from brdfdb.gauss import gauss_rule
 
 INTEGRALS = 7
 # Of the integrands W times C, S, S C, S^2, S^2 C / (1 + C), S^3 / (1 + C) and S^4 / (C (1 + C))
@@ -26,7 +27,7 @@ _TERMS = 34  # of a series, at most: for x up to 6 they leave 1e-12
 _FLAT = 0.03  # 1 - C below which `_steepest` is a series: 1e-15 of it is left out
 _SMALL = 1e-18  # factor of `_steepest` below which it is left out
 _TINY = 1e-300  # guard against 0 / 0 and log(0): the smallest cosine
-_GAUSS_LEGENDRE = np.stack(np.polynomial.legendre.leggauss(8)) / 2.0 + np.array([[0.5], [0.0]])  # between two nodes
+_GAUSS_LEGENDRE = np.stack(gauss_rule(8).on(0.0, 1.0))  # between two nodes
 
 
 # The integrals of one deviation of slopes. A tuple of Python: numba stores the types of arguments, and a class of ours

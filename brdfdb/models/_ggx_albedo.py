@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from brdfdb.gauss import gauss_rule
 from brdfdb.parameters import Floats
 
 _NODES = 14  # of Gauss's rule on a panel
@@ -25,15 +26,15 @@ _FEW = 16  # distinct alphas up to which each has series of its own
 _BLOCK = 1000  # values of a quadrature at a time
 _NARROWEST = 1e-6  # alpha
 
-_X, _W = np.polynomial.legendre.leggauss(_NODES)
+_RULE = gauss_rule(_NODES)
 
 
 def _graded(length: Floats, r: Floats) -> tuple[Floats, Floats]:
     """Return nodes r sinh(v) from 0 to the lengths, dense up to r, and their weights, for columns of both."""
     v = np.arcsinh(length / r)
     panels = max(1, int(np.ceil(np.max(v) / _PANEL)))
-    y = ((np.arange(panels)[:, np.newaxis] + (_X + 1.0) / 2.0) / panels).ravel()
-    return r * np.sinh(v * y), r * np.cosh(v * y) * v * np.tile(_W / (2.0 * panels), panels)
+    y = ((np.arange(panels)[:, np.newaxis] + (_RULE.nodes + 1.0) / 2.0) / panels).ravel()
+    return r * np.sinh(v * y), r * np.cosh(v * y) * v * np.tile(_RULE.weights / (2.0 * panels), panels)
 
 
 def lost_by_quadrature(cos: Floats, alpha: Floats) -> Floats:
@@ -54,8 +55,8 @@ def lost_by_quadrature(cos: Floats, alpha: Floats) -> Floats:
         return a2 * versine * (1.0 + c) / ((R_r + c) * (R_r + c * R_i / mu))
 
     # Facets that mirror the light below the horizon, c in [-mu, 0]
-    c: Floats = -mu * (_X + 1.0) / 2.0
-    lost = density(c, 1.0 - c, beta * c - mu * (1.0 + a2)) @ _W * mu[..., 0] / 2.0
+    c: Floats = -mu * (_RULE.nodes + 1.0) / 2.0
+    lost = density(c, 1.0 - c, beta * c - mu * (1.0 + a2)) @ _RULE.weights * mu[..., 0] / 2.0
     # The peak at c = mu (1 + alpha^2) / beta, or 1 where that is larger: c = peak + r sinh(v)
     beyond = 2.0 * a2 * mu / beta - (1.0 - mu)
     peak = np.where(beyond < 0.0, mu * (1.0 + a2) / beta, 1.0)
@@ -131,7 +132,7 @@ def share_of(alpha: float) -> tuple[Share, float]:
 
 def _mean(share: Share) -> float:
     """Return the mean [1] over all directions, weighted by the cosine: 2 L mu dmu, and dmu = R dv."""
-    x, w = np.polynomial.legendre.leggauss(_MEAN_NODES)
+    x, w = gauss_rule(_MEAN_NODES)
     y = (x[:, np.newaxis] + 1.0) / 2.0
     v, step = share.width * (np.arange(share.series.shape[1]) + y), np.full((x.size, share.series.shape[1]), 1.0)
     v[:, 0], step[:, 0] = share.width * y[:, 0] ** 4, 4.0 * y[:, 0] ** 3  # for the logarithm

@@ -155,76 +155,26 @@ def _vector_rows(
             f[j] = (uniform + lobe) * (0.0 if z_i < 0.0 or z_r < 0.0 else 1.0)  # nan stays nan
 
 
-# Each form has a loop of its own: where the form is known there is no branch, and the loop vectorises. Each is compiled
-# when it is first called.
+def _loops(distribution: int, shadowing: int, fresnel: int) -> RowLoops:
+    """Return loops of a form. The form is a constant to them, so they have no branch, and vectorise."""
+
+    @loop
+    def by_angles(cos_phi: Rows, sin_phi: Rows, scalars: Rows, f_r: Rows) -> None:
+        _angle_rows(distribution, shadowing, fresnel, cos_phi, sin_phi, scalars, f_r)
+
+    @loop
+    def by_vectors(w_i: Floats, w_r: Floats, scalars: Rows, f_r: Floats) -> None:
+        _vector_rows(distribution, shadowing, fresnel, w_i, w_r, scalars, f_r)
+
+    return RowLoops(by_angles, by_vectors)
 
 
-@loop
-def _ggx_angles(cos_phi: Rows, sin_phi: Rows, scalars: Rows, f_r: Rows) -> None:
-    _angle_rows(_GGX, _CORRELATED, _EXACT, cos_phi, sin_phi, scalars, f_r)
-
-
-@loop
-def _ggx_vectors(w_i: Floats, w_r: Floats, scalars: Rows, f_r: Floats) -> None:
-    _vector_rows(_GGX, _CORRELATED, _EXACT, w_i, w_r, scalars, f_r)
-
-
-@loop
-def _ggx_schlick_angles(cos_phi: Rows, sin_phi: Rows, scalars: Rows, f_r: Rows) -> None:
-    _angle_rows(_GGX, _CORRELATED, _SCHLICK, cos_phi, sin_phi, scalars, f_r)
-
-
-@loop
-def _ggx_schlick_vectors(w_i: Floats, w_r: Floats, scalars: Rows, f_r: Floats) -> None:
-    _vector_rows(_GGX, _CORRELATED, _SCHLICK, w_i, w_r, scalars, f_r)
-
-
-@loop
-def _beckmann_angles(cos_phi: Rows, sin_phi: Rows, scalars: Rows, f_r: Rows) -> None:
-    _angle_rows(_BECKMANN, _CORRELATED, _EXACT, cos_phi, sin_phi, scalars, f_r)
-
-
-@loop
-def _beckmann_vectors(w_i: Floats, w_r: Floats, scalars: Rows, f_r: Floats) -> None:
-    _vector_rows(_BECKMANN, _CORRELATED, _EXACT, w_i, w_r, scalars, f_r)
-
-
-@loop
-def _beckmann_schlick_angles(cos_phi: Rows, sin_phi: Rows, scalars: Rows, f_r: Rows) -> None:
-    _angle_rows(_BECKMANN, _CORRELATED, _SCHLICK, cos_phi, sin_phi, scalars, f_r)
-
-
-@loop
-def _beckmann_schlick_vectors(w_i: Floats, w_r: Floats, scalars: Rows, f_r: Floats) -> None:
-    _vector_rows(_BECKMANN, _CORRELATED, _SCHLICK, w_i, w_r, scalars, f_r)
-
-
-@loop
-def _ggx_separable_angles(cos_phi: Rows, sin_phi: Rows, scalars: Rows, f_r: Rows) -> None:
-    _angle_rows(_GGX, _SEPARABLE, _EXACT, cos_phi, sin_phi, scalars, f_r)
-
-
-@loop
-def _ggx_separable_vectors(w_i: Floats, w_r: Floats, scalars: Rows, f_r: Floats) -> None:
-    _vector_rows(_GGX, _SEPARABLE, _EXACT, w_i, w_r, scalars, f_r)
-
-
-@loop
-def _beckmann_separable_angles(cos_phi: Rows, sin_phi: Rows, scalars: Rows, f_r: Rows) -> None:
-    _angle_rows(_BECKMANN, _SEPARABLE, _EXACT, cos_phi, sin_phi, scalars, f_r)
-
-
-@loop
-def _beckmann_separable_vectors(w_i: Floats, w_r: Floats, scalars: Rows, f_r: Floats) -> None:
-    _vector_rows(_BECKMANN, _SEPARABLE, _EXACT, w_i, w_r, scalars, f_r)
-
-
-GGX_LOOPS = RowLoops(_ggx_angles, _ggx_vectors)
-GGX_SCHLICK_LOOPS = RowLoops(_ggx_schlick_angles, _ggx_schlick_vectors)
-BECKMANN_LOOPS = RowLoops(_beckmann_angles, _beckmann_vectors)
-BECKMANN_SCHLICK_LOOPS = RowLoops(_beckmann_schlick_angles, _beckmann_schlick_vectors)
-GGX_SEPARABLE_LOOPS = RowLoops(_ggx_separable_angles, _ggx_separable_vectors)
-BECKMANN_SEPARABLE_LOOPS = RowLoops(_beckmann_separable_angles, _beckmann_separable_vectors)
+GGX_LOOPS = _loops(_GGX, _CORRELATED, _EXACT)
+GGX_SCHLICK_LOOPS = _loops(_GGX, _CORRELATED, _SCHLICK)
+BECKMANN_LOOPS = _loops(_BECKMANN, _CORRELATED, _EXACT)
+BECKMANN_SCHLICK_LOOPS = _loops(_BECKMANN, _CORRELATED, _SCHLICK)
+GGX_SEPARABLE_LOOPS = _loops(_GGX, _SEPARABLE, _EXACT)
+BECKMANN_SEPARABLE_LOOPS = _loops(_BECKMANN, _SEPARABLE, _EXACT)
 
 _NONE = np.zeros(())
 

@@ -9,7 +9,6 @@ rho E_0 cos(theta_i) / pi, those of the second bounce divided by rho^2 E_0 cos(t
 
 from __future__ import annotations
 
-import functools
 import math
 
 import numpy as np
@@ -17,6 +16,7 @@ from numpy.typing import NDArray
 
 from brdfdb._elementary import arcsin, exp, summand_exp
 from brdfdb._numba import elementwise, inner_loop, kernel, loop
+from brdfdb.gauss import gauss_rule
 from brdfdb.models._gaussian_slopes import (
     INTEGRALS,
     OF_C,
@@ -51,13 +51,6 @@ _RAYS = 4 * _PANELS * NODES
 #   the integrals up to the first of these, and those up to the second, (INTEGRALS, RAYS)
 #   others, (4, RAYS)
 Work = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
-
-
-@functools.cache
-def _gauss_legendre(nodes: int) -> NDArray[np.float64]:
-    """Return nodes and weights [1] of Gauss-Legendre quadrature on [0, 1], an array of shape (2, nodes)."""
-    x, w = np.polynomial.legendre.leggauss(nodes)
-    return np.stack([(x + 1.0) / 2.0, w / 2.0])
 
 
 @kernel
@@ -376,5 +369,5 @@ def _integrated(
     """Return both parts [1] of values whose features are columns of an array of shape (5, N)."""
     direct, bounced = np.empty(columns.shape[1]), np.empty(columns.shape[1])
     with np.errstate(all="ignore"):  # as in `elementwise`, nan is passed on
-        _gaussian_loop(columns, _gauss_legendre(nodes), lit, bounce, direct, bounced)
+        _gaussian_loop(columns, np.stack(gauss_rule(nodes).on(0.0, 1.0)), lit, bounce, direct, bounced)
     return direct, bounced

@@ -61,32 +61,22 @@ def _vector_rows(form: int, w_i: Floats, w_r: Floats, scalars: Rows, f_r: Floats
             f[j] = nothing + (0.0 if z_i < 0.0 or z_r < 0.0 else value)
 
 
-# Each form has loops of its own: where the form is known there is no branch, and the loop vectorises
+def _loops(form: int) -> RowLoops:
+    """Return loops of a form. The form is a constant to them, so they have no branch, and vectorise."""
+
+    @loop
+    def by_angles(x_r: Rows, y_r: Rows, scalars: Rows, f_r: Rows) -> None:
+        _angle_rows(form, x_r, y_r, scalars, f_r)
+
+    @loop
+    def by_vectors(w_i: Floats, w_r: Floats, scalars: Rows, f_r: Floats) -> None:
+        _vector_rows(form, w_i, w_r, scalars, f_r)
+
+    return RowLoops(by_angles, by_vectors, attrgetter("x_r", "y_r"), attrgetter("x_i", "y_i"), of_viewers=True)
 
 
-@loop
-def _abg_angles(x_r: Rows, y_r: Rows, scalars: Rows, f_r: Rows) -> None:
-    _angle_rows(_ABG, x_r, y_r, scalars, f_r)
-
-
-@loop
-def _abg_vectors(w_i: Floats, w_r: Floats, scalars: Rows, f_r: Floats) -> None:
-    _vector_rows(_ABG, w_i, w_r, scalars, f_r)
-
-
-@loop
-def _harvey_angles(x_r: Rows, y_r: Rows, scalars: Rows, f_r: Rows) -> None:
-    _angle_rows(_HARVEY, x_r, y_r, scalars, f_r)
-
-
-@loop
-def _harvey_vectors(w_i: Floats, w_r: Floats, scalars: Rows, f_r: Floats) -> None:
-    _vector_rows(_HARVEY, w_i, w_r, scalars, f_r)
-
-
-_LIGHT, _VIEWER = attrgetter("x_i", "y_i"), attrgetter("x_r", "y_r")
-ABG_LOOPS = RowLoops(_abg_angles, _abg_vectors, _VIEWER, _LIGHT, of_viewers=True)
-HARVEY_LOOPS = RowLoops(_harvey_angles, _harvey_vectors, _VIEWER, _LIGHT, of_viewers=True)
+ABG_LOOPS = _loops(_ABG)
+HARVEY_LOOPS = _loops(_HARVEY)
 
 
 def lobe(cos_i: Floats, knee: ArrayLike) -> Lobe:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -138,80 +138,36 @@ def _gradient_rows(form: int, w_i: Floats, w_r: Floats, scalars: Rows, values: F
             by_alpha_y[j] = changing * u_y * (twice * (h_y * u_y) ** 2 - 1.0)
 
 
-# Each form has a loop of its own: where the form is known there is no branch, and the loop vectorises. Each is compiled
-# when it is first called.
+class FormLoops(NamedTuple):
+    """The loops of a form of the lobe, and the loop of its derivatives."""
+
+    rows: RowLoops
+    slopes: Slopes
 
 
-@loop
-def _elliptical_angles(cos_phi: Rows, sin_phi: Rows, scalars: Rows, f_r: Floats) -> None:
-    _angle_rows(_ELLIPTICAL, cos_phi, sin_phi, scalars, f_r)
+def _loops(form: int) -> FormLoops:
+    """Return loops of a form. The form is a constant to them, so they have no branch, and vectorise."""
 
+    @loop
+    def by_angles(cos_phi: Rows, sin_phi: Rows, scalars: Rows, f_r: Floats) -> None:
+        _angle_rows(form, cos_phi, sin_phi, scalars, f_r)
 
-@loop
-def _elliptical_vectors(w_i: Floats, w_r: Floats, scalars: Rows, f_r: Floats) -> None:
-    _vector_rows(_ELLIPTICAL, w_i, w_r, scalars, f_r)
+    @loop
+    def by_vectors(w_i: Floats, w_r: Floats, scalars: Rows, f_r: Floats) -> None:
+        _vector_rows(form, w_i, w_r, scalars, f_r)
 
+    @loop
+    def gradient(w_i: Floats, w_r: Floats, scalars: Rows, values: Floats) -> None:
+        _gradient_rows(form, w_i, w_r, scalars, values)
 
-@loop
-def _elliptical_gradient(w_i: Floats, w_r: Floats, scalars: Rows, values: Floats) -> None:
-    _gradient_rows(_ELLIPTICAL, w_i, w_r, scalars, values)
+    return FormLoops(RowLoops(by_angles, by_vectors, single=True), Slopes(gradient, _NAMES))
 
-
-@loop
-def _half_vector_angles(cos_phi: Rows, sin_phi: Rows, scalars: Rows, f_r: Floats) -> None:
-    _angle_rows(_HALF_VECTOR, cos_phi, sin_phi, scalars, f_r)
-
-
-@loop
-def _half_vector_vectors(w_i: Floats, w_r: Floats, scalars: Rows, f_r: Floats) -> None:
-    _vector_rows(_HALF_VECTOR, w_i, w_r, scalars, f_r)
-
-
-@loop
-def _half_vector_gradient(w_i: Floats, w_r: Floats, scalars: Rows, values: Floats) -> None:
-    _gradient_rows(_HALF_VECTOR, w_i, w_r, scalars, values)
-
-
-@loop
-def _duer_angles(cos_phi: Rows, sin_phi: Rows, scalars: Rows, f_r: Floats) -> None:
-    _angle_rows(_DUER, cos_phi, sin_phi, scalars, f_r)
-
-
-@loop
-def _duer_vectors(w_i: Floats, w_r: Floats, scalars: Rows, f_r: Floats) -> None:
-    _vector_rows(_DUER, w_i, w_r, scalars, f_r)
-
-
-@loop
-def _duer_gradient(w_i: Floats, w_r: Floats, scalars: Rows, values: Floats) -> None:
-    _gradient_rows(_DUER, w_i, w_r, scalars, values)
-
-
-@loop
-def _bounded_angles(cos_phi: Rows, sin_phi: Rows, scalars: Rows, f_r: Floats) -> None:
-    _angle_rows(_BOUNDED, cos_phi, sin_phi, scalars, f_r)
-
-
-@loop
-def _bounded_vectors(w_i: Floats, w_r: Floats, scalars: Rows, f_r: Floats) -> None:
-    _vector_rows(_BOUNDED, w_i, w_r, scalars, f_r)
-
-
-@loop
-def _bounded_gradient(w_i: Floats, w_r: Floats, scalars: Rows, values: Floats) -> None:
-    _gradient_rows(_BOUNDED, w_i, w_r, scalars, values)
-
-
-ELLIPTICAL_LOOPS = RowLoops(_elliptical_angles, _elliptical_vectors, single=True)
-HALF_VECTOR_LOOPS = RowLoops(_half_vector_angles, _half_vector_vectors, single=True)
-DUER_LOOPS = RowLoops(_duer_angles, _duer_vectors, single=True)
-BOUNDED_LOOPS = RowLoops(_bounded_angles, _bounded_vectors, single=True)
 
 _NAMES = tuple(parameter.name for parameter in WARD_PARAMETERS)
-ELLIPTICAL_SLOPES = Slopes(_elliptical_gradient, _NAMES)
-HALF_VECTOR_SLOPES = Slopes(_half_vector_gradient, _NAMES)
-DUER_SLOPES = Slopes(_duer_gradient, _NAMES)
-BOUNDED_SLOPES = Slopes(_bounded_gradient, _NAMES)
+ELLIPTICAL = _loops(_ELLIPTICAL)
+HALF_VECTOR = _loops(_HALF_VECTOR)
+DUER = _loops(_DUER)
+BOUNDED = _loops(_BOUNDED)
 
 
 def lobe(

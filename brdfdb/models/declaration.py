@@ -198,7 +198,8 @@ class _Declared:
         evaluate = self._evaluate(finish=not returns)
         call, twin = (self._call(kind, evaluate, large=not returns, together=together) for kind in kinds)
         call.__doc__ = self._document(kinds[0], references, returns)
-        name, unit = call.__name__, (returns or _RETURNS).partition("[")[2].partition("]")[0]
+        name = call.__name__
+        unit = (returns or _RETURNS).partition("[")[2].partition("]")[0]
         words = f"Return `{name}` [{unit}] for unit vectors {kinds[1].description} of shape (..., 3)."
         public = cast(FunctionOfDirections[Any], call)
         public.vectors = self._defined(twin, f"{name}_vectors", words)
@@ -231,7 +232,8 @@ class _Declared:
         if self.takes_out:
             return function
         if self.features:
-            kernel, features = elementwise(function), operator.attrgetter(*self.features)
+            kernel = elementwise(function)
+            features = operator.attrgetter(*self.features)
             one = len(self.features) == 1
 
             def formula(directions: Directions, _: Floats | None, *values: Floats) -> Floats:
@@ -246,9 +248,12 @@ class _Declared:
     def _call(self, kind: _Kind, evaluate: Callable[..., Any], *, large: bool, together: str) -> Callable[..., Any]:
         """Return a function of one kind of directions: with the gate of arrays, and with the checks."""
         signature = self._signature(kind)
-        names, count, check = tuple(signature.parameters), len(kind.names), kind.check
+        names = tuple(signature.parameters)
+        count = len(kind.names)
+        check = kind.check
         order = tuple(parameter.name for parameter in self.parameters)
-        wanted, most = frozenset(order), len(order)
+        wanted = frozenset(order)
+        most = len(order)
         read = operator.itemgetter(*order) if len(order) > 1 else lambda given: tuple(given[name] for name in order)
         checks = tuple(self._check(parameter) for parameter in self.parameters)
         all_defaults = {name: signature.parameters[name].default for name in order}

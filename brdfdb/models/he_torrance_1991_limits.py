@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb import fresnel
+from brdfdb.gauss import gauss_rule
 from brdfdb.geometry import Directions, Vectors, common_solid_angle, finished, versine
 from brdfdb.models import he_torrance_1991 as full
 from brdfdb.models._he_torrance_kernels import hidden, shadowing, variance
@@ -218,7 +219,7 @@ def _nodes(frame: tuple[Floats, Floats, Floats], solid_angle: Floats, rings: int
     if rings == 0:
         return axis, np.ones(1)
     # Gauss's rule in the versine, in which solid angle is uniform, with equal steps around: exact to degree 4 rings - 1
-    x, weight = np.polynomial.legendre.leggauss(rings)
+    x, weight = gauss_rule(rings)
     turn = 2.0 * np.pi * np.arange(4 * rings) / (4 * rings)
     off = versine(np.arcsin(np.sqrt(solid_angle / np.pi)))[..., None] * np.repeat(0.5 * (1.0 + x), turn.size)
     sin_off = np.sqrt(off * (2.0 - off))

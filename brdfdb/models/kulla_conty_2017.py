@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from typing import Any
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -31,16 +30,13 @@ def _first_slides(wi: Floats, wr: Floats, *, f_0: ArrayLike, alpha: ArrayLike) -
 
 def _lobe(cos_i: Floats, *, f_0: ArrayLike, alpha: ArrayLike) -> Lobe:
     """Return the lobe of the facets. Its share is that of the light which they reflect once."""
-    f_0, alpha = np.asarray(f_0, np.float64), np.asarray(alpha, np.float64)
+    f_0 = np.asarray(f_0, np.float64)
+    alpha = np.asarray(alpha, np.float64)
     cos = np.clip(cos_i, 1e-16, 1.0)
     lost = lost_share(cos, alpha)
     once = (f_0 + (1.0 - f_0) * (1.0 - cos) ** 5) * (1.0 - lost)
     total = once + _reflected_again(f_0, mean_lost_share(alpha), 2) * lost
     return Lobe(once / total, alpha, alpha, GGX, visible=True)
-
-
-def _lossless(_: Mapping[str, Any]) -> dict[str, float]:
-    return {"f_0": 1.0}
 
 
 def _forms(arguments: Arguments) -> Iterator[ModelForm]:
@@ -66,7 +62,7 @@ def _single(wi: Floats, wr: Floats, *, f_0: ArrayLike, alpha: ArrayLike) -> Floa
     grazing_pole=True,
     grazing_power=0.0,
     lobe=_lobe,
-    lossless=_lossless,
+    lossless=lambda _: {"f_0": 1.0},
     forms=_forms,
 )
 def ggx_compensated(directions: Directions, f_0: Floats, alpha: Floats) -> Floats:

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from brdfdb.errors import counted
+from brdfdb.gauss import gauss_rule
 from brdfdb.geometry import Directions, Vectors, checked_vectors, degrees, finished
 from brdfdb.lobes import Lobe
 from brdfdb.models import torrance_sparrow_1967
@@ -234,7 +235,7 @@ def _over_slopes(wi: Floats, wr: Floats, *, rho: float, sigma: float, lit: bool 
 @functools.cache
 def _slopes(sigma: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return slopes [rad] and their weights [1], which add up to 1, each of shape (_SLOPES,)."""
-    x, w = np.polynomial.legendre.leggauss(_SLOPES)
+    x, w = gauss_rule(_SLOPES)
     deviation = max(sigma, 1e-9)  # above 0, because all slopes of a flat surface are 0
     theta_a = (x + 1.0) * min(np.pi / 2, _WIDEST * deviation) / 2.0
     weight = w * np.exp(-(theta_a**2) / (2.0 * deviation**2)) * np.sin(theta_a)

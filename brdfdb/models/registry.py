@@ -101,7 +101,9 @@ class Registry(dict[str, ModelSpec]):
         for path in paths:
             file = path_of(path, "paths").absolute()
             if os.pathsep in str(file):
-                raise BrdfdbError(f"{file}: the path of a file of models has no {os.pathsep!r}, which separates paths")
+                raise BrdfdbError(
+                    f"{file}: the path of a file of models must not have {os.pathsep!r}, which separates paths"
+                )
             self._add_file(file)
             known = [str(Path(entry).absolute()) for entry in os.environ.get(VARIABLE, "").split(os.pathsep) if entry]
             # absolute paths: a process that is started later may have another working directory
@@ -120,7 +122,7 @@ class Registry(dict[str, ModelSpec]):
             raise BrdfdbError(f"{file}: no such file of models")
         description = importlib.util.spec_from_file_location(name, file)
         if description is None or description.loader is None:
-            raise BrdfdbError(f"{file}: a file of models has a name that ends in .py")
+            raise BrdfdbError(f"{file}: the name of a file of models must end in .py")
         module = importlib.util.module_from_spec(description)
         sys.modules[name] = module
         try:
@@ -148,7 +150,9 @@ def _spec_of(model: Any) -> ModelSpec | None:
 def _check(spec: ModelSpec, origin: str) -> None:
     """Raise a BrdfdbError that names the first field of a model which cannot be used."""
     if not isinstance(spec.name, str) or not _NAME.fullmatch(spec.name):
-        raise BrdfdbError(f"{origin}: name: {spec.name!r} is not letters, digits, _ and -, a letter first")
+        raise BrdfdbError(
+            f"{origin}: name: {spec.name!r} is not a name of letters, digits, _ and - that begins with a letter"
+        )
     if not isinstance(spec.version, int) or spec.version < 1:
         raise BrdfdbError(f"{origin}: {spec.name}: version: {spec.version!r} is not an integer of at least 1")
     parameters: Any = spec.parameters

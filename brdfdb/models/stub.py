@@ -54,16 +54,12 @@ def _signature(function: Callable[..., Any]) -> str:
         arguments = textwrap.fill(", ".join([*given[:first], "*", *given[first:]]), _MOST - 4)
         line = f"def {function.__name__}(\n{textwrap.indent(arguments, '    ')},\n{returned}"
     explicit = f'{line}\n    """{summary}"""\n'
-    if "threads : int" not in _documentation(function):
+    by_angles = getattr(models, function.__name__.removesuffix("_vectors"))
+    if "threads : int" not in (by_angles.__doc__ or ""):
         return explicit
     # With the explicit arguments alone, a call with `**parameters` of numbers would pass them as `out` and `threads`
     overloads = [explicit, *(_LARGE.format(name=function.__name__, arguments=arguments) for arguments in _WAYS)]
     return "".join(f"@overload\n{overload}" for overload in overloads)
-
-
-def _documentation(function: Callable[..., Any]) -> str:
-    """Return the docstring, of a twin that of its function of angles."""
-    return getattr(models, function.__name__.removesuffix("_vectors")).__doc__ or ""
 
 
 if __name__ == "__main__":

@@ -10,10 +10,8 @@ from brdfdb.geometry import Directions
 from brdfdb.models._rows import Out
 from brdfdb.models._ward_kernels import (
     DRAW,
-    ELLIPTICAL_LOOPS,
-    ELLIPTICAL_SLOPES,
-    HALF_VECTOR_LOOPS,
-    HALF_VECTOR_SLOPES,
+    ELLIPTICAL,
+    HALF_VECTOR,
     WARD_PARAMETERS,
     lobe,
     lossless,
@@ -106,7 +104,7 @@ _HALF_VECTOR_EXCESS = _GRAZING + "receive near grazing, measured 2.07 at 89.5 de
     lossless=lossless,
     forms=forms,
     limits=limits,
-    slopes=ELLIPTICAL_SLOPES,
+    slopes=ELLIPTICAL.slopes,
     draw=DRAW,
 )
 def ward(directions: Directions, out: Out, *parameters: Floats) -> Floats:
@@ -123,7 +121,7 @@ def ward(directions: Directions, out: Out, *parameters: Floats) -> Floats:
     >>> round(float(ward(0.3, 0.0, 0.3, np.pi, rho_d=0.1, rho_s=0.33, alpha_x=0.05, alpha_y=0.16)), 4)
     3.4679
     """
-    return ELLIPTICAL_LOOPS.evaluated(directions, out, parameters)
+    return ELLIPTICAL.rows.evaluated(directions, out, parameters)
 
 
 @DeclaredModel(
@@ -142,7 +140,7 @@ def ward(directions: Directions, out: Out, *parameters: Floats) -> Floats:
     forms=forms,
     exact_model=lambda parameters: ("ward", dict(parameters)),
     limits=limits,
-    slopes=HALF_VECTOR_SLOPES,
+    slopes=HALF_VECTOR.slopes,
     draw=DRAW,
 )
 def ward_half_vector(directions: Directions, out: Out, *parameters: Floats) -> Floats:
@@ -156,4 +154,4 @@ def ward_half_vector(directions: Directions, out: Out, *parameters: Floats) -> F
     >>> round(float(ward_half_vector(0.3, 0.0, 0.5, np.pi, rho_d=0.1, rho_s=0.33, alpha_x=0.05, alpha_y=0.16)), 5)
     0.09771
     """
-    return HALF_VECTOR_LOOPS.evaluated(directions, out, parameters)
+    return HALF_VECTOR.rows.evaluated(directions, out, parameters)

@@ -12,11 +12,31 @@ checked here. Misprinted equations are corrected, and the docstring states the c
 Importing `brdfdb` imports neither this package nor mpmath. `brdfdb.atlas` and the tests import them.
 """
 
-from typing import Any
+import functools
+from collections.abc import Callable
+from typing import Any, ParamSpec, TypeVar
 
 import mpmath
+
+P = ParamSpec("P")
+R = TypeVar("R")
 
 Number = Any  # int, float, str or mpf; mpmath ships no types
 
 mp = mpmath.MPContext()  # a separate context, so that the caller's mpmath.mp.dps is neither read nor changed
 mp.dps = 40
+
+
+def exact(function: Callable[P, R]) -> Callable[P, R]:
+    """Return a function whose arguments become mpf, each as the number that it stands for; None remains."""
+
+    def number(value: Any) -> Any:
+        return None if value is None else mp.mpf(value)
+
+    @functools.wraps(function)
+    def converted(*arguments: P.args, **named: P.kwargs) -> R:
+        exact_arguments: Any = map(number, arguments)
+        exact_named: Any = {name: number(value) for name, value in named.items()}
+        return function(*exact_arguments, **exact_named)
+
+    return converted

@@ -1,15 +1,14 @@
 """Fujii 2013 at 40 digits: the proposed form of "A tiny improvement of Oren-Nayar reflectance model"."""
 
-from brdfdb.reference import Number, mp
+from brdfdb.reference import Number, exact, mp
 
 
+@exact
 def fujii(theta_i: Number, theta_r: Number, delta_phi: Number, rho: Number, sigma: Number) -> Number:
     """Return f_r [1/sr] for the albedo `rho` and roughness `sigma` [1], from 0 (Lambert) to 1; not a slope deviation.
 
     `sigma` is the ratio of the amplitudes B and A. The article does not number its equations.
     """
-    theta_i, theta_r = mp.mpf(theta_i), mp.mpf(theta_r)
-    rho, sigma = mp.mpf(rho), mp.mpf(sigma)
     cos_i, cos_r = mp.cos(theta_i), mp.cos(theta_r)
     # s: the cosine between the directions less the product of their cosines to the normal
     s = mp.sin(theta_i) * mp.sin(theta_r) * mp.cos(mp.mpf(delta_phi))

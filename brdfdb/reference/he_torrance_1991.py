@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from brdfdb.reference import Number, mp
+from brdfdb.reference import Number, exact, mp
 
 Array = NDArray[np.float64]
 
@@ -24,6 +24,7 @@ def uniform_diffuse(a: Number) -> Number:
     return mp.mpf(a) / mp.pi
 
 
+@exact
 def directional_diffuse(
     theta_i: Number,
     theta_r: Number,
@@ -35,13 +36,13 @@ def directional_diffuse(
     k: Number,
 ) -> Number:
     """Return f_r [1/sr] of the directional diffuse part, Eq. (71), for the refractive index n + i k."""
-    theta_i, theta_r, delta_phi = mp.mpf(theta_i), mp.mpf(theta_r), mp.mpf(delta_phi)
     # Eq. (75), at the bisecting angle arccos(|v|/2)
     fresnel = fresnel_unpolarised(_cos_bisecting(theta_i, theta_r, delta_phi), n, k)
     # Eq. (71)
     return fresnel * _directional_diffuse_of_a_mirror(theta_i, theta_r, delta_phi, wavelength_nm, sigma_0_um, tau_um)
 
 
+@exact
 def jones(theta_i: Number, theta_r: Number, delta_phi: Number, n: Number, k: Number) -> Any:
     """Return the complex 2x2 matrix [1] of Eqs. (61)-(64) over |k_r x k_i|^2, for the refractive index n + i k.
 
@@ -57,7 +58,6 @@ def jones(theta_i: Number, theta_r: Number, delta_phi: Number, n: Number, k: Num
     Where k_r and k_i are parallel the plane of reflection is any plane through them: exactly backscattered (F_p = -F_s)
     and exactly forward at grazing (F_p = F_s) the result is the same for all of them.
     """
-    theta_i, theta_r, delta_phi = mp.mpf(theta_i), mp.mpf(theta_r), mp.mpf(delta_phi)
     with mp.workdps(3 * mp.dps):  # next to backscattering the division loses digits
         matrix = _jones(theta_i, theta_r, delta_phi, n, k)
     return matrix * mp.one  # rounded to the 40 digits
@@ -93,13 +93,13 @@ def mueller(
     return value * (stokes * kronecker * coherency).apply(mp.re)
 
 
+@exact
 def very_rough(theta_i: Number, theta_r: Number, delta_phi: Number, slope: Number, n: Number, k: Number) -> Number:
     """Return f_r [1/sr] in the limit of wavelength 0: `directional_diffuse` with Beckmann's exp(-V/g) / g for the sum.
 
     The paper gives it in words (section 4 on sandpaper, and Figure 13 a): the wavelength drops out of V / g and of
     tau^2 / (wavelength^2 g), and only `slope` = sigma_0 / tau [1] is left, in the effective roughness and in S too.
     """
-    theta_i, theta_r, delta_phi, slope = mp.mpf(theta_i), mp.mpf(theta_r), mp.mpf(delta_phi), mp.mpf(slope)
     v_x, v_y, v_z = _wave_vector_change(theta_i, theta_r, delta_phi)
     v_squared = v_x**2 + v_y**2 + v_z**2
     # Eq. (75), at the bisecting angle arccos(|v|/2)
@@ -123,11 +123,11 @@ def smooth(theta_i: Number, n: Number, k: Number) -> Number:
     return fresnel_unpolarised(mp.cos(mp.mpf(theta_i)), n, k)
 
 
+@exact
 def specular_reflectance(
     theta_i: Number, wavelength_nm: Number, sigma_0_um: Number, tau_um: Number, n: Number, k: Number
 ) -> Number:
     """Return the specular reflectance rho_s [1] of Eq. (73), in the mirror direction theta_r = theta_i."""
-    theta_i = mp.mpf(theta_i)
     wavelength = mp.mpf(wavelength_nm) / 1000
     sigma_0, tau = mp.mpf(sigma_0_um), mp.mpf(tau_um)
     # Eqs. (23), (77)
@@ -145,12 +145,12 @@ def fresnel_unpolarised(cos_theta: Number, n: Number, k: Number) -> Number:
     return (abs(f_s) ** 2 + abs(f_p) ** 2) / 2
 
 
+@exact
 def shadowing(theta: Number, sigma_0: Number, tau: Number) -> Number:
     """Return S_i or S_r [1] of Eq. (24), the shadowing of one direction; the model takes the product of both, Eq. (23).
 
     `theta` [rad]; `sigma_0` and `tau` in the same unit of length.
     """
-    theta, sigma_0, tau = mp.mpf(theta), mp.mpf(sigma_0), mp.mpf(tau)
     if theta == 0 or sigma_0 == 0:
         return mp.one  # the argument x of erfc is infinite
     cot = mp.cot(theta)
@@ -161,9 +161,9 @@ def shadowing(theta: Number, sigma_0: Number, tau: Number) -> Number:
     return (1 - mp.erfc(x) / 2) / (lambda_cot + 1)
 
 
+@exact
 def effective_roughness(theta_i: Number, theta_r: Number, sigma_0: Number, tau: Number) -> Number:
     """Return sigma of Eq. (80), the roughness that is lit and seen, in the unit of length of `sigma_0` and `tau`."""
-    sigma_0 = mp.mpf(sigma_0)
     # Eqs. (82), (83)
     k_i = _shadowed_tangent(theta_i, sigma_0, tau)
     k_r = _shadowed_tangent(theta_r, sigma_0, tau)
@@ -273,9 +273,9 @@ def aperture_diffuse(
     raise ArithmeticError(f"no convergence at {axes}, solid angles {solid_angles}: {coarse}")
 
 
+@exact
 def _fresnel(cos_theta: Number, n: Number, k: Number) -> tuple[Number, Number]:
     """Return F_s and F_p [1] of Eq. (44): F_p = -F_s = (index - 1) / (index + 1) at the normal, both -1 at grazing."""
-    cos_theta = mp.mpf(cos_theta)
     index = mp.mpc(n, k)
     # Snell's law: index * cos of the (complex) angle of refraction
     refracted = mp.sqrt(index**2 - (1 - cos_theta**2))
@@ -316,11 +316,11 @@ def _jones(theta_i: Number, theta_r: Number, delta_phi: Number, n: Number, k: Nu
     return mp.matrix([[m_ss, m_sp], [m_ps, m_pp]]) / squared
 
 
+@exact
 def _directional_diffuse_of_a_mirror(
     theta_i: Number, theta_r: Number, delta_phi: Number, wavelength_nm: Number, sigma_0_um: Number, tau_um: Number
 ) -> Number:
     """Return eq. (71) [1/sr] with |F|^2 = 1."""
-    theta_i, theta_r, delta_phi = mp.mpf(theta_i), mp.mpf(theta_r), mp.mpf(delta_phi)
     wavelength = mp.mpf(wavelength_nm) / 1000
     sigma_0, tau = mp.mpf(sigma_0_um), mp.mpf(tau_um)
 
@@ -367,9 +367,9 @@ def _largest_term(g: Number, V: Number) -> int:
     return high
 
 
+@exact
 def _shadowed_tangent(theta: Number, sigma_0: Number, tau: Number) -> Number:
     """Return K_i or K_r [1] of Eqs. (82), (83)."""
-    theta, sigma_0, tau = mp.mpf(theta), mp.mpf(sigma_0), mp.mpf(tau)
     if theta == 0 or sigma_0 == 0:
         return mp.zero  # the argument of erfc is infinite
     # Eqs. (82), (83)

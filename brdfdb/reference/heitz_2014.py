@@ -3,7 +3,7 @@
 Angles are radians; alpha_x and alpha_y are widths of slopes [1], n + ik is the refractive index of the facets.
 """
 
-from brdfdb.reference import Number, mp
+from brdfdb.reference import Number, exact, mp
 from brdfdb.reference.he_torrance_1991 import fresnel_unpolarised
 
 
@@ -124,9 +124,9 @@ def _correlated(
     return 1 / (1 + sum(mp.zero if a == mp.inf else of_a(a) for a in steep))
 
 
+@exact
 def half_vector(theta_i: Number, phi_i: Number, theta_r: Number, phi_r: Number) -> tuple[Number, Number, Number]:
     """Return the cosine [1] of the angle on the facet, and theta and phi [rad] of the half vector."""
-    theta_i, phi_i, theta_r, phi_r = mp.mpf(theta_i), mp.mpf(phi_i), mp.mpf(theta_r), mp.mpf(phi_r)
     h_x = mp.sin(theta_r) * mp.cos(phi_r) + mp.sin(theta_i) * mp.cos(phi_i)
     h_y = mp.sin(theta_r) * mp.sin(phi_r) + mp.sin(theta_i) * mp.sin(phi_i)
     h_z = mp.cos(theta_r) + mp.cos(theta_i)

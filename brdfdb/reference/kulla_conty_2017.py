@@ -11,7 +11,7 @@ from typing import Any
 
 from mpmath.calculus.quadrature import GaussLegendre
 
-from brdfdb.reference import Number, mp
+from brdfdb.reference import Number, exact, mp
 from brdfdb.reference.heitz_2014 import ggx_schlick
 
 _DIGITS = 60  # C^2 - B^2 has lost 34 of them next to the horizon
@@ -45,10 +45,10 @@ def albedo(theta: Number, alpha: Number) -> Number:
     return _albedo(mp.cos(mp.mpf(theta)), mp.mpf(alpha))
 
 
+@exact
 @functools.cache
 def mean_albedo(alpha: Number) -> Number:
     """Return the mean E_avg [1] of `albedo` over all directions, weighted by the cosine."""
-    alpha = mp.mpf(alpha)
     with mp.workdps(_DIGITS):
         # The loss of light, 1 - E, changes with cos / alpha
         points = _graded(mp.zero, mp.one, mp.zero, alpha / 256)

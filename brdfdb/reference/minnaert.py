@@ -1,8 +1,9 @@
 """Minnaert's BRDF at 40 digits, as Oren and Nayar 1994 print it in section 2."""
 
-from brdfdb.reference import Number, mp
+from brdfdb.reference import Number, exact, mp
 
 
+@exact
 def minnaert(theta_i: Number, theta_r: Number, k: Number, rho: Number = 1) -> Number:
     """Return f_r [1/sr] for polar angles [rad], darkening exponent `k` [1] and scale `rho` [1].
 
@@ -10,6 +11,5 @@ def minnaert(theta_i: Number, theta_r: Number, k: Number, rho: Number = 1) -> Nu
     """
     cos_i = mp.cos(mp.mpf(theta_i))
     cos_r = mp.cos(mp.mpf(theta_r))
-    k = mp.mpf(k)
     # Section 2, unnumbered: f_r = (k + 1)/(2 pi) (cos theta_i cos theta_r)^(k - 1)
     return mp.mpf(rho) * (k + 1) / (2 * mp.pi) * (cos_i * cos_r) ** (k - 1)

@@ -9,20 +9,14 @@ of Eq. (17) ends at 0; the weight P sin(theta_a) of Eq. (25) is normalised over 
 import numpy as np
 from numpy.typing import NDArray
 
-from brdfdb.reference import Number, mp
+from brdfdb.reference import Number, exact, mp
 from brdfdb.reference.torrance_sparrow_1967 import torrance_sparrow
 
 Array = NDArray[np.float64]
 
 
 def unidirectional(
-    theta_i: Number,
-    phi_i: Number,
-    theta_r: Number,
-    phi_r: Number,
-    rho: Number,
-    theta_a: Number,
-    phi_a: Number,
+    theta_i: Number, phi_i: Number, theta_r: Number, phi_r: Number, rho: Number, theta_a: Number, phi_a: Number
 ) -> tuple[Number, Number]:
     """Return both parts of f_r [1/sr] of parallel V-cavities, Eq. (22): direct and interreflected.
 
@@ -57,11 +51,10 @@ def single_slope(
     return +direct, +interreflected
 
 
+@exact
 def _single_slope(
     theta_i: Number, theta_r: Number, delta_phi: Number, rho: Number, theta_a: Number
 ) -> tuple[Number, Number]:
-    theta_i, theta_r, delta_phi = mp.mpf(theta_i), mp.mpf(theta_r), mp.mpf(delta_phi)
-    rho, theta_a = mp.mpf(rho), mp.mpf(theta_a)
     cos_phi, tan_a = mp.cos(delta_phi), mp.tan(theta_a)
     alpha, beta = max(theta_i, theta_r), min(theta_i, theta_r)
     phi_c_i, phi_c_r = _critical_angle(theta_a, theta_i), _critical_angle(theta_a, theta_r)
@@ -92,6 +85,7 @@ def _single_slope(
     return direct, interreflected
 
 
+@exact
 def single_slope_integral(
     theta_i: Number, theta_r: Number, delta_phi: Number, rho: Number, theta_a: Number
 ) -> tuple[Number, Number]:
@@ -100,7 +94,6 @@ def single_slope_integral(
     `unidirectional` averaged over the azimuth of the cavities by the tanh-sinh rule, in pieces between the azimuths
     where shadowing or masking begins, ends or takes over from the other. A value takes about a second.
     """
-    theta_i, theta_r, delta_phi = mp.mpf(theta_i), mp.mpf(theta_r), mp.mpf(delta_phi)
 
     def both(phi_a: Number) -> Number:
         direct, interreflected = unidirectional(theta_i, 0, theta_r, delta_phi, rho, theta_a, phi_a)
@@ -165,6 +158,7 @@ def body_surface(
     return mp.mpf(k_b) * direct, mp.mpf(k_b) * interreflected, mp.mpf(k_s) * surface
 
 
+@exact
 def functional(
     theta_i: Number, theta_r: Number, delta_phi: Number, rho: Number, sigma: Number
 ) -> tuple[Number, Number]:
@@ -173,8 +167,6 @@ def functional(
     The direct part turns negative for rough surfaces near grazing in the mirror half plane, and there the sum may too:
     the value stays as the equation gives it.
     """
-    theta_i, theta_r = mp.mpf(theta_i), mp.mpf(theta_r)
-    rho, sigma = mp.mpf(rho), mp.mpf(sigma)
     cos_phi = mp.cos(mp.mpf(delta_phi))
     alpha = max(theta_i, theta_r)
     beta = min(theta_i, theta_r)
@@ -199,6 +191,7 @@ def functional(
     return direct, interreflected
 
 
+@exact
 def qualitative(
     theta_i: Number, theta_r: Number, delta_phi: Number, rho: Number, sigma: Number, offset: Number = "0.33"
 ) -> Number:
@@ -206,8 +199,6 @@ def qualitative(
 
     A float64 `offset` is taken as it is: pass "0.57" for the exact decimal.
     """
-    theta_i, theta_r = mp.mpf(theta_i), mp.mpf(theta_r)
-    rho, sigma = mp.mpf(rho), mp.mpf(sigma)
     cos_phi = mp.cos(mp.mpf(delta_phi))
     alpha = max(theta_i, theta_r)
     beta = min(theta_i, theta_r)
@@ -220,8 +211,8 @@ def qualitative(
     return rho / mp.pi * (a + b * max(mp.zero, cos_phi) * mp.sin(alpha) * mp.tan(beta))
 
 
+@exact
 def _direction(theta: Number, phi: Number) -> tuple[Number, Number, Number]:
-    theta, phi = mp.mpf(theta), mp.mpf(phi)
     return mp.sin(theta) * mp.cos(phi), mp.sin(theta) * mp.sin(phi), mp.cos(theta)
 
 

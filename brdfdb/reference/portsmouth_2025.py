@@ -1,9 +1,10 @@
 """Portsmouth, Kutz and Hill 2025 at 40 digits: the energy-preserving Oren-Nayar model (EON), with exact albedos."""
 
-from brdfdb.reference import Number, mp
+from brdfdb.reference import Number, exact, mp
 from brdfdb.reference.fujii_2013 import fujii
 
 
+@exact
 def energy_preserving(
     theta_i: Number, theta_r: Number, delta_phi: Number, rho: Number, roughness: Number
 ) -> tuple[Number, Number]:
@@ -12,7 +13,6 @@ def energy_preserving(
     The single scattering is Fujii's lobe (there called FON). What it loses at rho = 1 comes back in the multiple
     scattering, tinted by rho: with rho = 1 the albedo is 1 for every direction and roughness.
     """
-    rho, roughness = mp.mpf(rho), mp.mpf(roughness)
     single = fujii(theta_i, theta_r, delta_phi, rho, roughness)
     if roughness == 0:
         return single, mp.zero  # nothing is lost, and the multiple scattering is 0/0
@@ -23,9 +23,9 @@ def energy_preserving(
     return single, multiple
 
 
+@exact
 def fujii_albedo(theta: Number, roughness: Number) -> Number:
     """Return the directional albedo [1] of Fujii's lobe at rho = 1, for light or viewer at `theta` [rad]."""
-    theta, roughness = mp.mpf(theta), mp.mpf(roughness)
     sin, cos = mp.sin(theta), mp.cos(theta)
     # tan(theta) (1 - sin(theta)^3), with 1 - sin = cos^2 / (1 + sin): finite at grazing
     tangent_term = sin * cos * (1 + sin + sin**2) / (1 + sin)
@@ -33,9 +33,9 @@ def fujii_albedo(theta: Number, roughness: Number) -> Number:
     return _amplitude(roughness) * (1 + roughness * g / mp.pi)
 
 
+@exact
 def fujii_mean_albedo(roughness: Number) -> Number:
     """Return the mean of `fujii_albedo` [1] over all directions, weighted by the cosine."""
-    roughness = mp.mpf(roughness)
     return _amplitude(roughness) * (1 + (mp.mpf(2) / 3 - 28 / (15 * mp.pi)) * roughness)
 
 

@@ -1,8 +1,9 @@
 """Rahman, Pinty and Verstraete 1993 at 40 digits: the reflectance factor of their equations over pi."""
 
-from brdfdb.reference import Number, mp
+from brdfdb.reference import Number, exact, mp
 
 
+@exact
 def rpv(
     theta_i: Number, theta_r: Number, delta_phi: Number, rho_0: Number, k: Number, asymmetry: Number, rho_c: Number
 ) -> Number:
@@ -11,7 +12,6 @@ def rpv(
     The paper has `rho_0` in place of `rho_c`.
     """
     t_i, t_r, phi = mp.mpf(theta_i), mp.mpf(theta_r), mp.mpf(delta_phi)
-    rho_0, k, asymmetry, rho_c = (mp.mpf(x) for x in (rho_0, k, asymmetry, rho_c))
     # Minnaert's function in its later, reciprocal form
     M = (mp.cos(t_i) * mp.cos(t_r)) ** (k - 1) * (mp.cos(t_i) + mp.cos(t_r)) ** (k - 1)
     # Henyey and Greenstein's function of the phase angle g

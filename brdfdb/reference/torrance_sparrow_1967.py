@@ -1,16 +1,12 @@
 """Torrance and Sparrow 1967 at 40 digits, in the form of Eq. (31) of Oren and Nayar 1994."""
 
-from brdfdb.reference import Number, mp
+from brdfdb.reference import Number, exact, mp
 from brdfdb.reference.he_torrance_1991 import fresnel_unpolarised
 
 
+@exact
 def torrance_sparrow(
-    theta_i: Number,
-    theta_r: Number,
-    delta_phi: Number,
-    sigma: Number,
-    n: Number | None = None,
-    k: Number | None = None,
+    theta_i: Number, theta_r: Number, delta_phi: Number, sigma: Number, n: Number | None = None, k: Number | None = None
 ) -> Number:
     """Return f_r [1/sr] by Eq. (31) of Oren and Nayar 1994 over cos theta_i, with E_0 = 1; the lobe is not normalised.
 
@@ -18,8 +14,6 @@ def torrance_sparrow(
     slope angle. F is 1, as that paper has it, or with a refractive index n + i k the reflectance of a plane interface
     for unpolarised light, at half the angle between the directions.
     """
-    theta_i, theta_r, delta_phi = mp.mpf(theta_i), mp.mpf(theta_r), mp.mpf(delta_phi)
-    sigma = mp.mpf(sigma)
     cos_i, cos_r = mp.cos(theta_i), mp.cos(theta_r)
     h_x = mp.sin(theta_i) + mp.sin(theta_r) * mp.cos(delta_phi)
     h_y = mp.sin(theta_r) * mp.sin(delta_phi)

@@ -3,15 +3,14 @@
 Angles are radians, the reflectances rho_d and rho_s and the slope deviations alpha are numbers [1].
 """
 
-from brdfdb.reference import Number, mp
+from brdfdb.reference import Number, exact, mp
 
 
+@exact
 def circular(
     theta_i: Number, theta_r: Number, delta_phi: Number, rho_d: Number, rho_s: Number, alpha: Number
 ) -> Number:
     """Return f_r [1/sr] by Eq. (4), the isotropic model."""
-    theta_i, theta_r = mp.mpf(theta_i), mp.mpf(theta_r)
-    rho_d, rho_s, alpha = mp.mpf(rho_d), mp.mpf(rho_s), mp.mpf(alpha)
     h_x, h_y, h_z = _half_vector(theta_i, mp.zero, theta_r, delta_phi)
     # Figure 5: delta is the polar angle of h
     tan_delta = mp.hypot(h_x, h_y) / h_z
@@ -20,6 +19,7 @@ def circular(
     return rho_d / mp.pi + rho_s / mp.sqrt(mp.cos(theta_i) * mp.cos(theta_r)) * lobe
 
 
+@exact
 def elliptical(
     theta_i: Number,
     phi_i: Number,
@@ -31,8 +31,6 @@ def elliptical(
     alpha_y: Number,
 ) -> Number:
     """Return f_r [1/sr] by Eq. (5a)."""
-    theta_i, theta_r = mp.mpf(theta_i), mp.mpf(theta_r)
-    rho_d, rho_s, alpha_x, alpha_y = mp.mpf(rho_d), mp.mpf(rho_s), mp.mpf(alpha_x), mp.mpf(alpha_y)
     h_x, h_y, h_z = _half_vector(theta_i, phi_i, theta_r, phi_r)
     # Figure 5: delta and phi are the polar angle and the azimuth of h
     tan_delta = mp.hypot(h_x, h_y) / h_z
@@ -43,6 +41,7 @@ def elliptical(
     return rho_d / mp.pi + rho_s / mp.sqrt(mp.cos(theta_i) * mp.cos(theta_r)) * lobe
 
 
+@exact
 def half_vector(
     theta_i: Number,
     phi_i: Number,
@@ -54,8 +53,6 @@ def half_vector(
     alpha_y: Number,
 ) -> Number:
     """Return f_r [1/sr] by Eq. (5b); "approximation" in the paper, it differs from Eq. (5a) away from the peak."""
-    theta_i, theta_r = mp.mpf(theta_i), mp.mpf(theta_r)
-    rho_d, rho_s, alpha_x, alpha_y = mp.mpf(rho_d), mp.mpf(rho_s), mp.mpf(alpha_x), mp.mpf(alpha_y)
     h_x, h_y, h_z = _half_vector(theta_i, phi_i, theta_r, phi_r)
     # Eq. (5b)
     exponent = -2 * ((h_x / alpha_x) ** 2 + (h_y / alpha_y) ** 2) / (1 + h_z)
@@ -63,6 +60,7 @@ def half_vector(
     return rho_d / mp.pi + rho_s / mp.sqrt(mp.cos(theta_i) * mp.cos(theta_r)) * lobe
 
 
+@exact
 def sampling_pdf(
     theta_i: Number, phi_i: Number, theta_r: Number, phi_r: Number, alpha_x: Number, alpha_y: Number
 ) -> Number:
@@ -73,8 +71,6 @@ def sampling_pdf(
     solid angle of omega_r in one of h. Samples may fall below the horizon: over the hemisphere it integrates to less
     than 1.
     """
-    theta_i, phi_i = mp.mpf(theta_i), mp.mpf(phi_i)
-    alpha_x, alpha_y = mp.mpf(alpha_x), mp.mpf(alpha_y)
     h_x, h_y, h_z = _half_vector(theta_i, phi_i, theta_r, phi_r)
     tan_delta = mp.hypot(h_x, h_y) / h_z
     phi = mp.atan2(h_y, h_x)
@@ -84,9 +80,9 @@ def sampling_pdf(
     return mp.exp(exponent) / (4 * mp.pi * alpha_x * alpha_y * h_i * h_z**3)
 
 
+@exact
 def _half_vector(theta_i: Number, phi_i: Number, theta_r: Number, phi_r: Number) -> tuple[Number, Number, Number]:
     """Return the unit vector h, below Eq. (5b)."""
-    theta_i, phi_i, theta_r, phi_r = mp.mpf(theta_i), mp.mpf(phi_i), mp.mpf(theta_r), mp.mpf(phi_r)
     h_x = mp.sin(theta_r) * mp.cos(phi_r) + mp.sin(theta_i) * mp.cos(phi_i)
     h_y = mp.sin(theta_r) * mp.sin(phi_r) + mp.sin(theta_i) * mp.sin(phi_i)
     h_z = mp.cos(theta_r) + mp.cos(theta_i)

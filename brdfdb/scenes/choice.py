@@ -68,6 +68,14 @@ class PlaceSample(NamedTuple):
     most: float
     share: float
 
+    @classmethod
+    def of(cls, errors: Array, tolerance: float, confidence: float) -> PlaceSample:
+        """Return a sample with the upper bound of Clopper and Pearson. The bound of an empty sample is 1."""
+        beyond = int(np.count_nonzero(errors > tolerance))
+        places = errors.size
+        share = 1.0 if beyond == places else float(stats.beta.ppf(confidence, beyond + 1, places - beyond))
+        return cls(places, float(errors.max(initial=0.0)), share)
+
 
 class Decision(NamedTuple):
     """The choice for a material, with its error by itself and together with all other choices."""
@@ -170,11 +178,11 @@ def pick(costs: Floats, error: Callable[[int], float], tolerance: float) -> Pick
 
 def check_feasible(tolerance: Tolerance) -> None:
     """Raise an InfeasibleError if a tolerance is smaller than the error of the truth."""
-    value, unit = tolerance.value, tolerance.unit
+    value = tolerance.value
+    unit = tolerance.unit
     if value < FINEST[unit]:
-        raise InfeasibleError(
-            "tolerance", f"{value:g} ({unit}) is finer than the truth is known, {FINEST[unit]:g}", value
-        )
+        text = f"{value:g} ({unit}) is smaller than the error of the truth, {FINEST[unit]:g}"
+        raise InfeasibleError("tolerance", text, value)
 
 
 class Look(NamedTuple):
@@ -200,13 +208,6 @@ def _error(errors: Sequence[Array], percentile: float) -> PictureError:
     return PictureError(float(np.percentile(errors[0], percentile)), most)
 
 
-def _sample(errors: Array, tolerance: float, confidence: float) -> PlaceSample:
-    """Return a sample with the upper bound of Clopper and Pearson. The bound of an empty sample is 1."""
-    beyond, places = int(np.count_nonzero(errors > tolerance)), errors.size
-    share = 1.0 if beyond == places else float(stats.beta.ppf(confidence, beyond + 1, places - beyond))
-    return PlaceSample(places, float(errors.max(initial=0.0)), share)
-
-
 def choose(
     planned: Look,
     check: Callable[[int], Look | None],
@@ -216,30 +217,13 @@ def choose(
 ) -> dict[str, Decision]:
     """Choose a form for each material of a scene, and check all of them together.
 
-    Parameters
-    ----------
-    planned : Look
-        Picture, and places near edges, where each form is compared with the truth, all other materials at their truth.
-    check : callable
-        ``check(round)`` gives the scene at fresh places for a round from 1 on, or None if it has no other places.
-    offered : mapping
-        Forms of each material by its name, the truth first.
-    costs : mapping
-        Costs of the forms of each material, of shape (rounds, forms).
-    tick : callable
-        A function that is called for each material, and for each round of checks.
+    `planned` is where each form is compared with the truth, all other materials at their truth. ``check(round)`` gives
+    the scene at fresh places for a round from 1 on, or None if it has no other places. `offered` has the forms of each
+    material, the truth first, and `costs` theirs, of shape (rounds, forms). `tick` is called for each material, and for
+    each round of checks. InfeasibleError if the tolerance is smaller than the error of the truth.
 
-    Returns
-    -------
-    dict
-        A decision for each material. If all choices together exceed the tolerance, the choices that exceed it by
-        themselves are refused. If none does, the choice with the largest error is refused. The truth is never refused.
-        Then the next round checks other places.
-
-    Raises
-    ------
-    InfeasibleError
-        If the tolerance is smaller than the error of the truth.
+    If all choices together exceed the tolerance, the choices that exceed it by themselves are refused. If none does,
+    the choice with the largest error is refused. The truth is never refused. Then the next round checks other places.
     """
     check_feasible(planned.even.scene.tolerance)
     tolerance, percentile = planned.even.scene.tolerance.value, planned.even.scene.tolerance.percentile
@@ -283,7 +267,7 @@ def choose(
             None if one.cheaper is None else known(name, one.cheaper),
             (name, one.cheaper) in refused,
             joint[name],
-            *(_sample(values, tolerance, confidence) for fresh in errors[1:] for values in fresh[name]),
+            *(PlaceSample.of(values, tolerance, confidence) for fresh in errors[1:] for values in fresh[name]),
         )
         for name, one in picks.items()
     }
@@ -314,7 +298,7 @@ class Sampled(DocumentPart):
     places: int = Field(description="number of places")
     most: float = Field(description="largest error at these places")
     one_in: int = Field(
-        description="fewer than 1 in so many of all such places exceeds the tolerance, with the stated confidence"
+        description="fewer than 1 in this number of all such places exceeds the tolerance, with the stated confidence"
     )
 
 
@@ -348,12 +332,14 @@ class MaterialChoice(DocumentPart):
     whole: Residue = Field(description="error of all choices at once: at all pixels of the picture, and all samples")
     even: Sampled | None = Field(description="places anywhere in the picture, equally likely; null if recorded")
     edges: Sampled | None = Field(
-        description="places beside limbs, terminators and edges of shadows: each power of ten of the distance, from a "
+        description="places near limbs, terminators and edges of shadows: each power of ten of the distance, from a "
         "pixel's width down to a hundred millionth of it, is equally likely; null if recorded"
     )
     reason: str
     revision: str | None = Field(description="revision of the table, if a store was named and a table chosen")
-    left_out: list[LeftOut] = Field(default=[], description="forms that cannot be made, such as a table too large")
+    left_out: list[LeftOut] = Field(
+        default=[], description="forms that cannot be made, for example because a table would be too large"
+    )
 
 
 class SceneChoice(DocumentPart):
@@ -366,10 +352,10 @@ class SceneChoice(DocumentPart):
     tolerance: Tolerance
     weigh: Weigh
     picture: tuple[int, int] = Field(
-        description="pixels across and down; the choices keep to the tolerance at each of them, seen through its middle"
+        description="pixels across and down; at the centre of each of them, the error is within the tolerance"
     )
     confidence: float = Field(description="confidence of statements on samples, for each material and kind of sample")
-    grazing_deg: float = Field(description="angle from the normal up to which errors count; nothing is stated beyond")
+    grazing_deg: float = Field(description="largest angle from the normal at which errors count")
     statement: str = Field(description="proven and sampled results in a few sentences")
     materials: list[MaterialChoice]
 
@@ -384,23 +370,23 @@ def within(tolerance: Tolerance) -> str:
 def statement(tolerance: Tolerance, picture: tuple[int, int], materials: Sequence[MaterialChoice]) -> str:
     """Return the proven results for the choices and the results of samples, with their confidence, in words."""
     value = f"{tolerance.value:g}"
-    size, share = f"{picture[0]} x {picture[1]}", tolerance.percentile
-    proven = f"Proven: each of the {size} pixels, seen through its middle, is within {value}."
+    size = f"{picture[0]} x {picture[1]}"
+    share = tolerance.percentile
+    proven = f"Proven: at the centre of each of the {size} pixels, the error is at most {value}."
     if share != 100.0:
-        proven = (
-            f"Proven: {share:g} % of each material's pixels, of {size} seen through their middles, are within {value}."
-        )
+        proven = f"Proven: for {share:g} % of each material's pixels, of {size}, the error is at most {value}."
     even = [one.even for one in materials if one.even is not None]
     edges = [one.edges for one in materials if one.edges is not None]
     if not even:
-        return f"{proven} The file holds no other places."
-    places, most = sum(one.places for one in (*even, *edges)), max(one.most for one in (*even, *edges))
+        return f"{proven} The file has no other places."
+    places = sum(one.places for one in (*even, *edges))
+    most = max(one.most for one in (*even, *edges))
     return (
-        f"{proven} Sampled: all other places of the picture, for other widths and offsets of its pixels, at {places} "
-        f"places that were not used to choose; the largest error at them is {most:.2g}. With {100 * CONFIDENCE:g} % "
-        f"confidence for each material, fewer than 1 in {min(one.one_in for one in even)} of its places is beyond "
-        f"{value}, and fewer than 1 in {min(one.one_in for one in edges)} of those beside its edges. "
-        f"What is seen within {90.0 - GRAZING_DEG:.2g} degrees of grazing is left out."
+        f"{proven} Sampled: {places} other places, which pixels of other widths and offsets show, were not used to "
+        f"choose; their largest error is {most:.2g}. With {100 * CONFIDENCE:g} % confidence for each material, fewer "
+        f"than 1 in {min(one.one_in for one in even)} of its places exceeds {value}, and fewer than 1 in "
+        f"{min(one.one_in for one in edges)} of those near its edges. "
+        f"Directions within {90.0 - GRAZING_DEG:.2g} degrees of grazing are left out."
     )
 
 
@@ -468,7 +454,7 @@ def _reason(choice: Option, cheaper: Option | None, decision: Decision, toleranc
     # At least two digits, and enough to show that the error is above the tolerance
     error = cheaper.error.counted
     text = next(text for digits in range(2, 18) if float(text := f"{error:.{digits}g}") > tolerance)
-    return f"{clause}; the best of what is cheaper, {cheaper.title}, would leave {text}{where}"
+    return f"{clause}; the most accurate cheaper form, {cheaper.title}, would leave {text}{where}"
 
 
 def _sampled(sample: PlaceSample | None) -> Sampled | None:

@@ -45,7 +45,7 @@ class Environment(BaseModel):
     model_config = STRICT
 
     rows: list[list[float]] | None = Field(default=None, description="from the zenith to the nadir")
-    file: str | None = Field(default=None, min_length=1, description="EXR, .npz or .npy; lies beside the scene")
+    file: str | None = Field(default=None, min_length=1, description="EXR, .npz or .npy, in the directory of the scene")
     samples: int = Field(
         default=32, ge=1, le=4096, description="directions for each point, drawn from its lobe or table"
     )
@@ -56,7 +56,7 @@ class Environment(BaseModel):
     def _check_rows(cls, rows: list[list[float]] | None) -> list[list[float]] | None:
         if rows is not None:
             if not rows or not rows[0] or any(len(row) != len(rows[0]) for row in rows):
-                raise ParameterError("rows", "must be lists of numbers, all of one length")
+                raise ParameterError("rows", "must be lists of numbers of equal length")
             _checked("rows", np.array(rows, dtype=np.float64))
         return rows
 
@@ -76,11 +76,8 @@ class Environment(BaseModel):
     def picture(self) -> Array:
         """The radiance (rows, columns), in multiples of the illuminant.
 
-        Raises
-        ------
-        ParameterError
-            If the file does not exist, is not readable, or holds no picture. If radiance is negative, not finite, or
-            nowhere above 0.
+        ParameterError if the file does not exist, is not readable, or holds no picture, or if radiance is negative, not
+        finite, or nowhere above 0.
         """
         if self.file is None:
             return np.array(self.rows, dtype=np.float64)
@@ -118,7 +115,8 @@ class Environment(BaseModel):
         turns = np.random.default_rng([self.seed, *stream]).random((2, 1, len(wr)))
         number = np.arange(self.samples)[:, np.newaxis]
         # The numbers are even over the unit square for any number of samples. Random turns make points independent
-        u1, u2 = (number / self.samples + turns[0]) % 1.0, (number * _TURN + turns[1]) % 1.0
+        u1 = (number / self.samples + turns[0]) % 1.0
+        u2 = (number * _TURN + turns[1]) % 1.0
         sampler = source.sampler if isinstance(source, TableSource) else None
         if sampler is not None:
             wi = sampler.draw(u1, u2, wr)
@@ -161,9 +159,8 @@ def _checked(name: str, picture: Array) -> Array:
     if np.any(bad):
         row, column = np.argwhere(bad)[0]
         value = picture[row, column]
-        raise ParameterError(
-            name, f"{value:g} at row {row}, column {column} must be finite and not below 0", float(value)
-        )
+        text = f"{value:g} at row {row}, column {column} must be finite and not below 0"
+        raise ParameterError(name, text, float(value))
     if not np.any(picture):
         raise ParameterError(name, "radiance is 0 everywhere")
     return picture
@@ -187,7 +184,8 @@ def _from_numpy(path: Path) -> NDArray[np.generic]:
             if "radiance" in arrays:
                 return np.asarray(arrays["radiance"])
     except (ValueError, EOFError, zipfile.BadZipFile, zlib.error):
-        raise ParameterError("environment.file", f"{path}: is no .npz or .npy of numbers, or a damaged one") from None
+        text = f"{path}: is not an .npz or .npy file of numbers, or is damaged"
+        raise ParameterError("environment.file", text) from None
     raise ParameterError("environment.file", f"{path}: has no array `radiance`")
 
 
@@ -198,11 +196,10 @@ def _from_exr(path: Path) -> NDArray[np.generic]:
         with OpenEXR.File(str(path), separate_channels=True) as file:
             channels = {name: np.asarray(channel.pixels, dtype=np.float64) for name, channel in file.channels().items()}
     except RuntimeError:
-        raise ParameterError("environment.file", f"{path}: is no OpenEXR file, or a damaged one") from None
+        raise ParameterError("environment.file", f"{path}: is not an OpenEXR file, or is damaged") from None
     if "Y" in channels:
         return channels["Y"]
     if channels.keys() >= _LUMINANCE.keys():
         return np.asarray(sum(weight * channels[name] for name, weight in _LUMINANCE.items()))
-    raise ParameterError(
-        "environment.file", f"{path}: has neither a channel Y nor R, G, B; it has {', '.join(channels)}"
-    )
+    text = f"{path}: has neither a channel Y nor R, G, B; it has {', '.join(channels)}"
+    raise ParameterError("environment.file", text)

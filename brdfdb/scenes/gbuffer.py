@@ -264,18 +264,20 @@ def _recorded(scene: Scene, item: Object, shape: Recorded) -> CameraView:
     good = np.all(np.abs(length - 1.0) < _LENGTH_OFF, axis=0)
     at = np.flatnonzero(good)
     if not at.size:
-        raise ParameterError(shape.file, "shows nothing: at every pixel a vector is not finite, or not 1 long")
+        raise ParameterError(shape.file, "shows nothing: at every pixel a vector is not finite or not of length 1")
     flat = {name: unit(array.reshape(-1, height * width, 3)[:, at]) for name, array in arrays.items()}
     if "normal" in flat:
         surface = _frames(flat, scene.camera, width, height, at, item.grain_deg)
         # A file holds no positions, so its points are far apart and have no shadows
-        wr, beyond = _viewed(surface), _from_afar(scene, _mirror(surface))
+        wr = _viewed(surface)
+        beyond = _from_afar(scene, _mirror(surface))
         wi, irradiance = _lit(scene.model_copy(update={"shadows": False}), item, surface, wr, (0, 0))
     else:
         if scene.environment is not None:
-            raise ParameterError(shape.file, "has wr and wi; an environment needs normals, to know what is above them")
+            raise ParameterError(shape.file, "has wr and wi; an environment needs normals")
         turn = _turned(np.eye(3)[np.newaxis], item.grain_deg)[0]
-        wr, wi = flat["wr"][0] @ turn.T, flat["wi"] @ turn.T
+        wr = flat["wr"][0] @ turn.T
+        wi = flat["wi"] @ turn.T
         if len(wi) != len(scene.lights) or any(light.solid_angle_sr for light in scene.lights):
             raise ParameterError(
                 shape.file,
@@ -285,7 +287,8 @@ def _recorded(scene: Scene, item: Object, shape: Recorded) -> CameraView:
         strength = np.array([light.strength for light in scene.lights])
         irradiance = np.pi * strength[:, np.newaxis] * np.maximum(wi[..., 2], 0.0)
         beyond = np.full(at.size, scene.ambient)
-    directions, none = scene.camera.rays(width, height).directions, np.flatnonzero(~good)
+    directions = scene.camera.rays(width, height).directions
+    none = np.flatnonzero(~good)
     background = _background(scene, directions[none], none, width * height)
     return CameraView(
         [VisiblePoints(item.name, item.material, wr, wi, irradiance, beyond, None, at)], width, height, 1, background
@@ -314,9 +317,8 @@ def _height(camera: Camera, width: int, across: int) -> int:
             raise ParameterError(name, f"{value} must be at least 1", value)
     height = max(1, round(width / camera.aspect))
     if max(width, height) > _WIDEST:
-        raise ParameterError(
-            "width", f"{width} x {height} pixels are too many; either side may have {_WIDEST} at most", width
-        )
+        text = f"{width} x {height} pixels are too many; either side may have {_WIDEST} at most"
+        raise ParameterError("width", text, width)
     if across * max(width, height) > _MOST:
         raise ParameterError(
             "across",
@@ -333,9 +335,6 @@ def _check_lights(scene: Scene, points: Sequence[VisiblePoints]) -> None:
     for number, light in enumerate(scene.lights):
         stop = start + len(light.towards())
         if not any(np.any(seen.irradiance[start:stop]) for seen in points):
-            raise ParameterError(
-                f"lights.{number}",
-                "falls on nothing that is seen: it is below the horizon of every visible point, or "
-                "stands behind another object",
-            )
+            text = "lights no visible point: it is below the horizon of each of them, or stands behind another object"
+            raise ParameterError(f"lights.{number}", text)
         start = stop

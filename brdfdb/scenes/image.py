@@ -55,27 +55,11 @@ def write_png(path: str | os.PathLike[str], scene: Scene, radiance: ArrayLike) -
 
 
 def write_exr(path: str | os.PathLike[str], scene: Scene, radiance: ArrayLike) -> None:
-    """Write a picture (height, width, L) as an OpenEXR file.
+    """Write a picture (height, width, L), in multiples of the illuminant of a scene, as an OpenEXR file.
 
-    Parameters
-    ----------
-    path : path
-        The file. An existing file is replaced.
-    scene : Scene
-        The scene, for its illuminant, wavelengths and exposure.
-    radiance : array_like (height, width, L)
-        Spectral radiance in multiples of the illuminant.
-
-    Raises
-    ------
-    OSError
-        If the file cannot be written.
-
-    Notes
-    -----
-    R, G, B are linear sRGB, exposed, by `linear_srgb`. Channels such as ``S0.550,0nm``, the emissive layout of Fichet
-    et al. (2021, ``fichet2021``), are spectral radiance: the multiples times the illuminant, which is 1 at 560 nm, not
-    exposed.
+    An existing file is replaced; OSError if the file cannot be written. R, G, B are linear sRGB, exposed, by
+    `linear_srgb`. Channels such as ``S0.550,0nm``, the emissive layout of Fichet et al. (2021, ``fichet2021``), are
+    spectral radiance: the multiples times the illuminant, which is 1 at 560 nm, not exposed.
     """
     values = np.asarray(radiance)
     rgb = linear_srgb(scene, values)

@@ -39,7 +39,7 @@ _COARSE = 8  # every eighth row and column is blurred
 # Standard deviations of the blurred light, and the radius of a sample from which each is used
 _BLURS_DEG = np.array([3.5, 7.0])
 _BLURS_FROM = radians(np.array([1.2, 2.4]))
-_TABULATION = threading.Lock()  # threads that begin together wait for one table: each would take 0.4 s of its own
+_TABULATION = threading.Lock()  # one thread makes the table in 0.4 s; others that need it wait
 _KEPT_SIZE = 512  # largest picture [pixels across] whose weights stay in memory: 30 MB
 _BLOCK_SIZE = 2**17  # directions of light, or points of pixels, of a block: its arrays stay in the cache
 
@@ -86,7 +86,8 @@ def _seen(light: _Softbox, towards: Array) -> Array:
     right /= np.linalg.norm(right)
     forward = towards @ axis
     depth = np.maximum(forward, 1e-6)
-    x, y = np.abs(towards @ right) / depth, np.abs(towards @ np.cross(axis, right)) / depth
+    x = np.abs(towards @ right) / depth
+    y = np.abs(towards @ np.cross(axis, right)) / depth
     inside = _smooth((1.0 - x / light.width) / light.edge) * _smooth((1.0 - y / light.height) / light.edge)
     return np.asarray(np.where(forward > 0.0, light.radiance * inside, 0.0))
 
@@ -257,7 +258,8 @@ def _pixels(size: int, light: Light, detail: Detail) -> _Pixels:
         covered = np.clip((1.0 - radius) * size / 2.0 + 0.5, 0.0, 1.0) if across == 1 else (radius <= 1.0).astype(float)
         coverage.append(covered.reshape(len(y), across, size, across).mean(axis=(1, 3)))
         seen = covered > 0.0
-        theta, phi = np.arcsin(np.minimum(radius[seen], 1.0)), np.arctan2(y.reshape(-1, 1), fine)[seen]
+        theta = np.arcsin(np.minimum(radius[seen], 1.0))
+        phi = np.arctan2(y.reshape(-1, 1), fine)[seen]
         weights = _weights_at(theta, phi, light, detail)
         pixel = np.arange(coverage[-1].size).reshape(len(y), 1, size, 1)
         pixel = np.broadcast_to(pixel, (len(y), across, size, across)).reshape(seen.shape)[seen]
@@ -283,6 +285,13 @@ class _Shown(NamedTuple):
     def elliptical(self) -> bool:
         """True if quarters of the sphere have mirrored reflections."""
         return self.source is not None and self.source.elliptical
+
+    def azimuths(self, phis: int) -> Array:
+        """Return the azimuths [rad] whose reflection gives that of all others: one, a quarter turn, or all of them."""
+        full = 2.0 * np.pi * np.arange(phis) / phis
+        if not self.surface.anisotropic:
+            return full[:1]
+        return full[: phis // 4 + 1] if self.elliptical else full
 
     def brdf(self, wi: Array, wr: Array) -> Array:
         """Return f_r [1/sr] in linear sRGB (..., 3)."""
@@ -313,8 +322,12 @@ def _shown(surface: Source | BaseTable) -> _Shown:
 
 def _reflected(shown: _Shown, nodes: Array, sky: _Sky, detail: Detail) -> Array:
     """Return the radiance (thetas, azimuths, 3) that a sphere reflects, without the specular part."""
-    theta, phi = np.meshgrid(nodes, _azimuths(shown, detail.phis), indexing="ij")
-    frame = _frames(theta, phi).reshape(-1, 3, 3)
+    theta, phi = np.meshgrid(nodes, shown.azimuths(detail.phis), indexing="ij")
+    # The rows of a frame are a tangent around the vertical axis, the bitangent and the normal; the viewer is along z
+    normal = unit_vector(theta, phi).reshape(-1, 3)
+    tangent = np.cross((0.0, 1.0, 0.0), normal)
+    tangent /= np.linalg.norm(tangent, axis=-1, keepdims=True)
+    frame = np.stack([tangent, np.cross(normal, tangent), normal], axis=-2)
     wr = frame[..., 2]
     lobe = None if shown.source is None else shown.source.lobe(wr[:, np.newaxis, 2], shown.wavelength_nm)
     widest = widest_lobe(lobe, len(wr))
@@ -344,16 +357,9 @@ def _reflected(shown: _Shown, nodes: Array, sky: _Sky, detail: Detail) -> Array:
 def _numbers(samples: int) -> tuple[Array, Array]:
     """Return pairs of numbers (samples, 1) in [0, 1], whose azimuths 2 pi u2 are symmetric about both axes."""
     number = np.arange(samples // 4)[:, np.newaxis]
-    u1, u2 = (number + 0.5) / len(number), number * _GOLDEN % 1.0
+    u1 = (number + 0.5) / len(number)
+    u2 = number * _GOLDEN % 1.0
     return np.tile(u1, (4, 1)), np.concatenate([u2, 1.0 - u2, (0.5 + u2) % 1.0, (1.5 - u2) % 1.0])
-
-
-def _azimuths(shown: _Shown, phis: int) -> Array:
-    """Return the azimuths [rad] whose reflection gives that of all others: one, a quarter turn, or all of them."""
-    full = 2.0 * np.pi * np.arange(phis) / phis
-    if not shown.surface.anisotropic:
-        return full[:1]
-    return full[: phis // 4 + 1] if shown.elliptical else full
 
 
 def _same_as(phi: int, known: int, phis: int) -> tuple[int, int, int]:
@@ -370,14 +376,6 @@ def _same_as(phi: int, known: int, phis: int) -> tuple[int, int, int]:
         (rest, 1, _COLUMNS // 2),
         (half // 2 - rest, -1, 0),
     )[quadrant]
-
-
-def _frames(theta: Array, phi: Array) -> Array:
-    """Return tangents around the vertical axis, bitangents and normals as the rows of (..., 3, 3)."""
-    normal = unit_vector(theta, phi)
-    tangent = np.cross((0.0, 1.0, 0.0), normal)
-    tangent /= np.linalg.norm(tangent, axis=-1, keepdims=True)
-    return np.stack([tangent, np.cross(normal, tangent), normal], axis=-2)
 
 
 class _Sky(NamedTuple):
@@ -432,9 +430,11 @@ def _between(rows: int, columns: int, at: Array) -> csr_array:
 
     Columns are periodic.
     """
-    row, column = np.minimum(at[0].astype(np.int32), rows - 2), np.floor(at[1]).astype(np.int32)
+    row = np.minimum(at[0].astype(np.int32), rows - 2)
+    column = np.floor(at[1]).astype(np.int32)
     down, along = at[0] - row, at[1] - column
-    left, right = row * columns + column % columns, row * columns + (column + 1) % columns
+    left = row * columns + column % columns
+    right = row * columns + (column + 1) % columns
     node = np.stack([left, right, left + columns, right + columns], axis=1)
     weight = np.stack([(1.0 - down) * (1.0 - along), (1.0 - down) * along, down * (1.0 - along), down * along], axis=1)
     ends = np.arange(0, node.size + 1, 4, dtype=np.int32)

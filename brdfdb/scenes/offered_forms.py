@@ -45,25 +45,10 @@ def offered_forms(
 ) -> Forms[OfferedForm]:
     """Return the forms to choose from, the truth first, at all wavelengths and for spectral sources also at fewer.
 
-    Parameters
-    ----------
-    source : Source
-        Material, or table of a store.
-    wavelength_nm : array of shape (L,) [nm], or None
-        Wavelengths of the scene for spectral materials, and only for such materials.
-    tolerances : sequence of float, optional
-        Tolerances of planned tables: see `brdfdb.forms.catalogue`. The default for grey materials is `GREY_TOLERANCES`.
-
-    Returns
-    -------
-    Forms of OfferedForm
-        The forms, without models that are meant to differ and without forms that differ only in rounding. A table that
-        cannot be made is among `left_out`.
-
-    Raises
-    ------
-    ParameterError
-        As in `brdfdb.forms.catalogue.forms`.
+    Models that are meant to differ, and forms that differ only in rounding, are not offered. A table that cannot be
+    made is among `left_out`. `source` is a material, or a table of a store; `wavelength_nm` (L,) [nm] is None for grey
+    ones. `tolerances` are those of planned tables, and errors those of `brdfdb.forms.catalogue.forms`; the default for
+    grey materials is `GREY_TOLERANCES`.
     """
     if tolerances is None and wavelength_nm is None:
         tolerances = GREY_TOLERANCES

@@ -37,12 +37,8 @@ class Reflector:
     """The reflection of a source in a scene: f_r, the albedo for ambient light, and the mirror.
 
     `wavelength_nm` are those of its evaluation: of the scene, or the first of a source that is stated for too few
-    wavelengths for a colour; None for a grey source.
-
-    Raises
-    ------
-    ParameterError
-        If the source is stated for invisible light, or is not known at the wavelengths of the scene.
+    wavelengths for a colour; None for a grey source. ParameterError if the source is stated for invisible light, or is
+    not known at the wavelengths of the scene.
     """
 
     def __init__(self, source: Source, wavelength_nm: Array) -> None:
@@ -75,7 +71,8 @@ class Reflector:
         values = around[:, 0]
         if around.shape[1] > 1:
             turn, share = np.divmod(np.arctan2(wr[:, 1], wr[:, 0]) / _PHI, 1.0)
-            row, low = np.arange(len(wr)), turn.astype(np.int64) % around.shape[1]
+            row = np.arange(len(wr))
+            low = turn.astype(np.int64) % around.shape[1]
             upper = around[row, (low + 1) % around.shape[1]]
             values = around[row, low] + share[:, np.newaxis] * (upper - around[row, low])
         return np.where(wr[:, 2:] >= 0.0, np.maximum(values, 0.0), 0.0)
@@ -104,28 +101,10 @@ def reflectors(scene: Scene) -> dict[str, Reflector]:
 
 
 def radiance(scene: Scene, points: VisiblePoints, reflector: Reflector, brdf: Brdf | None = None) -> Floats:
-    """Return the spectral radiance of points in multiples of the illuminant; white has 1.
+    """Return the spectral radiance (N, L) of points in multiples of the illuminant; white has 1.
 
-    Parameters
-    ----------
-    scene : Scene
-        The scene, for its wavelengths and ambient light.
-    points : VisiblePoints
-        The visible points.
-    reflector : Reflector
-        The material of the points.
-    brdf : callable, optional
-        f_r in place of the model's: ``brdf(wi, wr, wavelength_nm)`` gives (N, L) or (N, 1) [1/sr].
-
-    Returns
-    -------
-    array (N, L)
-        Radiance without the mirror images of other objects, which `render` adds.
-
-    Raises
-    ------
-    ParameterError
-        If `brdf` returns another shape.
+    Mirror images of other objects are left out; `render` adds them. `brdf` stands in for f_r of the reflector:
+    ``brdf(wi, wr, wavelength_nm)`` gives (N, L) or (N, 1) [1/sr]; ParameterError if its result has another shape.
 
     Notes
     -----
@@ -193,23 +172,23 @@ def render(
     Raises
     ------
     ParameterError
-        If `brdfs` has a key that is no material of the scene, or one of them is no function or returns a wrong shape.
+        If a key of `brdfs` is not a material of the scene, or a value is not a function or returns a wrong shape.
         If a material is stated for invisible light, or the view is that of another scene.
     """
     for points in view.points:
         if points.material not in scene.materials:
-            text = f"it shows {points.material}, which is no material of the scene; gather the view of this scene"
+            text = f"it shows {points.material}, which is not a material of the scene; gather the view of this scene"
             raise ParameterError("view", text, points.material, tuple(scene.materials))
     known = reflectors(scene) if materials is None else materials
-    replaced = {name: _function(name, given) for name, given in ({} if brdfs is None else brdfs).items()}
-    for name in replaced:
+    replaced: dict[str, Brdf] = {}
+    for name, given in ({} if brdfs is None else brdfs).items():
         if name not in scene.materials:
-            raise ParameterError(
-                "brdfs",
-                f"{name!r} is not one of the scene's materials: {', '.join(scene.materials)}",
-                name,
-                tuple(scene.materials),
-            )
+            text = f"{name!r} is not one of the scene's materials: {', '.join(scene.materials)}"
+            raise ParameterError("brdfs", text, name, tuple(scene.materials))
+        brdf = given.lookup_vectors if isinstance(given, Lookups) else given
+        if not callable(brdf):
+            raise ParameterError("brdfs", f"{name}: {given!r:.80} is not a function, a source or a table", given)
+        replaced[name] = brdf
     lists = []
     for points in view.points:
         lists.append(radiance(scene, points, known[points.material], replaced.get(points.material)))
@@ -218,20 +197,12 @@ def render(
     return composed(scene, view, lists, known)
 
 
-def _function(name: str, given: Brdf | Lookups) -> Brdf:
-    """Return f_r of a source or a table as a function, and a function as it is."""
-    if isinstance(given, Lookups):
-        return given.lookup_vectors
-    if not callable(given):
-        raise ParameterError("brdfs", f"{name}: {given!r:.80} is not a function, a source or a table", given)
-    return given
-
-
 def composed(
     scene: Scene, view: CameraView, lists: Sequence[Floats], materials: Mapping[str, Reflector]
 ) -> NDArray[np.float64]:
     """Return the picture (height, width, L) of radiances of each list of points; mirrors add what they show."""
-    known, lists = materials, [values.copy() for values in lists]
+    known = materials
+    lists = [values.copy() for values in lists]
     pixels = np.zeros((view.height * view.width, len(scene.wavelengths_nm)))
     free = np.full(len(pixels), float(view.samples))
     # Points seen in a mirror come after the points of the mirror in the list

@@ -41,7 +41,7 @@ class Light(BaseModel):
     strength: float = Field(default=1.0, gt=0.0)
     solid_angle_sr: float = Field(default=0.0, ge=0.0, le=1.0)
     samples: int = Field(
-        default=16, ge=1, le=1024, description="over the solid angle; much narrower lobes show them one by one"
+        default=16, ge=1, le=1024, description="over the solid angle; much narrower lobes show single samples"
     )
 
     @property
@@ -89,7 +89,7 @@ class Camera(BaseModel):
     target: Vector = (0.0, 0.0, 0.0)
     up: Vector = (0.0, 0.0, 1.0)
     fov_deg: float | None = Field(default=None, gt=0.0, lt=170.0, description="from the lower to the upper edge")
-    height: float | None = Field(default=None, gt=0.0, description="of what a camera far away sees, at the target")
+    height: float | None = Field(default=None, gt=0.0, description="height at the target that a distant camera sees")
     aspect: float = Field(default=4.0 / 3.0, ge=0.1, le=10.0, description="width of the picture over its height")
 
     @model_validator(mode="after")
@@ -98,7 +98,7 @@ class Camera(BaseModel):
             raise ParameterError("fov_deg, height", "give one of the two")
         forward = np.subtract(self.target, self.position)
         if np.linalg.norm(np.cross(forward, self.up)) <= 1e-9 * np.linalg.norm(forward) * np.linalg.norm(self.up):
-            raise ParameterError("target", "the camera must look at another place than its own, and not along `up`")
+            raise ParameterError("target", "the camera must look neither at its own position nor along `up`")
         return self
 
     def covered(self, distance: Array) -> Array:
@@ -199,15 +199,15 @@ class Scene(BaseModel):
     wavelengths_nm: list[float] = WAVELENGTHS_NM
     hold_ends: bool = Field(
         default=False,
-        description="true: beyond the wavelengths of a table of the store f_r is that of its first or last wavelength",
+        description="true: outside the wavelengths of a table of the store, f_r is that of its nearest wavelength",
     )
     tolerance: Tolerance = Tolerance(ciede2000=1.0)
     define: dict[str, dict[str, Any]] = Field(default={}, description="materials of your own, as in the preset files")
     store: Text | None = Field(
         default=None,
         min_length=1,
-        description="directory of a store, beside the scene, for materials store:NAME: the model that the table NAME "
-        "was tabulated from, or the table itself where that was a function or is not known",
+        description="directory of a store, relative to the scene, for materials store:NAME: the model that the table "
+        "NAME was tabulated from, or the table itself if its source was a function or is unknown",
     )
 
     @field_validator("illuminant")
@@ -224,9 +224,8 @@ class Scene(BaseModel):
     @classmethod
     def _check_wavelengths(cls, wavelengths_nm: list[float]) -> list[float]:
         if not covers_visible(wavelengths_nm):
-            raise ParameterError(
-                "wavelengths_nm", "must increase from 420 or less to 680 or more in steps of at most 20 nm"
-            )
+            text = "must increase from 420 or less to 680 or more in steps of at most 20 nm"
+            raise ParameterError("wavelengths_nm", text)
         return wavelengths_nm
 
     @model_validator(mode="after")
@@ -238,7 +237,7 @@ class Scene(BaseModel):
             if names.count(name) > 1:
                 raise ParameterError("objects", f"{name!r} is the name of two")
         if any(isinstance(item.shape, Recorded) for item in self.objects) and len(names) > 1:
-            raise ParameterError("objects", "one that is recorded is the whole picture, and stands alone")
+            raise ParameterError("objects", "a recorded object fills the picture and must be the only object")
         _materials(self)
         return self
 
@@ -246,10 +245,7 @@ class Scene(BaseModel):
     def materials(self) -> dict[str, Source]:
         """The sources of the objects by name, each once.
 
-        Raises
-        ------
-        ParameterError
-            If the store of the scene cannot be read, or has no such material.
+        ParameterError if the store of the scene cannot be read, or has no such material.
         """
         sources = _materials(self)
         for name in self.stored:
@@ -294,13 +290,11 @@ def _check_range(name: str, source: Source, wavelengths_nm: list[float]) -> None
     if outside:
         inside = [wavelength for wavelength in wavelengths_nm if at[0] <= wavelength <= at[-1]]
         within = "give the scene a range within it, or " if covers_visible(inside) else ""
-        raise ParameterError(
-            "wavelengths_nm",
+        text = (
             f"{outside[0]:g} is outside [{at[0]:g}, {at[-1]:g}] nm of {name}; {within}set hold_ends = true, which "
-            "takes f_r of the nearest wavelength that it has",
-            outside[0],
-            (at[0], at[-1]),
+            "takes f_r of the nearest wavelength that it has"
         )
+        raise ParameterError("wavelengths_nm", text, outside[0], (at[0], at[-1]))
 
 
 def _materials(scene: Scene) -> dict[str, Source]:
@@ -320,11 +314,7 @@ def _materials(scene: Scene) -> dict[str, Source]:
                 raise ParameterError("store", f"objects.{item.name} has the material {item.material}, give its store")
             continue
         if item.material not in known:
-            raise ParameterError(
-                f"objects.{item.name}.material",
-                f"{item.material!r} is unknown{closest(item.material, known)}",
-                item.material,
-                tuple(known),
-            )
+            text = f"{item.material!r} is unknown{closest(item.material, known)}"
+            raise ParameterError(f"objects.{item.name}.material", text, item.material, tuple(known))
         sources[item.material] = known[item.material]
     return sources

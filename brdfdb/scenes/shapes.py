@@ -164,16 +164,21 @@ class Revolution(Shape):
         """Return the radius of the smooth profile at a height, and its slope dr/dz."""
         radius, height = np.array(self.profile).T
         secant = np.diff(radius) / np.diff(height)
-        before, after = secant[[0, *range(secant.size)]], secant[[*range(secant.size), -1]]
+        before = secant[[0, *range(secant.size)]]
+        after = secant[[*range(secant.size), -1]]
         # Fritsch and Butland's slopes, 0 where the secants change sign, keep straight profiles straight
         turns = before * after <= 0.0
         slope = np.where(turns, 0.0, 2.0 * before * after / np.where(turns, 1.0, before + after))
         at = np.clip(np.searchsorted(height, z) - 1, 0, height.size - 2)
         h = height[at + 1] - height[at]
         u = np.clip((z - height[at]) / h, 0.0, 1.0)
-        r0, r1, m0, m1 = radius[at], radius[at + 1], h * slope[at], h * slope[at + 1]
+        r0 = radius[at]
+        r1 = radius[at + 1]
+        m0 = h * slope[at]
+        m1 = h * slope[at + 1]
         # Hermite's cubic and its derivative
-        c2, c3 = 3.0 * (r1 - r0) - 2.0 * m0 - m1, 2.0 * (r0 - r1) + m0 + m1
+        c2 = 3.0 * (r1 - r0) - 2.0 * m0 - m1
+        c3 = 2.0 * (r0 - r1) + m0 + m1
         return ((c3 * u + c2) * u + m0) * u + r0, ((3.0 * c3 * u + 2.0 * c2) * u + m0) / h
 
     def _hit(self, o: Array, d: Array) -> Array:
@@ -296,10 +301,7 @@ class Recorded(BaseModel):
     def read(self) -> dict[str, Array]:
         """Return the arrays of the file, float64, by name; ``wi`` with its axis of lights.
 
-        Raises
-        ------
-        ParameterError
-            If the file does not exist, is not readable, or holds no directions.
+        ParameterError if the file does not exist, is not readable, or holds no directions.
         """
         path = path_of(self.file, "file")
         if not path.is_file():
@@ -325,9 +327,9 @@ def _from_npz(path: Path) -> dict[str, Array]:
         with np.load(path) as file:
             arrays = {name: file[name] for name in ("normal", "tangent", "wr", "wi") if name in file}
     except (ValueError, TypeError, EOFError, zipfile.BadZipFile, zlib.error):
-        raise ParameterError(str(path), "is no .npz of numbers, or a damaged one") from None
+        raise ParameterError(str(path), "is not an .npz file of numbers, or is damaged") from None
     if any(array.dtype.kind not in "iuf" for array in arrays.values()):
-        raise ParameterError(str(path), f"has {WANTED}: what has these names is not made of numbers")
+        raise ParameterError(str(path), f"has {WANTED}: the arrays of these names are not numbers")
     return {name: array.astype(np.float64) for name, array in arrays.items()}
 
 
@@ -338,7 +340,7 @@ def _from_exr(path: Path) -> dict[str, Array]:
         with OpenEXR.File(str(path), separate_channels=True) as file:
             channels: dict[str, NDArray[np.floating]] = {name: c.pixels for name, c in file.channels().items()}
     except RuntimeError:
-        raise ParameterError(str(path), "is no OpenEXR file, or a damaged one") from None
+        raise ParameterError(str(path), "is not an OpenEXR file, or is damaged") from None
     arrays = {name: vector for name in ("normal", "tangent", "wr") if (vector := _vector(channels, name)) is not None}
     lights: list[Array] = []
     while (light := _vector(channels, f"wi{len(lights)}")) is not None:

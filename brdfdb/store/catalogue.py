@@ -34,7 +34,7 @@ _SEARCHED = ("name", "title", "model", "model_title", "paper", "source")  # fiel
 SortKey = tuple[bool, float, str]  # value is unknown, value, name; pages of a list write it as JSON
 SpectrumKind = Annotated[
     Literal["grey", "one wavelength", "spectral"],
-    Field(description="grey: no colour is known, all wavelengths are alike; one wavelength: shown as grey"),
+    Field(description="grey: the same value at all wavelengths; one wavelength: shown as grey"),
 ]
 
 
@@ -63,7 +63,7 @@ class ShownSentence(BaseModel):
 class AuditSummary(BaseModel):
     """The verdict of an audit, its answers to two questions, and its findings in sentences."""
 
-    revision: str = Field(description="that was audited")
+    revision: str = Field(description="revision that was audited")
     model: str
     verdict: str
     sentences: list[ShownSentence]
@@ -98,7 +98,7 @@ class Verdict(NamedTuple):
 
 
 class LastAudit(NamedTuple):
-    """The report of an audit: its date, and what it found on each material."""
+    """The report of an audit: its date, and its findings on each material."""
 
     when: str
     by_name: dict[str, AuditedMaterial]
@@ -208,15 +208,17 @@ class Choice(BaseModel):
         default="name",
         description="order; with a minus the largest, or the newest, first; unknown ones last, then by name",
     )
-    model: str = Field(default="", description="only of this model; measured: only of measured data")
-    paper: str = Field(default="", description="only with this in the key of the paper or in the source")
-    q: str = Field(default="", description="only with all of these words in name, title, model or source")
+    model: str = Field(default="", description="only materials of this model; measured: only measured data")
+    paper: str = Field(default="", description="only materials with this text in the key of the paper or in the source")
+    q: str = Field(default="", description="only materials with all of these words in name, title, model or source")
     verdict: (
         Literal["passes", "known published excess", "accepted excess", "violates", "not judged", "not audited"] | None
     ) = Field(default=None, description="only with this verdict of the audit of the current revision")
-    anisotropic: bool | None = Field(default=None, description="only anisotropic, or only isotropic ones")
+    anisotropic: bool | None = Field(
+        default=None, description="true: only anisotropic materials; false: only isotropic materials"
+    )
     wavelength_nm: tuple[float, ...] = Field(
-        default=(), description="only with tables at this wavelength [nm], repeatable; grey ones hold at all"
+        default=(), description="only tables that cover this wavelength [nm], repeatable; grey tables cover all"
     )
 
     def rank(self, name: str, line: Mapping[str, Any]) -> SortKey:
@@ -272,7 +274,7 @@ def _papers(line: Mapping[str, Any]) -> str:
 
 
 class Attributes(TableMetadata):
-    """The attributes of a table; tables of other programs may lack any."""
+    """The attributes of a table; those of other programs may be missing."""
 
     model_config = ConfigDict(json_schema_extra={"required": []})
 
@@ -293,7 +295,7 @@ class ParameterDocument(BaseModel):
 class ShownAudit(AuditSummary):
     """The last audit of a material."""
 
-    current: bool = Field(description="whether that is this one")
+    current: bool = Field(description="true: the audit is of this revision")
     when: str
 
 

@@ -19,7 +19,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from brdfdb.arrays import array_lookup
 from brdfdb.errors import ParameterError, StoreError, sentence_of
-from brdfdb.geometry import checked_angles, checked_vectors, radians
+from brdfdb.geometry import checked_angles, checked_vectors, degrees, radians
 from brdfdb.materials import written_name
 from brdfdb.models import MODELS
 from brdfdb.notebook import card, percent
@@ -54,7 +54,7 @@ class FamilyLine(BaseModel):
 class Sweep(FamilyLine):
     """Tables of a family, with the requests that they were built for."""
 
-    request_sha256: list[str] = Field(description="of the request that each member was built for")
+    request_sha256: list[str] = Field(description="sha256 of the request of each member")
 
     @property
     def parameters(self) -> dict[str, Parameter]:
@@ -81,6 +81,13 @@ class Sweep(FamilyLine):
             for name, value in written.items()
         }
 
+    def in_file_units(self, at: Mapping[str, float]) -> dict[str, float]:
+        """Return parameters of the model by the names and in the units of files, to six digits."""
+        return {
+            written: float(f"{degrees(at[parameter.name]) if parameter.unit == 'rad' else at[parameter.name]:.6g}")
+            for written, parameter in self.parameters.items()
+        }
+
 
 class Blend(BaseModel):
     """The interpolation between members: by polynomials, in one parameter after the other."""
@@ -95,14 +102,14 @@ class Blend(BaseModel):
         description="of each swept parameter, in which these are polynomials; 0: its logarithm"
     )
     offset: float | None = Field(
-        description="1/sr; what is interpolated is the logarithm of f_r plus this. null: f_r itself"
+        description="1/sr; the logarithm of f_r plus this number is interpolated; null: f_r itself"
     )
-    specular_offset: float | None = Field(description="the same of the specular part")
-    reason: str = Field(description="what this and the other ways were measured to leave")
+    specular_offset: float | None = Field(description="the same for the specular part, without unit")
+    reason: str = Field(description="measured errors of this and of the other interpolations")
 
 
 class WorstPoint(BaseModel):
-    """The parameters, of those measured at, where the interpolation is worst."""
+    """The measured parameters at which the interpolation is worst."""
 
     model_config = _STRICT
 
@@ -117,11 +124,11 @@ class FamilyRecord(Sweep):
     version: Literal[2] = FORMAT_VERSION
     interpolation: Blend
     error: Error = Field(
-        description="of interpolated f_r against the model, over directions and parameters: all points pooled, as many "
-        "in each cell between members, spread evenly in it; of more than 256 cells one point in each of 256 drawn at "
-        "random. 99 of 100 values of the family are within p99; places are measured at the same points"
+        description="error of interpolated f_r against the model, over all directions and parameters together. The "
+        "parameters are spread evenly over the cells between members, the same number in each; of more than 256 cells, "
+        "256 random ones have one each. 99 of 100 values are within p99; places are measured at the same parameters"
     )
-    points: int = Field(description="parameters at which the error was measured")
+    points: int = Field(description="number of parameters at which the error was measured")
     worst: WorstPoint
     specular_error: float | None = Field(
         description="largest absolute error of the specular part at the same parameters"
@@ -175,7 +182,7 @@ def member_loader(sweep: Sweep, tables: Mapping[str, Table]) -> Callable[[int], 
 def stale(family: str, member: str) -> str:
     """Return the sentence about a family whose member is not the one that its record was made of."""
     return (
-        f"the family {family} is out of date: {member} is another table than it was measured with; "
+        f"the family {family} is out of date: {member} was rebuilt since the error of the family was measured; "
         "build its recipe again"
     )
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.errors import StoreError, UnknownMaterialError
-from brdfdb.geometry import degrees, radians
+from brdfdb.geometry import radians
 from brdfdb.materials import Material
 from brdfdb.parameters import Floats
 from brdfdb.store.family import (
@@ -121,7 +121,12 @@ def measure(sweep: Sweep, tables: Mapping[str, Table], seed: int = SEED) -> Fami
     best = min(ways, key=lambda way: ways[way])
     pairs = places.draw(_OF_A_SAMPLE * len(measured.points), seed)
     value = _interpolated(sweep, measured, measured.corners, best)
-    specular = _specular(sweep, measured, best)
+    specular: dict[float | None, float] = {}  # largest error of the specular part, by the offset of its logarithm
+    if measured.specular_corners is not None and measured.specular_truth is not None:
+        for offset in (None, _SPECULAR_OFFSET):
+            mirrored = _interpolated(sweep, measured, measured.specular_corners, best._replace(offset=offset))
+            specular[offset] = float(np.abs(mirrored - measured.specular_truth).max())
+    specular_offset = min(specular, key=lambda offset: specular[offset], default=None)
     between = _between(sweep, tables, seed, best, floor) if floor.size > 1 else None
     p99 = [
         float(np.percentile(error_measurement.relative(v, t, floor)[d.above], 99.0, axis=0).max())
@@ -134,7 +139,7 @@ def measure(sweep: Sweep, tables: Mapping[str, Table], seed: int = SEED) -> Fami
             method=best.method,
             powers=dict(zip(sweep.axes, best.powers, strict=True)),
             offset=best.offset,
-            specular_offset=specular.offset,
+            specular_offset=specular_offset,
             reason="; ".join(
                 f"{way.in_words(sweep)}: p99 {left:.3g}" for way, left in sorted(ways.items(), key=lambda item: item[1])
             ),
@@ -146,8 +151,8 @@ def measure(sweep: Sweep, tables: Mapping[str, Table], seed: int = SEED) -> Fami
             }
         ),
         points=len(measured.points),
-        worst=WorstPoint(parameters=_written(sweep, measured.parameters[worst]), p99=float(f"{p99[worst]:.3g}")),
-        specular_error=specular.error,
+        worst=WorstPoint(parameters=sweep.in_file_units(measured.parameters[worst]), p99=float(f"{p99[worst]:.3g}")),
+        specular_error=float(f"{specular[specular_offset]:.3g}") if specular else None,
     )
 
 
@@ -296,7 +301,8 @@ def _ways(sweep: Sweep, measured: _Measured, drawn: error_measurement.RandomPair
                 for power in _POWERS if values[0] > 0.0 else (1, 2) if values[0] == 0.0 else (1,):
                     other = best._replace(powers=(*best.powers[:axis], power, *best.powers[axis + 1 :]))
                     if other != best and (there := left(other, _THINNED)) < least:
-                        best, least = other, there
+                        best = other
+                        least = there
             ways[best] = left(best)
     return ways
 
@@ -320,32 +326,6 @@ def _interpolated(sweep: Sweep, measured: _Measured, corners: Floats, way: _Way)
     members = np.flatnonzero(np.any(weights != 0.0, axis=0))
     spread = (slice(None), *(np.newaxis,) * (corners.ndim - 2))
     return blended([corners[:, c] for c in members], [weights[:, c][spread] for c in members], way.offset)
-
-
-class _SpecularPart(NamedTuple):
-    """The offset with which the specular part is interpolated, and its largest error; None without such a part."""
-
-    offset: float | None
-    error: float | None
-
-
-def _specular(sweep: Sweep, measured: _Measured, way: _Way) -> _SpecularPart:
-    """Choose how to interpolate the specular part."""
-    if measured.specular_corners is None or measured.specular_truth is None:
-        return _SpecularPart(None, None)
-    left: dict[float | None, float] = {}
-    for offset in (None, _SPECULAR_OFFSET):
-        value = _interpolated(sweep, measured, measured.specular_corners, way._replace(offset=offset))
-        left[offset] = float(np.abs(value - measured.specular_truth).max())
-    best = min(left, key=lambda offset: left[offset])
-    return _SpecularPart(best, float(f"{left[best]:.3g}"))
-
-
-def _written(sweep: Sweep, at: Mapping[str, float]) -> dict[str, float]:
-    return {
-        written: float(f"{degrees(at[parameter.name]) if parameter.unit == 'rad' else at[parameter.name]:.6g}")
-        for written, parameter in sweep.parameters.items()
-    }
 
 
 def recorded(root: Path, sweep: Sweep) -> FamilyRecord | None:

@@ -130,7 +130,7 @@ def read_sealed(path: Path, where: str) -> dict[str, Any]:
 
 
 def write_sealed(path: Path, content: Mapping[str, Any], temporary: Path | None = None) -> None:
-    """Write a sealed JSON file as `write_file` does, by default by way of its own directory."""
+    """Write a sealed JSON file as `write_file` does, by default through a temporary file in its directory."""
     write_file(path, sealed(content), temporary or path.parent)
 
 

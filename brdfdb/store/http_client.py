@@ -89,7 +89,7 @@ class Service:
             raise ParameterError("url", f"{url!r} is not an address such as http://127.0.0.1:8000", url)
         if not re.fullmatch("[!-~]+", url):
             raise ParameterError(
-                "url", f"{url!r} is not an address: it has characters other than those of ASCII, or spaces", url
+                "url", f"{url!r} is not an address: it contains spaces or characters outside ASCII", url
             )
         if not 0.0 < timeout_s <= threading.TIMEOUT_MAX:
             raise ParameterError(
@@ -136,15 +136,22 @@ class Service:
 
     def stranger(self) -> StoreError:
         """Return the error for an address where something else answers, such as the login page of a network."""
-        return StoreError(f"{self.url} is no service of brdfdb")
+        return StoreError(f"{self.url} is not a brdfdb service")
 
     def content(self, path: str, body: bytes | None, media: str) -> bytes:
         """Return the bytes of an answer.
 
-        StoreError says that no service answers, that it cannot read its store, or that it fails; errors of the store
-        itself are raised as it raised them.
+        If the service is busy for a short time that it names, ask again after that time. StoreError says that no
+        service answers, that it cannot read its store, or that it fails; errors of the store itself are raised as it
+        raised them.
         """
-        response, answer = self._answer(path, body, media)
+        end = time.monotonic() + min(self.timeout_s, PATIENCE_S)
+        while True:
+            response, answer = self._exchanged(path, body, media)
+            wait = response.getheader("Retry-After", "") if response.status == 503 else ""
+            if not wait.isdecimal() or time.monotonic() + int(wait) > end:
+                break
+            time.sleep(int(wait))
         status = response.status
         location = response.getheader("Location")
         if status == 200:
@@ -166,24 +173,17 @@ class Service:
             raise ParameterError(parameter, detail.removeprefix(f"{parameter}: "))
         if status == 503 and detail:
             raise StoreError(detail)
-        why = f": {detail}" if detail else ", and does not say why"
+        why = f": {detail}" if detail else " without a reason"
         sentence = f"{self.url} answered {status} {response.reason}".rstrip() + why
         raise TooLargeError(sentence) if status == 413 else StoreError(sentence)
-
-    def _answer(self, path: str, body: bytes | None, media: str) -> _Answer:
-        """Return an answer; if the service is busy for a short time that it names, wait and ask again."""
-        end = time.monotonic() + min(self.timeout_s, PATIENCE_S)
-        while True:
-            answer = self._exchanged(path, body, media)
-            wait = answer.response.getheader("Retry-After", "") if answer.response.status == 503 else ""
-            if not wait.isdecimal() or time.monotonic() + int(wait) > end:
-                return answer
-            time.sleep(int(wait))
 
     def _exchanged(self, path: str, body: bytes | None, media: str) -> _Answer:
         headers = {"Accept": media} if body is None else {"Accept": media, "Content-Type": media}
         request = ("GET" if body is None else "POST", self._path + path, body, headers)
-        connection = self._connection()
+        own: _Connection | None = getattr(self._local, "connection", None)
+        if own is None or own.process != os.getpid():  # a forked process does not share the connection of its parent
+            own = self._local.connection = _Connection(self._kind(self._host, self._port, timeout=self.timeout_s))
+        connection = own.connection
         try:
             if connection.sock is not None:
                 with suppress(ConnectionError):
@@ -198,13 +198,6 @@ class Service:
         except BaseException:
             connection.close()  # the rest of this answer must not be read as the next one
             raise
-
-    def _connection(self) -> http.client.HTTPConnection:
-        """Return the connection of this thread, open or not; a forked process does not share that of its parent."""
-        own: _Connection | None = getattr(self._local, "connection", None)
-        if own is None or own.process != os.getpid():
-            own = self._local.connection = _Connection(self._kind(self._host, self._port, timeout=self.timeout_s))
-        return own.connection
 
 
 class _Connection:
@@ -295,7 +288,7 @@ class RemoteTable(BaseTable):
         return finished(values.reshape(shape), given, trailing=len(wavelengths.tail))
 
     def _mueller_at(self, angles: FourAngles, wavelength_nm: ArrayLike | None) -> Floats:
-        """Return the Mueller BRDF [1/sr] from what the service reflects of four lights."""
+        """Return the Mueller BRDF [1/sr] from the reflected Stokes vectors of four lights."""
         self._wavelengths(wavelength_nm)
         shape_of_angles(*(np.asarray(angle) for angle in angles))
         given = checked_angles(*angles)

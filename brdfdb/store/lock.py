@@ -9,10 +9,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import IO
 
-from brdfdb.errors import (
-    BusyError,
-    StoreError,
-)
+from brdfdb.errors import BusyError, StoreError
 from brdfdb.store.paths import staged_path, staging_path
 
 try:

@@ -12,9 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from brdfdb.errors import (
-    ParameterError,
-)
+from brdfdb.errors import ParameterError
 from brdfdb.materials import Source
 from brdfdb.measurements import MeasuredSource
 from brdfdb.place import path_of
@@ -60,9 +58,8 @@ def publish(
 ) -> Published:
     """Tabulate a source to a tolerance and publish the table in a store.
 
-    This is the way for a `brdfdb.materials.FunctionSource`, which no recipe can name and no other process can read. It
-    runs in this process, with the whole table in memory, and starts anew after a crash: a build from a recipe
-    (``brdfdb build``) resumes.
+    Use it for a `brdfdb.materials.FunctionSource`, which no recipe can name and no other process can read. It runs in
+    this process, with the whole table in memory, and cannot resume after a crash as ``brdfdb build`` does.
 
     Parameters
     ----------
@@ -184,7 +181,7 @@ def checked_dataset(name: str, dataset: xr.Dataset) -> xr.Dataset:
     if "brdf" in dataset and "parts" in dataset:
         rebuilt = with_brdf(dataset.drop_vars("brdf"))["brdf"]
         if not np.array_equal(rebuilt.values, dataset["brdf"].values, equal_nan=True):
-            raise ParameterError("brdf", "it is not what parts make, of which it is rebuilt; leave out one of the two")
+            raise ParameterError("brdf", "differs from the f_r that is rebuilt from parts; leave out one of the two")
         dataset = dataset.drop_vars("brdf")
     variable = "brdf" if "brdf" in dataset else "parts"
     if variable in dataset and dataset[variable].dtype == np.float64:

@@ -23,12 +23,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from brdfdb.errors import (
-    StoreError,
-    UnknownFamilyError,
-    UnknownMaterialError,
-    UnknownRevisionError,
-)
+from brdfdb.errors import StoreError, UnknownFamilyError, UnknownMaterialError, UnknownRevisionError
 from brdfdb.notebook import listing, percent
 from brdfdb.place import path_of
 from brdfdb.store.files import read_sealed, regular_bytes
@@ -169,7 +164,7 @@ class Store(Mapping[str, "Table"]):
             except StoreError:
                 if self.location(name) == location:
                     raise
-                # a newer revision was published, and this one removed meanwhile: read the newer one
+                # a newer revision was published, and this one was removed: read the newer one
 
     def table(self, name: str, revision: str) -> Table:
         """Return the decoded table of a revision, current or not: ``r000003``, or ``r000003-0123456789abcdef``.
@@ -298,7 +293,7 @@ class Store(Mapping[str, "Table"]):
         try:
             return opened(CheckedRevision(location.group, files))
         except ValueError as error:  # written by another program
-            raise StoreError(f"{name} {location.group.name} is no table: {error}") from error
+            raise StoreError(f"{name} {location.group.name} is not a table: {error}") from error
 
     def verify(self, name: str) -> None:
         """Check every file of the current revision against its manifest, and the manifest against the pointer.

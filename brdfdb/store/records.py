@@ -329,8 +329,14 @@ def check_manifest(group: Path, digest: str | None, *, contents: bool) -> Manife
             raise StoreError(f"{where} is damaged: {name} is missing") from None
         except OSError as error:
             raise StoreError(f"{where} is damaged: {name} cannot be read: {error.strerror}") from None
-    if contents:
-        _check_facts(group, manifest)
+    if not contents:
+        return manifest
+    summary: Mapping[str, Any] = manifest["summary"]
+    stored = sum(entry["size"] for entry in manifest["files"].values())
+    for key, value in summary_of(read_metadata(group), stored, summary["created"]).items():
+        if key in summary and not _agrees(summary[key], value):  # older manifests may say less
+            file = manifest_path(group).name
+            raise StoreError(f"{where} is damaged: {file} says {key} {summary[key]!r}, where the table has {value!r}")
     return manifest
 
 
@@ -346,7 +352,7 @@ def check_file(
     where = f"{group.parent.name} {group.name}"
     if value is None:
         if not manifest_path(group).is_file():
-            raise StoreError(f"{where} was removed while it was read; open the material anew")
+            raise StoreError(f"{where} was removed while it was read; open the material again")
         raise StoreError(f"{where} is damaged: {key} is missing")
     if complete and hashlib.sha256(value).hexdigest() != entry["sha256"]:
         raise StoreError(f"{where} is damaged: the content of {key} changed")
@@ -357,18 +363,6 @@ def read_metadata(group: Path) -> TableMetadata:
     from brdfdb.tables.metadata import TableMetadata  # it loads numpy, which a list does not need
 
     return TableMetadata.read(read_json(group / METADATA).get("attributes", {}))
-
-
-def _check_facts(group: Path, manifest: Manifest) -> None:
-    """Raise StoreError unless a manifest says of a table what the table says; older manifests may say less."""
-    summary: Mapping[str, Any] = manifest["summary"]
-    stored = sum(entry["size"] for entry in manifest["files"].values())
-    for key, value in summary_of(read_metadata(group), stored, summary["created"]).items():
-        if key in summary and not _agrees(summary[key], value):
-            raise StoreError(
-                f"{group.parent.name} {group.name} is damaged: {manifest_path(group).name} says {key} "
-                f"{summary[key]!r}, where the table has {value!r}"
-            )
 
 
 def _agrees(stated: Any, value: Any) -> bool:
@@ -403,7 +397,7 @@ def _undamaged_head(material: Path) -> Head | None:
 
 
 def check_summary(head: Head, manifest: Manifest) -> None:
-    """Raise WrongSummaryError unless a pointer says of its revision what the manifest does."""
+    """Raise WrongSummaryError unless a pointer has the summary of the manifest."""
     for key, value in manifest["summary"].items():
         if head.get(key) != value:
             raise WrongSummaryError(

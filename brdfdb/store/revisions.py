@@ -86,7 +86,7 @@ def adoptable(root: Path, name: str, request_sha256: str) -> str | None:
 def difference(old: Mapping[str, Any], new: Mapping[str, Any]) -> str:
     """Return a phrase on how a request differs from that of the current table."""
     if not old:
-        return "the current table does not say what was asked for"
+        return "the current table does not record its request"
     new = json.loads(json.dumps(new))
     changes: list[str] = []
     for key in sorted({*old, *new}):
@@ -243,7 +243,7 @@ def _collect_material(
     except UnknownMaterialError:  # nothing but what crashes left behind
         current = material
     except StoreError:
-        return  # nobody knows what the pointer pointed to: the next build repairs it
+        return  # the current revision is unknown until the next build repairs the pointer
     for group in sorted(kept & set(revisions)):
         if damaged and group != current and group not in stay:
             try:

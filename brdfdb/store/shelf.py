@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 class Shelf:
-    """The materials of a store, as a program shows them that runs while the store changes.
+    """The materials of a store, for a program that runs while the store changes.
 
     The store at `root`, or an open one, is opened when it is first needed: there may be none yet. `audit_files` are
     what ``brdfdb audit`` wrote as JSON, such as the reports on all materials and on some; each may be missing.

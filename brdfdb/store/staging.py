@@ -25,10 +25,7 @@ from typing import Any, TypedDict
 import numpy as np
 from numpy.typing import NDArray
 
-from brdfdb.errors import (
-    BusyError,
-    StoreError,
-)
+from brdfdb.errors import BusyError, StoreError
 from brdfdb.store.files import FileEntry, read_sealed, sealed, sha256_of, write_file, write_files
 from brdfdb.store.lock import Lock, writing
 from brdfdb.store.paths import marker_path, materials_path, request_path, staging_path, store_of_staged

@@ -13,7 +13,7 @@ from brdfdb.store.paths import NAME, manifest_path, number_of, revision_path
 
 NOT_MEASURED = "not measured"
 NOT_AUDITED = "not audited"
-# What the two errors of a list are, for the line below it
+# Explains the two errors of a list in a line below it
 ERRORS_EXPLAINED = (
     "table error: of the table relative to its formula, or to the data if it is measured; formula error: of the "
     "formula relative to the exact form of the same model; 0, exact form: the formula is exact"
@@ -25,7 +25,7 @@ REPORT_OF_SOME = "audit-part.json"  # on those that were named or imported
 
 
 class Audited(NamedTuple):
-    """The answers of an audit in a few words: is it what the paper says, does the published model conserve energy."""
+    """The answers of an audit in a few words: does the table agree with the paper, does its model conserve energy."""
 
     as_published: str
     conserves_energy: str
@@ -36,7 +36,13 @@ def last_audit(root: Path) -> dict[tuple[str, str], Audited]:
 
     Audits of older programs have one verdict, which stands for the first answer.
     """
-    return {(one["material"], one["revision"]): _answers(one) for one in audited_materials(root)}
+    answers = {}
+    for entry in audited_materials(root):
+        audited = Audited(str(entry["verdict"]), "")
+        if "as_published" in entry:
+            audited = Audited(str(entry["as_published"]["text"]), str(entry["conserves_energy"]["text"]))
+        answers[entry["material"], entry["revision"]] = audited
+    return answers
 
 
 def audited_materials(root: Path) -> list[dict[str, Any]]:
@@ -49,8 +55,8 @@ def audited_materials(root: Path) -> list[dict[str, Any]]:
     for path in sorted(paths, key=lambda path: path.stat().st_mtime_ns):
         try:
             of_report = json.loads(path.read_bytes())["materials"]
-            known = [one for one in of_report if {"material", "revision", "verdict"} <= one.keys()]
-            entries += [one for one in known if is_of_store(root, one)]
+            complete = [entry for entry in of_report if {"material", "revision", "verdict"} <= entry.keys()]
+            entries += [entry for entry in complete if is_of_store(root, entry)]
         except (OSError, ValueError, KeyError, TypeError, AttributeError):
             continue
     return entries
@@ -69,12 +75,6 @@ def is_of_store(root: Path, entry: Mapping[str, Any]) -> bool:
         return False
 
 
-def _answers(one: Mapping[str, Any]) -> Audited:
-    if "as_published" not in one:
-        return Audited(str(one["verdict"]), "")
-    return Audited(str(one["as_published"]["text"]), str(one["conserves_energy"]["text"]))
-
-
 def colours(head: Mapping[str, Any]) -> str:
     """Return the wavelengths of a table in words: grey, one wavelength, or a range; empty if its pointer is older."""
     at = head.get("wavelength_range_nm")
@@ -86,7 +86,7 @@ def colours(head: Mapping[str, Any]) -> str:
 
 
 def kind(head: Mapping[str, Any]) -> str:
-    """Return the model of a table, or what it is of without one: measured, or a function."""
+    """Return the model of a table; without a model, measured or function."""
     return head["model"] or ("measured" if head.get("measured") else "function")
 
 
@@ -106,15 +106,12 @@ def energy(head: Mapping[str, Any], audited: Audited | None) -> str:
     """Return the answer of the audit on energy; without one, that it is missing and an albedo above 1."""
     if audited is not None:
         return audited.conserves_energy
-    above = excess(head) or _beyond(head)
-    return f"{NOT_AUDITED}: {above}" if above else NOT_AUDITED
-
-
-def _beyond(head: Mapping[str, Any]) -> str:
-    """Return in words the grazing angle, beyond those judged, where an albedo passes 1; empty without one."""
+    above = excess(head)
     largest = head.get("largest_albedo") or {}
     passes = (largest.get("grazing") or {}).get("passes_1_at_theta_i_deg")
-    return "" if passes is None else f"albedo of the {_whose(largest)} passes 1 at {near_90(passes)}°"
+    if not above and passes is not None:
+        above = f"albedo of the {_whose(largest)} passes 1 at {near_90(passes)}°"
+    return f"{NOT_AUDITED}: {above}" if above else NOT_AUDITED
 
 
 def _whose(largest: Mapping[str, Any]) -> str:

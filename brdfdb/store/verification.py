@@ -52,7 +52,7 @@ class Verified(NamedTuple):
 
 
 class WrongTableError(StoreError):
-    """A revision whose files are those of its manifest, and no table: another program wrote it."""
+    """A revision whose files match its manifest but are not a table: another program wrote it."""
 
 
 def material(root: Path, name: str) -> Verified:

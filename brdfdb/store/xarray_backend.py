@@ -89,11 +89,11 @@ def _local(path: Path, revision: str | None, snapshot: str | None) -> xr.Dataset
         return Store(root, snapshot=snapshot).dataset(path.name, revision)
     if (root := store_of(path)) is not None:
         if revision not in (None, path.name):
-            raise ParameterError("revision", f"{revision!r} is another one than that of {path}", revision, path.name)
+            raise ParameterError("revision", f"{revision!r} is not the revision of {path}", revision, path.name)
         return Store(root, snapshot=snapshot).dataset(path.parent.name, path.name)
     if not (path / METADATA).is_file():
         raise StoreError(f"no table at {path}: name a revision, a material of a store, or a store with `material`")
     try:
         return opened(path)
     except (ValueError, FileNotFoundError) as error:
-        raise StoreError(f"{path} is no table: {error}") from error
+        raise StoreError(f"{path} is not a table: {error}") from error

@@ -53,7 +53,9 @@ class CheckedRemoteRevision(FsspecStore):
         if entry is None:
             return None
         if value is None:
-            raise StoreError(f"{self._where} was removed or replaced while it was read ({key}); open the material anew")
+            raise StoreError(
+                f"{self._where} was removed or replaced while it was read ({key}); open the material again"
+            )
         if byte_range is None and hashlib.sha256(value.to_bytes()).hexdigest() != entry["sha256"]:
-            raise StoreError(f"{self._where}: {key} is another one than its manifest names, as of a cache on the way")
+            raise StoreError(f"{self._where}: {key} differs from its manifest; a cache in between may hold an old one")
         return value

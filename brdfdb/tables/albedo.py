@@ -1,4 +1,4 @@
-"""The directional albedo of a table: the exact integral of what is linear between nodes, else by quadrature."""
+"""The directional albedo of a table: an exact integral if f_r is linear between nodes, else a quadrature."""
 
 from __future__ import annotations
 
@@ -20,27 +20,28 @@ from brdfdb.tables.grids import Axis
 from brdfdb.tables.stated_error import Grazing, LargestAlbedo
 from brdfdb.tables.table import Table, TableSource
 
-# Absolute, of the albedo of a table whose interpolant has no exact integral; its kinks are worth no more
+# Absolute tolerance of the albedo of a table without an exact integral; the kinks of its interpolant limit it
 QUADRATURE_TOLERANCE = 2e-5
-MEASURED_TOLERANCE = 2e-4  # of measured tables: their data are uncertain by more, and it takes a quarter of the time
-# Absolute, of the largest albedo that a table states: three digits are shown, and it takes a third of the time
+MEASURED_TOLERANCE = 2e-4  # the same of measured tables: data are less exact, and it takes a quarter of the time
+# Absolute tolerance of the largest albedo that a table states: it has three digits, and takes a third of the time
 LARGEST_TOLERANCE = 1e-3
-_MOST_PANELS = 1000  # of a light
-# Lights for which such a table is integrated [degree]; phi_i up to where the symmetry of its grid begins anew
+_MOST_PANELS = 1000  # largest number of panels for a light
+# Lights for which such a table is integrated [degree]; phi_i covers one period of the symmetry of the grid
 THETA_I_DEG = np.array([*range(0, 85, 5), 82.5, 85.0, 87.5, 89.0, 89.5], dtype=np.float64)
 _PHI_I_STEP_DEG = 30.0
 LAST_LIGHT_DEG = 89.9  # largest angle at which the albedo of a source with a pole at the horizon is judged
-_ROUNDS = 4  # of the search for the largest albedo of a source; each halves the steps around it
+_ROUNDS = 4  # rounds of the search for the largest albedo of a source; each halves the steps around it
 # Cosines of the lights that show the growth of an albedo towards 90 degrees
 _NEAR = 1e-4
 _NEARER = 1e-6
 _NEAREST = 1e-8
 _LEAST = 1e-12  # smallest cosine that is tried
-_GRAZING_TOLERANCE = 1e-5  # of those albedos, relative to the albedo at the light before, or to 1
-_PASSING = 1e-3  # relative tolerance of the cosine from which on an albedo exceeds 1
-_FLAT = 1e-4  # rise from light to light, relative to the albedo, up to which it is bounded
+_GRAZING_TOLERANCE = 1e-5  # tolerance of those albedos, relative to the albedo of the light before, or to 1
+_PASSING = 1e-3  # relative tolerance of the cosine below which an albedo exceeds 1
+_FLAT = 1e-4  # largest rise from light to light, relative to the albedo, of a bounded albedo
 
-AlbedoAt = Callable[[Axis, float], Floats]  # of lights [degree] and a tolerance: albedos (theta_i, wavelengths) [1]
+# From lights [degree] and a tolerance to albedos (theta_i, wavelengths) [1]
+AlbedoAt = Callable[[Axis, float], Floats]
 
 
 class TableAlbedo(NamedTuple):
@@ -107,7 +108,8 @@ def directional_albedo(
         lights = np.union1d(THETA_I_DEG, nodes)
     if lights is not None:
         matrix = np.stack([np.interp(lights, nodes, one) for one in np.eye(nodes.size)], axis=1)
-        nodes, albedo = lights, np.tensordot(matrix, albedo, axes=1)
+        nodes = lights
+        albedo = np.tensordot(matrix, albedo, axes=1)
     return TableAlbedo(nodes, phi_i, np.asarray(albedo), np.zeros(nodes.size))
 
 
@@ -167,7 +169,7 @@ class AlbedoDocument(BaseModel):
 
 
 def reflected(table: Table) -> Reflected:
-    """Return what a table reflects, integrated once: it takes a third of a second if it is not exact."""
+    """Return the share of light that a table reflects, cached: a quadrature takes a third of a second."""
     if table not in _REFLECTED:
         _REFLECTED[table] = _reflected(directional_albedo(table), table, table.wavelength_nm)
     return _REFLECTED[table]
@@ -177,7 +179,7 @@ _REFLECTED: WeakKeyDictionary[Table, Reflected] = WeakKeyDictionary()
 
 
 def reflected_by(source: Source, wavelength_nm: Axis | None) -> Reflected:
-    """Return what a source reflects at wavelengths (L,) [nm]; ParameterError if it does not hold at one of them."""
+    """Return the share of light that a source reflects at wavelengths (L,) [nm]; ParameterError outside its range."""
     phi_i_deg = azimuths_deg(source)
     angles = radians(THETA_I_DEG)[:, np.newaxis], radians(phi_i_deg)
     albedo, error = source_albedo(source, *angles, wavelength_nm, tolerance=LARGEST_TOLERANCE)
@@ -191,12 +193,12 @@ def azimuths_deg(source: Source) -> Axis:
 
 
 def _reflected(albedo: TableAlbedo, surface: Table | Source, wavelength_nm: Axis | None) -> Reflected:
-    diffuse, angles = albedo.mean, albedo.theta_i_deg
-    specular = np.asarray(surface.specular_reflectance(radians(angles), wavelength_nm)).reshape(diffuse.shape[0], -1)
-    specular = np.broadcast_to(specular, diffuse.shape)
-    return Reflected(
-        angles, diffuse, specular, hemispherical_albedo(angles, diffuse + specular), float(albedo.error.max())
-    )
+    diffuse = albedo.mean
+    theta_i_deg = albedo.theta_i_deg
+    specular = np.asarray(surface.specular_reflectance(radians(theta_i_deg), wavelength_nm))
+    specular = np.broadcast_to(specular.reshape(diffuse.shape[0], -1), diffuse.shape)
+    hemispherical = hemispherical_albedo(theta_i_deg, diffuse + specular)
+    return Reflected(theta_i_deg, diffuse, specular, hemispherical, float(albedo.error.max()))
 
 
 def source_albedo(
@@ -216,7 +218,9 @@ def source_albedo(
     f_r = source.brdf_at(wavelength_nm)
 
     def brdf(wi: Floats, wr: Floats) -> Floats:
-        with np.errstate(all="ignore"):  # nodes lie in every corner; what is finite is tested, not flagged
+        with np.errstate(
+            all="ignore"
+        ):  # nodes lie at grazing angles, too; callers check for values that are not finite
             return f_r(wi, wr)
 
     cos_i = np.cos(np.asarray(theta_i, dtype=np.float64))[..., np.newaxis]
@@ -277,7 +281,7 @@ def _trapezoid_weights(nodes: Axis) -> Axis:
 
 
 def _theta_weights(nodes: Axis) -> Axis:
-    """Return the integrals of hat_j(theta) cos(theta) sin(theta) over [0, pi/2], the last hat held constant up to pi/2.
+    """Return the integrals of hat_j(theta) cos(theta) sin(theta) over [0, pi/2], the last hat constant up to pi/2.
 
     With F = sin^2 / 2 and its integral G = theta / 4 - sin(2 theta) / 8, the rising half over [a, b] gives
     F(b) - (G(b) - G(a)) / (b - a).
@@ -394,7 +398,7 @@ def _searched(albedo_at: AlbedoAt, lights: Axis) -> _Albedos:
         for at, albedo in enumerate(of_lights):
             around = slice(max(at - 1, 0), at + 2)
             drop = np.ptp(of_lights[around])
-            # between lights the albedo rises by no more than it drops to the next, or the lights are too far apart
+            # The maximum between two lights is assumed to rise by at most the drop to the next light
             if albedo == of_lights[around].max() and drop > LARGEST_TOLERANCE / 2.0 and albedo + drop > of_lights.max():
                 between.update((lights[around][1:] + lights[around][:-1]) / 2.0)
         if not between:
@@ -425,11 +429,13 @@ def _grazing(albedo_at: AlbedoAt, declared: float | None, largest: float, up_to_
         rises = nearer - near, nearest - nearer
         grows = rises[1] > rises[0] > _FLAT * nearest
         power = round(float(np.log(rises[1] / rises[0]) / np.log(_NEARER / _NEAREST)), 2) if grows else 0.0
-    factor, rest = nearest, 0.0
+    factor = nearest
+    rest = 0.0
     if power > 0.0:  # of an albedo of rest + factor cos^-power
         factor = max((nearest - nearer) / (_NEAREST**-power - _NEARER**-power), 0.0)
         rest = nearest - factor * _NEAREST**-power
-    most, passes = max(largest, near, nearer, nearest), None
+    most = max(largest, near, nearer, nearest)
+    passes = None
     if largest <= 1.0 and (power > 0.0 or most > 1.0 + LARGEST_TOLERANCE):
         tried = {_NEAR: near, _NEARER: nearer, _NEAREST: nearest, _LEAST: at(_LEAST, nearest)}
         above = next((cos_i for cos_i, albedo in tried.items() if albedo > 1.0), None)

@@ -18,16 +18,16 @@ from brdfdb.tables.layout import Layout
 from brdfdb.tables.table import points
 
 _LINES = 100
-_POINTS = 145  # of a line
+_POINTS = 145  # points on a line
 _COUNTS = (2, 3, 4, 5, 6, 8, 10, 12, 15, 18, 22, 27, 33, 41, 50, 61, 75, 92, 112, 137)  # nodes of an axis
-_MOST_NODES = 400  # of an axis
-_SMOOTHED = 9  # points of a line that the density of nodes is averaged over
-_PERCENTILE = 99.0  # of the errors on lines that counts
-# Least difference that counts: rounding would decide where the nodes of an axis lie along which numbers hardly change
+_MOST_NODES = 400  # largest number of nodes of an axis
+_SMOOTHED = 9  # points of a line over which the density of nodes is averaged
+_PERCENTILE = 99.0  # percentile of the errors on lines
+# Smallest difference that shifts nodes: along an axis where numbers hardly change, rounding would decide their places
 _LEAST = 1e-10
-_EASED = 0.15  # of the mean density of nodes is what the emptiest part of an axis gets
+_EASED = 0.15  # smallest density of nodes on an axis, as a share of the mean density
 
-# Where the points of a line lie, s in [0, 1]: (end [degree], power); a power p > 0 crowds them at 0 as s**p, p < 0 at
+# Places of the points of a line, s in [0, 1]: (end [degree], power). A power p > 0 crowds points at 0 as s**p, p < 0 at
 # the end
 LINE = {
     "theta_i": (90.0, -2.0),
@@ -43,7 +43,7 @@ LINE = {
 
 
 class Need:
-    """The need of an axis: the density of its nodes, and the error that so many of them leave on lines along it."""
+    """The need of an axis: the density of its nodes, and the interpolation error on lines for each number of nodes."""
 
     def __init__(self, layout: Layout, axis: int, numbers: Floats, weight: Floats) -> None:
         order = 4 if layout.interpolation.cubic else 2
@@ -55,7 +55,7 @@ class Need:
         self.x = _points(name, layout.grid.axes[name][-1], np.linspace(0.0, 1.0, size))
         self.rows = np.moveaxis(numbers, 2, 1).reshape(count * wavelengths, size)
         self.weights = np.moveaxis(weight, 2, 1).reshape(count * wavelengths, size)
-        self.known: dict[int, tuple[float, float]] = {}  # a bound that the error is above, and one that it keeps
+        self.known: dict[int, tuple[float, float]] = {}  # largest error exceeded, smallest error kept
         self.counted = int(np.count_nonzero(self.weights > 0.0))
         left = np.abs(np.diff(self.rows, order, axis=1)) * self.weights[:, order // 2 : size - order // 2]
         steepest = np.maximum(np.percentile(left, 98, axis=0), _LEAST)
@@ -65,18 +65,24 @@ class Need:
         )
         density = smooth + _EASED * smooth.mean() + 1e-30
         self.density = density / density.sum()
-        self.points = _spread(self.density)
+        # The points of a line that are nodes, for each number of nodes; numbers that would repeat a point are left out
+        at = np.round(_LADDER.places(self.density) * (size - 1)).astype(np.int64)
+        repeated = np.append(at[1:] <= at[:-1], False)
+        repeated[_ENDS - 1] = False  # there the points for the next number begin
+        usable = ~np.logical_or.reduceat(repeated, _ENDS - _COUNTS)
+        ladder = zip(_COUNTS, _ENDS, usable, strict=True)
+        self.points = {count: at[end - count : end] for count, end, is_usable in ladder if is_usable}
         self.counts = [*self.points]
 
     def left(self, count: int) -> float:
-        """Return the error that a number of nodes leaves: the 99th percentile on the lines."""
+        """Return the error on the lines with a number of nodes: the 99th percentile."""
         error = self._errors(count)[self.weights > 0.0]
         return float(np.percentile(error, _PERCENTILE)) if error.size else 0.0
 
     def keeps(self, count: int, error: float) -> bool:
-        """Return True if a number of nodes leaves no more than an error.
+        """Return True if the error with a number of nodes is at most `error`.
 
-        The number of larger errors decides, unless the percentile lies between two errors next to the limit.
+        Larger errors are counted, which is fast; the percentile is computed only if the count is too close to decide.
         """
         above, kept = self.known.get(count, (-math.inf, math.inf))
         if above < error < kept:
@@ -88,9 +94,9 @@ class Need:
         return error >= kept
 
     def count(self, error: float) -> float:
-        """Return the smallest number of nodes that leaves no more than an error; infinite if no sensible one does.
+        """Return the smallest number of nodes with at most an error; infinite if more than 400 are needed.
 
-        More nodes than lines have points are guessed, from the order of the interpolation.
+        Numbers beyond the points of a line are extrapolated from the order of the interpolation.
         """
         at = bisect.bisect_left(self.counts, True, key=lambda count: self.keeps(count, error))
         if at < len(self.counts):
@@ -100,7 +106,9 @@ class Need:
 
     def _errors(self, count: int) -> Floats:
         """Return the errors on lines that are interpolated between so many of their points."""
-        layout, x, at = self.layout, self.x, self.points[count]
+        layout = self.layout
+        x = self.x
+        at = self.points[count]
         index, weight = weights_of_nodes(x[at], x, layout.grid.ends[self.axis], cubic=layout.interpolation.cubic)
         matrix = np.zeros((x.size, at.size))
         for column, share in zip(index.T, weight.T, strict=True):
@@ -110,7 +118,7 @@ class Need:
         return np.multiply(np.abs(error, out=error), self.weights, out=error)
 
     def more(self, count: float, steps: int) -> float:
-        """Return the number of nodes some steps of the ladder above a number; infinite if it is not sensible."""
+        """Return the number of nodes that is some steps of the ladder above a number; infinite above 400."""
         for _ in range(steps):
             larger = [n for n in _COUNTS if n > count]
             count = larger[0] if larger else math.ceil(count * _COUNTS[-1] / _COUNTS[-2])
@@ -139,13 +147,13 @@ def _quotient(above: Floats, below: Floats) -> Floats:
 class Lines(NamedTuple):
     """f_r along lines of one axis through directions of a draw, the same for all interpolations.
 
-    `values` are f_r [1/sr] of the shape (lines, points, L) with cos theta_i cos theta_r. `before` is what
-    `tabulation.held` returns beside them, on grids of half and difference vectors alone. `lowest` is the lower of the
-    cosines of light and viewer, `mu` their product, both below the horizon, too.
+    `values` are f_r [1/sr] of the shape (lines, points, L) with the product of cosines. `before` are the values a step
+    before the horizon as of `tabulation.evaluated_to_horizon`, only on grids of half and difference vectors. `lowest`
+    is the lower of the cosines of light and viewer, `mu` their product; both are negative below the horizon.
     """
 
-    values: tuple[Floats, Floats]
-    before: tuple[tuple[Floats, Floats], tabulation.Beyond] | None
+    values: tabulation.NumberFactors
+    before: tuple[tabulation.NumberFactors, tabulation.Beyond] | None
     lowest: Floats
     mu: Floats
 
@@ -155,7 +163,8 @@ def lines(layout: Layout, axis: int, drawn: error_measurement.RandomPairs) -> Li
     grid = layout.grid
     above = np.flatnonzero(drawn.above)
     chosen = above[:: max(1, above.size // _LINES)][:_LINES]
-    wi, wr = drawn.wi[chosen], drawn.wr[chosen]
+    wi = drawn.wi[chosen]
+    wr = drawn.wr[chosen]
     x = points(grid, wi, wr)
     name = grid.names[axis]
     coordinates = [column[:, np.newaxis] for column in x]
@@ -163,13 +172,15 @@ def lines(layout: Layout, axis: int, drawn: error_measurement.RandomPairs) -> Li
     if grid.half_difference:
         theta_h, *others = coordinates
         phi_h, theta_d, phi_d = others if grid.anisotropic else (np.zeros(()), *others)
-        values, before = tabulation.held(layout, theta_h, phi_h, theta_d, phi_d, tabulation.values_at)
-        cos_h, sin_h = np.cos(theta_h) * np.cos(theta_d), np.sin(theta_h) * np.sin(theta_d) * np.cos(phi_d)
+        values, before = tabulation.evaluated_to_horizon(layout, theta_h, phi_h, theta_d, phi_d, tabulation.factors)
+        cos_h = np.cos(theta_h) * np.cos(theta_d)
+        sin_h = np.sin(theta_h) * np.sin(theta_d) * np.cos(phi_d)
         return Lines(values, before, cos_h - np.abs(sin_h), (cos_h + sin_h) * (cos_h - sin_h))
     theta_i, *others = coordinates
     phi_i, theta_r, phi_r = others if grid.anisotropic else (np.zeros(()), *others)
-    at = tabulation.values_at(layout, unit_vector(theta_i, phi_i), unit_vector(theta_r, phi_r))
-    cos_i, cos_r = np.cos(theta_i), np.cos(theta_r)
+    at = tabulation.factors(layout, unit_vector(theta_i, phi_i), unit_vector(theta_r, phi_r))
+    cos_i = np.cos(theta_i)
+    cos_r = np.cos(theta_r)
     return Lines(at, None, np.minimum(cos_i, cos_r), cos_i * cos_r)
 
 
@@ -188,14 +199,16 @@ def numbers_along(layout: Layout, along: Lines, floor: Floats) -> LineNumbers:
     """Return the numbers of a layout along lines of one axis, for errors relative to a floor [1/sr]."""
     how = layout.interpolation
     before = None if along.before is None else (how.numbers(*along.before[0]), along.before[1])
-    numbers = tabulation.joined(layout.source, how.numbers(*along.values), before)
+    numbers = tabulation.extended(layout.source, how.numbers(*along.values), before)
     factor = np.maximum(along.mu, 1e-12)[..., np.newaxis] ** -how.power
     uniform = 0.0 if layout.uniform is None else layout.uniform
     if how.logarithm:
         shifted = np.exp(numbers)
-        f_r, slope = (shifted - how.offset) * factor, shifted * factor
+        f_r = (shifted - how.offset) * factor
+        slope = shifted * factor
     else:
-        f_r, slope = numbers * factor, factor
+        f_r = numbers * factor
+        slope = factor
     if layout.part_nm is None or layout.spectra is None:
         share = _quotient(slope, np.maximum(f_r + uniform, floor))
     else:  # of a part at the wavelength where its error counts most
@@ -228,14 +241,3 @@ class Quantiles(NamedTuple):
 
 _LADDER = Quantiles.of(*_COUNTS)
 _ENDS: NDArray[np.int64] = np.cumsum(_COUNTS)
-
-
-def _spread(density: Floats) -> dict[int, NDArray[np.int64]]:
-    """Return the points of a line that are nodes of an axis, by their number; without numbers that repeat a point."""
-    at = np.round(_LADDER.places(density) * (density.size - 1)).astype(np.int64)
-    repeated = np.append(at[1:] <= at[:-1], False)
-    repeated[_ENDS - 1] = False  # there the points for the next number begin
-    usable = ~np.logical_or.reduceat(repeated, _ENDS - _COUNTS)
-    return {
-        count: at[end - count : end] for count, end, is_usable in zip(_COUNTS, _ENDS, usable, strict=True) if is_usable
-    }

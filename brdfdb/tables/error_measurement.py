@@ -1,4 +1,4 @@
-"""Measurement of the error of a table against its source, at random directions that are not its nodes."""
+"""Measurement of the error of a table against its source, at random directions between its nodes."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ WIDTHS = (1.0, 2.0)  # widths of the lobes that viewers are drawn from, relative
 DIRECTIONS = 4000  # pairs of directions in each band of theta_i
 # Each wavelength is measured: tables of more than _FEW wavelengths use fewer pairs
 _FEW = 4
-_FEWER_DIRECTIONS = 3000
+_FEWER_DIRECTIONS = 3000  # the same for such tables
 SEED = 1991
 # Numbers of pairs as shares of those of a band
 _IN_PLACES = 1 / 10  # of a sample in a place
@@ -41,10 +41,9 @@ _BETWEEN = 1 / 6  # of a band, between wavelengths
 _BETWEEN_IN_PLACES = 1 / 15  # of a sample in a place, between wavelengths
 _WITHIN = 0.98  # share of the values within a limit
 _CONFIDENCE = 0.98  # probability that at least this share is within
-# The worst wavelength of an interval is searched at a few pairs of a band
-_SEARCHED_AT = 40
-_SEARCHED_WAVELENGTHS = 9  # smallest number in an interval
-_SEARCHED_IN_ALL = 400
+_SEARCHED_AT = 40  # pairs in a band at which the worst wavelength of an interval is searched
+_SEARCHED_WAVELENGTHS = 9  # smallest number of wavelengths that are tried in an interval
+_SEARCHED_IN_ALL = 400  # number of wavelengths that are tried in all intervals together
 _THIN = 0.05  # smallest share of random pairs that were measured; pairs of thinner data are drawn within their extent
 _ROUNDING = 1e-5  # relative error that float32 and the bits of a table leave
 _WINDOW = 1 << 21  # number of values of a table in memory
@@ -74,7 +73,7 @@ class RandomPairs(NamedTuple):
         return np.asarray((self.weight > 0.0) & self.measured)
 
     def some(self, rows: NDArray[np.bool_]) -> RandomPairs:
-        """Return the pairs of a mask."""
+        """Return the pairs that a mask selects."""
         return RandomPairs(
             self.wi[rows], self.wr[rows], self.band[rows], self.weight[rows], self.in_lobe[rows], self.measured[rows]
         )
@@ -95,7 +94,7 @@ class RandomPairs(NamedTuple):
         }
 
     def first_of_bands(self, count: int) -> NDArray[np.bool_]:
-        """Return a mask of the pairs that count among the first `count` of each band; of all pairs if none of these."""
+        """Return a mask of the pairs that count among the first `count` of each band, or among all without any."""
         first = _among_first(self.band, count) & self.above
         return first if first.any() else self.above
 
@@ -297,7 +296,8 @@ def worst_pair(
     """
     error = np.where(pairs.above[:, np.newaxis], error, -np.inf)
     row, column = np.unravel_index(int(np.argmax(error)), error.shape)
-    light, viewer = pairs.wi[row], pairs.wr[row]
+    light = pairs.wi[row]
+    viewer = pairs.wr[row]
     theta_i, theta_r = (float(degrees(np.arccos(np.clip(w[2], -1.0, 1.0)))) for w in (light, viewer))
     turn = np.arctan2(viewer[1], viewer[0]) - np.arctan2(light[1], light[0])
     delta_phi = abs((float(degrees(turn)) + 180.0) % 360.0 - 180.0)
@@ -340,7 +340,7 @@ def _between(layout: Layout, read: Read, pairs: RandomPairs, near: places.Pairs,
     pairs = pairs.some(chosen)
     near = near.some(_among_first(near.sample, math.ceil(count * _BETWEEN_IN_PLACES)))
     compared = _compared(layout, read, wavelength_nm, pairs, near)
-    # The error is relative to what a lookup knows
+    # The error is relative to the table, the only value that a lookup knows
     error = relative(compared.truth, compared.values, np.maximum(floor[1:], floor[:-1]))
     everywhere = error[: len(pairs.wi)]
     elsewhere = ~places.anywhere(pairs.wi, pairs.wr)
@@ -381,7 +381,7 @@ def worst_between(
     numbers = interpolation.numbers(model_values(source, stored_nm, wi, wr), mu)
     nodes, weight = weights_of_nodes(stored_nm, tried_nm, cubic=not interpolation.straight)
     interval = np.searchsorted(stored_nm, tried_nm) - 1
-    error = relative(  # to what a lookup knows
+    error = relative(  # relative to the interpolated value, the only one that a lookup knows
         model_values(source, tried_nm, wi, wr),
         np.maximum(interpolation.f_r(np.sum(numbers[:, nodes] * weight, axis=-1), mu), 0.0),
         np.maximum(floor[1:], floor[:-1])[interval],
@@ -434,8 +434,8 @@ def limit_of(error: Floats) -> Floats:
 def rank_of_limit(count: int, within: float, confidence: float) -> int:
     """Return the rank, from the largest of `count` values, of a bound of the quantile `within` of all values.
 
-    The number of values beyond the quantile is binomial. That it is below the rank is the chance of a limit that is too
-    low: at most 1 - `confidence`, unless the values are too few for that. The rank is at least 1.
+    The number of values beyond the quantile is binomial. A limit is too low if that number is below the rank, with a
+    probability of at most 1 - `confidence`, unless there are too few values. The rank is at least 1.
     """
     rank = 0
     chance = 0.0  # that at most `rank` values are beyond the quantile
@@ -495,7 +495,7 @@ def _looked_up(layout: Layout, read: Read, wi: Floats, wr: Floats, wavelength_nm
 
 
 def not_less(values: Floats) -> list[float]:
-    """Return numbers to three digits, rounded up: errors that are all alike would exceed a smaller limit."""
+    """Return numbers rounded up to three digits, so that errors that are all equal do not exceed their limit."""
     return [float(f"{1.00501 * value:.3g}") for value in values.tolist()]
 
 

@@ -366,7 +366,8 @@ def view_directions(view: ViewName, theta_i_deg: float, phi_i_deg: float) -> Lob
     theta_i_deg, phi_i_deg : float [degree]
         The light, theta_i in [0, 90]. Of half-difference phi_i is phi_h, and theta_i is not used.
     """
-    light, turned = radians(theta_i_deg), radians(phi_i_deg)
+    light = radians(theta_i_deg)
+    turned = radians(phi_i_deg)
     if view == "half-difference":
         points = directions_from_half_difference(radians(_HALF)[:, np.newaxis], turned, radians(_HALF), radians(90.0))
         return LobeDirections({"theta_h": _HALF, "theta_d": _HALF}, points)
@@ -398,7 +399,7 @@ class StokesDocument(BaseModel):
 
 
 def read_stokes(text: str) -> tuple[float, ...]:
-    """Return the Stokes vector of a text such as 1,0.5,0,0; ParameterError if it is none of any light."""
+    """Return the Stokes vector of a text such as 1,0.5,0,0; ParameterError if it is not one of real light."""
     try:
         numbers = tuple(float(number) for number in text.split(","))
     except ValueError:
@@ -408,7 +409,7 @@ def read_stokes(text: str) -> tuple[float, ...]:
         raise ParameterError("stokes", f"{shown!r} is not made of four finite numbers, I,Q,U,V", text)
     intensity, *others = numbers
     if not float(np.linalg.norm(others)) <= (1.0 + _ROUNDING) * intensity:
-        raise ParameterError("stokes", f"Q, U and V make more than I = {intensity:g}, which no light does", text)
+        raise ParameterError("stokes", f"sqrt(Q^2 + U^2 + V^2) exceeds I = {intensity:g}", text)
     return numbers
 
 

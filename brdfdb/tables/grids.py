@@ -60,11 +60,11 @@ class Grid:
     axes: dict[str, Axis]  #: nodes of each axis, strictly increasing, in the order of the table's dimensions, [degree]
 
     @classmethod
-    def part(cls, whole: Grid, rows: slice) -> Grid:
+    def part(cls, grid: Grid, rows: slice) -> Grid:
         """Return rows of the first axis of a grid, which need not begin at 0."""
         part = object.__new__(cls)
-        first, *others = whole.axes
-        axes = {first: whole.axes[first][rows], **{name: whole.axes[name] for name in others}}
+        leading, *others = grid.axes
+        axes = {leading: grid.axes[leading][rows], **{name: grid.axes[name] for name in others}}
         object.__setattr__(part, "axes", axes)
         return part
 
@@ -107,10 +107,10 @@ class Grid:
 
     @property
     def reciprocal(self) -> bool:
-        """True if the grid may stand for light and viewer exchanged.
+        """True if the grid assumes that light and viewer may be exchanged.
 
-        Half and difference vectors leave half of phi_d out then. A table over theta_i, theta_r and delta_phi, with the
-        same nodes for both thetas, is its own transpose then.
+        Half of phi_d is then left out of a grid of half and difference vectors. A table over theta_i, theta_r and
+        delta_phi with the same nodes for both thetas is then its own transpose.
         """
         if self.half_difference:
             return bool(self.axes["phi_d"][-1] == (180.0 if self.anisotropic else 90.0))
@@ -126,7 +126,7 @@ class Grid:
 
     @property
     def ends(self) -> list[tuple[str, str]]:
-        """For each axis, what is known of a table beyond its first and its last node: see `interpolation.prepared`."""
+        """The continuation of a table beyond the ends of each axis, as of `_interpolation.prepared`."""
         even_pole = "even" if not self.anisotropic or self.copies > 1 else "open"
         known = {
             "delta_phi": ("even", "even"),
@@ -205,7 +205,7 @@ def _checked(names: tuple[str, ...], name: str, nodes: Any) -> Axis:
 
 
 def check_wavelengths(nodes: Any) -> Axis:
-    """Return wavelengths [nm] as float64, or raise a ValueError saying what is wrong with them."""
+    """Return wavelengths [nm] as float64, or raise a ParameterError."""
     axis = np.array(nodes, dtype=np.float64)
     if axis.ndim != 1 or axis.size == 0 or not (axis[0] > 0.0 and np.all(np.diff(axis) > 0.0)):
         raise ParameterError("wavelengths_nm", "must be positive and increase strictly")

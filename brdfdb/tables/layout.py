@@ -160,7 +160,7 @@ class Layout:
 
     @property
     def uniform(self) -> NDArray[np.float64] | None:
-        """The uniform part [1/sr] where it is beside the table, not in it: (1,), or (L,) if it is a spectrum."""
+        """The uniform part [1/sr] if it is stored separately: (1,), or (L,) if it is a spectrum."""
         return None if self.plain else self.source.uniform_at(self.wavelength_nm)
 
     @property
@@ -198,11 +198,12 @@ class Layout:
     @property
     def blocks(self) -> list[slice]:
         """The rows of the first axis that each block holds."""
-        rows, every = self.shape[0], self.block_rows
+        rows = self.shape[0]
+        every = self.block_rows
         return [slice(start, min(start + every, rows)) for start in range(0, rows, every)]
 
     def document(self) -> dict[str, Any]:
-        """Return all that decides the values, as JSON, but for the function of a source that is one."""
+        """Return all that determines the values, as JSON, except the callable of a function."""
         return {
             "table_version": TABLE_VERSION,
             **self.source.document(),

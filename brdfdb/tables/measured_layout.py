@@ -13,7 +13,6 @@ from brdfdb.errors import ParameterError
 from brdfdb.geometry import degrees
 from brdfdb.materials import Source
 from brdfdb.measurements import MeasuredSource
-from brdfdb.parameters import Floats
 from brdfdb.tables import error_measurement, tabulation
 from brdfdb.tables.grids import (
     ANISOTROPIC_AXES,
@@ -123,23 +122,18 @@ def _grid(source: Source, count: int, *, chiral: bool) -> Grid:
         names = HALF_DIFFERENCE_AXES if half else ISOTROPIC_AXES
     # a third of the nodes of theta_h lie within two widths of the lobe
     power = 1.0 if alpha is None else np.clip(np.log(45.0 / degrees(np.arctan(alpha))) / np.log(3.0), 1.0, 4.0)
-    axes = {}
+    axes: dict[str, Axis] = {}
     for name in names:
         s = np.linspace(0.0, 1.0, max(4, round(_SHARES.get(name, 1.0) * count)))
         end = {"delta_phi": 180.0, "phi_i": 360.0, "phi_r": 360.0, "phi_h": 360.0}.get(name, 90.0)
         if name == "phi_d":
             end *= (1 + source.anisotropic) * (2 - source.reciprocal)
             s = np.linspace(0.0, 1.0, max(4, round(_SHARES[name] * count * (2 - source.reciprocal))))
-        axes[name] = np.array([0.0, 360.0]) if chiral and name == "phi_h" else _placed(name, s, float(power), end)
+        if name == "theta_h":
+            s = (1.0 - _EASED) * s ** float(power) + _EASED * s
+        elif name in ("theta_d", "theta_i", "theta_r", "delta_phi"):
+            s = 1.0 - (1.0 - s) ** 1.5
+        axes[name] = np.append(np.round(end * s[:-1], 4), end)
+    if chiral and "phi_h" in axes:
+        axes["phi_h"] = np.array([0.0, 360.0])
     return Grid(axes)
-
-
-def _placed(name: str, s: Floats, power: float, end: float) -> Axis:
-    """Return nodes [degree] of an axis at places s in [0, 1]."""
-    if name == "theta_h":
-        placed = (1.0 - _EASED) * s**power + _EASED * s
-    elif name in ("theta_d", "theta_i", "theta_r", "delta_phi"):
-        placed = 1.0 - (1.0 - s) ** 1.5
-    else:
-        placed = s
-    return np.append(np.round(end * placed[:-1], 4), end)

@@ -1,4 +1,4 @@
-"""Metadata of a table: what it states of its own making, as one typed record of the attributes of its zarr group."""
+"""Metadata of a table: its origin and its errors, as one typed record of the attributes of its zarr group."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ MANTISSA_BITS = 23  # of a float32 value
 # Attributes without which a table cannot be interpreted
 REQUIRED = ("title", "material", "table_version", "model", "model_version", "parameters", "source", "conventions")
 _OF_MODELS = ("model", "model_version", "parameters")
-# Attributes that cite: without a record of the source nobody can say whether the table is of what they name
+# Attributes that cite: only a record of the source proves that the table is of the cited material
 _CITING = (
     "model_title",
     "model_equation",
@@ -126,7 +126,7 @@ class TableMetadata(BaseModel):
 
     @classmethod
     def read(cls, attributes: Mapping[str, Any]) -> TableMetadata:
-        """Return the metadata that attributes hold; an attribute that is not what it must be is left out.
+        """Return the metadata that attributes hold; an attribute that is not valid is left out.
 
         What a table cites is left out, too, unless it keeps a record of its source, or of measured data.
         """
@@ -152,7 +152,7 @@ class TableMetadata(BaseModel):
 
     @property
     def strange(self) -> dict[str, str]:
-        """The attributes that are not what they must be, each with the reason."""
+        """The attributes that are not valid, each with the reason."""
         return self._strange
 
     @property
@@ -173,13 +173,13 @@ class TableMetadata(BaseModel):
         return [key for key in needed if key not in known]
 
     def without_source(self, request: Mapping[str, Any]) -> dict[str, Any]:
-        """Return a request but for what the source record says, as a table keeps it."""
+        """Return a request as a table stores it, without the entries that the source record repeats."""
         record = self.source_record or {}
         return {key: value for key, value in request.items() if key not in record or record[key] != value}
 
     @property
     def whole_request(self) -> dict[str, Any]:
-        """The request with what the source record says of it; empty if the table keeps none."""
+        """The request with the entries of the source record; empty if the table stores none."""
         return {} if self.request is None else {**(self.source_record or {}), **self.request}
 
     def known_interpolation(self) -> Interpolation:
@@ -197,7 +197,7 @@ class TableMetadata(BaseModel):
 
     @property
     def gaps(self) -> str:
-        """A phrase that names the attributes that are missing or not what they must be; empty for a whole record."""
+        """A phrase that names the missing and the invalid attributes; empty for a complete record."""
         phrases = [f"does not state its {', '.join(map(_words, self.missing))}"] if self.missing else []
         phrases += [f"states its {_words(key)} wrongly ({why})" for key, why in self.strange.items()]
         return ", and ".join(phrases)

@@ -75,13 +75,14 @@ def refined_wavelengths(source: Source, wavelength_nm: Axis | None, tolerance: f
     if wavelength_nm is None or wavelength_nm.size < 2 or over_wavelengths(source) != LINEAR:
         return wavelength_nm
     drawn = error_measurement.draw(source, wavelength_nm, _DIRECTIONS, _REFINED_SEED).above_the_horizon()
-    nodes = wavelength_nm
-    while nodes.size < MOST:
-        floor = error_measurement.floor_of(error_measurement.model_values(source, nodes, drawn.wi, drawn.wr), drawn)
-        worst = error_measurement.worst_between(source, nodes, _STRAIGHT, drawn.wi, drawn.wr, floor)
+    refined_nm = wavelength_nm
+    while (size := refined_nm.size) < MOST:
+        truth = error_measurement.model_values(source, refined_nm, drawn.wi, drawn.wr)
+        floor = error_measurement.floor_of(truth, drawn)
+        worst = error_measurement.worst_between(source, refined_nm, _STRAIGHT, drawn.wi, drawn.wr, floor)
         wrong = sorted((place for place in worst if place.error > _SHARE * tolerance), key=lambda place: -place.error)
-        finer = np.union1d(nodes, np.round([place.wavelength_nm for place in wrong[: MOST - nodes.size]], _DECIMALS))
-        if finer.size == nodes.size:
+        added_nm = np.round([place.wavelength_nm for place in wrong[: MOST - size]], _DECIMALS)
+        refined_nm = np.union1d(refined_nm, added_nm)
+        if refined_nm.size == size:
             break
-        nodes = finer
-    return nodes
+    return refined_nm

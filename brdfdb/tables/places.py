@@ -1,8 +1,7 @@
-"""The places where the error of a table is measured by itself: who is there, and pairs of directions drawn there.
+"""Places: thin sets of directions whose error is measured separately, and pairs of directions drawn in them.
 
-Bands of theta_i pool all viewers. In thin sets of directions a table can be off by more than in the band: where the
-viewer is as high as the light, on its side of the normal, where models have a ridge; and next to the horizon, where
-they have a pole.
+Bands of theta_i pool all viewers. In two places a table can be less exact than in the band: at viewers as high as the
+light and on its side of the normal, where models have a ridge, and next to the horizon, where they have a pole.
 """
 
 from __future__ import annotations
@@ -22,7 +21,8 @@ RINGS_DEG = (85.0, 87.0, 89.0, 90.0)  # edges of rings next to the horizon
 _CLOSE_DEG = 2.0  # of the light, in theta_r and across: viewers that hardly miss it
 _SAME_DEG = 1e-9  # an angle that is so little below an edge is on it: unit vectors round
 
-BANDS, RINGS = BANDS_DEG.size - 1, len(RINGS_DEG) - 1
+BANDS = BANDS_DEG.size - 1
+RINGS = len(RINGS_DEG) - 1
 # Rows of a table of errors: bands of theta_i, viewers alongside the light in each band, rings with one direction beyond
 # 85 degrees, and with both
 ALONGSIDE = BANDS
@@ -38,7 +38,7 @@ class Pairs(NamedTuple):
     wi: Floats
     wr: Floats
     row: NDArray[np.int64]  #: the place of each, (N,)
-    sample: NDArray[np.int64]  #: which sample it belongs to: several samples are drawn alongside the light, (N,)
+    sample: NDArray[np.int64]  #: the number of its sample: a place may have several samples, (N,)
 
     def some(self, chosen: NDArray[np.bool_]) -> Pairs:
         """Return the pairs that are chosen."""
@@ -60,7 +60,7 @@ def rows_of(directions: Directions) -> NDArray[np.int64]:
 
 
 def anywhere(wi: Floats, wr: Floats) -> NDArray[np.bool_]:
-    """Return which pairs of unit vectors (N, 3) are in a place of its own; elsewhere the band alone counts."""
+    """Return a mask of the pairs of unit vectors (N, 3) that lie in a place; for the others only the band counts."""
     rows = rows_of(checked_vectors(wi, wr))
     return np.asarray(np.any(rows[1:] != rows[:1], axis=0))
 
@@ -69,7 +69,7 @@ def anywhere(wi: Floats, wr: Floats) -> NDArray[np.bool_]:
 def draw(count: int, seed: int) -> Pairs:
     """Draw pairs of directions in every place, `count` a sample; all angles are uniform.
 
-    The pairs are kept, since all tables share them: their arrays cannot be written.
+    The pairs are cached and shared by all tables, so their arrays are read-only.
 
     Alongside the light there are four samples a band, up to 85 degrees: exactly towards the light; within two degrees
     of that; at theta_r = theta_i; and within 10 degrees of that. With both directions beyond 85 degrees there are
@@ -95,12 +95,13 @@ def draw(count: int, seed: int) -> Pairs:
         ]
     for ring in range(RINGS):
         lower = rng.uniform(RINGS_DEG[ring], RINGS_DEG[ring + 1], count)
-        pair = _either(rng, lower, rng.uniform(0.0, end, count))
-        samples.append((ONE_GRAZING + ring, *pair, _turn(rng, 180.0, count)))
+        theta = _either(rng, lower, rng.uniform(0.0, end, count))
+        samples.append((ONE_GRAZING + ring, theta[0], theta[1], _turn(rng, 180.0, count)))
     for ring in range(RINGS):
         lower = rng.uniform(RINGS_DEG[ring], RINGS_DEG[ring + 1], count)
+        theta = _either(rng, lower, rng.uniform(end, lower))
         samples += [
-            (BOTH_GRAZING + ring, *_either(rng, lower, rng.uniform(end, lower)), _turn(rng, 180.0, count)),
+            (BOTH_GRAZING + ring, theta[0], theta[1], _turn(rng, 180.0, count)),
             (BOTH_GRAZING + ring, lower, lower, still),
             (BOTH_GRAZING + ring, lower, lower, _turn(rng, 90.0, count)),
         ]
@@ -121,7 +122,7 @@ def _turn(rng: np.random.Generator, most: float, count: int) -> Floats:
     return rng.uniform(-most, most, count)
 
 
-def _either(rng: np.random.Generator, one: Floats, other: Floats) -> tuple[Floats, Floats]:
-    """Return two arrays with their values exchanged by chance."""
+def _either(rng: np.random.Generator, one: Floats, other: Floats) -> Floats:
+    """Return two arrays as rows, with their values exchanged by chance."""
     swapped = rng.random(one.size) < 0.5
-    return np.where(swapped, other, one), np.where(swapped, one, other)
+    return np.where(swapped, [other, one], [one, other])

@@ -16,14 +16,14 @@ from brdfdb.tables.layout import Layout
 from brdfdb.tables.mixture import Mixture
 from brdfdb.tables.table import Table
 
-MARGIN = 0.88  # of the tolerance: other directions than the planner's find other errors
+MARGIN = 0.88  # share of the tolerance that a plan may use: the final measurement draws other directions
 SEED = 1994
-_DRAWS = 2000  # directions of a band of theta_i, for the finished table
-_OF_A_BAND = 30.0  # times the tolerance is what the 99th percentile of a band of theta_i may be
+_DRAWS = 2000  # pairs of directions in a band of theta_i, for the finished table
+_OF_A_BAND = 30.0  # largest 99th percentile of a band of theta_i, in units of the tolerance
 _NEAR_THE_LIGHT = 200  # pairs of each sample near the light
-_SOME = 8  # one of so many directions is measured first
+_SOME = 8  # one in eight pairs is measured first
 _BITS = range(9, 24)
-_WORTH_ROUNDING = 4096  # values: of smaller tables nothing is rounded
+_WORTH_ROUNDING = 4096  # smallest number of values of a table that is rounded
 
 
 class HotSpot(NamedTuple):
@@ -56,9 +56,11 @@ class PlanSample(NamedTuple):
         if self.hot_spot is None:
             return self.drawn
         pairs = self.hot_spot.pairs
-        wi, wr = np.concatenate([self.drawn.wi, pairs.wi]), np.concatenate([self.drawn.wr, pairs.wr])
+        wi = np.concatenate([self.drawn.wi, pairs.wi])
+        wr = np.concatenate([self.drawn.wr, pairs.wr])
         order = np.random.default_rng(SEED).permutation(len(wi))
-        ones, none = np.ones(len(wi)), np.zeros(len(wi), dtype=bool)
+        ones = np.ones(len(wi))
+        none = np.zeros(len(wi), dtype=bool)
         return error_measurement.RandomPairs(wi[order], wr[order], np.zeros(len(wi), np.int64), ones, none, ~none)
 
 
@@ -95,15 +97,16 @@ def sample_of(
 
 
 def error_of(layout: Layout, values: NDArray[np.float32], sample: PlanSample) -> float:
-    """Return the largest of the errors that are held to the tolerance.
+    """Return the largest of the errors that the tolerance limits.
 
-    They are the 99th percentile of the relative error at the worst wavelength, the l1 error, as a few values that are
-    off by orders of magnitude next to a pole escape any percentile, `hot_spot_error`, and the 99th percentile of each
-    band of theta_i over `_OF_A_BAND`: grazing light is a ninth of the directions.
+    They are the 99th percentile of the relative error at the worst wavelength; the l1 error, since a few values next to
+    a pole that are wrong by orders of magnitude do not change a percentile; `hot_spot_error`; and the 99th percentile
+    of each band of theta_i over `_OF_A_BAND`, since grazing light is only a ninth of the directions.
     """
     error, l1 = _errors(layout, values, sample)
     counts = sample.drawn.above
-    counted, band = np.ascontiguousarray(error[counts].T), sample.drawn.band[counts]
+    counted = np.ascontiguousarray(error[counts].T)
+    band = sample.drawn.band[counts]
     worst = max(np.percentile(counted, 99, axis=1).max(), l1.max(), hot_spot_error(layout, values, sample))
     if counted.max() > _OF_A_BAND * worst:  # else no band can be worse
         for row in np.unique(band):
@@ -131,9 +134,9 @@ def _errors(layout: Layout, values: NDArray[np.float32], sample: PlanSample) -> 
 
 
 def keeps(layout: Layout, values: NDArray[np.float32], sample: PlanSample, goal: float) -> bool:
-    """Return True if `error_of` a table is within a goal. Most tables fail at a few directions.
+    """Return True if `error_of` a table is at most a goal; a few directions are tried first.
 
-    Errors are counted where `error_of` sorts them, in a tenth of the time.
+    Errors are counted, not sorted, which takes a tenth of the time.
     """
     drawn, truth, floor, _ = sample
     few = slice(None, None, _SOME)
@@ -147,7 +150,8 @@ def keeps(layout: Layout, values: NDArray[np.float32], sample: PlanSample, goal:
     counted = error[drawn.above]
     if not (l1.max() <= goal and _within(counted, goal) and hot_spot_error(layout, values, sample) <= goal):
         return False
-    band, limit = drawn.band[drawn.above], _OF_A_BAND * goal
+    band = drawn.band[drawn.above]
+    limit = _OF_A_BAND * goal
     return counted.max() <= limit or all(_within(counted[band == row], limit) for row in np.unique(band))
 
 
@@ -200,7 +204,8 @@ def finished(
             return None
         known = numbers
         numbers = np.empty((*layout.grid.shape, wavelength_nm.size))
-        numbers[..., few], numbers[..., ~few] = known, _numbers(replace(layout, wavelength_nm=wavelength_nm[~few]))
+        numbers[..., few] = known
+        numbers[..., ~few] = _numbers(replace(layout, wavelength_nm=wavelength_nm[~few]))
     layout = replace(layout, wavelength_nm=wavelength_nm, reason=reason)
     whole = _as_values(layout, numbers)
     if wavelength_nm.size > 2:
@@ -212,7 +217,8 @@ def finished(
             factored = replace(layout, spectra=basis[:parts])
             values = (rows @ basis[:parts].T).astype(np.float32).reshape(factored.shape)
             if keeps(factored, values, final, goal):
-                layout, whole = factored, values
+                layout = factored
+                whole = values
                 break
     return _rounded(layout, whole, numbers, final, goal)
 

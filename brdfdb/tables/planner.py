@@ -32,17 +32,17 @@ if TYPE_CHECKING:
 
 PLAN_VERSION = 3
 
-MOST_VALUES = 10_000_000  # of a table: a tolerance that takes more is refused
-_TRIED = 2  # ways to interpolate on each kind of grid that keep to the tolerance, of those that promise to be smallest
-_ROUNDS = 8  # of finer and coarser axes
-_STALLED = 0.95  # share of its error that a finer table keeps if lines misjudge an axis
-_PATIENCE = 2  # such rounds, after which each axis is tried alone
-_STEPS = 2  # of the ladder of numbers of nodes, of an axis that lines misjudge
-_STRICTER = (1.0, 0.8, 0.65, 0.5, 0.4, 0.3, 0.2)  # tolerances at a few wavelengths, of that at all of them
-_WAVELENGTHS = 4  # that the axes are chosen for; the finished table is measured at all
-_DRAWS = 700  # directions of a band of theta_i, for the axes
+MOST_VALUES = 10_000_000  # largest table [values]; tolerances that need more are refused
+_TRIED = 2  # interpolations that are refined on each kind of grid, the most promising first
+_ROUNDS = 8  # rounds of finer and coarser axes
+_STALLED = 0.95  # ratio of errors of two rounds above which the lines are taken to misjudge an axis
+_PATIENCE = 2  # such rounds, after which each axis is refined alone
+_STEPS = 2  # steps on the ladder of numbers of nodes, for an axis that lines misjudge
+_STRICTER = (1.0, 0.8, 0.65, 0.5, 0.4, 0.3, 0.2)  # tolerances at a few wavelengths, relative to that at all of them
+_WAVELENGTHS = 4  # number of wavelengths for which axes are chosen; the finished table is measured at all
+_DRAWS = 700  # pairs of directions in a band of theta_i, for the axes
 _BEYOND = 4.0  # safety factor on the node count where the grid extends below the horizon
-_HOPELESS = 8.0  # times the fewest values of another kind: a kind that takes so many is not looked into
+_HOPELESS = 8.0  # kinds that need this many times the values of the smallest kind are dropped
 
 
 class _TableKind(NamedTuple):
@@ -63,9 +63,9 @@ class _TableKind(NamedTuple):
 
 
 class _Task(NamedTuple):
-    """A plan to make: a source at a few wavelengths, a sample of it there, and the tolerance.
+    """The task of a plan: a source at a few wavelengths, a sample of it there, and the tolerance.
 
-    `mixture` says how a few wavelengths make f_r at these, if they do; None: each is tabulated.
+    `mixture` gives f_r at these wavelengths from a few of them; None: each wavelength is tabulated.
     """
 
     source: Source
@@ -149,7 +149,7 @@ def planned(
         reason = "f_r is 0: all light is in the specular part"
         return PlannedTable(Layout(source, coarsest(source), wavelength_nm, reason=reason), None)
     final: PlanSample | None = None
-    for hopeless in (_HOPELESS, math.inf):  # kinds that promised too many values are looked into if the others fail
+    for hopeless in (_HOPELESS, math.inf):  # kinds that were dropped are tried if the others fail
         table_kinds = left = list(_table_kinds(task, hopeless))
         while left:
             failed: Counter[str] = Counter()
@@ -166,20 +166,20 @@ def planned(
                     return finished._replace(layout=replace(finished.layout, reason=reason))
             if not failed:
                 break
-            # the kind that failed most often hid the others, which may keep to the tolerance with more nodes
+            # Other kinds may keep to the tolerance with more nodes: try them without the kind that failed most often
             ((hiding, _),) = failed.most_common(1)
             left = [kind for kind in left if _kind(kind.layout) != hiding]
     if hot_spot_tolerance is not None:
         raise ParameterError(
             "hot_spot_tolerance",
             f"{hot_spot_tolerance:g} near the light, with {tolerance:g} elsewhere, takes more than {MOST_VALUES} "
-            f"values of {source.name}; ask for a larger one",
+            f"values of {source.name}; choose a larger one",
             hot_spot_tolerance,
         )
-    hint = "" if isinstance(source, Material) else ", or say grazing_pole if f_r has a pole or a root at the horizon"
+    hint = "" if isinstance(source, Material) else ", or set grazing_pole if f_r has a pole or a root at the horizon"
     raise ParameterError(
         "tolerance",
-        f"{tolerance:g} takes more than {MOST_VALUES} values of {source.name}; ask for a larger one{hint}",
+        f"{tolerance:g} takes more than {MOST_VALUES} values of {source.name}; choose a larger one{hint}",
         tolerance,
     )
 
@@ -192,7 +192,7 @@ def _smallest(task: _Task, table_kinds: list[_TableKind]) -> Layout | None:
     for most in (
         0.5 * _HOPELESS * ranked[0].size,
         math.inf,
-    ):  # nodes: a kind that takes many more than it seemed is left
+    ):  # nodes; the first limit drops kinds that promised too much
         best: Layout | None = None
         tried: Counter[tuple[str, ...]] = Counter()
         for size, layout, needs in ranked:
@@ -200,7 +200,7 @@ def _smallest(task: _Task, table_kinds: list[_TableKind]) -> Layout | None:
                 values = min(MOST_VALUES, most * layout.size / math.prod(layout.grid.shape))
                 smaller = _refined(task, layout, needs, values if best is None else best.size, probing=most == math.inf)
                 best = smaller or best
-                # a kind that fails leaves its turn to the next
+                # A kind that fails does not count as tried
                 tried[layout.grid.names] += int(smaller is not None)
         if best is not None:
             return best
@@ -209,7 +209,8 @@ def _smallest(task: _Task, table_kinds: list[_TableKind]) -> Layout | None:
 
 def _reason(layout: Layout, tolerance: float, table_kinds: list[_TableKind]) -> str:
     """Return the reason for a layout: its number of nodes, and those of the other grid and of the simplest table."""
-    chosen, clauses = _kind(layout), [first_reason(layout, tolerance)]
+    chosen = _kind(layout)
+    clauses = [first_reason(layout, tolerance)]
     ranked = sorted(table_kinds, key=lambda kind: kind.order)
     simplest = [kind for kind in ranked if kind.layout.interpolation.plain and not kind.layout.interpolation.cubic]
     others = [kind for kind in ranked if kind.layout.grid.names != layout.grid.names][:1] + simplest[:1]
@@ -241,14 +242,14 @@ def _task(
     mixture: Mixture | None,
     hot_spot: float | None = None,
 ) -> _Task:
-    some = wavelength_nm
+    few_nm = wavelength_nm
     if wavelength_nm is not None and wavelength_nm.size > _WAVELENGTHS:
         chosen = np.round(np.linspace(0, wavelength_nm.size - 1, _WAVELENGTHS)).astype(int)
         if mixture is not None:
             chosen = np.union1d(chosen, mixture.extremes)
             mixture = mixture._replace(spectra=mixture.spectra[:, chosen])
-        some = wavelength_nm[chosen]
-    return _Task(source, some, plan_trials.sample_of(source, some, _DRAWS, SEED, hot_spot), tolerance, mixture)
+        few_nm = wavelength_nm[chosen]
+    return _Task(source, few_nm, plan_trials.sample_of(source, few_nm, _DRAWS, SEED, hot_spot), tolerance, mixture)
 
 
 def offset_of(source: Source, wavelength_nm: NDArray[np.float64] | None) -> float:
@@ -281,26 +282,27 @@ def _grid(source: Source, names: tuple[str, ...], *, pole: bool) -> Grid:
 
 
 def _table_kinds(task: _Task, hopeless: float = _HOPELESS) -> Iterator[_TableKind]:
-    """Yield kinds of tables, each with the number of values that it is likely to take; simple ones first.
+    """Yield kinds of tables, each with its expected number of values; simple ones first.
 
-    A kind that takes `hopeless` times the fewest values is dropped as soon as some of its axes show it.
+    A kind is dropped as soon as some of its axes need `hopeless` times the values of the smallest kind.
     """
     source = task.source
-    offset, floor = _offset(task), task.sample.floor
+    offset = _offset(task)
+    floor = task.sample.floor
     kinds: list[tuple[str, ...]]
     if source.anisotropic:
         kinds = [ANISOTROPIC_HALF_DIFFERENCE_AXES] if source.elliptical else [ANISOTROPIC_AXES]
     else:
         of_halves = source.has_lobe or task.sample.hot_spot is not None
         kinds = [ISOTROPIC_AXES, HALF_DIFFERENCE_AXES] if of_halves else [ISOTROPIC_AXES]
-        if source.grazing_pole:  # over light and viewer it takes many nodes: where a lobe takes few, it is soon dropped
+        if source.grazing_pole:  # a pole needs many nodes over light and viewer: this kind, tried last, is soon dropped
             kinds = kinds[::-1]
     fewest = float(MOST_VALUES)
     known: dict[tuple[str, bool, bool], axis_nodes.Lines] = {}  # of a kind of grid, where f_r is the same
     for names in kinds:
         known.clear()
         for power in (0.5, 1.0, 0.0) if source.grazing_pole else (0.0,):
-            # what goes on beyond the horizon may fall below 0, which a logarithm does not
+            # Beyond the horizon the continued f_r may be negative, its logarithm may not
             for logarithm in (True,) if "theta_h" in names else (True, False):
                 grid = _grid(source, names, pole=source.grazing_pole and power == 0.0)
                 how = Interpolation("linear", logarithm, offset if logarithm else 0.0, power, over_wavelengths(source))

@@ -114,14 +114,15 @@ class Plot:
         ax : matplotlib Axes, optional
             Axes to draw on.
         """
-        curves, name = self._curves(theta_i_deg, phi_i_deg, wavelength_nm)
+        wavelengths = self._wavelengths(wavelength_nm)
+        curves = self._curves(theta_i_deg, phi_i_deg, wavelengths)
         axes = axes_for("lobe", ax, (6.4, 3.9))
         turned = []
         for curve in curves:
             theta = radians(curve.x)
             turned.append(replace(curve, x=curve.y * np.sin(theta), y=curve.y * np.cos(theta)))
         edge = polar_grid(axes, turned)
-        add(axes, "lobe", name, turned)
+        add(axes, "lobe", self._name(wavelengths), turned)
         axes.set(
             xlim=(-1.13 * edge, 1.13 * edge), ylim=(-0.1 * edge, 1.13 * edge), aspect="equal", xticks=[], yticks=[]
         )
@@ -143,10 +144,11 @@ class Plot:
         Parameters and errors are those of `lobe`. `log` chooses a logarithmic axis. The default is one where the
         largest value is more than 50 times the median.
         """
-        curves, name = self._curves(theta_i_deg, phi_i_deg, wavelength_nm)
+        wavelengths = self._wavelengths(wavelength_nm)
+        curves = self._curves(theta_i_deg, phi_i_deg, wavelengths)
         axes = axes_for("cuts", ax, (6.4, 3.9))
         was_log = bool(drawn_on(axes)) and axes.get_yscale() == "log"
-        add(axes, "cuts", name, curves)
+        add(axes, "cuts", self._name(wavelengths), curves)
         values = np.concatenate([np.asarray(line.get_ydata(), dtype=np.float64) for line in axes.lines])
         largest = float(np.nanmax(values))
         if log is None:
@@ -211,11 +213,13 @@ class Plot:
         wanted = self._wavelength(wavelength_nm)
         axes = axes_for("slices", ax, (6.4, 3.6))
         picture = _SLICES[kind](self.table)
-        values, stored = picture.values, self.table.wavelength_nm
+        values = picture.values
+        stored = self.table.wavelength_nm
         at = None
         if stored is not None:
             index = int(np.argmin(np.abs(stored - (_SHOWN_NM if wanted is None else wanted))))
-            values, at = values[..., index], float(stored[index])
+            values = values[..., index]
+            at = float(stored[index])
         positive = values[values > 0.0]
         high = float(positive.max()) if positive.size else 1.0
         low = max(float(positive.min()) if positive.size else 0.1, 1e-6 * high)
@@ -243,18 +247,17 @@ class Plot:
         self,
         theta_i_deg: float | Sequence[float],
         phi_i_deg: float | Sequence[float] | None,
-        wavelength_nm: float | Sequence[float] | None,
-    ) -> tuple[list[DrawnCurve], str]:
-        """Return cuts in the plane of incidence, f_r over theta_r [degree], and the name of the plot.
+        wavelengths: list[float | None],
+    ) -> list[DrawnCurve]:
+        """Return cuts in the plane of incidence, f_r over theta_r [degree], which is negative towards the light.
 
-        There is one for each light, azimuth and wavelength. Angles are negative towards the light.
+        There is one for each light, azimuth and wavelength [nm].
         """
         if phi_i_deg is None:
             phi_i_deg = (0.0, 90.0) if self.table.anisotropic else 0.0
         lights = _numbers("theta_i_deg", theta_i_deg)
         azimuths = _numbers("phi_i_deg", phi_i_deg)
         check_azimuth_deg("phi_i_deg", azimuths)
-        wavelengths = self._wavelengths(wavelength_nm)
         for theta in lights:
             if not 0.0 <= theta <= 90.0:
                 raise ParameterError("theta_i_deg", f"{theta:g} is outside [0, 90] degrees", theta, (0.0, 90.0))
@@ -262,7 +265,14 @@ class Plot:
         for (number, theta), (row, phi), wavelength in itertools.product(
             enumerate(lights), enumerate(azimuths), wavelengths
         ):
-            signed = self._views(theta, wavelength)
+            around = _AROUND_DEG + theta  # more viewers around the mirror direction, most in a narrow lobe
+            signed = np.union1d(_EVEN_DEG, around[np.abs(around) <= 89.0])
+            at = None if wavelength is None else np.array([wavelength])
+            if (
+                self.table.source is not None
+                and (lobe := self.table.source.lobe(np.cos(radians(theta)), at)) is not None
+            ):
+                signed = np.union1d(signed, around_mirror(theta, lobe))
             phi_r = phi + np.where(signed > 0.0, 180.0, 0.0)
             light = radians(theta), radians(phi)
             brdf = np.asarray(
@@ -280,15 +290,11 @@ class Plot:
                 colour = tuple(float(np.interp(wavelength, _SPECTRUM_NM, channel)) for channel in channels)
                 dashes = DASHES[number % len(DASHES)]
             curves.append(DrawnCurve(", ".join(parts), signed, brdf, colour, dashes))
-        return curves, f"{self.table.name}{_at(wavelengths[0]) if len(wavelengths) == 1 else ''}"
+        return curves
 
-    def _views(self, theta: float, wavelength: float | None) -> Array:
-        """Return angles of viewers [degree] of a cut, with more around the mirror direction, most in a narrow lobe."""
-        around = _AROUND_DEG + theta
-        views = np.union1d(_EVEN_DEG, around[np.abs(around) <= 89.0])
-        at = None if wavelength is None else np.array([wavelength])
-        lobe = None if self.table.source is None else self.table.source.lobe(np.cos(radians(theta)), at)
-        return views if lobe is None else np.union1d(views, around_mirror(theta, lobe))
+    def _name(self, wavelengths: list[float | None]) -> str:
+        """Return the name of the table, with its wavelength if there is a single one."""
+        return self.table.name + (_at(wavelengths[0]) if len(wavelengths) == 1 else "")
 
     def _wavelengths(self, wavelength_nm: float | Sequence[float] | None) -> list[float | None]:
         stored = self.table.wavelength_nm
@@ -311,7 +317,8 @@ def albedo_shares(table: Plotted, phi_i: float, wavelength_nm: float | None) -> 
 
     Lookups are integrated to 1e-3, for lights at the azimuth `phi_i` [rad]; `wavelength_nm` is None for a grey table.
     """
-    source, theta_i = table.source, radians(ALBEDO_DEG)
+    source = table.source
+    theta_i = radians(ALBEDO_DEG)
 
     def brdf(wi: Floats, wr: Floats) -> Floats:
         return np.asarray(table.lookup_vectors(wi, wr, wavelength_nm))[..., np.newaxis]

@@ -19,7 +19,8 @@ LOBE_SHARE = 0.8
 # Lights whose cells are stored. In between, those of the lights next to it are mixed
 _LIGHTS_DEG = (0, 12, 24, 34, 43, 51, 58, 64, 69, 73, 77, 80, 83, 85.5, 87.5, 88.8, 89.5)
 _TURNS = 16  # azimuths of lights of an anisotropic table
-THETA_CELLS, PHI_CELLS = 64, 32
+THETA_CELLS = 64
+PHI_CELLS = 32
 # Angles of half vectors from which the edges of cells are chosen: half of them by the reflected light
 _FINE = 400  # number of these angles
 _LEAST = 1e-5  # smallest [rad] above 0
@@ -69,7 +70,7 @@ def cells_of(evaluate: Evaluate, *, anisotropic: bool) -> Cells:
     lights = unit_vector(theta_i[:, np.newaxis], phi_i).reshape(-1, 1, 1, 3)
     edges = _edges(evaluate, lights)
     places = edges[:-1, np.newaxis] + np.diff(edges)[:, np.newaxis] * np.array(_GAUSS)
-    # The two halves of an isotropic lobe are alike
+    # The two halves of an isotropic lobe are mirror images
     columns = PHI_CELLS if anisotropic else PHI_CELLS // 2
     phi_h = (np.arange(columns)[:, np.newaxis] + np.array(_GAUSS)) * (2.0 * np.pi / PHI_CELLS)
     h = unit_vector(np.arccos(1.0 - places.reshape(-1, 1)), phi_h.reshape(1, -1))
@@ -95,7 +96,8 @@ def _edges(evaluate: Evaluate, lights: Array) -> Array:
     summed = (1.0 - _EVEN) * np.cumsum(share) / max(share.sum(), 1e-300) + _EVEN * theta_h[1:] / theta_h[-1]
     chosen = np.interp(np.linspace(0.0, 1.0, THETA_CELLS + 1), np.append(0.0, summed / summed[-1]), theta_h)
     edges = 2.0 * np.sin(0.5 * chosen) ** 2
-    edges[0], edges[-1] = 0.0, 1.0
+    edges[0] = 0.0
+    edges[-1] = 1.0
     return np.asarray(edges)
 
 
@@ -138,32 +140,29 @@ class Sampler:
         in_lobe = u1 < LOBE_SHARE
         # The first number is used again, in the component and in the cell that it has chosen
         first = np.clip(np.where(in_lobe, u1 / LOBE_SHARE, (u1 - LOBE_SHARE) / (1.0 - LOBE_SHARE)), 0.0, 1.0)
-        sin, angle = np.sqrt(first), 2.0 * np.pi * u2
+        sin = np.sqrt(first)
+        angle = 2.0 * np.pi * u2
         cosine = np.stack(np.broadcast_arrays(sin * np.cos(angle), sin * np.sin(angle), np.sqrt(1.0 - first)), axis=-1)
-        h = self._half_vector(first, u2, wi)
-        mirrored = 2.0 * np.sum(h * wi, axis=-1, keepdims=True) * h - wi
-        return np.asarray(np.where(in_lobe[..., np.newaxis], mirrored, cosine + 0.0 * mirrored))
-
-    def _half_vector(self, u1: Array, u2: Array, wi: Array) -> Array:
-        cells = self.cells
-        _, rings, columns = cells.probability.shape
         # Cumulative numbers are mixed, not lights drawn: numbers that are even stay even over half vectors
+        _, rings, columns = self.cells.probability.shape
         lights = self._lights(wi)
-        place, ring = _place(self._theta, lights, u1)
-        versine = cells.edges[ring] + np.diff(cells.edges)[ring] * place
+        place, ring = _place(self._theta, lights, first)
+        versine = self.cells.edges[ring] + np.diff(self.cells.edges)[ring] * place
         place, column = _place(self._phi, [_WeightedRow(weight, row * rings + ring) for weight, row in lights], u2)
         phi = (column + place) * (2.0 * np.pi / columns)
         sin = np.sqrt(versine * (2.0 - versine))
-        return self._turned(np.stack([sin * np.cos(phi), sin * np.sin(phi), 1.0 - versine], axis=-1), wi, 1.0)
+        h = self._turned(np.stack([sin * np.cos(phi), sin * np.sin(phi), 1.0 - versine], axis=-1), wi, 1.0)
+        mirrored = 2.0 * np.sum(h * wi, axis=-1, keepdims=True) * h - wi
+        return np.asarray(np.where(in_lobe[..., np.newaxis], mirrored, cosine + 0.0 * mirrored))
 
     def density(self, wi: Array, wr: Array) -> Array:
         """Return the density [1/sr] of `draw` over the sphere, for unit vectors (..., 3)."""
         cells = self.cells
         h = wi + wr
         length = np.sqrt(np.sum(h * h, axis=-1))
-        apart = np.abs(h[..., 2]) > _FLAT  # no half vector is drawn at the horizon
+        inclined = np.abs(h[..., 2]) > _FLAT  # no half vector is drawn at the horizon
         # A half vector whose back the light sees is that of directions below the horizon
-        h = h / np.copysign(np.where(apart, length, 1.0), h[..., 2])[..., np.newaxis]
+        h = h / np.copysign(np.where(inclined, length, 1.0), h[..., 2])[..., np.newaxis]
         local = self._turned(h, np.broadcast_to(wi, h.shape), -1.0)
         # 1 - cos(theta_h), without a difference of numbers near 1
         versine = (local[..., 0] ** 2 + local[..., 1] ** 2) / (1.0 + np.maximum(local[..., 2], 0.0))
@@ -172,13 +171,14 @@ class Sampler:
         phi = np.arctan2(local[..., 1], local[..., 0]) % (2.0 * np.pi)
         column = np.clip(np.nan_to_num(phi * (columns / (2.0 * np.pi))), 0, columns - 1).astype(np.int64)
         of_h = sum(weight * self._density[row, ring, column] for weight, row in self._lights(wi))
-        mirrored = np.divide(of_h, 2.0 * length, out=np.zeros(of_h.shape), where=apart)  # h.i = length / 2
+        mirrored = np.divide(of_h, 2.0 * length, out=np.zeros(of_h.shape), where=inclined)  # h.i = length / 2
         cosine = np.maximum(wr[..., 2], 0.0) / np.pi + 0.0 * length  # nan is passed on
         return np.asarray(LOBE_SHARE * mirrored + (1.0 - LOBE_SHARE) * cosine)
 
     def _lights(self, wi: Array) -> list[_WeightedRow]:
         """Return the weights and the rows of the lights around `wi`: two, or four of an anisotropic table."""
-        theta_i, turns = self.cells.theta_i, self.cells.turns
+        theta_i = self.cells.theta_i
+        turns = self.cells.turns
         theta = np.arctan2(np.hypot(wi[..., 0], wi[..., 1]), wi[..., 2])
         number = np.clip(np.searchsorted(theta_i, theta, side="right") - 1, 0, theta_i.size - 2)
         weight = np.clip((theta - theta_i[number]) / np.diff(theta_i)[number], 0.0, 1.0)
@@ -199,7 +199,8 @@ class Sampler:
         upright = sin == 0.0
         cos_phi = np.where(upright, 1.0, wi[..., 0] / np.where(upright, 1.0, sin))
         sin_phi = sign * np.where(upright, 0.0, wi[..., 1] / np.where(upright, 1.0, sin))
-        x, y = h[..., 0], h[..., 1]
+        x = h[..., 0]
+        y = h[..., 1]
         return np.stack([x * cos_phi - y * sin_phi, x * sin_phi + y * cos_phi, h[..., 2]], axis=-1)
 
 
@@ -211,7 +212,8 @@ def _summed(probability: Array) -> Array:
 
 def _place(sums: Array, lights: list[_WeightedRow], u: Array) -> _CellPlace:
     """Return the place in a cell and its number, for a random number in the mixture of rows of sums over 2^m cells."""
-    flat, count = sums.ravel(), sums.shape[1] - 1
+    flat = sums.ravel()
+    count = sums.shape[1] - 1
     starts = [(weight, row * (count + 1)) for weight, row in lights]
 
     def up_to(cell: NDArray[np.int64] | int) -> Array:
@@ -223,7 +225,8 @@ def _place(sums: Array, lights: list[_WeightedRow], u: Array) -> _CellPlace:
     while step:
         cell = cell + step * (up_to(cell + step) <= wanted)
         step //= 2
-    low, high = up_to(cell), up_to(cell + 1)
+    low = up_to(cell)
+    high = up_to(cell + 1)
     width = high - low
     place = np.divide(wanted - low, width, out=np.full(width.shape, 0.5), where=width > 0.0)
     return _CellPlace(np.clip(place, 0.0, 1.0), cell)

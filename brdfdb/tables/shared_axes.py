@@ -15,12 +15,14 @@ from brdfdb.parameters import Floats
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# Colours that are told apart with any kind of colour blindness (after Okabe and Ito); the first for the first curve
+# Colours that remain distinct with colour blindness (after Okabe and Ito), in the order of the curves
 COLOURS = ("#0b5fc0", "#c8401e", "#00806b", "#8c4aa6", "#b47400", "#3e97cf")
-INK, MUTED, GRID = "#1b2028", "#5a6470", "#dde2e8"
+INK = "#1b2028"
+MUTED = "#5a6470"
+GRID = "#dde2e8"
 DASHES = ("-", (0, (5, 2)), (0, (1.5, 1.5)), (0, (7, 2, 1.5, 2)), (0, (9, 3)), (0, (3, 1, 1, 1, 1, 1)))
 _ONLY = "brdfdb, of one plot or one scale"  # id of artists that the next plot on the axes replaces
-_PLOTS = "_brdfdb_plots"  # attribute of axes
+_PLOTS = "_brdfdb_plots"  # attribute of axes that holds their plots
 
 
 @dataclass(frozen=True)
@@ -36,7 +38,7 @@ class DrawnCurve:
 
 @dataclass(frozen=True, eq=False)
 class Drawn:
-    """A plot on axes: what it shows, the name of the table with its wavelength, and its curves with their artists."""
+    """A plot on axes: its kind, the name of the table with its wavelength, and its curves with their artists."""
 
     kind: str
     name: str
@@ -103,8 +105,12 @@ def add(axes: Axes, kind: str, name: str, curves: Sequence[DrawnCurve], *, legen
     plots = remember(axes, Drawn(kind, name, curves, lines))
     if len(plots) > 1:
         for number, plot in enumerate(plots):
+            colour: Any = COLOURS[number % len(COLOURS)]
+            if number >= len(COLOURS):  # hues that differ from those before
+                hue = (0.618 * number % 1.0, 0.75, 0.6)
+                colour = tuple(import_extra("matplotlib.colors").hsv_to_rgb(hue).tolist())
             for index, (line, curve) in enumerate(zip(plot.artists, plot.curves, strict=True)):
-                line.set(color=_colour(number), linestyle=DASHES[index % len(DASHES)])
+                line.set(color=colour, linestyle=DASHES[index % len(DASHES)])
                 line.set_label(", ".join(filter(None, [plot.name, curve.label])))
     if legend or len(plots) > 1:
         look: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (1.0, 1.02), "frameon": False}
@@ -120,13 +126,6 @@ def remember(axes: Axes, plot: Drawn) -> list[Drawn]:
     plots = [*drawn_on(axes), plot]
     setattr(axes, _PLOTS, plots)
     return plots
-
-
-def _colour(number: int) -> Any:
-    """Return the colour of a plot by its number: hues that differ from those before."""
-    if number < len(COLOURS):
-        return COLOURS[number]
-    return tuple(import_extra("matplotlib.colors").hsv_to_rgb((0.618 * number % 1.0, 0.75, 0.6)).tolist())
 
 
 def only(*artists: Any) -> None:
@@ -161,7 +160,8 @@ def polar_grid(axes: Axes, curves: Sequence[DrawnCurve]) -> float:
         only(*axes.plot(ring * np.sin(turn), ring * np.cos(turn), **thin))
         only(axes.text(ring, -0.02 * edge, f"{ring:g}", va="top", **small))
     for angle_deg in range(-90, 91, 30):
-        x, y = edge * float(np.sin(radians(angle_deg))), edge * float(np.cos(radians(angle_deg)))
+        x = edge * float(np.sin(radians(angle_deg)))
+        y = edge * float(np.cos(radians(angle_deg)))
         only(*axes.plot([0.0, x], [0.0, y], **thin))
         if abs(angle_deg) < 90:
             only(axes.text(1.06 * x, 1.05 * y, f"{abs(angle_deg)}°", va="center", **small))

@@ -46,10 +46,10 @@ class Overall(BaseModel):
 
 
 class Places(BaseModel):
-    """Limits of the error in places of their own: 98 of 100 values are within, with a confidence of 98 %.
+    """Limits of the error in thin sets of directions: 98 of 100 values are within them, with a confidence of 98 %.
 
-    The error is abs(table - model) / max(table, floor): next to a pole, where a table can be low by a factor, the value
-    of the table is what a lookup knows.
+    The error is abs(table - model) / max(table, floor). It is relative to the table, the only value that a lookup
+    knows: next to a pole a table can be too low by a factor.
     """
 
     model_config = _STRICT
@@ -92,7 +92,7 @@ class Between(BaseModel):
         default=None, description="[band or ring][interval]; one row of each kind of a mixture"
     )
     overall: list[float] | None = Field(
-        default=None, description="[interval], of all bands together; none of a table of before version 6"
+        default=None, description="[interval], of all bands together; null in tables before version 6"
     )
 
     def of_worst_row(self) -> Between:
@@ -116,18 +116,18 @@ class Between(BaseModel):
 class Error(BaseModel):
     """The error of a table, abs(table - source) / max(source, floor), for each band of theta_i and each wavelength.
 
-    The table of a mixture states one column, for the wavelength where it is largest: all of its wavelengths are made of
-    the same few parts. Only the floor is then for each wavelength. In the intervals between, it states one row.
+    A mixture states one column, that of its worst wavelength, because the same few parts make all of its wavelengths.
+    Only the floor is then given for each wavelength. Between wavelengths a mixture states one row.
 
-    Of measured data, directions that were not measured do not count. Bands in which none was repeat the error of all.
+    Of measured data, only measured directions count. A band without any repeats the error of all bands.
     """
 
     model_config = _STRICT
 
     theta_i_deg: list[float] = Field(description="edges of the bands")
     directions: int = Field(
-        description="drawn above the horizon, half over the hemisphere and half in the lobe; of measured data those "
-        "that were measured"
+        description="number of random pairs of directions above the horizon, half over the hemisphere and half in the "
+        "lobe; of measured data, only measured directions"
     )
     seed: int
     floor: list[float] = Field(
@@ -142,10 +142,10 @@ class Error(BaseModel):
     max: Numbers = Field(description="[band][wavelength]")
     overall: Overall
     worst: WorstPair | None = Field(
-        default=None, description="where the largest was met; none of a family, and of a table of before version 4"
+        default=None, description="directions of the largest error; null for families and in tables before version 4"
     )
-    places: Places | None = Field(default=None, description="none of a table of before version 3")
-    between: Between | None = Field(default=None, description="none without two wavelengths, and before version 3")
+    places: Places | None = Field(default=None, description="null in tables before version 3")
+    between: Between | None = Field(default=None, description="null with one wavelength, and before version 3")
 
     @functools.cached_property
     def limits(self) -> NDArray[np.float64]:
@@ -205,12 +205,12 @@ def _worst_row(rows: Numbers) -> Numbers:
 
 
 def _wide(limits: NDArray[np.float64], rows: int, columns: int) -> NDArray[np.float64]:
-    """Return limits in full, where one stands for all rows or columns."""
+    """Return limits for all rows and columns, where a single one may stand for all of them."""
     return np.broadcast_to(limits, (rows, columns))
 
 
 def _rows(bands: Numbers | NDArray[np.float64], some: Places | None) -> NDArray[np.float64]:
-    """Return limits by row; of places that were not measured, 0: the band counts there."""
+    """Return limits by row; 0 for places that were not measured, where only the band counts."""
     if some is None:
         some = Places(
             alongside=np.zeros_like(bands).tolist(),
@@ -243,11 +243,13 @@ class FormulaError(BaseModel):
         "none known: the formula is a fit, or there is no more exact form to compare with"
     )
     rung: str = Field(description="name of the highest rung; empty: none is known")
-    directions: int = Field(description="drawn above the horizon, half of the viewers in the lobe; 0: not measured")
+    directions: int = Field(
+        description="number of random pairs above the horizon, half of the viewers in the lobe; 0: not measured"
+    )
     overall: Overall | None = Field(
         description="abs(formula - rung) / max(rung, floor), as the error of a table is measured; null: none is known"
     )
-    worst: WorstPair | None = Field(description="where the largest was met; null: not measured")
+    worst: WorstPair | None = Field(description="directions of the largest error; null: not measured")
 
     @property
     def p99(self) -> float | None:

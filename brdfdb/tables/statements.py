@@ -1,4 +1,4 @@
-"""Measurement of all that a table states of itself: builds write it, and audits repeat it."""
+"""Measurement of the numbers that a table states: builds write them, and audits repeat the measurement."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ MEASURED = ("error", "formula_error", "largest_albedo", "polarisation")  # attri
 
 
 def first_numbers(layout: Layout, read: Read) -> dict[str, Any]:
-    """Return the attributes of a table that lists show beside its stated error.
+    """Return the attributes of a table that lists show next to its stated error.
 
     They are `formula_error`; `largest_albedo` unless the table has more than `LARGE` values; `polarisation` of a
     polarised table. `read` gives some rows of the first axis of the stored array.
@@ -109,7 +109,8 @@ def element_error(table: Table, source: Source, seed: int = _ELEMENT_SEED) -> El
     nodes = table.wavelength_nm
     count = _ELEMENT_DIRECTIONS if nodes.size <= _FEW else _FEWER_DIRECTIONS
     pairs = error_measurement.draw(source, nodes, count, seed)
-    wi, wr = pairs.wi[pairs.above], pairs.wr[pairs.above]
+    wi = pairs.wi[pairs.above]
+    wr = pairs.wr[pairs.above]
     at_nodes = _element_errors(table, source, wi, wr, nodes)
     middles = 0.5 * (nodes[1:] + nodes[:-1])
     between = None if nodes.size < 2 else _element_errors(table, source, wi, wr, middles)

@@ -64,7 +64,8 @@ def plane(theta_i: ArrayLike, phi_i: ArrayLike, theta_r: ArrayLike, phi_r: Array
     angles = np.broadcast_arrays(*(np.asarray(angle, np.float64) for angle in (theta_i, phi_i, theta_r, phi_r)))
     w_i = unit_vector(angles[0], angles[1])
     w_r = unit_vector(angles[2], angles[3])
-    s_i, s_r = horizontal(angles[1]), horizontal(angles[3])
+    s_i = horizontal(angles[1])
+    s_r = horizontal(angles[3])
     normal = np.cross(w_i, w_r)
     length = np.linalg.norm(normal, axis=-1, keepdims=True)
     s = np.where(length > _NO_PLANE, normal / np.maximum(length, _NO_PLANE), s_i)
@@ -101,7 +102,9 @@ class ElementError(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    directions: int = Field(description="drawn above the horizon, half over the hemisphere and half in the lobe")
+    directions: int = Field(
+        description="number of random pairs above the horizon, half over the hemisphere and half in the lobe"
+    )
     seed: int
     p99: Matrix = Field(description="[row][column] of the Mueller matrix, between bases of the surface")
     max: Matrix = Field(description="[row][column]")

@@ -1,4 +1,4 @@
-"""Values of a table at any direction and wavelength: what is stored, interpolated on its grid."""
+"""Tables: f_r at any direction and wavelength, interpolated from the numbers stored on a grid."""
 
 from __future__ import annotations
 
@@ -24,7 +24,6 @@ from brdfdb.geometry import (
     unit_vector,
 )
 from brdfdb.materials import FunctionRecord, FunctionSource, Material, Source
-from brdfdb.materials.function_source import Function
 from brdfdb.materials.source import FourAngles
 from brdfdb.measurements.record import Measured
 from brdfdb.models.large_calls import array_for_result, filled
@@ -234,10 +233,11 @@ class Table(BaseTable):
     ) -> Floats:
         located = self._wavelengths(wavelength_nm)
         shape: tuple[int, ...] = ()
+        flat: NDArray[Any] | list[NDArray[Any]]  # a row for each angle
         if FLOAT_TYPES.issuperset(map(type, angles)):  # broadcasting takes longer than the lookup of one point
-            numbers = np.array(angles).reshape(4, 1)
-            numbers.flags.writeable = False  # as by `_flat`
-            dtype, flat = numbers.dtype, list(numbers)
+            flat = np.array(angles).reshape(4, 1)
+            flat.flags.writeable = False  # as by `_flat`
+            dtype = flat.dtype
         else:
             arrays = [np.asarray(angle) for angle in angles]
             dtype = asked_for(*angles)
@@ -291,7 +291,8 @@ class Table(BaseTable):
     @functools.cached_property
     def _kernel(self) -> _Arrays:
         """The table as kernels read it."""
-        grid, how = self.grid, self.interpolation
+        grid = self.grid
+        how = self.interpolation
         # a cubic, and what continues beyond the horizon; a sum of positive numbers does not
         overshoots = how.logarithm or how.cubic or grid.half_difference
         rule = _coordinates.Rule(
@@ -448,9 +449,9 @@ def table_from(name: str, revision: str, arrays: Mapping[str, NDArray[Any]], att
     if spectra is not None and spectra.shape != (*channels, *spectrum):
         raise ParameterError(basis, f"shape {spectra.shape} is not {(*channels, *spectrum)}, of parts and wavelengths")
     if (part_nm is not None) != ("mixture" in arrays) or (part_nm is not None and part_nm.shape != channels):
-        raise ParameterError("part_wavelengths_nm", "it goes with mixture, one wavelength for each part")
+        raise ParameterError("part_wavelengths_nm", "needs the array mixture, and one wavelength for each of its parts")
     if variable == "brdf" and not (interpolation.plain and spectra is uniform is None):
-        raise ParameterError("brdf", "it is f_r itself, and the table says that f_r is rebuilt; name the array parts")
+        raise ParameterError("brdf", "the attributes say that f_r is rebuilt from parts; rename the array to parts")
     if uniform is not None and uniform.size not in (1, *spectrum):
         raise ParameterError("uniform", f"{uniform.size} values are neither one nor one for each wavelength")
     return Table(
@@ -483,7 +484,8 @@ class TableSource(FunctionSource):
 
     def __init__(self, table: Table, known_nm: NDArray[np.float64] | None = None) -> None:
         recorded = table.source
-        wavelength_nm, metadata = table.wavelength_nm, table.metadata
+        wavelength_nm = table.wavelength_nm
+        metadata = table.metadata
         if known_nm is not None and wavelength_nm is not None and wavelength_nm.size > 1:
             wavelength_nm = np.union1d(wavelength_nm, known_nm)
         stated = metadata.source or "source not stated"
@@ -497,7 +499,11 @@ class TableSource(FunctionSource):
         }
         if isinstance(recorded, FunctionRecord):
             record |= {name: getattr(recorded, name) for name in ("reciprocal", "grazing_pole", "alpha")}
-        super().__init__(brdf=_brdf_of(table), **record)
+
+        def brdf(wi: Floats, wr: Floats, asked_nm: NDArray[np.float64] | None) -> Floats:
+            return table.lookup_vectors(wi, wr, _in_range(table, asked_nm))
+
+        super().__init__(brdf=brdf, **record)
         self._table = table
 
     @property
@@ -536,13 +542,6 @@ class TableSource(FunctionSource):
 
     def _check_function(self) -> None:
         """Take the table as it is: between its nodes the two halves of a symmetry differ by its error."""
-
-
-def _brdf_of(table: Table) -> Function:
-    def brdf(wi: Floats, wr: Floats, wavelength_nm: NDArray[np.float64] | None) -> Floats:
-        return table.lookup_vectors(wi, wr, _in_range(table, wavelength_nm))
-
-    return brdf
 
 
 def _in_range(table: Table, wavelength_nm: ArrayLike | None) -> ArrayLike | None:

@@ -122,7 +122,8 @@ class BaseTable(Lookups):
         """
         from brdfdb.integrals.sampling import Sample, check_uniform
 
-        v1, v2 = check_uniform("u1", u1), check_uniform("u2", u2)
+        v1 = check_uniform("u1", u1)
+        v2 = check_uniform("u2", u2)
         i = checked_vectors(wi, wi).w_i.astype(np.float64)
         common_shape("u1, u2, wi without its last axis", v1, v2, i[..., 0])
         v1, v2 = np.broadcast_arrays(v1, v2)
@@ -258,8 +259,9 @@ class BaseTable(Lookups):
         return self.metadata.error
 
     def _repr_html_(self) -> str:
-        """Return the table for notebooks: what it states, and a sketch of its lobe where that needs no service."""
-        known, error = self.metadata, self.error
+        """Return the table for notebooks: its metadata, and a sketch of its lobe unless that needs a service."""
+        known = self.metadata
+        error = self.error
         axes = " × ".join(f"{name} {nodes.size}" for name, nodes in self.axes_deg.items())
         wavelengths = None if self.wavelength_nm is None else self.wavelength_nm.tolist()
         facts = [

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 _SLOPE_STEP = np.deg2rad(2.0)  # step of the difference that gives the slope at the horizon
 POLE_END_DEG = 89.9  # last angle of light and viewer if the pole of a model is tabulated
-_RISE = 1.0  # largest rise of the stored numbers of measured data beyond the horizon, where their slopes are noise
+_RISE = 1.0  # largest rise of the stored numbers of measured data beyond the horizon, where their slope is noise
 _CONTINUED = 7.5  # number of steps up to which numbers are continued beyond the horizon
 # Nodes of the specular part, unless a recipe gives an axis theta_i: planned nodes do not suit it
 SPECULAR_THETA_DEG = np.append(np.arange(0.0, 60.0, 0.5), np.arange(60.0, 90.01, 0.1).round(1))
@@ -51,7 +51,7 @@ class Frame(NamedTuple):
 
 
 def tabulate(layout: Layout, values: NDArray[np.float32] | None = None) -> xr.Dataset:
-    """Tabulate the BRDF of a source: all blocks of a layout, in memory, or the values of them if they are known.
+    """Tabulate the BRDF of a source in memory: all blocks of a layout, or their `values` if they are known.
 
     The Dataset has ``brdf`` [1/sr], or ``parts``, from which it is rebuilt as the attribute ``reconstruction`` says:
     float32, over the axes of the grid and, last, ``wavelength`` or ``part``; for models with a specular part
@@ -73,8 +73,8 @@ def block(layout: Layout, rows: slice) -> NDArray[np.float32]:
     for slab in slabs(layout, rows):
         at = slice(slab.start - rows.start, slab.stop - rows.start)
         if layout.plain and not layout.grid.half_difference:
-            nodes_nm = layout.evaluated_nm
-            for number, wavelength in enumerate([None] if nodes_nm is None else nodes_nm.tolist()):
+            evaluated_nm = layout.evaluated_nm
+            for number, wavelength in enumerate([None] if evaluated_nm is None else evaluated_nm.tolist()):
                 index: tuple[Any, ...] = (at, ...) if wavelength is None else (at, ..., number)
                 values[index] = _evaluated(layout, slab, wavelength)
         else:
@@ -91,7 +91,7 @@ def slabs(layout: Layout, rows: slice) -> Iterator[slice]:
 
 
 def stored(layout: Layout, numbers: Floats) -> Floats:
-    """Return what a table stores of `node_numbers`: the coefficients of a factored spectrum, or the numbers."""
+    """Return the numbers that a table stores: coefficients of a factored spectrum, or `node_numbers` themselves."""
     if layout.spectra is None or layout.part_nm is not None:
         return numbers
     # A BLAS sums in an order that depends on the position of a row, which would break the symmetry of a table
@@ -134,33 +134,36 @@ def numbers(layout: Layout, wi: Floats, wr: Floats) -> Floats:
 
     If spectra mix f_r itself, they are those of the parts, shape (..., parts).
     """
-    return layout.interpolation.numbers(*values_at(layout, wi, wr))
+    return layout.interpolation.numbers(*factors(layout, wi, wr))
 
 
-def values_at(layout: Layout, wi: Floats, wr: Floats) -> tuple[Floats, Floats]:
-    """Return f_r [1/sr] to tabulate at directions as `numbers` takes them, shape (..., L), and cos theta_i cos theta_r.
+class NumberFactors(NamedTuple):
+    """What stored numbers are computed from: f_r [1/sr], shape (..., L), and mu = cos theta_i cos theta_r."""
 
-    The stored numbers are made of both.
-    """
+    f_r: Floats
+    mu: Floats
+
+
+def factors(layout: Layout, wi: Floats, wr: Floats) -> NumberFactors:
+    """Return f_r to tabulate, and the cosines, at unit vectors as `numbers` takes them."""
     wi, wr = np.broadcast_arrays(wi, wr)
     mu = np.maximum(wi[..., 2], COS_HORIZON) * np.maximum(wr[..., 2], COS_HORIZON)
     f_r = layout.tabulated.brdf_at(layout.evaluated_nm)(wi.reshape(-1, 3), wr.reshape(-1, 3))
-    return f_r.reshape(*mu.shape, -1), mu
+    return NumberFactors(f_r.reshape(*mu.shape, -1), mu)
 
 
 def node_numbers(layout: Layout, rows: slice) -> Floats:
-    """`numbers` at some rows of nodes, continued beyond the horizon on a grid of half and difference vectors.
+    """Return `numbers` at some rows of nodes, continued beyond the horizon on a grid of half and difference vectors.
 
-    There theta_d is held at its largest value, where light or viewer is at the horizon, or at 89.9 degrees if the
-    numbers have a pole there; from there they go on along theta_d with the slope that they arrive with.
+    They are continued along theta_d, with the slope at the largest theta_d: the one where light or viewer is at the
+    horizon, or at 89.9 degrees if the numbers have a pole there.
     """
     grid = layout.grid
     if not grid.half_difference:
         angles = grid.directions(rows)
         mu = np.maximum(np.cos(angles[0]), COS_HORIZON) * np.maximum(np.cos(angles[2]), COS_HORIZON)
-        nodes_nm = layout.evaluated_nm
-        f_r = _evaluated(layout, rows, nodes_nm)
-        return layout.interpolation.numbers(f_r[..., np.newaxis] if nodes_nm is None else f_r, mu)
+        f_r = _evaluated(layout, rows, layout.evaluated_nm)
+        return layout.interpolation.numbers(f_r[..., np.newaxis] if layout.evaluated_nm is None else f_r, mu)
     axes = [radians(nodes) for nodes in grid.axes.values()]
     axes[0] = axes[0][rows]
     nodes = np.ix_(*axes)
@@ -169,12 +172,12 @@ def node_numbers(layout: Layout, rows: slice) -> Floats:
 
 
 def continued(layout: Layout, theta_h: Floats, phi_h: Floats, theta_d: Floats, phi_d: Floats) -> Floats:
-    """`numbers` at half and difference angles [rad], and beyond the horizon what `node_numbers` says."""
-    return joined(layout.source, *held(layout, theta_h, phi_h, theta_d, phi_d, numbers))
+    """Return `numbers` at half and difference angles [rad], continued beyond the horizon as by `node_numbers`."""
+    return extended(layout.source, *evaluated_to_horizon(layout, theta_h, phi_h, theta_d, phi_d, numbers))
 
 
 class Beyond(NamedTuple):
-    """Mask of half and difference angles beyond the horizon, and the number of steps [1] that each of these is."""
+    """Mask of half and difference angles beyond the horizon, and their distance from it in steps [1]."""
 
     mask: NDArray[np.bool_]
     steps: Floats
@@ -183,26 +186,27 @@ class Beyond(NamedTuple):
 Evaluated = TypeVar("Evaluated")
 
 
-def held(
+class HorizonValues(NamedTuple, Generic[Evaluated]):
+    """Values up to the horizon and, for the angles beyond it, the values a step before it with these angles."""
+
+    values: Evaluated
+    before: tuple[Evaluated, Beyond] | None
+
+
+def evaluated_to_horizon(
     layout: Layout,
     theta_h: Floats,
     phi_h: Floats,
     theta_d: Floats,
     phi_d: Floats,
     evaluate: Callable[[Layout, Floats, Floats], Evaluated],
-) -> tuple[Evaluated, tuple[Evaluated, Beyond] | None]:
-    """Evaluate a layout at half and difference angles [rad], theta_d held at its largest value.
-
-    Returns
-    -------
-    tuple
-        The values; and of the angles beyond the horizon alone, those a step before and which they are. None stands for
-        the second if no angle is beyond.
-    """
+) -> HorizonValues[Evaluated]:
+    """Evaluate a layout at half and difference angles [rad], with theta_d limited to its largest value."""
     lowest = 0.0  # cosine of light and viewer
     if layout.source.grazing_pole and layout.interpolation.power == 0.0:
         end = radians(POLE_END_DEG)
-        lowest, theta_h = float(np.cos(end)), np.minimum(theta_h, end)
+        lowest = float(np.cos(end))
+        theta_h = np.minimum(theta_h, end)
     # cos theta_r = along cos theta_d - across sin theta_d, at phi_d or at the other side
     along = np.cos(theta_h)
     across = np.sin(theta_h) * np.abs(np.cos(phi_d))
@@ -214,14 +218,15 @@ def held(
     before = np.maximum(within - step, 0.0)
     steps = np.minimum((theta_d - within) / np.maximum(step, 1e-9), _CONTINUED)
     *angles, steps = np.broadcast_arrays(theta_h, phi_h, before, phi_d, steps)
-    some = steps > 0.0
-    if not some.any():
-        return values, None
-    return values, (evaluate(layout, *_half_vectors(*(angle[some] for angle in angles))), Beyond(some, steps[some]))
+    mask = steps > 0.0
+    if not mask.any():
+        return HorizonValues(values, None)
+    before_horizon = evaluate(layout, *_half_vectors(*(angle[mask] for angle in angles)))
+    return HorizonValues(values, (before_horizon, Beyond(mask, steps[mask])))
 
 
-def joined(source: Source, values: Floats, before: tuple[Floats, Beyond] | None) -> Floats:
-    """Return the numbers of a table, continued with their slope: `held` says what they are made of."""
+def extended(source: Source, values: Floats, before: tuple[Floats, Beyond] | None) -> Floats:
+    """Return the numbers of a table, continued with their slope, from those of `evaluated_to_horizon`."""
     if before is None:
         return values
     inside, beyond = before
@@ -320,7 +325,8 @@ def _reconstruction(layout: Layout) -> str:
 
 def metadata_of(layout: Layout) -> TableMetadata:
     """Return the metadata of a table that is known before its values are: without request and stated error."""
-    source, wavelength_nm = layout.source, layout.wavelength_nm
+    source = layout.source
+    wavelength_nm = layout.wavelength_nm
     return TableMetadata(
         table_version=TABLE_VERSION,
         **source.attributes(),

@@ -1,4 +1,4 @@
-"""Documents of values: what a lookup, and the view of a lobe, found."""
+"""Documents of the values of a lookup and of the view of a lobe."""
 
 from __future__ import annotations
 
@@ -57,7 +57,9 @@ class OfTable(BaseModel):
 
     material: str
     revision: str
-    digest: str = Field(description="sha256 of the manifest of the revision: stores number their revisions alike")
+    digest: str = Field(
+        description="sha256 of the manifest of the revision; other stores use the same numbers for other tables"
+    )
 
 
 class Lookup(Evaluated, OfTable):
@@ -137,7 +139,8 @@ def lobe_document(
     values: Values, axes_deg: Mapping[str, Any], view: ViewName, theta_i_deg: float, phi_i_deg: float
 ) -> dict[str, Any]:
     """Return the fields of `LobeView` and `Evaluated` of a lobe; of half-difference there is no one light."""
-    surface, no_light = values.surface, view == "half-difference"
+    surface = values.surface
+    no_light = view == "half-difference"
     document = values_document(values)
     if surface.kind == "table" and surface.source.metadata.measured is not None:
         document["extrapolated"] = plain(surface.source.extrapolated(*values.points.angles))
@@ -163,6 +166,7 @@ def arrays_of(values: Mapping[str, Values]) -> dict[str, NDArray[Any]]:
 
 def npy_bytes(array: NDArray[Any]) -> bytes:
     """Return an array as a .npy file."""
-    buffer, array = io.BytesIO(), np.asarray(array, order="C")
+    buffer = io.BytesIO()
+    array = np.asarray(array, order="C")
     np.lib.format.write_array_header_1_0(buffer, np.lib.format.header_data_from_array_1_0(array))
     return b"".join((buffer.getvalue(), array.data))  # np.save copies twice

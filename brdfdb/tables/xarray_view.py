@@ -52,7 +52,10 @@ def plain_attributes(attributes: Mapping[str, Any]) -> dict[str, Any]:
     for key, value in attributes.items():
         if isinstance(value, bool):
             plain[key] = int(value)
-        elif isinstance(value, Mapping) or (isinstance(value, list) and not all(map(_is_number, value))):
+        elif isinstance(value, Mapping) or (
+            isinstance(value, list)
+            and any(isinstance(item, bool) or not isinstance(item, int | float) for item in value)
+        ):
             plain[key] = json.dumps(value, ensure_ascii=False)
         else:
             plain[key] = value
@@ -82,10 +85,6 @@ def stored_attributes(attributes: Mapping[str, Any]) -> dict[str, Any]:
     metadata = TableMetadata.read(stored)
     sound = {key: value for key, value in metadata.attributes().items() if key not in metadata.strange}
     return sound | {key: value for key, value in stored.items() if key not in sound}
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def with_brdf(dataset: xr.Dataset) -> xr.Dataset:

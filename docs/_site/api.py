@@ -45,7 +45,7 @@ def _page(name: str, modules: list[str]) -> str:
 
 
 def _constants(name: str) -> dict[str, str]:
-    """Return the names that a module exports beside classes, functions and modules, with their types."""
+    """Return the constants that a module exports, with their types."""
     module = importlib.import_module(name)
     exported = {constant: getattr(module, constant) for constant in getattr(module, "__all__", ())}
     others = (inspect.isclass, inspect.isroutine, inspect.ismodule)
@@ -54,7 +54,7 @@ def _constants(name: str) -> dict[str, str]:
 
 
 def _index(modules: list[str]) -> str:
-    """Return the page that lists the rooms and the modules beside them."""
+    """Return the page that lists the rooms and the modules outside rooms."""
     title = "Python"
     top = _children("brdfdb", modules)
     rooms = [name for name in top if _children(name, modules)]

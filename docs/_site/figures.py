@@ -57,7 +57,8 @@ def _index(key: str, paper: Paper, figures: list[Figure], plots: dict[str, list[
 
 
 def _held(figure: Figure) -> str:
-    held, count = sum(statement.holds for statement in figure.statements), len(figure.statements)
+    held = sum(statement.holds for statement in figure.statements)
+    count = len(figure.statements)
     return f"{held} of {count} statements hold" if count > 1 else ("Its statement holds" if held else "Does not hold")
 
 
@@ -101,7 +102,7 @@ def _statement(statement: Statement) -> str:
 
 
 def source_of(draw: Callable[[], Figure], key: str) -> tuple[ModuleType, str]:
-    """Return the module of a figure and the source of what draws it: a function, or a row of the table `FIGURES`."""
+    """Return the module of a figure and the source that draws it: a function, or a row of the table `FIGURES`."""
     function: Any = draw.func if isinstance(draw, functools.partial) else draw
     if "<locals>" not in function.__qualname__:
         module = inspect.getmodule(function)

@@ -24,14 +24,14 @@ class Card(NamedTuple):
 
 
 def write_page(path: Path, text: str) -> None:
-    """Write a page; a file that holds this text already is left alone, so that Sphinx does not read it again."""
+    """Write a page; a file with the same text is not written, so that Sphinx does not read it again."""
     path.parent.mkdir(parents=True, exist_ok=True)
     if not path.exists() or path.read_text(encoding="utf-8") != text:
         path.write_text(text, encoding="utf-8")
 
 
 def remove_others(folder: Path, names: set[str]) -> None:
-    """Remove the files of a folder whose names are not among `names`: pages of what is gone."""
+    """Remove the files of a folder whose names are not among `names`."""
     for path in folder.iterdir():
         if path.is_file() and path.name not in names:
             path.unlink()
@@ -72,7 +72,7 @@ def toctree(pages: Iterable[str], options: str = ":hidden:") -> str:
 
 
 def cards(shown: Iterable[Card]) -> str:
-    """Return a grid of cards. A picture without a text of its own is decoration: the title says what it shows."""
+    """Return a grid of cards. Pictures are decoration: the title describes them."""
     parts = []
     for card in shown:
         picture = f'<span class="picture" aria-hidden="true">{card.picture}</span>' if card.picture else ""

@@ -65,7 +65,7 @@ def anchor(name: str, definition: str) -> str:
 
 
 def fields_of(name: str, schema: Schema) -> list[str]:
-    """Return what a schema says of itself, and the table of its fields."""
+    """Return the description of a schema, and the table of its fields."""
     parts = [described(schema["description"])] if schema.get("description") else []
     properties: Schema = schema.get("properties", {})
     if not properties:

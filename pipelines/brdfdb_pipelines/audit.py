@@ -1,6 +1,6 @@
 """The audit job: it audits tables of a store, writes the report as JSON and as a page, and prints the findings.
 
-What the last report says of the same bytes, by the same program, is taken from it.
+Results of the last report are reused for the same bytes and the same program.
 """
 
 from __future__ import annotations
@@ -77,7 +77,7 @@ class _FigureSets(NamedTuple):
 
 
 class _Groups(NamedTuple):
-    """Groups of materials, each for one task: those that take long, and the others; the largest come first."""
+    """Groups of materials, each for one task: long tasks and short tasks, the largest first."""
 
     long: list[tuple[str, ...]]
     short: list[tuple[str, ...]]
@@ -186,7 +186,7 @@ def _groups(store: Store, names: Sequence[str]) -> _Groups:
     for name in names:
         try:
             head, metadata = store.summary(name), store.metadata(name)
-        except StoreError:  # the audit of the material says what is wrong
+        except StoreError:  # the audit of the material reports the error
             groups[name], sizes[name] = [name], (False, 0)
             continue
         spec = None if metadata.model is None else MODELS.get(metadata.model)
@@ -213,7 +213,7 @@ def _sections(subject: Any) -> list[Section]:
 def _written(
     audit_report: AuditReport, sections: Sequence[Section], before: Former, report_path: Path, store: Store
 ) -> AuditReport:
-    """Write the page, unless nothing on it changed, and the report; return it with what it says of both."""
+    """Write the page if anything on it changed, and the report; return the report with the digest of the page."""
     subjects = [audit_page.key_of(section.subject) for section in sections]
     page_path = report_path.with_suffix(".html")
     if tuple(subjects) != before.page or any(section.plots is not None for section in sections):
@@ -265,7 +265,7 @@ def _check_path(report_path: Path) -> None:
 
 
 def _outcomes(tasks: dict[tuple[str, ...], Task], jobs: int) -> Iterator[tuple[tuple[str, ...], list[Any]]]:
-    """Yield the names and the results of each task as it is done; a process of its own for one would only take time."""
+    """Yield the names and the results of each finished task; a single task runs in this process."""
     if min(jobs, len(tasks)) <= 1:
         for names, task in tasks.items():
             yield names, task()
@@ -283,7 +283,7 @@ def _outcomes(tasks: dict[tuple[str, ...], Task], jobs: int) -> Iterator[tuple[t
 
 
 def _audited(root: Path, names: Sequence[str], allow: Sequence[str]) -> list[Section | StoreError]:
-    """Audit materials; return an error of its files in place of a damaged one, so that the others are audited."""
+    """Audit materials; a damaged material has its error as the result, and the others are audited."""
     store = brdfdb.open(root)
     outcomes: list[Section | StoreError] = []
     for name in names:
@@ -309,7 +309,11 @@ def _families(root: Path, before: Former, jobs: int) -> list[FamilyAudit]:
     tasks: dict[tuple[str, ...], Task] = {}
     audits: dict[str, FamilyAudit] = {}
     for (snapshot, name), opened in subjects.items():
-        sha256 = _family_sha256(opened, name)
+        content: dict[str, Any] = {"name": name}
+        with suppress(StoreError, UnknownMaterialError):
+            content["record"] = opened.family_content(name)
+            content["members"] = {member: opened.location(member).digest for member in content["record"]["members"]}
+        sha256 = digest(content)
         if sha256 in known:
             audits[sha256] = known[sha256]
         elif (sha256,) not in tasks:
@@ -317,15 +321,6 @@ def _families(root: Path, before: Former, jobs: int) -> list[FamilyAudit]:
     for (sha256,), (audited,) in _outcomes(tasks, jobs):
         audits[sha256] = audited
     return [*audits.values()]
-
-
-def _family_sha256(store: Store, name: str) -> str:
-    """Return the digest of a record of a family and of its members."""
-    content: dict[str, Any] = {"name": name}
-    with suppress(StoreError, UnknownMaterialError):
-        content["record"] = store.family_content(name)
-        content["members"] = {member: store.location(member).digest for member in content["record"]["members"]}
-    return digest(content)
 
 
 def _family_audited(root: Path, name: str, snapshot: str, sha256: str) -> list[FamilyAudit]:
@@ -359,19 +354,10 @@ def _drawn(key: str) -> list[Section]:
     return _sections((atlas.get(key) or gallery[key])())
 
 
-def _why(store: Store, name: str) -> str:
-    """Return the reason why the source of a table cannot be evaluated."""
-    if store.metadata(name).measured is not None:
-        return "it is measured, and the table does not contain the data"
-    model = store.metadata(name).model
-    if model is None or model in MODELS:
-        return "its source cannot be evaluated"
-    return f"its model {model} is unknown; add it with --models FILE or $BRDFDB_MODELS"
-
-
 def _print(root: Path, audit_report: AuditReport, report_path: Path) -> None:
     store = Store(root)
-    audits, columns = audit_report.materials, audit_page.columns()
+    audits = audit_report.materials
+    columns = audit_page.columns()
     terminal.print_table(
         f"Audit of {root}, the tables as interpolated",
         ("material", *audit_page.QUESTIONS, *columns),
@@ -389,7 +375,13 @@ def _print(root: Path, audit_report: AuditReport, report_path: Path) -> None:
         for problem in a.problems():
             print(f"{a.material}: {problem}")
         if a.not_judged:
-            print(f"{a.material}: {_why(store, a.material)}; not judged: {', '.join(a.not_judged).lower()}")
+            metadata = store.metadata(a.material)
+            why = "its source cannot be evaluated"
+            if metadata.measured is not None:
+                why = "it is measured, and the table does not contain the data"
+            elif metadata.model is not None and metadata.model not in MODELS:
+                why = f"its model {metadata.model} is unknown; add it with --models FILE or $BRDFDB_MODELS"
+            print(f"{a.material}: {why}; not judged: {', '.join(a.not_judged).lower()}")
     for key, kind in FINDINGS.items():
         for sentence in kind.overview([a.findings[key] for a in audits]):
             print(sentence)
@@ -416,7 +408,7 @@ def _print(root: Path, audit_report: AuditReport, report_path: Path) -> None:
 
 @cache
 def program() -> str:
-    """Return the digest of all that decides a finding beside the table: our files, and the packages they compute with.
+    """Return the digest of the inputs of a finding except the table: our files, and the packages that they use.
 
     It covers models, audits and materials. A change of any of them audits everything again.
     """

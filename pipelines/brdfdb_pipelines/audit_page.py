@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from itertools import groupby
 from typing import NamedTuple
 
 from brdfdb.audit import FINDINGS, AuditReport, MaterialAudit
 from brdfdb.audit.energy import Energy
-from brdfdb.audit.finding import LAST, LEVELS, RANKS, Cell, Finding, NotJudged, NumberTable, Word
+from brdfdb.audit.finding import LAST, LEVELS, RANKS, Cell, NotJudged, NumberTable, Word
 from brdfdb.audit.report import AS_PUBLISHED, CONSERVES_ENERGY, NO_PAPER, Answer
 from brdfdb.audit.validity import Validity
 from brdfdb.figure import Figure
@@ -81,11 +80,18 @@ def render(report: AuditReport, plots: Mapping[str, list[DrawnPlot]] | None = No
     environment.filters |= {"level": LEVELS.__getitem__, "mark": _MARKS.__getitem__, "sentence": _sentence}
     environment.globals |= {"anchor": anchor, "key_of": key_of, "rank": RANKS.__getitem__}
     energy = {a.material: a.findings[Energy.key].verdict for a in report.materials}
-    rows = [Row(a, anchor(a.material), answers_of(a), cells_of(a), _tables(a)) for a in report.materials]
+    tables = {
+        a.material: [table for finding in a.findings.values() for table in finding.tables() if table.rows]
+        for a in report.materials
+    }
+    rows = [Row(a, anchor(a.material), answers_of(a), cells_of(a), tables[a.material]) for a in report.materials]
     rows.sort(key=lambda row: (RANKS[row.audit.verdict], RANKS[energy[row.audit.material]], row.audit.material))
     if plots is None:
         subjects: list[MaterialAudit | Figure] = [*report.materials, *report.atlas, *report.gallery]
         plots = {key_of(subject): plots_of(subject) for subject in subjects}
+    papers: dict[str, list[Figure]] = {}  # in the order of their first figures
+    for figure in report.gallery:
+        papers.setdefault(PAPERS.get(figure.paper, figure.paper), []).append(figure)
     return environment.get_template("page.html").render(
         report=report,
         plots=plots,
@@ -95,7 +101,7 @@ def render(report: AuditReport, plots: Mapping[str, list[DrawnPlot]] | None = No
         remarked=remarked(report),
         columns=columns(),
         counts=[(word, sum(verdict == word for verdict in energy.values())) for word in _COUNTED],
-        gallery=_by_paper(report.gallery),
+        gallery=list(papers.items()),
     )
 
 
@@ -122,26 +128,13 @@ def answers_of(a: MaterialAudit) -> list[Answer]:
 
 def cells_of(a: MaterialAudit) -> list[Cell]:
     """Return the cells of all findings on a material, in the order of `columns`."""
-    return [cell for key, finding in a.findings.items() for cell in _cells(FINDINGS[key], finding)]
-
-
-def _cells(kind: type[Finding], finding: Finding) -> list[Cell]:
-    if isinstance(finding, NotJudged):
-        return [Cell(finding.verdict, "–", LAST)] * len(kind.columns)
-    return finding.cells()
-
-
-def _tables(a: MaterialAudit) -> list[NumberTable]:
-    return [table for finding in a.findings.values() for table in finding.tables() if table.rows]
+    cells: list[Cell] = []
+    for key, finding in a.findings.items():
+        judged = not isinstance(finding, NotJudged)
+        cells += finding.cells() if judged else [Cell(finding.verdict, "–", LAST)] * len(FINDINGS[key].columns)
+    return cells
 
 
 def _sentence(text: str) -> str:
     """Return a text with a capital and a full stop."""
     return f"{text[:1].upper()}{text[1:].removesuffix('.')}." if text else ""
-
-
-def _by_paper(figures: list[Figure]) -> list[tuple[str, list[Figure]]]:
-    """Return figures grouped by paper, papers in the order of their first figures."""
-    order = list(dict.fromkeys(figure.paper for figure in figures))
-    grouped = groupby(sorted(figures, key=lambda figure: order.index(figure.paper)), key=lambda figure: figure.paper)
-    return [(PAPERS.get(paper, paper), list(group)) for paper, group in grouped]

@@ -7,12 +7,12 @@ import gc
 import threading
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,9 +25,9 @@ from brdfdb.store.family import FamilyRecord, Sweep
 from brdfdb.store.family_records import recorded, write_family
 from brdfdb.store.files import FileEntry
 from brdfdb.store.lock import Lock, writing
-from brdfdb.store.paths import material_path, pointer_path, revision_path
-from brdfdb.store.publication import publish_staged
-from brdfdb.store.records import make_store, point_to, read_manifest
+from brdfdb.store.paths import material_path, pointer_path
+from brdfdb.store.publication import NewRevision, publish_staged
+from brdfdb.store.records import make_store, point_to
 from brdfdb.store.staging import Block, discard, prepare, remove_begun, write_block, write_frame
 from brdfdb.tables import _kernels
 from brdfdb.tables.layout import Layout
@@ -46,13 +46,15 @@ from brdfdb_pipelines.build_survey import (
     memory_of_plan,
     survey,
 )
-from brdfdb_pipelines.measured_job import MeasuredJob, MeasuredResult, build_measured
+from brdfdb_pipelines.measured_job import MeasuredJob, MeasuredResult, build_measured, revision_bytes
 from brdfdb_pipelines.recipe_file import Job, Recipe
 from brdfdb_pipelines.workers import Workers, WorkersError
 
 _LOOK_S = 2.0  # interval [s] at which silent workers are checked
-_PUBLISHED = 16  # tables that are published at once: each waits for the disk several times, which serves many as fast
+_PUBLISHED = 16  # tables that are published at once: each waits for the disk several times
 _POLL_S = 0.1  # interval [s] at which a lock of another build is tried again
+
+_Item = TypeVar("_Item")
 
 
 @dataclass(frozen=True)
@@ -119,9 +121,8 @@ def build(
     existed = root.exists()
     made = make_store(root)
     try:
-        return _Builder(
-            jobs, measured, sweeps, root, at if isinstance(at, Workers) else Workers(at, lambda: 1), report, memory
-        ).run()
+        at = at if isinstance(at, Workers) else Workers(at, lambda: 1)
+        return _Builder(jobs, measured, sweeps, root, at, report, memory).run()
     except ParameterError:
         if made:
             remove_begun(root)
@@ -130,31 +131,28 @@ def build(
         raise
 
 
+@dataclass(eq=False)
 class _Builder:
-    def __init__(
-        self,
-        jobs: list[Job],
-        measured: list[MeasuredJob],
-        sweeps: list[Sweep],
-        root: Path,
-        at: Workers,
-        report: Callable[[Event], None],
-        memory: int | None,
-    ) -> None:
-        self.jobs, self.measured, self.sweeps, self.root = jobs, measured, sweeps, root
-        self.at, self.report, self.memory = at, report, memory
-        self.task_bytes = 1
-        self.running: dict[Future[Any], Callable[[Future[Any]], None]] = {}
-        self.publisher = ThreadPoolExecutor(_PUBLISHED)
-        self.publishing: set[Future[Any]] = set()  # those of the running ones that this process does itself
-        self.surveys: dict[str, Survey] = {}
-        self.waiting: deque[_Table] = deque()  # not begun
-        self.open: list[_Table] = []
-        self.ready: deque[_Table] = deque()  # all blocks are there
-        self.built: dict[str, Built] = {}
-        self.error: Exception | None = None
-        self.tally = Tally(0)
-        self.idle = False  # the event that there are no workers was sent
+    """The progress of a build."""
+
+    jobs: list[Job]
+    measured: list[MeasuredJob]
+    sweeps: list[Sweep]
+    root: Path
+    at: Workers
+    report: Callable[[Event], None]
+    memory: int | None
+    task_bytes: int = 1
+    running: dict[Future[Any], Callable[[Future[Any]], None]] = field(default_factory=dict)
+    publisher: ThreadPoolExecutor = field(default_factory=lambda: ThreadPoolExecutor(_PUBLISHED))
+    publishing: set[Future[Any]] = field(default_factory=set)  # the running tasks of this process itself
+    waiting: deque[_Table] = field(default_factory=deque)  # not begun
+    open: list[_Table] = field(default_factory=list)
+    ready: deque[_Table] = field(default_factory=deque)  # all blocks are there
+    built: dict[str, Built] = field(default_factory=dict)
+    error: Exception | None = None
+    tally: Tally = field(default_factory=lambda: Tally(0))
+    idle: bool = False  # the event that there are no workers was sent
 
     def run(self) -> list[Built]:
         """Survey, tabulate and publish; return the result of each job in the order of the recipe."""
@@ -165,8 +163,13 @@ class _Builder:
             self._tabulate()
             self._build_measured()
             self._measure_families()
-        finally:
-            self._leave()
+        finally:  # cancel pending tasks, wait for running ones, and release the locks; staged blocks stay
+            for future in self.running:
+                future.cancel()
+            wait(self.running)
+            self.publisher.shutdown()
+            for table in self.open:
+                table.lock.__exit__(None, None, None)
         if self.error is not None:
             raise self.error
         names = [job.name for job in self.jobs] + [job.name for job in self.measured]
@@ -188,7 +191,7 @@ class _Builder:
 
     @property
     def _room(self) -> bool:
-        most = 2 * max(1, self.at.slots())  # so that a worker that finishes has a next task
+        most = 2 * max(1, self.at.slots())  # each worker has a next task when it finishes
         if self.memory is not None:
             most = min(most, self.memory // self.task_bytes)
         return len(self.running) - len(self.publishing) < max(1, most) and len(self.publishing) < _PUBLISHED
@@ -202,14 +205,14 @@ class _Builder:
             self.publishing.discard(future)
             self.running.pop(future)(future)
 
-    def _leave(self) -> None:
-        """Cancel pending tasks, wait for running ones, and release the locks; staged blocks stay."""
-        for future in self.running:
-            future.cancel()
-        wait(self.running)
-        self.publisher.shutdown()
-        for table in self.open:
-            table.lock.__exit__(None, None, None)
+    def _each(self, items: Iterable[_Item], begin: Callable[[_Item], None]) -> None:
+        """Begin a task for each item as workers become free, and wait for all tasks."""
+        pending = deque(items)
+        while pending or self.running:
+            while pending and self._room:
+                begin(pending.popleft())
+            if self.running:
+                self._wait()
 
     # Survey
 
@@ -217,18 +220,22 @@ class _Builder:
         for job in self.jobs:
             if job.tolerance is not None:
                 wavelengths = 1 if job.wavelength_nm is None else job.wavelength_nm.size
-                self._claim(f"planning {job.material.name}", memory_of_plan(wavelengths, job.tolerance))
-        jobs = deque(sorted(self.jobs, key=cost_of_plan, reverse=True))
-        while jobs or self.running:
-            while jobs and self._room:
-                job = jobs.popleft()
+                self._claim(f"planning {job.name}", memory_of_plan(wavelengths, job.tolerance))
 
-                def then(future: Future[Survey], job: Job = job) -> None:
-                    if (result := self._result(job.material.name, future)) is not None:
-                        self._surveyed(job, result)
+        def begin(job: Job) -> None:
+            def then(future: Future[Survey]) -> None:
+                if (result := self._result(job.name, future)) is None:
+                    return
+                status = result.standing
+                self.report({"event": "surveyed", "material": job.name, "state": status.state, "why": status.why})
+                if status.state == "current":
+                    self._is_current(job, status.revision)
+                else:
+                    self.waiting.append(_Table(job, result, Lock(self.root, job.name, wait=False)))
 
-                self._submit(then, survey, str(self.root), job)
-            self._wait()
+            self._submit(then, survey, str(self.root), job)
+
+        self._each(sorted(self.jobs, key=cost_of_plan, reverse=True), begin)
         missing = sorted(self.waiting, key=lambda table: cost_of_table(table.job, table.survey), reverse=True)
         self.waiting = deque(missing)
         self.task_bytes = 1
@@ -243,19 +250,9 @@ class _Builder:
         self.task_bytes = max(self.task_bytes, need)
         check_memory(what, need, self.memory)
 
-    def _surveyed(self, job: Job, result: Survey) -> None:
-        name = job.material.name
-        self.report({"event": "surveyed", "material": name, "state": result.standing.state, "why": result.standing.why})
-        if result.standing.state == "current":
-            self._is_current(job, result.standing.revision)
-        else:
-            self.waiting.append(_Table(job, result, Lock(self.root, name, wait=False)))
-
     def _is_current(self, job: Job, revision: str) -> None:
-        name = job.material.name
-        stored = read_manifest(revision_path(self.root, name, revision), None).content["summary"]["bytes"]
-        self.built[name] = Built(job, "unchanged", revision, stored)
-        self.report({"event": "unchanged", "material": name, "revision": revision})
+        self.built[job.name] = Built(job, "unchanged", revision, revision_bytes(self.root, job.name, revision))
+        self.report({"event": "unchanged", "material": job.name, "revision": revision})
 
     # Tables
 
@@ -297,7 +294,8 @@ class _Builder:
 
     def _begin(self, table: _Table) -> bool:
         """Lock a material and survey it again; return True if there are blocks to compute."""
-        job, name = table.job, table.name
+        job = table.job
+        name = table.name
         try:
             table.lock.__enter__()
         except BusyError:
@@ -307,7 +305,7 @@ class _Builder:
             self.waiting.append(table)
             return False
         self.open.append(table)
-        if head_of(self.root, name) != table.survey.head:  # another build published meanwhile
+        if head_of(self.root, name) != table.survey.head:  # another build has published a revision since the survey
             table.survey = survey(str(self.root), job)
         standing = table.survey.standing
         if standing.state == "missing":
@@ -318,7 +316,7 @@ class _Builder:
             with writing(self.root, name):
                 point_to(material_path(self.root, name), standing.revision)
             discard(self.root, name, job.request)  # the build that made this revision may have been killed
-            stored = read_manifest(revision_path(self.root, name, standing.revision), None).content["summary"]["bytes"]
+            stored = revision_bytes(self.root, name, standing.revision)
             self.built[name] = Built(job, "adopted", standing.revision, stored, standing.why)
             self.report({"event": "adopted", "material": name, "revision": standing.revision, "why": standing.why})
         else:
@@ -358,60 +356,52 @@ class _Builder:
             return
         staged = (self.root, table.name, table.staging, {**table.files, **files})
         publication = self.publisher.submit(publish_staged, *staged)
-        self.publishing.add(publication)
-        self.running[publication] = lambda future: self._published(table, future)
 
-    def _published(self, table: _Table, future: Future[tuple[str, int]]) -> None:
-        result = self._result(table.name, future)
-        if result is not None:
-            revision, stored = result
-            why = table.survey.standing.why
-            about = (table.survey.shape, table.survey.wavelengths)
-            self.built[table.name] = Built(table.job, "published", revision, stored, why, *about)
-            event = {"event": "published", "material": table.name}
-            self.report({**event, "revision": revision, "bytes": stored, "why": why})
-        self._close(table)
+        def published(future: Future[NewRevision]) -> None:
+            if (made := self._result(table.name, future)) is not None:
+                why = table.survey.standing.why
+                size = (table.survey.shape, table.survey.wavelengths)
+                self.built[table.name] = Built(table.job, "published", made.revision, made.bytes, why, *size)
+                event = {"event": "published", "material": table.name}
+                self.report({**event, "revision": made.revision, "bytes": made.bytes, "why": why})
+            self._close(table)
+
+        self.publishing.add(publication)
+        self.running[publication] = published
 
     # Measured tables, each by one task
 
     def _build_measured(self) -> None:
-        jobs = deque(self.measured)
-        while jobs or self.running:
-            while jobs and self._room:
-                job = jobs.popleft()
+        def begin(job: MeasuredJob) -> None:
+            def then(future: Future[MeasuredResult]) -> None:
+                if (result := self._result(job.name, future)) is not None:
+                    self.built[job.name] = Built(job, *result)
+                    event = {"event": result.state, "material": job.name, "revision": result.revision}
+                    more = {} if result.state == "unchanged" else {"bytes": result.bytes, "why": result.why}
+                    self.report({**event, **more})
 
-                def then(future: Future[MeasuredResult], job: MeasuredJob = job) -> None:
-                    if (result := self._result(job.name, future)) is not None:
-                        self.built[job.name] = Built(job, *result)
-                        event = {"event": result.state, "material": job.name, "revision": result.revision}
-                        more = {} if result.state == "unchanged" else {"bytes": result.bytes, "why": result.why}
-                        self.report({**event, **more})
+            self.report({"event": "measuring", "material": job.name, "tables": len(self.measured)})
+            self._submit(then, build_measured, str(self.root), job)
 
-                self.report({"event": "measuring", "material": job.name, "tables": len(self.measured)})
-                self._submit(then, build_measured, str(self.root), job)
-            if self.running:
-                self._wait()
+        self._each(self.measured, begin)
 
     # Families
 
     def _measure_families(self) -> None:
         """Measure and record the families whose members are all current, unless their record is."""
-        sweeps = deque(sweep for sweep in self.sweeps if all(name in self.built for name in sweep.members))
-        while sweeps or self.running:
-            while sweeps and self._room:
-                sweep = sweeps.popleft()
-                if (record := recorded(self.root, sweep)) is not None:
-                    self._family(record, "unchanged")
-                    continue
 
-                def then(future: Future[FamilyRecord], name: str = sweep.name) -> None:
-                    if (measured := self._result(name, future)) is not None:
-                        self._family(measured, "published")
+        def begin(sweep: Sweep) -> None:
+            def then(future: Future[FamilyRecord]) -> None:
+                if (measured := self._result(sweep.name, future)) is not None:
+                    self._family(measured, "published")
 
-                self.report({"event": "family", "family": sweep.name, "state": "measuring"})
-                self._submit(then, write_family, str(self.root), sweep)
-            if self.running:
-                self._wait()
+            if (record := recorded(self.root, sweep)) is not None:
+                self._family(record, "unchanged")
+                return
+            self.report({"event": "family", "family": sweep.name, "state": "measuring"})
+            self._submit(then, write_family, str(self.root), sweep)
+
+        self._each((sweep for sweep in self.sweeps if all(name in self.built for name in sweep.members)), begin)
 
     def _family(self, record: FamilyRecord, state: str) -> None:
         self.report(
@@ -429,7 +419,7 @@ class _Builder:
         error: BaseException | None
         try:
             error = future.exception()
-        except CancelledError as cancelled:  # by the cluster, which lost the task
+        except CancelledError as cancelled:  # the cluster lost the task
             error = cancelled
         if error is None:
             return future.result()
@@ -459,9 +449,8 @@ def compile_kernels(recipe: Recipe, root: Path, jobs: int, report: Callable[[Eve
     for job in missing:
         models.setdefault(job.material.model, partial(_compile_model, job.material, job.wavelength_nm))
     # the longest first: lookups, and kernels of spectral models
-    tasks = deque(
-        [_compile_tables, *(models[name] for name in sorted(models, key=lambda name: not MODELS[name].spectral))]
-    )
+    by_length = sorted(models, key=lambda name: not MODELS[name].spectral)
+    tasks = deque([_compile_tables, *(models[name] for name in by_length)])
     others = min(jobs, len(tasks)) - 1
     lock = threading.Lock()
     report({"event": "compiling", "kernels": len(tasks)})

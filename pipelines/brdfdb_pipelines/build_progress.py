@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import time
-from types import TracebackType
 from typing import Any
 
 from rich.progress import TaskID
@@ -19,7 +18,9 @@ class Tally:
     """The number of finished values, the rate, and the remaining time."""
 
     def __init__(self, total: int) -> None:
-        self.total, self.done, self._computed = total, 0, 0
+        self.total = total
+        self.done = 0
+        self._computed = 0
         self._start = time.perf_counter()
 
     def add(self, values: int, *, kept: bool) -> Event:
@@ -36,20 +37,9 @@ class Tally:
         }
 
 
-class JsonLines:
-    """Printer of events as JSON; a context manager like `Bars`."""
-
-    def __enter__(self) -> JsonLines:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
-        pass
-
-    def __call__(self, event: Event) -> None:
-        """Print an event."""
-        print(json.dumps(event), flush=True)
+def print_json(event: Event) -> None:
+    """Print an event as one line of JSON."""
+    print(json.dumps(event), flush=True)
 
 
 class Bars:
@@ -67,9 +57,7 @@ class Bars:
         self._progress.start()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._progress.stop()
 
     def __call__(self, event: Event) -> None:
@@ -106,9 +94,23 @@ class Bars:
                 )
                 self._ended(event["material"], made=False)
             case "block":
-                self._block(event)
+                name = event["material"]
+                if event["blocks"] > 1:
+                    if name not in self._tables:
+                        self._tables[name] = self._progress.add_task(f"  {name}", total=event["blocks"], rate="")
+                    self._progress.advance(self._tables[name])
+                if self._overall is not None:
+                    rate = f"{event['values_per_s'] / 1e6:.1f} M values/s"
+                    self._progress.update(self._overall, completed=event["values_done"], rate=rate)
             case "family":
-                self._family(event)
+                name = event["family"]
+                if event["state"] == "measuring":
+                    self._tables[name] = self._progress.add_task(f"  measuring {name}", total=None, rate="")
+                elif (task := self._tables.pop(name, None)) is not None:
+                    self._progress.remove_task(task)
+                    error = terminal.error(event["error_p99"])
+                    text = f"family {name}: {event['members']} tables, error at parameters between them {error} (p99)"
+                    self._progress.console.print(text, markup=False)
             case "measuring":
                 name = event["material"]
                 if self._measured is None:
@@ -140,23 +142,3 @@ class Bars:
         self._progress.advance(task)
         bar = self._progress.tasks[self._progress.task_ids.index(task)]
         self._progress.update(task, rate=f"{bar.completed:.0f}/{bar.total:.0f} {bar.fields['unit']}")
-
-    def _family(self, event: Event) -> None:
-        name = event["family"]
-        if event["state"] == "measuring":
-            self._tables[name] = self._progress.add_task(f"  measuring {name}", total=None, rate="")
-        elif (task := self._tables.pop(name, None)) is not None:
-            self._progress.remove_task(task)
-            error = terminal.error(event["error_p99"])
-            text = f"family {name}: {event['members']} tables, error at parameters between them {error} (p99)"
-            self._progress.console.print(text, markup=False)
-
-    def _block(self, event: Event) -> None:
-        name = event["material"]
-        if event["blocks"] > 1:
-            if name not in self._tables:
-                self._tables[name] = self._progress.add_task(f"  {name}", total=event["blocks"], rate="")
-            self._progress.advance(self._tables[name])
-        if self._overall is not None:
-            rate = f"{event['values_per_s'] / 1e6:.1f} M values/s"
-            self._progress.update(self._overall, completed=event["values_done"], rate=rate)

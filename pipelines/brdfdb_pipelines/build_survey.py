@@ -25,11 +25,11 @@ from brdfdb_pipelines.recipe_file import Job
 _THETA_DEG = (0.0, 30.0, 60.0, 85.0)  # polar angles at which a model is tried before it is planned
 _PHI_DEG = (0.0, 90.0, 180.0)  # azimuths of the viewer there
 
-_TASK = 20_000_000  # memory of any task [byte]: the interpreter, and the directions of the error measurement
+_TASK = 20_000_000  # memory of every task [byte]: the interpreter, and the directions of the error measurement
 # Memory of the planner's layouts [byte]. Measured peaks: copper at 41 wavelengths 119 MB for a tolerance of 0.01 and
 # 377 MB for 0.001; grey foam 49 MB for 0.0001
-_PLAN = 10_000_000  # of any plan
-_PLAN_WAVELENGTH = 3_000_000  # more for each wavelength
+_PLAN = 10_000_000  # memory of a plan without wavelengths
+_PLAN_WAVELENGTH = 3_000_000  # additional memory per wavelength
 _FINE = 0.005  # tolerance below which a plan takes more memory
 _FINE_TIMES = 4  # factor of the memory of such a plan
 _SLAB = 1 << 17  # directions that a block evaluates at once, or one row of the grid if that is more
@@ -66,12 +66,15 @@ def survey(root: str, job: Job) -> Survey:
 
     The values that a plan has computed are staged as the blocks of the table, if the disk has room for them.
     """
-    store, name, request = Path(root), job.material.name, job.request
+    store = Path(root)
+    name = job.name
+    request = job.request
     head = head_of(store, name)
     status = standing(store, name, request)
     if status.state != "missing":
         return Survey(status, head)
-    text, tabulated = planned(store, name, request), False
+    text = planned(store, name, request)
+    tabulated = False
     if text is None:
         check_values(job)
         layout, values = job.planned()
@@ -90,9 +93,17 @@ def survey(root: str, job: Job) -> Survey:
     block_values = tuple((rows.stop - rows.start) * rest for rows in layout.blocks)
     staged = stored_bytes([request_path(store, name, digest(request)) / "table"])
     disk = 0 if tabulated else max(0, size_on_disk(layout) - staged)
-    shape, wavelengths = tuple(layout.shape), 0 if layout.wavelength_nm is None else layout.wavelength_nm.size
-    task_bytes = memory_of_task(layout)
-    return Survey(status, head, text, shape, wavelengths, block_values, task_bytes, disk, tabulated)
+    return Survey(
+        status,
+        head,
+        layout=text,
+        shape=tuple(layout.shape),
+        wavelengths=0 if layout.wavelength_nm is None else layout.wavelength_nm.size,
+        block_values=block_values,
+        task_bytes=memory_of_task(layout),
+        disk_bytes=disk,
+        tabulated=tabulated,
+    )
 
 
 def cost_of_plan(job: Job) -> int:
@@ -107,9 +118,10 @@ def cost_of_table(job: Job, survey: Survey) -> float:
 
 def check_values(job: Job) -> None:
     """Raise ParameterError if the model gives values at a few directions that no BRDF has: nan, infinite, negative."""
-    theta, phi = np.radians(_THETA_DEG), np.radians(_PHI_DEG)
-    theta_i, theta_r, phi_r = (axis.ravel() for axis in np.meshgrid(theta, theta, phi))
-    wi, wr = unit_vector(theta_i, np.zeros_like(phi_r)), unit_vector(theta_r, phi_r)
+    theta = np.radians(_THETA_DEG)
+    theta_i, theta_r, phi_r = (axis.ravel() for axis in np.meshgrid(theta, theta, np.radians(_PHI_DEG)))
+    wi = unit_vector(theta_i, np.zeros_like(phi_r))
+    wr = unit_vector(theta_r, phi_r)
     wavelength_nm = job.wavelength_nm
     f_r = job.material.lookup_vectors(wi, wr, None if wavelength_nm is None else wavelength_nm[:: wavelength_nm.size])
     values = np.reshape(f_r, (len(wi), -1))[:, 0]
@@ -190,7 +202,7 @@ def free_bytes(directory: Path) -> int:
 
 
 def stored_bytes(directories: Sequence[Path]) -> int:
-    """Return the size [byte] of all files below some directories, which need not exist."""
+    """Return the size [byte] of all files below directories, which need not exist."""
     return sum(
         os.lstat(os.path.join(folder, file)).st_size
         for directory in directories

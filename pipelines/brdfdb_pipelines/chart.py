@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 import brdfdb
 from brdfdb.errors import BrdfdbError, ParameterError
 from brdfdb.forms.catalogue import Form, of_table
-from brdfdb.forms.tradeoff import STEPS, TIMED, Chart, ChartPoint, Charts, FamilyChart, chart, chart_family
+from brdfdb.forms.tradeoff import STEPS, TIMED, Chart, Charts, FamilyChart, chart, chart_family
 from brdfdb.materials import Material, Source
 from brdfdb.measurements import Measured
 from brdfdb.store.family import Family, Sweep
@@ -103,7 +103,7 @@ def _write(stem: Path, document: Charts, drawn: Chart | FamilyChart) -> None:
 
 
 def _subjects(names: Sequence[str], root: Path | None, recipe_path: Path | None) -> list[_Subject | _Family]:
-    """Return what each name means, in the recipe first, and then in the store."""
+    """Return the subject of each name; names in the recipe precede those in the store."""
     recipe = recipe_file.load(recipe_path, to_build=False)
     listed = recipe.jobs()
     jobs = {job.material.name: job for job in listed}
@@ -131,7 +131,10 @@ def _subjects(names: Sequence[str], root: Path | None, recipe_path: Path | None)
             continue
         elif store is not None and name in store.families():
             family = store.family(name)
-            materials = [_material_of(store[member]) for member in family.record.members]
+            sources = [store[member].source for member in family.record.members]
+            materials = [source for source in sources if isinstance(source, Material)]
+            if len(materials) < len(sources):
+                raise BrdfdbError(f"{name}: the family cannot be charted, because a table of it names no known model")
             subjects.append(_Family(family.record, materials, family.wavelength_nm, family))
             continue
         else:
@@ -143,7 +146,8 @@ def _subjects(names: Sequence[str], root: Path | None, recipe_path: Path | None)
 
 def _of_table(table: Table) -> _Subject:
     """Return a table of the store; without a model that can be evaluated, errors are those against the table itself."""
-    source, measured = source_of_table(table), table.metadata.measured
+    source = source_of_table(table)
+    measured = table.metadata.measured
     subject = _Subject(source, table.wavelength_nm)
     if measured is not None:
         print(
@@ -172,21 +176,12 @@ def _with_table(subject: _Subject, table: Table | None) -> _Subject:
 
 
 def _trust(measured: Measured) -> str:
-    """Return how far measured data are to be trusted, in a sentence; empty if nothing is known."""
+    """Return a sentence on the error of measured data; empty if it is not known."""
     held = measured.held_out
     if held is not None:
         return f" The data are within {terminal.error(held.p95)} of 95 % of the samples left out of the interpolation."
     noise = measured.noise
     return "" if noise is None else f" The noise of the data is below {terminal.error(noise.p95)} in 95 of 100 values."
-
-
-def _material_of(table: Table) -> Material:
-    """Return the material behind a table; BrdfdbError where the table does not say."""
-    if not isinstance(table.source, Material):
-        raise BrdfdbError(
-            f"{table.name}: the table does not name a model that is known here, so its family cannot be charted"
-        )
-    return table.source
 
 
 def _print(one: Chart) -> None:
@@ -212,20 +207,19 @@ def _print(one: Chart) -> None:
     for out in one.left_out:
         print(f"  left out: {out.title}: {out.reason}")
     points = {point.key: point for point in one.points}
-    print("  worth having: " + "; ".join(_in_words(points[key]) for key in one.fronts.batch))
+    phrases = []
+    for point in (points[key] for key in one.fronts.batch):
+        off = f"{percent(point.l1)} off in the mean, p99 {percent(point.p99)}"
+        error = "the truth" if point.l1 == 0.0 else off
+        faster = ""
+        if point.saving is not None:
+            faster = f", {terminal.count(float(f'{point.saving.times:.2g}'))} times as fast as {point.rung}"
+        phrases.append(f"{point.title} ({terminal.count(point.batch.ns)} ns{faster}, {error})")
+    print(f"  worth having: {'; '.join(phrases)}")
     heads = ("variance", "ns a sample", "ms to 1 %")
     work = tuple(f"{problem}: {head}" for problem in ("albedo", "sphere") for head in heads)
     rows = [(sampler.title, *chart_picture.works(sampler)) for sampler in one.samplers]
     terminal.print_table(f"{one.material}: samplers, noise and time", ("sampler", *work), rows, numbers=work)
-
-
-def _in_words(point: ChartPoint) -> str:
-    """Return the title of a form with its time, its speed and its error."""
-    off = f"{percent(point.l1)} off in the mean, p99 {percent(point.p99)}"
-    error = "the truth" if point.l1 == 0.0 else off
-    faster = "" if point.saving is None else f", {terminal.count(float(f'{point.saving.times:.2g}'))} times as fast as"
-    rung = f"{faster} {point.rung}" if faster else ""
-    return f"{point.title} ({terminal.count(point.batch.ns)} ns{rung}, {error})"
 
 
 def _print_family(family: FamilyChart) -> None:
@@ -262,7 +256,7 @@ def _print_family(family: FamilyChart) -> None:
 
 
 def _where(family: FamilyChart, members: Sequence[int]) -> str:
-    """Return the part of a family that some members lie in, in words."""
+    """Return the ranges of the parameters of members in words."""
     points = list(itertools.product(*family.axes.values()))
     spans = []
     for number, axis in enumerate(family.axes):
@@ -270,7 +264,8 @@ def _where(family: FamilyChart, members: Sequence[int]) -> str:
         least, most = min(inside), max(inside)
         spans.append(f"{axis} {least:g} to {most:g}" if least < most else f"{axis} {least:g}")
     if family.diagnostic is not None:
-        symbol, inside = family.diagnostic.symbol, [family.diagnostic.values[index] for index in members]
+        symbol = family.diagnostic.symbol
+        inside = [family.diagnostic.values[index] for index in members]
         least, most = min(inside), max(inside)
         spans.append(f"{symbol} {least:g} to {most:g}" if least < most else f"{symbol} {least:g}")
     return f"at {len(members)} of {len(points)} members, {', '.join(spans)}"

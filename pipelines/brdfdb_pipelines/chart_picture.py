@@ -326,12 +326,15 @@ def _labelled(axes: Axes, labels: Sequence[_PointLabel]) -> None:
         taken.append(TextBox.at(point, best, width))
         chosen.append(best)
     for index, (label, point, best) in enumerate(zip(labels, at, chosen, strict=True)):
-        text, number, width = label.least, len(at) + index, label.width(label.full)
+        text = label.least
+        number = len(at) + index
+        width = label.width(label.full)
         others = [*taken[:number], *taken[number + 1 :]]
         near = [offset for offset in offsets(width) if abs(offset.y) <= _NEAR]
         free = [offset for offset in near if TextBox.at(point, offset, width).hidden(others, frame) == 0.0]
         if free:
-            text, best = label.full, free[0]
+            text = label.full
+            best = free[0]
             taken[number] = TextBox.at(point, best, width)
         width = label.width(text)
         side = min(max(-best.x / width, 0.0), 1.0)  # side of the text that is next to its point: left, middle or right
@@ -460,7 +463,8 @@ def _panel(axes: Axes, chart: Chart, panel: _CostPanel, *, named: bool) -> None:
         rungs = [(costs[key][1], _height_of(points[key].l1)) for key in chart.ladder]
         axes.plot(*zip(*rungs, strict=True), color=TRUTH, linestyle=(0, (4, 2)), linewidth=1.0, zorder=1.5)
     for key, point in points.items():
-        mark, y = _MARKS[point.kind], _height_of(point.l1)
+        mark = _MARKS[point.kind]
+        y = _height_of(point.l1)
         first, centre, last = costs[key]
         line: dict[str, Any] = {"color": mark.colour, "zorder": 2, "clip_on": False}
         axes.plot([centre, centre], [y, max(y, point.p99)], linewidth=0.7, alpha=0.55, **line)
@@ -496,7 +500,7 @@ def _family(family: FamilyChart) -> Canvas:
         family.title,
         f"{subtitle} Large: worth having there. Times are those of one member.",
     )
-    tails = _LEFT + _MEAN + _NAMES
+    tails_left = _LEFT + _MEAN + _NAMES
     for number, axis in enumerate(family.axes):
         top = _FAMILY_ABOVE + number * _FAMILY_ROW
         mean = sheet.axes(_LEFT, top, _MEAN)
@@ -507,15 +511,28 @@ def _family(family: FamilyChart) -> Canvas:
             _headed(mean, "mean error")
         else:
             _diagnostic(mean, family.axes[axis], family.diagnostic)
-        high = sheet.axes(tails, top, _TAIL)
+        high = sheet.axes(tails_left, top, _TAIL)
         _sweep(high, family, axis, lambda curve: curve.p99, None if family.between is None else family.between.p99)
         _headed(high, "99th percentile")
         high.tick_params(labelleft=False)
-    left = tails + _TAIL + 2.0 * _GAP
+    left = tails_left + _TAIL + 2.0 * _GAP
     _family_costs(sheet.axes(left, _FAMILY_ABOVE, _WIDTH - _RIGHT - left), family)
     bar = Line2D([], [], color=MUTED, linewidth=3.0, alpha=0.3, label="from the least to the most of the members")
     sheet.legend({form.kind for form in forms}, [bar], bottom)
-    sheet.table(_FAMILY_COLUMNS, _FAMILY_HEADS, [_family_row(family, form) for form in forms], bottom + _BELOW)
+    rows = []
+    for form in forms:
+        times = terminal.count(form.batch.ns), terminal.count(form.single.ns)
+        if isinstance(form, BetweenMembers):
+            rows.append(_Row(form, ("", percent(form.l1), "", "", percent(form.p99), *times, ""), False))
+            continue
+        means, tails = ([v for v in values if v is not None] for values in (form.l1, form.p99))
+        errors = (percent(min(means)), percent(float(np.median(means))), percent(max(means)))
+        close = sum(v <= CLOSE for v in means)
+        fronts = sum(form.key in front for front in family.fronts)
+        within, worth = (f"{number} of {len(family.members)}" if number else "" for number in (close, fronts))
+        cells = (*errors, within, percent(float(np.median(tails))), *times, worth)
+        rows.append(_Row(form, cells, fronts > 0))
+    sheet.table(_FAMILY_COLUMNS, _FAMILY_HEADS, rows, bottom + _BELOW)
     return sheet.canvas
 
 
@@ -536,7 +553,8 @@ def _sweep(
     members = along(family, axis)
     used: Counter[str] = Counter()
     for curve in family.curves:
-        mark, values = _MARKS[curve.kind], errors(curve)
+        mark = _MARKS[curve.kind]
+        values = errors(curve)
         rows = [[v for index in alike if (v := values[index]) is not None] for alike in members]
         drawn = [index for index, row in enumerate(rows) if row]
         at = [x[index] for index in drawn]
@@ -620,7 +638,8 @@ def apart(wanted: Sequence[float], least: float, most: float) -> list[float]:
     """Return increasing heights, moved as little as possible to be `least` apart and between 0 and `most`."""
     blocks: list[tuple[float, int]] = []  # names that touch: position of the first, and their number
     for index, height in enumerate(wanted):
-        start, number = height - least * index, 1
+        start = height - least * index
+        number = 1
         while blocks and blocks[-1][0] > start:
             before, several = blocks.pop()
             start = (before * several + start * number) / (several + number)
@@ -639,7 +658,8 @@ def _family_costs(axes: Axes, family: FamilyChart) -> None:
         forms.append((family.between, [family.between.l1]))
     _cost_axes(axes, [t for form, _ in forms for t in (form.batch.low, form.batch.high)], [_HIGHEST / 2.0])
     for number, (form, values) in enumerate(forms, 1):
-        mark, ns = _MARKS[form.kind], form.batch.ns
+        mark = _MARKS[form.kind]
+        ns = form.batch.ns
         heights = [_height_of(value) for value in values if value is not None]
         y = float(np.median(heights))
         bold = any(form.key in front for front in family.fronts)
@@ -652,15 +672,3 @@ def _family_costs(axes: Axes, family: FamilyChart) -> None:
     axes.set_xlabel("ns a value, many directions at once")
     _headed(axes, "mean error over cost")
     axes.tick_params(labelleft=False)
-
-
-def _family_row(family: FamilyChart, form: FamilyCurve | BetweenMembers) -> _Row:
-    times = terminal.count(form.batch.ns), terminal.count(form.single.ns)
-    if isinstance(form, BetweenMembers):
-        return _Row(form, ("", percent(form.l1), "", "", percent(form.p99), *times, ""), False)
-    means, tails = ([v for v in values if v is not None] for values in (form.l1, form.p99))
-    errors = (percent(min(means)), percent(float(np.median(means))), percent(max(means)))
-    close = sum(v <= CLOSE for v in means)
-    fronts = sum(form.key in front for front in family.fronts)
-    within, worth = (f"{number} of {len(family.members)}" if number else "" for number in (close, fronts))
-    return _Row(form, (*errors, within, percent(float(np.median(tails))), *times, worth), fronts > 0)

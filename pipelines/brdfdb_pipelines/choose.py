@@ -52,7 +52,7 @@ TIMED = 20_000  # pairs of directions of a material for timing, drawn from those
 SEED = 1992
 ROUNDS = 7  # rounds of timing
 FINER = 2  # width, relative to the picture, of the finer picture with one checked place per pixel
-EDGES = 4000  # places near edges where forms are compared, and as many others where choices are checked
+EDGES = 4000  # places near edges at which forms are compared; choices are checked at as many other places
 
 TIMES = 2.0  # end of the colour bar, relative to the tolerance
 BEYOND = "#e5341a"  # colour of larger differences
@@ -108,7 +108,8 @@ def run(
     StoreError
         If the store cannot be written or is no store: before any work.
     """
-    scene, made = load(name), False
+    scene = load(name)
+    made = False
     try:
         check_feasible(scene.tolerance)  # before minutes of work, like the store
         made = store is not None and make_store(store)
@@ -193,7 +194,7 @@ def _run(
 def _checks(
     scene: Scene, view: CameraView, offered: Mapping[str, Sequence[OfferedForm]], materials: Mapping[str, Reflector]
 ) -> _Checks:
-    """Return the places of a scene: those of the picture, and for each check others. A recorded scene has no others."""
+    """Return the places of the picture, and a function of new places for each check; a recorded scene has none."""
     truths = {key: forms[0] for key, forms in offered.items()}
     picture = Seen(scene, view, truths, materials)
     if isinstance(scene.objects[0].shape, Recorded):
@@ -263,7 +264,7 @@ def _draw(
 
 def _print(choice: SceneChoice, built: Mapping[str, PublishedChoice]) -> None:
     """Print the choices as a table, their reasons, and the tables that were published."""
-    numbers = ("alone", "together", "largest", "ns", "bytes", "share of the truth")
+    numbers = ("error alone", "error together", "largest error", "ns", "bytes", "share of the truth")
     rows = [
         (
             one.material,
@@ -362,18 +363,21 @@ def png(seen: Seen, choice: Array, cheaper: Array | None, left_out: Sequence[str
     height, width = seen.truth.shape[:2]
     times = max(1, round(_PANEL / width))
     across, down = times * width, times * height
-    wide, high = 3 * across + 4 * _GAP, 2 * (down + _TITLE) + 2 * _GAP
+    wide = 3 * across + 4 * _GAP
+    high = 2 * (down + _TITLE) + 2 * _GAP
     canvas = Figure(figsize=(wide / _DPI, high / _DPI), dpi=_DPI, facecolor="white")
 
     def panel(column: int, row: int, title: str, size: tuple[int, int] = (across, down)) -> Axes:
-        left, top = _GAP + column * (across + _GAP), (row + 1) * _TITLE + row * (down + _GAP)
+        left = _GAP + column * (across + _GAP)
+        top = (row + 1) * _TITLE + row * (down + _GAP)
         axes = canvas.add_axes((left / wide, 1.0 - (top + size[1]) / high, size[0] / wide, size[1] / high))
         axes.set_title(title, **_TEXT)
         return axes
 
     tolerance = seen.scene.tolerance
     most = TIMES * tolerance.value
-    scale, colours = Normalize(0.0, most), mpl.colormaps["viridis"].with_extremes(over=BEYOND)
+    scale = Normalize(0.0, most)
+    colours = mpl.colormaps["viridis"].with_extremes(over=BEYOND)
     last = "nothing is cheaper" if cheaper is None else "next cheaper of each material"
     images = (("truth", seen.truth), ("choice", choice), (last, cheaper))
     for column, (title, picture) in enumerate(images):

@@ -39,7 +39,7 @@ _MODELS = "files of models"  # begins the names under which parsers keep --model
 _EPILOG = f"""\
 exit codes:
   0    done
-  {VIOLATED}    audit: an unknown violation, or a table that cannot be judged; export --strict: an inaccurate file
+  {VIOLATED}    a new violation (audit, import), an unjudged table (audit), or an inaccurate file (export --strict)
   {REFUSED}    refused or impossible; stderr has the reason: bad input, a damaged store, a full disk, a missing extra
   {BUG}   a bug of brdfdb; stderr names the file with the traceback
   {INTERRUPTED}  interrupted by Ctrl-C
@@ -53,7 +53,7 @@ class _Parser(argparse.ArgumentParser):
     def __init__(self, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **options)
         group = self.add_argument_group("options of every command")
-        # A default of a command, or a name that it shares, would replace what stands before the command
+        # A default, or the same name in the parser of a command, would replace the value given before the command
         group.add_argument(
             "--debug", action="store_true", default=argparse.SUPPRESS, help="also print the traceback of an error"
         )
@@ -78,7 +78,7 @@ class _Parser(argparse.ArgumentParser):
 
 
 class _Version(argparse.Action):
-    """Print the version; the metadata of the distribution is read for this option alone."""
+    """Print the version; only this option reads the metadata of the distribution."""
 
     def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
         import brdfdb
@@ -132,15 +132,19 @@ def _sigterm_as_ctrl_c() -> Iterator[list[int]]:
 def _run(options: argparse.Namespace, arguments: Sequence[str]) -> int:
     """Run the command and return its exit code; errors become sentences."""
     try:
-        _add_models(options)
+        files = [file for name, files in vars(options).items() if name.startswith(_MODELS) for file in files]
+        if files:  # before or after the command
+            from brdfdb.models import MODELS
+
+            MODELS.add_files(files)
         with _telling_of_compilation(_command(arguments)):
             code: int = options.run(options)
-        sys.stdout.flush()  # a reader that left shows here, not at exit
+        sys.stdout.flush()  # if the reader of the output has closed it, the error occurs here and not at exit
         return code
     except KeyboardInterrupt:
         print("brdfdb: interrupted", file=sys.stderr)
         return INTERRUPTED
-    except BrokenPipeError:  # the reader of our output has seen enough
+    except BrokenPipeError:  # the reader of the output has closed it
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except Exception as error:
@@ -179,19 +183,10 @@ def _parser(arguments: Sequence[str] | None = None) -> argparse.ArgumentParser:
     for name, command in commands().items():
         first_sentence = command.HELP.partition(". ")[0].rstrip(".")
         subparser = subparsers.add_parser(name, help=f"{first_sentence}.", description=command.HELP)
-        if arguments is None or name in arguments:  # some import a room of the library
+        if arguments is None or name in arguments:  # some of these functions import a part of the library
             command.add_arguments(subparser)
         subparser.set_defaults(run=command.run)
     return parser
-
-
-def _add_models(options: argparse.Namespace) -> None:
-    """Add the models of the files that stand before or after the command."""
-    files = [file for name, files in vars(options).items() if name.startswith(_MODELS) for file in files]
-    if files:
-        from brdfdb.models import MODELS
-
-        MODELS.add_files(files)
 
 
 def _refusal(error: Exception) -> str | None:

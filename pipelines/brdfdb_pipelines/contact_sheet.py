@@ -113,7 +113,8 @@ def sheet(papers: Mapping[str, Sequence[BaseTable]], spheres: Mapping[str, Array
     count = sum(map(len, papers.values()))
     page.write(_MARGIN, 36, f"{count} materials" if count > 1 else "1 material", 30, _INK)
     page.write(WIDTH - _MARGIN, 50, "brdfdb", 20, _MUTED, align="right")
-    top, corners = _HEADER, {}
+    top = _HEADER
+    corners = {}
     for (paper, tables), cell, tall in zip(papers.items(), cells, heights, strict=True):
         page.write(_MARGIN, top, paper, 16, _MUTED)
         page.rule(top + 26)
@@ -135,17 +136,19 @@ def sheet(papers: Mapping[str, Sequence[BaseTable]], spheres: Mapping[str, Array
         image = np.asarray(colour_science().cctf_decoding(image, function="sRGB"))
     for name, (upper, left) in corners.items():
         part = image[upper : upper + SPHERE, left : left + SPHERE]
-        colour, coverage = spheres[name][..., :3], spheres[name][..., 3:]
+        colour = spheres[name][..., :3]
+        coverage = spheres[name][..., 3:]
         part += coverage * (colour - part)
     return image
 
 
 def colour_known(table: BaseTable) -> str:
-    """Return words for a table whose colour is not known: grey, with its wavelengths; empty for a colour.
+    """Return words for a table without a colour: grey, with its wavelengths; empty for a table with a colour.
 
     A table so dark that its sphere is black has the bound of its albedo in place of "grey".
     """
-    stored, largest = table.wavelength_nm, table.metadata.largest_albedo
+    stored = table.wavelength_nm
+    largest = table.metadata.largest_albedo
     if stored is not None and picture_wavelengths(stored) is not None:
         return ""
     dark = largest is not None and largest.albedo is not None and largest.albedo < _DARK
@@ -208,7 +211,8 @@ class _Page:
 
     def rule(self, y: float) -> None:
         """Draw a line across the page."""
-        ends, level = [_MARGIN / WIDTH, 1.0 - _MARGIN / WIDTH], 1.0 - y / self._height
+        ends = [_MARGIN / WIDTH, 1.0 - _MARGIN / WIDTH]
+        level = 1.0 - y / self._height
         self._figure.add_artist(Line2D(ends, [level, level], color=_LINE, linewidth=1.0))
 
     def drawn(self) -> Array:

@@ -141,8 +141,8 @@ def run(
 
 def lines(conversion: Conversion) -> list[str]:
     """Return the lines that the command prints."""
-    made, was = conversion.material, conversion.source_model or "no model"
-    text = [f"{conversion.source} ({was}) as {conversion.model}", "  parameters"]
+    made = conversion.material
+    text = [f"{conversion.source} ({conversion.source_model or 'no model'}) as {conversion.model}", "  parameters"]
     in_file = made.file_parameters()
     fixed = set(conversion.fixed)
     for parameter in made.spec.parameters:
@@ -193,13 +193,15 @@ def _drawn(figure: Figure) -> Canvas:
     panels = [panel for panel in figure.panels if isinstance(panel, Panel)]
     rows = -(-len(panels) // _COLUMNS)
     each_row = _ABOVE + _PLOT + _BELOW
-    width, height = _COLUMNS * _WIDTH, _HEAD + rows * each_row
+    width = _COLUMNS * _WIDTH
+    height = _HEAD + rows * each_row
     canvas = Canvas(figsize=(width / 72.0, height / 72.0), facecolor="white")
     canvas.text(8.0 / width, 1.0 - 8.0 / height, figure.title, va="top", fontsize=12, fontweight="bold")
     canvas.text(8.0 / width, 1.0 - 25.0 / height, figure.caption, va="top")
     for number, panel in enumerate(panels):
         row, column = divmod(number, _COLUMNS)
-        left, top = column * _WIDTH, _HEAD + row * each_row
+        left = column * _WIDTH
+        top = _HEAD + row * each_row
         below = 1.0 - (top + _ABOVE + _PLOT) / height
         axes = canvas.add_axes(((left + _LEFT) / width, below, (_WIDTH - _LEFT - _RIGHT) / width, _PLOT / height))
         axes.tick_params(length=0)

@@ -66,12 +66,12 @@ def run(
     write = partial(_write, root, directory, file_format, options, verdicts)
     exports: list[_Export] = []
     pool = workers.threads(jobs) if len(revisions) <= _FEW else workers.processes(jobs, patient=False)
-    with terminal.progress() as bar, pool as some:
+    with terminal.progress() as bar, pool as opened:
         try:
-            results = some.executor.map(write, revisions)
+            results = opened.executor.map(write, revisions)
             exports += bar.track(results, total=len(revisions), description="exporting tables")
         except BaseException:
-            some.executor.shutdown(cancel_futures=True)
+            opened.executor.shutdown(cancel_futures=True)
             raise
     refusals = [export.refusal for export in exports if export.refusal]
     within = not any(export.files for export in exports) or _report(exports, directory, file_format)
@@ -88,7 +88,9 @@ def _write(
     root: Path, directory: Path, file_format: str, options: Mapping[str, Any], verdicts: Mapping[str, str], name: str
 ) -> _Export:
     """Write the files of one material."""
-    exporter, table, verdict = EXPORTERS[file_format], brdfdb.open(root)[name], verdicts.get(name, NOT_AUDITED)
+    exporter = EXPORTERS[file_format]
+    table = brdfdb.open(root)[name]
+    verdict = verdicts.get(name, NOT_AUDITED)
     kinds = (options["kind"],) if "kind" in options else exporter.kinds
     paths = [(directory / f"{name}_{kind}{exporter.suffix}", {"kind": kind}) for kind in kinds]
     files: list[Written] = []
@@ -96,7 +98,7 @@ def _write(
         for path, kind in paths or [(directory / f"{name}{exporter.suffix}", {})]:
             written = exporter.write(table, path, verdict=verdict, **{**options, **kind})
             files.append(replace(written, remarks=(*written.remarks, *extrapolated_remark(table))))
-    except (CannotHoldError, ParameterError) as error:  # options that some tables cannot have
+    except (CannotHoldError, ParameterError) as error:  # also for an option that the table does not allow
         return _Export(name, files, str(error) if name in str(error) else f"{name}: {error}")
     return _Export(name, files)
 
@@ -116,8 +118,9 @@ def _verdicts(root: Path, audit: Path | None, revisions: Mapping[str, str]) -> d
 def _report(exports: list[_Export], directory: Path, file_format: str) -> bool:
     """Print what was written, and what is beyond its tolerance; return True if nothing is beyond."""
     written = [(export.name, files) for export in exports for files in export.files]
-    beside, total = sum(len(files.paths) - 1 for _, files in written), sum(files.nbytes for _, files in written)
-    others = f" and {beside} more" if beside else ""
+    more_files = sum(len(files.paths) - 1 for _, files in written)
+    total = sum(files.nbytes for _, files in written)
+    others = f" and {more_files} more" if more_files else ""
     print(f"{counted(len(written), f'{file_format.upper()} file')}{others}, {terminal.size(total)}, in {directory}")
     stated = [(files.error.document()["p99"], files.paths[0].name) for _, files in written if files.error is not None]
     if stated:
@@ -127,7 +130,8 @@ def _report(exports: list[_Export], directory: Path, file_format: str) -> bool:
     if statements := [(statement, name) for statement, name in known if statement is not None]:
         whole, file = max(statements, key=lambda item: item[0].p98)
         rows = whole.places
-        light, horizon = max(rows.alongside), max(rows.one_grazing + rows.both_grazing)
+        light = max(rows.alongside)
+        horizon = max(rows.one_grazing + rows.both_grazing)
         print(
             f"error relative to {whole.against}, with that of the table: 98 % of the values within {_share(whole.p98)} "
             f"({file}), near the light {_share(light)}, next to the horizon {_share(horizon)}"

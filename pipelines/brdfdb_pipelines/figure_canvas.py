@@ -46,7 +46,7 @@ def svg(draw: Callable[[], Canvas], description: str) -> str:
     with mpl.rc_context(_STYLE):
         text = io.StringIO()
         draw().savefig(text, format="svg", metadata=_WITHOUT_DATE)
-    opening, rest = _with_few_ids(_shortened(text.getvalue())).split(">", 1)
+    opening, rest = _shortened(text.getvalue()).split(">", 1)
     described = html.escape(description)
     plate = '<rect width="100%" height="100%" fill="#fff"/>'
     return f'{opening} font-family="sans-serif" role="img" aria-label="{described}">{plate}{rest}\n'
@@ -61,7 +61,10 @@ def png(draw: Callable[[], Canvas]) -> bytes:
 
 
 def _shortened(text: str) -> str:
-    """Return an SVG of matplotlib from its first tag on, without invisible parts and with one decimal per point."""
+    """Return an SVG of matplotlib from its first tag on, without invisible parts and unused ids.
+
+    Points have one decimal.
+    """
     text = text[text.index("<svg") :]
     for invisible in _INVISIBLE:
         text = re.sub(invisible, "", text, flags=re.DOTALL)
@@ -76,11 +79,7 @@ def _shortened(text: str) -> str:
             text = re.sub(r"(?<=\d) L ", " ", text)  # a path repeats its last command: L of a line, not that of a curve
         return text.replace(": ", ":").replace("; ", ";").replace(' "', '"')
 
-    return re.sub(r"<[^>]+>", short, text)
-
-
-def _with_few_ids(text: str) -> str:
-    """Return an SVG in which only elements that others refer to have ids."""
+    text = re.sub(r"<[^>]+>", short, text)
     used = set(re.findall(r'(?:url\(|href=")#([^)"]+)', text))
     text = re.sub(r' id="([^"]*)"', lambda m: f' id="c-{m[1]}"' if m[1] in used else "", text)
     text = re.sub(r'(url\(|href=")#', r"\1#c-", text)

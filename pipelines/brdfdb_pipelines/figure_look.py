@@ -68,7 +68,8 @@ class Tick(NamedTuple):
 
 def styles_of(curves: Sequence[Curve]) -> list[LineStyle]:
     """Return the style of each curve: that of its role, or the next of the cycle."""
-    styles, others = [], 0
+    styles = []
+    others = 0
     used: Counter[Role] = Counter()
     for curve in curves:
         if curve.role == "other":
@@ -92,7 +93,8 @@ def limits_of(values: Iterable[float | None], which: Literal["x", "y"], *, log: 
         pad = (high / low) ** (0.04 if which == "y" else 0.0)
         return Limits(low / pad, high * pad)
     if low == high:
-        low, high = low - 0.5, high + 0.5
+        low = low - 0.5
+        high = high + 0.5
     if which == "x":
         return Limits(low, high)
     if 0.0 <= low < 0.5 * high:

@@ -87,7 +87,7 @@ class _Axis(NamedTuple):
     log: bool
 
     def at(self, values: Floats) -> Floats:
-        """Return the positions of values; what has no logarithm lies far before the beginning."""
+        """Return the positions of values; values without a logarithm are far before the beginning."""
         low, high = self.limits
         if self.log:
             low, high = math.log(low), math.log(high)
@@ -157,8 +157,9 @@ def _polar(panel: Panel, key: str) -> str:
     box = _box(panel.title, panel.curves, _POLAR_HEIGHT, _POLAR_BELOW)
     box = box._replace(left=6.0, right=WIDTH - 6.0)
     rings = rings_of(max((y for curve in panel.curves for y in curve.y if y is not None), default=0.0))
-    radius = min((box.right - box.left) / 2.2, (box.bottom - box.top) / 1.18)  # what is beside and below has labels
-    x, y = box.middle, box.top + 1.1 * radius
+    radius = min((box.right - box.left) / 2.2, (box.bottom - box.top) / 1.18)  # labels need the space beside and below
+    x = box.middle
+    y = box.top + 1.1 * radius
     arcs, labels = "", ""
     for ring in rings:
         r = radius * ring / rings[-1]
@@ -175,7 +176,8 @@ def _polar(panel: Panel, key: str) -> str:
     ]
     points = []
     for curve in panel.curves:
-        theta, distance = np.radians(curve.x), array_of(curve.y) * (radius / rings[-1])
+        theta = np.radians(curve.x)
+        distance = array_of(curve.y) * (radius / rings[-1])
         points.append((x + distance * np.sin(theta), y - distance * np.cos(theta)))
     return _whole(panel, box, [*parts, _lines(panel.curves, points, box, key)])
 
@@ -190,7 +192,8 @@ def _map(drawn: Map) -> str:
     low, high = (float(usable.min()), float(usable.max())) if usable.size else (1.0, 10.0)
     name = "viridis"
     if low < 0.0 < high:
-        name, high = "berlin", max(-low, high)
+        name = "berlin"
+        high = max(-low, high)
         low = -high
     if low == high:
         low, high = (low / 2.0, 2.0 * high) if drawn.log else (low - 0.5, high + 0.5)
@@ -248,7 +251,8 @@ def _picture(picture: Picture) -> str:
     grey = np.stack([encoded] * 3 + [np.isfinite(radiance).astype(np.float64)], axis=-1)
     data = _png(np.round(255.0 * grey).astype(np.uint8))
     rows, columns = radiance.shape
-    side, above = 150.0, 16.0 if picture.title else 0.0
+    side = 150.0
+    above = 16.0 if picture.title else 0.0
     height = side * rows / columns
     title = (
         f'<text y="10" style="font-size:7px;font-weight:bold;fill:var(--truth)">{html.escape(picture.title)}</text>'
@@ -337,7 +341,8 @@ def _lines(curves: Sequence[Curve], points: Sequence[tuple[Floats, Floats]], box
 
 def _path(x: Floats, y: Floats, *, dots: bool) -> str:
     """Return the path of a line through points, with gaps where one is not finite, or a point at each of them."""
-    path, pen = [], "M"
+    path = []
+    pen = "M"
     for across, down, seen in zip(x.tolist(), y.tolist(), (np.isfinite(x) & np.isfinite(y)).tolist(), strict=True):
         if not seen:
             pen = "M"

@@ -16,7 +16,7 @@ from brdfdb.fitting import published
 from brdfdb.fitting.document import Estimate, Fits
 from brdfdb.fitting.figure import figure_of
 from brdfdb.fitting.fit import INTERRUPTED, fits
-from brdfdb.fitting.published import PublishedFit, PublishedFits
+from brdfdb.fitting.published import PublishedFits
 from brdfdb.fitting.residuals import Kind
 from brdfdb.fitting.surface import fitted_by_default
 from brdfdb.geometry import degrees, radians, versine
@@ -188,7 +188,14 @@ def lines(document: Fits) -> list[str]:
     if reasons:
         text.append(f"  left out: {', '.join(reasons)}")
     text += [f"  note  {sentence}" for sentence in document.remarks]
-    text += _aperture(document)
+    solid_angles = {"receiver": document.receiver_solid_angle_sr, "light": document.source_solid_angle_sr}
+    cones = [
+        f"{name} {2.0 * float(degrees(np.arccos(max(1.0 - known / (2.0 * np.pi), 0.0)))):.3g}°"
+        for name, known in solid_angles.items()
+        if known is not None
+    ]
+    if cones:
+        text.append(f"  averaged over the aperture: {', '.join(cones)}")
     width = max(len(one.model) for one in document.fits)
     text.append(f"  {'model':<{width}}  held out    all   numbers      BIC  albedo")
     for one in document.fits:
@@ -200,7 +207,7 @@ def lines(document: Fits) -> list[str]:
         )
     text.append("  held out, all: rms of ln(model / sample) at the incidences left out of the fit, and at all")
     if document.shared_outlier_count:
-        text.append(f"  both without {counted(document.shared_outlier_count, 'value')} far from every fit")
+        text.append(f"  both are without {counted(document.shared_outlier_count, 'value')} far from every fit")
     text += [
         f"  not fitted: {reason if reason.startswith(name) else f'{name}, {reason}'}"
         for name, reason in document.skipped.items()
@@ -225,17 +232,6 @@ def lines(document: Fits) -> list[str]:
             return [*text, "", _no_recipe(document)]
         return [*text, "", f"best single model of the registry: {single.model}", "", *single.recipe.splitlines()]
     return [*text, "", *best.recipe.splitlines()]
-
-
-def _aperture(document: Fits) -> list[str]:
-    """Return a line on the solid angles that lobes were averaged over, if any is known."""
-    solid_angles = {"receiver": document.receiver_solid_angle_sr, "light": document.source_solid_angle_sr}
-    cones = [
-        f"{name} {2.0 * float(degrees(np.arccos(max(1.0 - known / (2.0 * np.pi), 0.0)))):.3g}°"
-        for name, known in solid_angles.items()
-        if known is not None
-    ]
-    return [f"  averaged over the aperture: {', '.join(cones)}"] if cones else []
 
 
 def _no_recipe(document: Fits) -> str:
@@ -285,7 +281,7 @@ def list_published(
 
 
 def lines_of_published(listed: PublishedFits) -> list[str]:
-    """Return a line for each material, the counts, and what the file does not state."""
+    """Return a line for each material, the counts, and notes on missing conventions of the file."""
     names = list(dict.fromkeys(term.name for one in listed.fits for term in one.terms))
     unphysical = [one for one in listed.fits if one.flags]
     ours = [one for one in listed.fits if one.model is not None]
@@ -293,19 +289,16 @@ def lines_of_published(listed: PublishedFits) -> list[str]:
     if listed.comment:
         text.append(f"  {listed.comment}")
     width = max(len(one.name) for one in listed.fits)
-    text += [f"  {one.name:<{width}}  {_published_line(one)}" for one in listed.fits]
+    for one in listed.fits:
+        numbers = [
+            f"{name} {'/'.join(f'{value:.3g}' for value in values)}"
+            for term in one.terms
+            for name, values in term.numbers.items()
+        ]
+        albedo = "" if one.albedo is None else f"  albedo {one.albedo.value:.3f}"
+        text.append(f"  {one.name:<{width}}  {'  '.join(numbers)}{albedo}")
+        text += [f"    contradicts physics: {sentence}" for sentence in one.flags]
     models = ", ".join(sorted({one.model for one in ours if one.model}))
     counts = f"  {len(unphysical)} of {len(listed.fits)} contradict physics; {len(ours)} are models of the registry"
     text.append(f"{counts} ({models})" if models else counts)
     return [*text, *(f"  note  {sentence}" for sentence in listed.sentences)]
-
-
-def _published_line(one: PublishedFit) -> str:
-    """Return the numbers of a published fit, its albedo, and a line for each contradiction to physics."""
-    numbers = "  ".join(
-        f"{name} {'/'.join(f'{value:.3g}' for value in values)}"
-        for term in one.terms
-        for name, values in term.numbers.items()
-    )
-    albedo = "" if one.albedo is None else f"  albedo {one.albedo.value:.3f}"
-    return f"{numbers}{albedo}" + "".join(f"\n    contradicts physics: {sentence}" for sentence in one.flags)

@@ -243,7 +243,7 @@ class _Read(NamedTuple):
 
 
 def _read(target: ImportTarget, label: str, patience_s: float) -> _Read:
-    """Read the samples of a material; a progress bar appears after some time."""
+    """Read the samples of a material; a progress bar appears after `patience_s` [s]."""
     with terminal.progress(counted=False, transient=True) as bar:
         task = bar.add_task(label, total=1.0, visible=patience_s <= 0.0)
         shown = threading.Timer(max(patience_s, 0.0), lambda: bar.update(task, visible=True))
@@ -266,8 +266,8 @@ def _named(targets: Sequence[ImportTarget], tables: Tables, count: int, result: 
             raise ParameterError(option, f"names a single material, and there are {count}", text)
     materials: dict[str, list[ImportTarget]] = {}
     for target in targets:
-        first, stems = target.files[0], [file.stem for file in target.files]
-        of_files = common_name(stems) or ("" if len(stems) > 1 else first.stem)
+        stems = [file.stem for file in target.files]
+        of_files = common_name(stems) or ("" if len(stems) > 1 else stems[0])
         if not (tables.name or of_files):
             raise ParameterError("--name", f"{target.label} have no word in common; give a name", None)
         name = tables.name or slug(target.keys.get("member", "").removesuffix(".h5") or of_files)
@@ -276,7 +276,7 @@ def _named(targets: Sequence[ImportTarget], tables: Tables, count: int, result: 
                 "--name", f"{name!r} is not made of lower-case letters, digits and single hyphens, 128 at most", name
             )
         if name in presets():
-            raise ParameterError("--name", f"{name!r} is the name of a preset; give {first} another", name)
+            raise ParameterError("--name", f"{name!r} is the name of a preset; give {target.files[0]} another", name)
         title = {} if tables.title is None else {"title": tables.title}
         one = replace(target, name=name, keys={**target.keys, **title})
         assert one.table  # checked before anything is read
@@ -357,10 +357,11 @@ def figures_of(root: Path, report: AuditReport) -> list[ImportedTable]:
     store = Store(root)
     tables = []
     for audited in report.materials:
-        measured, error = store.metadata(audited.material).measured, store[audited.material].error
+        measured = store.metadata(audited.material).measured
+        error = store[audited.material].error
         assert measured is not None
-        seen, uncertainty = measured.reciprocity.asymmetry, measured.uncertainty
-        energy, reciprocity = audited.of(Energy).table, audited.of(Reciprocity)
+        seen = measured.reciprocity.asymmetry
+        energy = audited.of(Energy).table
         wrong = energy.uncertainty
         if wrong is not None and energy.max_albedo is not None and measured.held_out is not None:
             wrong += measured.held_out.l1 * energy.max_albedo
@@ -373,8 +374,8 @@ def figures_of(root: Path, report: AuditReport) -> list[ImportedTable]:
                 1.0 if measured.extrapolated is None else 1.0 - measured.extrapolated,
                 None if seen is None else seen.median,
                 None if seen is None else seen.p99,
-                uncertainty,
-                None if uncertainty is None else reciprocity.verdict == "violates",
+                measured.uncertainty,
+                None if measured.uncertainty is None else audited.of(Reciprocity).verdict == "violates",
                 energy.max_albedo,
                 wrong,
                 energy.max_at_theta_i_deg,
@@ -406,6 +407,7 @@ def summary(tables: Sequence[ImportedTable], report: AuditReport) -> dict[str, A
 def _show(tables: Sequence[ImportedTable], report: AuditReport, tolerance: float) -> None:
     """Print a row for each table, the problems of tables, and the summary."""
     print()
+    shares = ("error_p95", "measured", "asymmetry_median", "asymmetry_p99", "uncertainty")
     numbers = ("table error", "measured", "asymmetry, median", "99 of 100", "uncertainty", "albedo up to")
     terminal.print_table(
         f"Measured tables in {report.store}",
@@ -413,10 +415,7 @@ def _show(tables: Sequence[ImportedTable], report: AuditReport, tolerance: float
         [
             (
                 table.material,
-                *map(
-                    _percent,
-                    (table.error_p95, table.measured, table.asymmetry_median, table.asymmetry_p99, table.uncertainty),
-                ),
+                *(_percent(getattr(table, field)) for field in shares),
                 _albedo(table),
                 table.verdict,
             )

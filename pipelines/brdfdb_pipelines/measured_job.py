@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel, BeforeValidator, Field, ValidationError
 
 from brdfdb import formats
@@ -25,8 +24,8 @@ from brdfdb.store.publication import publish_layout
 from brdfdb.store.records import point_to, read_manifest
 from brdfdb.store.revisions import standing
 from brdfdb.tables.albedo import largest_albedo
-from brdfdb.tables.layout import TABLE_VERSION, Layout
-from brdfdb.tables.measured_layout import tabulated
+from brdfdb.tables.layout import TABLE_VERSION
+from brdfdb.tables.measured_layout import MeasuredLayout, tabulated
 from brdfdb.tables.table import Table
 from brdfdb_pipelines.recipe_grids import STRICT, RecipeError
 
@@ -201,23 +200,23 @@ class MeasuredResult(NamedTuple):
     wavelengths: int = 0
 
 
-class _TabulatedValues(NamedTuple):
-    """The layout of a table, and its values."""
-
-    layout: Layout
-    values: NDArray[np.float32]
+def revision_bytes(root: Path, name: str, revision: str) -> int:
+    """Return the size [byte] of the files of a revision, as its manifest states it."""
+    size: int = read_manifest(revision_path(root, name, revision), None).content["summary"]["bytes"]
+    return size
 
 
 def build_measured(root: str, job: MeasuredJob) -> MeasuredResult:
     """Build the table of a job unless the store has it: a task for a worker."""
-    store, request = Path(root), job.request
+    store = Path(root)
+    request = job.request
     status = standing(store, job.name, request)
     if status.state == "adoptable":
         with Lock(store, job.name), writing(store, job.name):
             point_to(material_path(store, job.name), status.revision)
     if status.state != "missing":
-        stored = read_manifest(revision_path(store, job.name, status.revision), None).content["summary"]["bytes"]
         state = "unchanged" if status.state == "current" else "adopted"
+        stored = revision_bytes(store, job.name, status.revision)
         return MeasuredResult(state, status.revision, stored, status.why)
     try:
         layout, values = _tabulated(job)
@@ -231,7 +230,7 @@ def build_measured(root: str, job: MeasuredJob) -> MeasuredResult:
     return MeasuredResult("published", published.revision, published.bytes, status.why, shape, wavelengths)
 
 
-def _tabulated(job: MeasuredJob) -> _TabulatedValues:
+def _tabulated(job: MeasuredJob) -> MeasuredLayout:
     """Tabulate the data, made reciprocal or energy-conserving where the job asks for it.
 
     Interpolation can raise an albedo above 1 again: the data are then darkened further, in at most `_MARGINS` steps.
@@ -241,13 +240,13 @@ def _tabulated(job: MeasuredJob) -> _TabulatedValues:
     if job.table.reciprocal:
         source = source.made("reciprocal")
     if not job.table.conserving:
-        return _TabulatedValues(*tabulated(source, wavelength_nm, job.tolerance))
+        return tabulated(source, wavelength_nm, job.tolerance)
     margin = MARGIN
     for _ in range(_MARGINS):
         made = source.made("conserving", margin)
-        layout, values = tabulated(made, wavelength_nm, job.tolerance)
-        largest = largest_albedo(Table.of(layout, values), made)
+        table = tabulated(made, wavelength_nm, job.tolerance)
+        largest = largest_albedo(Table.of(*table), made)
         if not largest.above_1:
             break
         margin += 1.1 * ((largest.albedo or 2.0) - 1.0)
-    return _TabulatedValues(layout, values)
+    return table

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,7 +31,7 @@ from brdfdb.models import MODELS
 from brdfdb.parameters import closest
 from brdfdb.store.family import Sweep
 from brdfdb.store.paths import NAME
-from brdfdb.tables.grids import Axis, Grid, check_wavelengths
+from brdfdb.tables.grids import Grid, check_wavelengths
 from brdfdb.tables.layout import TABLE_VERSION, Interpolation, Layout, digest, over_wavelengths
 from brdfdb.tables.mixture import refined_wavelengths
 from brdfdb.tables.planner import PLAN_VERSION, coarsest, offset_of, planned
@@ -53,6 +53,13 @@ def _known_library(name: str) -> str:
     if name not in names:
         raise ValueError(f"{name!r} is not one of {', '.join(names)}")
     return name
+
+
+class _Selected(NamedTuple):
+    """A material that a recipe selects, and the family that it is a member of, with its parameters there."""
+
+    material: Material
+    family: Mapping[str, Any] | None = None
 
 
 @dataclass(frozen=True)
@@ -88,7 +95,8 @@ class Job:
 
     def _unpolarised(self) -> tuple[Layout, NDArray[np.float32] | None]:
         if self.grid is not None:
-            method, logarithm = self.interpolation.removeprefix("log-"), self.interpolation.startswith("log-")
+            method = self.interpolation.removeprefix("log-")
+            logarithm = method != self.interpolation
             offset = offset_of(self.material, self.wavelength_nm) if logarithm else 0.0
             how = Interpolation(method, logarithm, offset, wavelengths=over_wavelengths(self.material))
             return Layout(self.material, self.grid, self.wavelength_nm, interpolation=how), None
@@ -217,7 +225,12 @@ class Recipe(BaseModel):
             )
         given = {} if self.grids is None else {name: grid for name, grid in self.grids if grid is not None}
         grids = {name: self._grid(grid, name) for name, grid in given.items()}
-        wavelengths = self._wavelengths()
+        wavelengths = None
+        if self.wavelengths_nm:
+            try:
+                wavelengths = check_wavelengths(nodes_of("wavelengths_nm", self.wavelengths_nm))
+            except ParameterError as error:
+                raise RecipeError(error.parameter, error.sentence) from None
         jobs = []
         selected = self._selected()
         if self.polarised and self._measured:
@@ -253,14 +266,6 @@ class Recipe(BaseModel):
             jobs.append(job)
         return jobs
 
-    def _wavelengths(self) -> Axis | None:
-        if not self.wavelengths_nm:
-            return None
-        try:
-            return check_wavelengths(nodes_of("wavelengths_nm", self.wavelengths_nm))
-        except ParameterError as error:
-            raise RecipeError(error.parameter, error.sentence) from None
-
     def _grid(self, grid: BaseModel, name: str) -> Grid:
         parts: dict[str, list[float | Range]] = dict(grid)
         try:
@@ -291,10 +296,8 @@ class Recipe(BaseModel):
                 )
         return sweeps
 
-    def _selected(self) -> list[tuple[Material, dict[str, Any] | None]]:
-        """Return the selected materials, each with the family that it is a member of, or None."""
-        known: dict[str, tuple[Material, dict[str, Any] | None]]
-        known = {name: (material, None) for name, material in presets(self.library).items()}
+    def _selected(self) -> list[_Selected]:
+        known = {name: _Selected(material) for name, material in presets(self.library).items()}
         for name, table in self.define.items():
             if name in known:
                 raise RecipeError(f"define.{name}", "is the name of a preset; choose another name")
@@ -303,7 +306,7 @@ class Recipe(BaseModel):
                     raise RecipeError(f"define.{name}", "is not made of lower-case letters, digits and single hyphens")
                 continue
             try:
-                known[name] = Material.from_table(name, table, self._folder), None
+                known[name] = _Selected(Material.from_table(name, table, self._folder))
             except MaterialError as error:
                 raise RecipeError(f"define.{name}", f"{error.parameter}: {error.sentence}") from None
         families: dict[str, list[str]] = {}
@@ -316,13 +319,13 @@ class Recipe(BaseModel):
                     f"the lists make {count} members; the families of a recipe have at most {_MOST_MEMBERS} in total",
                 )
         for name, table in self.sweep.items():
-            members = {material.name: (material, family) for material, family in _members(name, table, self._folder)}
+            members = {member.material.name: member for member in _members(name, table, self._folder)}
             for taken in (name, *members):
                 if taken in known or taken in families:
                     raise RecipeError(f"sweep.{name}", f"{taken!r} is the name of another material or family")
             known |= members
             families[name] = list(members)
-        chosen: dict[str, tuple[Material, dict[str, Any] | None]] = {}
+        chosen: dict[str, _Selected] = {}
         measured = {name: table for name, table in self.define.items() if "samples" in table}
         files: dict[str, MeasuredJob] = {}
         for pattern in self.materials:
@@ -338,23 +341,28 @@ class Recipe(BaseModel):
         return list(chosen.values())
 
 
+def _parameters_of(model: Any) -> list[str]:
+    """Return the parameters of a model as recipes write them; none if there is no such model."""
+    known = isinstance(model, str) and model in MODELS
+    return [written_name(parameter) for parameter in MODELS[model].parameters] if known else []
+
+
 def _swept(name: str, table: Mapping[str, Any]) -> dict[str, list[float]]:
     """Return the values of the swept parameters, which are lists, in the order of the model."""
-    parameters, model = table.get("parameters"), table.get("model")
+    parameters = table.get("parameters")
     where = f"sweep.{name}.parameters"
     lists = {x: v for x, v in parameters.items() if isinstance(v, list)} if isinstance(parameters, dict) else {}
     if not lists:
         raise RecipeError(where, "give a list of numbers for at least one parameter")
     if len(lists) > _MOST_SWEPT:
         raise RecipeError(where, f"{len(lists)} parameters are lists; at most {_MOST_SWEPT} are allowed")
-    known = [written_name(p) for p in MODELS[model].parameters] if isinstance(model, str) and model in MODELS else []
+    known = _parameters_of(table.get("model"))
     axes = {}
     for x in sorted(lists, key=lambda x: known.index(x) if x in known else len(known)):
         try:
             parts = LIST.validate_python(lists[x])
         except ValidationError as error:
-            field, message = _first(error)
-            raise RecipeError(f"{where}.{x}{field and f'.{field}'}", message) from None
+            raise _refusal(error, f"{where}.{x}") from None
         values = [float(f"{value:.12g}") for value in nodes_of(f"{where}.{x}", parts)]  # 0.3, not 0.1 + 0.1 + 0.1
         if len(values) < 2:
             raise RecipeError(f"{where}.{x}", "needs a list of at least two values")
@@ -364,33 +372,25 @@ def _swept(name: str, table: Mapping[str, Any]) -> dict[str, list[float]]:
     return axes
 
 
-def _members(name: str, table: Mapping[str, Any], folder: Path | None) -> list[tuple[Material, dict[str, Any]]]:
-    """Return the materials of a sweep, the last parameter varying fastest, each with its place in the family."""
+def _members(name: str, table: Mapping[str, Any], folder: Path | None) -> list[_Selected]:
+    """Return the materials of a sweep, the last parameter varying fastest."""
     axes = _swept(name, table)
     width = max(3, len(str(math.prod(map(len, axes.values())))))
     members = []
     for number, values in enumerate(itertools.product(*axes.values()), start=1):
-        member, at = f"{name}-{number:0{width}d}", dict(zip(axes, values, strict=True))
+        member = f"{name}-{number:0{width}d}"
+        at = dict(zip(axes, values, strict=True))
         fields = {**table, "parameters": {**table["parameters"], **at}}
         if isinstance(title := table.get("title"), str) and title:
             fields["title"] = ", ".join([title, *(f"{x} {value:.12g}" for x, value in at.items())])
         try:
-            members.append((Material.from_table(member, fields, folder), {"name": name, "parameters": at}))
+            material = Material.from_table(member, fields, folder)
         except MaterialError as error:
-            written = (
-                [written_name(p) for p in MODELS[table["model"]].parameters] if table.get("model") in MODELS else []
-            )
-            if error.parameter in (*table["parameters"], *written):
+            if error.parameter in (*table["parameters"], *_parameters_of(table.get("model"))):
                 raise RecipeError(f"sweep.{name}.parameters.{error.parameter}", error.sentence) from None
             raise RecipeError(f"sweep.{name}", f"{error.parameter}: {error.sentence}") from None
+        members.append(_Selected(material, {"name": name, "parameters": at}))
     return members
-
-
-def _completed(content: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a recipe that only defines materials, with a list of them and a tolerance, which nothing will use."""
-    own = [name for kind in ("define", "sweep") if isinstance(content.get(kind), dict) for name in content[kind]]
-    tolerance = {} if "grids" in content else {"tolerance": 0.1}
-    return {"materials": own or ["*"], **tolerance, **content}
 
 
 def load(path: Path | None = None, library: str = PAPERS, *, to_build: bool = True) -> Recipe:
@@ -402,7 +402,11 @@ def load(path: Path | None = None, library: str = PAPERS, *, to_build: bool = Tr
     source = recipe_of(library) if path is None else path
     try:
         content = toml_file.read(source)
-        recipe = Recipe.model_validate(content if to_build else _completed(content))
+        if not to_build:  # a list of materials and a tolerance, which nothing will use
+            kinds = [content[kind] for kind in ("define", "sweep") if isinstance(content.get(kind), dict)]
+            tolerance = {} if "grids" in content else {"tolerance": 0.1}
+            content = {"materials": [name for kind in kinds for name in kind] or ["*"], **tolerance, **content}
+        recipe = Recipe.model_validate(content)
         if path is not None:
             recipe._folder = path.parent
         recipe.jobs()
@@ -411,7 +415,7 @@ def load(path: Path | None = None, library: str = PAPERS, *, to_build: bool = Tr
     except toml_file.TomlError as error:
         refusal = RecipeError("", str(error))
     except ValidationError as error:
-        refusal = RecipeError(*_first(error))
+        refusal = _refusal(error)
     except RecipeError as error:
         refusal = error
     else:
@@ -420,15 +424,15 @@ def load(path: Path | None = None, library: str = PAPERS, *, to_build: bool = Tr
     raise refusal from None
 
 
-def _first(error: ValidationError) -> tuple[str, str]:
-    """Return the first field that pydantic refuses, and its message."""
+def _refusal(error: ValidationError, where: str = "") -> RecipeError:
+    """Return the refusal of the first field that pydantic refuses, below a table of the recipe."""
     # pydantic lists each branch of number | range: a table was meant as a range, whatever else is wrong with it,
     # and the names of the branches are not names of the recipe
     errors = error.errors(include_url=False)
     first = next(item for item in errors if not ("float" in item["loc"][-1:] and isinstance(item["input"], dict)))
     field = ".".join(str(part) for part in first["loc"] if part not in ("float", "Range", "plain", "half"))
     hint = "; 0.01 is 1 %" if field == "tolerance" and first["type"] != "missing" else ""
-    return field, sentence_of(first) + hint
+    return RecipeError(".".join(part for part in (where, field) if part), sentence_of(first) + hint)
 
 
 def recipe_of(library: str) -> Traversable:

@@ -49,7 +49,8 @@ LIST: TypeAdapter[list[float | Range]] = TypeAdapter(Nodes, config=ConfigDict(st
 
 def nodes_of(name: str, parts: list[float | Range]) -> Axis:
     """Return the numbers of a list with ranges; RecipeError if there are more than an axis may have."""
-    pieces, count = [], 0
+    pieces = []
+    count = 0
     for part in parts:
         pieces.append(part.nodes(name) if isinstance(part, Range) else np.array([part]))
         count += pieces[-1].size
@@ -58,20 +59,20 @@ def nodes_of(name: str, parts: list[float | Range]) -> Axis:
     return np.concatenate(pieces)
 
 
-class IsotropicGrid(BaseModel):
-    """Axes of a table of an isotropic material."""
-
+class _GridAxes(BaseModel):
     model_config = STRICT
+
+
+class IsotropicGrid(_GridAxes):
+    """Axes of a table of an isotropic material."""
 
     theta_i_deg: Nodes
     theta_r_deg: Nodes
     delta_phi_deg: Nodes
 
 
-class AnisotropicGrid(BaseModel):
+class AnisotropicGrid(_GridAxes):
     """Axes of a table of an anisotropic material."""
-
-    model_config = STRICT
 
     theta_i_deg: Nodes
     phi_i_deg: Nodes
@@ -79,20 +80,16 @@ class AnisotropicGrid(BaseModel):
     phi_r_deg: Nodes
 
 
-class HalfDifferenceGrid(BaseModel):
+class HalfDifferenceGrid(_GridAxes):
     """Axes of half and difference vectors, of a table of an isotropic material."""
-
-    model_config = STRICT
 
     theta_h_deg: Nodes
     theta_d_deg: Nodes
     phi_d_deg: Nodes
 
 
-class AnisotropicHalfDifferenceGrid(BaseModel):
+class AnisotropicHalfDifferenceGrid(_GridAxes):
     """Axes of half and difference vectors, of a table of an anisotropic material."""
-
-    model_config = STRICT
 
     theta_h_deg: Nodes
     phi_h_deg: Nodes

@@ -158,7 +158,7 @@ def _alone(partial: Path, out: Path) -> Iterator[None]:
     handle = os.open(partial, os.O_RDONLY)
     try:
         fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        if os.path.lexists(out):  # another writer finished it meanwhile
+        if os.path.lexists(out):  # another process has just finished the set
             with contextlib.suppress(OSError):
                 partial.rmdir()
             raise SampleError(f"{out} exists already; remove it, or give another name")
@@ -171,7 +171,12 @@ def _alone(partial: Path, out: Path) -> Iterator[None]:
 
 def _write(made: TrainingSet, seed: int, partial: Path, jobs: int) -> None:
     """Write all files of a set that are missing. Its metadata come first, under another name, and last."""
-    files = group_files(_coordinates(made), _attributes(made, seed), _arrays(made))
+    shapes = (made.shape, (made.rows, made.shape[1]))
+    arrays = {  # whose chunks are written one by one
+        f"{name}/{METADATA}": array_files(_DIMENSIONS, *shapes, "<f4", json.dumps(attributes), None)[METADATA]
+        for name, attributes in made.variables.items()
+    }
+    files = group_files(_coordinates(made), _attributes(made, seed), arrays)
     last = files.pop(METADATA)
     begun = [partial / name for name in (_LAST, METADATA) if (partial / name).exists()]
     if any(file.read_bytes() != last for file in begun):
@@ -186,55 +191,39 @@ def _write(made: TrainingSet, seed: int, partial: Path, jobs: int) -> None:
 
 
 def _write_chunks(made: TrainingSet, partial: Path, jobs: int) -> None:
-    """Write the chunks that are missing. A chunk is there whole or not at all."""
+    """Write the missing chunks. An interrupted write leaves no part of a chunk."""
     chunks = range(-(-made.shape[0] // made.rows))
-    name = next(reversed(made.variables))  # it is written last
-    missing = [chunk for chunk in chunks if not _chunk_file(partial, name, chunk).exists()]
-    for half in partial.glob(".*"):  # files that a kill left
+
+    def chunk_file(name: str, chunk: int) -> Path:
+        return partial / name / "c" / str(chunk) / "0"
+
+    def write(chunk: int) -> None:
+        for name, values in zip(made.variables, made.values(chunk), strict=True):
+            write_file(chunk_file(name, chunk), chunk_bytes(values, made.rows), partial)
+
+    last = next(reversed(made.variables))  # the array whose chunks are written last
+    missing = [chunk for chunk in chunks if not chunk_file(last, chunk).exists()]
+    for half in partial.glob(".*"):  # files of a killed process
         half.unlink()
     with terminal.progress() as bar, ThreadPoolExecutor(jobs) as executor:
         task = bar.add_task(made.spec.name, total=len(chunks), completed=len(chunks) - len(missing))
         try:
-            for _ in executor.map(functools.partial(_write_chunk, made, partial), missing):
+            for _ in executor.map(write, missing):
                 bar.advance(task)
         except BaseException:
             executor.shutdown(cancel_futures=True)
             raise
 
 
-def _write_chunk(made: TrainingSet, partial: Path, chunk: int) -> None:
-    for name, values in zip(made.variables, made.values(chunk), strict=True):
-        write_file(_chunk_file(partial, name, chunk), chunk_bytes(values, made.rows), partial)
-
-
-def _chunk_file(partial: Path, name: str, chunk: int) -> Path:
-    return partial / name / "c" / str(chunk) / "0"
-
-
-def _arrays(made: TrainingSet) -> dict[str, bytes]:
-    """Return the metadata of the arrays whose chunks are written one by one."""
-    chunks = (made.rows, made.shape[1])
-    return {
-        f"{name}/{METADATA}": array_files(_DIMENSIONS, made.shape, chunks, "<f4", json.dumps(attributes), None)[
-            METADATA
-        ]
-        for name, attributes in made.variables.items()
-    }
-
-
 def _coordinates(made: TrainingSet) -> dict[str, StoredArray]:
     """Return parameters along the materials, and angles along the directions."""
-    variables = {
-        axis.parameter.name: StoredArray(
-            _DIMENSIONS[:1],
-            made.written[axis.parameter.name],
-            {"units": axis.parameter.unit, "long_name": axis.parameter.meaning},
-        )
-        for axis in made.axes
-    }
-    return variables | {
-        name: StoredArray(_DIMENSIONS[1:], angles, {"units": "degree"}) for name, angles in made.angles.items()
-    }
+    variables = {}
+    for parameter in (axis.parameter for axis in made.axes):
+        attributes = {"units": parameter.unit, "long_name": parameter.meaning}
+        variables[parameter.name] = StoredArray(_DIMENSIONS[:1], made.written[parameter.name], attributes)
+    for name, angles in made.angles.items():
+        variables[name] = StoredArray(_DIMENSIONS[1:], angles, {"units": "degree"})
+    return variables
 
 
 def _attributes(made: TrainingSet, seed: int) -> dict[str, Any]:

@@ -47,17 +47,17 @@ def load(name: str) -> Scene:
     except OSError as error:
         raise SceneError(name, "", error.strerror or str(error)) from None
     except ValidationError as error:
-        raise SceneError(name, *_field_and_sentence(error)) from None
+        raise _refusal(name, error) from None
     except toml_file.TomlError as error:
         raise SceneError(name, "", str(error)) from None
     try:
         return scene.resolved(path.parent)
-    except ParameterError as error:  # a file of it is no path
+    except ParameterError as error:  # the scene names a file with a path that is not allowed
         raise SceneError(name, error.parameter, error.sentence) from None
 
 
-def _field_and_sentence(error: ValidationError) -> tuple[str, str]:
-    """Return the first field that pydantic refuses, and why; an unknown key before a missing one."""
+def _refusal(name: str, error: ValidationError) -> SceneError:
+    """Return the refusal of the first field that pydantic refuses; of an unknown key before a missing one."""
     errors = error.errors(include_url=False)
     first = next((item for item in errors if item["type"] == "extra_forbidden"), errors[0])
     # after the key of a shape comes its kind, which is no key
@@ -65,9 +65,8 @@ def _field_and_sentence(error: ValidationError) -> tuple[str, str]:
     match first["type"]:
         case "value_error":
             cause = first["ctx"]["error"]
-            if not isinstance(cause, ParameterError):
-                sentence = str(cause)
-            else:
+            sentence = str(cause)
+            if isinstance(cause, ParameterError):
                 if loc and cause.parameter.startswith(loc[-1]):
                     loc.pop()
                 loc.append(cause.parameter)
@@ -83,4 +82,4 @@ def _field_and_sentence(error: ValidationError) -> tuple[str, str]:
             sentence = "is missing"
         case _:
             sentence = sentence_of(first)
-    return ".".join(loc), sentence
+    return SceneError(name, ".".join(loc), sentence)

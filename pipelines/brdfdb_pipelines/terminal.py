@@ -72,7 +72,8 @@ def print_table(
     When the output is not a terminal, lines are as long as needed, so that programs read everything. On a narrow
     terminal the columns in `less` are left out, the first of them first, and a line names them.
     """
-    title, rows = plain(title), [[plain(cell) for cell in row] for row in rows]
+    title = plain(title)
+    rows = [[plain(cell) for cell in row] for row in rows]
     console = Console(markup=False, emoji=False, highlight=False)  # a name may hold [brackets] and :colons:
     dropped = _too_many(columns, rows, numbers, less, console.width) if console.is_terminal else []
     if dropped:
@@ -105,7 +106,8 @@ def _too_many(
     columns: Sequence[str], rows: Sequence[Sequence[str]], numbers: Sequence[str], less: Sequence[str], width: int
 ) -> list[str]:
     """Return the columns of `less` that a table of a width [1] has no room for."""
-    left, dropped = dict(zip(columns, zip(*rows, strict=True), strict=True)) if rows else {}, []
+    dropped: list[str] = []
+    left = dict(zip(columns, zip(*rows, strict=True), strict=True)) if rows else {}
     for column in less:
         if not left or _least_width([*left], [*zip(*left.values(), strict=True)], numbers, _NARROW) <= width:
             break

@@ -35,18 +35,19 @@ class Workers:
 
 @contextmanager
 def threads(count: int) -> Iterator[Workers]:
-    """Provide threads of this process: kernels and codecs release the lock of the interpreter."""
+    """Provide threads of this process; kernels and codecs release the lock of the interpreter."""
     with ThreadPoolExecutor(count) as executor:
         yield Workers(executor, lambda: count)
 
 
 @contextmanager
 def processes(count: int, *, patient: bool = True) -> Iterator[Workers]:
-    """Provide processes of this machine, spawned: a fork would inherit locks of threads that it does not have.
+    """Provide spawned processes of this machine; forked processes would inherit locks of threads that they lack.
 
-    Ctrl-C lets their tasks end, or kills them at once where they are not `patient`.
+    On Ctrl-C, `patient` processes finish their tasks, and others are killed.
     """
-    context, others = multiprocessing.get_context("spawn"), set(multiprocessing.active_children())
+    context = multiprocessing.get_context("spawn")
+    others = set(multiprocessing.active_children())
     with ProcessPoolExecutor(count, mp_context=context, initializer=_start_process) as executor:
         try:
             yield Workers(executor, lambda: count)
@@ -63,7 +64,7 @@ def _start_process() -> None:
 
         def leave() -> None:
             parent.join()
-            os._exit(1)  # a killed builder does not stop its workers
+            os._exit(1)  # if the builder is killed, nothing else stops its workers
 
         threading.Thread(target=leave, daemon=True).start()
 
@@ -75,10 +76,10 @@ def cluster(address: str) -> Iterator[Workers]:
     WorkersError if nothing answers there, or from `slots` if the scheduler is gone. ParameterError for an address
     without a port; MissingExtraError without dask.
     """
-    if ":" not in address:  # dask waits for half a minute, and then prints a traceback of its own
+    if ":" not in address:  # dask would wait for half a minute, and then print a traceback
         raise ParameterError("--scheduler", f"{address!r} is not an address such as tcp://10.0.0.1:8786", address)
     distributed: Any = import_extra("distributed")
-    # a dead scheduler is one sentence of ours; dask sets levels of its own loggers
+    # a scheduler that ends is reported below in one sentence; dask sets the levels of its loggers itself
     for name in ("distributed", "distributed.client", "distributed.core", "tornado", "asyncio"):
         logging.getLogger(name).setLevel(logging.CRITICAL + 1)
     try:

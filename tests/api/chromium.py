@@ -17,34 +17,18 @@ from typing import Any, Self
 import numpy as np
 from matplotlib.image import imread
 
-SECONDS = 300.0  # for anything, on a machine that has a hundred other things to do
+from tests.api.connections import WAIT_S
+
 FLAGS = [
     *("--headless", "--no-sandbox", "--no-first-run", "--hide-scrollbars", "--remote-debugging-pipe"),
     *("--disable-gpu", "--force-color-profile=srgb"),  # no page has WebGL, and pictures are cheaper without OpenGL
     *(f"--disable-{each}" for each in ("quic", "background-networking", "component-update", "sync", "dev-shm-usage")),
 ]
-KEYS = {
-    "Enter": 13,
-    "ArrowLeft": 37,
-    "ArrowUp": 38,
-    "ArrowRight": 39,
-    "ArrowDown": 40,
-    "Home": 36,
-    "End": 35,
-    "Tab": 9,
-}
+KEYS = {"Tab": 9, "Enter": 13, "Home": 36, "ArrowLeft": 37, "ArrowUp": 38, "ArrowRight": 39, "ArrowDown": 40}  # codes
 
 
 class Chromium:
-    """A browser process; one page at a time.
-
-    Parameters
-    ----------
-    binary : str
-        The program.
-    profile : Path
-        A directory of its own.
-    """
+    """A process of the program `binary` with one page; `profile` is a new directory."""
 
     def __init__(self, binary: str, profile: Path) -> None:
         # the protocol wants descriptors 3 and 4: ends from 10 on never are in the way of those
@@ -106,11 +90,35 @@ class Chromium:
 
     def until(self, script: str) -> Any:
         """The value of an expression as soon as it is one that counts as true."""
-        deadline = time.monotonic() + SECONDS
+        deadline = time.monotonic() + WAIT_S
         while not (found := self.evaluate(script)):
             assert time.monotonic() < deadline, f"never true: {script}; {self.errors}"
             time.sleep(0.02)
         return found
+
+    def texts(self, selector: str) -> list[str]:
+        """The texts of all elements of a selector."""
+        elements = f"[...document.querySelectorAll({json.dumps(selector)})]"
+        return [str(each) for each in self.evaluate(f"{elements}.map(each => each.textContent)")]
+
+    def click(self, selector: str, number: int = 0) -> None:
+        """Click one of the elements of a selector; a negative number counts from the end."""
+        self.evaluate(f"[...document.querySelectorAll({json.dumps(selector)})].at({number}).click()")
+
+    def go(self, link: str) -> None:
+        """Change the link of the page."""
+        self.evaluate(f"location.hash = {json.dumps(link)}")
+
+    def choose(self, name: str, value: float | str) -> None:
+        """Set a control of the form, as a hand does."""
+        control = f"controls.elements.{name}"
+        event = "new Event('input', { bubbles: true })"
+        self.evaluate(f"{control}.value = {json.dumps(value)}; {control}.dispatchEvent({event})")
+
+    def drag(self, x: float, y: float, by: float = 0.0) -> None:
+        """Press the mouse at a point [pixel], move it to the right and release it."""
+        for kind, at in (("mousePressed", x), ("mouseMoved", x + by), ("mouseReleased", x + by)):
+            self.send("Input.dispatchMouseEvent", type=kind, x=at, y=y, button="left", buttons=1, clickCount=1)
 
     def press(self, *keys: str) -> None:
         """Press keys, one after the other."""
@@ -135,7 +143,7 @@ class Chromium:
         return np.asarray(imread(io.BytesIO(shot)))[..., :3].mean(axis=-1)
 
     def _next(self, waiting_for: str) -> dict[str, Any]:
-        deadline = time.monotonic() + SECONDS
+        deadline = time.monotonic() + WAIT_S
         while b"\0" not in self._buffer:
             ready, _, _ = select.select([self._read], [], [], max(0.0, deadline - time.monotonic()))
             assert ready, f"the browser does not answer {waiting_for}"
@@ -162,6 +170,12 @@ def shown(browser: Chromium, *parts: str) -> None:
     browser.until(" && ".join([f"{of} !== ''", *(f"{of}.includes('{part}')" for part in parts)]))
 
 
+def visit(browser: Chromium, link: str, *parts: str) -> None:
+    """Open a link, and wait for a picture of the state whose link has these parts."""
+    browser.open(link)
+    shown(browser, *parts)
+
+
 def chosen(browser: Chromium) -> str:
     return str(browser.evaluate("document.querySelector('[aria-selected=true]').dataset.name"))
 
@@ -178,6 +192,11 @@ def curve(browser: Chromium, kind: str | int, view: str = "cut") -> np.ndarray:
     number = 0 if isinstance(kind, str) else kind
     path = browser.evaluate(f"document.querySelectorAll('#{view} > svg {of}')[{number}].getAttribute('d')")
     return np.array([point.split() for point in path[1:].split("L")], dtype=float)
+
+
+def idle(browser: Chromium, *conditions: str) -> Any:
+    """Wait until no picture is being drawn, and for further conditions; return the value of the last one."""
+    return browser.until(" && ".join(["picture.ariaBusy === 'false'", *conditions]))
 
 
 def labels(browser: Chromium) -> list[str]:
@@ -211,6 +230,6 @@ def image(browser: Chromium, of: str) -> np.ndarray:
 
 
 def copied(browser: Chromium, kind: str) -> str:
-    browser.evaluate(f"document.querySelector('[data-copy={kind}]').click()")
+    browser.click(f"[data-copy={kind}]")
     browser.until("/Copied|Selected/.test(document.querySelector('#message').textContent)")
     return str(browser.evaluate("document.querySelector('#copied textarea').value"))

@@ -1,4 +1,4 @@
-"""nginx and Caddy as the documentation configures them, at free ports and with other deadlines where a test says so."""
+"""nginx and Caddy as the documentation configures them, at free ports, with the changes that a test names."""
 
 from __future__ import annotations
 
@@ -7,15 +7,15 @@ import shutil
 import signal
 import socket
 import subprocess
-import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 
+from tests.api.connections import wait_until
+
 FOLDER = Path(__file__).parents[2] / "docs" / "reference" / "proxies"
-WAIT_S = 300.0  # for what takes a second or two on an idle machine
 _SYSTEM_FOLDERS = "/usr/sbin:/usr/local/sbin"
 _TEMPORARY = ("client_body", "proxy", "fastcgi", "uwsgi", "scgi")
 _NGINX = """\
@@ -48,7 +48,7 @@ def free_port() -> int:
 
 
 def configuration(name: str, changes: Mapping[str, str]) -> str:
-    """Return a file of the documentation with changes, each of which must be of something that the file has."""
+    """Return a file of the documentation with changes; the file must contain each text that is replaced."""
     text = (FOLDER / name).read_text(encoding="utf-8")
     for old, new in changes.items():
         assert old in text, old
@@ -87,17 +87,14 @@ def _running(command: list[str], port: int, environment: Mapping[str, str]) -> I
     """Run a proxy until the end of the block, which begins when the proxy listens."""
     log = Path(command[-1] if "-e" in command else os.devnull)
     with subprocess.Popen(command, env={**os.environ, **environment}, stderr=subprocess.DEVNULL) as process:
+
+        def listens() -> bool:
+            assert process.poll() is None, log.read_text()
+            with socket.socket() as client:
+                return client.connect_ex(("127.0.0.1", port)) == 0
+
         try:
-            deadline = time.monotonic() + WAIT_S
-            while not _listens(port):
-                assert process.poll() is None, log.read_text()
-                assert time.monotonic() < deadline
-                time.sleep(0.02)
+            wait_until(listens)
             yield
         finally:
             process.send_signal(signal.SIGTERM)
-
-
-def _listens(port: int) -> bool:
-    with socket.socket() as client:
-        return client.connect_ex(("127.0.0.1", port)) == 0

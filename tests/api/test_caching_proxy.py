@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import httpx
@@ -14,7 +13,7 @@ import brdfdb
 from brdfdb.errors import StoreError, UnknownRevisionError
 from brdfdb.store.reader import Store
 from tests.api.a_store import pinned_of, publish, serving
-from tests.api.chromium import SECONDS
+from tests.api.connections import WAIT_S
 from tests.api.proxies import free_port, nginx
 
 # What is kept, and for how long, is what the service says
@@ -46,21 +45,13 @@ def stores(tmp_path: Path) -> tuple[Path, Path]:
     return tmp_path / "first", tmp_path / "second"
 
 
-@contextmanager
-def _served(root: Path, upstream: int) -> Iterator[None]:
-    with serving(root, port=upstream):
-        yield
-
-
 def _state(proxy: str, path: str) -> str:
-    return httpx.get(f"{proxy}{path}", timeout=SECONDS).headers["x-cache"]
+    return httpx.get(f"{proxy}{path}", timeout=WAIT_S).headers["x-cache"]
 
 
-def test_the_cache_keeps_what_has_a_digest_and_asks_for_the_rest(
-    proxy: str, upstream: int, stores: tuple[Path, Path]
-) -> None:
+def test_the_cache_keeps_answers_with_a_digest(proxy: str, upstream: int, stores: tuple[Path, Path]) -> None:
     pinned = pinned_of(Store(stores[0]), "tile")
-    with _served(stores[0], upstream):
+    with serving(stores[0], port=upstream):
         for path in (f"materials/tile/revisions/{{}}/{LOOKUP}", "store/materials/tile/{}/brdf/c/0/0/0"):
             for _ in range(2):
                 assert _state(proxy, f"/v1/{path.format('r000001')}") == "MISS"
@@ -73,17 +64,17 @@ def test_lookups_are_those_of_the_store_that_is_served(proxy: str, upstream: int
     tables = []
     for root in stores:
         here = brdfdb.open(root)["tile"]
-        with _served(root, upstream):
+        with serving(root, port=upstream):
             table = brdfdb.open(proxy)["tile"]
             tables.append(table)
             for _ in range(2):
                 assert table.lookup(*one_point) == pytest.approx(float(here.lookup(*one_point)), rel=1e-12)
                 np.testing.assert_allclose(table.lookup(*ANGLES), here.lookup(*ANGLES), rtol=1e-12)
                 assert dict(table.attrs) == {key: value for key, value in here.attrs.items() if key != "request"}
-            answer = httpx.get(f"{proxy}/v1/materials/tile/revisions/r000001/{LOOKUP}", timeout=SECONDS).json()
+            answer = httpx.get(f"{proxy}/v1/materials/tile/revisions/r000001/{LOOKUP}", timeout=WAIT_S).json()
             expected = here.lookup(*np.deg2rad([10.0, 0.0, 20.0, 0.0]))
             assert answer["brdf"] == pytest.approx(float(expected), rel=1e-12)
-    with _served(stores[1], upstream):  # the table of the store before: what the cache has, or no answer
+    with serving(stores[1], port=upstream):  # the table of the store before: what the cache has, or no answer
         first = float(brdfdb.open(stores[0])["tile"].lookup(*one_point))
         assert tables[0].lookup(*one_point) == pytest.approx(first, rel=1e-12)
         with pytest.raises(UnknownRevisionError, match=r"^tile has no revision 'r000001-"):
@@ -93,34 +84,31 @@ def test_lookups_are_those_of_the_store_that_is_served(proxy: str, upstream: int
 def test_a_dataset_is_of_one_store(proxy: str, upstream: int, stores: tuple[Path, Path]) -> None:
     pytest.importorskip("aiohttp")
     for root in stores:
-        with _served(root, upstream):
+        with serving(root, port=upstream):
             for there in (brdfdb.open(proxy).dataset("tile"), brdfdb.open(proxy).dataset("tile", "r000001")):
                 assert there.load().identical(brdfdb.open(root).dataset("tile").load())
-    with _served(stores[0], upstream):
+    with serving(stores[0], port=upstream):
         cached = brdfdb.open(proxy).dataset("tile")
         direct = brdfdb.open(f"http://127.0.0.1:{upstream}").dataset("tile")
-    with _served(stores[1], upstream):  # what was opened before: the same table, or no answer
+    with serving(stores[1], port=upstream):  # what was opened before: the same table, or no answer
         assert cached.load().identical(brdfdb.open(stores[0]).dataset("tile").load())
         with pytest.raises(StoreError, match=r"^tile r000001 of http.* was removed or replaced while it was read"):
             direct["brdf"].load()
 
 
-def test_a_cache_that_mixes_two_stores_all_the_same_is_noticed(
-    proxy: str, upstream: int, stores: tuple[Path, Path], tmp_path: Path
-) -> None:
+def test_a_cache_that_mixes_two_stores(proxy: str, upstream: int, stores: tuple[Path, Path], tmp_path: Path) -> None:
     pytest.importorskip("aiohttp")
-    with _served(stores[0], upstream):
+    with serving(stores[0], port=upstream):
         brdfdb.open(proxy).dataset("tile").load()
-    kept = [path for path in (tmp_path / "nginx" / "cache").rglob("*") if b"/brdf/c/0/0/0" in path.read_bytes()]
-    (chunk,) = kept
+    cached = (tmp_path / "nginx" / "cache").rglob("*")
+    (chunk,) = (path for path in cached if b"/brdf/c/0/0/0" in path.read_bytes())
     content = chunk.read_bytes()
-    second = (stores[1] / "materials" / "tile" / "r000001" / "brdf" / "c" / "0" / "0" / "0").read_bytes()
-    first = (stores[0] / "materials" / "tile" / "r000001" / "brdf" / "c" / "0" / "0" / "0").read_bytes()
+    first, second = ((root / "materials/tile/r000001/brdf/c/0/0/0").read_bytes() for root in stores)
     assert content.endswith(first)
     padded = (second + bytes(len(first)))[: len(first)]
     chunk.write_bytes(content.replace(first, padded))
     with (
-        _served(stores[0], upstream),
+        serving(stores[0], port=upstream),
         pytest.raises(StoreError, match=r"brdf/c/0/0/0 is another one than its manifest names"),
     ):
         brdfdb.open(proxy).dataset("tile")["brdf"].load()

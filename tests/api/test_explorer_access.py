@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.api.chromium import Chromium, box, shown
+from tests.api.chromium import Chromium, box, idle, shown, visit
 
 AXE = Path(os.environ.get("BRDFDB_NODE", "node_modules/.bin")).parent / "axe-core" / "axe.min.js"
 VIEWS = ("together", "cut&axes=cartesian&curves=rgb", "slice", "spectrum", "albedo", "sphere")
@@ -24,7 +24,7 @@ def test_axe_finds_no_violation(chromium: Chromium, address: str, scheme: str, w
         link = f"{address}#material=rolled-brass(rho_d=0.2)&compare=rolled-brass&view={view}"
         chromium.open(link, width, 900, scheme)
         shown(chromium)
-        chromium.until("picture.ariaBusy === 'false' && parameters.children.length > 0")
+        idle(chromium, "parameters.children.length > 0")
         chromium.evaluate("document.querySelectorAll('details').forEach(each => { each.open = true; })")
         chromium.evaluate(f"{rules}; undefined")
         found = json.loads(chromium.evaluate("axe.run().then(({ violations }) => JSON.stringify(violations))"))
@@ -33,15 +33,11 @@ def test_axe_finds_no_violation(chromium: Chromium, address: str, scheme: str, w
 
 
 def test_every_control_has_a_name_and_can_be_reached_by_keys(chromium: Chromium, address: str) -> None:
-    chromium.open(f"{address}#material=rolled-brass&compare=foam")
-    shown(chromium)
-    chromium.until("picture.ariaBusy === 'false' && parameters.children.length > 0")
-    unnamed = chromium.evaluate(
-        "[...document.querySelectorAll('input, select, textarea, button:not([aria-hidden])')]"
-        ".filter(each => !each.closest('[hidden]') && !(each.labels?.[0] ?? each).innerText.trim())"
-        ".map(each => each.outerHTML)"
-    )
-    assert unnamed == []
+    visit(chromium, f"{address}#material=rolled-brass&compare=foam")
+    idle(chromium, "parameters.children.length > 0")
+    controls = "[...document.querySelectorAll('input, select, textarea, button:not([aria-hidden])')]"
+    unnamed = "each => !each.closest('[hidden]') && !(each.labels?.[0] ?? each).innerText.trim()"
+    assert chromium.evaluate(f"{controls}.filter({unnamed}).map(each => each.outerHTML)") == []
     reached, now = set(), "document.activeElement"
     seen = [f"getComputedStyle({each}).outlineStyle !== 'none'" for each in (now, f"({now}.closest('label') ?? {now})")]
     chromium.evaluate("document.body.focus()")
@@ -56,14 +52,12 @@ def test_every_control_has_a_name_and_can_be_reached_by_keys(chromium: Chromium,
     assert {"rho_d", "alpha_x", "reset", "keep", "recipe", "link", "curl", "python", "Foam (sample D) ×"} <= reached
 
 
-def test_arrow_keys_read_curves_and_a_space_opens_details(chromium: Chromium, address: str) -> None:
-    chromium.open(f"{address}#material=foam&view=cut")
-    shown(chromium)
+def test_arrow_keys_read_curves(chromium: Chromium, address: str) -> None:
+    visit(chromium, f"{address}#material=foam&view=cut")
     chromium.evaluate("document.querySelector('#cut').focus()")
-    chromium.press("ArrowRight")
-    assert chromium.evaluate("document.querySelector('#cut .read').textContent").startswith("θᵣ 1°: ")
-    chromium.press("ArrowLeft", "ArrowLeft")
-    assert chromium.evaluate("document.querySelector('#cut .read').textContent").startswith("θᵣ −1°: ")
+    for keys, theta_r in ((["ArrowRight"], "1"), (["ArrowLeft", "ArrowLeft"], "−1")):
+        chromium.press(*keys)
+        assert chromium.texts("#cut .read")[0].startswith(f"θᵣ {theta_r}°: ")
 
 
 def test_a_phone_shows_the_picture_first(chromium: Chromium, address: str) -> None:
@@ -74,7 +68,7 @@ def test_a_phone_shows_the_picture_first(chromium: Chromium, address: str) -> No
         assert 0 < top < top + tall < height
         assert chromium.evaluate("search.getBoundingClientRect().top") > height
         was = chromium.evaluate("[location.hash, picture.dataset.shown]")
-        chromium.evaluate("document.querySelector('header a').click()")  # one link at the top reaches the list
+        chromium.click("header a")  # one link at the top reaches the list
         assert chromium.evaluate("document.activeElement.id") == "search"
         assert 0 <= chromium.evaluate("search.getBoundingClientRect().top") < height
         assert chromium.evaluate("[location.hash, picture.dataset.shown]") == was

@@ -12,12 +12,9 @@ import pytest
 
 import brdfdb
 from brdfdb.geometry import unit_vector
-from brdfdb.materials import presets
-from brdfdb.measurements import MeasuredSource
-from brdfdb.store.publication import publish
 from tests.api.a_store import serving
-from tests.api.chromium import SECONDS, Chromium, box, curve, frame, image, labels, shown
-from tests.measurements.made_up import scans
+from tests.api.chromium import Chromium, box, curve, frame, idle, image, labels, shown, visit
+from tests.api.connections import WAIT_S
 
 # What a view has drawn once it is there
 DRAWN = {
@@ -40,8 +37,7 @@ READ = "document.querySelector('#stage > div:not([hidden]) .read').textContent"
 
 
 def test_the_cut_shows_the_numbers_of_the_table(chromium: Chromium, address: str, explored: Path) -> None:
-    chromium.open(f"{address}#material=foam&view=cut&scale=linear&theta_i=30")
-    shown(chromium, "material=foam", "scale=linear")
+    visit(chromium, f"{address}#material=foam&view=cut&scale=linear&theta_i=30", "material=foam", "scale=linear")
     x, y = curve(chromium, 0).T
     (centre, middle), (_, top) = curve(chromium, "mirror")[0], curve(chromium, "mirror")[1]
     assert top < middle
@@ -55,12 +51,9 @@ def test_the_cut_shows_the_numbers_of_the_table(chromium: Chromium, address: str
 
 
 def test_the_pointer_reads_the_cut(chromium: Chromium, address: str, explored: Path) -> None:
-    chromium.open(f"{address}#material=foam&view=cut&theta_i=30")
-    shown(chromium, "material=foam")
+    visit(chromium, f"{address}#material=foam&view=cut&theta_i=30", "material=foam")
     (x, y), _ = curve(chromium, "mirror")
-    left, top = chromium.evaluate(
-        "(({ left, top }) => [left, top])(document.querySelector('#cut svg').getBoundingClientRect())"
-    )
+    left, top, _, _ = box(chromium, "#cut svg")
     aside = 100.0 * np.tan(np.deg2rad(-40.0))
     chromium.send("Input.dispatchMouseEvent", type="mouseMoved", x=left + x + aside, y=top + y - 100.0)
     value = brdfdb.open(explored)["foam"].lookup(*np.deg2rad([30.0, 0.0, 40.0, 0.0]))
@@ -68,17 +61,15 @@ def test_the_pointer_reads_the_cut(chromium: Chromium, address: str, explored: P
 
 
 def test_any_number_of_series_lie_over_one_another(chromium: Chromium, address: str) -> None:
-    chromium.open(f"{address}#material=scene-copper-sphere&view=cut")
-    shown(chromium)
-    change = "; controls.elements.compare.dispatchEvent(new Event('input', { bubbles: true }))"
+    visit(chromium, f"{address}#material=scene-copper-sphere&view=cut")
     chromium.until("controls.elements.compare.options.length > 3")
-    chromium.evaluate("controls.elements.compare.value = ':model'" + change)
+    chromium.choose("compare", ":model")
     shown(chromium, "compare=:model")
     assert len(curve(chromium, 0)) == len(curve(chromium, 1)) == len(curve(chromium, "off"))
     said = r"able − model, relative to the model, or to the floor .* is larger: \d.* % at most"
     assert re.search(said, chromium.evaluate("caption.textContent"))
     for name in ("foam", "rolled-brass"):
-        chromium.evaluate(f"controls.elements.compare.value = '{name}'" + change)
+        chromium.choose("compare", name)
         shown(chromium, f"compare={name}")
     assert chromium.evaluate("document.querySelectorAll('#cut > svg path.curve').length") == 4
     paths = "[...document.querySelectorAll('#cut > svg path.curve')]"
@@ -86,18 +77,15 @@ def test_any_number_of_series_lie_over_one_another(chromium: Chromium, address: 
     assert len(set(chromium.evaluate(strokes))) == 4
     assert "Foam" in chromium.evaluate("document.querySelector('#cut .legend').textContent")
     assert chromium.evaluate("document.querySelector('#cut path.off')") is None
-    chromium.evaluate("document.querySelectorAll('#beside button')[1].click()")
-    chromium.until("picture.ariaBusy === 'false' && !picture.dataset.shown.includes('foam')")
+    chromium.click("#beside button", 1)
+    idle(chromium, "!picture.dataset.shown.includes('foam')")
     assert "compare=:model&compare=rolled-brass" in chromium.evaluate("picture.dataset.shown")
-    assert chromium.errors == []
 
 
 @pytest.mark.parametrize("scale", ["linear", "log"])
-def test_a_chart_of_the_cut_shows_the_numbers_of_the_table(
-    chromium: Chromium, address: str, explored: Path, scale: str
-) -> None:
-    chromium.open(f"{address}#material=scene-copper-sphere&view=cut&axes=cartesian&curves=wavelengths&scale={scale}")
-    shown(chromium, "view=cut")
+def test_a_chart_has_the_numbers_of_the_table(chromium: Chromium, address: str, explored: Path, scale: str) -> None:
+    link = f"{address}#material=scene-copper-sphere&view=cut&axes=cartesian&curves=wavelengths&scale={scale}"
+    visit(chromium, link, "view=cut")
     left, top, width, height, low, high = frame(chromium)
     table = brdfdb.open(explored)["scene-copper-sphere"]
     assert labels(chromium) == ["450 nm", "500 nm", "550 nm", "600 nm", "650 nm"]
@@ -125,11 +113,10 @@ def test_numbers_of_the_scale_do_not_overlap_on_a_phone(chromium: Chromium, addr
 
 
 def test_a_table_is_off_by_what_its_stated_error_means(chromium: Chromium, address: str, explored: Path) -> None:
-    chromium.open(f"{address}#material=scene-copper-sphere&view=slice&compare=%3Amodel&nm=500")
-    shown(chromium, "nm=500")
+    visit(chromium, f"{address}#material=scene-copper-sphere&view=slice&compare=%3Amodel&nm=500", "nm=500")
     table = brdfdb.open(explored)["scene-copper-sphere"]
     lobe = f"{address}v1/materials/scene-copper-sphere/lobe?view=half-difference&wavelength_nm=500"
-    answers = [httpx.get(lobe + of, timeout=SECONDS).json()["brdf"] for of in ("&from=table", "&from=model")]
+    answers = [httpx.get(lobe + of, timeout=WAIT_S).json()["brdf"] for of in ("&from=table", "&from=model")]
     tabulated, model = np.array(answers)
     floor = table.error.floor[list(table.wavelength_nm).index(500.0)]
     assert model.min() < floor < model.max()
@@ -144,16 +131,14 @@ def test_a_table_is_off_by_what_its_stated_error_means(chromium: Chromium, addre
 
 
 def test_a_slice_has_half_angles_across_and_a_click_picks_directions(chromium: Chromium, address: str) -> None:
-    chromium.open(f"{address}#material=scene-copper-sphere&view=slice&nm=500")
-    shown(chromium, "view=slice")
+    visit(chromium, f"{address}#material=scene-copper-sphere&view=slice&nm=500", "view=slice")
     brightness = image(chromium, "#slice canvas")[..., 1].astype(int)  # green grows along the scale
     assert brightness[45, 0] > brightness[45, 30] > brightness[45, 80]  # away from the half vector
     left, top, width, height = box(chromium, "#slice canvas")
     x, y = left + width * 20.5 / 90.0, top + height * (1.0 - 60.5 / 90.0)
     chromium.send("Input.dispatchMouseEvent", type="mouseMoved", x=x, y=y)
     assert chromium.evaluate(READ).startswith("θh 20.5°, θd 60.5°: ")  # before the click: it draws anew
-    for kind in ("mousePressed", "mouseReleased"):
-        chromium.send("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", clickCount=1)
+    chromium.drag(x, y)
     shown(chromium, "theta_r=")
     names = ("theta_i", "phi_i", "theta_r", "turn")
     theta_i, phi_i, theta_r, turn = np.deg2rad(
@@ -177,42 +162,40 @@ def test_every_view_draws_at_any_width(chromium: Chromium, address: str, view: s
         assert chromium.evaluate("document.documentElement.scrollWidth") <= width
         assert len(chromium.evaluate("caption.textContent")) > 40
         assert chromium.evaluate("message.textContent") == ""
-    assert chromium.errors == []
 
 
 @pytest.mark.parametrize("view", ["hemisphere", "slice", "spectrum", "albedo"])
 def test_a_finger_on_a_picture_scrolls_the_page(chromium: Chromium, address: str, view: str) -> None:
     chromium.open(f"{address}#material=foam&view={view}", 390, 844, touch=True)
     shown(chromium, f"view={view}")
-    x, y = chromium.evaluate(
-        "(({ left, top, width, height }) => [left + width / 2, top + height / 2])"
-        f"(document.querySelector('#{view} > svg, #{view} canvas').getBoundingClientRect())"
-    )
-    chromium.swipe(x, y, 100.0)
+    left, top, width, height = box(chromium, f"#{view} > svg, #{view} canvas")
+    chromium.swipe(left + width / 2.0, top + height / 2.0, 100.0)
     chromium.until("scrollY > 50")
 
 
 @pytest.mark.parametrize("name", ["foam", "scene-copper-sphere"])
 def test_the_axis_of_a_spectrum_is_wider_than_rounding(chromium: Chromium, address: str, name: str) -> None:
-    chromium.open(f"{address}#material={name}&view=spectrum&compare=%3Amodel")
-    shown(chromium, "view=spectrum")
+    visit(chromium, f"{address}#material={name}&view=spectrum&compare=%3Amodel", "view=spectrum")
     _, top, _, height, low, high = frame(chromium, "spectrum")
     assert high - low > np.log10(1.5)
-    assert (
-        len(chromium.evaluate("[...document.querySelectorAll('#spectrum text.end')].map(each => each.textContent)")) > 2
-    )
+    assert len(chromium.texts("#spectrum text.end")) > 2
     ys = np.concatenate([curve(chromium, number, "spectrum")[:, 1] for number in range(2)])
     assert top < ys.min() <= ys.max() < top + height
 
 
 def test_a_spectrum_over_decades_has_numbers_at_1_2_and_5(chromium: Chromium, address: str) -> None:
-    chromium.open(f"{address}#material=foam&view=spectrum&compare=rolled-brass")
-    shown(chromium, "view=spectrum")
+    visit(chromium, f"{address}#material=foam&view=spectrum&compare=rolled-brass", "view=spectrum")
     low, high = 10.0 ** np.array(frame(chromium, "spectrum")[4:])
     assert high / low > 10.0
-    texts = chromium.evaluate("[...document.querySelectorAll('#spectrum text.end')].map(each => each.textContent)")
+    texts = chromium.texts("#spectrum text.end")
     expected = [mantissa * 10.0**power for power in range(-3, 3) for mantissa in (1, 2, 5)]
     assert [float(each) for each in texts] == [pytest.approx(each) for each in expected if low <= each <= high]
+
+
+def middle(browser: Chromium) -> float:
+    """The mean place of the surface of a hemisphere across the picture, 0 to 1."""
+    surface = painted(browser)
+    return float(np.nonzero(surface)[1].mean() / surface.shape[1])
 
 
 def painted(browser: Chromium) -> np.ndarray:
@@ -222,8 +205,7 @@ def painted(browser: Chromium) -> np.ndarray:
 
 
 def test_the_hemisphere_of_a_white_tile_is_half_a_ball_that_keys_turn(chromium: Chromium, plain: str) -> None:
-    chromium.open(f"{plain}/#material=white-tile&view=hemisphere&scale=linear")
-    shown(chromium, "view=hemisphere")
+    visit(chromium, f"{plain}/#material=white-tile&view=hemisphere&scale=linear", "view=hemisphere")
     chromium.evaluate("document.querySelector('#hemisphere').focus()")
     for keys, elevation in (((), 27.0), (("ArrowDown", "ArrowLeft"), 32.0), (("Home",), 27.0)):
         chromium.press(*keys)
@@ -233,67 +215,36 @@ def test_the_hemisphere_of_a_white_tile_is_half_a_ball_that_keys_turn(chromium: 
         width = 2.0 * np.sin(np.deg2rad(LAST))
         assert ratio == pytest.approx((1.0 + front) / width, abs=PIXELS / np.ptp(columns))
     assert f"to θᵣ = {LAST:g}°" in chromium.evaluate("caption.textContent")
-    assert chromium.errors == []
 
 
-def test_a_hand_turns_the_hemisphere(chromium: Chromium, address: str) -> None:
-    chromium.open(f"{address}#material=rolled-brass&view=hemisphere&theta_i=60")
-    shown(chromium, "view=hemisphere")
-    before = painted(chromium)
+def test_the_lobe_of_a_hemisphere_is_across_from_the_light_and_turns_with_it(chromium: Chromium, address: str) -> None:
+    for phi, at_the_right in ((0, True), (180, False)):
+        visit(chromium, f"{address}#material=rolled-brass&view=hemisphere&theta_i=60&phi_i={phi}", "view=hemisphere")
+        assert (middle(chromium) > 0.55, middle(chromium) < 0.45) == (at_the_right, not at_the_right)
     left, top, _, _ = box(chromium, "#hemisphere canvas")
-    half_a_turn = 360  # pixels
-    for kind, x in (("mousePressed", 50), ("mouseMoved", 50 + half_a_turn), ("mouseReleased", 50 + half_a_turn)):
-        chromium.send(
-            "Input.dispatchMouseEvent", type=kind, x=left + x, y=top + 50, button="left", buttons=1, clickCount=1
-        )
-    middles = [np.nonzero(each)[1].mean() / each.shape[1] for each in (before, painted(chromium))]
-    assert middles[0] > 0.55
-    assert middles[1] < 0.45
-
-
-def test_the_lobe_of_the_hemisphere_is_across_from_the_light(chromium: Chromium, address: str) -> None:
-    middles = []
-    for phi in (0, 180):  # the light is at the left, then at the right
-        chromium.open(f"{address}#material=rolled-brass&view=hemisphere&theta_i=60&phi_i={phi}")
-        shown(chromium, "view=hemisphere")
-        surface = painted(chromium)
-        middles.append(np.nonzero(surface)[1].mean() / surface.shape[1])
-    assert middles[0] > 0.55
-    assert middles[1] < 0.45
+    chromium.drag(left + 50, top + 50, 360.0)  # half a turn
+    assert middle(chromium) > 0.55
 
 
 @pytest.mark.parametrize("compare", ["", "%3Amodel", "grey-felt"])
-def test_the_spectrum_of_a_table_that_states_no_error_is_drawn_without_one(
-    chromium: Chromium, plain: str, compare: str
-) -> None:
+def test_the_spectrum_of_a_table_without_a_stated_error(chromium: Chromium, plain: str, compare: str) -> None:
     chromium.open(f"{plain}/#material=white-tile&view=spectrum&compare={compare}")
-    assert (
-        chromium.until(
-            "document.querySelector('#picture')?.dataset.shown && 'shown' || globalThis.message?.textContent"
-        )
-        == "shown"
-    )
+    of_picture = "document.querySelector('#picture')?.dataset.shown"
+    assert chromium.until(f"{of_picture} && 'shown' || globalThis.message?.textContent") == "shown"
     bands = chromium.evaluate("document.querySelectorAll('#spectrum path.band').length")
     assert bands == (compare == "grey-felt")
     assert f"is grey: {1.0 / np.pi:.3g} /sr" in chromium.evaluate("caption.textContent")
     assert ("with the band" in chromium.evaluate("caption.textContent")) == (compare == "grey-felt")
-    assert chromium.errors == []
 
 
-def test_what_a_measured_table_extrapolates_is_dashed(chromium: Chromium, tmp_path: Path) -> None:
-    clay, store = presets()["clay-vase"], tmp_path / "store"
-    samples = scans(clay.brdf_at(None), np.array([10.0, 35.0, 60.0]), 0.03, step_deg=15.0)
-    source = MeasuredSource.of_samples(samples, name="my-clay", title="Clay", provenance="run 12")
-    publish(store, source.recorded(file="clay.csv", file_sha256="0" * 64), tolerance=0.1)
-    with serving(store) as address:
+def test_what_a_measured_table_extrapolates_is_dashed(chromium: Chromium, measured: Path) -> None:
+    with serving(measured) as address:
         for theta_i, dashed in ((35, False), (80, True)):
-            chromium.open(f"{address}/#material=my-clay&view=cut&axes=cartesian&theta_i={theta_i}")
-            shown(chromium, f"theta_i={theta_i}")
-            dashes = "[...document.querySelectorAll('#cut > svg path.curve')].map(each => each.style.strokeDasharray)"
-            pieces = chromium.evaluate(dashes)
-            assert "3, 4" in pieces
-            path = chromium.evaluate("[...document.querySelectorAll('#cut > svg path.curve')].at(-1).getAttribute('d')")
+            link = f"{address}/#material=my-clay&view=cut&axes=cartesian&theta_i={theta_i}"
+            visit(chromium, link, f"theta_i={theta_i}")
+            curves = "[...document.querySelectorAll('#cut > svg path.curve')]"
+            assert "3, 4" in chromium.evaluate(f"{curves}.map(each => each.style.strokeDasharray)")
+            path = chromium.evaluate(f"{curves}.at(-1).getAttribute('d')")
             assert (len(re.findall("[ML]", path)) > 150) is dashed  # at 80 degrees nothing was measured
-            assert "Dashed is what was not measured" in chromium.evaluate("caption.textContent")
+            assert "Dashed lines are extrapolated" in chromium.evaluate("caption.textContent")
             assert chromium.evaluate("parameters.hidden")
-        assert chromium.errors == []

@@ -11,7 +11,7 @@ import brdfdb
 from brdfdb.geometry import unit_vector
 from brdfdb.spectra import srgb_weights, xyz_weights
 from tests.api.a_store import publish, serving
-from tests.api.chromium import Chromium, box, image, shown
+from tests.api.chromium import Chromium, box, image, shown, visit
 
 SIZE = 320  # pixels across
 SKY = 0.35  # what is seen of the surroundings at the height of the eye
@@ -40,11 +40,8 @@ def levels(browser: Chromium, link: str) -> np.ndarray:
 
 
 @pytest.mark.parametrize(("phi_i", "axis", "side", "words"), [(0, 1, 1, "right (+x)"), (90, 0, -1, "top (+y)")])
-def test_the_light_of_a_sphere_is_where_its_caption_says(
-    chromium: Chromium, address: str, phi_i: int, axis: int, side: int, words: str
-) -> None:
-    chromium.open(f"{address}#material=foam&view=sphere&theta_i=60&phi_i={phi_i}&surround=dark")
-    shown(chromium, "view=sphere")
+def test_the_light_of_a_sphere(chromium: Chromium, address: str, phi_i: int, axis: int, side: int, words: str) -> None:
+    visit(chromium, f"{address}#material=foam&view=sphere&theta_i=60&phi_i={phi_i}&surround=dark", "view=sphere")
     bright = image(chromium, "#sphere canvas")[..., 0].astype(float)  # rows from the top
     middle = np.sum(np.nonzero(bright)[axis] * bright[bright > 0]) / np.sum(bright)
     assert side * (middle / SIZE - 0.5) > 0.1
@@ -53,8 +50,7 @@ def test_the_light_of_a_sphere_is_where_its_caption_says(
 
 def test_a_mirror_is_spoken_of_where_there_is_one(chromium: Chromium, address: str) -> None:
     for name, mirror in (("foam", False), ("scene-copper-sphere", True)):
-        chromium.open(f"{address}#material={name}&view=sphere")
-        shown(chromium, "view=sphere")
+        visit(chromium, f"{address}#material={name}&view=sphere", "view=sphere")
         assert ("specular" in chromium.evaluate("caption.textContent")) is mirror
 
 
@@ -62,9 +58,7 @@ def test_a_mirror_is_spoken_of_where_there_is_one(chromium: Chromium, address: s
     ("name", "illuminant"),
     [("foam", "D65"), ("rolled-brass", "D65"), ("scene-copper-sphere", "D65"), ("scene-copper-sphere", "A")],
 )
-def test_the_sphere_has_the_radiance_of_the_table(
-    chromium: Chromium, address: str, explored: Path, name: str, illuminant: str
-) -> None:
+def test_the_radiance_of_a_sphere(chromium: Chromium, address: str, explored: Path, name: str, illuminant: str) -> None:
     theta, phi, at = 50.0, 70.0, np.arange(420.0, 681.0, 20.0)
     link = f"{address}#material={name}&view=sphere&theta_i={theta}&phi_i={phi}&illuminant={illuminant}&surround=dark"
     drawn, (normal, _) = levels(chromium, link), normals()
@@ -108,19 +102,16 @@ def test_a_mirror_shows_its_surroundings_and_the_light(chromium: Chromium, tmp_p
         drawn = levels(chromium, f"{address}#material=mirror&view=sphere&theta_i=40&phi_i=90&exposure=-2")
         assert "The specular part reflects them and the light" in chromium.evaluate("caption.textContent")
         for view in ("hemisphere", "cut"):
-            chromium.evaluate(f"location.hash = 'material=mirror&view={view}&theta_i=40'")
+            chromium.go(f"material=mirror&view={view}&theta_i=40")
             shown(chromium, f"view={view}")
             assert "The spike is the specular part" in chromium.evaluate("caption.textContent")
         assert chromium.evaluate("document.querySelectorAll('#cut path.spike').length") == 1
         part = 100.0 * table.specular_reflectance(np.deg2rad(40.0), at) @ xyz_weights(tuple(at), "D65")[:, 1]
         for axes in ("polar", "cartesian"):  # the legend names it: in the picture the name would cover something
-            chromium.evaluate(f"location.hash = 'material=mirror&view=cut&theta_i=40&axes={axes}'")
+            chromium.go(f"material=mirror&view=cut&theta_i=40&axes={axes}")
             chromium.until(f"picture.dataset.shown.includes('cartesian') === {str(axes == 'cartesian').lower()}")
-            assert f"specular part {part:.3g} %" in chromium.evaluate(
-                "document.querySelector('#cut .legend').innerText"
-            )
-            assert "specular" not in chromium.evaluate("document.querySelector('#cut > svg').textContent")
-        assert chromium.errors == []
+            assert f"specular part {part:.3g} %" in chromium.texts("#cut .legend")[0]
+            assert "specular" not in chromium.texts("#cut > svg")[0]
     normal, _ = normals()
     mirror = 2.0 * normal[:, 2:] * normal - [0.0, 0.0, 1.0]
     half, near = unit_vector(np.deg2rad(20.0), np.deg2rad(90.0)), normal[:, 2] > 0.3
@@ -138,29 +129,23 @@ def test_a_sphere_that_is_nearly_black_says_so_and_can_be_brightened(chromium: C
     with serving(tmp_path / "store") as address:
         dark = levels(chromium, f"{address}#material=soot&view=sphere")
         assert "Nearly black" in chromium.evaluate("sphere.innerText")
-        chromium.evaluate("document.querySelector('#sphere button').click()")
+        chromium.click("#sphere button")
         shown(chromium, "exposure=8")
         chromium.until("picture.dataset.detail === 'fine' && picture.ariaBusy === 'false'")
         bright = image(chromium, "#sphere canvas")
         assert dark.max() < 25 < 150 < bright[..., :3].max()
         assert chromium.evaluate("sphere.innerText").strip() == ""
-        assert chromium.errors == []
 
 
 def test_a_hand_and_keys_move_the_light_to_where_they_point(chromium: Chromium, address: str) -> None:
-    chromium.open(f"{address}#material=foam&view=together")
-    shown(chromium, "material=foam")
+    visit(chromium, f"{address}#material=foam&view=together", "material=foam")
     left, top, width, _ = box(chromium, "#sphere canvas")
     x, y = left + width * (0.5 + 0.25), top + width * 0.5  # of a normal at 30 degrees: the light is at 60
-    for kind in ("mousePressed", "mouseReleased"):
-        chromium.send("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", buttons=1, clickCount=1)
+    chromium.drag(x, y)
     shown(chromium, "theta_i=60")
     chromium.evaluate("document.querySelector('#sphere').focus()")
     chromium.press("ArrowDown", "ArrowLeft")
     shown(chromium, "theta_i=55", "phi_i=5")
     left, top, width, height = box(chromium, "#cut .lamp")
-    x, y = left + width / 2.0, top + height / 2.0
-    for kind, by in (("mousePressed", 0), ("mouseMoved", 10), ("mouseReleased", 10)):
-        chromium.send("Input.dispatchMouseEvent", type=kind, x=x + by, y=y, button="left", buttons=1, clickCount=1)
+    chromium.drag(left + width / 2.0, top + height / 2.0, 10.0)
     chromium.until("controls.elements.theta_i.value < 55")
-    assert chromium.errors == []

@@ -19,7 +19,7 @@ import numpy as np
 import pytest
 
 from brdfdb.audit import FINDINGS
-from tests.api.a_store import npy, serving
+from tests.api.a_store import npy, read_npy, serving
 from tests.api.test_views import report
 
 pytest.importorskip("openapi_python_client")
@@ -107,9 +107,7 @@ def called(package: types.ModuleType, address: str, tag: str, name: str, argumen
 
 
 @pytest.mark.parametrize(("tag", "name"), OPERATIONS)
-def test_every_operation_is_generated_and_answers(
-    generated: types.ModuleType, service: str, tag: str, name: str
-) -> None:
+def test_every_operation_answers(generated: types.ModuleType, service: str, tag: str, name: str) -> None:
     if name == "family_lookup":  # the store has no family: the refusal is read, too
         body = {"parameters": {"sigma_deg": 3.0}, **LIGHT}
         answer = called(generated, service, tag, name, {"family": "none", "PointsOfFamily": body})
@@ -127,7 +125,7 @@ def test_every_operation_is_generated_and_answers(
         assert back == {key: value for key, value in json.loads(answer.content).items() if key in back}
 
 
-def test_numbers_come_through(generated: types.ModuleType, service: str) -> None:
+def test_numbers_arrive_and_may_be_npy_both_ways(generated: types.ModuleType, service: str) -> None:
     model = called(generated, service, "models", "model_lookup", CALLS["model_lookup"]).parsed
     np.testing.assert_allclose(model.brdf, 0.5 / np.pi, rtol=1e-15)
     many = called(generated, service, "lookup", "lookup_many", CALLS["lookup_many"]).parsed
@@ -135,22 +133,14 @@ def test_numbers_come_through(generated: types.ModuleType, service: str) -> None
     np.testing.assert_allclose(many.materials[0].brdf, 1.0 / np.pi, rtol=1e-6)
     zipped = called(generated, service, "files", "download", TILE).content
     assert "zarr.json" in zipfile.ZipFile(io.BytesIO(zipped)).namelist()
-
-
-def test_npy_comes_back_as_the_bytes_of_an_answer(generated: types.ModuleType, service: str) -> None:
     operation = importlib.import_module("generated_client.api.lookup.lookup_points")
     models = importlib.import_module("generated_client.models")
-    body = models.PointsBody.from_dict(LIGHT)
-    request = operation._get_kwargs("white-tile", body=body, format_=models.LookupPointsFormatType0.NPY)
-    with generated.Client(base_url=service) as client:
-        answer = client.get_httpx_client().request(**request)
-    np.testing.assert_allclose(np.load(io.BytesIO(answer.content)), [1.0 / np.pi] * 2, rtol=1e-6)
-
-
-def test_npy_goes_there(generated: types.ModuleType, service: str) -> None:
-    operation = importlib.import_module("generated_client.api.lookup.lookup_points")
-    kind = importlib.import_module("generated_client.models").LookupPointsFormatType0.JSON
+    body, file_format = models.PointsBody.from_dict(LIGHT), models.LookupPointsFormatType0
+    request = operation._get_kwargs("white-tile", body=body, format_=file_format.NPY)
     file = generated.types.File(payload=io.BytesIO(npy(np.full((3, 4), 10.0))))
     with generated.Client(base_url=service) as client:
-        answer = operation.sync_detailed("white-tile", client=client, body=file, format_=kind)
-    np.testing.assert_allclose(answer.parsed.brdf, [1.0 / np.pi] * 3, rtol=1e-6)
+        answer = client.get_httpx_client().request(**request)
+    with generated.Client(base_url=service) as client:
+        posted = operation.sync_detailed("white-tile", client=client, body=file, format_=file_format.JSON)
+    np.testing.assert_allclose(read_npy(answer.content), [1.0 / np.pi] * 2, rtol=1e-6)
+    np.testing.assert_allclose(posted.parsed.brdf, [1.0 / np.pi] * 3, rtol=1e-6)

@@ -14,7 +14,7 @@ from packaging.requirements import Requirement
 from packaging.version import Version
 
 from tests.api.a_store import client_of, serving_command
-from tests.api.chromium import SECONDS
+from tests.api.connections import WAIT_S
 
 PROJECT = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 FOLDER = os.environ.get("BRDFDB_LOWEST", "")
@@ -69,7 +69,7 @@ def test_the_folder_holds_what_the_project_states() -> None:
 def test_an_address_answers_as_with_the_present_versions(address: str, root: Path) -> None:
     for path in ASKED:
         present = client_of(root).get(path)
-        answer = httpx.get(f"{address}{path}", timeout=SECONDS)
+        answer = httpx.get(f"{address}{path}", timeout=WAIT_S)
         assert (answer.status_code, answer.headers["content-type"]) == (
             present.status_code,
             present.headers["content-type"],
@@ -80,5 +80,5 @@ def test_an_address_answers_as_with_the_present_versions(address: str, root: Pat
 def test_a_body_is_answered_as_with_the_present_versions(address: str, root: Path) -> None:
     for path in POSTED:
         present = client_of(root).post(path, json=POSTED[path])
-        answer = httpx.post(f"{address}{path}", json=POSTED[path], timeout=SECONDS)
+        answer = httpx.post(f"{address}{path}", json=POSTED[path], timeout=WAIT_S)
         assert (answer.status_code, answer.content) == (present.status_code, present.content)

@@ -8,7 +8,6 @@ import json
 import os
 import re
 import signal
-import socket
 import subprocess
 import sys
 import threading
@@ -21,12 +20,10 @@ import pytest
 
 from tests.api import proxies
 from tests.api.a_store import publish
+from tests.api.connections import BODY, LOOKUP, POINT, WAIT_S, all_of, connected, in_threads, post, wait_until
 
-LOOKUP = "/v1/materials/grey/lookup?theta_i=10&theta_r=20"
-BODY = b'{"theta_i": 10, "theta_r": 20}'
 COUNTED = re.compile(r'^brdfdb_requests_total{route="/v1/materials/{name}/lookup",status="200"} (\d+)', re.MULTILINE)
 CLIENTS = 24
-WAIT_S = 300  # for what takes a second or two where the machine has nothing else to do
 LAST_S = 2.0  # time in which requests on open connections are answered after the signal to stop; half a second else [s]
 # The command that serves, and the program that it starts as a worker. On a busy machine requests in flight take longer
 # than ten seconds
@@ -57,18 +54,15 @@ class Serving:
         self.answered: list[str] = []  # addresses of lookups; a list, because threads ask, too
         self.port = int(process.stdout.readline().rsplit(":", 1)[1].strip(" /\n"))
 
-    def get(self, path: str = LOOKUP) -> tuple[int, bytes]:
+    def get(self, path: str = POINT) -> tuple[int, bytes]:
         """Status and body of an answer over a new connection."""
         with contextlib.closing(http.client.HTTPConnection("127.0.0.1", self.port, timeout=WAIT_S)) as connection:
             connection.request("GET", path)
             answer = connection.getresponse()
             body = answer.read()
-        if answer.status == 200 and path.startswith(LOOKUP.partition("?")[0]):
+        if answer.status == 200 and path.startswith(LOOKUP):
             self.answered.append(path)
         return answer.status, body
-
-    def connect(self) -> socket.socket:
-        return socket.create_connection(("127.0.0.1", self.port), timeout=WAIT_S)
 
     @property
     def workers(self) -> set[int]:
@@ -143,33 +137,18 @@ def serving(
             process.terminate()
 
 
-def wait_until(true: Callable[[], bool]) -> None:
-    """Wait for what will be; an error where it does not come."""
-    deadline = time.monotonic() + WAIT_S
-    while not true():
-        assert time.monotonic() < deadline
-        time.sleep(0.02)
-
-
 @pytest.fixture(scope="module")
-def store(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    root = tmp_path_factory.mktemp("server") / "store"
-    publish(root, "grey", "lambert", rho=0.25)
-    return root
-
-
-@pytest.fixture(scope="module")
-def pair(store: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Serving]:
+def pair(grey_store: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Serving]:
     """Two workers."""
-    with serving(store, tmp_path_factory.mktemp("pair") / "log", 2) as found:
+    with serving(grey_store, tmp_path_factory.mktemp("pair") / "log", 2) as found:
         yield found
         found.process.terminate()
         assert found.process.wait(WAIT_S) == 0
 
 
-def test_all_workers_answer_the_same_revision_after_a_publication(store: Path, pair: Serving) -> None:
+def test_all_workers_answer_the_same_revision_after_a_publication(grey_store: Path, pair: Serving) -> None:
     for rho in (0.5, 0.75):
-        revision = publish(store, "grey", "lambert", rho=rho)
+        revision = publish(grey_store, "grey", "lambert", rho=rho)
         answers = []
         for worker in pair.workers:
             with pair.alone(worker):
@@ -209,17 +188,14 @@ def test_lines_of_the_log_are_whole_under_load(pair: Serving) -> None:
 
     def load() -> None:
         for query in queries:
-            pair.get(f"{LOOKUP.partition('?')[0]}?{query}")
+            pair.get(f"{LOOKUP}?{query}")
 
     def found() -> Counter[object]:
         return Counter(line.get("query", line.get("failed")) for line in pair.logged())
 
-    threads = [threading.Thread(target=load) for _ in range(4)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    with pair.connect() as connection:
+    with in_threads(load, 4):
+        pass
+    with connected(pair.port) as connection:
         connection.sendall(b"no HTTP\r\n\r\n")
         assert connection.recv(65536).startswith(b"HTTP/1.1 400 ")
     expected = {**dict.fromkeys(queries, 4), "Invalid HTTP request received.": 1}
@@ -227,10 +203,10 @@ def test_lines_of_the_log_are_whole_under_load(pair: Serving) -> None:
 
 
 @pytest.mark.parametrize(("workers", "word"), [(1, signal.SIGTERM), (2, signal.SIGINT)])
-def test_told_to_stop_what_was_let_in_is_answered_and_nobody_waits(
-    store: Path, tmp_path: Path, workers: int, word: signal.Signals
+def test_requests_are_answered_after_a_signal(
+    grey_store: Path, tmp_path: Path, workers: int, word: signal.Signals
 ) -> None:
-    with serving(store, tmp_path / "log", workers, last_s=LAST_S) as served:
+    with serving(grey_store, tmp_path / "log", workers, last_s=LAST_S) as served:
         statuses: Counter[int] = Counter()
         refused: list[ConnectionError] = []
 
@@ -241,32 +217,24 @@ def test_told_to_stop_what_was_let_in_is_answered_and_nobody_waits(
             except (ConnectionRefusedError, ConnectionResetError) as error:  # reset: nobody had accepted it
                 refused.append(error)
 
-        request = f"GET {LOOKUP} HTTP/1.1\r\nHost: x\r\n\r\n".encode()
-        idle, used, half = served.connect(), served.connect(), served.connect()
+        request = f"GET {POINT} HTTP/1.1\r\nHost: x\r\n\r\n".encode()
+        idle, used, half = connected(served.port), connected(served.port), connected(served.port)
         used.sendall(request)
         first = b""
         while not first.endswith(b"}"):
             first += used.recv(65536)
-        head = f"POST {LOOKUP.partition('?')[0]} HTTP/1.1\r\nHost: x\r\nContent-Length: {len(BODY)}\r\n\r\n".encode()
-        half.sendall(head + BODY[:10])
-        threads = [threading.Thread(target=ask) for _ in range(4)]
-        for thread in threads:
-            thread.start()
-        time.sleep(0.1)
-        children = served.workers
-        served.process.send_signal(word)
-        idle.sendall(request)
-        used.sendall(request)
-        for thread in threads:
-            thread.join()
+        half.sendall(post(BODY[:10], length=len(BODY)))
+        with in_threads(ask, 4):
+            time.sleep(0.1)
+            children = served.workers
+            served.process.send_signal(word)
+            idle.sendall(request)
+            used.sendall(request)
         half.sendall(BODY[10:])  # when nobody is let in any more
         for connection in (idle, used, half):
-            answer = b""
-            while part := connection.recv(65536):
-                answer += part
+            answer = all_of(connection)
             assert answer.startswith(b"HTTP/1.1 200 ")
             assert b'"specular_reflectance"' in answer
-            connection.close()
         assert served.process.wait(WAIT_S) == 0
     assert len(refused) == 4
     assert set(statuses) == {200}
@@ -276,17 +244,17 @@ def test_told_to_stop_what_was_let_in_is_answered_and_nobody_waits(
     assert not any(Path(f"/proc/{child}").exists() for child in children)
 
 
-def test_a_worker_that_fails_ends_the_server_with_a_sentence(store: Path, tmp_path: Path) -> None:
+def test_a_worker_that_fails_ends_the_server_with_a_sentence(grey_store: Path, tmp_path: Path) -> None:
     (tmp_path / "fastapi.py").write_text(  # workers alone import it
         "import warnings\nwarnings.warn('beware')\nraise RuntimeError('no such luck')\n"
     )
-    command = [sys.executable, "-m", "brdfdb_pipelines.cli", "serve", "--store", str(store), "--port", "0"]
+    command = [sys.executable, "-m", "brdfdb_pipelines.cli", "serve", "--store", str(grey_store), "--port", "0"]
     environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
     ended = subprocess.run(
         [*command, "--workers", "2"], env=environment, capture_output=True, text=True, timeout=WAIT_S, check=False
     )
     said = ended.stderr.splitlines()
-    assert (ended.returncode, said[-1]) == (2, "brdfdb: a worker ended with status 1; its log says why")
+    assert (ended.returncode, said[-1]) == (2, "brdfdb: a worker ended with status 1; its log has the reason")
     assert "RuntimeError: no such luck" in ended.stderr
     # two workers write at once: a line of the log may begin in the middle of a line of the other's traceback
     warned = [json.loads(line[line.index("{") :])["failed"] for line in said if "UserWarning" in line]
@@ -294,8 +262,8 @@ def test_a_worker_that_fails_ends_the_server_with_a_sentence(store: Path, tmp_pa
     assert all("UserWarning: beware" in line for line in warned)
 
 
-def test_workers_end_with_the_command_that_started_them_even_while_they_start(store: Path, tmp_path: Path) -> None:
-    with serving(store, tmp_path / "log", 2, ready=False) as served:
+def test_workers_end_with_the_command_that_started_them_even_while_they_start(grey_store: Path, tmp_path: Path) -> None:
+    with serving(grey_store, tmp_path / "log", 2, ready=False) as served:
         workers = served.workers
         served.process.kill()
         wait_until(lambda: not any(map(_runs, workers)))
@@ -304,16 +272,16 @@ def test_workers_end_with_the_command_that_started_them_even_while_they_start(st
     assert served.logged() == []
 
 
-def test_a_log_that_nobody_reads_stops_neither_answers_nor_the_end(store: Path, tmp_path: Path) -> None:
-    with serving(store, tmp_path / "log", 2, log_is_read=False) as served:
+def test_a_log_that_nobody_reads_stops_neither_answers_nor_the_end(grey_store: Path, tmp_path: Path) -> None:
+    with serving(grey_store, tmp_path / "log", 2, log_is_read=False) as served:
         for _ in range(100):  # 300 kB of lines; a pipe holds 64
-            assert served.get(f"{LOOKUP}&phi_r={'0' * 3000}")[0] == 200
+            assert served.get(f"{POINT}&phi_r={'0' * 3000}")[0] == 200
         served.process.send_signal(signal.SIGTERM)
         assert served.process.wait(WAIT_S) == 0
 
 
-def test_a_halted_worker_is_replaced_and_does_not_keep_the_server_from_ending(store: Path, tmp_path: Path) -> None:
-    with serving(store, tmp_path / "log", 2, halted_s=6.0, stopped_s=1.0) as served:
+def test_a_halted_worker_is_replaced_and_does_not_keep_the_server_from_ending(grey_store: Path, tmp_path: Path) -> None:
+    with serving(grey_store, tmp_path / "log", 2, halted_s=6.0, stopped_s=1.0) as served:
         first, second = sorted(served.workers)
         time.sleep(2.0)  # signs of life come each second
         os.kill(first, signal.SIGSTOP)
@@ -336,18 +304,18 @@ def test_counts_of_workers_have_room_before_a_disk_is_full(pair: Serving) -> Non
 
 @pytest.mark.parametrize("proxy", [proxies.nginx, proxies.caddy])
 def test_workers_are_replaced_one_by_one_behind_a_proxy_without_a_lost_request(
-    store: Path, tmp_path: Path, proxy: Callable[[Path, int], contextlib.AbstractContextManager[int]]
+    grey_store: Path, tmp_path: Path, proxy: Callable[[Path, int], contextlib.AbstractContextManager[int]]
 ) -> None:
     proxies.program(proxy.__name__)
-    with serving(store, tmp_path / "log", 2) as served, proxy(tmp_path, served.port) as port:
+    with serving(grey_store, tmp_path / "log", 2) as served, proxy(tmp_path, served.port) as port:
         stop, statuses = threading.Event(), Counter[object]()
 
         def ask() -> None:
             client = http.client.HTTPConnection("127.0.0.1", port, timeout=WAIT_S)
             while not stop.wait(0.005):
-                post = sum(statuses.values()) % 4 == 0
+                is_post = sum(statuses.values()) % 4 == 0
                 try:
-                    client.request(*(("POST", LOOKUP.partition("?")[0], BODY) if post else ("GET", LOOKUP)))
+                    client.request(*(("POST", LOOKUP, BODY) if is_post else ("GET", POINT)))
                     answer = client.getresponse()
                     answer.read()
                     statuses[answer.status] += 1
@@ -356,19 +324,15 @@ def test_workers_are_replaced_one_by_one_behind_a_proxy_without_a_lost_request(
                     client.close()
             client.close()
 
-        clients = [threading.Thread(target=ask) for _ in range(CLIENTS)]
-        for client in clients:
-            client.start()
-        for worker in sorted(served.workers):
-            others = served.workers
-            os.kill(worker, signal.SIGTERM)
-            wait_until(lambda others=others: len(served.workers - others) == 1)
-            (new,) = served.workers - others
-            with served.alone(new):
-                wait_until(lambda: served.get("/readyz")[0] == 200)
-        stop.set()
-        for client in clients:
-            client.join()
+        with in_threads(ask, CLIENTS):
+            for worker in sorted(served.workers):
+                others = served.workers
+                os.kill(worker, signal.SIGTERM)
+                wait_until(lambda others=others: len(served.workers - others) == 1)
+                (new,) = served.workers - others
+                with served.alone(new):
+                    wait_until(lambda: served.get("/readyz")[0] == 200)
+            stop.set()
         assert set(statuses) == {200}
 
 

@@ -43,22 +43,14 @@ def wrong(key: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     return np.array(line.x), np.array(line.y, dtype=np.float64)
 
 
-def test_every_misprint_has_a_figure() -> None:
+def test_every_misprint_has_a_figure_and_each_figure_its_own_key() -> None:
     assert {misprint.key for misprint in MISPRINTS} <= set(FIGURES)
-
-
-def test_keys_are_those_of_one_figure() -> None:
     assert len(FIGURES) == sum(len(module.FIGURES) for module in MODULES)
 
 
 @every_figure
-def test_a_figure_has_the_key_and_the_paper_that_it_is_listed_under(key: str) -> None:
-    lists = (("orennayar1994",), ("he1991",), ("ward1992",), ("rahman1993", "lucht2000"))
-    papers = dict(zip(MODULES, lists, strict=True))
-    (module,) = [module for module in MODULES if key in module.FIGURES]
+def test_a_figure_has_the_key_that_it_is_listed_under_and_a_paper_of_the_bibliography(key: str) -> None:
     assert figure(key).key == key
-    assert figure(key).paper in papers[module]
-    assert re.fullmatch(r"[a-z0-9-]+", key)
     bibliography = (Path(__file__).parents[2] / "references.bib").read_text(encoding="utf-8")
     assert f"{{{figure(key).paper}," in bibliography
 
@@ -126,13 +118,10 @@ def test_beckmanns_limit_is_off_by_a_part_in_g_at_the_peak() -> None:
 
 
 def test_a_form_that_is_off_does_not_stay_and_one_that_is_not_does_not_fail() -> None:
-    near, far, gap = np.array([0.0, 1e-12]), np.array([0.0, 1e-3]), np.array([0.0, np.nan])
-    assert _errors.stays("ours", near, 1e-10, "").holds
-    assert not _errors.stays("ours", far, 1e-10, "").holds
-    assert not _errors.stays("ours", gap, 1e-10, "").holds
-    assert not _errors.fails("printed", near, 1e-10, "").holds
-    assert _errors.fails("printed", far, 1e-10, "").holds
-    assert _errors.fails("printed", gap, 1e-10, "").holds
+    for error, off in ((1e-12, False), (1e-3, True), (np.nan, True)):
+        errors = np.array([0.0, error])
+        assert _errors.stays("ours", errors, 1e-10, "").holds != off
+        assert _errors.fails("printed", errors, 1e-10, "").holds == off
 
 
 def test_an_error_of_zero_is_drawn_and_one_of_nan_is_a_gap_that_the_label_counts() -> None:

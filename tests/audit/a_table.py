@@ -108,7 +108,6 @@ def written(audits: list[MaterialAudit]) -> dict[str, Any]:
     """The report as a file holds it, valid by the schema in the repository."""
     document = json.loads(report(audits, **ABOUT).model_dump_json())
     validate(document, SCHEMA)
-    assert isinstance(document, dict)
     return document
 
 

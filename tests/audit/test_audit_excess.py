@@ -86,34 +86,24 @@ def test_the_published_magnesium_oxide_is_a_known_excess() -> None:
     found = audit(tabulated(presets()["magnesium-oxide-ceramic"], fine(1.0), np.array([500.0])))
     assert verdicts(found) == {"energy": "known published excess"}
     assert found.verdict == "known published excess"
-    energy = found.of(Energy).table
-    assert " of what arrives at 83 degrees and 500 nm: He et al. 1991, section 3.2.3" in energy.reason
-    # ERRATA: 0.977 at 30 degrees, 1.016 at 60, 1.11 at 85, above 1 from about 54 on
-    at = {theta: row[0] for theta, row in zip(energy.theta_i_deg, energy.albedo, strict=True)}
-    assert at[30.0] == pytest.approx(0.977, abs=0.002)
-    assert at[60.0] == pytest.approx(1.016, abs=0.002)
-    assert at[85.0] == pytest.approx(1.11, abs=0.015)
-    assert energy.exceeds_1_from_theta_i_deg == pytest.approx(54.0, abs=1.0)
+    assert " of what arrives at 83 degrees and 500 nm: He et al. 1991, section 3.2.3" in found.of(Energy).table.reason
+    assert found.of(Energy).table.exceeds_1_from_theta_i_deg == pytest.approx(54.0, abs=1.0)  # ERRATA
 
 
-# Directional albedo at 89 degrees with rho = 1, interreflection included: ERRATA of eqs 27 and 28
-@pytest.mark.parametrize(("sigma_deg", "albedo"), [(10, 1.031), (20, 1.042), (30, 1.012)])
-def test_oren_nayar_with_rho_1_violates_unless_it_is_accepted(sigma_deg: float, albedo: float) -> None:
-    table = tabulated(material("oren_nayar", {"rho": 1.0, "sigma_deg": sigma_deg}), fine(2.0))
+def test_oren_nayar_with_rho_1_violates_unless_it_is_accepted() -> None:
+    table = tabulated(material("oren_nayar", {"rho": 1.0, "sigma_deg": 20}), fine(2.0))
     found = audit(table)
     assert (found.verdict, verdicts(found)) == ("violates", {"energy": "violates"})
-    assert "; this model does so by itself for such parameters: up to 1.0" in found.of(Energy).model.reason
-    assert "(Oren and Nayar 1994, eqs 27, 28 and 30: " in found.of(Energy).model.reason
+    assert found.of(Energy).table.albedo[-2] == [pytest.approx(1.042, abs=0.002)]  # ERRATA of eqs 27 and 28, 89 degrees
     accepted = audit(table, accept_excess=True)
     assert (accepted.verdict, accepted.of(Energy).verdict) == ("accepted excess", "accepted excess")
     assert "this model does so by itself" in accepted.of(Energy).reason
-    assert found.of(Energy).table.albedo[-2] == [pytest.approx(albedo, abs=0.002)]
 
 
 @pytest.mark.parametrize(
     ("rho_d", "alpha", "limit", "general"), [(0.0, 1.0, False, True), (0.1, 1.0, True, True), (0.1, 0.1, True, False)]
 )
-def test_a_model_gives_its_general_reason_unless_only_a_limit_of_energy_is_left(
+def test_a_general_reason_follows_unless_only_energy_is_broken(
     rho_d: float, alpha: float, limit: bool, general: bool
 ) -> None:
     ward = {"rho_d": rho_d, "rho_s": 1.0, "alpha_x": alpha, "alpha_y": alpha}
@@ -133,10 +123,8 @@ def test_what_a_recipe_says_of_an_excess_is_repeated_and_excuses_nothing() -> No
 def test_what_is_accepted_excuses_nothing_but_the_energy_of_the_model() -> None:
     table = node(tabulated(material("oren_nayar", {"rho": 1.0, "sigma_deg": 20}), fine(5.0)), -1.0)
     found = audit(table, accept_excess=True)
-    assert (found.verdict, found.of(Energy).model.verdict, found.of(ValueCounts).positivity) == (
-        *("violates", "accepted excess"),
-        "violates",
-    )
+    assert (found.verdict, found.of(Energy).model.verdict) == ("violates", "accepted excess")
+    assert found.of(ValueCounts).positivity == "violates"
 
 
 def test_oren_nayar_with_rho_1_conserves_energy_on_a_rough_surface() -> None:

@@ -201,9 +201,21 @@ def test_where_the_materials_of_the_papers_stand(name: str, standing: str) -> No
     assert validity_of(presets()[name], np.array([400.0, 700.0])).verdict == standing
 
 
-def test_a_very_rough_surface_needs_no_gentle_slopes_for_its_integrals() -> None:
-    found = limits(presets()["sandpaper-220-grit"], np.array([550.0]))
-    assert [found[name].standing for name in ("slope", "very")] == ["outside", "inside"]
+@pytest.mark.parametrize(
+    ("name", "limit", "nm", "standing"),
+    [
+        ("sandpaper-220-grit", "slope", 550.0, "outside"),
+        ("sandpaper-220-grit", "very", 550.0, "inside"),  # its integrals need no gentle slopes
+        ("sandpaper-220-grit", "reflections", 550.0, "outside"),  # a nonmetal without a uniform part
+        ("scene-plastic-table", "reflections", 550.0, "inside"),
+        ("aluminum-cylinder-12a", "reflections", 550.0, "inside"),
+        ("aluminum-cylinder-12e", "reflections", 550.0, "at the edge"),  # a steep metal without a uniform part
+        ("aluminum-cylinder-12a", "rms", 400.0, "inside"),
+        ("aluminum-cylinder-12a", "rms", 2000.0, "at the edge"),
+    ],
+)
+def test_where_a_limit_stands(name: str, limit: str, nm: float, standing: str) -> None:
+    assert limits(presets()[name], np.array([nm]))[limit].standing == standing
 
 
 def test_the_radius_of_curvature_is_that_of_the_correlation_of_eq_48() -> None:
@@ -214,20 +226,9 @@ def test_the_radius_of_curvature_is_that_of_the_correlation_of_eq_48() -> None:
     assert value == f"{radius / 0.5:.3g} at 500 nm"
 
 
-def test_a_nonmetal_or_a_steep_metal_without_a_uniform_part_is_outside() -> None:
-    wavelength = np.array([550.0])
-    standings = {
-        name: limits(presets()[name], wavelength)["reflections"].standing
-        for name in ("sandpaper-220-grit", "scene-plastic-table", "aluminum-cylinder-12a", "aluminum-cylinder-12e")
-    }
-    assert list(standings.values()) == ["outside", "inside", "inside", "at the edge"]
-
-
 def test_limits_depend_on_the_longest_wavelength() -> None:
     aluminum = presets()["aluminum-cylinder-12a"]
     assert limits(aluminum, np.array([400.0, 700.0]))["rms"] == limits(aluminum, np.array([700.0]))["rms"]
-    assert limits(aluminum, np.array([400.0]))["rms"].standing == "inside"
-    assert limits(aluminum, np.array([2000.0]))["rms"].standing == "at the edge"
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,7 @@
 """Our models against the same arithmetic in C++, on one core: ``python tests/benchmarks/against_cpp.py [section ...]``.
 
-The contestants take turns, in several rounds of one run. A rate is the median over rounds of the median pass, "best"
-the fastest pass of all, "spread" that of the rounds; a ratio is the median over rounds of ours over theirs.
+The contestants take turns, in several rounds of one run. A rate is the median over rounds of the median pass, "spread"
+that of the rounds; a ratio is the median over rounds of ours over theirs.
 Seconds are those of the processor: others on the machine count less.
 "public" is the function as a user calls it, checks and new arrays and all; "loop" is its compiled loop alone, on the
 arrays that the public function hands it. "random angles" are four plain arrays, and the C++ takes their sines, too.
@@ -45,7 +45,7 @@ SEED = 1994
 AGREEMENT = {"float64": (1.0, 1e-8), "float32": (0.99, 1e-3)}
 TINY = 1e-30
 ROWS = 2  # of theta_i at a time, as brdfdb.tables.tabulation cuts a grid of this size
-MEASURED = "Million values of f_r a second on one core: our models beside the same arithmetic in C++."
+MEASURED = "Million values of f_r per second on one core: our models, and the same arithmetic in C++."
 
 
 class Size(NamedTuple):
@@ -94,22 +94,9 @@ MANY_RATE = 1e3 / 170.0  # a surface of its own for each value of He-Torrance: 1
 OVER_CPP, OVER_RANDOM, TABLE_RATE, GAUSSIAN_RATE = 0.9, 1.5, {"float64": 30.0, "float32": 80.0}, 0.02
 
 Call = Callable[[], Any]
-Clock = Callable[[], tuple[float, float]]  # median and least seconds of a pass
+Clock = Callable[[], float]  # median seconds of a pass
+Rates = list[float]  # million values a second of each round
 Vectors = tuple[NDArray[Any], NDArray[Any]]
-
-
-@dataclass(frozen=True)
-class Rates:
-    """Million values a second of each round: of the median and of the fastest pass."""
-
-    medians: list[float]
-    fastest: list[float]
-
-    @property
-    def cells(self) -> tuple[float, float, float]:
-        """Median, best, and spread of the rounds in percent."""
-        middle = median(self.medians)
-        return middle, max(self.fastest), 100.0 * (max(self.medians) - min(self.medians)) / middle
 
 
 @dataclass(frozen=True)
@@ -124,26 +111,26 @@ class Row:
 
     def add_to(self, table: Table) -> None:
         """Add the line to a table."""
-        theirs = (None, None, None) if self.theirs is None else self.theirs.cells
-        ratio = best = None
+        theirs = ratio = None
+        rate = value = median(self.ours)
+        spread = 100.0 * (max(self.ours) - min(self.ours)) / rate
         if self.theirs is not None:
-            ratio = median(a / b for a, b in zip(self.ours.medians, self.theirs.medians, strict=True))
-            best = self.ours.cells[1] / self.theirs.cells[1]
-        value = self.ours.cells[0] if ratio is None else ratio
+            theirs = median(self.theirs)
+            ratio = value = median(a / b for a, b in zip(self.ours, self.theirs, strict=True))
         verdict = "" if self.floor is None else "ok" if value >= self.floor else "below"
-        table.add(self.case, self.timed, *theirs, *self.ours.cells, ratio, best, self.floor, verdict)
+        table.add(self.case, self.timed, theirs, rate, spread, ratio, self.floor, verdict)
 
 
 def columns() -> list[Column]:
     """Return the columns of `Row`."""
-    rates = [
-        Column(name=f"{whose}{name}", unit=unit, recorded=name != ", best" and (whose, name) != ("C++", ", spread"))
-        for whose in ("C++", "ours")
-        for name, unit in (("", "1e6/s"), (", best", "1e6/s"), (", spread", "%"))
+    names = [Column(name="case / against", width=56), Column(name="timed", recorded=False)]
+    rates = [Column(name=name, unit="1e6/s") for name in ("C++", "ours")]
+    return [
+        *names,
+        *rates,
+        Column(name="ours, spread", unit="%"),
+        *(Column(name=name) for name in ("ratio", "floor", "verdict")),
     ]
-    names = ("ratio", "ratio of best", "floor", "verdict")
-    ratios = [Column(name=name, recorded=name != "ratio of best") for name in names]
-    return [Column(name="case / against", width=56), Column(name="timed", recorded=False), *rates, *ratios]
 
 
 class Cpp:
@@ -159,11 +146,7 @@ class Cpp:
         return self.process.stdout.readline().split()
 
     def clock(self, kernel: str, parameters: list[float], seconds: float) -> Clock:
-        def passes() -> tuple[float, float]:
-            middle, least = self._ask("time", kernel, seconds, *parameters)
-            return float(middle), float(least)
-
-        return passes
+        return lambda: float(self._ask("time", kernel, seconds, *parameters)[0])
 
     def check(self, kernel: str, parameters: list[float], ours: NDArray[np.floating]) -> None:
         """Compare our values with those of the C++; SystemExit if they differ."""
@@ -198,7 +181,7 @@ def baseline(wi: NDArray[Any], wr: NDArray[Any], size: Size) -> Iterator[Cpp]:
 def clock(call: Call, seconds: float) -> Clock:
     """Time passes of `call` for that long, after one to warm up."""
 
-    def passes() -> tuple[float, float]:
+    def passes() -> float:
         call()
         times: list[float] = []
         start = time.perf_counter()
@@ -208,7 +191,7 @@ def clock(call: Call, seconds: float) -> Clock:
             elapsed = time.process_time() - before
             if elapsed > 0.0:  # on a busy machine the clock sometimes stands still during a short pass
                 times.append(elapsed)
-        return median(times), min(times)
+        return median(times)
 
     return passes
 
@@ -216,23 +199,20 @@ def clock(call: Call, seconds: float) -> Clock:
 def once(call: Call) -> Clock:
     """Time one pass of `call`, which is long."""
 
-    def one() -> tuple[float, float]:
+    def one() -> float:
         before = time.process_time()
         call()
-        elapsed = time.process_time() - before
-        return elapsed, elapsed
+        return time.process_time() - before
 
     return one
 
 
 def in_turns(rounds: int, contestants: Mapping[str, tuple[int, Clock]]) -> dict[str, Rates]:
     """Rates of all contestants, each the size of its pass and its clock."""
-    rates = {name: Rates([], []) for name in contestants}
+    rates: dict[str, Rates] = {name: [] for name in contestants}
     for _ in range(rounds):
         for name, (size, passes) in contestants.items():
-            middle, least = passes()
-            rates[name].medians.append(size / middle / 1e6)
-            rates[name].fastest.append(size / least / 1e6)
+            rates[name].append(size / passes() / 1e6)
     return rates
 
 

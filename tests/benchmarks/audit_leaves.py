@@ -30,7 +30,9 @@ from tests.benchmarks.recording import Column, Run
 
 SAMPLES = 2000  # of each sampler: what is forged is in the attributes
 QUICK = "rolled-brass"
-MEASURED = "Attributes of tables forged one by one, manifests made good again: which of them an audit does not notice."
+MEASURED = (
+    "Attributes of tables changed one at a time, with updated digests: how many changes an audit does not notice."
+)
 
 
 def noticed(table: Table) -> bool:

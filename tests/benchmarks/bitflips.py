@@ -21,45 +21,20 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from brdfdb_pipelines import cli
 from tests.benchmarks.recording import Column, Run
+from tests.pipelines.recipes import anisotropic, isotropic, material
 
 # A grey, a spectral and two members of a family, on grids so coarse that the store is built in seconds
-RECIPE = """\
-materials = ["white", "copper", "shade"]
-wavelengths_nm = [450, 550, 650]
-[grids.isotropic]
-theta_i_deg = [0, 40, 80]
-theta_r_deg = [0, 40, 80]
-delta_phi_deg = [0, 90, 180]
-[grids.spectral]
-theta_i_deg = [0, 40, 80]
-theta_r_deg = [0, 40, 80]
-delta_phi_deg = [0, 90, 180]
-[grids.anisotropic]
-theta_i_deg = [0, 80]
-phi_i_deg = [0, 360]
-theta_r_deg = [0, 80]
-phi_r_deg = [0, 360]
-[define.white]
-title = "White"
-model = "lambert"
-source = "no paper"
-[define.white.parameters]
-rho = RHO
-[define.copper]
-title = "Copper"
-model = "he_torrance"
-source = "no paper"
-refractive_index = "main/Cu/Johnson"
-[define.copper.parameters]
-sigma_0_um = 0.1
-tau_um = 2.0
-[sweep.shade]
-title = "Shades"
-model = "lambert"
-source = "a sweep"
-[sweep.shade.parameters]
-rho = [0.2, 0.8]
-"""
+THETA = "[0, 40, 80]"
+RECIPE = "".join(
+    (
+        'materials = ["white", "copper", "shade"]\nwavelengths_nm = [450, 550, 650]\n',
+        *(isotropic(THETA, "[0, 90, 180]", kind=kind) for kind in ("isotropic", "spectral")),
+        anisotropic(),
+        material("white", "White", "lambert", "rho = RHO"),
+        material("copper", "Copper", "he_torrance", "sigma_0_um = 0.1", "tau_um = 2.0"),
+        material("shade", "Shades", "lambert", "rho = [0.2, 0.8]", table="sweep"),
+    )
+)
 LOOKUPS = (
     ("white", "30", "0", "50", "120"),
     ("copper", "30", "0", "50", "120"),
@@ -69,6 +44,7 @@ LOOKUPS = (
 )
 NAMES = ("white", "copper", "shade-001", "shade-002")
 QUICK_COUNT = 2
+SEED = 20261122  # of files and bits
 MEASURED = "Bits flipped one at a time in the files of a store: every command must refuse or answer as before."
 _ROUNDS = 6  # of verify and the repairs that it names
 
@@ -221,10 +197,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     bench = Run("bitflips", "accuracy", "Flipped bits in a store", MEASURED)
     parser = bench.parser(__doc__)
     parser.add_argument("--count", type=int, default=300, metavar="N", help="flips (default: %(default)s)")
-    parser.add_argument("--seed", type=int, default=20261122, metavar="N", help="of files and bits")
     options = bench.parse(parser, arguments)
     with tempfile.TemporaryDirectory() as folder:
-        result = flips(QUICK_COUNT if options.quick else options.count, options.seed, Path(folder))
+        result = flips(QUICK_COUNT if options.quick else options.count, SEED, Path(folder))
     table = bench.table("Flips by the kind of file", Column(name="file", width=20), "flips", "named and repaired")
     for name, count in sorted(result.kinds.items()):
         table.add(name, count, result.repaired[name])

@@ -28,7 +28,7 @@ from brdfdb_pipelines.workers import Workers
 from tests.benchmarks.plain import plain_recipe
 from tests.benchmarks.recording import Column, Run
 
-MEASURED = "The values a second of a build, of its kernels alone and of its codec alone, of the same tables."
+MEASURED = "Values per second of a build, and of its kernels and its codec alone, for the same tables."
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

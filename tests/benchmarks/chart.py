@@ -1,7 +1,7 @@
-"""Speed against accuracy of the forms of four materials, and of a family: ``python tests/benchmarks/chart.py``.
+"""Speed against accuracy of the forms of four materials: ``python tests/benchmarks/chart.py``.
 
 Times are those of the processor, but programs that share its caches on a busy machine lengthen them. ``--pictures``
-copies the pictures to docs/pictures/NAME.svg.
+copies the pictures of the materials and of a family to docs/pictures/NAME.svg.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from unittest import mock
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from brdfdb.forms import sampler_efficiency, timing, tradeoff
-from brdfdb.forms.tradeoff import Chart, Cost, FamilyChart
+from brdfdb.forms.tradeoff import Chart, Cost
 from brdfdb_pipelines import chart
 from tests.benchmarks.recording import Column, Run
 
@@ -36,18 +36,18 @@ FEWER = (
     (sampler_efficiency, "ROUNDS", 1),
 )
 MEASURED = (
-    "Error against the exact form, and time of a value of f_r on one core, of every form of a material; variance and "
-    "time of samplers for the albedo in light from 60 degrees and for the picture of a sphere."
+    "Error against the exact form, and time of a value of f_r on one core, of every form of a material; the time that "
+    "a sampler takes to a standard deviation of 1 %, for the albedo in light from 60 degrees and a picture of a sphere."
 )
 TIMES = ("many at once", "256 at once", "one", "64 materials in turn")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Chart the materials and the family, and print their tables."""
+    """Chart the materials, and print their tables."""
     run = Run("chart", "speed", "Speed against accuracy", MEASURED)
     parser = run.parser(__doc__)
     parser.add_argument("--pictures", action="store_true", help="write docs/pictures/NAME.svg")
-    parser.add_argument("names", metavar="NAME", nargs="*", help="of presets, by default four and a family")
+    parser.add_argument("names", metavar="NAME", nargs="*", help="of presets, by default four")
     options = run.parse(parser, arguments)
     names = options.names or (QUICK if options.quick else NAMES)
     with contextlib.ExitStack() as stack:
@@ -56,14 +56,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
         for module, name, value in FEWER if options.quick else ():
             stack.enter_context(mock.patch.object(module, name, value))
         charts = chart.run(names, folder, tolerances=[0.2] if options.quick else None).charts
-        families = [] if options.quick or options.names else chart.run((FAMILY,), folder, recipe_path=RECIPE).families
-        for path in folder.glob("*.svg") if options.pictures else ():
-            shutil.copy(path, PICTURES)
+        if options.pictures:
+            chart.run((FAMILY,), folder, recipe_path=RECIPE)
+            for path in folder.glob("*.svg"):
+                shutil.copy(path, PICTURES)
     for one in charts:
         forms(run, one)
         samplers(run, one)
-    for family in families:
-        members(run, family)
     run.end()
     return 0
 
@@ -103,7 +102,7 @@ def samplers(run: Run, one: Chart) -> None:
         f"{one.material}: samplers",
         Column(name="sampler", width=44),
         *(
-            Column(name=f"{problem}, {name}", unit=unit, recorded=name not in ("from", "to"))
+            Column(name=f"{problem}, {name}", unit=unit, recorded=name == "time to 1 %")
             for problem in ("albedo", "sphere")
             for name, unit in (("variance", ""), ("time", "ns"), ("time to 1 %", "ms"), ("from", "ms"), ("to", "ms"))
         ),
@@ -111,21 +110,6 @@ def samplers(run: Run, one: Chart) -> None:
     for sampler in one.samplers:
         works = (sampler.albedo, sampler.sphere)
         table.add(sampler.title, *(n for w in works for n in (w.variance, w.ns, w.ms, w.low_ms, w.high_ms)))
-
-
-def members(run: Run, family: FamilyChart) -> None:
-    """Print the mean error of every form along a family of one parameter."""
-    ((axis, values),) = family.axes.items()
-    table = run.table(
-        f"{family.family}: mean error in % along {axis}",
-        Column(name="form", width=44),
-        Column(name="many at once", unit="ns"),
-        *(Column(name=f"{value:g}") for value in values),
-    )
-    if family.diagnostic is not None:
-        table.add(family.diagnostic.title, None, *family.diagnostic.values)
-    for curve in family.curves:
-        table.add(curve.title, curve.batch.ns, *(None if error is None else 100.0 * error for error in curve.l1))
 
 
 if __name__ == "__main__":

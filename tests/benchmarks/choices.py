@@ -1,8 +1,8 @@
 """The forms that `brdfdb choose` takes for the shipped scenes: ``python tests/benchmarks/choices.py``.
 
-Pictures that share no code with `choose` judge some of the choices (see picture_judge.py), at four widths and 16
-offsets of the pixels; ``--judge`` names the scenes. It exits with 1 if more pixels are beyond the tolerance than
-choice.json states.
+Pictures that share no code with `choose` judge the choices of three of them, or of the scenes that are named (see
+picture_judge.py), at four widths and 16 offsets of the pixels. It exits with 1 if more pixels are beyond the tolerance
+than choice.json states.
 """
 
 from __future__ import annotations
@@ -38,8 +38,8 @@ material = "rolled-brass"
 shape = { kind = "sphere", radius = 1 }
 """
 MEASURED = (
-    "The cheapest form of each material that a scene cannot tell from the exact form, its errors in CIEDE2000, and its "
-    "cost as a share of the exact form's."
+    "The cheapest form of each material that the picture of a scene cannot distinguish from the exact form, its "
+    "errors in CIEDE2000, and its cost as a share of the cost of the exact form."
 )
 
 
@@ -47,8 +47,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Choose for scenes and judge the choices, and return 1 if a choice breaks its statement."""
     run = Run("choices", "accuracy", "Choices for scenes", MEASURED)
     parser = run.parser(__doc__)
-    parser.add_argument("--judge", metavar="SCENE", nargs="*", default=JUDGED, help="by default three of the scenes")
-    parser.add_argument("--most", type=int, help="pixels of an object in a picture (default: by the samples of lights)")
     parser.add_argument("scenes", metavar="SCENE", nargs="*", help="names or files, by default those that are shipped")
     options = run.parse(parser, arguments)
     table = run.table(
@@ -77,8 +75,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
                     one.choice.share,
                     *((None, None) if cheaper is None else (cheaper.title, cheaper.error.counted)),
                 )
-        wanted = [scene for scene in choices if options.quick or scene.stem in options.judge]
-        broken = judged(run, {scene: choices[scene] for scene in wanted}, options.most, options.quick)
+        named = options.quick or options.scenes
+        wanted = {scene: choice for scene, choice in choices.items() if named or scene.stem in JUDGED}
+        broken = judged(run, wanted, options.quick)
     run.end()
     return min(broken, 1)
 
@@ -104,7 +103,7 @@ def chosen(scene: Path, out: Path, quick: bool) -> tuple[SceneChoice, Path]:
     return choice, out / "choice.json"
 
 
-def judged(run: Run, choices: dict[Path, tuple[SceneChoice, Path]], most: int | None, quick: bool) -> int:
+def judged(run: Run, choices: dict[Path, tuple[SceneChoice, Path]], quick: bool) -> int:
     """Judge choices by other pictures, and return the number of broken statements."""
     widths, offsets = (QUICK_WIDTHS, QUICK_OFFSETS) if quick else (WIDTHS, OFFSETS)
     table = run.table(
@@ -117,7 +116,7 @@ def judged(run: Run, choices: dict[Path, tuple[SceneChoice, Path]], most: int | 
     )
     broken = 0
     for scene, (choice, path) in choices.items():
-        counts = judge(scene, path, widths=widths, offsets=offsets, most=QUICK_MOST if quick else most)
+        counts = judge(scene, path, widths=widths, offsets=offsets, most=QUICK_MOST if quick else None)
         for one in choice.materials:
             count, one_in = counts[one.material], one.even.one_in if one.even is not None else 1
             holds = count.beyond * one_in <= count.pixels

@@ -18,7 +18,7 @@ ROUNDS = 5  # of the commands that take less than a second or two; the fastest c
 # Of the default recipe on a quiet machine of two cores
 WANTED_S = {"build, cached": 12.0, "build, cold": 30.0, "audit": 45.0, "audit, nothing new": 3.0, "lookup": 0.4}
 QUICK = 'materials = ["rolled-brass"]\ntolerance = 0.05\n'
-MEASURED = "The seconds of the clock and of the processors that whole commands take, on the materials of the papers."
+MEASURED = "Wall time and processor time of commands on the materials of the papers."
 
 
 def timed(arguments: Sequence[str], cache: Path | None, rounds: int) -> tuple[float, float]:

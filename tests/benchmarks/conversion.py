@@ -37,9 +37,7 @@ PAIRS, QUICK_PAIRS = 40_000, 2_000
 GRID, QUICK_GRID = (25, 25, 18, 4), (5, 5, 5, 3)  # alpha_x, alpha_y, reflectance at normal incidence, edge
 LEVELS = 4  # grids, each over a cell on either side of the best point of the last
 REQUIRED = 1.01
-MEASURED = (
-    "l1 and p99 of the closest parameters of another model, and the distance from the least of an exhaustive search."
-)
+MEASURED = "l1 and p99 of the closest parameters of another model, compared with those of an exhaustive search."
 
 Array = NDArray[np.float64]
 

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import sys
-import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -14,7 +12,7 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from brdfdb.derivatives import gradient_vectors
 from brdfdb.models import MODELS
-from tests.benchmarks.recording import Column, Run
+from tests.benchmarks.recording import Column, Run, times_of
 
 COUNT, QUICK_COUNT = 200_000, 2_000
 REPEATS, QUICK_REPEATS = 15, 1
@@ -26,18 +24,7 @@ SURFACES: tuple[tuple[str, dict[str, float]], ...] = (
     *((name, GREY) for name in ("oren_nayar", "oren_nayar_qualitative")),
     *(("he_torrance", {**COPPER, "sigma_0_um": sigma_0, "tau_um": 5.0 * sigma_0}) for sigma_0 in (0.02, 0.2, 2.0)),
 )
-MEASURED = "Unit vectors spread over both hemispheres, on one core: f_r alone, and f_r with its derivatives."
-
-
-def fastest(function: Callable[[], Any], repeats: int) -> float:
-    """Return the least processor time [s] of some calls after a first one, which compiles."""
-    function()
-    times = []
-    for _ in range(repeats):
-        begin = time.process_time()
-        function()
-        times.append(time.process_time() - begin)
-    return min(times)
+MEASURED = "f_r alone, and f_r with its derivatives, at random unit vectors on one core."
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -54,8 +41,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     table = run.table(f"{count} pairs of directions", *named, *columns)
     for name, parameters in SURFACES:
         with np.errstate(all="ignore"):
-            value = fastest(lambda: MODELS[name].vectors(wi, wr, **parameters), repeats)  # noqa: B023  # called at once
-            both = fastest(lambda: gradient_vectors(name, wi, wr, **parameters), repeats)  # noqa: B023  # the same
+            value = min(times_of(lambda: MODELS[name].vectors(wi, wr, **parameters), repeats))  # noqa: B023  # called at once
+            both = min(times_of(lambda: gradient_vectors(name, wi, wr, **parameters), repeats))  # noqa: B023  # the same
         size = len(gradient_vectors(name, wi[:1], wr[:1], **parameters).derivatives)
         ratio = both / value if value > 0.0 else None
         table.add(name, parameters.get("sigma_0_um"), size, 1e9 * value / count, 1e9 * both / count, ratio)

@@ -44,7 +44,10 @@ class Families(NamedTuple):
 
 FULL = Families((5, 9), (0.1, 0.2), (1.0, 2.0), (450.0, 550.0, 650.0), 0.02, 200)
 SMALL = Families((2,), (0.1, 0.11), (1.9, 2.0), (550.0,), 0.1, 4)
-MEASURED = "Families of rough copper over the height and the correlation length of the surface: size and stated error."
+MEASURED = (
+    "Families of rough copper over the height and the correlation length of the surface: size, stated error, and the "
+    "share of values within it."
+)
 
 
 def recipe(families: Families, count: int) -> Recipe:

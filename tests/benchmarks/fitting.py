@@ -1,8 +1,8 @@
 """Fits of synthetic samples: ``python tests/benchmarks/fitting.py``, ten minutes.
 
 Twelve materials of the papers are sampled at four incidences, with 3 % of noise and gaps. The share of parameters that
-lie in their 95 % intervals, the same where noise is not in proportion to f_r, the processor time of one fit of 7000
-samples by each analytic model, first calls of kernels apart, and what the derivatives of models save of it.
+lie in their 95 % intervals, the same where noise is not in proportion to f_r, and the processor time of one fit of 7000
+samples by each analytic model, without the first calls of kernels.
 """
 
 from __future__ import annotations
@@ -12,8 +12,6 @@ import time
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
-from unittest import mock
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +25,6 @@ from brdfdb.geometry import unit_vector
 from brdfdb.materials import Material, presets
 from brdfdb.measurements import Samples
 from brdfdb.models import MODELS
-from brdfdb.parameters import ModelSpec
 from tests.benchmarks.recording import Column, Run
 
 MATERIALS = (
@@ -41,15 +38,6 @@ MANY, QUICK_MANY = 7000, 500
 DARK = {"rho_d": 0.02, "rho_s": 0.1, "alpha_x": 0.15, "alpha_y": 0.15}  # a glossy black surface, of ward
 CONSTANT, MANY_SEEDS = 0.003, 60  # noise [1/sr] of all its samples alike
 QUICK_MATERIALS = ("glossy-grey-paper", "clay-vase", "roughened-aluminum-500nm")  # one of each paper
-# Models that have derivatives, and the material whose samples they fit
-DERIVED = {
-    "ward": ("ward", "rolled-brass"),
-    "ward_bounded": ("ward_bounded", "rolled-brass"),
-    "lambert + 2 ward": ("ward", "rolled-brass"),
-    "oren_nayar": ("oren_nayar", "clay-vase"),
-    "he_torrance": ("he_torrance", "roughened-aluminum-500nm"),
-}
-QUICK_DERIVED, REPEATS = ("ward",), 3
 QUICK_MODELS = ("lambert", "ward", "ggx")
 MEASURED = "The share of true parameters in the 95 % intervals of fits to noisy samples, and the time of one fit."
 
@@ -147,53 +135,6 @@ def times(run: Run, searched: Sequence[str], count: int) -> None:
         table.add(model, seconds, float(np.sqrt(np.mean(left**2))))
 
 
-def beside_differences(run: Run, models: Sequence[str], count: int, repeats: int) -> None:
-    """Measure fits with the derivatives of models beside fits with differences, the better of some repeats of each."""
-    columns = [Column(name="model", width=24), Column(name="values, differences", unit="M")]
-    columns += [Column(name="values", unit="M"), Column(name="gradients", unit="M")]
-    columns += [Column(name="time over that with differences"), Column(name="difference")]
-    table = run.table(f"one fit of {count} samples with derivatives; difference of its cost, relative", *columns)
-    for name, (model, material) in ((name, DERIVED[name]) for name in models):
-        few = samples(presets()[material], 0)
-        rows = np.tile(np.arange(len(few)), -(-count // len(few)))[:count]
-        many = replace(few.selected(rows), values=few.values[rows])
-        entry = presets()[material].refractive_index
-        seconds, costs, evaluated = [np.inf, np.inf], [0.0, 0.0], [(0, 0), (0, 0)]
-        for _ in range(repeats):
-            for kind, spec in enumerate((replace(MODELS[model], gradient=None), MODELS[model])):
-                counted = Counted(spec)
-                with mock.patch.dict(MODELS, {model: counted.spec}):
-                    fit(few, name, refractive_index=entry)  # compiles
-                    counted.values = counted.gradients = 0
-                    begin = time.process_time()
-                    costs[kind] = fit(many, name, refractive_index=entry).point.cost
-                    seconds[kind] = min(seconds[kind], time.process_time() - begin)
-                    evaluated[kind] = counted.values, counted.gradients
-        (before, _), (values, gradients) = evaluated
-        share = seconds[1] / seconds[0]
-        table.add(name, 1e-6 * before, 1e-6 * values, 1e-6 * gradients, share, costs[1] / costs[0] - 1.0)
-
-
-class Counted:
-    """A model that counts the values and gradients that are evaluated."""
-
-    def __init__(self, spec: ModelSpec) -> None:
-        self.values = self.gradients = 0
-
-        def vectors(*directions: Any, **parameters: Any) -> Any:
-            f_r = spec.vectors(*directions, **parameters)
-            self.values += np.size(f_r)
-            return f_r
-
-        def gradient(*directions: Any, **parameters: Any) -> Any:
-            assert spec.gradient is not None
-            answer = spec.gradient(*directions, **parameters)
-            self.gradients += np.size(answer.f_r)
-            return answer
-
-        self.spec = replace(spec, vectors=vectors, gradient=gradient if spec.gradient else None)
-
-
 def main(arguments: Sequence[str] | None = None) -> int:
     """Measure, print and record."""
     run = Run("fitting", "accuracy", "Fits of synthetic samples", MEASURED)
@@ -202,12 +143,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         coverage(run, QUICK_MATERIALS, QUICK_SEEDS)
         constant_noise(run, QUICK_SEEDS)
         times(run, QUICK_MODELS, QUICK_MANY)
-        beside_differences(run, QUICK_DERIVED, QUICK_MANY, 1)
     else:
         coverage(run, MATERIALS, SEEDS)
         constant_noise(run, MANY_SEEDS)
         times(run, fitted_by_default(sums=False), MANY)
-        beside_differences(run, tuple(DERIVED), MANY, REPEATS)
     run.end()
     return 0
 

@@ -11,7 +11,6 @@ the rate at which float64 directions and values move, as a share of the rate at 
 from __future__ import annotations
 
 import sys
-import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -25,12 +24,12 @@ from brdfdb.geometry import radians, unit_vector
 from brdfdb.tables.grids import Grid
 from brdfdb.tables.layout import PLAIN, Interpolation
 from brdfdb.tables.table import Table
-from tests.benchmarks.recording import Column, Run
+from tests.benchmarks.recording import Column, Run, times_of
 
 REPEATS = 9
 DIRECTIONS, QUICK_DIRECTIONS = 1_000_000, 2000
 STREAMED = 1 << 26  # bytes of an array that no cache holds
-MEASURED = "The directions that one core looks up in a second in tables in memory, and scipy's interpolator beside it."
+MEASURED = "Directions that one core looks up per second in tables in memory, compared with the interpolator of scipy."
 Case = tuple[str, Table, Any, str]
 RNG = np.random.default_rng(1992)
 
@@ -43,13 +42,7 @@ def table(axes: dict[str, Any], how: Interpolation = PLAIN) -> Table:
 
 def rate(call: Callable[[], Any], count: int, repeats: int = REPEATS) -> float:
     """Millions a second, by the fastest of some calls."""
-    call()
-    seconds = []
-    for _ in range(repeats):
-        start = time.process_time()
-        call()
-        seconds.append(time.process_time() - start)
-    return float(count / max(min(seconds), 1e-9) / 1e6)
+    return float(count / max(min(times_of(call, repeats)), 1e-9) / 1e6)
 
 
 def stream() -> float:

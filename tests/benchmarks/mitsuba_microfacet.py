@@ -29,7 +29,9 @@ COPPER = {"n": 0.95, "k": 2.6}  # rounded, near 550 nm
 REQUIRED = 1e-4
 FLOOR = 1e-9  # [1/sr]
 FULL, QUICK = 100_000, 100
-MEASURED = "The largest relative difference of f_r cos theta_r, and of the densities of samples, from Mitsuba, float32."
+MEASURED = (
+    "The largest relative difference from Mitsuba of f_r cos theta_r and of the densities of samples, in float32."
+)
 
 Array = NDArray[np.float64]
 

@@ -10,10 +10,10 @@ sphere under a lamp and a sky. Exits with 1 if a value is off by more than 2e-5,
 
 from __future__ import annotations
 
+import itertools
 import os
 import sys
 import tempfile
-import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -27,7 +27,7 @@ from brdfdb.geometry import unit_vector
 from brdfdb.integrals.quadrature import directional_albedo
 from brdfdb.materials import presets
 from brdfdb.store.publication import publish
-from tests.benchmarks.recording import Column, Run
+from tests.benchmarks.recording import Column, Run, times_of
 from tests.mitsuba.surfaces import SUBJECTS, Subject, directions, evaluated, interaction
 
 LIGHTS_DEG, TURNED = (0.0, 20.0, 45.0, 60.0, 75.0, 85.0), 0.5
@@ -40,7 +40,9 @@ PASSES = 128  # samples of a pixel
 TABLES = ("white-ceramic-tile", "rolled-brass", "clay-vase", "magnesium-oxide-ceramic", "ivory-computer-plastic")
 TOLERANCE = 0.01
 TIMED = (*SUBJECTS[::2], SUBJECTS[-2])  # a surface of most forms; He-Torrance is rough, and smooth as the last one
-MEASURED = "BSDF plugins of Mitsuba 3 against brdfdb.models, their samplers, and their speed beside roughconductor."
+MEASURED = (
+    "BSDF plugins of Mitsuba 3 compared with brdfdb.models: values, samplers, and speed relative to roughconductor."
+)
 
 Array = NDArray[Any]
 
@@ -93,13 +95,11 @@ def speeds(mitsuba: Any, surface: Any, count: int, repeats: int) -> tuple[float,
     context = mitsuba.BSDFContext()
 
     def best(work: Callable[[], Any]) -> float:
-        seconds = []
-        for _ in range(repeats + 1):  # the first run compiles
-            began = time.process_time()
+        def evaluated_now() -> None:
             drjit.eval(drjit.sum(work(), axis=None))
             drjit.sync_thread()
-            seconds.append(time.process_time() - began)
-        return count / min(seconds[1:]) / 1e6
+
+        return count / min(times_of(evaluated_now, repeats)) / 1e6
 
     return (
         best(lambda: surface.eval(context, place, wr)),
@@ -128,13 +128,13 @@ def picture_seconds(mitsuba: Any, bsdf: dict[str, Any], samples: int, repeats: i
             "sphere": {"type": "sphere", "bsdf": bsdf},
         }
     )
-    seconds = []
-    for seed in range(repeats + 1):  # the first run compiles
-        began = time.process_time()
-        drjit.eval(mitsuba.render(scene, spp=samples, seed=seed))
+    seeds = itertools.count()
+
+    def render() -> None:
+        drjit.eval(mitsuba.render(scene, spp=samples, seed=next(seeds)))
         drjit.sync_thread()
-        seconds.append(time.process_time() - began)
-    return min(seconds[1:])
+
+    return min(times_of(render, repeats))
 
 
 def compare(run: Run, mitsuba: Any, pairs: int, samples: int) -> bool:

@@ -48,6 +48,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             run.say(f"{paper}: {len(matrix.blind)} statements fail for none of the wrong models.")
             wrong += len(matrix.blind)
         wrong += len(matrix.overlooked)
+        table.keep_worst("statements that notice it", lambda _: None, smallest=True)
+    run.say("For each paper, the page shows the wrong model that the fewest statements notice.")
     run.end()
     return 1 if wrong else 0
 

@@ -12,6 +12,7 @@ import os
 import platform
 import shlex
 import sys
+import time
 from collections.abc import Callable, Hashable, Sequence
 from datetime import UTC, date, datetime
 from importlib.metadata import version
@@ -213,6 +214,17 @@ class Run:
         path = FOLDER / f"{self.name}.json"
         path.write_text(record.model_dump_json(indent=1, exclude_defaults=True) + "\n", encoding="utf-8")
         print(f"written: {path.name}")
+
+
+def times_of(call: Callable[[], object], repeats: int, clock: Callable[[], float] = time.process_time) -> list[float]:
+    """Return the seconds of calls after a first call, which compiles."""
+    call()
+    seconds = []
+    for _ in range(repeats):
+        begin = clock()
+        call()
+        seconds.append(clock() - begin)
+    return seconds
 
 
 def model_of(row: list[Value]) -> Value:

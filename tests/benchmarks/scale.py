@@ -21,6 +21,7 @@ import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import AbstractContextManager
+from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -83,11 +84,6 @@ def on_threads(root: Path, count: int, state: str = "published") -> None:
     _build(root, count, workers.threads(JOBS), state)
 
 
-def again(root: Path, count: int) -> None:
-    """Build what is built already."""
-    on_threads(root, count, "unchanged")
-
-
 def on_dask(root: Path, count: int) -> None:
     """Build all materials on a dask cluster of two processes of this machine."""
     from distributed import LocalCluster
@@ -138,35 +134,18 @@ def page(root: Path, count: int) -> None:
     assert (first["total"], first["materials"][0]["name"]) == (count, "grey-0")
 
 
-def command(root: Path, _: int, *words: str) -> None:
+def command(root: Path, _: int, word: str) -> None:
     """Run a command of brdfdb, and throw away what it prints."""
     with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
-        assert cli.main([*words, "--store", str(root)]) == 0
-
-
-def listed(root: Path, count: int) -> None:
-    """Run `brdfdb list`."""
-    command(root, count, "list")
-
-
-def verified(root: Path, count: int) -> None:
-    """Run `brdfdb verify`."""
-    command(root, count, "verify")
-
-
-def collected(root: Path, count: int) -> None:
-    """Run `brdfdb gc`."""
-    command(root, count, "gc")
+        assert cli.main([word, "--store", str(root)]) == 0
 
 
 TASKS: tuple[tuple[str, Callable[[Path, int], Any]], ...] = (
     ("make the jobs of a recipe", check_recipe),
     ("build, 2 threads", on_threads),
-    ("build again, nothing to do", again),
+    ("build again, nothing to do", partial(on_threads, state="unchanged")),
     ("brdfdb.open and all names", names_of),
-    ("brdfdb list", listed),
-    ("brdfdb verify", verified),
-    ("brdfdb gc", collected),
+    *((f"brdfdb {word}", partial(command, word=word)) for word in ("list", "verify", "gc")),
     ("first page of the service", page),
     ("open by a wrong name", unknown_name),
     ("open and look up, 200 times", lookups),

@@ -19,16 +19,17 @@ import sys
 import tempfile
 import time
 import urllib.request
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
-from tests.benchmarks.recording import Column, Run, Table
+from tests.benchmarks.recording import Column, Run, Table, times_of
 
 CONNECTIONS = 8
 NAMES = ("rolled-brass", "scene-copper-sphere")
@@ -190,17 +191,6 @@ def add(table: Table, title: str, connections: int, seconds: list[float], whole:
     table.add(title, connections, len(seconds) / whole, p50, p99, used)
 
 
-def time_of(call: Callable[[], object], repeats: int) -> float:
-    """Return the median time [s] of a call."""
-    call()
-    seconds = []
-    for _ in range(repeats):
-        start = time.perf_counter()
-        call()
-        seconds.append(time.perf_counter() - start)
-    return float(np.median(seconds))
-
-
 def clients(run: Run, store: str, port: int, quick: bool) -> None:
     """Time lookups through the Python client and in the directory."""
     import brdfdb
@@ -210,16 +200,18 @@ def clients(run: Run, store: str, port: int, quick: bool) -> None:
         Column(name="points", width=28),
         *(Column(name=name, unit="ms") for name in ("from the service", "from the directory")),
     )
+
+    def seconds_of(table: Any, angles: np.ndarray, calls: int) -> float:
+        """Return the median time of a lookup."""
+        times = times_of(lambda: [table.lookup(*angles) for _ in range(calls)], REPEATS, time.perf_counter)
+        return float(np.median(times)) / calls
+
     tables = [brdfdb.open(place)[NAMES[0]] for place in (f"http://127.0.0.1:{port}", store)]
     for count in (1, 1000) if quick else (1, 1000, 1_000_000):
         angles = np.radians(points(count)).T
         # many calls of one point: a single one takes microseconds
         calls = 100 if count == 1 and not quick else 1
-        times = [
-            time_of(lambda one=one, angles=angles, calls=calls: [one.lookup(*angles) for _ in range(calls)], REPEATS)
-            for one in tables
-        ]
-        table.add(count, *(1e3 * seconds / calls for seconds in times))
+        table.add(count, *(1e3 * seconds_of(one, angles, calls) for one in tables))
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

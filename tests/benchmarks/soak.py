@@ -40,7 +40,9 @@ STEPS = 1000  # of albedo, from one revision to the next; far more than are curr
 OFF = 1e-7  # of float32 tables, albedos up to 1: 3e-9 measured up to 0.06, neighbours are 1e-3 apart
 GROWTH = 1.1  # of memory, from the middle of the time to its end
 MANY = points(2000)
-MEASURED = "Answers of the service while new revisions are published: each must be of a revision that was current."
+MEASURED = (
+    "Answers of the service while new revisions are published: each must be that of a revision which was current."
+)
 QUICK_MINUTES, QUICK_EVERY = 0.01, 0.2
 
 Get = Callable[..., bytes]

@@ -2,24 +2,21 @@
 
 Directions are drawn here, apart from the code that states errors: towards the light exactly and within a cone of two
 degrees, both directions at 85 to 90 degrees, and over the hemisphere; of spectral tables at the wavelengths, in the
-middle between them, and at random ones. A line for each material, of every preset or those that are named; exit status
-1 if a share is below 98 %.
+middle between them, and at random ones. A line for each preset; exit status 1 if a share is below 98 %.
 """
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
-import brdfdb
 from brdfdb.materials import Material
 from brdfdb.tables import error_measurement, tabulation
 from brdfdb.tables.planner import plan
@@ -41,21 +38,15 @@ Array = NDArray[np.float64]
 def main(arguments: Sequence[str] | None = None) -> int:
     """Measure and print the shares, and return 1 if one is below the promised one."""
     run = Run("stated_errors", "accuracy", "Stated errors that hold", MEASURED)
-    parser = run.parser(__doc__)
-    parser.add_argument("--store", metavar="DIR", help="check the tables of this store; by default they are made here")
-    parser.add_argument("--wavelengths", metavar="NM", type=float, nargs="+", help="of tables that are made here")
-    parser.add_argument("names", metavar="NAME", nargs="*", help="of materials")
-    options = run.parse(parser, arguments)
-    names = options.names or (QUICK if options.quick else ())
-    wavelengths = options.wavelengths or (QUICK_WAVELENGTHS if options.quick else None)
+    options = run.parse(run.parser(__doc__), arguments)
     table = run.table(
         "Share of values within their stated error; of spectral tables the least of all wavelengths",
         Column(name="material", width=32),
         Column(name="wavelengths", width=18),
         *(Column(name=place, digits=4) for place in PLACES),
     )
-    for made in stored(options.store, names) if options.store else planned(names, wavelengths):
-        for words, shares in shares_of(made, made.source if options.store else made.attrs["of"]).items():
+    for material, made in planned(options.quick):
+        for words, shares in shares_of(made, material).items():
             table.add(made.name, words, *(shares[place] for place in PLACES))
     least = [(min(row[2:]), row) for row in table.rows]
     share, row = min(least, key=lambda pair: pair[0])
@@ -68,24 +59,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return int(share < PROMISED)
 
 
-def stored(root: str, names: Any) -> Any:
-    """Tables of a store."""
-    store = brdfdb.open(root)
-    return (store[name] for name in names or store)
-
-
-def planned(names: Any, wavelengths: Sequence[float] | None) -> Any:
-    """Tables of the default recipe, made here, with the material that each is of as an attribute."""
+def planned(quick: bool) -> Iterator[tuple[Material, Table]]:
+    """Materials of the default recipe with their tables; a few at a few wavelengths for a quick run."""
     for job in load().jobs():
         material, wavelength_nm = job.material, job.wavelength_nm
-        if names and material.name not in names:
+        if quick and material.name not in QUICK:
             continue
-        if wavelengths and wavelength_nm is not None and material.wavelengths_nm is None:
-            wavelength_nm = np.array(wavelengths)
+        if quick and wavelength_nm is not None and material.wavelengths_nm is None:
+            wavelength_nm = np.array(QUICK_WAVELENGTHS)
         layout = plan(material, wavelength_nm, 0.01)
         values = np.concatenate([tabulation.block(layout, rows) for rows in layout.blocks])
         error = error_measurement.measure(layout, lambda rows, values=values: values[rows])
-        yield replace(Table.of(layout, values), attrs={"error": error.model_dump(mode="json"), "of": material})
+        yield material, replace(Table.of(layout, values), attrs={"error": error.model_dump(mode="json")})
 
 
 def shares_of(table: Table, material: Material) -> dict[str, dict[str, float]]:

@@ -26,7 +26,9 @@ from tests.benchmarks.recording import Column, Run
 COUNT, QUICK_COUNT = 100_000, 200
 DIRECTIONS, QUICK_DIRECTIONS = 1_000, 50
 REPEATS = 3
-MEASURED = "Values of ward from `brdfdb sample`, against its kernel alone and the codec of the same chunks alone."
+MEASURED = (
+    "Values of ward per second from `brdfdb sample`, and from its kernel alone and its codec alone for the same chunks."
+)
 
 
 def once(count: int, directions: int, folder: Path | None) -> dict[str, tuple[float, float]]:

@@ -128,20 +128,6 @@ def test_float32_in_float32_out(spec: ModelSpec) -> None:
         np.testing.assert_array_equal(values, double.derivatives[name].astype(np.float32))
 
 
-def test_where_the_fit_of_oren_nayar_falls_below_0_nothing_changes() -> None:
-    dark = {"rho": 0.2, "sigma": 1.5}
-    found = gradient("oren_nayar", 1.5, 0.0, 1.5, np.pi, **dark)
-    assert found.f_r == 0.0
-    assert found.derivatives == {"rho": 0.0, "sigma": 0.0}
-
-
-def test_a_black_surface_has_the_slope_of_a_grey_one() -> None:
-    surface = {"rho_d": 0.2, "alpha_x": 0.1, "alpha_y": 0.3}
-    black, grey = (gradient("ward", 0.3, 0.0, 0.4, 3.0, rho_s=rho_s, **surface).derivatives for rho_s in (0.0, 0.7))
-    assert black["rho_s"] == pytest.approx(grey["rho_s"], rel=BY_ROUNDING)
-    assert black["alpha_x"] == black["alpha_y"] == 0.0
-
-
 @pytest.mark.parametrize("g", [1e8, 1e10, 1e12, 1e16, 1e22])
 def test_the_sum_of_he_torrance_has_the_slopes_of_its_limit(g: float) -> None:
     b = np.array([1e-6, 0.1, 1.0, 10.0])
@@ -155,5 +141,5 @@ def test_the_sum_of_he_torrance_has_the_slopes_of_its_limit(g: float) -> None:
 
 
 def test_a_model_without_derivatives_is_refused_with_those_that_have_them() -> None:
-    with pytest.raises(ParameterError, match=r"^model: lambert has no derivatives; those that have: oren_nayar, .*"):
+    with pytest.raises(ParameterError, match=r"^model: lambert has no derivatives; .* oren_nayar, "):
         gradient("lambert", 0.1, 0.0, 0.2, 0.0, rho=0.5)

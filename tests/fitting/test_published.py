@@ -108,5 +108,5 @@ def test_other_texts_are_refused_in_a_sentence(tmp_path: Path) -> None:
         assert str(caught.value).startswith(f"{path}: ")
         assert sentence in str(caught.value)
     path.write_bytes(b"a = \xff\xfe")
-    with pytest.raises(FileFormatError, match="no text in UTF-8"):
+    with pytest.raises(FileFormatError, match="not UTF-8 text"):
         read_published(path)

@@ -7,16 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from brdfdb import formats
-from brdfdb.formats import EXPORTERS, IMPORTERS, astm
-from brdfdb.formats._readings import FileTable
-from brdfdb.formats._written import Written
-from brdfdb.measurements.samples import Samples
-from tests.formats.refusals import check_texts_refused
-from tests.formats.small_tables import DIFFUSE, KINDS, small_table
+from tests.formats.a_file import check_texts_refused, exported, read_table, samples_of
+from tests.formats.small_tables import KINDS, small_table
 
-SIZE, LOOSE = 0.3, 0.2  # MB, and tolerance, so that tests are quick
-ERROR_RTOL = 1e-6  # of p99 of a file that is read again, whose angles have nine digits: worst measured 3.7e-7
 LOGARITHMS = 1e-10  # of f_r [1/sr] of a table of logarithms of f_r + 1e-4, in float32: worst measured 2e-11
 HEAD = "A measurement\nNUM_POINTS 8\nVARS theta_i,phi_i,theta_s,phi_s,400nm,500nm\n"
 ROWS = [
@@ -27,17 +20,10 @@ ROWS = [
 ]
 
 
-@pytest.fixture(scope="module", params=KINDS)
-def exported(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple[str, Written]:
-    """A kind of table, and its file."""
-    path = tmp_path_factory.mktemp("astm") / "a.astm"
-    return request.param, astm.write(small_table(request.param), path, tolerance=LOOSE, size=SIZE, verdict="sound")
-
-
-def test_rows_are_f_r_of_the_table(exported: tuple[str, Written]) -> None:
-    kind, written = exported
+@pytest.mark.parametrize("kind", KINDS)
+def test_rows_are_f_r_of_the_table(kind: str, tmp_path: Path) -> None:
     table = small_table(kind)
-    head, rows = written.paths[0].read_text(encoding="utf-8").split("VARS ")
+    head, rows = exported(tmp_path, "astm", kind).read_text(encoding="utf-8").split("VARS ")
     names, *texts = rows.strip().split("\n")
     assert f"NUM_POINTS {len(texts)}\n" in head
     assert names.startswith("theta_i,phi_i,theta_s,phi_s,")
@@ -53,8 +39,7 @@ def test_rows_are_f_r_of_the_table(exported: tuple[str, Written]) -> None:
 def test_a_grid_by_hand(tmp_path: Path) -> None:
     path = tmp_path / "a.astm"
     path.write_text(HEAD + "\n".join(ROWS[::-1]) + "\n", encoding="utf-8")
-    reading = formats.read(path)
-    assert isinstance(reading, FileTable)
+    reading = read_table(path)
     np.testing.assert_array_equal(reading.wavelength_nm, [400.0, 500.0])
     np.testing.assert_allclose(reading.lookup(1.0, 0.7, 0.5, 0.7), [1, 10], rtol=1e-6)
     np.testing.assert_allclose(reading.lookup(0.0, 0.0, 1.0, 0.0), [2, 20], rtol=1e-6)
@@ -64,10 +49,7 @@ def test_a_grid_by_hand(tmp_path: Path) -> None:
 
 
 def test_rows_that_are_no_grid_are_samples(tmp_path: Path) -> None:
-    path = tmp_path / "a.astm"
-    path.write_text(HEAD + "\n".join(ROWS[:-1]) + "\n0.1,-0.5,0.2,0.3,-4,5\n", encoding="utf-8")
-    reading = astm.read(path)
-    assert isinstance(reading, Samples)
+    reading = samples_of(tmp_path, HEAD + "\n".join(ROWS[:-1]) + "\n0.1,-0.5,0.2,0.3,-4,5\n", "a.astm")
     assert reading.values.shape == (8, 2)
     assert reading.phi_i[-1] == pytest.approx(2.0 * np.pi - 0.5)
     assert reading.values[-1].tolist() == [-4.0, 5.0]  # as the file has them; libbsdf takes negative values for 0
@@ -75,7 +57,6 @@ def test_rows_that_are_no_grid_are_samples(tmp_path: Path) -> None:
 
 def test_damaged_files(tmp_path: Path) -> None:
     texts = [
-        "",
         "NUM_POINTS 8\n",
         HEAD,
         HEAD.replace(",400nm,500nm", ""),
@@ -85,12 +66,3 @@ def test_damaged_files(tmp_path: Path) -> None:
         HEAD + ROWS[0].rsplit(",", 1)[0] + ",nan",
     ]
     check_texts_refused(tmp_path / "a.astm", [(text, "") for text in texts], "astm")
-
-
-@pytest.mark.parametrize("name", ["utia", "ssdd", "zemax", "astm"])
-def test_a_file_is_recognised_by_its_own_format_alone(tmp_path: Path, name: str) -> None:
-    options = {} if name == "utia" else {"size": 0.1}
-    EXPORTERS[name].write(small_table(DIFFUSE), tmp_path / "a", **options)
-    with (tmp_path / "a").open("rb") as file:
-        head = file.read(4096)
-    assert [other for other, importer in IMPORTERS.items() if importer.recognises(head)] == [name]

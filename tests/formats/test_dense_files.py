@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import io
 import json
 import os
 import subprocess
-import zipfile
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -16,15 +13,11 @@ import xarray as xr
 from scipy.io import netcdf_file
 
 import brdfdb
-from brdfdb import formats
-from brdfdb.errors import FileFormatError, ParameterError, WriteError
-from brdfdb.formats import EXPORTERS, IMPORTERS, eradiate, netcdf
+from brdfdb.errors import ParameterError
+from brdfdb.formats import eradiate, netcdf
 from brdfdb.formats._dense_grid import dense_table, rounded
-from brdfdb.formats._readings import FileTable
-from brdfdb.formats._stated_error import Comparison
 from brdfdb.geometry import radians
 from brdfdb.materials import Material
-from brdfdb.measurements.samples import Samples
 from brdfdb.store.publication import publish_dataset
 from brdfdb.tables.grids import (
     ANISOTROPIC_AXES,
@@ -35,43 +28,12 @@ from brdfdb.tables.grids import (
 )
 from brdfdb.tables.layout import Layout
 from brdfdb.tables.tabulation import tabulate
-from tests.formats.small_tables import ANISOTROPIC, DIFFUSE, GREY, SMOOTH, SPECTRAL, SPECULAR, small_table
+from tests.formats.a_file import exported, read_table
+from tests.formats.small_tables import ANISOTROPIC, DIFFUSE, GREY, SPECTRAL, small_table
 
 CF_CHECKER = os.environ.get("BRDFDB_CF")  # the program compliance-checker
 FORMATS = ("netcdf", "zarr", "numpy", "csv")
-TRIPS = [
-    (GREY, "netcdf"),
-    (ANISOTROPIC, "zarr"),
-    (DIFFUSE, "numpy"),
-    (SPECTRAL, "csv"),
-    (SMOOTH, "csv"),
-    (SPECTRAL, "numpy"),
-]
-AT_NODES = {
-    "netcdf": 2e-7,
-    "zarr": 2e-7,
-    "numpy": 2e-7,
-    "csv": 5.1e-5,
-}  # float32, or five digits: worst seen 6e-8, 5e-5
-
-
-@pytest.mark.parametrize(("kind", "name"), TRIPS)
-def test_files_read_back_are_within_the_error_that_they_state(kind: str, name: str, tmp_path: Path) -> None:
-    table, path = small_table(kind), tmp_path / f"table{EXPORTERS[name].suffix}"
-    written = EXPORTERS[name].write(table, path, tolerance=0.5, verdict="passes")
-    back = formats.read(path)
-    assert isinstance(back, FileTable)
-    assert written.error is not None
-    assert written.within
-    count = len(back.channels)
-    again = Comparison(table).error_of(lambda wi, wr: np.reshape(back.lookup_vectors(wi, wr), (len(wi), count)))
-    assert again == written.error
-    assert again.p99 <= back.record["error_of_file"]["p99"] <= 1.02 * again.p99
-    assert (back.record["name"], back.record["audit"], back.record["tolerance"]) == (table.name, "passes", 0.5)
-    assert back.record["parameters"] == table.metadata.model_dump(mode="json")["parameters"]
-    assert (back.wavelength_nm is None) == (table.wavelength_nm is None)
-    said = " ".join((*written.remarks, *back.record.get("remarks", [])))
-    assert ("in the exact mirror direction" in said) == (kind in SPECULAR and name == "csv")
+AT_NODES = {"netcdf": 2e-7, "zarr": 2e-7, "numpy": 2e-7, "csv": 5.1e-5}  # float32, or five digits: worst 6e-8, 5e-5
 
 
 @pytest.mark.parametrize(
@@ -105,10 +67,8 @@ def test_a_file_that_cannot_be_within_the_tolerance_says_how_near_it_comes() -> 
 def test_a_regular_grid_has_the_values_of_the_table_at_its_nodes(
     kind: str, axes: str, name: str, tmp_path: Path
 ) -> None:
-    table, path = small_table(kind), tmp_path / f"table{EXPORTERS[name].suffix}"
-    assert EXPORTERS[name].write(table, path, axes=axes, resolution=30.0).tolerance is None
-    reading = formats.read(path)
-    assert isinstance(reading, FileTable)
+    table = small_table(kind)
+    reading = read_table(exported(tmp_path, name, kind, axes=axes))
     names = {
         "light_viewer": ANISOTROPIC_AXES if kind == ANISOTROPIC else ISOTROPIC_AXES,
         "half_difference": ANISOTROPIC_HALF_DIFFERENCE_AXES if kind == ANISOTROPIC else HALF_DIFFERENCE_AXES,
@@ -124,9 +84,7 @@ def test_a_regular_grid_has_the_values_of_the_table_at_its_nodes(
 
 def test_programs_that_know_nothing_of_us_open_the_files(tmp_path: Path) -> None:
     table = small_table(SPECTRAL)
-    paths = {name: tmp_path / f"table{EXPORTERS[name].suffix}" for name in FORMATS}
-    for name, path in paths.items():
-        EXPORTERS[name].write(table, path, axes="light_viewer", resolution=30.0)
+    paths = {name: exported(tmp_path, name, SPECTRAL, axes="light_viewer") for name in FORMATS}
     with xr.open_dataset(paths["netcdf"]) as nc, xr.open_zarr(paths["zarr"], chunks=None, consolidated=False) as group:
         assert nc["brdf"].dims == group["brdf"].dims == ("theta_i", "theta_r", "delta_phi", "wavelength")
         assert nc["brdf"].attrs["units"] == "sr-1"
@@ -147,75 +105,14 @@ def test_programs_that_know_nothing_of_us_open_the_files(tmp_path: Path) -> None
     assert row["550nm"].item() == pytest.approx(float(expected), rel=AT_NODES["csv"])
 
 
-def test_a_list_of_directions_gives_samples(tmp_path: Path) -> None:
-    path = tmp_path / "list.csv"
-    path.write_text(
-        "theta_i, phi_i, theta_r, phi_r, brdf\n30, 10, 40, 190, 0.25\n60, 0, 5, 90, 0.5\n", encoding="utf-8"
-    )
-    samples = formats.read(path)
-    assert isinstance(samples, Samples)
-    assert (samples.name, samples.channels, samples.values.tolist()) == ("list", ("grey",), [[0.25], [0.5]])
-    assert np.allclose(np.rad2deg(samples.phi_r), [190.0, 90.0], rtol=1e-15)
-
-
 def test_rounding_keeps_digits_and_prints_no_more() -> None:
-    values = np.array([0.0, 1234567.0, 0.0012345678, 9.99999e-7, 31.41592])
-    assert [repr(value) for value in rounded(values, 5).tolist()] == [
-        "0.0",
-        "1234567.0",
-        "0.0012346",
-        "1e-06",
-        "31.416",
-    ]
+    values = rounded(np.array([0.0, 1234567.0, 0.0012345678, 9.99999e-7, 31.41592]), 5)
+    assert [repr(value) for value in values.tolist()] == ["0.0", "1234567.0", "0.0012346", "1e-06", "31.416"]
 
 
-@pytest.mark.parametrize("name", FORMATS)
-def test_damaged_files_are_refused_in_a_sentence(name: str, tmp_path: Path) -> None:
-    path = tmp_path / f"table{EXPORTERS[name].suffix}"
-    EXPORTERS[name].write(small_table(DIFFUSE), path, axes="light_viewer", resolution=30.0)
-    whole = path / "brdf" / "zarr.json" if name == "zarr" else path
-    data = whole.read_bytes()
-    for cut in (0.3, 0.9):
-        whole.write_bytes(data[: int(cut * len(data))])
-        with pytest.raises(FileFormatError, match="table"):
-            IMPORTERS[name].read(path)
-    with pytest.raises(FileNotFoundError):
-        IMPORTERS[name].read(tmp_path / "missing")
-
-
-def _archive(path: Path, **arrays: Any) -> Path:
-    np.savez(path, **arrays)
-    return path
-
-
-def test_archives_that_lie_are_refused(tmp_path: Path) -> None:
-    axes = {"theta_i": [0.0, 90.0], "theta_r": [0.0, 90.0], "delta_phi": [0.0, 180.0], "axes": ["theta_i", "theta_r"]}
-    with pytest.raises(FileFormatError, match="grid axes"):
-        IMPORTERS["numpy"].read(_archive(tmp_path / "two.npz", brdf=np.ones((2, 2)), **axes))
-    axes["axes"] = ["theta_i", "theta_r", "delta_phi"]
-    with pytest.raises(FileFormatError, match=r"shape \(2, 3, 2\), not numbers of shape \(2, 2, 2\)"):
-        IMPORTERS["numpy"].read(_archive(tmp_path / "shape.npz", brdf=np.ones((2, 3, 2)), **axes))
-    with pytest.raises(FileFormatError, match="not finite"):
-        IMPORTERS["numpy"].read(_archive(tmp_path / "nan.npz", brdf=np.full((2, 2, 2), np.nan), **axes))
-    header = io.BytesIO()
-    np.lib.format.write_array_header_1_0(header, {"descr": "<f4", "fortran_order": False, "shape": (10**12,)})
-    path = _archive(tmp_path / "large.npz", **axes)
-    with zipfile.ZipFile(path, "a") as archive:
-        archive.writestr("brdf.npy", header.getvalue())
-    with pytest.raises(FileFormatError, match="has 0 bytes"):
-        IMPORTERS["numpy"].read(path)
-
-
-def test_what_cannot_be_written_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(ParameterError, match=r"resolution: 0\.1 degrees take .* values; the most are 25000000"):
-        EXPORTERS["netcdf"].write(small_table(ANISOTROPIC), tmp_path / "table.nc", resolution=0.1)
-    for name in FORMATS:
-        (tmp_path / "file").touch()
-        with pytest.raises(WriteError, match="cannot write"):
-            EXPORTERS[name].write(
-                small_table(DIFFUSE), tmp_path / "file" / f"x{EXPORTERS[name].suffix}", resolution=45.0
-            )
-    assert [path.name for path in tmp_path.iterdir()] == ["file"]
+def test_a_regular_grid_that_is_too_large_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ParameterError, match=r"resolution: 0\.1 degrees need .* values; at most 25000000"):
+        exported(tmp_path, "netcdf", ANISOTROPIC, resolution=0.1)
 
 
 def netcdf_files(folder: Path) -> list[Path]:

@@ -6,21 +6,20 @@ import json
 import re
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import xarray as xr
 
 from brdfdb import formats
-from brdfdb.formats import EXPORTERS, IMPORTERS
 from brdfdb.formats._nodes import FILL_VALUES
 from brdfdb.formats._readings import FileTable
 from brdfdb.formats.rgl._tensors import read_tensors, write_tensors
 from brdfdb.measurements.samples import Samples
+from tests.formats.a_file import exported, read_table, samples_of
 from tests.formats.round_trip import ROUND_TRIPPED
-from tests.formats.small_tables import DIFFUSE, small_table
 
-TOLERANCE = 0.1  # of the files: few nodes are enough
 GREEN = 1
 
 
@@ -110,7 +109,11 @@ PLANTED: dict[str, Callable[[Path], None]] = {
 # What has no place for a hole, and whose readers refuse nan: parameters of a shader, a density that is drawn from, and
 # files of Radiance, where a negative number is defined to be 0
 WITHOUT = {"materialx", "rgl", "klems", "radiance"}
-OPTIONS = {"ssdd": {"data": "ascii"}}
+OPTIONS: dict[str, dict[str, Any]] = {
+    "ssdd": {"data": "ascii"},
+    **{name: {"resolution": 0.0, "tolerance": 0.1} for name in ("netcdf", "numpy", "zarr")},  # nodes in the middle
+    "zemax": {"tolerance": 0.1, "size": 4.0},
+}
 
 
 def holes_of(samples: Samples) -> dict[bytes, int]:
@@ -126,10 +129,7 @@ def test_each_format_that_is_written_and_read_has_a_hole_here() -> None:
 
 @pytest.mark.parametrize("name", PLANTED)
 def test_a_hole_is_nan_and_a_part_of_no_number(name: str, tmp_path: Path) -> None:
-    path = tmp_path / f"paint{EXPORTERS[name].suffix}"
-    known = {option.name for option in EXPORTERS[name].options}
-    tolerance = {"tolerance": TOLERANCE} if "tolerance" in known else {}
-    formats.write(small_table(DIFFUSE), path, name, **tolerance, **OPTIONS.get(name, {}))
+    path = exported(tmp_path, name, **OPTIONS.get(name, {}))
     before, listed = formats.read(path, name), formats.samples(path, name)
     PLANTED[name](path)
     after, holed = formats.read(path, name), formats.samples(path, name)
@@ -163,14 +163,12 @@ def test_a_hole_in_a_matrix_of_polarisation_is_a_hole(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("fill", FILL_VALUES)
 def test_fill_values_of_texts_are_holes(fill: float, tmp_path: Path) -> None:
-    path = tmp_path / "paint.csv"
-    path.write_text(f"theta_i,theta_r,phi_r,brdf\n10,20,180,0.5\n10,30,180,{fill!r}\n10,40,180,-0.25\n")
-    samples = formats.samples(path)
+    header = "theta_i,theta_r,phi_r,brdf"
+    samples = samples_of(tmp_path, f"{header}\n10,20,180,0.5\n10,30,180,{fill!r}\n10,40,180,-0.25\n")
     assert samples.values[[0, 2], 0].tolist() == [0.5, -0.25]  # noise stays
     assert np.isnan(samples.values[1, 0])
-    percent = tmp_path / "percent.csv"
-    percent.write_text(f"theta_i,theta_r,phi_r,brdf [%]\n10,20,180,50\n10,30,180,{fill!r}\n")
-    assert formats.samples(percent).known[:, 0].tolist() == [True, False]
+    percent = samples_of(tmp_path, f"{header} [%]\n10,20,180,50\n10,30,180,{fill!r}\n")
+    assert percent.known[:, 0].tolist() == [True, False]
 
 
 @pytest.mark.parametrize(
@@ -190,10 +188,6 @@ def test_what_a_netcdf_file_declares_missing_is_a_hole(
 
 
 def test_a_direction_that_is_nan_is_nan_from_a_file(tmp_path: Path) -> None:
-    path = tmp_path / "paint.npz"
-    formats.write(small_table(DIFFUSE), path, "numpy", tolerance=TOLERANCE)
-    reading = formats.read(path)
-    assert isinstance(reading, FileTable)
+    reading = read_table(exported(tmp_path, "numpy"))
     assert np.isnan(reading.lookup([0.2, np.nan], 0.0, 0.3, 1.0)).tolist() == [False, True]
     assert reading.lookup(2.0, 0.0, 0.3, 1.0) == 0.0
-    assert "numpy" in IMPORTERS

@@ -13,14 +13,14 @@ from brdfdb import formats
 from brdfdb.errors import CannotHoldError, ParameterError
 from brdfdb.formats import kaist
 from brdfdb.formats.rgl._tensors import read_tensors
-from brdfdb.geometry import unit_vector
 from brdfdb.materials import Material
 from brdfdb.measurements.samples import Samples
 from brdfdb.tables.planner import plan
 from brdfdb.tables.polarisation import planned_theta_d
 from brdfdb.tables.table import Table
+from tests.formats.a_file import random_pairs
 from tests.formats.round_trip import round_trip
-from tests.formats.small_tables import GREY, small_table, table_of
+from tests.formats.small_tables import table_of
 from tests.formats.test_rgl import mitsuba_of
 from tests.mitsuba.polarised import as_mitsuba_has_them, off_by, picture_of_lookups, picture_of_mitsuba
 
@@ -57,8 +57,7 @@ def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_matrices_are_those_of_mitsuba(path: Path) -> None:
     mitsuba = mitsuba_of(VARIANT)
     surface = mitsuba.load_dict({"type": "measured_polarized", "filename": str(path)})
-    rng = np.random.default_rng(8)
-    wi, wr = (unit_vector(np.arccos(rng.uniform(0.1, 1.0, 1000)), rng.uniform(0.0, 6.28, 1000)) for _ in range(2))
+    wi, wr = random_pairs(1000, 8, 0.1)
     theirs = []
     for light, viewer in zip(wi, wr, strict=True):
         interaction = mitsuba.SurfaceInteraction3f()
@@ -93,9 +92,7 @@ def test_f_r_is_read_again_within_what_the_file_states(path: Path, tmp_path: Pat
     assert read_tensors(path)["wvls"].tolist() == [500, 600]
 
 
-def test_what_the_format_cannot_hold_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(CannotHoldError, match=f"{GREY}: is unpolarised, and the format holds Mueller matrices"):
-        kaist.write(small_table(GREY), tmp_path / "grey.pbsdf")
+def test_a_size_for_which_no_file_is_small_enough_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ParameterError, match=r"megabytes: 0.08 MB are too few for any file of plastic"):
         formats.write(plastic(), tmp_path / "x.pbsdf", "kaist", megabytes=0.1, tolerance=1e-4)
     assert list(tmp_path.iterdir()) == []

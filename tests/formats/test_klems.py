@@ -19,15 +19,10 @@ from brdfdb.formats.klems import BASES, Basis, averages
 from brdfdb.geometry import unit_vector
 from brdfdb.measurements.statement import statement
 from brdfdb.parameters import Floats
-from brdfdb.store.publication import publish_dataset
-from brdfdb.tables.layout import Layout
 from brdfdb.tables.table import Table
-from brdfdb.tables.tabulation import tabulate
-from tests.api.a_store import client_of
+from tests.formats.a_file import check_changes_refused, exported, random_pairs
 from tests.formats.bsdf_judges import check_bsdf, in_window, klems_total, made, queried, thermal
-from tests.formats.refusals import check_changes_refused
 from tests.formats.small_tables import ANISOTROPIC, DIFFUSE, GREY, small_table
-from tests.pipelines.command import run
 
 WRITTEN = [(GREY, "full"), (GREY, "half"), (GREY, "quarter"), (ANISOTROPIC, "half"), ("spectral", "quarter")]
 FILES = pytest.mark.parametrize(("material", "kind"), WRITTEN)
@@ -52,12 +47,6 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> dict[tuple[str, str], Pat
     for (material, kind), path in paths.items():
         klems.write(table_of(material), path, kind=kind)
     return paths
-
-
-def drawn(count: int) -> tuple[Floats, Floats]:
-    rng = np.random.default_rng(11)
-    theta, phi = np.arccos(rng.uniform(0.02, 1.0, (2, count))), rng.uniform(-np.pi, np.pi, (2, count))
-    return unit_vector(theta[0], phi[0]), unit_vector(theta[1], phi[1])
 
 
 @pytest.mark.parametrize(("kind", "count"), [("full", 145), ("half", 77), ("quarter", 41)])
@@ -106,14 +95,6 @@ def test_isotropic_averages_are_those_of_all_pairs() -> None:
     assert alike == pytest.approx(whole, rel=1e-4)
 
 
-@FILES
-def test_what_is_read_is_what_the_file_states(files: dict[tuple[str, str], Path], material: str, kind: str) -> None:
-    reading = formats.read(files[material, kind])
-    assert reading.channels == ("Y",)
-    assert reading.record["error_of_file"]["p99"] > 0.0
-    assert any("both sides" in remark for remark in reading.record["remarks"])
-
-
 def test_fixed_patches_report_a_tolerance_that_is_out_of_reach(tmp_path: Path) -> None:
     for tolerance in (0.02, 1.0):
         written = klems.write(table_of(DIFFUSE), tmp_path / "a.xml", kind="quarter", tolerance=tolerance)
@@ -154,7 +135,7 @@ def test_damaged_files_are_refused_with_a_sentence(tmp_path: Path, files: dict[t
         ("<ScatteringData>\n", "<ScatteringData>\none,", "could not convert string to float"),
         ("<nPhis>12</nPhis>", "<nPhis>many</nPhis>", r"invalid literal for int\(\)"),
         ("<nPhis>12</nPhis>", "<nPhis>1000000000000</nPhis>", "more than 100000"),
-        ("<UpperTheta>45", "<UpperTheta>5", "no rings of patches that rise to 90 degrees"),
+        ("<UpperTheta>45", "<UpperTheta>5", "no rings of patches up to 90 degrees"),
     ]
     check_changes_refused(tmp_path / "a.xml", files[GREY, "quarter"].read_text(), changes, "klems")
 
@@ -163,7 +144,7 @@ def test_damaged_files_are_refused_with_a_sentence(tmp_path: Path, files: dict[t
 @pytest.mark.parametrize(("material", "kind"), [(GREY, "full"), (ANISOTROPIC, "half")])
 def test_radiance_sees_the_values_that_are_read(files: dict[tuple[str, str], Path], material: str, kind: str) -> None:
     path = files[material, kind]
-    wi, wr = drawn(1000)
+    wi, wr = random_pairs(1000)
     assert queried(path, wi, wr)[:, 1] == pytest.approx(klems.read(path).lookup_vectors(wi, wr), rel=AS_RADIANCE)
 
 
@@ -173,7 +154,7 @@ def test_radiance_sees_the_colour(tmp_path: Path) -> None:
     klems.write(table_of("spectral"), path, kind="quarter", colour=True)
     reading = klems.read(path)
     assert reading.channels == ("X", "Y", "Z")
-    wi, wr = drawn(1000)
+    wi, wr = random_pairs(1000)
     values = reading.lookup_vectors(wi, wr)
     assert np.max(np.abs(queried(path, wi, wr) - values) / values[:, 1:2]) < AS_RADIANCE_COLOURED
 
@@ -246,14 +227,9 @@ def test_the_emissivity_of_a_table_in_the_infrared_is_one_minus_its_albedo(tmp_p
         assert ("assumed" in remark) == (most is not at)
 
 
-def test_the_command_and_the_service_take_an_emissivity(tmp_path: Path) -> None:
-    store = tmp_path / "store"
-    publish_dataset(store, "grey", tabulate(Layout(table_of(DIFFUSE).source, table_of(DIFFUSE).grid)))
-    given = ("--emissivity-back", "0.05")
-    assert run("export", "klems", "grey", "--kind", "quarter", *given, "--store", store, "--out", tmp_path) == 0
-    of_command = (tmp_path / "grey_quarter.xml").read_text(encoding="utf-8")
-    address = "/v1/materials/grey/export/klems?kind=quarter&emissivity_back="
-    for text in (of_command, client_of(store).get(f"{address}0.05").text):
-        assert re.findall(r"<Emissivity(?:Front|Back)>([^<]*)", text) == ["0.9", "0.05"]
-        assert "emissivity 0.9 of the front is assumed" in text
-    assert client_of(store).problem("GET", f"{address}1.2", 422)["parameter"] == "emissivity_back"
+def test_an_emissivity_that_is_not_given_is_assumed(tmp_path: Path) -> None:
+    text = exported(tmp_path, "klems", emissivity_back=0.05).read_text(encoding="utf-8")
+    assert re.findall(r"<Emissivity(?:Front|Back)>([^<]*)", text) == ["0.9", "0.05"]
+    assert "emissivity 0.9 of the front is assumed" in text
+    with pytest.raises(ParameterError, match=r"emissivity_back: '1\.2' is not"):
+        exported(tmp_path, "klems", emissivity_back=1.2)

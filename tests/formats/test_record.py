@@ -16,17 +16,12 @@ from hypothesis import strategies as st
 
 from brdfdb import formats
 from brdfdb.formats import EXPORTERS, IMPORTERS, radiance
-from brdfdb.formats._readings import FileTable
 from brdfdb.formats._record import lines, of_lines
 from brdfdb.materials import Material
-from brdfdb.store.publication import publish_dataset
 from brdfdb.tables.grids import Grid
 from brdfdb.tables.layout import Layout
-from brdfdb.tables.tabulation import tabulate
-from tests.api.a_store import client_of
+from tests.formats.a_file import POLARISED_ALONE, options_of
 from tests.formats.small_tables import table_of
-from tests.formats.test_round_trips import POLARISED_ALONE, options_of
-from tests.pipelines.command import run
 
 FORMULA = 'Copper,=HYPERLINK("http://a.example","here")'
 HOSTILE = (
@@ -72,7 +67,7 @@ def test_lines_are_read_back_exactly_and_begin_no_formula(document: dict[str, An
 @pytest.mark.parametrize("name", [name for name in EXPORTERS if name not in POLARISED_ALONE])
 def test_no_title_breaks_a_file(name: str, title: str, tmp_path: Path) -> None:
     path = tmp_path / f"a{EXPORTERS[name].suffix}"
-    written = formats.write(table_of(layout_of(title)), path, name, **({} if name == "png" else options_of(name)))
+    written = formats.write(table_of(layout_of(title)), path, name, **options_of(name))
     if name in IMPORTERS:
         assert formats.read(path, name).record["title"] == title
     if path.suffix in (".xml", ".mtlx"):
@@ -86,21 +81,6 @@ def test_no_title_breaks_a_file(name: str, title: str, tmp_path: Path) -> None:
         assert "plastic injected" not in [line[5:] for line in text.splitlines() if line.startswith("void ")]
     if name == "csv":
         assert formulas(path.read_text(encoding="utf-8")) == []
-
-
-def test_no_cell_of_a_csv_is_a_formula_from_command_and_service(tmp_path: Path) -> None:
-    """The title `,=HYPERLINK(...)` stood in a cell of its own, which a spreadsheet follows."""
-    publish_dataset(tmp_path / "store", "titled", tabulate(layout_of(FORMULA)))
-    given = ("--resolution", "45", "--store", tmp_path / "store", "--out", tmp_path)
-    assert run("export", "csv", "titled", *given) == 0
-    served = client_of(tmp_path / "store").get("/v1/materials/titled/export/csv?resolution=45").content
-    for content in ((tmp_path / "titled.csv").read_bytes(), served):
-        assert b"HYPERLINK" in content
-        assert formulas(content.decode("utf-8")) == []
-        (tmp_path / "again.csv").write_bytes(content)
-        reading = formats.read(tmp_path / "again.csv")
-        assert isinstance(reading, FileTable)
-        assert reading.record["title"] == FORMULA
 
 
 @pytest.mark.judge

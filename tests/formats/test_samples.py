@@ -11,63 +11,25 @@ import pytest
 from brdfdb import formats
 from brdfdb.errors import FileFormatError, ParameterError
 from brdfdb.formats import zemax
-from brdfdb.formats._readings import FileTable
 from brdfdb.formats.netcdf import write_samples
 from brdfdb.formats.rgl._tensors import write_tensors
 from brdfdb.measurements import Instrument, Samples
-from tests.formats.refusals import check_changes_refused, check_texts_refused
-from tests.formats.small_tables import ANISOTROPIC, DIFFUSE, SPECTRAL, small_table
-
-# Options that keep files small
-COARSE: dict[str, dict[str, Any]] = {
-    **{name: {"resolution": 30.0} for name in ("bird", "csv", "netcdf", "numpy", "openmaterial", "zarr")},
-    "rgl": {"megabytes": 0.4},
-    "radiance": {"cells": 3000.0},
-    "klems": {"kind": "quarter"},
-    **{name: {"size": 0.2} for name in ("astm", "fred", "ssdd", "zemax")},
-}
-GRIDS = sorted((set(formats.EXPORTERS) & set(formats.IMPORTERS)) - {"materialx", "kaist"})  # tests of their own
-ISOTROPIC_ALONE = {"eradiate", "fred", "merl", "openmaterial"}
-COLOURED = {"merl", "utia", "klems"}  # their colours need more wavelengths than the small table has
-CASES = [
-    (name, kind)
-    for name in GRIDS
-    for kind in (DIFFUSE, ANISOTROPIC, SPECTRAL)
-    if name not in {ANISOTROPIC: ISOTROPIC_ALONE, SPECTRAL: COLOURED}.get(kind, set())
-]
+from tests.formats.a_file import check_changes_refused, check_texts_refused, samples_of
 
 
-@pytest.mark.parametrize(("name", "kind"), CASES)
-def test_values_of_a_grid_are_those_that_its_tools_see_at_the_nodes(name: str, kind: str, tmp_path: Path) -> None:
-    path = tmp_path / f"table{formats.EXPORTERS[name].suffix}"
-    formats.write(small_table(kind), path, name, tolerance=0.3, **COARSE.get(name, {}))
-    table, samples = formats.read(path), formats.samples(path)
-    assert isinstance(table, FileTable)
-    assert len(samples) >= 8
-    assert np.all(samples.known)
-    inside = (samples.w_i[:, 2] > 1e-3) & (samples.w_r[:, 2] > 1e-3)  # the horizon itself is nobody's
-    if kind == ANISOTROPIC:  # at the normal all azimuths of the light are one, and RGL's readers mirror the last ones
-        inside &= (samples.theta_i > 1e-6) & ((name != "rgl") | (np.abs(np.degrees(samples.phi_i) + 135.0) < 44.0))
-    some = np.flatnonzero(inside)[:: max(1, inside.sum() // 20_000)]
-    seen = table.evaluate(samples.w_i[some], samples.w_r[some])
-    channels = [samples.channels.index(channel) for channel in table.channels]
-    np.testing.assert_allclose(samples.values[np.ix_(some, channels)], seen, rtol=2e-3, atol=1e-6)
-
-
-def text_of(values: np.ndarray[Any, Any], symmetry: str = "PlaneSymmetrical") -> zemax.ZemaxText:
-    """A Zemax file with one incidence of 60 degrees and an azimuth step of 90."""
+def of_zemax(folder: Path, values: np.ndarray[Any, Any]) -> Samples:
+    """Return samples of a Zemax file with one incidence of 60 degrees and an azimuth step of 90."""
     angles = np.zeros(1), np.array([60.0]), np.array([0.0, 90.0, 180.0]), np.array([0.0, 40.0])
     comments = ("Sample: paint", "Scatterometer: bench", "Light source: laser (650 nm, 3.5mm spot diam.)")
-    return zemax.ZemaxText(
-        comments, symmetry, "Monochrome", "BRDF", angles, np.full((1, 1, 1), 0.1), values.reshape(1, 1, 1, 3, 2)
-    )
+    tis, values = np.full((1, 1, 1), 0.1), values.reshape(1, 1, 1, 3, 2)
+    with (folder / "paint.bsdf").open("wb") as stream:
+        text = zemax.ZemaxText(comments, "PlaneSymmetrical", "Monochrome", "BRDF", angles, tis, values)
+        zemax.write_text(stream, text)
+    return formats.samples(folder / "paint.bsdf")
 
 
 def test_a_grid_about_the_specular_direction_is_turned_and_loses_what_is_below_the_horizon(tmp_path: Path) -> None:
-    path = tmp_path / "paint.bsdf"
-    with path.open("wb") as stream:
-        zemax.write_text(stream, text_of(np.array([1.0, 2.0, 1.0, -3.0, 1.0, 4.0])))
-    samples = formats.samples(path)
+    samples = of_zemax(tmp_path, np.array([1.0, 2.0, 1.0, -3.0, 1.0, 4.0]))
     # The mirror direction stands in the file three times; 40 degrees beyond it, at azimuth 180, is below the horizon
     assert samples.record["repeated"] == 2
     assert samples.record["below_the_horizon"] == 1
@@ -107,10 +69,7 @@ def test_a_dense_grid_with_holes_gives_samples(tmp_path: Path) -> None:
 
 
 def test_samples_come_back_from_the_netcdf_that_was_written_of_them(tmp_path: Path) -> None:
-    path = tmp_path / "paint.bsdf"
-    with path.open("wb") as stream:
-        zemax.write_text(stream, text_of(np.arange(1.0, 7.0)))
-    samples = formats.samples(path)
+    samples = of_zemax(tmp_path, np.arange(1.0, 7.0))
     write_samples(samples, tmp_path / "paint.nc")
     again = formats.samples(tmp_path / "paint.nc")
     np.testing.assert_array_equal(again.values, samples.values)
@@ -120,28 +79,24 @@ def test_samples_come_back_from_the_netcdf_that_was_written_of_them(tmp_path: Pa
 
 
 def test_the_solid_angle_of_an_openmaterial_file_is_that_of_the_instrument(tmp_path: Path) -> None:
-    path = tmp_path / "asphalt.xompt"
-    path.write_text(
+    text = (
         '{"$schema": "material_brdf_schema.json", "metadata": {"name": "asphalt", "sources": "measurement"}, "brdf": '
         '{"wavelengths": [5.5e-7], "receiverSolidAngles": [{"wavelength": 5.5e-7, "solidAngle": 0.002}], '
-        '"lookupTable": [[5.5e-7, 0.1, 0.2, 0.0, 0.03], [5.5e-7, 0.2, 0.2, 0.0, -0.01]]}}',
-        encoding="utf-8",
+        '"lookupTable": [[5.5e-7, 0.1, 0.2, 0.0, 0.03], [5.5e-7, 0.2, 0.2, 0.0, -0.01]]}}'
     )
-    samples = formats.samples(path)
+    samples = samples_of(tmp_path, text, "asphalt.xompt")
     assert samples.instrument.receiver_solid_angle_sr == 0.002
     assert samples.values.tolist() == [[0.03], [-0.01]]
     assert samples.channels == ("550nm",)
 
 
 def test_null_is_a_hole_and_ubrdf_the_uncertainty_of_a_bird_file(tmp_path: Path) -> None:
-    path = tmp_path / "tile.json"
-    path.write_text(
+    text = (
         '{"metadata": {"type":"BRDF"}, "data": {"theta_i": {"unit": "deg", "values": [10, 20]}, '
         '"phi_i": {"values": [0, 0]}, "theta_r": {"values": [5, 5]}, "phi_r": {"values": [180, 180]}, '
-        '"BRDF": {"values": [0.3, null]}, "uBRDF": {"values": [0.01, 0.02]}}}',
-        encoding="utf-8",
+        '"BRDF": {"values": [0.3, null]}, "uBRDF": {"values": [0.01, 0.02]}}}'
     )
-    samples = formats.samples(path)
+    samples = samples_of(tmp_path, text, "tile.json")
     assert samples.known[:, 0].tolist() == [True, False]
     assert samples.uncertainty is not None
     assert samples.uncertainty[:, 0].tolist() == [0.01, 0.02]
@@ -197,9 +152,7 @@ DataEnd
 
 
 def test_the_light_of_a_lighttools_file_has_an_azimuth_of_90_degrees(tmp_path: Path) -> None:
-    path = tmp_path / "sheet.bsdf"
-    path.write_text(LIGHTTOOLS, encoding="utf-8")
-    samples = formats.samples(path)
+    samples = samples_of(tmp_path, LIGHTTOOLS, "sheet.bsdf")
     assert samples.values[:, 0].tolist() == [0.1, 0.2, 0.4]
     assert np.degrees(samples.theta_i).tolist() == pytest.approx([20.0] * 3)
     delta = np.degrees(samples.phi_r - samples.phi_i) % 360.0
@@ -212,40 +165,37 @@ def test_a_damaged_lighttools_file_is_refused_with_line_and_field(tmp_path: Path
     changes = [
         ("0.1 0.4", "0.1 x", "line 16, field TIS of block 1: 'x' is not a number"),
         ("ScatterRadial 2\n0 30", "ScatterRadial 9\n0 30", "line 8, field ScatterRadial: 'DataBegin' is not a number"),
-        ("ScatterAzimuth 2", "ScatterAzimuth 99999", "line 4, field ScatterAzimuth: '99999' is no number of values"),
+        ("ScatterAzimuth 2", "ScatterAzimuth 99999", "line 4, field ScatterAzimuth: '99999' is not a number of values"),
         ("AOI 20\nPOI 0\nSide Front", "AOI up\nPOI 0\nSide Front", "line 14, field AOI: 'up' is not a number"),
-        ("DataEnd\n", "", "field DataEnd: the text ends without it, after 2 blocks"),
-        ("Side Back", "Side Front", "field AOI: 20 degrees stand twice for 550"),
+        ("DataEnd\n", "", "field DataEnd: the file ends without it, after 2 blocks"),
+        ("Side Back", "Side Front", "field AOI: 20 degrees are listed twice for 550"),
     ]
-    check_changes_refused(tmp_path / "sheet.bsdf", LIGHTTOOLS, changes)
+    check_changes_refused(tmp_path / "sheet.bsdf", LIGHTTOOLS, changes, "")
 
 
 PABOPTO = '#sample_name "shade"\n#format: theta phi DSF\n#incident_angle 150 20\n'
 
 
 def test_the_cosine_of_a_pab_opto_file_is_divided_out_and_its_back_turned(tmp_path: Path) -> None:
-    path = tmp_path / "shade.dat"
-    path.write_text(PABOPTO + "120 30 0.05\n60 30 0.9\n", encoding="utf-8")
-    samples = formats.samples(path)
+    samples = samples_of(tmp_path, PABOPTO + "120 30 0.05\n60 30 0.9\n", "shade.dat")
     assert samples.name == "shade"
     assert np.degrees([samples.theta_i[0], samples.theta_r[0]]) == pytest.approx([30.0, 60.0])
     assert samples.values[:, 0] == pytest.approx([0.1])  # the other row is transmitted
     assert samples.record["below_the_horizon"] == 1
     damages = {
-        PABOPTO + "120 30\n": "line 4 has 2 fields; theta, phi and values are 3",
+        PABOPTO + "120 30\n": "line 4 has 2 fields; expected are 3: theta, phi and values",
         PABOPTO + "120 30 much\n": "line 4: 'much' is not a finite number",
         PABOPTO.replace("DSF", "radiance") + "1 2 3\n": "field #format: 'radiance' is not one of dsf",
         PABOPTO.replace("150 20", "150") + "1 2 3\n": "field #incident_angle",
     }
-    check_texts_refused(path, damages)
+    check_texts_refused(tmp_path / "shade.dat", damages)
 
 
 def test_keywords_that_a_format_does_not_have_are_refused(tmp_path: Path) -> None:
-    path = tmp_path / "shade.dat"
-    path.write_text(PABOPTO + "120 30 0.05\n", encoding="utf-8")
-    with pytest.raises(ParameterError, match=r"member: the format of .* does not take it"):
-        formats.samples(path, member="x")
-    with pytest.raises(ParameterError, match="theta_q: no format takes it; there are angles, delta_phi"):
-        formats.samples(path, "text", theta_q="x")
-    with pytest.raises(ParameterError, match="file_format: 'paper' is not one of"):
-        formats.samples(path, "paper")
+    for keywords, sentence in (
+        ({"member": "x"}, r"member: the format of .* does not have this keyword"),
+        ({"file_format": "text", "theta_q": "x"}, "theta_q: no format has this keyword; allowed are angles, delta_phi"),
+        ({"file_format": "paper"}, "file_format: 'paper' is not one of"),
+    ):
+        with pytest.raises(ParameterError, match=sentence):
+            samples_of(tmp_path, PABOPTO + "120 30 0.05\n", "shade.dat", **keywords)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import importlib
 import shutil
 import subprocess
@@ -19,7 +20,7 @@ from brdfdb.formats._stated_error import Comparison
 from brdfdb.models import MODELS
 from brdfdb.models.shaders import SHADERS
 from tests.formats import opengl, slang_compiler
-from tests.formats.small_tables import ALPHA_X, ALPHA_Y, ANISOTROPIC, DIFFUSE, GREY, SPECTRAL, small_table
+from tests.formats.small_tables import ALPHA_X, ALPHA_Y, ANISOTROPIC, SPECTRAL, small_table
 from tests.formats.test_materialx import pairs
 
 # Single precision against the model, relative to f_r and a hundredth of its mean: worst seen 1.6e-6, up to 88 degrees
@@ -169,21 +170,11 @@ def test_a_file_has_its_record_and_the_error_of_the_model(name: str, tmp_path: P
     assert "// audit: ok\n" in text
     assert f'"p99": {written.error.document()["p99"]}' in text
     assert f"#define P_ALPHA_X {ALPHA_X}\n" in text
-    parameters = {"rho_d": 0.1, "rho_s": 0.33, "alpha_x": ALPHA_X, "alpha_y": ALPHA_Y}
-    model = MODELS["ward"].vectors
-
-    def evaluate(wi: NDArray[np.float64], wr: NDArray[np.float64]) -> NDArray[np.float64]:
-        return np.asarray(model(wi, wr, **parameters))[:, np.newaxis]
-
-    assert Comparison(table).error_of(evaluate) == written.error
+    ward = functools.partial(MODELS["ward"].vectors, rho_d=0.1, rho_s=0.33, alpha_x=ALPHA_X, alpha_y=ALPHA_Y)
+    assert Comparison(table).error_of(lambda wi, wr: ward(wi, wr)[:, np.newaxis]) == written.error
 
 
 def test_what_has_no_closed_form_is_refused(tmp_path: Path) -> None:
     with pytest.raises(CannotHoldError, match="copper: the model he_torrance has no closed form in"):
         glsl.write(small_table(SPECTRAL), tmp_path / "a.glsl")
     assert not list(tmp_path.iterdir())
-
-
-def test_materials_of_every_kind_are_written(tmp_path: Path) -> None:
-    for name in (GREY, DIFFUSE):
-        assert glsl.write(small_table(name), tmp_path / f"{name}.glsl").error is not None

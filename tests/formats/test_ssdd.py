@@ -7,14 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from brdfdb import formats
 from brdfdb.formats import ssdd
-from brdfdb.formats._readings import FileTable
-from tests.formats.refusals import check_changes_refused
+from tests.formats.a_file import check_changes_refused, exported, options_of, read_table
 from tests.formats.round_trip import round_trip
 from tests.formats.small_tables import KINDS, SPECTRAL, small_table
 
-SIZE, LOOSE = 0.3, 0.2  # MB, and tolerance, so that tests are quick
 ERROR_RTOL = 1e-6  # of p99 of a file that is read again: worst measured 1.2e-7, of the seven digits in ASCII
 ORDER = (
     *("VERSION", "SOFTWARE", "DATA_TYPE", "COLOR_MODEL", "WAVELENGTH_LIST", "PARAM_TYPE", "REDUCTION_TYPE"),
@@ -57,39 +54,28 @@ DAMAGES = [
 ]
 
 
-def entries_of(path: Path) -> list[str]:
-    """Return the names of the entries of the first block."""
-    head = path.read_bytes()
-    head = head[: head.index(b"\nDATA ") + 6]
-    lines = head.decode().split("\n")
-    return [line.split(" ")[0] for line in lines if line and not line.startswith("#")]
-
-
 @pytest.mark.parametrize(("kind", "data"), [*((kind, "binary") for kind in KINDS), (SPECTRAL, "ascii")])
 def test_entries_are_in_order(tmp_path: Path, kind: str, data: str) -> None:
-    trip = round_trip(small_table(kind), tmp_path, "ssdd", tolerance=LOOSE, size=SIZE, data=data)
+    trip = round_trip(small_table(kind), tmp_path, "ssdd", **options_of("ssdd"), data=data)
     assert trip.measured == pytest.approx(trip.stated, rel=ERROR_RTOL)
-    names = entries_of(tmp_path / f"{kind}.ssdd")
+    head = (tmp_path / f"{kind}.ssdd").read_bytes().partition(b"\nDATA ")[0].decode() + "\nDATA"
+    names = [line.split(" ")[0] for line in head.split("\n") if line and not line.startswith("#")]
     assert names == [name for name in ORDER if name in names]
 
 
 def test_the_specular_part_has_a_block_of_its_own(tmp_path: Path) -> None:
     table = small_table(SPECTRAL)
-    ssdd.write(table, tmp_path / "a.ssdd", tolerance=1.0, size=SIZE)
-    record = ssdd.read(tmp_path / "a.ssdd").record
+    record = ssdd.read(exported(tmp_path, "ssdd", SPECTRAL)).record
     assert table.specular is not None
     np.testing.assert_allclose(record["specular_reflectance"], table.specular, rtol=1e-6)
     assert record["specular_theta_i_deg"][0] == 0.0
-    assert "remarks" in record
-    assert record["remarks"] == []
 
 
 def test_the_first_angle_runs_fastest(tmp_path: Path) -> None:
     path = tmp_path / "a.ssdd"
     text = BY_HAND.format(kind=SPHERICAL, reduction="", azimuths="0 180", values="\n".join(["# PARAM3: 0", *ROWS]))
     path.write_text(text, encoding="utf-8")
-    reading = formats.read(path)
-    assert isinstance(reading, FileTable)
+    reading = read_table(path)
     assert reading.channels == ("R", "G", "B")
     turn = np.deg2rad
     np.testing.assert_allclose(reading.lookup(turn(80.0), 0.0, 0.0, 0.0), [1, 10, 100], rtol=1e-6)

@@ -30,8 +30,7 @@ def brass() -> Table:
 
 
 def with_source(table: Table) -> Table:
-    attrs = {**table.attrs, "source_record": presets()[BRASS].document()}
-    return Table(**{**{name: getattr(table, name) for name in table.__dataclass_fields__}, "attrs": attrs})
+    return replace(table, attrs={**table.attrs, "source_record": presets()[BRASS].document()})
 
 
 def test_the_error_is_that_of_the_worst_draw(brass: Table) -> None:

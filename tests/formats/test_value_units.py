@@ -1,4 +1,6 @@
-"""Units and cosines in the names of columns of values: read, or refused with the option that helps."""
+"""Units and cosines in the names of columns of values, and uncertainties."""
+
+from __future__ import annotations
 
 from pathlib import Path
 from typing import Any
@@ -6,20 +8,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from brdfdb import formats
-from brdfdb.errors import FileFormatError
 from brdfdb.formats.text._columns import quantity_of
 from brdfdb.measurements import Samples
-from brdfdb.measurements.statement import statement
-
-ANGLES = ("theta_i", "theta_r", "delta_phi", "values")
+from tests.formats.a_file import notes_of, samples_of
 
 
-def samples(folder: Path, name: str, number: float, also: str = "", row: str = "60,20,180", **keywords: Any) -> Samples:
-    """Return the samples of a text with one row, whose column of values has a name and a number."""
-    path = folder / "sheet.csv"
-    path.write_text(f"theta_i,theta_r,delta_phi,{name}{also}\n{row},{number!r}{',0.5' if also else ''}\n")
-    return formats.samples(path, **keywords)
+def of_column(folder: Path, name: str, number: float, also: str = "", field: str = "", **keywords: Any) -> Samples:
+    """Return the samples of a row at 60 and 20 degrees, whose column of values has a name and a number."""
+    text = f"theta_i,theta_r,delta_phi,{name}{also and ','}{also}\n60,20,180,{number!r}{field and ','}{field}\n"
+    return samples_of(folder, text, **keywords)
 
 
 @pytest.mark.parametrize(
@@ -49,19 +46,13 @@ def test_theta_s_is_that_of_the_columns() -> None:
 
 
 def test_f_r_is_divided_by_the_cosine_that_is_named(tmp_path: Path) -> None:
-    of_light, of_viewer = (samples(tmp_path, f"brdf*cos(theta_{side})", 0.1) for side in "ir")
+    of_light, of_viewer = (of_column(tmp_path, f"brdf*cos(theta_{side})", 0.1) for side in "ir")
     assert of_light.values == pytest.approx(0.1 / np.cos(np.radians(60.0)))
     assert of_viewer.values == pytest.approx(0.1 / np.cos(np.radians(20.0)))
-    assert any("values with the cosine of the light" in note for note in statement(of_light).notes)
-    assert not any("not known" in note for note in statement(of_light).notes)
-    stated = samples(tmp_path, "brdf", 0.1, quantity="f_r_cos_i")
+    assert "values with the cosine of the light" in notes_of(of_light)
+    assert "not known" not in notes_of(of_light)
+    stated = of_column(tmp_path, "brdf", 0.1, quantity="f_r_cos_i")
     assert stated.values == pytest.approx(0.1 / np.cos(np.radians(60.0)))
-
-
-def test_the_cosine_of_another_angle_is_asked_for(tmp_path: Path) -> None:
-    with pytest.raises(FileFormatError, match=r"field brdf\*cos\(alpha\): the cosine is neither .* --quantity f_r_cos"):
-        samples(tmp_path, "brdf*cos(alpha)", 0.1)
-    assert samples(tmp_path, "brdf*cos(alpha)", 0.1, quantity="f_r").values == pytest.approx(0.1)
 
 
 @pytest.mark.parametrize(
@@ -83,46 +74,32 @@ def test_the_cosine_of_another_angle_is_asked_for(tmp_path: Path) -> None:
     ],
 )
 def test_units_are_powers_of_ten_of_one_over_steradian(name: str, factor: float, tmp_path: Path) -> None:
-    sheet = samples(tmp_path, name, 0.25)
+    sheet = of_column(tmp_path, name, 0.25)
     assert sheet.values == pytest.approx(0.25 * factor, rel=1e-12)
-    assert ("multiplied" in " ".join(statement(sheet).notes)) == ("%" not in name and factor not in (1.0,))
+    assert ("multiplied" in notes_of(sheet)) == ("%" not in name and factor != 1.0)
+    assert sheet.channels == (("550nm",) if "nm" in name else ("grey",))
 
 
-def test_a_wavelength_may_stand_in_brackets_behind_the_quantity(tmp_path: Path) -> None:
-    sheet = samples(tmp_path, "BRDF (550 nm)", 0.25)
-    assert sheet.wavelength_nm is not None
-    assert sheet.wavelength_nm.tolist() == [550.0]
+# Name and field of a column of uncertainties behind one of values, 0.25; the standard uncertainty [1/sr], and a note
+UNCERTAINTIES = [
+    ("BRDF [1/sr]", "u(BRDF)", "0.5", 0.5, ""),
+    ("BRDF [10^-3 sr^-1]", "std", "0.5", 0.5e-3, ""),
+    ("BRDF [10^-3 sr^-1]", "std [1/sr]", "0.5", 0.5, ""),
+    ("BRDF [1/sr]", "std [10^-3 /sr]", "0.5", 0.5e-3, ""),
+    ("brdf", "U (k=2)", "0.02", 0.01, "divided by their coverage factor k, 2."),
+    ("brdf", '"U (k = 2, 95 %)"', "0.02", 0.01, "divided by their coverage factor k, 2."),
+    ("brdf", "U [%] (k=2)", "8", 0.01, "taken as percent of the values"),
+    ("brdf", "u [rel]", "0.04", 0.01, "Relative uncertainties were multiplied by the values"),
+    ("brdf", "u [%]", "4", 0.01, "taken as percent of the values"),
+    ("brdf", "u [1/sr]", "0.01", 0.01, "read from the column u [1/sr]"),
+]
 
 
-@pytest.mark.parametrize("unit", ["furlong", "x 1000", "10e-3/sr", "3/sr", "10^-3", "a.u."])
-def test_a_unit_that_is_not_known_is_refused_unless_the_user_states_the_quantity(unit: str, tmp_path: Path) -> None:
-    name = f"brdf [{unit}]"
-    with pytest.raises(FileFormatError, match=r"line 1, field brdf .*the unit '.*' is not known; .* --quantity f_r "):
-        samples(tmp_path, name, 0.25)
-    sheet = samples(tmp_path, name, 0.25, quantity="f_r")
-    assert sheet.values == pytest.approx(0.25)
-    assert any(f"{unit!r} of the column {name} is not known" in note for note in statement(sheet).notes)
-
-
-@pytest.mark.parametrize("name", ["BRDF [dB]", "log10(BRDF)", "ln BRDF"])
-def test_logarithms_are_refused(name: str, tmp_path: Path) -> None:
-    columns = {role: role for role in ANGLES[:3]}
-    with pytest.raises(FileFormatError, match="values are logarithms; write f_r itself"):
-        samples(tmp_path, name, -3.0, quantity="f_r", values=name, **columns)
-
-
-@pytest.mark.parametrize(
-    ("name", "also", "uncertainty"),
-    [
-        ("BRDF [1/sr]", ",u(BRDF)", 0.5),
-        ("BRDF [10^-3 sr^-1]", ",std", 0.5e-3),
-        ("BRDF [10^-3 sr^-1]", ",std [1/sr]", 0.5),
-        ("BRDF [1/sr]", ",std [10^-3 /sr]", 0.5e-3),
-    ],
-)
-def test_uncertainties_have_the_unit_of_the_values_or_their_own(
-    name: str, also: str, uncertainty: float, tmp_path: Path
+@pytest.mark.parametrize(("name", "also", "field", "uncertainty", "note"), UNCERTAINTIES)
+def test_uncertainties_are_made_standard_ones_in_1_sr(
+    name: str, also: str, field: str, uncertainty: float, note: str, tmp_path: Path
 ) -> None:
-    sheet = samples(tmp_path, name, 0.25, also)
+    sheet = of_column(tmp_path, name, 0.25, also, field)
     assert sheet.uncertainty == pytest.approx(uncertainty)
-    assert not any("not known" in note for note in statement(sheet).notes)
+    assert note in notes_of(sheet)
+    assert "not known" not in notes_of(sheet)

@@ -7,16 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from brdfdb import formats
 from brdfdb.formats import zemax
-from brdfdb.formats._readings import FileTable
-from brdfdb.formats._written import Written
 from brdfdb.tables.albedo import directional_albedo
-from tests.formats.refusals import check_changes_refused
+from tests.formats.a_file import check_changes_refused, exported, read_table
 from tests.formats.small_tables import DIFFUSE, GREY, KINDS, SPECTRAL, small_table
 
-SIZE, LOOSE = 0.3, 0.2  # MB, and tolerance, so that tests are quick
-ERROR_RTOL = 1e-9  # of p99 of a file that is read again: no difference was measured
 TIS_ATOL = 1e-4  # of the quadrature
 BY_HAND = """# a measurement
 Source  Measured
@@ -53,23 +48,21 @@ DAMAGES = [
 
 
 @pytest.fixture(scope="module", params=KINDS)
-def exported(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple[str, Written]:
+def file(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple[str, Path]:
     """A kind of table, and its file."""
-    path = tmp_path_factory.mktemp("zemax") / "a.bsdf"
-    return request.param, zemax.write(small_table(request.param), path, tolerance=LOOSE, size=SIZE, verdict="sound")
+    return request.param, exported(tmp_path_factory.mktemp("zemax"), "zemax", request.param)
 
 
-def test_spectra_are_xyz_and_anisotropic_tables_have_four_angles(exported: tuple[str, Written]) -> None:
-    kind, written = exported
-    assert zemax.read(written.paths[0]).channels == (("X", "Y", "Z") if kind == SPECTRAL else ("Y",))
-    text = written.paths[0].read_text(encoding="utf-8")
+def test_anisotropic_tables_have_four_angles_and_channels_their_blocks(file: tuple[str, Path]) -> None:
+    kind, path = file
+    text = path.read_text(encoding="utf-8")
     assert ("Symmetry ASymmetrical4D" if small_table(kind).anisotropic else "Symmetry PlaneSymmetrical") in text
     assert text.count("DataBegin") == text.count("DataEnd") == (3 if kind == SPECTRAL else 1)
 
 
-def test_tis_is_the_albedo_of_the_table(exported: tuple[str, Written]) -> None:
-    kind, written = exported
-    record = zemax.read(written.paths[0]).record
+def test_tis_is_the_albedo_of_the_table(file: tuple[str, Path]) -> None:
+    kind, path = file
+    record = zemax.read(path).record
     tis = np.array(record["tis"])  # rotations, incidences, channels
     albedo = directional_albedo(small_table(kind), tolerance=TIS_ATOL)
     at_normal = albedo.albedo[0].min(), albedo.albedo[0].max()  # over azimuths and wavelengths
@@ -83,8 +76,7 @@ def test_tis_is_the_albedo_of_the_table(exported: tuple[str, Written]) -> None:
 def test_a_file_by_hand(tmp_path: Path) -> None:
     path = tmp_path / "other.BSDF"
     path.write_text(BY_HAND.format(symmetry="PlaneSymmetrical", turns="1\n0", blocks=BLOCKS), encoding="utf-8")
-    reading = formats.read(path)
-    assert isinstance(reading, FileTable)
+    reading = read_table(path)
     degrees = np.deg2rad
     assert reading.lookup(degrees(60.0), 1.0, degrees(60.0), 1.0 + np.pi) == pytest.approx(3.0)  # specular
     # 40 degrees from the specular direction towards the normal: azimuth 0
@@ -108,9 +100,3 @@ def test_rotations_come_first(tmp_path: Path) -> None:
 def test_damaged_files(tmp_path: Path) -> None:
     text = BY_HAND.format(symmetry="PlaneSymmetrical", turns="1\n0", blocks=BLOCKS)
     check_changes_refused(tmp_path / "a.bsdf", text, [(old, new, "") for old, new in DAMAGES], "zemax")
-
-
-def test_it_is_told_from_rgl_files_of_the_same_suffix() -> None:
-    assert not zemax.recognises(b"tensor_file\0\x01\0" + bytes(100))
-    assert zemax.recognises(BY_HAND.encode())
-    assert not zemax.recognises(b"# name: something else\n1 2 3\n")

@@ -73,7 +73,7 @@ def test_a_table_that_is_too_large_is_left_out_of_a_choice_and_named(
     written = SceneChoice.model_validate(json.loads((tmp_path / "out" / "choice.json").read_text(encoding="utf-8")))
     (one,) = written.materials
     assert [each.key for each in one.left_out] == ["table-10", "table-1", "table-0-05"]
-    assert one.left_out[2].reason == "tolerance: 0.0005 takes more than 1 values of drawn; ask for a larger one"
+    assert one.left_out[2].reason == "tolerance: 0.0005 takes more than 1 values of drawn; choose a larger one"
     assert f"left out: {one.left_out[2].title}: {one.left_out[2].reason}" in capsys.readouterr().out.replace("\n", " ")
 
 
@@ -87,5 +87,6 @@ def test_a_table_that_is_too_large_is_left_out_of_a_chart_and_named(capsys: pyte
 
 
 def test_a_wrong_tolerance_is_still_refused() -> None:
-    with pytest.raises(ValueError, match=r"^tolerance: 0\.7 is outside"):
-        catalogue.forms(draws("lambert", 1)[0], None, (0.1, 0.7))
+    for wrong in (0.0, 0.7, float("nan")):
+        with pytest.raises(ValueError, match=r"^tolerance: \S+ is outside \[0.0001, 0.5\]$"):
+            catalogue.forms(draws("lambert", 1)[0], None, (0.1, wrong))

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import pytest
 
 from brdfdb.forms import catalogue, timing
 from brdfdb.forms.catalogue import Form
@@ -20,7 +22,10 @@ class Machine:
     """A clock that moves only when something is evaluated, and slows down from call to call as it is told."""
 
     def __init__(self) -> None:
-        self.now, self.calls, self.slow = 0.0, [], itertools.repeat(1.0)
+        self.now = 0.0
+        self.calls: list[tuple[str, int]] = []
+        self.slow: Iterator[float] = itertools.repeat(1.0)
+        self.copies = 0
 
     def form(self, key: str, ns: float, wavelengths: int = 1, dtype: Any = np.float64) -> Form:
         def evaluate(wi: Any, wr: Any) -> Any:
@@ -31,20 +36,32 @@ class Machine:
 
         return Form(key, key, "approximation", key, evaluate, 8, dtype)
 
+    def copied(self) -> Any:
+        self.copies += 1
+        return self.form(f"copy {self.copies}", 10.0).evaluate
+
     def times(self, *forms: Form, **how: Any) -> list[timing.Times]:
         return times(forms, WI, WI, clock=lambda: self.now, **how)
 
+    def mixed_times(self, *forms: Form, rounds: int) -> list[timing.Times]:
+        return timing.mixed_times(forms, WI, WI, rounds=rounds, clock=lambda: self.now)
 
-def test_times_are_those_of_a_value() -> None:
-    machine = Machine()
+
+@pytest.fixture
+def machine() -> Machine:
+    return Machine()
+
+
+def test_times_are_those_of_a_value_of_many_wavelengths_too(machine: Machine) -> None:
     grey, spectral = machine.times(machine.form("a", 20.0), machine.form("b", 5.0, 41, np.float32), rounds=4)
     assert grey.seconds.shape == (4,)
     np.testing.assert_allclose(grey.quartiles_ns, 20.0)
     np.testing.assert_allclose(spectral.quartiles_ns, 5.0)
+    (spectral,) = machine.times(machine.form("a", 1.0, 41), rounds=1)
+    assert 1e5 < spectral.directions * 41 <= 1e6
 
 
-def test_fast_forms_are_timed_at_many_directions_and_slow_ones_at_as_many_as_fit() -> None:
-    machine = Machine()
+def test_fast_forms_are_timed_at_many_directions_and_slow_ones_at_as_many_as_fit(machine: Machine) -> None:
     forms = [machine.form(key, ns) for key, ns in (("a", 1.0), ("b", 3e4), ("c", 6e4), ("d", 1e9))]
     fast, slow, as_slow, slowest = machine.times(*forms)
     assert fast.directions == timing.BATCH
@@ -53,21 +70,13 @@ def test_fast_forms_are_timed_at_many_directions_and_slow_ones_at_as_many_as_fit
     assert slowest.directions < slow.directions
 
 
-def test_busy_moments_do_not_make_a_form_slow() -> None:
-    machine = Machine()
+def test_busy_moments_do_not_make_a_form_slow(machine: Machine) -> None:
     machine.slow = itertools.chain([100.0] * 6, itertools.repeat(1.0))  # and the first call compiles
     first, second = machine.times(machine.form("a", 3e4), machine.form("b", 3e4), rounds=1)
     assert first.directions == second.directions == 2048
 
 
-def test_many_wavelengths_are_many_values() -> None:
-    machine = Machine()
-    (spectral,) = machine.times(machine.form("a", 1.0, 41), rounds=1)
-    assert 1e5 < spectral.directions * 41 <= 1e6
-
-
-def test_what_a_call_costs_apart_from_its_directions_does_not_make_them_few() -> None:
-    machine = Machine()
+def test_what_a_call_costs_apart_from_its_directions_does_not_make_them_few(machine: Machine) -> None:
     plain, called = machine.form("a", 1000.0), machine.form("b", 1000.0)
 
     def with_overhead(wi: Any, wr: Any) -> Any:
@@ -78,49 +87,32 @@ def test_what_a_call_costs_apart_from_its_directions_does_not_make_them_few() ->
     assert other.directions == alike.directions
 
 
-def test_one_direction_is_one_direction() -> None:
-    machine = Machine()
-    (one,) = machine.times(machine.form("a", 1.0), most=1, rounds=2)
-    assert one.directions == 1
-    assert {count for _, count in machine.calls} == {1}
-
-
-def test_short_calls_are_repeated_until_the_clock_can_tell() -> None:
-    machine = Machine()
+def test_short_calls_of_one_direction_are_repeated_until_the_clock_can_tell(machine: Machine) -> None:
     (short,) = machine.times(machine.form("a", 1e4), most=1, rounds=1)  # 10 us
+    assert short.directions == 1
+    assert {count for _, count in machine.calls} == {1}
     assert len(machine.calls) > 20
     np.testing.assert_allclose(short.quartiles_ns, 1e4)
 
 
-def test_materials_in_turn_read_memory_of_their_own() -> None:
-    machine, copies = Machine(), []
-
-    def copied() -> Any:
-        copies.append(len(copies))
-        return machine.form(f"copy {copies[-1]}", 10.0).evaluate
-
-    table = replace(machine.form("a", 1.0), copied=copied)
-    found, plain = timing.mixed_times([table, machine.form("b", 20.0)], WI, WI, rounds=3, clock=lambda: machine.now)
+def test_materials_in_turn_read_memory_of_their_own(machine: Machine) -> None:
+    table = replace(machine.form("a", 1.0), copied=machine.copied)
+    found, plain = machine.mixed_times(table, machine.form("b", 20.0), rounds=3)
     np.testing.assert_allclose(found.quartiles_ns, 10.0)
     np.testing.assert_allclose(plain.quartiles_ns, 20.0)
     assert found.directions == timing.FEW
-    assert len(copies) == timing.MATERIALS
+    assert machine.copies == timing.MATERIALS
     turns = [key for key, count in machine.calls if key.startswith("copy") and count == timing.FEW][timing.MATERIALS :]
     first, second = turns[: timing.MATERIALS], turns[timing.MATERIALS : 2 * timing.MATERIALS]
-    assert sorted(first) == sorted(second) == sorted(f"copy {number}" for number in copies)
+    assert sorted(first) == sorted(second) == sorted(f"copy {number + 1}" for number in range(machine.copies))
     assert first != second  # the order is drawn anew
 
 
-def test_large_tables_are_copied_as_often_as_memory_allows() -> None:
-    machine, copies = Machine(), []
-
-    def copied() -> Any:
-        copies.append(1)
-        return machine.form("copy", 10.0).evaluate
-
-    table = replace(machine.form("a", 1.0), bytes=timing._COPIES_BYTES // 4, copied=copied)
-    timing.mixed_times([table], WI, WI, rounds=1, clock=lambda: machine.now)
-    assert len(copies) == 4
+def test_large_tables_are_copied_as_often_as_memory_allows(machine: Machine) -> None:
+    machine.mixed_times(
+        replace(machine.form("a", 1.0), bytes=timing._COPIES_BYTES // 4, copied=machine.copied), rounds=1
+    )
+    assert machine.copies == 4
 
 
 def test_a_copy_of_a_table_has_the_same_values_in_other_memory() -> None:
@@ -132,8 +124,8 @@ def test_a_copy_of_a_table_has_the_same_values_in_other_memory() -> None:
     assert all((form.copied is None) == (form.kind != "table") for form in forms.values())
 
 
-def test_forms_take_turns() -> None:
-    machine, ticks = Machine(), []
+def test_forms_take_turns(machine: Machine) -> None:
+    ticks: list[float] = []
     machine.times(machine.form("a", 1e6), machine.form("b", 2e6), rounds=3, tick=lambda: ticks.append(machine.now))
     turns = [key for key, count in machine.calls if count > 1][-6:]
     assert turns == ["a", "b"] * 3

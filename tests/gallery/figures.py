@@ -19,9 +19,7 @@ def figure(key: str) -> Figure:
 
 def panel_of(figure: Figure, index: int = 0) -> Panel:
     """Return a panel of curves."""
-    panel = figure.panels[index]
-    assert isinstance(panel, Panel)
-    return panel
+    return figure.panels[index]
 
 
 def curve_of(figure: Figure, label: str, index: int = 0) -> Curve:
@@ -32,9 +30,7 @@ def curve_of(figure: Figure, label: str, index: int = 0) -> Curve:
 
 def value_at(curve: Curve, x: float) -> float:
     """Return the value of a curve at one of its points."""
-    value = curve.y[curve.x.index(x)]
-    assert value is not None
-    return value
+    return curve.y[curve.x.index(x)]
 
 
 def optics(page: str, wavelength_nm: float) -> dict[str, float]:

@@ -49,11 +49,8 @@ def test_curves_are_over_their_value_in_the_mirror_direction(number: int) -> Non
 
 def through_apertures(theta_i: float, x: float, surface: dict[str, float], a: float) -> float:
     arguments = np.deg2rad(theta_i), np.deg2rad(abs(x)), np.pi if x > 0.0 else 0.0, CONE, CONE
-    return (
-        float(reference.aperture_specular(*arguments, **surface))
-        + reference.aperture_diffuse(*arguments, **surface)
-        + a / np.pi
-    )
+    specular = float(reference.aperture_specular(*arguments, **surface))
+    return specular + reference.aperture_diffuse(*arguments, **surface) + a / np.pi
 
 
 @pytest.mark.parametrize(
@@ -67,9 +64,7 @@ def through_apertures(theta_i: float, x: float, surface: dict[str, float], a: fl
         (9, 10.0, -20.0, CERAMIC | optics("main/MgO/Stephens-vis", 500.0), 0.9),
     ],
 )
-def test_curves_through_apertures_against_the_reference(
-    number: int, theta_i: float, x: float, surface: dict[str, float], a: float
-) -> None:
+def test_curves_through_apertures(number: int, theta_i: float, x: float, surface: dict[str, float], a: float) -> None:
     expected = through_apertures(theta_i, x, surface, a) / through_apertures(theta_i, theta_i, surface, a)
     assert value_at(curve(number, f"θ_i = {theta_i:g}°"), x) == pytest.approx(expected, rel=DIGITS)
 

@@ -7,9 +7,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
-from brdfdb.figure import Curve, Picture
+from brdfdb.figure import Curve
 from brdfdb.reference import mp, oren_nayar_1994
 from tests.gallery.figures import figure, panel_of
 
@@ -39,30 +38,37 @@ def close(value: Any, expected: Any, tolerance: float = FIVE_DIGITS) -> None:
     assert value == pytest.approx(float(expected), rel=tolerance)
 
 
+def integral(theta_i_deg: float, viewer: tuple[float, float], rho: float, sigma_deg: float) -> Any:
+    """Return f_r [1/sr] of both bounces by the integral over facets."""
+    return sum(oren_nayar_1994.gaussian(rad(theta_i_deg), *viewer, rho, rad(sigma_deg)))
+
+
+def fit(theta_i_deg: float, viewer: tuple[float, float], rho: float, sigma_deg: float) -> Any:
+    """Return f_r [1/sr] of both bounces by eqs 27 and 28."""
+    return sum(oren_nayar_1994.functional(rad(theta_i_deg), *viewer, rho, rad(sigma_deg)))
+
+
+COS_75 = np.cos(rad(75.0))
+
+
 @pytest.mark.parametrize("theta_r_deg", [-60.0, 30.0, 80.0])
 def test_fig_08_is_the_radiance_of_the_integral_with_the_second_bounce_and_without(theta_r_deg: float) -> None:
     direct, bounce = oren_nayar_1994.gaussian(rad(75.0), *line(theta_r_deg), 0.9, rad(30.0))
     both, alone, _ = curves("fig-08")
-    close(at(both, theta_r_deg), (direct + bounce) * np.cos(rad(75.0)))
-    close(at(alone, theta_r_deg), direct * np.cos(rad(75.0)))
+    close(at(both, theta_r_deg), (direct + bounce) * COS_75)
+    close(at(alone, theta_r_deg), direct * COS_75)
 
 
-def test_fig_09_has_a_curve_a_roughness_with_the_light_at_75_degrees() -> None:
-    smooth, *_, rough = curves("fig-09")
-    assert (smooth.label, rough.label) == ("σ = 0°", "σ = 40°")
-    close(at(smooth, -30.0), 0.9 / np.pi * np.cos(rad(75.0)))
-    close(at(rough, -30.0), sum(oren_nayar_1994.gaussian(rad(75.0), *line(-30.0), 0.9, rad(40.0))) * np.cos(rad(75.0)))
-
-
-def test_fig_10_is_the_brdf_and_not_the_radiance() -> None:
-    by_label = {curve.label: curve for curve in curves("fig-10")}
-    close(at(by_label["θ_i = 45°"], 20.0), sum(oren_nayar_1994.gaussian(rad(45.0), *line(20.0), 0.9, rad(40.0))))
-
-
-def test_fig_11_turns_the_viewers_about_the_normal() -> None:
-    by_label = {curve.label: curve for curve in curves("fig-11", panel=1)}
-    expected = sum(oren_nayar_1994.gaussian(rad(75.0), *line(-50.0, 60.0), 0.9, rad(40.0))) * np.cos(rad(75.0))
-    close(at(by_label["φ_r - φ_i = 60°"], -50.0), expected)
+def test_figs_09_to_11_are_radiance_by_roughness_the_brdf_and_radiance_out_of_the_plane() -> None:
+    drawn = {
+        (name, curve.label): curve
+        for name, panel in ((9, 0), (10, 0), (11, 1))
+        for curve in curves(f"fig-{name:02}", panel)
+    }
+    close(at(drawn[9, "σ = 0°"], -30.0), 0.9 / np.pi * COS_75)
+    close(at(drawn[9, "σ = 40°"], -30.0), integral(75.0, line(-30.0), 0.9, 40.0) * COS_75)
+    close(at(drawn[10, "θ_i = 45°"], 20.0), integral(45.0, line(20.0), 0.9, 40.0))
+    close(at(drawn[11, "φ_r - φ_i = 60°"], -50.0), integral(75.0, line(-50.0, 60.0), 0.9, 40.0) * COS_75)
 
 
 @pytest.mark.parametrize(
@@ -71,11 +77,11 @@ def test_fig_11_turns_the_viewers_about_the_normal() -> None:
 def test_the_three_forms_of_figs_12_and_13(name: str, panel: int, delta_phi_deg: float) -> None:
     forms = {curve.role: curve for curve in curves(name, panel)}
     for theta_r_deg in (-40.0, 65.0):
-        arguments = rad(75.0), *line(theta_r_deg, delta_phi_deg), 0.9, rad(30.0)
-        cosine = np.cos(rad(75.0))
-        close(at(forms["truth"], theta_r_deg), sum(oren_nayar_1994.gaussian(*arguments)) * cosine)
-        close(at(forms["ours"], theta_r_deg), float(sum(oren_nayar_1994.functional(*arguments))) * cosine)
-        close(at(forms["textbook"], theta_r_deg), float(oren_nayar_1994.qualitative(*arguments)) * cosine)
+        viewer = line(theta_r_deg, delta_phi_deg)
+        qualitative = oren_nayar_1994.qualitative(rad(75.0), *viewer, 0.9, rad(30.0))
+        close(at(forms["truth"], theta_r_deg), integral(75.0, viewer, 0.9, 30.0) * COS_75)
+        close(at(forms["ours"], theta_r_deg), float(fit(75.0, viewer, 0.9, 30.0)) * COS_75)
+        close(at(forms["textbook"], theta_r_deg), float(qualitative) * COS_75)
 
 
 @pytest.mark.parametrize(
@@ -113,28 +119,21 @@ def own_evaluation(theta_i: float, theta_r: float, delta_phi: float, rho: float,
 
 
 def test_fig_16_is_the_painted_sandpaper_under_the_lights_of_fig_15() -> None:
-    arguments = 0.8, rad(40.0)
     for panel, theta_i_deg in enumerate((30.0, 45.0, 60.0)):
         evaluated, facets, functional = curves("fig-16", panel)
         assert "eqs 24 and 49" in evaluated.label
-        value, normal = (own_evaluation(rad(theta_i_deg), *line(angle), *arguments) for angle in (-55.0, 0.0))
+        value, normal = (own_evaluation(rad(theta_i_deg), *line(angle), 0.8, rad(40.0)) for angle in (-55.0, 0.0))
         close(at(evaluated, -55.0), value / normal)
         assert "eq. 47" in facets.label
-        normal = sum(oren_nayar_1994.gaussian(rad(theta_i_deg), *line(0.0), *arguments))
-        close(at(facets, -55.0), sum(oren_nayar_1994.gaussian(rad(theta_i_deg), *line(-55.0), *arguments)) / normal)
-        normal, value = (
-            sum(oren_nayar_1994.functional(rad(theta_i_deg), *line(theta_r_deg), *arguments))
-            for theta_r_deg in (0.0, 70.0)
-        )
+        value, normal = (integral(theta_i_deg, line(angle), 0.8, 40.0) for angle in (-55.0, 0.0))
+        close(at(facets, -55.0), value / normal)
+        value, normal = (fit(theta_i_deg, line(angle), 0.8, 40.0) for angle in (70.0, 0.0))
         close(at(functional, 70.0), value / normal)
 
 
 def test_fig_18_leaves_the_plane_of_incidence_by_45_and_60_degrees() -> None:
     for panel, (theta_i_deg, delta_phi_deg) in enumerate([(60.0, 45.0), (75.0, 60.0)]):
-        value, normal = (
-            sum(oren_nayar_1994.functional(rad(theta_i_deg), *line(theta_r_deg, delta_phi_deg), 0.8, rad(35.0)))
-            for theta_r_deg in (-65.0, 0.0)
-        )
+        value, normal = (fit(theta_i_deg, line(angle, delta_phi_deg), 0.8, 35.0) for angle in (-65.0, 0.0))
         close(at(curves("fig-18", panel)[2], -65.0), value / normal)
 
 
@@ -170,22 +169,19 @@ def test_fig_23_is_the_vase_over_its_largest_radiance() -> None:
 
 def test_fig_23_b_has_the_light_20_degrees_to_the_right() -> None:
     integrated, _, lambertian = curves("fig-23", panel=1)
-    xs: NDArray[np.float64] = np.array(lambertian.x)[10::10]
+    xs = np.array(lambertian.x)[10::10]
     for x in xs:
-        theta_i, _, _ = across(20.0, x)
-        close(at(lambertian, x), max(np.cos(theta_i), 0.0))
-    shares = []
-    for x in (xs[5], xs[12], xs[-2]):
-        angles = across(20.0, x)
-        shares.append(at(integrated, x) / sum(oren_nayar_1994.gaussian(*angles, 0.7, rad(40.0))) / np.cos(angles[0]))
-    close(shares[1], shares[0])
-    close(shares[2], shares[0])
+        close(at(lambertian, x), max(np.cos(across(20.0, x)[0]), 0.0))
+    angles = {x: across(20.0, x) for x in (xs[5], xs[12], xs[-2])}
+    radiance = {x: sum(oren_nayar_1994.gaussian(*a, 0.7, rad(40.0))) * np.cos(a[0]) for x, a in angles.items()}
+    first, *others = (at(integrated, x) / radiance[x] for x in angles)
+    for other in others:
+        close(other, first)
 
 
 @pytest.mark.parametrize(("panel", "sigma_deg"), [(0, 0.0), (1, 10.0), (2, 20.0), (3, 40.0)])
 def test_spheres_are_lit_from_the_camera_by_eq_27(panel: int, sigma_deg: float) -> None:
     picture = figure("oren-nayar-1994-spheres").panels[panel]
-    assert isinstance(picture, Picture)
     half = len(picture.radiance) // 2
     for row, column in ((half, half), (10, half), (half + 20, 15)):
         x, y = (column + 0.5) / half - 1.0, (row + 0.5) / half - 1.0
@@ -196,19 +192,14 @@ def test_spheres_are_lit_from_the_camera_by_eq_27(panel: int, sigma_deg: float) 
 
 def test_the_picture_of_the_vase_is_upright() -> None:
     lambertian, rough = figure("oren-nayar-1994-fig-22").panels
-    assert isinstance(lambertian, Picture)
-    assert isinstance(rough, Picture)
     for picture in (lambertian, rough):
         assert all(row == picture.radiance[0] for row in picture.radiance)
         assert picture.radiance[0] == picture.radiance[0][::-1]
     x = 1.0 / 96 - 1.0
     close(lambertian.radiance[0][0], 0.7 * np.sqrt(1.0 - x * x), PIXEL)
     angles = across(0.0, x)
-    close(
-        rough.radiance[0][0],
-        sum(oren_nayar_1994.functional(*angles, 0.7, rad(40.0))) * mp.pi * mp.cos(angles[0]),
-        PIXEL,
-    )
+    expected = sum(oren_nayar_1994.functional(*angles, 0.7, rad(40.0))) * mp.pi * mp.cos(angles[0])
+    close(rough.radiance[0][0], expected, PIXEL)
 
 
 def test_the_cylinder_of_the_scenes_is_smooth_and_rough() -> None:

@@ -25,9 +25,7 @@ def curves(name: str, panel: int = 0) -> list[Curve]:
 
 
 @pytest.mark.parametrize(("theta_i", "theta_r", "delta_phi"), [(0.5, 1.4, np.pi), (1.3, 1.2, 2.0), (1.05, 1.5, 0.9)])
-def test_the_paper_s_own_evaluation_is_eq_25_over_eqs_24_and_49(
-    theta_i: float, theta_r: float, delta_phi: float
-) -> None:
+def test_their_evaluation_is_eq_25_over_eqs_24_and_49(theta_i: float, theta_r: float, delta_phi: float) -> None:
     rho, sigma = 0.8, 0.6
     both = np.arctan(np.hypot(1.0 / np.tan(theta_i), 1.0 / np.tan(theta_r)))
     kinks = sorted([0.0, np.pi / 2 - theta_i, np.pi / 2 - theta_r, both, np.pi / 2])

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from brdfdb.figure import Panel, Picture
 from brdfdb.gallery import GALLERY, ward_1992_renderings
 from brdfdb.gallery.ward_1992_renderings import SpherePoints
 from brdfdb.measurements import gonioreflectometer
@@ -58,10 +57,8 @@ def test_traced_rays_come_from_beside_the_target() -> None:
 def test_noise_of_strict_monte_carlo_is_that_of_a_light_that_is_hit_or_missed() -> None:
     """The share p of rays that meet the disc is the density of eq. 7 at its middle times its solid angle."""
     (panel,) = figure("ward-1992-fig-07-noise").panels
-    assert isinstance(panel, Panel)
     strict, hybrid, even = panel.curves
     middle = int(np.argmin(hybrid.y))
-    assert strict.y[middle] is not None
     up = strict.x[middle]
     # In the frame of the camera: the normal at that height, and the light at an elevation of 40 degrees
     normal = np.arcsin(up)
@@ -82,11 +79,7 @@ def test_noise_of_strict_monte_carlo_is_that_of_a_light_that_is_hit_or_missed() 
 
 def test_pictures_b_and_c_differ_by_the_highlight_alone() -> None:
     pictures = figure("ward-1992-fig-07-techniques").panels
-    values = []
-    for picture in pictures:
-        assert isinstance(picture, Picture)
-        values.append(np.array(picture.radiance, dtype=np.float64))
-    deterministic, strict, hybrid = values
+    deterministic, strict, hybrid = (np.array(picture.radiance, dtype=np.float64) for picture in pictures)
     seen = np.isfinite(hybrid)
     dark = seen & (np.arange(len(hybrid))[:, None] > len(hybrid) // 2)  # Below the highlight
     np.testing.assert_array_equal(strict[dark], hybrid[dark])
@@ -108,13 +101,8 @@ def test_evenly_drawn_rays_and_those_of_eq_7_have_one_mean() -> None:
 
 
 def test_the_lid_that_is_not_brushed_has_no_wave() -> None:
-    waves, even, isotropic = figure("ward-1992-fig-09").panels
-    for picture in (waves, even, isotropic):
-        assert isinstance(picture, Picture)
-    x = np.array([-0.4, 0.1, 0.35])
-    y = np.full(3, 0.2)
-    alphas = (0.09, 0.09)
-    one, other = (ward_1992_renderings._radiance(x, y, swing, alphas) for swing in (0.0, 40.0))
+    at = np.array([-0.4, 0.1, 0.35]), np.full(3, 0.2)
+    one, other = (ward_1992_renderings._radiance(*at, swing, (0.09, 0.09)) for swing in (0.0, 40.0))
     np.testing.assert_allclose(one, other, rtol=1e-12)
 
 

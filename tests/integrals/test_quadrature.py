@@ -36,11 +36,10 @@ def parameters_of(name: str) -> list[dict[str, float]]:
 CASES = [pytest.param(name, each, id=f"{name}-{i}") for name in MODELS for i, each in enumerate(parameters_of(name))]
 
 
-@pytest.mark.parametrize("theta_deg", THETA_DEG)
-def test_of_the_ideal_diffuser_it_is_rho(theta_deg: float) -> None:
-    albedo, error = directional_albedo("lambert", np.deg2rad(theta_deg), rho=0.7)
-    assert albedo == pytest.approx(0.7, abs=EXACT)
-    assert error < 1e-11
+def test_of_the_ideal_diffuser_it_is_rho() -> None:
+    albedo, error = directional_albedo("lambert", np.deg2rad(THETA_DEG), rho=0.7)
+    np.testing.assert_allclose(albedo, 0.7, rtol=0.0, atol=EXACT)
+    assert (error < 1e-11).all()
 
 
 @pytest.mark.parametrize("k", [0.0, 0.1, 0.5, 0.9, 1.0])
@@ -108,8 +107,6 @@ def test_several_sets_of_parameters_share_panels_and_keep_their_albedos() -> Non
     np.testing.assert_allclose(together.albedo, each.albedo, atol=2e-7)
     grey = spectral_albedo(MODELS["lambert"], 1.2, 0.0, {"rho": 0.3}, tolerance=1e-9)
     assert grey.albedo == pytest.approx([0.3], abs=1e-9)
-    with pytest.raises(ValueError, match=r"^tolerance: 0 is outside \[1e-13, 1\]$"):
-        spectral_albedo(MODELS["lambert"], 1.2, 0.0, {"rho": 0.3}, tolerance=0.0)
 
 
 @pytest.mark.parametrize("alpha", [(0.01, 0.01), (0.1, 0.1), (0.6, 0.6), (2.0, 2.0), (0.01, 2.0), (2.0, 0.3)])
@@ -214,9 +211,10 @@ def test_refuses_what_the_model_refuses_and_tolerances_that_float64_does_not_rea
     for tolerance in (0.0, -1.0, 1e-14, 2.0, np.nan):
         with pytest.raises(ValueError, match=r"^tolerance: .* is outside \[1e-13, 1\]$"):
             directional_albedo("lambert", 0.5, rho=0.5, tolerance=tolerance)
-    with pytest.raises(ValueError, match=r"^rho: 2 is outside \[0, 1\]$"):
-        directional_albedo("lambert", 0.5, rho=2.0)
-    with pytest.raises(ValueError, match=r"^theta_i: "):
-        directional_albedo("lambert", 4.0, rho=0.5)
+        with pytest.raises(ValueError, match=r"^tolerance: .* is outside \[1e-13, 1\]$"):
+            spectral_albedo(MODELS["lambert"], 1.2, 0.0, {"rho": 0.3}, tolerance=tolerance)
+    for parameter, model, theta_i, rho in (("rho", "lambert", 0.5, 2.0), ("theta_i", "lambert", 4.0, 0.5)):
+        with pytest.raises(ValueError, match=f"^{parameter}: "):
+            directional_albedo(model, theta_i, rho=rho)
     with pytest.raises(ValueError, match=r"^model: 'phong' is not one of lambert, "):
         directional_albedo("phong", 0.5, rho=0.5)

@@ -18,21 +18,13 @@ RECORDED = 6e-4  # absolute, of a largest albedo: three decimals are recorded, a
 
 def largest_albedo(material: Material) -> float:
     """The largest directional albedo, Dirac part included, over angles and wavelengths."""
-    wavelengths = (None,) if not material.spectral else material.wavelengths_nm or VISIBLE_NM
-    return max(
-        float(
-            np.max(
-                directional_albedo(
-                    material.model,
-                    np.deg2rad(ANGLES_DEG),
-                    tolerance=1e-4,
-                    specular=material.spec.specular is not None,
-                    **material.arguments(wavelength_nm),
-                ).albedo
-            )
-        )
-        for wavelength_nm in wavelengths
-    )
+    theta_i, mirror = np.deg2rad(ANGLES_DEG), material.spec.specular is not None
+    largest = []
+    for wavelength_nm in (material.wavelengths_nm or VISIBLE_NM) if material.spectral else (None,):
+        arguments = material.arguments(wavelength_nm)
+        found = directional_albedo(material.model, theta_i, tolerance=1e-4, specular=mirror, **arguments)
+        largest.append(float(np.max(found.albedo)))
+    return max(largest)
 
 
 def changed(material: Material, **values: Number | str) -> Material:
@@ -72,10 +64,7 @@ def test_verdicts_that_rest_on_an_assumption_are_known() -> None:
         ("scene-object-rough", "rho"),
     }
     # as they are, none of the four reflects more than it receives
-    for name, own in deciding:
-        albedo = presets()[name].assumed[own].max_albedo
-        assert albedo is not None
-        assert albedo < 1.0
+    assert all(presets()[name].assumed[own].max_albedo < 1.0 for name, own in deciding)
 
 
 def decides(material: Material, name: str) -> bool:

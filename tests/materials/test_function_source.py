@@ -9,7 +9,7 @@ import pytest
 
 from brdfdb.errors import BrdfdbError, ParameterError
 from brdfdb.geometry import unit_vector
-from brdfdb.materials import FunctionRecord, FunctionSource, Material, presets, source_of
+from brdfdb.materials import FunctionRecord, FunctionSource, presets, source_of
 from brdfdb.tables.grids import Grid
 from brdfdb.tables.layout import Layout
 
@@ -38,9 +38,8 @@ def test_a_spectral_function_is_called_with_the_wavelengths_and_has_them_last() 
     theta_i, theta_r = np.array([[0.1], [0.4]]), np.array([0.2, 0.3, 1.0])
     expected = (1.0 - np.cos(theta_i)) * (1.0 - np.cos(theta_r))
     np.testing.assert_allclose(source.lookup(theta_i, 0.0, theta_r, 1.0, 500.0), 0.5 * expected, rtol=1e-14)
-    np.testing.assert_allclose(
-        source.lookup(theta_i, 0.0, theta_r, 1.0), expected[..., np.newaxis] * [0.4, 0.7], rtol=1e-14
-    )
+    both = source.lookup(theta_i, 0.0, theta_r, 1.0)
+    np.testing.assert_allclose(both, expected[..., np.newaxis] * [0.4, 0.7], rtol=1e-14)
     vectors = source.lookup_vectors(unit_vector(theta_i, 0.0), unit_vector(theta_r, 1.0), [600.0])
     np.testing.assert_allclose(vectors, 0.6 * expected[..., np.newaxis], rtol=1e-14)
 
@@ -55,12 +54,12 @@ def test_a_spectral_function_is_called_with_the_wavelengths_and_has_them_last() 
         ({"elliptical": True}, "elliptical: an isotropic function has more symmetry than an ellipse; leave it out"),
         ({"wavelengths_nm": (700.0, 400.0)}, "wavelengths_nm: [700.0, 400.0] must be positive and increasing"),
         ({"colour": "red"}, "colour: unknown key"),
-        ({"brdf": lambda wi, wr, _: wi[:, 2] * 2.0 + wr[:, 2]}, "brdf: made-up is not reciprocal, which it"),
-        ({"brdf": lambda wi, wr, _: 2.0 + wi[:, 0] * wr[:, 0]}, "brdf: made-up is anisotropic, which it does not say"),
+        ({"brdf": lambda wi, wr, _: wi[:, 2] * 2.0 + wr[:, 2]}, "brdf: made-up is not reciprocal; set"),
+        ({"brdf": lambda wi, wr, _: 2.0 + wi[:, 0] * wr[:, 0]}, "brdf: made-up is anisotropic; set"),
         (
             {"brdf": lambda wi, wr, _: 2.0 + wi[:, 0] * wr[:, 1] + wi[:, 1] * wr[:, 0], "anisotropic": True}
             | {"elliptical": True},
-            "brdf: made-up is not its own mirror image: ",
+            "brdf: made-up lacks mirror symmetry: ",
         ),
         ({"brdf": lambda wi, wr, _: wi[:, 2] * wr[:, 2] - 0.5}, "brdf: made-up gave -0."),
         ({"brdf": lambda wi, _wr, _: np.full(len(wi), np.inf)}, "brdf: made-up gave inf for the light ("),
@@ -76,9 +75,7 @@ def test_what_is_no_brdf_is_refused_in_one_sentence(given: dict[str, Any], sente
 
 
 def test_a_function_without_a_provenance_is_refused() -> None:
-    with pytest.raises(
-        ParameterError, match=r"^provenance: missing; a function needs a name, a title and a provenance$"
-    ):
+    with pytest.raises(ParameterError, match=r"^provenance: missing; a function needs "):
         FunctionSource(brdf=white, name="made-up", title="Made up")
 
 
@@ -128,9 +125,7 @@ def test_a_material_without_its_uniform_part_is_short_of_that_part() -> None:
 def test_a_lossless_material_is_the_model_at_the_changed_arguments() -> None:
     for name in ("clay-vase", "rolled-brass", "sandpaper-220-grit"):
         material = presets()[name]
-        assert isinstance(material, Material)
         lossless = material.lossless
-        assert lossless is not None
         at = np.array([500.0]) if material.spectral else None
         wi, wr = unit_vector([0.3], [0.0]), unit_vector([0.5], [2.0])
         expected = material.spec.vectors(wi, wr, **{**material.arguments(at), **lossless.changes})

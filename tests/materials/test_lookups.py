@@ -23,7 +23,5 @@ def test_a_material_is_looked_up_as_its_table_would_be(name: str, wavelength_nm:
         if material.spec.specular is None:
             assert not mirrored.any()
         else:
-            specular = material.spec.specular(
-                theta_r, **{key: arguments[key] for key in material.spec.specular_parameters}
-            )
-            np.testing.assert_array_equal(mirrored.reshape(2, -1)[:, w], specular)
+            known = {key: arguments[key] for key in material.spec.specular_parameters}
+            np.testing.assert_array_equal(mirrored.reshape(2, -1)[:, w], material.spec.specular(theta_r, **known))

@@ -1,7 +1,6 @@
 """The presets against the numbers of the papers, typed again here, and what a wrong material is told."""
 
 import re
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -111,8 +110,6 @@ def preset(name: str) -> Material:
 def test_the_presets_are_those_of_the_papers():
     assert (len(WARD), len(OREN_NAYAR), len(HE_TORRANCE) + 1) == (28, 13, 18)
     assert set(presets()) == {*WARD, *OREN_NAYAR, *HE_TORRANCE, HE_IDEAL_DIFFUSE}
-    assert len(presets()) == 59
-    assert all(material.name == name for name, material in presets().items())
 
 
 @pytest.mark.parametrize("name", WARD)
@@ -127,13 +124,12 @@ def test_ward(name):
 def test_oren_nayar(name):
     material = preset(name)
     rho, sigma_deg = OREN_NAYAR[name]
+    model, more = "oren_nayar", {"interreflection": True}
     if name in SURFACE_TERM_RATIOS:
-        assert material.model == "oren_nayar_body_surface"
-        surface = {"k_s": SURFACE_TERM_RATIOS[name], "k_b": 1.0, "e_0": np.pi, "interreflection": False}
-        assert material.file_parameters() == {"rho": rho, "sigma_deg": sigma_deg, **surface}
-    else:
-        assert material.model == "oren_nayar"
-        assert material.file_parameters() == {"rho": rho, "sigma_deg": sigma_deg, "interreflection": True}
+        model = "oren_nayar_body_surface"
+        more = {"k_s": SURFACE_TERM_RATIOS[name], "k_b": 1.0, "e_0": np.pi, "interreflection": False}
+    assert material.model == model
+    assert material.file_parameters() == {"rho": rho, "sigma_deg": sigma_deg, **more}
     assert material.parameters["sigma"] == pytest.approx(sigma_deg * np.pi / 180.0, rel=1e-15)
     assert not material.anisotropic
 
@@ -145,10 +141,8 @@ def test_he_torrance(name):
     printed = {"sigma_0_um": sigma_0_um, "tau_um": tau_um, "a": a}
     assert material.model == "he_torrance"
     for parameter, value in printed.items():
-        if value is None:
-            assert parameter in material.assumed
-        else:
-            assert material.file_parameters()[parameter] == value
+        assert value in (None, material.file_parameters()[parameter]), parameter
+        assert value is not None or parameter in material.assumed
     assert material.wavelengths_nm == (None if wavelength_um is None else (round(1000 * wavelength_um),))
 
 
@@ -200,18 +194,14 @@ def test_blue_plastic_reflects_what_was_measured():
 
 
 def test_only_known_presets_exceed_one():
-    assert {name for name, material in presets().items() if material.known_excess} == {
-        "magnesium-oxide-ceramic",
-        "blue-plastic",
-        "scene-plastic-cube",
-    }
+    known = {name for name, material in presets().items() if material.known_excess}
+    assert known == {"magnesium-oxide-ceramic", "blue-plastic", "scene-plastic-cube"}
 
 
 @pytest.mark.parametrize("name", ["blue-plastic", "scene-plastic-cube"])
 def test_the_excess_of_a_smooth_plastic_is_fresnel_plus_a(name):
     material = preset(name)
     arguments, excess = material.arguments(), material.known_excess
-    assert excess is not None
     assert excess.max_albedo == 1.0 + arguments["a"]  # the reflectance of a surface at grazing incidence is 1
     onset = np.deg2rad([excess.from_theta_i_deg, excess.from_theta_i_deg + 0.1])
     below, above = (dielectric_reflectance(theta, arguments["n"].item()) + arguments["a"] for theta in onset)
@@ -219,9 +209,8 @@ def test_the_excess_of_a_smooth_plastic_is_fresnel_plus_a(name):
 
 
 def test_the_excess_of_magnesium_oxide():
-    # albedo from an independent evaluation of the model: 0.977 at 30, 1.016 at 60, 1.116 at 85 degrees, 1 at about 54
+    # albedo from an independent evaluation of the model: 1.116 at 85 degrees, 1 at about 54
     excess = preset("magnesium-oxide-ceramic").known_excess
-    assert excess is not None
     assert 1.11 < excess.max_albedo < 1.13
     assert 53.0 < excess.from_theta_i_deg < 54.0
 
@@ -236,10 +225,7 @@ def test_arguments_of_a_spectral_material():
         cylinder.arguments()
     with pytest.raises(ValueError, match=r"wavelength_nm: 3000 .* main/Cu/Johnson"):
         preset("scene-copper-sphere").arguments([3000.0])
-
-
-def test_arguments_of_a_grey_material_need_no_wavelength():
-    assert preset("rolled-brass").arguments([550.0]) == preset("rolled-brass").parameters
+    assert preset("rolled-brass").arguments([550.0]) == preset("rolled-brass").parameters  # it is grey
 
 
 @pytest.mark.parametrize("directions", [1, 2, 300, 3000])
@@ -265,12 +251,6 @@ def test_presets_can_be_taken_apart_without_harm():
     assert len(presets()) == 59
     with pytest.raises(ValidationError, match="frozen"):
         preset("rolled-brass").title = "Gold"
-
-
-def test_the_papers_of_the_models_are_in_the_bibliography():
-    bibliography = (Path(__file__).parents[2] / "references.bib").read_text(encoding="utf-8")
-    keys = set(re.findall(r"^@\w+\{(\w+),$", bibliography, flags=re.MULTILINE))
-    assert {preset(name).spec.reference for name in presets()} <= keys
 
 
 EXCESS = {"max_albedo": 1.1, "from_theta_i_deg": 80, "citation": "Fig. 1"}

@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from brdfdb.geometry import radians, unit_vector
 from brdfdb.materials.source import Evaluate
-from brdfdb.measurements import Instrument, Samples
+from brdfdb.measurements import Instrument, MeasuredSource, Samples
 from brdfdb.parameters import Floats
+
+
+def source_of(f_r: Evaluate, channels: tuple[str, ...] = ("grey",), **more: Any) -> MeasuredSource:
+    """Return a function of directions as a measured source."""
+    given = {"name": "Made up_1", "title": "Made up", "provenance": "this test", **more}
+    return MeasuredSource.of_function(f_r, channels, None, **given)
 
 
 def scattered(f_r: Evaluate, count: int, noise: float, seed: int = 5) -> Samples:

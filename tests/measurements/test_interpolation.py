@@ -92,7 +92,7 @@ def test_too_few_samples_are_refused_with_their_number() -> None:
 @pytest.mark.parametrize(
     ("numbers", "refusal"),
     [
-        ([-999.0], "-999 is no f_r"),
+        ([-999.0], "-999 is not a possible f_r"),
         ([-1.0] * 3, "-1 is the value of 3 samples of grey"),
         ([0.0] * 200, "no value is above 0"),
         ([-0.1] * 200, "no value is above 0"),

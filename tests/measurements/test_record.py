@@ -9,10 +9,7 @@ from brdfdb.measurements.record import Measured, MeasuredSymmetry
 
 @pytest.mark.parametrize(
     ("samples", "noise", "share"),
-    [
-        (300, "noise of the samples:", "75 %"),
-        (0, "noise of the file:", "less than 0.1 %"),
-    ],
+    [(300, "noise of the samples:", "75 %"), (0, "noise of the file:", "less than 0.1 %")],
 )
 def test_values_of_a_grid_are_nodes_and_those_of_a_list_samples(samples: int, noise: str, share: str) -> None:
     lines = Measured(
@@ -25,7 +22,4 @@ def test_values_of_a_grid_are_nodes_and_those_of_a_list_samples(samples: int, no
         extrapolated=0.25 if samples else 1.0,
     ).in_words()
     assert any(line.startswith(noise) for line in lines)
-    assert (
-        f"{share} of all pairs of directions were measured; beyond, and in holes, f_r is extrapolated, and its error "
-        "not known"
-    ) in lines
+    assert any(line.startswith(f"{share} of all pairs of directions were measured; ") for line in lines)

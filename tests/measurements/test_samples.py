@@ -36,17 +36,14 @@ def samples(**changes: Any) -> Samples:
 
 
 def test_a_hole_is_known_and_incidences_are_numbered() -> None:
-    some = samples()
-    assert some.known.tolist() == [[True, True], [True, False], [True, True], [True, True]]
-    assert some.incidence.tolist() == [0, 0, 1, 1]
-    assert not some.turned
-    assert samples(phi_i=np.array([0.0, 0.0, 1.0, 1.0])).turned
-
-
-def test_all_azimuths_at_the_normal_are_one_incidence() -> None:
-    some = samples(theta_i=np.zeros(4), phi_i=np.array([0.0, 1.0, 2.0, 3.0]))
-    assert some.incidence.tolist() == [0, 0, 0, 0]
-    assert not some.turned
+    assert samples().known.tolist() == [[True, True], [True, False], [True, True], [True, True]]
+    turned, normal = np.array([0.0, 0.0, 1.0, 1.0]), np.zeros(4)  # all azimuths at the normal are one incidence
+    for some, incidence, turns in (
+        (samples(), [0, 0, 1, 1], False),
+        (samples(phi_i=turned), [0, 0, 1, 1], True),
+        (samples(phi_i=turned, theta_i=normal), [0, 0, 0, 0], False),
+    ):
+        assert (some.incidence.tolist(), some.turned) == (incidence, turns)
 
 
 @pytest.mark.parametrize("noise_deg", [0.0, 0.02, 0.05])
@@ -81,7 +78,6 @@ def test_a_selection_keeps_rows_together() -> None:
     some = samples().selected(np.array([False, True, False, True]))
     assert len(some) == 2
     assert some.values[1].tolist() == [0.7, 0.8]
-    assert some.uncertainty is not None
     assert some.uncertainty.shape == (2, 2)
 
 
@@ -121,9 +117,7 @@ def test_samples_that_cannot_be_are_refused_by_parameter() -> None:
         for value in values:
             with pytest.raises(ParameterError, match=f"^{name}: "):
                 samples(**{name: value})
-    with pytest.raises(
-        ParameterError, match=r"^theta_r: 95 degrees is below the horizon; allowed are 0 to 90 degrees$"
-    ):
+    with pytest.raises(ParameterError, match=r"^theta_r: 95 degrees is below the horizon"):
         samples(theta_r=below)
     with pytest.raises(ParameterError, match=r"^phi_i: shape"):
         samples(theta_i=np.zeros(5))
@@ -165,17 +159,15 @@ def test_other_units_of_a_dataset_are_refused(name: str, units: str, allowed: st
 
 def test_joined_files_that_contradict_say_so() -> None:
     first = samples(uncertainty=None)
-    turned_round = first.phi_r + 2.0 * np.pi
-    twice = joined([first, samples(uncertainty=None, values=1.4 * first.values, phi_r=turned_round)])
+    twice = joined([first, replace(first, values=1.4 * first.values, phi_r=first.phi_r + 2.0 * np.pi)])
     sentence = "At 4 directions that both files have, f_r differs by 40 % in the median."
     assert sentence in statement(twice).sentences
-    third = samples(uncertainty=None, values=0.5 * first.values, name="dark")
-    assert (
-        joined([first, first, third]).record["contradiction"].startswith("At 4 directions that dark and files before")
-    )
-    assert "contradiction" not in joined([first, samples(uncertainty=None, values=1.1 * first.values)]).record
-    elsewhere = samples(uncertainty=None, values=9.0 * first.values, phi_i=np.ones(4), theta_i=first.theta_i + 0.1)
-    assert "contradiction" not in joined([first, elsewhere]).record
+    dark = replace(first, values=0.5 * first.values, name="dark")
+    said = joined([first, first, dark]).record["contradiction"]
+    assert said.startswith("At 4 directions that dark and files before")
+    elsewhere = replace(first, values=9.0 * first.values, phi_i=np.ones(4), theta_i=first.theta_i + 0.1)
+    for other in (replace(first, values=1.1 * first.values), elsewhere):
+        assert "contradiction" not in joined([first, other]).record
 
 
 def test_joined_files_that_differ_beyond_their_uncertainties_say_so() -> None:

@@ -24,16 +24,8 @@ def samples(
     axes = np.meshgrid(np.radians(lights), np.radians(polar), np.radians(turns), indexing="ij")
     theta_i, theta_r, delta = (axis.reshape(-1) for axis in axes)
     f_r = values(theta_i, theta_r, delta) if callable(values) else np.full(theta_i.shape, values)
-    given = {
-        "name": "sheet",
-        "theta_i": theta_i,
-        "phi_i": np.zeros_like(theta_i),
-        "theta_r": theta_r,
-        "phi_r": delta,
-        "channels": ("grey",),
-        "wavelength_nm": None,
-    }
-    return Samples(**given | {"values": f_r[:, np.newaxis]} | changes)
+    grey = Samples("sheet", theta_i, np.zeros_like(theta_i), theta_r, delta, ("grey",), None, f_r[:, np.newaxis])
+    return replace(grey, **changes)
 
 
 def test_a_lambertian_surface_integrates_to_its_reflectance() -> None:
@@ -73,14 +65,11 @@ def test_reciprocity_is_that_of_samples_with_light_and_viewer_exchanged() -> Non
         return 0.1 + 0.1 * (theta_i > 0.5) * (theta_r < 0.5) + 0.0 * delta
 
     fair = statement(samples(lambda theta_i, theta_r, delta: np.cos(theta_i) * np.cos(theta_r) + 0.0 * delta))
-    assert fair.reciprocity is not None
     # 10 to 50 degrees at 24 azimuths, and 12 pairs each within 10 and within 50 degrees: those at delta and -delta
     assert fair.reciprocity.pairs == 24 + 11 + 11
     assert fair.reciprocity.largest < 1e-12
     unfair = statement(samples(skewed)).reciprocity
-    assert unfair is not None
-    assert unfair.largest == pytest.approx(0.1 / 0.3)
-    assert unfair.median == pytest.approx(0.1 / 0.3)  # 24 of 46 pairs are of both incidences
+    assert unfair.largest == unfair.median == pytest.approx(0.1 / 0.3)  # 24 of 46 pairs are of both incidences
 
 
 def test_a_claim_of_the_header_is_compared_with_its_values() -> None:
@@ -129,9 +118,7 @@ def test_each_channel_has_its_own_holes() -> None:
 
 
 def test_a_lobe_narrower_than_the_steps_has_no_known_albedo() -> None:
-    known = statement(
-        samples(lambda i, r, delta: 0.1 + 500.0 * (np.abs(r - i) < 0.01) * (np.abs(delta - np.pi) < 0.01))
-    )
+    known = statement(samples(lambda i, r, delta: 0.1 + 500.0 * _in_mirror(i, r, delta)))
     assert all(some.peak > 0.8 for some in known.incidences)
     assert any("narrower than the steps" in sentence for sentence in known.sentences)
     assert known.hints == ()  # no unit is doubted for it
@@ -144,9 +131,8 @@ def test_scattered_directions_are_integrated_in_bands() -> None:
     values = np.cos(theta_i)[:, np.newaxis]
     known = statement(Samples("bins", theta_i, phi_i, theta_r, phi_r, ("grey",), None, values))
     assert known.in_bands
-    assert [some.albedo[0] for some in known.incidences] == pytest.approx(
-        np.pi * np.cos(np.radians([10.0, 30.0, 50.0, 70.0])), rel=0.02
-    )
+    expected = np.pi * np.cos(np.radians([10.0, 30.0, 50.0, 70.0]))
+    assert [some.albedo[0] for some in known.incidences] == pytest.approx(expected, rel=0.02)
 
 
 def test_the_document_is_json_with_the_sentences() -> None:
@@ -182,9 +168,9 @@ def test_numbers_that_may_mean_missing_are_stated(number: float, count: int, sen
 
 def test_values_of_one_number_and_values_below_0_are_stated() -> None:
     sheet = samples()
-    assert "f_r is one number at all directions: the samples tell no shape." in statement(sheet).sentences
+    assert "f_r is the same at all directions: the samples do not show its shape." in statement(sheet).sentences
     varied = replace(sheet, values=sheet.values * np.linspace(0.9, 1.1, len(sheet))[:, np.newaxis])
-    assert not any("one number" in sentence for sentence in statement(varied).sentences)
+    assert not any("do not show its shape" in sentence for sentence in statement(varied).sentences)
     assert any(hint.startswith("Sign?") for hint in statement(replace(varied, values=-varied.values)).hints)
 
 
@@ -236,5 +222,9 @@ def test_a_lobe_at_the_light_is_doubted(values: Any, doubted: bool) -> None:
 
 
 def test_shares_are_plain_numbers() -> None:
-    sheet = samples(lambda i, r, delta: 1e4 * (np.abs(r - i) < 0.01) * (np.abs(delta - np.pi) < 0.01) + 1e-9)
-    assert any("unknown: one viewer makes 100 % of it" in sentence for sentence in statement(sheet).sentences)
+    known = statement(samples(lambda i, r, delta: 1e4 * _in_mirror(i, r, delta) + 1e-9))
+    assert any("unknown: one viewer contributes 100 % of it" in sentence for sentence in known.sentences)
+
+
+def _in_mirror(theta_i: Any, theta_r: Any, delta: Any) -> Any:
+    return (np.abs(theta_r - theta_i) < 0.01) * (np.abs(delta - np.pi) < 0.01)

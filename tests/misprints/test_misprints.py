@@ -7,52 +7,28 @@ import re
 from pathlib import Path
 
 import numpy as np
-import pytest
 
 import brdfdb
 from brdfdb import misprints
-from brdfdb.misprints import MISPRINTS, Misprint
+from brdfdb.misprints import MISPRINTS
 from tests.misprints.an_entry import BY_KEY
 
-FIELDS = ("key", "paper", "equation", "printed", "right", "consequence")
 
-
-def test_keys_are_unique_and_papers_in_order() -> None:
+def test_entries_are_in_order_differ_visibly_and_say_something_in_one_line() -> None:
     assert len(BY_KEY) == len(MISPRINTS) >= 20
     papers = [misprint.paper for misprint in MISPRINTS]
     assert papers == sorted(papers, key=[misprints.ORENNAYAR, misprints.HE, misprints.WARD].index)
-
-
-@pytest.mark.parametrize("misprint", MISPRINTS, ids=lambda misprint: misprint.key)
-def test_every_text_is_one_line_that_says_something(misprint: Misprint) -> None:
-    for name in FIELDS:
-        text = getattr(misprint, name)
-        assert text == text.strip() != ""
-        assert "\n" not in text
-    assert re.search(r"\d", misprint.consequence)
     bibliography = (Path(__file__).parents[2] / "references.bib").read_text(encoding="utf-8")
-    assert f"{{{misprint.paper}," in bibliography
-
-
-@pytest.mark.parametrize("misprint", MISPRINTS, ids=lambda misprint: misprint.key)
-def test_the_two_forms_differ_visibly(misprint: Misprint) -> None:
-    printed, right = np.asarray(misprint.as_printed(**misprint.where)), np.asarray(misprint.corrected(**misprint.where))
-    assert printed.shape == right.shape
-    assert np.isfinite(right).all()
-    assert not np.allclose(printed, right, rtol=0.05, atol=1e-4)
-
-
-def test_what_is_a_custom_or_words_alone_is_not_called_printed() -> None:
-    kinds = {kind: {each.key for each in MISPRINTS if each.kind == kind} for kind in ("printed", "customary", "words")}
-    assert kinds["customary"] == {"surface-radiance-as-brdf", "ten-terms", "beckmanns-limit", "root-search"}
-    assert kinds["words"] == {
-        "visible-and-masked-widths",
-        "hemispherical-for-bidirectional",
-        "local-normal-for-z",
-        "deviation-of-slopes",
-        "arctangent-of-7a",
-    }
-    assert sum(map(len, kinds.values())) == len(MISPRINTS)
+    for entry in MISPRINTS:
+        assert f"{{{entry.paper}," in bibliography
+        for text in (entry.key, entry.paper, entry.equation, entry.printed, entry.right, entry.consequence):
+            assert text == text.strip() != "", entry.key
+            assert "\n" not in text, entry.key
+        assert re.search(r"\d", entry.consequence), entry.key
+        printed, right = (np.asarray(form(**entry.where)) for form in (entry.as_printed, entry.corrected))
+        assert printed.shape == right.shape, entry.key
+        assert np.isfinite(right).all(), entry.key
+        assert not np.allclose(printed, right, rtol=0.05, atol=1e-4), entry.key
 
 
 def test_every_misprint_is_tested_for_its_figure() -> None:

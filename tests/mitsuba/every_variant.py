@@ -31,7 +31,7 @@ from brdfdb.tables.table import Table, table_from
 from brdfdb.tables.tabulation import tabulate
 from tests.formats.small_tables import ANISOTROPIC, DIFFUSE, GREY, SPECTRAL, small_table
 from tests.formats.test_kaist import plastic
-from tests.mitsuba.surfaces import SUBJECTS, Subject, directions, interaction
+from tests.mitsuba.surfaces import SUBJECTS, Subject, directions, interaction, smooth, vectors
 from tests.mitsuba.test_table import painted
 from tests.tables.made_up import made_up
 
@@ -360,13 +360,13 @@ def _at_once(mitsuba: Any, nm: Array, function: Callable[..., Any], wi: Array, o
     place = interaction(mitsuba, wi)
     if mitsuba.is_spectral:
         place.wavelengths = nm.tolist()
-    results = function(_context(mitsuba), place, mitsuba.Vector3f(np.ascontiguousarray(other.T, np.float32)))
+    results = function(smooth(mitsuba), place, vectors(mitsuba, other))
     drjit.eval(results)
     return [np.stack([np.broadcast_to(x, len(wi)) for x in _channels(mitsuba, result)], axis=-1) for result in results]
 
 
 def _one_by_one(mitsuba: Any, nm: Array, function: Callable[..., Any], wi: Array, other: Array) -> list[Array]:
-    place, context, rows = mitsuba.SurfaceInteraction3f(), _context(mitsuba), []
+    place, context, rows = mitsuba.SurfaceInteraction3f(), smooth(mitsuba), []
     if mitsuba.is_spectral:
         place.wavelengths = nm.tolist()
     for light, vector in zip(wi.tolist(), other.tolist(), strict=True):
@@ -384,13 +384,6 @@ def _channels(mitsuba: Any, result: Any) -> list[Any]:
     if mitsuba.is_polarized and isinstance(result, mitsuba.Spectrum):
         result = result[0, 0]
     return [result] if type(result) is mitsuba.Float else [np.array(x) for x in result]
-
-
-def _context(mitsuba: Any) -> Any:
-    """Return a context without the specular part, a Dirac delta that has no density."""
-    context = mitsuba.BSDFContext()
-    context.type_mask = mitsuba.BSDFFlags.Glossy | mitsuba.BSDFFlags.Diffuse
-    return context
 
 
 def main(variants: list[str]) -> None:

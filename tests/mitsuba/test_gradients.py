@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from brdfdb.models import MODELS
-from tests.mitsuba.surfaces import SUBJECTS, Array, Subject, directions, interaction, variant
+from tests.mitsuba.surfaces import SUBJECTS, Array, Subject, directions, interaction, variant, vectors
 
 PAIRS = 2000
 STEP = 1e-4  # relative to the parameter. The error of the central difference is 1e-7
@@ -20,14 +20,10 @@ BY_PARAMETER = [(subject, name) for subject in SUBJECTS for name in (*subject.pa
 
 def difference(subject: Subject, name: str, wi: Array, wr: Array) -> Array:
     """Return the derivative of f_r [1/sr] by a parameter, from a central difference of float64."""
-    step = STEP * subject.arguments[name]
-    values = [
-        MODELS[subject.model].vectors(
-            wi.astype(np.float64), wr.astype(np.float64), **subject.arguments | {name: subject.arguments[name] + by}
-        )
-        for by in (step, -step)
-    ]
-    return np.asarray((values[0] - values[1]) / (2.0 * step))
+    model, at = MODELS[subject.model].vectors, subject.arguments[name]
+    step, wi, wr = STEP * at, wi.astype(np.float64), wr.astype(np.float64)
+    more, less = (model(wi, wr, **subject.arguments | {name: at + by}) for by in (step, -step))
+    return np.asarray((more - less) / (2.0 * step))
 
 
 @pytest.mark.parametrize(("subject", "name"), BY_PARAMETER, ids=str)
@@ -41,8 +37,7 @@ def test_derivatives_are_those_of_the_model(subject: Subject, name: str) -> None
     key = f"{subject.written(name)}.value"
     drjit.enable_grad(parameters[key])
     parameters.update()
-    viewers = mitsuba.Vector3f(np.ascontiguousarray(wr.T))
-    value = surface.eval(mitsuba.BSDFContext(), interaction(mitsuba, wi), viewers)
+    value = surface.eval(mitsuba.BSDFContext(), interaction(mitsuba, wi), vectors(mitsuba, wr))
     drjit.forward(parameters[key])
     gradient = np.array(drjit.grad(value))[0] / wr[:, 2]
     if subject.written(name) != name:
@@ -61,7 +56,7 @@ def test_derivatives_are_the_same_backwards(subject: Subject) -> None:
     import drjit
 
     wi, wr = directions(PAIRS)
-    viewers = mitsuba.Vector3f(np.ascontiguousarray(wr.T))
+    viewers = vectors(mitsuba, wr)
     for name in subject.parameters:
         sums = []
         for derive in (drjit.forward, drjit.backward):

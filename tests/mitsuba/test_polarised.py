@@ -14,9 +14,10 @@ from brdfdb.models import (
     oren_nayar_qualitative_vectors,
 )
 from brdfdb.tables import stokes
+from tests.formats.a_file import random_pairs
 from tests.formats.test_kaist import NM, plastic
 from tests.mitsuba.polarised import Array, as_mitsuba_has_them, off_by, picture_of_lookups, picture_of_mitsuba
-from tests.mitsuba.surfaces import interaction, variant
+from tests.mitsuba.surfaces import interaction, specular_sample, variant, vectors
 from tests.mitsuba.test_table import surface_of
 
 FLOAT32, OF_TABLES = 2e-5, 5e-5  # of elements over the first one
@@ -37,8 +38,7 @@ def rounded(n: float, k: float) -> dict[str, float]:
 
 
 def pairs() -> tuple[Array, Array]:
-    rng = np.random.default_rng(8)
-    wi, wr = (unit_vector(np.arccos(rng.uniform(0.1, 1.0, PAIRS)), rng.uniform(0.0, 6.28, PAIRS)) for _ in range(2))
+    wi, wr = random_pairs(PAIRS, 8, 0.1)
     wi[:10] = wr[:10]  # back towards the light, where any plane serves
     return wi.astype(np.float32), wr.astype(np.float32)
 
@@ -54,8 +54,8 @@ def reflected(mitsuba: Any, surface: Any, wi: Array, wr: Array) -> Array:
     place = interaction(mitsuba, wr)
     if mitsuba.is_spectral:
         place.wavelengths = [NM] * 4
-    lights = mitsuba.Vector3f(np.ascontiguousarray(wi.T))
-    return matrices(surface.eval(mitsuba.BSDFContext(), place, lights)) / wi[:, 2, np.newaxis, np.newaxis]
+    value = surface.eval(mitsuba.BSDFContext(), place, vectors(mitsuba, wi))
+    return matrices(value) / wi[:, 2, np.newaxis, np.newaxis]
 
 
 def exact(wi: Array, wr: Array) -> tuple[Array, Array]:
@@ -114,11 +114,9 @@ def in_plane(wi: Array, wr: Array) -> Array:
 def test_samples_of_the_specular_part_carry_its_matrix() -> None:
     mitsuba = variant("llvm_ad_mono_polarized")
     wr = unit_vector(np.linspace(0.05, 1.5, 100), np.linspace(0.0, 6.0, 100)).astype(np.float32)
-    context = mitsuba.BSDFContext()
-    context.type_mask = mitsuba.BSDFFlags.DeltaReflection
     smooth = {**rounded(1.53, 0.0), "sigma_0_um": float(np.float32(0.02))}
     surface = mitsuba.load_dict({"type": "brdfdb_he_torrance", **smooth})
-    sample, weight = surface.sample(context, interaction(mitsuba, wr), 0.5, mitsuba.Point2f(0.5, 0.5))
+    sample, weight = specular_sample(mitsuba, surface, interaction(mitsuba, wr))
     wi = np.array(sample.wo).T
     del smooth["a"]
     ours = as_mitsuba_has_them(

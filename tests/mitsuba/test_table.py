@@ -8,14 +8,23 @@ from typing import Any
 import numpy as np
 import pytest
 
-from brdfdb.geometry import unit_vector
 from brdfdb.tables.albedo import directional_albedo
 from brdfdb.tables.planner import plan
 from brdfdb.tables.table import Table
-from brdfdb.tables.tabulation import tabulate
 from tests.api.a_store import publish, serving
-from tests.formats.small_tables import ANISOTROPIC, DIFFUSE, GREY, KINDS, SMOOTH, SPECTRAL, small_table
-from tests.mitsuba.surfaces import directions, interaction, variant
+from tests.formats.small_tables import ANISOTROPIC, DIFFUSE, GREY, KINDS, SMOOTH, SPECTRAL, small_table, table_of
+from tests.mitsuba.surfaces import (
+    FURNACE,
+    LIGHTS_DEG,
+    check_samples_have_their_density,
+    directions,
+    interaction,
+    mean_weight,
+    smooth,
+    specular_sample,
+    variant,
+    vectors,
+)
 from tests.store.a_store import lambert
 from tests.tables.made_up import WAVELENGTHS, made_up
 from tests.tables.test_mixture import NM, PAINTED
@@ -27,17 +36,13 @@ PAIRS = 20_000
 FLOAT32, MOST, FLOOR = 5e-4, 5e-5, 5e-3
 # Of 1000 densities, those next to an edge of a cell may be of the neighbour
 OTHER_CELLS = 0.002
-LIGHTS_DEG, TURNED = (0.0, 20.0, 45.0, 60.0, 75.0, 85.0), np.pi / 6
-FURNACE = 3e-3
+TURNED = np.pi / 6
 
 
 def painted() -> Table:
     layout = plan(PAINTED, NM, 0.1)
     assert layout.part_nm is not None
-    arrays = tabulate(layout)
-    from brdfdb.tables.table import table_from
-
-    return table_from("painted", "", {str(k): np.asarray(v.values) for k, v in arrays.variables.items()}, arrays.attrs)
+    return table_of(layout)
 
 
 TABLES: dict[str, Any] = {
@@ -57,12 +62,6 @@ def surface_of(mitsuba: Any, monkeypatch: pytest.MonkeyPatch, table: Table) -> A
     return mitsuba.load_dict({"type": "brdfdb_table", "material": table.name})
 
 
-def smooth(mitsuba: Any) -> Any:
-    context = mitsuba.BSDFContext()
-    context.type_mask = mitsuba.BSDFFlags.Glossy | mitsuba.BSDFFlags.Diffuse
-    return context
-
-
 @pytest.mark.parametrize("kind", TABLES)
 def test_values_and_densities_are_those_of_the_table(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
     mitsuba = variant("llvm_ad_spectral")
@@ -72,8 +71,7 @@ def test_values_and_densities_are_those_of_the_table(kind: str, monkeypatch: pyt
     place = interaction(mitsuba, wi)
     at = np.array([400.0, 480.25, 549.1, 700.0])
     place.wavelengths = at.tolist()
-    viewers = mitsuba.Vector3f(np.ascontiguousarray(wr.T))
-    value, density = surface.eval_pdf(smooth(mitsuba), place, viewers)
+    value, density = surface.eval_pdf(smooth(mitsuba), place, vectors(mitsuba, wr))
     wi, wr = wi.astype(np.float64), wr.astype(np.float64)
     stored = table.wavelength_nm
     wavelength = None if stored is None else np.clip(at, stored[0], stored[-1])
@@ -89,23 +87,8 @@ def test_values_and_densities_are_those_of_the_table(kind: str, monkeypatch: pyt
 @pytest.mark.parametrize("kind", [GREY, ANISOTROPIC, SPECTRAL, SMOOTH])
 def test_densities_of_samples_pass_mitsubas_chi2(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
     mitsuba = variant("llvm_ad_mono")
-    import drjit
-    from mitsuba.chi2 import ChiSquareTest, SphericalDomain
-
-    surface, context = surface_of(mitsuba, monkeypatch, small_table(kind)), smooth(mitsuba)
-    for theta_deg in LIGHTS_DEG:
-        wi = unit_vector(np.deg2rad(theta_deg), TURNED)[np.newaxis]
-
-        # Mitsuba's own adapter leaves out directions in which f_r is 0, as it is in parts of a table
-        def sample(u: Any, wi: Any = wi) -> Any:
-            drawn, _ = surface.sample(context, interaction(mitsuba, wi), u[0], mitsuba.Point2f(u[1], u[2]))
-            return drawn.wo, drjit.select(drawn.pdf > 0.0, 1.0, 0.0)
-
-        def density(wo: Any, wi: Any = wi) -> Any:
-            return surface.pdf(context, interaction(mitsuba, wi), wo)
-
-        test = ChiSquareTest(SphericalDomain(), sample, density, 3, sample_count=200_000, res=101, ires=20)
-        assert test.run(0.01, len(LIGHTS_DEG), quiet=True), f"{theta_deg} degrees: {test.messages}"
+    surface = surface_of(mitsuba, monkeypatch, small_table(kind))
+    check_samples_have_their_density(mitsuba, surface, LIGHTS_DEG, TURNED)
 
 
 @pytest.mark.parametrize("kind", [GREY, ANISOTROPIC, SPECTRAL, SMOOTH])
@@ -113,18 +96,13 @@ def test_weights_of_samples_add_up_to_our_albedo(kind: str, monkeypatch: pytest.
     mitsuba = variant("llvm_ad_mono")
     table = small_table(kind)
     surface = surface_of(mitsuba, monkeypatch, table)
-    count = 1 << 18
-    choice, u, v = (np.arange(count) * 1.2207440846057596 ** -np.array([[1.0], [2.0], [3.0]]) % 1.0).astype(np.float32)
     for theta_deg in LIGHTS_DEG:
-        wi = np.tile(unit_vector(np.deg2rad(theta_deg), TURNED), (count, 1))
-        place, point = interaction(mitsuba, wi), mitsuba.Point2f(u, v)
-        _, weight = surface.sample(mitsuba.BSDFContext(), place, mitsuba.Float(choice), point)
         albedo = directional_albedo(table, np.array([theta_deg])).albedo[0, 1 if table.anisotropic else 0]
         nm = table.wavelength_nm
         at = None if nm is None else float(np.clip(549.1, nm[0], nm[-1]))
         expected = albedo[0] if nm is None else np.interp(at, nm, albedo)
         expected += float(table.specular_reflectance(np.deg2rad(theta_deg), at))
-        assert np.mean(np.array(weight)[0], dtype=np.float64) == pytest.approx(expected, rel=FURNACE)
+        assert mean_weight(mitsuba, surface, theta_deg, TURNED) == pytest.approx(expected, rel=FURNACE)
 
 
 @pytest.mark.parametrize("name", ["scalar_rgb", "scalar_spectral", "llvm_ad_rgb"])
@@ -153,7 +131,7 @@ def test_the_numbers_of_a_table_have_derivatives(monkeypatch: pytest.MonkeyPatch
     drjit.enable_grad(numbers)
     parameters.update()
     wi, wr = directions(100)
-    value = surface.eval(mitsuba.BSDFContext(), interaction(mitsuba, wi), mitsuba.Vector3f(np.ascontiguousarray(wr.T)))
+    value = surface.eval(mitsuba.BSDFContext(), interaction(mitsuba, wi), vectors(mitsuba, wr))
     drjit.backward(drjit.sum(value, axis=None))
     # All numbers larger by one: the logarithm of f_r and of the offset
     wi, wr = wi.astype(np.float64), wr.astype(np.float64)
@@ -168,13 +146,12 @@ def test_a_table_behind_a_service_is_that_of_the_directory(tmp_path: Path) -> No
     publish(tmp_path, "foil", "he_torrance", refractive_index="main/Cu/Johnson", sigma_0_um=0.1, tau_um=2.0)
     place = mitsuba.SurfaceInteraction3f()
     place.wi, place.wavelengths = mitsuba.Vector3f(0.6, 0.0, 0.8), [450.0, 500.0, 550.0, 600.0]
-    values, specular = [], mitsuba.BSDFContext()
-    specular.type_mask = mitsuba.BSDFFlags.DeltaReflection
+    values = []
     with serving(tmp_path) as url:
         for store in (str(tmp_path), url):
             surface = mitsuba.load_dict({"type": "brdfdb_table", "material": "foil", "store": store})
             value = surface.eval(mitsuba.BSDFContext(), place, mitsuba.Vector3f(-0.48, 0.0, 0.8772))
-            _, weight = surface.sample(specular, place, 0.4, mitsuba.Point2f(0.3, 0.7))
+            _, weight = specular_sample(mitsuba, surface, place)
             values.append(np.array([np.ravel(value), np.ravel(weight)]))
     np.testing.assert_array_equal(values[0], values[1])
     assert np.all(values[0] > 0.0)

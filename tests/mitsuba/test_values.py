@@ -11,7 +11,16 @@ import pytest
 from brdfdb.geometry import unit_vector
 from brdfdb.models import he_torrance_specular
 from brdfdb.models import ward_vectors as ward
-from tests.mitsuba.surfaces import SUBJECTS, Array, Subject, directions, evaluated, interaction, variant
+from tests.mitsuba.surfaces import (
+    SUBJECTS,
+    Array,
+    Subject,
+    directions,
+    evaluated,
+    interaction,
+    specular_sample,
+    variant,
+)
 from tests.models.hazard_directions import EXACT, NEAR
 from tests.models.hazards import BY_NAME
 
@@ -68,10 +77,8 @@ def test_the_specular_part_is_that_of_the_model() -> None:
     subject = SUBJECTS[-2]
     theta = np.linspace(0.0, 1.57, 200)
     wi = unit_vector(theta, np.full(200, 0.3)).astype(np.float32)
-    context = mitsuba.BSDFContext()
-    context.type_mask = mitsuba.BSDFFlags.DeltaReflection
     surface = mitsuba.load_dict(subject.document)
-    sample, weight = surface.sample(context, interaction(mitsuba, wi), 0.5, mitsuba.Point2f(0.5, 0.5))
+    sample, weight = specular_sample(mitsuba, surface, interaction(mitsuba, wi))
     np.testing.assert_array_equal(np.array(sample.wo).T, wi * np.float32([-1.0, -1.0, 1.0]))
     arguments = {name: value for name, value in subject.arguments.items() if name != "a"}
     sines = np.hypot(wi[:, 0].astype(np.float64), wi[:, 1])
@@ -97,15 +104,14 @@ def test_textures_are_parameters_and_stay_within_their_range() -> None:
 
 def test_bad_parameters_are_named() -> None:
     mitsuba = variant("scalar_rgb")
-    good = {"type": "brdfdb_ward", "rho_d": 0.1, "rho_s": 0.5, "alpha": 0.2}
-    for change, sentence in (
-        ({"rho_d": 1.5}, r"rho_d: 1\.5 is outside \[0, 1\]"),
-        ({"alpha": 0.0}, r"alpha_x: 0 is outside \[1e-06, 2\]"),
-        ({"form": "phong"}, "form: 'phong' is none of ward, ward_half_vector, ward_duer, ward_bounded"),
+    ward = {"type": "brdfdb_ward", "rho_d": 0.1, "alpha": 0.2}
+    shiny = ward | {"rho_s": 0.5}
+    for document, sentence in (
+        (shiny | {"rho_d": 1.5}, r"rho_d: 1\.5 is outside \[0, 1\]"),
+        (shiny | {"alpha": 0.0}, r"alpha_x: 0 is outside \[1e-06, 2\]"),
+        (shiny | {"form": "phong"}, "form: 'phong' is not one of ward, ward_half_vector, ward_duer, ward_bounded"),
+        (ward, r"rho_s: a number in \[0, 1\] or a texture is missing"),
+        ({"type": "brdfdb_oren_nayar", "rho": 0.5, "sigma_deg": 100.0}, r"sigma_deg: 100 is outside \[0, 90\] degree"),
     ):
         with pytest.raises(RuntimeError, match=sentence):
-            mitsuba.load_dict(good | change)
-    with pytest.raises(RuntimeError, match=r"rho_s: a number in \[0, 1\] or a texture is missing"):
-        mitsuba.load_dict({name: value for name, value in good.items() if name != "rho_s"})
-    with pytest.raises(RuntimeError, match=r"sigma_deg: 100 is outside \[0, 90\] degree"):
-        mitsuba.load_dict({"type": "brdfdb_oren_nayar", "rho": 0.5, "sigma_deg": 100.0})
+            mitsuba.load_dict(document)

@@ -21,7 +21,6 @@ ANGLES = ("theta_i", "phi_i", "theta_r", "phi_r")
 SLOW = ("oren_nayar_gaussian",)  # an integral, 30 us a value
 
 every_model = pytest.mark.parametrize("spec", MODELS.values(), ids=MODELS.keys())
-every_specular = pytest.mark.parametrize("spec", [s for s in MODELS.values() if s.specular], ids=lambda s: s.name)
 
 Arguments = dict[str, Any]
 

@@ -24,9 +24,6 @@ SUBNORMAL = 1e-300  # [rad] such an angle is 0, but has an azimuth
 Reals = NDArray[np.float64]
 
 
-# Their values
-
-
 def flat(values: Any) -> Reals:
     if isinstance(values, tuple):  # parts
         values = np.stack(values, axis=-1)

@@ -119,12 +119,8 @@ def test_second_lobe_is_of_second_order_in_the_reflectance() -> None:
 
 
 def test_scaled_form_is_that_of_its_twin() -> None:
-    for angles in (
-        (0.5, 0.3, 0.9, 2.0),
-        (0.0, 0.0, 0.0, 0.0),
-        (1.2, 0.7, 1.2, 0.7 + np.pi),
-        (0.4, 0.3, np.pi / 2, 1.0),
-    ):
+    mirror, grazing = (1.2, 0.7, 1.2, 0.7 + np.pi), (0.4, 0.3, np.pi / 2, 1.0)
+    for angles in ((0.5, 0.3, 0.9, 2.0), (0.0, 0.0, 0.0, 0.0), mirror, grazing):
         expected = float(turquin_2019.ggx_scaled(*angles, 0.7, 0.5))
         assert models.ggx_scaled(*angles, f_0=0.7, alpha=0.5) == pytest.approx(expected, rel=1e-10)
         vectors = unit_vector(*angles[:2]), unit_vector(*angles[2:])

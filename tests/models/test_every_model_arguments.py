@@ -1,31 +1,12 @@
 """Every model of the registry: shapes and types, what it refuses, and its signature."""
 
-import inspect
-
 import numpy as np
 import pytest
 
 from brdfdb import models
 from brdfdb.models import MODELS
-from brdfdb.parameters import ModelSpec, Parameter
-from tests.models.draws import (
-    ANGLES,
-    HALF_PI,
-    LIGHT,
-    ROWS,
-    TINY,
-    beyond,
-    drawn,
-    drawn_angles,
-    every_model,
-    every_specular,
-    parameters_of,
-    refused,
-    specular,
-)
-
-# Shapes and types
-
+from brdfdb.parameters import ModelSpec
+from tests.models import draws
 
 SHAPES: tuple[tuple[tuple[int, ...], ...], ...] = (
     ((), (), (), ()),
@@ -44,86 +25,69 @@ SHAPES: tuple[tuple[tuple[int, ...], ...], ...] = (
 )
 
 
-@every_model
+@draws.every_model
 def test_broadcasts_over_angles(spec: ModelSpec) -> None:
     for shapes in SHAPES:
         rng = np.random.default_rng(8)
         angles = [np.asarray(rng.uniform(0.0, 1.5, shape)) for shape in shapes]
-        parameters = drawn(spec, rng)
+        parameters = draws.drawn(spec, rng)
         values = spec.evaluate(*angles, **parameters)
         assert np.shape(values) == np.broadcast_shapes(*shapes)
         assert values.dtype == np.float64
         indices = np.ndindex(values.shape)
         expected = [spec.evaluate(*(a[i] for a in np.broadcast_arrays(*angles)), **parameters) for i in indices]
-        np.testing.assert_allclose(np.ravel(values), expected, rtol=ROWS, err_msg=str(shapes))
+        np.testing.assert_allclose(np.ravel(values), expected, rtol=draws.ROWS, err_msg=str(shapes))
 
 
-@every_model
-def test_scalars_give_a_scalar(spec: ModelSpec) -> None:
-    parameters = drawn(spec, np.random.default_rng(9))
-    value = spec.evaluate(0.1, 0.2, 0.3, 0.4, **parameters)
-    assert isinstance(value, np.float64)
-    assert isinstance(spec.evaluate(*np.float32([0.1, 0.2, 0.3, 0.4]), **parameters), np.float32)
-    if spec.specular:
-        assert isinstance(specular(spec, 0.1, parameters), np.float64)
-        assert isinstance(specular(spec, np.float32(0.1), parameters), np.float32)
-
-
-@every_model
+@draws.every_model
 def test_broadcasts_over_each_parameter(spec: ModelSpec) -> None:
-    for parameter in parameters_of(spec):
-        check_broadcasting(spec, parameter)
-
-
-def check_broadcasting(spec: ModelSpec, parameter: Parameter) -> None:
-    """Assert that several values of a parameter give the values of one after the other."""
-    rng = np.random.default_rng(10)
-    theta_i, phi_i, theta_r, phi_r = drawn_angles(rng, 6)
-    parameters = drawn(spec, rng)
-    several = drawn(spec, rng, 3)[parameter.name]
-    values = spec.evaluate(theta_i, phi_i, theta_r, phi_r, **parameters | {parameter.name: several[:, None]})
-    assert values.shape == (3, 6)
-    for row, value in zip(values, several, strict=True):
-        alone = spec.evaluate(theta_i, phi_i, theta_r, phi_r, **parameters | {parameter.name: value})
-        np.testing.assert_allclose(row, alone, rtol=ROWS)
-    last = spec.evaluate(
-        *(a[:, None] for a in (theta_i, phi_i, theta_r, phi_r)), **parameters | {parameter.name: several}
-    )
-    np.testing.assert_allclose(last.T, values, rtol=ROWS)
-    if spec.specular and parameter.name in spec.specular_parameters:
-        reflected = specular(spec, theta_i, parameters | {parameter.name: several[:, None]})
-        assert reflected.shape == (3, 6)
-        np.testing.assert_array_equal(reflected[1], specular(spec, theta_i, parameters | {parameter.name: several[1]}))
-    empty = spec.evaluate(0.1, 0.2, 0.3, 0.4, **parameters | {parameter.name: np.array([])})
-    assert empty.shape == (0,)
+    for name in (parameter.name for parameter in draws.parameters_of(spec)):
+        rng = np.random.default_rng(10)
+        angles = np.array(draws.drawn_angles(rng, 6))
+        parameters = draws.drawn(spec, rng)
+        several = draws.drawn(spec, rng, 3)[name]
+        values = spec.evaluate(*angles, **parameters | {name: several[:, None]})
+        assert values.shape == (3, 6), name
+        for row, value in zip(values, several, strict=True):
+            alone = spec.evaluate(*angles, **parameters | {name: value})
+            np.testing.assert_allclose(row, alone, rtol=draws.ROWS, err_msg=name)
+        last = spec.evaluate(*angles[..., None], **parameters | {name: several})
+        np.testing.assert_allclose(last.T, values, rtol=draws.ROWS, err_msg=name)
+        if spec.specular and name in spec.specular_parameters:
+            reflected = draws.specular(spec, angles[0], parameters | {name: several[:, None]})
+            assert reflected.shape == (3, 6), name
+            np.testing.assert_array_equal(
+                reflected[1], draws.specular(spec, angles[0], parameters | {name: several[1]})
+            )
+        assert spec.evaluate(0.1, 0.2, 0.3, 0.4, **parameters | {name: np.array([])}).shape == (0,), name
 
 
 @pytest.mark.parametrize("spec", [s for s in MODELS.values() if s.spectral], ids=lambda s: s.name)
 def test_wavelengths_with_their_indices_along_an_axis(spec: ModelSpec) -> None:
     rng = np.random.default_rng(11)
-    parameters = drawn(spec, rng)
-    spectrum = {light.name: drawn(spec, rng, 4)[light.name] for light in LIGHT}
-    theta, phi = np.linspace(0.0, HALF_PI, 5), np.linspace(0.0, np.pi, 9)
+    parameters = draws.drawn(spec, rng)
+    spectrum = {light.name: draws.drawn(spec, rng, 4)[light.name] for light in draws.LIGHT}
+    theta, phi = np.linspace(0.0, draws.HALF_PI, 5), np.linspace(0.0, np.pi, 9)
     columns = {name: values[:, None, None, None] for name, values in spectrum.items()}
     values = spec.evaluate(theta[:, None, None], 0.0, theta[:, None], phi, **parameters | columns)
     assert values.shape == (4, 5, 5, 9)
     inner = spec.evaluate(theta[:, None, None, None], 0.0, theta[:, None, None], phi[:, None], **parameters | spectrum)
     assert inner.shape == (5, 5, 9, 4)
-    np.testing.assert_allclose(np.moveaxis(inner, -1, 0), values, rtol=ROWS, atol=TINY)
+    np.testing.assert_allclose(np.moveaxis(inner, -1, 0), values, rtol=draws.ROWS, atol=draws.TINY)
     for index in range(4):
         one = {name: float(each[index]) for name, each in spectrum.items()}
         alone = spec.evaluate(theta[:, None, None], 0.0, theta[:, None], phi, **parameters | one)
-        np.testing.assert_allclose(values[index], alone, rtol=ROWS, atol=TINY)
+        np.testing.assert_allclose(values[index], alone, rtol=draws.ROWS, atol=draws.TINY)
     if spec.specular:
         rows = {name: each[:, None] for name, each in spectrum.items()}
-        assert specular(spec, theta, parameters | rows).shape == (4, 5)
+        assert draws.specular(spec, theta, parameters | rows).shape == (4, 5)
 
 
-@every_model
+@draws.every_model
 def test_float32_angles_give_float32_and_the_arithmetic_is_float64(spec: ModelSpec) -> None:
     rng = np.random.default_rng(12)
-    parameters = drawn(spec, rng)
-    single = [angle.astype(np.float32) for angle in drawn_angles(rng, 50)]
+    parameters = draws.drawn(spec, rng)
+    single = [angle.astype(np.float32) for angle in draws.drawn_angles(rng, 50)]
     values = spec.evaluate(*single, **parameters)
     assert values.dtype == np.float32
     double = spec.evaluate(*(angle.astype(np.float64) for angle in single), **parameters)
@@ -131,31 +95,18 @@ def test_float32_angles_give_float32_and_the_arithmetic_is_float64(spec: ModelSp
     assert spec.evaluate(single[0], 0.0, 0.5, 1, **parameters).dtype == np.float32  # Python numbers have no dtype
     assert spec.evaluate(single[0], np.float64(0.0), 0.5, 1, **parameters).dtype == np.float64
     single_parameters = {name: np.float32(value) for name, value in parameters.items()}
-    assert spec.evaluate(0.1, 0.2, 0.3, 0.4, **single_parameters).dtype == np.float64
+    assert isinstance(spec.evaluate(0.1, 0.2, 0.3, 0.4, **single_parameters), np.float64)
+    assert isinstance(spec.evaluate(*np.float32([0.1, 0.2, 0.3, 0.4]), **parameters), np.float32)
+    if spec.specular:
+        assert isinstance(draws.specular(spec, 0.1, parameters), np.float64)
+        assert isinstance(draws.specular(spec, np.float32(0.1), parameters), np.float32)
 
 
-@every_model
-def test_lists_integers_and_half_precision_are_numbers_too(spec: ModelSpec) -> None:
-    parameters = drawn(spec, np.random.default_rng(13))
-    expected = spec.evaluate(np.array([0.0, 1.0]), 0.0, np.array([1.0, 0.0]), 2.0, **parameters)
-    for angles in (
-        ([0, 1], 0, [1, 0], 2),
-        ((0, 1.0), [0], (1, 0.0), [2]),
-        (np.array([0, 1]), np.int8(0), np.array([1, 0], dtype=np.uint8), 2),
-        (np.array([0, 1], dtype=np.float16), 0, [1, 0], np.longdouble(2)),
-    ):
-        values = spec.evaluate(*angles, **parameters)
-        assert values.dtype == np.float64
-        np.testing.assert_array_equal(values, expected)
-    listed = {name: [float(value)] for name, value in parameters.items()}
-    np.testing.assert_array_equal(spec.evaluate([0, 1], 0, [1, 0], 2, **listed), expected)
-
-
-@every_model
+@draws.every_model
 def test_inputs_are_left_alone_and_outputs_are_fresh(spec: ModelSpec) -> None:
     rng = np.random.default_rng(14)
-    angles = [np.append(angle, [2.0, 0.5]) for angle in drawn_angles(rng, 20)]
-    parameters = drawn(spec, rng, 22)
+    angles = [np.append(angle, [2.0, 0.5]) for angle in draws.drawn_angles(rng, 20)]
+    parameters = draws.drawn(spec, rng, 22)
     arguments = [*angles, *parameters.values()]
     copies = [argument.copy() for argument in arguments]
     for argument in arguments:
@@ -168,90 +119,25 @@ def test_inputs_are_left_alone_and_outputs_are_fresh(spec: ModelSpec) -> None:
     assert spec.evaluate(*angles, **parameters)[0] != 7.0
 
 
-@every_model
+@draws.every_model
 def test_non_contiguous_angles_give_the_same_values(spec: ModelSpec) -> None:
     rng = np.random.default_rng(15)
-    parameters = drawn(spec, rng)
-    angles = [np.ascontiguousarray(angle) for angle in drawn_angles(rng, 60)]
+    parameters = draws.drawn(spec, rng)
+    angles = [np.ascontiguousarray(angle) for angle in draws.drawn_angles(rng, 60)]
     expected = spec.evaluate(*angles, **parameters)
     strided = [np.repeat(angle, 3)[::3] for angle in angles]
-    np.testing.assert_allclose(spec.evaluate(*strided, **parameters), expected, rtol=ROWS)
+    np.testing.assert_allclose(spec.evaluate(*strided, **parameters), expected, rtol=draws.ROWS)
     backwards = [angle[::-1] for angle in angles]
-    np.testing.assert_allclose(spec.evaluate(*backwards, **parameters)[::-1], expected, rtol=ROWS)
+    np.testing.assert_allclose(spec.evaluate(*backwards, **parameters)[::-1], expected, rtol=draws.ROWS)
 
 
-# Ranges. What models refuse is that of their declaration: tests/models/test_declaration.py
+# What models refuse, and their signatures, are those of their declaration: tests/models/test_declaration.py
 
 
-@every_model
-def test_refuses_each_parameter_outside_its_range(spec: ModelSpec) -> None:
-    for parameter in parameters_of(spec):
-        for wrong in (parameter.low - 0.125, beyond(parameter), np.nan):
-            assert refused(spec, parameter, wrong).startswith(f"{parameter.name}: {wrong:.16g} is outside ")
-        for barely in (np.nextafter(parameter.low, -np.inf), np.nextafter(parameter.high, np.inf)):
-            assert refused(spec, parameter, barely).startswith(f"{parameter.name}: ")
-
-
-@every_model
-def test_takes_both_ends_of_each_range(spec: ModelSpec) -> None:
-    parameters = drawn(spec, np.random.default_rng(20))
-    for parameter in parameters_of(spec):
-        for end in (parameter.low, parameter.high):
-            value = spec.evaluate(0.1, 0.2, 0.3, 0.4, **parameters | {parameter.name: end})
-            assert 0.0 <= value < np.inf, parameter.name
-
-
-# Signatures
-
-
-@every_model
-def test_the_registry_knows_the_public_function(spec: ModelSpec) -> None:
+@draws.every_model
+def test_the_registry_has_the_public_function(spec: ModelSpec) -> None:
     assert MODELS[spec.name] is spec
-    assert spec.evaluate.__name__ == spec.name
     assert getattr(models, spec.name) is spec.evaluate
-    assert spec.name in models.__all__
-    assert spec.version >= 1
-    for axis in spec.lobe_axes or ():
-        assert spec.parameter(axis).name == axis
-    with pytest.raises(KeyError):
-        spec.parameter("no such parameter")
-
-
-@every_model
-def test_parameters_match_the_signature(spec: ModelSpec) -> None:
-    arguments = inspect.signature(spec.evaluate).parameters
-    assert tuple(arguments)[:4] == ANGLES
-    for name in ANGLES:
-        assert arguments[name].kind is inspect.Parameter.POSITIONAL_OR_KEYWORD
-        assert arguments[name].default is inspect.Parameter.empty
-    # what may be None, such as a refractive index, is no parameter of a material
-    own = [name for name in tuple(arguments)[4:] if arguments[name].default is not None]
-    assert sorted(own) == sorted(parameter.name for parameter in parameters_of(spec))
-    for parameter in parameters_of(spec):
-        argument = arguments[parameter.name]
-        assert argument.kind is inspect.Parameter.KEYWORD_ONLY
-        default = None if argument.default is inspect.Parameter.empty else argument.default
-        assert (default, type(default)) == (parameter.default, type(parameter.default))
-        if parameter.default is not None:
-            assert parameter.check(parameter.default) == parameter.default
-    with pytest.raises(TypeError):
-        spec.evaluate(0.1, 0.2, 0.3, 0.4, *drawn(spec, np.random.default_rng(21)).values())
-
-
-@every_specular
-def test_specular_parameters_match_the_signature(spec: ModelSpec) -> None:
-    assert spec.specular is not None
-    arguments = inspect.signature(spec.specular).parameters
-    assert tuple(arguments) == ("theta_i", *spec.specular_parameters)
-    assert {name for name, argument in arguments.items() if argument.kind is inspect.Parameter.KEYWORD_ONLY} == {
-        *spec.specular_parameters
+    assert {*(spec.lobe_axes or ()), *(spec.specular_parameters or ())} <= {
+        each.name for each in draws.parameters_of(spec)
     }
-    assert {*spec.specular_parameters} <= {parameter.name for parameter in parameters_of(spec)}
-
-
-@every_model
-def test_a_default_may_be_left_out(spec: ModelSpec) -> None:
-    parameters = drawn(spec, np.random.default_rng(22))
-    defaults = {p.name: p.default for p in spec.parameters if p.default is not None}
-    without = {name: value for name, value in parameters.items() if name not in defaults}
-    assert spec.evaluate(0.1, 0.2, 0.3, 0.4, **without) == spec.evaluate(0.1, 0.2, 0.3, 0.4, **without | defaults)

@@ -1,26 +1,12 @@
 """What the unit-vector twin of every model promises: the values of its angles, and the same ends."""
 
-from typing import Any
-
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from brdfdb import models
 from brdfdb.geometry import unit_vector
 from brdfdb.parameters import Floats, ModelSpec
-from tests.models.draws import (
-    HALF_PI,
-    ROWS,
-    TINY,
-    Arguments,
-    corner_parameters,
-    drawn,
-    drawn_angles,
-    every_model,
-    every_specular,
-    specular,
-)
+from tests.models import draws
 
 TWIN = 1e-14  # 6.0e-15 (He-Torrance), beside what rounding the angles does: unit vectors against angles
 TWIN_ROUNDING = 3e-16  # [rad] the rounding of an angle, of which a narrow lobe makes much
@@ -28,22 +14,22 @@ TWIN_ROUNDING = 3e-16  # [rad] the rounding of an angle, of which a narrow lobe 
 
 def drawn_vectors(rng: np.random.Generator, *shape: int) -> NDArray[np.float64]:
     """Random unit vectors above the horizon, of shape (*shape, 3)."""
-    return unit_vector(rng.uniform(0.0, HALF_PI, shape), rng.uniform(-np.pi, np.pi, shape))
+    return unit_vector(rng.uniform(0.0, draws.HALF_PI, shape), rng.uniform(-np.pi, np.pi, shape))
 
 
 def check_twin(error: Floats, expected: Floats, conditioning: Floats) -> None:
     """Assert that vectors give the values of their angles, but for rounding and how it is amplified."""
-    assert np.mean(expected > TINY) > 0.5
-    worst = np.max((error - TWIN_ROUNDING * conditioning) / np.maximum(expected, TINY))
+    assert np.mean(expected > draws.TINY) > 0.5
+    worst = np.max((error - TWIN_ROUNDING * conditioning) / np.maximum(expected, draws.TINY))
     assert worst <= TWIN, f"off by {worst:.3g}"
 
 
-@every_model
+@draws.every_model
 def test_vectors_give_the_values_of_their_angles(spec: ModelSpec) -> None:
     rng = np.random.default_rng(23)
-    *others, phi_r = (angle[:, np.newaxis] for angle in drawn_angles(rng, 2000))
+    *others, phi_r = (angle[:, np.newaxis] for angle in draws.drawn_angles(rng, 2000))
     angles = [*others, np.append(phi_r, phi_r + 1.0, axis=1)]  # rows of azimuths, which have loops of their own
-    parameters = {name: values[:, np.newaxis] for name, values in drawn(spec, rng, 2000).items()}
+    parameters = {name: values[:, np.newaxis] for name, values in draws.drawn(spec, rng, 2000).items()}
     wi, wr = unit_vector(*angles[:2]), unit_vector(*angles[2:])
     expected = spec.evaluate(*angles, **parameters)
     step = 1e-9
@@ -53,10 +39,10 @@ def test_vectors_give_the_values_of_their_angles(spec: ModelSpec) -> None:
     check_twin(error, expected, conditioning)
 
 
-@every_model
+@draws.every_model
 def test_float32_vectors_give_float32_and_the_arithmetic_is_float64(spec: ModelSpec) -> None:
     rng = np.random.default_rng(24)
-    parameters = drawn(spec, rng)
+    parameters = draws.drawn(spec, rng)
     wi, wr = drawn_vectors(rng, 50).astype(np.float32), drawn_vectors(rng, 50).astype(np.float32)
     values = spec.vectors(wi, wr, **parameters)
     assert values.dtype == np.float32
@@ -68,7 +54,7 @@ def test_float32_vectors_give_float32_and_the_arithmetic_is_float64(spec: ModelS
     assert isinstance(spec.vectors([0, 0, 1], [0.0, 0.6, 0.8], **parameters), np.float64)
 
 
-@every_model
+@draws.every_model
 @pytest.mark.parametrize("dtype", [np.float64, np.float32])
 def test_vectors_in_every_corner_give_finite_values_above_the_horizon_and_0_below(spec: ModelSpec, dtype: type) -> None:
     corners = np.array(
@@ -79,7 +65,7 @@ def test_vectors_in_every_corner_give_finite_values_above_the_horizon_and_0_belo
         ],
         dtype=dtype,
     )
-    parameters = {name: values.reshape(-1, 1, 1) for name, values in corner_parameters(spec).items()}
+    parameters = {name: values.reshape(-1, 1, 1) for name, values in draws.corner_parameters(spec).items()}
     values = spec.vectors(corners[:, None], corners, **parameters)
     assert values.dtype == dtype
     assert np.isfinite(values).all()
@@ -90,10 +76,10 @@ def test_vectors_in_every_corner_give_finite_values_above_the_horizon_and_0_belo
         assert (spec.vectors(wi, wr, **parameters) == 0.0).all()
 
 
-@every_model
+@draws.every_model
 def test_a_nan_in_a_vector_goes_through_and_leaves_its_neighbours_alone(spec: ModelSpec) -> None:
     rng = np.random.default_rng(25)
-    parameters = drawn(spec, rng)
+    parameters = draws.drawn(spec, rng)
     wi, wr = drawn_vectors(rng, 70), drawn_vectors(rng, 70)
     wr[5] *= -1.0
     expected = spec.vectors(wi, wr, **parameters)
@@ -102,63 +88,25 @@ def test_a_nan_in_a_vector_goes_through_and_leaves_its_neighbours_alone(spec: Mo
         dirty_i[row, axis] = dirty_r[row, axis] = np.nan
         for values in (spec.vectors(dirty_i, wr, **parameters), spec.vectors(wi, dirty_r, **parameters)):
             np.testing.assert_array_equal(np.isnan(values), np.arange(70) == row)
-            np.testing.assert_allclose(np.delete(values, row), np.delete(expected, row), rtol=ROWS)
+            np.testing.assert_allclose(np.delete(values, row), np.delete(expected, row), rtol=draws.ROWS)
 
 
-@every_model
+@draws.every_model
 def test_broadcasts_over_vectors(spec: ModelSpec) -> None:
     rng = np.random.default_rng(26)
-    parameters = drawn(spec, rng)
+    parameters = draws.drawn(spec, rng)
     wi, wr = drawn_vectors(rng, 5), drawn_vectors(rng, 7)
     values = spec.vectors(wi[:, None], wr, **parameters)
     assert values.shape == (5, 7)
     for row, one in zip(values, wi, strict=True):
-        np.testing.assert_allclose(spec.vectors(one, wr, **parameters), row, rtol=ROWS)
-    np.testing.assert_allclose(spec.vectors(wi, wr[0], **parameters), values[:, 0], rtol=ROWS)
+        np.testing.assert_allclose(spec.vectors(one, wr, **parameters), row, rtol=draws.ROWS)
+    np.testing.assert_allclose(spec.vectors(wi, wr[0], **parameters), values[:, 0], rtol=draws.ROWS)
     assert np.shape(spec.vectors(wi[0], wr[0], **parameters)) == ()
     assert spec.vectors(wi[:0], wr[0], **parameters).shape == (0,)
     assert spec.vectors(wi[:0, None], wr, **parameters).shape == (0, 7)
-    several = {name: value[:, None] for name, value in drawn(spec, rng, 3).items()}
+    several = {name: value[:, None] for name, value in draws.drawn(spec, rng, 3).items()}
     rows = spec.vectors(wi[0], wr, **several)
     assert rows.shape == (3, 7)
     for index, row in enumerate(rows):
         alone = {name: value[index, 0] for name, value in several.items()}
-        np.testing.assert_allclose(spec.vectors(wi[0], wr, **alone), row, rtol=ROWS)
-
-
-def specular_vectors(spec: ModelSpec, wi: Any, parameters: Arguments) -> Any:
-    assert spec.specular is not None
-    twin = getattr(models, f"{spec.specular.__name__}_vectors")
-    return twin(wi, **{name: parameters[name] for name in spec.specular_parameters})
-
-
-@every_specular
-def test_specular_vectors_give_the_values_of_their_angles(spec: ModelSpec) -> None:
-    rng = np.random.default_rng(29)
-    theta_i, phi_i, _, _ = drawn_angles(rng, 4000)
-    parameters = drawn(spec, rng, 4000)
-    expected, step = specular(spec, theta_i, parameters), 1e-9
-    conditioning = np.abs(specular(spec, np.maximum(theta_i - step, 0.0), parameters) - expected) / step
-    error = np.abs(specular_vectors(spec, unit_vector(theta_i, phi_i), parameters) - expected)
-    check_twin(error, expected, conditioning)
-
-
-@every_specular
-def test_specular_vectors_keep_the_rules_of_the_others(spec: ModelSpec) -> None:
-    rng = np.random.default_rng(30)
-    parameters = drawn(spec, rng)
-    wi = drawn_vectors(rng, 50).astype(np.float32)
-    single, double = (specular_vectors(spec, w, parameters) for w in (wi, wi.astype(np.float64)))
-    assert (single.dtype, double.dtype) == (np.float32, np.float64)
-    np.testing.assert_array_equal(single, double.astype(np.float32))
-    corners = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [1.0, 0.0, -1e-30], [0.0, 0.0, -1.0], [np.nan, 0.0, 1.0]])
-    at_the_pole, at_the_horizon, *below, unknown = specular_vectors(spec, corners, parameters)
-    assert at_the_pole == specular(spec, 0.0, parameters)
-    assert 0.0 <= at_the_horizon <= 1.0
-    assert below == [0.0, 0.0]
-    assert np.isnan(unknown)
-    assert isinstance(specular_vectors(spec, [0, 0, 1], parameters), np.float64)
-    several = {name: value[:, None] for name, value in drawn(spec, rng, 3).items()}
-    assert specular_vectors(spec, wi, several).shape == (3, 50)
-    with pytest.raises(ValueError, match=r"^wi: \(0, 0, 2\) has the length 2, not 1$"):
-        specular_vectors(spec, [0, 0, 2], parameters)
+        np.testing.assert_allclose(spec.vectors(wi[0], wr, **alone), row, rtol=draws.ROWS)

@@ -53,12 +53,6 @@ def declared(spec: ModelSpec, parameters: Arguments) -> float:
 
 
 @every_model
-def test_every_model_declares_how_its_albedo_grows(spec: ModelSpec) -> None:
-    assert spec.grazing_power is not None
-    assert declared(spec, drawn(spec, np.random.default_rng(3))) >= 0.0
-
-
-@every_model
 def test_albedos_at_grazing_light_grow_as_declared(spec: ModelSpec) -> None:
     rng = np.random.default_rng(89)
     theta_i = np.deg2rad(THETA_I_DEG)

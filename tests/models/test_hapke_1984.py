@@ -38,20 +38,6 @@ def test_the_hot_spot_has_the_height_and_the_width_that_it_says() -> None:
     assert hapke(*side, **bright) == pytest.approx(1.35 * hapke(*side, **dark), rel=1e-8)
 
 
-def test_the_lobe_towards_the_light_is_the_share_c() -> None:
-    back, forth = ((0.6, 0.0, 0.6, 0.0), (0.6, 0.0, 0.6, np.pi))
-    for share, brighter, darker in ((1.0, back, forth), (0.0, forth, back)):
-        grains = {"w": 0.1, "b": 0.3, "c": share}
-        assert hapke(*brighter, **grains) > hapke(*darker, **grains)
-
-
-def test_nearly_no_roughness_is_none() -> None:
-    rng = np.random.default_rng(4)
-    theta_i, theta_r, phi = rng.uniform(0.0, 1.4, 500), rng.uniform(0.0, 1.4, 500), rng.uniform(-np.pi, np.pi, 500)
-    smooth = hapke(theta_i, 0.0, theta_r, phi, **SOIL | {"theta_bar": 0.0})
-    np.testing.assert_allclose(hapke(theta_i, 0.0, theta_r, phi, **SOIL | {"theta_bar": 1e-9}), smooth, rtol=1e-12)
-
-
 @pytest.mark.parametrize(
     ("grains", "theta_deg", "stated"),
     [

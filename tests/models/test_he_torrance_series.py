@@ -44,6 +44,7 @@ def draws() -> Iterator[tuple[float, float]]:
     yield from ((g, V) for g in (1e-250, 1e-9, 1.0, 9.0, 39.0, 41.0, 745.0, 1e4) for V in (0.0, 1e-9, 1.0, 300.0))
     yield from ((g, 1e6) for g in (1e-3, 1.0, 2e3, 1e4))
     yield from ((1e6, V) for V in (0.0, 1e5, 1e6))
+    yield from ((1e-12, 0.0), (1e-12, 1e3), (40.0, 1e3), (1e7, 1e6))
     yield from ((0.3, 1.0), (1e-289, 600.0), (1e-291, 600.0), (1e-308, 5.0))
     rng = np.random.default_rng(78)
     for _ in range(60):
@@ -151,32 +152,21 @@ def test_ends_and_stays_finite_far_outside_the_models(g: float, V: float) -> Non
         assert (value >= 0.0).all()
 
 
-@pytest.mark.parametrize(
-    ("g_shape", "V_shape", "shape"),
-    [
-        ((), (), ()),
-        ((), (7,), (7,)),
-        ((1,), (0,), (0,)),
-        ((), (0,), (0,)),
-        ((3, 1), (1, 0), (3, 0)),
-        ((0, 1), (5,), (0, 5)),
-        ((3, 1), (5,), (3, 5)),
-        ((3, 1), (3, 5), (3, 5)),
-        ((2, 1, 1), (3, 5), (2, 3, 5)),
-        ((5,), (3, 1), (3, 5)),
-        ((5,), (), (5,)),
-    ],
+SHAPES: tuple[tuple[tuple[int, ...], tuple[int, ...]], ...] = (
+    *(((), ()), ((), (7,)), ((1,), (0,)), ((), (0,)), ((3, 1), (1, 0)), ((0, 1), (5,)), ((3, 1), (5,))),
+    *(((3, 1), (3, 5)), ((2, 1, 1), (3, 5)), ((5,), (3, 1)), ((5,), ())),
 )
-def test_broadcasts(g_shape: tuple[int, ...], V_shape: tuple[int, ...], shape: tuple[int, ...]) -> None:
-    rng = np.random.default_rng(5)
-    g, V = np.asarray(rng.uniform(0.1, 50.0, g_shape)), np.asarray(rng.uniform(0.0, 90.0, V_shape))
-    values = diffraction_series(g, V)
-    assert values.shape == shape
-    each = [
-        diffraction_series(np.float64(a), np.float64(b))
-        for a, b in np.nditer(np.broadcast_arrays(g, V), ["zerosize_ok"])
-    ]
-    np.testing.assert_allclose(np.ravel(values), each, rtol=TOGETHER)
+
+
+def test_broadcasts() -> None:
+    for shapes in SHAPES:
+        rng = np.random.default_rng(5)
+        g, V = np.asarray(rng.uniform(0.1, 50.0, shapes[0])), np.asarray(rng.uniform(0.0, 90.0, shapes[1]))
+        values = diffraction_series(g, V)
+        assert values.shape == np.broadcast_shapes(*shapes)
+        pairs = zip(*(array.ravel() for array in np.broadcast_arrays(g, V)), strict=True)
+        each = [diffraction_series(*pair) for pair in pairs]
+        np.testing.assert_allclose(np.ravel(values), each, rtol=TOGETHER, err_msg=str(shapes))
 
 
 @pytest.mark.parametrize(

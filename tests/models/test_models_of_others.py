@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -75,20 +76,12 @@ def registry(monkeypatch: pytest.MonkeyPatch) -> Iterator[Registry]:
             del sys.modules[name]
 
 
-# rho, power, rim; light and viewer [degree]; pi f_r, worked out by hand: 0.4 (1 + 2 / 16), and 0.5
-HAND = [((0.4, 2.0, 2.0), (60.0, 60.0), 0.45), ((0.5, 1.0, 4.0), (0.0, 60.0), 0.5)]
-
-
-@pytest.mark.parametrize(("parameters", "theta_deg", "expected"), HAND)
-def test_their_model_has_the_values_that_a_hand_works_out(
-    installed: ModelSpec, parameters: tuple[float, ...], theta_deg: tuple[float, float], expected: float
+def test_a_table_of_their_model_has_its_values_and_those_that_a_hand_works_out(
+    store: Path, installed: ModelSpec
 ) -> None:
-    named = dict(zip(("rho", "power", "rim"), parameters, strict=True))
-    theta_i, theta_r = np.deg2rad(theta_deg)
-    assert np.pi * installed.evaluate(theta_i, 0.0, theta_r, 0.0, **named) == pytest.approx(expected, rel=1e-8)
-
-
-def test_a_table_of_their_model_is_that_of_the_model(store: Path, installed: ModelSpec) -> None:
+    theta = np.deg2rad(60.0)  # 0.4 (1 + 2 / 16)
+    by_hand = installed.evaluate(theta, 0.0, theta, 0.0, rho=0.4, power=2.0, rim=2.0)
+    assert np.pi * by_hand == pytest.approx(0.45, rel=1e-8)
     table = brdfdb.open(store)["peach"]
     angles = np.deg2rad([30.0, 0.0, 60.0, 120.0])
     expected = installed.evaluate(*angles, **PARAMETERS)
@@ -152,6 +145,7 @@ def mine(cos_i, depth): return depth
         pytest.param(None, "no such file of models", id="missing"),
         pytest.param("raise RuntimeError('boo\\nhoo')", "RuntimeError: boo", id="raises"),
         pytest.param("x = (", r"SyntaxError: .*", id="syntax"),
+        pytest.param("import sys; sys.exit(0)", "SystemExit: 0", id="ends"),
         pytest.param(LAMBERT, r"it declares no model, .*ModelSpec", id="none"),
         pytest.param(ARGUMENT, r"TypeError: mine: its arguments depth are not its parameters none; .*", id="argument"),
         pytest.param(CLASH, "the name 'lambert' is that of another model; choose another name", id="clash"),
@@ -172,25 +166,16 @@ def test_a_file_that_is_wrong_is_refused_in_a_sentence(
 
 
 @pytest.mark.parametrize(
-    ("field", "value", "sentence"),
+    ("field", "value"),
     [
-        ("evaluate", 3, "lambert: evaluate: 3 is not a function"),
-        ("vectors", None, "lambert: vectors: None is not a function"),
-        ("lobe", "wide", "lambert: lobe: 'wide' is not a function or None"),
-        ("specular", 0.5, "lambert: specular: 0.5 is not a function or None"),
-        ("grazing_power", -1.0, "lambert: grazing_power: -1.0 is not a number of at least 0, a function or None"),
-        ("version", 0, "lambert: version: 0 is not an integer of at least 1"),
-        ("parameters", ["rho"], "lambert: parameters: ['rho'] is not a tuple of brdfdb.parameters.Parameter"),
-        ("name", "my model", "name: 'my model' is not letters, digits, _ and -, a letter first"),
-        ("name", ["a"], "name: ['a'] is not letters, digits, _ and -, a letter first"),
+        *[("evaluate", 3), ("vectors", None), ("lobe", "wide"), ("specular", 0.5), ("grazing_power", -1.0)],
+        *[("version", 0), ("parameters", ["rho"]), ("name", "my model"), ("name", ["a"])],
     ],
 )
-def test_a_model_with_a_wrong_field_is_refused_in_a_sentence(
-    registry: Registry, field: str, value: Any, sentence: str
-) -> None:
-    with pytest.raises(BrdfdbError) as caught:
+def test_a_model_with_a_wrong_field_is_refused(registry: Registry, field: str, value: Any) -> None:
+    of_model = "" if field == "name" else "lambert: "
+    with pytest.raises(BrdfdbError, match=rf"^mine\.py: {of_model}{field}: {re.escape(repr(value))} is not "):
         registry.add([replace(MODELS["lambert"], **{field: value})], "mine.py")
-    assert str(caught.value) == f"mine.py: {sentence}"
     assert not registry
 
 
@@ -220,16 +205,6 @@ def test_the_command_line_takes_files_before_and_after_the_command(
         assert capsys.readouterr().err == f"brdfdb: {tmp_path / 'a.py'}: no such file of models\n"
 
 
-@pytest.mark.parametrize(
-    ("name", "text", "words"),
-    [
-        ("leaves.py", "import sys; sys.exit(0)", "SystemExit"),
-        ("a:b.py", "", "separates paths"),
-    ],
-)
-def test_a_file_that_ends_the_program_or_splits_its_path_is_refused(
-    tmp_path: Path, name: str, text: str, words: str
-) -> None:
-    (tmp_path / name).write_text(text, encoding="utf-8")
-    with pytest.raises(BrdfdbError, match=words):
-        Registry().add_files([tmp_path / name])
+def test_a_file_that_splits_its_path_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(BrdfdbError, match="separates paths"):
+        Registry().add_files([tmp_path / "a:b.py"])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from brdfdb.integrals.quadrature import directional_albedo
-from brdfdb.models import MODELS, rpv, rpv_vectors
+from brdfdb.models import MODELS, rpv
 
 NAMES = ("rho_0", "k", "asymmetry", "rho_c")
 # rho_0, k, Theta, rho_c; light and viewer [degree]; pi f_r, worked out by hand:
@@ -48,9 +48,3 @@ def test_light_goes_back_for_a_negative_asymmetry_and_the_hot_spot_is_where_the_
     off = rpv(0.7, 0.4, 0.7, 0.4 + 1e-9 / np.sin(0.7), asymmetry=0.0, **flat | {"rho_c": 0.0})
     # 1 / (1 + G) next to the light, with G = 1e-9 / cos: 1 - cos(1e-9) would be 0
     assert off == pytest.approx(0.3 / np.pi * (2.0 - 1e-9 / np.cos(0.7)), rel=1e-15)
-
-
-def test_three_parameters_are_four_with_the_hot_spot_of_the_paper() -> None:
-    w = np.array([0.6, 0.0, 0.8])
-    value = rpv_vectors(w, w, rho_0=0.2, k=1.0, asymmetry=0.0, rho_c=0.2)
-    assert value == pytest.approx(0.2 / np.pi * 1.8, rel=1e-14)

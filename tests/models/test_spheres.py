@@ -88,12 +88,6 @@ def test_the_roughest_vmf_surface_is_a_layer_of_spheres_within_its_fit() -> None
     assert np.sum(weight * abs(f_0 - expected.mean)) <= 0.05 * np.sum(weight * expected.mean)
 
 
-def test_the_smoothest_vmf_surface_is_lambert() -> None:
-    angles = np.linspace(0.0, 1.5, 7)
-    f_r = models.vmf_diffuse(angles[:, None], 0.3, angles, 1.0, rho=0.7, roughness=0.0)
-    np.testing.assert_allclose(f_r, 0.7 / np.pi, rtol=1e-15)
-
-
 def test_a_vmf_surface_reflects_as_much_as_its_excess_says() -> None:
     albedo, error = directional_albedo("vmf_diffuse", np.deg2rad(89.9), rho=1.0, roughness=0.98)
     assert f"{albedo:.2f}" in models.MODELS["vmf_diffuse"].excess

@@ -9,11 +9,10 @@ from typing import Any
 
 import pytest
 
+import brdfdb
 from brdfdb.tables import tabulation
 from brdfdb.tables.layout import Layout
 from brdfdb_pipelines.build import Built
-
-Captured = pytest.CaptureFixture[str]
 
 
 class OneByOne(Executor):
@@ -44,9 +43,9 @@ def failing(monkeypatch: pytest.MonkeyPatch, name: str, error: BaseException) ->
     monkeypatch.setattr(tabulation, "block", fail)
 
 
-def changed(recipe: Path, to: Path) -> Path:
-    """The recipe with another isotropic grid: foam, blue-plastic are new tables, and the others are not."""
-    to.write_text(recipe.read_text(encoding="utf-8").replace("step = 15", "step = 30"), encoding="utf-8")
+def changed(recipe: Path, to: Path, step: float = 30) -> Path:
+    """Write the recipe with another isotropic grid: foam and blue-plastic are new tables, and the others are not."""
+    to.write_text(recipe.read_text(encoding="utf-8").replace("step = 15", f"step = {step}"), encoding="utf-8")
     return to
 
 
@@ -56,3 +55,9 @@ def states(built: list[Built]) -> dict[str, tuple[str, str, str]]:
 
 def staged(root: Path) -> list[str]:
     return sorted(path.name for path in (root / ".staging").iterdir())
+
+
+def chunks(root: Path, name: str) -> dict[str, bytes]:
+    """Return the chunks of the current table of a material by their paths in its group."""
+    group = brdfdb.open(root).path(name)
+    return {str(path.relative_to(group)): path.read_bytes() for path in group.rglob("c/**/*") if path.is_file()}

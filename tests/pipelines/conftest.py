@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import pytest
 
 from brdfdb_pipelines import audit_page, cli
+from tests.pipelines.a_build import changed
 from tests.pipelines.recipes import anisotropic, isotropic, material
 
 # Grey isotropic, anisotropic, spectral, one wavelength, nothing but a Dirac part
@@ -31,12 +33,6 @@ NAMES = ["foam", "rolled-brass", "scene-copper-sphere", "blue-plastic", "mirror"
 
 
 @pytest.fixture(scope="session")
-def recipe_text() -> str:
-    """The recipe above."""
-    return RECIPE
-
-
-@pytest.fixture(scope="session")
 def names() -> list[str]:
     """The materials of the recipe, in its order."""
     return NAMES
@@ -56,6 +52,18 @@ def built(tmp_path_factory: pytest.TempPathFactory, recipe: Path) -> Path:
     root = tmp_path_factory.mktemp("built") / "store"
     assert cli.main(["build", str(recipe), "--store", str(root), "--jobs", "2"]) == 0
     return root
+
+
+@pytest.fixture
+def store_copy(built: Path, tmp_path: Path) -> Path:
+    """A copy of that store, for tests that change it."""
+    return Path(shutil.copytree(built, tmp_path / "store"))
+
+
+@pytest.fixture
+def changed_recipe(recipe: Path, tmp_path: Path) -> Path:
+    """The recipe with another grid for foam and blue-plastic."""
+    return changed(recipe, tmp_path / "changed.toml")
 
 
 @pytest.fixture

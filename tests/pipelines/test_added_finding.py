@@ -11,12 +11,8 @@ import pytest
 
 from brdfdb.audit import FINDINGS, AuditReport
 from brdfdb.audit.finding import Cell, Finding, Sentence, Subject, Verdict
-from brdfdb.materials import Material
-from brdfdb.store.publication import publish_dataset
-from brdfdb.tables.grids import Grid
-from brdfdb.tables.layout import Layout
-from brdfdb.tables.tabulation import tabulate
 from tests.api.a_store import client_of
+from tests.pipelines.a_lambert import publish_lambert
 from tests.pipelines.command import Captured, run
 
 
@@ -41,34 +37,13 @@ class Brightness(Finding):
         return [Cell(self.verdict, f"{self.largest:.3f}", self.largest)]
 
 
-def test_the_modules_of_the_room_are_the_registry_in_their_order() -> None:
-    assert list(FINDINGS) == [
-        *(
-            "energy",
-            "reciprocity",
-            "values",
-            "nodes",
-            "smoothness",
-            "table_error",
-            "polarisation",
-            "sampling",
-            "validity",
-            "record",
-        )
-    ]
-    for key, kind in FINDINGS.items():
-        assert (kind.key, kind.__module__) == (key, f"brdfdb.audit.{key}")
-
-
 def test_a_finding_of_twenty_lines_is_seen_everywhere(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Captured
 ) -> None:
     monkeypatch.setitem(FINDINGS, Brightness.key, Brightness)
     monkeypatch.setattr("brdfdb.audit.sampling.SAMPLES", 2000)
-    grid = Grid({"theta_i": [0, 45, 80], "theta_r": [0, 45, 80], "delta_phi": [0, 90, 180]})
     for name, rho in (("grey", 0.5), ("white", 1.0)):
-        table = {"title": name, "model": "lambert", "source": "no paper", "parameters": {"rho": rho}}
-        publish_dataset(tmp_path, name, tabulate(Layout(Material.from_table(name, table), grid)))
+        publish_lambert(tmp_path, name, rho)
     assert run("audit", "--no-figures", "--store", tmp_path) == 1
 
     terminal = capsys.readouterr().out

@@ -1,10 +1,9 @@
-"""The page of an audit: whole, well formed, quiet on the network."""
+"""The page of an audit: it is complete and well formed, and fetches nothing."""
 
 from __future__ import annotations
 
 import re
 from collections import Counter
-from html.parser import HTMLParser
 
 import numpy as np
 import pytest
@@ -15,43 +14,8 @@ from brdfdb.audit.report import AuditReport
 from brdfdb.audit.table_error import TableError
 from brdfdb.figure import number
 from brdfdb_pipelines import audit_page, figure_look
+from tests.pipelines.a_page import Document
 from tests.pipelines.a_report import ODD, material, report_of, whole
-
-
-class Document(HTMLParser):
-    """Elements, their attributes and the text of a page, of which every tag is closed."""
-
-    VOID = frozenset({"meta", "link", "br", "input"})
-
-    def __init__(self, html: str) -> None:
-        super().__init__()
-        self.open: list[str] = []
-        self.unbalanced: list[str] = []
-        self.elements: list[tuple[str, dict[str, str | None]]] = []
-        self.text: list[tuple[str, str]] = []
-        self.feed(html)
-        self.close()
-        self.unbalanced += self.open
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self.elements.append((tag, dict(attrs)))
-        if tag not in self.VOID:
-            self.open.append(tag)
-
-    def handle_endtag(self, tag: str) -> None:
-        if self.open and self.open[-1] == tag:
-            self.open.pop()
-        else:
-            self.unbalanced.append(tag)
-
-    def handle_data(self, data: str) -> None:
-        self.text.append((self.open[-1] if self.open else "", data))
-
-    def attributes(self, name: str) -> list[str]:
-        return [value for _, attributes in self.elements if (value := attributes.get(name)) is not None]
-
-    def words(self) -> str:
-        return "".join(text for tag, text in self.text if tag not in ("script", "style"))
 
 
 @pytest.fixture(scope="module")
@@ -113,36 +77,26 @@ def test_every_material_figure_and_statement_is_there(document: Document, report
     drawings = sum(len(each.panels) for each in (*report.atlas, *report.gallery))
     drawings += sum(len(each.of(TableError).maps) for each in report.materials)
     drawings += 4 * 2 + 5  # grey: model and table, furnace; spectral: the model alone, uniform light, the bound, too
-    assert sum(tag == "svg" for tag, _ in document.elements) == drawings
-
-
-def test_what_holds_and_what_does_not_is_said_in_words(document: Document, report: AuditReport) -> None:
+    assert document.count("svg") == drawings
     found = [each.holds for figure in (*report.atlas, *report.gallery) for each in figure.statements]
-    words = document.words()
     assert words.count("Does not hold:") == found.count(False) > 0
     assert words.count("Holds:") == found.count(True) > 0
 
 
 def test_reasons_are_sentences_and_said_once(document: Document) -> None:
-    words = re.sub(r"\s+", " ", document.words())
+    words = document.words()
     assert words.count("Reflects up to 0.4774 at 89 degrees.") == 1  # of model and table alike
-    assert (
-        "White furnace: conserves. Rho = 1; the albedo is between 0.8 at 0° and 1.2 at 89°, in uniform light" in words
-    )
-    assert "Uniform diffuse part: inside. The material's own a(λ) keeps to the largest that conserves energy." in words
-    assert "Energy of the model: loses. Reflects" in words
-    assert "Energy of the table: passes. As the model; in uniform light the model reflects 0.7, the table" in words
-    assert "Reciprocity: passes. Asymmetry up to 3·10⁻¹³, of 1·10⁻¹¹ allowed." in words
-    assert "Nodes: passes. All 360 stored values that were compared, of the 720 in the table, are the model's." in words
-    assert "Smoothness: passes. The table jumps by 0.0001 of f_r across delta_phi = 180°, of 0.01 allowed." in words
-    assert "Sampling: passes. The smallest p of 3 lights is below 0.001." in words
-    assert "Table error: passes. 99 of 100 fresh values are within 0.91 %, on average off by −0.2 % of the" in words
-    assert "Alpha: at the edge. 0.2 (at most 0.2). up to about 0.2 section 4" in words
-    assert "Validity: at the edge. 2 limits that the paper states: 1 at the edge, 1 met." in words
+    for sentence in (
+        "Energy of the table: passes. As the model; in uniform light the model reflects 0.7, the table",
+        "Reciprocity: passes. Asymmetry up to 3·10⁻¹³, of 1·10⁻¹¹ allowed.",
+        "Table error: passes. 99 of 100 fresh values are within 0.91 %, on average off by −0.2 % of the",
+        "Alpha: at the edge. 0.2 (at most 0.2). up to about 0.2 section 4",
+    ):
+        assert sentence in words
 
 
 def test_the_two_questions_have_answers_on_every_material(document: Document, report: AuditReport) -> None:
-    words = re.sub(r"\s+", " ", document.words())
+    words = document.words()
     for question in audit_page.QUESTIONS:
         assert words.count(question.capitalize()) == 1 + len(report.materials)  # in the words, and in each section
     for text in (
@@ -154,8 +108,9 @@ def test_the_two_questions_have_answers_on_every_material(document: Document, re
 
 
 def test_one_material_violates_and_a_remark_on_a_model_that_passes_is_said() -> None:
-    good, bad = material("good", "gains"), material("bad", "violates")
-    words = re.sub(r"\s+", " ", Document(audit_page.render(report_of([good, bad], ["bad"]))).words())
+    good = material("good", "gains")
+    bad = material("bad", "violates")
+    words = Document(audit_page.render(report_of([good, bad], ["bad"]))).words()
     assert "1 of 2 violates something that is neither" in words
     assert " 1 passes with a remark on the model: it would create light" in words
     assert audit_page.remarked(report_of([good, bad], ["bad"])) == 1
@@ -187,21 +142,9 @@ def test_the_dark_page_has_a_colour_for_every_variable(html: str) -> None:
             assert f"{variable}: #" in dark, variable
 
 
-@pytest.mark.parametrize(
-    ("value", "text"),
-    [
-        (0.0, "0"),
-        (0.01234, "0.0123"),
-        (-2.0, "−2"),
-        (3e-13, "3·10⁻¹³"),
-        (1.26e5, "1.3·10⁵"),
-        (None, "–"),
-        (1.0, "1"),
-        (np.inf, "not finite"),
-    ],
-)
-def test_numbers_are_those_that_people_write(value: float | None, text: str) -> None:
-    assert number(value) == text
+def test_numbers_are_those_that_people_write() -> None:
+    values = [0.0, 0.01234, -2.0, 3e-13, 1.26e5, None, 1.0, np.inf]
+    assert [number(value) for value in values] == ["0", "0.0123", "−2", "3·10⁻¹³", "1.3·10⁵", "–", "1", "not finite"]
 
 
 @pytest.mark.parametrize(("of", "column"), [("model", 2), ("table", 3)])

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import json
 import re
-import shutil
 import threading
 import time
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -17,23 +17,21 @@ import xarray as xr
 from numpy.typing import NDArray
 
 import brdfdb
+from brdfdb import _numba
 from brdfdb.errors import StoreError
-from brdfdb.store.reader import Store
+from brdfdb.materials import Material
+from brdfdb.tables import _kernels, tabulation
 from brdfdb.tables import layout as layouts
-from brdfdb.tables import tabulation
 from brdfdb.tables.layout import Layout, digest
 from brdfdb.tables.xarray_view import plain_attributes
-from brdfdb_pipelines import build_survey, cli
+from brdfdb_pipelines import build as builds
+from brdfdb_pipelines import build_survey, workers
 from brdfdb_pipelines.build import build
-from brdfdb_pipelines.recipe_file import Job, Recipe, load
+from brdfdb_pipelines.recipe_file import Job, load
 from brdfdb_pipelines.workers import Workers
-from tests.pipelines.a_build import Captured, OneByOne, changed, failing, staged, states
-
-
-def chunks(store: Store, name: str) -> dict[str, bytes]:
-    group = store.path(name)
-    return {str(path.relative_to(group)): path.read_bytes() for path in group.rglob("c/**/*") if path.is_file()}
-
+from tests.pipelines.a_build import OneByOne, chunks, failing, staged, states
+from tests.pipelines.command import Captured, run
+from tests.pipelines.recipes import recipe_file_of
 
 # What is built
 
@@ -64,6 +62,7 @@ def test_tables_are_those_of_tabulate_with_the_request_beside_them(recipe: Path,
         whole = json.loads(json.dumps(job.request))
         request = {key: value for key, value in whole.items() if key not in ("material", "model_version")}
         assert store.metadata(job.material.name).whole_request == whole
+        assert Material.model_validate(whole["material"]) == job.material
         with store.dataset(job.material.name) as found:
             attrs = store[job.material.name].attrs
             measured = {key: attrs[key] for key in ("error", "formula_error", "largest_albedo")}
@@ -90,10 +89,9 @@ def test_a_build_names_a_material_that_reflects_more_than_it_receives(tmp_path: 
     path = tmp_path / "recipe.toml"
     define = [WARD.format(name=name, rho_d=0.6, rho_s=rho_s, alpha_y=0.1) for name, rho_s in (("a", 0.2), ("b", 0.6))]
     path.write_text('materials = ["a", "b", "blue-plastic"]\ntolerance = 0.1\n' + "".join(define))
-    assert cli.main(["build", str(path), "--store", str(tmp_path / "store"), "--jobs", "1"]) == 0
-    said = [line for line in capsys.readouterr().out.splitlines() if "reflects more" in line]
-    assert len(said) == 1
-    assert said[0].startswith("b reflects more light than it receives: albedo of the model 1.")
+    assert run("build", path, "--store", tmp_path / "store", "--jobs", 1) == 0
+    (said,) = [line for line in capsys.readouterr().out.splitlines() if "reflects more" in line]
+    assert said.startswith("b reflects more light than it receives: albedo of the model 1.")
 
 
 OF_A_WAVELENGTH = 100  # bytes that a wavelength adds to a mixture; measured: 80
@@ -112,10 +110,7 @@ def test_a_colour_takes_less_than_twice_the_bytes_of_grey_and_some_for_added_wav
     path.write_text(
         f"materials = {list(parameters)}\ntolerance = 0.01\n"
         "wavelengths_nm = [{ start = 380, stop = 730, step = 8.75 }]\n"
-        + "".join(
-            WARD.format(name=name, rho_d=rho_d, rho_s=rho_s, alpha_y=alpha_y)
-            for name, (rho_d, rho_s) in parameters.items()
-        )
+        + "".join(WARD.format(name=name, rho_d=d, rho_s=s, alpha_y=alpha_y) for name, (d, s) in parameters.items())
     )
     with ThreadPoolExecutor(1) as executor:
         built = build(load(path), tmp_path / "store", Workers(executor, lambda: 1), lambda _: None)
@@ -136,8 +131,7 @@ def test_the_largest_table_comes_first_and_the_number_of_workers_changes_nothing
     blocks = [Path(args[0]).parent.name for task, args in executor.submitted if task == "write_block"]
     assert sorted(blocks) == sorted(names)
     assert [sizes[name] for name in blocks] == sorted(sizes.values(), reverse=True)
-    one, other = brdfdb.open(tmp_path), brdfdb.open(built)
-    assert all(chunks(one, name) == chunks(other, name) for name in names)
+    assert all(chunks(tmp_path, name) == chunks(built, name) for name in names)
 
 
 def test_a_layout_is_planned_on_a_worker_and_at_most_once(
@@ -145,8 +139,6 @@ def test_a_layout_is_planned_on_a_worker_and_at_most_once(
 ) -> None:
     plan, planned, plan_of = load(recipe), [], Job.planned
     jobs = plan.jobs()
-    monkeypatch.setattr(Recipe, "jobs", lambda _: jobs)
-    monkeypatch.setattr(Job, "request", property(lambda job: {"material": job.material.name}))
 
     def plan_it(job: Job) -> tuple[Layout, NDArray[np.float32] | None]:
         planned.append((job.material.name, threading.current_thread().name))
@@ -159,33 +151,42 @@ def test_a_layout_is_planned_on_a_worker_and_at_most_once(
     assert sorted(name for name, _ in planned) == sorted(job.material.name for job in jobs)
     assert all(thread.startswith("worker") for _, thread in planned)
     monkeypatch.undo()
-    monkeypatch.setattr(Recipe, "jobs", lambda _: jobs)
-    monkeypatch.setattr(Job, "request", property(lambda job: {"material": job.material.name}))
     monkeypatch.setattr(Job, "planned", lambda _: pytest.fail("planned again"))
     assert {state for state, _, _ in states(build(plan, tmp_path, OneByOne())).values()} <= {"published", "unchanged"}
+
+
+def test_kernels_compile_in_processes_before_the_first_build_only(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    recipe = load(recipe_file_of(tmp_path, 'materials = ["foam", "rolled-brass"]\ntolerance = 0.1\n'))
+    events: list[dict[str, Any]] = []
+    monkeypatch.setattr(workers, "processes", lambda count, **_: workers.threads(count))
+    monkeypatch.setattr(builds, "is_cached", lambda _: False)
+    builds.compile_kernels(recipe, tmp_path, 2, events.append)
+    assert [event["event"] for event in events] == ["compiling", *["compiled"] * 3]
+    assert events[0]["kernels"] == 3
+    events.clear()
+    monkeypatch.setattr(builds, "is_cached", lambda _: True)
+    builds.compile_kernels(recipe, tmp_path, 2, events.append)
+    assert events == []
+    assert _numba.INTERPRETED or _numba.is_cached(_kernels.by_vectors)
 
 
 # What is not built again
 
 
-def test_an_unchanged_recipe_does_nothing(recipe: Path, built: Path, tmp_path: Path, names: list[str]) -> None:
-    root = tmp_path / "store"
-    shutil.copytree(built, root)
-    before = {path: path.stat().st_mtime_ns for path in (root / "materials").rglob("*")}
+def test_an_unchanged_recipe_does_nothing(recipe: Path, store_copy: Path, names: list[str]) -> None:
+    before = {path: path.stat().st_mtime_ns for path in (store_copy / "materials").rglob("*")}
     executor = OneByOne()
-    assert states(build(load(recipe), root, executor)) == dict.fromkeys(names, ("unchanged", "r000001", ""))
+    assert states(build(load(recipe), store_copy, executor)) == dict.fromkeys(names, ("unchanged", "r000001", ""))
     assert [task for task, _ in executor.submitted] == ["survey"] * len(names)
-    assert {path: path.stat().st_mtime_ns for path in (root / "materials").rglob("*")} == before
-    assert cli.main(["build", str(recipe), "--store", str(root)]) == 0
+    assert {path: path.stat().st_mtime_ns for path in (store_copy / "materials").rglob("*")} == before
 
 
 def test_a_changed_recipe_is_a_new_revision_and_says_why(
-    recipe: Path, built: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Captured
+    changed_recipe: Path, store_copy: Path, monkeypatch: pytest.MonkeyPatch, capsys: Captured
 ) -> None:
-    root = tmp_path / "store"
-    shutil.copytree(built, root)
-    other = changed(recipe, tmp_path / "other.toml")
-    found = states(build(load(other), root, OneByOne()))
+    found = states(build(load(changed_recipe), store_copy, OneByOne()))
     new = ("published", "r000002", "grid changed")
     same = ("unchanged", "r000001", "")
     assert found == {
@@ -193,28 +194,26 @@ def test_a_changed_recipe_is_a_new_revision_and_says_why(
     }  # fmt: skip
     request = Job.request.fget
     monkeypatch.setattr(Job, "request", property(lambda self: {**request(self), "model_version": 7}))
-    text = other.read_text(encoding="utf-8").replace("tau_um = 1\n", "tau_um = 2\n")
-    other.write_text(text, encoding="utf-8")
-    found = states(build(load(other), root, OneByOne()))
+    text = changed_recipe.read_text(encoding="utf-8").replace("tau_um = 1\n", "tau_um = 2\n")
+    changed_recipe.write_text(text, encoding="utf-8")
+    found = states(build(load(changed_recipe), store_copy, OneByOne()))
     assert found["foam"] == ("published", "r000003", "model version 1 -> 7")
     assert found["mirror"][2].endswith("parameters changed, model version 2 -> 7")
     assert capsys.readouterr().out == ""
 
 
 def test_what_was_current_before_is_made_current_again_and_not_computed(
-    recipe: Path, built: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Captured
+    recipe: Path, changed_recipe: Path, store_copy: Path, monkeypatch: pytest.MonkeyPatch, capsys: Captured
 ) -> None:
-    root = tmp_path / "store"
-    shutil.copytree(built, root)
-    other = changed(recipe, tmp_path / "other.toml")
-    build(load(other), root, OneByOne())
+    root = store_copy
+    build(load(changed_recipe), root, OneByOne())
     monkeypatch.setattr(tabulation, "block", lambda *_: pytest.fail("computed again"))
-    assert cli.main(["build", str(recipe), "--store", str(root)]) == 0
+    assert run("build", recipe, "--store", root) == 0
     out, _ = capsys.readouterr()
     assert "grid changed; r000001 is current again" in out
     assert "3 tables unchanged" in out
     assert brdfdb.open(root).head("foam") == "r000001"
-    assert cli.main(["rollback", "foam", "r000002", "--store", str(root)]) == 0
+    assert run("rollback", "foam", "r000002", "--store", root) == 0
     assert states(build(load(recipe), root, OneByOne()))["foam"] == ("adopted", "r000001", "grid changed")
     assert staged(root) == []
 
@@ -225,22 +224,22 @@ def flip(path: Path) -> None:
     path.write_bytes(data)
 
 
-@pytest.mark.parametrize("damage", ["flip", "truncate", "empty", "delete"])
+def truncate(path: Path) -> None:
+    path.write_bytes(path.read_bytes()[:-1])
+
+
+def empty(path: Path) -> None:
+    path.write_bytes(b"")
+
+
+@pytest.mark.parametrize("damage", [flip, truncate, empty, Path.unlink])
 @pytest.mark.parametrize("file", ["brdf/c/0/0/0", "../r000001.MANIFEST.json", "../HEAD.json"])
 def test_what_is_damaged_is_named_and_built_again(
-    damage: str, file: str, recipe: Path, built: Path, tmp_path: Path, capsys: Captured
+    damage: Callable[[Path], None], file: str, recipe: Path, built: Path, store_copy: Path, capsys: Captured
 ) -> None:
-    root = tmp_path / "store"
-    shutil.copytree(built, root)
-    path = root / "materials" / "foam" / "r000001" / file
-    before = brdfdb.open(built)["foam"].brdf
-    {
-        "flip": flip,
-        "truncate": lambda path: path.write_bytes(path.read_bytes()[:-1]),
-        "empty": lambda path: path.write_bytes(b""),
-        "delete": Path.unlink,
-    }[damage](path)
-    assert cli.main(["verify", "--store", str(root)]) == 2
+    root, before = store_copy, brdfdb.open(built)["foam"].brdf
+    damage(root / "materials" / "foam" / "r000001" / file)
+    assert run("verify", "--store", root) == 2
     out, err = capsys.readouterr()
     assert "5 materials verified, " in out
     assert re.search(r"brdfdb: foam (r000001 )?is damaged: .*; `brdfdb build` with its recipe (repairs|makes) it", err)
@@ -248,17 +247,15 @@ def test_what_is_damaged_is_named_and_built_again(
     with pytest.raises(StoreError, match=r"^foam (r000001 )?is damaged: "):
         brdfdb.open(root)["foam"]
     found = states(build(load(recipe), root, OneByOne()))
-    assert {name: state for name, (state, _, _) in found.items() if name != "foam"} == {
-        name: "unchanged" for name in found if name != "foam"
-    }
-    state, _, why = found["foam"]
+    state, _, why = found.pop("foam")
+    assert {state for state, _, _ in found.values()} == {"unchanged"}
     assert state == ("adopted" if file == "../HEAD.json" else "published")
     assert Path(file).name in why
     np.testing.assert_array_equal(brdfdb.open(root)["foam"].brdf, before)
-    if cli.main(["verify", "foam", "--store", str(root)]) != 0:  # what was damaged is there, and not current
+    if run("verify", "foam", "--store", root) != 0:  # the damaged revision is there, and not current
         assert capsys.readouterr().err.endswith("(not the current revision); `brdfdb gc --damaged` removes it\n")
-        assert cli.main(["gc", "--damaged", "--store", str(root)]) == 0
-    assert cli.main(["verify", "foam", "--store", str(root)]) == 0
+        assert run("gc", "--damaged", "--store", root) == 0
+    assert run("verify", "foam", "--store", root) == 0
 
 
 # What is told
@@ -267,8 +264,8 @@ def test_what_is_damaged_is_named_and_built_again(
 def test_json_lines_tell_all_and_nothing_else_is_on_stdout(
     recipe: Path, tmp_path: Path, names: list[str], capsys: Captured
 ) -> None:
-    command = ["build", str(recipe), "--store", str(tmp_path / "store"), "--json"]
-    assert cli.main(command) == 0
+    command = ("build", recipe, "--store", tmp_path / "store", "--json")
+    assert run(*command) == 0
     out, err = capsys.readouterr()
     assert err == ""
     events = [json.loads(line) for line in out.splitlines()]
@@ -282,7 +279,7 @@ def test_json_lines_tell_all_and_nothing_else_is_on_stdout(
             }
     assert events[-1]["event"] == "done"
     assert (events[-1]["published"], events[-1]["unchanged"], events[-1]["tables"]) == (5, 0, 5)
-    assert cli.main(command) == 0
+    assert run(*command) == 0
     events = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
     assert {event["event"] for event in events} == {"start", "surveyed", "unchanged", "planned", "done"}
 

@@ -3,29 +3,29 @@
 from __future__ import annotations
 
 import errno
-import shutil
-import tempfile
 import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import brdfdb
-from brdfdb.errors import StoreError
-from brdfdb.store import files
+from brdfdb.errors import ParameterError, StoreError
+from brdfdb.materials import Material
+from brdfdb.store import files, lock
 from brdfdb.store.lock import Lock
 from brdfdb.tables import layout as layouts
 from brdfdb.tables import tabulation
 from brdfdb.tables.layout import Layout
-from brdfdb_pipelines import cli
 from brdfdb_pipelines.build import build
-from brdfdb_pipelines.commands import BUG
-from brdfdb_pipelines.recipe_file import Recipe, load
+from brdfdb_pipelines.build_survey import check_values
+from brdfdb_pipelines.recipe_file import Job, Recipe, load
 from brdfdb_pipelines.recipe_grids import RecipeError
-from tests.pipelines.a_build import Captured, OneByOne, changed, failing, staged, states
+from tests.pipelines.a_build import OneByOne, failing, staged, states
+from tests.pipelines.command import Captured, refused, run
 
 WAIT_S = 300.0  # for what takes a second or two where the machine has nothing else to do
 
@@ -40,13 +40,33 @@ def test_a_recipe_that_cannot_be_built_is_refused_before_anything_is_written(rec
     assert not (tmp_path / "store").exists()
 
 
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -0.1])
+def test_values_that_no_brdf_has_are_refused_with_model_and_parameters(
+    bad: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fields = {"title": "White", "model": "lambert", "source": "me", "parameters": {"rho": 0.5}}
+    job = Job(Material.from_table("white", fields), None, None, 0.1)
+    check_values(job)
+    monkeypatch.setattr(Material, "lookup_vectors", lambda _, wi, *__: np.where(wi[:, 2] < 0.9, bad, 0.1))
+    with pytest.raises(ParameterError) as caught:
+        check_values(job)
+    said = f"white: its model lambert with rho = 0.5 gives {bad:.3g} /sr at theta_i 30, theta_r 0, phi_r 0 degrees"
+    assert str(caught.value) == f"{said}; f_r must be finite and not negative"
+
+
+def test_a_system_without_file_locks_is_told_in_one_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(lock, "fcntl", None)
+    with pytest.raises(StoreError, match="this system has no file locks; use Linux or macOS"), Lock(tmp_path, "foam"):
+        pass
+
+
 def test_a_block_that_does_not_fit_into_the_memory_is_refused(recipe: Path, tmp_path: Path, capsys: Captured) -> None:
-    assert cli.main(["build", str(recipe), "--store", str(tmp_path / "store"), "--memory", "1MB"]) == 2
-    _, err = capsys.readouterr()
-    assert err.splitlines()[-1].startswith("brdfdb: memory: a block of ")
-    assert " 1 MB " in err.splitlines()[-1]
+    command = ("build", recipe, "--store", tmp_path / "store", "--memory")
+    said = refused(capsys, *command, "1MB")
+    assert said.startswith("memory: a block of ")
+    assert " 1 MB " in said
     assert not (tmp_path / "store").exists()
-    assert cli.main(["build", str(recipe), "--store", str(tmp_path / "store"), "--memory", "0.1GB"]) == 0
+    assert run(*command, "0.1GB") == 0
 
 
 def test_one_table_that_fails_takes_no_other_with_it(
@@ -79,41 +99,27 @@ def test_a_build_that_is_broken_off_says_so_and_the_old_revision_is_served(
     error: BaseException,
     code: int,
     sentence: str,
-    recipe: Path,
-    tmp_path: Path,
+    changed_recipe: Path,
+    store_copy: Path,
     monkeypatch: pytest.MonkeyPatch,
     capsys: Captured,
 ) -> None:
-    command = ["build", str(recipe), "--store", str(tmp_path / "store"), "--jobs", "1"]
-    assert cli.main(command) == 0
-    capsys.readouterr()
-    command[1] = str(changed(recipe, tmp_path / "other.toml"))
+    command = ["build", str(changed_recipe), "--store", str(store_copy), "--jobs", "1"]
     failing(monkeypatch, "foam", error)
-    assert cli.main(command) == code
+    assert run(*command) == code
     out, err = capsys.readouterr()
     assert out == ""
     assert err.splitlines()[-1].startswith(sentence)
     if code == 130:
         assert err.splitlines()[-1].endswith("to resume: brdfdb " + " ".join(command))
     assert "Traceback" not in err
-    store = brdfdb.open(tmp_path / "store")
+    store = brdfdb.open(store_copy)
     store.verify("foam")
     assert store["foam"].revision == "r000001"
     monkeypatch.undo()
-    assert cli.main(command) == 0
+    assert run(*command) == 0
     assert store["foam"].revision == "r000002"
-    assert staged(tmp_path / "store") == []
-
-
-def test_a_bug_in_the_program_keeps_its_traceback(
-    recipe: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Captured
-) -> None:
-    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
-    failing(monkeypatch, "foam", ZeroDivisionError("a bug"))
-    assert cli.main(["build", str(recipe), "--store", str(tmp_path / "store"), "--jobs", "1"]) == BUG
-    (file,) = tmp_path.glob("brdfdb-*.txt")
-    assert capsys.readouterr().err.endswith(f"its traceback is in {file} (ZeroDivisionError: a bug)\n")
-    assert file.read_text(encoding="utf-8").endswith("\nZeroDivisionError: a bug\n")
+    assert staged(store_copy) == []
 
 
 def test_a_full_disk_is_one_sentence_and_what_was_written_is_kept(
@@ -133,11 +139,9 @@ def test_a_full_disk_is_one_sentence_and_what_was_written_is_kept(
     with monkeypatch.context() as patch:
         for user in ("staging.write_file", "files.write_file"):
             patch.setattr(f"brdfdb.store.{user}", fill)
-        assert cli.main(["build", str(recipe), "--store", str(root), "--jobs", "1"]) == 2
-    out, err = capsys.readouterr()
-    assert (out, err.count("brdfdb: ")) == ("", 1)
-    assert err.splitlines()[-1].startswith("brdfdb: cannot write ")
-    assert err.splitlines()[-1].endswith(f" to the store at {root}: No space left on device")
+        said = refused(capsys, "build", recipe, "--store", root, "--jobs", 1)
+    assert said.startswith("cannot write ")
+    assert said.endswith(f" to the store at {root}: No space left on device")
     markers = len(list((root / ".staging").rglob("blocks/*.json")))
     assert markers > 5
     events: list[dict[str, Any]] = []
@@ -181,17 +185,14 @@ def test_a_second_build_of_a_material_waits_and_then_has_nothing_to_do(
     assert staged(tmp_path) == []
 
 
-def test_a_build_waits_for_whoever_holds_the_lock(recipe: Path, built: Path, tmp_path: Path, capsys: Captured) -> None:
-    root = tmp_path / "store"
-    shutil.copytree(built, root)
-    other = changed(recipe, tmp_path / "other.toml")
-    with ThreadPoolExecutor(1) as executor, Lock(root, "foam"):
-        done = executor.submit(build, load(other), root, OneByOne())
+def test_a_build_waits_for_whoever_holds_the_lock(changed_recipe: Path, store_copy: Path, capsys: Captured) -> None:
+    with ThreadPoolExecutor(1) as executor, Lock(store_copy, "foam"):
+        done = executor.submit(build, load(changed_recipe), store_copy, OneByOne())
         deadline = time.monotonic() + WAIT_S
-        while brdfdb.open(root).head("blue-plastic") != "r000002":
+        while brdfdb.open(store_copy).head("blue-plastic") != "r000002":
             assert time.monotonic() < deadline
             time.sleep(0.01)
         assert not done.done()
-        assert cli.main(["gc", "--keep", "1", "--store", str(root)]) == 0
+        assert run("gc", "--keep", 1, "--store", store_copy) == 0
         assert "foam was skipped" in capsys.readouterr().out
     assert states(done.result(WAIT_S))["foam"] == ("published", "r000002", "grid changed")

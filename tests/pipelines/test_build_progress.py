@@ -7,7 +7,8 @@ import json
 import pytest
 
 from brdfdb_pipelines import build_progress
-from brdfdb_pipelines.build_progress import Bars, JsonLines, Tally
+from brdfdb_pipelines.build_progress import Bars, Tally, print_json
+from tests.pipelines.command import Captured
 
 
 def test_the_rate_is_that_of_what_was_computed_and_tells_the_time_left(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -23,9 +24,8 @@ def test_the_rate_is_that_of_what_was_computed_and_tells_the_time_left(monkeypat
     assert tally.add(600, kept=False)["seconds_left"] == 0.0
 
 
-def test_lines_are_json_and_bars_are_on_stderr(capsys: pytest.CaptureFixture[str]) -> None:
-    with JsonLines() as lines:
-        lines({"event": "unchanged", "material": "Größe", "revision": "r000001"})
+def test_lines_are_json_and_bars_are_on_stderr(capsys: Captured) -> None:
+    print_json({"event": "unchanged", "material": "Größe", "revision": "r000001"})
     out, err = capsys.readouterr()
     assert (json.loads(out), err) == ({"event": "unchanged", "material": "Größe", "revision": "r000001"}, "")
     block = {"event": "block", "blocks": 2, "kept": False, "values_total": 4, "values_per_s": 2e6, "seconds_left": 0.0}
@@ -59,7 +59,7 @@ def test_lines_are_json_and_bars_are_on_stderr(capsys: pytest.CaptureFixture[str
     assert "grey failed: [no] idea" in err
 
 
-def test_a_table_of_measured_data_that_failed_does_not_count_as_done(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_table_of_measured_data_that_failed_does_not_count_as_done(capsys: Captured) -> None:
     with Bars() as bars:
         for name in ("grey", "white"):
             bars({"event": "measuring", "material": name, "tables": 2})

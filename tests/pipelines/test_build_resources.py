@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import tracemalloc
 from pathlib import Path
 from types import SimpleNamespace
@@ -16,7 +17,9 @@ from brdfdb.materials import presets
 from brdfdb.store import records, staging
 from brdfdb.tables.grids import Grid
 from brdfdb.tables.layout import Interpolation, Layout
-from brdfdb_pipelines import build_survey, cli
+from brdfdb_pipelines import build_survey
+from brdfdb_pipelines.commands import _arguments
+from tests.pipelines.command import Captured, refused, run
 
 LOG = Interpolation("cubic", True, 1e-4)
 WAVELENGTHS = np.linspace(400.0, 700.0, 31)
@@ -61,20 +64,19 @@ def test_a_task_takes_at_most_the_memory_that_is_expected_and_not_a_tenth_of_it(
 
 
 def test_a_disk_that_is_too_small_is_one_sentence_before_anything_is_written(
-    recipe: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    recipe: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Captured
 ) -> None:
     monkeypatch.setattr(build_survey.shutil, "disk_usage", lambda _: SimpleNamespace(free=10_000))
     root = tmp_path / "store"
-    assert cli.main(["build", str(recipe), "--store", str(root)]) == 2
-    said = capsys.readouterr().err.splitlines()[-1]
-    assert said.startswith("brdfdb: disk: the tables take up to ")
+    said = refused(capsys, "build", recipe, "--store", root)
+    assert said.startswith("disk: the tables take up to ")
     assert said.endswith(f" kB, and {root} has 10 kB free")
     assert not root.exists()
 
 
 @pytest.mark.parametrize(("free", "staged"), [(100, []), (10_000, ["rolled-brass"])])
 def test_a_disk_too_small_for_planned_tables_leaves_nothing(
-    free: int, staged: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    free: int, staged: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Captured
 ) -> None:
     planned = tmp_path / "planned.toml"
     planned.write_text('materials = ["foam", "rolled-brass"]\ntolerance = 0.01\n', encoding="utf-8")
@@ -87,17 +89,21 @@ def test_a_disk_too_small_for_planned_tables_leaves_nothing(
 
     monkeypatch.setattr(build_survey, "write_block", write_block)
     root = tmp_path / "store"
-    assert cli.main(["build", str(planned), "--store", str(root), "--jobs", "1"]) == 2
-    assert capsys.readouterr().err.splitlines()[-1].startswith("brdfdb: disk: the tables take up to ")
+    assert refused(capsys, "build", planned, "--store", root, "--jobs", 1).startswith("disk: the tables take up to ")
     assert not root.exists()
     assert names == staged
 
 
-def test_what_is_staged_already_needs_no_disk_again(
-    recipe: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_an_unchanged_recipe_needs_no_free_disk(
+    recipe: Path, store_copy: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    root = tmp_path / "store"
-    assert cli.main(["build", str(recipe), "--store", str(root)]) == 0
     monkeypatch.setattr(build_survey.shutil, "disk_usage", lambda _: SimpleNamespace(free=0))
-    assert cli.main(["build", str(recipe), "--store", str(root)]) == 0
-    assert brdfdb.open(root).head("foam") == "r000001"
+    assert run("build", recipe, "--store", store_copy) == 0
+    assert brdfdb.open(store_copy).head("foam") == "r000001"
+
+
+def test_systems_that_do_not_tell_processors_or_memory_have_defaults(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delattr(os, "sched_getaffinity")
+    monkeypatch.delattr(os, "sysconf")
+    assert _arguments.processors() == os.cpu_count()
+    assert build_survey.machine_memory() is None

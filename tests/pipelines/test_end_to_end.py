@@ -1,11 +1,11 @@
-"""From a recipe to answers: built, audited, exported, looked up in Python, at the command line and over HTTP alike."""
+"""From a recipe to answers: tables are built and audited, and Python and a server look them up."""
 
 from __future__ import annotations
 
-import asyncio
 import json
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -15,24 +15,15 @@ from typing import Any
 
 import httpx
 import numpy as np
-import OpenEXR
 import pytest
 
 import brdfdb
-from brdfdb import models
-from brdfdb.materials import Material
-from brdfdb_api.http.app import create_app
-from brdfdb_api.settings import Settings
-from brdfdb_pipelines import cli
-from brdfdb_pipelines.recipe_file import load
+from tests.pipelines.a_build import changed
+from tests.pipelines.command import Captured, refused, run
 
-# The command line prints and HTTP writes what the library returns, digit by digit
-SAME = 1e-12
-# Between nodes, where the tables are coarse, a lookup is an interpolation; on them it is the model to float32
-FLOAT32 = 1e-6
-
+SAME = 1e-12  # HTTP writes what the library returns, digit by digit
 ANGLES_DEG = (37.0, 12.0, 51.0, 200.5)
-START_SECONDS = 300.0  # for what takes two seconds where the machine has nothing else to do
+START_SECONDS = 300.0  # time limit; it takes two seconds on an idle machine
 
 
 @pytest.fixture(params=["foam", "rolled-brass", "scene-copper-sphere", "blue-plastic", "mirror"])
@@ -54,23 +45,9 @@ def test_the_recipe_has_one_material_of_every_kind(built: Path, names: list[str]
     assert [table.specular is not None for table in tables] == [False, False, True, True, True]
 
 
-def test_on_a_node_the_answer_is_the_model(name: str, built: Path, recipe: Path) -> None:
-    (job,) = (job for job in load(recipe).jobs() if job.material.name == name)
-    theta_i, theta_r, azimuth = 40.0, 60.0, 150.0
-    made: Material = job.material
-    arguments = made.arguments(job.wavelength_nm)
-    expected = getattr(models, made.model)(*np.deg2rad([theta_i, 0.0, theta_r, azimuth]), **arguments)
-    found = brdfdb.open(built)[name].lookup(*np.deg2rad([theta_i, 0.0, theta_r, azimuth]))
-    assert found == pytest.approx(expected, rel=FLOAT32)
-    if name == "mirror":
-        assert np.all(found == 0.0)
-    else:
-        assert np.all(found > 0.0)
-
-
 def test_every_table_is_audited(built: Path, names: list[str], tmp_path: Path) -> None:
     report = tmp_path / "audit.json"
-    code = cli.main(["audit", "--no-figures", "--jobs", "1", "--store", str(built), "--report", str(report)])
+    code = run("audit", "--no-figures", "--store", built, "--report", report)
     entries = {entry["material"]: entry for entry in json.loads(report.read_bytes())["materials"]}
     assert sorted(entries) == sorted(names)
     for entry in entries.values():
@@ -84,82 +61,19 @@ def test_every_table_is_audited(built: Path, names: list[str], tmp_path: Path) -
     assert 0.3 < mirror.min() < mirror.max() <= 1.0
 
 
-def test_exported_slices_hold_what_a_lookup_gives(name: str, built: Path, tmp_path: Path) -> None:
-    assert cli.main(["export", "exr", name, "--store", str(built), "--out", str(tmp_path)]) == 0
-    table = brdfdb.open(built)[name]
-    assert sorted(path.name for path in tmp_path.iterdir()) == [
-        f"{name}_{kind}.exr" for kind in ("half_difference", "in_plane", "lobe", "sphere")
-    ]
-    with OpenEXR.File(str(tmp_path / f"{name}_in_plane.exr"), separate_channels=True) as file:
-        channels = {channel: values.pixels.copy() for channel, values in file.channels().items()}
-        header = dict(file.header())
-    assert (header["brdf:material"], header["brdf:revision"], header["brdf:unit"]) == (name, "r000001", "1/sr")
-    theta_r = np.deg2rad(np.arange(180) - 89.5)
-    theta_i = np.deg2rad(89.5 - np.arange(90))[:, np.newaxis]
-    expected = table.lookup(theta_i, 0.0, np.abs(theta_r), np.where(theta_r > 0.0, np.pi, 0.0)).astype(np.float32)
-    if table.wavelength_nm is None:
-        assert sorted(channels) == ["B", "G", "R"]
-        for channel in "RGB":
-            np.testing.assert_array_equal(channels[channel], expected)
-    else:
-        assert len(channels) == 3 + table.wavelength_nm.size
-        for index, wavelength in enumerate(table.wavelength_nm):
-            channel = "T." + f"{wavelength:.1f}nm".replace(".", ",")
-            np.testing.assert_array_equal(channels[channel], expected[..., index])
-
-
-def test_the_command_line_answers_as_the_library_does(
-    name: str, built: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert cli.main(["lookup", name, *map(str, ANGLES_DEG), "--json", "--store", str(built)]) == 0
-    answer = json.loads(capsys.readouterr().out)
-    assert answer["brdf"] == pytest.approx(np.atleast_1d(looked_up(built, name)), rel=SAME)
-
-
-def get(app: Any, path: str, **query: Any) -> httpx.Response:
-    """A request to an application without a network. (Starlette's client warns that httpx is not httpx2.)"""
-
-    async def ask() -> httpx.Response:
-        transport = httpx.ASGITransport(app=app)
-        async with httpx.AsyncClient(transport=transport, base_url="http://test") as client:
-            return await client.get(path, params=query)
-
-    return asyncio.run(ask())
-
-
 QUERY = dict(zip(("theta_i", "phi_i", "theta_r", "phi_r"), ANGLES_DEG, strict=True))
 
 
-def test_the_application_answers_as_the_library_does(name: str, built: Path, names: list[str]) -> None:
-    app = create_app(Settings(store=built))
-    assert get(app, "/readyz").json() == {"status": "ok", "materials": len(names)}
-    catalogue = get(app, "/v1/materials").json()["materials"]
-    assert [entry["name"] for entry in catalogue] == sorted(names)
-    response = get(app, f"/v1/materials/{name}/lookup", **QUERY)
-    assert response.status_code == 200
-    answer = response.json()
-    assert (answer["material"], answer["revision"], answer["unit"]) == (name, "r000001", "1/sr")
-    assert answer["brdf"] == pytest.approx(looked_up(built, name), rel=SAME)
-    table = brdfdb.open(built)[name]
-    specular = table.specular_reflectance(np.deg2rad(ANGLES_DEG[0]))
-    assert answer["specular_reflectance"] == pytest.approx(specular, rel=SAME)
-
-
-def test_the_application_serves_a_new_revision_as_soon_as_it_is_published(recipe: Path, tmp_path: Path) -> None:
-    command = ["build", str(recipe), "--store", str(tmp_path)]
-    assert cli.main(command) == 0
-    app = create_app(Settings(store=tmp_path))
-    assert get(app, "/v1/materials/foam/lookup", **QUERY).json()["revision"] == "r000001"
-    changed = tmp_path.with_name("changed.toml")
-    changed.write_text(recipe.read_text(encoding="utf-8").replace("step = 15", "step = 30"), encoding="utf-8")
-    assert cli.main([command[0], str(changed), *command[2:]]) == 0
-    assert get(app, "/v1/materials/foam/lookup", **QUERY).json()["revision"] == "r000002"
+@pytest.fixture(scope="module")
+def store(built: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A copy of the store, which is served and gets a new revision."""
+    return Path(shutil.copytree(built, tmp_path_factory.mktemp("served") / "store"))
 
 
 @pytest.fixture(scope="module")
-def served(built: Path) -> Iterator[httpx.Client]:
+def served(store: Path) -> Iterator[httpx.Client]:
     """A client of `brdfdb serve` in a process of its own."""
-    command = [sys.executable, "-m", "brdfdb_pipelines.cli", "serve", "--store", str(built), "--port", "0"]
+    command = [sys.executable, "-m", "brdfdb_pipelines.cli", "serve", "--store", str(store), "--port", "0"]
     environment = {key: value for key, value in os.environ.items() if not key.startswith("BRDFDB_")}
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, env=environment)
     assert process.stdout is not None
@@ -176,11 +90,21 @@ def served(built: Path) -> Iterator[httpx.Client]:
 
 
 def test_the_server_answers_as_the_library_does(name: str, built: Path, served: httpx.Client) -> None:
-    response = served.get(f"/v1/materials/{name}/lookup", params=QUERY)
-    assert response.status_code == 200
-    assert response.json()["brdf"] == pytest.approx(looked_up(built, name), rel=SAME)
+    answer = served.get(f"/v1/materials/{name}/lookup", params=QUERY).json()
+    assert (answer["material"], answer["revision"], answer["unit"]) == (name, "r000001", "1/sr")
+    assert answer["brdf"] == pytest.approx(looked_up(built, name), rel=SAME)
+    specular = brdfdb.open(built)[name].specular_reflectance(np.deg2rad(ANGLES_DEG[0]))
+    assert answer["specular_reflectance"] == pytest.approx(specular, rel=SAME)
     posted = served.post(f"/v1/materials/{name}/lookup", json={**QUERY, "wavelength_nm": 460.0})
     assert posted.json()["brdf"] == pytest.approx(looked_up(built, name, 460.0), rel=SAME)
+
+
+def test_the_server_serves_a_new_revision_as_soon_as_it_is_published(
+    served: httpx.Client, store: Path, recipe: Path, tmp_path: Path
+) -> None:
+    assert served.get("/v1/materials/foam/lookup", params=QUERY).json()["revision"] == "r000001"
+    assert run("build", changed(recipe, tmp_path / "changed.toml"), "--store", store) == 0
+    assert served.get("/v1/materials/foam/lookup", params=QUERY).json()["revision"] == "r000002"
 
 
 def test_the_server_tells_what_is_wrong(served: httpx.Client) -> None:
@@ -192,10 +116,7 @@ def test_the_server_tells_what_is_wrong(served: httpx.Client) -> None:
     assert (below.status_code, below.json()["brdf"]) == (200, 0.0)
 
 
-def test_a_port_that_is_taken_is_one_sentence(
-    served: httpx.Client, built: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_port_that_is_taken_is_one_sentence(served: httpx.Client, built: Path, capsys: Captured) -> None:
     port = served.base_url.port
-    assert cli.main(["serve", "--store", str(built), "--port", str(port)]) == 2
-    out, err = capsys.readouterr()
-    assert (out, err) == ("", f"brdfdb: cannot listen on 127.0.0.1, port {port}: Address already in use\n")
+    said = f"cannot listen on 127.0.0.1, port {port}: Address already in use"
+    assert refused(capsys, "serve", "--store", built, "--port", port) == said

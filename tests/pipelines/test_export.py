@@ -22,7 +22,7 @@ from brdfdb.tables.grids import Grid
 from brdfdb.tables.layout import Layout
 from brdfdb.tables.tabulation import tabulate
 from brdfdb_pipelines.commands import TERMINATED
-from tests.pipelines.command import Captured, run
+from tests.pipelines.command import Captured, refused, run
 
 P99 = {"grey": 0.01, "dark": 0.03001}
 
@@ -93,14 +93,12 @@ def test_all_leaves_out_what_the_format_cannot_hold(store: Path, tmp_path: Path,
 def test_a_material_that_is_named_is_refused_and_others_are_written(
     store: Path, tmp_path: Path, capsys: Captured
 ) -> None:
-    assert run("export", "list", "strange", "--store", store, "--out", tmp_path / "out") == 2
-    captured = capsys.readouterr()
-    assert captured.out == ""
-    assert captured.err.endswith("\nbrdfdb: strange: this format holds nothing strange\n")
+    said = "strange: this format holds nothing strange"
+    assert refused(capsys, "export", "list", "strange", "--store", store, "--out", tmp_path / "out") == said
     assert run("export", "list", "strange", "grey", "--store", store, "--out", tmp_path / "out") == 2
     captured = capsys.readouterr()
     assert captured.out.startswith("1 LIST file, ")
-    assert captured.err.endswith("\nbrdfdb: strange: this format holds nothing strange\n")
+    assert captured.err.endswith(f"\nbrdfdb: {said}\n")
 
 
 def test_kinds_before_one_that_is_refused_count(
@@ -121,10 +119,9 @@ def test_kinds_before_one_that_is_refused_count(
     assert captured.err.endswith("\nbrdfdb: grey: wavelength: 900 nm is outside\n")
 
 
-@pytest.mark.parametrize("name", ["glsl", "osl", "slang", "exr", "png"])
-def test_strict_is_no_option_of_formats_without_a_tolerance(tmp_path: Path, capsys: Captured, name: str) -> None:
+def test_strict_is_no_option_of_formats_without_a_tolerance(tmp_path: Path, capsys: Captured) -> None:
     with pytest.raises(SystemExit, match="2"):
-        run("export", name, "grey", "--strict", "--out", tmp_path / "out")
+        run("export", "exr", "grey", "--strict", "--out", tmp_path / "out")
     assert "--strict" in capsys.readouterr().err
 
 
@@ -161,16 +158,13 @@ def test_a_report_that_is_named_must_be_one(store: Path, tmp_path: Path, capsys:
         report.write_text(text)
         reason = "it is not a report of `brdfdb audit`"
     out = tmp_path / "out"
-    assert run("export", "list", "grey", "--audit", report, "--store", store, "--out", out) == 2
-    assert capsys.readouterr().err == f"brdfdb: audit: {report} cannot be read: {reason}\n"
+    said = refused(capsys, "export", "list", "grey", "--audit", report, "--store", store, "--out", out)
+    assert said == f"audit: {report} cannot be read: {reason}"
     assert not out.exists()
 
 
-def test_an_output_that_is_a_file_is_refused(store: Path, tmp_path: Path, capsys: Captured) -> None:
-    (tmp_path / "out").write_text("a file")
-    assert run("export", "list", "grey", "--store", store, "--out", tmp_path / "out") == 2
-    assert capsys.readouterr().err == f"brdfdb: cannot write to {tmp_path / 'out'}: it is a file, not a directory\n"
+def test_an_output_that_is_a_directory_is_refused(store: Path, tmp_path: Path, capsys: Captured) -> None:
     (tmp_path / "grey.list").mkdir()
-    assert run("export", "list", "grey", "--store", store, "--out", tmp_path) == 2
-    assert capsys.readouterr().err.endswith("grey.list: it is a directory\n")
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["grey.list", "out", "store"]
+    said = refused(capsys, "export", "list", "grey", "--store", store, "--out", tmp_path)
+    assert said.endswith("grey.list: it is a directory")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["grey.list", "store"]

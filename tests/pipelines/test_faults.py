@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import random
 import shutil
 import signal
@@ -19,7 +18,9 @@ import numpy as np
 import pytest
 
 import brdfdb
-from brdfdb_pipelines import cli
+from tests.pipelines.a_build import changed, staged
+from tests.pipelines.a_nursery import Nursery
+from tests.pipelines.command import run
 from tests.pipelines.recipes import anisotropic, isotropic, material
 
 KILLS = 50
@@ -42,67 +43,19 @@ def ranged(stop: float, step: float) -> str:
 
 
 SMALL = {"step": 2.0, "viewer": 1.0}  # a quarter of the values, in blocks that are a quarter as large
-# Imports once, then forks a build for each line: a fork is safe while there is one thread
-NURSERY = """
-import os, sys
+# The first call loads a kernel, which takes longer than the rest of a build
+PREPARE = """
 from pathlib import Path
 import numpy, numba, xarray, zarr, zarr.codecs
 from brdfdb.store import codec, staging
 from brdfdb.tables import layout, tabulation
-from brdfdb_pipelines import build, build_survey, cli, recipe_file
+from brdfdb_pipelines import build, build_survey, recipe_file
 layout._BLOCK_VALUES //= 4
-jobs = recipe_file.load(Path(sys.argv[1])).jobs()
-build_survey.check_values(jobs[0])  # the first call loads a kernel, which takes longer than the rest of a build
-tabulation.block(jobs[0].layout(), slice(0, 1))
-tabulation.frame(jobs[0].layout())
-print("warm", flush=True)
-for line in sys.stdin:
-    recipe_path, root, out = line.split()
-    if (child := os.fork()) == 0:
-        os.dup2(os.open(out, os.O_WRONLY | os.O_CREAT | os.O_TRUNC), 1)
-        os.dup2(1, 2)
-        os._exit(cli.main(["build", recipe_path, "--store", root, "--jobs", "2", "--json"]))
-    print(child, flush=True)
-    sys.stdin.readline()  # until then the child's number is its own, dead or alive
-    print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), flush=True)
+job = recipe_file.load(Path({recipe!r})).jobs()[0]
+build_survey.check_values(job)
+tabulation.block(job.layout(), slice(0, 1))
+tabulation.frame(job.layout())
 """
-
-
-class Nursery:
-    """Builds in processes of their own that start within milliseconds."""
-
-    def __init__(self, recipe: Path) -> None:
-        command = [sys.executable, "-c", NURSERY, str(recipe)]
-        self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
-        assert self._line() == "warm"
-
-    def _line(self) -> str:
-        assert self._process.stdout is not None
-        return self._process.stdout.readline().strip()
-
-    def build(self, recipe: Path, root: Path, out: Path, kill_after_s: float | None = None) -> int:
-        """Run a build, and kill it after a time; returns its exit code."""
-        assert self._process.stdin is not None
-        self._process.stdin.write(f"{recipe} {root} {out}\n")
-        self._process.stdin.flush()
-        child = int(self._line())
-        if kill_after_s is not None:
-            time.sleep(kill_after_s)
-            os.kill(child, signal.SIGKILL)
-        self._process.stdin.write("wait\n")
-        self._process.stdin.flush()
-        return int(self._line())
-
-    def close(self) -> None:
-        self._process.communicate(timeout=WAIT_S)
-
-
-@pytest.fixture
-def nursery(tmp_path: Path) -> Iterator[Nursery]:
-    first = write_recipe(tmp_path / "first.toml", 1 / 128, **SMALL)
-    made = Nursery(first)
-    yield made
-    made.close()
 
 
 def write_recipe(path: Path, rho: float, step: float = 1.0, viewer: float = 0.5) -> Path:
@@ -152,13 +105,31 @@ def marked(root: Path) -> set[tuple[str, int]]:
     }
 
 
-def test_killed_at_fifty_random_moments_nothing_is_lost_and_every_read_is_whole(
-    tmp_path: Path, nursery: Nursery
-) -> None:
+def test_killed_at_fifty_random_moments_nothing_is_lost_and_every_read_is_whole(tmp_path: Path) -> None:
     root, out = tmp_path / "store", tmp_path / "out.jsonl"
+    first = write_recipe(tmp_path / "first.toml", 1 / 128, **SMALL)
+    with Nursery(PREPARE.format(recipe=str(first))) as nursery:
+
+        def build(recipe: Path, root: Path, kill_after_s: float | None = None) -> int:
+            command = ("build", recipe, "--store", root, "--jobs", 2, "--json")
+            return nursery.run(*command, told=out, kill_after_s=kill_after_s).code
+
+        assert build(first, tmp_path / "other") == 0
+        assert build(first, root) == 0
+        kill_fifty_times(root, out, build)
+    assert run("gc", "--keep", 1, "--store", root) == 0
+    assert staged(root) == []
+    for name in ("grey", "white"):
+        head = brdfdb.open(root).head(name)
+        assert sorted(path.name for path in (root / "materials" / name).iterdir()) == [
+            "HEAD.json", head, f"{head}.MANIFEST.json"
+        ]  # fmt: skip
+    assert run("verify", "--store", root) == 0
+
+
+def kill_fifty_times(root: Path, out: Path, build: Callable[..., int]) -> None:
+    tmp_path = root.parent
     draw = random.Random(SEED)
-    assert nursery.build(tmp_path / "first.toml", tmp_path / "other", out) == 0
-    assert nursery.build(tmp_path / "first.toml", root, out) == 0
     rhos = {1 / 128, 2 / 128}
     reader = Reader(root, lambda: rhos)
     reader.start()
@@ -168,8 +139,8 @@ def test_killed_at_fifty_random_moments_nothing_is_lost_and_every_read_is_whole(
     try:
         second = write_recipe(tmp_path / "2.toml", 2 / 128, **SMALL)
         started = time.perf_counter()
-        assert nursery.build(second, root, out) == 0
-        whole_s = time.perf_counter() - started  # beside the reader, as all that come
+        assert build(second, root) == 0
+        whole_s = time.perf_counter() - started  # while the reader reads, as in the builds below
         while kills < KILLS:
             number += 1
             rhos.add(number / 128)
@@ -179,7 +150,7 @@ def test_killed_at_fifty_random_moments_nothing_is_lost_and_every_read_is_whole(
                 last = kills == KILLS
                 out.write_bytes(b"")
                 started = time.perf_counter()
-                code = nursery.build(recipe, root, out, None if last else draw.uniform(0.0, 1.2 * whole_s))
+                code = build(recipe, root, None if last else draw.uniform(0.0, 1.2 * whole_s))
                 assert code in (0, -signal.SIGKILL), out.read_text()
                 lines = out.read_text().splitlines(keepends=True)
                 events = [json.loads(line) for line in lines if line.endswith("\n")]
@@ -201,7 +172,7 @@ def test_killed_at_fifty_random_moments_nothing_is_lost_and_every_read_is_whole(
             store = brdfdb.open(root)
             assert {store.metadata(name).parameters["rho"] for name in store} == {number / 128}
             if number % 8 == 0:
-                assert cli.main(["gc", "--keep", "1", "--store", str(root)]) == 0
+                assert run("gc", "--keep", 1, "--store", root) == 0
     finally:
         reader.over.set()
         reader.join(WAIT_S)
@@ -210,14 +181,6 @@ def test_killed_at_fifty_random_moments_nothing_is_lost_and_every_read_is_whole(
     assert reader.reads > 10
     assert resumed > 10
     assert published > 0
-    assert cli.main(["gc", "--keep", "1", "--store", str(root)]) == 0
-    assert not list((root / ".staging").iterdir())
-    for name in ("grey", "white"):
-        head = brdfdb.open(root).head(name)
-        assert sorted(path.name for path in (root / "materials" / name).iterdir()) == [
-            "HEAD.json", head, f"{head}.MANIFEST.json"
-        ]  # fmt: skip
-    assert cli.main(["verify", "--store", str(root)]) == 0
 
 
 def command(*arguments: object) -> list[str]:
@@ -251,7 +214,7 @@ def test_ctrl_c_says_how_to_resume_and_the_same_command_does(tmp_path: Path) -> 
     done = subprocess.run(build, capture_output=True, text=True, check=True)
     events = [json.loads(line) for line in done.stdout.splitlines()]
     assert {(e["material"], e["block"]) for e in events if e["event"] == "block" and e["kept"]} == left
-    assert not list((root / ".staging").iterdir())
+    assert staged(root) == []
 
 
 # Runs commands in a process that is somebody else or may do less
@@ -301,50 +264,49 @@ def sentence(code: int, out: str, err: str) -> str:
     return err.splitlines()[-1]
 
 
-def test_a_directory_that_is_read_only_is_one_sentence(recipe_text: str, built: Path, public: Path) -> None:
-    root, recipe, other = public / "store", public / "recipe.toml", public / "other.toml"
+def cannot_write(said: str, root: Path, reason: str) -> str:
+    """Check the sentence of a store that cannot be written; return the name of the material."""
+    assert said.startswith("brdfdb: cannot write ")
+    assert said.endswith(f" to the store at {root}: {reason}")
+    return said.split()[3]
+
+
+def test_a_directory_that_is_read_only_is_one_sentence(recipe: Path, built: Path, public: Path) -> None:
+    root, same = public / "store", public / "recipe.toml"
     shutil.copytree(built, root)
-    recipe.write_text(recipe_text, encoding="utf-8")
+    shutil.copyfile(recipe, same)
     for path in [root, *root.rglob("*")]:
         path.chmod(0o555 if path.is_dir() else 0o444)
-    other.write_text(recipe_text.replace("step = 15", "step = 30"), encoding="utf-8")
     try:
-        changed, unchanged, lookup, new = restricted(
+        of_other, of_same, lookup, new = restricted(
             "nobody",
-            recipe,
-            ["build", other, "--store", root],
-            ["build", recipe, "--store", root],
+            same,
+            ["build", changed(recipe, public / "other.toml"), "--store", root],
+            ["build", same, "--store", root],
             ["lookup", "foam", 0, 0, 0, 0, "--store", root],
-            ["build", recipe, "--store", public / "new"],
+            ["build", same, "--store", public / "new"],
         )
     finally:
         for path in [root, *(path for path in root.rglob("*") if path.is_dir())]:
             path.chmod(0o755)
-    said = sentence(*changed)
-    assert said.startswith("brdfdb: cannot write ")
-    assert said.endswith(f" to the store at {root}: Permission denied")
-    assert (unchanged[0], lookup[0]) == (0, 0)
+    cannot_write(sentence(*of_other), root, "Permission denied")
+    assert (of_same[0], lookup[0]) == (0, 0)
     assert sentence(*new) == f"brdfdb: cannot write a store at {public / 'new'}: Permission denied"
     assert brdfdb.open(root).head("foam") == "r000001"
 
 
 def test_a_limit_on_the_size_of_files_is_one_sentence_and_the_old_revision_is_served(
-    recipe: Path, built: Path, tmp_path: Path
+    recipe: Path, store_copy: Path, tmp_path: Path
 ) -> None:
-    root = tmp_path / "store"
-    shutil.copytree(built, root)
-    other = tmp_path / "other.toml"
-    other.write_text(recipe.read_text(encoding="utf-8").replace("step = 15", "step = 5"), encoding="utf-8")
-    (answer,) = restricted(8000, recipe, ["build", other, "--store", root])
-    said = sentence(*answer)
-    assert said.startswith("brdfdb: cannot write ")
-    assert said.endswith(f" to the store at {root}: File too large")
-    failed = said.split()[3]
-    assert brdfdb.open(root).head(failed) == "r000001"
-    for name in brdfdb.open(root):
-        brdfdb.open(root).verify(name)
-    assert cli.main(["build", str(other), "--store", str(root)]) == 0
-    assert brdfdb.open(root).head(failed) == "r000002"
+    other = changed(recipe, tmp_path / "other.toml", 5)
+    (answer,) = restricted(8000, recipe, ["build", other, "--store", store_copy])
+    failed = cannot_write(sentence(*answer), store_copy, "File too large")
+    store = brdfdb.open(store_copy)
+    assert store.head(failed) == "r000001"
+    for name in store:
+        store.verify(name)
+    assert run("build", other, "--store", store_copy) == 0
+    assert store.head(failed) == "r000002"
 
 
 def test_a_full_disk_is_one_sentence_and_the_old_revision_is_served(recipe: Path, tmp_path: Path) -> None:
@@ -355,27 +317,25 @@ def test_a_full_disk_is_one_sentence_and_the_old_revision_is_served(recipe: Path
     if mounted.returncode != 0:
         pytest.skip("no tmpfs can be mounted here; test_build has a write that fails instead")
     try:
-        root = disk / "store"
-        assert cli.main(["build", str(recipe), "--store", str(root)]) == 0
-        other = tmp_path / "other.toml"
-        text = recipe.read_text(encoding="utf-8")
-        other.write_text(text.replace("step = 15", "step = 0.1"), encoding="utf-8")
-        done = subprocess.run(command("build", other, "--store", root), capture_output=True, text=True, check=False)
+        root, other = disk / "store", tmp_path / "other.toml"
+        build = command("build", other, "--store", root)
+        assert run("build", recipe, "--store", root) == 0
+        changed(recipe, other, 0.1)
+        done = subprocess.run(build, capture_output=True, text=True, check=False)
         assert sentence(done.returncode, done.stdout, done.stderr).startswith("brdfdb: disk: the tables take up to ")
         # room for the values, and not for the small files beside them
-        other.write_text(text.replace("step = 15", "step = 7.5"), encoding="utf-8")
+        changed(recipe, other, 7.5)
         used = shutil.disk_usage(disk).used // 1000
         subprocess.run(["mount", "-o", f"remount,size={used + 40}k", disk], capture_output=True, check=True)
-        done = subprocess.run(command("build", other, "--store", root), capture_output=True, text=True, check=False)
-        said = sentence(done.returncode, done.stdout, done.stderr)
-        assert said.startswith("brdfdb: cannot write ")
-        assert said.endswith(f" to the store at {root}: No space left on device")
-        for name in brdfdb.open(root):
-            brdfdb.open(root).verify(name)
-        assert brdfdb.open(root).head("foam") == "r000001"
+        done = subprocess.run(build, capture_output=True, text=True, check=False)
+        cannot_write(sentence(done.returncode, done.stdout, done.stderr), root, "No space left on device")
+        store = brdfdb.open(root)
+        for name in store:
+            store.verify(name)
+        assert store.head("foam") == "r000001"
         subprocess.run(["mount", "-o", "remount,size=20m", disk], capture_output=True, check=True)
-        assert cli.main(["build", str(other), "--store", str(root)]) == 0
-        assert brdfdb.open(root).head("foam") == "r000002"
+        assert run("build", other, "--store", root) == 0
+        assert store.head("foam") == "r000002"
     finally:
         subprocess.run(["umount", disk], capture_output=True, check=True)
 

@@ -6,7 +6,6 @@ import contextlib
 import io
 import json
 import re
-from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -21,7 +20,9 @@ from brdfdb.models import MODELS
 from brdfdb.store.reader import Store
 from brdfdb_pipelines import recipe_file
 from brdfdb_pipelines.documents import schema
+from tests.pipelines.a_page import Document
 from tests.pipelines.command import Captured, run
+from tests.pipelines.failing import fails
 
 TRUTH = {"rho_d": 0.2, "rho_s": 0.1, "alpha_x": 0.25, "alpha_y": 0.25}
 HEADER = "theta_i_deg,theta_r_deg,delta_phi_deg,f_r"
@@ -96,40 +97,15 @@ def test_json_has_its_schema(answer: Answer) -> None:
     assert document["receiver_solid_angle_sr"] is None
 
 
-class Page(HTMLParser):
-    """The elements of a page that are open, and how many there were."""
-
-    VOID = ("meta", "link", "br", "img", "input", "hr")
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.open: list[str] = []
-        self.count: dict[str, int] = {}
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self.count[tag] = self.count.get(tag, 0) + 1
-        assert not any(name.startswith("on") for name, _ in attrs)
-        if tag not in self.VOID:
-            self.open.append(tag)
-
-    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self.handle_starttag(tag, attrs)
-        if tag not in self.VOID:
-            self.open.pop()
-
-    def handle_endtag(self, tag: str) -> None:
-        assert self.open.pop() == tag
-
-
 def test_the_page_is_html_with_figures_and_no_script(answer: Answer) -> None:
     text = (answer.folder / "new" / "fit.html").read_text(encoding="utf-8")
-    page = Page()
-    page.feed(text)
+    page = Document(text)
     assert text.startswith("<!doctype html>")
-    assert page.open == []
-    assert "script" not in page.count
-    assert page.count["figure"] == 6  # a cut and a map for each incidence
-    assert page.count["svg"] >= 6
+    assert page.unbalanced == []
+    assert not any(name.startswith("on") for _, attributes in page.elements for name in attributes)
+    assert page.count("script") == 0
+    assert page.count("figure") == 6  # a cut and a map for each incidence
+    assert page.count("svg") >= 6
     assert not re.search(r"(src|href)=.?https?:", text)
     for words in ("The best of 3 fits is", "held out", "residuals", "theta_i = 55 degrees", "[define.tile-as-ward]"):
         assert words in text
@@ -143,24 +119,17 @@ def test_the_page_is_html_with_figures_and_no_script(answer: Answer) -> None:
     assert dots.count("h0") == 20  # 18 samples in the plane and 2 at the normal
 
 
-def test_the_recipe_is_that_of_the_best_model(answer: Answer) -> None:
-    (job,) = recipe_file.load(answer.folder / "fit.toml").jobs()
-    assert job.material.name == "tile-as-ward"
-    assert job.material.parameters["alpha_x"] == pytest.approx(TRUTH["alpha_x"], rel=0.05)
-
-
-def test_the_recipe_builds(tile: Path, tmp_path: Path, capsys: Captured) -> None:
-    recipe, store = tmp_path / "fit.toml", tmp_path / "store"
-    assert run("fit", tile, "--model", "lambert", "--recipe", recipe) == 0
-    assert run("build", recipe, "--store", store, "--jobs", "1") == 0
+def test_the_recipe_of_the_best_model_builds(answer: Answer, tmp_path: Path) -> None:
+    recipe, store = answer.folder / "fit.toml", tmp_path / "store"
     (job,) = recipe_file.load(recipe).jobs()
-    assert Store(store)["tile-as-lambert"].lookup(0.5, 0.0, 0.3, 3.0) == pytest.approx(
-        job.material.parameters["rho"] / np.pi, rel=1e-3
-    )
-    capsys.readouterr()
+    assert job.material.parameters["alpha_x"] == pytest.approx(TRUTH["alpha_x"], rel=0.05)
+    assert run("build", recipe, "--store", store, "--jobs", "1") == 0
+    at = (0.5, 0.0, 0.3, 3.0)
+    expected = MODELS["ward"].evaluate(*at, **job.material.parameters)
+    assert Store(store)["tile-as-ward"].lookup(*at) == pytest.approx(expected, rel=0.02)
 
 
-@pytest.mark.parametrize("model", ["ward", "ggx_schlick", "abg"])
+@pytest.mark.parametrize("model", ["ward", "abg"])
 def test_the_recipe_of_a_fit_at_one_wavelength_holds_there(
     model: str, tile: Path, tmp_path: Path, capsys: Captured
 ) -> None:
@@ -244,56 +213,41 @@ def test_two_lengths_that_are_not_told_apart_are_named(tmp_path: Path, capsys: C
     wi = unit_vector(np.deg2rad(lines[:, 0]), np.zeros(len(lines)))
     wr = unit_vector(np.deg2rad(lines[:, 1]), np.deg2rad(lines[:, 2]))
     rough = {"wavelength_nm": 500.0, "sigma_0_um": 2.0, "tau_um": 8.0, "n": 1.7, "k": 0.0, "a": 0.3}
-    lines[:, 3] = MODELS["he_torrance"].vectors(wi, wr, **rough) * (lines[:, 3] / lines[:, 3].mean()) ** 0
+    lines[:, 3] = MODELS["he_torrance"].vectors(wi, wr, **rough)
     data, page = written(tmp_path / "rough.csv", lines.tolist()), tmp_path / "rough.html"
     options = ("--model", "he_torrance", "--refractive-index", "constant/1.7/0.0", "--wavelength-nm", "500")
     assert run("fit", data, *options, "--page", page) == 0
-    printed = capsys.readouterr().out
-    assert "  note  sigma_0_um and tau_um are correlated by 0.99" in printed or "by 1.000" in printed
-    assert "only their ratio is measured." in printed
-    assert "only their ratio is measured." in page.read_text(encoding="utf-8")
+    for text in (capsys.readouterr().out, page.read_text(encoding="utf-8")):
+        assert "sigma_0_um and tau_um are correlated by " in text
+        assert "only their ratio is measured." in text
 
 
 @pytest.mark.parametrize(
     ("options", "sentence"),
     [
         (["--model", "wrad"], "model: 'wrad' is unknown; closest: ward"),
-        (["--model", "nosuch"], "model: 'nosuch' is unknown; the models are lambert, "),
-        (["--model", "ward +"], "model: 'ward +' is no model and no sum of models"),
-        (["--model", "lambert", "--residual", "uncertainty"], "has no uncertainties; choose log, relative or cosine"),
         (["--channel", "green"], "channel: 'green' is not one of grey"),
         (["--wavelength-nm", "-5"], "wavelength_nm: -5 is outside"),
         (["--receiver-deg", "0"], "receiver-deg: 0 is outside (0, 30] degrees"),
         (["--source-deg", "nan"], "source-deg: nan is outside (0, 30] degrees"),
-        (["--model", "oren_nayar_unidirectional"], "the light is in one azimuth alone"),
     ],
 )
 def test_mistakes_are_one_sentence(
     options: list[str], sentence: str, tile: Path, tmp_path: Path, capsys: Captured
 ) -> None:
     out = tmp_path / "fit.json"
-    assert run("fit", tile, *options, "--json", out) == 2
-    error = capsys.readouterr().err
-    assert error.startswith("brdfdb: ")
-    assert sentence in error
-    assert error.count("\n") == 1
+    assert sentence in fails(capsys, "fit", tile, *options, "--json", out)
     assert not out.exists()
 
 
 @pytest.mark.parametrize(
-    ("line", "sentence"),
-    [
-        ([float("nan"), 20.0, 0.0, 0.3], "theta_i"),
-        ([20.0, 20.0, 0.0, float("inf")], "f_r"),
-    ],
+    ("line", "sentence"), [([float("nan"), 20.0, 0.0, 0.3], "theta_i"), ([20.0, 20.0, 0.0, float("inf")], "f_r")]
 )
 def test_samples_that_are_none_are_refused(line: list[float], sentence: str, tmp_path: Path, capsys: Captured) -> None:
     data = written(tmp_path / "wrong.csv", [*rows()[:5], line])
-    assert run("fit", data, "--model", "lambert") == 2
-    error = capsys.readouterr().err
+    error = fails(capsys, "fit", data, "--model", "lambert")
     assert str(data) in error
     assert sentence in error
-    assert error.count("\n") == 1
 
 
 def test_values_that_are_left_out_are_counted(tmp_path: Path, capsys: Captured) -> None:
@@ -321,15 +275,16 @@ def test_texts_are_read_by_the_options_of_an_import_and_doubts_are_said(tmp_path
 
 def test_files_without_a_usable_sample_are_refused(tmp_path: Path, capsys: Captured) -> None:
     dark = written(tmp_path / "dark.csv", [[*line[:3], -0.01] for line in rows()])
-    assert run("fit", dark, "--model", "lambert") == 2
-    assert "dark has no value that the residual log can use" in capsys.readouterr().err
     holes = written(tmp_path / "holes.csv", [[*line[:3], float("nan")] for line in rows()])
-    assert run("fit", holes, "--model", "lambert") == 2
-    assert "no value" in capsys.readouterr().err
     noise = tmp_path / "noise.csv"
     noise.write_bytes(np.random.default_rng(0).bytes(4096))
-    for file, words in ((noise, "no format recognises it"), (tmp_path / "missing.csv", "No such file or directory")):
-        assert run("fit", file) == 2
+    for file, words in (
+        (dark, "dark has no value that the residual log can use"),
+        (holes, "no value"),
+        (noise, "no format recognises it"),
+        (tmp_path / "missing.csv", "No such file or directory"),
+    ):
+        assert run("fit", file, "--model", "lambert") == 2
         error = capsys.readouterr().err
         assert words in error
         assert error.count("\n") == 1
@@ -362,7 +317,7 @@ def test_published_fits_are_listed_and_become_a_recipe(tmp_path: Path, capsys: C
         r"physics: the scale of NganHe is 9, .*\n.* physics: the refractive index of NganHe is 0.9", printed
     )
     assert re.search(r"  1 of 2 .* physics; 1 are models of the registry \(ward\)", printed)
-    assert "  note  NganHe: no model of the registry is taken for it" in printed
+    assert "  note  NganHe: no model of the registry is used for it" in printed
     assert [len(one["flags"]) for one in json.loads(out.read_text(encoding="utf-8"))["fits"]] == [0, 2]
     assert "the recipe has channel" not in printed
     assert [job.material.name for job in recipe_file.load(recipe).jobs()] == ["tile-1-tiles-r"]

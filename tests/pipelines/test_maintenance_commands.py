@@ -3,27 +3,21 @@
 from __future__ import annotations
 
 import re
-import shutil
 from pathlib import Path
 
 import pytest
 
 import brdfdb
 from brdfdb_pipelines import cli
-
-Captured = pytest.CaptureFixture[str]
+from tests.pipelines.command import Captured
 
 
 @pytest.fixture
-def root(built: Path, recipe: Path, tmp_path: Path, capsys: Captured) -> Path:
+def root(store_copy: Path, changed_recipe: Path, capsys: Captured) -> Path:
     """A store with two revisions of foam and blue-plastic."""
-    store = tmp_path / "store"
-    shutil.copytree(built, store)
-    other = tmp_path / "other.toml"
-    other.write_text(recipe.read_text(encoding="utf-8").replace("step = 15", "step = 30"), encoding="utf-8")
-    assert cli.main(["build", str(other), "--store", str(store)]) == 0
+    assert cli.main(["build", str(changed_recipe), "--store", str(store_copy)]) == 0
     capsys.readouterr()
-    return store
+    return store_copy
 
 
 def run(root: Path, *arguments: str) -> int:

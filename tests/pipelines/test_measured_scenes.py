@@ -13,7 +13,7 @@ from brdfdb.measurements import MeasuredSource
 from brdfdb.parameters import Floats
 from brdfdb.store.publication import publish
 from brdfdb.tables.table import TableSource
-from tests.pipelines.command import Captured, run
+from tests.pipelines.command import Captured, refused, run
 
 SPECTRUM_NM = np.array([450.0, 550.0, 650.0])
 SCENE = """
@@ -75,12 +75,11 @@ def test_measured_tables_are_rendered_and_chosen_for(folder: Path, name: str) ->
 
 
 def test_remedy_for_wavelengths_beyond_the_data_is_said(folder: Path, capsys: Captured) -> None:
-    assert run("render", _scene(folder, "spectral"), "--width", 12, "--out", folder / "no") == 2
-    sentence = capsys.readouterr().err
+    sentence = refused(capsys, "render", _scene(folder, "spectral"), "--width", 12, "--out", folder / "no")
     assert "400 is outside [450, 650] nm of store:spectral; set hold_ends = true" in sentence
     assert "range within it" not in sentence  # no scene has less than 420 to 680 nm
-    assert run("render", _scene(folder, "rgb"), "--width", 12, "--out", folder / "no") == 2
-    assert "give the scene a range within it, or set hold_ends = true" in capsys.readouterr().err
+    sentence = refused(capsys, "render", _scene(folder, "rgb"), "--width", 12, "--out", folder / "no")
+    assert "give the scene a range within it, or set hold_ends = true" in sentence
 
 
 def test_ends_that_are_held_are_those_of_the_table(folder: Path) -> None:

@@ -1,8 +1,9 @@
-"""Measured tables in the rest of the program: listed, looked up, charted, exported, without the file they are of."""
+"""Measured tables: built from recipes, listed, looked up, charted, exported, without the file they are of."""
 
 from __future__ import annotations
 
 import json
+import math
 import re
 from pathlib import Path
 
@@ -13,13 +14,15 @@ import xarray as xr
 import brdfdb
 from brdfdb import formats
 from brdfdb.forms.catalogue import forms
-from brdfdb.geometry import degrees, radians
+from brdfdb.geometry import radians
 from brdfdb.materials import presets
-from brdfdb.measurements import MeasuredSource, Samples
+from brdfdb.measurements import MeasuredSource
 from brdfdb.store.publication import publish
 from brdfdb_pipelines.named_source import named_source
-from tests.measurements.made_up import scans
-from tests.pipelines.command import Captured, run
+from tests.measurements.made_up import scans, scattered
+from tests.pipelines.a_measurement import write_csv
+from tests.pipelines.command import Captured, refused, run
+from tests.pipelines.recipes import recipe_file_of
 
 NAME = "my-clay"
 RECIPE = f"""\
@@ -29,26 +32,55 @@ tolerance = 0.1
 samples = "clay.csv"
 source = "run 12"
 """
-INSIDE_DEG, OUTSIDE_DEG = (30.0, 0.0, 20.0, 120.0), (80.0, 0.0, 20.0, 120.0)  # lights of 10 to 60 degrees
-
-
-def _write(path: Path, samples: Samples) -> None:
-    columns = [degrees(a) for a in (samples.theta_i, samples.theta_r, samples.phi_r)] + [samples.values[:, 0]]
-    np.savetxt(
-        path, np.stack(columns, axis=1), delimiter=",", header="theta_i,theta_r,delta_phi,brdf", comments="", fmt="%.9g"
-    )
+INSIDE_DEG = (30.0, 0.0, 20.0, 120.0)  # lights of the samples: 10 to 60 degrees
+OUTSIDE_DEG = (80.0, 0.0, 20.0, 120.0)
+CLAY = presets()["clay-vase"].brdf_at(None)
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A store with a measured table, beside the recipe that it is of; the file of samples is gone."""
     directory = tmp_path_factory.mktemp("measured")
-    samples = scans(presets()["clay-vase"].brdf_at(None), np.array([10.0, 35.0, 60.0]), 0.03, step_deg=15.0)
-    _write(directory / "clay.csv", samples)
-    (directory / "recipe.toml").write_text(RECIPE)
-    assert run("build", directory / "recipe.toml", "--store", directory / "store") == 0
+    write_csv(directory / "clay.csv", scans(CLAY, np.array([10.0, 35.0, 60.0]), 0.03, step_deg=15.0))
+    assert run("build", recipe_file_of(directory, RECIPE), "--store", directory / "store") == 0
     (directory / "clay.csv").rename(directory / "elsewhere.csv")
     return directory
+
+
+def test_a_table_is_built_anew_for_another_file_or_law(tmp_path: Path, capsys: Captured) -> None:
+    command = ("build", recipe_file_of(tmp_path, RECIPE), "--store", tmp_path / "store")
+    assert "clay.csv: No such file" in refused(capsys, *command)
+    assert not (tmp_path / "store").exists()
+    write_csv(tmp_path / "clay.csv", scattered(CLAY, 300, 0.03))
+    assert run(*command) == 0
+    built = capsys.readouterr().out
+    assert f"1 table, {math.prod(brdfdb.open(tmp_path / 'store')[NAME].values.shape)} values" in built
+    assert f"{NAME}   measured" in built
+    assert run(*command) == 0
+    assert "1 table unchanged" in capsys.readouterr().out
+    recipe_file_of(tmp_path, RECIPE + "conserving = true\nreciprocal = true\n")
+    assert run(*command) == 0
+    measured = brdfdb.open(tmp_path / "store").metadata(NAME).measured
+    assert measured is not None
+    assert [change.law for change in measured.changes] == ["reciprocal", "conserving"]
+    recipe_file_of(tmp_path, RECIPE)
+    write_csv(tmp_path / "clay.csv", scattered(CLAY, 200, 0.03))
+    assert run(*command) == 0
+    assert brdfdb.open(tmp_path / "store")[NAME].revision == "r000003"
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        (RECIPE + 'base = "x"', f"define.{NAME}.base"),
+        (RECIPE + "reciprocal = 3", f"define.{NAME}.reciprocal"),
+        (RECIPE + 'format = "tiff"', "file_format: 'tiff' is not one of"),
+        (RECIPE.replace("tolerance = 0.1", "[grids]"), "tolerance: is missing"),
+    ],
+)
+def test_mistakes_are_one_sentence(tmp_path: Path, capsys: Captured, text: str, sentence: str) -> None:
+    write_csv(tmp_path / "clay.csv", scattered(CLAY, 300, 0.03))
+    assert sentence in refused(capsys, "build", recipe_file_of(tmp_path, text), "--store", tmp_path / "store")
 
 
 def test_lists_say_measured(folder: Path, capsys: Captured) -> None:
@@ -61,17 +93,14 @@ def test_lists_say_measured(folder: Path, capsys: Captured) -> None:
     assert ">measured</td>" in brdfdb.open(folder / "store")._repr_html_()
 
 
-def test_show_names_file_and_digest(folder: Path, capsys: Captured) -> None:
+def test_show_tells_the_samples_and_has_a_dash_where_nothing_was_measured(folder: Path, capsys: Captured) -> None:
     measured = brdfdb.open(folder / "store").metadata(NAME).measured
     assert measured is not None
     assert run("show", NAME, "--store", folder / "store") == 0
-    assert f"file clay.csv, sha256 {measured.file_sha256[:12]}" in capsys.readouterr().out
-
-
-def test_show_has_a_dash_where_nothing_was_measured(folder: Path, capsys: Captured) -> None:
-    """Lights are 10 to 60 degrees, and viewers end at 75 degrees."""
-    assert run("show", NAME, "--store", folder / "store") == 0
     printed = capsys.readouterr().out
+    digest = f"file clay.csv, sha256 {measured.file_sha256[:12]}"
+    for words in (digest, "run 12", "samples of", "error at samples held out", "noise of the samples", "extrapolated"):
+        assert words in printed
     rows = {line[4:26].strip(): line[26:].split() for line in printed.splitlines() if line.startswith("    ")}
     assert rows["one direction grazing"] == rows["both grazing"] == ["-"] * len(rows["both grazing"])
     assert "-" not in rows["99 % of f_r"][:3]
@@ -146,12 +175,13 @@ def test_export_says_that_some_values_were_not_measured(folder: Path, capsys: Ca
 
 
 def test_source_code_of_a_measured_table_is_refused_in_a_sentence(folder: Path, capsys: Captured) -> None:
-    assert run("export", "glsl", NAME, "--store", folder / "store", "--out", folder / "out") == 2
-    assert "it is measured, and source code is of models" in capsys.readouterr().err
+    said = refused(capsys, "export", "glsl", NAME, "--store", folder / "store", "--out", folder / "out")
+    assert "the table is measured, and source code needs a model" in said
 
 
-def test_audit_judges_energy_of_the_data_and_pairs_that_were_measured(folder: Path) -> None:
+def test_audit_judges_energy_of_the_data_and_pairs_that_were_measured(folder: Path, capsys: Captured) -> None:
     assert run("audit", "--store", folder / "store", "--no-figures", "--report", folder / "audit.json") == 0
+    assert "it is measured" in capsys.readouterr().out
     finding = json.loads((folder / "audit.json").read_text())["materials"][0]
     assert finding["as_published"]["text"] == "measured"
     assert finding["conserves_energy"]["word"] == "passes"
@@ -167,12 +197,11 @@ def test_chart_needs_no_file(folder: Path, capsys: Captured) -> None:
     printed = capsys.readouterr().out
     assert "--recipe FILE" in printed
     assert "The data are within " in printed
-    assert run(*chart, "--recipe", folder / "recipe.toml") == 2
-    assert "clay.csv: No such file" in capsys.readouterr().err
+    assert "clay.csv: No such file" in refused(capsys, *chart, "--recipe", folder / "recipe.toml")
 
 
 def test_data_of_a_recipe_are_what_its_tables_are_compared_with(folder: Path, tmp_path: Path) -> None:
-    (tmp_path / "recipe.toml").write_text(RECIPE + "conserving = true\n")
+    recipe_file_of(tmp_path, RECIPE + "conserving = true\n")
     (tmp_path / "clay.csv").write_bytes((folder / "elsewhere.csv").read_bytes())
     source, at = named_source(NAME, folder / "store", tmp_path / "recipe.toml")
     assert isinstance(source, MeasuredSource)

@@ -10,9 +10,10 @@ import pytest
 
 import brdfdb
 from brdfdb.audit import audit
-from brdfdb_pipelines import cli
 from brdfdb_pipelines.recipe_file import load
 from brdfdb_pipelines.recipe_grids import RecipeError
+from tests.pipelines.command import Captured, run
+from tests.pipelines.failing import fails
 
 RECIPE = """\
 materials = ["magnesium-oxide-ceramic"]
@@ -27,12 +28,10 @@ def written(tmp_path: Path, text: str) -> Path:
     return path
 
 
-def test_a_polarised_recipe_builds_tables_that_are_looked_up_and_pass(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_polarised_recipe_builds_tables_that_are_looked_up_and_pass(tmp_path: Path, capsys: Captured) -> None:
     store = tmp_path / "store"
-    build = ["build", str(written(tmp_path, RECIPE)), "--store", str(store)]
-    assert cli.main(build) == 0
+    build = ("build", written(tmp_path, RECIPE), "--store", store)
+    assert run(*build) == 0
     table = brdfdb.open(store)["magnesium-oxide-ceramic"]
     assert table.mueller(0.5, 0.0, 0.7, 3.0).shape == (1, 4, 4)
     record = table.metadata.polarisation
@@ -41,20 +40,19 @@ def test_a_polarised_recipe_builds_tables_that_are_looked_up_and_pass(
     assert record.error.worst_p99 <= 0.05
     assert record.error.between_p99 is None
     assert audit(table).findings["polarisation"].verdict == "passes"
-    assert cli.main(build) == 0
+    assert run(*build) == 0
     assert brdfdb.open(store)["magnesium-oxide-ceramic"].revision == "r000001"
     assert "unchanged" in capsys.readouterr().out
-    lookup = ["lookup", "magnesium-oxide-ceramic", "60", "0", "50", "165", "--store", str(store)]
-    assert cli.main([*lookup, "--stokes", "1,0,1,0", "--json"]) == 0
+    lookup = ("lookup", "magnesium-oxide-ceramic", 60, 0, 50, 165, "--store", store, "--stokes")
+    assert run(*lookup, "1,0,1,0", "--json") == 0
     light = json.loads(capsys.readouterr().out)["stokes"]
     expected = table.mueller(*np.radians([60.0, 0.0, 50.0, 165.0])) @ [1.0, 0.0, 1.0, 0.0]
     np.testing.assert_allclose(light["reflected"], expected, rtol=1e-12)
-    assert cli.main([*lookup, "--stokes", "1,0,1,0"]) == 0
+    assert run(*lookup, "1,0,1,0") == 0
     lines = capsys.readouterr().out.splitlines()
     assert lines[1].startswith(f"500 nm  I, Q, U, V: {expected[0, 0]:.6g}, {expected[0, 1]:.6g}")
     assert "Q > 0 is s-polarised" in lines[2]
-    assert cli.main([*lookup, "--stokes", "1,2,0,0"]) != 0
-    assert "stokes: Q, U and V make more than I = 1" in capsys.readouterr().err
+    assert "stokes: Q, U and V make more than I = 1" in fails(capsys, *lookup, "1,2,0,0")
 
 
 def test_requests_of_unpolarised_tables_do_not_mention_polarisation(tmp_path: Path) -> None:
@@ -66,19 +64,11 @@ def test_requests_of_unpolarised_tables_do_not_mention_polarisation(tmp_path: Pa
 
 
 @pytest.mark.parametrize(
-    ("text", "sentence"),
-    [
-        (
-            RECIPE.replace("magnesium-oxide-ceramic", "rolled-brass"),
-            "polarised: its model ward has no Mueller",
-        ),
-        (
-            RECIPE.replace('["magnesium-oxide-ceramic"]', '["mine"]') + '[define.mine]\nsamples = "mine.csv"\n',
-            "polarised: mine ",
-        ),
-    ],
+    ("name", "sentence"),
+    [("rolled-brass", "polarised: its model ward has no Mueller"), ("mine", "polarised: mine ")],
 )
-def test_what_has_no_mueller_matrices_is_refused(tmp_path: Path, text: str, sentence: str) -> None:
+def test_what_has_no_mueller_matrices_is_refused(tmp_path: Path, name: str, sentence: str) -> None:
     (tmp_path / "mine.csv").write_text("theta_i_deg,theta_r_deg,delta_phi_deg,brdf\n0,0,0,0.1\n")
+    mine = '[define.mine]\nsamples = "mine.csv"\n' if name == "mine" else ""
     with pytest.raises(RecipeError, match=sentence):
-        load(written(tmp_path, text)).jobs()
+        load(written(tmp_path, RECIPE.replace("magnesium-oxide-ceramic", name) + mine)).jobs()

@@ -17,26 +17,23 @@ from typing import Any
 import pytest
 
 import brdfdb
+from brdfdb.errors import ParameterError
 from brdfdb_pipelines import build as builds
-from brdfdb_pipelines import cli, workers
+from brdfdb_pipelines import workers
 from brdfdb_pipelines.build import build
 from brdfdb_pipelines.recipe_file import load
 from brdfdb_pipelines.workers import Workers
+from tests.pipelines.a_build import chunks, staged
+from tests.pipelines.command import Captured, refused, run
+from tests.pipelines.recipes import isotropic
 
 START_S = 300.0  # for what takes a few seconds where the machine has nothing else to do
 
-Captured = pytest.CaptureFixture[str]
-
-
-def chunks(root: Path, name: str) -> dict[str, bytes]:
-    group = brdfdb.open(root).path(name)
-    return {str(path.relative_to(group)): path.read_bytes() for path in group.rglob("c/**/*") if path.is_file()}
-
 
 def test_processes_build_what_threads_build(recipe: Path, built: Path, tmp_path: Path, names: list[str]) -> None:
-    assert cli.main(["build", str(recipe), "--store", str(tmp_path), "--processes", "--jobs", "2"]) == 0
+    assert run("build", recipe, "--store", tmp_path, "--processes", "--jobs", 2) == 0
     assert all(chunks(tmp_path, name) == chunks(built, name) for name in names)
-    assert not list((tmp_path / ".staging").iterdir())
+    assert staged(tmp_path) == []
 
 
 def kill(*_: Any) -> None:
@@ -96,6 +93,11 @@ def test_processes_leave_when_their_builder_was_killed(tmp_path: Path) -> None:
 # A dask cluster
 
 
+def test_a_scheduler_without_a_port_is_one_sentence() -> None:
+    with pytest.raises(ParameterError, match=r"^--scheduler: 'nope' "), workers.cluster("nope"):
+        pass
+
+
 def dask(*arguments: object) -> subprocess.Popen[str]:
     command = [sys.executable, "-m", "distributed.cli." + str(arguments[0]), *map(str, arguments[1:])]
     return subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, text=True)
@@ -142,14 +144,13 @@ def test_a_cluster_builds_what_threads_build_and_a_worker_that_is_killed_does_no
 ) -> None:
     address, processes = cluster
     root = tmp_path / "store"
-    assert cli.main(["build", str(recipe), "--store", str(root), "--scheduler", address, "--json"]) == 0
+    assert run("build", recipe, "--store", root, "--scheduler", address, "--json") == 0
     assert '"event": "done", "tables": 5, "published": 5' in capsys.readouterr().out
     assert all(chunks(root, name) == chunks(built, name) for name in names)
     large = tmp_path / "large.toml"
     fine = "[{ start = 0, stop = 89, step = 0.25 }]"
-    text = recipe.read_text(encoding="utf-8").replace("[{ start = 0, stop = 80, step = 10 }, 85, 89.5]", fine)
-    text = text.replace('"foam", "rolled-brass", "scene-copper-sphere", "blue-plastic", "mirror"', '"wall-plaster"')
-    large.write_text(text.replace("step = 15", "step = 1"), encoding="utf-8")
+    text = 'materials = ["wall-plaster"]\n' + isotropic(fine, "[{ start = 0, stop = 180, step = 1 }]")
+    large.write_text(text, encoding="utf-8")
     (job,) = load(large).jobs()
     assert len(job.layout().blocks) > 20
     seen = []
@@ -174,22 +175,11 @@ def test_a_scheduler_that_is_not_there_is_one_sentence(
     recipe: Path, tmp_path: Path, capsys: Captured, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(workers, "_CONNECT_S", 0.5)
-    root = tmp_path / "store"
-    assert cli.main(["build", str(recipe), "--store", str(root), "--scheduler", "tcp://127.0.0.1:9"]) == 2
-    out, err = capsys.readouterr()
-    assert out == ""
-    assert err.splitlines()[-1] == "brdfdb: no dask scheduler answers at tcp://127.0.0.1:9"
-    assert not root.exists()
-
-
-def test_without_dask_the_scheduler_option_says_what_to_install(
-    recipe: Path, tmp_path: Path, capsys: Captured, monkeypatch: pytest.MonkeyPatch
-) -> None:
+    command = ("build", recipe, "--store", tmp_path / "store", "--scheduler", "tcp://127.0.0.1:9")
+    assert refused(capsys, *command) == "no dask scheduler answers at tcp://127.0.0.1:9"
     monkeypatch.setitem(sys.modules, "distributed", None)
-    assert cli.main(["build", str(recipe), "--store", str(tmp_path), "--scheduler", "tcp://127.0.0.1:9"]) == 2
-    assert capsys.readouterr().err == (
-        "brdfdb: distributed is not installed; it comes with pip install 'brdfdb[dask]'\n"
-    )
+    assert refused(capsys, *command) == "distributed is not installed; it comes with pip install 'brdfdb[dask]'"
+    assert not (tmp_path / "store").exists()
 
 
 def test_a_cluster_without_workers_is_said_and_waited_for(

@@ -15,7 +15,7 @@ from scipy import ndimage
 from brdfdb.errors import ParameterError
 from brdfdb.geometry import unit_vector
 from brdfdb.integrals.quadrature import directional_albedo
-from brdfdb.materials import Material, presets
+from brdfdb.materials import Material, Source, presets
 from brdfdb.reference import ward_1992
 from brdfdb.scenes.environment import Environment
 from brdfdb.scenes.gbuffer import gather
@@ -23,7 +23,8 @@ from brdfdb.scenes.image import write_channels
 from brdfdb.scenes.renderer import Reflector, render
 from brdfdb.scenes.scene import Scene
 from brdfdb_pipelines.scene_file import SceneError, load
-from tests.scenes.a_mirror import MIRROR
+from tests.scenes import a_scene
+from tests.scenes.a_scene import COARSE, SPHERE, TILTED
 
 Array = NDArray[np.float64]
 
@@ -31,19 +32,13 @@ ROUNDING = 1e-15  # 8.9e-16 measured
 SINGLE = 6e-8  # half of the last bit of 32 bit floats
 STANDARD_ERRORS = 5.0
 PRECISE = 0.003  # standard error of 800 estimates of 16 directions, relative: 0.0029 measured, of copper at 75 degrees
-FALLS = (
-    0.09  # the error of 64 directions over that of 4: 0.082 measured, of varnish; a quarter if they were independent
-)
+FALLS = 0.09  # the error of 64 directions over that of 4: 0.082 measured, of varnish; 0.25 if they were independent
 NOISE = 0.008  # of a pixel in uniform light, 64 directions: 0.0076 measured, of copper
 QUADRATURE = 1e-6  # absolute, of the albedos that estimates are held against
 ALBEDO = 1e-3  # of those that ambient light meets: see test_render.py
 
-COARSE = [float(wavelength) for wavelength in range(400, 701, 20)]
 WAVELENGTH = np.array([400.0, 550.0, 700.0])
-WHITE = {"title": "white", "model": "lambert", "source": "a test", "parameters": {"rho": 1.0}}
-SPHERE = {"kind": "sphere", "radius": 1.0}
-FAR = {"position": [0.0, -5.0, 0.0], "height": 2.2, "aspect": 1.0}
-ABOVE = {"position": [0.0, -0.6, 0.8], "height": 1.0, "aspect": 1.0}
+FAR = {**a_scene.FAR, "height": 2.2}
 ROOM = np.array([[4.0, 4.0, 4.0, 4.0], [1.0, 2.0, 0.5, 0.25], [0.1, 0.0, 0.2, 0.1]])
 # Lambert; rough Oren-Nayar; Ward, anisotropic, and as faint as varnish; He-Torrance
 MATERIALS = ("foam", "clay-vase", "rolled-brass", "varnished-plywood", "scene-copper-sphere")
@@ -54,23 +49,15 @@ def around(rows: Any = ((1.0,),), **fields: Any) -> Environment:
 
 
 def scene(material: str, environment: Any, shape: dict[str, Any] | None = None, **fields: Any) -> Scene:
-    item = {"name": "thing", "material": material, "shape": shape or SPHERE, "grain_deg": fields.pop("grain_deg", 0.0)}
-    given = {
-        "objects": [item, *fields.pop("more", [])],
-        "camera": FAR,
-        "wavelengths_nm": COARSE,
-        "define": {"white": WHITE, "mirror": MIRROR},
-        **({} if environment is None else {"environment": environment}),
-    }
-    return Scene.model_validate(given | fields)
+    lit = {} if environment is None else {"environment": environment}
+    return a_scene.scene(material, shape, **{"camera": FAR, **lit, **fields})
 
 
-def estimates(material: str, wr: Array, environment: Environment) -> Array:
-    """What is reflected towards viewers (N, 3) by surfaces that face up, x along the grain: (N, L)."""
-    reflector = Reflector(presets()[material], WAVELENGTH)
-    drawn = environment.drawn(presets()[material], WAVELENGTH, wr, (0,))
+def estimates(source: Source, wr: Array, environment: Environment, drawn_by: Source | None = None) -> Array:
+    """Return the radiance (N, L) of surfaces that face up, x along the grain, towards viewers (N, 3)."""
+    drawn = environment.drawn(drawn_by or source, WAVELENGTH, wr, (0,))
     weight = environment.radiance(drawn.wi) * np.maximum(drawn.wi[..., 2], 0.0) * drawn.solid_angle
-    f_r = reflector.brdf(drawn.wi.reshape(-1, 3), np.tile(wr, (len(drawn.wi), 1)))
+    f_r = source.brdf_at(source.evaluated_at(WAVELENGTH))(drawn.wi.reshape(-1, 3), np.tile(wr, (len(drawn.wi), 1)))
     return np.asarray(np.sum(f_r.reshape(*weight.shape, -1) * weight[..., np.newaxis], axis=0))
 
 
@@ -97,11 +84,6 @@ def test_between_pixels_radiance_is_bilinear_and_goes_around() -> None:
     assert abs(np.subtract(*around(rows).radiance(np.array(seam)))) < 1e-8
 
 
-def test_at_the_poles_radiance_is_that_of_the_first_and_last_row() -> None:
-    found = around([[1.0], [2.0]]).radiance(np.array([[0.0, 0.0, 1.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]]))
-    assert np.array_equal(found, [1.0, 2.0, 1.5])
-
-
 # Columns are at azimuths of 135, 45, -45 and -135 degrees
 @pytest.mark.parametrize(
     ("camera", "seen"),
@@ -119,14 +101,10 @@ def test_a_mirror_shows_what_is_across(camera: tuple[float, float], seen: float)
 
 def test_a_mirror_shows_an_object_in_place_of_what_lies_beyond() -> None:
     # the wall is square to what the mirror shows of it, and has the environment behind the camera in front of it
-    wall = {
-        "name": "wall",
-        "material": "white",
-        "shape": {"kind": "plane", "position": [0.0, 3.0, 4.0], "axis": [0.0, -0.6, -0.8]},
-    }
-    of = scene("mirror", {"rows": [[5.0], [1.0]]}, {"kind": "plane"}, camera=ABOVE, more=[wall], shadows=False)
-    view = gather(of, 2)
-    mirror, shown = view.points
+    wall = {"kind": "plane", "position": [0.0, 3.0, 4.0], "axis": [0.0, -0.6, -0.8]}
+    more = [{"name": "wall", "material": "white", "shape": wall}]
+    of = scene("mirror", {"rows": [[5.0], [1.0]]}, {"kind": "plane"}, camera=TILTED, more=more, shadows=False)
+    mirror, shown = gather(of, 2).points
     assert (shown.name, shown.via) == ("wall", 0)
     assert not mirror.beyond.any()
     assert shown.irradiance.sum(axis=0).min() > 1.0
@@ -150,7 +128,7 @@ def test_estimates_in_uniform_light_are_unbiased(name: str, theta_deg: float, ph
     theta, phi, count = np.radians(theta_deg), np.radians(phi_deg), 800
     parameters = presets()[name].arguments(presets()[name].evaluated_at(WAVELENGTH))
     albedo = directional_albedo(presets()[name].spec, theta, phi, tolerance=QUADRATURE, **parameters).albedo
-    found = estimates(name, np.tile(unit_vector(theta, phi), (count, 1)), around(samples=16))
+    found = estimates(presets()[name], np.tile(unit_vector(theta, phi), (count, 1)), around(samples=16))
     standard_error = found.std(axis=0, ddof=1) / np.sqrt(count)
     assert np.all(standard_error < PRECISE * albedo)
     assert np.all(np.abs(found.mean(axis=0) - albedo) < STANDARD_ERRORS * standard_error + QUADRATURE)
@@ -159,15 +137,14 @@ def test_estimates_in_uniform_light_are_unbiased(name: str, theta_deg: float, ph
 @pytest.mark.parametrize("name", MATERIALS)
 def test_the_error_falls_faster_than_that_of_independent_directions(name: str) -> None:
     wr = np.tile(unit_vector(np.radians(40.0), 0.5), (400, 1))
-    few, many = (estimates(name, wr, around(ROOM, samples=samples)).std(axis=0) for samples in (4, 64))
+    few, many = (estimates(presets()[name], wr, around(ROOM, samples=samples)).std(axis=0) for samples in (4, 64))
     assert np.all(many < FALLS * few)
 
 
 @pytest.mark.parametrize("grain_deg", [0.0, 60.0])
 def test_a_room_is_reflected_as_by_a_grid_over_the_hemisphere(grain_deg: float) -> None:
-    of = scene(
-        "rolled-brass", around(ROOM, samples=64).model_dump(), {"kind": "plane"}, camera=ABOVE, grain_deg=grain_deg
-    )
+    room = around(ROOM, samples=64).model_dump()
+    of = scene("rolled-brass", room, {"kind": "plane"}, camera=TILTED, grain_deg=grain_deg)
     found = render(of, gather(of, 40))[..., 0]
     steps = 500
     cos, phi = (np.arange(steps) + 0.5) / steps, (np.arange(2 * steps) + 0.5) * np.pi / steps
@@ -200,9 +177,7 @@ def test_ward_like_is_the_reference() -> None:
 @pytest.mark.parametrize("alpha", [1e-6, 0.01, 0.5])
 def test_whatever_f_r_is_its_weights_are_bounded_and_a_lobe_has_its_share(theta_deg: float, alpha: float) -> None:
     gloss = {"rho_d": 0.0, "rho_s": 0.3, "alpha_x": alpha, "alpha_y": alpha}
-    material = Material.from_table(
-        "gloss", {"title": "gloss", "model": "ward", "source": "a test", "parameters": gloss}
-    )
+    material = Material(name="gloss", title="gloss", model="ward", source="a test", parameters=gloss)
     wr = np.tile(unit_vector(np.radians(theta_deg), 0.3), (50, 1))
     drawn = around(samples=100).drawn(material, WAVELENGTH, wr, ())
     # a tenth of all directions has a density of cos / pi, and cos / pdf is pi of them alone
@@ -284,15 +259,11 @@ def test_a_wall_takes_the_light_from_behind_it(shadows: bool) -> None:
     assert points.irradiance[~behind & (points.wi[..., 2] > 1e-6)].min() > 0.0
 
 
-def recorded(path: Path, environment: Any) -> Scene:
-    return scene("white", environment, {"kind": "recorded", "file": str(path)})
-
-
 def test_recorded_normals_are_lit_from_all_around(tmp_path: Path) -> None:
     normal = np.zeros((4, 4, 3))
     normal[1:, :, 1] = -1.0
     np.savez(tmp_path / "flat.npz", normal=normal)
-    of = recorded(tmp_path / "flat.npz", {"rows": [[0.5]]})
+    of = scene("white", {"rows": [[0.5]]}, {"kind": "recorded", "file": str(tmp_path / "flat.npz")})
     image = render(of, gather(of, 1))
     assert np.abs(image - 0.5).max() < ROUNDING
 
@@ -300,8 +271,18 @@ def test_recorded_normals_are_lit_from_all_around(tmp_path: Path) -> None:
 def test_recorded_directions_have_no_environment(tmp_path: Path) -> None:
     up = np.tile([0.0, 0.0, 1.0], (2, 2, 1))
     np.savez(tmp_path / "directions.npz", wr=up, wi=up[np.newaxis])
+    of = scene("white", {"rows": [[0.5]]}, {"kind": "recorded", "file": str(tmp_path / "directions.npz")})
     with pytest.raises(ValueError, match="has wr and wi; an environment needs normals"):
-        gather(recorded(tmp_path / "directions.npz", {"rows": [[0.5]]}), 1)
+        gather(of, 1)
+
+
+def written(folder: Path, environment: str) -> str:
+    """Write a file of a scene with an environment, and return its path."""
+    path = folder / "scene.toml"
+    camera = "{ position = [0, -5, 0], height = 2.5 }"
+    ball = '{ name = "ball", material = "foam", shape = { kind = "sphere", radius = 1 } }'
+    path.write_text(f"environment = {environment}\ncamera = {camera}\nobjects = [{ball}]\n", encoding="utf-8")
+    return str(path)
 
 
 @pytest.mark.parametrize("name", ["room.npy", "room.npz", "grey.exr", "colour.exr"])
@@ -311,13 +292,7 @@ def test_a_file_is_read_as_rows_are_and_lies_beside_the_scene(tmp_path: Path, na
     write_channels(tmp_path / "grey.exr", {}, {"Y": ROOM})
     # a green of 1 / 0.7152 has a luminance of 1
     write_channels(tmp_path / "colour.exr", {}, {"R": 0.0 * ROOM, "G": ROOM / 0.7152, "B": 0.0 * ROOM})
-    text = (
-        f'environment = {{ file = "{name}" }}\ncamera = {{ position = [0, -5, 0], height = 2.5 }}\n'
-        '[[objects]]\nname = "ball"\nmaterial = "foam"\nshape = { kind = "sphere", radius = 1 }\n'
-    )
-    (tmp_path / "scene.toml").write_text(text, encoding="utf-8")
-    environment = load(str(tmp_path / "scene.toml")).environment
-    assert environment is not None
+    environment = load(written(tmp_path, f'{{ file = "{name}" }}')).environment
     assert np.abs(environment.picture - ROOM).max() <= (SINGLE * ROOM.max() if name.endswith("exr") else 0.0)
 
 
@@ -333,7 +308,6 @@ def test_another_picture_is_another_light(tmp_path: Path) -> None:
 
 
 def test_a_wrong_environment_is_one_sentence_with_the_field(tmp_path: Path) -> None:
-    path = tmp_path / "scene.toml"
     wrong = {
         "{}": "rows, file: ",
         '{ rows = [[1]], file = "room.npy" }': "rows, file: ",
@@ -347,13 +321,9 @@ def test_a_wrong_environment_is_one_sentence_with_the_field(tmp_path: Path) -> N
         "{ rows = [[1]], colour = 0 }": "colour: unknown key",
     }
     for table, sentence in wrong.items():
-        text = (
-            f"environment = {table}\ncamera = {{ position = [0, -5, 0], height = 2.5 }}\n"
-            '[[objects]]\nname = "ball"\nmaterial = "foam"\nshape = { kind = "sphere", radius = 1 }\n'
-        )
-        path.write_text(text, encoding="utf-8")
+        path = written(tmp_path, table)
         with pytest.raises(SceneError) as caught:
-            load(str(path))
+            load(path)
         assert str(caught.value).startswith(f"{path}: environment.{sentence}")
         assert "\n" not in str(caught.value)
 
@@ -364,30 +334,25 @@ def test_a_file_without_a_picture_is_one_sentence(tmp_path: Path) -> None:
     (tmp_path / "empty.npy").write_bytes(b"")
     np.savez(tmp_path / "other.npz", albedo=ROOM)
     write_channels(tmp_path / "depth.exr", {}, {"Z": ROOM})
-    arrays: dict[str, Any] = {
-        "cube": np.ones((2, 2, 3)),
-        "words": np.array([["x"]]),
-        "none": np.ones((0, 3)),
-        "negative": np.array([[1.0, -0.5]]),
-        "nan": np.array([[np.nan]]),
-        "black": np.zeros((2, 2)),
-    }
-    for stem, array in arrays.items():
-        np.save(tmp_path / f"{stem}.npy", array)
     sentences = {
         "none.exr": "there is no such file",
-        "text.npz": "is no .npz or .npy of numbers",
-        "empty.npy": "is no .npz or .npy of numbers",
-        "text.exr": "is no OpenEXR file",
+        "text.npz": "is not an .npz or .npy file of numbers",
+        "empty.npy": "is not an .npz or .npy file of numbers",
+        "text.exr": "is not an OpenEXR file",
         "other.npz": "has no array `radiance`",
         "depth.exr": "it has Z",
-        "cube.npy": r"shape \(rows, columns\)",
-        "words.npy": r"shape \(rows, columns\)",
-        "none.npy": r"shape \(rows, columns\)",
-        "negative.npy": "-0.5 at row 0, column 1",
-        "nan.npy": "nan at row 0, column 0",
-        "black.npy": "radiance is 0 everywhere",
     }
+    arrays: tuple[tuple[Any, str], ...] = (
+        (np.ones((2, 2, 3)), r"shape \(rows, columns\)"),
+        (np.array([["x"]]), r"shape \(rows, columns\)"),
+        (np.ones((0, 3)), r"shape \(rows, columns\)"),
+        (np.array([[1.0, -0.5]]), "-0.5 at row 0, column 1"),
+        (np.array([[np.nan]]), "nan at row 0, column 0"),
+        (np.zeros((2, 2)), "radiance is 0 everywhere"),
+    )
+    for number, (array, sentence) in enumerate(arrays):
+        np.save(tmp_path / f"{number}.npy", array)
+        sentences[f"{number}.npy"] = sentence
     for name, sentence in sentences.items():
         with pytest.raises(ParameterError, match=sentence) as caught:
             gather(scene("foam", {"file": str(tmp_path / name)}), 4)

@@ -16,14 +16,14 @@ from brdfdb.scenes.gbuffer import VisiblePoints, gather
 from brdfdb.scenes.image import write_channels
 from brdfdb.scenes.scene import Scene
 from brdfdb.scenes.shapes import Array
+from tests.scenes import a_scene
+from tests.scenes.a_scene import ABOVE, SPHERE
 
 ROUNDING = 1e-15  # 3.3e-16 measured
 LIMB = 3e-13  # of a radius of 1, next to the limb, where a normal is least certain: 2e-13 measured
 SINGLE = 2e-7  # the same of 32 bit floats: 1.2e-7 measured
 MOVED = 1.5e-9  # 1.3e-9 measured, moved by ten thousand radii: next to limbs, where hits are least certain
-SPHERE = {"kind": "sphere", "radius": 1.0}
-FAR = {"position": [0.0, -5.0, 0.0], "height": 2.2, "aspect": 1.0}
-ABOVE = {"position": [0.0, 0.0, 5.0], "up": [0.0, 1.0, 0.0], "height": 2.0, "aspect": 1.0}
+FAR = {**a_scene.FAR, "height": 2.2}
 WIDTH = 40
 
 
@@ -31,37 +31,12 @@ def scene(
     shape: dict[str, Any] | None = None, *, light: Any = (0.0, -1.0, 0.0), material: str = "clay-vase", **fields: Any
 ) -> Scene:
     """A sphere, or another shape, lit from the camera."""
-    item = {"name": "thing", "material": material, "shape": shape or SPHERE, "grain_deg": fields.pop("grain_deg", 0.0)}
-    lights = fields.pop("lights", [{"direction": list(light)}])
-    objects = [item, *fields.pop("more", [])]
-    return Scene.model_validate({"objects": objects, "lights": lights, "camera": FAR, **fields})
+    return a_scene.scene(material, shape, **{"lights": [{"direction": list(light)}], "camera": FAR, **fields})
 
 
 def only(view_of: Scene, width: int = WIDTH) -> VisiblePoints:
     (points,) = gather(view_of, width).points
     return points
-
-
-def picture(points: VisiblePoints, values: Array, width: int = WIDTH) -> Array:
-    image = np.zeros(width * width)
-    image[points.at] = values
-    return image.reshape(width, width)
-
-
-@pytest.mark.parametrize(
-    ("light", "lit", "dark"),
-    [
-        ((1.0, 0.0, 0.0), np.s_[:, 30], np.s_[:, 9]),
-        ((-1.0, 0.0, 0.0), np.s_[:, 9], np.s_[:, 30]),
-        ((0.0, 0.0, 1.0), np.s_[9, :], np.s_[30, :]),
-        ((0.0, 0.0, -1.0), np.s_[30, :], np.s_[9, :]),
-    ],
-)
-def test_the_side_towards_the_light_is_lit(light: tuple[float, ...], lit: Any, dark: Any) -> None:
-    points = only(scene(light=light))
-    image = picture(points, points.irradiance[0])
-    assert image[lit].max() > 1.0
-    assert image[dark].max() == 0.0
 
 
 def test_irradiance_of_a_sphere_is_pi_times_the_cosine() -> None:
@@ -108,11 +83,7 @@ def test_a_pinhole_looks_through_the_angle_of_view() -> None:
 @pytest.mark.parametrize("shadows", [True, False])
 def test_a_sphere_casts_a_round_shadow(shadows: bool) -> None:
     ball = {"name": "ball", "material": "foam", "shape": {**SPHERE, "position": [0.0, 0.0, 4.0]}}
-    camera = {
-        "position": [0.0, -6.0, 6.0],
-        "height": 4.0,
-        "aspect": 1.0,
-    }  # the ball stands above the middle of the view
+    camera = {"position": [0.0, -6.0, 6.0], "height": 4.0, "aspect": 1.0}  # the ball is above the middle of the view
     view = gather(scene({"kind": "plane"}, light=(0.0, 0.0, 1.0), camera=camera, more=[ball], shadows=shadows), 200)
     (plane,) = (each for each in view.points if each.name == "thing")
     area = np.count_nonzero(plane.irradiance[0] == 0.0) * (4.0 / 200) ** 2 * np.sqrt(2.0)
@@ -151,13 +122,8 @@ def test_a_disc_of_light_is_as_strong_as_a_direction(solid_angle_sr: float) -> N
     lights = [{"direction": [0.0, 0.0, 1.0], "solid_angle_sr": solid_angle_sr, "samples": 50}]
     points = only(scene({"kind": "plane"}, camera=ABOVE, lights=lights))
     assert np.abs(points.irradiance.sum(axis=0) - np.pi).max() < ROUNDING
-
-
-def test_samples_of_a_disc_are_even_all_around() -> None:
-    lights = [{"direction": [0.0, 0.0, 1.0], "solid_angle_sr": 0.2, "samples": 50}]
-    points = only(scene({"kind": "plane"}, camera=ABOVE, lights=lights))
-    mean = points.wi[:, 0].mean(axis=0)
-    assert np.hypot(mean[0], mean[1]) < 0.003  # 0.0025 measured
+    mean = points.wi[:, 0].mean(axis=0)  # samples are even all around
+    assert np.hypot(mean[0], mean[1]) <= 0.006 * np.sqrt(solid_angle_sr)  # 0.0025 measured for 0.2 sr
 
 
 def test_a_mirror_shows_a_light_only_inside_its_disc() -> None:
@@ -286,8 +252,8 @@ def test_a_file_without_directions_is_refused(tmp_path: Path) -> None:
         ({"wr": np.ones((2, 2, 3)), "wi": np.ones((2, 2, 3))}, r"wi has .* \(lights, height, width, 3\)"),
         ({"normal": np.zeros((2, 2, 3))}, "shows nothing"),
         ({"normal": np.full((2, 2, 3), np.nan)}, "shows nothing"),
-        ({"normal": np.array([[None]])}, "is no .npz of numbers"),
-        ({"normal": np.array([["x"]])}, "is not made of numbers"),
+        ({"normal": np.array([[None]])}, "is not an .npz file of numbers"),
+        ({"normal": np.array([["x"]])}, "the arrays of these names are not numbers"),
         ({"wr": up[0], "wi": up}, "wi has 2 lights, the scene 1"),
     ]
     for arrays, sentence in refused:
@@ -297,16 +263,15 @@ def test_a_file_without_directions_is_refused(tmp_path: Path) -> None:
 
 
 def test_a_file_of_another_kind_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "text.npz").write_bytes(b"not an archive")
-    (tmp_path / "empty.npz").write_bytes(b"")
-    (tmp_path / "text.exr").write_bytes(b"not a picture")
-    (tmp_path / "empty.exr").write_bytes(b"")
+    for name, content in (("text", b"no file of numbers"), ("empty", b"")):
+        for suffix in ("npz", "exr"):
+            (tmp_path / f"{name}.{suffix}").write_bytes(content)
     write_channels(tmp_path / "picture.exr", {}, {name: np.zeros((2, 2)) for name in "RGB"})
     sentences = {
-        "text.npz": "is no .npz of numbers",
-        "empty.npz": "is no .npz of numbers",
-        "text.exr": "is no OpenEXR file",
-        "empty.exr": "is no OpenEXR file",
+        "text.npz": "is not an .npz file of numbers",
+        "empty.npz": "is not an .npz file of numbers",
+        "text.exr": "is not an OpenEXR file",
+        "empty.exr": "is not an OpenEXR file",
         "no.npz": "there is no such file",
         "picture.exr": "has neither `normal`",
     }
@@ -316,7 +281,7 @@ def test_a_file_of_another_kind_is_refused(tmp_path: Path) -> None:
 
 
 def test_a_scene_that_shows_nothing_of_a_part_is_refused() -> None:
-    with pytest.raises(ValueError, match=r"lights\.0: falls on nothing that is seen"):
+    with pytest.raises(ValueError, match=r"lights\.0: lights no visible point"):
         gather(scene({"kind": "plane"}, light=(0.0, 0.0, -1.0), camera=ABOVE), WIDTH)
     behind = {"name": "behind", "material": "foam", "shape": {**SPHERE, "position": [0.0, -9.0, 0.0]}}
     with pytest.raises(ValueError, match="objects: no ray of 40 x 40 pixels meets behind"):
@@ -327,16 +292,15 @@ def test_a_scene_that_shows_nothing_of_a_part_is_refused() -> None:
         inside = {"position": [0.0, 0.1, 0.5], "target": [0.0, 1.0, 0.5], **camera}
         with pytest.raises(ValueError, match=r"camera\.position: is inside thing, which is black from there"):
             gather(scene(kind, camera=inside, ambient=0.1, more=[hidden]), WIDTH)
-    with pytest.raises(ValidationError, match="stands alone"):
+    with pytest.raises(ValidationError, match="must be the only object"):
         scene({"kind": "recorded", "file": "x.npz"}, more=[hidden])
 
 
 def test_a_picture_of_a_wrong_size_is_refused() -> None:
     sizes = {(10_000_000, 1): "width", (8192, 3): "across", (0, 1): "width", (4, 0): "across"}
     for (width, across), parameter in sizes.items():
-        with pytest.raises(ParameterError) as caught:
+        with pytest.raises(ParameterError, match=f"^{parameter}: "):
             gather(scene(), width, across=across)
-        assert caught.value.parameter == parameter
 
 
 def test_the_back_of_a_plane_may_be_seen() -> None:

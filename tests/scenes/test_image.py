@@ -12,6 +12,7 @@ from matplotlib.image import imread
 from brdfdb.scenes import image
 from brdfdb.scenes.scene import Scene
 from brdfdb.spectra import illuminant_spectrum
+from tests.scenes import a_scene
 
 ROUNDING = 5e-15  # a sum of 41 products is off by 41 * 2**-53 = 4.6e-15 at most; 1.4e-15 measured, by processor
 PUBLISHED = 2e-6  # five decimals are printed, and E308 sums in steps of 1 nm: 1.5e-6 measured
@@ -20,9 +21,7 @@ SINGLE = 1e-7  # relative, of 32 bit floats: 5.5e-8 measured
 
 
 def scene(**fields: object) -> Scene:
-    sphere = {"name": "sphere", "material": "foam", "shape": {"kind": "sphere", "radius": 1.0}}
-    camera = {"position": [0.0, -5.0, 0.0], "height": 2.0}
-    return Scene.model_validate({"objects": [sphere], "ambient": 1.0, "camera": camera, **fields})
+    return a_scene.scene("foam", ambient=1.0, wavelengths_nm=np.arange(380.0, 781.0, 10.0).tolist(), **fields)
 
 
 @pytest.mark.parametrize("illuminant", ["D65", "A", "E", "FL2", "LED-B1"])

@@ -13,6 +13,7 @@ from brdfdb.materials import FunctionSource, Material
 from brdfdb.scenes.lit_sphere import DRAFT, WHITE, lit_sphere, sphere_radiance
 from brdfdb.tables.grids import Grid
 from brdfdb.tables.table import Table
+from tests.scenes.a_scene import MIRROR
 
 Array = NDArray[np.float64]
 
@@ -44,8 +45,7 @@ def spot(towards: Array) -> Array:
 
 
 def mirror_table(reflectance: float) -> Table:
-    axes = {"theta_i": [0.0, 90.0], "theta_r": [0.0, 90.0], "delta_phi": [0.0, 180.0]}
-    grid = Grid({name: np.array(nodes) for name, nodes in axes.items()})
+    grid = Grid({"theta_i": [0.0, 90.0], "theta_r": [0.0, 90.0], "delta_phi": [0.0, 180.0]})
     specular = np.full(2, reflectance, np.float32)
     return Table("mirror", "r000001", {}, grid, None, np.zeros((2, 2, 2), np.float32), specular)
 
@@ -114,15 +114,7 @@ def test_mirror_is_no_black_disc() -> None:
 
 
 def test_copper_is_red() -> None:
-    copper = Material(
-        name="copper",
-        title="Copper",
-        model="he_torrance",
-        parameters={"sigma_0_um": 0.0, "tau_um": 1.0},
-        refractive_index="main/Cu/Johnson",
-        source="a test",
-    )
-    red, green, blue, _ = np.moveaxis(lit_sphere(copper, 24), -1, 0)
+    red, green, blue, _ = np.moveaxis(lit_sphere(Material(name="copper", **MIRROR), 24), -1, 0)
     shown = red < 1.0
     assert np.all((red >= green)[shown])
     assert np.all((green >= blue)[shown])

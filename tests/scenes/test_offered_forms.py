@@ -16,7 +16,6 @@ def test_a_spectrum_at_a_few_wavelengths_is_joined_by_straight_lines() -> None:
     material = presets()["scene-copper-sphere"]
     wavelength = np.array(COARSE)
     few = next(each for each in offered_forms(material, wavelength, ()) if each.form.key == "sum-3-wavelengths")
-    assert few.wavelength_nm is not None
     wi, wr = np.array([[0.6, 0.0, 0.8]]), np.array([[-0.6, 0.0, 0.8]])
     whole = offered_forms(material, few.wavelength_nm, ())[0].brdf(wi, wr)
     expected = np.interp(wavelength, few.wavelength_nm, whole[0])

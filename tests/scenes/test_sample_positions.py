@@ -11,6 +11,7 @@ from brdfdb.scenes import sample_positions
 from brdfdb.scenes.scene import Scene
 
 HEIGHT = 2.5  # of what the camera sees
+WALL: dict[str, Any] = {"name": "wall", "material": "clay-vase", "shape": {"kind": "plane", "axis": (0, -1, 0)}}
 BALL = {"name": "ball", "material": "clay-vase", "shape": {"kind": "sphere", "radius": 1}}
 
 
@@ -40,11 +41,7 @@ def test_a_limb_is_seen_at_distances_of_every_magnitude_on_both_sides() -> None:
 
 
 def test_terminators_and_the_edges_of_shadows_are_edges() -> None:
-    wall = {
-        "name": "wall",
-        "material": "clay-vase",
-        "shape": {"kind": "plane", "axis": (0, -1, 0), "position": (0, 1, 0)},
-    }
+    wall = {**WALL, "shape": {**WALL["shape"], "position": (0, 1, 0)}}
     lights = [{"direction": (-1.0, 0.0, 0.0)}]
     places = sample_positions.at_edges(scene_of(BALL, lights=lights), 48, 48, 2000, np.random.default_rng(3))
     x, z = places.T * HEIGHT / 2.0
@@ -59,5 +56,4 @@ def test_terminators_and_the_edges_of_shadows_are_edges() -> None:
 
 
 def test_a_picture_without_edges_has_no_places_beside_them() -> None:
-    wall = {"name": "wall", "material": "clay-vase", "shape": {"kind": "plane", "axis": (0, -1, 0)}}
-    assert sample_positions.at_edges(scene_of(wall), 8, 8, 100, np.random.default_rng(5)).shape == (0, 2)
+    assert sample_positions.at_edges(scene_of(WALL), 8, 8, 100, np.random.default_rng(5)).shape == (0, 2)

@@ -148,7 +148,6 @@ def test_a_profile_passes_its_points_and_does_not_overshoot() -> None:
 
 def test_cones_follow_the_profile() -> None:
     shape = SHAPES["revolution"]
-    assert isinstance(shape, Revolution)
     points, _, _ = met(shape)
     side = (points[:, 2] > 1e-9) & (points[:, 2] < 1.36 - 1e-9)
     radius = np.hypot(points[side, 0], points[side, 1])

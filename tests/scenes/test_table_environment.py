@@ -11,21 +11,20 @@ from numpy.typing import NDArray
 import brdfdb
 from brdfdb.geometry import unit_vector
 from brdfdb.materials import Source, presets
-from brdfdb.measurements import MeasuredSource
 from brdfdb.parameters import Floats
 from brdfdb.scenes.gbuffer import gather
 from brdfdb.scenes.renderer import render
-from brdfdb.scenes.scene import Scene
 from brdfdb.store.publication import publish
 from brdfdb.tables.sampler import LOBE_SHARE, Sampler
 from brdfdb.tables.table import TableSource
 from tests.formats.small_tables import ANISOTROPIC, GREY, SPECTRAL, small_table
 from tests.formats.small_tables import DIFFUSE as ROUGH
-from tests.scenes.test_environment import ROOM, STANDARD_ERRORS, around, reference_radiance
+from tests.measurements.made_up import source_of
+from tests.scenes.a_scene import scene
+from tests.scenes.test_environment import FAR, ROOM, STANDARD_ERRORS, WAVELENGTH, around, estimates, reference_radiance
 
 Array = NDArray[np.float64]
 
-WAVELENGTH = np.array([400.0, 550.0, 700.0])
 POINTS, SAMPLES = 600, 16
 GRID = 3e-4  # of the quadrature over a grid of directions, relative; measured 2.2e-4
 PRECISE = 0.006  # standard error of the mean of all points, relative; measured 0.0049
@@ -56,18 +55,13 @@ def _white(wi: Floats, _wr: Floats) -> Floats:
 def store(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("lit") / "store"
     for name, f_r in (("road-sign", _back), ("half-mirror", _glossy), ("white-paper", _white)):
-        source = MeasuredSource.of_function(f_r, ("grey",), None, name=name, title=name, provenance="made up")
-        publish(folder, source, tolerance=0.05)
+        publish(folder, source_of(f_r, name=name), tolerance=0.05)
     return folder
 
 
-def estimates(source: TableSource, wr: Array, drawn_by: Source | None = None) -> Array:
-    """Return the radiance (N, L) of surfaces that face up in a room towards viewers (N, 3), by drawn directions."""
-    environment = around(ROOM, samples=SAMPLES)
-    drawn = environment.drawn(drawn_by or source, WAVELENGTH, wr, (0,))
-    weight = environment.radiance(drawn.wi) * np.maximum(drawn.wi[..., 2], 0.0) * drawn.solid_angle
-    f_r = source.brdf_at(source.evaluated_at(WAVELENGTH))(drawn.wi.reshape(-1, 3), np.tile(wr, (len(drawn.wi), 1)))
-    return np.asarray(np.sum(f_r.reshape(*weight.shape, -1) * weight[..., np.newaxis], axis=0))
+def in_room(source: TableSource, wr: Array, drawn_by: Source | None = None) -> Array:
+    """Return the radiance (N, L) in a room, by drawn directions."""
+    return estimates(source, wr, around(ROOM, samples=SAMPLES), drawn_by)
 
 
 def integral(source: TableSource, wr: Array) -> Array:
@@ -81,15 +75,15 @@ def integral(source: TableSource, wr: Array) -> Array:
     return np.asarray(weight @ f_r)
 
 
-def source_of(kind: str, store: Path) -> TableSource:
+def table_source(kind: str, store: Path) -> TableSource:
     return TableSource(brdfdb.open(store)[kind] if kind in LIT else small_table(kind))
 
 
 @pytest.mark.parametrize("kind", [*LIT, GREY, ANISOTROPIC, ROUGH, SPECTRAL])
 @pytest.mark.parametrize("theta_deg", [10.0, 65.0])
 def test_a_room_is_reflected_as_by_a_grid_over_the_hemisphere(kind: str, theta_deg: float, store: Path) -> None:
-    source, wr = source_of(kind, store), unit_vector(np.radians(theta_deg), 0.7)
-    found = estimates(source, np.tile(wr, (POINTS, 1)))
+    source, wr = table_source(kind, store), unit_vector(np.radians(theta_deg), 0.7)
+    found = in_room(source, np.tile(wr, (POINTS, 1)))
     expected = integral(source, wr)
     standard_error = found.std(axis=0, ddof=1) / np.sqrt(POINTS)
     assert np.all(standard_error < PRECISE * expected)
@@ -105,31 +99,24 @@ def test_a_wrong_density_is_noticed(store: Path, monkeypatch: pytest.MonkeyPatch
         return 0.7 * of_cells + 0.3 * cosine  # the cosine has a fifth of the directions
 
     monkeypatch.setattr(Sampler, "density", shared_wrongly)
-    source, wr = source_of("half-mirror", store), unit_vector(0.2, 0.7)
-    found = estimates(source, np.tile(wr, (POINTS, 1)))
+    source, wr = table_source("half-mirror", store), unit_vector(0.2, 0.7)
+    found = in_room(source, np.tile(wr, (POINTS, 1)))
     standard_error = found.std(ddof=1) / np.sqrt(POINTS)
     assert abs(found.mean() - integral(source, wr)) > BIASED * standard_error
 
 
 def test_a_peak_without_a_lobe_has_little_noise(store: Path) -> None:
-    source, wr = source_of("road-sign", store), np.tile(unit_vector(0.6, 0.7), (POINTS, 1))
+    source, wr = table_source("road-sign", store), np.tile(unit_vector(0.6, 0.7), (POINTS, 1))
     assert not source.has_lobe
     cosine = presets()["aluminum-cylinder-13c"]  # of Lambert's model
-    assert estimates(source, wr).std() < SHINY * estimates(source, wr, cosine).std()
+    assert in_room(source, wr).std() < SHINY * in_room(source, wr, cosine).std()
 
 
 def picture(store: Path, material: str, rows: Array | None, **fields: int) -> Array:
-    scene = Scene.model_validate(
-        {
-            "objects": [{"name": "ball", "material": f"store:{material}", "shape": {"kind": "sphere", "radius": 1.0}}],
-            "camera": {"position": [0.0, -5.0, 0.0], "height": 2.2, "aspect": 1.0},
-            "wavelengths_nm": list(range(420, 681, 20)),
-            "store": str(store),
-            **({} if rows is None else {"environment": around(rows, **fields).model_dump()}),
-            **({"ambient": 1.0} if rows is None else {}),
-        }
-    )
-    return np.asarray(render(scene, gather(scene, 24))[..., 0])
+    light = {"ambient": 1.0} if rows is None else {"environment": around(rows, **fields).model_dump()}
+    coarse = list(range(420, 681, 20))
+    of = scene(f"store:{material}", store=str(store), camera=FAR, wavelengths_nm=coarse, **light)
+    return np.asarray(render(of, gather(of, 24))[..., 0])
 
 
 @pytest.mark.parametrize("material", LIT)
@@ -146,12 +133,9 @@ def test_white_paper_cannot_be_seen_in_a_uniform_environment(store: Path) -> Non
 
 
 @pytest.mark.parametrize("material", LIT)
-def test_pictures_by_lobe_and_by_table_agree_within_their_noise(
-    material: str, store: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_pictures_by_lobe_and_by_table_agree(material: str, store: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     by_table = picture(store, material, ROOM, samples=64)
-    table_source = "brdfdb.scenes.environment.TableSource"
-    monkeypatch.setattr(table_source, type(None))  # no source is a table then
+    monkeypatch.setattr("brdfdb.scenes.environment.TableSource", type(None))  # no source is a table then
     off = (by_table - picture(store, material, ROOM, samples=64, seed=1)).ravel()
     assert np.any(off)
     assert abs(off.mean()) < STANDARD_ERRORS * off.std() / np.sqrt(off.size)

@@ -24,15 +24,6 @@ from tests.site.conftest import ROOT
 from tests.site.pages import Page, broken_links, read_pages
 
 NARROW = 390  # pixels of a phone
-WIDTH_IN_A_FRAME = """(async () => {
-  const frame = document.createElement("iframe");
-  const loaded = new Promise(done => { frame.onload = done; });
-  frame.src = "/%s";
-  frame.style = "width: %dpx; height: 800px; border: 0";
-  document.body.replaceChildren(frame);
-  await loaded;
-  return frame.contentDocument.documentElement.scrollWidth;
-})()"""
 
 
 def public_modules() -> list[str]:
@@ -145,23 +136,27 @@ def address(site: Path) -> Iterator[str]:
         server.shutdown()
 
 
+def opened(chromium: Chromium, page: str, width: int = NARROW, scheme: str = "light") -> int:
+    """Open a page, and return the width of its content."""
+    chromium.open(page, width=width, scheme=scheme)
+    chromium.until("document.readyState == 'complete' && location.protocol == 'http:'")
+    return int(chromium.evaluate("document.documentElement.scrollWidth"))
+
+
 def test_no_page_is_wider_than_a_phone(site: Path, pages: dict[Path, Page], chromium: Chromium, address: str) -> None:
     names = [path.relative_to(site).as_posix() for path in pages]
     alike = ("reference/api/", "gallery/figures/", "gallery/materials/")  # of these, some
     shown = [name for index, name in enumerate(names) if not name.startswith(alike) or index % 30 == 0]
-    chromium.open(f"{address}/index.html")
-    chromium.until("document.readyState == 'complete' && location.protocol == 'http:'")
-    widths = {name: chromium.evaluate(WIDTH_IN_A_FRAME % (name, NARROW)) for name in shown}
+    widths = {name: opened(chromium, f"{address}/{name}") for name in shown}
     assert {name: width for name, width in widths.items() if width > NARROW} == {}
     (site / "wide.html").write_text("<p style='width: 500px'>wide</p>", encoding="utf-8")
-    assert chromium.evaluate(WIDTH_IN_A_FRAME % ("wide.html", NARROW)) > NARROW
+    assert opened(chromium, f"{address}/wide.html") > NARROW
     (site / "wide.html").unlink()
 
 
 def test_plots_are_light_in_the_dark(chromium: Chromium, address: str) -> None:
     colour = "getComputedStyle(document.documentElement).getPropertyValue('--truth')"
     for scheme, expected in (("light", "#1b2028"), ("dark", "#e4e8ee")):
-        chromium.open(f"{address}/gallery/figures/ward-1992-fig-06.html", scheme=scheme)
-        chromium.until("document.readyState == 'complete' && location.protocol == 'http:'")
+        opened(chromium, f"{address}/gallery/figures/ward-1992-fig-06.html", 1280, scheme)
         assert chromium.evaluate("document.documentElement.dataset.theme") == scheme
         assert chromium.evaluate(colour).strip() == expected

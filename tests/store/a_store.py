@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import threading
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -48,6 +50,40 @@ def rho(store: Path | Store, name: str = "white") -> float:
 
 def pointer(root: Path, name: str = "white") -> Path:
     return root / "materials" / name / "HEAD.json"
+
+
+def chunk(root: Path, revision: str = "r000001", name: str = "white") -> Path:
+    """Return the path of the first chunk of f_r."""
+    return root / "materials" / name / revision / "brdf" / "c" / "0" / "0" / "0"
+
+
+def flip(path: Path) -> None:
+    """Flip a bit in the middle of a file."""
+    data = bytearray(path.read_bytes())
+    data[len(data) // 2] ^= 0x10
+    path.write_bytes(data)
+
+
+def in_threads(count: int, work: Callable[[], object]) -> Callable[[], list[BaseException]]:
+    """Start a function in several threads; the result waits for them and returns their errors."""
+    errors: list[BaseException] = []
+
+    def guarded() -> None:
+        try:
+            work()
+        except BaseException as error:
+            errors.append(error)
+
+    threads = [threading.Thread(target=guarded) for _ in range(count)]
+    for thread in threads:
+        thread.start()
+
+    def joined() -> list[BaseException]:
+        for thread in threads:
+            thread.join()
+        return errors
+
+    return joined
 
 
 def contents(directory: Path) -> dict[str, bytes]:

@@ -13,9 +13,7 @@ import brdfdb
 from brdfdb.errors import StoreError
 from brdfdb.store.files import sealed, unsealed
 from brdfdb.store.reader import Store
-from tests.store.a_store import lambert, pointer, publish, rho
-
-# Damage
+from tests.store.a_store import chunk, flip, lambert, pointer, publish, rho
 
 
 def delete(path: Path) -> None:
@@ -30,12 +28,6 @@ def empty(path: Path) -> None:
     path.write_bytes(b"")
 
 
-def flip(path: Path) -> None:
-    data = bytearray(path.read_bytes())
-    data[len(data) // 2] ^= 0x10
-    path.write_bytes(data)
-
-
 FILES = ["brdf/c/0/0/0", "theta_i/c/0", "brdf/zarr.json", "zarr.json", "../r000001.MANIFEST.json"]
 
 
@@ -44,27 +36,20 @@ FILES = ["brdf/c/0/0/0", "theta_i/c/0", "brdf/zarr.json", "zarr.json", "../r0000
 def test_a_damaged_file_is_found_and_never_read_as_data(root: Path, file: str, damage: Callable[[Path], None]) -> None:
     damage(root / "materials" / "white" / "r000001" / file)
     store = brdfdb.open(root)
-    with pytest.raises(StoreError, match=r"^white r000001 is damaged: ") as caught:
-        store["white"]
-    assert "\n" not in str(caught.value)
-    with pytest.raises(StoreError, match=r"^white r000001 is damaged: ") as caught:
-        store.verify("white")
+    asks: list[Callable[[Store, str], object]] = [Store.__getitem__, Store.verify]
+    asks += [Store.metadata] if file == "zarr.json" else []
+    asks += [Store.dataset] if "/c/" in file and damage is not flip else []  # else xarray would read nan
+    for ask in asks:
+        with pytest.raises(StoreError, match=r"^white r000001 is damaged: ") as caught:
+            ask(store, "white")
+        assert "\n" not in str(caught.value)
     if damage is not flip or not file.endswith("MANIFEST.json"):
         assert Path(file).name in str(caught.value)
 
 
-@pytest.mark.parametrize("damage", [delete, truncate, empty])
-def test_a_damaged_chunk_is_found_before_xarray_reads_nan_in_its_place(
-    root: Path, damage: Callable[[Path], None]
-) -> None:
-    damage(root / "materials" / "white" / "r000001" / "brdf" / "c" / "0" / "0" / "0")
-    with pytest.raises(StoreError, match=r"^white r000001 is damaged: brdf/c/0/0/0"):
-        brdfdb.open(root).dataset("white")
-
-
 def test_a_chunk_that_is_damaged_while_a_dataset_is_read_is_named(root: Path) -> None:
     with brdfdb.open(root).dataset("white") as lazy:
-        flip(root / "materials" / "white" / "r000001" / "brdf" / "c" / "0" / "0" / "0")
+        flip(chunk(root))
         with pytest.raises(StoreError, match=r"^white r000001 is damaged: the content of brdf/c/0/0/0 changed$"):
             lazy["brdf"].load()
 
@@ -78,25 +63,14 @@ def test_a_store_of_a_relative_path_stays_where_it_was_opened(root: Path, monkey
     assert (rho(store), store.path("white")) == (0.25, root / "materials" / "white" / "r000001")
 
 
-@pytest.mark.parametrize("damage", [delete, truncate, empty, flip])
-def test_damaged_attributes_are_not_served(root: Path, damage: Callable[[Path], None]) -> None:
-    damage(root / "materials" / "white" / "r000001" / "zarr.json")
-    with pytest.raises(StoreError, match=r"^white r000001 is damaged: .*zarr\.json"):
-        brdfdb.open(root).metadata("white")
-
-
 def test_any_flipped_bit_of_a_chunk_is_found(root: Path) -> None:
-    chunk = root / "materials" / "white" / "r000001" / "brdf" / "c" / "0" / "0" / "0"
-    data = chunk.read_bytes()
-    brdfdb.open(root).verify("white")
+    data = chunk(root).read_bytes()
     for bit in np.random.default_rng(0).choice(8 * len(data), 100, replace=False):
         damaged = bytearray(data)
         damaged[bit // 8] ^= 1 << (bit % 8)
-        chunk.write_bytes(damaged)
+        chunk(root).write_bytes(damaged)
         with pytest.raises(StoreError, match="white r000001 is damaged"):
             brdfdb.open(root)["white"]
-        with pytest.raises(StoreError, match="the content of brdf/c/0/0/0 changed"):
-            brdfdb.open(root).verify("white")
 
 
 def test_a_pointer_that_was_changed_is_not_followed(root: Path) -> None:

@@ -17,9 +17,7 @@ from brdfdb.store import records
 from brdfdb.store.lock import Lock
 from brdfdb.store.paths import manifest_path
 from brdfdb.store.records import check_manifest
-from tests.store.a_store import staged
-
-# Locks
+from tests.store.a_store import in_threads, staged
 
 
 def test_a_material_has_one_builder_at_a_time_and_leaves_no_lock_behind(root: Path) -> None:
@@ -37,47 +35,30 @@ def test_a_material_has_one_builder_at_a_time_and_leaves_no_lock_behind(root: Pa
 
 
 def test_a_lock_is_never_held_twice(root: Path) -> None:
-    inside, errors = [], []
+    inside: list[int] = []
 
     def work() -> None:
-        try:
-            for _ in range(200):
-                with Lock(root, "white"):
-                    inside.append(1)
-                    assert len(inside) == 1
-                    inside.pop()
-        except BaseException as error:
-            errors.append(error)
+        for _ in range(200):
+            with Lock(root, "white"):
+                inside.append(1)
+                assert len(inside) == 1
+                inside.pop()
 
-    threads = [threading.Thread(target=work) for _ in range(4)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    assert not errors
+    assert in_threads(4, work)() == []
     assert staged(root) == []
 
 
 def test_stores_that_are_made_at_the_same_moment_are_one(tmp_path: Path) -> None:
-    errors: list[BaseException] = []
     for attempt in range(20):
         barrier = threading.Barrier(4)
 
         def start(root: Path = tmp_path / str(attempt), barrier: threading.Barrier = barrier) -> None:
             barrier.wait()
-            try:
-                for _ in range(3):
-                    records.make_store(root)
-            except BaseException as error:
-                errors.append(error)
+            for _ in range(3):
+                records.make_store(root)
 
-        threads = [threading.Thread(target=start) for _ in range(4)]
-        for thread in threads:
-            thread.start()
-        for thread in threads:
-            thread.join()
-    assert not errors
-    assert all(len(brdfdb.open(tmp_path / str(attempt))) == 0 for attempt in range(20))
+        assert in_threads(4, start)() == []
+        assert len(brdfdb.open(tmp_path / str(attempt))) == 0
 
 
 PUBLISHER = """

@@ -6,7 +6,6 @@ import json
 from pathlib import Path
 from xml.etree import ElementTree
 
-import brdfdb
 from brdfdb.store.reader import Store
 from tests.store.a_store import lambert, pointer, publish
 
@@ -35,9 +34,3 @@ def test_store_with_a_damaged_pointer_or_report_is_shown(root: Path) -> None:
     pointer(root).write_text("{}", encoding="utf-8")
     (root / "audit.json").write_text("[]", encoding="utf-8")
     assert any("white is damaged" in text for text in texts(Store(root)._repr_html_()))
-
-
-def test_open_gives_what_notebooks_show(root: Path) -> None:
-    store = brdfdb.open(root)
-    assert isinstance(store, Store)
-    assert "White" in texts(store["white"]._repr_html_())

@@ -12,13 +12,12 @@ import pytest
 
 import brdfdb
 from brdfdb.errors import StoreError, UnknownMaterialError
-from brdfdb.store import revisions
 from brdfdb.store.lock import Lock
 from brdfdb.store.paths import manifest_path
 from brdfdb.store.publication import publish_dataset
 from brdfdb.store.revisions import collect, difference, history, rollback, standing
 from brdfdb.tables.layout import digest
-from tests.store.a_store import requested, rho
+from tests.store.a_store import chunk, in_threads, pointer, requested, rho
 
 
 @pytest.fixture
@@ -62,7 +61,7 @@ def test_rollback_refuses_what_is_not_there_or_damaged(root: Path) -> None:
     for revision in ("r000009", "", "../white/r000001", "HEAD.json"):
         with pytest.raises(StoreError, match=r"^white has no revision .*; it has r000001, r000002, r000003, r000004$"):
             rollback(root, "white", revision)
-    (root / "materials" / "white" / "r000002" / "brdf" / "c" / "0" / "0" / "0").write_bytes(b"")
+    chunk(root, "r000002").write_bytes(b"")
     with pytest.raises(StoreError, match=r"^white r000002 is damaged: brdf/c/0/0/0 has 0 bytes"):
         rollback(root, "white", "r000002")
     with pytest.raises(UnknownMaterialError):
@@ -78,8 +77,7 @@ def test_how_a_material_stands_to_a_request(root: Path) -> None:
     stands = standing(root, "white", {"rho": 0.5, "grid": []})
     assert (stands.state, stands.why) == ("missing", "grid changed, rho changed")
     assert standing(root, "black", {"rho": 0.5}).why == "new"
-    pointer = root / "materials" / "white" / "HEAD.json"
-    pointer.unlink()
+    pointer(root).unlink()
     stands = standing(root, "white", {"rho": 1.0})
     why = "white is damaged: HEAD.json is missing"
     assert (stands.state, stands.revision, stands.why) == ("adoptable", "r000004", why)
@@ -92,7 +90,7 @@ def test_how_a_material_stands_to_a_request(root: Path) -> None:
         ({"grid": {"a": [1.0]}}, {"grid": {"a": [2.0]}}, "grid changed"),
         ({"material": {"parameters": 1, "source": "x"}}, {"material": {"parameters": 2, "source": "x"}},
          "parameters changed"),
-        ({}, {"grid": 1}, "the current table does not say what was asked for"),
+        ({}, {"grid": 1}, "the current table does not record its request"),
     ],
 )  # fmt: skip
 def test_a_difference_is_a_phrase(old: dict[str, object], new: dict[str, object], said: str) -> None:
@@ -144,12 +142,10 @@ def test_collection_takes_what_crashes_left_behind_and_nothing_of_a_build_at_wor
 
 
 def test_collection_leaves_alone_what_no_pointer_tells_about(root: Path) -> None:
-    pointer = root / "materials" / "white" / "HEAD.json"
+    pointer(root).unlink()
     for content in (None, "{", json.dumps({"revision": "r000002"})):
-        if content is None:
-            pointer.unlink()
-        else:
-            pointer.write_text(content)
+        if content is not None:
+            pointer(root).write_text(content)
         collect(root, 1)
         assert [n for n in names(root) if n != "HEAD.json"] == [n for n in kept(1, 2, 3, 4) if n != "HEAD.json"]
 
@@ -159,32 +155,25 @@ def test_a_revision_that_is_removed_while_it_is_read_is_never_read_as_data(root:
     with store.dataset("white") as lazy:
         publish_dataset(root, "white", requested(0.5))
         collect(root, 1)
-        with pytest.raises(StoreError, match=r"^white r000004 was removed while it was read; open the material anew$"):
+        with pytest.raises(StoreError, match=r"^white r000004 was removed while it was read; open the material again$"):
             lazy["brdf"].load()
 
 
 def test_readers_of_a_material_that_is_published_and_collected_all_the_time_see_whole_tables(root: Path) -> None:
-    errors: list[BaseException] = []
-    over, reads = threading.Event(), [0]
+    over = threading.Event()
+    reads = [0]
 
     def read() -> None:
-        try:
-            while not over.is_set():
-                table = brdfdb.open(root)["white"]
-                assert np.all(table.brdf == table.brdf[0, 0, 0])
-                assert float(np.round(table.brdf[0, 0, 0] * np.pi, 6)) == table.attrs["parameters"]["rho"]
-                reads[0] += 1
-        except BaseException as error:
-            errors.append(error)
+        while not over.is_set():
+            table = brdfdb.open(root)["white"]
+            assert np.all(table.brdf == table.brdf[0, 0, 0])
+            assert float(np.round(table.brdf[0, 0, 0] * np.pi, 6)) == table.attrs["parameters"]["rho"]
+            reads[0] += 1
 
-    readers = [threading.Thread(target=read) for _ in range(2)]
-    for reader in readers:
-        reader.start()
+    errors = in_threads(2, read)
     for number in range(40):
         publish_dataset(root, "white", requested(number % 8 / 8))
-        revisions.collect(root, 1)
+        collect(root, 1)
     over.set()
-    for reader in readers:
-        reader.join()
-    assert not errors
+    assert errors() == []
     assert reads[0] > 5

@@ -15,6 +15,7 @@ from brdfdb.store.reader import Store
 from brdfdb.store.records import Summary, fields_of, record_of
 from brdfdb.store.summary_words import Audited, colours, energy, formula_error, last_audit
 
+ANSWERS = ("as_published", "conserves_energy")
 ALBEDO = {"albedo": 1.37, "theta_i_deg": 80.0, "wavelength_nm": 550.0, "tolerance": 1e-3}
 
 
@@ -55,17 +56,19 @@ def test_an_albedo_above_1_is_told_before_any_audit_and_by_the_audit_after_it() 
     assert energy({"largest_albedo": above}, None) == "not audited: albedo of the model 1.37 at 80°, 550 nm"
 
 
-def test_the_audit_of_an_older_program_has_one_verdict(tmp_path: Path) -> None:
-    answers = {"as_published": {"text": "yes"}, "conserves_energy": {"text": "no: albedo 2"}}
-    found = [
-        {"material": "old", "revision": "r000001", "verdict": "passes"},
-        {"material": "new", "revision": "r000002", "verdict": "violates", **answers},
+def audited(path: Path, **answers: str) -> None:
+    """Write an audit of the first revisions of materials, each with an answer."""
+    materials = [
+        {"material": name, "revision": "r1", "verdict": "x", **{key: {"text": text} for key in ANSWERS}}
+        for name, text in answers.items()
     ]
-    (tmp_path / "audit.json").write_text(json.dumps({"materials": found}), encoding="utf-8")
-    assert last_audit(tmp_path) == {
-        ("old", "r000001"): Audited("passes", ""),
-        ("new", "r000002"): Audited("yes", "no: albedo 2"),
-    }
+    path.write_text(json.dumps({"materials": materials}), encoding="utf-8")
+
+
+def test_the_audit_of_an_older_program_has_one_verdict(tmp_path: Path) -> None:
+    old = {"material": "old", "revision": "r1", "verdict": "passes"}
+    (tmp_path / "audit.json").write_text(json.dumps({"materials": [old]}), encoding="utf-8")
+    assert last_audit(tmp_path) == {("old", "r1"): Audited("passes", "")}
     for broken in ("", "[]", '{"materials": [1]}', '{"materials": [{"as_published": 1}]}'):
         (tmp_path / "audit.json").write_text(broken, encoding="utf-8")
         assert last_audit(tmp_path) == {}
@@ -81,17 +84,13 @@ def test_a_pointer_of_an_older_program_is_read_and_a_wrong_one_is_not(root: Path
         record_of(wrong, Summary, "white", "HEAD.json")
 
 
-def test_answers_of_a_part_of_a_store_stand_beside_those_of_all(tmp_path: Path) -> None:
-    def entry(material: str, revision: str, text: str) -> dict[str, object]:
-        answers = {"as_published": {"text": text}, "conserves_energy": {"text": text}}
-        return {"material": material, "revision": revision, "verdict": text, **answers}
-
-    whole, part = tmp_path / "audit.json", tmp_path / "audit-part.json"
-    whole.write_text(json.dumps({"materials": [entry("a", "r1", "old"), entry("b", "r1", "old")]}), encoding="utf-8")
-    part.write_text(json.dumps({"materials": [entry("b", "r1", "new"), entry("c", "r1", "new")]}), encoding="utf-8")
-    os.utime(whole, (1.0, 1.0))
+def test_the_newer_of_two_audits_answers_for_the_materials_in_both(tmp_path: Path) -> None:
+    part = tmp_path / "audit-part.json"
+    audited(tmp_path / "audit.json", a="old", b="old")
+    audited(part, b="new", c="new")
+    os.utime(tmp_path / "audit.json", (1.0, 1.0))
     answers = last_audit(tmp_path)
-    assert [answers[name, "r1"].as_published for name in "abc"] == ["old", "new", "new"]
+    assert [answers[name, "r1"] for name in "abc"] == [Audited(text, text) for text in ("old", "new", "new")]
     os.utime(part, (0.0, 0.0))
     assert last_audit(tmp_path)["b", "r1"].as_published == "old"
     part.write_text("{", encoding="utf-8")

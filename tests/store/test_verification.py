@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 import os
 import shutil
 from collections.abc import Callable
@@ -22,7 +20,7 @@ from brdfdb.store.publication import publish_dataset
 from brdfdb.store.records import make_store
 from brdfdb.store.revisions import adoptable, collect, history, rollback, standing
 from brdfdb.tables.layout import digest
-from tests.store.a_store import requested, rho
+from tests.store.a_store import chunk, flip, pointer, requested, rho
 
 
 def findings(root: Path) -> list[str]:
@@ -48,17 +46,11 @@ def test_a_sound_store_has_no_findings_and_counts_its_bytes(root: Path) -> None:
     assert verification.material(root, "white") == (size, [])
 
 
-def test_the_first_line_of_a_sealed_file_is_the_digest_of_the_others(root: Path) -> None:
-    first, _, rest = (root / "materials" / "white" / "HEAD.json").read_bytes().partition(b"\n")
-    assert json.loads(first.rstrip(b",") + b"}") == {"sha256": hashlib.sha256(rest).hexdigest()}
-
-
 # What the chain of digests notices
 
 
 def test_a_pointer_that_says_other_than_its_manifest_is_named_and_repaired(root: Path) -> None:
-    head = root / "materials" / "white" / "HEAD.json"
-    changed(head, title="Black")
+    changed(pointer(root), title="Black")
     said = "white is damaged: HEAD.json says title 'Black', not 'White'; `brdfdb build` with its recipe repairs it, or"
     assert findings(root) == [f"{said} `brdfdb rollback white r000003`"]
     assert rollback(root, "white", "r000003") == "r000003"
@@ -67,16 +59,13 @@ def test_a_pointer_that_says_other_than_its_manifest_is_named_and_repaired(root:
 
 
 def test_a_pointer_that_was_lost_is_missed_and_made_again(root: Path) -> None:
-    (root / "materials" / "white" / "HEAD.json").unlink()
+    pointer(root).unlink()
     store = brdfdb.open(root)
-    assert "white" in store
-    assert list(store) == ["white"]
+    assert ("white" in store, list(store)) == (True, ["white"])
     with pytest.raises(StoreError, match=r"^white is damaged: HEAD\.json is missing$"):
         store["white"]
-    said = (
-        "white is damaged: HEAD.json is missing; `brdfdb build` with its recipe repairs it, or `brdfdb rollback white "
-    )
-    assert findings(root) == [f"{said}r000003`"]
+    said = "white is damaged: HEAD.json is missing; `brdfdb build` with its recipe repairs it, or"
+    assert findings(root) == [f"{said} `brdfdb rollback white r000003`"]
     assert rollback(root, "white", "r000003") == ""
     assert (findings(root), rho(root)) == ([], 0.75)
     assert publish_dataset(root, "white", requested(1.0))[0] == "r000004"
@@ -84,11 +73,10 @@ def test_a_pointer_that_was_lost_is_missed_and_made_again(root: Path) -> None:
 
 def test_a_pointer_that_a_first_publication_is_about_to_write_is_not_missed(tmp_path: Path) -> None:
     publish_dataset(tmp_path, "white", requested(0.25))
-    (tmp_path / "materials" / "white" / "HEAD.json").unlink()
+    pointer(tmp_path).unlink()
     (tmp_path / ".staging" / "white" / "0123456789abcdef").mkdir(parents=True)  # as if killed before the swap
     store = brdfdb.open(tmp_path)
-    assert list(store) == []
-    assert "white" not in store
+    assert ("white" in store, list(store)) == (False, [])
     collect(tmp_path)
     assert list(store) == []
 
@@ -96,24 +84,20 @@ def test_a_pointer_that_a_first_publication_is_about_to_write_is_not_missed(tmp_
 def test_an_altered_older_manifest_is_not_believed(root: Path) -> None:
     older = manifest_path(root / "materials" / "white" / "r000001")
     files = unsealed(older.read_bytes(), "", "")["files"]
-    chunk = older.with_name("r000001") / "brdf" / "c" / "0" / "0" / "0"
-    other = (older.with_name("r000002") / "brdf" / "c" / "0" / "0" / "0").read_bytes()
-    chunk.write_bytes(other)
-    newer = unsealed(manifest_path(root / "materials" / "white" / "r000002").read_bytes(), "", "")["files"]
+    newer = unsealed(older.with_name("r000002.MANIFEST.json").read_bytes(), "", "")["files"]
+    chunk(root).write_bytes(chunk(root, "r000002").read_bytes())
     changed(older, files={**files, "brdf/c/0/0/0": newer["brdf/c/0/0/0"]})
-    said = r"^white r000001 is damaged: r000001\.MANIFEST\.json is not the one whose digest was recorded$"
+    said = "white r000001 is damaged: r000001.MANIFEST.json is not the one whose digest was recorded"
     for ask in (
         lambda: rollback(root, "white", "r000001"),
         lambda: history(root, "white"),
         lambda: brdfdb.open(root).table("white", "r000001"),
     ):
-        with pytest.raises(StoreError, match=said):
+        with pytest.raises(StoreError, match=f"^{said}$"):
             ask()
     assert adoptable(root, "white", digest({"rho": 0.25})) is None
     (found,) = findings(root)
-    assert found.startswith(
-        "white r000001 is damaged: r000001.MANIFEST.json is not the one whose digest was recorded ("
-    )
+    assert found.startswith(f"{said} (")
     assert found.endswith("; `brdfdb gc --damaged` removes it")
     assert "materials/white/r000001" in collect(root, 9, damaged=True).removed
     assert findings(root) == []
@@ -121,15 +105,12 @@ def test_an_altered_older_manifest_is_not_believed(root: Path) -> None:
 
 
 def test_a_damaged_older_revision_is_named_and_collected(root: Path) -> None:
-    chunk = root / "materials" / "white" / "r000001" / "brdf" / "c" / "0" / "0" / "0"
-    chunk.write_bytes(chunk.read_bytes()[:-1] + b"?")
+    flip(chunk(root))
     said = "white r000001 is damaged: the content of brdf/c/0/0/0 changed (not the current revision); "
     assert findings(root) == [f"{said}`brdfdb gc --damaged` removes it"]
     assert collect(root, 9).removed == []
-    assert collect(root, 9, damaged=True).removed == [
-        "materials/white/r000001.MANIFEST.json",
-        "materials/white/r000001",
-    ]
+    removed = collect(root, 9, damaged=True).removed
+    assert removed == ["materials/white/r000001.MANIFEST.json", "materials/white/r000001"]
     assert findings(root) == []
 
 
@@ -154,9 +135,7 @@ def test_the_marker_of_a_store_with_tables_is_written_anew(root: Path, damage: C
     assert (findings(root), rho(root)) == ([], 0.75)
 
 
-def test_a_revision_that_is_superseded_and_collected_while_it_is_verified_is_no_alarm(
-    root: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_revision_superseded_during_verification_is_no_finding(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     check, waiting = verification.check_manifest, [1.0, 0.125]
 
     def overtaken(*arguments: object, **keywords: object) -> object:
@@ -193,19 +172,10 @@ def test_verify_knows_what_a_table_is(
     assert found == f"white r000004 {said}; `rm {manifest}`, then `brdfdb build` with its recipe repairs it"
 
 
-def test_a_dataset_in_float64_is_published_in_float32_and_verified(root: Path) -> None:
-    publish_dataset(root, "white", requested(0.5).astype(np.float64))
-    assert findings(root) == []
-    assert rho(root) == 0.5
-
-
 @pytest.mark.parametrize(
     ("change", "said"),
     [
         (lambda d: d.rename(brdf="rho"), r"brdf: neither it nor parts is among the arrays "),
-        (lambda d: d.drop_vars("theta_r"), r"grid axes: none of "),
-        (lambda d: d.assign_coords(theta_i=np.deg2rad(d.theta_i)[::-1]), "theta_i: the nodes must increase strictly"),
-        (lambda d: d.assign_coords(delta_phi=[0.0, 1.5, 3.14]), "delta_phi: ends at 3.14 degrees, must end at 180"),
         (lambda d: d.transpose("theta_r", "theta_i", "delta_phi"), r"brdf: shape .* is not "),
         (lambda d: d.transpose("theta_i", "delta_phi", "theta_r"), r"brdf: its dimensions .* must begin with "),
         (lambda d: d.assign(brdf=d["brdf"].astype(np.int32)), "brdf: its values are int32, not float32"),
@@ -217,6 +187,8 @@ def test_a_dataset_that_no_lookup_can_read_is_not_published(
     with pytest.raises(ParameterError, match=f"^{said}"):
         publish_dataset(root, "white", change(requested(0.5)))
     assert brdfdb.open(root).head("white") == "r000003"
+    publish_dataset(root, "white", requested(0.5).astype(np.float64))  # these are converted
+    assert (findings(root), rho(root)) == ([], 0.5)
 
 
 def test_verify_remarks_on_what_a_table_does_not_state(root: Path) -> None:
@@ -250,10 +222,11 @@ def test_verify_decodes_every_chunk(root: Path, monkeypatch: pytest.MonkeyPatch)
 
 def test_a_revision_of_another_material_is_not_adopted(root: Path) -> None:
     publish_dataset(root, "black", requested(0.125))
-    white, black = root / "materials" / "white", root / "materials" / "black"
-    shutil.copytree(black / "r000001", white / "r000009")
-    shutil.copyfile(manifest_path(black / "r000001"), manifest_path(white / "r000009"))
-    (white / "HEAD.json").unlink()
+    black = root / "materials" / "black" / "r000001"
+    white = root / "materials" / "white" / "r000009"
+    shutil.copytree(black, white)
+    shutil.copyfile(manifest_path(black), manifest_path(white))
+    pointer(root).unlink()
     (found,) = findings(root)
     assert "`brdfdb rollback white r000003`" in found
     said = r"^white r000009 is damaged: r000009\.MANIFEST\.json is that of black r000001$"
@@ -278,8 +251,7 @@ def test_a_revision_without_its_directory_is_named_and_stays_while_a_snapshot_na
 
 
 def test_a_pointer_that_is_a_pipe_is_damage_and_does_not_hang(root: Path) -> None:
-    path = root / "materials" / "white" / "HEAD.json"
-    path.unlink()
-    os.mkfifo(path)
+    pointer(root).unlink()
+    os.mkfifo(pointer(root))
     with pytest.raises(StoreError, match=r"^white is damaged: HEAD\.json cannot be read: Not a regular file$"):
         brdfdb.open(root)["white"]

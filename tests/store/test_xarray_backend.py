@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,28 +18,18 @@ from brdfdb.materials import presets
 from brdfdb.store import publication
 from brdfdb.store.publication import publish_dataset
 from brdfdb.store.snapshots import create
-from brdfdb.tables.grids import Grid
-from brdfdb.tables.layout import Interpolation, Layout
 from brdfdb.tables.tabulation import tabulate
 from tests.api.a_store import serving
+from tests.tables.test_xarray_view import LAYOUTS as TABLES
 
-WAVELENGTHS = np.array([450.0, 550.0, 650.0])
-POLAR = Grid({"theta_i": [0, 30, 60, 89], "theta_r": [0, 30, 60, 89], "delta_phi": [0, 90, 180]})
-TURNED = Grid({"theta_h": [0, 3, 10, 40], "phi_h": [0, 45, 90], "theta_d": [0, 45, 79], "phi_d": [0, 90, 180]})
-BASIS = np.linalg.qr(np.array([[1.0, 1.0, 1.0], [0.0, 1.0, 2.0]]).T)[0].T
-LOGARITHMS = Interpolation("cubic", True, 1e-3)
-LAYOUTS = {
-    "clay": Layout(presets()["clay-vase"], POLAR),
-    "brass": Layout(presets()["rolled-brass"], TURNED, interpolation=LOGARITHMS),
-    "copper": Layout(presets()["scene-copper-sphere"], POLAR, WAVELENGTHS, LOGARITHMS, BASIS),
-}
+LAYOUTS = {name: TABLES[kind] for name, kind in (("clay", "plain"), ("brass", "anisotropic"), ("copper", "factored"))}
 
 
 @pytest.fixture(scope="module")
 def root(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A store with a plain table, an anisotropic one and a factored one with a specular part; two revisions of clay."""
     store = tmp_path_factory.mktemp("backend") / "store"
-    publish_dataset(store, "clay", tabulate(Layout(presets()["foam"], POLAR)))
+    publish_dataset(store, "clay", tabulate(replace(LAYOUTS["clay"], source=presets()["foam"])))
     create(store, "first")
     for name, layout in LAYOUTS.items():
         publish_dataset(store, name, tabulate(layout))
@@ -50,51 +41,21 @@ def opened(place: Any, **keywords: Any) -> xr.Dataset:
 
 
 @pytest.mark.parametrize("name", LAYOUTS)
-def test_a_material_a_revision_and_a_copy_give_brdf_over_all_axes_lazily(name: str, root: Path, tmp_path: Path) -> None:
+def test_all_ways_to_a_revision_give_brdf_lazily(name: str, root: Path, tmp_path: Path) -> None:
     store = brdfdb.open(root)
-    table, path = store[name], store.path(name)
-    copy = shutil.copytree(path, tmp_path / "copy")
-    for place, keywords in ((path.parent, {}), (str(path), {}), (copy, {}), (root, {"material": name})):
+    table = store[name]
+    copy = shutil.copytree(store.path(name), tmp_path / "copy")
+    for place, keywords in ((store.path(name).parent, {}), (copy, {}), (root, {"material": name})):
         with opened(place, **keywords) as dataset:
             assert not dataset["brdf"].variable._in_memory
-            spectrum = () if table.wavelength_nm is None else ("wavelength",)
-            assert dataset["brdf"].dims == (*table.grid.names, *spectrum)
             np.testing.assert_array_equal(dataset["brdf"].values, table.brdf)
             assert dataset.attrs["title"] == table.metadata.title
-
-
-def test_revisions_and_snapshots_are_named_by_keywords(root: Path) -> None:
-    foam = brdfdb.open(root).table("clay", "r000001").brdf
-    for keywords in ({"revision": "r000001"}, {"snapshot": "first"}):
-        np.testing.assert_array_equal(opened(root, material="clay", **keywords)["brdf"].values, foam)
-        np.testing.assert_array_equal(opened(root / "materials" / "clay", **keywords)["brdf"].values, foam)
-
-
-def test_a_service_is_read_as_far_as_needed(root: Path) -> None:
-    copper = brdfdb.open(root)["copper"]
-    with serving(root) as url:
-        for place, keywords in (
-            (url, {"material": "copper"}),
-            (url, {"material": "copper", "revision": "r000001"}),
-            (f"{url}/v1/store/materials/copper/r000001", {}),
-        ):
-            with opened(place, **keywords) as dataset:
-                np.testing.assert_array_equal(dataset["brdf"].isel(theta_i=1).values, copper.brdf[1])
-        with pytest.raises(ParameterError, match=r"^material: http.* is not the address of a revision"):
-            opened(url)
-        with pytest.raises(UnknownMaterialError, match=r"^no material 'cooper' in the store; closest: copper"):
-            opened(url, material="cooper")
-        pinned = f"r000001-{copper.digest[:16]}"
-        np.testing.assert_array_equal(opened(url, material="copper", revision=pinned)["brdf"][1], copper.brdf[1])
-        for revision in ("r000009", "r000001-0123456789abcdef"):
-            with pytest.raises(UnknownRevisionError, match=rf"^copper has no revision '{revision}'"):
-                opened(f"{url}/v1/store/materials/copper/{revision}")
-
-
-@pytest.mark.parametrize("name", LAYOUTS)
-def test_netcdf_and_zarr_files_hold_what_the_table_does(name: str, root: Path, tmp_path: Path) -> None:
-    table = brdfdb.open(root)[name]
-    with opened(root, material=name) as dataset:
+            assert dataset.attrs["Conventions"].startswith("CF-")
+            assert all(found.attrs["units"] and found.attrs["long_name"] for found in dataset.variables.values())
+            assert "parts" not in opened(place, drop_variables=["parts", "spectra"], **keywords)
+    with opened(str(store.path(name))) as dataset:
+        spectrum = () if table.wavelength_nm is None else ("wavelength",)
+        assert dataset["brdf"].dims == (*table.grid.names, *spectrum)
         dataset.to_netcdf(tmp_path / "table.nc", engine="scipy")
         dataset.to_zarr(tmp_path / "table.zarr", consolidated=False)
     for written in (
@@ -110,32 +71,50 @@ def test_netcdf_and_zarr_files_hold_what_the_table_does(name: str, root: Path, t
             assert written.attrs["anisotropic"] == table.anisotropic
 
 
-def test_variables_say_what_they_are_as_cf_does(root: Path) -> None:
-    with opened(root, material="copper") as dataset:
-        assert dataset.attrs["Conventions"].startswith("CF-")
-        assert all(variable.attrs["units"] and variable.attrs["long_name"] for variable in dataset.variables.values())
-        assert dataset["brdf"].attrs["units"] == "sr-1"
-        assert dataset["wavelength"].attrs["standard_name"] == "radiation_wavelength"
-        assert "parts" not in opened(root, material="copper", drop_variables=["parts", "spectra"])
+def test_revisions_and_snapshots_are_named_by_keywords(root: Path) -> None:
+    foam = brdfdb.open(root).table("clay", "r000001").brdf
+    for keywords in ({"revision": "r000001"}, {"snapshot": "first"}):
+        np.testing.assert_array_equal(opened(root, material="clay", **keywords)["brdf"].values, foam)
+        np.testing.assert_array_equal(opened(root / "materials" / "clay", **keywords)["brdf"].values, foam)
 
 
-def test_what_is_no_table_is_refused_with_a_sentence(
-    root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    with pytest.raises(ParameterError, match=r"^material: .* is a store; name one of its materials, such as brass"):
-        opened(root)
-    with pytest.raises(UnknownMaterialError, match=r"^no material 'clya' in the store; closest: clay$"):
-        opened(root / "materials" / "clya")
-    with pytest.raises(UnknownRevisionError, match=r"^clay has no revision 'r000009'"):
-        opened(root, material="clay", revision="r000009")
-    with pytest.raises(StoreError, match=r"^no table at .*empty: name a revision, a material of a store, or"):
-        opened(tmp_path / "empty")
+def test_a_service_is_read_as_far_as_needed(root: Path) -> None:
+    copper = brdfdb.open(root)["copper"]
+    pinned = f"r000001-{copper.digest[:16]}"
+    with serving(root) as url:
+        for place, keywords in (
+            (url, {"material": "copper"}),
+            (url, {"material": "copper", "revision": "r000001"}),
+            (url, {"material": "copper", "revision": pinned}),
+            (f"{url}/v1/store/materials/copper/r000001", {}),
+        ):
+            with opened(place, **keywords) as dataset:
+                np.testing.assert_array_equal(dataset["brdf"].isel(theta_i=1).values, copper.brdf[1])
+        with pytest.raises(ParameterError, match=r"^material: http.* is not the address of a revision"):
+            opened(url)
+        with pytest.raises(UnknownMaterialError, match=r"^no material 'cooper' in the store; closest: copper"):
+            opened(url, material="cooper")
+        for revision in ("r000009", "r000001-0123456789abcdef"):
+            with pytest.raises(UnknownRevisionError, match=rf"^copper has no revision '{revision}'"):
+                opened(f"{url}/v1/store/materials/copper/{revision}")
+
+
+def test_other_places_are_refused(root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    place: Path
+    for place, keywords, error, said in (
+        (root, {}, ParameterError, "material: .* is a store; name one of its materials, such as brass"),
+        (root / "materials" / "clya", {}, UnknownMaterialError, "no material 'clya' in the store; closest: clay$"),
+        (root, {"material": "clay", "revision": "r9"}, UnknownRevisionError, "clay has no revision 'r9'"),
+        (tmp_path / "empty", {}, StoreError, "no table at .*empty: name a revision, a material of a store, or"),
+    ):
+        with pytest.raises(error, match=f"^{said}"):
+            opened(place, **keywords)
     with monkeypatch.context() as patch:  # another program does not check
         patch.setattr(publication, "checked_dataset", lambda _, dataset: dataset)
         publish_dataset(tmp_path / "other", "odd", xr.Dataset({"rho": ("theta", [0.5, 0.25])}))
-    copy = shutil.copytree(tmp_path / "other" / "materials" / "odd" / "r000001", tmp_path / "copy")
-    for place in (tmp_path / "other" / "materials" / "odd", copy):
-        with pytest.raises(StoreError, match=r"is no table: brdf: neither it nor parts is among the arrays rho$"):
+    material = tmp_path / "other" / "materials" / "odd"
+    for place in (material, shutil.copytree(material / "r000001", tmp_path / "copy")):
+        with pytest.raises(StoreError, match=r"is not a table: brdf: neither it nor parts is among the arrays rho$"):
             opened(place)
 
 

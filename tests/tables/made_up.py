@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline
 
+from brdfdb.materials import Material
+from brdfdb.tables import error_measurement
 from brdfdb.tables.grids import Grid
-from brdfdb.tables.table import Table
+from brdfdb.tables.layout import Layout
+from brdfdb.tables.stated_error import Error
+from brdfdb.tables.table import Table, table_from
+from brdfdb.tables.tabulation import block
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 # Sums of sixteen products against scipy's sums in another order; measured 5e-15 of the largest value
 INTERPOLATION_TOLERANCE = 1e-13
@@ -53,3 +61,32 @@ def scipys_cubic(values: NDArray[np.float64], wavelengths: Any) -> NDArray[np.fl
     """Catmull-Rom over wavelengths by others: slopes of parabolas are second-order differences; nothing below 0."""
     slopes = np.gradient(values, WAVELENGTHS, axis=-1, edge_order=2)
     return np.maximum(CubicHermiteSpline(WAVELENGTHS, values, slopes, axis=-1)(wavelengths), 0.0)
+
+
+def material(model: str, title: str = "Made up", **parameters: Any) -> Material:
+    """A material of no paper; metals are copper."""
+    metal = {"refractive_index": "main/Cu/Johnson"} if model == "he_torrance" else {}
+    about = {"title": title, "model": model, "source": "no paper", "parameters": parameters, **metal}
+    return Material.from_table("made-up", about)
+
+
+def values_of(layout: Layout) -> NDArray[np.float32]:
+    """The values of all blocks of a table."""
+    return np.concatenate([block(layout, rows) for rows in layout.blocks])
+
+
+def table_of(layout: Layout) -> Table:
+    """The table of a layout in memory."""
+    return Table.of(layout, values_of(layout))
+
+
+def error_of(layout: Layout, **keywords: int) -> Error:
+    """The measured error of the table of a layout."""
+    values = values_of(layout)
+    return error_measurement.measure(layout, lambda rows: values[rows], **keywords)
+
+
+def read_back(dataset: xr.Dataset, **attrs: Any) -> Table:
+    """The table that a store reads from a dataset, with further attributes."""
+    arrays = {str(name): np.asarray(variable.values) for name, variable in dataset.variables.items()}
+    return table_from("made-up", "r000001", arrays, {**dataset.attrs, **attrs})

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,13 +11,13 @@ import pytest
 from numpy.typing import NDArray
 
 from brdfdb.integrals import quadrature
-from brdfdb.materials import Material
-from brdfdb.tables import albedo, error_measurement
+from brdfdb.tables import albedo
 from brdfdb.tables.albedo import QUADRATURE_TOLERANCE, THETA_I_DEG, directional_albedo
 from brdfdb.tables.layout import Layout
 from brdfdb.tables.planner import plan
-from brdfdb.tables.table import Table, table_from
+from brdfdb.tables.table import Table
 from brdfdb.tables.tabulation import tabulate
+from tests.tables.made_up import error_of, material, read_back
 
 WAVELENGTHS = np.linspace(400.0, 700.0, 13)
 
@@ -36,18 +37,12 @@ MODEL_TOLERANCE = 1.5e-3
 
 def planned(model: str, parameters: dict[str, float], wavelength_nm: Any = None, tolerance: float = 0.02) -> Table:
     """A planned table as a store holds it."""
-    spectral = {} if wavelength_nm is None else {"refractive_index": "main/Cu/Johnson"}
-    written = {"title": "Made up", "model": model, "source": "no paper", "parameters": parameters, **spectral}
-    return measured(plan(Material.from_table("made-up", written), wavelength_nm, tolerance))
+    return measured(plan(material(model, **parameters), wavelength_nm, tolerance))
 
 
 def measured(layout: Layout) -> Table:
     """The table of a layout as a store holds it, its error measured."""
-    dataset = tabulate(layout)
-    values = dataset[layout.variable].values
-    error = error_measurement.measure(layout, lambda rows: values[rows])
-    arrays = {str(name): np.asarray(variable.values) for name, variable in dataset.variables.items()}
-    return table_from("made-up", "r000001", arrays, {**dataset.attrs, "error": error.model_dump(mode="json")})
+    return read_back(tabulate(layout), error=error_of(layout).model_dump(mode="json"))
 
 
 @functools.cache
@@ -66,9 +61,7 @@ def test_planned_tables_are_on_the_grids_that_they_are_meant_to_try(kind: str) -
 
 
 @KINDS
-def test_the_quadrature_keeps_to_its_tolerance_against_one_that_is_much_finer(
-    kind: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_quadrature_keeps_to_its_tolerance(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
     table = table_of(kind)
     monkeypatch.setattr(albedo, "THETA_I_DEG", np.array([0.0, 30.0, 75.0, 89.0]))
     found = directional_albedo(table)
@@ -84,14 +77,14 @@ def test_the_quadrature_keeps_to_its_tolerance_against_one_that_is_much_finer(
 def test_the_albedo_is_that_of_the_model(kind: str) -> None:
     table = table_of(kind)
     found = directional_albedo(table)
-    material = table.source
+    source = table.source
     np.testing.assert_array_equal(found.theta_i_deg, THETA_I_DEG)
     for at in (0, 9, 16):
         theta_i, phi_i = np.deg2rad(found.theta_i_deg[at]), np.deg2rad(found.phi_i_deg)
         for w in range(0, found.albedo.shape[2], 6):
             one = None if table.wavelength_nm is None else table.wavelength_nm[w]
             exact, _ = quadrature.directional_albedo(
-                material.spec, theta_i, phi_i, tolerance=1e-6, **material.arguments(one)
+                source.spec, theta_i, phi_i, tolerance=1e-6, **source.arguments(one)
             )
             np.testing.assert_allclose(found.albedo[at, :, w], exact, atol=MODEL_TOLERANCE)
 
@@ -120,6 +113,5 @@ def test_of_a_planned_table_that_is_linear_it_is_exact_up_to_90_degrees() -> Non
 
 def test_a_table_that_holds_nan_has_no_albedo() -> None:
     table = table_of("half-difference")
-    values = np.full_like(table.values, np.nan)
-    broken = Table(**{**{name: getattr(table, name) for name in table.__dataclass_fields__}, "values": values})
+    broken = replace(table, values=np.full_like(table.values, np.nan))
     assert np.isnan(directional_albedo(broken).albedo).all()

@@ -11,7 +11,7 @@ import pytest
 
 from brdfdb.geometry import checked_angles, radians, unit_vector
 from brdfdb.materials import Material, presets
-from brdfdb.tables import error_measurement, tabulation
+from brdfdb.tables import error_measurement
 from brdfdb.tables.error_measurement import compare, draw, floor_of, measure, model_values, relative
 from brdfdb.tables.grids import Grid
 from brdfdb.tables.layout import Interpolation, Layout
@@ -19,6 +19,7 @@ from brdfdb.tables.places import BANDS, BANDS_DEG, ROWS
 from brdfdb.tables.planner import plan
 from brdfdb.tables.stated_error import stated
 from brdfdb.tables.table import Table
+from tests.tables.made_up import error_of, table_of, values_of
 
 WAVELENGTHS = np.array([400.0, 550.0, 700.0])
 ALBEDO_TOLERANCE = 0.01  # measured: 0.005, of 360 000 directions or of 18 000 over the hemisphere
@@ -32,23 +33,13 @@ NAMES = ["glossy-grey-paper", "rolled-brass", "clay-vase", "scene-copper-sphere"
 def coarse(name: str) -> Layout:
     """A table that is off by several percent."""
     material = presets()[name]
-    theta = np.append(np.arange(0.0, 89.0, 8.0), 89.5)
     if material.anisotropic:
-        grid = Grid(
-            {
-                "theta_h": np.linspace(0.0, 1.0, 17) ** 2 * 90.0,
-                "phi_h": [0, 20, 45, 70, 90],
-                "theta_d": [0, 90],
-                "phi_d": [0, 180],
-            }
-        )
+        halves = {"theta_h": np.linspace(0.0, 1.0, 17) ** 2 * 90.0, "phi_h": [0, 20, 45, 70, 90]}
+        grid = Grid({**halves, "theta_d": [0, 90], "phi_d": [0, 180]})
         return Layout(material, grid, interpolation=Interpolation("cubic", True, 1e-4, 0.5))
+    theta = np.append(np.arange(0.0, 89.0, 8.0), 89.5)
     grid = Grid({"theta_i": theta, "theta_r": theta, "delta_phi": np.linspace(0.0, 180.0, 25)})
     return Layout(material, grid, WAVELENGTHS if material.spectral else None)
-
-
-def values_of(layout: Layout) -> np.ndarray:
-    return np.concatenate([tabulation.block(layout, rows) for rows in layout.blocks])
 
 
 @pytest.mark.parametrize("name", [*NAMES, "aluminum-cylinder-13c"])
@@ -109,9 +100,7 @@ def test_errors_of_small_values_are_relative_to_the_floor() -> None:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_a_stated_error_and_one_measured_afresh_agree(name: str) -> None:
-    layout = coarse(name)
-    values = values_of(layout)
-    once, again = (measure(layout, lambda rows: values[rows], seed=seed) for seed in (error_measurement.SEED, 5))
+    once, again = (error_of(coarse(name), seed=seed) for seed in (error_measurement.SEED, 5))
     assert once.overall.p99 > 1e-4
     assert again.overall.p99 == pytest.approx(once.overall.p99, rel=AGREEMENT)
 
@@ -157,12 +146,10 @@ def test_a_value_is_given_the_error_of_its_band_and_wavelength() -> None:
 def stating(name: str, *wavelength_nm: float) -> Table:
     """A table that is planned for 1 %, with the error that is measured of it."""
     layout = plan(presets()[name], np.array(wavelength_nm) if wavelength_nm else None, 0.01)
-    values = values_of(layout)
-    error = measure(layout, lambda rows: values[rows])
-    return replace(Table.of(layout, values), attrs={"error": error.model_dump(mode="json")})
+    return replace(table_of(layout), attrs={"error": error_of(layout).model_dump(mode="json")})
 
 
-def held(table: Table, material: Material, wi: np.ndarray, wr: np.ndarray, at: np.ndarray | None = None) -> float:
+def within(table: Table, material: Material, wi: np.ndarray, wr: np.ndarray, at: np.ndarray | None = None) -> float:
     """The share of values that are as near to the model as stated."""
     found = table.lookup_vectors_with_error(wi, wr, at)
     truth = model_values(material, at, wi, wr).reshape(found.brdf.shape)
@@ -192,9 +179,8 @@ def grazing(count: int) -> tuple[np.ndarray, np.ndarray]:
 def test_what_is_stated_holds_in_thin_places(name: str) -> None:
     material = presets()[name]
     table = stating(name, *(WAVELENGTHS if material.spectral else ()))
-    assert held(table, material, *towards_the_light(3000, 0.0), table.wavelength_nm) >= HOLDS
-    assert held(table, material, *towards_the_light(3000, 2.0), table.wavelength_nm) >= HOLDS
-    assert held(table, material, *grazing(3000), table.wavelength_nm) >= HOLDS
+    for pairs in (towards_the_light(3000, 0.0), towards_the_light(3000, 2.0), grazing(3000)):
+        assert within(table, material, *pairs, table.wavelength_nm) >= HOLDS
 
 
 @pytest.mark.parametrize("wavelength_nm", [WAVELENGTHS, KINKED], ids=["three", "every 10 nm"])
@@ -205,9 +191,9 @@ def test_what_is_stated_holds_between_wavelengths(wavelength_nm: np.ndarray) -> 
     inside = wavelength_nm[:-1, np.newaxis] + np.diff(wavelength_nm)[:, np.newaxis] * [0.1, 0.5, 0.68, 0.9]
     for at in [*inside.reshape(-1), 600.0, 615.0]:
         some = np.array([at])
-        assert held(table, material, drawn.wi[drawn.above], drawn.wr[drawn.above], some) >= HOLDS
-    assert held(table, material, *towards_the_light(1000, 0.0), inside.reshape(-1)) >= HOLDS
-    assert held(table, material, *grazing(1000), inside.reshape(-1)) >= HOLDS
+        assert within(table, material, drawn.wi[drawn.above], drawn.wr[drawn.above], some) >= HOLDS
+    for pairs in (towards_the_light(1000, 0.0), grazing(1000)):
+        assert within(table, material, *pairs, inside.reshape(-1)) >= HOLDS
 
 
 def test_between_wavelengths_no_less_is_stated_than_on_them() -> None:
@@ -216,8 +202,8 @@ def test_between_wavelengths_no_less_is_stated_than_on_them() -> None:
     assert error.between is not None
     assert error.limits.shape == (ROWS, 5)
     assert np.all(error.limits[:, 3:] >= np.maximum(error.limits[:, :2], error.limits[:, 1:3]))
-    assert np.all(np.array(error.between.wavelength_nm) > WAVELENGTHS[:2])
-    assert np.all(np.array(error.between.wavelength_nm) < WAVELENGTHS[1:])
+    between = np.array(error.between.wavelength_nm)
+    assert np.all((between > WAVELENGTHS[:2]) & (between < WAVELENGTHS[1:]))
     # copper's edge lies between 550 and 700 nm: a tenth, where the wavelengths themselves are off by a percent
     assert np.all(error.limits[: BANDS - 1, 4] > 5.0 * error.limits[: BANDS - 1, 1])
 

@@ -11,7 +11,7 @@ from brdfdb import models
 from brdfdb.audit.table_energy import table_energy_of
 from brdfdb.forms import catalogue
 from brdfdb.geometry import unit_vector
-from brdfdb.materials import FunctionSource, Material, presets
+from brdfdb.materials import FunctionSource, presets
 from brdfdb.tables import error_measurement
 from brdfdb.tables.albedo import largest_albedo
 from brdfdb.tables.error_measurement import RandomPairs, worst_pair
@@ -19,10 +19,16 @@ from brdfdb.tables.layout import Layout
 from brdfdb.tables.planner import coarsest, plan
 from brdfdb.tables.stated_error import LargestAlbedo
 from brdfdb.tables.statements import DIRECTIONS, SEED, first_numbers, formula_error_of, highest_rung
-from brdfdb.tables.table import Table, table_from
 from brdfdb.tables.tabulation import tabulate
+from tests.tables.made_up import material, read_back, table_of
 
 AT = np.array([460.0])
+
+
+def largest_of(layout: Layout) -> Any:
+    """The largest albedo that a build states."""
+    values = tabulate(layout)[layout.variable].to_numpy()
+    return first_numbers(layout, lambda rows: values[rows])["largest_albedo"]
 
 
 def test_the_error_of_the_fit_is_that_of_its_chart() -> None:
@@ -68,36 +74,23 @@ def test_no_rung_of_a_function_is_known() -> None:
 
 
 def test_half_vectors_of_ward_are_measured_against_his_ellipse() -> None:
-    parameters = {"rho_d": 0.1, "rho_s": 0.2, "alpha_x": 0.2, "alpha_y": 0.2}
-    made = Material.from_table(
-        "x", {"title": "X", "model": "ward_half_vector", "source": "x", "parameters": parameters}
-    )
+    made = material("ward_half_vector", rho_d=0.1, rho_s=0.2, alpha_x=0.2, alpha_y=0.2)
     assert formula_error_of(made, None).rung == "elliptical Gaussian, eq. 5a"
 
 
 @pytest.mark.parametrize(("name", "largest"), [("blue-plastic", 1.15), ("aluminum-cylinder-13b", 1.0)])
-def test_the_largest_albedo_of_a_build_is_that_of_the_audit_of_the_table_and_of_its_model(
-    name: str, largest: float
-) -> None:
+def test_the_largest_albedo_is_that_of_the_audit(name: str, largest: float) -> None:
     layout = plan(presets()[name], AT, 0.01)
-    dataset = tabulate(layout)
-    stated = first_numbers(layout, lambda rows: dataset["brdf"].values[rows])["largest_albedo"]
-    arrays = {str(key): np.asarray(variable.values) for key, variable in dataset.variables.items()}
-    stored = table_from(name, "r000001", arrays, dataset.attrs)
-    audited = table_energy_of(stored, None)
+    stated = largest_of(layout)
+    audited = table_energy_of(read_back(tabulate(layout)), None)
     assert (audited.max_albedo, audited.max_at_theta_i_deg) == (pytest.approx(largest, abs=1e-6), 90.0)
     assert (stated.albedo, stated.theta_i_deg) == (pytest.approx(largest, abs=1e-4), 90.0)
 
 
 def test_the_largest_albedo_is_that_of_the_model_at_each_tolerance() -> None:
     """Minnaert's law has the albedo rho cos^(k - 1): 1.0306 at 89.9 degrees, where tables stated 0.901 and 1.036."""
-    parameters = {"k": 0.92, "rho": 0.62}
-    made = Material.from_table("m", {"title": "M", "model": "minnaert", "source": "x", "parameters": parameters})
-    stated = []
-    for tolerance in (0.01, 0.05):
-        layout = plan(made, None, tolerance)
-        values = tabulate(layout)[layout.variable].to_numpy()
-        stated.append(first_numbers(layout, lambda rows, values=values: values[rows])["largest_albedo"])
+    made = material("minnaert", k=0.92, rho=0.62)
+    stated = [largest_of(plan(made, None, tolerance)) for tolerance in (0.01, 0.05)]
     assert stated[0] == stated[1]
     assert stated[0].albedo == pytest.approx(0.62 * np.cos(np.deg2rad(89.9)) ** -0.08, abs=1e-3)
     assert (stated[0].theta_i_deg, stated[0].up_to_theta_i_deg, stated[0].of) == (89.9, 89.9, "source")
@@ -110,9 +103,7 @@ def test_the_largest_albedo_of_a_function_is_its_own_and_that_of_its_table_is_of
         return (wi[:, 2] * wr[:, 2]) ** -0.08 * 0.62 * 1.92 / (2.0 * np.pi)
 
     source = FunctionSource(brdf=rising, name="m", title="M", provenance="made up", grazing_pole=True)
-    layout = plan(source, None, 0.05)
-    values = tabulate(layout)[layout.variable].to_numpy()
-    table = Table.of(layout, values)
+    table = table_of(plan(source, None, 0.05))
     stated = largest_albedo(table, source)
     assert stated.albedo == pytest.approx(1.0306, abs=1e-3)
     assert stated.grazing is not None
@@ -126,9 +117,7 @@ def test_the_largest_albedo_of_a_function_is_its_own_and_that_of_its_table_is_of
 def test_the_largest_albedo_has_the_specular_part() -> None:
     """Fresnel's reflectance is 1 at 90 degrees, and the uniform part of the plastic is 0.15."""
     plastic = presets()["blue-plastic"]
-    layout = Layout(plastic, coarsest(plastic), AT)
-    values = tabulate(layout)[layout.variable].to_numpy()
-    largest = first_numbers(layout, lambda rows: values[rows])["largest_albedo"]
+    largest = largest_of(Layout(plastic, coarsest(plastic), AT))
     assert (largest.theta_i_deg, largest.wavelength_nm) == (90.0, 460.0)
     assert largest.albedo == pytest.approx(1.15, abs=1e-3)
     assert largest.above_1
@@ -154,14 +143,11 @@ def test_an_albedo_is_above_1_beyond_its_tolerance(albedo: float | None, above: 
 def test_the_largest_error_has_a_reason(
     theta_i: float, theta_r: float, turn: float, f_r: float, lobe: bool, why: str
 ) -> None:
-    wi, wr = (
-        unit_vector(np.deg2rad([10.0, theta_i]), 0.3),
-        unit_vector(np.deg2rad([10.0, theta_r]), 0.3 + np.deg2rad(turn)),
-    )
-    error, truth = np.array([[0.1], [0.5]]), np.array([[1.0], [f_r]])
-    brass = presets()["rolled-brass"]
+    wi = unit_vector(np.deg2rad([10.0, theta_i]), 0.3)
+    wr = unit_vector(np.deg2rad([10.0, theta_r]), 0.3 + np.deg2rad(turn))
     pairs = RandomPairs(wi, wr, np.zeros(2, int), np.ones(2), np.array([False, lobe]), np.ones(2, bool))
-    found = worst_pair(error, truth, np.array([1e-4]), pairs, brass, None)
+    truth = np.array([[1.0], [f_r]])
+    found = worst_pair(np.array([[0.1], [0.5]]), truth, np.array([1e-4]), pairs, presets()["rolled-brass"], None)
     assert (found.theta_i_deg, found.theta_r_deg, found.delta_phi_deg) == (theta_i, theta_r, turn)
     assert found.why == why
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -21,9 +22,15 @@ from brdfdb.tables.measured_layout import tabulated
 from brdfdb.tables.table import Table
 from brdfdb.tables.tabulation import block, metadata_of
 from tests.measurements.made_up import scans, scattered
+from tests.tables.made_up import table_of
 
 RNG = np.random.default_rng(8)
 WI, WR = (unit_vector(RNG.uniform(0.0, 1.2, 500), RNG.uniform(0.0, 6.0, 500)) for _ in range(2))
+
+
+def grey(f_r: Any, **keywords: Any) -> MeasuredSource:
+    """Measured data that are a function, of one channel."""
+    return MeasuredSource.of_function(f_r, ("grey",), None, name="x", title="x", provenance="x", **keywords)
 
 
 def _lopsided(wi: Floats, wr: Floats) -> Floats:
@@ -48,7 +55,7 @@ def test_half_difference_grid_holds_both_ways_of_a_pair(anisotropic: bool) -> No
     axes |= {"phi_h": np.linspace(0.0, 90.0, 7)} if anisotropic else {}
     axes |= {"theta_d": np.linspace(0.0, 90.0, 19), "phi_d": np.linspace(0.0, 360.0 if anisotropic else 180.0, 19)}
     layout = Layout(source, Grid(axes), interpolation=Interpolation("cubic", True, 1e-4))
-    table = Table.of(layout, np.concatenate([block(layout, rows) for rows in layout.blocks]))
+    table = table_of(layout)
     for wi, wr in ((WI, WR), (WR, WI)):
         off = np.abs(table.lookup_vectors(wi, wr) / f_r(wi, wr)[:, 0] - 1.0)
         assert np.percentile(off, 95) < 0.02  # measured 0.005; the exchanged pair differs by 0.2
@@ -67,13 +74,13 @@ def test_black_data_are_refused() -> None:
     def black(wi: Floats, _: Floats) -> Floats:
         return 0.0 * wi[:, 2:]
 
-    source = MeasuredSource.of_function(black, ("grey",), None, name="x", title="x", provenance="x")
+    source = grey(black)
     with pytest.raises(ParameterError, match="values: no value is above 0"):
         tabulated(source, None, 0.05)
 
 
 def test_a_narrow_lobe_that_is_not_its_own_mirror_image_is_sampled_as_densely_as_one_that_is() -> None:
-    source = MeasuredSource.of_function(_chiral, ("grey",), None, name="x", title="x", provenance="x")
+    source = grey(_chiral)
     assert source.measured.chiral
     assert source.lobe(np.ones(1), None).alpha_x[0] == pytest.approx(0.004, rel=0.1)  # type: ignore[union-attr]
     layout, values = tabulated(source, None, 0.05)
@@ -97,7 +104,7 @@ def test_a_slope_at_the_horizon_makes_no_value_far_above_those_of_the_data() -> 
         steep = 1e-3 * np.exp(9.0 * np.exp(-lowest / 0.01))
         return np.asarray((steep + 5.0 * np.exp((half[:, 2] ** 2 - 1.0) * 100.0))[:, np.newaxis])
 
-    source = MeasuredSource.of_function(f_r, ("grey",), None, name="x", title="x", provenance="x")
+    source = grey(f_r)
     table = Table.of(*tabulated(source, None, 0.05))
     theta, turn = np.meshgrid(radians(np.linspace(60.0, 89.9, 150)), np.linspace(0.0, np.pi, 91), indexing="ij")
     for light in (85.0, 87.5):
@@ -108,14 +115,14 @@ def test_a_slope_at_the_horizon_makes_no_value_far_above_those_of_the_data() -> 
 
 
 def test_half_of_phi_d_is_refused_for_a_source_that_is_not_reciprocal() -> None:
-    source = MeasuredSource.of_function(_lopsided, ("grey",), None, name="x", title="x", provenance="x")
+    source = grey(_lopsided)
     grid = Grid({"theta_h": [0.0, 90.0], "theta_d": [0.0, 90.0], "phi_d": [0.0, 90.0]})
     with pytest.raises(ParameterError, match="not reciprocal; phi_d must end at 180"):
         Layout(source, grid)
 
 
 def test_same_nodes_of_light_and_viewer_do_not_make_data_reciprocal() -> None:
-    source = MeasuredSource.of_function(lambda wi, _: wi[:, 2:], ("grey",), None, name="x", title="x", provenance="x")
+    source = grey(lambda wi, _: wi[:, 2:])
     theta = np.linspace(0.0, 90.0, 10)
     layout = Layout(source, Grid({"theta_i": theta, "theta_r": theta, "delta_phi": [0.0, 90.0, 180.0]}))
     values = block(layout, slice(0, 10))
@@ -127,7 +134,7 @@ def test_finest_grid_is_taken_and_says_so_where_steps_keep_no_tolerance() -> Non
     def steps(wi: Floats, wr: Floats) -> Floats:
         return np.asarray(1.0 + (np.floor(17.0 * (wi[:, 2:] + wr[:, 2:])) % 2.0))
 
-    source = MeasuredSource.of_function(steps, ("grey",), None, name="x", title="x", provenance="x")
+    source = grey(steps)
     assert "does not keep to a tolerance of 0.001" in tabulated(source, None, 0.001)[0].reason
 
 
@@ -171,7 +178,7 @@ def test_directions_that_were_not_measured_count_neither_for_the_grid_nor_for_th
 
     stated = {}
     for nodes in (None, scans(lambda wi, _: wi[:, 2:], np.arange(10.0, 61.0, 10.0), 0.0)):
-        source = MeasuredSource.of_function(torn, ("grey",), None, name="x", title="x", provenance="x", nodes=nodes)
+        source = grey(torn, nodes=nodes)
         layout, values = tabulated(source, None, 0.05)
         stated[nodes is None] = measure(layout, lambda rows, values=values: values[rows])
         assert ("does not keep" in layout.reason) == (nodes is None)

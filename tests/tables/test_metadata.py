@@ -38,10 +38,6 @@ def test_what_is_written_is_read_back_and_fits_the_schema(name: str) -> None:
     assert read.attributes() == attributes
 
 
-def test_the_attributes_of_a_table_are_its_metadata() -> None:
-    assert tabulate(layout("clay-vase")).attrs == metadata_of(layout("clay-vase")).attributes()
-
-
 def test_no_attributes_are_no_error_but_a_phrase() -> None:
     bare = TableMetadata.read({})
     assert (bare.title, bare.error, bare.parameters, bare.interpolation) == (None, None, {}, Interpolation())
@@ -57,10 +53,7 @@ def test_a_strange_attribute_is_named_and_leaves_the_others() -> None:
     assert set(read.strange) == {"title", "note"}
     assert "title" not in read.missing
     assert "states its title wrongly (['White'] is not a text, in quotes)" in read.gaps
-
-
-def test_assumptions_of_earlier_tables_are_names_alone() -> None:
-    assert TableMetadata.read({"assumed": ["rho"], **RECORDED}).assumed == {"rho": None}
+    assert TableMetadata.read({"assumed": ["rho"], **RECORDED}).assumed == {"rho": None}  # as earlier tables state it
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,7 @@
 """Mixtures: tables of coloured materials that hold a few wavelengths and make the others of them."""
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from brdfdb.store.publication import publish
 from brdfdb.tables import error_measurement
 from brdfdb.tables.mixture import mixture_of
 from brdfdb.tables.planner import plan
+from brdfdb.tables.table import Table
 
 NM = np.linspace(400.0, 700.0, 41)
 RED = Spectrum(wavelengths_nm=(380.0, 550.0, 600.0, 780.0), values=(0.05, 0.1, 0.5, 0.55), origin="a test")
@@ -26,6 +28,12 @@ BRASS, CLAY = presets()["rolled-brass"], presets()["clay-vase"]
 
 def changed(material: Material, **parameters: Spectrum | float) -> Material:
     return material.model_copy(update={"parameters": material.parameters | parameters})
+
+
+def built(root: Path, material: Material, wavelengths_nm: Any, tolerance: float) -> Table:
+    """A table as a store holds it."""
+    publish(root / "store", material, wavelengths_nm=wavelengths_nm, tolerance=tolerance)
+    return brdfdb.open(root / "store")[material.name]
 
 
 PAINTED = changed(BRASS, rho_d=BLUE, rho_s=RED)
@@ -50,9 +58,8 @@ def test_a_mixture_takes_as_many_parts_as_the_model_has(material: Material, part
     np.testing.assert_array_equal(mixture.spectra[:, at], np.eye(parts))
 
 
-def test_lookups_of_a_coloured_table_keep_the_stated_error(tmp_path: object) -> None:
-    publish(f"{tmp_path}/store", PAINTED, wavelengths_nm=NM, tolerance=0.02)
-    table = brdfdb.open(f"{tmp_path}/store")[PAINTED.name]
+def test_lookups_of_a_coloured_table_keep_the_stated_error(tmp_path: Path) -> None:
+    table = built(tmp_path, PAINTED, NM, 0.02)
     assert table.part_nm is not None
     assert table.error is not None
     assert table.error.overall.p99 < 0.02
@@ -69,9 +76,8 @@ def test_lookups_of_a_coloured_table_keep_the_stated_error(tmp_path: object) -> 
     assert table.nbytes < 2 * 4 * grey.size  # the grey table holds float32 alone
 
 
-def test_the_one_column_that_a_mixture_states_is_judged_on_both_sides(tmp_path: object) -> None:
-    publish(f"{tmp_path}/store", PAINTED, wavelengths_nm=NM[::4], tolerance=0.05)
-    table = brdfdb.open(f"{tmp_path}/store")[PAINTED.name]
+def test_the_one_column_that_a_mixture_states_is_judged_on_both_sides(tmp_path: Path) -> None:
+    table = built(tmp_path, PAINTED, NM[::4], 0.05)
     error = table.error
     assert error is not None
     assert (error.columns, len(error.floor), error.limits.shape[1]) == (1, 11, 21)
@@ -88,10 +94,9 @@ EDGE = Spectrum(wavelengths_nm=(380.0, 560.0, 580.0, 780.0), values=(0.02, 0.02,
 COARSE = np.linspace(400.0, 700.0, 16)
 
 
-def test_beside_a_steep_edge_nothing_is_negative_and_other_intervals_are_not_charged(tmp_path: object) -> None:
+def test_beside_a_steep_edge_nothing_is_negative_and_other_intervals_are_not_charged(tmp_path: Path) -> None:
     steep = changed(BRASS, rho_d=EDGE, rho_s=0.05)
-    publish(f"{tmp_path}/store", steep, wavelengths_nm=COARSE, tolerance=0.03)
-    table = brdfdb.open(f"{tmp_path}/store")[steep.name]
+    table = built(tmp_path, steep, COARSE, 0.03)
     nm = np.linspace(400.0, 700.0, 301)
     drawn = error_measurement.draw(steep, COARSE, 30, 7)
     wi, wr = drawn.wi[drawn.above], drawn.wr[drawn.above]
@@ -106,25 +111,23 @@ def test_beside_a_steep_edge_nothing_is_negative_and_other_intervals_are_not_cha
 
 
 @pytest.mark.parametrize("values", [(0.0, 0.5, 0.5), (0.5, 0.5, 0.0)])
-@pytest.mark.parametrize("model", [{"model": "lambert"}, {"model": "oren_nayar", "sigma": 0.5}], ids=str)
+@pytest.mark.parametrize(("model", "others"), [("lambert", {}), ("oren_nayar", {"sigma": 0.5})])
 def test_a_surface_that_is_black_at_a_wavelength_has_a_table(
-    model: dict[str, Any], values: tuple[float, ...], tmp_path: object
+    model: str, others: dict[str, Any], values: tuple[float, ...], tmp_path: Path
 ) -> None:
     black = Spectrum(wavelengths_nm=(400.0, 500.0, 700.0), values=values, origin="a test")
-    parameters = {"rho": black} | {name: value for name, value in model.items() if name != "model"}
-    material = Material(name="black", title="Black", model=model["model"], parameters=parameters, source="a test")
-    publish(f"{tmp_path}/store", material, wavelengths_nm=[400.0, 500.0, 600.0, 700.0], tolerance=0.05)
-    table = brdfdb.open(f"{tmp_path}/store")["black"]
+    parameters = {"rho": black, **others}
+    material = Material(name="black", title="Black", model=model, parameters=parameters, source="a test")
+    table = built(tmp_path, material, [400.0, 500.0, 600.0, 700.0], 0.05)
     dark = 400.0 if values[0] == 0.0 else 700.0
     assert table.lookup(0.3, 0.0, 0.5, 1.0, wavelength_nm=dark) == 0.0
     expected = material.lookup(0.3, 0.0, 0.5, 1.0, wavelength_nm=500.0)
     np.testing.assert_allclose(table.lookup(0.3, 0.0, 0.5, 1.0, wavelength_nm=500.0), expected, rtol=0.1)
 
 
-def test_nodes_hold_the_f_r_of_lookups(tmp_path: object) -> None:
-    publish(f"{tmp_path}/store", OCHRE, wavelengths_nm=NM[::4], tolerance=0.1)
-    store = brdfdb.open(f"{tmp_path}/store")
-    table, dataset = store["ochre"], store.dataset("ochre")
+def test_nodes_hold_the_f_r_of_lookups(tmp_path: Path) -> None:
+    table = built(tmp_path, OCHRE, NM[::4], 0.1)
+    dataset = brdfdb.open(tmp_path / "store").dataset("ochre")
     theta = np.deg2rad(table.axes_deg["theta_i"][1:4])
     light, viewer = theta[:, np.newaxis], theta[np.newaxis, :]
     expected = table.lookup(light, 0.0, viewer, 0.0)
@@ -141,9 +144,8 @@ def test_a_uniform_spectrum_lies_beside_a_factored_table() -> None:
     np.testing.assert_allclose(layout.uniform * np.pi, RED.at("a", NM[::8]))
 
 
-def test_a_damaged_uniform_spectrum_is_found(tmp_path: object) -> None:
-    publish(f"{tmp_path}/store", PAINTED, wavelengths_nm=NM[::8], tolerance=0.1)
-    table = brdfdb.open(f"{tmp_path}/store")[PAINTED.name]
+def test_a_damaged_uniform_spectrum_is_found(tmp_path: Path) -> None:
+    table = built(tmp_path, PAINTED, NM[::8], 0.1)
     assert table.uniform is not None
     wrong = table.uniform.copy()
     wrong[3] *= 1.01

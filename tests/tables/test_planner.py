@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,7 +18,7 @@ from brdfdb.tables.grids import ANISOTROPIC_HALF_DIFFERENCE_AXES, HALF_DIFFERENC
 from brdfdb.tables.layout import Layout
 from brdfdb.tables.planner import plan
 from brdfdb.tables.stated_error import Error
-from brdfdb.tables.table import Table
+from tests.tables.made_up import error_of, material, table_of, values_of
 
 TOLERANCE = 0.01
 FRESH = 20261121  # a seed that the planner does not use
@@ -38,15 +39,14 @@ NAMES = [
 ]
 
 
-def spectrum(material: Material) -> NDArray[np.float64] | None:
-    if not material.spectral:
+def spectrum(source: Material) -> NDArray[np.float64] | None:
+    if not source.spectral:
         return None
-    return WAVELENGTHS if material.wavelengths_nm is None else np.array(material.wavelengths_nm)
+    return WAVELENGTHS if source.wavelengths_nm is None else np.array(source.wavelengths_nm)
 
 
-def measured(layout: Layout, seed: int = FRESH) -> Error:
-    values = np.concatenate([tabulation.block(layout, rows) for rows in layout.blocks])
-    return error_measurement.measure(layout, lambda rows: values[rows], seed=seed)
+def measured(layout: Layout) -> Error:
+    return error_of(layout, seed=FRESH)
 
 
 @pytest.fixture(scope="module")
@@ -59,18 +59,12 @@ def planned() -> dict[str, Layout]:
 @pytest.mark.parametrize("name", NAMES)
 def test_a_planned_table_keeps_to_its_tolerance_in_few_bytes(name: str, planned: dict[str, Layout]) -> None:
     layout = planned[name]
-    found = measured(layout)
-    assert found.overall.p99 <= TOLERANCE
+    assert measured(layout).overall.p99 <= TOLERANCE
     part = 4 * math.prod(layout.grid.shape)
     assert part <= (ANISOTROPIC_BYTES if layout.grid.anisotropic else ISOTROPIC_BYTES)
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_no_node_of_a_planned_table_is_below_0(name: str, planned: dict[str, Layout]) -> None:
-    layout = planned[name]
-    values = np.concatenate([tabulation.block(layout, rows) for rows in layout.blocks])
-    assert Table.of(layout, values).brdf.min() >= 0.0
-    assert layout.interpolation.logarithm or values.min() >= 0.0
+    table = table_of(layout)
+    assert table.brdf.min() >= 0.0
+    assert layout.interpolation.logarithm or table.values.min() >= 0.0
 
 
 def test_the_kind_of_table_suits_the_material(planned: dict[str, Layout]) -> None:
@@ -97,17 +91,15 @@ def test_a_layout_survives_its_document(name: str, planned: dict[str, Layout]) -
 
 
 def test_a_plan_is_the_same_every_time(planned: dict[str, Layout]) -> None:
-    material = presets()["rolled-aluminum"]
-    assert plan(material, None, TOLERANCE).document() == planned["rolled-aluminum"].document()
+    assert plan(presets()["rolled-aluminum"], None, TOLERANCE).document() == planned["rolled-aluminum"].document()
 
 
 def test_a_smaller_tolerance_takes_a_larger_table() -> None:
-    clay = presets()["clay-vase"]
-    layouts = [plan(clay, None, tolerance) for tolerance in (0.05, 0.01, 0.002)]
-    assert layouts[0].size < layouts[1].size < layouts[2].size
-    assert [measured(layout).overall.p99 <= t for layout, t in zip(layouts, (0.05, 0.01, 0.002), strict=True)] == [
-        True
-    ] * 3
+    layouts = {tolerance: plan(presets()["clay-vase"], None, tolerance) for tolerance in (0.05, 0.01, 0.002)}
+    sizes = [layout.size for layout in layouts.values()]
+    assert sizes[0] < sizes[1] < sizes[2]
+    for tolerance, layout in layouts.items():
+        assert measured(layout).overall.p99 <= tolerance
 
 
 def test_a_plan_on_the_fit_keeps_to_its_tolerance_of_the_facets() -> None:
@@ -117,8 +109,7 @@ def test_a_plan_on_the_fit_keeps_to_its_tolerance_of_the_facets() -> None:
     assert layout.source == exact_material(fit)
     drawn = error_measurement.draw(layout.source, None, 400, FRESH)
     truth = error_measurement.model_values(layout.source, None, drawn.wi, drawn.wr)
-    values = np.concatenate([tabulation.block(layout, rows) for rows in layout.blocks])
-    found = Table.of(layout, values).lookup_vectors(drawn.wi, drawn.wr).reshape(truth.shape)
+    found = table_of(layout).lookup_vectors(drawn.wi, drawn.wr).reshape(truth.shape)
     assert error_measurement.compare(found, truth, drawn).overall.p99 <= TOLERANCE
 
 
@@ -137,9 +128,7 @@ def test_a_tolerance_out_of_range_is_refused(tolerance: float) -> None:
 
 
 def test_grooves_are_planned_over_light_and_viewer() -> None:
-    table = {"title": "Grooves", "model": "oren_nayar_unidirectional", "source": "no paper"}
-    grooves = Material.from_table("grooves", {**table, "parameters": {"rho": 0.9, "theta_a_deg": 30, "phi_a_deg": 20}})
-    layout = plan(grooves, None, 0.2)
+    layout = plan(material("oren_nayar_unidirectional", rho=0.9, theta_a_deg=30, phi_a_deg=20), None, 0.2)
     assert layout.grid.copies == 1
     assert measured(layout).overall.p99 <= 0.2
 
@@ -151,10 +140,7 @@ BOUNDED = {"rho_d": 0.2, "rho_s": 0.3, "alpha_x": 0.3, "alpha_y": 0.45}
 
 
 def ward_bounded(change: float = 0.0) -> Material:
-    parameters = BOUNDED | {"alpha_x": BOUNDED["alpha_x"] * (1.0 + change)}
-    return Material.from_table(
-        "bounded", {"title": "Bounded", "model": "ward_bounded", "source": "no paper", "parameters": parameters}
-    )
+    return material("ward_bounded", **BOUNDED | {"alpha_x": BOUNDED["alpha_x"] * (1.0 + change)})
 
 
 @pytest.mark.parametrize("tolerance", [0.02, 0.005])
@@ -167,27 +153,21 @@ def test_the_last_digit_of_a_parameter_decides_not_whether_a_table_is_found(tole
         assert measured(layout).overall.p99 <= tolerance
 
 
-def moon(k: float, rho: float) -> Material:
-    written = {"title": "Moon", "model": "minnaert", "source": "no paper", "parameters": {"k": k, "rho": rho}}
-    return Material.from_table("moon", written)
-
-
 @pytest.mark.parametrize(("k", "rho"), [(0.47658484, 0.81669623), (0.44454535, 0.50307130)])
 def test_a_kind_that_fails_hides_none_that_keeps_to_the_tolerance(k: float, rho: float) -> None:
     """Two kinds fail in turn at stricter tolerances, and the second keeps to 0.01 at those where it is not tried."""
-    layout = plan(moon(k, rho), None, TOLERANCE)
+    layout = plan(material("minnaert", k=k, rho=rho), None, TOLERANCE)
     assert measured(layout).overall.p99 <= TOLERANCE
 
 
 def test_kinds_that_promise_too_much_leave_their_turn_to_the_next() -> None:
     """Two kinds promise fewer nodes than they take, 700425; the third takes some hundreds."""
-    parameters = {"rho_d": 0.17984396, "rho_s": 0.04964861, "alpha_x": 0.05635773, "alpha_y": 0.05635773}
-    written = {"title": "Bounded", "model": "ward_bounded", "source": "no paper", "parameters": parameters}
-    assert plan(Material.from_table("bounded", written), None, TOLERANCE).size < 1000
+    bounded = material("ward_bounded", rho_d=0.17984396, rho_s=0.04964861, alpha_x=0.05635773, alpha_y=0.05635773)
+    assert plan(bounded, None, TOLERANCE).size < 1000
 
 
 def test_finer_axes_end_where_nodes_are_rounded_to_the_same() -> None:
-    task = planner._task(moon(0.47658484, 0.81669623), None, TOLERANCE, None)
+    task = planner._task(material("minnaert", k=0.47658484, rho=0.81669623), None, TOLERANCE, None)
     kinds = [(layout, needs) for _, layout, needs in planner._table_kinds(task) if needs]
     finest = [planner._with_axes(*kind, TOLERANCE, {"theta_i": 11, "theta_r": 11}) for kind in kinds]
     assert None in finest
@@ -195,14 +175,14 @@ def test_finer_axes_end_where_nodes_are_rounded_to_the_same() -> None:
 
 
 def test_a_kind_that_fails_at_all_directions_leaves_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
-    material, finished = presets()["glossy-grey-paper"], plan_trials.finished
-    first = plan(material, None, TOLERANCE)
-    monkeypatch.setattr(
-        plan_trials,
-        "finished",
-        lambda layout, *others: None if layout.interpolation == first.interpolation else finished(layout, *others),
-    )
-    other = plan(material, None, TOLERANCE)
+    finished = plan_trials.finished
+    first = plan(presets()["glossy-grey-paper"], None, TOLERANCE)
+
+    def failing(layout: Layout, *others: Any) -> Any:
+        return None if layout.interpolation == first.interpolation else finished(layout, *others)
+
+    monkeypatch.setattr(plan_trials, "finished", failing)
+    other = plan(presets()["glossy-grey-paper"], None, TOLERANCE)
     assert other.interpolation != first.interpolation
     assert measured(other).overall.p99 <= TOLERANCE
 
@@ -210,20 +190,15 @@ def test_a_kind_that_fails_at_all_directions_leaves_the_others(monkeypatch: pyte
 @pytest.mark.parametrize(
     ("name", "tolerance"),
     [
-        ("glossy-grey-paper", 0.05),
-        ("glossy-grey-paper", 0.01),
-        ("ivory-computer-plastic", 0.05),
-        ("ivory-computer-plastic", 0.01),
         ("wall-plaster", 0.05),
-        ("rendered-sphere-10deg", 0.05),
-        ("rendered-sphere-10deg", 0.01),
+        *itertools.product(("glossy-grey-paper", "ivory-computer-plastic", "rendered-sphere-10deg"), (0.05, 0.01)),
     ],
 )
 def test_no_table_of_an_exhaustive_search_has_half_the_values_of_a_plan(name: str, tolerance: float) -> None:
     """Every number of nodes of each axis is tabulated and measured, of each kind of table that a plan looks into."""
-    material = presets()[name]
-    most = plan(material, None, tolerance).size / TIMES_THE_SMALLEST
-    task = planner._task(material, None, tolerance, None)
+    source = presets()[name]
+    most = plan(source, None, tolerance).size / TIMES_THE_SMALLEST
+    task = planner._task(source, None, tolerance, None)
     for _, layout, needs in (kind for kind in planner._table_kinds(task) if kind[2]):
         shared = list(dict.fromkeys(needs.values()))
         for counts in itertools.product(*(need.counts for need in shared)):
@@ -237,18 +212,18 @@ def test_no_table_of_an_exhaustive_search_has_half_the_values_of_a_plan(name: st
 
 @pytest.mark.parametrize("name", ["glossy-grey-paper", "blue-plastic"])
 def test_the_values_of_a_plan_are_those_of_its_blocks(name: str) -> None:
-    material = presets()[name]
-    layout, values = planner.planned(material, np.array([450.0, 500.0, 600.0]) if material.spectral else None, 0.05)
+    source = presets()[name]
+    layout, values = planner.planned(source, np.array([450.0, 500.0, 600.0]) if source.spectral else None, 0.05)
     assert values is not None
-    np.testing.assert_array_equal(values, np.concatenate([tabulation.block(layout, rows) for rows in layout.blocks]))
+    np.testing.assert_array_equal(values, values_of(layout))
 
 
 def test_few_directions_rule_out_only_what_all_of_them_do() -> None:
-    material = presets()["wall-plaster"]
-    final = plan_trials.final_of(material, None)
+    plaster = presets()["wall-plaster"]
+    final = plan_trials.final_of(plaster, None)
     for nodes in (3, 6, 9, 18):
         theta = np.append(np.linspace(0.0, 88.0, nodes), 89.9)
-        layout = Layout(material, Grid({"theta_i": theta, "theta_r": theta, "delta_phi": np.linspace(0.0, 180.0, 8)}))
+        layout = Layout(plaster, Grid({"theta_i": theta, "theta_r": theta, "delta_phi": np.linspace(0.0, 180.0, 8)}))
         values = plan_trials.values_of(layout)
         error = plan_trials.error_of(layout, values, final)
         for goal in (0.5 * error, 0.99 * error, 1.01 * error, 2.0 * error):
@@ -257,13 +232,7 @@ def test_few_directions_rule_out_only_what_all_of_them_do() -> None:
 
 # The hot spot
 
-MOON = Material(
-    name="moon",
-    title="Moon",
-    model="hapke",
-    source="a test",
-    parameters={"w": 0.3, "b": 0.24, "c": 0.6, "b_0": 1.0, "h": 0.05, "theta_bar": 0.35},
-)
+MOON = material("hapke", w=0.3, b=0.24, c=0.6, b_0=1.0, h=0.05, theta_bar_deg=20.05)
 
 
 def near_the_light(layout: Layout) -> float:

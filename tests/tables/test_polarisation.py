@@ -21,26 +21,22 @@ from brdfdb.tables.planner import coarsest, plan
 from brdfdb.tables.polarisation import Facets, planned_theta_d
 from brdfdb.tables.table import Table
 from brdfdb.tables.tabulation import tabulate
+from tests.tables.made_up import material
 
 WAVELENGTHS = np.array([450.0, 500.0, 650.0])
 TOLERANCE = 0.02
 ROUNDING = 1e-6  # of elements at nodes, which are float32
 
 
-def rough(refractive_index: str = "main/Cu/Johnson", a: float = 0.1) -> Material:
-    table = {
-        "title": "Made up",
-        "model": "he_torrance",
-        "source": "no paper",
-        "parameters": {"sigma_0_um": 0.3, "tau_um": 2.0, "a": a},
-        "refractive_index": refractive_index,
-    }
-    return Material.from_table("made-up", table)
+def rough(refractive_index: str = "main/Cu/Johnson", a: float = 0.1, sigma_0_um: float = 0.3) -> Material:
+    parameters = {"sigma_0_um": sigma_0_um, "tau_um": 2.0, "a": a}
+    made = material("he_torrance", **parameters)
+    return made.model_copy(update={"refractive_index": refractive_index})
 
 
-def polarised(material: Material, tolerance: float = TOLERANCE) -> Layout:
-    layout = plan(material, WAVELENGTHS, tolerance)
-    return replace(layout, facet_theta_d_deg=planned_theta_d(material, WAVELENGTHS, tolerance))
+def polarised(source: Material, tolerance: float = TOLERANCE) -> Layout:
+    layout = plan(source, WAVELENGTHS, tolerance)
+    return replace(layout, facet_theta_d_deg=planned_theta_d(source, WAVELENGTHS, tolerance))
 
 
 @pytest.fixture(scope="module")
@@ -82,12 +78,12 @@ def test_elements_keep_to_the_tolerance_and_to_what_is_stated(table: Table) -> N
 
 
 def test_elements_of_the_facet_keep_to_half_the_tolerance_between_nodes() -> None:
-    for material in (rough(), rough("main/MgO/Stephens-vis"), rough("main/Al/Rakic")):
-        nodes = planned_theta_d(material, WAVELENGTHS, 1e-3)
-        layout = Layout(material, coarsest(material), WAVELENGTHS, facet_theta_d_deg=nodes)
+    for source in (rough(), rough("main/MgO/Stephens-vis"), rough("main/Al/Rakic")):
+        nodes = planned_theta_d(source, WAVELENGTHS, 1e-3)
+        layout = Layout(source, coarsest(source), WAVELENGTHS, facet_theta_d_deg=nodes)
         table = Table.of(layout, np.zeros(layout.shape, np.float32))
         theta_d = np.linspace(0.0, np.pi / 2.0, 5001)
-        truth = polarised_source(material).facet(theta_d, WAVELENGTHS)
+        truth = polarised_source(source).facet(theta_d, WAVELENGTHS)
         assert np.abs(table.facet_mueller(theta_d) - truth).max() <= 0.5 * 1e-3 + ROUNDING
 
 
@@ -112,11 +108,11 @@ def test_angles_and_vectors_agree_at_the_pole_too(table: Table) -> None:
 
 
 def test_specular_part_is_that_of_the_model(tmp_path: Path) -> None:
-    material = rough(a=0.0).model_copy(update={"parameters": {"sigma_0_um": 0.02, "tau_um": 2.0, "a": 0.0}})
-    publish_layout(tmp_path, "made-up", polarised(material))
+    smooth = rough(a=0.0, sigma_0_um=0.02)
+    publish_layout(tmp_path, "made-up", polarised(smooth))
     theta = np.deg2rad([0.0, 10.0, 40.0, 70.0, 85.0])
     table = brdfdb.open(tmp_path)["made-up"]
-    arguments = material.arguments(500.0)
+    arguments = smooth.arguments(500.0)
     truth = models.he_torrance_specular_mueller(theta, **{k: v for k, v in arguments.items() if k != "a"})
     found = table.specular_mueller(theta, 500.0)
     np.testing.assert_array_equal(found[:, 0, 0], table.specular_reflectance(theta, 500.0))
@@ -150,9 +146,8 @@ def test_unpolarised_tables_and_sources_say_so(layout: Layout, tmp_path: Path) -
     publish_dataset(tmp_path, "made-up", tabulate(plain))
     with pytest.raises(ParameterError, match=r"polarised: the table of made-up is unpolarised; build it with polaris"):
         brdfdb.open(tmp_path)["made-up"].mueller(0.1, 0.0, 0.2, 0.0)
-    grey = Material.from_table("grey", {"title": "g", "model": "lambert", "source": "s", "parameters": {"rho": 0.5}})
     with pytest.raises(ParameterError, match="polarised: its model lambert has no Mueller matrices; he_torrance has"):
-        planned_theta_d(grey, WAVELENGTHS, 0.01)
+        planned_theta_d(material("lambert", rho=0.5), WAVELENGTHS, 0.01)
     with pytest.raises(ParameterError, match="tolerance: 1e-16 takes more than 10000 angles of the facet"):
         planned_theta_d(rough(), WAVELENGTHS, 1e-16)
 

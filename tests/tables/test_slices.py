@@ -79,9 +79,7 @@ def test_in_plane_lobes_are_on_their_diagonals() -> None:
 @pytest.mark.parametrize(
     ("turned_deg", "right", "up"), [(180.0, 45.0, 0.0), (0.0, -45.0, 0.0), (90.0, 0.0, -45.0), (-90.0, 0.0, 45.0)]
 )
-def test_lobe_map_has_the_light_left_and_the_mirror_right(
-    turned_deg: float, right: float, up: float, phi_i_deg: float
-) -> None:
+def test_the_mirror_is_right_in_lobe_maps(turned_deg: float, right: float, up: float, phi_i_deg: float) -> None:
     lobe = table(lobe_towards(lambda theta_i: theta_i, turned_deg))
     position = lobe_position(slices.lobe_map(lobe, phi_i_deg=phi_i_deg))
     assert position == pytest.approx((right, up), abs=180.0 / 256)

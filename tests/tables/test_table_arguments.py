@@ -13,22 +13,12 @@ from scipy.interpolate import RegularGridInterpolator
 
 from brdfdb.errors import ParameterError
 from brdfdb.geometry import unit_vector
-from brdfdb.materials import Material
 from brdfdb.tables import _coordinates, _kernels
 from brdfdb.tables import table as table_module
 from brdfdb.tables.grids import Grid
-from brdfdb.tables.layout import Interpolation, Layout
+from brdfdb.tables.layout import Interpolation
 from brdfdb.tables.table import Table, points
-from brdfdb.tables.tabulation import tabulate
-from tests.tables.made_up import (
-    AXES,
-    INTERPOLATION_TOLERANCE,
-    KINDS,
-    WAVELENGTHS,
-    made_up,
-    random_directions,
-    scipys_cubic,
-)
+from tests.tables.made_up import AXES, INTERPOLATION_TOLERANCE, KINDS, WAVELENGTHS, made_up, scipys_cubic
 
 
 @KINDS
@@ -49,15 +39,13 @@ from tests.tables.made_up import (
         (WAVELENGTHS[:1], [400.0, 400.0], (2,)),
     ],
 )
-def test_shapes_are_those_of_the_angles_then_of_the_wavelengths(
-    kind: str, wavelengths: Any, asked: Any, adds: tuple[int, ...]
-) -> None:
+def test_shapes_of_angles_and_wavelengths(kind: str, wavelengths: Any, asked: Any, adds: tuple[int, ...]) -> None:
     table = made_up(kind, wavelengths, dirac=True)
     assert np.shape(table.lookup(0.1, 0.2, 0.3, 0.4, asked)) == adds
     assert np.shape(table.lookup(np.full((3, 1), 0.1), 0.2, np.full(5, 0.3), 0.4, asked)) == (3, 5, *adds)
     assert np.shape(table.lookup(0.1, np.zeros(2), 0.3, np.zeros((2, 1)), asked)) == (2, 2, *adds)
-    assert np.shape(table.lookup([], 0.2, 0.3, 0.4, asked)) == (0, *adds)
     assert np.shape(table.lookup(np.zeros((2, 0)), 0.2, np.zeros((2, 1)), 0.4, asked)) == (2, 0, *adds)
+    assert np.shape(table.lookup_vectors(np.empty((0, 3)), [0.0, 0.0, 1.0], asked)) == (0, *adds)
     assert np.shape(table.specular_reflectance(0.1, asked)) == adds
     assert np.shape(table.specular_reflectance(np.full((3, 5), 0.1), asked)) == (3, 5, *adds)
     assert np.shape(table.specular_reflectance([], asked)) == (0, *adds)
@@ -80,9 +68,7 @@ def test_broadcasting_is_looking_up_one_by_one() -> None:
         assert specular[index, 0, 0, 0, m] == table.specular_reflectance(theta_i[index, 0, 0, 0], asked[m])
 
 
-def test_kernels_see_arguments_of_one_type_whether_lookups_are_of_arrays_or_numbers(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_kernels_are_compiled_for_one_type_of_arguments(monkeypatch: pytest.MonkeyPatch) -> None:
     # they are compiled for each type, and what may be written to is another
     seen: dict[str, set[Any]] = {}
 
@@ -241,24 +227,3 @@ def test_the_dirac_part_is_interpolated_over_theta_and_wavelength() -> None:
 def test_a_model_without_a_dirac_part_reflects_nothing_there() -> None:
     np.testing.assert_array_equal(made_up("isotropic", WAVELENGTHS).specular_reflectance([0.1, 0.2]), np.zeros((2, 4)))
     assert made_up("anisotropic").specular_reflectance(0.1) == 0.0
-
-
-def test_the_two_kinds_of_table_of_one_material_agree() -> None:
-    turning = np.arange(0.0, 361.0, 20.0)
-    theta = {"theta_i": [0, 25, 50, 75], "theta_r": [0, 30, 60, 80]}
-    iso = Grid(theta | {"delta_phi": turning[:10]})
-    aniso = Grid({"theta_i": theta["theta_i"], "phi_i": turning, "theta_r": theta["theta_r"], "phi_r": turning})
-    parameters = {"rho": 0.8, "sigma_deg": 30}
-    plaster = Material.from_table(
-        "plaster", {"title": "Plaster", "model": "oren_nayar", "source": "no paper", "parameters": parameters}
-    )
-    tables = []
-    for grid in (iso, aniso):
-        dataset = tabulate(Layout(plaster, grid))
-        tables.append(Table("plaster", "r000001", dataset.attrs, grid, None, dataset["brdf"].values, None))
-    assert [table.anisotropic for table in tables] == [False, True]
-    theta_i, _, theta_r, phi_r = random_directions(300)
-    # with the light on a node the two interpolate between the same values, but for their rounding to float32
-    for phi_i in np.deg2rad(turning):
-        one, other = (table.lookup(theta_i, phi_i, theta_r, phi_r) for table in tables)
-        np.testing.assert_allclose(one, other, rtol=2e-7)

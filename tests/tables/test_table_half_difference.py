@@ -23,16 +23,6 @@ ANGLES: tuple[Any, ...] = (np.linspace(0.0, 1.5, 40), 0.3, np.linspace(1.4, 0.1,
 
 
 @KINDS
-def test_float32_arrays_give_float32_whatever_pythons_numbers_are_beside_them(kind: str) -> None:
-    table = table_of(kind)
-    single = np.array([0.1, 1.2], np.float32)
-    assert table.lookup(single, 0.0, 0.3, 0).dtype == np.float32
-    assert table.lookup(single, single, single, single).dtype == np.float32
-    assert table.lookup(single, np.zeros(2), 0.3, 0).dtype == np.float64
-    assert table.lookup(0.1, 0, 0.3, 0).dtype == np.float64
-
-
-@KINDS
 def test_the_float32_horizon_is_the_horizon_and_beyond_it_is_dark(kind: str) -> None:
     table = table_of(kind)
     horizon = np.array([np.pi / 2], np.float32)
@@ -40,14 +30,6 @@ def test_the_float32_horizon_is_the_horizon_and_beyond_it_is_dark(kind: str) -> 
     at = table.lookup(zero, zero, horizon, zero)
     np.testing.assert_allclose(at, table.lookup(0.0, 0.0, [np.pi / 2], 0.0), rtol=1e-6)
     assert (table.lookup(zero, zero, np.nextafter(horizon, np.float32(2.0)), zero) == 0.0).all()
-
-
-@KINDS
-def test_no_directions_give_no_values(kind: str) -> None:
-    table = table_of(kind)
-    tail = () if table.wavelength_nm is None else table.wavelength_nm.shape
-    assert table.lookup(np.empty((0, 3)), 0.0, 0.1, 0.0).shape == (0, 3, *tail)
-    assert table.lookup_vectors(np.empty((0, 3)), [0.0, 0.0, 1.0]).shape == (0, *tail)
 
 
 @KINDS

@@ -8,15 +8,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from brdfdb.materials import Material, presets
+from brdfdb.materials import presets
 from brdfdb.tables.grids import Grid
 from brdfdb.tables.layout import LINEAR, Interpolation, Layout, over_wavelengths
 from brdfdb.tables.metadata import TableMetadata
 from brdfdb.tables.mixture import refined_wavelengths
 from brdfdb.tables.planner import plan
-from brdfdb.tables.table import Table, table_from
-from brdfdb.tables.tabulation import block, tabulate
-from tests.tables.made_up import random_directions
+from brdfdb.tables.table import Table
+from brdfdb.tables.tabulation import tabulate
+from tests.tables.made_up import error_of, material, random_directions, read_back, table_of
 
 # Bands of MODIS, and the weight of its uniform kernel over snow and soil of Roy et al. 2016
 BANDS = (469.0, 555.0, 645.0, 858.0, 1640.0, 2130.0)
@@ -29,40 +29,31 @@ def spectrum(values: tuple[float, ...]) -> dict[str, Any]:
     return {"wavelengths_nm": list(BANDS), "values": list(values)}
 
 
-def material(model: str, **parameters: Any) -> Material:
-    fields = {"title": "t", "model": model, "source": "a test", "parameters": parameters}
-    return Material.from_table("made-up", fields)
-
-
 LAMBERT = material("lambert", rho=spectrum(ISO))
 HAPKE = material("hapke", w=spectrum((0.2, 0.3, 0.35, 0.6, 0.8, 0.7)), b=0.3, c=0.4, b_0=1.0, h=0.07, theta_bar_deg=20)
 PAINTED = material("ward", rho_d=spectrum(ISO), rho_s=spectrum(ISO[::-1]), alpha_x=0.2, alpha_y=0.2)
 AT = np.array(BANDS)
 
 
-def of_layout(layout: Layout) -> Table:
-    return Table.of(layout, np.concatenate([block(layout, rows) for rows in layout.blocks]))
-
-
 def factored(logarithm: bool) -> Table:
     """Return a table of coefficients whose six spectra are turned, so that no coefficient is a wavelength."""
     turn = np.linalg.qr(np.random.default_rng(1).normal(size=(6, 6)))[0]
     how = Interpolation("linear", logarithm, 1e-4 if logarithm else 0.0, 0.0, LINEAR)
-    return of_layout(Layout(HAPKE, GRID, AT, how, spectra=turn))
+    return table_of(Layout(HAPKE, GRID, AT, how, spectra=turn))
 
 
 TABLES: dict[str, Any] = {
-    "f_r": lambda: of_layout(Layout(HAPKE, GRID, AT, Interpolation(wavelengths=LINEAR))),
-    "logarithms": lambda: of_layout(Layout(HAPKE, GRID, AT, Interpolation("cubic", True, 1e-4, 0.5, LINEAR))),
+    "f_r": lambda: table_of(Layout(HAPKE, GRID, AT, Interpolation(wavelengths=LINEAR))),
+    "logarithms": lambda: table_of(Layout(HAPKE, GRID, AT, Interpolation("cubic", True, 1e-4, 0.5, LINEAR))),
     "factored": lambda: factored(logarithm=False),
     "factored-logarithms": lambda: factored(logarithm=True),
-    "mixture": lambda: of_layout(plan(PAINTED, AT, 0.05)),
+    "mixture": lambda: table_of(plan(PAINTED, AT, 0.05)),
 }
 
 
 def test_no_bump_is_made_up_between_six_bands() -> None:
     """A cubic reaches 0.387 near 1195 nm, above all six bands."""
-    table = of_layout(Layout(LAMBERT, GRID, AT, Interpolation(wavelengths=over_wavelengths(LAMBERT))))
+    table = table_of(Layout(LAMBERT, GRID, AT, Interpolation(wavelengths=over_wavelengths(LAMBERT))))
     for nm in (500.0, 700.0, 1200.0, 2000.0):
         expected = np.interp(nm, BANDS, ISO) / np.pi
         assert float(table.lookup(0.3, 0.0, 0.5, 1.0, nm)) == pytest.approx(expected, rel=FLOAT32)
@@ -84,9 +75,7 @@ def test_a_stored_table_says_so_and_is_read_so() -> None:
     dataset = tabulate(layout)
     assert TableMetadata.read(dataset.attrs).interpolation.wavelengths == "linear"
     assert "over wavelengths brdf is linear" in dataset.attrs["reconstruction"]
-    arrays = {str(name): np.asarray(variable.values) for name, variable in dataset.variables.items()}
-    read = table_from("read", "", arrays, dataset.attrs)
-    value = read.lookup(0.5, 0.0, 0.4, 1.0, [555.0, 600.0, 645.0])
+    value = read_back(dataset).lookup(0.5, 0.0, 0.4, 1.0, [555.0, 600.0, 645.0])
     assert value[1] == pytest.approx(0.5 * (value[0] + value[2]), rel=1e-9)
     before = {key: value for key, value in dataset.attrs["interpolation"].items() if key != "wavelengths"}
     assert TableMetadata.read(dataset.attrs | {"interpolation": before}).interpolation.wavelengths == "cubic"
@@ -119,14 +108,12 @@ def test_models_that_are_linear_in_their_spectra_take_the_kinks_alone() -> None:
 
 
 def test_the_error_between_is_measured_of_straight_lines() -> None:
-    from brdfdb.tables.error_measurement import measure
-
-    fine = Grid({"theta_i": np.linspace(0, 89, 60), "theta_r": np.linspace(0, 89, 60), "delta_phi": [0.0, 90.0, 180.0]})
+    theta = np.linspace(0, 89, 60)
+    fine = Grid({"theta_i": theta, "theta_r": theta, "delta_phi": [0.0, 90.0, 180.0]})
     layout = Layout(LAMBERT, fine, AT, Interpolation(wavelengths=LINEAR))
-    error = measure(layout, lambda rows: block(layout, rows), 300)
-    assert error.between is not None
-    assert np.max(error.between.bands) < FLOAT32
-    cubic = replace(layout, interpolation=Interpolation())
-    bump = measure(cubic, lambda rows: block(cubic, rows), 300).between
-    assert bump is not None
-    assert np.max(bump.bands) > 0.05
+    straight = error_of(layout, count=300).between
+    cubic = error_of(replace(layout, interpolation=Interpolation()), count=300).between
+    assert straight is not None
+    assert np.max(straight.bands) < FLOAT32
+    assert cubic is not None
+    assert np.max(cubic.bands) > 0.05

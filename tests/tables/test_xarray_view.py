@@ -31,11 +31,7 @@ LAYOUTS = {
     "anisotropic": Layout(presets()["rolled-brass"], Grid(TURNED), interpolation=ROOT),
     "weighted": Layout(presets()["clay-vase"], Grid(POLAR), interpolation=Interpolation("cubic", False, 0.0, 1.0)),
     "factored": Layout(
-        presets()["scene-copper-sphere"],
-        Grid(POLAR),
-        WAVELENGTHS,
-        interpolation=Interpolation("cubic", True, 1e-3),
-        spectra=BASIS,
+        presets()["scene-copper-sphere"], Grid(POLAR), WAVELENGTHS, Interpolation("cubic", True, 1e-3), BASIS
     ),
 }
 

@@ -1,17 +1,17 @@
-// What the service answers for a view; the last answers and refusals of each view are not asked for again.
+// The answers of the service for a view; the last answers and refusals of each view are stored.
 
 import { Problem, json } from "./api.js";
 
-/** @typedef {import("./state.js").State} State */
+/** @typedef {import("./link.js").State} State */
 /** @typedef {import("./series.js").Series} Series */
 /** @typedef {import("./main.js").View} View */
 
 /** @type {Map<string, { key: string, coarse: boolean, answers: any[] }>} */
-const before = new Map(); // the last answers, by the names of views
+const before = new Map(); // last answers by name of the view
 /** @type {Map<string, { key: string, problem: Problem }>} */
-const refused = new Map(); // the last refusals
+const refused = new Map(); // last refusals by name of the view
 
-/** Answers for a view, of the series that the service knows there.
+/** Answers for a view, for those series that the service can answer for.
  * @param {View} view
  * @param {State} now
  * @param {Series[]} series
@@ -34,18 +34,18 @@ export async function answersTo(view, now, series, signal) {
   return { known, answers };
 }
 
-/** What answers depend on, as text.
+/** Everything that answers depend on, as text.
  * @param {Series[]} known
  * @param {Series[]} series
  * @param {State} now */
 function keyOf(known, series, now) {
-  // what does not change answers is 0
+  // 0: has no effect on answers
   const asked = { ...now, quick: 0, exposure: 0, scale: 0, axes: 0, view: 0, compare: 0 };
   const of = known.map(({ text, source, info }) => [text, source, info.digest]);
   return JSON.stringify([of, series.some(({ info }) => info.anisotropic), asked]);
 }
 
-/** Whether an answer is of another table than what is known; what an audit found may be of an old revision.
+/** Whether an answer is about another table than the loaded one; an audit may be of an older revision.
  * @param {any} answer
  * @param {Series} each */
 export const outdates = ({ digest, revision, current, finding }, { info, source }) =>

@@ -1,14 +1,14 @@
-// Requests: questions of what is shown, their answers, and arrays of numbers from .npy bytes.
+// Requests to the service, and arrays of numbers from .npy bytes.
 
 import { early } from "./begin.js";
 
-/** @typedef {{ path: string, body?: Record<string, unknown> }} Question a GET, or a POST of a document */
+/** @typedef {{ path: string, body?: Record<string, unknown> }} Question a GET request, or a POST request with a body */
 
 const NPY = "application/x-npy";
 
-export const AGAIN_MS = 3000; // after which is asked again for what may have come back
+export const AGAIN_MS = 3000; // time until a failed request is repeated
 
-/** An answer that is an error; its message is the sentence that the service gives; whether it may pass by itself. */
+/** An answer that is an error, with the sentence of the service; `passes`: a later request may succeed. */
 export class Problem extends Error {
   /** @param {string} sentence */
   constructor(sentence, passes = false) {
@@ -17,7 +17,7 @@ export class Problem extends Error {
   }
 }
 
-/** A path with a query; of a list each value is given.
+/** A path with a query; a list repeats its name.
  * @param {string} path
  * @param {Record<string, unknown>} query */
 export function withQuery(path, query) {
@@ -42,7 +42,7 @@ export async function json(question, signal) {
   return (await answer(typeof question === "string" ? { path: question } : question, {}, signal)).json();
 }
 
-/** Values at the directions of a question, how many each, and the digest of the table that they are of.
+/** Values at the directions of a question, the number of channels, and the digest of the table.
  * @param {Question} question
  * @param {number} count
  * @param {AbortSignal} [signal]
@@ -73,11 +73,11 @@ async function answer({ path, body }, headers, signal) {
     response = await (begun ?? fetch(path, options));
   } catch (error) {
     if (signal?.aborted) throw error;
-    throw new Problem("the server does not answer", true);
+    throw new Problem("the service does not answer", true);
   }
   if (response.ok) return response;
   const problem = await response.json().catch(() => ({}));
-  throw new Problem(problem.detail ?? `the server answers with status ${response.status}`, response.status === 503);
+  throw new Problem(problem.detail ?? `the service answered with status ${response.status}`, response.status === 503);
 }
 
 /** The numbers of a .npy file of version 1.0, in its order.
@@ -85,6 +85,6 @@ async function answer({ path, body }, headers, signal) {
 function fromNpy(buffer) {
   const start = 10 + new DataView(buffer).getUint16(8, true);
   const kind = /'descr': '<(f[48])'/.exec(new TextDecoder().decode(buffer.slice(10, start)))?.[1];
-  if (!kind) throw new Problem("the server answers with numbers of another kind");
+  if (!kind) throw new Problem("the service answered with numbers of an unknown type");
   return kind === "f4" ? new Float32Array(buffer.slice(start)) : new Float64Array(buffer.slice(start));
 }

@@ -1,24 +1,24 @@
-// What the page shows first is asked for while its script is still on its way: the list, and a material of it.
+// Early requests: the list and the first material are requested while the main script is still loading.
 
-const FIRST = "scene-copper-sphere"; // to look at: colour, a lobe and a specular part
+const FIRST = "scene-copper-sphere"; // it has a colour, a lobe and a specular part
 export const LIST = "v1/materials?limit=1000";
 
-/** The material to look at first.
+/** The material that the page shows first.
  * @param {any[]} all */
 export const first = (all) =>
   all.find(({ name, damaged }) => name === FIRST && !damaged) ??
   all.find(({ damaged, spectrum }) => !damaged && spectrum === "spectral") ??
   all.find(({ damaged }) => !damaged);
 
-/** Answers on their way, by path; each is taken once, before the first picture, or never: later it may be outdated.
- * The script of the page has this module, too, and finds them.
+/** Promised answers, by path. Each is used once, before the first picture, because later it may be outdated.
+ * The main script contains this module, too, and finds them here.
  * @type {Map<string, Promise<Response>>} */
 export const early = (/** @type {any} */ (globalThis).early ??= begun());
 
 function begun() {
   const found = new Map([[LIST, fetch(LIST).then(withMaterial)]]);
 
-  /** The list, once the material that it leads to is asked for, too.
+  /** Request the material that the page shows, and return the list.
    * @param {Response} response */
   async function withMaterial(response) {
     const { materials = [] } = await response
@@ -31,6 +31,6 @@ function begun() {
     if (name) found.set(path, fetch(path));
     return response;
   }
-  found.get(LIST)?.catch(() => {}); // who takes it says what is wrong
+  found.get(LIST)?.catch(() => {}); // its user reports the error
   return found;
 }

@@ -1,11 +1,11 @@
-// Sliders, switches and the choice of a view: they show the state, and change it by hand.
+// Sliders, switches and the choice of a view: they show the state and change it.
 
 import { byId, element } from "./dom.js";
 import { anisotropic, makesColour, nearest } from "./series.js";
-import { CHOICES, ILLUMINANTS, MODEL } from "./state.js";
+import { CHOICES, ILLUMINANTS, MODEL } from "./link.js";
 import { VIEWS } from "./views.js";
 
-/** @typedef {import("./state.js").State} State */
+/** @typedef {import("./link.js").State} State */
 /** @typedef {import("./series.js").Series} Series */
 
 const form = byId("controls", HTMLFormElement),
@@ -24,7 +24,7 @@ for (const { name, title } of Object.values(VIEWS)) {
 
 field("illuminant").append(...ILLUMINANTS.map((name) => new Option(name)));
 
-/** Call `choose` with what a hand changes of the state.
+/** Call `choose` with the changed part of the state.
  * @param {(part: Partial<State>) => void} choose
  * @param {() => State} now */
 export function listen(choose, now) {
@@ -37,7 +37,7 @@ export function listen(choose, now) {
     const { value } = field("compare");
     if (value && !now().compare.includes(value)) choose({ compare: [...now().compare, value] });
   };
-  let typed = false; // keys in a closed list pass over other names: Enter takes the one that is reached
+  let typed = false; // keys in a closed list pass over other names; Enter confirms
   field("compare").addEventListener("pointerdown", () => (typed = false));
   field("compare").addEventListener("keydown", (/** @type {KeyboardEvent} */ event) => {
     if (event.key === "Enter" && typed) compare();
@@ -62,19 +62,19 @@ export function listen(choose, now) {
 export function offer(materials) {
   field("compare").replaceChildren(
     new Option("add … (Enter confirms)", ""),
-    new Option("its own model or table", MODEL),
+    new Option("model or table of the material", MODEL),
     ...materials.filter((each) => !each.damaged).map((each) => new Option(each.title, each.name)),
   );
 }
 
 const all = [views, form, byId("copies", HTMLElement), beside];
 
-/** Nothing can be moved while there is nothing to look at. */
+/** Disable all controls while there is nothing to show. */
 export function forget() {
   for (const each of all) each.inert = true;
 }
 
-/** Show a state of some series; what has no effect on the picture cannot be moved.
+/** Show a state; controls without an effect on the picture are disabled.
  * @param {State} state
  * @param {Series[]} series */
 export function show(state, series) {
@@ -103,7 +103,7 @@ export function show(state, series) {
   beside.replaceChildren(
     ...series
       .slice(1)
-      .map(({ label }, i) => element("button", { type: "button", title: "take it away" }, `${label} ×`)),
+      .map(({ label }, i) => element("button", { type: "button", title: "remove" }, `${label} ×`)),
   );
   series.slice(1).forEach((_, i) => {
     /** @type {HTMLElement} */ (beside.children[i]).dataset.text = state.compare[i];
@@ -120,7 +120,7 @@ export function show(state, series) {
   said(
     "nm",
     !spectral
-      ? "grey: the same at all"
+      ? "grey: the same at all wavelengths"
       : idle.includes("nm") || (field("nm").disabled && !one)
         ? "all"
         : `${nearest(spectral, state.nm)} nm`,

@@ -1,4 +1,4 @@
-// Buttons that copy: a link to the view, and its question as curl and as Python.
+// Buttons that copy the link of the view, and its request as curl and as Python.
 
 import { byId } from "./dom.js";
 
@@ -19,7 +19,7 @@ function curl(href, { body }) {
     : `curl '${href}'`;
 }
 
-/** Directions of a question as lines of Python, the last of which is the arguments of a lookup [rad].
+/** Directions of a question in Python: lines before, and the arguments of a lookup [rad].
  * @type {Record<string, (query: Record<string, string>) => [string, string]>} */
 const DIRECTIONS = {
   lookup: ({ theta_i, phi_i = 0, theta_r, phi_r }) => ["", `*np.deg2rad([${theta_i}, ${phi_i}, ${theta_r}, ${phi_r}])`],
@@ -38,7 +38,7 @@ const DIRECTIONS = {
   ],
 };
 
-/** A question as Python: of the client, which has f_r; albedos and findings are documents.
+/** A question as Python: with `brdfdb.open` for f_r, else as a document.
  * @param {string} href
  * @param {Question} question */
 function python(href, { body }) {
@@ -64,7 +64,7 @@ function python(href, { body }) {
   );
 }
 
-/** Make the buttons work; `link` gives that of the view, `request` what it asks for, `say` tells people.
+/** Make the buttons work; `link` and `request` are those of the view, `say` shows a message.
  * @param {() => URL} link
  * @param {() => Question} request
  * @param {(sentence: string, tone: string) => void} say */
@@ -84,7 +84,7 @@ export async function copyText(of, say) {
   text.value = of;
   box.hidden = false;
   try {
-    await navigator.clipboard.writeText(of); // there is no clipboard off https and localhost
+    await navigator.clipboard.writeText(of); // it needs https or localhost
     say("Copied.", "calm");
   } catch {
     text.focus();

@@ -1,10 +1,9 @@
-// What is known of a material, beside the picture: one sentence of verdict, and the details folded below it.
+// Facts about a material, next to the picture: the verdict in a sentence, and folded details.
 
 import { byId, chip, element, isGood, percent, short } from "./dom.js";
 import { nearest } from "./series.js";
 
-/** @typedef {[string | Node, string | Node, ...(string | undefined)[]]} Row a term, its value, and small lines below
- *   that */
+/** @typedef {[string | Node, string | Node, ...(string | undefined)[]]} Row a term, its value, and small lines below */
 
 /** @type {Record<string, string>} */
 const QUESTIONS = {
@@ -13,7 +12,7 @@ const QUESTIONS = {
 };
 const aside = byId("facts", HTMLElement);
 
-/** Fill the side with what the service says of a material, or of a model with other parameters.
+/** Show the facts about a material, or about a model with other parameters.
  * @param {import("./series.js").Series} series */
 export function show({ info, source }) {
   const { attributes, error, audit } = info;
@@ -22,12 +21,12 @@ export function show({ info, source }) {
       element(
         "p",
         { className: "verdict" },
-        "Computed now, with parameters of your own: neither tabulated nor audited.",
+        "Computed with your own parameters: neither tabulated nor audited.",
       ),
       element("h3", {}, "Surface"),
       pairs([
         ["model", info.model_title],
-        ["begun with", info.base.title],
+        ["based on", info.base.title],
         ["source", info.base.attributes.source],
       ]),
     );
@@ -78,26 +77,26 @@ export function show({ info, source }) {
         : element("p", {}, "not measured"),
       ...(info.measured
         ? []
-        : [element("h4", {}, "Of the formula against the highest rung"), ...formula(info.formula_error)]),
+        : [element("h4", {}, "Of the formula against the most exact form"), ...formula(info.formula_error)]),
     ),
     folded(
       "Audit",
       pairs(above(info.largest_albedo)),
       ...(audit
         ? audited(audit)
-        : [element("p", {}, "no audit of it is here; ", element("code", {}, "brdfdb audit"), " makes one")]),
+        : [element("p", {}, "not audited; run ", element("code", {}, "brdfdb audit"))]),
     ),
-    folded("As data", element("p", { className: "links" }, ...links(info))),
+    folded("Data", element("p", { className: "links" }, ...links(info))),
     element("p", { className: "quiet" }, `${info.name}, revision ${info.revision}`),
   );
 }
 
-/** A verdict as a sentence for people.
+/** The verdict as a sentence.
  * @param {any} info
  * @returns {(string | Node)[]} */
 function verdict({ audit, error, measured, formula_error: of }) {
   const table = error
-    ? `the table keeps within ${percent(error.overall.p99)} of ${measured ? "the data" : "its formula"}`
+    ? `the table is within ${percent(error.overall.p99)} of ${measured ? "the data" : "its formula"}`
     : "the error of the table was not measured";
   if (!audit?.current || !audit.as_published) return [`Not audited at this revision; ${table}.`];
   const { as_published: published, conserves_energy: energy } = audit;
@@ -123,7 +122,7 @@ const folded = (title, ...children) => element("details", {}, element("summary",
  * @returns {Row[]} */
 const optional = (term, text) => (text ? [[term, text]] : []);
 
-/** What measured data are of.
+/** The origin of measured data.
  * @param {any} measured */
 const origin = ({ by, file, samples, incidences, extrapolated }) =>
   [
@@ -136,7 +135,7 @@ const origin = ({ by, file, samples, incidences, extrapolated }) =>
     .filter(Boolean)
     .join("; ");
 
-/** How far measured data are to be trusted, and where nothing was measured.
+/** The accuracy of measured data, and the measured share of all directions.
  * @param {any} measured
  * @returns {Row[]} */
 const data = ({ held_out: left, noise, extrapolated, negative, changes }) => [
@@ -147,13 +146,13 @@ const data = ({ held_out: left, noise, extrapolated, negative, changes }) => [
   ],
   ["noise", noise ? `95 of 100 below ${percent(noise.p95)}` : "not stated"],
   ...optional("measured", extrapolated === null ? "" : `${percent(1 - extrapolated)} of all directions`),
-  ...optional("below 0", negative && `${percent(negative)} of the values, which are 0 here`),
+  ...optional("below 0", negative && `${percent(negative)} of the values, which were set to 0`),
   ...changes.map(
     (/** @type {any} */ { law, changed }) => /** @type {Row} */ ([`made ${law}`, `by up to ${percent(changed.max)}`]),
   ),
 ];
 
-/** How far the formula is from the best that is known of its surface.
+/** The error of the formula against the most exact form for its surface.
  * @param {any} of */
 function formula(of) {
   if (!of) return [element("p", {}, "not measured")];
@@ -182,18 +181,18 @@ const above = (largest) =>
       ]
     : [];
 
-/** Why a value that no paper prints was chosen; tables built earlier have the names alone, and reasons in their note.
+/** The reason for a value that the paper does not print; older tables have the reasons in their note.
  * @param {any} parameter
  * @param {any} attributes */
 function assumed(parameter, attributes) {
   const why = attributes.assumed?.[parameter.name]?.why ?? "the paper does not print it";
-  return parameter.assumed && why !== parameter.source ? `assumed: ${why}` : ""; // a colour says so in its source
+  return parameter.assumed && why !== parameter.source ? `assumed: ${why}` : ""; // the source of a colour says it already
 }
 
-/** Know nothing. */
+/** Remove all facts. */
 export const forget = () => aside.replaceChildren();
 
-/** Say the error at the light that is looked at: between two wavelengths the one stated there, no less than theirs.
+/** Show the error at the current light. Between two wavelengths it is at least the larger one of their errors.
  * @param {any} info
  * @param {{ theta_i: number, nm: number | null }} state */
 export function band({ error, wavelength_nm: wavelengths }, { theta_i, nm }) {
@@ -217,7 +216,7 @@ export function band({ error, wavelength_nm: wavelengths }, { theta_i, nm }) {
   into.textContent = `within ${percent(Math.max(...around, ...there))}`;
 }
 
-/** Every finding of the audit, in words where it is no plain pass; the report has the words of the papers.
+/** All findings of the audit, with a sentence unless they pass; the report also quotes the papers.
  * @param {any} audit */
 function audited(audit) {
   const findings = audit.sentences.filter((/** @type {any} */ { quote }) => !quote);
@@ -234,7 +233,7 @@ function audited(audit) {
         isGood(word) ? "" : text,
       ]),
     ]),
-    ...(audit.current ? [] : [element("p", {}, `This is of revision ${audit.revision}, not of the current one.`)]),
+    ...(audit.current ? [] : [element("p", {}, `This audit is of revision ${audit.revision}, not of the current revision.`)]),
   ];
 }
 
@@ -246,7 +245,7 @@ function links({ links: to, audit }) {
     ...(audit ? [["audit", to.audit]] : []),
     ["table (zarr)", to["download.zarr"]],
     ...Object.entries(to).flatMap(([key, href]) => {
-      const [kind, format] = key.split("/"); // a file of every format that the service exports
+      const [kind, format] = key.split("/"); // all formats that the service exports
       return kind === "export" ? [[format.toUpperCase(), href]] : [];
     }),
   ];
@@ -271,7 +270,7 @@ function pairs(rows) {
   );
 }
 
-/** A list of questions: each with its verdict beside it or below, and a reason over the whole width.
+/** A list of questions, each with its verdict and a reason over the full width.
  * @param {Row[]} rows */
 function answers(rows) {
   return element(

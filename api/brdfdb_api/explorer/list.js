@@ -12,21 +12,21 @@ const [model, paper, verdict] = ["model", "paper", "verdict"].map((id) => byId(i
 /** @type {any[]} */
 const materials = [];
 /** @type {HTMLElement | null} */
-let active = null; // the option that arrow keys have reached
+let active = null; // the option selected by arrow keys
 let chosen = "";
 let painted = false;
 let choose = (/** @type {string} */ _) => {};
 let arrive = () => {};
 /** @type {Promise<void>} */
-const begun = new Promise((resolve) => (arrive = resolve)); // the first page is there, or has failed
-const [NEAR, MOST_NEAR] = [0.6, 5]; // likeness from which names are offered for an unknown one, and how many
-const DARK = 0.02; // largest albedo of what is nearly black beside the others
+const begun = new Promise((resolve) => (arrive = resolve)); // the first page has arrived or failed
+const [NEAR, MOST_NEAR] = [0.6, 5]; // similarity of names offered for an unknown one, and their number
+const DARK = 0.02; // largest albedo of a nearly black material
 
 /** All options. */
 const options = () => /** @type {HTMLElement[]} */ ([...list.children]);
 
-/** Fill the list; `onChoose` gets the name of what is chosen, `onPage` the materials so far, after each page;
- * `onFail` is called when a page does not come, which is asked for again where that may pass by itself.
+/** Load the list. `onChoose` gets the name of a chosen material, `onPage` all materials so far, after each page;
+ * `onFail` is called when a page fails, before a second request if that may succeed.
  * @param {(name: string) => void} onChoose
  * @param {(materials: any[]) => void} onPage
  * @param {() => void} onFail */
@@ -49,7 +49,7 @@ export async function load(onChoose, onPage, onFail) {
   }
 }
 
-/** A page, once it is there; until then the list says why it is not.
+/** A page of the catalogue; until it arrives, the list shows the error.
  * @param {string} path
  * @param {() => void} onFail */
 async function arrived(path, onFail) {
@@ -68,8 +68,8 @@ async function arrived(path, onFail) {
 
 const pause = (/** @type {number} */ ms) => new Promise((resolve) => setTimeout(resolve, ms));
 
-/** Raise a problem with the closest names if no material has a name. The list tells, and for a name that it lacks a
- * search of the store: an address that does not exist would be an error of the page, too.
+/** Throw a problem with the closest names if no material has a name. It searches the list, and then the store, because
+ * a request to an unknown address would also be an error of the page.
  * @param {string} name */
 export async function check(name) {
   await begun;
@@ -123,7 +123,7 @@ export function update(each) {
   offer(verdict, words(each));
 }
 
-/** Show which material is looked at.
+/** Mark the current material.
  * @param {string} name */
 export function mark(name) {
   chosen = name;
@@ -137,13 +137,13 @@ export function mark(name) {
  * @returns {string} */
 const paperOf = (each) => each.source?.split(",")[0];
 
-/** The verdict on the current revision, by a line of the catalogue or by all that is known of a material.
+/** The verdict on the current revision, from a line of the catalogue or the document of a material.
  * @param {any} each
  * @returns {string} */
 const words = ({ damaged, verdict, audit }) =>
   damaged ? "damaged" : (verdict ?? (audit?.current ? audit.verdict : "not audited"));
 
-/** A mark where something is wrong with a material: with its table, its formula, its error or its energy.
+/** Marks of what is wrong with a material: its table, its formula, its error or its energy.
  * @param {any} each */
 function marks(each) {
   const from = each.audit?.current ? each.audit : each,
@@ -191,7 +191,7 @@ function option(each) {
   return made;
 }
 
-/** What a material is, in a line.
+/** A material in one line.
  * @param {any} each */
 const about = ({ damaged, measured, model_title: title, spectrum, anisotropic, largest_albedo: most }) =>
   damaged
@@ -231,7 +231,7 @@ function filter() {
 
 const visible = () => options().filter((each) => !each.hidden);
 
-/** Make a line the active one, and scroll to it where it is out of sight: to the nearest edge, or to the middle.
+/** Make a line the active one and scroll to it, to the nearest edge or to the middle.
  * @param {HTMLElement | undefined} to
  * @param {"edge" | "middle"} place */
 function reach(to, place = "edge") {

@@ -1,4 +1,4 @@
-// The page in the browser: events change its value, and one loop turns that into pictures.
+// The page in the browser: events change its value, and one loop draws the pictures.
 
 import { answersTo, outdates } from "./answers.js";
 import { AGAIN_MS, Problem } from "./api.js";
@@ -8,16 +8,16 @@ import * as copy from "./copy.js";
 import { byId, element } from "./dom.js";
 import * as facts from "./facts.js";
 import * as list from "./list.js";
-import { after, opened } from "./page.js";
+import { after, opened } from "./reducer.js";
 import * as parameters from "./parameters.js";
 import { seriesOf } from "./series.js";
-import { fromHash, subjectOf, toHash } from "./state.js";
+import { fromHash, subjectOf, toHash } from "./link.js";
 import { VIEWS } from "./views.js";
 
-/** @typedef {import("./state.js").State} State */
+/** @typedef {import("./link.js").State} State */
 /** @typedef {import("./series.js").Series} Series */
 /** @typedef {import("./api.js").Question} Question */
-/** @typedef {import("./page.js").PageEvent} PageEvent */
+/** @typedef {import("./reducer.js").PageEvent} PageEvent */
 /** @typedef {(part: Partial<State>) => void} Choose */
 /** @typedef {{
  *   name: string, title: string, order: number,
@@ -28,25 +28,25 @@ import { VIEWS } from "./views.js";
  *   known?: (each: Series, state: State, series: Series[]) => boolean,
  *   draw?: (into: HTMLElement, series: Series[], answers: any[], state: State, all: Series[]) => string,
  *   begin?: (into: HTMLElement, choose: Choose, now: () => State) => void,
- * }} View parts: views that are shown side by side, or the view itself; idle: controls without effect; also: controls
- *   that few views have; request: what a copy asks for; answer: what the picture asks for, if that is more; known: the
- *   series that the service knows there; draw: the picture, and its caption; begin: what hands and keys do in it */
+ * }} View parts: views side by side, or the view itself; idle: controls without effect; also: controls that few views
+ *   have; request: the request that can be copied; answer: the requests of the picture, if there are others; known: the
+ *   series that the service can answer for; draw: draw the picture, return its caption; begin: add pointer and keys */
 
 const title = byId("title", HTMLElement);
 const message = byId("message", HTMLElement);
 const caption = byId("caption", HTMLElement);
 const picture = byId("picture", HTMLElement);
-const SLOW_MS = 200; // after which people are told that a picture is on its way
-const REST_MS = 250; // after which a slider rests
-const LINK_MS = 200; // browsers slow pages down that write their address at every move of a slider
+const SLOW_MS = 200; // time after which the caption says that a picture is loading
+const REST_MS = 250; // time without a move after which a slider rests
+const LINK_MS = 200; // time between two links: browsers slow down pages that write their address at every move
 
 let page = opened(fromHash(location.hash, VIEWS));
-let stop = new AbortController(); // of the picture that is being drawn
+let stop = new AbortController(); // aborts the current picture
 let drawing = false;
 /** @type {Map<string, ReturnType<typeof setTimeout>>} */
 const timers = new Map();
 
-/** Act later, and once: what waits under the same name is forgotten.
+/** Act later, and once: it replaces an earlier action of the same name.
  * @param {"link" | "rest" | "again"} name
  * @param {number} ms
  * @param {() => void} act */
@@ -55,8 +55,8 @@ function later(name, ms, act) {
   timers.set(name, setTimeout(act, ms));
 }
 
-/** Let an event change the page, show that in the controls, and draw what it asks for. A slider's next picture waits
- * for the present one, any other change stops it.
+/** Let an event change the page and the controls, and draw. The next picture of a slider waits for the current one; any
+ * other change aborts it.
  * @param {PageEvent} event */
 function dispatch(event) {
   const { state, series } = page;
@@ -77,7 +77,7 @@ function dispatch(event) {
 
 const redraw = () => dispatch({ kind: "asked", at: performance.now() });
 
-/** Change the state by hand: another material or view can be gone back from, anything else is written over its link.
+/** Change the state: another material or view is a step of the history, any other change replaces the link.
  * @type {Choose} */
 function choose(part) {
   const before = toHash(page.state),
@@ -86,14 +86,14 @@ function choose(part) {
   clearTimeout(timers.get("link"));
   const link = toHash(page.state);
   if (("view" in part || subjectOf(page.state.material).base !== from) && link !== before) {
-    history.replaceState(null, "", before); // which may wait to be written
+    history.replaceState(null, "", before); // a timer may not have written it yet
     history.pushState(null, "", link);
   } else {
     later("link", LINK_MS, () => history.replaceState(null, "", toHash(page.state)));
   }
 }
 
-/** Draw pictures until none is asked for. */
+/** Draw pictures until no further one is requested. */
 async function work() {
   drawing = true;
   picture.ariaBusy = "true";
@@ -125,7 +125,7 @@ async function work() {
   picture.ariaBusy = "false";
 }
 
-/** The views that are drawn for one.
+/** The views that a view consists of.
  * @param {string} name */
 const partsOf = (name) => (VIEWS[name].parts ?? [name]).map((part) => VIEWS[part]);
 
@@ -145,7 +145,7 @@ async function draw(now, start, signal) {
     if (!performance.getEntriesByName("first").length) performance.measure("first", { start, end: performance.now() });
     return said;
   };
-  const words = page.pictures === "none" ? [await one(views[0], 0)] : []; // on a slow connection it has no rivals
+  const words = page.pictures === "none" ? [await one(views[0], 0)] : []; // alone, for slow connections
   if (page.pictures === "none") {
     dispatch({ kind: "shown", pictures: "first" });
     begin.early.clear();
@@ -160,7 +160,7 @@ async function draw(now, start, signal) {
   caption.replaceChildren(...words.map((text) => element("p", {}, text)));
 }
 
-/** The places of a view's pictures, shown instead of the others: what is hidden has no size to draw into.
+/** Show the places of the pictures of a view and hide the others; a hidden place has no size to draw into.
  * @param {string | null} name */
 function shown(name) {
   const parts = name ? partsOf(name).map((view) => view.name) : [];
@@ -170,14 +170,14 @@ function shown(name) {
   return parts.map((id) => byId(id, HTMLElement));
 }
 
-/** Show no picture rather than one of something else.
+/** Remove the picture, which would be of an earlier state.
  * @param {State} now */
 function forget(now) {
   shown(null);
   list.paint();
   caption.textContent = "";
   if (page.series.length) {
-    parameters.show(page.series[0], now); // to move away from what was refused
+    parameters.show(page.series[0], now); // so that a refused parameter can be moved
     return;
   }
   title.textContent = now.material;
@@ -186,7 +186,7 @@ function forget(now) {
   controls.forget();
 }
 
-/** Learn what is shown; a comparison that is refused is left out.
+/** Load the series and show what is known of them, without a comparison that is refused.
  * @param {State} now
  * @param {AbortSignal} signal */
 async function know(now, signal) {
@@ -208,12 +208,12 @@ async function know(now, signal) {
   updateList();
 }
 
-/** Show in the list what was learnt of tables. */
+/** Update the lines of the list from the loaded series. */
 function updateList() {
   for (const each of page.series) if (each.source !== "parameters") list.update(each.info);
 }
 
-/** Answers of the tables that are known; where a new one was published meanwhile, that is learnt first, once.
+/** Answers for the loaded series; if a newer table was published meanwhile, it is loaded first, once.
  * @param {View} view
  * @param {State} now
  * @param {AbortSignal} signal */
@@ -228,7 +228,7 @@ async function currentAnswersTo(view, now, signal) {
   return again;
 }
 
-/** Tell people: what failed, or in another colour what worked; the names of materials that come closest are links.
+/** Show a message, `bad` or `calm`; the names of the closest materials in it are links.
  * @param {string} sentence */
 function say(sentence, tone = "bad") {
   const [, before, names] = /^(.*closest: )(.+)$/.exec(sentence) ?? [];
@@ -260,9 +260,8 @@ copy.listen(
   },
   say,
 );
-addEventListener("popstate", () => clearTimeout(timers.get("link"))); // it would write over the link that is gone to
+addEventListener("popstate", () => clearTimeout(timers.get("link"))); // it would overwrite the new link
 addEventListener("hashchange", () => {
-  // a link, or the way back
   const { state, wrong } = fromHash(location.hash, VIEWS);
   const material = state.material || page.state.material;
   dispatch({ kind: "changed", part: { ...state, material }, wrong, at: performance.now() });
@@ -276,7 +275,7 @@ new ResizeObserver(() => {
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => page.series.length && redraw());
 for (const link of document.querySelectorAll("a[href^='#']")) {
   link.addEventListener("click", (event) => {
-    event.preventDefault(); // the address holds what is shown
+    event.preventDefault(); // the address is the link of the view
     byId(link.getAttribute("href")?.slice(1) ?? "", HTMLElement).focus();
   });
 }
@@ -295,7 +294,7 @@ list
         dispatch({ kind: "changed", part: { material: first.name }, wrong: page.wrong, at: 0 });
       } else if (!page.state.material) {
         forget(page.state);
-        say("There is nothing to look at in the store.");
+        say("The store has no material to show.");
       }
     },
     () => page.state.material || forget(page.state),

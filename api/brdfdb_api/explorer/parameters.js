@@ -1,30 +1,29 @@
-// Parameters that move: sliders of a model with the published materials as marks, and what they make as a recipe.
+// Sliders for the parameters of a model, with published values as marks, and their values as a recipe.
 
 import { address, json } from "./api.js";
 import { copyText } from "./copy.js";
 import { byId, closest, element, short } from "./dom.js";
 import { check } from "./list.js";
-import { PICTURE_NM, changedText, subjectOf } from "./state.js";
+import { PICTURE_NM, changedText, subjectOf } from "./link.js";
 
-/** @typedef {import("./state.js").State} State */
+/** @typedef {import("./link.js").State} State */
 /** @typedef {import("./series.js").Series} Series */
 /** @typedef {{ name: string, unit: string, low: number, high: number, meaning: string, default: number | boolean |
  *   null,
  *   typical: [number, number] | null, published: { material: string, value: number }[] }} Parameter */
-/** @typedef {{ at: (share: number) => number, share: (value: number) => number }} Track the values of a slider, and
- *   back */
+/** @typedef {{ at: (share: number) => number, share: (value: number) => number }} Track value at a place, and back */
 
 const panel = byId("parameters", HTMLElement);
-const BEYOND = 3; // factor by which sliders go beyond what is published, where a parameter has no end of its own
-const DECADES = 30; // ratio of published values from which on a slider is logarithmic
+const BEYOND = 3; // factor beyond the published values that a slider reaches, within the limits of the parameter
+const DECADES = 30; // ratio of published values above which a slider is logarithmic
 
 /** Whether a base is a model, and no material.
  * @param {string} base */
 export const isModel = (base) => base.startsWith(OF_MODEL);
 
-const OF_MODEL = "*"; // before the name of a model, which stands for a material of typical parameters
+const OF_MODEL = "*"; // before the name of a model: a material with typical parameters
 const [N, K] = ["n", "k"];
-const GREEN_NM = 550; // at which n and k are shown where a picture has all wavelengths
+const GREEN_NM = 550; // wavelength of n and k if a picture has all wavelengths [nm]
 /** @type {Parameter[]} */
 const INDEX = [
   { name: N, unit: "1", low: 0.05, high: 4, meaning: "refractive index", default: 1.5, typical: null, published: [] },
@@ -32,9 +31,9 @@ const INDEX = [
 ];
 
 /** @type {Map<string, Promise<any>>} */
-const documents = new Map(); // what the service says of models and of materials that they begin with, which stays
-let shown = ""; // whose sliders there are
-let calls = 0; // of show and forget: the last one decides, whichever document arrives last
+const documents = new Map(); // of models and of the materials of the sliders, by path
+let shown = ""; // name of the material of the sliders
+let calls = 0; // number of calls of show and forget; only the last call has an effect
 
 /** @param {string} path
  * @returns {Promise<any>} */
@@ -47,7 +46,7 @@ function known(path) {
 
 const modelOf = (/** @type {string} */ name) => known(`v1/models/${encodeURIComponent(name)}`);
 
-/** The material that a base names, or a model as one: its parameters are typical ones.
+/** The material of a base; a model is a material with typical parameters.
  * @param {string} base
  * @returns {Promise<{ material: any, model: any }>} */
 async function begun(base) {
@@ -74,7 +73,7 @@ async function begun(base) {
   return { material, model };
 }
 
-/** Whether a model has a direction of its own, which parameters along x and y tell.
+/** Whether a model is anisotropic: it has parameters along x and y.
  * @param {any} model */
 const turned = (model) => model.parameters.some((/** @type {Parameter} */ { name }) => /_x(_|$)/.test(name));
 
@@ -85,7 +84,7 @@ function typical({ default: given, typical: ends, low, high }) {
   return ends ? Number(((ends[0] + ends[1]) / 2).toPrecision(3)) : Math.min(Math.max(0.3, low), high);
 }
 
-/** What is known of a material with other parameters, and its recipe.
+/** The document of a material with other parameters, and its recipe.
  * @param {string} base
  * @param {Record<string, number>} changes
  * @returns {Promise<{ info: any, recipe: Record<string, any> }>} */
@@ -115,7 +114,7 @@ export async function described(base, changes) {
   return { info, recipe: { parameters, ...(model.spectral && { refractive_index: index }) } };
 }
 
-/** What differs from what it began with, in words.
+/** The changed parameters in words.
  * @param {any} info */
 export const changed = ({ base, changes }) =>
   [base.title, ...Object.entries(changes).map(([name, value]) => `${name} ${short(value)}`)].join(", ");
@@ -127,7 +126,7 @@ export function forget() {
   shown = "";
 }
 
-/** Show the sliders of a series: of measured data there are none.
+/** Show the sliders of a series; measured data have none.
  * @param {Series} series
  * @param {State} state */
 export async function show({ info, name, source }, { nm }) {
@@ -159,7 +158,7 @@ export async function show({ info, name, source }, { nm }) {
   return undefined;
 }
 
-/** n and k of a material, and at which wavelength they are that: of a constant index at all.
+/** n and k of a material, and their wavelength; a constant index has none.
  * @param {{ attributes: any, n?: number[], k?: number[], wavelength_nm?: number[] }} material
  * @param {number | null} nm
  * @returns {{ n: number, k: number, where: string }} */
@@ -175,7 +174,7 @@ function indexOf({ attributes, n, k, wavelength_nm: at }, nm) {
 /** @type {Record<string, Track>} */
 let tracks = {};
 
-/** Make the sliders of a model: of parameters that are numbers, and of the refractive index.
+/** Make the sliders of a model: for its numeric parameters and its refractive index.
  * @param {any} model
  * @param {Record<string, any>} values
  * @param {string} name */
@@ -203,7 +202,7 @@ function build(model, values, name) {
         const made = element("button", { type: "button", tabIndex: -1, title: `${short(value)}: ${names.join(", ")}` });
         made.style.left = `${100 * track.share(value)}%`;
         Object.assign(made.dataset, { key, value });
-        made.setAttribute("aria-hidden", "true"); // the list of materials has the same for keys
+        made.setAttribute("aria-hidden", "true"); // keys use the list of materials
         return made;
       }),
     );
@@ -248,7 +247,7 @@ function published(parameter) {
   return [...found].map(([value, names]) => ({ value, names })).sort((a, b) => a.value - b.value);
 }
 
-/** The values of a slider: between the ends of a parameter, or around what is published; logarithmic over decades.
+/** The values of a slider: within the limits of a parameter, around its published values; logarithmic over decades.
  * @param {Parameter} parameter
  * @param {number[]} values
  * @returns {Track} */
@@ -279,7 +278,7 @@ function trackOf(parameter, values) {
   };
 }
 
-/** Fill the list of models, which begin with typical parameters.
+/** Fill the list of models, which start from typical parameters.
  * @param {(part: Partial<State>) => void} choose */
 export async function offer(choose) {
   const { models } = await json("v1/models"),

@@ -4,7 +4,7 @@ import { steps } from "./chart.js";
 import { closest, element, percent, short } from "./dom.js";
 import { makesColour, nearest } from "./series.js";
 
-/** @typedef {import("./state.js").State} State */
+/** @typedef {import("./link.js").State} State */
 /** @typedef {import("./series.js").Series} Series */
 
 const [APART, SHORT] = [0.13, 5]; // share of a colour bar between its marks of so many letters
@@ -121,14 +121,14 @@ export function colourBar(marks) {
   return element("div", { className: "bar quiet" }, stripe, ...texts);
 }
 
-/** A sentence on what no eye sees: one wavelength out of the visible, which a sphere shows as grey.
+/** A sentence on a wavelength outside the visible range, which a sphere shows as grey.
  * @param {Series} of
  * @param {State} state */
 export function unseenWords({ info }, { nm }) {
   if (info.wavelength_nm === null || (nm === null && makesColour(info))) return "";
   const at = nearest(info, nm);
   if (at >= 380 && at <= 780) return "";
-  return ` It is grey for what no eye sees: ${at} nm is ${at > 780 ? "infrared" : "ultraviolet"}.`;
+  return ` It is grey, because ${at} nm is ${at > 780 ? "infrared" : "ultraviolet"}.`;
 }
 
 /** A sentence on specular parts.

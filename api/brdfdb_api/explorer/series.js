@@ -3,9 +3,9 @@
 import { address, json, withQuery } from "./api.js";
 import { check } from "./list.js";
 import { changed, described, isModel } from "./parameters.js";
-import { PICTURE_NM, subjectOf } from "./state.js";
+import { PICTURE_NM, subjectOf } from "./link.js";
 
-/** @typedef {import("./state.js").State} State */
+/** @typedef {import("./link.js").State} State */
 /** @typedef {import("./api.js").Question} Question */
 /** @typedef {{ text: string, label: string, name: string, source: "table" | "model" | "parameters", info: any,
  *   recipe?: Record<string, any>, colour: string, dash: string }} Series recipe: the material of a model with

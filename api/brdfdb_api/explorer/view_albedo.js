@@ -4,7 +4,7 @@ import { chart, steps, valueAt } from "./chart.js";
 import { closest, ink, short } from "./dom.js";
 import { against, nearest, question } from "./series.js";
 
-/** @typedef {import("./state.js").State} State */
+/** @typedef {import("./link.js").State} State */
 /** @typedef {import("./series.js").Series} Series */
 
 const NM = [450, 550, 650]; // of albedos, where none is chosen

@@ -5,7 +5,7 @@ import { closest, degrees, element, ink, path, percent, short, svg } from "./dom
 import { RELATIVE, floorOf, relative, scaled, shortOfHorizon, span, specularWords, ticks } from "./scales.js";
 import { against, channelsOf, lobe, quantityWords } from "./series.js";
 
-/** @typedef {import("./state.js").State} State */
+/** @typedef {import("./link.js").State} State */
 /** @typedef {import("./series.js").Series} Series */
 /** @typedef {import("./chart.js").Curve} Curve */
 
@@ -85,7 +85,7 @@ function cut(into, series, answers, state) {
       ? ` ${state.axes === "polar" ? "Below, to 89°, t" : "T"}able − model, ${RELATIVE}: ${percent(worstOf(off))} at most.`
       : "") +
     (answers.some(({ extrapolated }) => extrapolated?.includes(true))
-      ? " Dashed is what was not measured but extrapolated."
+      ? " Dashed lines are extrapolated from the measured directions."
       : "") +
     specularWords(series, specular)
   );

@@ -5,7 +5,7 @@ import { element, ink, short } from "./dom.js";
 import { colourBar, mapped, scaled, span, specularWords, ticks } from "./scales.js";
 import { anisotropic, azimuth, lobe, number, quantity, quantityWords, question } from "./series.js";
 
-/** @typedef {import("./state.js").State} State */
+/** @typedef {import("./link.js").State} State */
 /** @typedef {import("./series.js").Series} Series */
 /** @typedef {[number, number, number]} Vector */
 /** @typedef {{ corners: number[], colour?: string, ink?: string, width?: number, depth?: number }} Piece corners are
@@ -139,7 +139,7 @@ function hemisphere(into, series, answers, state) {
   return (
     `${quantityWords(series[0], state)} in 1/sr over all viewers to θᵣ = ${LAST}°: ` +
     `the distance from the centre is ${scale}. ` +
-    "Drag the light, or anything else to turn the picture; arrow keys turn it, too." +
+    "Drag the light to move it, or any other point to turn the picture; arrow keys turn it, too." +
     specularWords(series, specular)
   );
 }

@@ -5,7 +5,7 @@ import { element, percent, short, svg } from "./dom.js";
 import { RELATIVE, colourBar, floorOf, mapped, relative, scaled, span, ticks } from "./scales.js";
 import { against, anisotropic, lobe, number, quantityWords } from "./series.js";
 
-/** @typedef {import("./state.js").State} State */
+/** @typedef {import("./link.js").State} State */
 /** @typedef {import("./series.js").Series} Series */
 /** @typedef {{ label: string, text: (j: number, i: number) => string, colour: (j: number, i: number) => number[] }}
  *   Map j of theta_h, i of theta_d */

@@ -5,7 +5,7 @@ import { ink, short } from "./dom.js";
 import { scaled, ticks } from "./scales.js";
 import { azimuth, question } from "./series.js";
 
-/** @typedef {import("./state.js").State} State */
+/** @typedef {import("./link.js").State} State */
 /** @typedef {import("./series.js").Series} Series */
 
 const LEAST_DECADES = 0.2; // of the logarithmic axis of a spectrum: a factor of 1.6
@@ -84,6 +84,6 @@ function spectrum(into, series, answers, state) {
       ? ` ${series[i].label} is grey: ${short(answer.brdf)} /sr${answer.error ? ` ± ${short(answer.error)}` : ""} at every wavelength.`
       : "",
   );
-  const band = answers.some(({ error }) => error) ? ", with the band that 99 of 100 values of the table keep to" : "";
+  const band = answers.some(({ error }) => error) ? ", with the band of the error that 99 of 100 values of the table stay within" : "";
   return `fᵣ at one pair of directions${band}.${words.join("")}`;
 }

@@ -6,7 +6,7 @@ import { unseenWords } from "./scales.js";
 import { anisotropic, azimuth, quantity, question } from "./series.js";
 import { add, between, lightOf, lune, moments, surroundings } from "./sphere_scene.js";
 
-/** @typedef {import("./state.js").State} State */
+/** @typedef {import("./link.js").State} State */
 /** @typedef {import("./series.js").Series} Series */
 /** @typedef {{ viewers: number[], moments: Float64Array, specular: number[][] | null }} Around */
 
@@ -21,8 +21,8 @@ const ENCODED = Uint8Array.from({ length: 4097 }, (_, i) => {
 });
 
 const WORDS =
-  "The viewer is far above the page; the light is θᵢ away from the viewer, to the right (+x) at φᵢ = 0 and to the " +
-  "top (+y) at 90°, and as bright as makes a white matt surface white. Drag it. " +
+  "The viewer is far above the page. The light is θᵢ away from the viewer, to the right (+x) at φᵢ = 0 and to the " +
+  "top (+y) at 90°, and so bright that a white matt surface appears white. Drag the light to move it. " +
   "The x axis of the surface runs around the vertical axis of the sphere.";
 const SKY = " The surroundings are bright above and black below.";
 const SPECULAR = " The specular part reflects them and the light, a disk of 5°.";
@@ -129,7 +129,7 @@ function spheres(into, series, answers, state) {
     around?.specular?.flat().some((/** @type {number} */ part) => part > 0),
   );
   if (state.surround === "studio")
-    return "The viewer is far above the page, and the light is that of a studio, which the specular part reflects, too.";
+    return "The viewer is far above the page. The light is that of a studio; the specular part reflects it, too.";
   return WORDS + (state.surround === "sky" ? SKY : "") + (specular ? SPECULAR : "") + unseenWords(series[0], state);
 }
 
@@ -141,7 +141,7 @@ function brightened(seen, { exposure }) {
   if (ev <= exposure) return [];
   const button = element("button", { type: "button" }, `Show at +${ev} EV`);
   button.dataset.exposure = String(ev);
-  return [element("p", {}, "Nearly black beside a white surface"), button];
+  return [element("p", {}, "Nearly black compared with a white surface"), button];
 }
 
 /** Paint a sphere; its largest linear value.

@@ -24,36 +24,37 @@ T = TypeVar("T")
 
 Revision = Annotated[
     str | None,
-    WithJsonSchema({"type": "string", "description": "such as r000001, or r000001-0123456789abcdef with its digest"}),
+    WithJsonSchema({"type": "string", "description": "such as r000001, or with its digest, r000001-0123456789abcdef"}),
 ]
-NPY_ANSWER = {NPY: "brdf alone, or brdf and error on a first axis, as a .npy file"}
+NPY_ANSWER = {NPY: "brdf as a .npy file; with error=true, brdf and error along a first axis"}
 NPY_BODY = (
-    "Or .npy of shape (..., 4), float32 or float64: theta_i, phi_i, theta_r, phi_r. Other media are read as JSON."
+    "Or a .npy array of shape (..., 4), float32 or float64: theta_i, phi_i, theta_r, phi_r. "
+    "A body of any other media type is read as JSON."
 )
 
 _REFERENCE = "#/components/schemas/{model}"
 _OTHERS = {
-    304: "The ETag in If-None-Match still holds",
-    404: "No such name or revision; the closest names are listed",
-    413: "Too large a body, or too many points for one answer",
+    304: "The ETag in If-None-Match is still current",
+    404: "Unknown name or revision; the answer lists the closest names",
+    413: "The body is too large, or one answer cannot have so many points",
     415: "The body is compressed",
-    416: "The file ends before the range begins",
-    422: "A parameter is missing, unknown or out of range; it is named",
-    503: "The store, or the files of this material, cannot be read; or too much is asked for at once",
+    416: "The range begins after the end of the file",
+    422: "A parameter is missing, unknown or out of range; the answer names it",
+    503: "The store or the files of the material cannot be read, or the service is too busy",
 }
 _HEADERS = {
-    "X-Request-ID": "that of the request, or a new one; the log has it, too",
-    "ETag": "changes with the answer",
-    "Cache-Control": "how long the answer holds: what a revision stores for good",
-    REVISION: "revision of the values",
-    DIGEST: "sha256 of the manifest of the revision",
-    "Content-Disposition": "name of the file",
+    "X-Request-ID": "ID of the request, from its own header or new; the log has it, too",
+    "ETag": "changes when the answer changes",
+    "Cache-Control": "how long the answer may be cached: without end where a revision is named with its digest",
+    REVISION: "revision of the table",
+    DIGEST: "SHA-256 of the manifest of the revision",
+    "Content-Disposition": "file name",
     "Retry-After": "seconds after which the same request may succeed",
 }
 
 
 def is_pinned(revision: str | None) -> bool:
-    """Return True if a revision that was found is named with its digest, so that its numbers hold in any store."""
+    """Return True if a revision is named with its digest, so that its numbers are the same in any store."""
     return revision is not None and "-" in revision
 
 
@@ -67,7 +68,7 @@ async def _content(request: Request) -> bytes:
     return await request.body()
 
 
-Content = Annotated[bytes, Depends(_content)]  # of addresses that run in a thread
+Content = Annotated[bytes, Depends(_content)]  # for endpoints that run in a thread
 
 
 class Address(APIRoute):
@@ -87,8 +88,8 @@ class Address(APIRoute):
             if not reads_itself:
                 parsed(request.scope["query_string"], names)
             if (coding := request.headers.get("content-encoding", "identity").lower()) != "identity":
-                sentence = f"Content-Encoding: {shortened(coding)!r} is not read; send the body as it is"
-                raise RequestError(415, sentence, Accept_Encoding="identity")
+                detail = f"Content-Encoding: {shortened(coding)!r} is not supported; send the body uncompressed"
+                raise RequestError(415, detail, Accept_Encoding="identity")
             return unchanged(await handle(request), request.headers.get("if-none-match"))
 
         return answer
@@ -161,7 +162,7 @@ def answers(
     model: type[BaseModel] | None, *statuses: int, media: Mapping[str, str] = {}, headers: tuple[str, ...] = ()
 ) -> dict[int | str, dict[str, Any]]:
     """Return the OpenAPI description of the answers of an address: `model` at 200 or other media, and `statuses`."""
-    content = {} if model is None else {JSON: _schema(model)}  # first: generated clients take the first that they read
+    content = {} if model is None else {JSON: _schema(model)}  # first, because generated clients use the first one
     for kind, text in media.items():
         binary = {"type": "string"} if "text" in kind else {"type": "string", "format": "binary"}
         content[kind] = {"schema": {"description": text, **({"type": "object"} if kind == JSON else binary)}}
@@ -183,7 +184,7 @@ def _answer(description: str, *names: str, **more: Any) -> dict[str, Any]:
 
 
 def body(model: type[BaseModel], *, npy: bool = False) -> dict[str, Any]:
-    """Return the OpenAPI description of a body that is JSON, or .npy, too."""
+    """Return the OpenAPI description of a body that is JSON, or also .npy."""
     example: Any = model.model_config.get("json_schema_extra")
     content = {JSON: {**_schema(model, "validation"), **example}}
     if npy:

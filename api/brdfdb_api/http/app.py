@@ -34,18 +34,19 @@ if TYPE_CHECKING:
     from brdfdb.store.reader import Store
 
 DESCRIPTION = """\
-Lookups in audited tables of spectral BRDFs, in 1/sr with the cosine not folded in.
+Lookups in audited tables of spectral BRDFs [1/sr], without the cosine.
 
 All angles are in degrees: theta from the normal, phi counter-clockwise; index i is the light, r the viewer.
-phi_r - phi_i = 0 looks back towards the light, 180 is the side of the mirror direction. Every error is an
+phi_r - phi_i = 0 is back towards the light, 180 is the side of the mirror direction. Every error is an
 application/problem+json document with one sentence."""
 
 
 class Application(FastAPI):
-    """FastAPI behind an edge, whose OpenAPI document has the schemas that its answers name."""
+    """A FastAPI application behind `Edge`, with the schemas of all answers in its OpenAPI document."""
 
     def build_middleware_stack(self) -> ASGIApp:
-        given, inner = self.state.settings, super().build_middleware_stack()
+        given = self.state.settings
+        inner = super().build_middleware_stack()
         quick = [route for route in lookups.routes if isinstance(route, Quick)]
         edge = Edge(inner, given.max_body_bytes, quick, self.state.failed, given.log_level)
         if not given.cors_origins:
@@ -72,13 +73,13 @@ def create_app(settings: Settings | None = None, store: Store | None = None) -> 
     settings : Settings, optional
         Read from the environment (``BRDFDB_*``) if missing.
     store : Store, optional
-        An open store, instead of `settings.store`. That one is opened by the first request that needs it, so that an
-        application can start, and answer 503, before there is a store.
+        An open store, instead of the one at `settings.store`, which the first request opens. Until a store exists, the
+        application answers 503.
 
     Raises
     ------
     ValueError
-        If a variable of the environment has a value that is not allowed.
+        If an environment variable has a value that is not allowed.
     """
     app = Application(
         title="brdfdb",
@@ -105,7 +106,7 @@ def create_app(settings: Settings | None = None, store: Store | None = None) -> 
 
 
 class _Cors(CORSMiddleware):
-    """CORS whose refusals are problems, too."""
+    """CORS middleware whose refusals are problem documents, too."""
 
     def preflight_response(self, request_headers: Headers) -> Response:
         answer = super().preflight_response(request_headers)
@@ -116,14 +117,14 @@ class _Cors(CORSMiddleware):
 
 @contextlib.asynccontextmanager
 async def _warmed(app: FastAPI) -> AsyncIterator[None]:
-    """Load the kernels of lookups and what pictures share in a thread, while the application answers already."""
+    """Load the kernels of lookups and the data of pictures in a thread, while the application already answers."""
     loads = (app.state.shelf.warm, lit_sphere.prepare)
     threading.Thread(target=lambda: [load() for load in loads], daemon=True).start()
     yield
 
 
 def openapi_json() -> bytes:
-    """Return the OpenAPI document as it stands in ``api/openapi.json``."""
+    """Return the OpenAPI document as in ``api/openapi.json``."""
     return orjson.dumps(create_app(Settings()).openapi(), option=orjson.OPT_INDENT_2 | orjson.OPT_APPEND_NEWLINE)
 
 

@@ -20,40 +20,32 @@ from brdfdb import errors
 
 PROBLEM_JSON = "application/problem+json"
 
-BUSY_S, DAMAGED_S = 1, 60  # seconds to wait for a turn, and until somebody may have mended a store
+BUSY_S = 1  # time until a busy service may answer [s]
+DAMAGED_S = 60  # time until somebody may have repaired a store [s]
 
 # Phrases of RFC 9110; those of http.HTTPStatus differ between versions of Python
 _TITLES = {413: "Content Too Large", 422: "Unprocessable Content"}
 
 
 class RequestError(errors.BrdfdbError):
-    """A refused request.
+    """A refused request: its status, the sentence `detail` and the wrong parameter.
 
-    Parameters
-    ----------
-    status : int
-        The HTTP status.
-    detail : str
-        The sentence.
-    parameter : str, optional
-        The parameter that is at fault.
-    retry_after_s : int, optional [s]
-        Time after which the same request may succeed, of status 503.
-    **headers : str
-        Headers of the answer, with ``_`` in place of ``-``.
+    `headers` of the answer have ``_`` in place of ``-``. Answers of status 503 have Retry-After.
     """
 
     def __init__(
         self, status: int, detail: str, parameter: str | None = None, *, retry_after_s: int = BUSY_S, **headers: str
     ) -> None:
         super().__init__(detail)
-        self.status, self.parameter, self.retry_after_s = status, parameter, retry_after_s
+        self.status = status
+        self.parameter = parameter
+        self.retry_after_s = retry_after_s
         self.headers = {name.replace("_", "-"): value for name, value in headers.items()}
 
 
 @contextlib.contextmanager
 def refused() -> Iterator[None]:
-    """Turn errors about the parameters of a request, or what its format cannot hold, into refusals (422)."""
+    """Turn errors about parameters of a request, and tables that a format cannot hold, into refusals (422)."""
     try:
         yield
     except (errors.ParameterError, errors.CannotHoldError) as error:
@@ -61,13 +53,13 @@ def refused() -> Iterator[None]:
 
 
 def refusal_of(finding: Mapping[str, Any]) -> RequestError:
-    """Return the refusal (422) of a finding of pydantic; it names the parameter, or else the body."""
+    """Return the refusal (422) of an error that pydantic found; it names the parameter, or else the body."""
     wrong = finding.get("ctx", {}).get("error")
     parameter = wrong.parameter if isinstance(wrong, errors.ParameterError) else str((*finding["loc"], "body")[0])
     return RequestError(422, f"{parameter}: {errors.sentence_of(finding)}", parameter)
 
 
-# Classes that the router hands to `handler`. Any other error of brdfdb is a bug of the service, and answered with 500
+# Errors that the router passes to `handler`. Any other error of brdfdb is a bug of the service: 500
 HANDLED = (
     errors.UnknownMaterialError,
     errors.UnknownRevisionError,
@@ -81,27 +73,22 @@ HANDLED = (
 
 async def handler(request: Request, error: Exception) -> Response:
     """Return the answer of the router to an exception."""
+    state = request.app.state
     if isinstance(error, HTTPException) and error.status_code in (404, 405):
-        error = _not_routed(request)
-    answer: Response = request.app.state.failed(error)
+        routes = [route for route in state.routes if route.matches(request.scope)[0] is not Match.NONE]
+        methods = {method for route in routes for method in route.methods}  # the router lists those of one route only
+        allowed = ", ".join(sorted(methods | {"HEAD"} if "GET" in methods else methods))
+        unknown = RequestError(404, f"{request.scope['path'][:100]!r} is not an address of this service; see /docs")
+        detail = f"{request.method[:20]} is not allowed at this address; allowed are {allowed}"
+        error = RequestError(405, detail, Allow=allowed) if routes else unknown
+    answer: Response = state.failed(error)
     return answer
 
 
-def _not_routed(request: Request) -> RequestError:
-    """Return the refusal of an unknown address (404), or of a method that the address does not have (405)."""
-    routes = [route for route in request.app.state.routes if route.matches(request.scope)[0] is not Match.NONE]
-    if not routes:
-        return RequestError(404, f"{request.scope['path'][:100]!r} is no address; /docs lists all that there are")
-    methods = {method for route in routes for method in route.methods}  # the router names those of one route only
-    allowed = ", ".join(sorted(methods | {"HEAD"} if "GET" in methods else methods))
-    method = request.method[:20]
-    return RequestError(405, f"{method} is not allowed at this address; allowed are {allowed}", Allow=allowed)
-
-
 def problem_of(error: Exception, root: Path | None = None) -> Response:
-    """Return the answer to an exception; of the path of the store, its `root`, it shows the last name only.
+    """Return the answer to an exception; of the directory of the store, `root`, it shows only the last name.
 
-    A ParameterError that reaches this table is about a parameter that no client gave, so it is a bug: 500.
+    A ParameterError here is about a parameter that no client sent, so it is a bug: 500.
     """
     match error:
         case RequestError():
@@ -119,11 +106,11 @@ def problem_of(error: Exception, root: Path | None = None) -> Response:
             detail = str(error) if root is None else str(error).replace(str(root), root.name)
             return _problem(503, detail, headers={"Retry-After": str(DAMAGED_S)})
         case OSError() if error.errno in (errno.EMFILE, errno.ENFILE):
-            return problem_of(RequestError(503, "too many files and connections are open; ask again later"))
+            return problem_of(RequestError(503, "too many files and connections are open; try again later"))
         case HTTPException():
             return _problem(error.status_code, error.detail, headers=dict(error.headers or {}))
         case _:
-            return _problem(500, "the server failed on this request; its log says why")
+            return _problem(500, "the service failed on this request; its log has the reason")
 
 
 def _problem(
@@ -133,7 +120,7 @@ def _problem(
     closest: Sequence[str] | None = None,
     headers: dict[str, str] | None = None,
 ) -> Response:
-    """Return an error as application/problem+json, with the members `parameter` and `closest` where they are known."""
+    """Return an error as application/problem+json, with the fields `parameter` and `closest` if they are given."""
     problem: dict[str, Any] = {
         "type": "about:blank",
         "title": _TITLES.get(status) or HTTPStatus(status).phrase,

@@ -1,4 +1,4 @@
-"""The files of the store, read-only: one by one, as xarray reads them over HTTP, and a revision as one zip."""
+"""The files of the store, read-only: single files, as xarray reads them over HTTP, and a revision as a zip file."""
 
 from __future__ import annotations
 
@@ -16,11 +16,12 @@ from brdfdb.store.paths import manifest_path, pinned
 from brdfdb.store.records import check_manifest, read_manifest
 from brdfdb_api.http.addresses import Revision, addresses, answers, both, is_pinned, shelf_of
 from brdfdb_api.http.errors import RequestError
+from brdfdb_api.http.queries import shortened
 from brdfdb_api.http.responses import JSON, Document, cache_headers, tagged
 
 BYTES = "application/octet-stream"
 
-_RANGE = re.compile(r"bytes=(?:(?P<first>\d{1,18})-(?P<end>\d{1,18})?|-(?P<last>\d{1,18}))")  # others are not read
+_RANGE = re.compile(r"bytes=(?:(?P<first>\d{1,18})-(?P<end>\d{1,18})?|-(?P<last>\d{1,18}))")  # others are ignored
 
 files = addresses()
 
@@ -31,20 +32,20 @@ files = addresses()
     tags=["files"],
     responses=answers(
         *(None, 304, 404, 503),
-        media={ZIP: "a zarr v3 group, for zarr.storage.ZipStore"},
+        media={ZIP: "a zarr v3 group for zarr.storage.ZipStore"},
         headers=("Content-Disposition",),
     ),
 )
 def download(request: Request, name: str, revision: Revision = None) -> Response:
-    """Return a revision as one uncompressed zip file: xarray.open_zarr(zarr.storage.ZipStore(path, mode="r"))."""
+    """Return a revision as an uncompressed zip file for xarray.open_zarr(zarr.storage.ZipStore(path, mode="r"))."""
     group, digest = shelf_of(request).located(name, revision)
     headers = cache_headers(f"{name}-{pinned(group.name, digest)}-{__version__}", "zip", immutable=is_pinned(revision))
     headers["Content-Disposition"] = f'attachment; filename="{name}-{group.name}.zarr.zip"'
     listed = check_manifest(group, digest, contents=False)["files"]
     contents = ((name, checked_bytes(group, name, listed)) for name in sorted(listed))
     pieces = zipped(contents, zipfile.ZIP_STORED)
-    whole = itertools.chain([next(pieces)], pieces)  # all is read before the answer begins
-    return StreamingResponse(whole, media_type=ZIP, headers=headers)
+    pieces = itertools.chain([next(pieces)], pieces)  # the first piece reads and checks every file
+    return StreamingResponse(pieces, media_type=ZIP, headers=headers)
 
 
 @files.get(
@@ -53,16 +54,16 @@ def download(request: Request, name: str, revision: Revision = None) -> Response
     responses=answers(None, 304, 404, 416, 503, media={BYTES: "a file of the zarr group"}),
 )
 def stored_file(request: Request, name: str, revision: str, file: str) -> Response:
-    """Return a file of a revision: ``xarray.open_zarr(".../v1/store/materials/NAME/REVISION")`` reads these.
+    """Return a file of a revision, as ``xarray.open_zarr(".../v1/store/materials/NAME/REVISION")`` reads it.
 
-    REVISION is that of ``links.store`` of the material, with its digest: what is read is then of one table.
+    Take REVISION with its digest from ``links.store`` of the material: all files then belong to the same table.
     """
     group, digest = shelf_of(request).located(name, revision)
     listed = check_manifest(group, digest, contents=False)["files"]
     if file not in listed:
-        raise RequestError(404, f"{name} {revision} has no such file")
-    content = checked_bytes(group, file, listed)  # a cache would keep damaged ones forever
-    is_json = file.endswith(".json")  # JSON may be compressed on its way
+        raise RequestError(404, f"{name} {revision} has no file {shortened(file)!r}")
+    content = checked_bytes(group, file, listed)  # a cache would never replace a damaged file
+    is_json = file.endswith(".json")  # JSON may be compressed
     tag = f"{name}-{group.name}-{listed[file]['sha256'][:16]}"
     headers = cache_headers(tag, "json" if is_json else "file", immutable=is_pinned(revision))
     return Document(content, headers) if is_json else _ranged(request, content, headers)
@@ -71,10 +72,10 @@ def stored_file(request: Request, name: str, revision: str, file: str) -> Respon
 @files.get(
     "/v1/store/materials/{name}/{revision}.MANIFEST.json",
     tags=["files"],
-    responses=answers(None, 304, 404, 503, media={JSON: "the manifest as it is stored: its sha256 is the digest"}),
+    responses=answers(None, 304, 404, 503, media={JSON: "the stored manifest; its SHA-256 is the digest"}),
 )
 def manifest(request: Request, name: str, revision: str) -> Response:
-    """Return the manifest of a revision: sizes and sha256 of its files."""
+    """Return the manifest of a revision: the size and the SHA-256 of each file."""
     group, digest = shelf_of(request).located(name, revision)
     read_manifest(group, digest)
     headers = cache_headers(f"{name}-{pinned(group.name, digest)}", immutable=is_pinned(revision))
@@ -82,15 +83,18 @@ def manifest(request: Request, name: str, revision: str) -> Response:
 
 
 def _ranged(request: Request, content: bytes, headers: dict[str, str]) -> Response:
-    """Return the range of bytes that a request names, or all; RequestError (416) if it begins after the end."""
-    part, size = _RANGE.fullmatch(request.headers.get("range", "")), len(content)
+    """Return the requested range of bytes, or all bytes; RequestError (416) if the range begins after the end."""
+    part = _RANGE.fullmatch(request.headers.get("range", ""))
+    size = len(content)
     headers = headers | {"Accept-Ranges": "bytes"}
     other = request.headers.get("if-range", headers["ETag"]) != headers["ETag"]
     if part is None or other or (part["end"] and int(part["end"]) < int(part["first"])):
         return Response(content, media_type=BYTES, headers=headers)
     first = max(0, size - int(part["last"])) if part["last"] else int(part["first"])
     if first >= size:
-        raise RequestError(416, f"the file has {size} bytes", Content_Range=f"bytes */{size}")
+        raise RequestError(
+            416, f"Range: begins after the end of the file, which has {size} bytes", Content_Range=f"bytes */{size}"
+        )
     piece = content[first : int(part["end"] or size) + 1]
     headers["Content-Range"] = f"bytes {first}-{first + len(piece) - 1}/{size}"
     return Response(piece, 206, headers, BYTES)
@@ -100,6 +104,6 @@ def _ranged(request: Request, content: bytes, headers: dict[str, str]) -> Respon
 def root(request: Request) -> Response:
     """Return the metadata of all current revisions: ``zarr.open_group(".../v1/store")`` lists materials/NAME/REVISION.
 
-    A material that is damaged is left out.
+    Damaged materials are left out.
     """
     return tagged(root_group(shelf_of(request).store), "store")

@@ -1,4 +1,4 @@
-"""TableLookups: values of tables, models and families at the points of a request, and the addresses of tables."""
+"""Values of tables, models and families at the points of a request, and the lookup addresses of tables."""
 
 from __future__ import annotations
 
@@ -42,13 +42,13 @@ T = TypeVar("T")
 
 INLINE_VALUES = 1000  # larger lookups run in a thread, so that the event loop can serve others
 INLINE_BYTES = 96 * 2**10  # larger bodies are read in a thread; 1000 points take about this many bytes
-LARGE_BYTES = 2**20  # larger bodies wait for a turn
-LARGE_VALUES = 100_000  # larger answers wait for a turn
-LARGE_AT_ONCE = 2  # turns at a time
+LARGE_BYTES = 2**20  # size of bodies above which they wait for a turn
+LARGE_VALUES = 100_000  # number of values above which answers wait for a turn
+LARGE_AT_ONCE = 2  # number of turns that run together
 TURN_S = 10.0  # longest wait for a turn [s]
 LIMITS = {"json": (1, 100), "npy": (100, 400)}  # points and values of one answer, as multiples of max_points
-MATRIX = 16  # elements of the Mueller matrix that a Stokes vector takes
-SPECTRA_OF_COLOURS = 10  # factor on the number of values where only colours are returned
+MATRIX = 16  # elements of a Mueller matrix, which a Stokes vector needs
+SPECTRA_OF_COLOURS = 10  # factor on the allowed number of values if only colours are returned
 # Parameters with the same name in the library and in requests
 _PARAMETERS = (*ANGLES, "wavelength_nm", *queries.TableOptions.model_fields)
 NPZ = "application/x-npz"
@@ -71,7 +71,7 @@ async def turn(turns: asyncio.Semaphore) -> AsyncIterator[None]:
         async with asyncio.timeout(TURN_S):
             await turns.acquire()
     except TimeoutError:
-        detail = "the server does as much at once as it can; ask again later"
+        detail = "the service is busy with other large requests; try again later"
         raise RequestError(503, detail, retry_after_s=round(TURN_S)) from None
     try:
         yield
@@ -84,7 +84,7 @@ async def _large(request: Request) -> AsyncIterator[None]:
         yield
 
 
-LARGE = Depends(_large)  # for addresses that need much memory or time
+LARGE = Depends(_large)  # for endpoints that need much memory or time
 
 
 async def in_thread(state: State, work: Callable[[], T], *, large: bool) -> T:
@@ -94,7 +94,7 @@ async def in_thread(state: State, work: Callable[[], T], *, large: bool) -> T:
 
 
 def surface_in(table: Table, query: queries.TableOptions) -> LookupSubject:
-    """Return a table, or the model that it was made of; RequestError (422) if the table has no model."""
+    """Return a table, or the model that it was made from; RequestError (422) if the table has no model."""
     if query.source == "table":
         return surface_of(table)
     with refused():
@@ -102,16 +102,16 @@ def surface_in(table: Table, query: queries.TableOptions) -> LookupSubject:
 
 
 def tag_in(table: Table, surface: LookupSubject) -> str:
-    """Return the ETag of values of a table, or of its model, whose version it names then."""
+    """Return the ETag of values of a table, or of its model, with the version of the model."""
     if surface.kind == "table":
         return responses.tag_of(table)
     return responses.tag_of(table, surface.source.material.spec.version)
 
 
 def evaluate(points: LookupPoints, query: queries.Options, surface: LookupSubject, *, specular: bool = True) -> Values:
-    """Look up points; RequestError (422) outside the range of the surface, or where it makes no colour."""
-    error = getattr(query, "error", False)  # models state none
-    incident = getattr(query, "stokes", None)  # models have none
+    """Look up points; RequestError (422) outside the range of the surface, or if it has no colour."""
+    error = getattr(query, "error", False)  # not a parameter of models
+    incident = getattr(query, "stokes", None)  # not a parameter of models
     try:
         return surface.values(points, query.output, query.illuminant, error=error, specular=specular, incident=incident)
     except ParameterError as wrong:
@@ -123,20 +123,18 @@ def evaluate(points: LookupPoints, query: queries.Options, surface: LookupSubjec
 def checked_size(
     max_points: int, points: LookupPoints, query: queries.Options, surface: LookupSubject, kind: queries.Format
 ) -> int:
-    """Return the number of values to look up; RequestError (413) if they are too many for one answer."""
+    """Return the number of values to look up; RequestError (413) if it is too large for one answer."""
     most_points, most_values = (factor * max_points for factor in LIMITS[kind])
     if points.count > most_points:
-        hint = "; format=npy may hold more" if kind == "json" else ""
-        raise RequestError(
-            413, f"{points.count} points are more than the {most_points} that one {kind} answer may hold{hint}"
-        )
+        hint = "; ask for format=npy" if kind == "json" else ""
+        raise RequestError(413, f"{points.count} points are more than the {most_points} of a {kind} answer{hint}")
     wavelengths = surface.wavelengths(points)
     values = points.count * (1 if wavelengths is None else int(np.size(wavelengths)))
     values *= 1 if getattr(query, "stokes", None) is None else MATRIX
     if query.output != "spectrum" and surface.kind == "table":
         most_values *= SPECTRA_OF_COLOURS
     if values > most_values:
-        raise RequestError(413, f"{values} values are more than the {most_values} that one {kind} answer may be of")
+        raise RequestError(413, f"{values} values are more than the {most_values} for a {kind} answer")
     return values
 
 
@@ -149,7 +147,7 @@ async def looked_up(
     binary: bool = False,
     quick: bool = False,
 ) -> Response:
-    """Answer a body of `size` bytes: read it, in a thread unless it is `quick`, and look its points up."""
+    """Read a body of `size` bytes, in a thread unless it is `quick`, and answer with the values at its points."""
     state = request.app.state
     kind = query.kind(queries.accept_of(request), binary=binary)
     requested = read() if quick else await in_thread(state, read, large=size > LARGE_BYTES)
@@ -160,7 +158,7 @@ async def looked_up(
 async def answered(
     state: State, requested: RequestedPoints, query: queries.Options, kind: queries.Format, headers: responses.Encoded
 ) -> Response:
-    """Look the points up and write them as `kind`, in a thread unless that is quick."""
+    """Answer with the values at points as `kind`, in a thread unless they are few."""
     surface, points, about = requested
     count = checked_size(state.settings.max_points, points, query, surface, kind)
 
@@ -173,7 +171,7 @@ async def answered(
 
     if count <= INLINE_VALUES and surface.kind == "table" and query.output == "spectrum":
         return write()
-    # a row and a column of angles take few bytes and make many points
+    # A row and a column of angles are few bytes and many points
     return await in_thread(state, write, large=count > LARGE_VALUES)
 
 
@@ -190,13 +188,13 @@ _OF_POINTS = queries.names_of(queries.PointQuery)
 async def lookup_point(
     request: Request,
     name: str,
-    query: Annotated[queries.PointQuery, InQuery()],  # of the document
+    query: Annotated[queries.PointQuery, InQuery()],  # for the OpenAPI document only
     revision: Revision = None,
 ) -> Response:
     """Return the BRDF at one pair of directions (angles in degrees).
 
-    The wavelengths are an axis, unless wavelength_nm is one number or the material is grey. Below the horizon (theta
-    above 90 degrees) the BRDF is 0.
+    The BRDF has an axis of wavelengths, unless wavelength_nm is one number or the material is grey. Below the horizon
+    (theta above 90 degrees) it is 0.
     """
     scope = request.scope
     query = queries.checked(queries.PointQuery, queries.parsed(scope["query_string"], _OF_POINTS))
@@ -206,19 +204,20 @@ async def lookup_point(
             accept += f",{value.decode('latin-1')}"  # the header may come in several lines
         elif key == b"if-none-match":
             if_none_match = value.decode("latin-1")
-    state, kind, points = scope["app"].state, query.kind(accept), query.points
+    state = scope["app"].state
+    kind = query.kind(accept)
     table = await _table(state.shelf, name, revision)
     surface = surface_in(table, query)
     computed = query.source == "model" or query.output != "spectrum" or query.stokes is not None
-    tag, immutable = tag_in(table, surface), is_pinned(revision) and not computed
-    headers = responses.value_headers(kind, tag, table.revision, table.digest, immutable=immutable)
-    requested = RequestedPoints(surface, points, of_table(table))
+    immutable = is_pinned(revision) and not computed
+    headers = responses.value_headers(kind, tag_in(table, surface), table.revision, table.digest, immutable=immutable)
+    requested = RequestedPoints(surface, query.points, of_table(table))
     answer = await answered(state, requested, query, kind, headers)
     return responses.unchanged(answer, if_none_match) if if_none_match else answer
 
 
 async def _table(shelf: Shelf, name: str, revision: str | None) -> Table:
-    """Return a table at once if it is decoded, else from a thread."""
+    """Return a table that is in memory, or decode it in a thread."""
     table = shelf.held(name)
     if table is not None and (revision is None or revision in (table.revision, pinned(table.revision, table.digest))):
         return table
@@ -236,14 +235,14 @@ async def _table(shelf: Shelf, name: str, revision: str | None) -> Table:
 async def lookup_points(
     request: Request, name: str, query: Annotated[queries.BodyQuery, InQuery()], revision: Revision = None
 ) -> Response:
-    """Return the BRDF at many pairs of directions (angles in degrees), in the shape that the angles broadcast to.
+    """Return the BRDF at many pairs of directions (angles in degrees), in the shape to which the angles broadcast.
 
-    The wavelengths are a last axis, unless wavelength_nm is one number or the material is grey. Below the horizon
-    (theta above 90 degrees) the BRDF is 0. A body of any media type but .npy is read as JSON.
+    Wavelengths are the last axis, unless wavelength_nm is one number or the material is grey. Below the horizon (theta
+    above 90 degrees) the BRDF is 0. A body of any media type except .npy is read as JSON.
     """
     binary = request.headers.get("content-type", "").partition(";")[0].strip().lower() == responses.NPY
     if query.wavelength_nm and not binary:
-        raise RequestError(422, "wavelength_nm: a JSON body holds it, not the query", "wavelength_nm")
+        raise RequestError(422, "wavelength_nm: must be in the JSON body, not in the query", "wavelength_nm")
     table = await _table(shelf_of(request), name, revision)
     surface = surface_in(table, query)
     content = await request.body()
@@ -263,7 +262,7 @@ async def lookup_points(
 @lookups.post(
     "/v1/lookup",
     tags=["lookup"],
-    responses=answers(TableLookups, 404, 413, 415, 503, media={NPZ: "an array a material, by its name"}),
+    responses=answers(TableLookups, 404, 413, 415, 503, media={NPZ: "one array per material, by name"}),
     openapi_extra=body(queries.ManyBody),
     dependencies=[LARGE],
 )
@@ -281,7 +280,7 @@ def lookup_many(request: Request, query: Annotated[queries.ManyQuery, InQuery()]
         surface = surface_in(table, query)
         total += checked_size(max_points, points, query, surface, kind)
         if total > (most := LIMITS[kind][1] * max_points):
-            raise RequestError(413, f"the values of all materials are more than the {most} that one answer may hold")
+            raise RequestError(413, f"the values of all materials are more than the {most} of a {kind} answer")
         results[name] = table, evaluate(points, query, surface)
     if kind == "npy":
         data = io.BytesIO()

@@ -1,4 +1,4 @@
-"""The outermost ASGI layer: request ids, the log, metrics, room for bodies and answers, and lookups of one point."""
+"""The outermost ASGI layer: request IDs, the log, metrics, limits of memory, and lookups of one point."""
 
 from __future__ import annotations
 
@@ -23,48 +23,37 @@ from brdfdb_api import log
 from brdfdb_api.http.errors import RequestError
 from brdfdb_api.settings import LogLevel
 
-GONE = 499  # status of a request whose client went away, as nginx counts it
+GONE = 499  # status of a request whose client disconnected, as in nginx
 SMALL = 64 * 2**10  # size up to which bodies and answers are not counted [byte]
-BODIES = 1  # bodies of the largest size that may be in memory together
-RETRY_S = 10  # time after which room may be free again [s]
+BODIES = 1  # number of bodies of the largest size that fit in memory
+RETRY_S = 10  # time after which memory may be free again [s]
 PIECE = 256 * 2**10  # size of the pieces of larger answers [byte]
-ROOM = {"memory": 64 * 2**20, "files": 2**31}  # bytes of larger answers that may wait to be read
+ROOM = {"memory": 64 * 2**20, "files": 2**31}  # size of all larger answers that clients have not read yet [byte]
 _REQUEST_ID = re.compile(rb"[A-Za-z0-9._-]{1,64}")
 
-# made once per process, like the registry
+# One of each per process, like the registry
 REQUESTS = Counter("brdfdb_requests", "Requests answered", ["route", "status"])
 SECONDS = Histogram(
     "brdfdb_request_seconds",
-    "From the first byte of a request to the last of its answer",
+    "Seconds from the first byte of a request to the last byte of its answer",
     ["route"],
     buckets=(0.0005, 0.001, 0.0025, 0.005, 0.01, 0.025, 0.1, 0.5, 2.5, 10.0),
 )
 POINTS = Counter("brdfdb_points", "Pairs of directions looked up", ["source"])
 
-LOGGED_FROM: dict[LogLevel, int] = {"info": 0, "warning": 400, "error": 500}  # lowest status that is logged
+LOGGED_FROM: dict[LogLevel, int] = {"info": 0, "warning": 400, "error": 500}  # lowest status in the log
 
 
 @functools.lru_cache(maxsize=4096)
 def _labelled(metric: Any, *labels: object) -> Any:
-    """Return a metric with its labels, cached: finding them takes as long as a lookup."""
+    """Return a metric with its labels; cached, because the search for them takes as long as a lookup."""
     return metric.labels(*labels)
 
 
 class Edge:
-    """ASGI middleware around the whole application.
+    """ASGI middleware around the application `app`; it answers GET requests to the `quick` routes itself.
 
-    Parameters
-    ----------
-    app : ASGI application
-        What answers all other requests.
-    limit : int
-        Bytes that a body may have; past that, reading it is a RequestError (413), counted while it arrives.
-    quick : sequence of routes
-        GET at their addresses is answered without the application.
-    failed : callable
-        From an exception to the answer.
-    log_level : str
-        "info" logs each request, "warning" those that were refused, "error" those that failed here.
+    A body larger than `limit` bytes is refused (413) while it arrives. `failed` makes the answer to an exception.
     """
 
     def __init__(
@@ -75,19 +64,21 @@ class Edge:
         failed: Callable[[Exception], Response],
         log_level: LogLevel,
     ) -> None:
-        self.app, self.get = app, Router(quick, default=app, redirect_slashes=False)
-        self.limit, self.failed = limit, failed
+        self.app = app
+        self.get = Router(quick, default=app, redirect_slashes=False)
+        self.limit = limit
+        self.failed = failed
         self.logged_from = LOGGED_FROM[log_level]
-        self.bodies = 0  # bytes of larger bodies in memory
-        self.unread = dict.fromkeys(ROOM, 0)  # bytes of larger answers
+        self.bodies = 0  # size of all larger bodies in memory [byte]
+        self.unread = dict.fromkeys(ROOM, 0)  # size of all larger answers that are not read yet [byte]
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] != "http":
             await self.app(scope, receive, send)
             return
         start = time.perf_counter()
-        exchange, original_scope = _Exchange(self, scope, receive, send), scope
-        if scope["method"] == "HEAD":  # answered like GET, without the body
+        exchange = _Exchange(self, scope, receive, send)
+        if exchange.head:  # answered like GET, without the body
             scope = {**scope, "method": "GET"}
         try:
             app = self.get if scope["method"] == "GET" else self.app
@@ -96,53 +87,71 @@ class Edge:
         except Exception as error:
             refusal = self.failed(error)
             if refusal.status_code == 500 and not exchange.gone:
-                failed, lines = log.ascii_of(f"{type(error).__name__}: {error}"), log.ascii_of(traceback.format_exc())
-                log.write({**_about(original_scope, exchange.id), "failed": failed, "traceback": lines})
+                failed = log.ascii_of(f"{type(error).__name__}: {error}")
+                lines = log.ascii_of(traceback.format_exc())
+                log.write(exchange.line() | {"failed": failed, "traceback": lines})
             if not exchange.started:
                 await refusal(scope, receive, exchange.send)
-            elif not exchange.ended:  # the answer has started: no other is possible
+            elif not exchange.ended:  # it is too late for another answer
                 exchange.status = 500
                 raise
         finally:
             self.bodies -= exchange.counted
             seconds = time.perf_counter() - start
-            status = exchange.status or GONE  # no client waits for a cancelled request
+            status = exchange.status or GONE  # cancelled, because the client disconnected
             route = getattr(scope.get("route"), "path", "other")
             _labelled(REQUESTS, route, status).inc()
             _labelled(SECONDS, route).observe(seconds)
             if status >= self.logged_from:
-                log.write(_about(original_scope, exchange.id) | {"status": status, "ms": round(1e3 * seconds, 3)})
+                log.write(exchange.line() | {"status": status, "ms": round(1e3 * seconds, 3)})
 
 
 class _Exchange:
-    """A request and its answer: its id, the bytes of its body in memory, and a large answer that waits to be read."""
+    """A request and its answer: the ID, the size of the body in memory, and a large answer before it is sent."""
 
     def __init__(self, edge: Edge, scope: Scope, receive: Receive, send: Send) -> None:
-        self.edge, self._receive, self._send = edge, receive, send
-        self.id = _request_id(scope)
+        self.edge = edge
+        self._scope = scope
+        self._receive = receive
+        self._send = send
+        given = (bytes(value) for name, value in scope["headers"] if name == b"x-request-id")
+        self.id = next(filter(_REQUEST_ID.fullmatch, given), None) or b"%016x" % random.getrandbits(64)
         self.head = scope["method"] == "HEAD"
-        self.size = 0  # bytes of the body so far
-        self.counted = 0  # bytes of the body that are counted against the limit of all bodies
-        self.status = 0  # status of the answer, once there is one
-        self.start: Message | None = None  # the head of the answer, which waits for the first piece of the body
-        self.large: bytes | None = None  # the body of an answer that is sent once the application has ended
+        self.size = 0  # size of the body so far [byte]
+        self.counted = 0  # part of it that counts against the limit of all bodies [byte]
+        self.status = 0  # status of the answer; 0: there is none yet
+        self.start: Message | None = None  # head of the answer, sent with the first piece of its body
+        self.large: bytes | None = None  # body of a larger answer, sent when the application has returned
         self.started = self.ended = self.gone = False
+
+    def line(self) -> dict[str, object]:
+        """Return the fields of the request for a line of the log."""
+        scope = self._scope
+        client = scope.get("client")
+        return {
+            "request": self.id.decode(),
+            "client": client[0] if client else "",
+            "method": scope["method"],
+            "path": log.ascii_of(scope["path"]),
+            "query": scope["query_string"].decode("ascii", "backslashreplace"),
+        }
 
     async def receive(self) -> Message:
         message = await self._receive()
         if message["type"] == "http.disconnect":
             if not self.ended:
-                self.gone, self.status, self.ended = True, GONE, True
+                self.gone = self.ended = True
+                self.status = GONE
             return message
         size = len(message.get("body", b""))
         self.size += size
         if self.size > self.edge.limit:
-            raise RequestError(413, f"the body is larger than the {self.edge.limit} bytes that are allowed")
+            raise RequestError(413, f"the body is larger than the {self.edge.limit} bytes allowed")
         if self.size > SMALL:
             self.edge.bodies += self.size - self.counted
             self.counted = self.size
             if self.edge.bodies > BODIES * self.edge.limit:
-                detail = "the server holds as many large bodies as it can; ask again later"
+                detail = "the service has no memory for another large body; try again later"
                 raise RequestError(503, detail, retry_after_s=RETRY_S)
         return message
 
@@ -165,20 +174,23 @@ class _Exchange:
 
     async def _sent(self, message: Message) -> None:
         if self.start is not None:
-            start, self.start, self.started = self.start, None, True
+            start = self.start
+            self.start = None
+            self.started = True
             await self._send(start)
         await self._send(message)
 
     async def send_large(self) -> None:
-        """Send a large answer in pieces, as fast as they are read. What does not fit in memory waits in a file."""
-        self.edge.bodies -= self.counted  # nobody needs the body any more
+        """Send a large answer in pieces, as fast as the client reads them, from memory or else from a file."""
+        self.edge.bodies -= self.counted  # the body is not needed any more
         self.counted = 0
         if self.large is None:
             return
-        size, unread = len(self.large), self.edge.unread
+        size = len(self.large)
+        unread = self.edge.unread
         place = next((place for place, room in ROOM.items() if unread[place] + size <= room), None)
         if place is None:
-            detail = "too many large answers wait to be read; ask again later"
+            detail = "too many large answers are not read yet; try again later"
             raise RequestError(503, detail, retry_after_s=RETRY_S)
         unread[place] += size
         try:
@@ -189,14 +201,14 @@ class _Exchange:
                     piece = {"type": "http.response.body", "body": file.read(PIECE), "more_body": end < size}
                     await self._sent(piece)
             self.ended = True
-        except OSError as error:  # no room for the file
-            raise RequestError(503, "no large answer can wait to be read; ask again later") from error
+        except OSError as error:  # the disk is full
+            raise RequestError(503, "the service has no disk space for a large answer; try again later") from error
         finally:
             unread[place] -= size
 
 
 def _in_file(content: bytes) -> IO[bytes]:
-    """Return a temporary file with this content, to be read from its start."""
+    """Return a temporary file with this content."""
     file = tempfile.TemporaryFile()  # noqa: SIM115 the caller closes it
     file.write(content)
     file.seek(0)
@@ -204,7 +216,7 @@ def _in_file(content: bytes) -> IO[bytes]:
 
 
 def metrics() -> bytes:
-    """Return the counts of all workers in the format of Prometheus."""
+    """Return the counters of all workers in the format of Prometheus."""
     if "PROMETHEUS_MULTIPROC_DIR" not in os.environ:
         return generate_latest(REGISTRY)
     from prometheus_client.multiprocess import MultiProcessCollector
@@ -212,23 +224,3 @@ def metrics() -> bytes:
     registry = CollectorRegistry()
     MultiProcessCollector(registry)  # type: ignore[no-untyped-call]
     return generate_latest(registry)
-
-
-def _request_id(scope: Scope) -> bytes:
-    """Return the id that a client gives a request, else a new one."""
-    for name, value in scope["headers"]:
-        if name == b"x-request-id" and _REQUEST_ID.fullmatch(value):
-            return bytes(value)
-    return b"%016x" % random.getrandbits(64)
-
-
-def _about(scope: Scope, request_id: bytes) -> dict[str, object]:
-    """Return what a line of the log says of a request."""
-    client = scope.get("client")
-    return {
-        "request": request_id.decode(),
-        "client": client[0] if client else "",
-        "method": scope["method"],
-        "path": log.ascii_of(scope["path"]),
-        "query": scope["query_string"].decode("ascii", "backslashreplace"),
-    }

@@ -42,13 +42,13 @@ class PointsAt(PointsBody, Parameters):
 class PointsOfFamily(PointsBody):
     """Parameters between those of the members of a family, and the points to look up."""
 
-    parameters: dict[str, float] = Field(description="one for each swept parameter, as recipes write them")
+    parameters: dict[str, float] = Field(description="value of each swept parameter, in the units of recipes")
 
 
 class FamilyQuery(Options):
     """The query of a lookup in a family."""
 
-    error: Flag = Field(default=False, description="the error that the family states beside the values")
+    error: Flag = Field(default=False, description="add the error that the family states")
 
 
 def _spec(model: str) -> ModelSpec:
@@ -62,7 +62,7 @@ Spec = Annotated[ModelSpec, Depends(_spec)]
 
 @models.get("/v1/models", tags=["models"], responses=answers(Models))
 def model_list() -> Response:
-    """Return all models: parameters with units, ranges, and the values that the papers publish."""
+    """Return all models and their parameters, with units, ranges and published values."""
     return Document({"models": [_with_address(spec) for spec in MODELS.values()]})
 
 
@@ -84,7 +84,7 @@ class ModelSurface(NamedTuple):
 
 
 def _surface(spec: ModelSpec, given: Parameters) -> ModelSurface:
-    """Return the material of a request, by default at the wavelengths of pictures."""
+    """Return the model at the parameters of a request, by default at the wavelengths of pictures."""
     with refused():
         material = given.material(spec)
     written = {
@@ -104,9 +104,9 @@ def _surface(spec: ModelSpec, given: Parameters) -> ModelSurface:
 async def model_lookup(
     request: Request, spec: Spec, query: Annotated[Options, InQuery()], content: Content
 ) -> Response:
-    """Return the BRDF of a model at its parameters and many pairs of directions (angles in degrees).
+    """Return the BRDF of a model at the given parameters and many pairs of directions (angles in degrees).
 
-    A spectral model is evaluated from 420 to 680 nm in steps of 20 nm, unless wavelength_nm says otherwise.
+    Without wavelength_nm, a spectral model is evaluated from 420 to 680 nm in steps of 20 nm.
     """
 
     def read() -> RequestedPoints:
@@ -124,9 +124,9 @@ async def model_lookup(
     openapi_extra=body(Parameters),
 )
 def model_lobe(request: Request, spec: Spec, query: Annotated[LobeOptions, InQuery()], content: Content) -> Response:
-    """Return f_r [1/sr] of a model for one light, in a view as of a material.
+    """Return f_r [1/sr] of a model for one light, in the same views as for a material.
 
-    The first request for a model after an installation may take 20 s, in which its kernels are compiled.
+    After an installation, the first request for a model may take 20 s, because its kernels are compiled.
     """
     surface, about = _surface(spec, from_json(Parameters, content))
     return lobe_answer(request, surface, query, about, NO_STORE)
@@ -145,7 +145,7 @@ class WavelengthQuery(Query):
     openapi_extra=body(Parameters),
 )
 def model_albedo(spec: Spec, query: Annotated[WavelengthQuery, InQuery()], content: Content) -> Response:
-    """Return the directional and the hemispherical albedo [1] of a model, to a thousandth."""
+    """Return the directional and the hemispherical albedo [1] of a model, to 0.001."""
     surface, about = _surface(spec, from_json(Parameters, content))
     at = surface.wavelength_nm
     if at is not None and query.wavelength_nm:
@@ -162,14 +162,14 @@ def model_albedo(spec: Spec, query: Annotated[WavelengthQuery, InQuery()], conte
     dependencies=[LARGE],
 )
 def model_sphere(spec: Spec, query: Annotated[SphereQuery, InQuery()], content: Content) -> Response:
-    """Return the picture of a sphere of a model in the light of a studio, drawn as a draft."""
+    """Return a draft picture of a sphere of a model in studio light."""
     with refused():
         return sphere_answer(from_json(Parameters, content).material(spec), query, NO_STORE)
 
 
 @models.get("/v1/families", tags=["models"], responses=answers(Families, 503))
 def family_list(request: Request) -> Response:
-    """Return the families of the store: materials of one model between whose parameters a lookup may lie."""
+    """Return the families of the store: materials of one model, between whose parameters lookups interpolate."""
     store = shelf_of(request).store
     contents = (store.family_content(name) for name in store.families())
     shown = ({key: content[key] for key in FamilyLine.model_fields} for content in contents)
@@ -185,7 +185,7 @@ def family_list(request: Request) -> Response:
 async def family_lookup(
     request: Request, family: str, query: Annotated[FamilyQuery, InQuery()], content: Content
 ) -> Response:
-    """Return the BRDF of a family at parameters between those of its members, interpolated in their tables."""
+    """Return the BRDF of a family at parameters between those of its members, interpolated between their tables."""
 
     def read() -> RequestedPoints:
         given = from_json(PointsOfFamily, content)

@@ -1,4 +1,4 @@
-"""The pages: the explorer at `/`, the OpenAPI document, and at `/docs` a list of its operations."""
+"""The pages: the explorer at `/`, the OpenAPI document, and the list of its operations at `/docs`."""
 
 from __future__ import annotations
 
@@ -17,26 +17,19 @@ from starlette.requests import Request
 from starlette.responses import Response
 
 from brdfdb_api.http.errors import RequestError
+from brdfdb_api.http.queries import shortened
 from brdfdb_api.http.responses import preferred, tagged, unchanged
 
-POLICY = "; ".join(
-    (
-        "default-src 'none'",
-        "script-src 'self'",
-        "style-src 'self'",
-        "img-src 'self' data:",
-        "connect-src 'self'",
-        "base-uri 'none'",
-        "form-action 'none'",
-        "frame-ancestors 'none'",
-    )
+POLICY = (
+    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; connect-src 'self'; "
+    "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
 SAFE = {"Content-Security-Policy": POLICY, "X-Content-Type-Options": "nosniff", "Referrer-Policy": "no-referrer"}
 
 SCRIPT = "text/javascript; charset=utf-8"
 _TYPES = {".html": "text/html; charset=utf-8", ".css": "text/css; charset=utf-8", ".js": SCRIPT}
-_VIEWS = "views.js"  # the views of all modules view_*.js
-# All modules as one script: the first picture comes 150 ms earlier than from modules, 220 ms at 50 ms of latency
+_VIEWS = "views.js"  # generated: the views of all modules view_*.js
+# Generated: all modules as one script, because the first picture is then 150 ms earlier, 220 ms at 50 ms of latency
 _BUNDLE = "explorer.js"
 FOLDER = files("brdfdb_api").joinpath("explorer")
 # Media types of the files of the explorer
@@ -56,7 +49,7 @@ def document(request: Request) -> Response:
 
 @pages.get("/docs")
 def operations(request: Request) -> Response:
-    """Return a page with all operations, which needs nothing from elsewhere."""
+    """Return a page that lists all operations."""
     return Response(operations_page(request.app.openapi()), media_type=MEDIA["index.html"], headers=SAFE)
 
 
@@ -70,7 +63,7 @@ def index(request: Request) -> Response:
 def explorer_file(request: Request, file: str) -> Response:
     """Return a file of the explorer."""
     if file not in MEDIA:
-        raise RequestError(404, "the explorer has no such file")
+        raise RequestError(404, f"the explorer has no file {shortened(file)!r}")
     packed = preferred(request.headers.get("accept-encoding", ""), "identity", "gzip") == "gzip"
     stored = _explorer_file(file, packed=packed)
     headers = {
@@ -112,9 +105,9 @@ def _text(name: str) -> str:
 
 
 def _modules(name: str, before: set[str]) -> Iterator[str]:
-    """Yield a module as a function that is called once, after those that it imports and are not `before`.
+    """Yield a module as a function that is called once, after its imports, except those that are in `before`.
 
-    Imports are lines of their own, and exports declare a constant, a function or a class, or are a default.
+    An import is one statement per line; an export declares a constant, a function or a class, or is the default.
     """
     before.add(name)
     text = re.sub(r"^ +", "", _COMMENT.sub("", _text(name)), flags=re.MULTILINE)
@@ -130,7 +123,7 @@ def _modules(name: str, before: set[str]) -> Iterator[str]:
 
 
 def _bound(names: str) -> str:
-    """Return the pattern that takes the names of an import from the exports of a module."""
+    """Return the pattern of a `const` declaration that has the names of an import."""
     if names.startswith("*"):
         return names.removeprefix("* as ")
     return names.replace(" as ", ": ") if names.startswith("{") else f"{{ default: {names} }}"
@@ -154,12 +147,12 @@ _PAGE = """<!doctype html>
 <link rel="icon" href="data:,"><link rel="stylesheet" href="/explorer/explorer.css"></head>
 <body><main class="text">
 <h1>{title}: operations</h1><p>{description}</p>
-<p><a href="/openapi.json">openapi.json</a> has all of this with the schemas of bodies and answers.</p>
+<p><a href="/openapi.json">openapi.json</a> also has the schemas of bodies and answers.</p>
 {operations}</main></body></html>
 """
 _OPERATION = """<section><h2>{method} {path}</h2>
 <p>{summary}</p><ul>{parameters}</ul></section>"""
-_NAMED = {"name": "a material", "file": "a file of the table", "file_format": "a format", "revision": "a revision"}
+_NAMED = {"name": "a material", "file": "a file of the table", "file_format": "a format"}
 
 
 def operations_page(document: Mapping[str, Any]) -> str:
@@ -181,7 +174,8 @@ def operations_page(document: Mapping[str, Any]) -> str:
 
 
 def _parameter(parameter: Mapping[str, Any]) -> str:
-    schema, name = parameter["schema"], parameter["name"]
+    schema = parameter["schema"]
+    name = parameter["name"]
     words = parameter.get("description") or schema.get("description") or f"name of {_NAMED.get(name, f'a {name}')}"
     needed = ", required" if parameter.get("required") and parameter["in"] == "query" else ""
     return f"<li><code>{escape(name)}</code> ({parameter['in']}{needed}): {escape(words)}</li>"

@@ -40,23 +40,23 @@ class ServedProblem(BaseModel):
 
     model_config = ConfigDict(title="Problem")
 
-    type: str = Field(description="about:blank: the status says which kind of error this is")
+    type: str = Field(description="about:blank, because the status tells the kind of error")
     title: str
     status: int
-    detail: str = Field(description="one sentence; an error of a parameter starts with its name")
-    parameter: str = Field(default="", description="the parameter at fault, where there is one")
-    closest: list[str] = Field(default=[], description="for an unknown name: the names most like it")
+    detail: str = Field(description="one sentence; if a parameter is wrong, the sentence begins with its name")
+    parameter: str = Field(default="", description="name of the wrong parameter, if the error is about one")
+    closest: list[str] = Field(default=[], description="for an unknown name: the most similar names")
 
 
 class Health(BaseModel):
-    """State of the process, and of the store where that was asked for."""
+    """State of the process, and of the store if `/readyz` was asked."""
 
     status: str
     materials: int | None = Field(default=None, description="number of materials in the store")
 
 
 class ServedSummary(Line):
-    """One line of the catalogue; of a damaged material only `name`, `damaged` and `href`."""
+    """One line of the catalogue. A damaged material has only `name`, `damaged` and `href`."""
 
     model_config = ConfigDict(title="Summary")
 
@@ -65,19 +65,19 @@ class ServedSummary(Line):
 
 
 class Catalogue(BaseModel):
-    """Materials of the store, a page of them."""
+    """One page of the catalogue of the store."""
 
     materials: list[ServedSummary]
-    total: int = Field(description="materials that the filters let through, on all pages")
-    next: str | None = Field(description="address of the next page; null: this is the last")
+    total: int = Field(description="number of materials that match the filters, on all pages")
+    next: str | None = Field(description="address of the next page; null: this is the last page")
 
 
 class ServedMaterial(MaterialDocument):
-    """One material: where its table comes from, where it is sampled, how far to believe it."""
+    """One material: the source, the grid and the error of its table."""
 
     model_config = ConfigDict(title="Material")
 
-    revisions: list[str] = Field(description="that are kept, oldest first")
+    revisions: list[str] = Field(description="revisions in the store, oldest first")
     links: dict[str, str]
 
 
@@ -100,11 +100,11 @@ class Families(BaseModel):
 
 
 class _Audited:
-    """The JSON schema of the audit of a material. Its modules are loaded for the document only."""
+    """The JSON schema of the audit of a material, whose modules are loaded for the OpenAPI document only."""
 
     @classmethod
     def __get_pydantic_json_schema__(cls, _: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
-        with contextlib.suppress(ImportError):  # without the extra `report` findings are objects
+        with contextlib.suppress(ImportError):  # without the extra `report`, findings are plain objects
             from brdfdb.audit import MaterialAudit
 
             return handler(MaterialAudit.__pydantic_core_schema__)
@@ -115,20 +115,20 @@ class Audit(BaseModel):
     """The findings of the audit on a material."""
 
     material: str
-    revision: str = Field(description="that was audited")
-    current: bool = Field(description="whether that is the current one")
+    revision: str = Field(description="the revision that was audited")
+    current: bool = Field(description="whether that is the current revision")
     when: str
     finding: Annotated[dict[str, Any], _Audited]
 
 
 def json_bytes(document: Any) -> bytes:
-    """Return a document as JSON; it may contain numpy arrays, except 0-d ones."""
+    """Return a document as JSON; it may contain numpy arrays, but no 0-d arrays."""
     return orjson.dumps(document, option=orjson.OPT_SERIALIZE_NUMPY)
 
 
 @functools.lru_cache(maxsize=1024)
 def preferred(accepted: str, *offers: str) -> str:
-    """Return the offer that an Accept or Accept-Encoding header prefers; the first of the offers if all are equal."""
+    """Return the offer that an Accept or Accept-Encoding header prefers; the first offer if all are equal."""
     known: dict[str, tuple[float, int]] = {}
     for place, part in enumerate(accepted.lower().split(",")):
         name, _, parameters = part.partition(";")
@@ -146,10 +146,9 @@ def preferred(accepted: str, *offers: str) -> str:
 
 
 class Document(Response):
-    """A JSON document, compressed if the client accepts gzip.
+    """A JSON document, compressed if the client accepts gzip. Level 1 takes a quarter of the time of level 5.
 
-    Lookups are not compressed, because that takes longer than the lookup. Compression at level 1 takes a quarter of the
-    time of level 5 and saves nearly as many bytes.
+    Lookups are not compressed, because compression takes longer than the lookup.
     """
 
     media_type = JSON
@@ -167,10 +166,12 @@ class Document(Response):
 
 
 class ValuesResponse(Response):
-    """Values as JSON or .npy, with headers that are encoded once: encoding them takes as long as a lookup."""
+    """Values as JSON or .npy; their headers are encoded only once, because encoding takes as long as a lookup."""
 
     def __init__(self, content: bytes, headers: Encoded) -> None:
-        self.status_code, self.background, self.body = 200, None, content
+        self.status_code = 200
+        self.background = None
+        self.body = content
         self.raw_headers = [*headers, (b"content-length", b"%d" % len(content))]
 
 
@@ -183,7 +184,7 @@ def value_headers(
     *,
     immutable: bool = False,
 ) -> Encoded:
-    """Return the headers of values of a `kind`: of a tag (None: not to be cached), and a revision if there is one."""
+    """Return the headers of values of a `kind`, with a tag (None: not to be cached) and a revision."""
     named = NO_STORE if tag is None else cache_headers(tag, kind, immutable=immutable)
     if revision is not None and digest is not None:
         named = named | {REVISION: revision, DIGEST: digest}
@@ -192,29 +193,29 @@ def value_headers(
 
 
 def tag_of(table: Table, *more: object) -> str:
-    """Return the ETag of an answer on a table, made by this program, and of what `more` it depends on.
+    """Return the ETag of an answer about a table: of the digest, the version of this program and `more` dependencies.
 
-    It names the digest, too, because revisions are numbered anew in a new store.
+    The revision alone is not enough, because a new store begins to count again.
     """
     tag = f"{table.name}-{table.revision}-{table.digest[:16]}-{__version__}"
     return "-".join((tag, *map(str, more))) if more else tag
 
 
 def cache_headers(tag: str, kind: str = "json", *, immutable: bool = False) -> dict[str, str]:
-    """Return ETag and Cache-Control: forever for what is stored in a revision. JSON may be compressed: a weak tag."""
+    """Return ETag, weak for JSON, which may be compressed, and Cache-Control, without end for immutable content."""
     etag = f'W/"{tag}"' if kind == "json" else f'"{tag}-{kind}"'
     cache_control = "public, max-age=31536000, immutable" if immutable else "no-cache"
     return {"ETag": etag, "Cache-Control": cache_control, "Vary": "Accept"}
 
 
 def tagged(document: dict[str, Any], name: str) -> Document:
-    """Return a document whose ETag is the digest of its content."""
+    """Return a document whose ETag is a digest of its content."""
     content = json_bytes(document)
     return Document(content, cache_headers(f"{name}-{hashlib.sha256(content).hexdigest()[:16]}"))
 
 
 def unchanged(answer: Response, if_none_match: str | None) -> Response:
-    """Return 304 instead of an answer whose tag is in If-None-Match; ``*`` stands for any tag."""
+    """Return 304 in place of an answer whose tag is in If-None-Match; ``*`` matches any tag."""
     tag = answer.headers.get("etag")
     if if_none_match is None or tag is None or answer.status_code != 200:
         return answer

@@ -1,4 +1,4 @@
-"""The catalogue, the document of a material, and the addresses that report health."""
+"""The catalogue, the document of a material, and the health of the service."""
 
 from __future__ import annotations
 
@@ -30,8 +30,9 @@ from brdfdb_api.http.responses import (
     tagged,
 )
 
-PAGE, MOST = 100, 1000  # materials on a page: default and largest number
-PARTS = ("lookup", "albedo", "lobe", "sphere", "thumbnail.png", "audit", "download.zarr")  # of a material
+PAGE = 100  # materials on a page
+MOST = 1000  # largest number of materials on a page
+PARTS = ("lookup", "albedo", "lobe", "sphere", "thumbnail.png", "audit", "download.zarr")  # links of a material
 
 router = addresses()
 
@@ -44,15 +45,15 @@ async def healthz() -> Response:
 
 @router.get("/readyz", tags=["service"], responses=answers(Health, 503))
 def readyz(request: Request) -> Response:
-    """Report that kernels are loaded and the store can be read, and the number of its materials."""
+    """Report that kernels are loaded and the store can be read, with the number of its materials."""
     if shelf_of(request).warming:
-        raise RequestError(503, "kernels are being loaded; the first time they are compiled, which takes half a minute")
+        raise RequestError(503, "kernels are being loaded, which takes half a minute after an installation")
     return Document({"status": "ok", "materials": len(shelf_of(request).names())})
 
 
-@router.get("/metrics", tags=["service"], responses=answers(None, media={"text/plain": "counts as text"}))
+@router.get("/metrics", tags=["service"], responses=answers(None, media={"text/plain": "counters as text"}))
 def metrics() -> Response:
-    """Return requests, seconds and points that were counted, as Prometheus reads them."""
+    """Return the counters of requests, seconds and points in the format of Prometheus."""
     return Response(middleware.metrics(), media_type="text/plain; version=1.0.0; charset=utf-8")
 
 
@@ -60,32 +61,32 @@ _PLACE = TypeAdapter(tuple[bool, float, str])
 
 
 class CatalogueQuery(Choice, Query):
-    """The materials of a page, and their order."""
+    """The filters and the order of the catalogue, and a page of it."""
 
-    cursor: str = Field(default="", description="as `next` of the page before has it")
-    limit: int = Field(default=PAGE, ge=1, le=MOST, description="materials on a page")
-    family: str = Field(default="", description="only the members of this family of the store")
+    cursor: str = Field(default="", description="begin of the page, from `next` of the previous page")
+    limit: int = Field(default=PAGE, ge=1, le=MOST, description="largest number of materials on the page")
+    family: str = Field(default="", description="only members of this family")
     anisotropic: Flag | None = Field(default=None, description=Choice.model_fields["anisotropic"].description)
     wavelength_nm: Wavelengths = Field(default=(), description=Choice.model_fields["wavelength_nm"].description)
 
     @property
     def after(self) -> tuple[bool, float, str]:
-        """The place after which the page begins; RequestError (422) if the cursor is none."""
+        """The place after which the page begins; RequestError (422) if the cursor is not valid."""
         try:
             return _PLACE.validate_json(self.cursor) if self.cursor else (False, -np.inf, "")
         except ValidationError:
-            raise RequestError(422, "cursor: it is not that of `next` of a page", "cursor") from None
+            raise RequestError(422, "cursor: it is not from `next` of a page", "cursor") from None
 
     @property
     def given(self) -> dict[str, Any]:
-        """The parameters that were given, as a query has them."""
+        """The parameters of the request, as text of a query."""
         given = self.model_dump(exclude={"cursor"}, exclude_defaults=True)
         return {key: str(value).lower() if isinstance(value, bool) else value for key, value in given.items()}
 
 
 @router.get("/v1/materials", tags=["materials"], responses=answers(Catalogue, 304, 404, 503))
 def catalogue(request: Request, query: Annotated[CatalogueQuery, InQuery()]) -> Response:
-    """Return materials of the store, a page at a time."""
+    """Return the catalogue of the store, page by page."""
     shelf = shelf_of(request)
     names = shelf.names()
     if query.family:
@@ -108,13 +109,14 @@ def catalogue(request: Request, query: Annotated[CatalogueQuery, InQuery()]) -> 
 
 @both(router, "", tags=["materials"], responses=answers(ServedMaterial, 304, 404, 503))
 def material(request: Request, name: str, revision: Revision = None) -> Response:
-    """Return the origin of the table of a material, its grid (axes in degrees), and its error."""
+    """Return the source, the grid (axes in degrees) and the error of the table of a material."""
     shelf = shelf_of(request)
     table = shelf.table(name, revision)
-    verdict, revisions = shelf.verdict(name), shelf.store.revisions(name)
-    # facts that change while the table does not
-    beside = f"{'' if verdict is None else verdict.when} {revisions}"
-    headers = cache_headers(tag_of(table, hashlib.sha256(beside.encode()).hexdigest()[:8]))
+    verdict = shelf.verdict(name)
+    revisions = shelf.store.revisions(name)
+    # These change while the table does not
+    changing = f"{'' if verdict is None else verdict.when} {revisions}"
+    headers = cache_headers(tag_of(table, hashlib.sha256(changing.encode()).hexdigest()[:8]))
     address = f"/v1/materials/{name}" + ("" if revision is None else f"/revisions/{revision}")
     links = {
         "self": address,

@@ -28,10 +28,11 @@ from brdfdb_api.http.queries import LobeOptions, LobeQuery, Query, accept_of, pa
 from brdfdb_api.http.responses import NPY, Audit, Document, cache_headers, tag_of
 
 SPHERE = {"image/png": "sRGB with transparent corners", NPY: "linear sRGB and coverage (size, size, 4), not clipped"}
-EXPORTS_AT_ONCE = 2  # files of other formats that are made at a time
-THUMBNAIL, MOST = 96, 256  # pixels across a thumbnail: default and largest number
+EXPORTS_AT_ONCE = 2  # number of exported files that are made together
+THUMBNAIL = 96  # width of a thumbnail [pixel]
+MOST = 256  # largest width of a thumbnail [pixel]
 
-# Of all formats: an option that a format does not have is refused
+# Options of all formats; an option that the format does not have is refused
 EXPORT_OPTIONS = [
     {"name": name, "in": "query", "required": False, "description": text, "schema": schema}
     for name, (schema, text) in served_schemas().items()
@@ -43,14 +44,14 @@ views = addresses()
 class SphereQuery(Query):
     """The query of a picture."""
 
-    size: int = Field(default=256, ge=16, le=512, description="pixels across")
-    format: Literal["png", "npy"] = Field(default="png", description="a picture, or its linear values")
+    size: int = Field(default=256, ge=16, le=512, description="width and height [pixels]")
+    format: Literal["png", "npy"] = Field(default="png", description="a picture, or its linear values as an array")
 
 
 class ThumbnailQuery(Query):
     """The query of a thumbnail."""
 
-    size: int = Field(default=THUMBNAIL, ge=16, le=MOST, description="pixels across")
+    size: int = Field(default=THUMBNAIL, ge=16, le=MOST, description="width and height [pixels]")
 
 
 @both(views, "/albedo", tags=["views"], responses=answers(TableAlbedoDocument, 304, 404, 503))
@@ -61,16 +62,11 @@ def albedo(request: Request, name: str, revision: Revision = None) -> Response:
     return Document(about | reflected(table).document(table.wavelength_nm), cache_headers(tag_of(table)))
 
 
-@both(
-    views,
-    "/lobe",
-    tags=["views"],
-    responses=answers(TableLobe, 304, 404, 413, 503, media=NPY_ANSWER),
-)
+@both(views, "/lobe", tags=["views"], responses=answers(TableLobe, 304, 404, 413, 503, media=NPY_ANSWER))
 def lobe(request: Request, name: str, query: Annotated[LobeQuery, InQuery()], revision: Revision = None) -> Response:
-    """Return f_r [1/sr] for one light, in the plane of incidence or over all viewers; or over theta_h and theta_d.
+    """Return f_r [1/sr] for one light in the plane of incidence or over all viewers, or over theta_h and theta_d.
 
-    Viewers are closer together around the mirror direction. In half-difference, phi_h is phi_i and phi_d is 90 degrees.
+    Viewers are denser around the mirror direction. In the view half-difference, phi_h is phi_i and phi_d is 90 degrees.
     """
     table = shelf_of(request).table(name, revision)
     surface = surface_in(table, query)
@@ -90,7 +86,7 @@ def lobe_answer(
     kind = query.kind(accept_of(request))
     axes, angles = view_directions(query.view, query.theta_i, query.phi_i)
     points = LookupPoints.of(angles, listed(query.wavelength_nm))
-    # The view fixes the points; the client chooses only the wavelengths. Bytes have the limit of JSON, too
+    # The view fixes the points; the client chooses only the wavelengths. Arrays have the limit of JSON, too
     checked_size(max(request.app.state.settings.max_points, MOST_POINTS), points, query, surface, "json")
     values = evaluate(points, query, surface)
     if kind == "npy":
@@ -115,9 +111,9 @@ async def export(
     file_format: Annotated[str, Path(json_schema_extra={"enum": [*EXPORTERS]})],
     revision: Revision = None,
 ) -> Response:
-    """Return the table, or a slice of it, as a file of another format, as `brdfdb export` writes it."""
+    """Return the table, or a slice of it, as the file of another format that `brdfdb export` writes."""
     if file_format not in EXPORTERS:
-        raise RequestError(404, f"{file_format!r} is no format; there are {', '.join(EXPORTERS)}")
+        raise RequestError(404, f"{file_format!r} is not a format; allowed are {', '.join(EXPORTERS)}")
     allowed = served_options(file_format)
     query = parsed(request.scope["query_string"], allowed)
     with refused():
@@ -125,10 +121,10 @@ async def export(
     shelf = shelf_of(request)
     table, known = await run_in_threadpool(lambda: (shelf.table(name, revision), shelf.verdict(name)))
     verdict = known.finding.verdict if known and known.finding.is_of(table.revision, table.digest) else None
-    # The file states the verdict, which a later audit may change, and the program. A weak tag: some state the time
+    # The file states the program and the verdict, which a later audit may change. The tag is weak: some state the time
     headers = cache_headers(tag_of(table, verdict), file_format)
     headers["ETag"] = f"W/{headers['ETag']}"
-    if request.headers.get("if-none-match") == headers["ETag"]:  # a file takes seconds
+    if request.headers.get("if-none-match") == headers["ETag"]:  # before the file is made, which takes seconds
         return Response(status_code=304, headers=headers)
     pack = functools.partial(packed, table, file_format, verdict=verdict or NOT_AUDITED, **options)
     async with turn(request.app.state.exports):
@@ -140,12 +136,13 @@ async def export(
 
 @both(views, "/audit", tags=["views"], responses=answers(Audit, 304, 404, 503))
 def audit(request: Request, name: str, revision: Revision = None) -> Response:
-    """Return the findings of the last `brdfdb audit` on a material: energy, reciprocity, error and more."""
+    """Return the findings of the last `brdfdb audit` of a material: energy, reciprocity, error and others."""
     shelf = shelf_of(request)
-    verdict, current = shelf.verdict(name), shelf.head(name)
+    verdict = shelf.verdict(name)
+    current = shelf.head(name)
     table = None if revision is None else shelf.table(name, revision)  # raises if there is no such revision
     if verdict is None or not (table is None or verdict.finding.is_of(table.revision, table.digest)):
-        raise RequestError(404, f"{name}: no audit of it is here; `brdfdb audit` makes one")
+        raise RequestError(404, f"{name}: this revision is not audited; run `brdfdb audit`")
     audited = verdict.finding.revision
     document = {"material": name, "revision": audited, "current": audited == current, "when": verdict.when}
     headers = cache_headers(f"{name}-{current}-{verdict.when}-{__version__}")
@@ -156,7 +153,7 @@ def audit(request: Request, name: str, revision: Revision = None) -> Response:
 def sphere(
     request: Request, name: str, query: Annotated[SphereQuery, InQuery()], revision: Revision = None
 ) -> Response:
-    """Return the picture of a sphere of the table in the light of a studio, drawn as a draft."""
+    """Return a draft picture of a sphere of the material in studio light."""
     table = shelf_of(request).table(name, revision)
     return sphere_answer(table, query, cache_headers(tag_of(table, query.size), query.format))
 
@@ -175,7 +172,7 @@ def sphere_answer(surface: Any, query: SphereQuery, headers: dict[str, str]) -> 
 def thumbnail(
     request: Request, name: str, query: Annotated[ThumbnailQuery, InQuery()], revision: Revision = None
 ) -> Response:
-    """Return a small picture of the table for lists."""
+    """Return a small picture of the material for lists."""
     table = shelf_of(request).table(name, revision)
     headers = cache_headers(tag_of(table, query.size), "png")
     return Response(lit_sphere.thumbnail_png(table, query.size), media_type="image/png", headers=headers)

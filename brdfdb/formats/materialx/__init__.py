@@ -1,10 +1,10 @@
 """MaterialX: the OpenPBR or Standard Surface that comes closest to a table, as a document that states its error.
 
 The file holds the parameters of a surface, which are fitted to the table. Renderers evaluate the surface, so nothing is
-interpolated. Its shapes are those of GGX and Oren-Nayar. Other lobes come out different, and the stated error says how
-much.
+interpolated. Its shapes are those of GGX and Oren-Nayar. Other lobes are represented by these shapes, and the file
+states the error.
 
-Anisotropic highlights fit. Spectral tables become linear sRGB. The specular part is left out, unless the surface is
+The surface can be anisotropic. Spectral tables become linear sRGB. The specular part is left out, unless the surface is
 smooth.
 """
 
@@ -31,12 +31,12 @@ if TYPE_CHECKING:
 
 suffix = ".mtlx"
 media_type = "application/mtlx+xml"
-summary = "surfaces of MaterialX that come closest to tables"
+summary = "surfaces of MaterialX whose parameters are fitted to tables"
 tools = "MaterialX and the programs with it: USD, Maya, Houdini, Blender, Arnold, RenderMan"
 kinds = (OPEN_PBR, STANDARD)
 options = (
     replace(
-        TOLERANCE, help="largest error against the table that 99 of 100 values may have; the closest surface is written"
+        TOLERANCE, help="largest relative error of 99 % of the values against the table; the closest surface is written"
     ),
 )
 
@@ -113,14 +113,16 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     with path.open("rb") as file:
         text = file.read(_LARGEST + 1)
     if len(text) > _LARGEST:
-        raise FileFormatError(f"{path}: more than {_LARGEST >> 20} MiB are no MaterialX document with one surface")
+        raise FileFormatError(
+            f"{path}: it has more than {_LARGEST >> 20} MiB, too many for a document with one surface"
+        )
     try:
         root = ElementTree.fromstring(text)
     except (ElementTree.ParseError, ValueError, LookupError) as error:
-        raise FileFormatError(f"{path}: no XML: {error}") from None
+        raise FileFormatError(f"{path}: it is not XML: {error}") from None
     node = next((child for child in root if child.tag in kinds), None)
     if root.tag != "materialx" or node is None:
-        raise FileFormatError(f"{path}: no node {' or '.join(kinds)} in the document")
+        raise FileFormatError(f"{path}: the document has no node {' or '.join(kinds)}")
     surface = _surface(path, node)
     material = root.find("surfacematerial")
     document = document_of("" if material is None else material.get("doc", ""))
@@ -181,7 +183,7 @@ def _input(parent: ElementTree.Element, name: str, kind: str, value: str) -> Non
 
 
 def _identifier(name: str) -> str:
-    """Return a name of letters, digits and _ alone, as MaterialX has them."""
+    """Return a name that has only letters, digits and _, as MaterialX needs it."""
     return "".join(letter if letter.isascii() and letter.isalnum() else "_" for letter in name)
 
 

@@ -70,16 +70,21 @@ class _MaterialXSearch:
     """
 
     def __init__(self, kind: str, nodes: TruthNodes, normal: Lobe | None, smooth: bool, anisotropic: bool) -> None:
-        self.kind, self.nodes, self.smooth, self.diffuse = kind, nodes, smooth, normal is None
+        self.kind = kind
+        self.nodes = nodes
+        self.smooth = smooth
+        self.diffuse = normal is None
         self.black = not np.any(nodes.truth)  # but for the mirror direction
         self.metals = _METALS[:1] if self.diffuse or self.black else _METALS
         self.widths = np.zeros(0)
         if normal is not None and not smooth:
             widths = np.array([np.min(normal.alpha_x), np.min(normal.alpha_y)])[: 2 if anisotropic else 1]
             self.widths = np.log(np.clip(widths, 1.01 * _NARROWEST, 0.99 * _WIDEST))
-        truth, weight = nodes.truth, nodes.weight
+        truth = nodes.truth
+        weight = nodes.weight
         if smooth:
-            truth, weight = np.concatenate([truth, nodes.specular]), np.concatenate([weight, nodes.theta_weight])
+            truth = np.concatenate([truth, nodes.specular])
+            weight = np.concatenate([weight, nodes.theta_weight])
         self._floor = np.cbrt(_FLOOR * (weight @ np.abs(truth)) / weight.sum())
         self._truth = np.maximum(np.cbrt(truth), self._floor)
         self._weight = np.sqrt(weight[:, np.newaxis] / (weight @ self._truth**2))
@@ -87,14 +92,16 @@ class _MaterialXSearch:
     def surface(self, numbers: Array) -> MaterialXSurface:
         """Return the surface of the numbers that are searched."""
         colors = self._truth.shape[1]
-        roughness, base = float(numbers[0]), tuple(numbers[1 : 1 + colors].tolist())
+        roughness = float(numbers[0])
+        base = tuple(numbers[1 : 1 + colors].tolist())
         if self.diffuse:
             # OpenPBR takes the light of a black highlight from the body, at grazing: least of a rough one
             rough = 1.0 if self.kind == OPEN_PBR else 0.3
             return MaterialXSurface(
                 self.kind, base, base_diffuse_roughness=roughness, specular_weight=0.0, specular_roughness=rough
             )
-        edge, rest = numbers[1 + colors : 1 + 2 * colors], numbers[1 + 2 * colors :]
+        edge = numbers[1 + colors : 1 + 2 * colors]
+        rest = numbers[1 + 2 * colors :]
         if self.kind == OPEN_PBR:
             edge = np.maximum(edge, darkest_edge(numbers[1 : 1 + colors]))
         root, metal, weight = rest[:3].tolist()
@@ -116,7 +123,9 @@ class _MaterialXSearch:
         """Return the surface at the end of a descent that begins with a share of metal."""
         least_squares = import_extra("scipy.optimize").least_squares
         colors = self._truth.shape[1]
-        begin, low, high = [0.3] * (1 + colors), [0.0] * (1 + colors), [1.0] * (1 + colors)
+        begin = [0.3] * (1 + colors)
+        low = [0.0] * (1 + colors)
+        high = [1.0] * (1 + colors)
         if not self.diffuse:
             begin += [*([0.7] * colors), 0.3, metal, 0.7, *self.widths]
             low += [*([0.0] * (colors + 3)), *np.full(self.widths.size, np.log(_NARROWEST))]

@@ -2,7 +2,7 @@
 
 Transcribed from the formulas of the pixel shaders that MaterialX 1.39 generates: `mx_oren_nayar_diffuse_bsdf`,
 `mx_dielectric_bsdf`, `mx_generalized_schlick_bsdf` and `mx_conductor_bsdf`, with its analytic directional albedo. The
-layers, and the compensation of facets, depend on the viewer alone: the surfaces are not quite reciprocal.
+layers, and the compensation of facets, depend only on the viewer: the surfaces are not quite reciprocal.
 """
 
 from __future__ import annotations

@@ -1,11 +1,11 @@
 """Radiance: tensor trees of variable resolution, and the material that scenes include.
 
 A tree cuts the directions of light and viewer into cells, small where f_r varies. A cell holds the average of f_r in
-1/sr. Radiance does not interpolate between cells, so that narrow lobes take many. The file beside the tree is the
-material that scenes include.
+1/sr. Radiance does not interpolate between cells, so that narrow lobes take many. A second file holds the material that
+scenes include.
 
-Anisotropic tables fit. Spectral tables become CIE Y and the chromaticities u' and v'. The specular part is left out: a
-scene can add a mirror for it.
+A file can hold anisotropic tables. Spectral tables become CIE Y and the chromaticities u' and v'. The specular part is
+left out: a scene can add a mirror for it.
 """
 
 from __future__ import annotations
@@ -70,7 +70,9 @@ _WAVELENGTHS = (VISIBLE, "CIE-u", "CIE-v")
 _FIRST = 16.0  # cells of the first tree that is compared with the table
 # The error falls with the third to fourth root of the number of cells: with this power the tree does not become larger
 # than needed, and few trees are compared
-_POWER, _LEAST, _MOST = 1.5, 1.15, 8.0
+_POWER = 1.5
+_LEAST = 1.15
+_MOST = 8.0
 # Share of the cells that is spent where all of them would not do: the error falls more slowly than the file grows
 _OUT_OF_REACH = 1.0 / 3.0
 _DARK_LEVEL = 6  # level of the cell without light in coloured trees: one of 262144
@@ -209,7 +211,7 @@ def read(path: str | os.PathLike[str]) -> FileTable:
         try:
             trees.append(parsed(block.numbers, rank))
         except ValueError as error:
-            raise FileFormatError(f"{path}: block {name} is no tensor tree: {error}") from None
+            raise FileFormatError(f"{path}: block {name} is not a tensor tree: {error}") from None
     of_colour = XYZ if len(trees) > 1 else LUMINOUS
 
     def nodes() -> Samples:
@@ -248,14 +250,16 @@ def _plastic(table: Table, name: str) -> list[str]:
     """Return the lines of Radiance's own materials, for models of Ward with grey parameters."""
     from brdfdb.models.shaders import OF_RADIANCE
 
-    model, parameters = table.metadata.model or "", table.metadata.parameters
+    model = table.metadata.model or ""
+    parameters = table.metadata.parameters
     values = [parameters.get(key) for key in _PARAMETERS]
     if model not in OF_RADIANCE or not all(isinstance(value, float | int) for value in values):
         return []
     rho_d, rho_s, alpha_x, alpha_y = (float(value) for value in values)  # type: ignore[arg-type]
     if rho_s >= 1.0:
         return []
-    colour, metal = rho_d / (1.0 - rho_s), rho_d + rho_s
+    colour = rho_d / (1.0 - rho_s)
+    metal = rho_d + rho_s
     share = rho_s / metal if metal > 0.0 else 0.0
     isotropic = alpha_x == alpha_y
     kind, strings = ("", "0") if isotropic else ("2", f"4 {_UP} .")

@@ -39,7 +39,9 @@ class Growth:
     """
 
     def __init__(self, evaluate: Evaluate, rank: int, channels: int) -> None:
-        self.rank, self._evaluate, self._channels = rank, evaluate, channels
+        self.rank = rank
+        self._evaluate = evaluate
+        self._channels = channels
         self._kin = 1 << rank
         self._bits = (np.arange(self._kin)[:, np.newaxis] >> np.arange(rank)) & 1
         self._plant()
@@ -63,7 +65,8 @@ class Growth:
         first = np.cumsum([0, *counts])
         inner = [first[level + 1] + self._kin * np.arange(counts[level]) for level in range(dense)]
         self._child = np.concatenate([*inner, np.full(counts[-1], _NONE)])
-        self._corner, self._level = np.concatenate(corners), np.repeat(np.arange(dense + 1), counts)
+        self._corner = np.concatenate(corners)
+        self._level = np.repeat(np.arange(dense + 1), counts)
         self._mean = np.concatenate([mean for mean, _, _ in cells])
         spread = np.concatenate([high - low for _, low, high in cells])
         self._measure = self._measured(self._mean, spread, self._level)
@@ -97,7 +100,7 @@ class Growth:
         return True
 
     def _split(self, count: int) -> bool:
-        """Divide `count` leaves with the largest measure; return False if there is none that varies."""
+        """Divide the `count` leaves with the largest measure; return False if f_r varies in no leaf."""
         measure = self._measure[self._leaves]
         count = min(count, len(self._leaves))
         chosen = np.argpartition(-measure, count - 1)[:count]
@@ -118,7 +121,8 @@ class Growth:
         mean, low, high = self._cells(corner, level)
         self._child[parents] = len(self._child) + self._kin * np.arange(len(parents))
         self._child = np.concatenate([self._child, np.full(len(corner), _NONE)])
-        self._corner, self._level = np.concatenate([self._corner, corner]), np.concatenate([self._level, level])
+        self._corner = np.concatenate([self._corner, corner])
+        self._level = np.concatenate([self._level, level])
         self._mean = np.concatenate([self._mean, mean])
         self._measure = np.concatenate([self._measure, self._measured(mean, high - low, level)])
         self._open = np.concatenate([self._open, np.zeros(len(corner), dtype=bool)])
@@ -140,7 +144,8 @@ class Growth:
 
     def tree(self) -> tuple[Tree, Floats]:
         """Return the tree, with the numbers of its leaves as values, and their averages [1/sr], shape (leaves, C)."""
-        inner, leaves = np.flatnonzero(self._open), np.sort(self._leaves)
+        inner = np.flatnonzero(self._open)
+        leaves = np.sort(self._leaves)
         code = np.zeros(len(self._child), dtype=np.int64)
         code[inner], code[leaves] = np.arange(len(inner)), -1 - np.arange(len(leaves))
         children = code[self._child[inner][:, np.newaxis] + np.arange(self._kin)].reshape(-1, self._kin)

@@ -196,7 +196,7 @@ def parsed(text: str, rank: int) -> Tree:
             path[-1].append(len(nodes))
             nodes.append(closed)
         else:
-            raise ValueError(f"{match.group()[:_SHOWN]!r} stands outside of the braces")
+            raise ValueError(f"{match.group()[:_SHOWN]!r} is outside the braces")
     if len(path) != 1 or len(path[0]) != 1:
         raise ValueError("a brace is not closed" if len(path) != 1 else f"it has {len(path[0])} roots")
     numbers_read = np.array(values)

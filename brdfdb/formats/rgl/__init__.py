@@ -1,11 +1,11 @@
 """RGL's tensor files: measured materials of Mitsuba 3, pbrt-v4 and RGL's own loader.
 
 The file holds f_r times the cosine, divided by a density of half vectors, on squares that the density warps. Readers
-interpolate in straight lines along both sides of a square, the angles of the light, and the wavelengths. They also draw
+interpolate linearly along both sides of a square, the angles of the light, and the wavelengths. They also draw
 directions with the density.
 
-Anisotropic tables and all wavelengths fit. A file of the kind ``rgb`` holds linear sRGB instead. The specular part is
-left out.
+A file can hold anisotropic tables and all wavelengths. A file of the kind ``rgb`` holds linear sRGB instead. The
+specular part is left out.
 """
 
 from __future__ import annotations
@@ -37,13 +37,14 @@ options = (
     FormatOption(
         "azimuth",
         "reduced",
-        "azimuths of the light of anisotropic tables: those that symmetry leaves, for Mitsuba 3, or all",
+        "azimuths of the light in anisotropic tables: a quarter, which Mitsuba 3 completes by symmetry, or all",
         choices=("reduced", "full"),
     ),
 )
 
 # Bytes beside the values and the record: its error and remarks, headers of fields, angles; and for each wavelength
-_BESIDE, _BESIDE_EACH = 4000, 30
+_BESIDE = 4000
+_BESIDE_EACH = 30
 HOLDS = (
     "spectra * ndf(half vector) / (4 sigma(light)) is f_r cos(theta_r) [1/sr], the cosine included; "
     "half vectors are warped by vndf"

@@ -145,7 +145,8 @@ class Fields:
             step = min(1, self.theta_i.size - 1)
             return MixedSlices(np.stack([j, j + step]), np.stack([1.0 - v, v]))
         i, u = Interval.between(self.phi_i, places.phi_i)
-        step, count = min(1, self.theta_i.size - 1), self.theta_i.size
+        step = min(1, self.theta_i.size - 1)
+        count = self.theta_i.size
         numbers = [i * count + j, i * count + j + step, (i + 1) * count + j, (i + 1) * count + j + step]
         return MixedSlices(np.stack(numbers), np.stack([(1 - u) * (1 - v), (1 - u) * v, u * (1 - v), u * v]))
 
@@ -199,14 +200,15 @@ def fields_of(path: str | os.PathLike[str], arrays: Mapping[str, NDArray[Any]]) 
     axes = _REQUIRED | {values: 5} | ({"wavelengths": 1} if spectral else {}) | {"description": 1}
     for name, count in axes.items():
         if name not in arrays:
-            raise FileFormatError(f"{path}: it has no field {name!r}, so it is no measured material of RGL")
+            raise FileFormatError(f"{path}: it has no field {name!r}, which measured materials of RGL need")
         dtype = np.dtype(np.uint8 if name in _BYTES else np.float32)
         if arrays[name].ndim != count or arrays[name].dtype != dtype:
-            raise FileFormatError(f"{path}: field {name!r} is not of {count} axes and of type {dtype}")
+            raise FileFormatError(f"{path}: field {name!r} does not have {count} axes and the type {dtype}")
         if dtype == np.float32 and not np.all(np.isfinite(arrays[name])):
             raise FileFormatError(f"{path}: field {name!r} has numbers that are not finite")
     slices = (arrays["phi_i"].size, arrays["theta_i"].size)
-    channels, size = (arrays["wavelengths"].size if spectral else 3), arrays["luminance"].shape[-1]
+    channels = arrays["wavelengths"].size if spectral else 3
+    size = arrays["luminance"].shape[-1]
     expected = {
         "vndf": (*slices, *arrays["vndf"].shape[2:]),
         "luminance": (*slices, size, size),
@@ -215,13 +217,13 @@ def fields_of(path: str | os.PathLike[str], arrays: Mapping[str, NDArray[Any]]) 
     }
     for name, shape in expected.items():
         if arrays[name].shape != shape:
-            raise FileFormatError(f"{path}: field {name!r} has the shape {arrays[name].shape}; its axes say {shape}")
+            raise FileFormatError(f"{path}: field {name!r} has the shape {arrays[name].shape}; its axes give {shape}")
     for name in ("ndf", "sigma", "vndf", "luminance"):
         if min(arrays[name].shape) < 1 or min(arrays[name].shape[-2:]) < 2:
             raise FileFormatError(f"{path}: field {name!r} of shape {arrays[name].shape} is too small")
     for name in ("theta_i", "phi_i", *(("wavelengths",) if spectral else ())):
         if arrays[name].size < 1 or not np.all(np.diff(arrays[name]) > 0.0):
-            raise FileFormatError(f"{path}: field {name!r} does not ascend")
+            raise FileFormatError(f"{path}: field {name!r} does not increase")
     _check_numbers(path, arrays)
     return Fields(
         **{name: arrays[name] for name in ("theta_i", "phi_i", "ndf", "sigma", "vndf", "luminance")},
@@ -389,7 +391,8 @@ class Warp:
         part = v[..., np.newaxis]
         columns = (1.0 - part) * self._columns[slices, j] + part * self._columns[slices, j + 1]
         density = (1.0 - part) * self._density[slices, j] + part * self._density[slices, j + 1]
-        flat, wanted = columns.reshape(-1, self.columns), s * columns[..., -1:].reshape(-1, 1)
+        flat = columns.reshape(-1, self.columns)
+        wanted = s * columns[..., -1:].reshape(-1, 1)
         i = _interval_of_lines(flat, wanted)
         lines = np.arange(len(flat))[:, np.newaxis]
         dense = density.reshape(-1, self.columns)

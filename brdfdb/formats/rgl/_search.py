@@ -111,7 +111,9 @@ class _RglSearch:
     """Files of one table, compared with it."""
 
     def __init__(self, table: Table, comparison: Comparison, kind: str, tolerance: float, full: bool) -> None:
-        self._comparison, self._tolerance, self._name = comparison, tolerance, table.name
+        self._comparison = comparison
+        self._tolerance = tolerance
+        self._name = table.name
         channels = comparison.channels
         at = channels.wavelength_nm if kind == "spectral" else None
         self._kept = np.arange(len(channels.names)) if at is None else _thinned(comparison, at, tolerance)
@@ -124,7 +126,8 @@ class _RglSearch:
             self._of_file = np.array([GREY_NM] if self.nodes is None else self.nodes, np.float32)
         self.surface = HalfVectorSurface(table, _some(channels, self._kept), full)
         few = np.unique(np.linspace(0, self._kept.size - 1, _FEW).astype(np.int64))
-        self._few, self._sample = few, self.surface
+        self._few = few
+        self._sample = self.surface
         if few.size < self._kept.size:
             self._sample = HalfVectorSurface(table, _some(channels, self._kept[few]), full)
 
@@ -157,7 +160,9 @@ class _RglSearch:
 
     def best(self, ladder: list[RglPlan]) -> FittedFields:
         """Return the first of a ladder within the tolerance, else the last."""
-        low, high, rung = 0, len(ladder) - 1, min(_FIRST, len(ladder) - 1)
+        low = 0
+        high = len(ladder) - 1
+        rung = min(_FIRST, len(ladder) - 1)
         while low < high:
             p99 = self.p99(ladder[rung])
             low, high = (low, rung) if p99 <= self._tolerance else (min(rung + 1, high), high)
@@ -171,7 +176,7 @@ class _RglSearch:
         return FittedFields(fields, error)
 
     def _built(self, plan: RglPlan) -> Fields:
-        """Return the fields of a plan with all channels; those of the last few plans are kept."""
+        """Return the fields of a plan with all channels; the fields of the last few plans are cached."""
         if plan not in self._files:
             if len(self._files) >= _REMEMBERED:
                 del self._files[next(iter(self._files))]
@@ -290,7 +295,8 @@ def build(surface: HalfVectorSurface, plan: RglPlan, wavelength_nm: Floats32 | N
     spectra = spectra - _LOWERED * sum(
         _bend(spectra, axis, at) for axis, at in ((0, phi_i), (1, theta_i), (3, nodes), (4, nodes))
     )
-    vndf, luminance = vndf.reshape(*shape, *vndf.shape[1:]), luminance.reshape(*shape, *luminance.shape[1:])
+    vndf = vndf.reshape(*shape, *vndf.shape[1:])
+    luminance = luminance.reshape(*shape, *luminance.shape[1:])
     if surface.reduction == 4:
         phi_i = np.append(phi_i, np.float32(phi_i[-1] + _BEYOND))
         vndf, luminance, spectra = (np.concatenate([part, part[:1]]) for part in (vndf, luminance, spectra))
@@ -311,7 +317,8 @@ def _bend(values: Array, axis: int, nodes: NDArray[Any]) -> Array:
     """Return h**2 times the second derivative of values along an axis; 0 at its ends."""
     bend = np.zeros_like(values)
     if nodes.size >= 3:
-        along, result = np.moveaxis(values, axis, -1), np.moveaxis(bend, axis, -1)
+        along = np.moveaxis(values, axis, -1)
+        result = np.moveaxis(bend, axis, -1)
         h = np.diff(nodes.astype(np.float64))
         second = np.diff(np.diff(along, axis=-1) / h, axis=-1) / (0.5 * (h[1:] + h[:-1]))
         result[..., 1:-1] = second * 0.5 * (h[1:] ** 2 + h[:-1] ** 2)

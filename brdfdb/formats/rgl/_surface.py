@@ -20,7 +20,10 @@ _LOWEST = 0.002  # cosine of theta_r below which f_r is continued: some models h
 _SYMMETRIES = {4: ((1.0, -1.0), (-1.0, 1.0)), 2: ((-1.0, -1.0),)}  # signs of x and y that leave f_r as it is
 _DRAWN, _SAME = 2000, 1e-3  # pairs that symmetries are tested with, and their largest relative difference
 # Nodes of the factors: of the half vector, of the light, and lights that the former is averaged over
-_COLUMNS, _ROWS, _LIGHTS, _SIDES = 384, 97, 8, 12
+_COLUMNS = 384
+_ROWS = 97
+_LIGHTS = 8
+_SIDES = 12
 _DARKEST = 1e-3  # share of the mean f_r that is added before logarithms are taken
 _NEAR_HORIZON = 0.05  # cosine of theta_r from which on values count for the factors
 _FLOOR = 0.02  # share of the mean value that bends are relative to, where values are smaller
@@ -81,7 +84,8 @@ class HalfVectorSurface:
     """
 
     def __init__(self, table: Table, channels: Channels, full: bool = False) -> None:
-        self._table, self._channels = table, channels
+        self._table = table
+        self._channels = channels
         self.isotropic = not table.anisotropic
         self.reduction = 1 if full or self.isotropic else _reduction(table, channels)
 
@@ -218,7 +222,8 @@ def _bends(values: HalfVectorValues, factor: Array, area: Array, ramp: Array) ->
     over_rows = np.sum((bent_across**2 * weight) ** _POWER * ramp, axis=2) / np.sum(ramp, axis=2) + 1e-9
     for _ in range(_SMOOTHINGS):
         dense[:, :, 1:-1] = 0.25 * (dense[:, :, 2:] + 2.0 * dense[:, :, 1:-1] + dense[:, :, :-2])
-        dense, over_rows = _smooth(dense), _smooth(over_rows)
+        dense = _smooth(dense)
+        over_rows = _smooth(over_rows)
     return Bends(dense, over_rows)
 
 

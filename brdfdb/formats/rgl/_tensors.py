@@ -30,7 +30,8 @@ def write_tensors(path: Path, arrays: Mapping[str, NDArray[Any]]) -> None:
     """Write arrays as a tensor file; OSError if it cannot be written."""
     header = MAGIC + _VERSION + struct.pack("<I", len(arrays))
     size = len(header) + sum(len(name.encode()) + 13 + 8 * array.ndim for name, array in arrays.items())
-    blocks, offset = [], size
+    blocks = []
+    offset = size
     for name, array in arrays.items():
         block = array.tobytes()
         offset += -offset % _ALIGNMENT
@@ -46,14 +47,14 @@ def write_tensors(path: Path, arrays: Mapping[str, NDArray[Any]]) -> None:
 
 
 def read_tensors(path: str | os.PathLike[str]) -> dict[str, NDArray[Any]]:
-    """Return the arrays of a tensor file by name; FileFormatError if it is no tensor file or is damaged."""
+    """Return the arrays of a tensor file by name; FileFormatError if it is not a tensor file or is damaged."""
     with path_of(path).open("rb") as file:
         if not file.read(1):
-            raise FileFormatError(f"{path}: it is no tensor file")
+            raise FileFormatError(f"{path}: it is not a tensor file")
         content = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)  # files of Mueller matrices have a gigabyte
     header = _Header(path, content)
     if header.take(len(MAGIC)) != MAGIC:
-        raise FileFormatError(f"{path}: it is no tensor file")
+        raise FileFormatError(f"{path}: it is not a tensor file")
     if header.take(2) != _VERSION:
         raise FileFormatError(f"{path}: its version is {content[12]}.{content[13]}; allowed is 1.0")
     (count,) = header.unpack("<I")
@@ -66,7 +67,9 @@ class _Header:
     """Reader of the header of a tensor file that never reads beyond its end."""
 
     def __init__(self, path: str | os.PathLike[str], content: mmap.mmap) -> None:
-        self._path, self._content, self._at = path, content, 0
+        self._path = path
+        self._content = content
+        self._at = 0
 
     def take(self, count: int) -> bytes:
         """Return the next bytes."""
@@ -91,7 +94,8 @@ class _Header:
             raise FileFormatError(
                 f"{self._path}: damaged: field {name!r} has {axes} axes and elements of type {number}"
             )
-        shape, dtype = self.unpack(f"<{axes}Q"), _TYPES[number]
+        shape = self.unpack(f"<{axes}Q")
+        dtype = _TYPES[number]
         size = math.prod(shape)  # of Python's integers, which do not overflow
         if offset + size * dtype.itemsize > len(self._content):
             raise FileFormatError(f"{self._path}: damaged: field {name!r} of shape {shape} lies beyond its end")

@@ -1,4 +1,4 @@
-"""Text of other programs: a row a pair of directions, with commas, tabs, semicolons or spaces.
+"""Text of other programs: one row for each pair of directions, with commas, tabs, semicolons or spaces.
 
 Columns are recognised by their names, such as ``theta_i``, ``sza``, ``view_z``, ``raa`` or ``550nm``, or the caller
 names them. Titles may stand before the names. Values are f_r in 1/sr, reflectance factors (pi f_r), or f_r times the
@@ -164,7 +164,9 @@ def read(
     at = _wavelengths(path, names, layout)
     if "wavelength" in roles:
         if table.values.shape[1] != 1:
-            raise FileFormatError(f"{path}: line {layout.line}: beside a wavelength there may be one column of values")
+            raise FileFormatError(
+                f"{path}: line {layout.line}: a text with a column of wavelengths may have only one column of values"
+            )
         lengths = _nm(path, rows[:, roles["wavelength"][0]], layout.described[roles["wavelength"][0]], layout, record)
         at = np.unique(np.round(lengths, 6))
         table = table.pivoted(lengths)
@@ -204,7 +206,7 @@ def _layout(path: Path) -> TextLayout:
     if layout is None:
         for number, line in itertools.islice(lines_of(path), _LONGEST_TITLE):
             if not _missing(roles_of([name for part in line.split(",") for name in part.split()])):
-                raise FileFormatError(f"{path}: line {number} has the names of columns, and no row of numbers follows")
+                raise FileFormatError(f"{path}: line {number} has the names of columns, but no row of numbers follows")
         raise FileFormatError(
             f"{path}: line 1: none of the first {_LONGEST_TITLE} lines is a row of numbers, three below names or four"
         )
@@ -233,13 +235,13 @@ def _roles(path: Path, layout: TextLayout, columns: Mapping[str, str | Sequence[
         known.pop("delta_phi" if "phi_i" in known or "phi_i" in given else "phi_r")
     roles = {role: numbers for role, numbers in (known | given).items() if numbers}
     if missing := _missing(roles):
-        raise FileFormatError(
-            f"{path}: line {layout.line}: among the columns {shown} is none of {missing}; name it: {HOW}"
-        )
+        raise FileFormatError(f"{path}: line {layout.line}: no column is {missing}, among {shown}; name it: {HOW}")
     for role in (*ANGLES, "wavelength"):
         if len(roles.get(role, ())) > 1:
             names = [layout.names[column] for column in roles[role]]
-            raise FileFormatError(f"{path}: line {layout.line}: {' and '.join(names)} are both {role}; name one")
+            raise FileFormatError(
+                f"{path}: line {layout.line}: {' and '.join(names)} are both {role}; name the column to read"
+            )
     return roles
 
 
@@ -260,7 +262,9 @@ def _scale(
     distinct = sorted(set(quantities) - {""})
     if len(distinct) > 1 and any(wavelength_of(name) is None for name in names):
         shown = " and ".join(next(n for n, q in zip(names, quantities, strict=True) if q == one) for one in distinct)
-        raise FileFormatError(f"{path}: line {layout.line}: {shown} are different quantities; name one as values")
+        raise FileFormatError(
+            f"{path}: line {layout.line}: {shown} are different quantities; name the columns to read as values"
+        )
     if quantity != "auto":
         quantities = [quantity] * len(names)
     other = distinct[0] if len(distinct) == 1 else "f_r"  # of names that give none
@@ -312,7 +316,8 @@ def _values(
         factors.append(factor)
     percent = any(PERCENT.search(name) for name in names["values"])
     if layout.names_percent and not any("[" in name or "(" in name for name in names["values"]):
-        factors, percent = [0.01] * len(factors), True
+        factors = [0.01] * len(factors)
+        percent = True
     if percent:
         note(record, "Values in percent were divided by 100.")
     elif any(factor != 1.0 for factor in factors):
@@ -324,7 +329,9 @@ def _values(
         return ListedValues(angles, values, None)
     given = rows[:, roles["uncertainty"]]
     if given.shape != values.shape:
-        raise FileFormatError(f"{path}: line {layout.line}: there are not as many uncertainties as values")
+        raise FileFormatError(
+            f"{path}: line {layout.line}: the columns of uncertainties are not as many as those of values"
+        )
     where = f"{path}: line {layout.line}"
     uncertainty = uncertainty_of(where, names["uncertainty"], given, values, scale, np.array(factors), record)
     return ListedValues(angles, values, uncertainty)
@@ -348,7 +355,7 @@ def _wavelengths(path: Path, names: Sequence[str], layout: TextLayout) -> Array 
         return None
     at = np.array(lengths, dtype=np.float64)
     if np.unique(at).size != at.size:
-        raise FileFormatError(f"{path}: line {layout.line}: a wavelength stands twice")
+        raise FileFormatError(f"{path}: line {layout.line}: a wavelength is listed twice")
     if at.min() < _LEAST_NM or any(name.startswith("-") for name in names):
         raise FileFormatError(f"{path}: line {layout.line}: {', '.join(names)}: a wavelength is less than 10 nm")
     return at
@@ -360,10 +367,13 @@ def _nm(path: Path, lengths: Array, name: str, layout: TextLayout, record: dict[
     if np.any(np.isnan(lengths)):
         line = line_of_row(path, layout, int(np.argmax(np.isnan(lengths))))
         raise FileFormatError(f"{path}: line {line}, field {name}: a wavelength is missing")
-    unit_nm, word = length_unit(name), ""
+    unit_nm = length_unit(name)
+    word = ""
     if unit_nm is None:
         if units := units_in(name):
-            raise FileFormatError(f"{where}: the unit {units[0]!r} is none of wavelengths; allowed are nm, um and m")
+            raise FileFormatError(
+                f"{where}: the unit {units[0]!r} is not a unit of wavelengths; allowed are nm, um and m"
+            )
         low, high = float(lengths.min()), float(lengths.max())
         if low < _LEAST_NM <= _LEAST_UM <= high:
             raise FileFormatError(f"{where}: {low:g} and {high:g} have no unit in common; write it into the name")
@@ -395,12 +405,14 @@ def uncertainty_of(
     """
     columns = f"column {names[0]}" if len(names) == 1 else f"columns {', '.join(names)}"
     note(record, f"Standard uncertainties were read from the {columns[:_SHOWN]}.")
-    shares, coverages = [], []
+    shares = []
+    coverages = []
     own = np.broadcast_to(factors, len(names)).copy()
     for column, name in enumerate(names):
-        coverage, field = _COVERAGE.search(name), f"{where}, field {name}"
+        coverage = _COVERAGE.search(name)
+        field = f"{where}, field {name}"
         if coverage is None and _PROBABILITY.search(name):
-            raise FileFormatError(f"{field}: a probability is no unit; write the coverage factor, such as U (k=2)")
+            raise FileFormatError(f"{field}: a probability is not a unit; write the coverage factor, such as U (k=2)")
         coverages.append(1.0 if coverage is None else float(coverage[1]))
         if coverages[-1] == 0.0:
             raise FileFormatError(f"{field}: the coverage factor k is 0; allowed are positive numbers")

@@ -58,8 +58,9 @@ def angles_of_rows(
         given[f"theta_{side}"] = np.abs(theta)
         if np.any(np.abs(theta) > np.pi * (1.0 + 1e-9)):
             row = int(np.argmax(np.abs(theta)))
-            shown, line = np.rad2deg(np.abs(theta[row])), line_of_row(path, layout, row)
-            raise FileFormatError(f"{path}: line {line}: theta_{side} of {shown:g} degrees is no polar angle")
+            shown = np.rad2deg(np.abs(theta[row]))
+            line = line_of_row(path, layout, row)
+            raise FileFormatError(f"{path}: line {line}: theta_{side} of {shown:g} degrees is not a polar angle")
     phi_i = given["phi_i"]
     phi_r = given["phi_r"] if "phi_r" in given else phi_i + given["delta_phi"]
     flat = np.abs(np.sin(phi_r - phi_i)) * np.sin(given["theta_r"]) < _FLAT
@@ -104,7 +105,9 @@ def _units(
         units[name] = angle_unit(column)
         if units[name] not in ("", *ANGLE_UNITS):
             where = f"{path}: line {layout.line}, field {column}"
-            raise FileFormatError(f"{where}: the unit {units[name]!r} is none of angles; allowed are deg, rad and mrad")
+            raise FileFormatError(
+                f"{where}: the unit {units[name]!r} is not a unit of angles; allowed are deg, rad and mrad"
+            )
     named = sorted(set(units.values()) - {""})
     unnamed = {name: column for name, column in given.items() if not units[name]}
     titles = [line for line in layout.titles if _OF_ANGLES.search(line)]
@@ -114,16 +117,18 @@ def _units(
         note(record, f"Angles were taken as {_WORDS[unit]}: a title says {titles[0].strip()[:_SHOWN]!r}.")
         return dict.fromkeys(given, unit)
     other = named[0] if len(named) == 1 else "deg"  # of columns whose names give none
-    # Angles without a unit may be radians if they are as small as radians are, and not 0 alone
+    # Angles without a unit may be radians if they are in the range of radians and not all 0
     largest = {name: float(np.abs(column).max(initial=0.0)) for name, column in unnamed.items()}
     bounds = {name: (0.5 if name.startswith("theta") else 2.0) * np.pi + 1e-3 for name in unnamed}
     may_be_radians = all(largest[name] <= bounds[name] for name in unnamed) and any(largest.values())
     if other == "deg" and unnamed and may_be_radians:
         if named:
             columns = [layout.names[roles[name][0]] for name in unnamed]
-            subject, verb = f"The column {columns[0]} was", "it gives"
+            subject = f"The column {columns[0]} was"
+            verb = "it gives"
             if len(columns) > 1:
-                subject, verb = f"The columns {' and '.join(columns)} were", "they give"
+                subject = f"The columns {' and '.join(columns)} were"
+                verb = "they give"
             text = f"{subject} taken as degrees, as other columns are, but {verb} no unit and may be radians"
             note(record, f"{text}: names such as {plain_name(columns[0])}_rad say so.")
         else:

@@ -29,7 +29,8 @@ _VIEWER = (
     *("r", "o", "out", "outgoing", "refl", "reflected", "scat", "scatter", "scattered"),
     *("v", "view", "viewing", "viewer", "det", "detector", "rec", "receiver", "obs", "observer"),
 )
-_POLAR, _AZIMUTH = ("theta", "zenith", "z", "za", "polar", "th"), ("phi", "azimuth", "a", "az", "aa", "azi", "ph")
+_POLAR = ("theta", "zenith", "z", "za", "polar", "th")
+_AZIMUTH = ("phi", "azimuth", "a", "az", "aa", "azi", "ph")
 _RELATIVE = ("delta_phi", "dphi", "deltaphi", "phi_d", "phid", "raa", "relaz", "relative_azimuth", "rel_azimuth")
 _OTHERS = {"aoi": "theta_i", "angle_of_incidence": "theta_i", "incidence_angle": "theta_i", "incidence": "theta_i"}
 _QUANTITIES = {
@@ -112,7 +113,7 @@ class TextLayout:
     units : tuple of str
         Units in a line of their own below the names, one a column; () if there is none.
     damaged : str
-        A sentence on a line before it that is a row with fields that are no numbers; empty if there is none.
+        A sentence on an earlier line that looks like a row but has fields that are not numbers; else empty.
     """
 
     delimiter: str | None
@@ -225,7 +226,7 @@ def _is_row(fields: Sequence[str], delimiter: str | None, before: Sequence[_Line
 
 
 def _names(before: Sequence[_Line], delimiter: str | None, count: int) -> tuple[int, tuple[str, ...]]:
-    """Return the line of the names and the names of columns, numbers from 1 and line 0 if there are none.
+    """Return the line and the names of columns; without names, line 0 and numbers from 1.
 
     They are in the last line with as many names, one of which is known, or else in the last line that is no row.
     """
@@ -263,7 +264,7 @@ def _split(text: str, delimiter: str | None, count: int) -> tuple[str, ...]:
 
 
 def _fault(line: _Line, delimiter: str | None, names: Sequence[str]) -> str:
-    """Return a sentence on a line that is a row of numbers, but for some field; empty if it is none."""
+    """Return a sentence on a line that is a row of numbers except for some fields; empty for other lines."""
     fields = fields_of(line.text, delimiter)
     numbers = [number_of(field) for field in fields]
     known = sum(value is not None and value == value for value in numbers)
@@ -272,7 +273,7 @@ def _fault(line: _Line, delimiter: str | None, names: Sequence[str]) -> str:
             if value is None:
                 return f"line {line.number}, field {name}: {field[:40]!r} is not a number"
     if len(fields) != len(names) and len(fields) >= 3 and None not in numbers and known:
-        return f"line {line.number} has {len(fields)} fields, and the first whole row {len(names)}"
+        return f"line {line.number} has {len(fields)} fields, but the first valid row has {len(names)}"
     return ""
 
 
@@ -353,7 +354,9 @@ def wavelength_of(name: str) -> float | None:
     if match is None:
         inner = _NM_IN_BRACKETS.search(name)
         return wavelength_of(inner[1]) if inner and _is_quantity(plain_name(name)) else None
-    word, number, unit = match["word"], float(match["number"]), match["unit"]
+    word = match["word"]
+    number = float(match["number"])
+    unit = match["unit"]
     if word and not (_is_quantity(word.rstrip("_")) or word.rstrip("_") in ("r", "reflectance")):
         return None
     if unit is None:
@@ -389,7 +392,8 @@ def quantity_of(name: str, columns: Sequence[str]) -> str:
                 return quantity
         if angle in ("s", "theta_s"):
             return UNKNOWN_COSINE
-        of_viewer, of_light = role_of(angle) == "theta_r" or angle in _VIEWER, role_of(angle) == "theta_i"
+        of_viewer = role_of(angle) == "theta_r" or angle in _VIEWER
+        of_light = role_of(angle) == "theta_i"
         return "f_r_cos" if of_viewer else "f_r_cos_i" if of_light or angle in _LIGHT else UNKNOWN_COSINE
     return next((quantity for quantity, words in _QUANTITIES.items() if word in words), "")
 

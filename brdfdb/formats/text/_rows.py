@@ -31,8 +31,9 @@ def rows_of(path: Path, layout: TextLayout, *, one_wavelength: bool) -> NDArray[
     FileFormatError if a row is damaged, stands below a comment with other columns, another unit of angles or another
     wavelength, or the file was cut within its last number.
     """
-    numbers, count = array("d"), len(layout.names)
-    decimals = ""  # the sign before decimals: a comma beside points may be that of thousands
+    numbers = array("d")
+    count = len(layout.names)
+    decimals = ""  # the sign before decimals: a comma in a file with points may separate thousands
     other = ""  # a sentence on the last comments: rows below them are not as those above
     for line_number, line in _from_first(path, layout):
         if _is_comment(line):
@@ -44,7 +45,7 @@ def rows_of(path: Path, layout: TextLayout, *, one_wavelength: bool) -> NDArray[
         fields = fields_of(line, layout.delimiter)
         fields = fields[:count] if len(fields) == count + 1 and not fields[-1] else fields
         if len(fields) != count:
-            raise FileFormatError(f"{path}: line {line_number} has {len(fields)} fields, and the first row {count}")
+            raise FileFormatError(f"{path}: line {line_number} has {len(fields)} fields, but the first row has {count}")
         for field, name in zip(fields, layout.names, strict=True):
             number = number_of(field)
             if number is None or number in (np.inf, -np.inf):
@@ -53,7 +54,7 @@ def rows_of(path: Path, layout: TextLayout, *, one_wavelength: bool) -> NDArray[
             if decimals not in ("", sign):
                 where = f"line {line_number}, field {name}"
                 raise FileFormatError(
-                    f"{path}: {where}: {field[:40]!r} has {sign!r}, and numbers before it {decimals!r}"
+                    f"{path}: {where}: {field[:40]!r} has {sign!r} where numbers above it have {decimals!r}"
                 )
             decimals = sign
             numbers.append(number)
@@ -92,7 +93,7 @@ def _other_rows(text: str, number: int, layout: TextLayout, *, one_wavelength: b
         at, before = (of_comments({"titles": titles})[1] for titles in (text, "\n".join(layout.titles)))
         if at is not None and at != before:
             was = "have none" if before is None else f"have {before:g} nm"
-            return f"line {number} gives a wavelength of {at:g} nm, and rows before it {was}; {_SPLIT}"
+            return f"line {number} gives a wavelength of {at:g} nm, but rows above it {was}; {_SPLIT}"
     return ""
 
 
@@ -114,14 +115,15 @@ def check_last_number(path: Path, fields: Iterable[tuple[int, str]]) -> None:
     It was cut if it has fewer digits behind the decimal point and in the exponent than the last fields of all rows
     before it; `fields` are these, with the numbers of their lines.
     """
-    last, fewest = (0, ""), np.inf
+    last = (0, "")
+    fewest = np.inf
     for field in fields:
         fewest = min(fewest, _digits(last[1])) if last[1] else fewest
         last = field
     if fewest < np.inf and _digits(last[1]) < fewest:
         text = f"{last[1]!r} has fewer decimals than all numbers above it, and the line has no end"
         raise FileFormatError(
-            f"{path}: line {last[0]}: {text}: the file was cut within it; remove the line, or fetch the file again"
+            f"{path}: line {last[0]}: {text}: the file was cut within it; remove the line, or download the file again"
         )
 
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
 from typing import Any
 
-_KEYS = ("format", "member", "quantity", "angles", "azimuth", "side")  # of a recipe, too
+_KEYS = ("format", "member", "quantity", "angles", "azimuth", "side")  # keys of recipes, too
+OPTIONS = (*_KEYS, "column", "wavelength_nm")
 
 
 def add_reading(parser: argparse.ArgumentParser) -> None:
@@ -50,23 +50,17 @@ def add_reading(parser: argparse.ArgumentParser) -> None:
 
 def reading_keys(options: argparse.Namespace) -> dict[str, Any]:
     """Return the options as keys of `MeasuredTable`; ParameterError for a wavelength out of range or a wrong column."""
+    from brdfdb.errors import ParameterError
     from brdfdb.formats._readings import check_wavelength
 
     keys: dict[str, Any] = {name: getattr(options, name) or "" for name in _KEYS}
     if options.wavelength_nm is not None:
         check_wavelength(options.wavelength_nm)
         keys["wavelength_nm"] = options.wavelength_nm
-    return keys | {"columns": _columns(options.column)}
-
-
-def _columns(texts: Sequence[str]) -> dict[str, list[str]]:
-    """Return the headers of each column from texts NAME=HEADER; ParameterError if one is not written so."""
-    from brdfdb.errors import ParameterError
-
     columns: dict[str, list[str]] = {}
-    for text in texts:
+    for text in options.column:
         name, sign, header = text.partition("=")
         if not (name and sign and header):
             raise ParameterError("--column", f"{text!r} is not NAME=HEADER", text, "NAME=HEADER")
         columns.setdefault(name, []).append(header)
-    return columns
+    return keys | {"columns": columns}

@@ -8,7 +8,7 @@ import sys
 from brdfdb_pipelines.commands import INTERRUPTED, VIOLATED
 from brdfdb_pipelines.commands._arguments import add_jobs, add_store, place, share_cores
 
-HELP = "Audit tables, their models and all that tables state; exit 1 if a table violates a law or cannot be judged."
+HELP = "Audit tables, their models and their metadata; exit with 1 for a new violation or an unjudged table."
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -7,7 +7,7 @@ import math
 import shlex
 import sys
 import time
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -69,7 +69,7 @@ def _build(options: argparse.Namespace) -> None:
     from brdfdb.materials import PAPERS
     from brdfdb_pipelines import recipe_file, workers
     from brdfdb_pipelines.build import build, compile_kernels
-    from brdfdb_pipelines.build_progress import Bars, JsonLines
+    from brdfdb_pipelines.build_progress import Bars, print_json
     from brdfdb_pipelines.build_survey import machine_memory
 
     if options.recipe is not None and options.library is not None:
@@ -85,7 +85,7 @@ def _build(options: argparse.Namespace) -> None:
     else:
         memory = machine_memory() if memory is None else memory
         at = (workers.processes if options.processes else workers.threads)(options.jobs)
-    with at as opened, JsonLines() if options.json else Bars() as report:
+    with at as opened, nullcontext(print_json) if options.json else Bars() as report:
         if not options.scheduler:
             compile_kernels(recipe, options.store, options.jobs, report)
         with when_compiling(lambda: report({"event": "compiling", "kernels": 0})):
@@ -102,30 +102,30 @@ def _print(built: list[Built], root: Path, seconds: float) -> None:
     from brdfdb_pipelines import terminal
 
     store = Store(root)
-    changed = [one for one in built if one.state != "unchanged"]
+    changed = [table for table in built if table.state != "unchanged"]
     if changed:
-        values = sum(math.prod(one.shape) for one in changed if one.shape)
+        values = sum(math.prod(table.shape) for table in changed if table.shape)
         amount = f"{values / 1e6:.1f} million values" if values >= 1e5 else counted(values, "value")
         terminal.print_table(
             f"{counted(len(changed), 'table')}, {amount}, in {seconds:.1f} s",
             ("material", "model", "shape", "revision", "stored", "why"),
             [
                 (
-                    one.job.name,
-                    one.job.model,
-                    shape_in_words(one.shape, one.wavelengths),
-                    one.revision,
-                    terminal.size(one.stored_bytes),
-                    f"{one.why}; {one.revision} is current again" if one.state == "adopted" else one.why,
+                    table.job.name,
+                    table.job.model,
+                    shape_in_words(table.shape, table.wavelengths),
+                    table.revision,
+                    terminal.size(table.stored_bytes),
+                    f"{table.why}; {table.revision} is current again" if table.state == "adopted" else table.why,
                 )
-                for one in changed
+                for table in changed
             ],
             numbers=("shape", "stored"),
         )
     if len(changed) < len(built):
         print(f"{counted(len(built) - len(changed), 'table')} unchanged")
-    print(f"{terminal.size(sum(one.stored_bytes for one in built))} in {root}")
-    for name in (one.job.name for one in changed):
+    print(f"{terminal.size(sum(table.stored_bytes for table in built))} in {root}")
+    for name in (table.job.name for table in changed):
         excess = summary_words.excess(store.summary(name))
         if excess and store.metadata(name).known_excess is None:
             print(f"{name} reflects more light than it receives: {excess}")

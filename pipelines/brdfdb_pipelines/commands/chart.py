@@ -6,7 +6,7 @@ import argparse
 
 from brdfdb_pipelines.commands._arguments import add_out, add_store, place
 
-HELP = "Chart the error of every form of a material or a family over its cost; write pictures and JSON."
+HELP = "Chart error against cost for all forms of materials or families; write pictures and JSON."
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -3,14 +3,10 @@
 from __future__ import annotations
 
 import argparse
-from typing import TYPE_CHECKING
 
 from brdfdb.errors import ParameterError
 from brdfdb_pipelines.commands import VIOLATED
 from brdfdb_pipelines.commands._arguments import add_jobs, add_out, add_store, place
-
-if TYPE_CHECKING:
-    from brdfdb.formats import FormatOption
 
 HELP = "Write tables as files of other formats."
 
@@ -45,20 +41,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                 help="exit with 1 if the error of a file is above the requested tolerance",
             )
         for option in options_of(exporter).values():
-            _add(command, option)
-
-
-def _add(command: argparse.ArgumentParser, option: FormatOption) -> None:
-    flag, target = f"--{option.name.replace('_', '-')}", f"option_{option.name}"
-    if option.default is False:
-        command.add_argument(flag, dest=target, action="store_const", const="true", help=option.help)
-    elif option.choices:
-        default = option.default if option.name != "kind" else "all"
-        text = f"{option.help}: {', '.join(option.choices)} (default: {default})"
-        command.add_argument(flag, dest=target, metavar=option.name.upper(), help=text)
-    else:
-        text = f"{option.help}; {option.allowed} (default: {option.default:g})"
-        command.add_argument(flag, dest=target, metavar="X", help=text)
+            flag = f"--{option.name.replace('_', '-')}"
+            target = f"option_{option.name}"
+            if option.default is False:
+                command.add_argument(flag, dest=target, action="store_const", const="true", help=option.help)
+            elif option.choices:
+                default = option.default if option.name != "kind" else "all"
+                text = f"{option.help}: {', '.join(option.choices)} (default: {default})"
+                command.add_argument(flag, dest=target, metavar=option.name.upper(), help=text)
+            else:
+                text = f"{option.help}; {option.allowed} (default: {option.default:g})"
+                command.add_argument(flag, dest=target, metavar="X", help=text)
 
 
 def run(options: argparse.Namespace) -> int:

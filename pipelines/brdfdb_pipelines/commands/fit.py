@@ -7,26 +7,12 @@ import sys
 
 from brdfdb_pipelines.commands import INTERRUPTED
 from brdfdb_pipelines.commands._arguments import place, share_cores
-from brdfdb_pipelines.commands._reading import add_reading, reading_keys
+from brdfdb_pipelines.commands._reading import OPTIONS, add_reading, reading_keys
 
 HELP = "Fit models to measured samples; rank them by their error at incidences left out of the fit."
 
 # Options that only a fit to samples has
-_OF_SAMPLES = (
-    "format",
-    "column",
-    "quantity",
-    "angles",
-    "azimuth",
-    "wavelength_nm",
-    "member",
-    "side",
-    "model",
-    "refractive_index",
-    "receiver_deg",
-    "source_deg",
-    "page",
-)
+_OF_SAMPLES = (*OPTIONS, "model", "refractive_index", "receiver_deg", "source_deg", "page")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -7,14 +7,14 @@ import argparse
 from brdfdb_pipelines.commands._arguments import add_store, whole_number
 
 HELP = (
-    "Remove old revisions, interrupted builds, which cannot be resumed then, and the remains of crashes. Revisions in "
-    "a snapshot are not removed, nor anything of a material that is being built. Readers may be running: a reader of a "
-    "removed revision gets an error, and never wrong data."
+    "Remove old revisions, interrupted builds (they can then not be resumed) and the remains of crashes. Revisions in "
+    "a snapshot and materials that are being built are not changed. Readers may be running: a reader of a removed "
+    "revision gets an error, and never wrong data."
 )
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the store and what is kept."""
+    """Add the store, and which revisions stay."""
     add_store(parser)
     parser.add_argument(
         "--keep",

@@ -15,7 +15,6 @@ from brdfdb_pipelines.commands._arguments import add_snapshot, add_store
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from brdfdb.materials import Material
     from brdfdb.store.reader import Store
 
 HELP = "List the materials and families of the store, or the presets."
@@ -72,7 +71,13 @@ def _print_presets(library: str | None) -> None:
     name = PAPERS if library is None else library
     materials = list(presets(name).values())
     shared = _shared([material.source for material in materials])
-    rows = [(m.name, m.title, m.model, _colours(m), m.source.removeprefix(shared)) for m in materials]
+    rows = []
+    for material in materials:
+        at = material.wavelengths_nm
+        stated = f"{at[0]:g} nm" if at is not None and len(at) == 1 else "spectral"
+        colours = stated if material.spectral else "grey"
+        source = material.source.removeprefix(shared)
+        rows.append((material.name, material.title, material.model, colours, source))
     title = f"{len(rows)} presets" if name == PAPERS else f"{len(rows)} presets of the library {name}"
     terminal.print_table(
         title, ("material", "title", "model", "colours", "source"), rows, less=("title", "model", "source")
@@ -90,14 +95,6 @@ def _shared(sources: Sequence[str]) -> str:
     columns = zip(*(source.split() for source in sources), strict=False)  # sources differ in length
     start = [words[0] for words in itertools.takewhile(lambda words: len(set(words)) == 1, columns)]
     return f"{' '.join(start)} " if len(sources) > 1 and len(start) >= _WORDS else ""
-
-
-def _colours(material: Material) -> str:
-    """Return whether a material is grey, is stated at one wavelength, or is spectral."""
-    if not material.spectral:
-        return "grey"
-    at = material.wavelengths_nm
-    return f"{at[0]:g} nm" if at is not None and len(at) == 1 else "spectral"
 
 
 def _chosen(store: Store, options: argparse.Namespace) -> list[str]:
@@ -134,7 +131,9 @@ def _print_materials(store: Store, root: Path, names: Sequence[str]) -> list[str
     )
     from brdfdb_pipelines import terminal
 
-    rows, damaged, incomplete = [], [], []
+    rows = []
+    damaged: list[str] = []
+    incomplete: list[str] = []
     audits = last_audit(root)
     for name in names:
         try:
@@ -173,7 +172,8 @@ def _print_families(store: Store) -> list[str]:
     """Print a line for each family from its record alone; return a sentence for each damaged one."""
     from brdfdb_pipelines import terminal
 
-    rows, damaged = [], []
+    rows = []
+    damaged: list[str] = []
     for name in store.families():
         try:
             record = store.family_content(name)

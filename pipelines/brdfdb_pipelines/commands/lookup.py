@@ -27,7 +27,7 @@ _ANGLES = ("theta_i", "phi_i", "theta_r", "phi_r")
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the material, the directions, the wavelengths and the form of the answer."""
-    parser.add_argument("name", metavar="NAME")
+    parser.add_argument("name", metavar="NAME", help="material or family")
     for angle in _ANGLES:
         parser.add_argument(angle, type=float, metavar=angle.upper(), help="degrees")
     add_store(parser)
@@ -163,7 +163,8 @@ def _swept(family: Family, settings: Sequence[str]) -> dict[str, float]:
         except ValueError:
             raise ParameterError(f"--set {setting}", f"give a number, such as {name}={axes[name][0]:g}", text) from None
     for name, nodes in axes.items():
-        low, high = nodes[0], nodes[-1]
+        low = nodes[0]
+        high = nodes[-1]
         if name not in values:
             raise ParameterError("--set", f"{name} is missing; give a value in [{low:g}, {high:g}]")
         if not low <= values[name] <= high:

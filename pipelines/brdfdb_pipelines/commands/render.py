@@ -37,7 +37,7 @@ def run(options: argparse.Namespace) -> int:
 
     for module in ("matplotlib.image", "OpenEXR"):  # before the time is spent
         import_extra(module)
-    name, directory = options.scene, options.out
+    name = options.scene
     scene = scene_file.load(name)
     if isinstance(scene.objects[0].shape, Recorded) and (options.width is not None or options.across is not None):
         raise scene_file.SceneError(
@@ -53,8 +53,8 @@ def run(options: argparse.Namespace) -> int:
     with terminal.progress() as bar:
         task = bar.add_task("rendering points", total=len(view.points))
         radiance = render(scene, view, materials=materials, progress=lambda: bar.advance(task))
-    directory.mkdir(parents=True, exist_ok=True)
-    stem = directory / Path(name).stem
+    options.out.mkdir(parents=True, exist_ok=True)
+    stem = options.out / Path(name).stem
     for write, suffix in ((image.write_png, ".png"), (image.write_exr, ".exr")):
         write(stem.with_name(stem.name + suffix), scene, radiance)
     count = sum(len(points.at) for points in view.points)

@@ -20,12 +20,12 @@ def run(options: argparse.Namespace) -> int:
     """Make the revision current, and print which one was."""
     from brdfdb.store import revisions
 
-    name, revision = options.name, options.revision
-    before = revisions.rollback(options.store, name, revision)
-    if not before:
-        print(f"{name}: {revision} is current now; HEAD.json was missing or damaged")
-    elif before != revision:
-        print(f"{name}: {revision} is current now, instead of {before}")
+    before = revisions.rollback(options.store, options.name, options.revision)
+    if before == options.revision:
+        result = "was current already"
+    elif before:
+        result = f"is current now, instead of {before}"
     else:
-        print(f"{name}: {revision} was current already")
+        result = "is current now; HEAD.json was missing or damaged"
+    print(f"{options.name}: {options.revision} {result}")
     return 0

@@ -8,7 +8,8 @@ from collections.abc import Sequence
 from brdfdb_pipelines.commands._arguments import add_jobs, place, whole_number
 
 HELP = "Write a training set: f_r of random materials of a model at random directions, as one zarr group."
-_MATERIALS, _DIRECTIONS = 10_000_000, 1_000_000
+_MATERIALS = 10_000_000
+_DIRECTIONS = 1_000_000
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -67,19 +68,12 @@ def _ranges(texts: Sequence[str]) -> dict[str, tuple[float, float]]:
 
     ranges: dict[str, tuple[float, float]] = {}
     for text in texts:
-        name, ends = _range(text)
+        name, _, ends = text.partition("=")
+        low, _, high = ends.partition(":")
         if name in ranges:
             raise ParameterError(f"--range {name}", "is given twice; a parameter has one range", text)
-        ranges[name] = ends
+        try:
+            ranges[name] = (float(low), float(high))
+        except ValueError:
+            raise ParameterError(f"--range {text}", "is not NAME=LOW:HIGH, such as alpha_x=0.05:0.3", text) from None
     return ranges
-
-
-def _range(text: str) -> tuple[str, tuple[float, float]]:
-    from brdfdb.errors import ParameterError
-
-    name, _, ends = text.partition("=")
-    low, _, high = ends.partition(":")
-    try:
-        return name, (float(low), float(high))
-    except ValueError:
-        raise ParameterError(f"--range {text}", "is not NAME=LOW:HIGH, such as alpha_x=0.05:0.3", text) from None

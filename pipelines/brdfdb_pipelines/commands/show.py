@@ -13,7 +13,6 @@ from brdfdb_pipelines.commands._arguments import add_snapshot, add_store
 
 if TYPE_CHECKING:
     from brdfdb.materials import Material
-    from brdfdb.materials.provenance import Assumption
     from brdfdb.store.family import Family
     from brdfdb.store.summary_words import Audited
     from brdfdb.tables.grids import Axis
@@ -36,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print what the store, or a snapshot of it, knows of a material or a family."""
+    """Print what the store, or a snapshot of it, states about a material or a family."""
     from brdfdb.store.summary_words import last_audit
 
     root: Path = options.store
@@ -62,11 +61,12 @@ def _print_material(table: Table, path: Path, audited: Audited | None) -> None:
     _print_error(table.error, truth, measured=metadata.measured is not None)
     if metadata.measured is None:
         _print_formula_error(metadata.formula_error)
-    _print_answers(audited, _says(metadata))
+    _print_answers(audited, metadata)
     source = _source_of(table)
     _print_validity(source, table.wavelength_nm)
     _print_albedo(table, source)
-    print(f"  files       {path} (zarr v3, {terminal.size(_stored(path))})")
+    stored = sum(file.stat().st_size for file in path.rglob("*") if file.is_file())
+    print(f"  files       {path} (zarr v3, {terminal.size(stored)})")
 
 
 def _print_family(family: Family) -> None:
@@ -118,21 +118,17 @@ def _origin(metadata: TableMetadata) -> list[str]:
     if metadata.note:
         lines.append(f"  note        {metadata.note}")
     for parameter, assumption in metadata.assumed.items():
-        lines += [] if assumption is None else _assumption(parameter, assumption)
+        if assumption is None:
+            continue
+        lines.append(f"  assumed     {parameter}: {assumption.why}")
+        if assumption.max_albedo is not None:
+            lines.append(f"    {'largest albedo':<16}{assumption.max_albedo:.3f} as tabulated")
+        for other in assumption.alternatives:
+            values = ", ".join(f"{name} = {value}" for name, value in other.parameters.items())
+            excess = ", above 1" if other.max_albedo > 1.0 else ""
+            lines.append(f"    {'':<16}{other.max_albedo:.3f} with {values}{excess}")
     if metadata.known_excess is not None:
         lines.append(f"  excess      {metadata.known_excess.citation}")
-    return lines
-
-
-def _assumption(parameter: str, assumption: Assumption) -> list[str]:
-    """Return lines on why an assumed value was chosen, with the largest albedo [1] of it and its alternatives."""
-    lines = [f"  assumed     {parameter}: {assumption.why}"]
-    if assumption.max_albedo is not None:
-        lines.append(f"    {'largest albedo':<16}{assumption.max_albedo:.3f} as tabulated")
-    for other in assumption.alternatives:
-        values = ", ".join(f"{name} = {value}" for name, value in other.parameters.items())
-        excess = ", above 1" if other.max_albedo > 1.0 else ""
-        lines.append(f"    {'':<16}{other.max_albedo:.3f} with {values}{excess}")
     return lines
 
 
@@ -140,7 +136,8 @@ def _print_grid(table: Table) -> None:
     """Print the axes, the number and precision of the stored values, and how f_r is reconstructed from them."""
     from brdfdb_pipelines import terminal
 
-    metadata, wavelength = table.metadata, table.wavelength_nm
+    metadata = table.metadata
+    wavelength = table.wavelength_nm
     print("  grid")
     for axis, nodes in table.axes_deg.items():
         print(f"    {axis:<16}{nodes.size} nodes, {nodes[0]:g} to {nodes[-1]:g} degrees")
@@ -155,22 +152,17 @@ def _print_grid(table: Table) -> None:
     bits = metadata.bits
     stored = f"stored with {'all 23' if bits == 23 else f'{bits} of 23'} bits of the mantissa"
     print(f"    {'values':<16}{table.values.size}, {stored}")
-    print(f"    {'interpolation':<16}{_interpolation(table)}")
-    if metadata.reason:
-        print(terminal.plain(f"    {'reason':<16}{metadata.reason}"))
-    if metadata.reconstruction:
-        print(terminal.plain(f"  f_r         {metadata.reconstruction}"))
-
-
-def _interpolation(table: Table) -> str:
-    """Return the interpolation of a table in words."""
     how = table.interpolation
     what = "f_r" if how.power == 0.0 else f"f_r (cos theta_i cos theta_r)^{how.power:g}"
     if table.uniform is not None:
         what = what.replace("f_r", "(f_r - uniform)", 1)
     if how.logarithm:
         what = f"the logarithm of {what} + {how.offset:.3g}"
-    return f"{how.method}, of {what}"
+    print(f"    {'interpolation':<16}{how.method}, of {what}")
+    if metadata.reason:
+        print(terminal.plain(f"    {'reason':<16}{metadata.reason}"))
+    if metadata.reconstruction:
+        print(terminal.plain(f"  f_r         {metadata.reconstruction}"))
 
 
 def _print_error(error: Error | None, truth: str, *, measured: bool = False) -> None:
@@ -257,21 +249,18 @@ def _print_formula_error(error: FormulaError | None) -> None:
         _print_worst(error.worst)
 
 
-def _says(metadata: TableMetadata) -> str:
-    """Return what an audit holds a table against."""
-    from brdfdb.materials import presets
-
-    if metadata.measured is not None:
-        return "its source"
-    return "the paper" if metadata.material in presets() and metadata.source_record else "its model"
-
-
-def _print_answers(audited: Audited | None, says: str) -> None:
+def _print_answers(audited: Audited | None, metadata: TableMetadata) -> None:
     """Print the answers of the last audit of this revision to its two questions."""
+    from brdfdb.materials import presets
     from brdfdb.store.summary_words import NOT_AUDITED
 
+    of_paper = metadata.material in presets() and metadata.source_record
+    says = "the paper" if of_paper else "its model"
+    whose = "does the published model"
+    if metadata.measured is not None:
+        says = "its source"
+        whose = "do the data"
     both = (NOT_AUDITED, NOT_AUDITED) if audited is None else audited
-    whose = "do the data" if says == "its source" else "does the published model"
     print(f"  audit       is it what {says} says? {both[0]}")
     print(f"              {whose} conserve energy? {both[1]}")
 
@@ -327,7 +316,3 @@ def _print_albedo(table: Table, material: Material | None) -> None:
         specular = table.specular_reflectance(radians(ALBEDO_ANGLES_DEG), at)
         values = diffuse[:, w] + specular
         print(f"    {'grey' if at is None else f'{at:g} nm':<10}" + "".join(f"{value:9.4f}" for value in values))
-
-
-def _stored(path: Path) -> int:
-    return sum(file.stat().st_size for file in path.rglob("*") if file.is_file())

@@ -16,56 +16,45 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("name", nargs="?", metavar="NAME", help="lower-case letters, digits and single hyphens")
     add_store(parser)
     parser.add_argument(
-        "--remove", action="store_true", help="remove the snapshot; `brdfdb gc` can remove its revisions then"
+        "--remove", action="store_true", help="remove the snapshot; `brdfdb gc` can then remove its revisions"
     )
 
 
 def run(options: argparse.Namespace) -> int:
     """Make, remove or list snapshots."""
     from brdfdb.store import snapshots
+    from brdfdb.store.reader import Store
+    from brdfdb.store.records import snapshot_names
+    from brdfdb_pipelines import terminal
 
+    root: Path = options.store
     if options.remove and options.name is None:
         raise ParameterError("snapshot", "--remove requires the NAME of a snapshot")
     if options.remove:
-        snapshots.remove(options.store, options.name)
+        snapshots.remove(root, options.name)
         print(
             f"{options.name} was removed; `brdfdb gc` removes revisions that are in no other snapshot and not current"
         )
     elif options.name is not None:
-        _create(options.store, options.name)
+        with terminal.progress() as bar:
+            task = bar.add_task("reading tables", total=len(Store(root)))
+            snapshots.create(root, options.name, lambda: bar.advance(task))
+        _print_contents(root, options.name)
     else:
-        _list(options.store)
+        names = snapshot_names(Store(root).root)
+        for name in names:
+            _print_contents(root, name)
+        if not names:
+            print(f"no snapshots in {root}")
     return 0
 
 
-def _create(root: Path, name: str) -> None:
-    """Name the current revisions of all materials, and print the digest to cite."""
-    from brdfdb.store import snapshots
-    from brdfdb.store.reader import Store
-    from brdfdb_pipelines import terminal
-
-    with terminal.progress() as bar:
-        task = bar.add_task("reading tables", total=len(Store(root)))
-        digest = snapshots.create(root, name, lambda: bar.advance(task))
-    print(f"{_contents(root, name)}; sha256 {digest}")
-
-
-def _list(root: Path) -> None:
-    """Print a line for each snapshot of a store."""
+def _print_contents(root: Path, name: str) -> None:
+    """Print the numbers of materials and families of a snapshot, and its digest, which can be cited."""
     from brdfdb.store.files import seal_of
     from brdfdb.store.paths import snapshot_path
-    from brdfdb.store.reader import Store
-    from brdfdb.store.records import snapshot_names
-
-    names = snapshot_names(Store(root).root)
-    for name in names:
-        print(f"{_contents(root, name)}; sha256 {seal_of(snapshot_path(root, name))}")
-    if not names:
-        print(f"no snapshots in {root}")
-
-
-def _contents(root: Path, name: str) -> str:
     from brdfdb.store.records import read_snapshot
 
     content = read_snapshot(root, name)
-    return f"{name}: {counted(len(content['materials']), 'material')}, {len(content['families'])} families"
+    numbers = f"{counted(len(content['materials']), 'material')}, {len(content['families'])} families"
+    print(f"{name}: {numbers}; sha256 {seal_of(snapshot_path(root, name))}")

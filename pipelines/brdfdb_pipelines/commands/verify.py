@@ -34,7 +34,8 @@ def run(options: argparse.Namespace) -> int:
     for name in wanted:
         if name not in store and name not in families:
             raise UnknownMaterialError(name, [*store, *families])
-    findings, total = [], 0
+    findings = []
+    total = 0
     with terminal.progress() as bar:
         task = bar.add_task("verifying tables", total=len(wanted))
         for name in wanted:

@@ -52,9 +52,11 @@ def closed(
     return {surfaces._single_slope: single_slope}
 
 
-def facet(slope_i: Any, slope_r: Any, S: Any, C: Any, *, hidden: bool) -> Any:
-    """Return the second bounce of one facet, eqs 15 to 20; `hidden` tells whether m_v and m_s are the hidden widths."""
-    p, q = S * slope_i, S * slope_r
+def facet(p: Any, q: Any, S: Any, C: Any, *, hidden: bool = True) -> Any:
+    """Return the second bounce of one facet, eqs 15 to 20; `hidden` tells whether m_v and m_s are the hidden widths.
+
+    p and q are the slopes of light and viewer across the facet, times S.
+    """
     seen, lit = C + q, C - p
     shown = (seen > 0.0) & (lit > 0.0)
     m_v = np.clip(-(C - q) / np.where(shown, seen, 1.0), 0.0, 1.0)
@@ -71,7 +73,7 @@ def facet(slope_i: Any, slope_r: Any, S: Any, C: Any, *, hidden: bool) -> Any:
 
 def cavity(hidden: bool) -> Function:
     """Return the function of the second bounce of both facets of a cavity."""
-    return lambda i, r, S, C: 0.5 * (facet(i, r, S, C, hidden=hidden) + facet(-i, -r, S, C, hidden=hidden))
+    return lambda i, r, S, C: 0.5 * sum(facet(side * S * i, side * S * r, S, C, hidden=hidden) for side in (1.0, -1.0))
 
 
 def direct_unshadowed(i: Any, r: Any, S: Any, C: Any) -> Any:

@@ -22,29 +22,9 @@ PREFIX = "he-torrance-1991-"
 Function = Callable[..., Any]
 
 
-def smith(sin: Any, cos: Any, slope: Any) -> Any:
-    """Return S_1 / cos(theta) [1] of eqs 23 to 25."""
-    return shadowing(sin, cos, slope)
-
-
 def effective(sin_i: Any, cos_i: Any, sin_r: Any, cos_r: Any, slope: Any) -> Any:
     """Return (sigma / sigma_0)^2 [1] of eqs 80 to 83."""
     return variance(hidden(sin_i, cos_i, slope) + hidden(sin_r, cos_r, slope))
-
-
-def squared(directions: Any) -> tuple[Any, Any]:
-    """Return v_xy^2 and v_z^2 [1] of eq. 84 for unit vectors."""
-    return model.v_squared(directions)
-
-
-def bisecting(directions: Any) -> Any:
-    """Return the cosine [1] at which |F|^2 is taken."""
-    return model.cos_bisecting(directions)
-
-
-def series(g: Any, V: Any) -> Any:
-    """Return the sum of eq. 78 over g [1]."""
-    return diffraction_series(g, V)
 
 
 @dataclass(frozen=True)
@@ -54,12 +34,12 @@ class Form:
     tau: float = 1.0
     sigma_0: float = 1.0
     uniform: float = 1.0 / np.pi  # f_r over a
-    smith: Function = smith
+    smith: Function = shadowing
     variance: Function = effective
-    squared: Function = squared
-    bisecting: Function = bisecting
+    squared: Function = model.v_squared
+    bisecting: Function = model.cos_bisecting
     reflectance: Function = fresnel.unpolarised
-    series: Function = series
+    series: Function = diffraction_series
     wave_number: bool = True  # in v_xy of eq. 78
     attenuation: Function = lambda g: np.exp(-g)  # of the specular part
     prefactor: float = 1.0
@@ -162,7 +142,7 @@ def backwards(directions: Any) -> tuple[Any, Any]:
     """Return v_xy^2 and v_z^2 [1] for the paper's azimuth, that of light which travels towards the surface."""
     d = directions
     v_xy2 = d.sin_i**2 + d.sin_r**2 - 2.0 * d.sin_i * d.sin_r * d.cos_dphi
-    return np.maximum(v_xy2, 0.0), squared(d)[1]
+    return np.maximum(v_xy2, 0.0), model.v_squared(d)[1]
 
 
 def one_cone(first: Any, second: Any, apart: Any) -> Any:

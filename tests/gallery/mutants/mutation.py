@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cache, wraps
+from types import ModuleType
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -57,7 +58,7 @@ def planted(mutant: Mutant) -> Iterator[None]:
         for title, module in list(sys.modules.items())
         if title.split(".")[0] == "brdfdb" and not title.startswith(_UNTOUCHED)
         for name, value in list(vars(module).items())
-        if callable(value) and _hashable(value) and value in mutant.functions
+        if callable(value) and isinstance(value, Hashable) and value in mutant.functions
     ]
     missed = set(mutant.functions.values()) - {wrong for _, _, wrong in places}
     if missed:
@@ -79,10 +80,6 @@ def planted(mutant: Mutant) -> Iterator[None]:
         for space, name, right in before:
             space[name] = right
         MODELS.update(specs)
-
-
-def _hashable(value: object) -> bool:
-    return type(value).__hash__ is not None
 
 
 class Sentence(NamedTuple):
@@ -216,32 +213,32 @@ def matrix_of(keys: Sequence[str], mutants: Sequence[Mutant]) -> Matrix:
 
 
 class MutantTests:
-    """The tests of the mutants of a paper; a subclass names the paper's figures, its mutants and their right twins."""
+    """The tests of the mutants of a paper; a subclass names the module with these mutants and their right twins."""
 
-    keys: ClassVar[Sequence[str]]
-    mutants: ClassVar[Sequence[Mutant]]
-    unchanged: ClassVar[Sequence[Mutant]]
+    paper: ClassVar[ModuleType]
 
     @classmethod
     @cache
     def baseline(cls) -> Baseline:
         """Return the statements that hold, and what each figure calls."""
-        return baseline_of(cls.keys, [*cls.mutants, *cls.unchanged])
+        keys = [key for key in GALLERY if key.startswith(cls.paper.PREFIX)]
+        return baseline_of(keys, [*cls.paper.MUTANTS, *cls.paper.UNCHANGED])
 
     @classmethod
     @cache
     def unseen(cls) -> Unseen:
         """Return the statements that never fail, and the mutants that nothing notices."""
-        return unseen_of(cls.baseline(), cls.mutants)
+        return unseen_of(cls.baseline(), cls.paper.MUTANTS)
 
     @classmethod
     @cache
     def matrix(cls) -> Matrix:
         """Return the statements that notice each mutant: the whole list, for a test that failed."""
-        return Matrix(cls.baseline().holding, {mutant.name: noticing(cls.baseline(), mutant) for mutant in cls.mutants})
+        noticed = {mutant.name: noticing(cls.baseline(), mutant) for mutant in cls.paper.MUTANTS}
+        return Matrix(cls.baseline().holding, noticed)
 
     def test_the_twins_that_mutants_change_are_the_models(self) -> None:
-        for twin in self.unchanged:
+        for twin in self.paper.UNCHANGED:
             assert any(called & twin.functions.keys() for called in self.baseline().calls.values())
             assert not noticing(self.baseline(), twin)
 

@@ -10,9 +10,7 @@ import numpy as np
 
 from brdfdb.geometry import checked_angles
 from brdfdb.models import oren_nayar_1994 as surfaces
-from brdfdb.models import (
-    oren_nayar_single_slope_parts,
-)
+from brdfdb.models import oren_nayar_single_slope_parts
 from brdfdb.models import torrance_sparrow_1967 as surface_part
 from tests.gallery.mutants import added_figures
 from tests.gallery.mutants.mutation import Mutant
@@ -71,18 +69,7 @@ class Facets:
 
     def bounce(self, p: Any, q: Any, S: Any, C: Any) -> Any:
         """Return eqs 15 to 20 over E_0 cos(theta_i) rho^2 / pi [1], for light on the adjacent facet."""
-        s_b, v_a = C - p, C + q
-        lit = (s_b > 0.0) & (v_a > 0.0)
-        m_v = np.clip(-(C - q) / np.where(lit, v_a, 1.0), 0.0, 1.0)
-        m_s = np.clip(-(C + p) / np.where(lit, s_b, 1.0), 0.0, 1.0)
-        cos2 = C * C - S * S
-
-        def d(x: Any, y: Any) -> Any:
-            return np.sqrt(np.maximum(x * x + 2.0 * x * y * cos2 + y * y, 0.0))
-
-        # Eq. (47), over pi
-        factor = 0.5 * (d(1.0, m_v) + d(1.0, m_s) - d(m_s, m_v) - d(1.0, 1.0))
-        return np.where(lit, s_b * v_a / C * factor, 0.0)
+        return added_figures.facet(p, q, S, C)
 
     def functions(self) -> dict[Function, Function]:
         return {right_facets: self.gaussian}
@@ -145,11 +132,6 @@ class Fit:
                 d, rho, sigma, np.where(offset == 0.33, self.offset, offset)
             ),
         }
-
-
-def facets_with(change: Function) -> dict[Function, Function]:
-    """Return the facets with a changed function."""
-    return {right_facets: change}
 
 
 def rougher(factor: float) -> dict[Function, Function]:
@@ -245,10 +227,10 @@ MUTANTS = (
     Mutant("sigma times 0.8", "the slopes are 0.8 times as steep",
            "the mean of abs(theta_a) is 0.8 times the standard deviation", rougher(0.8)),
     Mutant("the fit for the integral", "eqs 27 and 28 stand in place of the facets",
-           "the paper gives both, and the fit is a thousand times as fast", facets_with(fitted)),
+           "the paper gives both, and the fit is a thousand times as fast", {right_facets: fitted}),
     Mutant("no interreflection", "light that two facets reflect is left out, eqs 18 and 28",
            "the paper itself leaves it out of eq. 30",
-           {**Fit(bounced=0.0).functions(), **facets_with(facets_scaled(same, nothing))}),
+           {**Fit(bounced=0.0).functions(), right_facets: facets_scaled(same, nothing)}),
     Mutant("no interreflection in the fit", "eq. 28 is left out", "most renderers have eq. 27 alone",
            Fit(bounced=0.0).functions()),
     Mutant("GAF with Max", "the larger of shadowing and masking counts", "eq. 11 is printed like that",
@@ -258,8 +240,7 @@ MUTANTS = (
     Mutant("one facet of a cavity", "the mean of both facets, eq. 22, is that of the facet towards the light",
            "the other one is often dark", Facets(one_side=True).functions()),
     Mutant("eq. 48 for 47", "the interreflection factor is pi (1 - cos theta_a) (1 - m_s) (1 - m_v)",
-           "the paper replaces it to have a closed form",
-           facets_with(bounce_by_eq_48)),
+           "the paper replaces it to have a closed form", {right_facets: bounce_by_eq_48}),
     Mutant("slopes without their sine", "eq. 25 is weighted by P without sin(theta_a)",
            "a Gaussian in one angle is normalised over that angle",
            Facets(weight=lambda slope, sigma: np.exp(-0.5 * (slope / sigma) ** 2), bounce_changes=True).functions()),

@@ -40,10 +40,12 @@ def by_vectors(f_r: Function) -> Function:
     )
 
 
-def each_form(by_angles: Function, by_vectors: Function | None = None) -> dict[Function, Function]:
-    """Return all four forms, of angles and of vectors, by functions that make the wrong form from the right one."""
-    forms = {angles: by_angles(angles) for angles in FORMS}
-    return forms | {vectors: (by_vectors or by_angles)(vectors) for vectors in FORMS.values()}
+def each_form(change: Callable[[Function], Function]) -> dict[Function, Function]:
+    """Return all four forms, of angles and of vectors, by a function that makes the wrong form from the right one."""
+    wrong = {angles: change(vectors) for angles, vectors in FORMS.items()}
+    return {angles: by_vectors(vectors) for angles, vectors in wrong.items()} | {
+        FORMS[angles]: vectors for angles, vectors in wrong.items()
+    }
 
 
 def with_surface(change: Callable[[dict[str, Any]], dict[str, Any]]) -> dict[Function, Function]:
@@ -67,7 +69,7 @@ def parts(lobe: float = 1.0, diffuse: float = 1.0) -> dict[Function, Function]:
 def wider(factor: float) -> dict[Function, Function]:
     """Return all four forms with a multiple of both alphas."""
     return with_surface(
-        lambda surface: {**surface, **{name: surface[name] * factor for name in ("alpha_x", "alpha_y")}}
+        lambda surface: {**surface, "alpha_x": factor * surface["alpha_x"], "alpha_y": factor * surface["alpha_y"]}
     )
 
 
@@ -90,6 +92,12 @@ def printed(tan: Any, phi: Any, cos_i: Any, cos_r: Any, alpha_x: Any, alpha_y: A
     return np.exp(-exponent) / (4.0 * np.pi * alpha_x * alpha_y * np.sqrt(cos_i * cos_r))
 
 
+def one_power(tan: Any, phi: Any, cos_i: Any, cos_r: Any, alpha_x: Any, alpha_y: Any) -> Any:
+    """Return the lobe [1/sr] of eq. 5a whose exponent has the alphas without their squares."""
+    exponent = tan**2 * (np.cos(phi) ** 2 / alpha_x + np.sin(phi) ** 2 / alpha_y)
+    return np.exp(-exponent) / (4.0 * np.pi * alpha_x * alpha_y * np.sqrt(cos_i * cos_r))
+
+
 def half_vector(factor: float) -> dict[Function, Function]:
     """Return eq. 5b with another factor in its exponent."""
 
@@ -106,23 +114,17 @@ def half_vector(factor: float) -> dict[Function, Function]:
 
 def turned() -> dict[Function, Function]:
     """Return all four forms with light from the other side, as if d_i pointed along the light."""
-    return each_form(
-        lambda right: lambda ti, pi, tr, pr, **surface: right(ti, pi + np.pi, tr, pr, **surface),
-        lambda right: lambda wi, wr, **surface: right(np.asarray(wi) * [-1.0, -1.0, 1.0], wr, **surface),
-    )
-
-
-def taken(wrong: tuple[Function, Function], right: tuple[Function, Function]) -> dict[Function, Function]:
-    """Return the wrong functions in place of the right ones."""
-    return dict(zip(right, wrong, strict=True))
+    return each_form(lambda right: lambda wi, wr, **surface: right(np.asarray(wi) * [-1, -1, 1], wr, **surface))
 
 
 def folded() -> dict[Function, Function]:
     """Return all four forms times the cosine of the viewer."""
-    return each_form(
-        lambda right: lambda ti, pi, tr, pr, **surface: right(ti, pi, tr, pr, **surface) * np.cos(tr),
-        lambda right: lambda wi, wr, **surface: right(wi, wr, **surface) * np.asarray(wr)[..., 2],
-    )
+    return each_form(lambda right: lambda wi, wr, **surface: right(wi, wr, **surface) * np.asarray(wr)[..., 2])
+
+
+def taken(wrong: Function, right: Function) -> dict[Function, Function]:
+    """Return a wrong form in place of the right one, of angles and of vectors."""
+    return {right: wrong, FORMS[right]: FORMS[wrong]}
 
 
 def mean(surface: dict[str, Any]) -> dict[str, Any]:
@@ -137,135 +139,54 @@ def swapped(surface: dict[str, Any]) -> dict[str, Any]:
 
 
 UNCHANGED = (
-    Mutant(
-        "eqs 5a and 5b anew",
-        "nothing",
-        "the twins that the other mutants change",
-        {**elliptical(printed), **half_vector(factor=2.0)},
-    ),
-)
+    Mutant("eqs 5a and 5b anew", "nothing", "the twins that the other mutants change",
+           {**elliptical(printed), **half_vector(factor=2.0)}),
+)  # fmt: skip
 
 MUTANTS = (
-    Mutant(
-        "eq. 5b for 5a",
-        "the half-vector form is taken for the model itself",
-        "the paper calls it an approximation that is convenient to compute",
-        taken((ward_half_vector, ward_half_vector_vectors), (ward, ward_vectors)),
-    ),
-    Mutant(
-        "eq. 5a for 5b",
-        "the half-vector form is taken for the same as the model",
-        "the two agree at the peak",
-        taken((ward, ward_vectors), (ward_half_vector, ward_half_vector_vectors)),
-    ),
-    Mutant(
-        "eq. 5b without its 2",
-        "the exponent is -(..) / (1 + h.n)",
-        "(1 + h.n) / 2 is 1 at the peak, where the two are compared",
-        half_vector(factor=1.0),
-    ),
-    Mutant(
-        "half of rho_s",
-        "the specular reflectance is half as large",
-        "light and viewer share a lobe, or two polarisations share the light",
-        parts(lobe=0.5),
-    ),
-    Mutant(
-        "rho_d without 1 / pi",
-        "the diffuse part is rho_d",
-        "He et al. print theirs like that, eq. 8",
-        parts(diffuse=np.pi),
-    ),
-    Mutant(
-        "alpha_x and alpha_y exchanged",
-        "the lobe is turned by 90 degrees",
-        "the x axis is taken along the brushing in one place and across it in another",
-        with_surface(swapped),
-    ),
-    Mutant(
-        "alpha times sqrt 2",
-        "both alphas are larger by sqrt 2",
-        "the paper calls alpha the standard deviation of slopes, which is alpha / sqrt 2",
-        wider(np.sqrt(2.0)),
-    ),
-    Mutant(
-        "one alpha",
-        "eq. 4 with sqrt(alpha_x alpha_y)",
-        "an engine without tangents has no x axis",
-        with_surface(mean),
-    ),
-    Mutant(
-        "without 4",
-        "the normalisation is 1 / (pi alpha_x alpha_y)",
-        "it is the normalisation of the slopes; the 4 comes from the half vector",
-        parts(lobe=4.0),
-    ),
-    Mutant(
-        "Duer's normalisation",
-        "1 / (cos theta_i cos theta_r) stands in place of its square root",
-        "Duer 2006 proposes it, and renderers call the result Ward's model",
-        taken((ward_duer, ward_duer_vectors), (ward, ward_vectors)),
-    ),
-    Mutant(
-        "Ward's normalisation in Duer's form",
-        "the square root is left in 1 / (cos theta_i cos theta_r)",
-        "the two differ by a root",
-        taken((ward, ward_vectors), (ward_duer, ward_duer_vectors)),
-    ),
-    Mutant(
-        "Duer's normalisation in the bounded form",
-        "the factor (h.h) / h_z^4 is left out",
-        "papers call both Ward-Duer",
-        taken((ward_duer, ward_duer_vectors), (ward_bounded, ward_bounded_vectors)),
-    ),
-    Mutant(
-        "without the root of the cosines",
-        "1 / sqrt(cos theta_i cos theta_r) is left out",
-        "it is 1 at the usual angles of a highlight",
-        elliptical(lambda tan, phi, i, r, a, b: printed(tan, phi, i, r, a, b) * np.sqrt(i * r)),
-    ),
-    Mutant(
-        "delta for tan(delta)",
-        "the exponent has delta^2",
-        "eq. 7a, as printed, draws delta like that",
-        elliptical(lambda tan, phi, i, r, a, b: printed(np.arctan(tan), phi, i, r, a, b)),
-    ),
-    Mutant(
-        "the angle from the mirror direction",
-        "delta is doubled, as between the viewer and the mirror direction",
-        "Phong's model has that angle",
-        elliptical(
-            lambda tan, phi, i, r, a, b: printed(np.tan(np.minimum(2.0 * np.arctan(tan), 1.57)), phi, i, r, a, b)
-        ),
-    ),
-    Mutant(
-        "alpha_x squared in the normalisation",
-        "the lobe is divided by alpha_x^2 in place of alpha_x alpha_y",
-        "eq. 4, with its one alpha, was there first",
-        elliptical(lambda tan, phi, i, r, a, b: printed(tan, phi, i, r, a, b) * (b / a)),
-    ),
-    Mutant(
-        "exponent without the square of alpha",
-        "the exponent is divided by alpha",
-        "a width is squared in one place and not in the other",
-        elliptical(
-            lambda tan, phi, i, r, a, b: (
-                np.exp(-(tan**2) * (np.cos(phi) ** 2 / a + np.sin(phi) ** 2 / b))
-                / (4.0 * np.pi * a * b * np.sqrt(i * r))
-            )
-        ),
-    ),
-    Mutant(
-        "light from the other side",
-        "the lobe lies on the side of the light",
-        "the paper's d_i may be read as the direction in which light travels",
-        turned(),
-    ),
-    Mutant(
-        "the cosine of the viewer in f_r",
-        "f_r is multiplied by cos(theta_r)",
-        "intensity, which a photometer on an arm measures, has this cosine",
-        folded(),
-    ),
+    Mutant("eq. 5b for 5a", "the half-vector form is taken for the model itself",
+           "the paper calls it an approximation that is convenient to compute",
+           taken(ward_half_vector, ward)),
+    Mutant("eq. 5a for 5b", "the half-vector form is taken for the same as the model", "the two agree at the peak",
+           taken(ward, ward_half_vector)),
+    Mutant("eq. 5b without its 2", "the exponent is -(..) / (1 + h.n)",
+           "(1 + h.n) / 2 is 1 at the peak, where the two are compared", half_vector(factor=1.0)),
+    Mutant("half of rho_s", "the specular reflectance is half as large",
+           "light and viewer share a lobe, or two polarisations share the light", parts(lobe=0.5)),
+    Mutant("rho_d without 1 / pi", "the diffuse part is rho_d", "He et al. print theirs like that, eq. 8",
+           parts(diffuse=np.pi)),
+    Mutant("alpha_x and alpha_y exchanged", "the lobe is turned by 90 degrees",
+           "the x axis is taken along the brushing in one place and across it in another", with_surface(swapped)),
+    Mutant("alpha times sqrt 2", "both alphas are larger by sqrt 2",
+           "the paper calls alpha the standard deviation of slopes, which is alpha / sqrt 2", wider(np.sqrt(2.0))),
+    Mutant("one alpha", "eq. 4 with sqrt(alpha_x alpha_y)", "an engine without tangents has no x axis",
+           with_surface(mean)),
+    Mutant("without 4", "the normalisation is 1 / (pi alpha_x alpha_y)",
+           "it is the normalisation of the slopes; the 4 comes from the half vector", parts(lobe=4.0)),
+    Mutant("Duer's normalisation", "1 / (cos theta_i cos theta_r) stands in place of its square root",
+           "Duer 2006 proposes it, and renderers call the result Ward's model",
+           taken(ward_duer, ward)),
+    Mutant("Ward's normalisation in Duer's form", "the square root is left in 1 / (cos theta_i cos theta_r)",
+           "the two differ by a root", taken(ward, ward_duer)),
+    Mutant("Duer's normalisation in the bounded form", "the factor (h.h) / h_z^4 is left out",
+           "papers call both Ward-Duer", taken(ward_duer, ward_bounded)),
+    Mutant("without the root of the cosines", "1 / sqrt(cos theta_i cos theta_r) is left out",
+           "it is 1 at the usual angles of a highlight",
+           elliptical(lambda tan, phi, i, r, a, b: printed(tan, phi, i, r, a, b) * np.sqrt(i * r))),
+    Mutant("delta for tan(delta)", "the exponent has delta^2", "eq. 7a, as printed, draws delta like that",
+           elliptical(lambda tan, *rest: printed(np.arctan(tan), *rest))),
+    Mutant("the angle from the mirror direction", "delta is doubled, as between the viewer and the mirror direction",
+           "Phong's model has that angle",
+           elliptical(lambda tan, *rest: printed(np.tan(np.minimum(2.0 * np.arctan(tan), 1.57)), *rest))),
+    Mutant("alpha_x squared in the normalisation", "the lobe is divided by alpha_x^2 in place of alpha_x alpha_y",
+           "eq. 4, with its one alpha, was there first",
+           elliptical(lambda tan, phi, i, r, a, b: printed(tan, phi, i, r, a, b) * (b / a))),
+    Mutant("exponent without the square of alpha", "the exponent is divided by alpha",
+           "a width is squared in one place and not in the other",
+           elliptical(one_power)),
+    Mutant("light from the other side", "the lobe lies on the side of the light",
+           "the paper's d_i may be read as the direction in which light travels", turned()),
+    Mutant("the cosine of the viewer in f_r", "f_r is multiplied by cos(theta_r)",
+           "intensity, which a photometer on an arm measures, has this cosine", folded()),
     *added_figures.WARD,
-)
+)  # fmt: skip

@@ -1,19 +1,16 @@
-// What is looked at: subjects, directions, a wavelength, a view; as a link, and back from one.
+// The link of the page: the state of the current view as the end of an address, and back.
 
-/** @typedef {{ base: string, model: boolean, changes: Record<string, number> | null }} Subject a material's table;
- *   with `model`
- *   the model that it was made of; with `changes` that model, or a model by its name, with other parameters */
-/** @typedef {{ material: string, view: string, theta_i: number, phi_i: number, theta_r: number, turn: number, nm:
- *   number | null,
- *   scale: string, axes: string, curves: string, compare: string[], illuminant: string, exposure: number, surround:
- *   string, quick?: boolean }} State
- *   quick: drawn in a hurry, while a slider moves; turn is phi_r - phi_i; nm null is luminance and colours under an
- *   illuminant; material and compare are subjects as text */
+/** @typedef {{ base: string, model: boolean, changes: Record<string, number> | null }} Subject the table of a material;
+ *   with `model` the model that it was made from; with `changes` that model, or a named model, with other parameters */
+/** @typedef {{ material: string, view: string, theta_i: number, phi_i: number, theta_r: number, turn: number,
+ *   nm: number | null, scale: string, axes: string, curves: string, compare: string[], illuminant: string,
+ *   exposure: number, surround: string, quick?: boolean }} State the current view. material and compare are subjects
+ *   as text; turn is phi_r - phi_i; nm null: luminance and colours; quick: coarse pictures while a slider moves */
 
-// compare: the model of the material itself
+// Subject: the model of the material itself
 export const MODEL = ":model";
 
-// Of colours; D65 first, as in the list
+// Illuminants of colours; D65 is the first in the list
 export const ILLUMINANTS = ["D65", "D50", "A", "FL2"];
 
 /** @type {State} */
@@ -50,13 +47,13 @@ const RANGES = {
   nm: [1, 1e6],
   exposure: [-8, 8],
 };
-// Wavelengths at which pictures look up spectra, as `brdfdb render`
+// Wavelengths of pictures, as in `brdfdb render`
 export const PICTURE_NM = Array.from({ length: 14 }, (_, i) => 420 + 20 * i);
 const CHANGED = /^(.*?)\((.*)\)$/; // NAME(parameter=value,...)
-const MOST = 7; // subjects that are compared with: there are as many more colours
+const MOST = 7; // number of comparisons: there are eight colours
 
-/** The state that a link holds, of some views, and sentences on what it holds wrongly. A number out of range is the
- * nearest that is allowed; what it does not hold, or holds wrongly otherwise, is as at the start.
+/** The state of a link, and sentences on its wrong parts. A number out of range becomes the nearest allowed number;
+ * other parts that are wrong or missing have their default.
  * @param {string} hash
  * @param {Record<string, unknown>} views
  * @returns {{ state: State, wrong: string[] }} */
@@ -73,7 +70,7 @@ export function fromHash(hash, views) {
         [low, high] = RANGES[key];
       if (!Number.isNaN(value)) state[key] = Math.min(Math.max(value, low), high);
       if (state[key] !== value)
-        wrong.push(`${key} is a number from ${low} to ${high}, and not '${text}': ${state[key] ?? "all"} is shown.`);
+        wrong.push(`${key}: '${text}' is not a number from ${low} to ${high}; ${state[key] ?? "all"} is shown.`);
     } else if (key === "compare") {
       const kept = numbersOf(text, wrong);
       if (kept && !state.compare.includes(kept)) state.compare = [...state.compare, kept].slice(0, MOST);
@@ -81,15 +78,15 @@ export function fromHash(hash, views) {
       state.material = numbersOf(text, wrong);
     } else if (key in choices) {
       if (choices[key].includes(text)) state[key] = text;
-      else wrong.push(`${key} is one of ${choices[key].join(", ")}, and not '${text}': ${state[key]} is shown.`);
+      else wrong.push(`${key}: '${text}' is not one of ${choices[key].join(", ")}; ${state[key]} is shown.`);
     }
   }
   return { state: /** @type {State} */ (state), wrong };
 }
 
-/** A subject without parameters that are no numbers; of a material without any other, it is the one published.
+/** A subject without parameters that are not numbers; a material without parameters is the published one.
  * @param {string} text
- * @param {string[]} wrong sentences, to which those on such parameters are added */
+ * @param {string[]} wrong sentences, to which sentences on these parameters are added */
 function numbersOf(text, wrong) {
   const [, base, inside] = CHANGED.exec(text) ?? [];
   if (base === undefined) return text;
@@ -97,13 +94,13 @@ function numbersOf(text, wrong) {
   const kept = inside.split(",").filter((pair) => {
     const [name, value = ""] = pair.split("=");
     if (value.trim() && Number.isFinite(Number(value))) return true;
-    if (pair) wrong.push(`${name} is a number, and not '${value}': the ${own} value is shown.`);
+    if (pair) wrong.push(`${name}: '${value}' is not a number; the ${own} value is shown.`);
     return false;
   });
   return kept.length || base.startsWith("*") ? `${base}(${kept.join(",")})` : base;
 }
 
-/** The end of a link: what differs from the start.
+/** The link of a state: all values that differ from the defaults.
  * @param {State} state */
 export function toHash(state) {
   const { quick: _, ...all } = state;
@@ -117,7 +114,7 @@ export function toHash(state) {
   return `#${held.map(([key, value]) => `${key}=${plain(String(value))}`).join("&")}`;
 }
 
-/** Text as a link holds it: signs that mean nothing after # stay as they are.
+/** Text as in a link: characters without a meaning after # are not escaped.
  * @param {string} text */
 const plain = (text) => encodeURIComponent(text).replace(/%3A|%3D|%2C/g, (code) => decodeURIComponent(code));
 

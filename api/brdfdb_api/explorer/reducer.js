@@ -1,8 +1,8 @@
-// The page as one value, and the only function that makes the next one of it.
+// The reducer: the page as one value, and the only function that makes the next value from it and an event.
 
-import { subjectOf } from "./state.js";
+import { subjectOf } from "./link.js";
 
-/** @typedef {import("./state.js").State} State */
+/** @typedef {import("./link.js").State} State */
 /** @typedef {import("./series.js").Series} Series */
 
 /** @typedef {{
@@ -15,10 +15,10 @@ import { subjectOf } from "./state.js";
  *   asked: number | null,
  *   pictures: "none" | "first" | "all",
  * }} Page
- *   state: what the link says. wrong: sentences on the link, until a hand changes something. series: what is shown;
- *   empty until it is found. missing: why a comparison is not shown. learn: what has to be asked for before the next
- *   picture. moving: a slider moves, so pictures are coarse. asked: when the next picture was asked for [ms]; null if
- *   none is. pictures: those that the page has shown since it was opened */
+ *   state: the state of the link. wrong: sentences on the link, until the user changes something. series: the series in
+ *   the picture; empty until they are loaded. missing: why a comparison is not shown. learn: what to load before the
+ *   next picture. moving: a slider moves, so pictures are coarse. asked: time of the request for the next picture [ms],
+ *   or null. pictures: those that the page has shown since it was opened */
 
 /** @typedef {{ kind: "changed", part: Partial<State>, wrong?: string[], at: number }
  *   | { kind: "asked" | "rested", at: number }
@@ -26,7 +26,7 @@ import { subjectOf } from "./state.js";
  *   | { kind: "found", of: State, series: Series[], missing: string }
  *   | { kind: "shown", pictures: "first" | "all" }} PageEvent */
 
-const MOVED = ["theta_i", "phi_i", "theta_r", "turn", "nm", "exposure"]; // what sliders of the form change
+const MOVED = ["theta_i", "phi_i", "theta_r", "turn", "nm", "exposure"]; // values of the sliders of the form
 
 /** The page before its first picture.
  * @param {{ state: State, wrong: string[] }} link
@@ -69,7 +69,7 @@ export function after(page, event) {
   }
 }
 
-/** The page with another state: a slider of a model keeps what is shown until its next picture.
+/** The page with another state. While a slider of a model moves, the series stay until the next picture.
  * @param {Page} page
  * @param {Partial<State>} part
  * @param {string[]} wrong
