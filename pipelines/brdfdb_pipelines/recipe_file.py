@@ -101,16 +101,17 @@ class Job:
             how = Interpolation(method, logarithm, offset, wavelengths=over_wavelengths(self.material))
             return Layout(self.material, self.grid, self.wavelength_nm, interpolation=how), None
         assert self.tolerance is not None
-        given = self.wavelength_nm
-        # the members of a family share their wavelengths
-        more = given if self.family is not None else refined_wavelengths(self.material, given, self.tolerance)
+        wavelength_nm = self.wavelength_nm
+        refined_nm = wavelength_nm  # the members of a family share their wavelengths
+        if self.family is None:
+            refined_nm = refined_wavelengths(self.material, wavelength_nm, self.tolerance)
         plan = functools.partial(planned, alike=self.planned_on, hot_spot_tolerance=self.hot_spot_tolerance)
         try:
-            return plan(self.material, more, self.tolerance)
+            return plan(self.material, refined_nm, self.tolerance)
         except ParameterError:
-            if more is given or more is None or given is None or more.size == given.size:
+            if refined_nm is None or wavelength_nm is None or refined_nm.size == wavelength_nm.size:
                 raise
-        return plan(self.material, given, self.tolerance)
+        return plan(self.material, wavelength_nm, self.tolerance)
 
     def check(self) -> None:
         """Raise the ParameterError that `layout` would raise for what does not suit the material."""
