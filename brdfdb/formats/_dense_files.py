@@ -87,7 +87,7 @@ def opened_netcdf(path: Path) -> Iterator[xr.Dataset]:
 
     import_extra("scipy.io")
     try:
-        with xr.open_dataset(path, engine="scipy") as opened:
+        with xr.open_dataset(path, engine="scipy", mmap=False) as opened:  # the map of a damaged file stays open
             yield opened
     except (FileFormatError, FileNotFoundError):
         raise

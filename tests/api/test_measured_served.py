@@ -67,7 +67,7 @@ def test_cut_tells_where_it_is_extrapolated(client: Client) -> None:
 def test_a_model_and_its_source_code_are_refused_in_a_sentence(client: Client) -> None:
     code = client.get(f"{CLAY}/export/glsl")
     assert code.status_code == 422
-    assert "it is measured" in code.json()["detail"]
+    assert "the table is measured" in code.json()["detail"]
     model = client.get(f"{CLAY}/lookup", params={**INSIDE, "from": "model"})
     assert model.status_code == 422
     assert "keeps no model" in model.json()["detail"]

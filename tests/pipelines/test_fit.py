@@ -21,8 +21,7 @@ from brdfdb.store.reader import Store
 from brdfdb_pipelines import recipe_file
 from brdfdb_pipelines.documents import schema
 from tests.pipelines.a_page import Document
-from tests.pipelines.command import Captured, run
-from tests.pipelines.failing import fails
+from tests.pipelines.command import Captured, refused, run
 
 TRUTH = {"rho_d": 0.2, "rho_s": 0.1, "alpha_x": 0.25, "alpha_y": 0.25}
 HEADER = "theta_i_deg,theta_r_deg,delta_phi_deg,f_r"
@@ -236,7 +235,7 @@ def test_mistakes_are_one_sentence(
     options: list[str], sentence: str, tile: Path, tmp_path: Path, capsys: Captured
 ) -> None:
     out = tmp_path / "fit.json"
-    assert sentence in fails(capsys, "fit", tile, *options, "--json", out)
+    assert sentence in refused(capsys, "fit", tile, *options, "--json", out)
     assert not out.exists()
 
 
@@ -245,7 +244,7 @@ def test_mistakes_are_one_sentence(
 )
 def test_samples_that_are_none_are_refused(line: list[float], sentence: str, tmp_path: Path, capsys: Captured) -> None:
     data = written(tmp_path / "wrong.csv", [*rows()[:5], line])
-    error = fails(capsys, "fit", data, "--model", "lambert")
+    error = refused(capsys, "fit", data, "--model", "lambert")
     assert str(data) in error
     assert sentence in error
 

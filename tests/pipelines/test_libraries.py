@@ -13,8 +13,7 @@ import brdfdb
 from brdfdb.materials import PAPERS, libraries, presets
 from brdfdb_pipelines.recipe_file import load, recipe_of
 from brdfdb_pipelines.recipe_grids import RecipeError
-from tests.pipelines.command import Captured, run
-from tests.pipelines.failing import fails
+from tests.pipelines.command import Captured, refused, run
 
 # A few tables that build in seconds: a metal and a glass, at few wavelengths
 SMALL = """\
@@ -59,7 +58,7 @@ def test_list_prints_every_preset_of_a_library(library: str, tmp_path: Path, cap
 def test_a_wrong_option_is_one_sentence(
     arguments: tuple[str, ...], sentence: str, tmp_path: Path, capsys: Captured
 ) -> None:
-    assert fails(capsys, *arguments, "--store", tmp_path / "none").startswith(f"brdfdb: {sentence}")
+    assert refused(capsys, *arguments, "--store", tmp_path / "none").startswith(sentence)
     assert not (tmp_path / "none").exists()
 
 

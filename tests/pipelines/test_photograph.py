@@ -9,8 +9,7 @@ import pytest
 
 from brdfdb import formats
 from brdfdb.measurements import Samples
-from tests.pipelines.command import Captured, run
-from tests.pipelines.failing import fails
+from tests.pipelines.command import Captured, refused, run
 
 
 def test_pictures_are_written_and_read_as_samples(tmp_path: Path, capsys: Captured) -> None:
@@ -41,5 +40,5 @@ def test_a_mistake_is_one_sentence_and_writes_nothing(
     arguments: list[str], sentence: str, tmp_path: Path, capsys: Captured
 ) -> None:
     folders = ("--store", tmp_path / "store", "--out", tmp_path / "pictures")
-    assert sentence in fails(capsys, "photograph", *arguments, *folders)
+    assert sentence in refused(capsys, "photograph", *arguments, *folders)
     assert not (tmp_path / "pictures").exists()

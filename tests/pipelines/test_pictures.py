@@ -20,8 +20,7 @@ from brdfdb.tables.layout import Layout
 from brdfdb.tables.tabulation import tabulate
 from brdfdb_pipelines import contact_sheet
 from tests.pipelines.a_lambert import publish_lambert
-from tests.pipelines.command import Captured, run
-from tests.pipelines.failing import fails
+from tests.pipelines.command import Captured, refused, run
 
 
 def test_plot_writes_a_file_of_each_kind(built: Path, tmp_path: Path, capsys: Captured) -> None:
@@ -43,7 +42,7 @@ def test_plot_writes_the_same_svg_again(built: Path, tmp_path: Path) -> None:
 
 def test_unknown_names_are_refused_before_anything_is_drawn(built: Path, tmp_path: Path, capsys: Captured) -> None:
     for command, name in (("plot", "new"), ("gallery", "new.png")):
-        sentence = fails(capsys, command, "foam", "foan", "--store", built, "--out", tmp_path / name)
+        sentence = refused(capsys, command, "foam", "foan", "--store", built, "--out", tmp_path / name)
         assert "no material 'foan' in the store; closest: foam" in sentence
     assert list(tmp_path.iterdir()) == []
 
@@ -138,7 +137,7 @@ def test_a_missing_extra_is_named(command: str, built: Path, monkeypatch: pytest
         raise errors.MissingExtraError(f"{module} is not installed")
 
     monkeypatch.setattr(errors, "import_extra", missing)
-    assert "is not installed" in fails(capsys, command, "foam", "--store", built)
+    assert "is not installed" in refused(capsys, command, "foam", "--store", built)
 
 
 @pytest.mark.parametrize(
@@ -154,5 +153,5 @@ def test_gallery_refuses_other_files_before_it_draws(
 
 def test_gallery_makes_no_directories(built: Path, tmp_path: Path, capsys: Captured) -> None:
     out = tmp_path / "no" / "sheet.png"
-    assert f"cannot write {out}: " in fails(capsys, "gallery", "foam", "--store", built, "--out", out)
+    assert f"cannot write {out}: " in refused(capsys, "gallery", "foam", "--store", built, "--out", out)
     assert list(tmp_path.iterdir()) == []
