@@ -236,7 +236,8 @@ def test_a_missing_server_is_one_sentence_that_names_the_extra(
     assert refused(capsys, "serve", "--store", built) == said
 
 
-def test_a_host_that_is_no_name_is_one_sentence(built: Path, capsys: Captured) -> None:
+def test_a_host_that_is_no_name_is_one_sentence(built: Path, capsys: Captured, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("BRDFDB_STORE", "put back afterwards")
     for host in ("a..b", "x" * 70 + ".example", "256.256.256.256"):
         said = refused(capsys, "serve", "--store", built, "--host", host, "--port", 0)
         assert said.startswith(f"cannot listen on {host}, port 0: ")

@@ -116,7 +116,10 @@ def test_the_server_tells_what_is_wrong(served: httpx.Client) -> None:
     assert (below.status_code, below.json()["brdf"]) == (200, 0.0)
 
 
-def test_a_port_that_is_taken_is_one_sentence(served: httpx.Client, built: Path, capsys: Captured) -> None:
+def test_a_port_that_is_taken_is_one_sentence(
+    served: httpx.Client, built: Path, capsys: Captured, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("BRDFDB_STORE", "put back afterwards")
     port = served.base_url.port
     said = f"cannot listen on 127.0.0.1, port {port}: Address already in use"
     assert refused(capsys, "serve", "--store", built, "--port", port) == said
