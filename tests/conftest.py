@@ -39,7 +39,7 @@ _JUDGES = (
     "api/test_server.py",
     "pipelines/test_workers.py",
 )
-_FIXTURES_OF_JUDGES = {"chromium", "browser"}
+_FIXTURES_OF_JUDGES = {"chromium"}
 
 
 # Allocations between two searches for garbage, as in the commands: Python's 700 cost 3 % of the time of all tests
