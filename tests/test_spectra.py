@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from brdfdb.errors import ParameterError
-from brdfdb.spectra import covers_visible, linear_srgb, picture_wavelengths, refractive_index, srgb_weights, xyz_weights
+from brdfdb.refractive_indices import refractive_index
+from brdfdb.spectra import covers_visible, linear_srgb, picture_wavelengths, srgb_weights, xyz_weights
 
 EVERY_10_NM = np.arange(380.0, 781.0, 10.0)
 

@@ -19,7 +19,7 @@ from brdfdb.materials import FunctionSource, Material, presets
 from brdfdb.materials.spectrum import Spectrum
 from brdfdb.measurements.samples import Samples
 from brdfdb.models import MODELS
-from brdfdb.spectra import refractive_index
+from brdfdb.refractive_indices import refractive_index
 from brdfdb.tables.evaluation import PointsBody
 from brdfdb.tables.grids import Grid
 from brdfdb.tables.layout import Layout

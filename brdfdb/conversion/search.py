@@ -15,7 +15,7 @@ from brdfdb.fitting.variables import EDGE, NORMAL, best_apart, index_of, index_v
 from brdfdb.integrals.pairs import WIDTHS, Symmetry
 from brdfdb.materials import Source
 from brdfdb.parameters import Floats, ModelSpec, closest
-from brdfdb.spectra import refractive_index
+from brdfdb.refractive_indices import refractive_index
 
 Array = NDArray[np.float64]
 

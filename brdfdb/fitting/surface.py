@@ -18,7 +18,7 @@ from brdfdb.geometry import unit_vector
 from brdfdb.measurements.aperture import InstrumentView
 from brdfdb.models import MODELS
 from brdfdb.parameters import Floats, ModelSpec, Parameter, closest
-from brdfdb.spectra import refractive_index
+from brdfdb.refractive_indices import refractive_index
 
 Array = NDArray[np.float64]
 Numbers = Mapping[str, Any]

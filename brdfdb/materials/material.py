@@ -40,7 +40,7 @@ from brdfdb.materials.written_parameters import completed, from_file, written_na
 from brdfdb.models import MODELS
 from brdfdb.notebook import card, listed, spectrum
 from brdfdb.parameters import Floats, ModelSpec, check_nanometres
-from brdfdb.spectra import refractive_index
+from brdfdb.refractive_indices import refractive_index
 
 _SOURCED = ("refractive_index", "wavelengths_nm")  # fields besides parameters that may have an entry in `sources`
 
@@ -64,7 +64,7 @@ class Material(BaseModel, Lookups):
     assumed : dict of str to Assumption
         Values that the paper does not print, by parameter: the reason for the value, and the results of alternatives.
     refractive_index : str or None
-        ``shelf/book/page`` for `brdfdb.spectra.refractive_index`; spectral models have one, no other model has.
+        ``shelf/book/page`` for `brdfdb.refractive_indices`; spectral models have an entry, no other model has.
     wavelengths_nm : tuple of float or None
         Wavelengths [nm] for which the parameters are stated; None if the material may be used at any wavelength. A
         grey material has none.

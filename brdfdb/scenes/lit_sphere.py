@@ -18,8 +18,9 @@ from brdfdb.geometry import radians, spherical_angles, unit_vector
 from brdfdb.integrals.sampling import directions, mixture_density
 from brdfdb.materials import FunctionRecord, Source
 from brdfdb.parameters import Floats
+from brdfdb.refractive_indices import refractive_index
 from brdfdb.scenes.environment import widest_lobe
-from brdfdb.spectra import PICTURE_NM, colour_science, picture_wavelengths, refractive_index, srgb_weights
+from brdfdb.spectra import PICTURE_NM, colour_science, picture_wavelengths, srgb_weights
 from brdfdb.tables.table_base import BaseTable
 
 Array = NDArray[np.float64]

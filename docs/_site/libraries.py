@@ -10,7 +10,7 @@ import numpy as np
 from _site.markup import plain, table, write_page
 from brdfdb.materials import PAPERS, libraries
 from brdfdb.materials.preset_files import Entry, entries, files
-from brdfdb.spectra import refractive_index
+from brdfdb.refractive_indices import refractive_index
 
 _AT_NM = 550.0
 _KINDS = {"metal": "Metals", "semiconductor": "Semiconductors", "dielectric": "Dielectrics"}

@@ -26,7 +26,7 @@ from brdfdb.geometry import unit_vector
 from brdfdb.integrals.sampling import directions, mixture_density
 from brdfdb.lobes import GGX, Lobe
 from brdfdb.materials import Material, presets
-from brdfdb.spectra import refractive_index
+from brdfdb.refractive_indices import refractive_index
 from tests.benchmarks.recording import Column, Run, Table
 
 ALPHA, NM = 0.15, 550.0

@@ -21,7 +21,7 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 import brdfdb
 from brdfdb.geometry import unit_vector
 from brdfdb.models import he_torrance_vectors
-from brdfdb.spectra import refractive_index
+from brdfdb.refractive_indices import refractive_index
 from brdfdb_pipelines.build import build
 from brdfdb_pipelines.recipe_file import Recipe
 from brdfdb_pipelines.workers import threads

@@ -8,7 +8,7 @@ import numpy as np
 
 from brdfdb.figure import Curve, Figure, Panel
 from brdfdb.gallery import GALLERY
-from brdfdb.spectra import refractive_index
+from brdfdb.refractive_indices import refractive_index
 
 
 @cache

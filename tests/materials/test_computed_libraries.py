@@ -13,7 +13,7 @@ from brdfdb.audit.validity import validity_of
 from brdfdb.errors import ParameterError
 from brdfdb.materials import PAPERS, Material, libraries, presets
 from brdfdb.materials.preset_files import COMPUTED, Entry, Substance, entries
-from brdfdb.spectra import _optical_constants, refractive_index
+from brdfdb.refractive_indices import _optical_constants, refractive_index
 
 # Symbols that the library must have, typed from the request of its users
 ELEMENTS = {

@@ -24,7 +24,8 @@ from brdfdb.integrals.sampling import lobe_of, mixture_density, pdf
 from brdfdb.lobes import Lobe
 from brdfdb.materials import presets
 from brdfdb.models import MODELS
-from brdfdb.spectra import PICTURE_NM, linear_srgb, refractive_index
+from brdfdb.refractive_indices import refractive_index
+from brdfdb.spectra import PICTURE_NM, linear_srgb
 from brdfdb.tables.grids import directions as directions_of_nodes
 from brdfdb.tables.planner import plan
 from brdfdb.tables.table import Table, table_from

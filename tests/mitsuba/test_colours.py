@@ -14,7 +14,7 @@ pytest.importorskip("mitsuba")
 import brdfdb.mitsuba.table
 from brdfdb.formats import mitsuba as exporter
 from brdfdb.models import MODELS
-from brdfdb.spectra import refractive_index
+from brdfdb.refractive_indices import refractive_index
 from tests.mitsuba.every_variant import MONO_NM, RGB_NM, results_of, tabulated
 from tests.mitsuba.surfaces import Array, directions, variant
 from tests.tables.made_up import made_up

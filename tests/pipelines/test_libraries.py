@@ -120,7 +120,7 @@ def test_the_specular_part_of_a_mirror_is_that_of_eq_70(small: Path) -> None:
     # Fresnel at normal incidence, times exp(-g) with g = (4 pi sigma_0 / lambda)^2; nothing is hidden there
     for name, sigma_0_nm in (("gold-mirror", 3.0), ("n-bk7-polished", 10.0)):
         table = brdfdb.open(small)[name]
-        n, k = brdfdb.spectra.refractive_index(table.source.refractive_index, 550.0)
+        n, k = brdfdb.refractive_indices.refractive_index(table.source.refractive_index, 550.0)
         fresnel = ((n - 1.0) ** 2 + k**2) / ((n + 1.0) ** 2 + k**2)
         expected = fresnel * np.exp(-((4.0 * np.pi * sigma_0_nm / 550.0) ** 2))
         assert table.specular_reflectance(0.0, 550.0) == pytest.approx(expected, rel=1e-6)

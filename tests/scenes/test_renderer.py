@@ -12,11 +12,11 @@ from brdfdb.geometry import unit_vector
 from brdfdb.integrals.quadrature import directional_albedo
 from brdfdb.materials import FunctionSource, presets
 from brdfdb.reference import he_torrance_1991, oren_nayar_1994, ward_1992
+from brdfdb.refractive_indices import refractive_index
 from brdfdb.scenes.gbuffer import gather
 from brdfdb.scenes.renderer import Reflector, reflectors, render
 from brdfdb.scenes.scene import Scene
 from brdfdb.scenes.shapes import Array
-from brdfdb.spectra import refractive_index
 from brdfdb.tables.grids import Grid
 from brdfdb.tables.layout import Layout
 from brdfdb.tables.table import Table

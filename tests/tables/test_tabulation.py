@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from brdfdb import models
 from brdfdb.materials import Material
-from brdfdb.spectra import refractive_index
+from brdfdb.refractive_indices import refractive_index
 from brdfdb.tables import layout as layout_module
 from brdfdb.tables import tabulation as module
 from brdfdb.tables.grids import Grid
