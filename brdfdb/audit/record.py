@@ -83,9 +83,9 @@ class Record(Finding):
         "The metadata of a table are computed again, as in a build. Title, parameters and citations follow from the "
         "record of the source, which a digest protects. The stated error (also in places and between wavelengths), the "
         "error of the formula and the largest albedo are measured at the same directions. All numbers must agree to "
-        "rounding, and all texts exactly. Materials that have the name of a preset, or cite the same place as one, "
-        "must have the parameters of a preset. For tables of functions and of measured data, only metadata that follow "
-        "from the arrays are compared."
+        "rounding, and all texts exactly. A material that has the name of a preset must have its parameters; one that "
+        "cites the same place as presets do must have the parameters of one of them. For tables of functions and of "
+        "measured data, only metadata that follow from the arrays are compared."
     )
 
     compared: int = Field(description="number of leaves of the attributes that were compared")
