@@ -20,7 +20,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=whole_number(MOST_WIDTH),
         default=128,
         metavar="N",
-        help="width of the picture [pixel]; choices are checked at 4 times as many other points (default: %(default)s)",
+        help="width of the picture [pixel]; choices are checked at 4 other points per pixel (default: %(default)s)",
     )
     parser.add_argument(
         "--weigh",

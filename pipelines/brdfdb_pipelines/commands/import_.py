@@ -17,7 +17,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_reading(parser)
     parser.add_argument("--join", action="store_true", help="join all files to one set of samples of the same surface")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
-    parser.add_argument("--out", type=place, metavar="FILE.nc", help="write the samples as netCDF, of a single file")
+    parser.add_argument("--out", type=place, metavar="FILE.nc", help="write the samples of a single file as netCDF")
     tables = parser.add_argument_group("tables")
     tables.add_argument(
         "--store", type=place, metavar="DIR", help="build tables of the samples in this store, and audit them"

@@ -39,7 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--sort",
         default="name",
-        help="name, error_p99, created or bytes; with a minus, such as -error_p99, the largest first",
+        help="name, error_p99, created or bytes; the largest first with a minus: --sort=-error_p99",
     )
     add_snapshot(parser)
 
