@@ -58,7 +58,7 @@ class Energy(Finding):
         "energy. The verdict is for lights up to 90°, or up to 89.9° if f_r grows without bound at the horizon. The "
         "largest albedo of a model is searched between these lights, that of a table is the largest at fixed ones. "
         "Beyond the last light the albedo is bounded, or grows as a power of 1 / cos theta_i, which the model declares "
-        "or which is measured: the report says where it passes 1. The "
+        "or which is measured: the report says where it exceeds 1. The "
         "white furnace is the surface in uniform light, with its parameters set so that nothing is absorbed. An ideal "
         "model then shows 1 at every angle. Less than 1 is light that single scattering loses, more than 1 is energy "
         "that the model creates. The table of all materials shows the mean over angles, which counts as a loss or a "

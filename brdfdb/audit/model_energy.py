@@ -442,7 +442,7 @@ def _judged(
     if not np.isfinite(certain).all():
         broken, wavelength = np.argwhere(~np.isfinite(certain))[0]
         at = place(theta_i_deg[broken], _nm(wavelength_nm, wavelength))
-        return _Judgement("violates", f"the model reflects no finite share of what arrives at {at}")
+        return _Judgement("violates", f"the model reflects no finite share of the incident light at {at}")
     worst, wavelength = reflected.worst
     if np.any(certain > 1.0 + ENERGY_TOLERANCE):
         beyond = np.max(certain, axis=1) - limit_of(known, theta_i_deg) - ENERGY_TOLERANCE
@@ -451,25 +451,25 @@ def _judged(
             worst = int(np.argmax(beyond))
             wavelength = int(np.argmax(reflected.largest[worst]))
         at = place(theta_i_deg[worst], _nm(wavelength_nm, wavelength))
-        share = f"{reflected.largest[worst].max():.4g} of what arrives at {at}{growth}"
+        share = f"{reflected.largest[worst].max():.4g} of the incident light at {at}{growth}"
         if known is not None and published:
             return _Judgement("known published excess", f"reflects {share}: {known.citation}")
         return _Judgement("violates", f"the model reflects {share}")
     at = place(theta_i_deg[worst], _nm(wavelength_nm, wavelength))
     up_to = f"for lights up to {theta_i_deg[-1]:g} degrees"
-    largest = f"reflects at most {np.max(reflected.largest):.4g} of what arrives, {up_to}, at {at}{growth}"
+    largest = f"reflects at most {np.max(reflected.largest):.4g} of the incident light, {up_to}, at {at}{growth}"
     if furnace is None:
         return _Judgement("conserves", f"{largest}; no parameters make the model lossless")
     albedo = np.array(furnace.albedo, dtype=np.float64)[np.array(furnace.theta_i_deg) <= LOSS_UP_TO_DEG]
     row, column = np.unravel_index(np.argmin(albedo), albedo.shape)
     at = place(furnace.theta_i_deg[row], _nm(furnace.wavelength_nm, column))
-    least = f"{albedo[row, column]:.3g} of what arrives at {at}" if albedo[row, column] < LOSSLESS else ""
+    least = f"{albedo[row, column]:.3g} of the incident light at {at}" if albedo[row, column] < LOSSLESS else ""
     if furnace.largest is not None and furnace.largest > 1.0 + GAIN:
         at = place(furnace.largest_at_theta_i_deg, furnace.largest_at_wavelength_nm)
-        more = f"{furnace.largest:.5g} of what arrives at {at}" + (f", and {least}" if least else "")
+        more = f"{furnace.largest:.5g} of the incident light at {at}" + (f", and {least}" if least else "")
         return _Judgement("gains", f"{largest}; lossless ({furnace.lossless}), the model would reflect {more}")
     if least:
-        loss = f"lossless ({furnace.lossless}), the model reflects {least}; as it is, it {largest}"
+        loss = f"lossless ({furnace.lossless}), the model reflects {least}; with the given parameters, it {largest}"
         return _Judgement("loses", loss)
     return _Judgement("conserves", largest)
 

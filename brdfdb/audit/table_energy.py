@@ -153,7 +153,7 @@ def table_energy_of(
     verdict: Verdict
     worst_nm = None if table.wavelength_nm is None else float(table.wavelength_nm[worst_wavelength])
     share = f"{largest:.4g}" if np.isfinite(largest) else "no finite share"
-    reason = f"reflects {share} of what arrives at {place(theta_i[worst_theta], worst_nm)}"
+    reason = f"reflects {share} of the incident light at {place(theta_i[worst_theta], worst_nm)}"
     if unexplained.size == 0:
         verdict = "passes"
         cause = "its integration has" if bands is None else "the table states"

@@ -110,7 +110,7 @@ def energy(head: Mapping[str, Any], audited: Audited | None) -> str:
     largest = head.get("largest_albedo") or {}
     passes = (largest.get("grazing") or {}).get("passes_1_at_theta_i_deg")
     if not above and passes is not None:
-        above = f"albedo of the {_whose(largest)} passes 1 at {near_90(passes)}°"
+        above = f"albedo of the {_whose(largest)} exceeds 1 above {near_90(passes)}°"
     return f"{NOT_AUDITED}: {above}" if above else NOT_AUDITED
 
 

@@ -300,7 +300,7 @@ class Grazing(BaseModel):
     def in_words(self, largest: float, unit: str = " degrees") -> str:
         """Return the growth in a clause, for an albedo that is at most `largest` [1] up to the last angle judged."""
         at = self.passes_1_at_theta_i_deg
-        passes = "" if at is None else f" and passes 1 at {near_90(at)}{unit}"
+        passes = "" if at is None else f" and exceeds 1 above {near_90(at)}{unit}"
         if self.max_albedo is not None:
             beyond = f", at most {self.max_albedo:.4g}" if f"{self.max_albedo:.4g}" != f"{largest:.4g}" else ""
             return f"bounded{beyond}{passes}"

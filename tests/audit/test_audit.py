@@ -178,7 +178,7 @@ def test_one_value_that_is_not_finite_violates_and_its_albedo_is_null_in_the_rep
     assert (energy.verdict, energy.max_albedo) == ("violates", None)
     at = f"{table.axes_deg['theta_i'][1]:g} degrees"
     at += "" if table.wavelength_nm is None else f" and {table.wavelength_nm[0]:g} nm"
-    assert energy.reason == f"reflects no finite share of what arrives at {at}"
+    assert energy.reason == f"reflects no finite share of the incident light at {at}"
     albedo = entry["findings"]["energy"]["table"]["albedo"]
     assert albedo[1] == energy.albedo[1] == [None] * count
     assert None not in albedo[0]
@@ -231,7 +231,7 @@ def test_more_light_out_than_in_violates(grid: Grid) -> None:
     assert verdicts(found) == {"energy": "violates"}
     assert energy.max_albedo == pytest.approx(1.01, rel=1e-6)
     assert energy.exceeds_1_from_theta_i_deg == 0.0
-    assert energy.reason == "reflects 1.01 of what arrives at 0 degrees"
+    assert energy.reason == "reflects 1.01 of the incident light at 0 degrees"
     written([found])
 
 

@@ -57,7 +57,7 @@ pytestmark = [
 )
 def test_an_excess_is_known_up_to_its_albedo_and_from_its_angle_on(excess: KnownExcess | None, published: bool) -> None:
     verdict = "known published excess" if published else "violates"
-    reason = "reflects 1.05 of what arrives at 80 degrees" + (": Somebody 1991, p. 3" if published else "")
+    reason = "reflects 1.05 of the incident light at 80 degrees" + (": Somebody 1991, p. 3" if published else "")
     table = lambert(0.5)
     mirror = np.array([0.1, 0.1, 0.1, 0.51, 0.55, 0.5], dtype=np.float32)
     found = table_energy_of(replace(table, specular=mirror), excess)
@@ -86,7 +86,8 @@ def test_the_published_magnesium_oxide_is_a_known_excess() -> None:
     found = audit(tabulated(presets()["magnesium-oxide-ceramic"], fine(1.0), np.array([500.0])))
     assert verdicts(found) == {"energy": "known published excess"}
     assert found.verdict == "known published excess"
-    assert " of what arrives at 83 degrees and 500 nm: He et al. 1991, section 3.2.3" in found.of(Energy).table.reason
+    cited = " of the incident light at 83 degrees and 500 nm: He et al. 1991, section 3.2.3"
+    assert cited in found.of(Energy).table.reason
     assert found.of(Energy).table.exceeds_1_from_theta_i_deg == pytest.approx(54.0, abs=1.0)  # ERRATA
 
 

@@ -211,14 +211,14 @@ def test_the_verdict_says_up_to_which_light_it_holds_and_how_the_albedo_goes_on(
     assert brass.judged_up_to_theta_i_deg == 89.9
     assert (brass.grazing.power, brass.grazing.origin) == (0.5, "declared")
     assert brass.reason.endswith(
-        "; as it is, it reflects at most 0.417 of what arrives, for lights up to 89.9 degrees, at 0 degrees; "
-        "grows as cos^-1/2 and passes 1 at 89.9965 degrees"
+        "; with the given parameters, it reflects at most 0.417 of the incident light, for lights up to 89.9 degrees, "
+        "at 0 degrees; grows as cos^-1/2 and exceeds 1 above 89.9965 degrees"
     )
     wide = {"rho_d": 0.3, "rho_s": 0.1, "alpha_x": 0.12, "alpha_y": 0.25}
     bounded = energy(material("ward_bounded", wide))
     assert bounded.reason.endswith("for lights up to 89.9 degrees, at 89.9 degrees; bounded, at most 0.4")
     assert energy(material("ward_duer", wide)).reason.startswith(
-        "the model reflects 3.911 of what arrives at 89.9 degrees; grows as cos^-1; this model does so"
+        "the model reflects 3.911 of the incident light at 89.9 degrees; grows as cos^-1; this model does so"
     )
 
 
@@ -301,7 +301,7 @@ def doctored(monkeypatch: pytest.MonkeyPatch, change: Callable[[Any, Any], Any])
 def test_a_model_that_is_not_finite_violates_and_is_null(monkeypatch: pytest.MonkeyPatch) -> None:
     found = doctored(monkeypatch, lambda wi, wr: np.where(wr[..., 2] * wi[..., 2] < 0.1, np.nan, 0.0))
     assert (found.verdict, found.max_albedo) == ("violates", None)
-    assert found.reason == "the model reflects no finite share of what arrives at 0 degrees"
+    assert found.reason == "the model reflects no finite share of the incident light at 0 degrees"
     assert ModelEnergy.model_validate_json(found.model_dump_json()) == found
 
 

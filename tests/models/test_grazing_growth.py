@@ -95,7 +95,7 @@ def test_rolled_brass_passes_1_where_another_quadrature_says() -> None:
     found = grazing(brass, 0.417)
     assert found.power == 0.5
     assert found.passes_1_at_theta_i_deg == pytest.approx(89.9965, abs=1e-4)
-    assert found.in_words(0.417) == "grows as cos^-1/2 and passes 1 at 89.9965 degrees"
+    assert found.in_words(0.417) == "grows as cos^-1/2 and exceeds 1 above 89.9965 degrees"
     theta_i = np.deg2rad(found.passes_1_at_theta_i_deg)
     turns = np.deg2rad([0.0, 30.0, 60.0, 90.0])
     largest = max(albedo(brass.spec, theta_i, phi_i, brass.arguments()) for phi_i in turns)

@@ -70,7 +70,7 @@ VIOLATIONS: dict[str, tuple[dict[str, float], list[str]]] = {
     "nan": ({"value": np.nan}, NOT_FINITE),
     "inf": ({"value": np.inf}, NOT_FINITE),
     "asymmetric": ({"value": 0.1}, ASYMMETRIC),
-    "bright": ({"factor": 2.5}, ["the table reflects 1.25 of what arrives at 0 degrees"]),
+    "bright": ({"factor": 2.5}, ["the table reflects 1.25 of the incident light at 0 degrees"]),
 }
 
 

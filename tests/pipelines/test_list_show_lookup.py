@@ -54,7 +54,7 @@ def test_list_has_a_column_with_the_stated_error(planned: Path, capsys: Captured
         assert f" {terminal.error(error.overall.p99)}  " in line
     # Ward's model is a fit itself, and He and Torrance's is the sum that others cut short
     assert [re.split(r"  +", line)[3:8:2] for line in lines] == [
-        ["grey", "no exact form", "not audited: albedo of the model passes 1 at 89.9965°"],
+        ["grey", "no exact form", "not audited: albedo of the model exceeds 1 above 89.9965°"],
         ["400-700 nm", "0, exact form", "not audited"],
     ]
 
@@ -63,7 +63,7 @@ def test_show_says_up_to_which_light_an_albedo_is_the_largest_and_how_it_goes_on
     planned: Path, capsys: Captured
 ) -> None:
     assert run("show", "rolled-brass", "--store", planned) == 0
-    largest = "reflects at most 0.417 for lights up to 89.9°, at 0°; grows as cos^-1/2 and passes 1 at 89.9965°"
+    largest = "reflects at most 0.417 for lights up to 89.9°, at 0°; grows as cos^-1/2 and exceeds 1 above 89.9965°"
     assert f"    largest     the model {largest}\n" in capsys.readouterr().out
 
 

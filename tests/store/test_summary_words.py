@@ -51,7 +51,7 @@ def test_an_albedo_above_1_is_told_before_any_audit_and_by_the_audit_after_it() 
         "albedo of the table not finite at 80°"
     )
     below = ALBEDO | {"albedo": 0.4, "of": "source", "grazing": {"passes_1_at_theta_i_deg": 89.99647}}
-    assert energy({"largest_albedo": below}, None) == "not audited: albedo of the model passes 1 at 89.9965°"
+    assert energy({"largest_albedo": below}, None) == "not audited: albedo of the model exceeds 1 above 89.9965°"
     above = ALBEDO | {"of": "source"}
     assert energy({"largest_albedo": above}, None) == "not audited: albedo of the model 1.37 at 80°, 550 nm"
 
