@@ -195,7 +195,7 @@ class _Labels:
         if not is_labelled(value):
             if not self.alike and np.ndim(plain(name, value)) > own:
                 raise ParameterError(
-                    name, f"it has no names of dimensions, and the others broadcast by theirs: {_listed(self.dims)}"
+                    name, f"it has no names of dimensions, but the other arrays broadcast by name: {_listed(self.dims)}"
                 )
             return value
         last = value.dims[len(value.dims) - own :]

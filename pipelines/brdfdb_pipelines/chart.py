@@ -138,7 +138,7 @@ def _subjects(names: Sequence[str], root: Path | None, recipe_path: Path | None)
             subjects.append(_Family(family.record, materials, family.wavelength_nm, family))
             continue
         else:
-            others = "the recipe" if recipe_path else "the presets; `brdfdb list --presets` names them"
+            others = "the recipe" if recipe_path else "the presets; `brdfdb list --presets` prints their names"
             raise ParameterError(name, f"no such material or family, neither in the store nor among {others}", name)
         subjects.append(subject)
     return subjects

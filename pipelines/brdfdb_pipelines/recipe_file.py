@@ -451,4 +451,4 @@ def _no_match(pattern: str, names: Iterable[str], library: str) -> str:
         if other != library and fnmatch.filter(presets(other), pattern):
             return f'{pattern!r} is in the library {other}; for its materials, write library = "{other}"'
     option = "" if library == PAPERS else f" --library {library}"
-    return f"{pattern!r} matches no material{closest(pattern, names)}; `brdfdb list --presets{option}` names them"
+    return f"{pattern!r} matches no material{closest(pattern, names)}; `brdfdb list --presets{option}` prints all names"
