@@ -51,7 +51,7 @@ def test_a_polarised_recipe_builds_tables_that_are_looked_up_and_pass(tmp_path: 
     lines = capsys.readouterr().out.splitlines()
     assert lines[1].startswith(f"500 nm  I, Q, U, V: {expected[0, 0]:.6g}, {expected[0, 1]:.6g}")
     assert "Q > 0 is s-polarised" in lines[2]
-    assert "stokes: Q, U and V make more than I = 1" in refused(capsys, *lookup, "1,2,0,0")
+    assert "stokes: sqrt(Q^2 + U^2 + V^2) exceeds I = 1" in refused(capsys, *lookup, "1,2,0,0")
 
 
 def test_requests_of_unpolarised_tables_do_not_mention_polarisation(tmp_path: Path) -> None:
