@@ -19,6 +19,8 @@ from typing import Any, TypeVar, cast
 
 import numpy as np
 
+from brdfdb.errors import ParameterError
+
 F = TypeVar("F", bound=Callable[..., Any])
 
 # Kernels stay functions of Python, and numba is not imported. numba reads the same variable
@@ -234,6 +236,11 @@ def _ufunc(function: Callable[..., Any], arity: int) -> Callable[..., Any]:
         _load_alone(ufunc._dispatcher.cache)
     except RuntimeError:  # as in `_compiled`
         ufunc = vectorize()(function)
-    ufunc.add(numba.float64(*[numba.float64] * arity))
+    try:
+        ufunc.add(numba.float64(*[numba.float64] * arity))
+    except numba.core.errors.NumbaError as error:  # its first line is the stage of the compilation
+        lines = str(error).strip().splitlines()
+        sentence = f"the formula cannot be compiled: {lines[min(1, len(lines) - 1)]}"
+        raise ParameterError(function.__name__, sentence) from None
     ufunc.disable_compile()
     return cast(Callable[..., Any], ufunc)

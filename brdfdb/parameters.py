@@ -299,5 +299,5 @@ class ModelSpec:
 
 def closest(name: str, names: Iterable[str]) -> str:
     """Return the end of a message about an unknown name: up to three names that are close to it, if there are any."""
-    near = difflib.get_close_matches(name, list(names), n=3, cutoff=0.4)
+    near = difflib.get_close_matches(name, list(dict.fromkeys(names)), n=3, cutoff=0.4)
     return f"; closest: {', '.join(near)}" if near else ""

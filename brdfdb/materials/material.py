@@ -131,10 +131,7 @@ class Material(BaseModel, Lookups):
     @field_validator("model")
     @classmethod
     def _check_model(cls, model: str) -> str:
-        if model not in MODELS:
-            text = f"{model!r} is not one of {', '.join(MODELS)}; --models FILE adds your models"
-            raise ParameterError("model", text, model, tuple(MODELS))
-        return model
+        return MODELS[model].name
 
     @field_validator("parameters")
     @classmethod

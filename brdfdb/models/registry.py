@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from brdfdb.errors import BrdfdbError, ParameterError
-from brdfdb.parameters import ModelSpec, Parameter
+from brdfdb.parameters import ModelSpec, Parameter, closest
 from brdfdb.place import path_of
 
 GROUP = "brdfdb.models"  # group of entry points, each of which gives a model or an iterable of models
@@ -39,7 +39,8 @@ class Registry(dict[str, ModelSpec]):
     """Models by name. An unknown name raises `ParameterError`."""
 
     def __missing__(self, name: str) -> ModelSpec:
-        raise ParameterError("model", f"{name!r} is not one of {', '.join(self)}", name, tuple(self))
+        text = f"{name!r} is not one of {', '.join(self)}{closest(name, self)}; --models FILE adds your models"
+        raise ParameterError("model", text, name, tuple(self))
 
     def add(self, models: Iterable[Any], origin: str) -> None:
         """Add models: all of them, or none if one cannot be added.

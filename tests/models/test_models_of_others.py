@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 
 import brdfdb
+from brdfdb import _numba
 from brdfdb.errors import BrdfdbError, ParameterError
 from brdfdb.forms import catalogue
 from brdfdb.materials import Material
@@ -163,6 +164,17 @@ def test_a_file_that_is_wrong_is_refused_in_a_sentence(
             registry.add_files([file])
     assert registry == dict(MODELS)
     assert os.environ[VARIABLE] == ""
+
+
+@pytest.mark.skipif(_numba.INTERPRETED, reason="Python runs the formula, and names the fault itself")
+def test_a_formula_that_cannot_be_compiled_is_refused_in_a_sentence(registry: Registry, tmp_path: Path) -> None:
+    file = tmp_path / "mine.py"
+    file.write_text(ARGUMENT.replace("mine(cos_i, depth): return depth", "mine(cos_i): return cos_beta"))
+    registry.add_files([file])
+    sentence = "^mine: the formula cannot be compiled: NameError: name 'cos_beta' is not defined$"
+    for evaluate in (registry["mine"].evaluate, registry["mine"].vectors):
+        with pytest.raises(ParameterError, match=sentence):
+            evaluate(*([0.0] * 4 if evaluate is registry["mine"].evaluate else [[0.0, 0.0, 1.0]] * 2))
 
 
 @pytest.mark.parametrize(

@@ -17,6 +17,7 @@ import pytest
 from rich.console import Console
 
 import brdfdb
+from brdfdb.formats import EXPORTERS
 from brdfdb.materials import presets
 from brdfdb_pipelines import terminal
 from brdfdb_pipelines.commands import INTERRUPTED, commands
@@ -64,6 +65,11 @@ def test_help_of_commands_with_a_store_names_it(capsys: Captured) -> None:
     for command in ("choose", "render"):
         assert "unrecognized arguments: --store" in usage(capsys, command, "clay-vase", "--store", "somewhere")
         assert "--store" not in help_of(capsys, command)
+
+
+def test_every_command_and_every_format_has_help(capsys: Captured) -> None:
+    for command in (*([name] for name in commands()), *(["export", name] for name in EXPORTERS)):
+        assert help_of(capsys, *command).startswith(f"usage: brdfdb {' '.join(command)} ")
 
 
 @pytest.mark.parametrize(

@@ -31,6 +31,7 @@ def test_pictures_are_written_and_read_as_samples(tmp_path: Path, capsys: Captur
     [
         (["no-such"], "no such material"),
         (["rolled-brass", "--light", "95", "0"], "--light: 95 degrees is not in [0, 90)"),
+        (["rolled-brass", "--wavelength-nm", "0.55"], "--wavelength-nm: 0.55 is below 1 nm; is it in micrometres?"),
         (["rolled-brass", "--set", "blur=1"], "--set blur=1: the settings are width"),
         (["rolled-brass", "--set", "blur_px=x"], "'x' is no number"),
         (["rolled-brass", "--set", "bits=99"], "bits: 99 is not in [4, 24]"),

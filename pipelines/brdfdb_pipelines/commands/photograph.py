@@ -53,18 +53,19 @@ def run(options: argparse.Namespace) -> int:
 
     for module in ("OpenEXR", "scipy.ndimage"):  # before the time is spent
         import_extra(module)
-    import numpy as np
 
     from brdfdb.formats.gonioreflectometer import write_picture
     from brdfdb.geometry import check_azimuth_deg, radians
     from brdfdb.measurements.gonioreflectometer import photograph
+    from brdfdb.parameters import check_nanometres
     from brdfdb_pipelines import terminal
     from brdfdb_pipelines.named_source import named_source
 
     name = options.name
     source = named_source(name, options.store, options.recipe).source
     instrument = instrument_of(options.set)
-    brdf = source.brdf_at(np.array([options.wavelength_nm]) if source.spectral else None)
+    wavelength_nm = check_nanometres("--wavelength-nm", [options.wavelength_nm])
+    brdf = source.brdf_at(wavelength_nm if source.spectral else None)
     lights = options.light or LIGHTS
     for theta, phi in lights:
         check_azimuth_deg("--light", phi)

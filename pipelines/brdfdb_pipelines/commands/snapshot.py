@@ -56,5 +56,6 @@ def _print_contents(root: Path, name: str) -> None:
     from brdfdb.store.records import read_snapshot
 
     content = read_snapshot(root, name)
-    numbers = f"{counted(len(content['materials']), 'material')}, {len(content['families'])} families"
+    families = "1 family" if len(content["families"]) == 1 else f"{len(content['families'])} families"
+    numbers = f"{counted(len(content['materials']), 'material')}, {families}"
     print(f"{name}: {numbers}; sha256 {seal_of(snapshot_path(root, name))}")
