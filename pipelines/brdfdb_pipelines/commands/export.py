@@ -21,7 +21,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "; rgl is for Mitsuba 3 and pbrt; netcdf, csv and numpy are for any program"
     )
     for name, exporter in EXPORTERS.items():
-        sentence = _plain(f"Write {exporter.summary}.")
+        sentence = f"Write {exporter.summary}.".replace("%", "%%")
         command = formats.add_parser(name, help=sentence, description=sentence)
         command.add_argument("names", nargs="*", metavar="NAME", help="materials")
         add_store(command)
@@ -43,20 +43,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         for option in options_of(exporter).values():
             flag = f"--{option.name.replace('_', '-')}"
             target = f"option_{option.name}"
+            meaning = option.help.replace("%", "%%")  # argparse formats the help with the operator %
             if option.default is False:
-                command.add_argument(flag, dest=target, action="store_const", const="true", help=_plain(option.help))
+                command.add_argument(flag, dest=target, action="store_const", const="true", help=meaning)
             elif option.choices:
                 default = option.default if option.name != "kind" else "all"
-                text = f"{option.help}: {', '.join(option.choices)} (default: {default})"
-                command.add_argument(flag, dest=target, metavar=option.name.upper(), help=_plain(text))
+                text = f"{meaning}: {', '.join(option.choices)} (default: {default})"
+                command.add_argument(flag, dest=target, metavar=option.name.upper(), help=text)
             else:
-                text = f"{option.help}; {option.allowed} (default: {option.default:g})"
-                command.add_argument(flag, dest=target, metavar="X", help=_plain(text))
-
-
-def _plain(text: str) -> str:
-    """Return a text as argparse takes it: with two percent signs for each."""
-    return text.replace("%", "%%")
+                text = f"{meaning}; {option.allowed} (default: {option.default:g})"
+                command.add_argument(flag, dest=target, metavar="X", help=text)
 
 
 def run(options: argparse.Namespace) -> int:
