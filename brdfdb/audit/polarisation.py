@@ -33,8 +33,8 @@ class PolarisationFinding(Finding):
     explanation = (
         "A Mueller matrix is physically realisable if no eigenvalue of its coherency matrix is negative (Cloude 1986): "
         "it is then a sum of Jones matrices. Eigenvalues are divided by the trace. Negative values up to the stated "
-        "error of the elements of a facet are allowed, because interpolated matrices may break the condition even if "
-        "those at the nodes obey it. Unpolarised tables have no such matrices."
+        "error of the stored matrix elements are allowed, because interpolated matrices may break the condition even "
+        "if those at the nodes obey it. Unpolarised tables have no such matrices."
     )
 
     lookups: int = Field(description="directions and wavelengths at which the table was looked up; 0: unpolarised")

@@ -62,9 +62,9 @@ class Reciprocity(Finding):
     order = 2
     explanation = (
         "Asymmetry is |f − f′| / (|f| + |f′|), where f′ has light and viewer exchanged. 0 is reciprocal "
-        "(Helmholtz), 1 is the largest possible asymmetry. Measured data have noise: 99 of 100 of their "
-        "asymmetries are judged by their uncertainty and the stated error of the table, where both directions were "
-        "measured."
+        "(Helmholtz), 1 is the largest possible asymmetry. Measured data have noise. Of their asymmetries, "
+        "99 of 100 must be explained by the uncertainty of the data and the stated error of the table. Only pairs of "
+        "directions that were measured in both orders are judged."
     )
 
     model_random: Asymmetry | None = Field(description="viewers over the hemisphere; null: the source is not known")

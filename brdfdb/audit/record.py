@@ -48,7 +48,7 @@ _NO_FUNCTION = "the store does not hold the function, but an audit accepts it as
 UNCHECKED = (
     Unchecked("pointer and manifest", "created", "there is no other record of the time"),
     Unchecked("pointer", "last", "revisions with higher numbers may have been removed, and leave no trace"),
-    Unchecked("table", "reason", "expected sizes of other kinds of tables; only its first clause is compared"),
+    Unchecked("table", "reason", "it also has the sizes of other kinds of tables; only its first clause is compared"),
     Unchecked("table", "error.worst.*", "if all errors are due to rounding, the place of the largest is arbitrary"),
     Unchecked("table of a function", "error.*", f"{_NO_FUNCTION}; it must not contradict itself"),
     Unchecked("table of a function", "largest_albedo.*", f"{_NO_FUNCTION}; the albedo is near that of the lookups"),

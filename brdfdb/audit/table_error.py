@@ -43,8 +43,8 @@ class TableError(Finding):
     key = "table_error"
     order = 6
     explanation = (
-        "|table − model| over the model, or over a thousandth of the Lambertian of the same albedo where the model "
-        "is less. 99 of 100 values are below the number shown. The error measured at fresh directions comes first, "
+        "|table − model|, divided by the model, or by a thousandth of the Lambertian BRDF of the same albedo if this "
+        "is larger. 99 of 100 values are below the number shown. The error measured at fresh directions comes first, "
         "then the stated error of the table. Two samples differ by chance. The stated mean, median, 95th and 99th "
         "percentile and maximum of each band of theta_i and each wavelength are compared with the fresh ones. A stated "
         "number violates if a correct table would differ as much with a probability below 10⁻⁹."

@@ -116,7 +116,8 @@ TOLERANCE = FormatOption(
 
 FIXED = replace(
     TOLERANCE,
-    help="largest relative error of 99 % of the values against the table; the grid is fixed, a larger one is reported",
+    help="largest relative error of 99 % of the values against the table; the grid is fixed; "
+    "a larger error is reported",
 )
 
 MEGABYTES = FormatOption(

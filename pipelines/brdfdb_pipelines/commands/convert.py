@@ -25,13 +25,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="X=VALUE",
-        help="set a parameter instead of searching it, with the name and unit of recipes; may be repeated",
+        help="set a parameter instead of searching for it, with the name and unit of recipes; may be repeated",
     )
     parser.add_argument(
         "--refractive-index",
         metavar="ENTRY",
-        help="refractive index for models with n and k: shelf/book/page, or fit to search n and k (default: that of "
-        "the material, else fit)",
+        help="refractive index for models with n and k: shelf/book/page, or fit to search for n and k (default: that "
+        "of the material, else fit)",
     )
     parser.add_argument(
         "--weigh",

@@ -15,7 +15,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the files, the meaning of their columns, and the outputs."""
     parser.add_argument("files", nargs="+", type=place, metavar="FILE", help="a file of measurements, or a zarr group")
     add_reading(parser)
-    parser.add_argument("--join", action="store_true", help="join all files to one set of samples of the same surface")
+    parser.add_argument(
+        "--join", action="store_true", help="join all files into one set of samples of the same surface"
+    )
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     parser.add_argument("--out", type=place, metavar="FILE.nc", help="write the samples of a single file as netCDF")
     tables = parser.add_argument_group("tables")

@@ -42,7 +42,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--seed", type=int, default=0, metavar="N", help="the same seed draws the same set (default: %(default)s)"
     )
-    parser.add_argument("--gradients", action="store_true", help="also write the derivatives by the parameters")
+    parser.add_argument(
+        "--gradients", action="store_true", help="also write the derivatives with respect to the parameters"
+    )
     add_jobs(parser, "number of threads")
 
 

@@ -10,7 +10,7 @@ from brdfdb_pipelines.commands._arguments import add_store
 
 HELP = (
     "Verify the files of tables, families and snapshots: sizes, sha256, crc32c of each chunk, dimensions, attributes. "
-    "Print the command that repairs each damage."
+    "For all damage, print the command that repairs it."
 )
 
 
