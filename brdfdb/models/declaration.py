@@ -256,6 +256,7 @@ class _Declared:
         most = len(order)
         read = operator.itemgetter(*order) if len(order) > 1 else lambda given: tuple(given[name] for name in order)
         checks = tuple(self._check(parameter) for parameter in self.parameters)
+        optional = {parameter.name for parameter in self.optional}
         all_defaults = {name: signature.parameters[name].default for name in order}
         defaults = {name: value for name, value in all_defaults.items() if value is not inspect.Parameter.empty}
 
@@ -264,7 +265,7 @@ class _Declared:
             try:
                 arguments = signature.bind(*directions, **given)
             except TypeError as error:
-                raise TypeError(f"{self.function.__name__}() {error}") from None
+                raise TypeError(f"{plain.__name__}() {error}") from None
             arguments.apply_defaults()
             return arguments.args, arguments.kwargs
 
@@ -302,6 +303,9 @@ class _Declared:
         plain: Any = call if large else call_whole
         functools.update_wrapper(plain, self.function)
         plain.__signature__ = signature
+        returned = Floats if self.features else self.function.__annotations__.get("return", Any)
+        plain.__annotations__ = {name: ArrayLike | None if name in optional else ArrayLike for name in names}
+        plain.__annotations__["return"] = returned
         return cast(Callable[..., Any], plain if large else array_function(plain))
 
     def _check(self, parameter: Parameter) -> Callable[[Any], Any]:

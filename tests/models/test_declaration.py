@@ -3,7 +3,7 @@
 import inspect
 import pickle
 import re
-from typing import Any
+from typing import Any, get_type_hints
 
 import numpy as np
 import pytest
@@ -128,6 +128,8 @@ def test_three_forms_of_a_function_give_the_same_values() -> None:
     assert (dust.spec.name, dust.spec.reference, dust.spec.spectral) == ("dust", "seeliger1887", False)
     assert dust.spec.evaluate is dust
     assert inspect.signature(dust.vectors).parameters == inspect.signature(dust_of_arrays.vectors).parameters
+    for function in (dust, dust.vectors):
+        assert [*get_type_hints(function)] == [*inspect.signature(function).parameters, "return"]
     for words in (
         "\nw : array_like [1]\n    A weight, in [0, 1]; by default 0.5.\n",
         "\nout : array",

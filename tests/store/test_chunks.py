@@ -68,3 +68,6 @@ def test_a_wrong_checksum_and_a_missing_chunk_are_errors(group: Path) -> None:
     (group / "brdf" / "c" / "1" / "0").unlink()
     with pytest.raises(StoreError, match="brdf/c/1/0 is missing"):
         read_group(group, {})
+    for _, array in zarr.open_group(group, mode="r").arrays():
+        assert np.isnan(array.fill_value)  # zarr's own 0 would read as a black surface
+        assert [type(each).__name__ for each in array.compressors] == ["BloscCodec", "Crc32cCodec"]
