@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from functools import cached_property
 from typing import Any, NamedTuple, Self
 
 import numpy as np
@@ -251,11 +250,6 @@ class MeasuredSource(FunctionSource):
         wavelength_nm = None if self.wavelengths_nm is None else np.array(self.wavelengths_nm)
         label = _Label(self.name, self.title, self.provenance)
         return self._of(after, wavelength_nm, measured, label, turned=self.anisotropic)
-
-    @cached_property
-    def has_colours(self) -> bool:
-        """Return True if the data are colours, whose spectra are made up."""
-        return tuple(self._measured.channels) in _COLOURS
 
     def _check_function(self) -> None:
         """Take the data as they are."""

@@ -138,7 +138,7 @@ def numbers(layout: Layout, wi: Floats, wr: Floats) -> Floats:
 
 
 class NumberFactors(NamedTuple):
-    """What stored numbers are computed from: f_r [1/sr], shape (..., L), and mu = cos theta_i cos theta_r."""
+    """Sources of stored numbers: f_r [1/sr], shape (..., L), and mu = cos theta_i cos theta_r."""
 
     f_r: Floats
     mu: Floats

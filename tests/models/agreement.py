@@ -42,7 +42,7 @@ def check(values: Any, expected: Any, tolerance: float, arguments: object) -> No
 
 
 def conditioning(function: Callable[..., Any], arguments: tuple[float, ...]) -> float:
-    """How much a relative rounding of every argument moves the logarithm of a function, at most."""
+    """Return the largest change of the logarithm of a function for a relative rounding of each argument."""
     h = mp.mpf("1e-25")
     value = function(*arguments)
     moved = [function(*arguments[:i], mp.mpf(x) * (1 + h), *arguments[i + 1 :]) for i, x in enumerate(arguments)]

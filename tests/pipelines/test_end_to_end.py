@@ -1,4 +1,4 @@
-"""From a recipe to answers: tables are built and audited, and Python and a server look them up."""
+"""Tables of a recipe are built and audited, and Python and a server look them up."""
 
 from __future__ import annotations
 
