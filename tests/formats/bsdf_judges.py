@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from brdfdb.formats._channels import channels_of
-from brdfdb.formats.klems import Basis
+from brdfdb.integrals.patches import Basis
 from brdfdb.materials import Material
 from brdfdb.parameters import Floats
 from brdfdb.tables.albedo import directional_albedo

@@ -15,8 +15,9 @@ from brdfdb import formats
 from brdfdb.errors import ParameterError
 from brdfdb.formats import klems
 from brdfdb.formats._channels import channels_of
-from brdfdb.formats.klems import BASES, Basis, averages
+from brdfdb.formats.klems import averages
 from brdfdb.geometry import unit_vector
+from brdfdb.integrals.patches import BASES, Basis
 from brdfdb.measurements.statement import statement
 from brdfdb.parameters import Floats
 from brdfdb.tables.table import Table
