@@ -17,7 +17,7 @@ from brdfdb.mitsuba._surface import DIFFUSE, GLOSSY, SPECULAR, Facet, Formula, V
 from brdfdb.mitsuba._wavelengths import Columns, projection
 from brdfdb.store import open as open_store
 from brdfdb.tables._interpolation import prepared, weights_of_nodes
-from brdfdb.tables.polarisation import Facets
+from brdfdb.tables.polarisation import MuellerFacets
 from brdfdb.tables.sampler import LOBE_SHARE, Cells
 from brdfdb.tables.table import Table, table_from
 
@@ -211,9 +211,9 @@ def _combined(numbers: list[Any], weights: Array) -> Any:
 
 
 class _TableFacets:
-    """The polarisation of a table: `brdfdb.tables.polarisation.Facets`."""
+    """The polarisation of a table: `brdfdb.tables.polarisation.MuellerFacets`."""
 
-    def __init__(self, facets: Facets, table: Table, columns: Columns) -> None:
+    def __init__(self, facets: MuellerFacets, table: Table, columns: Columns) -> None:
         assert columns.at_nm is not None  # of all tables with Mueller matrices
         assert table.wavelength_nm is not None
         nodes = [radians(facets.theta_d_deg), *([table.wavelength_nm] if table.wavelength_nm.size > 1 else [])]

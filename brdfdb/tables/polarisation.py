@@ -41,7 +41,7 @@ _WITHIN_CELL = np.array([0.25, 0.5, 0.75])  # where a cell between nodes is meas
 
 
 @dataclass(frozen=True, eq=False)
-class Facets:
+class MuellerFacets:
     """The polarisation of a table in memory, at nodes (T,) of theta_d from 0 to 90 degrees.
 
     `elements` (T, L, 3) are m01, m22 and m23 over m00 of the facet, between bases of the plane of light and viewer.
@@ -100,14 +100,14 @@ class Facets:
         return matrix
 
 
-def facets_of(layout: Layout) -> Facets | None:
+def facets_of(layout: Layout) -> MuellerFacets | None:
     """Return the polarisation that a layout asks for; None if its table is unpolarised."""
     if layout.facet_theta_d_deg is None:
         return None
     assert layout.wavelength_nm is not None  # of all models with Mueller matrices
     source = polarised_source(layout.source)
     elements = _elements(layout.source, radians(layout.facet_theta_d_deg), layout.wavelength_nm).astype(np.float32)
-    return Facets(layout.facet_theta_d_deg, elements, source.depolarised(layout.wavelength_nm))
+    return MuellerFacets(layout.facet_theta_d_deg, elements, source.depolarised(layout.wavelength_nm))
 
 
 def _elements(source: Source, theta_d: Floats, wavelength_nm: NDArray[np.float64]) -> Floats:
@@ -139,7 +139,7 @@ def planned_theta_d(source: Source, wavelength_nm: NDArray[np.float64], toleranc
             )
 
 
-def checked_facets(arrays: Mapping[str, NDArray[Any]], wavelengths: int) -> Facets | None:
+def checked_facets(arrays: Mapping[str, NDArray[Any]], wavelengths: int) -> MuellerFacets | None:
     """Return the polarisation among stored arrays; None without it, ParameterError if the arrays do not fit."""
     if "mueller" not in arrays:
         return None
@@ -154,4 +154,4 @@ def checked_facets(arrays: Mapping[str, NDArray[Any]], wavelengths: int) -> Face
         raise ParameterError("mueller", f"shape {elements.shape} is not {expected}, of its axes")
     if depolarised.size not in (1, wavelengths):
         raise ParameterError("depolarised", f"{depolarised.size} values are neither one nor one for each wavelength")
-    return Facets(theta_d_deg, elements, np.atleast_1d(depolarised).astype(np.float64))
+    return MuellerFacets(theta_d_deg, elements, np.atleast_1d(depolarised).astype(np.float64))

@@ -34,7 +34,7 @@ from brdfdb.tables._interpolation import Axes, prepared
 from brdfdb.tables.grids import Axis, Grid, axes_among, check_wavelengths
 from brdfdb.tables.layout import PLAIN, Interpolation, Layout, rebuilt
 from brdfdb.tables.metadata import TableMetadata
-from brdfdb.tables.polarisation import Facets, checked_facets, facets_of
+from brdfdb.tables.polarisation import MuellerFacets, checked_facets, facets_of
 from brdfdb.tables.sampler import Sampler
 from brdfdb.tables.table_base import BaseTable
 
@@ -103,7 +103,7 @@ class Table(BaseTable):
     #: read them, (L,) [1]
     n: Axis | None = field(default=None, repr=False)
     k: Axis | None = field(default=None, repr=False)
-    facets: Facets | None = field(default=None, repr=False)  #: the polarisation; None of an unpolarised table
+    facets: MuellerFacets | None = field(default=None, repr=False)  #: the polarisation; None of an unpolarised table
 
     @classmethod
     def of(cls, layout: Layout, values: NDArray[np.float32], grid: Grid | None = None) -> Table:
@@ -386,7 +386,7 @@ class Table(BaseTable):
         return np.asarray(matrix, dtype=specular.dtype)
 
     @property
-    def _polarised(self) -> Facets:
+    def _polarised(self) -> MuellerFacets:
         if self.facets is None:
             raise ParameterError(
                 "polarised", f"the table of {self.name} is unpolarised; build it with polarised = true in its recipe"

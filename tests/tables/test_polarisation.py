@@ -18,7 +18,7 @@ from brdfdb.store.publication import publish_dataset, publish_layout
 from brdfdb.tables.grids import Grid
 from brdfdb.tables.layout import Layout
 from brdfdb.tables.planner import coarsest, plan
-from brdfdb.tables.polarisation import Facets, planned_theta_d
+from brdfdb.tables.polarisation import MuellerFacets, planned_theta_d
 from brdfdb.tables.table import Table
 from brdfdb.tables.tabulation import tabulate
 from tests.tables.made_up import material
@@ -168,5 +168,5 @@ def test_arrays_that_do_not_fit_are_refused(layout: Layout, tmp_path: Path, name
 
 
 def test_size_of_the_facets_counts(table: Table) -> None:
-    assert isinstance(table.facets, Facets)
+    assert isinstance(table.facets, MuellerFacets)
     assert table.nbytes > replace(table, facets=None).nbytes + table.facets.elements.nbytes
