@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -222,6 +222,22 @@ class Draw(NamedTuple):
 _WHOLE_RANGES = Draw()
 
 
+@dataclass(frozen=True, kw_only=True)
+class SurfaceRelation:
+    """The relation of a model to Gaussian surfaces, from which maps of its error against rays are made."""
+
+    facets: Literal["diffuse", "mirror"]
+    bounces: Literal["one", "two", "all"]  #: the bounces that the model states
+    words: str = ""  #: how the roughness follows from the surface; empty: it is the value that suits best
+    parameters: tuple[str, ...] = ()  #: parameters of the roughness, which have one value
+    per_slope: float | None = None  #: their value over the slope along an axis; None: the value that suits best
+    bounds: tuple[float, float] = (1e-4, 1.0)  #: range of a value that is fitted
+    arguments: Arguments = field(default_factory=dict, hash=False)  #: other arguments of the model
+    factor: bool = False  #: True if a factor in front of f_r is fitted, too: the lobe is not normalised
+    by_rho: bool = False  #: True if the errors depend on the albedo
+    only_fit: bool = False  #: True if slopes of the model have no variance, so that no Gaussian surface is its own
+
+
 @dataclass(frozen=True)
 class ModelSpec:
     """The specification of a model. No code outside the model's own modules knows a model by name.
@@ -255,7 +271,8 @@ class ModelSpec:
     uniform part is limited by energy conservation only. It returns the lowest cos theta_i [1] at which the largest
     reflectance is searched. `polarised` is the polarised form of the model; None: it is of unpolarised light.
     `gradient` is called as `vectors` is, and returns the `Gradient`; None: nobody has derived it.
-    `draw` says which materials training sets draw.
+    `draw` says which materials training sets draw. `surfaces` relates the model to Gaussian surfaces, with the default
+    arguments first; empty: it is compared with none.
     """
 
     name: str
@@ -288,6 +305,7 @@ class ModelSpec:
     polarised: Polarised | None = None
     gradient: Callable[..., Gradient] | None = None
     draw: Draw = _WHOLE_RANGES
+    surfaces: tuple[SurfaceRelation, ...] = ()
 
     def parameter(self, name: str) -> Parameter:
         """Return the parameter called `name`; KeyError if the model has none."""

@@ -9,7 +9,7 @@ import numpy as np
 from brdfdb._numba import elementwise, kernel
 from brdfdb.geometry import Directions
 from brdfdb.models.declaration import DeclaredModel
-from brdfdb.parameters import Floats, Parameter, white
+from brdfdb.parameters import Floats, Parameter, SurfaceRelation, white
 
 RHO = Parameter("rho", "c", "1", 0.0, 1.0, "albedo of a facet, for one scattering", reflectance=True)
 ROUGHNESS = Parameter("roughness", "r", "1", 0.0, 1.0, "0 is Lambert, 1 a layer of spheres")
@@ -170,6 +170,7 @@ _section, _evaluate = elementwise(_cross_section), elementwise(_vmf)
     excess="d'Eon and Weidlich 2024: the scatterings are fitted one by one; measured 1.14 at 89.9 degrees for rho = 1 "
     "and a roughness of 0.98",
     lossless=white,
+    surfaces=(SurfaceRelation(facets="diffuse", bounces="all", parameters=("roughness",), by_rho=True),),
 )
 def vmf_diffuse(directions: Directions, rho: Floats, roughness: Floats) -> Floats:
     """Return the BRDF [1/sr] of diffuse facets whose normals follow a von Mises-Fisher distribution.

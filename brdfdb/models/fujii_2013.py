@@ -10,7 +10,7 @@ from brdfdb._numba import elementwise, kernel, loop
 from brdfdb.geometry import Directions, Vectors, finished
 from brdfdb.models._rows import Out, by_rows_of_vectors
 from brdfdb.models.declaration import DeclaredModel
-from brdfdb.parameters import Floats, Parameter, white
+from brdfdb.parameters import Floats, Parameter, SurfaceRelation, white
 
 RHO = Parameter("rho", "ρ", "1", 0.0, 1.0, "albedo of the unnormalised lobe", reflectance=True)
 SIGMA = Parameter("sigma", "σ'", "1", 0.0, 1.0, "ratio of the non-diffuse to the diffuse term; 0 is Lambert")
@@ -50,6 +50,7 @@ def _vector_rows(w_i: Floats, w_r: Floats, scalars: NDArray[np.float64], f_r: Fl
     grazing_pole=True,
     grazing_power=0.0,
     lossless=white,
+    surfaces=(SurfaceRelation(facets="diffuse", bounces="one", parameters=("sigma",)),),
 )
 def oren_nayar_fujii(directions: Directions, out: Out, rho: Floats, sigma: Floats) -> Floats:
     """Return the BRDF [1/sr] of Fujii's form of the qualitative Oren-Nayar model, rho (A + B s / t).

@@ -24,7 +24,7 @@ from brdfdb.models._microfacets import (
 )
 from brdfdb.models._rows import Out
 from brdfdb.models.declaration import DeclaredModel, ModelFunction
-from brdfdb.models.walter_2007 import beckmann_separable, ggx_separable
+from brdfdb.models.walter_2007 import BECKMANN_SURFACE, GGX_SURFACE, beckmann_separable, ggx_separable
 from brdfdb.models.ward_1992 import ward
 from brdfdb.parameters import WAVELENGTH_NM, Arguments, Floats, FormKind, K, ModelForm, N, bytes_of
 
@@ -87,6 +87,7 @@ _EXCESS = (
     lobe=lobe_of_metal(GGX),
     lossless=lossless_metal,
     forms=ggx_forms,
+    surfaces=(GGX_SURFACE,),
 )
 def ggx(directions: Directions, out: Out, *parameters: Floats) -> Floats:
     """Return the BRDF [1/sr] of mirror facets with GGX slopes (Trowbridge-Reitz), of a metal or a dielectric.
@@ -146,6 +147,7 @@ def ggx_schlick(directions: Directions, out: Out, *parameters: Floats) -> Floats
     lobe=lobe_of_metal(GAUSSIAN),
     lossless=lossless_metal,
     forms=beckmann_forms,
+    surfaces=(BECKMANN_SURFACE,),
 )
 def beckmann(directions: Directions, out: Out, *parameters: Floats) -> Floats:
     """Return the BRDF [1/sr] of mirror facets with Gaussian slopes (Beckmann), of a metal or a dielectric.

@@ -9,7 +9,7 @@ from brdfdb._numba import loop
 from brdfdb.geometry import Directions, Vectors, finished
 from brdfdb.models._rows import Out, by_rows_of_vectors
 from brdfdb.models.declaration import DeclaredModel
-from brdfdb.parameters import Floats, Parameter, white
+from brdfdb.parameters import Floats, Parameter, SurfaceRelation, white
 
 RHO = Parameter("rho", "ρ", "1", 0.0, 1.0, "albedo", reflectance=True)
 
@@ -34,6 +34,7 @@ def _vector_rows(w_i: Floats, w_r: Floats, scalars: NDArray[np.float64], f_r: Fl
     grazing_power=0.0,
     lossless=white,
     highest_rung="the definition of an ideal diffuser",
+    surfaces=(SurfaceRelation(facets="diffuse", bounces="all", by_rho=True),),
 )
 def lambert(directions: Directions, out: Out, rho: Floats) -> Floats:
     """Return the BRDF [1/sr] of an ideal diffuser, rho / pi, the same in every direction.

@@ -49,6 +49,7 @@ from brdfdb.parameters import (
     N,
     Parameter,
     StatedLimit,
+    SurfaceRelation,
     standing,
     white,
 )
@@ -89,6 +90,15 @@ _FAR_BEYOND = 0.1
 _EXCESS = (
     "Oren and Nayar 1994, eqs 27, 28 and 30: near grazing and with an albedo near 1 the fit reflects up to "
     "5 % more than it receives, for sigma below 40 degrees"
+)
+
+_OF_SLOPE = SurfaceRelation(
+    facets="diffuse",
+    bounces="one",
+    words="sigma [rad] is the slope along an axis, as facets of small slopes have it",
+    parameters=("sigma",),
+    per_slope=1.0,
+    bounds=(1e-4, 1.5),
 )
 
 
@@ -270,6 +280,10 @@ _FUNCTIONAL = RowLoops(
     limits=_limits,
     slopes=Slopes(functional_gradient_rows, ("rho", "sigma")),
     draw=_DRAW,
+    surfaces=(
+        replace(_OF_SLOPE, bounces="two", by_rho=True, arguments={"interreflection": True}),
+        replace(_OF_SLOPE, arguments={"interreflection": False}),
+    ),
 )
 def oren_nayar(directions: Directions, out: Out, *parameters: Floats) -> Floats:
     """Return the BRDF [1/sr] of Lambertian V-cavities with Gaussian slopes, by the functional fit of the paper.
@@ -307,6 +321,10 @@ def _functional(directions: Directions, out: Out, *parameters: Floats) -> Floats
     limits=_limits,
     slopes=Slopes(qualitative_gradient_rows, ("rho", "sigma", "offset")),
     draw=_DRAW,
+    surfaces=(
+        replace(_OF_SLOPE, arguments={"offset": 0.33}),
+        replace(_OF_SLOPE, bounces="two", by_rho=True, arguments={"offset": 0.57}),
+    ),
 )
 def oren_nayar_qualitative(directions: Directions, out: Out, *parameters: Floats) -> Floats:
     """Return the BRDF [1/sr] of the qualitative model: the fit without its third term and without interreflection.
@@ -535,6 +553,7 @@ def single_slope_mean(
     highest_rung="facets integrated, eqs 8-20 and 47",
     limits=_limits,
     slow=True,
+    surfaces=(replace(_OF_SLOPE, bounces="two", by_rho=True),),
 )
 def oren_nayar_gaussian(directions: Directions, rho: Floats, sigma: Floats) -> Floats:
     """Return the BRDF [1/sr] of V-cavities with Gaussian slopes, integrated, which the fit `oren_nayar` approximates.

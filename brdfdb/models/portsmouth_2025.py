@@ -7,7 +7,7 @@ import numpy as np
 from brdfdb._elementary import arcsin
 from brdfdb._numba import kernel
 from brdfdb.models.declaration import DeclaredModel
-from brdfdb.parameters import Parameter, white
+from brdfdb.parameters import Parameter, SurfaceRelation, white
 
 RHO = Parameter("rho", "ρ", "1", 0.0, 1.0, "albedo of a single scattering; the albedo at 1", reflectance=True)
 ROUGHNESS = Parameter("roughness", "r", "1", 0.0, 1.0, "Fujii's mixing ratio; 0 is Lambert")
@@ -36,6 +36,7 @@ def _lost(cos_theta: float, sin_theta: float) -> float:
     grazing_pole=True,
     grazing_power=0.0,
     lossless=white,
+    surfaces=(SurfaceRelation(facets="diffuse", bounces="all", parameters=("roughness",), by_rho=True),),
 )
 def oren_nayar_energy_preserving(
     cos_i: float, sin_i: float, cos_r: float, sin_r: float, cos_dphi: float, rho: float, roughness: float

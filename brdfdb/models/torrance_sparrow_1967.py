@@ -14,7 +14,7 @@ from brdfdb.fresnel import unpolarised
 from brdfdb.geometry import Directions
 from brdfdb.lobes import Lobe
 from brdfdb.models.declaration import DeclaredModel
-from brdfdb.parameters import Floats, K, N, Parameter
+from brdfdb.parameters import Floats, K, N, Parameter, SurfaceRelation
 
 SIGMA = Parameter("sigma", "σ", "rad", 0.0, np.pi / 2, "standard deviation of the facets' slope angle")
 
@@ -74,6 +74,7 @@ def lobe(cos_i: Floats, *, sigma: ArrayLike, **_: ArrayLike) -> Lobe:
     # of 89.99. It exceeds 1 from a sigma of 12 degrees on, near normal incidence too
     excess="Oren and Nayar 1994, eq. 31: the lobe has the height 1 at any sigma and is not normalised; the factor "
     "k_s of eq. 32 is fitted",
+    surfaces=(SurfaceRelation(facets="mirror", bounces="one", parameters=("sigma",), bounds=(0.05, 1.5), factor=True),),
 )
 def torrance_sparrow(directions: Directions, sigma: Floats, n: Floats | None, k: Floats | None) -> Floats:
     """Return the BRDF [1/sr] of mirror-like facets with Gaussian slopes, a lobe of height 1 that is not normalised.

@@ -15,7 +15,18 @@ from brdfdb.models._microfacets import (
 )
 from brdfdb.models._rows import Out
 from brdfdb.models.declaration import DeclaredModel
-from brdfdb.parameters import WAVELENGTH_NM, Floats, K, N
+from brdfdb.parameters import WAVELENGTH_NM, Floats, K, N, SurfaceRelation
+
+GGX_SURFACE = SurfaceRelation(
+    facets="mirror", bounces="one", parameters=("alpha_x", "alpha_y"), bounds=(1e-2, 2.0), only_fit=True
+)
+BECKMANN_SURFACE = SurfaceRelation(
+    facets="mirror",
+    bounces="one",
+    words="alpha is sqrt(2) times the slope along an axis, exactly",
+    parameters=("alpha_x", "alpha_y"),
+    per_slope=2.0**0.5,
+)
 
 
 @DeclaredModel(
@@ -29,6 +40,7 @@ from brdfdb.parameters import WAVELENGTH_NM, Floats, K, N
     lobe_axes=("alpha_x", "alpha_y"),
     lobe=lobe_of_metal(GGX),
     lossless=lossless_metal,
+    surfaces=(GGX_SURFACE,),
 )
 def ggx_separable(directions: Directions, out: Out, *parameters: Floats) -> Floats:
     """Return the BRDF [1/sr] of GGX facets with the shadowing of light times that of viewer, as the paper prints it.
@@ -56,6 +68,7 @@ def ggx_separable(directions: Directions, out: Out, *parameters: Floats) -> Floa
     lobe_axes=("alpha_x", "alpha_y"),
     lobe=lobe_of_metal(GAUSSIAN),
     lossless=lossless_metal,
+    surfaces=(BECKMANN_SURFACE,),
 )
 def beckmann_separable(directions: Directions, out: Out, *parameters: Floats) -> Floats:
     """Return the BRDF [1/sr] of Gaussian facets with the paper's approximation of their shadowing.
