@@ -21,8 +21,8 @@ __all__ = ["__version__", "open", "presets"]
 # Rooms that are imported when they are first used; their modules are imported by name
 _ROOMS = (
     *("atlas", "audit", "derivatives", "formats", "forms", "fresnel", "gallery", "geometry", "integrals", "materials"),
-    *("measurements", "misprints", "mitsuba", "models", "refractive_indices", "roughness", "scenes", "spectra"),
-    *("store", "tables"),
+    *("measurements", "microgeometry", "misprints", "mitsuba", "models", "refractive_indices", "roughness", "scenes"),
+    *("spectra", "store", "tables"),
 )
 
 

@@ -164,6 +164,7 @@ EXTRAS = {
     "dask": ("distributed",),
     "http": ("fsspec", "aiohttp"),
     "measurements": ("scipy", "h5py"),
+    "microgeometry": ("embreex", "scipy", "SurfaceTopography", "tifffile", "PIL"),
 }
 
 
