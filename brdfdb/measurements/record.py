@@ -10,6 +10,7 @@ from brdfdb.measurements.extent import Extent
 
 _FEW = 1e-3  # smallest share of directions that is shown: it is counted with a few thousand directions
 _SHOWN = 12  # digits of a digest
+_LOW_DEG = 60.0  # light whose shadows are stated in words
 
 _STRICT = ConfigDict(frozen=True, extra="forbid")
 
@@ -74,6 +75,73 @@ class Change(BaseModel):
     changed: Spread
 
 
+class SimulationRecord(BaseModel):
+    """What rays on the facets of a surface have simulated, in place of a measurement."""
+
+    model_config = _STRICT
+
+    surface: str = Field(description="the surface in words")
+    facets: str = Field(description="the reflection of its facets in words")
+    slopes: list[float] = Field(
+        description="standard deviations of the slopes of the facets that rays met: of a made surface along x and y, "
+        "of a height map along its steepest axis and across it"
+    )
+    estimates: int = Field(description="realisations of a made surface, or estimates of the parts of a height map")
+    rays: int = Field(description="light paths of an estimate")
+    target: float = Field(description="relative standard error at which the simulation was to stop")
+    standard_error: float = Field(
+        description="largest relative standard error of the rays, where f_r exceeds a hundredth of its peak, for light "
+        "and viewer up to 82.5 degrees"
+    )
+    standard_error_lowest: float = Field(description="the same, with light and viewer at 87 degrees")
+    standard_error_of_map: float | None = Field(
+        description="the same up to 82.5 degrees, for the surface that the height map is a part of; null: it was made"
+    )
+    lights_deg: list[float] = Field(description="polar angles of the lights whose albedos follow")
+    one: list[float] = Field(description="share of the light that leaves after one bounce, mean over wavelengths")
+    two: list[float] = Field(description="the same after two bounces")
+    further: list[float] = Field(description="the same after more bounces")
+    in_shadow: list[float] = Field(
+        description="share of the area of the facets facing each of these lights that other facets shade; as much is "
+        "masked from a viewer there"
+    )
+    receivers: str = Field(description="light that is a mean over directions around the viewer; empty: none is")
+    shadows: str = Field(
+        default="", description="directions whose shadows may be longer than the height map; empty: there are none"
+    )
+
+    @property
+    def reached(self) -> bool:
+        """True if the standard error is below its target."""
+        return self.standard_error <= self.target
+
+    def in_words(self) -> list[str]:
+        """Return sentences on the surface, the light by bounces, and the standard error."""
+        steepest, across = self.slopes
+        albedo = self.one[0] + self.two[0] + self.further[0]
+        shares = [100.0 * part[0] / max(albedo, 1e-300) for part in (self.one, self.two, self.further)]
+        reached = "reached" if self.reached else "not reached"
+        low = min(range(len(self.lights_deg)), key=lambda number: abs(self.lights_deg[number] - _LOW_DEG))
+        lines = [
+            f"simulated by rays: {self.surface}; {self.facets}{f'; {self.receivers}' if self.receivers else ''}",
+            f"slopes of its facets: {steepest:.3g} and {across:.3g} (standard deviations)",
+            f"albedo at normal light {albedo:.3g}: {shares[0]:.3g} % of it after one bounce, {shares[1]:.2g} % after "
+            f"two, {shares[2]:.2g} % after more",
+            f"light at {self.lights_deg[low]:g} degrees: {100.0 * self.in_shadow[low]:.2g} % of the area of the facets "
+            f"facing it is in shadow",
+            f"standard error at most {100.0 * self.standard_error:.2g} % of f_r up to 82.5 degrees, where f_r exceeds "
+            f"a hundredth of its peak; the target of {100.0 * self.target:.2g} % was {reached} with {self.estimates} "
+            f"estimates of {self.rays} light paths; with directions at 87 degrees at most "
+            f"{100.0 * self.standard_error_lowest:.2g} %",
+        ]
+        if self.standard_error_of_map is not None:
+            lines.append(
+                f"the map is a part of a surface: for that, from its parts, the standard error is at most "
+                f"{100.0 * self.standard_error_of_map:.2g} %{f'; {self.shadows}' if self.shadows else ''}"
+            )
+        return lines
+
+
 class Measured(BaseModel):
     """The record of measured data in their table."""
 
@@ -102,6 +170,7 @@ class Measured(BaseModel):
     held_out: HeldOut | None = Field(default=None, description="null: f_r is known everywhere")
     noise: Noise | None = Field(default=None, description="null: not known")
     changes: list[Change] = Field(default_factory=list)
+    simulation: SimulationRecord | None = Field(default=None, description="null: an instrument measured, or a renderer")
 
     @property
     def chiral(self) -> bool:
@@ -126,6 +195,8 @@ class Measured(BaseModel):
         known = "f_r of a file, between its values" if self.extent else "f_r of a file, everywhere"
         of = f"{self.samples} samples of {self.incidences} incidences" if self.samples else known
         lines = [f"{of}, channels {', '.join(self.channels)}{f'; {self.by}' if self.by else ''}"]
+        if self.simulation is not None:
+            lines += self.simulation.in_words()
         if self.file:
             lines.append(f"file {self.file}, sha256 {self.file_sha256[:_SHOWN]}...")
         if self.held_out is not None:

@@ -48,6 +48,13 @@ class Published(NamedTuple):
     error: Error
 
 
+class StatedTable(NamedTuple):
+    """The files of a table, by their paths in its zarr group, and its measured error."""
+
+    files: dict[str, bytes]
+    error: Error
+
+
 def publish(
     root: str | os.PathLike[str],
     source: Source,
@@ -123,12 +130,22 @@ def publish_layout(
     The table records the request of a build if it is given, so that the same request is not built again. `values` are
     those of all blocks of the layout, if they are known already.
     """
-    root = path_of(root, "root")
+    stated = stated_table(layout, request, values=values)
+    return Published(*_published(path_of(root, "root"), name, stated.files), stated.error)
+
+
+def stated_table(
+    layout: Layout, request: Mapping[str, Any] | None = None, *, values: NDArray[np.float32] | None = None
+) -> StatedTable:
+    """Tabulate a layout in memory and measure its error; arguments as of `publish_layout`, which publishes it."""
+    from brdfdb.store.codec import dataset_files
+
     dataset = tabulate(layout, values)
     values = dataset[layout.variable].to_numpy()
     metadata = stated_metadata(layout, lambda rows: values[rows], request)
     assert metadata.error is not None
-    return Published(*publish_dataset(root, name, dataset.assign_attrs(metadata.attributes())), metadata.error)
+    checked = checked_dataset(layout.source.name, dataset.assign_attrs(metadata.attributes()))
+    return StatedTable(dataset_files(checked), metadata.error)
 
 
 def publish_dataset(root: str | os.PathLike[str], name: str, dataset: xr.Dataset) -> NewRevision:
@@ -156,20 +173,31 @@ def publish_dataset(root: str | os.PathLike[str], name: str, dataset: xr.Dataset
     """
     from brdfdb.store.codec import dataset_files
 
+    return _published(path_of(root, "root"), name, dataset_files(checked_dataset(name, dataset)))
+
+
+def _published(root: Path, name: str, files: Mapping[str, bytes]) -> NewRevision:
+    """Publish the files of a table; ParameterError if the name is not one of a material."""
     if not NAME.fullmatch(name):
         raise ParameterError("name", f"{name!r} is not made of lower-case letters, digits and single hyphens", name)
-    files = dataset_files(checked_dataset(name, dataset))
-    store = path_of(root, "root")
-    make_store(store)
-    with Lock(store, name):
-        staging = staged_path(store, name) / "dataset"
-        with writing(store, name):
+    make_store(root)
+    with Lock(root, name):
+        return publish_files(root, name, files)
+
+
+def publish_files(root: Path, name: str, files: Mapping[str, bytes]) -> NewRevision:
+    """Make a table, as its files, the current revision of its material; the caller holds the lock.
+
+    StoreError says that the store cannot be written.
+    """
+    staging = staged_path(root, name) / "dataset"
+    with writing(root, name):
+        shutil.rmtree(staging, ignore_errors=True)
+        try:
+            staging.mkdir()
+            return publish_staged(root, name, staging, write_files(staging / "table", files, staging))
+        finally:
             shutil.rmtree(staging, ignore_errors=True)
-            try:
-                staging.mkdir()
-                return publish_staged(store, name, staging, write_files(staging / "table", files, staging))
-            finally:
-                shutil.rmtree(staging, ignore_errors=True)
 
 
 def checked_dataset(name: str, dataset: xr.Dataset) -> xr.Dataset:

@@ -12,7 +12,7 @@ from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,7 @@ from brdfdb._numba import is_cached
 from brdfdb.errors import BusyError, ParameterError, StoreError
 from brdfdb.materials import FunctionSource, Material
 from brdfdb.models import MODELS
+from brdfdb.store.estimates import begin_estimates, estimates_path
 from brdfdb.store.family import FamilyRecord, Sweep
 from brdfdb.store.family_records import recorded, write_family
 from brdfdb.store.files import FileEntry
@@ -28,6 +29,7 @@ from brdfdb.store.lock import Lock, writing
 from brdfdb.store.paths import material_path, pointer_path
 from brdfdb.store.publication import NewRevision, publish_staged
 from brdfdb.store.records import make_store, point_to
+from brdfdb.store.revisions import standing
 from brdfdb.store.staging import Block, discard, prepare, remove_begun, write_block, write_frame
 from brdfdb.tables import _kernels
 from brdfdb.tables.layout import Layout
@@ -50,6 +52,9 @@ from brdfdb_pipelines.measured_job import MeasuredJob, MeasuredResult, build_mea
 from brdfdb_pipelines.recipe_file import Job, Recipe
 from brdfdb_pipelines.workers import Workers, WorkersError
 
+if TYPE_CHECKING:  # rays and their statistics take a second to load
+    from brdfdb_pipelines.simulated_job import SimulatedJob
+
 _LOOK_S = 2.0  # interval [s] at which silent workers are checked
 _PUBLISHED = 16  # tables that are published at once: each waits for the disk several times
 _POLL_S = 0.1  # interval [s] at which a lock of another build is tried again
@@ -65,7 +70,7 @@ class Built:
     the table is not unchanged. `shape` is empty unless the table was computed; `wavelengths` is 0 if it is grey.
     """
 
-    job: Job | MeasuredJob
+    job: Job | MeasuredJob | SimulatedJob
     state: str
     revision: str
     stored_bytes: int
@@ -116,13 +121,14 @@ def build(
     """
     jobs = recipe.jobs()
     measured = recipe.measured_jobs()
+    simulated = recipe.simulated_jobs()
     sweeps = recipe.sweeps(jobs)
     root = root.absolute()  # workers may be in another directory
     existed = root.exists()
     made = make_store(root)
     try:
         at = at if isinstance(at, Workers) else Workers(at, lambda: 1)
-        return _Builder(jobs, measured, sweeps, root, at, report, memory).run()
+        return _Builder(jobs, measured, simulated, sweeps, root, at, report, memory).run()
     except ParameterError:
         if made:
             remove_begun(root)
@@ -137,6 +143,7 @@ class _Builder:
 
     jobs: list[Job]
     measured: list[MeasuredJob]
+    simulated: list[SimulatedJob]
     sweeps: list[Sweep]
     root: Path
     at: Workers
@@ -157,11 +164,14 @@ class _Builder:
     def run(self) -> list[Built]:
         """Survey, tabulate and publish; return the result of each job in the order of the recipe."""
         start = time.perf_counter()
-        self.report({"event": "start", "tables": len(self.jobs) + len(self.measured), "store": str(self.root)})
+        others: list[MeasuredJob | SimulatedJob] = [*self.measured, *self.simulated]
+        names = [job.name for job in self.jobs] + [job.name for job in others]
+        self.report({"event": "start", "tables": len(names), "store": str(self.root)})
         try:
             self._survey()
             self._tabulate()
             self._build_measured()
+            self._simulate()
             self._measure_families()
         finally:  # cancel pending tasks, wait for running ones, and release the locks; staged blocks stay
             for future in self.running:
@@ -172,7 +182,6 @@ class _Builder:
                 table.lock.__exit__(None, None, None)
         if self.error is not None:
             raise self.error
-        names = [job.name for job in self.jobs] + [job.name for job in self.measured]
         built = [self.built[name] for name in names]
         states = [b.state for b in built]
         self.report(
@@ -373,17 +382,69 @@ class _Builder:
 
     def _build_measured(self) -> None:
         def begin(job: MeasuredJob) -> None:
-            def then(future: Future[MeasuredResult]) -> None:
-                if (result := self._result(job.name, future)) is not None:
-                    self.built[job.name] = Built(job, *result)
-                    event = {"event": result.state, "material": job.name, "revision": result.revision}
-                    more = {} if result.state == "unchanged" else {"bytes": result.bytes, "why": result.why}
-                    self.report({**event, **more})
-
             self.report({"event": "measuring", "material": job.name, "tables": len(self.measured)})
-            self._submit(then, build_measured, str(self.root), job)
+            self._submit(partial(self._of_data, job), build_measured, str(self.root), job)
 
         self._each(self.measured, begin)
+
+    def _of_data(self, job: MeasuredJob | SimulatedJob, future: Future[MeasuredResult]) -> None:
+        """Note the result of a job without a model."""
+        if (result := self._result(job.name, future)) is not None:
+            self.built[job.name] = Built(job, *result)
+            event = {"event": result.state, "material": job.name, "revision": result.revision}
+            more = {} if result.state == "unchanged" else {"bytes": result.bytes, "why": result.why}
+            self.report({**event, **more})
+
+    # Simulated tables: estimates by tasks, in rounds, and the table by one task
+
+    def _simulate(self) -> None:
+        if not self.simulated:
+            return
+        from brdfdb_pipelines import simulated_job as rays
+
+        for job in self.simulated:
+            self._claim(f"an estimate of {job.name}", job.task_bytes)
+            self.report({"event": "simulating", "material": job.name, "tables": len(self.simulated)})
+            lock = Lock(self.root, job.name, wait=False)
+            try:
+                lock.__enter__()
+            except BusyError:
+                self.report({"event": "waiting", "material": job.name})
+                lock = Lock(self.root, job.name)
+                lock.__enter__()
+            try:
+                folder = estimates_path(self.root, job.name, job.estimates_request)
+                missing = standing(self.root, job.name, job.request).state == "missing"
+                count = self._estimates(job, folder) if missing else 0
+            finally:
+                lock.__exit__(None, None, None)  # the task that publishes takes it
+            if count is not None:
+                self._submit(partial(self._of_data, job), rays.build_simulated, str(self.root), str(folder), job, count)
+        self._each((), lambda _: None)
+
+    def _estimates(self, job: SimulatedJob, folder: Path) -> int | None:
+        """Add estimates until they are enough; return their number, or None if a task failed."""
+        from brdfdb_pipelines import simulated_job as rays
+
+        def compute(numbers: range) -> bool:
+            failed: list[int] = []
+
+            def begin(number: int) -> None:
+                def then(future: Future[bool]) -> None:
+                    if (kept := self._result(job.name, future)) is None:
+                        failed.append(number)
+                    else:
+                        event = {"event": "estimate", "material": job.name, "number": number}
+                        self.report({**event, "of": numbers.stop, "kept": kept})
+
+                if not failed:
+                    self._submit(then, rays.estimate_simulated, str(folder), job, number)
+
+            self._each(numbers, begin)
+            return not failed
+
+        begin_estimates(folder, job.name, job.estimates_request)
+        return rays.estimates_needed(job, folder, compute, self.report)
 
     # Families
 

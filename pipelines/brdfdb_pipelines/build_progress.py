@@ -117,6 +117,21 @@ class Bars:
                     self._measured = self._begun("tabulating measured data", event["tables"], "tables")
                 self._measuring.add(name)
                 self._tables[name] = self._progress.add_task(f"  {name}, measured", total=None, rate="")
+            case "simulating":
+                self._tables[event["material"]] = self._progress.add_task(
+                    f"  {event['material']}, simulated", total=None, rate=""
+                )
+            case "estimate" if (task := self._tables.get(event["material"])) is not None:
+                self._progress.update(task, total=event["of"])
+                self._progress.advance(task)
+            case "judged":
+                far = f"standard error {100.0 * event['standard_error']:.2g} %"
+                if (task := self._tables.get(event["material"])) is not None:
+                    self._progress.update(task, total=event["next"], rate=far)
+                self._log(
+                    f"{event['material']}: {event['estimates']} estimates, {far}, "
+                    f"target {100.0 * event['target']:.2g} %"
+                )
             case "published" | "adopted" | "unchanged":
                 self._ended(event["material"])
 

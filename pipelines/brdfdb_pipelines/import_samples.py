@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json as _json
 import math
-import os
 import threading
 import time
 from collections.abc import Sequence
@@ -35,7 +34,7 @@ from brdfdb_pipelines.build import build
 from brdfdb_pipelines.build_progress import Bars, Event
 from brdfdb_pipelines.build_survey import machine_memory
 from brdfdb_pipelines.measured_job import MeasuredTable, measured_table
-from brdfdb_pipelines.recipe_file import Recipe
+from brdfdb_pipelines.recipe_file import Recipe, path_from
 from brdfdb_pipelines.workers import Workers, WorkersError
 
 if TYPE_CHECKING:  # the audit takes half a second to load
@@ -73,12 +72,7 @@ class ImportTarget:
 
     def define(self, folder: Path) -> dict[str, Any]:
         """Return the keys of the material in a recipe in a folder."""
-        paths = []
-        for file in map(Path.absolute, self.files):
-            try:
-                paths.append(Path(os.path.relpath(file, folder.absolute())).as_posix())
-            except ValueError:  # on another drive
-                paths.append(file.as_posix())
+        paths = [path_from(folder, file) for file in self.files]
         given = {key: value for key, value in self.keys.items() if value}
         return {"samples": paths[0] if len(paths) == 1 else paths, **given}
 
@@ -202,7 +196,7 @@ def run(
             document |= summary(audited, result.report)
         print(_json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False))
     elif result.report is not None and tables is not None:
-        _show(audited, result.report, tables.tolerance)
+        show_tables(audited, result.report, tables.tolerance)
     return result
 
 
@@ -404,7 +398,7 @@ def summary(tables: Sequence[ImportedTable], report: AuditReport) -> dict[str, A
     }
 
 
-def _show(tables: Sequence[ImportedTable], report: AuditReport, tolerance: float) -> None:
+def show_tables(tables: Sequence[ImportedTable], report: AuditReport, tolerance: float) -> None:
     """Print a row for each table, the problems of tables, and the summary."""
     print()
     shares = ("error_p95", "measured", "asymmetry_median", "asymmetry_p99", "uncertainty")

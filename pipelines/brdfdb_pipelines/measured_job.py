@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import BaseModel, BeforeValidator, Field, ValidationError
 
 from brdfdb import formats
@@ -20,11 +21,11 @@ from brdfdb.measurements.measured_source import MARGIN
 from brdfdb.place import path_of
 from brdfdb.store.lock import Lock, writing
 from brdfdb.store.paths import material_path, revision_path
-from brdfdb.store.publication import publish_layout
-from brdfdb.store.records import point_to, read_manifest
-from brdfdb.store.revisions import standing
+from brdfdb.store.publication import publish_files, stated_table
+from brdfdb.store.records import make_store, point_to, read_manifest
+from brdfdb.store.revisions import Standing, standing
 from brdfdb.tables.albedo import largest_albedo
-from brdfdb.tables.layout import TABLE_VERSION
+from brdfdb.tables.layout import TABLE_VERSION, Layout
 from brdfdb.tables.measured_layout import MeasuredLayout, tabulated
 from brdfdb.tables.table import Table
 from brdfdb_pipelines.recipe_grids import STRICT, RecipeError
@@ -171,7 +172,7 @@ def measured_job(name: str, fields: Mapping[str, Any], folder: Path | None, tole
     for path in paths:
         try:
             check_file(path)
-            digests.append(_sha256(path))
+            digests.append(sha256_of(path))
         except FileFormatError as error:
             raise RecipeError(f"define.{name}.samples", str(error)) from None
         except OSError as error:
@@ -179,11 +180,11 @@ def measured_job(name: str, fields: Mapping[str, Any], folder: Path | None, tole
     return MeasuredJob(name, tuple(path.absolute() for path in paths), ", ".join(digests), table, tolerance)
 
 
-def _sha256(path: Path) -> str:
+def sha256_of(path: Path) -> str:
     """Return the sha256 of a file, or of the names and digests of the files in the directory of a zarr group."""
     if path.is_dir():
         files = sorted(part for part in path.rglob("*") if part.is_file())
-        listing = "\n".join(f"{file.relative_to(path).as_posix()} {_sha256(file)}" for file in files)
+        listing = "\n".join(f"{file.relative_to(path).as_posix()} {sha256_of(file)}" for file in files)
         return hashlib.sha256(listing.encode()).hexdigest()
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
@@ -211,40 +212,60 @@ def build_measured(root: str, job: MeasuredJob) -> MeasuredResult:
     store = Path(root)
     request = job.request
     status = standing(store, job.name, request)
-    if status.state == "adoptable":
-        with Lock(store, job.name), writing(store, job.name):
-            point_to(material_path(store, job.name), status.revision)
     if status.state != "missing":
-        state = "unchanged" if status.state == "current" else "adopted"
-        stored = revision_bytes(store, job.name, status.revision)
-        return MeasuredResult(state, status.revision, stored, status.why)
+        return found(store, job.name, status)
     try:
-        layout, values = _tabulated(job)
-        published = publish_layout(store, job.name, layout, request, values=values)
+        layout, values = tabulated_lawfully(
+            job.source(), job.tolerance, reciprocal=job.table.reciprocal, conserving=job.table.conserving
+        )
+        return published(store, job.name, layout, request, values, status.why)
     except StoreError:
         raise
     except BrdfdbError as error:
         raise ParameterError(job.name, f"{job.files}: {error}") from None
+
+
+def found(root: Path, name: str, status: Standing) -> MeasuredResult:
+    """Return the result of a job whose table the store has, and make that revision the current one."""
+    if status.state == "adoptable":
+        with Lock(root, name), writing(root, name):
+            point_to(material_path(root, name), status.revision)
+    state = "unchanged" if status.state == "current" else "adopted"
+    return MeasuredResult(state, status.revision, revision_bytes(root, name, status.revision), status.why)
+
+
+def published(
+    root: Path, name: str, layout: Layout, request: Mapping[str, Any], values: NDArray[np.float32], why: str
+) -> MeasuredResult:
+    """Publish a new table, unless another build did; return the result of the job. `why` says why the table is new."""
+    staged = stated_table(layout, request, values=values)
+    make_store(root)
+    with Lock(root, name):
+        status = standing(root, name, request)
+        if status.state == "missing":
+            new = publish_files(root, name, staged.files)
+    if status.state != "missing":
+        return found(root, name, status)
     wavelengths = 0 if layout.wavelength_nm is None else layout.wavelength_nm.size
-    shape = tuple(layout.shape)
-    return MeasuredResult("published", published.revision, published.bytes, status.why, shape, wavelengths)
+    return MeasuredResult("published", new.revision, new.bytes, why, tuple(layout.shape), wavelengths)
 
 
-def _tabulated(job: MeasuredJob) -> MeasuredLayout:
-    """Tabulate the data, made reciprocal or energy-conserving where the job asks for it.
+def tabulated_lawfully(
+    source: MeasuredSource, tolerance: float, *, reciprocal: bool, conserving: bool
+) -> MeasuredLayout:
+    """Tabulate data to a tolerance, made reciprocal or energy-conserving where that is asked for.
 
     Interpolation can raise an albedo above 1 again: the data are then darkened further, in at most `_MARGINS` steps.
     """
-    source = job.source()
     wavelength_nm = None if source.wavelengths_nm is None else np.array(source.wavelengths_nm)
-    if job.table.reciprocal:
+    if reciprocal:
         source = source.made("reciprocal")
-    if not job.table.conserving:
-        return tabulated(source, wavelength_nm, job.tolerance)
+    if not conserving:
+        return tabulated(source, wavelength_nm, tolerance)
     margin = MARGIN
     for _ in range(_MARGINS):
         made = source.made("conserving", margin)
-        table = tabulated(made, wavelength_nm, job.tolerance)
+        table = tabulated(made, wavelength_nm, tolerance)
         largest = largest_albedo(Table.of(*table), made)
         if not largest.above_1:
             break

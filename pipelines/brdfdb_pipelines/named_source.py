@@ -36,5 +36,7 @@ def named_source(name: str, root: Path | None, recipe_path: Path | None) -> Name
     store = brdfdb.open(root) if root is not None and root.exists() else None
     if store is not None and name in store:
         return NamedSource(source_of_table(store[name]), store[name].wavelength_nm)
+    if name in (job.name for job in recipe.simulated_jobs()):
+        raise ParameterError(name, "is simulated; build the recipe first, and give the store", name)
     names = [*jobs, *measured, *(store or ())]
     raise ParameterError(name, f"no such material, neither in the store nor in the recipe{closest(name, names)}", name)

@@ -6,12 +6,13 @@ import fnmatch
 import functools
 import itertools
 import math
+import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,6 +42,11 @@ from brdfdb_pipelines import toml_file
 from brdfdb_pipelines.measured_job import MeasuredJob, measured_job
 from brdfdb_pipelines.recipe_grids import LIST, STRICT, Grids, Nodes, Range, RecipeError, nodes_of
 
+if TYPE_CHECKING:  # rays and their statistics take a second to load
+    from brdfdb_pipelines.simulated_job import SimulatedJob
+
+_SIMULATED = {"surface", "height_map"}  # keys of which simulated materials have one
+_WITHOUT_MODEL = {"samples", *_SIMULATED}  # keys of materials without a model
 _MOST_VALUES = 1 << 36  # values of a table: 275 GB
 _MOST_PATTERNS = 10_000  # names and patterns of a recipe; each is compared with every name
 _MOST_MEMBERS = 100_000  # members of all families of a recipe
@@ -192,7 +198,8 @@ class Recipe(BaseModel):
     )
     define: dict[str, dict[str, Any]] = Field(
         default={},
-        description="materials of your own, as in the preset files; with samples, a file, they are measured",
+        description="materials of your own, as in the preset files; with samples, a file, they are measured; with "
+        "surface or height_map they are simulated",
     )
     sweep: dict[str, dict[str, Any]] = Field(
         default={}, description="families of materials: written like a material, with lists as values of parameters"
@@ -200,6 +207,7 @@ class Recipe(BaseModel):
 
     _folder: Path | None = PrivateAttr(default=None)  # that relative paths of CSV files begin at
     _measured: list[MeasuredJob] = PrivateAttr(default=[])
+    _simulated: list[SimulatedJob] = PrivateAttr(default=[])
     _checked: list[Job] | None = PrivateAttr(default=None)  # jobs of this recipe, which does not change once it is read
 
     def jobs(self) -> list[Job]:
@@ -212,6 +220,11 @@ class Recipe(BaseModel):
         """Return a job for each table of measured data that the recipe asks for; errors as by `jobs`."""
         self.jobs()
         return [*self._measured]
+
+    def simulated_jobs(self) -> list[SimulatedJob]:
+        """Return a job for each table of a simulated surface that the recipe asks for; errors as by `jobs`."""
+        self.jobs()
+        return [*self._simulated]
 
     def _jobs(self) -> list[Job]:
         if (self.tolerance is None) == (self.grids is None):
@@ -233,11 +246,12 @@ class Recipe(BaseModel):
             except ParameterError as error:
                 raise RecipeError(error.parameter, error.sentence) from None
         jobs = []
-        selected = self._selected()
-        if self.polarised and self._measured:
-            raise RecipeError("polarised", f"{self._measured[0].name} is measured, and its polarisation is unknown")
-        if self.hot_spot_tolerance is not None and self._measured:
-            raise RecipeError("hot_spot_tolerance", f"is only for models, and {self._measured[0].name} is measured")
+        selected = self._selected(wavelengths)
+        for kind, others in (("measured", self._measured), ("simulated", self._simulated)):
+            if self.polarised and others:
+                raise RecipeError("polarised", f"{others[0].name} is {kind}, and its polarisation is unknown")
+            if self.hot_spot_tolerance is not None and others:
+                raise RecipeError("hot_spot_tolerance", f"is only for models, and {others[0].name} is {kind}")
         for named, family in selected:
             material = exact_material(named) if self.forms == "exact" and family is None else named
             wavelength_nm = None
@@ -297,12 +311,12 @@ class Recipe(BaseModel):
                 )
         return sweeps
 
-    def _selected(self) -> list[_Selected]:
+    def _selected(self, wavelengths: NDArray[np.float64] | None) -> list[_Selected]:
         known = {name: _Selected(material) for name, material in presets(self.library).items()}
         for name, table in self.define.items():
             if name in known:
                 raise RecipeError(f"define.{name}", "is the name of a preset; choose another name")
-            if "samples" in table:
+            if not _WITHOUT_MODEL.isdisjoint(table):
                 if not NAME.fullmatch(name):
                     raise RecipeError(f"define.{name}", "is not made of lower-case letters, digits and single hyphens")
                 continue
@@ -328,18 +342,31 @@ class Recipe(BaseModel):
             families[name] = list(members)
         chosen: dict[str, _Selected] = {}
         measured = {name: table for name, table in self.define.items() if "samples" in table}
+        simulated = {n: t for n, t in self.define.items() if n not in measured and not _SIMULATED.isdisjoint(t)}
         files: dict[str, MeasuredJob] = {}
+        surfaces: dict[str, SimulatedJob] = {}
         for pattern in self.materials:
             matches = fnmatch.filter(known, pattern)
             named = fnmatch.filter(measured, pattern)
             files |= {x: measured_job(x, measured[x], self._folder, self.tolerance) for x in named if x not in files}
+            of_rays = fnmatch.filter(simulated, pattern)
+            surfaces |= {x: self._of_rays(x, wavelengths) for x in of_rays if x not in surfaces}
             for family in fnmatch.filter(families, pattern):
                 matches += families[family]
-            if not matches and not named:
-                raise RecipeError("materials", _no_match(pattern, [*known, *measured, *families], self.library))
+            if not matches and not named and not of_rays:
+                names = [*known, *measured, *simulated, *families]
+                raise RecipeError("materials", _no_match(pattern, names, self.library))
             chosen |= {name: known[name] for name in matches}
         self._measured = list(files.values())
+        self._simulated = list(surfaces.values())
         return list(chosen.values())
+
+    def _of_rays(self, name: str, wavelengths: NDArray[np.float64] | None) -> SimulatedJob:
+        """Return the job of a simulated material; RecipeError if it cannot be built."""
+        from brdfdb_pipelines.simulated_job import simulated_job
+
+        at = None if wavelengths is None else wavelengths.tolist()
+        return simulated_job(name, self.define[name], self._folder, self.tolerance, at)
 
 
 def _parameters_of(model: Any) -> list[str]:
@@ -392,6 +419,14 @@ def _members(name: str, table: Mapping[str, Any], folder: Path | None) -> list[_
             raise RecipeError(f"sweep.{name}", f"{error.parameter}: {error.sentence}") from None
         members.append(_Selected(material, {"name": name, "parameters": at}))
     return members
+
+
+def path_from(folder: Path, file: Path) -> str:
+    """Return the path of a file as a recipe in a folder writes it: relative to the folder, if that is possible."""
+    try:
+        return Path(os.path.relpath(file.absolute(), folder.absolute())).as_posix()
+    except ValueError:  # on another drive
+        return file.absolute().as_posix()
 
 
 def load(path: Path | None = None, library: str = PAPERS, *, to_build: bool = True) -> Recipe:

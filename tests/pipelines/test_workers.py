@@ -171,6 +171,17 @@ def test_a_cluster_builds_what_threads_build_and_a_worker_that_is_killed_does_no
     assert other.stored_bytes == done.stored_bytes
 
 
+def test_a_cluster_simulates_what_threads_simulate(
+    cluster: tuple[str, list[subprocess.Popen[str]]], tmp_path: Path, capsys: Captured
+) -> None:
+    given = ("--surface", "gaussian", "--slope-deg", 20, "--rho", 1, "--nodes", 128, "--rays", 256, "--name", "rough")
+    given = (*given, "--standard-error", 0.3, "--tolerance", 0.1)
+    assert run("simulate", *given, "--store", tmp_path / "store", "--scheduler", cluster[0]) == 0
+    assert run("simulate", *given, "--store", tmp_path / "threads", "--jobs", 1) == 0
+    assert chunks(tmp_path / "store", "rough") == chunks(tmp_path / "threads", "rough")
+    capsys.readouterr()
+
+
 def test_a_scheduler_that_is_not_there_is_one_sentence(
     recipe: Path, tmp_path: Path, capsys: Captured, monkeypatch: pytest.MonkeyPatch
 ) -> None:
