@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from pydantic import BaseModel, Field
 
-from brdfdb.audit.finding import RANKS, STRICT, Cell, Finding, Sentence, Subject
+from brdfdb.audit.finding import RANKS, STRICT, Cell, Finding, Sentence, Subject, Word
 from brdfdb.materials import Material
 from brdfdb.materials.stated_limits import counts_of, in_words, limits_of
+from brdfdb.microgeometry.model_errors import SurfaceError, surface_error
 from brdfdb.parameters import Standing
 from brdfdb.tables.grids import Axis
 
@@ -34,11 +35,16 @@ class Validity(Finding):
     explanation = (
         "The parameters are compared with the limits that the paper states for its model. If the paper says “gentle” "
         "or “much less” without a number, values up to a tenth are inside, and values up to 1 at the edge. Validity "
-        "does not count for the verdict on a table, because the papers themselves go beyond these limits."
+        "does not count for the verdict on a table, because the papers themselves go beyond these limits. If errors "
+        "of the model against rays on surfaces are known, those at these parameters are stated, too."
     )
 
     limits: list[Limit]
     verdict: Standing = Field(description="worst of the known standings; inside: no limit is stated")
+    surface: SurfaceError | None = Field(
+        default=None,
+        description="error of the model against rays on the surface that suits the parameters; null: there is no map",
+    )
 
     @classmethod
     def judge(cls, subject: Subject) -> Finding:
@@ -48,8 +54,8 @@ class Validity(Finding):
         return validity_of(subject.source, subject.table.wavelength_nm)
 
     def sentences(self) -> list[Sentence]:
-        """Return a sentence on all limits, and one on each limit with the quotation from the paper."""
-        return [
+        """Return a sentence on all limits, one on each with the quotation from the paper, and one on rays."""
+        sentences = [
             self.sentence(self.verdict, in_words([limit.standing for limit in self.limits])),
             *(
                 self.sentence(
@@ -62,12 +68,19 @@ class Validity(Finding):
                 for limit in self.limits
             ),
         ]
+        if self.surface is not None:
+            word: Word = "compared" if self.surface.inside else "unknown"
+            sentences.append(self.sentence(word, self.surface.sentence, title="Surface"))
+        return sentences
 
     def cells(self) -> list[Cell]:
-        """Return the number of limits that are not met, or at the edge."""
+        """Return the number of limits that are not met, or at the edge, and the median error against rays."""
         standings = [limit.standing for limit in self.limits]
         edges = [words for word, words in counts_of(standings) if word in ("at the edge", "outside")]
-        text = ", ".join(words.replace(" ", f" of {len(self.limits)} limits ", 1) for words in edges)
+        texts = [words.replace(" ", f" of {len(self.limits)} limits ", 1) for words in edges]
+        if self.surface is not None:
+            texts.append(f"rays: {self.surface.in_lists}")
+        text = ", ".join(texts)
         return [Cell(self.verdict, text, -RANKS[self.verdict])]
 
 
@@ -78,4 +91,5 @@ def validity_of(material: Material, wavelength_nm: Axis | None) -> Validity:
         for limit in limits_of(material, wavelength_nm)
     ]
     known = [limit.standing for limit in limits if limit.standing != "unknown"]
-    return Validity(limits=limits, verdict=max(known, key=_ORDER.index, default="inside"))
+    verdict: Standing = max(known, key=_ORDER.index, default="inside")
+    return Validity(limits=limits, verdict=verdict, surface=surface_error(material))

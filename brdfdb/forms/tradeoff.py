@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Sequence
 from datetime import datetime
 from typing import Any, Literal
@@ -13,9 +14,11 @@ from pydantic import Field
 from brdfdb.figure import DocumentPart
 from brdfdb.forms import catalogue, sampler_efficiency, timing
 from brdfdb.forms.catalogue import SPECTRAL_TOLERANCES, Form, Kind, LeftOut, of_family
-from brdfdb.materials import Material, Source
+from brdfdb.forms.surface_rays import ChartedSurface, charted_surface
+from brdfdb.materials import Material, Source, exact_material
 from brdfdb.materials.provenance import Number
 from brdfdb.materials.spectrum import Spectrum
+from brdfdb.microgeometry.model_errors import SurfaceError, surface_error
 from brdfdb.parameters import Floats
 from brdfdb.store.family import Family, Sweep
 from brdfdb.tables import error_measurement
@@ -25,7 +28,7 @@ SEED = 1992
 BLOCK = 256  # directions of a call of medium size
 SINGLES = 21  # rounds of calls with one direction, and with `BLOCK` directions
 TIMED = timing.ROUNDS + 2 * SINGLES  # calls of `tick` during the timing
-STEPS = 4 + TIMED  # calls of `tick` for a chart
+STEPS = 5 + TIMED  # calls of `tick` for a chart
 SHARE = 0.99  # charted percentile
 CONFIDENCE = 0.95  # of the interval of this percentile
 
@@ -127,6 +130,9 @@ class Chart(DocumentPart):
     fronts: Fronts
     samplers: list[ChartedSampler]
     left_out: list[LeftOut] = Field(default=[], description="forms that cannot be made, such as a table too large")
+    surface: ChartedSurface | None = Field(
+        default=None, description="rays on the surface that suits the material; null: no map of errors for the truth"
+    )
 
 
 class FamilyCurve(ChartedForm):
@@ -175,6 +181,10 @@ class FamilyChart(DocumentPart):
         description="for each member, keys of the curves worth having in bulk, as in a chart, with the costs above"
     )
     left_out: list[LeftOutOfMember] = Field(default=[], description="forms that cannot be made of a member")
+    surface: list[SurfaceError | None] = Field(
+        default=[],
+        description="error of the truth of each member against rays on the surface that suits it; null: no map",
+    )
 
 
 class Charts(DocumentPart):
@@ -235,12 +245,11 @@ def chart(
         for key, (albedo, sphere) in sampler_efficiency.works(source, middle).items()
     ]
     tick()
+    surface = charted_surface(_truth(source, forms[0]))
+    tick()
     seconds = np.stack([cost.seconds for cost in batch], axis=1)
     rungs = [number for number, form in enumerate(forms) if form.kind in ("exact", "quadrature") and not form.rounded]
-
-    def front(costs: Floats) -> list[str]:
-        return _front(forms, [error["l1"] for error in errors], costs)
-
+    front = functools.partial(_front, forms, [error["l1"] for error in errors])
     return Chart(
         material=source.name,
         title=source.title,
@@ -266,6 +275,7 @@ def chart(
         ),
         samplers=samplers,
         left_out=offered.left_out,
+        surface=surface,
     )
 
 
@@ -371,7 +381,14 @@ def chart_family(
         ),
         fronts=fronts,
         left_out=left_out,
+        surface=[None if (exact := _truth(member, timed[0])) is None else surface_error(exact) for member in materials],
     )
+
+
+def _truth(source: Source, form: Form) -> Material | None:
+    """Return the material whose model is the first form of a source; None if that is no model of the registry."""
+    exact = exact_material(source) if isinstance(source, Material) else None
+    return exact if exact is not None and form.python == f"models.{exact.model}" else None
 
 
 def _forms_of_members(

@@ -20,6 +20,7 @@ from brdfdb.materials import written_name
 from brdfdb.materials.provenance import KnownExcess
 from brdfdb.materials.spectrum import Spectrum
 from brdfdb.measurements.record import Measured
+from brdfdb.microgeometry.model_errors import SurfaceError, surface_error_of
 from brdfdb.models import MODELS
 from brdfdb.store.records import read_metadata
 from brdfdb.store.summary_words import NOT_AUDITED
@@ -158,6 +159,9 @@ class Line(BaseModel):
         default=None, description="of the table: relative error that 99 of 100 values keep to; null: not measured"
     )
     formula_error: FormulaRung | None = Field(default=None, description="of its formula; null: not measured")
+    surface_error: SurfaceError | None = Field(
+        default=None, description="of its formula against rays on the surface that suits the material; null: no map"
+    )
     largest_albedo: LargestAlbedo | None = Field(default=None, description="with the specular part; null: not measured")
     spectrum: SpectrumKind | None = None
     verdict: str | None = Field(default=None, description="of the audit of this revision; null: it has none")
@@ -186,6 +190,7 @@ def line_of(name: str, group: Path, head: Mapping[str, Any]) -> dict[str, Any]:
         "spectrum": spectrum_of(metadata.wavelength_range_nm),
         "incomplete": metadata.gaps or None,
         "formula_error": None if metadata.formula_error is None else metadata.formula_error.in_lists(),
+        "surface_error": surface_error_of(metadata.model, metadata.parameters),
         "largest_albedo": None if metadata.largest_albedo is None else metadata.largest_albedo.model_dump(mode="json"),
         "revision": group.name,
         **{key: head.get(key) for key in ("error_p99", "created", "bytes")},
@@ -320,6 +325,9 @@ class MaterialDocument(BaseModel):
         description="origin, symmetries and errors of measured data; null: the values are a model's or a function's"
     )
     formula_error: FormulaError | None = Field(description="of the model against the highest rung; null: not measured")
+    surface_error: SurfaceError | None = Field(
+        description="of the model against rays on the surface that suits the material; null: there is no map for it"
+    )
     largest_albedo: LargestAlbedo | None = Field(description="specular part included; null: not measured")
     incomplete: str | None = Field(description="what the table does not state of itself; null: nothing")
     audit: ShownAudit | None = Field(description="null: none")
@@ -347,6 +355,7 @@ def material_document(table: Table, verdict: Verdict | None) -> dict[str, Any]:
         "error": None if table.error is None else attributes["error"],
         "measured": None if metadata.measured is None else metadata.measured.model_dump(exclude={"extent"}),
         "formula_error": attributes.get("formula_error"),
+        "surface_error": surface_error_of(metadata.model, metadata.parameters),
         "largest_albedo": attributes.get("largest_albedo"),
         "incomplete": metadata.gaps or None,
         "audit": None if verdict is None else verdict.document(table),

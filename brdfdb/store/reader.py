@@ -51,7 +51,7 @@ from brdfdb.store.records import (
     read_snapshot,
     whole_revisions,
 )
-from brdfdb.store.summary_words import COLUMNS, colours, energy, formula_error, kind, last_audit
+from brdfdb.store.summary_words import COLUMNS, colours, energy, formula_error, kind, last_audit, surface_error
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -106,21 +106,23 @@ class Store(Mapping[str, "Table"]):
         for name in self:
             try:
                 head = self.summary(name)
+                surface = surface_error(head, self.path(name))
             except StoreError as error:
-                rows.append((name, str(error), *[""] * 6))
+                rows.append((name, str(error), *[""] * 7))
                 continue
             audited = audits.get((name, head["revision"]))
             rows.append(
                 (
                     *(name, head["title"], kind(head), colours(head), percent(head.get("error_p99"))),
-                    formula_error(head, percent),
+                    *(formula_error(head, percent), surface),
                     "" if audited is None else audited.as_published,
                     energy(head, audited),
                 )
             )
         families = len(self.families())
         title = f"{len(rows)} materials" + (f", {families} families" if families else "")
-        columns = ("material", "title", "model", "colours", "table error (p99)", "formula error (p99)", *COLUMNS)
+        errors = ("table error (p99)", "formula error (p99)", "surface error")
+        columns = ("material", "title", "model", "colours", *errors, *COLUMNS)
         return listing("Store", str(self.root), title, columns, rows)
 
     def __iter__(self) -> Iterator[str]:

@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from brdfdb.errors import near_90
-from brdfdb.store.files import sha256_of
-from brdfdb.store.paths import NAME, manifest_path, number_of, revision_path
+from brdfdb.microgeometry.model_errors import has_map, surface_error_of
+from brdfdb.store.files import read_json, sha256_of
+from brdfdb.store.paths import METADATA, NAME, manifest_path, number_of, revision_path
 
 NOT_MEASURED = "not measured"
 NOT_AUDITED = "not audited"
@@ -18,6 +19,7 @@ ERRORS_EXPLAINED = (
     "table error: of the table relative to its formula, or to the data if it is measured; formula error: of the "
     "formula relative to the exact form of the same model; 0, exact form: the formula is exact"
 )
+SURFACE_EXPLAINED = "surface error: of the formula relative to rays on surfaces that suit the material, in the median"
 COLUMNS = ("what the paper says?", "model conserves energy?")  # headings of the two answers
 
 REPORT_OF_ALL = "audit.json"  # in a store: the report on all its materials
@@ -100,6 +102,19 @@ def formula_error(head: Mapping[str, Any], percent: Callable[[float], str]) -> s
     if stated["against"] == "measured":
         return percent(stated["p99"])
     return "0, exact form" if stated["against"] == "highest rung" else "no exact form"
+
+
+def surface_error(head: Mapping[str, Any], group: Path) -> str:
+    """Return the error of a formula against rays on the surface that suits a material, in words; empty without a map.
+
+    It is computed from the parameters of the table in the directory of a revision, of which the pointer has none, and
+    never stored: a newer map is shown at once. StoreError if the table cannot be read.
+    """
+    if not has_map(head["model"]):
+        return ""
+    attributes = read_json(group / METADATA).get("attributes", {})
+    error = surface_error_of(head["model"], attributes.get("parameters", {}))
+    return "" if error is None else error.in_lists
 
 
 def energy(head: Mapping[str, Any], audited: Audited | None) -> str:

@@ -27,6 +27,7 @@ from brdfdb.formats import EXPORTERS
 from brdfdb.geometry import degrees
 from brdfdb.materials import Material
 from brdfdb.materials.provenance import Assumption
+from brdfdb.microgeometry.model_errors import NO_MAP, surface_error_of
 from brdfdb.scenes.lit_sphere import lit_sphere
 from brdfdb.store.reader import Store
 from brdfdb.tables.table import Table
@@ -210,6 +211,8 @@ def _table(stored: Table) -> str:
     rows.append(("error of the table", f"**{stated}** (median {overall.median:.2g}, largest {overall.max:.2g})"))
     largest = "" if error.worst is None else f" The largest: {plain(error.worst.why)}."
     rows.append(("error of the formula", _formula(stored)))
+    surface = surface_error_of(metadata.model, metadata.parameters)
+    rows.append(("against a surface", NO_MAP if surface is None else plain(surface.sentence)))
     parts = [table(("axis or quantity", "stored"), rows), f"{largest}\n"]
     bands = [f"{low:g} to {high:g}" for low, high in itertools.pairwise(error.theta_i_deg)]
     worst = [f"{max(row):.2g}" for row in error.p99]

@@ -28,6 +28,7 @@ _MARKS: dict[Word, str] = {
     "at the edge": "≈",
     "unknown": "?",
     "not judged": "–",
+    "compared": "±",
     "outside": "!",
     "gains": "!",
     "known published excess": "!",

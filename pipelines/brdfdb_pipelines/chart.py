@@ -137,6 +137,8 @@ def _subjects(names: Sequence[str], root: Path | None, recipe_path: Path | None)
                 raise BrdfdbError(f"{name}: the family cannot be charted, because a table of it names no known model")
             subjects.append(_Family(family.record, materials, family.wavelength_nm, family))
             continue
+        elif name in (job.name for job in recipe.simulated_jobs()):
+            raise ParameterError(name, "is simulated; build the recipe first, and give the store", name)
         else:
             others = "the recipe" if recipe_path else "the presets; `brdfdb list --presets` prints their names"
             raise ParameterError(name, f"no such material or family, neither in the store nor among {others}", name)
@@ -201,11 +203,17 @@ def _print(one: Chart) -> None:
         )
         for point in one.points
     ]
+    if one.surface is not None:
+        off = f"truth {one.surface.error.in_lists} off" if one.surface.error.inside else ""
+        ns = "" if one.surface.cost is None else terminal.count(one.surface.cost.ns)
+        rows.append(("", "surface", one.surface.title, off, *[""] * 4, ns, *[""] * 5))
     errors = ("mean error", "p99 (95 % interval)", "forward", "back", "grazing")
     numbers = (*errors, "ns a value", "ns, 256", "ns, one", "ns, in turn", "times as fast as its rung", "bytes")
     terminal.print_table(f"{one.material}: {one.title}", ("", "key", "form", *numbers), rows, numbers=numbers)
     for out in one.left_out:
         print(f"  left out: {out.title}: {out.reason}")
+    if one.surface is not None:
+        print(f"  surface: {' '.join(chart_picture.of_surface(one.surface))}")
     points = {point.key: point for point in one.points}
     phrases = []
     for point in (points[key] for key in one.fronts.batch):
@@ -233,6 +241,13 @@ def _print_family(family: FamilyChart) -> None:
                 middle = chart_picture.middle([curve.l1[index] for index in alike])
                 cells.append("-" if middle is None else f"{'*' if chosen else ''}{percent(middle)}")
             rows.append((curve.key, curve.title, terminal.count(curve.batch.ns), *cells))
+        if any(family.surface):
+            cells = []
+            for alike in chart_picture.along(family, axis):
+                errors = [error.median for index in alike if (error := family.surface[index]) is not None]
+                middle = chart_picture.middle(errors)
+                cells.append("-" if middle is None else percent(middle))
+            rows.append(("surface", "truth against rays on Gaussian surfaces, median", "", *cells))
         columns = [f"{value:g}" for value in values]
         if family.diagnostic is not None and len(family.axes) == 1:
             rows.insert(0, ("", family.diagnostic.title, "", *map(terminal.count, family.diagnostic.values)))

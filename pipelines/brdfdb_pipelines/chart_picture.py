@@ -18,6 +18,7 @@ from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullLocat
 
 from brdfdb.errors import counted
 from brdfdb.forms.catalogue import Kind
+from brdfdb.forms.surface_rays import ChartedSurface
 from brdfdb.forms.tradeoff import (
     BetweenMembers,
     Chart,
@@ -29,6 +30,7 @@ from brdfdb.forms.tradeoff import (
     FamilyCurve,
     FamilyDiagnostic,
 )
+from brdfdb.microgeometry.model_errors import SurfaceError
 from brdfdb_pipelines import figure_canvas, terminal
 from brdfdb_pipelines.figure_look import GRID, MUTED, OTHERS, OURS, PRINTED, TEXTBOOK, TRUTH
 
@@ -62,6 +64,9 @@ _FAMILY_HEADS = ("mean: least", "median", "most", "within 1 %", "p99: median", "
 
 _SMALLEST = 1e-6  # smaller errors are drawn here: those of the exact form, and of forms that differ by rounding
 _HIGHEST = 10.0  # largest error of a family that is drawn: ten times the reflected light
+_SURFACE = "S"  # stands for the surface where forms have numbers
+_EARTH = OTHERS[1]
+_DOTS = (0, (1, 1.5))
 CLOSE = 0.01  # mean error below which a form replaces the exact one
 _LEADER: dict[str, Any] = {"arrowstyle": "-", "color": MUTED, "linewidth": 0.5}
 _DASHES: tuple[Any, ...] = ("-", (0, (5, 2)), (0, (1, 1.5)), (0, (5, 1.5, 1, 1.5)), (0, (9, 3)))
@@ -124,6 +129,17 @@ def quartiles(cost: Cost) -> str:
 def against(point: ChartPoint) -> str:
     """Return the speed of a form relative to the cheapest rung of the exact form that is as accurate, and that rung."""
     return "" if point.saving is None else f"{terminal.count(float(f'{point.saving.times:.2g}'))} ({point.rung})"
+
+
+def of_surface(surface: ChartedSurface) -> list[str]:
+    """Return how far the truth is from the surface, and what rays on the surface cost, in sentences for a line each."""
+    lines = [surface.error.sentence]
+    if surface.error.inside:
+        lines.append("This is the error of the truth. The errors of the forms are relative to the truth.")
+    if surface.cost is not None:
+        ns, error = terminal.count(surface.cost.ns), terminal.error(surface.cost.standard_error)
+        lines.append(f"Rays take {ns} ns a value for a standard error of {error}.")
+    return lines
 
 
 def works(sampler: ChartedSampler) -> tuple[str, ...]:
@@ -209,6 +225,12 @@ class _Row(NamedTuple):
     form: ChartedForm
     cells: tuple[str, ...]
     bold: bool
+
+
+def _against_rays() -> Line2D:
+    """Return the line of the legend for the error of the truth."""
+    label = "truth against rays, median"
+    return Line2D([], [], color=_EARTH, linestyle=_DOTS, marker="*", linewidth=1.0, label=label)
 
 
 def _wavelengths(chart: Chart | FamilyChart) -> str:
@@ -368,7 +390,8 @@ class _CostPanel(NamedTuple):
 def _material(chart: Chart) -> Canvas:
     """Draw panels of error over time and bytes with their fronts, a table of all forms, and the samplers."""
     table = _ABOVE + _PLOT + _BELOW
-    samplers = table + _ROW * (len(chart.points) + len(chart.left_out) + 3)
+    below = 0 if chart.surface is None else 1 + len(of_surface(chart.surface))
+    samplers = table + _ROW * (len(chart.points) + len(chart.left_out) + below + 3)
     subtitle = "Lines go up from the mean error to the 99th percentile, thick over its 95 % confidence interval."
     times = "Bars are quartiles of the time."
     if len(chart.ladder) > 1:
@@ -404,6 +427,8 @@ def _material(chart: Chart) -> Canvas:
     lines = [Line2D([], [], color=OURS, linewidth=5.0, alpha=0.16, label="front")]
     if len(chart.ladder) > 1:
         lines.append(Line2D([], [], color=TRUTH, linestyle=(0, (4, 2)), linewidth=1.0, label="ladder"))
+    if chart.surface is not None and chart.surface.error.inside:
+        lines.append(_against_rays())
     sheet.legend({point.kind for point in chart.points}, lines, _ABOVE + _PLOT)
     fronts = {*chart.fronts.batch, *chart.fronts.single}
     rows = []
@@ -417,6 +442,12 @@ def _material(chart: Chart) -> Canvas:
     sheet.table(COLUMNS, (*error_heads, *cost_heads), rows, table)
     for number, out in enumerate(chart.left_out, len(rows) + 1):
         sheet.row(COLUMNS[:2], number, ("–", f"{out.title}: cannot be made. {out.reason}"), table, color=MUTED)
+    if chart.surface is not None:
+        number = len(rows) + len(chart.left_out) + 1
+        ns = "" if chart.surface.cost is None else terminal.count(chart.surface.cost.ns)
+        sheet.row(COLUMNS[:8], number, (_SURFACE, chart.surface.title, *[""] * 5, ns), table, color=_EARTH)
+        for line, sentence in enumerate(of_surface(chart.surface), number + 1):
+            sheet.row(COLUMNS[:2], line, ("", sentence), table, color=_EARTH)
     _samplers(sheet, chart, samplers)
     return sheet.canvas
 
@@ -452,7 +483,9 @@ def _samplers(sheet: Sheet, chart: Chart, top: float) -> None:
 def _panel(axes: Axes, chart: Chart, panel: _CostPanel, *, named: bool) -> None:
     points = {point.key: point for point in chart.points}
     costs = {key: panel.cost(point) for key, point in points.items()}
-    _cost_axes(axes, [c[0] for c in costs.values()] + [c[2] for c in costs.values()], [p.p99 for p in chart.points])
+    rays = chart.surface.cost if chart.surface is not None and named else None
+    ends = [end for low, _, high in costs.values() for end in (low, high)] + ([rays.ns] if rays else [])
+    _cost_axes(axes, ends, [p.p99 for p in chart.points])
     steps: list[tuple[float, float]] = []
     for key in panel.front:  # down in error, then across: there is nothing clearly cheaper below
         corner = costs[key][1], _height_of(points[key].l1)
@@ -481,6 +514,12 @@ def _panel(axes: Axes, chart: Chart, panel: _CostPanel, *, named: bool) -> None:
         full = f"{numbers[key]} {points[key].title}" if named else numbers[key]
         least = full if key in panel.front else numbers[key]
         labels.append(_PointLabel(least, full, costs[key][1], _height_of(points[key].l1), key in panel.front))
+    if chart.surface is not None and chart.surface.error.inside:
+        y = _height_of(max(chart.surface.error.median or 0.0, chart.surface.error.noise or 0.0))
+        axes.axhline(y, color=_EARTH, linestyle=_DOTS, linewidth=1.0, zorder=1.5)
+        if rays is not None:
+            axes.plot(rays.ns, y, "*", color=_EARTH, markersize=7.0, zorder=3)
+            labels.append(_PointLabel(_SURFACE, f"{_SURFACE} rays", rays.ns, y, False))
     _labelled(axes, labels)
 
 
@@ -504,7 +543,8 @@ def _family(family: FamilyChart) -> Canvas:
     for number, axis in enumerate(family.axes):
         top = _FAMILY_ABOVE + number * _FAMILY_ROW
         mean = sheet.axes(_LEFT, top, _MEAN)
-        _sweep(mean, family, axis, lambda curve: curve.l1, None if family.between is None else family.between.l1)
+        between_l1 = None if family.between is None else family.between.l1
+        _sweep(mean, family, axis, lambda curve: curve.l1, between_l1, family.surface)
         mean.set_ylabel("mean error against the truth")
         _named(mean, family, axis)
         if family.diagnostic is None or len(family.axes) > 1:
@@ -518,7 +558,8 @@ def _family(family: FamilyChart) -> Canvas:
     left = tails_left + _TAIL + 2.0 * _GAP
     _family_costs(sheet.axes(left, _FAMILY_ABOVE, _WIDTH - _RIGHT - left), family)
     bar = Line2D([], [], color=MUTED, linewidth=3.0, alpha=0.3, label="from the least to the most of the members")
-    sheet.legend({form.kind for form in forms}, [bar], bottom)
+    lines = [bar, *([_against_rays()] if len(family.axes) == 1 and any(e and e.inside for e in family.surface) else [])]
+    sheet.legend({form.kind for form in forms}, lines, bottom)
     rows = []
     for form in forms:
         times = terminal.count(form.batch.ns), terminal.count(form.single.ns)
@@ -542,8 +583,12 @@ def _sweep(
     axis: str,
     errors: Callable[[FamilyCurve], list[float | None]],
     between: float | None,
+    surface: Sequence[SurfaceError | None] = (),
 ) -> None:
-    """Draw errors along one parameter; forms worth having at most members of a value are drawn large."""
+    """Draw errors along one parameter; forms worth having at most members of a value are drawn large.
+
+    The errors of the truth against surfaces are drawn along the parameter of a family that has no other.
+    """
     x = family.axes[axis]
     _error_axis(axes, _HIGHEST)
     if x[0] > 0.0 and x[-1] > 8.0 * x[0]:
@@ -569,6 +614,9 @@ def _sweep(
             chosen = 2 * sum(curve.key in family.fronts[m] for m in members[index]) > len(members[index])
             size = 6.5 if chosen else 2.8
             axes.plot(value, height, mark.marker, color=mark.colour, markerfacecolor=fill, markersize=size, zorder=3)
+    if surface and len(family.axes) == 1:
+        heights = [math.nan if error is None or error.median is None else _height_of(error.median) for error in surface]
+        axes.plot(x, heights, color=_EARTH, linestyle=_DOTS, marker="*", markersize=5.0, linewidth=1.0)
     if between is not None:
         axes.axhline(_height_of(between), color=_MARKS["table"].colour, linestyle=(0, (3, 2)), linewidth=0.9)
 

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 import brdfdb
+from brdfdb.microgeometry.model_errors import surface_error_of
 from tests.api.a_store import serving
 from tests.api.chromium import Chromium, chosen, copied, curve, idle, milliseconds, shown, visit
 
@@ -114,6 +115,16 @@ def test_a_verdict_is_a_sentence_and_its_details_are_folded(chromium: Chromium, 
     assert table[-1, 1] < limit[-1, 1] < table[0, 1]  # 1.2, 1 and 0.5, from the top
     visit(chromium, f"{address}#material=scene-copper-sphere", "material=scene-copper-sphere")
     assert "This audit is of revision r000009" in chromium.evaluate("facts.textContent")
+
+
+def test_the_error_against_a_surface_is_the_sentence_of_all_views(chromium: Chromium, own: Path) -> None:
+    felt = brdfdb.open(own)["grey-felt"].metadata
+    error = surface_error_of(felt.model, felt.parameters)
+    assert error is not None
+    with serving(own) as served:
+        for name, said in (("grey-felt", error.sentence), ("copper-foil", "not compared with rays")):
+            visit(chromium, f"{served}#material={name}", f"material={name}")
+            assert f"Of the formula against a surface{said}" in chromium.evaluate("facts.textContent")
 
 
 def test_the_list_has_pictures_and_marks_only_what_is_wrong(chromium: Chromium, address: str) -> None:

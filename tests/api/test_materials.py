@@ -47,6 +47,7 @@ def test_catalogue(client: Client, store: Store) -> None:
         "model_title": store.metadata("copper-foil").model_title,
         "paper": "he1991",
         "source": "no paper, copper-foil",
+        "surface_error": None,
         "measured": False,
         "anisotropic": False,
         "wavelength_range_nm": [400.0, 700.0],

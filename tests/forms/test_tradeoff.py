@@ -253,3 +253,12 @@ def test_a_form_that_some_members_lack_is_timed_where_it_is(monkeypatch: pytest.
     assert curves["ten-terms"].l1[1] is None
     assert "ten-terms" not in found.fronts[1]
     assert len(ticks) == len(materials) + timing.ROUNDS + 2 * charting.SINGLES
+
+
+def test_the_surface_is_that_of_the_exact_form() -> None:
+    vase = presets()["clay-vase"]
+    exact = charting._truth(vase, catalogue.forms(vase, None, ())[0])
+    assert exact is not None
+    assert (vase.model, exact.model) == ("oren_nayar", "oren_nayar_gaussian")
+    foam = presets()["foam"]  # the exact form of its body is no model of the registry
+    assert charting._truth(foam, catalogue.forms(foam, None, ())[0]) is None

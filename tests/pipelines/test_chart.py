@@ -6,6 +6,7 @@ import itertools
 import json
 import math
 import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -14,6 +15,7 @@ import pytest
 
 from brdfdb.forms import catalogue, timing
 from brdfdb.forms import tradeoff as charting
+from brdfdb.forms.surface_rays import ChartedSurface, RayCost
 from brdfdb.forms.tradeoff import (
     BetweenMembers,
     Chart,
@@ -28,7 +30,9 @@ from brdfdb.forms.tradeoff import (
     Saving,
 )
 from brdfdb.materials import presets
+from brdfdb.microgeometry.model_errors import SurfaceError
 from brdfdb.store import family_records
+from brdfdb_pipelines import chart as chart_job
 from brdfdb_pipelines import chart_picture, cli, terminal
 from brdfdb_pipelines.recipe_file import load
 from tests.json_schema import validate
@@ -76,7 +80,7 @@ def point(key: str, l1: float, ns: float, **more: Any) -> ChartPoint:
 WORK = SamplerWork(variance=0.25, ns=40.0, low_ms=0.09, ms=0.1, high_ms=0.11)
 
 
-def made_up(*points: ChartPoint) -> Chart:
+def made_up(*points: ChartPoint, surface: ChartedSurface | None = None) -> Chart:
     keys = [each.key for each in points]
     return Chart(
         material="made-up",
@@ -90,9 +94,13 @@ def made_up(*points: ChartPoint) -> Chart:
         ladder=[each.key for each in points if each.kind in ("exact", "quadrature")],
         samplers=[ChartedSampler(key="model", title="the model's lobe", albedo=WORK, sphere=WORK)],
         fronts=Fronts(batch=keys[:2], single=keys[:1], bytes=keys[:1]),
+        surface=surface,
     )
 
 
+INSIDE = SurfaceError("Against rays: 4.0 % in the median.", inside=True, slope=0.42, median=0.04, noise=0.001)
+OUTSIDE = SurfaceError("Against rays: outside of the map.", inside=False)
+RAYS = RayCost(ns=2.5e5, standard_error=0.012, directions=145)
 POINTS = (
     point("exact", 0.0, 1000.0, kind="exact"),
     point("fit", 0.02, 10.0, kind="approximation"),
@@ -135,6 +143,33 @@ def test_the_command_writes_the_data_and_a_picture_of_each(tmp_path: Path, capsy
     for name in names:
         assert (out / f"{name}.png").read_bytes().startswith(PNG)
         ElementTree.fromstring((out / f"{name}.svg").read_text(encoding="utf-8"))
+
+
+def test_the_surface_is_a_row_that_says_that_the_truth_is_off(capsys: Captured) -> None:
+    without, chart = made_up(*POINTS), made_up(*POINTS, surface=ChartedSurface(error=INSIDE, cost=RAYS))
+    plain, written = (texts(chart_picture.svg(each)) for each in (without, chart))
+    assert {"S", "S rays", "rays on a Gaussian surface, slope 0.42", "250k"}.isdisjoint(plain)
+    assert {"S", "S rays", "rays on a Gaussian surface, slope 0.42", "250k"} <= {*written}
+    sentences = [
+        "Against rays: 4.0 % in the median.",
+        "This is the error of the truth. The errors of the forms are relative to the truth.",
+        "Rays take 250k ns a value for a standard error of 1.2 %.",
+    ]
+    assert {*sentences} <= {*written}
+    assert "truth against rays, median" in written
+    chart_job._print(chart)
+    out = capsys.readouterr().out
+    assert re.search(r"\n *surface +rays on a Gaussian surface, slope 0.42 +truth 4.0 % off +250k *\n", out)
+    assert f"  surface: {' '.join(sentences)}\n" in out
+
+
+def test_a_surface_outside_of_the_map_has_a_sentence_and_no_line(capsys: Captured) -> None:
+    chart = made_up(*POINTS, surface=ChartedSurface(error=OUTSIDE, cost=None))
+    written = texts(chart_picture.svg(chart))
+    assert "Against rays: outside of the map." in written
+    assert "truth against rays, median" not in written
+    chart_job._print(chart)
+    assert "  surface: Against rays: outside of the map.\n" in capsys.readouterr().out
 
 
 @pytest.mark.usefixtures("quick", "no_pictures")
@@ -297,7 +332,9 @@ def time(ns: float) -> Cost:
     return Cost(ns=ns, low=ns, high=ns, directions=1)
 
 
-def made_up_family(between: BetweenMembers | None = None, **axes: list[float]) -> FamilyChart:
+def made_up_family(
+    between: BetweenMembers | None = None, surface: Sequence[SurfaceError | None] = (), **axes: list[float]
+) -> FamilyChart:
     """A truth, and a form that gets better along the family."""
     members = [f"member-{number}" for number in range(math.prod(map(len, axes.values())))]
     fixed = {"python": "none", "dtype": "float64", "bytes": 8, "timed": members[0]}
@@ -320,7 +357,26 @@ def made_up_family(between: BetweenMembers | None = None, **axes: list[float]) -
         ],
         between=between,
         fronts=[["exact"]] * (len(members) - 1) + [["exact", "fit"]],
+        surface=list(surface),
     )
+
+
+def test_a_family_shows_where_its_truth_leaves_the_surface(capsys: Captured) -> None:
+    family = made_up_family(height=[1.0, 2.0, 4.0, 9.0], surface=[INSIDE, INSIDE, OUTSIDE, None])
+    assert "truth against rays, median" in texts(chart_picture.svg(family))
+    chart_job._print_family(family)
+    (line,) = (line for line in capsys.readouterr().out.splitlines() if line.startswith("surface"))
+    assert re.split("  +", line.strip())[1:] == [
+        "truth against rays on Gaussian surfaces, median",
+        "4 %",
+        "4 %",
+        "-",
+        "-",
+    ]
+    without = made_up_family(height=[1.0, 2.0, 4.0, 9.0])
+    assert "truth against rays, median" not in texts(chart_picture.svg(without))
+    chart_job._print_family(without)
+    assert "surface" not in capsys.readouterr().out
 
 
 def test_the_picture_of_a_family_names_every_form_beside_its_curve_and_in_the_table() -> None:

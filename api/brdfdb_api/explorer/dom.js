@@ -11,6 +11,7 @@ const LEVELS = {
   "at the edge": "calm",
   unknown: "calm",
   "not judged": "calm",
+  compared: "calm",
   outside: "note",
   gains: "note",
   "known published excess": "note",

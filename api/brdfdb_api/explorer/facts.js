@@ -77,7 +77,12 @@ export function show({ info, source }) {
         : element("p", {}, "not measured"),
       ...(info.measured
         ? []
-        : [element("h4", {}, "Of the formula against the most exact form"), ...formula(info.formula_error)]),
+        : [
+            element("h4", {}, "Of the formula against the most exact form"),
+            ...formula(info.formula_error),
+            element("h4", {}, "Of the formula against a surface"),
+            element("p", {}, info.surface_error?.sentence ?? "not compared with rays"),
+          ]),
     ),
     folded(
       "Audit",

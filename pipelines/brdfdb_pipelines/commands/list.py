@@ -123,15 +123,17 @@ def _print_materials(store: Store, root: Path, names: Sequence[str]) -> list[str
         COLUMNS,
         ERRORS_EXPLAINED,
         NOT_AUDITED,
+        SURFACE_EXPLAINED,
         colours,
         energy,
         formula_error,
         kind,
         last_audit,
+        surface_error,
     )
     from brdfdb_pipelines import terminal
 
-    rows = []
+    rows: list[tuple[str, ...]] = []
     damaged: list[str] = []
     incomplete: list[str] = []
     audits = last_audit(root)
@@ -141,6 +143,7 @@ def _print_materials(store: Store, root: Path, names: Sequence[str]) -> list[str
             if not (head["title"] and head["model"]):  # the pointer of a whole table has both
                 gaps = store.metadata(name).gaps
                 incomplete += [f"{name} {head['revision']} {gaps}"] if gaps else []  # a function has no model
+            surface = surface_error(head, store.path(name))
         except StoreError as error:
             damaged.append(str(error))
             continue
@@ -148,21 +151,27 @@ def _print_materials(store: Store, root: Path, names: Sequence[str]) -> list[str
         rows.append(
             (
                 *(name, head["title"], kind(head), colours(head)),
-                *(terminal.error(head.get("error_p99")), formula_error(head, terminal.error)),
+                *(terminal.error(head.get("error_p99")), formula_error(head, terminal.error), surface),
                 *(NOT_AUDITED if audited is None else audited.as_published, energy(head, audited)),
                 head["revision"],
             )
         )
-    errors = ("table error (p99)", "formula error (p99)")
+    errors = ("table error (p99)", "formula error (p99)", "surface error")
+    columns: tuple[str, ...] = ("material", "title", "model", "colours", *errors, *COLUMNS, "revision")
+    at = columns.index(errors[2])
+    mapped = any(row[at] for row in rows)
+    if not mapped:
+        columns = (*columns[:at], *columns[at + 1 :])
+        rows = [(*row[:at], *row[at + 1 :]) for row in rows]
     terminal.print_table(
         f"{counted(len(rows), 'material')} in {root}",
-        ("material", "title", "model", "colours", *errors, *COLUMNS, "revision"),
+        columns,
         rows,
         numbers=errors,
-        less=("revision", "title", "model", errors[1], "colours", errors[0]),
+        less=("revision", "title", "model", *([errors[2]] if mapped else []), errors[1], "colours", errors[0]),
     )
     if rows:
-        print(ERRORS_EXPLAINED)
+        print(f"{ERRORS_EXPLAINED}; {SURFACE_EXPLAINED}" if mapped else ERRORS_EXPLAINED)
     for sentence in incomplete:
         print(terminal.plain(sentence))
     return damaged

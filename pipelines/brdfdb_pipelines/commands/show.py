@@ -50,6 +50,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _print_material(table: Table, path: Path, audited: Audited | None) -> None:
+    from brdfdb.microgeometry.model_errors import NO_MAP, surface_error_of
     from brdfdb_pipelines import terminal
 
     metadata = table.metadata
@@ -61,6 +62,8 @@ def _print_material(table: Table, path: Path, audited: Audited | None) -> None:
     _print_error(table.error, truth, measured=metadata.measured is not None)
     if metadata.measured is None:
         _print_formula_error(metadata.formula_error)
+        surface = surface_error_of(metadata.model, metadata.parameters)
+        print(f"  surface     {NO_MAP if surface is None else surface.sentence}")
     _print_answers(audited, metadata)
     source = _source_of(table)
     _print_validity(source, table.wavelength_nm)
