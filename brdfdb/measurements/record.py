@@ -76,7 +76,7 @@ class Change(BaseModel):
 
 
 class SimulationRecord(BaseModel):
-    """What rays on the facets of a surface have simulated, in place of a measurement."""
+    """The record of a simulation by rays on the facets of a surface, in place of a measurement."""
 
     model_config = _STRICT
 

@@ -32,7 +32,7 @@ class Triangles(NamedTuple):
 
 
 class Realised(NamedTuple):
-    """What a height map is, in place of what was asked for.
+    """Statistics of a height map, in place of those that were asked for.
 
     Attributes
     ----------

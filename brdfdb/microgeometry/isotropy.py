@@ -1,4 +1,4 @@
-"""Whether a height map stands for an isotropic surface: harmonics of its slopes over azimuth, and their chance."""
+"""Judge by harmonics of the slopes over azimuth whether a height map stands for an isotropic surface."""
 
 from __future__ import annotations
 

@@ -50,7 +50,7 @@ class StitchingStep(NamedTuple):
 
 @dataclass(frozen=True)
 class LevellingOptions:
-    """What is done with tilt and faults of a height map.
+    """The treatment of tilt and faults of a height map.
 
     ParameterError if a value is not among those allowed.
     """

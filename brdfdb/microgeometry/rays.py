@@ -32,7 +32,7 @@ class Region(NamedTuple):
 
 
 class Hits(NamedTuple):
-    """Where rays meet the surface.
+    """Points at which rays meet the surface.
 
     Attributes
     ----------

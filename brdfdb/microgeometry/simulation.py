@@ -53,7 +53,7 @@ class Estimated(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Simulation:
-    """What a goniometer measures of a surface, as estimates that are independent of each other.
+    """A measurement of a surface by a goniometer, as estimates that are independent of each other.
 
     Of a made surface, each estimate is a map of its own. A single map is divided into blocks: an estimate is that of a
     block, with random numbers of its own, and a round has an estimate of each block. ParameterError if a value is
@@ -281,7 +281,7 @@ class SimulatedBrdf:
 
     @property
     def sentence(self) -> str:
-        """How large the standard error is, and whether the target was reached."""
+        """Return the standard error in words, and whether the target was reached."""
         simulation = self.simulation
         error = self.relative_error()
         text = f"{self.count} estimates of {simulation.rays} light paths: the standard error of the rays is "

@@ -14,7 +14,7 @@ DRAWS = 999  # random signs that tell how large chi-square is by chance
 
 
 class Residuals(NamedTuple):
-    """How far the means of estimates are from expected values, in standard errors."""
+    """Distances of the means of estimates from expected values, in standard errors."""
 
     relative_error: float  # largest standard error, where the value exceeds a hundredth of its peak [1]
     dim_error: float  # the same where it does not, but is not 0 [1]

@@ -52,6 +52,19 @@ def add_jobs(parser: argparse.ArgumentParser, workers: str) -> None:
     )
 
 
+def add_workers(parser: argparse.ArgumentParser, written: str) -> None:
+    """Add --jobs, and --processes or --scheduler, whose workers must see the path `written` too."""
+    add_jobs(parser, "number of threads or processes")
+    where = parser.add_mutually_exclusive_group()
+    where.add_argument("--processes", action="store_true", help="use processes instead of threads")
+    where.add_argument(
+        "--scheduler",
+        metavar="ADDRESS",
+        help=f"use the dask cluster of this scheduler, such as tcp://10.0.0.1:8786; its workers must see {written} "
+        "under the same path",
+    )
+
+
 def processors() -> int:
     """Return the number of processors that this process may use; of all, where the system does not tell."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from brdfdb_pipelines.commands import INTERRUPTED
-from brdfdb_pipelines.commands._arguments import add_jobs, add_store, byte_count, place, share_cores
+from brdfdb_pipelines.commands._arguments import add_store, add_workers, byte_count, place, share_cores
 
 if TYPE_CHECKING:
     from brdfdb_pipelines.build import Built
@@ -30,15 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--library", metavar="NAME", help="build a library of presets, such as metals, instead of a recipe file"
     )
     add_store(parser)
-    add_jobs(parser, "number of threads or processes")
-    where = parser.add_mutually_exclusive_group()
-    where.add_argument("--processes", action="store_true", help="use processes instead of threads")
-    where.add_argument(
-        "--scheduler",
-        metavar="ADDRESS",
-        help="use the dask cluster of this scheduler, such as tcp://10.0.0.1:8786; its workers must see DIR under "
-        "the same path",
-    )
+    add_workers(parser, "DIR")
     parser.add_argument(
         "--memory",
         type=byte_count,

@@ -7,7 +7,7 @@ import shlex
 import sys
 
 from brdfdb_pipelines.commands import INTERRUPTED
-from brdfdb_pipelines.commands._arguments import add_jobs, picture_file, place, share_cores, whole_number
+from brdfdb_pipelines.commands._arguments import add_workers, picture_file, place, share_cores, whole_number
 
 HELP = "Show the error of models against rays on Gaussian surfaces, draw its maps, or compute them again."
 
@@ -38,15 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="N",
         help="light paths of each of them, with --out (default: %(default)s)",
     )
-    add_jobs(parser, "number of threads or processes")
-    where = parser.add_mutually_exclusive_group()
-    where.add_argument("--processes", action="store_true", help="use processes instead of threads")
-    where.add_argument(
-        "--scheduler",
-        metavar="ADDRESS",
-        help="use the dask cluster of this scheduler, such as tcp://10.0.0.1:8786; its workers must see FILE under "
-        "the same path",
-    )
+    add_workers(parser, "FILE")
 
 
 def run(options: argparse.Namespace) -> int:
