@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal, NamedTuple
@@ -24,6 +25,7 @@ FormKind = Literal["exact", "quadrature", "closed form", "approximation", "custo
 Standing = Literal["inside", "at the edge", "outside", "unknown"]
 STANDINGS: tuple[Standing, ...] = ("inside", "at the edge", "outside")  # the best first
 MUCH = 10.0  # ratio that counts as "much" where a paper gives no number: "much less" is a tenth
+OPAQUE = 1.0 / (4.0 * math.pi)  # least k of a substance that absorbs light within a wavelength
 
 
 @dataclass(frozen=True)
@@ -224,7 +226,7 @@ _WHOLE_RANGES = Draw()
 
 @dataclass(frozen=True, kw_only=True)
 class SurfaceRelation:
-    """The relation of a model to Gaussian surfaces, from which maps of its error against rays are made."""
+    """The relation of a model to made surfaces: maps of its error against rays on Gaussian ones are made from it."""
 
     facets: Literal["diffuse", "mirror"]
     bounces: Literal["one", "two", "all"]  #: the bounces that the model states
@@ -236,6 +238,58 @@ class SurfaceRelation:
     factor: bool = False  #: True if a factor in front of f_r is fitted, too: the lobe is not normalised
     by_rho: bool = False  #: True if the errors depend on the albedo
     only_fit: bool = False  #: True if slopes of the model have no variance, so that no Gaussian surface is its own
+    grooves: bool = False  #: True if the surface is V-grooves along y, and the parameter the angle of their walls
+
+
+SurfaceProperty = Literal[
+    "Gaussian heights",
+    "Gaussian correlation",
+    "Gaussian slopes",
+    "long-tailed slopes",
+    "large facets",
+    "no specular part",
+    "diffuse facets",
+    "mirror-like facets",
+]
+
+
+class SurfaceAssumption(NamedTuple):
+    """One property that a model assumes of its surface, which statistics of a height map and n + ik judge.
+
+    `words` is the assumption as the paper states it, `where` the paper and section.
+    """
+
+    property: SurfaceProperty
+    words: str
+    where: str
+
+
+class SurfaceNumbers(NamedTuple):
+    """The statistics of a measured surface that parameters of models follow from.
+
+    rms height [um], length where the correlation is 1 / e [um], rms slope along an axis in the mean of both [1], and
+    those along x and y, which are equal if the surface is isotropic [1].
+    """
+
+    sigma_0_um: float
+    tau_um: float
+    slope: float
+    slope_x: float
+    slope_y: float
+
+
+class HeightRelation(NamedTuple):
+    """The relation of a model to a surface whose heights were measured.
+
+    `parameters` returns the parameters that follow from the statistics, in the units of the model, and `words` says how
+    they do. `assumptions` are those on the surface, beside the limits of the parameters. A model whose parameters do
+    not follow from heights has `left_out`, the reason, instead.
+    """
+
+    parameters: Callable[[SurfaceNumbers], dict[str, float]] | None = None
+    words: str = ""
+    assumptions: tuple[SurfaceAssumption, ...] = ()
+    left_out: str = ""
 
 
 @dataclass(frozen=True)
@@ -272,7 +326,8 @@ class ModelSpec:
     reflectance is searched. `polarised` is the polarised form of the model; None: it is of unpolarised light.
     `gradient` is called as `vectors` is, and returns the `Gradient`; None: nobody has derived it.
     `draw` says which materials training sets draw. `surfaces` relates the model to Gaussian surfaces, with the default
-    arguments first; empty: it is compared with none.
+    arguments first; empty: it is compared with none. `heights` relates it to measured surfaces; None: another form of
+    the model does.
     """
 
     name: str
@@ -306,6 +361,12 @@ class ModelSpec:
     gradient: Callable[..., Gradient] | None = None
     draw: Draw = _WHOLE_RANGES
     surfaces: tuple[SurfaceRelation, ...] = ()
+    heights: HeightRelation | None = None
+
+    @property
+    def short_title(self) -> str:
+        """The title up to the first comma, for lists of models that differ in more than their form."""
+        return self.title.partition(",")[0]
 
     def parameter(self, name: str) -> Parameter:
         """Return the parameter called `name`; KeyError if the model has none."""

@@ -9,7 +9,7 @@ import numpy as np
 from brdfdb._numba import elementwise, kernel
 from brdfdb.geometry import Directions
 from brdfdb.models.declaration import DeclaredModel
-from brdfdb.parameters import Floats, Parameter, SurfaceRelation, white
+from brdfdb.parameters import Floats, HeightRelation, Parameter, SurfaceRelation, white
 
 RHO = Parameter("rho", "c", "1", 0.0, 1.0, "albedo of a facet, for one scattering", reflectance=True)
 ROUGHNESS = Parameter("roughness", "r", "1", 0.0, 1.0, "0 is Lambert, 1 a layer of spheres")
@@ -171,6 +171,9 @@ _section, _evaluate = elementwise(_cross_section), elementwise(_vmf)
     "and a roughness of 0.98",
     lossless=white,
     surfaces=(SurfaceRelation(facets="diffuse", bounces="all", parameters=("roughness",), by_rho=True),),
+    heights=HeightRelation(
+        left_out="its facets face all directions of a sphere, overhangs included, which no height map shows"
+    ),
 )
 def vmf_diffuse(directions: Directions, rho: Floats, roughness: Floats) -> Floats:
     """Return the BRDF [1/sr] of diffuse facets whose normals follow a von Mises-Fisher distribution.

@@ -44,6 +44,7 @@ from brdfdb.models._rows import Out, by_rows, by_rows_of_vectors
 from brdfdb.models.declaration import DeclaredModel, Slopes, of_directions
 from brdfdb.parameters import (
     MUCH,
+    OPAQUE,
     STANDINGS,
     WAVELENGTH_NM,
     Arguments,
@@ -51,6 +52,7 @@ from brdfdb.parameters import (
     Draw,
     Floats,
     FormKind,
+    HeightRelation,
     K,
     ModelForm,
     N,
@@ -58,6 +60,7 @@ from brdfdb.parameters import (
     Polarised,
     Standing,
     StatedLimit,
+    SurfaceAssumption,
     bytes_of,
     standing,
 )
@@ -120,7 +123,6 @@ def checked_surface(
 
 # Limits that the paper states
 
-_OPAQUE = 1.0 / (4.0 * math.pi)  # least k of a substance that absorbs light within a wavelength
 _GENTLE = "Simplifications result by making the local tangent-plane approximation and assuming gentle roughness slopes."
 _CHALLENGED = "the large ratio of σ_0/τ challenges the gentle slope assumption of the model"
 
@@ -152,7 +154,7 @@ def limits(arguments: Arguments) -> list[StatedLimit]:
     phase = (4.0 * math.pi * sigma / longest) ** 2
     gentle = standing(slope, 1.0 / MUCH, 1.0)
     rough: Standing = "inside" if phase >= MUCH else "at the edge" if phase > 1.0 else "outside"
-    first_surface: Standing = "inside" if a > 0.0 else gentle if k >= _OPAQUE else "outside"
+    first_surface: Standing = "inside" if a > 0.0 else gentle if k >= OPAQUE else "outside"
     return [
         StatedLimit(
             quantity="slope sigma_0 / tau",
@@ -532,6 +534,16 @@ def _scalars_of_gradient(*parameters: Floats) -> tuple[Floats, ...]:
         (("sigma_0_um", 0.01, 5.0), ("tau_um", 0.1, 50.0), ("a", 0.0, 0.3)),
         lambda given: given["sigma_0_um"] <= given["tau_um"],
         "sigma_0_um <= tau_um: the paper holds for slopes below 1",
+    ),
+    heights=HeightRelation(
+        lambda surface: {"sigma_0_um": surface.sigma_0_um, "tau_um": surface.tau_um},
+        "rms height, and length where the correlation is 1 / e",
+        (
+            SurfaceAssumption("Gaussian heights", "The heights are Gaussian.", "He et al. 1991, eq. 47"),
+            SurfaceAssumption(
+                "Gaussian correlation", "The correlation of the heights is Gaussian.", "He et al. 1991, eq. 48"
+            ),
+        ),
     ),
 )
 def he_torrance(

@@ -24,7 +24,14 @@ from brdfdb.models._microfacets import (
 )
 from brdfdb.models._rows import Out
 from brdfdb.models.declaration import DeclaredModel, ModelFunction
-from brdfdb.models.walter_2007 import BECKMANN_SURFACE, GGX_SURFACE, beckmann_separable, ggx_separable
+from brdfdb.models.walter_2007 import (
+    BECKMANN_HEIGHTS,
+    BECKMANN_SURFACE,
+    GGX_HEIGHTS,
+    GGX_SURFACE,
+    beckmann_separable,
+    ggx_separable,
+)
 from brdfdb.models.ward_1992 import ward
 from brdfdb.parameters import WAVELENGTH_NM, Arguments, Floats, FormKind, K, ModelForm, N, bytes_of
 
@@ -88,6 +95,7 @@ _EXCESS = (
     lossless=lossless_metal,
     forms=ggx_forms,
     surfaces=(GGX_SURFACE,),
+    heights=GGX_HEIGHTS,
 )
 def ggx(directions: Directions, out: Out, *parameters: Floats) -> Floats:
     """Return the BRDF [1/sr] of mirror facets with GGX slopes (Trowbridge-Reitz), of a metal or a dielectric.
@@ -148,6 +156,7 @@ def ggx_schlick(directions: Directions, out: Out, *parameters: Floats) -> Floats
     lossless=lossless_metal,
     forms=beckmann_forms,
     surfaces=(BECKMANN_SURFACE,),
+    heights=BECKMANN_HEIGHTS,
 )
 def beckmann(directions: Directions, out: Out, *parameters: Floats) -> Floats:
     """Return the BRDF [1/sr] of mirror facets with Gaussian slopes (Beckmann), of a metal or a dielectric.

@@ -22,6 +22,7 @@ from brdfdb.gauss import gauss_rule
 from brdfdb.geometry import Directions, Vectors, checked_vectors, degrees, finished
 from brdfdb.lobes import Lobe
 from brdfdb.models import torrance_sparrow_1967
+from brdfdb.models._geometrical_optics import LARGE_FACETS, NO_SPECULAR_PART
 from brdfdb.models._oren_nayar_facets import NODES, bounce_of_cavity, direct_of_cavity, gaussian
 from brdfdb.models._oren_nayar_kernels import (
     functional_angle_rows,
@@ -44,11 +45,13 @@ from brdfdb.parameters import (
     Draw,
     Floats,
     FormKind,
+    HeightRelation,
     K,
     ModelForm,
     N,
     Parameter,
     StatedLimit,
+    SurfaceAssumption,
     SurfaceRelation,
     standing,
     white,
@@ -100,6 +103,16 @@ _OF_SLOPE = SurfaceRelation(
     per_slope=1.0,
     bounds=(1e-4, 1.5),
 )
+_OF_HEIGHTS = HeightRelation(
+    lambda surface: {"sigma": surface.slope},
+    "sigma is the rms slope along an axis, as an angle in radians",
+    (
+        LARGE_FACETS,
+        NO_SPECULAR_PART,
+        SurfaceAssumption("Gaussian slopes", "The slopes are Gaussian.", "Oren and Nayar 1994, eq. 26"),
+        SurfaceAssumption("diffuse facets", "The facets are Lambertian.", "Oren and Nayar 1994, eq. 10"),
+    ),
+)
 
 
 def _facets(_: Arguments) -> list[StatedLimit]:
@@ -110,9 +123,8 @@ def _facets(_: Arguments) -> list[StatedLimit]:
             value="not a parameter of the model",
             valid="at least 10",
             standing="unknown",
-            words="Further, the facet area is large compared to the wavelength λ of incident light and therefore "
-            "geometrical optics can be used to derive the reflectance model.",
-            where="Oren and Nayar 1994, section 3, with eq. 5",
+            words=LARGE_FACETS.words,
+            where=LARGE_FACETS.where,
         )
     ]
 
@@ -284,6 +296,7 @@ _FUNCTIONAL = RowLoops(
         replace(_OF_SLOPE, bounces="two", by_rho=True, arguments={"interreflection": True}),
         replace(_OF_SLOPE, arguments={"interreflection": False}),
     ),
+    heights=_OF_HEIGHTS,
 )
 def oren_nayar(directions: Directions, out: Out, *parameters: Floats) -> Floats:
     """Return the BRDF [1/sr] of Lambertian V-cavities with Gaussian slopes, by the functional fit of the paper.
@@ -401,6 +414,11 @@ def _in_float64(directions: Directions) -> Directions:
     anisotropic=lambda parameters: parameters["theta_a"] > 0.0,
     lossless=white,
     limits=_facets,
+    surfaces=(
+        SurfaceRelation(
+            facets="diffuse", bounces="two", parameters=("theta_a",), arguments={"phi_a": 0.0}, grooves=True
+        ),
+    ),
 )
 def oren_nayar_unidirectional(directions: Directions, rho: Floats, theta_a: Floats, phi_a: Floats) -> Floats:
     """Return the BRDF [1/sr] of parallel V-cavities of one slope, exact in direct light and the second bounce.

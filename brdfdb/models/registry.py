@@ -12,10 +12,10 @@ import re
 import sys
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 from brdfdb.errors import BrdfdbError, ParameterError
-from brdfdb.parameters import ModelSpec, Parameter, closest
+from brdfdb.parameters import HeightRelation, ModelSpec, Parameter, SurfaceProperty, closest
 from brdfdb.place import path_of
 
 GROUP = "brdfdb.models"  # group of entry points, each of which gives a model or an iterable of models
@@ -170,6 +170,13 @@ def _check(spec: ModelSpec, origin: str) -> None:
     if not (power is None or callable(power) or (isinstance(power, int | float) and 0.0 <= power < math.inf)):
         allowed = "a number of at least 0, a function or None"
         raise BrdfdbError(f"{origin}: {spec.name}: grazing_power: {power!r:.80} is not {allowed}")
+    heights = spec.heights
+    if not isinstance(heights, HeightRelation | None):
+        raise BrdfdbError(f"{origin}: {spec.name}: heights: {heights!r:.80} is not a HeightRelation or None")
+    for assumption in heights.assumptions if heights else ():
+        if assumption.property not in get_args(SurfaceProperty):
+            allowed = ", ".join(get_args(SurfaceProperty))
+            raise BrdfdbError(f"{origin}: {spec.name}: heights: {assumption.property!r} is not one of {allowed}")
 
 
 def _message(error: BaseException) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from brdfdb.geometry import Directions
 from brdfdb.lobes import GAUSSIAN, GGX
+from brdfdb.models._geometrical_optics import LARGE_FACETS, NO_SPECULAR_PART
 from brdfdb.models._microfacets import (
     ALPHA_X,
     ALPHA_Y,
@@ -15,7 +16,16 @@ from brdfdb.models._microfacets import (
 )
 from brdfdb.models._rows import Out
 from brdfdb.models.declaration import DeclaredModel
-from brdfdb.parameters import WAVELENGTH_NM, Floats, K, N, SurfaceRelation
+from brdfdb.parameters import (
+    WAVELENGTH_NM,
+    Floats,
+    HeightRelation,
+    K,
+    N,
+    SurfaceAssumption,
+    SurfaceNumbers,
+    SurfaceRelation,
+)
 
 GGX_SURFACE = SurfaceRelation(
     facets="mirror", bounces="one", parameters=("alpha_x", "alpha_y"), bounds=(1e-2, 2.0), only_fit=True
@@ -26,6 +36,29 @@ BECKMANN_SURFACE = SurfaceRelation(
     words="alpha is sqrt(2) times the slope along an axis, exactly",
     parameters=("alpha_x", "alpha_y"),
     per_slope=2.0**0.5,
+)
+
+
+def _alphas(surface: SurfaceNumbers) -> dict[str, float]:
+    return {"alpha_x": 2.0**0.5 * surface.slope_x, "alpha_y": 2.0**0.5 * surface.slope_y}
+
+
+def _of_heights(slopes: SurfaceAssumption) -> HeightRelation:
+    """Return the relation of mirror-like facets to a measured surface, by the assumption on their slopes."""
+    mirrors = SurfaceAssumption("mirror-like facets", "The facets are mirrors.", "Walter et al. 2007, eq. 20")
+    words = "alpha is sqrt(2) times the rms slope along an axis"
+    return HeightRelation(_alphas, words, (LARGE_FACETS, NO_SPECULAR_PART, slopes, mirrors))
+
+
+GGX_HEIGHTS = _of_heights(
+    SurfaceAssumption(
+        "long-tailed slopes",
+        "Slopes have tails longer than those of a Gaussian, and no rms value.",
+        "Walter et al. 2007, eq. 33",
+    )
+)
+BECKMANN_HEIGHTS = _of_heights(
+    SurfaceAssumption("Gaussian slopes", "The slopes are Gaussian.", "Walter et al. 2007, eq. 25")
 )
 
 

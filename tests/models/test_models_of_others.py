@@ -22,7 +22,7 @@ from brdfdb.forms import catalogue
 from brdfdb.materials import Material
 from brdfdb.models import MODELS
 from brdfdb.models.registry import VARIABLE, Registry
-from brdfdb.parameters import ModelSpec
+from brdfdb.parameters import HeightRelation, ModelSpec, SurfaceAssumption
 from tests.api.a_store import client_of
 from tests.pipelines.command import run
 
@@ -182,6 +182,7 @@ def test_a_formula_that_cannot_be_compiled_is_refused_in_a_sentence(registry: Re
     [
         *[("evaluate", 3), ("vectors", None), ("lobe", "wide"), ("specular", 0.5), ("grazing_power", -1.0)],
         *[("version", 0), ("parameters", ["rho"]), ("name", "my model"), ("name", ["a"])],
+        ("heights", "rough"),
     ],
 )
 def test_a_model_with_a_wrong_field_is_refused(registry: Registry, field: str, value: Any) -> None:
@@ -189,6 +190,12 @@ def test_a_model_with_a_wrong_field_is_refused(registry: Registry, field: str, v
     with pytest.raises(BrdfdbError, match=rf"^mine\.py: {of_model}{field}: {re.escape(repr(value))} is not "):
         registry.add([replace(MODELS["lambert"], **{field: value})], "mine.py")
     assert not registry
+
+
+def test_an_assumption_that_no_height_map_judges_is_refused(registry: Registry) -> None:
+    relation = HeightRelation(assumptions=(SurfaceAssumption("wet", "The surface is wet.", "a notebook"),))  # type: ignore[arg-type]
+    with pytest.raises(BrdfdbError, match=r"^mine\.py: lambert: heights: 'wet' is not one of Gaussian heights, "):
+        registry.add([replace(MODELS["lambert"], heights=relation)], "mine.py")
 
 
 def test_an_entry_point_that_gives_no_model_is_refused(
