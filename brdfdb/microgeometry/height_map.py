@@ -9,53 +9,39 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.errors import ParameterError
+from brdfdb.microgeometry.random_fields import crossing
 
 Heights = NDArray[np.float64]
 
+STEPS_UM = (1e-6, 1e9)  #: distances of nodes that are allowed: rays are traced in float32, whose squares have an end
+_LARGEST = 1e5  # sides and heights of a map, in its smaller step: rays leave facets at 5e-7 of the largest length
+
 
 class Triangles(NamedTuple):
-    """Facets of a height map.
+    """Facets of a height map."""
 
-    Attributes
-    ----------
-    vertices : array (V, 3) [um]
-        Corners of the facets.
-    faces : array (F, 3)
-        Numbers of the three corners of each facet, counter-clockwise as seen from above.
-    normals : array (F, 3) [1]
-        Unit normals, which point upwards.
-    """
-
-    vertices: Heights
+    vertices: Heights  #: corners of the facets, (V, 3) [um]
+    #: numbers of the three corners of each facet, counter-clockwise as seen from above, (F, 3)
     faces: NDArray[np.int32]
-    normals: Heights
+    normals: Heights  #: unit normals, which point upwards, (F, 3) [1]
 
 
 class Realised(NamedTuple):
-    """Statistics of a height map, in place of those that were asked for.
+    """Statistics of a height map, in place of those that were asked for."""
 
-    Attributes
-    ----------
-    sigma_0_um : float [um]
-        Standard deviation of the heights.
-    slope_x, slope_y : float [1]
-        Standard deviations of the slopes of the facets along x and y, weighted by their horizontal areas.
-    tau_x_um, tau_y_um : float [um]
-        Distances along x and y at which the correlation of the heights has fallen to 1 / e; nan if it does not.
-    """
-
-    sigma_0_um: float
-    slope_x: float
-    slope_y: float
-    tau_x_um: float
-    tau_y_um: float
+    sigma_0_um: float  #: standard deviation of the heights [um]
+    slope_x: float  #: standard deviation of the slopes of the facets along x, weighted by their horizontal areas [1]
+    slope_y: float  #: the same along y [1]
+    tau_x_um: float  #: distance along x at which the correlation of the heights is 1 / e; nan: it stays above [um]
+    tau_y_um: float  #: the same along y [um]
 
 
 @dataclass(frozen=True, eq=False)
 class HeightMap:
     """Heights of a surface at the nodes of a grid. The grid of a periodic map goes on beyond its last node.
 
-    ParameterError if a height is not finite, a step is not positive, or there are fewer than two nodes along an axis.
+    ParameterError if a height is not finite, if a step is outside [1e-6, 1e9] um, if a side or the range of heights is
+    more than 1e5 smaller steps, or if there are fewer than two nodes along an axis.
     """
 
     heights_um: Heights = field(repr=False)  #: heights at x = i step_x, y = j step_y, (nx, ny) [um]
@@ -71,11 +57,19 @@ class HeightMap:
         if not np.all(np.isfinite(heights)):
             holes = np.count_nonzero(~np.isfinite(heights))
             raise ParameterError("heights_um", f"{holes} of {heights.size} heights are holes; fill or cut them first")
+        low, high = STEPS_UM
         for name in ("step_x_um", "step_y_um"):
             step = getattr(self, name)
-            if not 0.0 < step < np.inf:
-                raise ParameterError(name, f"{step:g} um is not a positive length", step, (0.0, np.inf))
+            if not low <= step <= high:
+                raise ParameterError(name, f"{step:g} um is outside [{low:g}, {high:g}] um", step, STEPS_UM)
         object.__setattr__(self, "heights_um", heights)
+        finest = min(self.step_x_um, self.step_y_um)
+        lengths = {float(np.ptp(heights)): "range of heights", self.width_um: "width", self.length_um: "length"}
+        longest = max(lengths)
+        if longest > _LARGEST * finest:
+            text = f"a {lengths[longest]} of {longest:.3g} um is too large for steps of {finest:.3g} um; "
+            text += f"allowed are up to {_LARGEST:g} steps, {_LARGEST * finest:.3g} um"
+            raise ParameterError("heights_um", text, longest, (0.0, _LARGEST * finest))
 
     @property
     def width_um(self) -> float:
@@ -145,12 +139,5 @@ class HeightMap:
         correlation = np.fft.irfft(power, size)[: count // 2]
         if not self.periodic:
             correlation /= count - np.arange(correlation.size)
-        if correlation[0] <= 0.0:
-            return float("nan")
-        correlation /= correlation[0]
-        below = np.flatnonzero(correlation < np.exp(-1.0))
-        if not below.size:
-            return float("nan")
-        last = int(below[0])
-        before, after = correlation[last - 1], correlation[last]
-        return float(last - 1 + (before - np.exp(-1.0)) / (before - after))
+        steps = crossing(correlation)
+        return float("nan") if steps is None else steps

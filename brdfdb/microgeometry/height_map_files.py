@@ -1,23 +1,25 @@
 """Height maps as instruments and programs write them: profilometers, microscopes, arrays and 16-bit pictures.
 
-The package SurfaceTopography reads the formats of instruments, and recognises them by their content. Left out are its
-readers of terrain (HGT), which accepts every file, of arrays (NPY, NPZ), and of formats that are TIFF files (LEXT,
-JPK), because a damaged TIFF file makes them run without end. Arrays (.npy, .csv) and pictures (TIFF, PNG) state no
-lengths, so that the caller gives them.
+The package SurfaceTopography reads the formats of instruments, and recognises them by their content. Left out is its
+reader of terrain (HGT), which accepts every file. Arrays (.npy, .npz, .csv) and pictures (TIFF, PNG) state no lengths,
+so that the caller gives them.
 
 Arrays, texts and pictures have the same axes: a row of numbers runs along x, and the first row is the uppermost, at the
-largest y. The same numbers are the same map in each of these formats.
+largest y. The same numbers are the same map in each of these formats. SurfaceTopography turns the maps of instruments
+so that the first row is the uppermost, as Gwyddion shows them, and counts it as y = 0; here y is turned upwards. A few
+formats state x and y themselves.
 """
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import math
 import re
 import struct
 import warnings
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple
 
@@ -25,6 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.errors import FileFormatError, ParameterError, import_extra
+from brdfdb.microgeometry.height_map import STEPS_UM
 
 Array = NDArray[np.float64]
 
@@ -32,18 +35,20 @@ MEMORY_GB = 2.0  # memory that reading and statistics may take
 BYTES_PER_HEIGHT = 115  # measured: 104 bytes a height of 2048 x 2048, 92 of 4096 x 4096
 FEWEST = 32  # nodes of a map along each axis
 LARGEST_FILE_GB = 1.0
-PIXELS_UM = (1e-6, 1e9)  # distances of nodes that are allowed
 HIGHEST_UM = 1e9  # largest height, so that no square overflows
 LEAST_RANGE_UM = 1e-9  # least difference of heights
 ROWS = "x along a row, to the right; y upwards, so that the first row is the uppermost"
 _MOST_PAGES = 1000  # of a TIFF file
-_LEFT_OUT = ("hgt", "npy", "npz", "lext", "jpk")
-_ROWS_FROM_ABOVE = ("asc", "gwy")  # formats of rows from above, which SurfaceTopography counts along +y
+_LEFT_OUT = ("hgt", "npy")
+_OF_TIFF = ("lext", "jpk", "ps")  # formats of instruments that are TIFF files
+_STATE_XY = ("sdf", "x3p", "xyz", "nc", "nmm", "mat", "h5")  # formats whose first index is x and whose second is y
 _UNITS_UM = {"m": 1e6, "mm": 1e3, "um": 1.0, "µm": 1.0, "μm": 1.0, "nm": 1e-3, "pm": 1e-6, "Å": 1e-4, "A": 1e-4}
 _TIFF = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
 _PNG = b"\x89PNG\r\n\x1a\n"
 _NPY = b"\x93NUMPY"
 _IMAGEJ_UNITS_UM = {**_UNITS_UM, "micron": 1.0, "microns": 1.0, r"\u00B5m": 1.0, "cm": 1e4, "inch": 25_400.0}
+#: some suffixes of files of instruments, to be named in sentences
+SUFFIXES = ("sur", "sdf", "x3p", "plu", "opd", "al3d", "vk4", "lext", "gwy", "spm", "jpk")
 _PNG_COLOURS = {0: "grey", 2: "colour", 3: "a palette", 4: "grey with transparency", 6: "colour with transparency"}
 
 
@@ -67,7 +72,7 @@ class MapOptions:
         lengths = [("pixel_um", pixel) for pixel in self.pixel_um]
         lengths += [] if self.height_um is None else [("height_um", self.height_um)]
         for name, length in lengths:
-            low, high = PIXELS_UM if name == "pixel_um" else (1e-15, HIGHEST_UM)
+            low, high = STEPS_UM if name == "pixel_um" else (1e-15, HIGHEST_UM)
             if not low <= length <= high:
                 raise ParameterError(name, f"{length:g} um is outside [{low:g}, {high:g}] um", length, (low, high))
         if self.unit is not None and self.unit not in _UNITS_UM:
@@ -114,8 +119,8 @@ def read_heights(path: Path, options: MapOptions | None = None) -> MeasuredHeigh
     Parameters
     ----------
     path : Path
-        A file of a profilometer or a microscope; an array (.npy, .csv, .txt); or a grey picture with 16 or more bits
-        (TIFF, PNG). Rows of arrays and pictures run along x, and the first row is the uppermost, at the largest y.
+        A file of a profilometer or a microscope; an array (.npy, .npz, .csv, .txt); or a grey picture with 16 or more
+        bits (TIFF, PNG). Rows of arrays and pictures run along x, and the first row is the uppermost, at the largest y.
     options : MapOptions, optional
         Lengths that the file does not state. They are refused where the file states them.
 
@@ -137,14 +142,39 @@ def read_heights(path: Path, options: MapOptions | None = None) -> MeasuredHeigh
         raise FileFormatError(f"{path}: {size / 1e9:.3g} GB are more than the {LARGEST_FILE_GB:g} GB that are allowed")
     with path.open("rb") as file:
         head = file.read(512)
+    if not head:
+        raise FileFormatError(f"{path}: the file is empty")
     if head.startswith(_NPY):
         return _of_npy(path, given)
     if head.startswith(_PNG):
         return _of_png(path, head, given)
     if head.startswith(_TIFF):
-        return _of_tiff(path, given)
+        return _of_tiff(path, head, given)
     separator = _separator(path)
-    return _of_instrument(path, head, given) if separator is None else _of_csv(path, separator, given)
+    if separator is not None:
+        return _of_csv(path, separator, given)
+    reader = _instrument(path, head)
+    if reader is None:
+        _check_text(path)
+        suffixes = ", ".join(f".{suffix}" for suffix in SUFFIXES)
+        raise FileFormatError(
+            f"{path}: no reader recognises the file as a height map; allowed are files of profilometers and "
+            f"microscopes ({suffixes} and more), arrays (.npy, .npz, .csv, .txt), and pictures of 16 bits (.tif, .png)"
+        )
+    return _of_npz(path, reader, given) if reader.format() == "npz" else _of_instrument(path, reader, given)
+
+
+@contextlib.contextmanager
+def _reading(path: Path, what: str) -> Iterator[None]:
+    """Say in a sentence that a file is damaged: libraries raise errors of all kinds."""
+    try:
+        yield
+    except (FileFormatError, ParameterError):
+        raise
+    except Exception as error:
+        lines = str(error).strip().splitlines()
+        words = lines[0][:120] if lines else type(error).__name__
+        raise FileFormatError(f"{path}: {what} cannot be read ({words})") from None
 
 
 def _check_size(path: Path, shape: Sequence[int]) -> None:
@@ -233,14 +263,27 @@ def _to_um(path: Path, heights: Array, height_um: float) -> None:
 
 
 def _of_npy(path: Path, given: MapOptions) -> MeasuredHeights:
-    try:
+    with _reading(path, "the array"):
         array = np.load(path, mmap_mode="r", allow_pickle=False)
-    except Exception as error:  # damaged headers raise errors of all kinds
-        raise FileFormatError(f"{path}: the array cannot be read ({_words(error)})") from None
+    _check_size(path, array.shape[::-1] if array.ndim == 2 else array.shape)
+    return _of_array(path, array, given)
+
+
+def _of_npz(path: Path, reader: Any, given: MapOptions) -> MeasuredHeights:
+    """Return the heights of an array in an archive, whose names and shapes SurfaceTopography tells."""
+    channel, notes = _channel(path, reader.channels, given.channel)
+    _check_size(path, channel.nb_grid_pts[::-1])
+    with _reading(path, "the array"), np.load(path, allow_pickle=False) as archive:
+        array = archive[channel.name]
+    return _of_array(path, array, replace(given, channel=None), tuple(notes))
+
+
+def _of_array(path: Path, array: NDArray[Any], given: MapOptions, notes: tuple[str, ...] = ()) -> MeasuredHeights:
     if array.dtype.kind not in "fiu" or array.dtype.itemsize == 1:
-        raise FileFormatError(f"{path}: numbers of type {array.dtype} are no heights; 16 bits or more are needed")
-    _check_size(path, array.shape[::-1])
-    return _scaled(path, array, given, "NumPy array")
+        raise FileFormatError(
+            f"{path}: numbers of type {array.dtype} are no heights; real numbers of 16 bits or more are needed"
+        )
+    return _scaled(path, array, given, "NumPy array", _PictureFacts(notes=notes))
 
 
 def _separator(path: Path) -> str | None:
@@ -257,11 +300,26 @@ def _separator(path: Path) -> str | None:
     return separator.decode() if len(parts) >= 4 else None
 
 
+def _check_text(path: Path) -> None:
+    """Raise FileFormatError for the first line of a table (.csv, .txt) that has other than numbers."""
+    if path.suffix.lower() not in (".csv", ".txt"):
+        return
+    with path.open(encoding="utf-8-sig", errors="replace") as file:
+        for number, line in enumerate(file, 1):
+            text = line.partition("#")[0].strip()
+            try:
+                [float(part) for part in re.split(r"\s*[;,]\s*|\s+", text) if part]
+            except ValueError:
+                shown = text if len(text) <= 40 else f"{text[:40]}..."
+                raise FileFormatError(
+                    f"{path}: line {number} is no row of numbers: {shown!r}; allowed are numbers with commas, "
+                    "semicolons or spaces between them, and comments that begin with #"
+                ) from None
+
+
 def _of_csv(path: Path, separator: str, given: MapOptions) -> MeasuredHeights:
-    try:
+    with _reading(path, "the table"):
         numbers = np.loadtxt(path, delimiter=separator, ndmin=2, encoding="utf-8-sig")
-    except Exception as error:
-        raise FileFormatError(f"{path}: the table cannot be read ({_words(error)})") from None
     _check_size(path, numbers.shape[::-1])
     return _scaled(path, numbers, given, "text of numbers")
 
@@ -278,16 +336,13 @@ def _of_png(path: Path, head: bytes, given: MapOptions) -> MeasuredHeights:
         raise FileFormatError(f"{path}: the picture has {bits} bits; heights need a grey picture of 16 bits")
     _check_size(path, (width, height))
     pillow = import_extra("PIL.Image")
-    try:
-        with pillow.open(path) as picture:
-            frames = getattr(picture, "n_frames", 1)
-            numbers = np.asarray(picture)
-            transparent, dpi = picture.info.get("transparency"), picture.info.get("dpi")
-            orientation = int(picture.getexif().get(274, 1))
-            pixel = (25_400.0 / dpi[0], 25_400.0 / dpi[1]) if dpi and min(dpi) > 0 else None
-            hole = None if transparent is None else float(transparent)
-    except Exception as error:
-        raise FileFormatError(f"{path}: the picture cannot be read ({_words(error)})") from None
+    with _reading(path, "the picture"), pillow.open(path) as picture:
+        frames = getattr(picture, "n_frames", 1)
+        numbers = np.asarray(picture)
+        transparent, dpi = picture.info.get("transparency"), picture.info.get("dpi")
+        orientation = int(picture.getexif().get(274, 1))
+        pixel = (25_400.0 / dpi[0], 25_400.0 / dpi[1]) if dpi and min(dpi) > 0 else None
+        hole = None if transparent is None else float(transparent)
     if frames != 1:
         raise FileFormatError(f"{path}: the file has {frames} pictures; a height map is a single picture")
     facts = _PictureFacts(pixel, "pHYs", hole, "tRNS", orientation)
@@ -320,12 +375,9 @@ def _pages(path: Path, file: BinaryIO) -> int:
     return len(seen)
 
 
-def _of_tiff(path: Path, given: MapOptions) -> MeasuredHeights:
+def _of_tiff(path: Path, head: bytes, given: MapOptions) -> MeasuredHeights:
     with path.open("rb") as stream:
         pages = _pages(path, stream)
-    if pages != 1:
-        raise FileFormatError(f"{path}: the file has {pages} pictures; a height map is a single picture")
-    tifffile = import_extra("tifffile")
     messages: list[str] = []
     log = logging.getLogger("tifffile")
 
@@ -335,24 +387,28 @@ def _of_tiff(path: Path, given: MapOptions) -> MeasuredHeights:
 
     log.addFilter(gather)
     try:
-        with tifffile.TiffFile(path) as file:
+        reader = _instrument(path, head, _OF_TIFF)
+        if reader is not None:
+            return _of_instrument(path, reader, given)
+        if pages != 1:
+            raise FileFormatError(
+                f"{path}: the file has {pages} pictures, and is not of a microscope that is known (.lext, .jpk, Park's "
+                ".tiff); export the heights as a single picture, or as .sdf, .sur or .x3p"
+            )
+        messages.clear()
+        with _reading(path, "the picture"), import_extra("tifffile").TiffFile(path) as file:
             page = file.pages.first
             if page.ndim != 2 or page.samplesperpixel != 1 or int(page.photometric) not in (0, 1):
                 raise FileFormatError(f"{path}: the picture is in colour; heights need a grey picture")
             if page.dtype is None or page.dtype.kind not in "fiu" or page.dtype.itemsize < 2:
-                bits = page.bitspersample
                 raise FileFormatError(
-                    f"{path}: the picture has {bits} bits; heights need a grey picture of 16 bits or more"
+                    f"{path}: the picture has {page.bitspersample} bits; heights need a grey picture of 16 bits or more"
                 )
             _check_size(path, page.shape[::-1])
             if math.prod(page.chunks) > 4 * MEMORY_GB * 1e9 / BYTES_PER_HEIGHT:
                 raise FileFormatError(f"{path}: the picture cannot be read (a tile is larger than the memory allows)")
             facts = _facts_of_tiff(path, page)
             numbers = page.asarray()
-    except FileFormatError:
-        raise
-    except Exception as error:  # a damaged file raises errors of all kinds
-        raise FileFormatError(f"{path}: the picture cannot be read ({_words(error)})") from None
     finally:
         log.removeFilter(gather)
     if messages:
@@ -365,8 +421,7 @@ def _facts_of_tiff(path: Path, page: Any) -> _PictureFacts:
     """Return what the tags of a page state about pixels, holes and orientation."""
     tags = {tag.code: tag.value for tag in page.tags}
     described = str(tags.get(270, ""))
-    lines = re.findall(r"^(\w+)=(.*?)\s*$", described, re.MULTILINE) if described.startswith("ImageJ=") else []
-    imagej = dict(lines)
+    imagej = dict(re.findall(r"^(\w+)=(.*?)\s*$", described, re.MULTILINE)) if described.startswith("ImageJ=") else {}
     notes = []
     if int(imagej.get("images", 1)) > 1:
         raise FileFormatError(f"{path}: the file has {imagej['images']} pictures; a height map is a single picture")
@@ -389,69 +444,71 @@ def _facts_of_tiff(path: Path, page: Any) -> _PictureFacts:
     return _PictureFacts(pixel, "X- and YResolution", hole, "GDAL_NODATA", int(tags.get(274, 1)), tuple(notes))
 
 
-def _of_instrument(path: Path, head: bytes, given: MapOptions) -> MeasuredHeights:
-    """Return the heights of a file that SurfaceTopography reads."""
+def _instrument(path: Path, head: bytes, formats: tuple[str, ...] = ()) -> Any | None:
+    """Return the reader of SurfaceTopography that recognises a file, of all formats by default, or None."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of packages that it would use if they were there, and of odd headers
         io = import_extra("SurfaceTopography.IO")
-        reader: Any = None
         for kind in io.readers:
-            if kind.format() in _LEFT_OUT or kind.can_read(head) == io.MagicMatch.NO:
+            if kind.format() in _LEFT_OUT or (formats and kind.format() not in formats):
+                continue
+            if kind.can_read(head) == io.MagicMatch.NO:
                 continue
             try:
                 reader = kind(str(path))
-                channels = list(reader.channels)
+                channels = reader.channels
             except Exception:  # readers of damaged files raise errors of all kinds
-                reader = None
-            else:
-                break
-        if reader is None:
-            raise FileFormatError(
-                f"{path}: no reader recognises the file as a height map; allowed are files of profilometers and "
-                "microscopes (.sur, .sdf, .x3p, .plu, .opd, .al3d, .vk4, .gwy, ...), .npy, .csv, and pictures of 16 "
-                "bits (.tif, .png)"
-            )
+                continue
+            if channels or not formats:  # other TIFF files may be those of JPK without a channel
+                return reader
+    return None
+
+
+def _of_instrument(path: Path, reader: Any, given: MapOptions) -> MeasuredHeights:
+    """Return the heights of a file that SurfaceTopography reads."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        channels = list(reader.channels)
         if not channels:
             raise FileFormatError(f"{path}: the file has no channel of heights")
         channel, notes = _channel(path, channels, given.channel)
         shape = channel.nb_grid_pts
         _check_size(path, shape)
         lengths = _lengths(path, channel, given)
-        try:
+        with _reading(path, "the heights"):
             keys = {} if channel.physical_sizes is not None else {"physical_sizes": tuple(map(float, shape))}
             stored = reader.topography(channel_index=channel.index, **keys).heights()
-        except Exception as error:
-            raise FileFormatError(f"{path}: the heights cannot be read ({_words(error)})") from None
     heights = np.array(np.ma.filled(np.ma.asarray(stored, np.float64), np.nan))
     _check_size(path, heights.shape)
     if given.hole is not None:
         heights[heights == given.hole] = np.nan
     _to_um(path, heights, lengths[2])
-    if reader.format() in _ROWS_FROM_ABOVE:
+    turned = reader.format() not in _STATE_XY
+    if turned:
         heights = np.ascontiguousarray(heights[:, ::-1])
-        axes = ROWS
-    else:
-        axes = "x and y of the file"
-    return MeasuredHeights(heights, lengths[0], lengths[1], path.stem, kind.name(), tuple(notes), axes)
+    axes = ROWS if turned else "x and y of the file"
+    return MeasuredHeights(heights, lengths[0], lengths[1], path.stem, reader.name(), tuple(notes), axes)
 
 
 def _channel(path: Path, channels: Sequence[Any], wanted: str | None) -> tuple[Any, list[str]]:
     """Return the channel of heights, and a note on the choice if there was any."""
-    maps = [one for one in channels if one.dim == 2 and one.data_kind.value == "height"]
-    names = [one.name for one in channels]
+    maps = [channel for channel in channels if channel.dim == 2 and channel.data_kind.value == "height"]
+    names = [channel.name for channel in channels]
     if wanted is not None:
-        found = [one for one in channels if one.name == wanted or str(one.index) == wanted]
-        if not found:
+        named = [channel for channel in channels if wanted in (channel.name, str(channel.index))]
+        if not named:
             raise ParameterError("channel", f"{wanted!r} is not one of {', '.join(names)}", wanted, tuple(names))
-        if found[0] not in maps:
+        if named[0] not in maps:
             raise ParameterError("channel", f"{wanted!r} of {path} is no map of heights", wanted, tuple(names))
-        return found[0], []
+        return named[0], []
     if not maps:
-        lines = any(one.dim == 1 for one in channels)
+        lines = any(channel.dim == 1 for channel in channels)
         what = "a profile along a line, no map" if lines else f"no channel of heights, but {', '.join(names)}"
         raise FileFormatError(f"{path}: the file has {what}")
+    # some readers call forces and voltages heights, too
+    maps = [channel for channel in maps if channel.unit is None or channel.unit in _UNITS_UM] or maps
     if len(maps) > 1:
-        others = ", ".join(one.name for one in maps[1:])
+        others = ", ".join(channel.name for channel in maps[1:])
         return maps[0], [f"channel {maps[0].name!r} was read; other channels of heights: {others}"]
     return maps[0], []
 
@@ -475,20 +532,14 @@ def _lengths(path: Path, channel: Any, given: MapOptions) -> tuple[float, float,
         raise ParameterError("pixel_um", f"{path} does not state the distance of its nodes; give it in um")
     if unit is None and (sizes is not None or given.height_um is None):
         name = "unit" if sizes is not None else "height_um"
-        raise ParameterError(name, f"{path} states no unit of its heights; give it with {name}")
+        raise ParameterError(name, f"{path} states no unit of its heights; give it")
     scale = _UNITS_UM[unit] if unit is not None else 1.0
     height = scale if given.height_um is None else given.height_um
     if sizes is None:
         return (*given.steps_um, height)
     step_x, step_y = (float(size) / count * scale for size, count in zip(sizes, channel.nb_grid_pts, strict=True))
     for step in (step_x, step_y):
-        if not PIXELS_UM[0] <= step <= PIXELS_UM[1]:
-            allowed = f"[{PIXELS_UM[0]:g}, {PIXELS_UM[1]:g}] um"
+        if not STEPS_UM[0] <= step <= STEPS_UM[1]:
+            allowed = f"[{STEPS_UM[0]:g}, {STEPS_UM[1]:g}] um"
             raise FileFormatError(f"{path}: the file states pixels of {step:.3g} um, outside {allowed}")
     return step_x, step_y, height
-
-
-def _words(error: Exception) -> str:
-    """Return the first line of an error of another library."""
-    lines = str(error).strip().splitlines()
-    return lines[0][:120] if lines else type(error).__name__

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
@@ -27,25 +27,14 @@ _LEAST_JUMP = 0.05  # share of the rms height below which a jump is no step
 _MOST_STEPS = 0.02  # share of the rows: more steps are a texture
 _MOST_HOLES = 0.5  # share of the heights: with more holes, the statistics mean nothing
 _ROBUST = 1.4826  # standard deviation of a Gaussian over its median absolute deviation
-_CHUNK = 1 << 20  # heights that a fit of a polynomial takes at once
 
 
 class StitchingStep(NamedTuple):
-    """A jump of the mean height between two neighbouring rows or columns.
+    """A jump of the mean height between two neighbouring rows or columns."""
 
-    Attributes
-    ----------
-    axis : int
-        0 for a jump along x, 1 along y.
-    node : int
-        Number of the last node before the jump.
-    height_um : float [um]
-        Height of the jump.
-    """
-
-    axis: int
-    node: int
-    height_um: float
+    axis: int  #: 0 for a jump along x, 1 along y
+    node: int  #: number of the last node before the jump
+    height_um: float  #: height of the jump [um]
 
 
 @dataclass(frozen=True)
@@ -63,15 +52,9 @@ class LevellingOptions:
     def __post_init__(self) -> None:
         kinds = {"level": Level, "outliers": OnOutliers, "steps": OnSteps, "holes": OnHoles}
         for name, kind in kinds.items():
-            allowed = get_args(kind)
-            if getattr(self, name) not in allowed:
-                value = getattr(self, name)
+            allowed, value = get_args(kind), getattr(self, name)
+            if value not in allowed:
                 raise ParameterError(name, f"{value!r} is not one of {', '.join(allowed)}", value, allowed)
-
-    @property
-    def degree(self) -> int:
-        """Return the degree of the polynomial that is subtracted."""
-        return _DEGREES[self.level]
 
 
 @dataclass(frozen=True)
@@ -91,24 +74,19 @@ class Levelled:
     def document(self) -> dict[str, Any]:
         """Return what was done to the map as JSON."""
         measured = self.measured
+        facts = {item.name: getattr(self, item.name) for item in fields(self) if item.name != "measured"}
         return {
             "nodes": list(measured.heights_um.shape),
             "step_um": [measured.step_x_um, measured.step_y_um],
-            "degree": self.degree,
-            "tilt_deg": self.tilt_deg,
-            "holes": self.holes,
-            "filled": self.filled,
-            "outliers": self.outliers,
-            "left_out": self.left_out,
+            **facts,
             "steps": [step._asdict() for step in self.steps],
-            "removed": self.removed,
             "notes": list(measured.notes),
         }
 
     def height_map(self) -> HeightMap:
         """Return the facets' height map, mean 0; ParameterError if a hole is not filled."""
-        one = self.measured
-        return HeightMap(one.heights_um, one.step_x_um, one.step_y_um, name=one.name)
+        measured = self.measured
+        return HeightMap(measured.heights_um, measured.step_x_um, measured.step_y_um, name=measured.name)
 
 
 def levelled(measured: MeasuredHeights, options: LevellingOptions | None = None) -> Levelled:
@@ -119,8 +97,7 @@ def levelled(measured: MeasuredHeights, options: LevellingOptions | None = None)
     measured : MeasuredHeights
         Heights as the file states them.
     options : LevellingOptions, optional
-        What is done with tilt and faults. By default a plane is subtracted, holes are left out, and outliers and steps
-        are refused.
+        Treatment of tilt and faults.
 
     Returns
     -------
@@ -139,28 +116,32 @@ def levelled(measured: MeasuredHeights, options: LevellingOptions | None = None)
     by 5 % of the rms height.
     """
     chosen = LevellingOptions() if options is None else options
+    degree = _DEGREES[chosen.level]
     z = np.array(measured.heights_um, np.float64)
-    missing = ~np.isfinite(z)
-    holes = int(np.count_nonzero(missing))
+    holes = int(np.count_nonzero(~np.isfinite(z)))
     if holes > _MOST_HOLES * z.size:
-        share = 100.0 * holes / z.size
-        raise ParameterError("holes", f"{share:.0f} % of the heights are holes; allowed are up to 50 %", holes)
+        share = f"{100.0 * holes / z.size:.0f} %"
+        raise ParameterError("holes", f"{share} of the heights are holes; allowed are up to 50 %", holes)
     if holes and chosen.holes == "refuse":
         raise ParameterError("holes", f"{holes} of {z.size} heights are holes; allowed is none", holes, 0)
     steps = tuple(_steps(z, 0) + _steps(z, 1))
     if steps and chosen.steps == "refuse":
-        raise ParameterError("steps", _words_of(steps, measured), len(steps), ("remove", "keep"))
+        largest = max(steps, key=lambda step: abs(step.height_um))
+        place = (largest.node + 0.5) * (measured.step_x_um, measured.step_y_um)[largest.axis]
+        more = f" and {len(steps) - 1} more" if len(steps) > 1 else ""
+        text = (
+            f"the mean height jumps by {largest.height_um:.3g} um at {'xy'[largest.axis]} = {place:.4g} um{more}, as "
+        )
+        text += "at stitching; allowed values of the option are remove and keep"
+        raise ParameterError("steps", text, len(steps), ("remove", "keep"))
     if chosen.steps == "remove":
         for step in steps:
-            if step.axis == 0:
-                z[step.node + 1 :] -= step.height_um
-            else:
-                z[:, step.node + 1 :] -= step.height_um
+            (z if step.axis == 0 else z.T)[step.node + 1 :] -= step.height_um
     tilt = _coefficients(z, 1)
-    far = _outliers(z - _polynomial(_coefficients(z, chosen.degree), z.shape, chosen.degree))
+    far = _outliers(z - _polynomial(_coefficients(z, degree), z.shape, degree))
     outliers = int(np.count_nonzero(far))
     if outliers and chosen.outliers == "refuse":
-        raise ParameterError("outliers", _outliers_in_words(far, z.size), outliers, ("leave-out", "keep"))
+        raise ParameterError("outliers", _outliers_in_words(far, measured.heights_um), outliers, ("leave-out", "keep"))
     if chosen.outliers == "leave-out":
         z[far] = np.nan
         tilt = _coefficients(z, 1)
@@ -168,19 +149,21 @@ def levelled(measured: MeasuredHeights, options: LevellingOptions | None = None)
     if chosen.holes == "fill":
         filled = int(np.count_nonzero(~np.isfinite(z)))
         z = fill_holes(z)
-    z -= _polynomial(_coefficients(z, chosen.degree), z.shape, chosen.degree)
+    z -= _polynomial(_coefficients(z, degree), z.shape, degree)
     if not np.nanmax(np.abs(z)) > 1e-12 * max(1e-6, float(np.nanmax(np.abs(measured.heights_um)))):
-        raise ParameterError("heights_um", "all heights are the same after levelling; a map needs roughness", 0.0)
+        raise ParameterError("heights_um", "all heights are the same after levelling; a rough surface is needed", 0.0)
+    rises = 2.0 * tilt[:0:-1]  # of the plane from one side of the map to the other, along x and y
+    slope = math.hypot(*rises / ((np.array(z.shape) - 1) * (measured.step_x_um, measured.step_y_um)))
     return Levelled(
         replace(measured, heights_um=z),
-        chosen.degree,
-        _tilt_deg(tilt, measured),
-        holes,
-        filled,
-        outliers,
-        outliers if chosen.outliers == "leave-out" else 0,
-        steps,
-        bool(steps) and chosen.steps == "remove",
+        degree=degree,
+        tilt_deg=math.degrees(math.atan(slope)),
+        holes=holes,
+        filled=filled,
+        outliers=outliers,
+        left_out=outliers if chosen.outliers == "leave-out" else 0,
+        steps=steps,
+        removed=bool(steps) and chosen.steps == "remove",
     )
 
 
@@ -197,13 +180,10 @@ def fill_holes(heights: Array) -> Array:
         return filled
     rim = ndimage.binary_dilation(hole, structure=np.ones((3, 3))) & ~hole
     around = np.argwhere(rim)
-    inside = np.argwhere(hole)
-    nearest = interpolate.NearestNDInterpolator(around, heights[rim])(inside)
-    values = nearest
-    if around.shape[0] > 3 and np.ptp(around, axis=0).min() > 0:
-        values = interpolate.LinearNDInterpolator(around, heights[rim])(inside)
-        values = np.where(np.isfinite(values), values, nearest)
-    filled[hole] = values
+    filled[hole] = interpolate.NearestNDInterpolator(around, heights[rim])(np.argwhere(hole))
+    if len(around) > 3 and np.ptp(around, axis=0).min() > 0:
+        values = interpolate.LinearNDInterpolator(around, heights[rim])(np.argwhere(hole))
+        filled[hole] = np.where(np.isfinite(values), values, filled[hole])
     return filled
 
 
@@ -215,21 +195,13 @@ def _basis(shape: tuple[int, int], degree: int) -> list[tuple[Array, Array]]:
 
 def _coefficients(z: Array, degree: int) -> Array:
     """Return the coefficients of the polynomial that suits the heights best, in the order of `_basis`."""
-    pairs = _basis(z.shape, degree)
-    normal = np.zeros((len(pairs), len(pairs)))
-    right = np.zeros(len(pairs))
-    rows = max(1, _CHUNK // z.shape[1])
-    for start in range(0, z.shape[0], rows):
-        part = z[start : start + rows]
-        there = np.isfinite(part)
-        heights = np.where(there, part, 0.0)
-        for i, (x, y) in enumerate(pairs):
-            right[i] += x[start : start + rows] @ heights @ y
-            for j in range(i + 1):
-                both = (x * pairs[j][0])[start : start + rows] @ there @ (y * pairs[j][1])
-                normal[i, j] += both
-                normal[j, i] = normal[i, j]
-    return np.asarray(np.linalg.lstsq(normal, right, rcond=None)[0])
+    basis = _basis(z.shape, degree)
+    known = np.isfinite(z)
+    heights = np.where(known, z, 0.0)
+    right = [x @ heights @ y for x, y in basis]
+    weight = known.astype(np.float64)
+    normal = [[(x * other_x) @ weight @ (y * other_y) for other_x, other_y in basis] for x, y in basis]
+    return np.asarray(np.linalg.lstsq(np.array(normal), np.array(right), rcond=None)[0])
 
 
 def _polynomial(coefficients: Array, shape: tuple[int, int], degree: int) -> Array:
@@ -240,14 +212,6 @@ def _polynomial(coefficients: Array, shape: tuple[int, int], degree: int) -> Arr
     return total
 
 
-def _tilt_deg(plane: Array, measured: MeasuredHeights) -> float:
-    """Return the angle of a plane to the horizontal [degree]."""
-    nx, ny = measured.heights_um.shape
-    along_y = 2.0 * plane[1] / ((ny - 1) * measured.step_y_um)
-    along_x = 2.0 * plane[2] / ((nx - 1) * measured.step_x_um)
-    return math.degrees(math.atan(math.hypot(along_x, along_y)))
-
-
 def _spread(values: Array) -> float:
     """Return the robust standard deviation of values without nan."""
     return float(_ROBUST * np.median(np.abs(values - np.median(values)))) if values.size else 0.0
@@ -255,62 +219,52 @@ def _spread(values: Array) -> float:
 
 def _outliers(z: Array) -> NDArray[np.bool_]:
     """Return where heights are far from the plane, or from their neighbours."""
-    there = np.isfinite(z)
-    heights = z[there]
-    spread = _spread(heights)
-    far = np.abs(z - np.median(heights)) > _FAR * spread if spread > 0.0 else np.zeros(z.shape, bool)
+    known = np.isfinite(z)
+    spread = _spread(z[known])
+    if spread == 0.0:
+        return np.zeros(z.shape, bool)
     ndimage = import_extra("scipy.ndimage")
-    known = z
-    if not there.all():  # holes take the mean of the heights around them, so that they do not move the median
-        share = ndimage.uniform_filter(there.astype(np.float64), size=5)
-        mean = ndimage.uniform_filter(np.where(there, z, 0.0), size=5)
-        known = np.where(there, z, np.divide(mean, share, out=np.zeros_like(mean), where=share > 1e-9))
-    continued = np.pad(known, 2, mode="reflect", reflect_type="odd")  # slopes go on beyond the edges
-    smooth = ndimage.median_filter(continued, size=5)[2:-2, 2:-2]
-    departure = np.abs(z - smooth)
-    local = float(_ROBUST * np.median(departure[there]))
-    far |= departure > max(_FAR * local, _FROM_NEIGHBOURS * spread)
-    return np.asarray(far & there & (spread > 0.0))
+    whole = z
+    if not known.all():  # holes take the mean of the heights around them, so that they do not move the median
+        share = ndimage.uniform_filter(known.astype(np.float64), size=5)
+        mean = ndimage.uniform_filter(np.where(known, z, 0.0), size=5)
+        whole = np.where(known, z, np.divide(mean, share, out=np.zeros_like(mean), where=share > 1e-9))
+    continued = np.pad(whole, 2, mode="reflect", reflect_type="odd")  # slopes go on beyond the edges
+    departure = np.abs(z - ndimage.median_filter(continued, size=5)[2:-2, 2:-2])
+    local = float(_ROBUST * np.median(departure[known]))
+    far = np.abs(z - np.median(z[known])) > _FAR * spread
+    return np.asarray((far | (departure > max(_FAR * local, _FROM_NEIGHBOURS * spread))) & known)
 
 
 def _steps(z: Array, axis: int) -> list[StitchingStep]:
     """Return the jumps of the mean height along an axis."""
     rows = z if axis == 0 else z.T
     with np.errstate(all="ignore"):
-        there = np.isfinite(rows).sum(axis=1) > rows.shape[1] // 4
+        known = np.isfinite(rows).sum(axis=1) > rows.shape[1] // 4
         difference = np.diff(rows, axis=0)
         difference[~np.isfinite(difference).any(axis=1)] = 0.0
         jump = np.nanmedian(difference, axis=1)
-    jump[~(there[1:] & there[:-1])] = 0.0
+    jump[~(known[1:] & known[:-1])] = 0.0
     before = jump - np.concatenate([jump[1:2], jump[:-1]])
     after = jump - np.concatenate([jump[1:], jump[-2:-1]])
     excess = np.where(before * after > 0.0, np.sign(before) * np.minimum(np.abs(before), np.abs(after)), 0.0)
     rough = _spread(rows[np.isfinite(rows)])
     limit = max(_JUMP * _spread(before), _LEAST_JUMP * rough)
-    found = np.flatnonzero(np.abs(excess) > limit)
-    if found.size > max(1, _MOST_STEPS * jump.size) or rough == 0.0:
+    nodes = np.flatnonzero(np.abs(excess) > limit)
+    if nodes.size > max(1, _MOST_STEPS * jump.size) or rough == 0.0:
         return []
-    return [StitchingStep(axis, int(node), float(0.5 * (before[node] + after[node]))) for node in found]
+    return [StitchingStep(axis, int(node), float(0.5 * (before[node] + after[node]))) for node in nodes]
 
 
-def _words_of(steps: tuple[StitchingStep, ...], measured: MeasuredHeights) -> str:
-    """Return a sentence on the steps of a map."""
-    first = max(steps, key=lambda step: abs(step.height_um))
-    width = measured.step_x_um if first.axis == 0 else measured.step_y_um
-    at = f"{'x' if first.axis == 0 else 'y'} = {(first.node + 0.5) * width:.4g} um"
-    more = f" and {len(steps) - 1} more" if len(steps) > 1 else ""
-    return (
-        f"the mean height jumps by {first.height_um:.3g} um at {at}{more}, as at stitching; "
-        "allowed values of the option are remove and keep"
-    )
-
-
-def _outliers_in_words(far: NDArray[np.bool_], size: int) -> str:
+def _outliers_in_words(far: NDArray[np.bool_], heights_um: Array) -> str:
     """Return a sentence on the outliers of a map."""
     x, y = np.argwhere(far)[0]
-    count = int(np.count_nonzero(far))
-    verb = "is an outlier" if count == 1 else "are outliers"
+    values = heights_um[far]
+    verb = "is an outlier" if values.size == 1 else "are outliers"
+    hint = ""
+    if values.size > 1 and np.all(values == values[0]):
+        hint = f"; all are {values[0]:g} um: if this stands for missing heights, give hole = {values[0]:g}"
     return (
-        f"{counted(count, 'height')} of {size} {verb}, the first at node ({x}, {y}); "
-        "allowed values of the option are leave-out and keep"
+        f"{counted(values.size, 'height')} of {heights_um.size} {verb}, the first at node ({x}, {y}); "
+        f"allowed values of the option are leave-out and keep{hint}"
     )

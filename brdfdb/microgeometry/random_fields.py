@@ -33,17 +33,11 @@ _GRID = 192  # lags along an axis over which the loss by levelling is integrated
 
 
 class HeightInterval(NamedTuple):
-    """An estimate with its interval of 95 %.
+    """An estimate with its interval of 95 %."""
 
-    Attributes
-    ----------
-    value, low, high : float
-        The estimate and the ends of its interval, in the same unit.
-    """
-
-    value: float
-    low: float
-    high: float
+    value: float  #: the estimate
+    low: float  #: lower end of the interval, in the same unit
+    high: float  #: upper end
 
     def scaled(self, factor: float) -> HeightInterval:
         """Return the estimate and its interval, multiplied by a number."""
@@ -51,18 +45,10 @@ class HeightInterval(NamedTuple):
 
 
 class MeanSquare(NamedTuple):
-    """A mean square and its variance.
+    """A mean square and its variance."""
 
-    Attributes
-    ----------
-    value : float
-        The mean square.
-    variance : float
-        Its variance over maps of the same surface and size.
-    """
-
-    value: float
-    variance: float
+    value: float  #: the mean square
+    variance: float  #: its variance over maps of the same surface and size
 
     @property
     def areas(self) -> float:
@@ -82,19 +68,11 @@ class MeanSquare(NamedTuple):
 
 
 class CorrelationForm(NamedTuple):
-    """The form of a correlation: exp(-r^(2 H)), with r^2 = (x / tau_x)^2 + (y / tau_y)^2.
+    """The form of a correlation: exp(-r^(2 H)), with r^2 = (x / tau_x)^2 + (y / tau_y)^2."""
 
-    Attributes
-    ----------
-    exponent : float [1]
-        H: 1 is Gaussian, 0.5 exponential.
-    tau_x, tau_y : float [steps]
-        Lengths along x and y at which it has fallen to 1 / e.
-    """
-
-    exponent: float
-    tau_x: float
-    tau_y: float
+    exponent: float  #: H: 1 is Gaussian, 0.5 exponential [1]
+    tau_x: float  #: length along x at which it has fallen to 1 / e [steps]
+    tau_y: float  #: the same along y [steps]
 
     def at(self, x: Array | float, y: Array | float) -> Array:
         """Return the correlation at lags [steps]."""
@@ -154,6 +132,7 @@ class FieldModel:
         self, form: CorrelationForm, variance: float, noise: float, shape: tuple[int, int], count: int
     ) -> None:
         x, y = (np.minimum(np.arange(n), n - np.arange(n)) for n in shape)
+        self.form = form
         self.shape = shape
         self.count = count
         self.power: Array = np.maximum(np.fft.rfft2(variance * form.at(x[:, np.newaxis], y)).real, 0.0) + noise
@@ -163,6 +142,10 @@ class FieldModel:
     def wave_number(self, axis: int) -> Array:
         """Return k [1/step] along an axis, as an array that broadcasts with periodograms."""
         return self.k_y if axis else self.k_x
+
+    def difference_gain(self, axis: int) -> Array:
+        """Return the factor of the spectrum in differences of neighbours along an axis."""
+        return np.asarray(2.0 - 2.0 * np.cos(self.wave_number(axis)))
 
     @property
     def mean_power(self) -> float:
@@ -195,11 +178,11 @@ def covariance(z: Array, axis: int, most: int) -> Array:
     chunk = max(1, (1 << 21) // size)
     for start in range(0, rows.shape[0], chunk):
         part = rows[start : start + chunk]
-        there = np.fft.rfft(np.isfinite(part).astype(np.float64), size, axis=1)
+        known = np.fft.rfft(np.isfinite(part).astype(np.float64), size, axis=1)
         values = np.nan_to_num(part)
         products += np.sum(np.abs(np.fft.rfft(values, size, axis=1)) ** 2, axis=0)
-        squares += np.sum(np.fft.rfft(values * values, size, axis=1) * there.conj(), axis=0)
-        pairs += np.sum(np.abs(there) ** 2, axis=0)
+        squares += np.sum(np.fft.rfft(values * values, size, axis=1) * known.conj(), axis=0)
+        pairs += np.sum(np.abs(known) ** 2, axis=0)
     # the sum of squares of both ends of all pairs, since the ends of a pair change places as the lag changes its sign
     both = np.fft.irfft(2.0 * squares.real, size)[:most]
     differences = both - 2.0 * np.fft.irfft(products, size)[:most]
@@ -209,24 +192,12 @@ def covariance(z: Array, axis: int, most: int) -> Array:
 
 @dataclass(frozen=True)
 class LevelledCovariance:
-    """The covariance of heights along x and y, corrected for the variance that levelling takes.
+    """The covariance of heights along x and y, corrected for the variance that levelling takes."""
 
-    Attributes
-    ----------
-    form : CorrelationForm
-        Fit to the correlation.
-    along : two arrays
-        Covariances at lags of 0, 1, 2 ... steps along x and y, corrected; lag 0 without the noise of the instrument.
-    lost : float [1]
-        Share of the variance of the surface that levelling and the finite map take.
-    reached : (bool, bool)
-        True where the correlation falls to 1 / e within half of the map.
-    """
-
-    form: CorrelationForm
+    form: CorrelationForm  #: fit to the correlation
+    #: covariances at lags of 0, 1, 2 ... steps along x and y, corrected; lag 0 without the noise of the instrument
     along: tuple[Array, Array]
-    lost: float
-    reached: tuple[bool, bool]
+    lost: float  #: share of the variance of the surface that levelling and the finite map take [1]
 
 
 def levelled_covariance(z: Array, degree: int, noise: float) -> LevelledCovariance:
@@ -241,25 +212,23 @@ def levelled_covariance(z: Array, degree: int, noise: float) -> LevelledCovarian
     noise : float [um^2]
         Variance of white noise, which is subtracted at lag 0.
     """
-    raw = []
-    for axis in (0, 1):
-        one = covariance(z, axis, max(4, z.shape[axis] // 2))
-        one[0] -= noise
-        raw.append(one)
+    x, y = (covariance(z, axis, max(4, z.shape[axis] // 2)) for axis in (0, 1))
+    raw = (x, y)
+    lags = [np.arange(along.size) / nodes for along, nodes in zip(raw, z.shape, strict=True)]
+    for along in raw:
+        along[0] -= noise
     corrected = raw
     lost = 0.0
     for _ in range(_ROUNDS):
-        form = fitted_form(corrected)
-        losses = _losses(form, z.shape, degree)
-        lost = float(sum(loss for loss, _ in losses.values()))
+        losses = _losses(fitted_form(corrected), z.shape, degree)
+        lost = sum(losses.values())
         variance = raw[0][0] / max(1.0 - lost, 0.2)
-        corrected = []
-        for axis in (0, 1):
-            lag = np.arange(raw[axis].size) / z.shape[axis]
-            back = sum(loss * _of_covariance(orders[axis], lag) for loss, orders in losses.values())
-            corrected.append(raw[axis] + variance * back)
-    reached = (crossing(corrected[0]) is not None, crossing(corrected[1]) is not None)
-    return LevelledCovariance(fitted_form(corrected), (corrected[0], corrected[1]), lost, reached)
+        x, y = (
+            along + variance * sum(loss * _of_covariance(orders[axis], lag) for orders, loss in losses.items())
+            for axis, (along, lag) in enumerate(zip(raw, lags, strict=True))
+        )
+        corrected = (x, y)
+    return LevelledCovariance(fitted_form(corrected), corrected, lost)
 
 
 def _of_covariance(order: int, lag: Array) -> Array:
@@ -269,24 +238,17 @@ def _of_covariance(order: int, lag: Array) -> Array:
 
 def _remaining(order: int, lag: Array) -> Array:
     """Return the correlation of a normalised Legendre polynomial with itself over the overlap, at lags of the width."""
-    t = np.asarray(lag)
+    # means of the second and fourth power of the middle of two points
+    second, fourth = (1.0 - lag) ** 2 / 12.0, (1.0 - lag) ** 4 / 80.0
     if order == 0:
-        return np.ones_like(t)
-    m = (1.0 - t) ** 2 / 12.0  # mean square of the middle of two points
+        return np.ones_like(lag)
     if order == 1:
-        return 12.0 * (m - t**2 / 4.0)
-    x = np.linspace(-0.5, 0.5, 401)
-    values = []
-    for one in t:
-        middle = x * (1.0 - one)
-        p = [math.sqrt(5.0) * (6.0 * (middle + sign * one / 2.0) ** 2 - 0.5) for sign in (-1.0, 1.0)]
-        values.append(float(np.mean(p[0] * p[1])))
-    return np.array(values)
+        return 12.0 * (second - lag**2 / 4.0)
+    mixed = fourth - second * lag**2 / 2.0 + lag**4 / 16.0
+    return 5.0 * (36.0 * mixed - 6.0 * (second + lag**2 / 4.0) + 0.25)
 
 
-def _losses(
-    form: CorrelationForm, shape: tuple[int, int], degree: int
-) -> dict[tuple[int, int], tuple[float, tuple[int, int]]]:
+def _losses(form: CorrelationForm, shape: tuple[int, int], degree: int) -> dict[tuple[int, int], float]:
     """Return the share of the variance that lies in each polynomial of a levelling, by its orders along x and y."""
     form = form._replace(exponent=max(form.exponent, _LEAST_OF_LOSS))
     lags = []
@@ -302,7 +264,7 @@ def _losses(
         weights.append([weight * _remaining(order, np.abs(middle)) for order in range(degree + 1)])
     correlation = form.at(lags[0][:, np.newaxis], lags[1][np.newaxis, :])
     return {
-        (a, b): (float(weights[0][a] @ correlation @ weights[1][b]), (a, b))
+        (a, b): float(weights[0][a] @ correlation @ weights[1][b])
         for a in range(degree + 1)
         for b in range(degree + 1 - a)
     }
@@ -332,59 +294,55 @@ class _FittedLags(NamedTuple):
     correlation: Array
 
 
-def _lags(along: list[Array] | tuple[Array, Array]) -> list[_FittedLags]:
-    """Return the lags of a fit: from 1 step to where the correlation has fallen."""
-    chosen = []
-    for axis, one in enumerate(along):
-        ratio = one / one[0]
-        below = np.flatnonzero(ratio < _CORRELATED)
-        last = max(3, int(below[0]) if below.size else one.size - 1)
-        lag = np.unique(np.linspace(1, min(last, one.size - 1), _LAGS).astype(np.int64))
-        chosen.append(_FittedLags(axis, lag, ratio[lag]))
-    return chosen
-
-
-def fitted_form(along: list[Array] | tuple[Array, Array]) -> CorrelationForm:
-    """Return the form of the correlation that fits covariances along x and y best."""
-    return _fit(_lags(along), along).form
-
-
-def exponent_error(found: LevelledCovariance, model: FieldModel, periodogram: Periodogram) -> float:
-    """Return the standard error of the exponent H [1] of a fitted form."""
-    lags = _lags(found.along)
-    row = iter(np.linalg.pinv(_fit(lags, found.along).slopes)[0])
-    weight = []
-    for one in lags:
-        k = model.wave_number(one.axis)
-        terms = (next(row) * (np.cos(k * lag) - ratio) for lag, ratio in zip(one.lag, one.correlation, strict=True))
-        weight.append(sum(terms, np.zeros_like(k)) / found.along[one.axis][0])
-    both = weight[0] + weight[1]
-    return math.sqrt(max(model.variance(both), periodogram.variance(periodogram.power * both)))
-
-
 class _FittedForm(NamedTuple):
-    """A fitted form, and the derivatives of the correlation by H, ln tau_x and ln tau_y."""
+    """A fitted form, its lags, and the derivatives of the correlation by H, ln tau_x and ln tau_y."""
 
     form: CorrelationForm
+    lags: list[_FittedLags]
     slopes: Array
 
 
-def _fit(lags: list[_FittedLags], along: list[Array] | tuple[Array, Array]) -> _FittedForm:
+def fitted_form(along: tuple[Array, Array]) -> CorrelationForm:
+    """Return the form of the correlation that fits covariances along x and y best."""
+    return _fit(along).form
+
+
+def exponent_error(measured: LevelledCovariance, model: FieldModel, periodogram: Periodogram) -> float:
+    """Return the standard error of the exponent H [1] of a fitted form."""
+    fit = _fit(measured.along)
+    gains = iter(np.linalg.pinv(fit.slopes)[0])
+    weight: Array = np.zeros(1)
+    for axis, lags, correlation in fit.lags:
+        k = model.wave_number(axis)
+        terms = sum(next(gains) * (np.cos(k * lag) - ratio) for lag, ratio in zip(lags, correlation, strict=True))
+        weight = weight + terms / measured.along[axis][0]
+    return math.sqrt(max(model.variance(weight), periodogram.variance(periodogram.power * weight)))
+
+
+def _fit(along: tuple[Array, Array]) -> _FittedForm:
+    """Return the fit to lags from 1 step to where the correlation has fallen."""
     least_squares = import_extra("scipy.optimize").least_squares
-    lag = np.concatenate([one.lag for one in lags]).astype(np.float64)
-    axis = np.concatenate([np.full(one.lag.size, one.axis) for one in lags])
-    seen = np.concatenate([one.correlation for one in lags])
+    lags = []
+    for number, covariances in enumerate(along):
+        ratio = covariances / covariances[0]
+        below = np.flatnonzero(ratio < _CORRELATED)
+        last = max(3, int(below[0]) if below.size else ratio.size - 1)
+        steps = np.unique(np.linspace(1, min(last, ratio.size - 1), _LAGS).astype(np.int64))
+        lags.append(_FittedLags(number, steps, ratio[steps]))
+    lag = np.concatenate([part.lag for part in lags]).astype(np.float64)
+    axis = np.concatenate([np.full(part.lag.size, part.axis) for part in lags])
+    measured = np.concatenate([part.correlation for part in lags])
 
     def model(p: Array) -> Array:
         tau = np.exp(np.where(axis == 0, p[1], p[2]))
         return np.asarray(np.exp(-((lag / tau) ** (2.0 * p[0]))))
 
-    starts = [math.log(crossing(one) or 2.0 * one.size) for one in along]
-    wide = math.log(1e4 * max(one.size for one in along))
-    found = least_squares(
-        lambda p: model(p) - seen,
+    starts = [math.log(crossing(covariances) or 2.0 * covariances.size) for covariances in along]
+    wide = math.log(1e4 * max(covariances.size for covariances in along))
+    fit = least_squares(
+        lambda p: model(p) - measured,
         [0.9, *starts],
         bounds=([_SMOOTH[0], -5.0, -5.0], [_SMOOTH[1], wide, wide]),
     )
-    p = found.x
-    return _FittedForm(CorrelationForm(float(p[0]), float(np.exp(p[1])), float(np.exp(p[2]))), found.jac)
+    h, tau_x, tau_y = float(fit.x[0]), float(np.exp(fit.x[1])), float(np.exp(fit.x[2]))
+    return _FittedForm(CorrelationForm(h, tau_x, tau_y), lags, fit.jac)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,7 @@ from brdfdb.microgeometry.height_map import HeightMap
 
 Correlation = Literal["gaussian", "exponential", "band"]
 Kind = Literal["gaussian", "exponential", "band", "grooves", "gaussian-grooves"]
-KINDS: tuple[Kind, ...] = ("gaussian", "exponential", "band", "grooves", "gaussian-grooves")
+KINDS: tuple[Kind, ...] = get_args(Kind)
 
 _FLATTEST, _STEEPEST = 1e-3, 10.0  # slopes of made surfaces [1]
 _MOST_NODES = 2048  # along each axis; the facets of a map of so many nodes take 2 GB
@@ -80,21 +80,20 @@ def gaussian_field(
 def _power(correlation: str, tau_x: float, tau_y: float, nodes: int) -> NDArray[np.float64]:
     """Return the spectrum of a correlation on a grid, but for its scale, with lengths in steps of the grid."""
     frequency = 2.0 * np.pi * np.fft.fftfreq(nodes)
-    power = _spectrum(correlation, (frequency[:, np.newaxis] * tau_x) ** 2 + (frequency * tau_y) ** 2)
+    k2 = (frequency[:, np.newaxis] * tau_x) ** 2 + (frequency * tau_y) ** 2
+    match correlation:
+        case "gaussian":
+            power = np.exp(-0.25 * k2)
+        case "exponential":
+            power = (1.0 + k2) ** -1.5
+        case "band":
+            power = np.where(k2 <= 4.0, 1.0, 0.0)
+        case _:
+            allowed = get_args(Correlation)
+            text = f"{correlation!r} is not one of {', '.join(allowed)}"
+            raise ParameterError("correlation", text, correlation, allowed)
     power[0, 0] = 0.0  # the mean height means nothing
     return power
-
-
-def _spectrum(correlation: str, k2: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the spectrum of a correlation, but for its scale, at squared frequencies in units of 1 / tau."""
-    if correlation == "gaussian":
-        return np.exp(-0.25 * k2)
-    if correlation == "exponential":
-        return (1.0 + k2) ** -1.5
-    if correlation == "band":
-        return np.where(k2 <= 4.0, 1.0, 0.0)
-    allowed = ("gaussian", "exponential", "band")
-    raise ParameterError("correlation", f"{correlation!r} is not one of {', '.join(allowed)}", correlation, allowed)
 
 
 def v_grooves(slope: float, *, grooves: int = 8) -> HeightMap:
@@ -145,14 +144,17 @@ class MadeSurface:
         if self._grooves and self.slope_y is not None:
             raise ParameterError("slope_y", f"{self.kind} have no slope along y; leave it out", self.slope_y)
         if self.all_azimuths and not self._grooves:
-            raise ParameterError("all_azimuths", "allowed is True for grooves alone", True, (False,))
+            raise ParameterError("all_azimuths", "is allowed only for grooves", True, (False,))
         if not 16 <= self.nodes <= _MOST_NODES:
             text = f"{self.nodes} is no number of nodes; allowed are 16 to {_MOST_NODES}"
             raise ParameterError("nodes", text, self.nodes, (16, _MOST_NODES))
-        most = self.nodes // 10  # ten lengths of correlation fit on the map
-        if not self._grooves and not 2 <= self.steps <= most:
-            text = f"{self.steps} is no number of steps for {self.nodes} nodes; allowed are 2 to {most}"
-            raise ParameterError("steps", text, self.steps, (2, most))
+        if not self._grooves and self.steps < 2:
+            raise ParameterError(
+                "steps", f"{self.steps} is no number of steps; allowed is 2 or more", self.steps, (2, None)
+            )
+        if not self._grooves and self.nodes < (least := 10 * self.steps):
+            text = f"{self.nodes} nodes are less than ten lengths of correlation; allowed is {least} or more"
+            raise ParameterError("nodes", text, self.nodes, (least, _MOST_NODES))
         if not self._grooves:
             self._shape()
 
@@ -209,7 +211,7 @@ class MadeSurface:
                 text += f"{self.nodes} nodes"
                 raise ParameterError("slope_y", text, self.slope_y)
             brentq = import_extra("scipy.optimize").brentq
-            ratio = float(brentq(lambda at: np.divide(*slopes(at)) - wanted, 1.0, longest, xtol=1e-9))
+            ratio = float(brentq(lambda trial: np.divide(*slopes(trial)) - wanted, 1.0, longest, xtol=1e-9))
         sigma_0 = steepest / float(slopes(ratio)[0])
         return (sigma_0, 1.0, ratio) if along_x else (sigma_0, ratio, 1.0)
 

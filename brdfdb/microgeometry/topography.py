@@ -28,6 +28,7 @@ Array = NDArray[np.float64]
 NoiseKind = Literal["given", "estimated", "negligible", "not separable"]
 
 FEWEST_LENGTHS = 8.0  # lengths of correlation along an axis below which no tau is stated
+_STEEP = 2.0  # rms slope [1], 63 degrees, above which the units of a map are doubted
 FEW_LENGTHS = 20.0  # lengths of correlation below which intervals are wide and the loss by levelling is large
 _FINEST = 2.0  # steps of the grid below which a length of correlation is not resolved
 _ORDERS = (4, 6)  # of the mixed differences that see noise alone
@@ -38,7 +39,7 @@ _BLOCK = 6.0  # least lengths of correlation along a side of a block
 _MOST_BLOCKS = 8  # blocks along an axis
 _SCATTER = 1e-3  # probability below which blocks scatter more than those of a homogeneous Gaussian surface
 _ROUNDING = 1e-20  # share of the variance of heights below which differences are errors of rounding
-_LEAST_PAIRS = 500  # neighbours without holes
+_LEAST_PAIRS = 500  # neighbours without holes, and mixed differences
 _COARSER = (2, 4)  # steps of the grid over which slopes are also stated
 _GROWTH = 1.1  # ratio of slopes over a pixel and over two from which finer pixels would show steeper ones
 _OBLIQUE = 1.2  # ratio of principal slopes from which their direction matters
@@ -47,20 +48,12 @@ _DIFFERENT = 0.01  # probability of isotropy below which a surface is anisotropi
 
 
 class Moments(NamedTuple):
-    """Skewness and kurtosis of heights or slopes; 0 and 3 of a Gaussian.
+    """Skewness and kurtosis of heights or slopes."""
 
-    Attributes
-    ----------
-    skewness, skewness_error : float [1]
-        Value, and its standard error for the number of independent areas.
-    kurtosis, kurtosis_error : float [1]
-        The same.
-    """
-
-    skewness: float
-    skewness_error: float
-    kurtosis: float
-    kurtosis_error: float
+    skewness: float  #: 0 of a Gaussian [1]
+    skewness_error: float  #: its standard error for the number of independent areas [1]
+    kurtosis: float  #: 3 of a Gaussian [1]
+    kurtosis_error: float  #: its standard error [1]
 
     @property
     def gaussian(self) -> bool:
@@ -69,37 +62,30 @@ class Moments(NamedTuple):
 
 
 class InstrumentNoise(NamedTuple):
-    """White noise of the instrument.
+    """White noise of the instrument."""
 
-    Attributes
-    ----------
-    kind : str
-        "given" by the caller; "estimated" from a flat end of the spectrum, and taken out; "negligible", less than 1 %
-        of the mean squares of slopes; "not separable" from roughness: intervals include those of 0 and of `sigma_um`.
-    sigma_um : float [um]
-        Its standard deviation; of negligible and inseparable noise the largest possible one.
-    """
-
+    #: "given" by the caller; "estimated" from a flat end of the spectrum, and taken out; "negligible", less than 1 %
+    #: of the mean squares of slopes; "not separable" from roughness: intervals include those of 0 and of `sigma_um`
     kind: NoiseKind
-    sigma_um: float
+    sigma_um: float  #: its standard deviation; of negligible and inseparable noise the largest possible one [um]
+
+    @property
+    def in_words(self) -> str:
+        """The noise in words."""
+        return {
+            "given": f"{self.sigma_um:.3g} um, as given",
+            "estimated": f"{self.sigma_um:.3g} um, from the flat end of the spectrum",
+            "negligible": f"at most {self.sigma_um:.2g} um, negligible",
+            "not separable": f"at most {self.sigma_um:.3g} um, not separable from roughness",
+        }[self.kind]
 
 
 class Anisotropy(NamedTuple):
-    """Direction in which slopes are largest.
+    """Direction in which slopes are largest."""
 
-    Attributes
-    ----------
-    ratio : float [1]
-        Largest over smallest rms slope of all directions.
-    direction_deg : float [degree]
-        Azimuth of the largest slopes, counter-clockwise from x, in [0, 180).
-    probability : float [1]
-        Probability that an isotropic surface departs as far by chance.
-    """
-
-    ratio: float
-    direction_deg: float
-    probability: float
+    ratio: float  #: largest over smallest rms slope of all directions [1]
+    direction_deg: float  #: azimuth of the largest slopes, counter-clockwise from x, in [0, 180) [degree]
+    probability: float  #: probability that an isotropic surface departs as far by chance [1]
 
     @property
     def significant(self) -> bool:
@@ -108,21 +94,12 @@ class Anisotropy(NamedTuple):
 
 
 class BlockScatter(NamedTuple):
-    """Spread of a mean square over blocks of the map.
+    """Spread of a mean square over blocks of the map."""
 
-    Attributes
-    ----------
-    blocks : int
-        Number of blocks.
-    ratio : float [1]
-        Their variance over that of a homogeneous Gaussian surface. Intervals are widened where it is not chance.
-    probability : float [1]
-        Probability of such a ratio by chance.
-    """
-
-    blocks: int
+    blocks: int  #: number of blocks
+    #: their variance over that of a homogeneous Gaussian surface. Intervals are widened where it is not chance [1]
     ratio: float
-    probability: float
+    probability: float  #: probability of such a ratio by chance [1]
 
     @property
     def factor(self) -> float:
@@ -192,7 +169,7 @@ class SurfaceStatistics:
         for name, value in document.items():
             if hasattr(value, "_asdict"):
                 document[name] = value._asdict()
-        document["scatter"] = {name: one._asdict() for name, one in self.scatter.items()}
+        document["scatter"] = {name: scatter._asdict() for name, scatter in self.scatter.items()}
         return document | {"form": self.form, "confidence": CONFIDENCE}
 
 
@@ -232,6 +209,30 @@ def surface_statistics(
     return _Map(levelled, stage).statistics(noise_um)
 
 
+def instrument_noise(levelled: Levelled, noise_um: float | None = None) -> InstrumentNoise:
+    """Return the noise of the instrument in a levelled map, as `surface_statistics` states it, with its errors.
+
+    Maps may be of any size: the noise of few heights is not separable.
+    """
+    z = levelled.measured.heights_um
+    if noise_um is not None:
+        return _given(noise_um, z)
+    differences = [_difference(z, axis) for axis in (0, 1)]
+    if min(np.count_nonzero(np.isfinite(part)) for part in differences) >= _LEAST_PAIRS:
+        return _Map(levelled, lambda _: None).noise(None, float(np.nanvar(z)))
+    return InstrumentNoise("not separable", math.sqrt(0.5 * min(np.nanmean(part**2) for part in differences)))
+
+
+def _given(noise_um: float, z: Array) -> InstrumentNoise:
+    """Return noise that is given; ParameterError if the heights, or those of neighbours, differ too little."""
+    most = math.sqrt(min(float(np.nanvar(z)), *(0.5 * float(np.nanmean(_difference(z, axis) ** 2)) for axis in (0, 1))))
+    if not 0.0 <= noise_um < most:
+        text = f"{noise_um:g} um is not at least 0 and below {most:.3g} um, the largest noise that the map can have: "
+        text += "neighbouring heights differ by sqrt(2) times the noise or more"
+        raise ParameterError("noise_um", text, noise_um, (0.0, most))
+    return InstrumentNoise("given", noise_um)
+
+
 class _Estimates(NamedTuple):
     """Estimates for one variance of the noise."""
 
@@ -253,13 +254,13 @@ class _Map:
         stage("spectra of heights and slopes")
         self.heights = Periodogram(self.z)
         self.differences = tuple(Periodogram(_difference(self.z, axis)) for axis in (0, 1))
-        pairs = min(one.count for one in self.differences)
+        pairs = min(difference.count for difference in self.differences)
         if pairs < _LEAST_PAIRS:
             text = f"holes leave {pairs} pairs of neighbours; at least {_LEAST_PAIRS} are needed for slopes"
             raise ParameterError("holes", text, pairs, (_LEAST_PAIRS, self.z.size))
         low, high = (Periodogram(_mixed(self.z, order)) for order in _ORDERS)
         self.rough = high
-        self.seen = self.rough.count > 500
+        self.seen = high.count > _LEAST_PAIRS
         self.ceiling = MeanSquare(high.mean(high.power), high.variance(high.power))
         ratio = self.ceiling.value / max(low.mean(low.power), 1e-300)
         spread = math.sqrt(self.ceiling.variance) / max(self.ceiling.value, 1e-300)
@@ -268,40 +269,38 @@ class _Map:
 
     def statistics(self, noise_um: float | None) -> SurfaceStatistics:
         variance = self.heights.mean(self.heights.power)
-        noise = self._noise(noise_um, variance)
+        noise = self.noise(noise_um, variance)
         taken = noise.sigma_um**2 if noise.kind in ("given", "estimated") else 0.0
-        found = levelled_covariance(self.z, self.degree, taken)
-        self._check_lengths(found)
-        model = FieldModel(found.form, found.along[0][0], taken, self.z.shape, self.heights.count)
+        covariance = levelled_covariance(self.z, self.degree, taken)
+        self._check_lengths(covariance)
+        model = self._model(covariance, taken)
         self.stage("distributions")
         moments = {"sigma_0": _moments(self.z, model, np.ones(1))}
-        for axis in (0, 1):
-            weight = 2.0 - 2.0 * np.cos(model.wave_number(axis))
-            moments[f"slope_{'xy'[axis]}"] = _moments(_difference(self.z, axis), model, weight)
+        for axis, name in enumerate(("slope_x", "slope_y")):
+            moments[name] = _moments(_difference(self.z, axis), model, model.difference_gain(axis))
         heights = moments["sigma_0"]
         assert heights is not None  # flat maps are refused by levelling
         self.stage("intervals")
-        scatter = self._scatter(found, model)
-        factors = {name: _factor(one, scatter.get(name)) for name, one in moments.items()}
-        given = self._estimates(found, model, taken, noise.kind == "estimated", factors)
+        scatter = self._scatter(model)
+        factors = {name: _factor(moment, scatter.get(name)) for name, moment in moments.items()}
+        estimates = self._estimates(covariance, taken, noise.kind == "estimated", factors)
         if noise.kind == "not separable":
-            other = levelled_covariance(self.z, self.degree, noise.sigma_um**2)
-            quiet = FieldModel(other.form, other.along[0][0], noise.sigma_um**2, self.z.shape, self.heights.count)
-            given = _either(given, self._estimates(other, quiet, noise.sigma_um**2, True, factors))
+            quiet = levelled_covariance(self.z, self.degree, noise.sigma_um**2)
+            estimates = _either(estimates, self._estimates(quiet, noise.sigma_um**2, True, factors))
         return SurfaceStatistics(
-            sigma_0_um=given.sigma,
-            tau_x_um=given.tau[0],
-            tau_y_um=given.tau[1],
-            slope_x=given.slopes[0],
-            slope_y=given.slopes[1],
-            exponent=given.exponent,
+            sigma_0_um=estimates.sigma,
+            tau_x_um=estimates.tau[0],
+            tau_y_um=estimates.tau[1],
+            slope_x=estimates.slopes[0],
+            slope_y=estimates.slopes[1],
+            exponent=estimates.exponent,
             coarser=tuple((lag, self._slope_over(lag, 0, taken), self._slope_over(lag, 1, taken)) for lag in _COARSER),
             heights=heights,
             slopes_x=moments["slope_x"],
             slopes_y=moments["slope_y"],
             anisotropy=self._anisotropy(model, taken),
             noise=noise,
-            lost=found.lost,
+            lost=covariance.lost,
             areas=MeanSquare(model.mean_power, model.variance(np.ones(1))).areas,
             scatter=scatter,
             step_um=self.step,
@@ -309,17 +308,16 @@ class _Map:
             count=self.heights.count,
         )
 
-    def _noise(self, noise_um: float | None, variance: float) -> InstrumentNoise:
+    def _model(self, covariance: LevelledCovariance, noise: float) -> FieldModel:
+        """Return the field that has a covariance, with a variance of the noise."""
+        return FieldModel(covariance.form, covariance.along[0][0], noise, self.z.shape, self.heights.count)
+
+    def noise(self, noise_um: float | None, variance: float) -> InstrumentNoise:
         """Return the noise, given, estimated or bounded."""
         if noise_um is not None:
-            most = math.sqrt(variance)
-            if not 0.0 <= noise_um < most:
-                raise ParameterError(
-                    "noise_um", f"{noise_um:g} um is not at least 0 and below the rms height of {most:.3g} um", noise_um
-                )
-            return InstrumentNoise("given", noise_um)
-        most = self.ceiling.value if self.seen else self._nearest_neighbours()
-        slopes = min(one.mean(one.power) for one in self.differences)
+            return _given(noise_um, self.z)
+        slopes = min(difference.mean(difference.power) for difference in self.differences)
+        most = self.ceiling.value if self.seen else 0.5 * slopes  # many holes leave no mixed differences
         if 2.0 * most <= _NEGLIGIBLE * slopes:
             return InstrumentNoise("negligible", math.sqrt(most))
         if self.flat and most < variance:
@@ -334,87 +332,72 @@ class _Map:
         square = float(np.nanmean((z[lag:] - z[:-lag]) ** 2)) - 2.0 * noise
         return math.sqrt(max(square, 0.0)) / (lag * self.step[axis])
 
-    def _nearest_neighbours(self) -> float:
-        """Return the largest variance of noise that neighbours allow, for maps with too many holes for more."""
-        return 0.5 * min(one.mean(one.power) for one in self.differences)
-
-    def _check_lengths(self, found: LevelledCovariance) -> None:
+    def _check_lengths(self, covariance: LevelledCovariance) -> None:
         """Refuse maps that are too small or too coarse."""
-        lengths = [self._tau(found, axis) for axis in (0, 1)]
+        lengths = [self._tau(covariance, axis) for axis in (0, 1)]
+        form = covariance.form
         if all(tau is None for tau in lengths):
-            axis = int(np.argmax([self.z.shape[0] / found.form.tau_x, self.z.shape[1] / found.form.tau_y]))
-            tau_um = (found.form.tau_x, found.form.tau_y)[axis] * self.step[axis]
-            raise ParameterError(
-                "tau_um",
+            axis = int(np.argmax([self.z.shape[0] / form.tau_x, self.z.shape[1] / form.tau_y]))
+            tau_um = (form.tau_x, form.tau_y)[axis] * self.step[axis]
+            text = (
                 f"the map is {self.width[axis]:.3g} um long, {self.width[axis] / tau_um:.2g} lengths of correlation of "
-                f"{tau_um:.3g} um; at least {FEWEST_LENGTHS:g} are needed along an axis",
-                tau_um,
             )
+            text += f"{tau_um:.3g} um; at least {FEWEST_LENGTHS:g} are needed along an axis: measure a larger area, or "
+            text += "subtract a quadratic surface if the map is bent"
+            raise ParameterError("tau_um", text, tau_um)
         for axis, tau in enumerate(lengths):
             if tau is not None and tau < _FINEST:
-                raise ParameterError(
-                    "tau_um",
-                    f"the length of correlation along {'xy'[axis]} is {tau:.2g} steps; allowed is 2 or more",
-                    tau * self.step[axis],
-                )
+                text = f"the length of correlation along {'xy'[axis]} is {tau:.2g} pixels; {_FINEST:g} or more are "
+                text += "needed: measure with a smaller pixel"
+                raise ParameterError("tau_um", text, tau * self.step[axis])
 
-    def _tau(self, found: LevelledCovariance, axis: int) -> float | None:
+    def _tau(self, covariance: LevelledCovariance, axis: int) -> float | None:
         """Return the length of correlation [steps]; None if the map is too short for it."""
-        tau = crossing(found.along[axis])
+        tau = crossing(covariance.along[axis])
         return None if tau is None or self.z.shape[axis] < FEWEST_LENGTHS * tau else tau
 
     def _estimates(
-        self,
-        found: LevelledCovariance,
-        model: FieldModel,
-        taken: float,
-        estimated: bool,
-        factors: dict[str, float],
+        self, covariance: LevelledCovariance, noise: float, estimated: bool, factors: dict[str, float]
     ) -> _Estimates:
         """Return estimates with their intervals for a variance of the noise, which differences may have estimated."""
-        student = import_extra("scipy.stats").t
-        rough = self.rough.power if estimated else np.zeros(1)
-        order = _ORDERS[1]
-        gain = float(math.comb(2 * order, order))
-        response = np.ones(1)
-        for axis in (0, 1):
-            response = response * (2.0 * np.sin(0.5 * model.wave_number(axis))) ** (2 * order) / gain
-        response = response if estimated else np.zeros(1)
+        model = self._model(covariance, noise)
+        rough = response = np.zeros(1)
+        if estimated:
+            order = _ORDERS[1]
+            both = model.difference_gain(0) * model.difference_gain(1)
+            rough, response = self.rough.power, (both / math.comb(2 * order, order) ** (2.0 / order)) ** order
 
-        def mean_square(one: Periodogram, weight: Array, times: float, name: str) -> MeanSquare:
-            spread = max(one.variance(one.power - times * rough), model.variance(weight - times * response))
-            return MeanSquare(one.mean(one.power) - times * taken, factors[name] * spread)
+        def mean_square(field: Periodogram, weight: Array, times: float, name: str) -> MeanSquare:
+            spread = max(field.variance(field.power - times * rough), model.variance(weight - times * response))
+            return MeanSquare(field.mean(field.power) - times * noise, factors[name] * spread)
 
         heights = mean_square(self.heights, np.ones(1), 1.0, "sigma_0")
-        sigma = heights.root().scaled(1.0 / math.sqrt(1.0 - found.lost))
+        sigma = heights.root().scaled(1.0 / math.sqrt(1.0 - covariance.lost))
+        student = float(import_extra("scipy.stats").t.ppf(0.5 + 0.5 * CONFIDENCE, max(3.0, 0.5 * heights.areas)))
         slopes: list[HeightInterval] = []
         taus: list[HeightInterval | None] = []
-        for axis, one in enumerate(self.differences):
-            k = model.wave_number(axis)
-            name = f"slope_{'xy'[axis]}"
-            slopes.append(mean_square(one, 2.0 - 2.0 * np.cos(k), 2.0, name).root().scaled(1.0 / self.step[axis]))
-            tau = self._tau(found, axis)
+        for axis, difference in enumerate(self.differences):
+            square = mean_square(difference, model.difference_gain(axis), 2.0, f"slope_{'xy'[axis]}")
+            slopes.append(square.root().scaled(1.0 / self.step[axis]))
+            tau = self._tau(covariance, axis)
             if tau is None:
                 taus.append(None)
                 continue
-            along = found.along[axis]
-            weight = (np.cos(k * tau) - math.exp(-1.0)) / along[0]
+            along = covariance.along[axis]
+            weight = (np.cos(model.wave_number(axis) * tau) - math.exp(-1.0)) / along[0]
             variance = max(self.heights.variance(self.heights.power * weight), model.variance(weight))
-            variance *= factors["sigma_0"]
-            at = int(tau)
-            fall = (along[at] - along[at + 1]) / along[0]
-            error = math.sqrt(variance) / max(fall, 1e-9) / tau
-            factor = math.exp(float(student.ppf(0.5 + 0.5 * CONFIDENCE, max(3.0, 0.5 * heights.areas))) * error)
+            fall = (along[int(tau)] - along[int(tau) + 1]) / along[0]
+            error = math.sqrt(variance * factors["sigma_0"]) / max(fall, 1e-9) / tau
+            factor = math.exp(student * error)
             taus.append(HeightInterval(tau, tau / factor, tau * factor).scaled(self.step[axis]))
-        h = found.form.exponent
-        error = float(student.ppf(0.5 + 0.5 * CONFIDENCE, max(3.0, 0.5 * heights.areas)))
-        error *= exponent_error(found, model, self.heights)
+        h = covariance.form.exponent
+        error = student * exponent_error(covariance, model, self.heights)
         exponent = HeightInterval(h, h - error, h + error)
         return _Estimates(sigma, (taus[0], taus[1]), (slopes[0], slopes[1]), exponent)
 
-    def _scatter(self, found: LevelledCovariance, model: FieldModel) -> dict[str, BlockScatter]:
+    def _scatter(self, model: FieldModel) -> dict[str, BlockScatter]:
         """Return the scatter of mean squares over blocks of several lengths of correlation."""
-        lengths = (found.form.tau_x, found.form.tau_y)
+        lengths = (model.form.tau_x, model.form.tau_y)
         count = [
             int(np.clip(nodes // (_BLOCK * tau), 1, _MOST_BLOCKS))
             for nodes, tau in zip(self.z.shape, lengths, strict=True)
@@ -425,9 +408,8 @@ class _Map:
         chi2 = import_extra("scipy.stats").chi2
         scatter = {}
         fields = {"sigma_0": (self.z, np.ones(1))}
-        for axis in (0, 1):
-            weight = 2.0 - 2.0 * np.cos(model.wave_number(axis))
-            fields[f"slope_{'xy'[axis]}"] = (_difference(self.z, axis), weight)
+        for axis, name in enumerate(("slope_x", "slope_y")):
+            fields[name] = (_difference(self.z, axis), model.difference_gain(axis))
         for name, (field, weight) in fields.items():
             squares = [
                 float(np.nanmean(part**2))
@@ -435,19 +417,17 @@ class _Map:
                 for part in np.array_split(rows, count[1], axis=1)
                 if np.count_nonzero(np.isfinite(part)) > part.size // 4
             ]
-            if len(squares) < 4:
-                continue
-            ratio = float(np.var(squares, ddof=1)) / (model.variance(weight) * blocks)
-            free = len(squares) - 1
-            scatter[name] = BlockScatter(len(squares), ratio, float(chi2.sf(ratio * free, free)))
+            if len(squares) >= 4:
+                ratio = float(np.var(squares, ddof=1)) / (model.variance(weight) * blocks)
+                free = len(squares) - 1
+                scatter[name] = BlockScatter(len(squares), ratio, float(chi2.sf(ratio * free, free)))
         return scatter
 
     def _anisotropy(self, model: FieldModel, noise: float) -> Anisotropy:
         """Return the direction and ratio of the principal slopes, and whether chance explains them."""
         h_x, h_y = self.step
-        xx, yy = (
-            (one.mean(one.power) - 2.0 * noise) / h**2 for one, h in zip(self.differences, self.step, strict=True)
-        )
+        power = [field.power / h**2 for field, h in zip(self.differences, self.step, strict=True)]
+        xx, yy = (self.heights.mean(part) - 2.0 * noise / h**2 for part, h in zip(power, self.step, strict=True))
         # noise cancels in the difference of both diagonals
         rising = self.z[1:, 1:] - self.z[:-1, :-1]
         falling = self.z[1:, :-1] - self.z[:-1, 1:]
@@ -456,8 +436,7 @@ class _Map:
         angle = 0.5 * math.atan2(2.0 * xy, xx - yy)
         half = math.hypot(0.5 * (xx - yy), xy)
         least = max(0.5 * total - half, 1e-12 * total)
-        weights = [(2.0 - 2.0 * np.cos(model.wave_number(axis))) / h**2 for axis, h in enumerate(self.step)]
-        power = [one.power / h**2 for one, h in zip(self.differences, self.step, strict=True)]
+        weights = [model.difference_gain(axis) / h**2 for axis, h in enumerate(self.step)]
         straight = max(1e-300, model.variance(weights[0] - weights[1]), self.heights.variance(power[0] - power[1]))
         oblique = np.sin(model.k_x) * np.sin(model.k_y) * (2.0 / (h_x * h_y))
         skew = max(1e-300, model.variance(oblique), self.heights.variance(self.heights.power * oblique))
@@ -480,8 +459,8 @@ def _factor(moments: Moments | None, scatter: BlockScatter | None) -> float:
 def _either(first: _Estimates, second: _Estimates) -> _Estimates:
     """Return the first estimates with intervals that contain those of both."""
 
-    def both(one: HeightInterval, other: HeightInterval) -> HeightInterval:
-        return HeightInterval(one.value, min(one.low, other.low), max(one.high, other.high))
+    def both(interval: HeightInterval, other: HeightInterval) -> HeightInterval:
+        return HeightInterval(interval.value, min(interval.low, other.low), max(interval.high, other.high))
 
     taus = [a if a is None or b is None else both(a, b) for a, b in zip(first.tau, second.tau, strict=True)]
     slopes = [both(a, b) for a, b in zip(first.slopes, second.slopes, strict=True)]
@@ -553,7 +532,7 @@ def uncertain(levelled: Levelled, surface: SurfaceStatistics) -> list[str]:
         elif width < FEW_LENGTHS * tau.value:
             lengths = width / tau.value
             sentences.append(
-                f"the map has only {lengths:.2g} lengths of correlation along {axis}; 20 or more are better"
+                f"the map has only {lengths:.3g} lengths of correlation along {axis}; 20 or more are better"
             )
     for axis, fine, coarse in (
         ("x", surface.slope_x.value, surface.coarser[0][1]),
@@ -564,6 +543,12 @@ def uncertain(levelled: Levelled, surface: SurfaceStatistics) -> list[str]:
                 f"slopes along {axis} grow from {coarse:.3g} over two pixels to {fine:.3g} over one: finer "
                 "pixels would show steeper slopes"
             )
+    steepest = max(surface.slope_x.value, surface.slope_y.value)
+    if steepest > _STEEP:
+        sentences.append(
+            f"rms slopes of {steepest:.3g} are those of {math.degrees(math.atan(steepest)):.0f} degrees, steeper than "
+            "instruments measure: are the units of heights and pixels right?"
+        )
     turned = surface.anisotropy
     if turned.significant and turned.ratio > _OBLIQUE and 10.0 < turned.direction_deg % 90.0 < 80.0:
         sentences.append(
@@ -574,7 +559,7 @@ def uncertain(levelled: Levelled, surface: SurfaceStatistics) -> list[str]:
         sentences.append(
             "the heights are not Gaussian: intervals are widened by their kurtosis, and may still be too narrow"
         )
-    wider = [name for name, one in surface.scatter.items() if one.factor > 1.0]
+    wider = [name for name, scatter in surface.scatter.items() if scatter.factor > 1.0]
     if wider:
         sentences.append(
             f"{' and '.join(wider)} of blocks of the map differ by more than chance: the surface is not homogeneous or "

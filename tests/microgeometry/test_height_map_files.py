@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 import struct
 import zipfile
 from dataclasses import replace
@@ -129,6 +130,115 @@ def test_directions_are_the_same_in_all_formats(name: str, tmp_path: Path) -> No
     assert np.allclose(found.heights_um, z)
     assert (found.step_x_um, found.step_y_um) == pytest.approx((0.5, 0.5))
     assert found.axes == ("x and y of the file" if name in ("sdf", "x3p") else height_map_files.ROWS)
+
+
+# Arrays in archives, and microscopes whose files are TIFF files
+
+
+def test_an_archive_has_the_axes_of_an_array_and_names_for_channels(tmp_path: Path) -> None:
+    path = tmp_path / "map.npz"
+    np.savez(path, heights=RAMP.T[::-1], twice=2.0 * RAMP.T[::-1], line=RAMP[0])
+    found = read_heights(path, MapOptions((0.5, 0.8), 0.001))
+    assert np.allclose(found.heights_um, 0.001 * RAMP)
+    assert (found.step_x_um, found.step_y_um) == (0.5, 0.8)
+    assert found.notes == ("channel 'heights' was read; other channels of heights: twice",)
+    assert np.allclose(read_heights(path, MapOptions((0.5,), 0.001, channel="twice")).heights_um, 0.002 * RAMP)
+    with pytest.raises(ParameterError, match="channel: 'phase' is not one of heights, twice"):
+        read_heights(path, MapOptions((0.5,), 0.001, channel="phase"))
+
+
+def lext(z_pm: np.ndarray, step_pm: int) -> bytes:
+    """Return a file of an Olympus LEXT microscope: an overview with XML in its tags, and a page of heights [pm]."""
+    axes = "".join(f"<HeightDataUnit{axis}>-12</HeightDataUnit{axis}>" for axis in "XYZ")
+    axes += "".join(
+        f"<HeightDataPerPixel{a}>{n}</HeightDataPerPixel{a}>" for a, n in zip("XYZ", (step_pm,) * 2 + (1,), strict=True)
+    )
+    calibration = "".join(f"<MakerCalibrationValue{axis}>1e6</MakerCalibrationValue{axis}>" for axis in "XYZ")
+    exif = f"<ExifTagDescData><ImageCommonSettingsInfo>{calibration}</ImageCommonSettingsInfo></ExifTagDescData>"
+    overview = f"<TiffTagDescData><HeightInfo>{axes}</HeightInfo></TiffTagDescData>"
+    content = b"II*\0" + struct.pack("<I", 0)
+    link = 4  # where the position of the next page stands
+    for description, settings in ((overview, exif), ("HEIGHT", "")):
+        rows = np.ascontiguousarray(z_pm.T[::-1]).astype("<u2")
+        text = description.encode() + b"\0"
+        place = len(content)
+        content += rows.tobytes() + text + b"\0" * (len(text) % 2)
+        tags = [(256, 3, 1, rows.shape[1]), (257, 3, 1, rows.shape[0]), (258, 3, 1, 16), (259, 3, 1, 1), (262, 3, 1, 1)]
+        tags += [(270, 2, len(text), place + rows.nbytes), (273, 4, 1, place), (277, 3, 1, 1)]
+        tags += [(278, 3, 1, rows.shape[0]), (279, 4, 1, rows.nbytes)]
+        if settings:
+            text = settings.encode() + b"\0"
+            start = len(content) + len(text) + len(text) % 2
+            content += text.ljust(start - len(content), b"\0")
+            content += struct.pack("<HHHIII", 1, 41995, 2, len(text), start - len(text) - len(text) % 2, 0)
+            tags.append((34665, 4, 1, start))
+        content = content[:link] + struct.pack("<I", len(content)) + content[link + 4 :]
+        content += struct.pack("<H", len(tags)) + b"".join(struct.pack("<HHII", *tag) for tag in tags)
+        link = len(content)
+        content += struct.pack("<I", 0)
+    return content
+
+
+def jpk(path: Path, z_um: np.ndarray, step_um: float) -> None:
+    """Write an image scan of a JPK microscope: a thumbnail, and a page of 32-bit numbers with their scale."""
+    nx, ny = z_um.shape
+    size = [(0x8042, "d", 1, 1e-6 * step_um * nx, True), (0x8043, "d", 1, 1e-6 * step_um * ny, True)]
+    size += [(0x8003, "s", 0, "2026-01-01 12:00:00.000 GMT", True)]
+    scale = [(0x8050, "s", 0, "height", True), (0x8051, "q", 1, 0, True), (0x8052, "s", 0, "Height", True)]
+    scale += [(0x8080, "I", 1, 1, True), (0x8081, "s", 0, "nominal", True), (0x8090, "s", 0, "nominal", True)]
+    scale += [(0x80A2, "s", 0, "m", True), (0x80A3, "s", 0, "LinearScaling", True)]
+    scale += [(0x80A4, "d", 1, 1e-9, True), (0x80A5, "d", 1, 5e-6, True)]
+    numbers = np.rint((z_um - 5.0) / 1e-3).astype(np.int32)
+    with tifffile.TiffWriter(path) as file:
+        file.write(np.zeros((8, 8), np.uint8), extratags=size, metadata=None)
+        # the first line of a scan is the lowest
+        file.write(np.ascontiguousarray(numbers.T), extratags=scale, metadata=None)
+
+
+def park(path: Path, z_um: np.ndarray, step_um: float) -> None:
+    """Write a file of a Park Systems microscope: a picture in colour, and heights and their header in tags."""
+
+    def text(words: str, count: int) -> bytes:
+        return words.encode("utf-16-le").ljust(2 * count, b"\0")
+
+    nx, ny = z_um.shape
+    head = struct.pack("<I", 0) + text("Z Height", 32) + text("", 8)
+    head += struct.pack("<dIIIIdIdIII", 0.0, 0, 0, nx, ny, 0.0, 0, 0.0, 1, 1, 0)
+    head += struct.pack("<6d", step_um * nx, step_um * ny, 0.0, 0.0, 1.0, 0.0) + text("", 8)
+    head += struct.pack("<5d", 0.0, 0.0, 1.0, 1e-3, 5.0) + text("um", 8) + struct.pack("<3i3I", 0, 0, 0, 0, 0, 0)
+    # the first line of a scan is the lowest
+    data = np.rint((z_um - 5.0) / 1e-3).astype("<i2").T.tobytes()
+    tags = [(50432, "I", 1, 0x0E031301, True), (50433, "I", 1, 0x1000001, True)]
+    tags += [(50434, "B", len(data), data, True), (50435, "B", len(head), head, True)]
+    tifffile.imwrite(path, np.zeros((16, 16, 3), np.uint8), photometric="rgb", extratags=tags, metadata=None)
+
+
+@pytest.mark.parametrize("name", ["lext", "jpk", "tiff"])
+def test_microscopes_that_write_tiff_files(name: str, tmp_path: Path) -> None:
+    path = tmp_path / f"map.{name}"
+    if name == "lext":
+        path.write_bytes(lext(RAMP, 500_000))
+        unit_um = 1e-6
+    else:
+        (jpk if name == "jpk" else park)(path, 0.001 * RAMP, 0.5)
+        unit_um = 1e-3
+    found = read_heights(path)
+    assert np.allclose(found.heights_um, unit_um * RAMP, rtol=1e-9)
+    assert (found.step_x_um, found.step_y_um) == pytest.approx((0.5, 0.5))
+    assert found.axes == height_map_files.ROWS
+    with pytest.raises(ParameterError, match=r"pixel_um: .* states its own pixel size"):
+        read_heights(path, GIVEN)
+
+
+def test_suffixes_that_sentences_and_pages_name_are_those_of_readers() -> None:
+    readers = pytest.importorskip("SurfaceTopography.IO").readers
+    read = [kind for kind in readers if kind.format() not in height_map_files._LEFT_OUT]
+    known = {suffix for kind in read for suffix in kind.file_extensions()}
+    assert set(height_map_files.SUFFIXES) <= known
+    page = Path(__file__).parents[2] / "docs/tutorials/height-maps.md"
+    named = set(re.findall(r"\.([a-z][a-z0-9]+)\b", page.read_text("utf-8").split("\n## Files\n")[1].split("\n## ")[0]))
+    assert named >= set(height_map_files.SUFFIXES)
+    assert named <= known | {"npy"}
 
 
 # Facts that pictures state
@@ -275,6 +385,11 @@ def written(folder: Path, kind: str) -> Path:
             np.save(path, RAMP[:, 0])
         case "bytes.npy":
             np.save(path, RAMP.astype(np.uint8))
+        case "bytes.npz":
+            np.savez(path, RAMP.astype(np.uint8))
+        case "truncated.npz":
+            np.savez(folder / "map.npz", RAMP)
+            path.write_bytes((folder / "map.npz").read_bytes()[:2000])
         case "small.sdf":
             path.write_bytes(sdf(small.astype(float), 0.5, 0.5))
         case "truncated.npy" | "truncated.png" | "truncated.tif" | "truncated.sdf":
@@ -322,7 +437,12 @@ def written(folder: Path, kind: str) -> Path:
         ("colour.png", "the picture is in colour; heights need a grey picture"),
         ("8-bit.tif", "the picture has 8 bits; heights need a grey picture of 16 bits"),
         ("colour.tif", "the picture is in colour; heights need a grey picture"),
-        ("pages.tif", "the file has 2 pictures"),
+        (
+            "pages.tif",
+            r"the file has 2 pictures, and is not of a microscope .*; export the heights as a single picture",
+        ),
+        ("bytes.npz", "numbers of type uint8 are no heights"),
+        ("truncated.npz", "no reader recognises the file as a height map"),
         ("small.npy", "40 x 20 heights are too few; at least 32 x 32 are needed"),
         ("small.sdf", "20 x 40 heights are too few; at least 32 x 32 are needed"),
         ("line.npy", r"an array of shape \(48,\) is no map of heights"),
@@ -342,8 +462,8 @@ def written(folder: Path, kind: str) -> Path:
         ("holes.npy", "all heights are holes"),
         ("words.csv", "the table cannot be read .*three"),
         ("noise.bin", "no reader recognises the file as a height map"),
-        ("empty.sdf", "no reader recognises the file as a height map"),
-        ("text.txt", "no reader recognises the file as a height map"),
+        ("empty.sdf", "empty.sdf: the file is empty"),
+        ("text.txt", "line 1 is no row of numbers: 'a plate of brass'; allowed are numbers with commas"),
     ],
 )
 def test_files_that_are_no_height_maps_are_a_sentence(kind: str, sentence: str, tmp_path: Path) -> None:

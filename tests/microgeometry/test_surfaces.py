@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 from scipy.special import j1
 
 from brdfdb.errors import ParameterError
+from brdfdb.microgeometry.goniometer import shadowed
+from brdfdb.microgeometry.height_map import HeightMap
 from brdfdb.microgeometry.surfaces import KINDS, Correlation, MadeSurface, gaussian_field, v_grooves
 
 FIELDS: tuple[Correlation, ...] = ("gaussian", "exponential", "band")
@@ -120,7 +122,7 @@ def test_the_seed_decides(kind: Any) -> None:
         ({"nodes": 8}, "nodes"),
         ({"nodes": 100_000}, "nodes"),
         ({"steps": 1}, "steps"),
-        ({"steps": 100}, "steps"),
+        ({"steps": 100}, "nodes"),  # 512 nodes are five lengths of correlation
     ],
 )
 def test_what_cannot_be_made_is_refused(arguments: dict[str, Any], parameter: str) -> None:
@@ -149,3 +151,31 @@ def test_fields_that_do_not_fit_on_their_grid_are_refused(arguments: dict[str, A
 def test_grooves_of_no_slope_are_refused() -> None:
     with pytest.raises(ParameterError, match="90 degrees is not in"):
         v_grooves(np.pi / 2)
+
+
+def test_rays_see_the_shape_alone_at_both_ends_of_the_range_of_steps() -> None:
+    rough = gaussian_field(sigma_0_um=0.3, tau_x_um=1.0, step_um=0.1, nodes=100, seed=1)
+    light = [[np.sin(1.4), 0.0, np.cos(1.4)]]
+    shares = []
+    for step_um in (1e-6, 0.1, 1e9):
+        scaled = HeightMap(rough.heights_um * (step_um / 0.1), step_um, step_um, periodic=True)
+        shares.append(shadowed(scaled, light, rays=1024, seed=0)[0])
+    assert 0.2 < shares[1] < 0.6
+    assert shares == pytest.approx([shares[1]] * 3, abs=0.002)  # two rays of 1024
+
+
+@pytest.mark.parametrize(
+    ("height_um", "step_x_um", "step_y_um", "sentence"),
+    [
+        (1.0, 1e-7, 1.0, r"step_x_um: 1e-07 um is outside \[1e-06, 1e\+09\] um"),
+        (1.0, 1.0, 1e15, r"step_y_um: 1e\+15 um is outside"),
+        (1.0, float("nan"), 1.0, "step_x_um: nan um is outside"),
+        (1e15, 1.0, 1.0, r"heights_um: a range of heights of 1e\+15 um is too large for steps of 1 um; allowed are up"),
+        (1.0, 0.1, 1e5, r"heights_um: a length of 1e\+05 um is too large for steps of 0\.1 um"),
+    ],
+)
+def test_maps_beyond_the_digits_of_rays_are_refused(
+    height_um: float, step_x_um: float, step_y_um: float, sentence: str
+) -> None:
+    with pytest.raises(ParameterError, match=sentence):
+        HeightMap(np.array([[0.0, height_um], [0.0, 0.0]]), step_x_um, step_y_um)

@@ -13,13 +13,17 @@ import pytest
 from brdfdb.errors import ParameterError
 from brdfdb.microgeometry.height_map_files import MeasuredHeights, read_heights
 from brdfdb.microgeometry.levelling import LevellingOptions, fill_holes, levelled
+from brdfdb.microgeometry.model_errors import SurfaceError, suited_parameters, surface_error_of
 from brdfdb.microgeometry.surface_models import (
+    ModelStanding,
     index_entry,
     spatial_band,
     standings,
     surface_materials,
 )
 from brdfdb.microgeometry.topography import SurfaceStatistics, surface_statistics, uncertain
+from brdfdb.models import MODELS
+from brdfdb.parameters import HeightRelation, Standing, StatedLimit, SurfaceAssumption
 from tests.microgeometry.made_maps import TWELVE, MadeMap, write
 
 MADE = MadeMap(nodes=(160, 160), noise=0.02)
@@ -219,14 +223,34 @@ def test_a_plane_through_holes_is_filled_exactly() -> None:
     ("made", "options", "sentence"),
     [
         (replace(MADE, tau_x=16.0, tau_y=16.0), {}, "lengths of correlation of .* um; at least 8 are needed"),
-        (replace(MADE, tau_x=0.6, tau_y=0.6, noise=0.0), {}, "steps; allowed is 2 or more"),
-        (MADE, {"noise_um": 3.0}, "3 um is not at least 0 and below the rms height"),
+        (
+            replace(MADE, tau_x=0.6, tau_y=0.6, noise=0.0),
+            {},
+            "pixels; 2 or more are needed: measure with a smaller pixel",
+        ),
+        (MADE, {"noise_um": 3.0}, "3 um is not at least 0 and below "),
         (MADE, {"noise_um": -1.0}, "-1 um is not at least 0"),
+        # neighbours of a smooth surface differ by less than the noise would make them differ
+        (
+            replace(MADE, noise=0.0),
+            {"noise_um": 0.1},
+            "0.1 um is not .* below 0.0.* um, the largest noise that the map",
+        ),
     ],
 )
 def test_maps_that_are_too_small_or_coarse_are_refused(made: MadeMap, options: dict[str, float], sentence: str) -> None:
     with pytest.raises(ParameterError, match=sentence):
         statistics(made, **options)
+
+
+def test_slopes_that_no_instrument_measures_are_doubted() -> None:
+    measured = MADE.measured(0)
+    as_um = levelled(replace(measured, heights_um=1e3 * measured.heights_um))  # nanometres read as micrometres
+    assert any(
+        "are the units of heights and pixels right?" in words for words in uncertain(as_um, surface_statistics(as_um))
+    )
+    right = levelled(measured)
+    assert not any("units" in words for words in uncertain(right, surface_statistics(right)))
 
 
 def test_flat_maps_and_unknown_options_are_refused() -> None:
@@ -285,7 +309,7 @@ def test_assumptions_are_judged_by_the_surface_and_the_wavelength() -> None:
     found = statistics(MADE)
     judged = {
         (one.model, one.wavelength_nm): one.worst
-        for one in standings(found, surface_materials(found, "plate", entry="main/Cu/Babar").materials)
+        for one in standings(found, surface_materials(found, "plate").materials)
     }
     # sigma_0 0.5 um: g is 130 at 550 nm and 0.35 at 10.6 um, where tau is also below the wavelength
     assert judged["beckmann", 550.0] == "inside"
@@ -299,6 +323,86 @@ def test_assumptions_are_judged_by_the_surface_and_the_wavelength() -> None:
         if (one.model, one.wavelength_nm) == ("he_torrance", 550.0)
     )
     assert {"outside"} == {limit.standing for limit in of_he.limits if limit.quantity.startswith("exponent H")}
+    assert "slope sigma_0 / tau" in {limit.quantity for limit in of_he.limits}  # stated of the parameters
+
+
+@pytest.mark.parametrize(
+    ("standings_of_limits", "worst"),
+    [
+        (("inside", "at the edge", "unknown"), "at the edge"),
+        (("outside", "at the edge", "inside"), "outside"),
+        (("inside", "unknown"), "inside"),
+        (("unknown",), "unknown"),
+        ((), "unknown"),
+    ],
+)
+def test_the_limit_that_is_met_least_decides(standings_of_limits: tuple[Standing, ...], worst: Standing) -> None:
+    limits = [StatedLimit("", "", "", of_limit, "", "") for of_limit in standings_of_limits]
+    assert ModelStanding("ggx", 550.0, limits).worst == worst
+
+
+@pytest.mark.parametrize(
+    ("entry", "diffuse", "mirrors"),
+    [  # a substance absorbs light within a wavelength from k = 1 / (4 pi) = 0.0796 on
+        ("main/Cu/Babar", "outside", "inside"),
+        ("constant/1.5/0.08", "outside", "inside"),
+        ("constant/1.5/0.079", "unknown", "unknown"),
+        ("constant/1.5/0", "unknown", "unknown"),
+    ],
+)
+def test_facets_of_a_metal_are_mirrors_and_not_diffuse(entry: str, diffuse: Standing, mirrors: Standing) -> None:
+    found = statistics(MADE)
+    for judged in standings(found, surface_materials(found, "plate", entry=entry).materials, entry):
+        of_facets = [limit.standing for limit in judged.limits if limit.quantity.startswith("extinction coefficient")]
+        expected = {"oren_nayar": [diffuse], "ggx": [mirrors], "beckmann": [mirrors], "he_torrance": []}
+        assert of_facets == expected[judged.model]
+        if judged.model == "oren_nayar" and diffuse == "outside":
+            assert judged.worst == "outside"
+
+
+def test_a_model_that_heights_do_not_tell_is_left_out_with_what_suits_best() -> None:
+    found = statistics(MADE)
+    reason = surface_materials(found, "plate", rho=0.9).left_out["vmf_diffuse"]
+    suited = suited_parameters("vmf_diffuse", found.slope)
+    assert suited is not None
+    assert f"roughness = {suited['roughness']:.3g} suits a Gaussian surface" in reason
+    assert reason.endswith(stated_error("vmf_diffuse", rho=0.9, **suited).sentence)
+    steep = statistics(replace(MADE, sigma=5.0, noise=0.0))  # beyond the map
+    assert surface_materials(steep, "plate").left_out["vmf_diffuse"].endswith("which no height map shows")
+
+
+def stated_error(model: str, **parameters: float) -> SurfaceError:
+    error = surface_error_of(model, parameters)
+    assert error is not None
+    return error
+
+
+def test_the_materials_are_those_that_models_declare() -> None:
+    found = statistics(replace(MADE, tau_x=6.0, tau_y=3.0))
+    materials = surface_materials(found, "plate").materials
+    assert materials["beckmann"].parameters["alpha_y"] == pytest.approx(math.sqrt(2.0) * found.slope_y.value, rel=1e-5)
+    assert set(materials) == {name for name, spec in MODELS.items() if spec.heights and spec.heights.parameters}
+    directions = {
+        judged.model: [limit.standing for limit in judged.limits if limit.words == "The surface is isotropic."]
+        for judged in standings(found, materials)
+    }
+    assert directions == {"he_torrance": ["outside"], "oren_nayar": ["outside"], "ggx": [], "beckmann": []}
+
+
+def test_a_model_of_the_user_that_declares_its_surface_is_judged(monkeypatch: pytest.MonkeyPatch) -> None:
+    assumption = SurfaceAssumption("no specular part", "Dust has no specular part.", "a notebook")
+    relation = HeightRelation(lambda _: {}, "it has no roughness", (assumption,))
+    dust = replace(MODELS["lambert"], name="dust", title="Dust, of a user", heights=relation)
+    monkeypatch.setitem(MODELS, "dust", dust)
+    found = statistics(MADE)
+    made = surface_materials(found, "plate", rho=0.3)
+    assert made.tables["dust"]["parameters"] == {"rho": 0.3}
+    assert made.tables["dust"]["title"] == "Dust with the statistics of plate"
+    (judged, _) = (one for one in standings(found, {"dust": made.materials["dust"]}))
+    assert [(limit.words, limit.standing) for limit in judged.limits] == [
+        ("Dust has no specular part.", "inside"),
+        ("The surface is isotropic.", "inside"),
+    ]
 
 
 def test_the_band_of_a_map() -> None:
