@@ -19,7 +19,7 @@ from brdfdb.microgeometry.surfaces import MadeSurface
 
 ESTIMATES = 4  # maps whose spread gives the standard error
 NODES = 256  # of a map along each axis: to prepare larger ones takes most of the time
-RAYS = 2048  # light paths on each map: the standard error is about 2 %
+RAYS = 2048  # rays for each light on each map: the standard error is about 2 %
 _FLAT = 1e-3  # slope below which no map is made
 _DIM = 0.01  # of the peak: darker values do not count
 

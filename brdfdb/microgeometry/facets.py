@@ -1,8 +1,9 @@
-"""The reflectance of facets: a Lambertian part, and a mirror-like part with Fresnel's reflectance."""
+"""The reflectance of facets, Lambertian and mirror-like with Fresnel's reflectance, and light that bounces on them."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -41,9 +42,11 @@ class Facets:
             values = np.atleast_1d(np.asarray(given, np.float64))
             wrong = values[~((values >= low) & (values <= high) & (values < np.inf))]
             if wrong.size or values.ndim != 1 or values.size not in (1, count):
-                allowed = f"allowed are {count} numbers from {low:g} to {high:g}"
-                found = f"{wrong[0]:g}" if wrong.size else f"shape {values.shape}"
-                raise ParameterError(name, f"{found} is not a value of facets; {allowed}", given, (low, high))
+                text = f"has shape {values.shape}; allowed are a number or a list of {count}"
+                if wrong.size:
+                    text = f"{wrong[0]:g} is not in [{low:g}, {high:g}]"
+                    text = text if high < np.inf else f"{wrong[0]:g} is not a number of at least {low:g}"
+                raise ParameterError(name, text, given, (low, high))
             if name != "mirror":
                 object.__setattr__(self, name, np.broadcast_to(values, count))
         most = float(np.max(self.rho)) + self.mirror
@@ -61,3 +64,25 @@ class Facets:
         if self.n is None:
             return np.full((at.shape[0], self.wavelengths), self.mirror)
         return np.asarray(self.mirror * unpolarised(at, np.asarray(self.n), np.asarray(self.k)))
+
+
+class Bounces(NamedTuple):
+    """Light by the number of its bounces.
+
+    Attributes
+    ----------
+    one, two, further : array (lights, viewers, wavelengths) [1/sr]
+        f_r after one, two and more bounces.
+    escaped : array (lights, 3, wavelengths) [1]
+        Share of the light that leaves the surface after one, two and more bounces.
+    """
+
+    one: NDArray[np.float64]
+    two: NDArray[np.float64]
+    further: NDArray[np.float64]
+    escaped: NDArray[np.float64]
+
+    @property
+    def total(self) -> NDArray[np.float64]:
+        """f_r [1/sr] of all bounces."""
+        return self.one + self.two + self.further

@@ -11,7 +11,7 @@ from scipy.stats import qmc
 
 from brdfdb.errors import ParameterError
 from brdfdb.geometry import checked_vectors
-from brdfdb.microgeometry.facets import Facets
+from brdfdb.microgeometry.facets import Bounces, Facets
 from brdfdb.microgeometry.height_map import HeightMap
 from brdfdb.microgeometry.mirrors import mirror_bounces
 from brdfdb.microgeometry.rays import Hits, Region, Tracer, Vectors
@@ -22,37 +22,12 @@ _GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)  # share of a turn between points of a latt
 _RAYS_AT_ONCE = 1 << 19  # rays to lights and viewers that are traced at a time: 100 MB
 
 
-class Bounces(NamedTuple):
-    """Light by the number of its bounces.
-
-    Attributes
-    ----------
-    one, two, further : array (lights, viewers, wavelengths) [1/sr]
-        f_r after one, two and more bounces.
-    escaped : array (lights, 3, wavelengths) [1]
-        Share of the light that leaves the surface after one, two and more bounces.
-    """
-
-    one: NDArray[np.float64]
-    two: NDArray[np.float64]
-    further: NDArray[np.float64]
-    escaped: NDArray[np.float64]
-
-    @property
-    def total(self) -> NDArray[np.float64]:
-        """f_r [1/sr] of all bounces."""
-        return self.one + self.two + self.further
-
-
 class _Walk(NamedTuple):
     """Points of light paths: where they are, and what leads there."""
 
     hits: Hits
     turn: NDArray[np.float64]  # angles by which lights and viewers are turned, (N,) [rad]
     onwards: Vectors  # two numbers of [0, 1)^2 for the direction in which each path goes on, (N, 2)
-
-    def of(self, rows: NDArray[np.bool_]) -> _Walk:
-        return _Walk(Hits(self.hits.points[rows], self.hits.faces[rows]), self.turn[rows], self.onwards[rows])
 
 
 def bounces(
@@ -108,8 +83,8 @@ def bounces(
     in a random direction, with the density of the cosine to the normal, or in several of them where few meet another
     facet. The light that reached the first point is seen by the viewers of the next points. A path backwards is as
     likely: if lights and viewers are the same directions, both are counted. Points, turns and first directions are
-    scrambled Sobol points (Owen 1998), later directions are random. Light with a mirror-like reflection on its way is
-    added by `mirrors.mirror_bounces`.
+    scrambled Sobol points (Matousek 1998), later directions are random. Light with a mirror-like reflection on its way
+    is added by `mirrors.mirror_bounces`.
     """
     tracer = surface if isinstance(surface, Tracer) else Tracer(surface)
     w_i, w_r = _directions("lights", lights), _directions("viewers", viewers)
@@ -117,34 +92,36 @@ def bounces(
         raise ParameterError("viewers", f"shape {w_r.shape} does not fit lights of shape {w_i.shape}", w_r.shape)
     if rays < 1:
         raise ParameterError("rays", f"{rays} is not a positive number", rays, (1, None))
-    same = w_r.shape == w_i.shape and bool(np.all(w_r == w_i))
-    pairs = "pi,piv->iv" if w_r.ndim == 3 else "pi,pv->iv"
+    same = np.array_equal(w_r, w_i)
+    # viewers that several lights share are traced once
+    traced, columns = np.unique(w_r.reshape(-1, 3), axis=0, return_inverse=True)
+    columns = np.broadcast_to(columns.reshape(w_r.shape[:-1]), (len(w_i), w_r.shape[-2]))
     rng = np.random.default_rng(seed)
     rho = np.asarray(facets.rho)
-    sums = np.zeros((3, len(w_i), w_r.shape[-2], rho.size))
+    sums = np.zeros((3, *columns.shape, rho.size))
     escaped = np.zeros((len(w_i), 3, rho.size))
     received = np.zeros(len(w_i))
-    paths = max(1, _RAYS_AT_ONCE // max(len(w_i), w_r.size // 3))
+    paths = max(1, _RAYS_AT_ONCE // max(len(w_i), len(traced)))
     within = tracer.checked(region)
     diffuse = bool(rho.any())
-    branches = _branches(tracer, within, len(w_i) + w_r.size // 3, rng) if diffuse else 1
+    branches = _branches(tracer, within, len(w_i) + len(traced), rng) if diffuse else 1
     for walk in _starts(tracer, rays, rng, within, turned, paths) if diffuse else ():
         lit = _received(tracer, walk, w_i)
         lit /= tracer.normals[walk.hits.faces, 2, np.newaxis]
         received += lit.sum(axis=0)
         for number in range(_MOST_BOUNCES):
             reached = np.any(lit > 0.0, axis=1)
-            walk, lit = walk.of(reached), lit[reached]
+            walk = _Walk(walk.hits.selected(reached), walk.turn[reached], walk.onwards[reached])
+            lit = lit[reached]
             if not lit.size:
                 break
             if same and number == 0:
-                seen = lit * tracer.normals[walk.hits.faces, 2, np.newaxis]
+                reflected = lit.T @ (lit * tracer.normals[walk.hits.faces, 2, np.newaxis])
             else:
-                seen = _received(tracer, walk, w_r.reshape(-1, 3)).reshape(-1, *w_r.shape[:-1])
-            of_pairs = np.einsum(pairs, lit, seen, optimize=True)
+                reflected = np.take_along_axis(lit.T @ _received(tracer, walk, traced), columns, axis=1)
             if same:
-                of_pairs = 0.5 * (of_pairs + of_pairs.T)
-            sums[min(number, 2)] += of_pairs[..., np.newaxis] * rho ** (number + 1)
+                reflected = 0.5 * (reflected + reflected.T)
+            sums[min(number, 2)] += reflected[..., np.newaxis] * rho ** (number + 1)
             directions = branches if number == 0 else 1
             walk, parents = _next(tracer, walk, directions, rng)
             leaving = lit.sum(axis=0) - lit[parents].sum(axis=0) / directions
@@ -187,7 +164,8 @@ def shadowed(
     towards = _directions("directions", directions).reshape(-1, 3)
     rng = np.random.default_rng(seed)
     facing, seen = np.zeros((2, len(towards)))
-    for walk in _starts(tracer, rays, rng, tracer.checked(region), turned, max(1, _RAYS_AT_ONCE // len(towards))):
+    paths = max(1, _RAYS_AT_ONCE // len(towards))
+    for walk in _starts(tracer, rays, rng, tracer.checked(region), turned, paths):
         normals = tracer.normals[walk.hits.faces]
         area = 1.0 / normals[:, 2]
         facing += area @ (_cosines(normals, _turned(towards, walk.turn)) > 0.0)
@@ -241,17 +219,14 @@ def _branches(tracer: Tracer, region: Region, directions: int, rng: np.random.Ge
 
 def _next(tracer: Tracer, walk: _Walk, branches: int, rng: np.random.Generator) -> tuple[_Walk, NDArray[np.int64]]:
     """Return the next points of paths that go on in a number of directions, and the points that they come from."""
-    count = len(walk.turn)
-    parents = np.repeat(np.arange(count), branches)
-    number = np.tile(np.arange(branches), count)
+    parents, number = np.indices((len(walk.turn), branches)).reshape(2, -1)
     # each direction is shifted by a point of a lattice, so that those of a path are spread evenly
     lattice = np.stack([number / branches, number * _GOLDEN], axis=-1)
     onwards = _scattered(tracer.normals[walk.hits.faces[parents]], (walk.onwards[parents] + lattice) % 1.0)
     hits = tracer.hits(tracer.off(walk.hits)[parents], onwards)
     met = hits.faces >= 0
     parents = parents[met]
-    points = Hits(hits.points[met], hits.faces[met])
-    return _Walk(points, walk.turn[parents], rng.random((len(parents), 2))), parents
+    return _Walk(hits.selected(met), walk.turn[parents], rng.random((len(parents), 2))), parents
 
 
 def _turned(directions: Vectors, turn: NDArray[np.float64]) -> Vectors:

@@ -11,14 +11,13 @@ from scipy.ndimage import map_coordinates, spline_filter
 from scipy.spatial import KDTree
 from scipy.stats import qmc
 
-from brdfdb.microgeometry.facets import Facets
+from brdfdb.microgeometry.facets import Bounces, Facets
 from brdfdb.microgeometry.height_map import HeightMap
 from brdfdb.microgeometry.rays import Hits, Region, Tracer, Vectors
 
 Floats = NDArray[np.float64]
 
 CONE = np.radians(10.0)  #: half angle of the receivers of light that leaves after several reflections [rad]
-CONE_SR = float(2.0 * np.pi * (1.0 - np.cos(CONE)))  #: their solid angle [sr]
 
 _RADIUS = 0.68  # of the kernel, in standard deviations of a part of the slopes. A Gaussian's peak is 0.27 % low
 _CELL = 0.05  # of the grid of the density, in standard deviations
@@ -33,6 +32,7 @@ _MOST = 4096  # and at most
 _MOST_ELONGATED = 1e6  # ratio of the variances of slopes along and across grooves; no density above it
 _MOST_EQUAL = 0.05  # of the facets have the same slope; no density above it
 _TURNS = 16  # azimuths of an isotropic surface
+_GOLDEN = 0.5 * (1.0 + np.sqrt(5.0))
 _FEWEST_POINTS, _MOST_POINTS = 1 << 14, 1 << 20  # points of the surface whose slopes are known, two for each facet
 _PAIRS_AT_ONCE = 1 << 18  # points of pairs of light and viewer that are traced at a time: 100 MB
 _CONNECTED = 1 / 16  # of the paths meet Lambertian points that rays connect to all viewers: these cost more
@@ -41,29 +41,6 @@ _PATHS_AT_ONCE = 1 << 16
 _RECEIVED_AT_ONCE = 1 << 23  # paths times viewers: 150 MB
 _MOST_BOUNCES = 200
 _FAINT = 0.1  # weight below which a path ends by chance
-
-
-class MirrorLight(NamedTuple):
-    """f_r [1/sr] of light with at least one mirror-like reflection, by its number of bounces, each (I, V, L).
-
-    Attributes
-    ----------
-    one, two, further : array (I, V, L) [1/sr]
-        f_r of one, two and more bounces. Light that leaves after a mirror-like reflection as its second or a later
-        bounce is the mean over a receiver of `CONE_SR` about the viewer, clipped at the horizon.
-    escaped : array (I, 3, L) [1]
-        Share of each light that leaves the surface after one, two and more bounces, whatever their kind: all together
-        it is 1 if the facets absorb nothing.
-    one_is_smoothed : bool
-        True if `one` is such a mean, too, since the slopes have no density: facets of grooves or flat parts have few
-        directions.
-    """
-
-    one: Floats
-    two: Floats
-    further: Floats
-    escaped: Floats
-    one_is_smoothed: bool
 
 
 class _Slopes(NamedTuple):
@@ -87,7 +64,7 @@ def mirror_bounces(
     turned: bool = False,
     gaussian_slopes: tuple[float, float] | None = None,
     region: tuple[float, float, float, float] | None = None,
-) -> MirrorLight:
+) -> Bounces:
     """Return f_r of the light that a mirror-like reflection is part of.
 
     Parameters
@@ -115,7 +92,11 @@ def mirror_bounces(
 
     Returns
     -------
-    MirrorLight
+    Bounces
+        f_r of light with a mirror-like reflection or more. That of light whose last bounce, the second or a later
+        one, is mirror-like is the mean over a receiver of `CONE` about the viewer, clipped at the horizon. So is
+        that of one bounce if the slopes have no density, as `one_bounce_is_smoothed` tells: facets of grooves or
+        flat parts have few directions. The shares that escape are those of all light.
 
     Notes
     -----
@@ -148,8 +129,7 @@ def mirror_bounces(
         by_bounces = 0.5 * (by_bounces + by_bounces.transpose(0, 2, 1, 3))
     if one is not None:
         by_bounces[0] = one
-    smoothed = slopes is None and facets.mirror > 0.0
-    return MirrorLight(by_bounces[0], by_bounces[1], by_bounces[2], escaped, smoothed)
+    return Bounces(by_bounces[0], by_bounces[1], by_bounces[2], escaped)
 
 
 def _slopes(
@@ -183,7 +163,9 @@ def _slopes(
         def density(at: Floats) -> Floats:
             return np.asarray(scale / (2.0 * np.pi) * np.exp(-0.5 * np.sum(at * at, axis=-1)))
 
-    return _Slopes(hits, mean, whitening, KDTree(coordinates), density)
+    # such a tree is built in half the time, and queries take as long
+    tree = KDTree(coordinates, balanced_tree=False, compact_nodes=False)
+    return _Slopes(hits, mean, whitening, tree, density)
 
 
 def _dense(slopes: Floats) -> bool:
@@ -200,9 +182,17 @@ def _dense(slopes: Floats) -> bool:
 
 
 def one_bounce_is_smoothed(surface: HeightMap) -> bool:
-    """Return True if one reflection by mirrors is a mean over `CONE_SR`: slopes of the surface have no density."""
-    normals = np.random.default_rng(0).permutation(surface.triangles().normals)
-    return not _dense(-normals[:, :2] / normals[:, 2:])
+    """Return True if one reflection by mirrors is a mean over `CONE`: slopes of the surface have no density.
+
+    A measured map has none if one of its 16 blocks has none, as a block with a flat part: blocks are measured apart.
+    """
+    cells = np.array(surface.closed().shape) - 1
+    normals = surface.triangles().normals.reshape(2, *cells, 3)
+    slopes = -normals[..., :2] / normals[..., 2:]
+    count = 1 if surface.periodic else 4
+    blocks = (part for rows in np.array_split(slopes, count, axis=1) for part in np.array_split(rows, count, axis=2))
+    rng = np.random.default_rng(0)
+    return not all(_dense(rng.permutation(block.reshape(-1, 2))) for block in blocks)
 
 
 class _Population(NamedTuple):
@@ -346,12 +336,16 @@ def _direct(
     distribution = np.zeros(len(w_i))
     positions = tracer.off(slopes.hits)
     normals = tracer.normals[slopes.hits.faces]
-    for turn in turns:
+    # half vectors along the normal are the same at all azimuths: each takes other points, from a disk that has as many
+    number = np.arange(len(turns))
+    radius = np.sqrt(2.0 * points / len(normals) * number)
+    angle = 2.0 * np.pi * number / _GOLDEN
+    for turn, *shift in zip(turns, radius * np.cos(angle), radius * np.sin(angle), strict=True):
         for start in range(0, len(w_i), max(1, _PAIRS_AT_ONCE // points)):
             pairs = slice(start, start + max(1, _PAIRS_AT_ONCE // points))
             h = _about_normal(half[pairs], turn)
             at = (-h[:, :2] / h[:, 2:] - slopes.mean) @ slopes.whitening
-            distance, near = slopes.tree.query(at, k=points)
+            distance, near = slopes.tree.query(at + shift, k=points)
             seen = (distance < _RADIUS) | (np.arange(points) < _FEWEST)
             tried = seen.sum(axis=1)
             for side in (w_i, w_r):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import math
 import threading
 from collections.abc import Callable, Iterable
 from concurrent.futures import Executor
@@ -16,8 +17,8 @@ from scipy.special import erf
 from brdfdb.errors import ParameterError
 from brdfdb.geometry import spherical_angles
 from brdfdb.measurements.samples import Samples
-from brdfdb.microgeometry.facets import Facets
-from brdfdb.microgeometry.goniometer import Bounces, bounces, shadowed
+from brdfdb.microgeometry.facets import Bounces, Facets
+from brdfdb.microgeometry.goniometer import bounces, shadowed
 from brdfdb.microgeometry.height_map import HeightMap
 from brdfdb.microgeometry.mirrors import CONE, one_bounce_is_smoothed
 from brdfdb.microgeometry.rays import Tracer, Vectors
@@ -29,8 +30,9 @@ _QUANTITIES = (*PARTS, "escaped")
 
 _CONE = f"{np.degrees(CONE):.0f} degrees about the viewer"
 _SHADOW = 4.0  # heights of shadows, in standard deviations of the heights
-_AT_A_TIME = 4  # estimates of made surfaces between two looks at their error
+_FEWEST = 8  # estimates of a made surface between two looks at their error, at least
 _DIM = 0.01  # of the peak: relative errors are those of f_r above it
+_JUDGED_DEG = 83.0  # polar angle up to which the standard error is judged: the 145 patches, without the lowest ring
 
 
 class Estimated(NamedTuple):
@@ -51,6 +53,27 @@ class Estimated(NamedTuple):
     noise: NDArray[np.float64]
 
 
+class StandardErrors(NamedTuple):
+    """Relative standard errors [1] of f_r where it exceeds a hundredth of its peak.
+
+    Attributes
+    ----------
+    judged : float [1]
+        The largest of the rays, for lights and viewers up to 83 degrees. The rule that stops a simulation judges it.
+    lowest : float [1]
+        The same at all lights and viewers.
+    median : float [1]
+        Of the rays, up to 83 degrees: the median in place of the largest.
+    of_map : float [1]
+        The largest of a single finite map, from its blocks, up to 83 degrees; of made surfaces the same as `judged`.
+    """
+
+    judged: float
+    lowest: float
+    median: float
+    of_map: float
+
+
 @dataclass(frozen=True, eq=False)
 class Simulation:
     """A measurement of a surface by a goniometer, as estimates that are independent of each other.
@@ -64,7 +87,7 @@ class Simulation:
     facets: Facets
     lights: Vectors = field(repr=False)  #: unit vectors to the lights, (I, 3) [1]
     viewers: Vectors = field(repr=False)  #: unit vectors to the viewers, (V, 3), or (I, V, 3) of each light [1]
-    rays: int = 1 << 13  #: light paths of an estimate
+    rays: int = 1 << 13  #: rays for each light in an estimate
     blocks: int = 4  #: blocks of a single map along each axis
     turned: bool = False  #: True for a single map that stands for a surface without a direction: it is turned
     seed: int = 0  #: the same seed gives the same estimates
@@ -188,6 +211,18 @@ class Simulation:
             sums.add(estimate)
         return sums.brdf()
 
+    def following(self, count: int, error: float) -> int:
+        """Return how many estimates there should be after `count` of them with a relative error [1]; `count` if enough.
+
+        The error falls with the square root of the count. The count at most doubles, since a few estimates tell their
+        error roughly.
+        """
+        most = self.most // self.round * self.round
+        if error <= self.target or count >= most:
+            return count
+        wanted = math.ceil(count * min((error / self.target) ** 2, 2.0) / self.round)
+        return min(max(wanted * self.round, count + max(self.round, _FEWEST)), most)
+
     def run(
         self, *, executor: Executor | None = None, progress: Callable[[int, float | None], None] | None = None
     ) -> SimulatedBrdf:
@@ -198,19 +233,18 @@ class Simulation:
         """
         sums = _Sums(self)
         compute = map if executor is None else executor.map
-        batch = self.round if self.round > 1 else _AT_A_TIME
-        last = self.most // self.round * self.round
+        following = self.minimum
         while True:
-            for estimate in compute(self.estimate, range(sums.count, min(sums.count + batch, last))):
+            for estimate in compute(self.estimate, range(sums.count, following)):
                 sums.add(estimate)
                 if progress is not None:
                     progress(sums.count, None)
-            if sums.count < self.minimum:
-                continue
             brdf = sums.brdf()
+            error = brdf.standard_errors.judged
             if progress is not None:
-                progress(sums.count, brdf.relative_error())
-            if brdf.reached or sums.count == last:
+                progress(sums.count, error)
+            following = self.following(sums.count, error)
+            if following == sums.count:
                 return brdf
 
 
@@ -265,46 +299,29 @@ class SimulatedBrdf:
     total: Estimated = field(repr=False)
     escaped: Estimated = field(repr=False)  #: share of the light that leaves, (lights, 3, wavelengths) [1]
 
-    def relative_error(self, *, of_map: bool = False) -> float:
-        """Return the largest relative standard error [1] of f_r where it exceeds a hundredth of its peak.
-
-        It is that of the rays, which further estimates reduce; with `of_map`, that of a single map as a sample.
-        """
-        error = self.total.error if of_map else self.total.noise
-        bright = self.total.mean > _DIM * self.total.mean.max(axis=(0, 1))
-        return float(np.max(error[bright] / self.total.mean[bright], initial=0.0))
-
-    @property
-    def reached(self) -> bool:
-        """True if the relative error is below the target."""
-        return self.relative_error() <= self.simulation.target
-
-    @property
-    def sentence(self) -> str:
-        """Return the standard error in words, and whether the target was reached."""
-        simulation = self.simulation
-        error = self.relative_error()
-        text = f"{self.count} estimates of {simulation.rays} light paths: the standard error of the rays is "
-        text += f"{error:.2%} at most where f_r exceeds a hundredth of its peak"
-        if error > simulation.target:
-            text += f"; the target of {simulation.target:.2%} was not reached"
-        if simulation.receivers:
-            text += f"; {simulation.receivers}"
-        if simulation.shadows:
-            text += f"; {simulation.shadows}"
-        if simulation.round > 1:
-            of_map = self.relative_error(of_map=True)
-            text += f"; that of the map, from {simulation.round} blocks, is {of_map:.2%} at most"
-        return text
+    @functools.cached_property
+    def standard_errors(self) -> StandardErrors:
+        """The relative standard errors of f_r after all bounces."""
+        total = self.total
+        viewers = np.broadcast_to(self.simulation.viewers, (*total.mean.shape[:2], 3))[..., 2]
+        high = np.minimum(self.simulation.lights[:, np.newaxis, 2], viewers) > np.cos(np.radians(_JUDGED_DEG))
+        bright = total.mean > _DIM * total.mean.max(axis=(0, 1), where=high[..., np.newaxis], initial=0.0)
+        inside = bright & high[..., np.newaxis]
+        of_rays, of_map = (error / np.where(bright, total.mean, 1.0) for error in (total.noise, total.error))
+        return StandardErrors(
+            judged=float(np.max(of_rays, where=inside, initial=0.0)),
+            lowest=float(np.max(of_rays, where=bright, initial=0.0)),
+            median=float(np.median(of_rays[inside])) if inside.any() else 0.0,
+            of_map=float(np.max(of_map, where=inside, initial=0.0)),
+        )
 
     def samples(self, name: str, part: PartOfLight = "total") -> Samples:
         """Return f_r with its standard uncertainty as samples of a measurement, in the order of lights and viewers."""
         simulation = self.simulation
         estimated: Estimated = getattr(self, part)
         shape = estimated.mean.shape
-        theta_i, phi_i = spherical_angles(np.repeat(simulation.lights, shape[1], axis=0))
+        lights = np.repeat(simulation.lights, shape[1], axis=0)
         viewers = np.broadcast_to(simulation.viewers, (*shape[:2], 3)).reshape(-1, 3)
-        theta_r, phi_r = spherical_angles(viewers)
         wavelength_nm = simulation.facets.wavelength_nm
         channels = ("grey",) if wavelength_nm is None else tuple(f"{at:g}nm" for at in np.asarray(wavelength_nm))
         surface = simulation.surface
@@ -313,24 +330,22 @@ class SimulatedBrdf:
         )
         return Samples(
             name,
-            theta_i,
-            phi_i,
-            theta_r,
-            phi_r,
+            *spherical_angles(lights),
+            *spherical_angles(viewers),
             channels,
             None if wavelength_nm is None else np.asarray(wavelength_nm, np.float64),
             estimated.mean.reshape(-1, shape[2]),
             uncertainty=estimated.error.reshape(-1, shape[2]),
-            provenance=f"rays on the facets of a surface; {self.sentence}",
+            provenance=f"rays on facets, {self.count} realisations of {simulation.rays} rays for each light",
             record={
                 "surface": made,
                 "bounces": part,
                 "seed": simulation.seed,
                 "rays": simulation.rays,
-                "estimates": self.count,
-                "relative_error": self.relative_error(),
+                "realisations": self.count,
+                **self.standard_errors._asdict(),
                 "target": simulation.target,
-                **({"shadows": simulation.shadows} if simulation.shadows else {}),
+                **{name: words for name in ("receivers", "shadows") if (words := getattr(simulation, name))},
             },
         )
 

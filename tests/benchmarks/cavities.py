@@ -181,9 +181,9 @@ def timed(run: Run, nodes: int, least: int) -> bool:
         brdf = simulation.run(executor=threads)
     seconds = time.perf_counter() - began
     gigabytes = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 / 1e9
-    errors = 100.0 * brdf.relative_error(), 100.0 * brdf.relative_error(of_map=True)
-    shown.add(nodes, brdf.count, *errors, seconds, gigabytes)
-    return brdf.reached and seconds < SECONDS and gigabytes < GIGABYTES
+    errors = brdf.standard_errors
+    shown.add(nodes, brdf.count, 100.0 * errors.judged, 100.0 * errors.of_map, seconds, gigabytes)
+    return errors.judged <= simulation.target and seconds < SECONDS and gigabytes < GIGABYTES
 
 
 def columns() -> list[Column | str]:

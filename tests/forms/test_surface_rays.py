@@ -13,7 +13,7 @@ from brdfdb.forms import surface_rays
 from brdfdb.forms.surface_rays import ChartedSurface, charted_surface
 from brdfdb.materials import Material
 from brdfdb.microgeometry import goniometer
-from brdfdb.microgeometry.goniometer import Bounces
+from brdfdb.microgeometry.facets import Bounces
 from brdfdb.microgeometry.model_errors import surface_error
 
 

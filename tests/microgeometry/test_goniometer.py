@@ -16,8 +16,8 @@ from brdfdb.errors import ParameterError
 from brdfdb.geometry import spherical_angles, unit_vector
 from brdfdb.integrals.patches import BASES
 from brdfdb.microgeometry import goniometer
-from brdfdb.microgeometry.facets import Facets
-from brdfdb.microgeometry.goniometer import Bounces, bounces, shadowed
+from brdfdb.microgeometry.facets import Bounces, Facets
+from brdfdb.microgeometry.goniometer import bounces, shadowed
 from brdfdb.microgeometry.height_map import HeightMap
 from brdfdb.microgeometry.rays import Tracer
 from brdfdb.microgeometry.surfaces import MadeSurface, gaussian_field, v_grooves
