@@ -31,6 +31,7 @@ _SIGMAS = 1.4826  # standard deviations in the median magnitude of normal noise,
 _ABSURD = 3.0  # times the noise, and the largest value, is what no value is below 0 by
 _OFTEN = 3  # samples with the same number below 0 that make it suspicious
 _JITTER = 1e-9  # added to the diagonal of a matrix, relative to it, so that rounding leaves it positive
+_EXCHANGED = np.array([1.0, 1.0, -1.0, 1.0, 1.0])  # factors on the coordinates if light and viewer are exchanged
 _SEED = 1998
 
 
@@ -60,6 +61,7 @@ class SampleInterpolation:
     #: smallest cosine of a light or a viewer that was measured. Directions closer to the horizon have the values there,
     #: as in tables: a lobe that is continued may reflect any amount
     lowest: float
+    reciprocal: bool = False  #: True if f_r is the same with light and viewer exchanged, as each sample is then, too
     #: centres, weights: centres of the radial functions in the coordinates, and their weights, (M, D) (M, C)
     centres: Floats = field(default_factory=lambda: np.empty((0, 0)))
     weights: Floats = field(default_factory=lambda: np.empty((0, 0)))
@@ -72,8 +74,15 @@ class SampleInterpolation:
             some = slice(start, start + (1 << 13))
             x = features(wi[some], wr[some], self.alpha, self.scales[:3], turned=self.turned)
             number = _logarithm(self.base(wi[some], wr[some]), self.level) + self.mean
-            values[some] = 2.0 * self.level * np.sinh(number + _radial(x, self.centres) @ self.weights)
+            values[some] = 2.0 * self.level * np.sinh(number + self.functions(x, self.centres) @ self.weights)
         return np.maximum(values, 0.0)
+
+    def functions(self, x: Floats, centres: Floats) -> Floats:
+        """Return the radial functions (N, M) of centres (M, D) at points (N, D) of the coordinates."""
+        values = _radial(x, centres)
+        if self.reciprocal:
+            values += _radial(x * _EXCHANGED[: x.shape[1]], centres)
+        return values
 
 
 def _raised(w: Floats, lowest: float) -> Floats:
@@ -252,11 +261,12 @@ class Fitted(NamedTuple):
     base: str
 
 
-def fit(samples: Samples, base: Base | None = None) -> Fitted:
+def fit(samples: Samples, base: Base | None = None, *, reciprocal: bool = False) -> Fitted:
     """Fit the interpolation of ten samples or more.
 
-    `base` is f_r that the ratio is taken to; by default `lambert_and_lobe`, of the same samples. ParameterError if
-    there are too few samples, no value is above 0, or numbers far below 0 stand for holes.
+    `base` is f_r that the ratio is taken to; by default `lambert_and_lobe`, of the same samples. Of `reciprocal` data
+    each sample counts with light and viewer exchanged, too; the base must be reciprocal. ParameterError if there are
+    too few samples, no value is above 0, or numbers far below 0 stand for holes.
 
     Notes
     -----
@@ -277,7 +287,7 @@ def fit(samples: Samples, base: Base | None = None) -> Fitted:
     few = problem.some(order[:_SEARCHED])
     tried = [
         SampleInterpolation(
-            f_base, lobe.alpha, level, _Scales(half * both, both, both, noise), samples.turned, mean, lowest
+            f_base, lobe.alpha, level, _Scales(half * both, both, both, noise), samples.turned, mean, lowest, reciprocal
         )
         for half, both, noise in itertools.product((1.0, 2.0), _SCALES, _ROUGHNESS)
     ]
@@ -286,7 +296,7 @@ def fit(samples: Samples, base: Base | None = None) -> Fitted:
     centres = problem.some(order[:_CENTRES])
     held_out = _stated(samples, problem, _held_out(chosen, problem, centres), chosen, scheme)
     at = _x(chosen, centres)
-    weights = _solved(*_normal(chosen, problem, _radial(_x(chosen, problem), at)), _radial(at, at))
+    weights = _solved(*_normal(chosen, problem, chosen.functions(_x(chosen, problem), at)), chosen.functions(at, at))
     return Fitted(
         replace(chosen, centres=at, weights=weights), held_out, lobe.words if base is None else "the given base"
     )
@@ -345,8 +355,8 @@ def _held_out(how: SampleInterpolation, problem: _Problem, centres: _Problem) ->
     The centres of radial functions stay: only values tell, not places.
     """
     at = _x(how, centres)
-    phi = _radial(_x(how, problem), at)
-    smooth = _radial(at, at)
+    phi = how.functions(_x(how, problem), at)
+    smooth = how.functions(at, at)
     matrix, right = _normal(how, problem, phi)
     predicted = np.empty_like(problem.y)
     for group in np.unique(problem.group):
@@ -370,9 +380,10 @@ def _stated(samples: Samples, problem: _Problem, predicted: Floats, how: SampleI
     floor = floor_of(samples)
     known = np.isfinite(values)
     off = np.abs(f_r - values)
-    error = (off / np.maximum(f_r, floor))[known]
+    errors = off / np.maximum(f_r, floor)
+    error = errors[known]
     median, p95, p99, largest = (float(f"{x:.3g}") for x in np.percentile(error, [50.0, 95.0, 99.0, 100.0]))
-    return HeldOut(
+    stated = HeldOut(
         scheme="incidences" if scheme == "incidences" else "folds",
         rounds=int(np.unique(problem.group).size),
         samples=int(np.count_nonzero(counted)),
@@ -384,3 +395,6 @@ def _stated(samples: Samples, problem: _Problem, predicted: Floats, how: SampleI
         p99=p99,
         max=largest,
     )
+    # held-out lights of reciprocal samples tell errors between viewers, too
+    lowest = np.minimum(problem.wi[:, 2], problem.wr[:, 2])[counted]
+    return stated.with_levels(errors, f_r, lowest) if how.reciprocal else stated

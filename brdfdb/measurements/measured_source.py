@@ -32,7 +32,7 @@ _NARROWEST = 1e-3  # width [1] of lobes below which grids are those of this widt
 _CLEAR = 3.0  # smallest ratio of a peak to f_r far from it that makes a lobe
 _BETWEEN = 0.05  # share of the pairs of directions outside of the extent of a file that lists all: it has corners
 _PROBED = 2000  # pairs at which the share of negative values of a function is counted
-_LIGHTS_DEG = np.concatenate([np.arange(0.0, 80.0, 2.5), np.arange(80.0, 90.0, 1.0), [89.5, 89.9]])
+LIGHTS_DEG = np.concatenate([np.arange(0.0, 80.0, 2.5), np.arange(80.0, 90.0, 1.0), [89.5, 89.9]])
 _AZIMUTHS = 16  # azimuths of the lights of an anisotropic surface
 # Half vectors over which an albedo is summed
 _RINGS = 64
@@ -84,16 +84,24 @@ class MeasuredSource(FunctionSource):
 
     @classmethod
     def of_samples(
-        cls, samples: Samples, *, name: str = "", title: str = "", provenance: str = "", base: Base | None = None
+        cls,
+        samples: Samples,
+        *,
+        name: str = "",
+        title: str = "",
+        provenance: str = "",
+        base: Base | None = None,
+        reciprocal: bool = False,
     ) -> Self:
         """Return ten samples or more as a source, by the fit of `brdfdb.measurements.interpolation`.
 
         f_r is anisotropic if the samples have several azimuths of the light. Name, title and provenance are by default
         those of the samples. `base` is f_r [1/sr] (N, C) at unit vectors, such as `Source.brdf_at` of a fit, to which
-        the ratio is interpolated; by default Lambert and one lobe. ParameterError if there are too few samples, no
-        value is above 0, numbers far below 0 stand for holes, or the name has no letters or digits.
+        the ratio is interpolated; by default Lambert and one lobe. Of data known to be `reciprocal`, each sample counts
+        with light and viewer exchanged, too. ParameterError if there are too few samples, no value is above 0, numbers
+        far below 0 stand for holes, or the name has no letters or digits.
         """
-        fitted = fit(samples, base)
+        fitted = fit(samples, base, reciprocal=reciprocal)
         noise = None
         uncertainty = samples.uncertainty
         if uncertainty is not None:
@@ -103,6 +111,7 @@ class MeasuredSource(FunctionSource):
         some = samples.known.any(axis=1)
         extent = Extent.of(samples, turned=samples.turned)
         known = samples.values[samples.known]
+        noise_p99 = fitted.held_out.p99
         measured = Measured(
             by=samples.instrument.name,
             channels=list(samples.channels),
@@ -111,8 +120,8 @@ class MeasuredSource(FunctionSource):
             holes=int(np.count_nonzero(~samples.known)),
             negative=float(f"{np.mean(known < 0.0):.3g}"),
             interpolation=f"asinh of f_r over noise, less that of {fitted.base}, by radial functions of directions",
-            reciprocity=symmetry.reciprocity(fitted.f_r, extent, fitted.held_out.p99),
-            mirror=None if samples.turned else _mirror_of(samples, fitted.held_out.p99),
+            reciprocity=symmetry.RECIPROCAL if reciprocal else symmetry.reciprocity(fitted.f_r, extent, noise_p99),
+            mirror=None if samples.turned else _mirror_of(samples, noise_p99),
             extrapolated=_extrapolated(extent),
             extent=extent,
             held_out=fitted.held_out,
@@ -220,12 +229,13 @@ class MeasuredSource(FunctionSource):
         changed._measured = self._measured.model_copy(update=changes)
         return changed
 
-    def made(self, law: str, margin: float = MARGIN) -> Self:
+    def made(self, law: str, margin: float | Floats = MARGIN) -> Self:
         """Return the nearest source that keeps a law; its record says what was changed.
 
         "reciprocal" is the mean of f_r and f_r with light and viewer exchanged. "conserving" is f_r times one number
         for each light, the largest up to 1 that keeps the albedo at most 1 - `margin`; times that of the viewer, too,
-        if f_r is reciprocal. The margin [1] is room for the error of a table.
+        if f_r is reciprocal. The margin [1] is room for the error of a table: a number, or one for each of the polar
+        angles `LIGHTS_DEG` of the light.
         """
         if law not in ("reciprocal", "conserving"):
             text = f"{law!r} is neither reciprocal nor conserving"
@@ -341,17 +351,17 @@ def _made_reciprocal(f_r: Evaluate) -> Evaluate:
     return lambda wi, wr: 0.5 * (f_r(wi, wr) + f_r(wr, wi))
 
 
-def _made_conserving(f_r: Evaluate, *, reciprocal: bool, turned: bool, margin: float) -> Evaluate:
+def _made_conserving(f_r: Evaluate, *, reciprocal: bool, turned: bool, margin: float | Floats) -> Evaluate:
     """Return f_r scaled so that no light has an albedo above 1 - margin: one factor for each polar angle and channel.
 
     The factor is the largest up to 1, so that the relative change of a light is as small as it can be. Of a reciprocal
     f_r it is a product of a factor for the light and one for the viewer, each of which is 1 or makes the albedo of its
     light 1 - margin. f_r of a surface that may not be turned is taken as that of its mirror image, too.
     """
-    theta = radians(_LIGHTS_DEG)
+    theta = radians(LIGHTS_DEG)
     azimuths = np.arange(_AZIMUTHS) * (2.0 * np.pi / _AZIMUTHS) if turned else np.zeros(1)
     shares = np.stack([_shares(f_r, unit_vector(t, phi), theta, whole=turned) for t in theta for phi in azimuths])
-    limit = 1.0 - margin
+    limit = 1.0 - np.broadcast_to(margin, theta.shape)[:, np.newaxis]
 
     def reflected(of_viewer: Floats) -> Floats:
         albedo = np.einsum("lkc,kc->lc", shares, of_viewer)
@@ -362,7 +372,7 @@ def _made_conserving(f_r: Evaluate, *, reciprocal: bool, turned: bool, margin: f
         for _ in range(_ROUNDS):  # the mean of the old and the new factor, in the logarithm: they would swing otherwise
             factors = np.minimum(1.0, np.sqrt(factors * limit / np.maximum(reflected(factors), 1e-12)))
         albedo = factors * reflected(factors)
-        factors *= np.sqrt(np.minimum(1.0, limit / np.maximum(albedo.max(axis=0), 1e-12)))
+        factors *= np.sqrt(np.minimum(1.0, np.min(limit / np.maximum(albedo, 1e-12), axis=0)))
 
     def scaled(wi: Floats, wr: Floats) -> Floats:
         light = _at(factors, theta, np.arccos(np.clip(wi[:, 2], -1.0, 1.0)))

@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, Literal
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
 from brdfdb.measurements.extent import Extent
 
+# Where errors at held-out samples are told apart: f_r in floors of the errors, and the cosine of a polar angle
+_LEVELS = (1.0, 10.0, 100.0, 1000.0)
+_LOW = 0.342  # of 70 degrees
+_FEWEST = 20  # samples that tell an error apart
+_NORMAL_99 = 2.6  # standard deviations within which 99 of 100 values of normal noise lie
 _FEW = 1e-3  # smallest share of directions that is shown: it is counted with a few thousand directions
 _SHOWN = 12  # digits of a digest
 _LOW_DEG = 60.0  # light whose shadows are stated in words
@@ -55,6 +62,34 @@ class HeldOut(BaseModel):
     p95: float
     p99: float
     max: float
+    p99_of_levels: list[list[float]] | None = Field(
+        default=None,
+        description="the same for f below 1, 10, 100 and 1000 times the mean floor, and above, each for light and "
+        "viewer up to 70 degrees, and for others; null: not known",
+    )
+
+    def level(self, f_r: NDArray[np.floating[Any]]) -> NDArray[np.int64]:
+        """Return the number of the level of each f_r [1/sr] in `p99_of_levels`."""
+        return np.asarray(np.digitize(f_r, np.multiply(np.mean(self.floor), _LEVELS)))
+
+    def with_levels(
+        self, errors: NDArray[np.float64], f_r: NDArray[np.float64], lowest: NDArray[np.float64]
+    ) -> HeldOut:
+        """Return the record with the percentiles of relative errors (N, C) of f_r [1/sr] of levels.
+
+        `lowest` (N,) are cosines of the lower of light and viewer. Where few samples tell, the error is that of the
+        next dimmer level, or else of all samples. Unknown errors are nan.
+        """
+        known = np.isfinite(errors)
+        level = self.level(f_r)
+        low = np.broadcast_to(lowest[:, np.newaxis] < _LOW, errors.shape)
+        of_levels = []
+        chosen = [known, known]
+        for number in range(len(_LEVELS) + 1):
+            parts = [known & (level == number) & zone for zone in (~low, low)]
+            chosen = [part if part.sum() >= _FEWEST else last for part, last in zip(parts, chosen, strict=True)]
+            of_levels.append([float(f"{np.percentile(errors[part], 99.0):.3g}") for part in chosen])
+        return self.model_copy(update={"p99_of_levels": of_levels})
 
 
 class Noise(BaseModel):
@@ -74,6 +109,12 @@ class Change(BaseModel):
     law: Literal["reciprocal", "conserving"]
     changed: Spread
 
+    @property
+    def sentence(self) -> str:
+        """Return what was changed, in words."""
+        text = f"made {self.law}: changed by a median of {self.changed.median:.2g}, p99 {self.changed.p99:.2g}, "
+        return f"{text}largest {self.changed.max:.2g}"
+
 
 class SimulationRecord(BaseModel):
     """The record of a simulation by rays on the facets of a surface, in place of a measurement."""
@@ -81,24 +122,31 @@ class SimulationRecord(BaseModel):
     model_config = _STRICT
 
     surface: str = Field(description="the surface in words")
+    noise: str = Field(
+        default="", description="noise of the instrument in a height map, and the filter, in words; empty: it was made"
+    )
     facets: str = Field(description="the reflection of its facets in words")
     slopes: list[float] = Field(
         description="standard deviations of the slopes of the facets that rays met: of a made surface along x and y, "
         "of a height map along its steepest axis and across it"
     )
-    estimates: int = Field(description="realisations of a made surface, or estimates of the parts of a height map")
-    rays: int = Field(description="light paths of an estimate")
+    realisations: int = Field(description="maps of a made surface, or repetitions of the parts of a height map")
+    rays: int = Field(description="rays for each light in a realisation")
     target: float = Field(description="relative standard error at which the simulation was to stop")
     standard_error: float = Field(
         description="largest relative standard error of the rays, where f_r exceeds a hundredth of its peak, for light "
         "and viewer up to 82.5 degrees"
     )
     standard_error_lowest: float = Field(description="the same, with light and viewer at 87 degrees")
+    standard_error_median: float = Field(
+        default=0.0, description="median of the relative standard errors of which `standard_error` is the largest"
+    )
     standard_error_of_map: float | None = Field(
         description="the same up to 82.5 degrees, for the surface that the height map is a part of; null: it was made"
     )
     lights_deg: list[float] = Field(description="polar angles of the lights whose albedos follow")
-    one: list[float] = Field(description="share of the light that leaves after one bounce, mean over wavelengths")
+    spectral: bool = Field(description="true: the albedos are means over wavelengths")
+    one: list[float] = Field(description="share of the light that leaves after one bounce")
     two: list[float] = Field(description="the same after two bounces")
     further: list[float] = Field(description="the same after more bounces")
     in_shadow: list[float] = Field(
@@ -117,27 +165,39 @@ class SimulationRecord(BaseModel):
 
     def in_words(self) -> list[str]:
         """Return sentences on the surface, the light by bounces, and the standard error."""
-        steepest, across = self.slopes
-        albedo = self.one[0] + self.two[0] + self.further[0]
-        shares = [100.0 * part[0] / max(albedo, 1e-300) for part in (self.one, self.two, self.further)]
-        reached = "reached" if self.reached else "not reached"
+        single = self.standard_error_of_map is not None
+        axes = ("along the steepest axis", "across it") if single else ("along x", "along y")
+        steep = " and ".join(f"{slope:.3g} {axis}" for slope, axis in zip(self.slopes, axes, strict=True))
+        one, two, further = self.one[0], self.two[0], self.further[0]
         low = min(range(len(self.lights_deg)), key=lambda number: abs(self.lights_deg[number] - _LOW_DEG))
-        lines = [
+        return [
             f"simulated by rays: {self.surface}; {self.facets}{f'; {self.receivers}' if self.receivers else ''}",
-            f"slopes of its facets: {steepest:.3g} and {across:.3g} (standard deviations)",
-            f"albedo at normal light {albedo:.3g}: {shares[0]:.3g} % of it after one bounce, {shares[1]:.2g} % after "
-            f"two, {shares[2]:.2g} % after more",
+            *([self.noise] if self.noise else []),
+            f"rms slopes of the facets: {steep}",
+            f"albedo for light along the normal{', mean over wavelengths' if self.spectral else ''}: "
+            f"{one + two + further:.3f}, of which {one:.3f} after one bounce, {two:.3f} after two and {further:.3f} "
+            "after more",
             f"light at {self.lights_deg[low]:g} degrees: {100.0 * self.in_shadow[low]:.2g} % of the area of the facets "
-            f"facing it is in shadow",
-            f"standard error at most {100.0 * self.standard_error:.2g} % of f_r up to 82.5 degrees, where f_r exceeds "
-            f"a hundredth of its peak; the target of {100.0 * self.target:.2g} % was {reached} with {self.estimates} "
-            f"estimates of {self.rays} light paths; with directions at 87 degrees at most "
-            f"{100.0 * self.standard_error_lowest:.2g} %",
+            "that face it lies in shadow",
+            *self.errors_in_words(),
+        ]
+
+    def errors_in_words(self) -> list[str]:
+        """Return sentences on the standard errors of the rays and of the map."""
+        error, grazing, target = (
+            f"{100.0 * value:.2g} %" for value in (self.standard_error, self.standard_error_lowest, self.target)
+        )
+        lines = [
+            f"standard error of the rays, where f_r exceeds a hundredth of its peak: at most {error} of f_r up to 82.5 "
+            f"degrees, {grazing} up to 87 degrees; the target of {target} up to 82.5 degrees was "
+            f"{'reached' if self.reached else 'not reached'} with {self.realisations} realisations of {self.rays} rays "
+            "for each light",
         ]
         if self.standard_error_of_map is not None:
             lines.append(
-                f"the map is a part of a surface: for that, from its parts, the standard error is at most "
-                f"{100.0 * self.standard_error_of_map:.2g} %{f'; {self.shadows}' if self.shadows else ''}"
+                f"standard error of the map as a sample of its surface, from its parts: at most "
+                f"{100.0 * self.standard_error_of_map:.2g} % of f_r up to 82.5 degrees"
+                f"{f'; {self.shadows}' if self.shadows else ''}"
             )
         return lines
 
@@ -188,7 +248,23 @@ class Measured(BaseModel):
         """
         if self.held_out is not None:
             return self.held_out.p99
-        return None if self.noise is None else 2.6 * self.noise.p95
+        return None if self.noise is None else _NORMAL_99 * self.noise.p95
+
+    def error_of(
+        self, f_r: NDArray[np.floating[Any]], lowest: NDArray[np.float64], floor: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Return the uncertainty [1/sr] of f_r (..., L) that 99 of 100 values keep to; 0 if nothing is known of it.
+
+        `lowest` (..., 1) are cosines of the lower of light and viewer. Errors are relative to the `floor` (L,) [1/sr]
+        at least, or that of the samples that were held out. All samples of a simulation share their rays: those that
+        were held out do not show their common noise, which is added.
+        """
+        held = self.held_out
+        if held is None or held.p99_of_levels is None:
+            return np.asarray((self.uncertainty or 0.0) * np.maximum(f_r, floor), np.float64)
+        relative = np.asarray(held.p99_of_levels)[held.level(f_r), (lowest < _LOW).astype(np.int64)]
+        common = 0.0 if self.simulation is None else _NORMAL_99 * self.simulation.standard_error_median
+        return np.asarray(np.hypot(relative, common) * np.maximum(f_r, np.mean(held.floor)), np.float64)
 
     def in_words(self) -> list[str]:
         """Return sentences on origin, errors, symmetries and changes."""
@@ -206,6 +282,11 @@ class Measured(BaseModel):
                 f"error at samples held out, {left} at a time: median {held.median:.2g}, 95 of 100 within "
                 f"{held.p95:.2g}, 99 within {held.p99:.2g}, of f_r"
             )
+            if held.p99_of_levels is not None:
+                lines[-1] += (
+                    f"; between a tenth of the mean and the mean f_r, 99 within {held.p99_of_levels[3][0]:.2g} up to "
+                    f"70 degrees, and {held.p99_of_levels[3][1]:.2g} beyond"
+                )
         noise = "not stated" if self.noise is None else f"median {self.noise.median:.2g}, p95 {self.noise.p95:.2g}"
         lines.append(f"noise of the {'samples' if self.samples else 'file'}: {noise}")
         for name, symmetry in (("reciprocity", self.reciprocity), ("mirror symmetry", self.mirror)):
@@ -222,16 +303,11 @@ class Measured(BaseModel):
         if self.extrapolated is not None:
             share = 1.0 - self.extrapolated
             words = f"{100.0 * share:.3g} %" if share >= _FEW else f"less than {100.0 * _FEW:g} %"
+            how = "measured" if self.simulation is None else "simulated"
             lines.append(
-                f"{words} of all pairs of directions were measured; elsewhere f_r is extrapolated, and its error is "
+                f"{words} of all pairs of directions were {how}; elsewhere f_r is extrapolated, and its error is "
                 "unknown"
             )
         if self.negative > 0.0:
             lines.append(f"{100.0 * self.negative:.3g} % of the values are below 0: f_r is 0 there")
-        for change in self.changes:
-            spread = change.changed
-            lines.append(
-                f"made {change.law}: changed by a median of {spread.median:.2g}, p99 {spread.p99:.2g}, "
-                f"largest {spread.max:.2g}"
-            )
-        return lines
+        return lines + [change.sentence for change in self.changes]

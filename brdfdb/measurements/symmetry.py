@@ -25,6 +25,8 @@ _ROUNDING = 1e-6  # asymmetry that a file in float32 has
 _CONTRADICTED = 0.05  # asymmetry above which data of unknown noise contradict a symmetry
 _SLOPES = np.geomspace(2.0**-9, 2.0, 11)  # of half vectors, from those of the narrowest lobes on: octaves
 _IN_OCTAVE = 400
+#: reciprocity of f_r that is interpolated as a reciprocal one
+RECIPROCAL = MeasuredSymmetry(assumed=True, asymmetry=Spread(median=0.0, p99=0.0, max=0.0), allowed=None)
 _WITHIN = 1.2  # times the noise is how large the asymmetry may be, because both are estimates
 
 

@@ -42,6 +42,7 @@ def write_estimate(folder: Path, number: int, arrays: Mapping[str, Any]) -> None
     data = io.BytesIO()
     np.savez(data, **arrays)
     with writing(folder, f"estimate {number}"):
+        folder.mkdir(parents=True, exist_ok=True)  # another build may have removed it
         content = data.getvalue()
         write_file(_path(folder, number), content + hashlib.sha256(content).digest(), folder, sync=False)
 

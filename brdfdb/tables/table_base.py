@@ -304,8 +304,9 @@ class BaseTable(Lookups):
         values = brdf if located.tail else np.asarray(brdf)[..., np.newaxis]
         errors = stated(error.limits[:, located.column], error.floors[located.column], directions, values)
         measured = self.metadata.known_measured()
-        if measured is not None and measured.uncertainty is not None:
-            errors = errors + measured.uncertainty * np.maximum(values, error.floors[located.column])
+        if measured is not None:
+            lowest = np.minimum(directions.cos_i, directions.cos_r)[..., np.newaxis]
+            errors = errors + measured.error_of(values, lowest, error.floors[located.column])
         if measured is not None and measured.extent is not None:
             errors = np.where(self._extrapolated(directions)[..., np.newaxis], np.nan, errors)
         return np.asarray(errors if located.tail else errors[..., 0])[()]

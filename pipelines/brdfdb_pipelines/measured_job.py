@@ -17,14 +17,14 @@ from brdfdb.errors import BrdfdbError, FileFormatError, ParameterError, StoreErr
 from brdfdb.formats._input import check_file
 from brdfdb.materials.provenance import Text
 from brdfdb.measurements import MeasuredSource, Samples, joined
-from brdfdb.measurements.measured_source import MARGIN
+from brdfdb.measurements.measured_source import LIGHTS_DEG, MARGIN
 from brdfdb.place import path_of
 from brdfdb.store.lock import Lock, writing
 from brdfdb.store.paths import material_path, revision_path
 from brdfdb.store.publication import publish_files, stated_table
 from brdfdb.store.records import make_store, point_to, read_manifest
 from brdfdb.store.revisions import Standing, standing
-from brdfdb.tables.albedo import largest_albedo
+from brdfdb.tables.albedo import directional_albedo, largest_albedo
 from brdfdb.tables.layout import TABLE_VERSION, Layout
 from brdfdb.tables.measured_layout import MeasuredLayout, tabulated
 from brdfdb.tables.table import Table
@@ -33,7 +33,7 @@ from brdfdb_pipelines.recipe_grids import STRICT, RecipeError
 if TYPE_CHECKING:
     from brdfdb.formats._readings import FileTable
 
-MEASURED_VERSION = 8  # of the way from a file to the values of its table
+MEASURED_VERSION = 9  # of the way from a file to the values of its table
 # Keys of a request that are left out where they are empty.
 _ADDED = {"columns", "quantity", "angles", "azimuth", "wavelength_nm", "side"}
 _MARGINS = 3  # tables of data that are made to conserve, each a little darker, until none is above 1
@@ -255,19 +255,27 @@ def tabulated_lawfully(
 ) -> MeasuredLayout:
     """Tabulate data to a tolerance, made reciprocal or energy-conserving where that is asked for.
 
-    Interpolation can raise an albedo above 1 again: the data are then darkened further, in at most `_MARGINS` steps.
+    Interpolation can raise an albedo above 1 again: for these lights the data are then darkened further, in at most
+    `_MARGINS` steps.
     """
     wavelength_nm = None if source.wavelengths_nm is None else np.array(source.wavelengths_nm)
     if reciprocal:
         source = source.made("reciprocal")
     if not conserving:
         return tabulated(source, wavelength_nm, tolerance)
-    margin = MARGIN
+    margin = np.full(LIGHTS_DEG.size, MARGIN)
     for _ in range(_MARGINS):
         made = source.made("conserving", margin)
         table = tabulated(made, wavelength_nm, tolerance)
-        largest = largest_albedo(Table.of(*table), made)
+        read = Table.of(*table)
+        largest = largest_albedo(read, made)
         if not largest.above_1:
             break
-        margin += 1.1 * ((largest.albedo or 2.0) - 1.0)
+        albedos = directional_albedo(read, source=made)
+        excess = np.append(albedos.albedo.max(axis=(1, 2)), largest.albedo or 2.0) - 1.0
+        theta_i_deg = np.append(albedos.theta_i_deg, largest.theta_i_deg)
+        order = np.argsort(theta_i_deg, kind="stable")
+        padded = np.pad(np.maximum(excess, 0.0)[order], 1)
+        highest = np.lib.stride_tricks.sliding_window_view(padded, 3).max(axis=1)  # lights between two have the larger
+        margin += 1.1 * np.interp(LIGHTS_DEG, theta_i_deg[order], highest)
     return table

@@ -120,3 +120,16 @@ def _with(numbers: Floats, top: float) -> Samples:
     samples = scattered(lambda wi, _: 0.005 + (top - 0.005) * wi[:, :1] ** 8, 200, 0.0)
     values = np.concatenate([numbers[:, np.newaxis], samples.values[len(numbers) :]])
     return replace(samples, values=values, uncertainty=None)
+
+
+def test_reciprocal_samples_tell_f_r_with_light_and_viewer_exchanged() -> None:
+    f_r = presets()["latex-gloss-sprayed-metal"].brdf_at(None)
+    samples = scans(f_r, np.arange(5.0, 76.0, 10.0), 0.01)
+    half = samples.selected(samples.theta_r >= samples.theta_i)
+    asked = scans(f_r, np.arange(20.0, 71.0, 10.0), 0.0)
+    asked = asked.selected((asked.theta_r <= asked.theta_i) & (asked.theta_r >= radians(5.0)))
+    for reciprocal in (False, True):
+        fitted = fit(half, reciprocal=reciprocal).f_r
+        values, exchanged = fitted(asked.w_i, asked.w_r), fitted(asked.w_r, asked.w_i)
+        assert np.allclose(values, exchanged, rtol=1e-9, atol=0.0) == reciprocal
+    assert np.percentile(np.abs(values / asked.values - 1.0), 95) < 0.05

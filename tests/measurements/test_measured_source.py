@@ -13,7 +13,7 @@ from brdfdb.materials import presets
 from brdfdb.materials.source import Evaluate
 from brdfdb.measurements import MeasuredSource, Samples
 from brdfdb.measurements.colours import spectra_of_colours
-from brdfdb.measurements.measured_source import MARGIN
+from brdfdb.measurements.measured_source import LIGHTS_DEG, MARGIN
 from brdfdb.measurements.record import Noise
 from brdfdb.models import MODELS
 from brdfdb.parameters import Floats
@@ -158,6 +158,15 @@ def test_conserving_source_has_no_albedo_above_1_though_its_lobe_is_narrow(alpha
     albedos, _ = reflected_share(made, theta, phi, width, tolerance=2e-4, most_panels=2000)
     assert np.max(albedos) <= 1.0
     assert np.percentile(albedos, 60) > 0.99  # no darker than the law asks for
+
+
+def test_a_margin_of_low_lights_leaves_high_ones_as_they_are() -> None:
+    white = source_of(lambda wi, _: np.full((len(wi), 1), 1.0 / np.pi)).made("reciprocal")
+    made = white.made("conserving", np.where(LIGHTS_DEG > 80.0, 0.05, 0.0)).brdf_at(None)
+    # a factor of light and one of viewer: low viewers get sin(10 degrees)^2 = 3 % of the light
+    for theta_deg, factor in ((85.0, 0.95**2), (20.0, 1.0)):
+        direction = unit_vector(radians(theta_deg), 0.0)[np.newaxis]
+        assert made(direction, direction)[0, 0] * np.pi == pytest.approx(factor, rel=0.005)
 
 
 def test_reciprocal_source_is_the_mean_of_both_ways() -> None:

@@ -159,6 +159,22 @@ def test_published_table_has_the_record_and_its_errors_the_uncertainty(tmp_path:
     assert np.mean((np.abs(looked_up.brdf - fresh.values[:, 0]) <= looked_up.error)[inside]) > 0.97
 
 
+def test_errors_of_reciprocal_samples_are_those_of_their_level(tmp_path: Path) -> None:
+    samples = scattered(presets()["clay-vase"].brdf_at(None), 300, 0.05)
+    publish(tmp_path, MeasuredSource.of_samples(samples, name="clay", reciprocal=True), tolerance=0.05)
+    table = brdfdb.open(tmp_path)["clay"]
+    measured = table.metadata.measured
+    assert measured is not None
+    assert measured.held_out is not None
+    assert measured.held_out.p99_of_levels is not None
+    both = table.lookup_vectors_with_error(WI, WR)
+    known = np.isfinite(both.error)
+    level = np.where(both.brdf >= 1000.0 * measured.held_out.floor[0], 4, 3)  # none is below 100 floors
+    low = np.minimum(WI[..., 2], WR[..., 2]) < np.cos(np.radians(70.0))
+    share = np.array(measured.held_out.p99_of_levels)[level, low.astype(int)]
+    assert np.all((both.error >= share * both.brdf)[known])
+
+
 def test_colours_take_three_parts(tmp_path: Path) -> None:
     def red(wi: Floats, wr: Floats) -> Floats:
         return np.asarray([0.3, 0.1, 0.05] + [0.1, 0.2, 0.3] * wi[:, 2:] * wr[:, 2:] + [0.0, 0.0, 0.1] * wr[:, 2:] ** 2)
