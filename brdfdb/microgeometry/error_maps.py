@@ -35,6 +35,7 @@ RHOS = (0.2, 0.5, 0.9, 1.0)  # albedos of Lambertian facets
 MAPPED = RHOS[:3]  # the albedos of rows; 1 serves models that are proportional to the albedo
 #: n and k of mirror-like facets. The first reflect all light; the metal is near iron at 550 nm
 MIRRORS: dict[str, tuple[float, float]] = {"F = 1": (1.0, 1e4), "n = 1.5": (1.5, 0.0), "metal": (2.9, 3.0)}
+_N, _K = np.array(list(MIRRORS.values())).T
 
 SURFACES = "Gaussian correlation, isotropic, 512 x 512 nodes, ten in a length of correlation, periodic"
 
@@ -64,8 +65,8 @@ class SurfaceEstimate:
 
     def against(self, count: BounceCount, columns: list[int]) -> tuple[Floats, Floats]:
         """Return f_r [1/sr] and its standard error (I, V, columns) of a number of bounces, for albedos or mirrors."""
-        at = ("one", "two", "all").index(count)
-        return self.f_r[at][..., columns], self.error[at][..., columns]
+        row = ("one", "two", "all").index(count)
+        return self.f_r[row][..., columns], self.error[row][..., columns]
 
     def noise(self) -> float:
         """Return the root mean square of the relative standard error [1] of all bounces where f_r is counted."""
@@ -85,9 +86,9 @@ _BEST = "has the least squares of (model - rays) / (model + rays) over all light
 
 
 def _comparisons() -> Iterator[tuple[str, ComparedModel]]:
-    """Yield the comparisons of all models, with their names: of forms that arguments choose, with these."""
+    """Yield the comparisons of models with Gaussian surfaces, with their names: that of a form has its arguments."""
     for name, spec in MODELS.items():
-        for number, relation in enumerate(spec.surfaces):
+        for number, relation in enumerate(relation for relation in spec.surfaces if not relation.grooves):
             chosen = "".join(f" {key}={str(value).lower()}" for key, value in relation.arguments.items())
             yield f"{name}{chosen if number else ''}", ComparedModel(model=name, **vars(relation))
 
@@ -115,23 +116,21 @@ def viewers(facets: FacetKind, slope: float) -> Floats:
 
     Viewers of mirror-like facets are those whose half vector is tilted by less than three slopes.
     """
-    found = []
+    chosen = []
+    steepest = np.inf if facets == "diffuse" else _LOBE * slope
     for light in lights():
-        count = VIEWERS
-        while True:
+        for count in itertools.count(VIEWERS, VIEWERS // 2):
             number = np.arange(count)
             sine = np.sqrt((number + 0.5) / count) * np.sin(np.radians(STEEPEST_DEG))
             # The surface is isotropic: azimuths from 0 to 180 degrees are all that there are
             azimuth = np.abs((number * _GOLDEN + np.pi) % (2.0 * np.pi) - np.pi)
-            at = unit_vector(np.arcsin(sine), azimuth)
-            half = at + light
-            inside = np.hypot(half[:, 0], half[:, 1]) <= _LOBE * slope * half[:, 2]
-            if facets == "diffuse" or np.count_nonzero(inside) >= VIEWERS:
+            directions = unit_vector(np.arcsin(sine), azimuth)
+            half = directions + light
+            seen = directions[np.hypot(half[:, 0], half[:, 1]) <= steepest * half[:, 2]]
+            if len(seen) >= VIEWERS:
                 break
-            count += VIEWERS // 2
-        chosen = at if facets == "diffuse" else at[inside]
-        found.append(chosen[np.round(np.linspace(0, len(chosen) - 1, VIEWERS)).astype(int)])
-    return np.stack(found)
+        chosen.append(seen[np.round(np.linspace(0, len(seen) - 1, VIEWERS)).astype(int)])
+    return np.stack(chosen)
 
 
 def traced(task: Task, rays: int) -> Floats:
@@ -145,16 +144,10 @@ def traced(task: Task, rays: int) -> Floats:
         facets = Facets(rho=RHOS, wavelength_nm=_wavelengths(len(RHOS)))
         seen = seen[0]  # the same for all lights
     else:
-        n, k = _mirrors()
-        facets = Facets(mirror=1.0, n=n, k=k, wavelength_nm=_wavelengths(len(MIRRORS)))
+        facets = Facets(mirror=1.0, n=_N, k=_K, wavelength_nm=_wavelengths(len(MIRRORS)))
     slopes = (task.slope, task.slope)
-    found = bounces(surface, facets, lights(), seen, rays=rays, seed=task.number, turned=True, gaussian_slopes=slopes)
-    return np.asarray(np.cumsum([found.one, found.two, found.further], axis=0))
-
-
-def _mirrors() -> Floats:
-    """Return n and k of the mirror-like facets, (2, L)."""
-    return np.array(list(MIRRORS.values())).T
+    shares = bounces(surface, facets, lights(), seen, rays=rays, seed=task.number, turned=True, gaussian_slopes=slopes)
+    return np.asarray(np.cumsum([shares.one, shares.two, shares.further], axis=0))
 
 
 def _wavelengths(count: int) -> Floats:
@@ -215,7 +208,7 @@ def rows(comparison: ComparedModel, slope: float, estimate: SurfaceEstimate, fit
     root mean square of the relative standard error of the rays, which is not subtracted. It is rounded up to a
     thousandth, because errors are rounded to it.
     """
-    found = []
+    result = []
     seen = viewers(comparison.facets, slope)
     azimuth = np.degrees(np.arctan2(np.abs(seen[..., 1]), seen[..., 0]))
     low = np.degrees(np.arccos(np.minimum(seen[..., 2], 1.0))) >= _FORWARD_DEG
@@ -227,7 +220,7 @@ def rows(comparison: ComparedModel, slope: float, estimate: SurfaceEstimate, fit
         absolute = np.abs(relative)
         noise = np.sqrt(np.nanmean(np.where(counted, (error / rays) ** 2, np.nan), axis=1))
         parameters = {**fit.parameters, **({"factor": fit.factor} if comparison.factor else {})}
-        found.append(
+        result.append(
             {
                 "slope": slope,
                 "rho": RHOS[column] if comparison.by_rho else None,
@@ -240,7 +233,7 @@ def rows(comparison: ComparedModel, slope: float, estimate: SurfaceEstimate, fit
                 "noise": _listed(np.ceil(1e3 * noise) / 1e3),
             }
         )
-    return found
+    return result
 
 
 def document(
@@ -253,12 +246,16 @@ def document(
     """
     models = {}
     for name, comparison in COMPARISONS.items():
-        of_slopes = [(slope, estimates[comparison.facets, slope]) for slope in SLOPES]
-        quoted = _compared(comparison, of_slopes)
+        by_slope = {slope: estimates[comparison.facets, slope] for slope in SLOPES}
+        quoted = [
+            row
+            for slope, estimate in by_slope.items()
+            for row in rows(comparison, slope, estimate, fitted(comparison, slope, estimate))
+        ]
         if comparison.facets == "diffuse" and comparison.parameters:
             quoted = [*_flat(quoted), *quoted]
         also = [
-            {"words": words, "rows": _short(other, of_slopes, fit_of)} for words, other, fit_of in _others(comparison)
+            {"words": words, "rows": _short(other, by_slope, suited)} for words, other, suited in _others(comparison)
         ]
         models[name] = {
             "model": comparison.model,
@@ -271,14 +268,6 @@ def document(
             **({"also": also} if also else {}),
         }
     return {"version": VERSION, "provenance": dict(provenance), "lights_deg": list(LIGHTS_DEG), "models": models}
-
-
-def _compared(
-    comparison: ComparedModel, of_slopes: Sequence[tuple[float, SurfaceEstimate]], fit_of: ComparedModel | None = None
-) -> list[dict[str, Any]]:
-    """Return the rows of a comparison at all slopes, with its own parameters or those of another comparison."""
-    made = [rows(comparison, *of_slope, fitted(fit_of or comparison, *of_slope)) for of_slope in of_slopes]
-    return list(itertools.chain.from_iterable(made))
 
 
 def _others(comparison: ComparedModel) -> Iterator[tuple[str, ComparedModel, ComparedModel | None]]:
@@ -294,43 +283,38 @@ def _others(comparison: ComparedModel) -> Iterator[tuple[str, ComparedModel, Com
 
 
 def _short(
-    comparison: ComparedModel, of_slopes: Sequence[tuple[float, SurfaceEstimate]], fit_of: ComparedModel | None
+    comparison: ComparedModel, estimates: Mapping[float, SurfaceEstimate], suited: ComparedModel | None
 ) -> list[dict[str, Any]]:
-    """Return a row for each slope: the median over lights and albedos of `median`, and the largest `p95`."""
-    rows = _compared(comparison, of_slopes, fit_of)
-    found = []
-    for slope in SLOPES:
-        alike = [row for row in rows if row["slope"] == slope]
-        medians, p95 = ([row[statistic] for row in alike] for statistic in ("median", "p95"))
-        parameters = {} if fit_of else {"parameters": alike[0]["parameters"]}
-        found.append(
-            {"slope": slope, **parameters, "median": round(float(np.median(medians)), 3), "p95": float(np.max(p95))}
-        )
-    return found
+    """Return a row for each slope: the median over lights and albedos of `median`, and the largest `p95`.
+
+    The parameters are those of the comparison `suited`, or else of this one, which are in the rows.
+    """
+    short = []
+    for slope, estimate in estimates.items():
+        whole = rows(comparison, slope, estimate, fitted(suited or comparison, slope, estimate))
+        median, p95 = np.median([row["median"] for row in whole]), np.max([row["p95"] for row in whole])
+        parameters = {} if suited else {"parameters": whole[0]["parameters"]}
+        short.append({"slope": slope, **parameters, "median": round(float(median), 3), "p95": float(p95)})
+    return short
 
 
-def _flat(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Return rows of slope 0, where diffuse models are exact, in place of those of the first slope."""
-    flat = []
+def _flat(rows: list[dict[str, Any]]) -> Iterator[dict[str, Any]]:
+    """Yield rows of slope 0, where diffuse models are exact, in place of those of the first slope."""
     for row in rows:
         if row["slope"] == SLOPES[0]:
-            zeros: dict[str, Any] = {
-                name: [0.0] * len(LIGHTS_DEG) for name, old in row.items() if isinstance(old, list)
-            }
-            flat.append({**row, **zeros, "slope": 0.0, "parameters": dict.fromkeys(row["parameters"], 0.0)})
-    return flat
+            zeros = {name: [0.0] * len(LIGHTS_DEG) for name, values in row.items() if isinstance(values, list)}
+            yield {**row, **zeros, "slope": 0.0, "parameters": dict.fromkeys(row["parameters"], 0.0)}
 
 
 def _listed(values: Floats, decimals: int = 3) -> list[float | None]:
-    """Return numbers with two digits, and at most so many decimals; None for nan."""
-    found = [None if np.isnan(value) else round(float(f"{value:.2g}"), decimals) for value in values]
-    return [number or 0 if number is not None else None for number in found]  # 0 takes less space than -0.0
+    """Return numbers with two digits, and at most so many decimals; None for nan, and 0 for 0.0, which is shorter."""
+    return [None if np.isnan(value) else round(float(f"{value:.2g}"), decimals) or 0 for value in values]
 
 
 def _means(values: Floats) -> list[float | None]:
     """Return the mean of the finite values of each row (I, V); None where there is none."""
-    found = np.array([row[np.isfinite(row)].mean() if np.any(np.isfinite(row)) else np.nan for row in values])
-    return _listed(found, 2)
+    rows = (row[np.isfinite(row)] for row in values)
+    return _listed(np.array([row.mean() if row.size else np.nan for row in rows]), 2)
 
 
 def _columns(comparison: ComparedModel) -> list[int]:
@@ -344,9 +328,10 @@ def _model(comparison: ComparedModel, slope: float, parameters: Mapping[str, flo
     """Return f_r [1/sr] of a model at columns: albedos of Lambertian facets, or mirrors (I, V, columns)."""
     wi = lights()[:, np.newaxis, np.newaxis]
     wr = viewers(comparison.facets, slope)[:, :, np.newaxis]
-    n, k = _mirrors()
-    light = {"rho": np.array(RHOS)[columns]} if comparison.facets == "diffuse" else {"n": n[columns], "k": k[columns]}
-    return np.asarray(MODELS[comparison.model].vectors(wi, wr, **comparison.arguments, **parameters, **light))
+    facets = {"rho": np.array(RHOS)[columns]}
+    if comparison.facets == "mirror":
+        facets = {"n": _N[columns], "k": _K[columns]}
+    return np.asarray(MODELS[comparison.model].vectors(wi, wr, **comparison.arguments, **parameters, **facets))
 
 
 def _counted(f_r: Floats) -> NDArray[np.bool_]:

@@ -13,7 +13,8 @@ The file model_errors.json has the key ``models``: a name, and an entry with
 * ``rows``: a row for each slope and albedo, with
 
   * ``slope`` [1], the standard deviation along each axis, and ``rho`` [1], null if errors do not depend on it;
-  * ``parameters`` that suit the surface, in the units of the model; they increase with the slope;
+  * ``parameters`` that suit the surface, in the units of the model; they increase with the slope, and all albedos have
+    the same;
   * for each light of ``lights_deg`` the statistics over viewers ``median``, ``p95``, ``worst``, ``towards_light``,
     ``forward`` and ``noise``; a row of slope 0, whose errors are 0, extends the map of a diffuse model to 0.
 """
@@ -40,6 +41,7 @@ _STATISTICS = ("median", "p95", "worst", "towards_light", "forward", "noise")
 _STEEP_DEG = 75  # light [degree] whose error is stated by itself
 _ROUNDING = 1e-9  # relative distance at which a parameter is at the end of a map: files have twelve digits of angles
 _NOTABLE = 0.02  # smallest mean error [1] of a side that the sentence mentions
+_Row = Mapping[str, Any]
 _BOUNCES = {"one": " of one bounce", "two": " of up to two bounces", "all": ""}
 
 
@@ -108,17 +110,6 @@ class _Errors(NamedTuple):
     slope: float
     by_light: dict[str, list[float | None]]
 
-    def towards(self, other: _Errors, share: float) -> _Errors:
-        """Return the errors at a share of the way to others."""
-        mixed = {
-            name: [
-                None if low is None or high is None else _between(low, high, share)
-                for low, high in zip(values, other.by_light[name], strict=True)
-            ]
-            for name, values in self.by_light.items()
-        }
-        return _Errors(_between(self.slope, other.slope, share), mixed)
-
     def of(self, statistic: str) -> list[float]:
         """Return a statistic for the lights that have it."""
         return [value for value in self.by_light[statistic] if value is not None]
@@ -149,12 +140,10 @@ def surface_error_of(model: str | None, parameters: Mapping[str, Any]) -> Surfac
     Angles are in degrees, under names in ``_deg``, and a spectrum is a mapping or an object with ``values``. Between
     the slopes and albedos of the map, errors are interpolated linearly. An albedo outside of the map is replaced by the
     nearest one, which the sentence says. Of two axes, and of the least and largest albedo of a spectrum, the worse one
-    is stated. ParameterError if an albedo is missing, or is not in [0, 1].
+    is stated. ParameterError if a parameter is no finite number, or an albedo is missing or not in [0, 1].
     """
-    for name, entry in _document()["models"].items():
-        if entry.get("model", name) == model and _same(entry.get("arguments", {}), parameters):
-            break
-    else:
+    entry = _entry(model, parameters)
+    if entry is None:
         return None
     first = entry["rows"][0]["parameters"]
     axes = [axis for axis in first if axis in parameters or f"{axis}_deg" in parameters]
@@ -166,22 +155,41 @@ def surface_error_of(model: str | None, parameters: Mapping[str, Any]) -> Surfac
         albedos = [*dict.fromkeys(_ends(parameters.get("rho")))]
     candidates = []
     for (axis, value), rho in itertools.product(values.items(), albedos):
-        errors = _at(entry["rows"], axis, value, rho)
-        if errors is None:
+        weighted = _weighted(entry["rows"], axis, value, rho)
+        if not weighted:
             unit = "" if axis in parameters else " degrees"
             return SurfaceError(_outside(entry["rows"], axis, value, unit), inside=False)
-        candidates.append(errors)
+        candidates.append(_mixed(weighted))
     worst = max(candidates, key=lambda errors: _middle(errors.of("median")))
     return _stated(entry, worst, _remarks(entry["rows"], values, albedos))
+
+
+def suited_parameters(model: str, slope: float) -> dict[str, float] | None:
+    """Return the parameters of a model that suit a Gaussian surface with a slope [1]; None outside of the map."""
+    entry = _entry(model, {})
+    suited = {row["slope"]: row["parameters"] for row in entry["rows"]} if entry else {}
+    if not suited or not min(suited) <= slope <= max(suited):
+        return None
+    weights = _weights(sorted(suited), slope)
+    return {name: sum(weight * suited[node][name] for node, weight in weights.items()) for name in suited[max(suited)]}
+
+
+def _entry(model: str | None, parameters: Mapping[str, Any]) -> dict[str, Any] | None:
+    """Return the map of a model for arguments among parameters; None if there is none."""
+    return next(
+        (
+            entry
+            for name, entry in _document()["models"].items()
+            if entry.get("model", name) == model and _same(entry.get("arguments", {}), parameters)
+        ),
+        None,
+    )
 
 
 @functools.cache
 def _document() -> dict[str, Any]:
     """Return the content of the file of the maps."""
-    text = Path(__file__).with_name("model_errors.json").read_bytes()
-    document: dict[str, Any] = json.loads(text)
-    for entry in document["models"].values():
-        entry["rows"].sort(key=lambda row: row["slope"])
+    document: dict[str, Any] = json.loads(Path(__file__).with_name("model_errors.json").read_bytes())
     return document
 
 
@@ -191,52 +199,58 @@ def _same(arguments: Mapping[str, Any], parameters: Mapping[str, Any]) -> bool:
 
 
 def _number(parameters: Mapping[str, Any], name: str) -> float:
-    """Return a parameter in the unit of the model."""
-    return float(parameters[name]) if name in parameters else math.radians(parameters[f"{name}_deg"])
+    """Return a parameter in the unit of the model; ParameterError if it is no finite number."""
+    key = name if name in parameters else f"{name}_deg"
+    value = parameters[key]
+    if not isinstance(value, int | float) or not math.isfinite(value):
+        raise ParameterError(key, f"{value!r} is not a finite number", value, "a finite number")
+    return float(value) if key == name else math.radians(value)
 
 
 def _ends(value: Any) -> tuple[float, float]:
     """Return the least and the largest albedo of a number or of a spectrum; ParameterError if there is none."""
-    values = value["values"] if isinstance(value, Mapping) else getattr(value, "values", value)
+    values = value.get("values") if isinstance(value, Mapping) else getattr(value, "values", value)
     albedos = values if isinstance(values, list | tuple) else [values]
     if not albedos or not all(isinstance(rho, int | float) and 0.0 <= rho <= 1.0 for rho in albedos):
         raise ParameterError("rho", f"{value!r} is no albedo; allowed are numbers from 0 to 1", value, (0.0, 1.0))
     return float(min(albedos)), float(max(albedos))
 
 
-def _at(rows: Sequence[Mapping[str, Any]], parameter: str, value: float, rho: float | None) -> _Errors | None:
-    """Return the errors at a value of a parameter and an albedo; None if the value is outside of the map."""
-    if rho is None:
-        return _along(rows, parameter, value)
-    albedos = sorted({row["rho"] for row in rows})
-    low, high, share = _bracket(albedos, min(max(rho, albedos[0]), albedos[-1]))
-    of_low, of_high = (
-        _along([row for row in rows if row["rho"] == albedos[at]], parameter, value) for at in (low, high)
-    )
-    return None if of_low is None or of_high is None else of_low.towards(of_high, share)
+def _weighted(rows: Sequence[_Row], parameter: str, value: float, rho: float | None) -> list[tuple[float, _Row]]:
+    """Return the rows around a value of a parameter and an albedo, with their weights; none outside of the map."""
+    values = sorted({row["parameters"][parameter] for row in rows})
+    if not math.isclose(min(max(value, values[0]), values[-1]), value, rel_tol=_ROUNDING):
+        return []
+    by_value = _weights(values, value)
+    by_rho = {None: 1.0} if rho is None else _weights(sorted({row["rho"] for row in rows}), rho)
+    return [
+        (by_value[row["parameters"][parameter]] * by_rho[row["rho"]], row)
+        for row in rows
+        if row["parameters"][parameter] in by_value and row["rho"] in by_rho
+    ]
 
 
-def _along(rows: Sequence[Mapping[str, Any]], parameter: str, value: float) -> _Errors | None:
-    """Return the errors at a value of a parameter, from rows of one albedo."""
-    values = [row["parameters"][parameter] for row in rows]
-    inside = min(max(value, values[0]), values[-1])
-    if not math.isclose(inside, value, rel_tol=_ROUNDING):
-        return None
-    low, high, share = _bracket(values, inside)
-    before, after = (_Errors(rows[at]["slope"], {name: rows[at][name] for name in _STATISTICS}) for at in (low, high))
-    return before.towards(after, share)
+def _mixed(weighted: Sequence[tuple[float, _Row]]) -> _Errors:
+    """Return the weighted mean of rows."""
+
+    def mean(values: Sequence[float | None]) -> float | None:
+        products = [weight * value for (weight, _), value in zip(weighted, values, strict=True) if value is not None]
+        return sum(products) if len(products) == len(values) else None
+
+    lights = range(len(_document()["lights_deg"]))
+    by_light = {name: [mean([row[name][light] for _, row in weighted]) for light in lights] for name in _STATISTICS}
+    return _Errors(sum(weight * row["slope"] for weight, row in weighted), by_light)
 
 
-def _bracket(nodes: Sequence[float], value: float) -> tuple[int, int, float]:
-    """Return the nodes around a value that is inside of them, and its share of the way from the first to the second."""
-    high = next(at for at, node in enumerate(nodes) if node >= value)
-    low = max(high - 1, 0)
-    width = nodes[high] - nodes[low]
-    return low, high, (value - nodes[low]) / width if width else 0.0
-
-
-def _between(low: float, high: float, share: float) -> float:
-    return (1.0 - share) * low + share * high
+def _weights(nodes: Sequence[float], value: float) -> dict[Any, float]:
+    """Return the nodes around a value with their weights in linear interpolation; beyond an end, the node there."""
+    inside = min(max(value, nodes[0]), nodes[-1])
+    if inside in nodes:
+        return {inside: 1.0}
+    low = max(node for node in nodes if node < inside)
+    high = min(node for node in nodes if node > inside)
+    share = (inside - low) / (high - low)
+    return {low: 1.0 - share, high: share}
 
 
 def _middle(values: Sequence[float]) -> float:
@@ -255,13 +269,14 @@ def _stated(entry: Mapping[str, Any], errors: _Errors, remarks: str) -> SurfaceE
     rays = f"rays{_BOUNCES[entry.get('bounces', 'all')]}"
     against = f"Against {rays} on Gaussian surfaces of these slopes"
     if entry.get("only_fit", False):
-        against = f"As the fit to a Gaussian surface, against {rays} on it"
+        against = f"Against {rays} on the Gaussian surface that the model fits best"
     if errors.slope == 0.0:
         numbers = "0, since the surface is flat"
     elif overall.hidden and at_75.hidden:
         numbers = f"within the noise of the rays, {error_in_words(max(overall.noise, at_75.noise))}"
     else:
-        numbers = f"{overall.in_words} in the median, {at_75.in_words} at {_STEEP_DEG} degrees"
+        numbers = f"{overall.in_words} in the median ({at_75.in_words} for light at {_STEEP_DEG} degrees)"
+        numbers += f", at most {error_in_words(max(errors.of('p95')))} for 95 % of the viewers"
     sides = _sides({"towards the light": towards_light, "forward": forward}, overall.noise)
     return SurfaceError(
         sentence=f"{', '.join([f'{against}: {numbers}', *sides])}.{remarks}",
@@ -285,7 +300,7 @@ def _sides(sides: Mapping[str, float | None], noise: float) -> Iterator[str]:
             yield f"{which} {' and '.join(where)}"
 
 
-def _remarks(rows: Sequence[Mapping[str, Any]], values: Mapping[str, float], albedos: Sequence[float | None]) -> str:
+def _remarks(rows: Sequence[_Row], values: Mapping[str, float], albedos: Sequence[float | None]) -> str:
     """Return sentences on what a statement leaves out: the second axis, and albedos outside of the map."""
     remarks = ""
     if len(set(values.values())) > 1:
@@ -298,13 +313,10 @@ def _remarks(rows: Sequence[Mapping[str, Any]], values: Mapping[str, float], alb
     return remarks
 
 
-def _outside(rows: Sequence[Mapping[str, Any]], parameter: str, value: float, unit: str) -> str:
-    """Return the sentence on a parameter outside of the map; its range is that of all albedos."""
-    by_rho = [
-        [row["parameters"][parameter] for row in rows if row["rho"] == rho] for rho in {row["rho"] for row in rows}
-    ]
-    numbers = (value, max(known[0] for known in by_rho), min(known[-1] for known in by_rho))
-    at, least, most = (f"{math.degrees(number) if unit else number:.3g}" for number in numbers)
-    return (
-        f"Against rays on Gaussian surfaces: {parameter} = {at}{unit} is outside of the map, {least} to {most}{unit}."
-    )
+def _outside(rows: Sequence[_Row], parameter: str, value: float, unit: str) -> str:
+    """Return the sentence on a parameter outside of the map."""
+    values = [row["parameters"][parameter] for row in rows]
+    numbers = (value, min(values), max(values))
+    given, least, most = (f"{math.degrees(number) if unit else number:.3g}" for number in numbers)
+    where = f"{parameter} = {given}{unit} is outside of the map, {least} to {most}{unit}"
+    return f"Against rays on Gaussian surfaces: {where}."

@@ -41,7 +41,7 @@ def run(out: Path, *, realisations: int, rays: int, at: Workers) -> dict[str, An
     realisations : int
         Maps drawn of each kind of surface, at least 2.
     rays : int
-        Light paths of each of them.
+        Rays for each light in a realisation.
     at : Workers
         Where the tasks run. Each is one realisation of a surface.
 
@@ -53,7 +53,7 @@ def run(out: Path, *, realisations: int, rays: int, at: Workers) -> dict[str, An
         If the directory has estimates of other settings.
     """
     if realisations < 2:
-        raise ParameterError("--realisations", f"{realisations} gives no standard error; allowed are 2 and more")
+        raise ParameterError("--realisations", f"{realisations} gives no standard error; allowed are 2 or more")
     if out.is_dir():
         raise ParameterError("--out", f"{out} is a directory; give the path of a file", str(out))
     import_extra("embreex.rtcore_scene")  # says which package is missing before anything is written
@@ -93,17 +93,13 @@ def _file(partial: Path, task: Task) -> Path:
 def _completed(tasks: deque[Task], partial: str, rays: int, at: Workers) -> Iterator[None]:
     """Submit tasks while workers are free; yield once for each that is complete."""
     running: set[Future[None]] = set()
-    try:
-        while tasks or running:
-            while tasks and len(running) < 2 * max(1, at.slots()):
-                running.add(at.executor.submit(trace, partial, tasks.popleft(), rays))
-            done, running = wait(running, timeout=_LOOK_S, return_when=FIRST_COMPLETED)
-            for future in done:
-                future.result()
-                yield
-    finally:
-        for future in running:
-            future.cancel()
+    while tasks or running:
+        while tasks and len(running) < 2 * max(1, at.slots()):
+            running.add(at.executor.submit(trace, partial, tasks.popleft(), rays))
+        done, running = wait(running, timeout=_LOOK_S, return_when=FIRST_COMPLETED)
+        for future in done:
+            future.result()
+            yield
 
 
 def trace(partial: str, task: Task, rays: int) -> None:
@@ -127,7 +123,7 @@ def _provenance(
         "surfaces": error_maps.SURFACES,
         "realisations": realisations,
         "seeds": f"0 to {realisations - 1}",
-        "light_paths": rays,
+        "rays": rays,
         "viewers": error_maps.VIEWERS,
         "standard_error": noise,
     }

@@ -57,7 +57,7 @@ def test_all_views_agree(root: Path, name: str, capsys: Captured) -> None:
 
     assert run("list", "--store", root) == 0
     _, head, *lines = capsys.readouterr().out.splitlines()
-    end = head.index("surface error") + len("surface error")
+    end = head.index("surface error (median)") + len("surface error (median)")
     (line,) = (line for line in lines if line.startswith(name))
     assert re.split("  +", line[:end])[-1].strip() == (cell or line[:end].split("  ")[-1].strip())
     assert line[:end].endswith(cell or "  ")

@@ -13,7 +13,7 @@ import pytest
 from brdfdb.errors import ParameterError
 from brdfdb.materials import Material
 from brdfdb.microgeometry import model_errors
-from brdfdb.microgeometry.model_errors import SurfaceError, has_map, surface_error, surface_error_of
+from brdfdb.microgeometry.model_errors import SurfaceError, has_map, suited_parameters, surface_error, surface_error_of
 from brdfdb.models import MODELS
 
 LIGHTS = [0, 45, 75]
@@ -55,25 +55,32 @@ def test_errors_are_interpolated_in_the_slope_and_the_albedo(maps: dict[str, Any
         "rows": [
             row(0.2, {"sigma": 0.2}, [0.01, 0.02, 0.03], 0.2),
             row(0.4, {"sigma": 0.3}, [0.03, 0.04, 0.07], 0.2),
-            row(0.2, {"sigma": 0.1}, [0.05, 0.06, 0.07], 0.6),
+            row(0.2, {"sigma": 0.2}, [0.05, 0.06, 0.07], 0.6),
             row(0.4, {"sigma": 0.3}, [0.07, 0.08, 0.11], 0.6),
         ]
     }
-    # sigma of 0.25 is half way of the first pair, and three quarters of the second: slopes of 0.3 and 0.35
+    # sigma of 0.25 is half way of slopes 0.2 and 0.4
     first = stated("oren_nayar", rho=0.2, sigma_deg=degrees(0.25))
     assert first.slope == pytest.approx(0.3)
     assert (first.median, first.at_75) == pytest.approx((0.03, 0.05))
     second = stated("oren_nayar", rho=0.6, sigma_deg=degrees(0.25))
-    assert second.slope == pytest.approx(0.35)
-    assert (second.median, second.at_75) == pytest.approx((0.075, 0.1))
+    assert (second.median, second.at_75) == pytest.approx((0.07, 0.09))
     # an albedo of 0.3 is a quarter of the way from 0.2 to 0.6
     between = stated("oren_nayar", rho=0.3, sigma_deg=degrees(0.25))
-    assert between.slope == pytest.approx(0.3125)
-    assert (between.median, between.at_75) == pytest.approx((0.04125, 0.0625))
-    assert (between.p95, between.worst) == pytest.approx((0.125, 0.25))
+    assert between.slope == pytest.approx(0.3)
+    assert (between.median, between.at_75) == pytest.approx((0.04, 0.06))
+    assert (between.p95, between.worst) == pytest.approx((0.12, 0.24))
     assert (between.towards_light, between.forward) == pytest.approx((-0.06, 0.0))  # of the lights at 45 and 75 degrees
     assert between.noise == pytest.approx(0.001)
     assert between.inside
+
+
+def test_a_side_that_one_of_two_rows_does_not_see_has_no_error(maps: dict[str, Any]) -> None:
+    # forward: seen by one row alone at 45 degrees, by both at 75
+    rows = [row(s, {"alpha_x": s, "alpha_y": s}, [0.1] * 3, forward=[None, x, s]) for s, x in ((0.1, None), (0.3, 0.9))]
+    maps["beckmann"] = {"rows": rows}
+    assert stated("beckmann", alpha_x=0.2, alpha_y=0.2).forward == pytest.approx(0.2)
+    assert stated("beckmann", alpha_x=0.3, alpha_y=0.3).forward == pytest.approx(0.6)
 
 
 def test_of_the_least_and_largest_albedo_of_a_spectrum_the_worse_is_stated(maps: dict[str, Any]) -> None:
@@ -105,8 +112,8 @@ def test_of_the_least_and_largest_albedo_of_a_spectrum_the_worse_is_stated(maps:
     ],
 )
 def test_nothing_is_extrapolated(maps: dict[str, Any], sigma: float, rho: float, sentence: str) -> None:
-    ends = ((0.1, 0.11, 0.2), (0.5, 0.5, 0.2), (0.1, 0.1, 0.6), (0.5, 0.4, 0.6))  # slope, sigma, albedo
-    maps["oren_nayar"] = {"rows": [row(s, {"sigma": x}, [0.1] * 3, of_rho) for s, x, of_rho in ends]}
+    ends = ((0.1, 0.11), (0.5, 0.4))  # slope, sigma
+    maps["oren_nayar"] = {"rows": [row(s, {"sigma": x}, [0.1] * 3, albedo) for s, x in ends for albedo in (0.2, 0.6)]}
     outside = stated("oren_nayar", rho=rho, sigma_deg=degrees(sigma))
     assert outside == SurfaceError(sentence, inside=False)
     assert outside.in_lists == "outside of map"
@@ -123,7 +130,8 @@ def test_of_two_axes_the_worse_is_stated(maps: dict[str, Any]) -> None:
     rows = [row(s, {"alpha_x": 2.0 * s, "alpha_y": 2.0 * s}, [s, s, 2.0 * s]) for s in (0.1, 0.3)]
     maps["beckmann"] = {"rows": rows, "arguments": {"n": 1.0, "k": 1e6}, "bounces": "one"}
     assert stated("beckmann", alpha_x=0.3, alpha_y=0.3).sentence == (
-        "Against rays of one bounce on Gaussian surfaces of these slopes: 15 % in the median, 30 % at 75 degrees, "
+        "Against rays of one bounce on Gaussian surfaces of these slopes: 15 % in the median (30 % for light at 75 "
+        "degrees), at most 60 % for 95 % of the viewers, "
         "too dark towards the light."
     )
     for alphas in ({"alpha_x": 0.3, "alpha_y": 0.5}, {"alpha_x": 0.5, "alpha_y": 0.3}):
@@ -134,31 +142,38 @@ def test_of_two_axes_the_worse_is_stated(maps: dict[str, Any]) -> None:
 
 
 GAUSSIAN = "Against rays on Gaussian surfaces of these slopes: "
+STEEP = "4.0 % in the median (11 % for light at 75 degrees)"
+MOST = ", at most 22 % for 95 % of the viewers"
 
 
 @pytest.mark.parametrize(
     ("model", "more", "sentence"),
     [
-        ("beckmann", {}, f"{GAUSSIAN}4.0 % in the median, 11 % at 75 degrees, too dark towards the light."),
+        (
+            "beckmann",
+            {},
+            f"{GAUSSIAN}{STEEP}{MOST}, too dark towards the light.",
+        ),
         (
             "beckmann",
             {"towards_light": [None, 0.03, 0.05], "forward": [None, -0.03, -0.05]},
-            f"{GAUSSIAN}4.0 % in the median, 11 % at 75 degrees, too dark forward, too bright towards the light.",
+            f"{GAUSSIAN}{STEEP}{MOST}, too dark forward, too bright towards the light.",
         ),
         (
             "beckmann",
             {"towards_light": [None, 0.03, 0.05], "forward": [None, 0.03, 0.05]},
-            f"{GAUSSIAN}4.0 % in the median, 11 % at 75 degrees, too bright towards the light and forward.",
+            f"{GAUSSIAN}{STEEP}{MOST}, too bright towards the light and forward.",
         ),
         (
             "beckmann",
             {"towards_light": [None, -0.01, -0.02], "forward": [None, None, None]},
-            f"{GAUSSIAN}4.0 % in the median, 11 % at 75 degrees.",
+            f"{GAUSSIAN}{STEEP}{MOST}.",
         ),
         (
             "beckmann",
             {"noise": [0.05] * 3},
-            f"{GAUSSIAN}within the noise (5.0 %) in the median, 11 % at 75 degrees, too dark towards the light.",
+            f"{GAUSSIAN}within the noise (5.0 %) in the median (11 % for light at 75 degrees){MOST}, too dark towards "
+            "the light.",
         ),
         (
             "beckmann",
@@ -168,12 +183,13 @@ GAUSSIAN = "Against rays on Gaussian surfaces of these slopes: "
         (
             "beckmann",
             {"noise": [0.001, 0.001, 0.12]},
-            f"{GAUSSIAN}4.0 % in the median, within the noise (12 %) at 75 degrees, too dark towards the light.",
+            f"{GAUSSIAN}4.0 % in the median (within the noise (12 %) for light at 75 degrees){MOST}, too dark towards "
+            "the light.",
         ),
         (
             "ggx",
             {},
-            "As the fit to a Gaussian surface, against rays on it: 4.0 % in the median, 11 % at 75 degrees, too dark "
+            f"Against rays on the Gaussian surface that the model fits best: {STEEP}{MOST}, too dark "
             "towards the light.",
         ),
     ],
@@ -190,6 +206,15 @@ def test_the_sentence_says_what_the_numbers_say(maps: dict[str, Any], model: str
 )
 def test_the_cell_of_a_list_is_not_smaller_than_the_noise(median: float, noise: float, cell: str) -> None:
     assert SurfaceError("", inside=True, slope=0.2, median=median, noise=noise).in_lists == cell
+
+
+def test_the_parameters_that_suit_a_slope_are_interpolated(maps: dict[str, Any]) -> None:
+    rows = [row(s, {"roughness": s * s}, [0.1] * 3, rho) for rho in (0.2, 0.6) for s in (0.1, 0.3)]
+    maps["vmf_diffuse"] = {"rows": rows}
+    assert suited_parameters("vmf_diffuse", 0.15) == pytest.approx({"roughness": 0.03})  # a quarter from 0.01 to 0.09
+    assert suited_parameters("vmf_diffuse", 0.31) is None
+    assert suited_parameters("vmf_diffuse", math.nan) is None
+    assert suited_parameters("ward", 0.2) is None
 
 
 def test_a_flat_surface_has_no_error(maps: dict[str, Any]) -> None:
@@ -223,10 +248,16 @@ def test_without_a_map_or_a_roughness_there_is_no_number(maps: dict[str, Any]) -
 # The shipped file
 
 
-@pytest.mark.parametrize("rho", [math.nan, None, [], "0.5", [0.2, 1.2]])
+@pytest.mark.parametrize("rho", [math.nan, None, [], "0.5", [0.2, 1.2], {"file": "a.csv"}])
 def test_what_is_no_albedo_is_refused(rho: Any) -> None:
     with pytest.raises(ParameterError, match="is no albedo"):
         surface_error_of("oren_nayar", {"rho": rho, "sigma": 0.3})
+
+
+@pytest.mark.parametrize("sigma", [math.nan, math.inf, "0.2", [0.2]])
+def test_a_roughness_that_is_no_finite_number_is_refused(sigma: Any) -> None:
+    with pytest.raises(ParameterError, match=r"sigma: .* is not a finite number"):
+        surface_error_of("oren_nayar", {"rho": 0.5, "sigma": sigma})
 
 
 def test_shipped_maps_name_all_parameters_and_grow_with_the_slope() -> None:
@@ -250,6 +281,7 @@ def test_shipped_maps_name_all_parameters_and_grow_with_the_slope() -> None:
             for key in axes:
                 values = [each["parameters"][key] for each in of_rho]
                 assert values == sorted(set(values)), (name, rho, key)
+                assert values == sorted({each["parameters"][key] for each in rows})  # the same for all albedos
         for each in rows:
             for statistic in ("median", "p95", "worst", "noise"):
                 assert len(each[statistic]) == lights

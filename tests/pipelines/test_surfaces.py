@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import statistics
 from pathlib import Path
 
 import numpy as np
@@ -24,7 +25,18 @@ def test_the_table_shows_where_models_are_within_a_limit(capsys: Captured) -> No
     entry = surface_maps.shipped()["models"]["beckmann"]
     within = [row["slope"] for row in entry["rows"] if max(row["p95"][:-1]) <= 0.2]
     assert lines["beckmann"][-1] == f"{max(within):g}"
+    # the median over lights, and the error of 95 % of the viewers at the worst light up to 60 degrees and of all
+    (row,) = (row for row in entry["rows"] if row["slope"] == 0.35)
+    noise = statistics.median(row["noise"])
+    assert statistics.median(row["median"]) < noise
+    cell = f"<{100 * noise:.2g} ({100 * max(row['p95'][:-1]):.2g}, {100 * max(row['p95']):.2g})"
+    assert cell in next(line for line in out.splitlines() if line.startswith("beckmann "))
     assert "realisations of each surface" in out
+
+
+@pytest.mark.parametrize("option", ["--rays", "--realisations"])
+def test_numbers_of_rays_without_a_file_to_write_are_refused(option: str, capsys: Captured) -> None:
+    assert refused(capsys, "surfaces", option, 8) == f"{option}: is allowed only with --out"
 
 
 def test_a_model_without_a_map_is_refused(capsys: Captured) -> None:
@@ -101,7 +113,7 @@ def test_an_interrupted_computation_resumes(monkeypatch: pytest.MonkeyPatch, cap
     assert not out.with_name("maps.json.partial").exists()
     document = json.loads(out.read_text(encoding="utf-8"))
     assert document["provenance"]["realisations"] == 3
-    assert document["provenance"]["light_paths"] == 64
+    assert document["provenance"]["rays"] == 64
     for row in document["models"]["lambert"]["rows"] + document["models"]["beckmann"]["rows"]:
         assert max(row["worst"]) < 0.04  # the noise of a mean of three
         assert min(row["noise"]) > 0.003

@@ -27,18 +27,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--realisations",
         type=whole_number(10_000),
-        default=32,
         metavar="N",
-        help="maps drawn of each surface, with --out (default: %(default)s)",
+        help="realisations of each surface, with --out (default: as many as the maps of the program have)",
     )
     parser.add_argument(
         "--rays",
         type=whole_number(1 << 24),
-        default=1 << 14,
         metavar="N",
-        help="light paths of each of them, with --out (default: %(default)s)",
+        help="rays for each light in a realisation, with --out (default: as many as the maps of the program have)",
     )
-    add_workers(parser, "FILE")
+    add_workers(parser, "FILE", threads=False)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -56,19 +54,22 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _run(options: argparse.Namespace) -> None:
+    from brdfdb.errors import ParameterError
     from brdfdb_pipelines import surface_maps
 
+    document = surface_maps.shipped()
     if options.out is None:
-        document = surface_maps.shipped()
+        for name in ("realisations", "rays"):
+            if getattr(options, name) is not None:
+                raise ParameterError(f"--{name}", "is allowed only with --out", getattr(options, name))
     else:
         from brdfdb_pipelines import surfaces, workers
 
-        if options.scheduler:
-            at = workers.cluster(options.scheduler)
-        else:
-            at = (workers.processes if options.processes else workers.threads)(options.jobs)
-        with at as opened:
-            document = surfaces.run(options.out, realisations=options.realisations, rays=options.rays, at=opened)
+        address = options.scheduler
+        made = document["provenance"]
+        realisations, rays = options.realisations or made["realisations"], options.rays or made["rays"]
+        with workers.cluster(address) if address else workers.interruptible(options.jobs) as opened:
+            document = surfaces.run(options.out, realisations=realisations, rays=rays, at=opened)
     names = surface_maps.chosen(document, options.models)
     surface_maps.print_maps(document, names)
     if options.picture is not None:
