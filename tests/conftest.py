@@ -7,18 +7,21 @@ import os
 import shutil
 from collections.abc import Generator, Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
 from hypothesis import settings
 
-from tests.api.chromium import Chromium
 from tests.smells import smells
+
+if TYPE_CHECKING:
+    from tests.api.chromium import Chromium
 
 settings.register_profile("brdfdb", derandomize=True, deadline=None, database=None)  # no clock: a first call compiles
 settings.load_profile("brdfdb")
 
 # Read by the workers of the tests and by the programs that they start: threads of linear algebra beside them wait for
-# one another, and take time of the processor while they wait
+# one another, and take time of the processor while they wait. numpy is imported below this line
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 # Files that begin, in this order: they take minutes. Workers take them in turn: while one builds the site, the other
@@ -72,6 +75,8 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 @pytest.fixture(scope="session")
 def chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Chromium]:
     """A Chromium; without one these tests are skipped, or fail where it is known to be there."""
+    from tests.api.chromium import Chromium
+
     for name in ("chromium", "chromium-browser", "google-chrome"):
         if binary := shutil.which(name):
             with Chromium(binary, tmp_path_factory.mktemp("profile")) as browser:

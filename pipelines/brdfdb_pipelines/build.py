@@ -173,6 +173,9 @@ class _Builder:
             self._build_measured()
             self._simulate()
             self._measure_families()
+        except KeyboardInterrupt:
+            self.at.stop()
+            raise
         finally:  # cancel pending tasks, wait for running ones, and release the locks; staged blocks stay
             for future in self.running:
                 future.cancel()
@@ -419,6 +422,7 @@ class _Builder:
             finally:
                 lock.__exit__(None, None, None)  # the task that publishes takes it
             if count is not None:
+                self.report({"event": "interpolating", "material": job.name})
                 self._submit(partial(self._of_data, job), rays.build_simulated, str(self.root), str(folder), job, count)
         self._each((), lambda _: None)
 
@@ -525,7 +529,7 @@ def compile_kernels(recipe: Recipe, root: Path, jobs: int, report: Callable[[Eve
                 with lock:
                     report({"event": "compiled"})
 
-    with ThreadPoolExecutor(others) as threads, workers.processes(others, patient=False) as pool:
+    with ThreadPoolExecutor(others) as threads, workers.processes(others) as pool:
         helpers = [
             threads.submit(work, lambda task: pool.executor.submit(_compiled, task).result()) for _ in range(others)
         ]

@@ -6,10 +6,12 @@ import json
 import time
 from typing import Any
 
-from rich.progress import TaskID
+from rich.progress import Task, TaskID
 
 from brdfdb.errors import counted
 from brdfdb_pipelines import terminal
+
+_LOG_S = 2.0  # interval [s] at which finished estimates are counted in a log
 
 Event = dict[str, Any]
 
@@ -52,6 +54,7 @@ class Bars:
         self._measured: TaskID | None = None
         self._measuring: set[str] = set()
         self._tables: dict[str, TaskID] = {}
+        self._logged = time.monotonic()
 
     def __enter__(self) -> Bars:
         self._progress.start()
@@ -78,12 +81,12 @@ class Bars:
             case "surveyed" if self._overall is not None:
                 self._advance(self._overall)
             case "planned" if self._overall is not None:
-                if event["tables"]:
+                if not event["tables"]:
+                    self._progress.remove_task(self._overall)
+                    self._overall = None
+                else:
                     self._log(f"tabulating {counted(event['tables'], 'table')}")
-                self._progress.reset(
-                    self._overall, description="tabulating", total=event["values"], completed=0, rate=""
-                )
-                self._progress.update(self._overall, completed=0 if event["values"] else 1, total=event["values"] or 1)
+                    self._progress.reset(self._overall, description="tabulating", total=event["values"], rate="")
             case "waiting":
                 self._progress.console.print(f"waiting for {event['material']}: another build is building it")
             case "idle":
@@ -117,23 +120,35 @@ class Bars:
                     self._measured = self._begun("tabulating measured data", event["tables"], "tables")
                 self._measuring.add(name)
                 self._tables[name] = self._progress.add_task(f"  {name}, measured", total=None, rate="")
-            case "simulating":
-                self._tables[event["material"]] = self._progress.add_task(
-                    f"  {event['material']}, simulated", total=None, rate=""
-                )
-            case "estimate" if (task := self._tables.get(event["material"])) is not None:
-                self._progress.update(task, total=event["of"])
-                self._progress.advance(task)
-            case "judged":
-                far = f"standard error {100.0 * event['standard_error']:.2g} %"
-                if (task := self._tables.get(event["material"])) is not None:
-                    self._progress.update(task, total=event["next"], rate=far)
-                self._log(
-                    f"{event['material']}: {event['estimates']} estimates, {far}, "
-                    f"target {100.0 * event['target']:.2g} %"
-                )
+            case "simulating" | "estimate" | "judged" | "interpolating":
+                self._show_simulation(event)
             case "published" | "adopted" | "unchanged":
                 self._ended(event["material"])
+
+    def _show_simulation(self, event: Event) -> None:
+        """Show an event of a simulated table."""
+        name = event["material"]
+        if event["event"] == "simulating":
+            self._log(f"simulating {name} by rays")
+            self._tables[name] = self._progress.add_task(f"  {name}, simulated", total=None, rate="")
+        if (task := self._tables.get(name)) is None:
+            return  # an estimate failed, and others end after it
+        match event["event"]:
+            case "estimate":
+                self._progress.update(task, total=event["of"])
+                self._progress.advance(task)
+                if time.monotonic() - self._logged > _LOG_S:
+                    self._log(f"{name}: {self._bar(task).completed:.0f} of {event['of']} realisations")
+            case "judged":
+                error = f"standard error {100.0 * event['standard_error']:.2g} %"
+                self._progress.update(task, total=event["next"], rate=error)
+                self._log(
+                    f"{name}: {event['realisations']} realisations, {error}, target {100.0 * event['target']:.2g} %"
+                )
+            case "interpolating":
+                self._log(f"{name}: interpolating and tabulating")
+                text = f"  {name}, interpolating and tabulating"
+                self._progress.reset(task, description=text, total=None, rate="")
 
     def _ended(self, name: str, *, made: bool = True) -> None:
         """Remove the bar of a table, and advance that of all measured ones if it is measured and was made."""
@@ -148,12 +163,16 @@ class Bars:
         """Print what begins now, unless a terminal shows the bar."""
         if not self._progress.console.is_terminal:
             self._progress.console.print(text)
+            self._logged = time.monotonic()
 
     def _begun(self, description: str, total: int, unit: str) -> TaskID:
         return self._progress.add_task(description, total=total, unit=unit, rate=f"0/{total} {unit}")
 
+    def _bar(self, task: TaskID) -> Task:
+        return self._progress.tasks[self._progress.task_ids.index(task)]
+
     def _advance(self, task: TaskID) -> None:
         """Advance a bar by one of its units, and say how many of them are done."""
         self._progress.advance(task)
-        bar = self._progress.tasks[self._progress.task_ids.index(task)]
+        bar = self._bar(task)
         self._progress.update(task, rate=f"{bar.completed:.0f}/{bar.total:.0f} {bar.fields['unit']}")

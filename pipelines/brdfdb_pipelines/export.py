@@ -65,7 +65,7 @@ def run(
         raise WriteError(f"cannot write to {directory}: {reason}") from None
     write = partial(_write, root, directory, file_format, options, verdicts)
     exports: list[_Export] = []
-    pool = workers.threads(jobs) if len(revisions) <= _FEW else workers.processes(jobs, patient=False)
+    pool = workers.threads(jobs) if len(revisions) <= _FEW else workers.processes(jobs)
     with terminal.progress() as bar, pool as opened:
         try:
             results = opened.executor.map(write, revisions)

@@ -9,9 +9,9 @@ import signal
 import threading
 import time
 from collections.abc import Callable, Iterator
-from concurrent.futures import CancelledError, Executor, ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures import CancelledError, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
 from typing import Any
 
@@ -27,10 +27,29 @@ class WorkersError(BrdfdbError):
 
 @dataclass(frozen=True)
 class Workers:
-    """An executor, and the number of tasks that it runs at a time, which may change; 0 while it has no workers."""
+    """An executor, the number of tasks that it runs at a time, and what stops it at once, where that is possible.
+
+    The number may change; it is 0 while there are no workers.
+    """
 
     executor: Executor
     slots: Callable[[], int]
+    stop: Callable[[], None] = lambda: None
+
+
+class _InTurn(Executor):
+    """Runs each task when it is submitted, in the thread that submits it: Ctrl-C interrupts the task."""
+
+    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+        future: Future[Any] = Future()
+        try:
+            future.set_result(fn(*args, **kwargs))
+        except Exception as error:
+            future.set_exception(error)
+        return future
+
+    def map(self, fn: Callable[..., Any], *iterables: Any, **_: Any) -> Iterator[Any]:
+        return map(fn, *iterables)
 
 
 @contextmanager
@@ -41,20 +60,34 @@ def threads(count: int) -> Iterator[Workers]:
 
 
 @contextmanager
-def processes(count: int, *, patient: bool = True) -> Iterator[Workers]:
+def processes(count: int) -> Iterator[Workers]:
     """Provide spawned processes of this machine; forked processes would inherit locks of threads that they lack.
 
-    On Ctrl-C, `patient` processes finish their tasks, and others are killed.
+    Ctrl-C kills them: a task may take a minute, and files that a task writes are complete or do not exist.
     """
     context = multiprocessing.get_context("spawn")
     others = set(multiprocessing.active_children())
+
     with ProcessPoolExecutor(count, mp_context=context, initializer=_start_process) as executor:
-        try:
-            yield Workers(executor, lambda: count)
-        except KeyboardInterrupt:
-            for process in () if patient else set(multiprocessing.active_children()) - others:
+
+        def stop() -> None:
+            for process in set(multiprocessing.active_children()) - others:
                 process.kill()
+            executor.shutdown()  # until all futures have failed: those cancelled before would end its thread in 3.11
+
+        try:
+            yield Workers(executor, lambda: count, stop)
+        except KeyboardInterrupt:
+            stop()
             raise
+        except BaseException:
+            executor.shutdown(cancel_futures=True)
+            raise
+
+
+def interruptible(count: int) -> AbstractContextManager[Workers]:
+    """Provide processes, or this thread itself, for long tasks that may be killed: threads do not stop on Ctrl-C."""
+    return processes(count) if count > 1 else nullcontext(Workers(_InTurn(), lambda: 1))
 
 
 def _start_process() -> None:

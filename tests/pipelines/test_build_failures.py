@@ -90,7 +90,11 @@ def test_one_table_that_fails_takes_no_other_with_it(
 @pytest.mark.parametrize(
     ("error", "code", "sentence"),
     [
-        (KeyboardInterrupt(), 130, "brdfdb: interrupted; published tables and complete blocks are preserved"),
+        (
+            KeyboardInterrupt(),
+            130,
+            "brdfdb: interrupted; published tables, complete blocks and realisations are preserved",
+        ),
         (MemoryError("Unable to allocate 3.64 TiB"), 2, "brdfdb: Unable to allocate 3.64 TiB"),
         (StoreError("cannot write foam: No space left"), 2, "brdfdb: cannot write foam: No space left"),
     ],

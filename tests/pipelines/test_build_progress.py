@@ -59,6 +59,36 @@ def test_lines_are_json_and_bars_are_on_stderr(capsys: Captured) -> None:
     assert "grey failed: [no] idea" in err
 
 
+def test_a_log_says_what_a_simulation_does(capsys: Captured, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(build_progress, "_LOG_S", 0.0)
+    judged = {"event": "judged", "material": "rough", "target": 0.02}
+    with Bars() as bars:
+        bars({"event": "start", "tables": 1, "store": "store"})
+        bars({"event": "planned", "tables": 0, "values": 0})
+        assert bars._progress.tasks == []  # no table of a model is to be tabulated
+        bars({"event": "simulating", "material": "rough", "tables": 1})
+        for number in (1, 0):  # as processes finish them
+            bars({"event": "estimate", "material": "rough", "number": number, "of": 2, "kept": False})
+        bars({**judged, "realisations": 2, "standard_error": 0.031, "next": 3})
+        bars({"event": "estimate", "material": "rough", "number": 2, "of": 3, "kept": False})
+        (bar,) = bars._progress.tasks
+        assert (bar.completed, bar.total, bar.fields["rate"]) == (3, 3, "standard error 3.1 %")
+        bars({"event": "interpolating", "material": "rough"})
+        (bar,) = bars._progress.tasks
+        assert bar.description == "  rough, interpolating and tabulating"
+        bars({"event": "published", "material": "rough", "revision": "r000001", "bytes": 1, "why": "new"})
+        bars({"event": "estimate", "material": "rough", "number": 3, "of": 4, "kept": False})  # too late for a bar
+    assert capsys.readouterr().err.split("\n")[:7] == [
+        "planning 1 table",
+        "simulating rough by rays",
+        "rough: 1 of 2 realisations",
+        "rough: 2 of 2 realisations",
+        "rough: 2 realisations, standard error 3.1 %, target 2 %",
+        "rough: 3 of 3 realisations",
+        "rough: interpolating and tabulating",
+    ]
+
+
 def test_a_table_of_measured_data_that_failed_does_not_count_as_done(capsys: Captured) -> None:
     with Bars() as bars:
         for name in ("grey", "white"):

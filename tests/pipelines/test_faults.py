@@ -206,7 +206,7 @@ def test_ctrl_c_says_how_to_resume_and_the_same_command_does(tmp_path: Path) -> 
         _, err = process.communicate(timeout=WAIT_S)
     assert process.returncode == 130
     assert err == (
-        "brdfdb: interrupted; published tables and complete blocks are preserved; "
+        "brdfdb: interrupted; published tables, complete blocks and realisations are preserved; "
         f"to resume: brdfdb build {recipe} --store {root} --jobs 1 --json\n"
     )
     left = marked(root)

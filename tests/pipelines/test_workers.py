@@ -8,6 +8,7 @@ import re
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -50,11 +51,11 @@ def test_a_process_that_is_killed_is_one_sentence_and_the_build_resumes(recipe: 
         assert {b.state for b in build(load(recipe), tmp_path, at)} == {"published"}
 
 
-def test_an_interrupt_kills_processes_that_are_not_patient() -> None:
+def test_an_interrupt_kills_processes() -> None:
     futures = []
 
     def interrupted() -> None:
-        with workers.processes(1, patient=False) as at:
+        with workers.processes(1) as at:
             at.executor.submit(os.getpid).result()
             futures.append(at.executor.submit(time.sleep, START_S))
             raise KeyboardInterrupt
@@ -64,6 +65,26 @@ def test_an_interrupt_kills_processes_that_are_not_patient() -> None:
         interrupted()
     assert time.monotonic() - started < START_S
     assert workers.lost(futures[0].exception(START_S) or OSError())
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_an_interrupt_does_not_wait_for_estimates_of_rays(jobs: int, tmp_path: Path) -> None:
+    recipe = tmp_path / "rough.toml"
+    keys = 'surface = "gaussian"\nslope_deg = 20\nrho = 1\nnodes = 128\nrays = 1048576'  # estimates of a minute
+    recipe.write_text(f'materials = ["rough"]\ntolerance = 0.1\n[define.rough]\n{keys}\n', encoding="utf-8")
+    interrupted: list[float] = []
+
+    def interrupt() -> None:
+        interrupted.append(time.monotonic())
+        os.kill(os.getpid(), signal.SIGINT)
+
+    def report(event: dict[str, Any]) -> None:
+        if event["event"] == "simulating":
+            threading.Timer(2.5, interrupt).start()
+
+    with pytest.raises(KeyboardInterrupt), workers.interruptible(jobs) as at:
+        build(load(recipe), tmp_path / "store", at, report)
+    assert time.monotonic() - interrupted[0] < 10.0
 
 
 ORPHAN = """

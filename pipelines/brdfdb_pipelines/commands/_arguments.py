@@ -25,6 +25,14 @@ def place(text: str) -> Path:
         raise argparse.ArgumentTypeError(error.sentence) from None
 
 
+def numbers(text: str) -> list[float]:
+    """Return numbers with commas between them."""
+    try:
+        return [float(part) for part in text.split(",")]
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is no number, or numbers with commas between them") from None
+
+
 def add_store(parser: argparse.ArgumentParser) -> None:
     """Add the option --store DIR."""
     parser.add_argument(
@@ -52,11 +60,12 @@ def add_jobs(parser: argparse.ArgumentParser, workers: str) -> None:
     )
 
 
-def add_workers(parser: argparse.ArgumentParser, written: str) -> None:
-    """Add --jobs, and --processes or --scheduler, whose workers must see the path `written` too."""
-    add_jobs(parser, "number of threads or processes")
+def add_workers(parser: argparse.ArgumentParser, written: str, *, threads: bool = True) -> None:
+    """Add --jobs, --processes where threads are the default, and --scheduler, whose workers must see `written` too."""
+    add_jobs(parser, "number of threads or processes" if threads else "number of processes")
     where = parser.add_mutually_exclusive_group()
-    where.add_argument("--processes", action="store_true", help="use processes instead of threads")
+    if threads:
+        where.add_argument("--processes", action="store_true", help="use processes instead of threads")
     where.add_argument(
         "--scheduler",
         metavar="ADDRESS",

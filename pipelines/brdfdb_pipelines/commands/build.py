@@ -47,7 +47,7 @@ def run(options: argparse.Namespace) -> int:
         _build(options)
     except KeyboardInterrupt:
         print(
-            "brdfdb: interrupted; published tables and complete blocks are preserved; "
+            "brdfdb: interrupted; published tables, complete blocks and realisations are preserved; "
             f"to resume: {shlex.join(['brdfdb', *options.arguments])}",
             file=sys.stderr,
         )
@@ -76,7 +76,10 @@ def _build(options: argparse.Namespace) -> None:
         at = workers.cluster(options.scheduler)
     else:
         memory = machine_memory() if memory is None else memory
-        at = (workers.processes if options.processes else workers.threads)(options.jobs)
+        if recipe.simulated_jobs():
+            at = workers.interruptible(options.jobs)
+        else:
+            at = (workers.processes if options.processes else workers.threads)(options.jobs)
     with at as opened, nullcontext(print_json) if options.json else Bars() as report:
         if not options.scheduler:
             compile_kernels(recipe, options.store, options.jobs, report)
