@@ -65,7 +65,7 @@ def audit(table: Table, *, source: Source | None = None, accept_excess: bool = F
         model=source.model if isinstance(source, Material) else "",
         findings=subject.findings,
         sentences=sentences,
-        as_published=as_published(subject.findings),
+        as_published=as_published(subject.findings, origin=subject.origin),
         conserves_energy=conserves_energy(subject.findings),
         verdict=verdict,
     )

@@ -216,10 +216,18 @@ class Subject:
         return NotJudged(reason=f"{needs}; {self.without}")
 
     @property
+    def origin(self) -> str:
+        """Return whether the data of a table were measured or simulated."""
+        measured = self.table.metadata.measured
+        return "measured" if measured is None or measured.simulation is None else "simulated"
+
+    @property
     def without(self) -> str:
         """The reason why a table is audited without a source, or without a model."""
         if self.source is not None:
             return f"the source of this table, {self.source.title}, is a function"
+        if self.origin == "simulated":
+            return "the table is simulated by rays, which the store does not hold"
         if self.table.metadata.measured is not None:
             return "the table is of measured data, which the store does not hold"
         if isinstance(self.table.source, FunctionRecord):

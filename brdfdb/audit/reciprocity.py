@@ -98,9 +98,9 @@ class Reciprocity(Finding):
             worst = max(measured, key=lambda asymmetry: asymmetry.p99 or 0.0)
             text = f"asymmetry of the table: median {_shown(worst.median)}, 99 of 100 up to {_shown(worst.p99)}"
             if worst.tolerance is None:
-                text += "; not judged, because their uncertainty is not known"
+                text += "; not judged, because the uncertainty of the data is not known"
             else:
-                text += f", of {number(worst.tolerance, 2)} that their uncertainty and the error of the table explain"
+                text += f", of {number(worst.tolerance, 2)} that its uncertainty, its stated error and rounding explain"
             return [self.sentence(self.verdict, text)]
         judged = [
             (asymmetry.max, asymmetry.tolerance) for _, asymmetry in self.named() if asymmetry.tolerance is not None

@@ -34,8 +34,11 @@ class Answer(BaseModel):
     reason: str = Field(description="the answer in a sentence, with its angle and its wavelength")
 
 
-def as_published(findings: Mapping[str, Finding]) -> Answer:
-    """Return the answer to `AS_PUBLISHED`: every finding on the table, its excess over that of the model included."""
+def as_published(findings: Mapping[str, Finding], *, origin: str = "measured") -> Answer:
+    """Return the answer to `AS_PUBLISHED`: every finding on the table, its excess over that of the model included.
+
+    `origin` is the word for a table of data: measured or simulated.
+    """
     energy = findings[Energy.key]
     failing = [
         FINDINGS[key].title.lower()
@@ -53,7 +56,7 @@ def as_published(findings: Mapping[str, Finding]) -> Answer:
         return Answer(word="violates", text=f"no: {named}", reason=f"the table differs from its source in: {named}")
     error = findings[TableError.key]
     if isinstance(error, NotJudged):
-        text = "measured" if _is_measured(findings) else "not judged"
+        text = origin if _is_measured(findings) else "not judged"
         return Answer(word="not judged", text=text, reason=error.reason)
     reason = "the table keeps to the formulas of its source within the error that it states"
     return Answer(word="passes", text="yes", reason=reason)
@@ -66,9 +69,9 @@ def conserves_energy(findings: Mapping[str, Finding]) -> Answer:
         table = energy.table
         most = "not finite" if table.max_albedo is None else f"albedo {table.max_albedo:.3g}"
         where = f"{most} at {table.max_at_theta_i_deg:.3g}°"
-        if table.verdict != "violates" and table.reason:
-            text = f"cannot be judged: {where}, within the error of the table"
-            return Answer(word="not judged", text=text, reason=table.reason)
+        if table.verdict != "violates" and not table.is_certain:
+            text = f"cannot be judged: {where}, and 1 is within the error of the table and its data"
+            return Answer(word="not judged", text=text, reason=table.reason or text)
         text = f"the data {'do not' if table.verdict == 'violates' else 'do'}: {where}"
         return Answer(word=table.verdict, text=text, reason=table.reason or text)
     if not isinstance(energy, Energy) or energy.model is None:

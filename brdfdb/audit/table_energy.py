@@ -34,7 +34,10 @@ class Bands(BaseModel):
     theta_i_deg: list[float] = Field(description="edges of the bands")
     stated_error: list[list[float]] = Field(
         description="[band][wavelength], without the specular part: integral of abs(error) cos theta_r over that of "
-        "f_r cos theta_r; that at held-out samples comes on top for measured data"
+        "f_r cos theta_r"
+    )
+    held_out_error: float = Field(
+        default=0.0, description="the same at samples of measured data that were held out; it comes on top"
     )
     explained: list[list[float | None]] = Field(
         description="[band][wavelength], largest rise of the mean albedo by that error; null: not finite"
@@ -82,15 +85,20 @@ class TableEnergy(BaseModel):
 
     @property
     def uncertainty(self) -> float | None:
-        """Return the part of the largest albedo [1] that the stated error of its band may make; None if none is stated.
+        """Return the part of the largest albedo [1] that the errors of its band may make; None if none is stated.
 
-        It is that of the worst wavelength.
+        It is that of the worst wavelength, with the error of measured data.
         """
         if self.bands is None or self.max_albedo is None:
             return None
         edges = np.array(self.bands.theta_i_deg)
         band = int(np.clip(np.searchsorted(edges, self.max_at_theta_i_deg, side="right") - 1, 0, edges.size - 2))
-        return self.max_albedo * max(self.bands.stated_error[band])
+        return self.max_albedo * (max(self.bands.stated_error[band]) + self.bands.held_out_error)
+
+    @property
+    def is_certain(self) -> bool:
+        """True if the largest albedo is at most 1, its uncertainty included."""
+        return self.max_albedo is None or self.max_albedo + (self.uncertainty or 0.0) <= 1.0
 
 
 class _Judge(NamedTuple):
@@ -148,11 +156,16 @@ def table_energy_of(
             for means in (judge.explained(one), judge.excess(certain, one))
         )
         bands = Bands(
-            theta_i_deg=table.error.theta_i_deg, stated_error=table.error.l1, explained=explained, excess=excess
+            theta_i_deg=table.error.theta_i_deg,
+            stated_error=table.error.l1,
+            held_out_error=_held_out_error(table),
+            explained=explained,
+            excess=excess,
         )
     verdict: Verdict
     worst_nm = None if table.wavelength_nm is None else float(table.wavelength_nm[worst_wavelength])
-    share = f"{largest:.4g}" if np.isfinite(largest) else "no finite share"
+    digits = 4 if abs(largest - 1.0) > 5e-4 else 7  # 1.0003 is not 1
+    share = f"{largest:.{digits}g}" if np.isfinite(largest) else "no finite share"
     reason = f"reflects {share} of the incident light at {place(theta_i[worst_theta], worst_nm)}"
     if unexplained.size == 0:
         verdict = "passes"
@@ -211,13 +224,17 @@ def _judge(table: Table, theta_i_deg: Axis, diffuse: Floats) -> _Judge:
         identity = np.eye(theta_i_deg.size)
         nothing = np.zeros((theta_i_deg.size, 1))
         return _Judge(identity, identity.astype(bool), nothing, nothing)
-    measured = table.metadata.measured
-    uncertain = 0.0 if measured is None or measured.held_out is None else measured.held_out.l1
     edges = np.array(table.error.theta_i_deg)
-    l1 = np.minimum(np.add(table.error.l1, uncertain), MOST_ERROR)
+    l1 = np.minimum(np.add(table.error.l1, _held_out_error(table)), MOST_ERROR)
     means = _band_means(theta_i_deg, edges)
     covers = (theta_i_deg >= edges[:-1, np.newaxis]) & (theta_i_deg <= edges[1:, np.newaxis])
     return _Judge(means, covers, l1, (means @ diffuse) / (1.0 - l1))
+
+
+def _held_out_error(table: Table) -> float:
+    """Return the error [1] of measured data at samples that were held out, over the reflected light; 0 of others."""
+    measured = table.metadata.measured
+    return 0.0 if measured is None or measured.held_out is None else measured.held_out.l1
 
 
 def _known(values: Floats) -> Floats:

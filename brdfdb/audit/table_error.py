@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from pydantic import Field
 
-from brdfdb.audit.finding import LAST, Cell, Finding, Sentence, Subject, Verdict, Word
+from brdfdb.audit.finding import LAST, Cell, Finding, NotJudged, Sentence, Subject, Verdict, Word
 from brdfdb.audit.nodes import Nodes
 from brdfdb.audit.pairs import SEED, ComparedPairs, representative_nm
 from brdfdb.audit.statement import Disagreement, contradictions, disagreements
@@ -71,7 +71,12 @@ class TableError(Finding):
     def judge(cls, subject: Subject) -> Finding:
         """Compare the error of a table with its stated error."""
         if subject.source is None:
-            return subject.not_judged("the error of a table is measured against its source")
+            needs = "the error of a table is measured against its source"
+            measured = subject.table.metadata.measured
+            if measured is not None and measured.simulation is not None:
+                errors = "; ".join(measured.simulation.errors_in_words())
+                return NotJudged(reason=f"{needs}; {subject.without}; {errors}")
+            return subject.not_judged(needs)
         return table_error_of(subject.table, subject.source, subject.pairs, subject.findings[Nodes.key].verdict)
 
     def sentences(self) -> list[Sentence]:

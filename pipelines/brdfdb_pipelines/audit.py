@@ -98,7 +98,8 @@ def run(
 
     The report is JSON, and the page lies beside it as .html. Both are written when everything has been audited. The
     report of some materials that lies in the store preserves what it said of others, as long as their revisions are
-    current. The `figures` are atlas and gallery. `allow` names materials whose models may have an albedo above 1. With
+    current. The `figures` are atlas and gallery; a store without tables of models has none, since they are about models
+    alone and take half a minute. `allow` names materials whose models may have an albedo above 1. With
     `again`, nothing is taken from the last report. Findings are printed if they are to be `shown`.
 
     Raises
@@ -117,7 +118,7 @@ def run(
         raise ParameterError("--allow", sentence, unused[0], tuple(materials))
     _check_path(report_path)
     before = NOTHING if again else former_of(report_path, store, materials, allow)
-    atlas, gallery = _figures() if figures else _FigureSets({}, {})
+    atlas, gallery = _figures() if figures and _has_models(store, materials) else _FigureSets({}, {})
     done = _done(root, materials, [*atlas, *gallery], before, allow=allow, jobs=jobs)
     audits = [done[name].subject for name in materials if isinstance(done[name], Section)]
     damaged = [str(done[name]) for name in materials if isinstance(done[name], StoreError)]
@@ -171,7 +172,10 @@ def _done(
     with terminal.progress() as bar:
         if tasks and not is_cached(_kernels.by_vectors):
             bar.console.print("compiling kernels, once after an installation")
-        task = bar.add_task("auditing tables, computing figures" if figures else "auditing tables", total=len(order))
+        text = "auditing tables, computing figures" if figures else "auditing tables"
+        if not bar.console.is_terminal:
+            bar.console.print(text)
+        task = bar.add_task(text, total=len(order))
         for names, outcomes in _outcomes(tasks, jobs):
             done |= zip(names, outcomes, strict=True)
             bar.advance(task, len(names))
@@ -277,9 +281,6 @@ def _outcomes(tasks: dict[tuple[str, ...], Task], jobs: int) -> Iterator[tuple[t
                 yield futures[future], future.result()
         except BrokenProcessPool as error:
             raise workers.WorkersError("the workers are gone, killed or out of memory") from error
-        finally:
-            for future in futures:
-                future.cancel()
 
 
 def _audited(root: Path, names: Sequence[str], allow: Sequence[str]) -> list[Section | StoreError]:
@@ -349,6 +350,15 @@ def _figures() -> _FigureSets:
     return _FigureSets(ATLAS, GALLERY)
 
 
+def _has_models(store: Store, materials: Sequence[str]) -> bool:
+    """Return True if a table is of a model; tables of measured data and of rays are not."""
+    for name in materials:
+        with suppress(StoreError):  # the audit of the material reports the error
+            if store.summary(name)["model"]:
+                return True
+    return False
+
+
 def _drawn(key: str) -> list[Section]:
     atlas, gallery = _figures()
     return _sections((atlas.get(key) or gallery[key])())
@@ -377,7 +387,10 @@ def _print(root: Path, audit_report: AuditReport, report_path: Path) -> None:
         if a.not_judged:
             metadata = store.metadata(a.material)
             why = "its source cannot be evaluated"
-            if metadata.measured is not None:
+            if metadata.measured is not None and metadata.measured.simulation is not None:
+                why = "it is simulated by rays, and the table does not contain them"
+                print(*(f"{a.material}: {line}" for line in metadata.measured.simulation.errors_in_words()), sep="\n")
+            elif metadata.measured is not None:
                 why = "it is measured, and the table does not contain the data"
             elif metadata.model is not None and metadata.model not in MODELS:
                 why = f"its model {metadata.model} is unknown; add it with --models FILE or $BRDFDB_MODELS"
@@ -392,7 +405,7 @@ def _print(root: Path, audit_report: AuditReport, report_path: Path) -> None:
     accepted = sum(a.verdict == "accepted excess" for a in audits)
     violating, unjudged = len(audit_report.violations), len(audit_report.not_judged)
     partly = sum(bool(a.not_judged) for a in audits)
-    not_whole = f"{partly} only in part, because the source is unknown; " if partly else ""
+    not_whole = f"{partly} only in part, without a formula to compare with; " if partly else ""
     allowed = f"accepted excess {accepted}, " if accepted else ""
     without = f"not judged {unjudged}, " if unjudged else ""
     remarks = audit_page.remarked(audit_report)

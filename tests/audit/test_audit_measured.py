@@ -31,7 +31,7 @@ def test_asymmetry_of_unknown_uncertainty_is_reported_and_not_judged(tmp_path: P
     finding = audited.of(Reciprocity)
     assert finding.verdict == "passes"
     assert 0.05 < finding.table_random.median < finding.table_random.p99 < 0.4
-    assert "not judged, because their uncertainty is not known" in finding.sentences()[0].text
+    assert "not judged, because the uncertainty of the data is not known" in finding.sentences()[0].text
     assert audited.of(Energy).verdict == "violates"
 
 

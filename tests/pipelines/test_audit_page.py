@@ -111,7 +111,7 @@ def test_one_material_violates_and_a_remark_on_a_model_that_passes_is_said() -> 
     good = material("good", "gains")
     bad = material("bad", "violates")
     words = Document(audit_page.render(report_of([good, bad], ["bad"]))).words()
-    assert "1 of 2 violates something that is neither" in words
+    assert "1 of 2 violates a law of energy, or what another finding demands, and" in words
     assert " 1 passes with a remark on the model: it would create light" in words
     assert audit_page.remarked(report_of([good, bad], ["bad"])) == 1
     assert audit_page.remarked(report_of([bad], ["bad"])) == 0
