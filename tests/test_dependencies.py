@@ -133,6 +133,11 @@ def test_the_core_alone_tabulates_and_looks_up(core: Path, tmp_path: Path) -> No
         (["serve", "--store", "{store}"], "serve"),
         (["export", "exr", "rolled-brass", "--store", "{store}"], "scenes"),
         (["build", "--scheduler", "tcp://127.0.0.1:1"], "dask"),
+        (
+            ["simulate", "--surface", "gaussian", "--slope-deg", "9", "--rho", "1", "--store", "{store}"],
+            "microgeometry",
+        ),
+        (["import", "{store}", "--store", "{store}"], "report"),
     ],
 )
 def test_a_missing_extra_is_a_sentence_that_names_it(

@@ -70,8 +70,10 @@ def write_file(path: Path, data: bytes, temporary: Path, *, sync: bool = True) -
         except FileNotFoundError:
             path.parent.mkdir(parents=True, exist_ok=True)
             os.replace(half, path)
-    except BaseException:
+    except BaseException as error:
         half.unlink(missing_ok=True)
+        if isinstance(error, OSError):
+            error.filename = str(path)  # which the user knows
         raise
     return {"size": len(data), "sha256": hashlib.sha256(data).hexdigest()}
 

@@ -121,7 +121,7 @@ class Store(Mapping[str, "Table"]):
             )
         families = len(self.families())
         title = f"{len(rows)} materials" + (f", {families} families" if families else "")
-        errors = ("table error (p99)", "formula error (p99)", "surface error")
+        errors = ("table error (p99)", "formula error (p99)", "surface error (median)")
         columns = ("material", "title", "model", "colours", *errors, *COLUMNS)
         return listing("Store", str(self.root), title, columns, rows)
 

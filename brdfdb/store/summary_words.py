@@ -19,7 +19,7 @@ ERRORS_EXPLAINED = (
     "table error: of the table relative to its formula, or to the data if it is measured; formula error: of the "
     "formula relative to the exact form of the same model; 0, exact form: the formula is exact"
 )
-SURFACE_EXPLAINED = "surface error: of the formula relative to rays on surfaces that suit the material, in the median"
+SURFACE_EXPLAINED = "surface error: of the formula relative to rays on surfaces that suit the material"
 COLUMNS = ("what the paper says?", "model conserves energy?")  # headings of the two answers
 
 REPORT_OF_ALL = "audit.json"  # in a store: the report on all its materials

@@ -7,7 +7,6 @@ import math
 import threading
 import time
 from collections.abc import Sequence
-from contextlib import AbstractContextManager
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -16,7 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from brdfdb import formats
-from brdfdb.errors import BrdfdbError, MissingExtraError, ParameterError, StoreError, counted
+from brdfdb.errors import BrdfdbError, MissingExtraError, ParameterError, StoreError, counted, import_extra
 from brdfdb.formats.netcdf import write_samples
 from brdfdb.materials import presets
 from brdfdb.materials.recipe_text import toml_of
@@ -35,7 +34,7 @@ from brdfdb_pipelines.build_progress import Bars, Event
 from brdfdb_pipelines.build_survey import machine_memory
 from brdfdb_pipelines.measured_job import MeasuredTable, measured_table
 from brdfdb_pipelines.recipe_file import Recipe, path_from
-from brdfdb_pipelines.workers import Workers, WorkersError
+from brdfdb_pipelines.workers import WorkersError
 
 if TYPE_CHECKING:  # the audit takes half a second to load
     from brdfdb.audit import AuditReport
@@ -114,8 +113,8 @@ class ImportedTable:
     share of all pairs of directions that were measured. The asymmetry [1] is abs(f - f') / (abs(f) + abs(f')) of the
     interpolated f_r, with light and viewer exchanged in f'; None: unknown. `uncertainty` [1] holds for 99 % of the
     values; the table is `asymmetric` if that does not explain its asymmetry. `albedo` is the largest directional
-    albedo; None: not finite. Its error includes that at samples that were held out. `verdict` is that of the audit, or
-    "not judged" where the error of the albedo does not tell whether it is above 1.
+    albedo; None: not finite. Its error includes that at samples that were held out. `verdict` is that of the audit;
+    `energy` is "not judged" where the error of the albedo does not tell whether it is above 1.
     """
 
     material: str
@@ -131,6 +130,7 @@ class ImportedTable:
     at_theta_i_deg: float
     above_1: bool
     verdict: str
+    energy: str
 
 
 def run(
@@ -157,6 +157,8 @@ def run(
     """
     if out is not None and out.suffix != ".nc":
         raise ParameterError("--out", f"{str(out)!r} does not end in .nc", str(out), "FILE.nc")
+    if tables is not None and tables.store is not None:
+        check_audit()
     result = Imported()
     targets = _targets(files, keys, join, result)
     count = len(targets) + len(result.refused)
@@ -198,6 +200,12 @@ def run(
     elif result.report is not None and tables is not None:
         show_tables(audited, result.report, tables.tolerance)
     return result
+
+
+def check_audit() -> None:
+    """Raise MissingExtraError if the audit of a table cannot run: before the time for the table is spent."""
+    for module in ("jinja2", "matplotlib", "mpmath"):
+        import_extra(module)
 
 
 def _targets(files: Sequence[Path], keys: dict[str, Any], join: bool, result: Imported) -> list[ImportTarget]:
@@ -321,8 +329,7 @@ def _build(recipe: Recipe, store: Path, jobs: int, result: Imported) -> list[str
     """Build tables; return the names of those that the store contains then."""
     built: list[str] = []
     failed: list[str] = []
-    at: AbstractContextManager[Workers] = workers.processes(jobs) if jobs > 1 else workers.threads(1)
-    with at as opened, Bars() as bars:
+    with workers.interruptible(jobs) as opened, Bars() as bars:
 
         def report(event: Event) -> None:
             if event["event"] == "failed":
@@ -356,10 +363,6 @@ def figures_of(root: Path, report: AuditReport) -> list[ImportedTable]:
         assert measured is not None
         seen = measured.reciprocity.asymmetry
         energy = audited.of(Energy).table
-        wrong = energy.uncertainty
-        if wrong is not None and energy.max_albedo is not None and measured.held_out is not None:
-            wrong += measured.held_out.l1 * energy.max_albedo
-        judged = energy.max_albedo is None or energy.max_albedo + (wrong or 0.0) <= 1.0
         tables.append(
             ImportedTable(
                 audited.material,
@@ -371,10 +374,11 @@ def figures_of(root: Path, report: AuditReport) -> list[ImportedTable]:
                 measured.uncertainty,
                 None if measured.uncertainty is None else audited.of(Reciprocity).verdict == "violates",
                 energy.max_albedo,
-                wrong,
+                energy.uncertainty,
                 energy.max_at_theta_i_deg,
                 energy.exceeds_1_from_theta_i_deg is not None,
-                audited.verdict if judged or audited.verdict != "passes" else NOT_JUDGED,
+                audited.verdict,
+                audited.conserves_energy.word,
             )
         )
     return tables
@@ -392,19 +396,21 @@ def summary(tables: Sequence[ImportedTable], report: AuditReport) -> dict[str, A
             "without_uncertainty": sum(table.uncertainty is None for table in tables),
             "above_1": [table.material for table in tables if table.above_1],
             "passes": sum(table.verdict == "passes" for table in tables),
-            "not_judged": [table.material for table in tables if table.verdict == NOT_JUDGED],
+            "not_judged": [table.material for table in tables if table.energy == NOT_JUDGED],
             "violates": report.violations,
         },
     }
 
 
-def show_tables(tables: Sequence[ImportedTable], report: AuditReport, tolerance: float) -> None:
-    """Print a row for each table, the problems of tables, and the summary."""
+def show_tables(
+    tables: Sequence[ImportedTable], report: AuditReport, tolerance: float, *, origin: str = "measured"
+) -> None:
+    """Print a row for each table, the problems of tables, and the summary; `origin` is measured or simulated."""
     print()
     shares = ("error_p95", "measured", "asymmetry_median", "asymmetry_p99", "uncertainty")
-    numbers = ("table error", "measured", "asymmetry, median", "99 of 100", "uncertainty", "albedo up to")
+    numbers = ("table error", origin, "asymmetry, median", "asymmetry, 99 %", "uncertainty", "albedo up to")
     terminal.print_table(
-        f"Measured tables in {report.store}",
+        f"{origin.capitalize()} tables in {report.store}",
         ("material", *numbers, "audit"),
         [
             (
@@ -417,22 +423,22 @@ def show_tables(tables: Sequence[ImportedTable], report: AuditReport, tolerance:
         ],
         numbers=numbers,
     )
-    print("table error: 95 % of the values differ by at most this from the interpolated data, where f_r was measured")
-    print("measured: share of all pairs of directions; elsewhere f_r is extrapolated, and its error is unknown")
+    print(f"table error: 95 % of the values differ by at most this from the interpolated data, where f_r was {origin}")
+    print(f"{origin}: share of all pairs of directions; elsewhere f_r is extrapolated, and its error is unknown")
     print("asymmetry: |f - f'| / (|f| + |f'|) of the interpolated f_r, for directions up to 80 degrees; f' is f with")
     print("light and viewer exchanged; the faintest pairs are left out")
-    print("albedo: largest value of the table, with its uncertainty; not judged if it may be below or above 1")
+    print("uncertainty: 99 % of the samples that were held out are this near to the interpolated f_r")
+    print("albedo: largest value of the table, ± its uncertainty; energy is not judged if that reaches above 1")
     for audited in report.materials:
         for problem in audited.problems():
             print(f"{audited.material}: {problem}")
     for sentence in sentences(tables, tolerance):
         print(sentence)
-    counts = ", ".join(
-        f"{verdict} {count}"
-        for verdict in ("passes", NOT_JUDGED, *sorted({table.verdict for table in tables} - {"passes", NOT_JUDGED}))
-        if (count := sum(table.verdict == verdict for table in tables)) or verdict == "passes"
-    )
-    print(f"{counted(len(tables), 'table')} audited: {counts}")
+    verdicts = dict.fromkeys(["passes", *sorted(table.verdict for table in tables)])
+    counts = ", ".join(f"{word} {sum(table.verdict == word for table in tables)}" for word in verdicts)
+    unsure = [table.material for table in tables if table.energy == NOT_JUDGED]
+    energy = f"; conservation of energy not judged: {_counted(unsure)}" if unsure else ""
+    print(f"{counted(len(tables), 'table')} audited: {counts}{energy}")
 
 
 def sentences(tables: Sequence[ImportedTable], tolerance: float) -> list[str]:

@@ -45,7 +45,7 @@ from brdfdb_pipelines.recipe_grids import LIST, STRICT, Grids, Nodes, Range, Rec
 if TYPE_CHECKING:  # rays and their statistics take a second to load
     from brdfdb_pipelines.simulated_job import SimulatedJob
 
-_SIMULATED = {"surface", "height_map"}  # keys of which simulated materials have one
+_SIMULATED = {"surface", "height_map", "slope_deg", "facets"}  # keys that simulated materials alone have
 _WITHOUT_MODEL = {"samples", *_SIMULATED}  # keys of materials without a model
 _MOST_VALUES = 1 << 36  # values of a table: 275 GB
 _MOST_PATTERNS = 10_000  # names and patterns of a recipe; each is compared with every name

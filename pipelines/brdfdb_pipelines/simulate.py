@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import functools
 import json as _json
 import tempfile
 import time
-from concurrent.futures import Executor
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
@@ -36,9 +36,8 @@ from brdfdb_pipelines.simulated_job import (
     simulated_job,
     simulated_samples,
 )
+from brdfdb_pipelines.simulated_table import in_options, option_of
 from brdfdb_pipelines.workers import Workers
-
-_OPTIONS = {"hole": "hole_value"}  # options that are not named as their keys in a recipe
 
 
 @dataclass(frozen=True)
@@ -54,7 +53,10 @@ class SimulationOutputs:
     scheduler: str | None = None
 
     def __post_init__(self) -> None:
-        check_tolerance(self.tolerance)
+        try:
+            check_tolerance(self.tolerance)
+        except ParameterError as error:
+            raise ParameterError("--tolerance", error.sentence, error.value, error.allowed) from None
         if self.store is None and self.out is None and self.recipe is None:
             raise ParameterError("--store, --out, --recipe", "none of them is given; give at least one")
         if self.store is not None and self.out is not None:
@@ -85,8 +87,13 @@ def run(keys: dict[str, Any], outputs: SimulationOutputs, *, json: bool = False)
         job = simulated_job(name, keys, None, outputs.tolerance, None)
     except RecipeError as error:
         field = error.parameter.removeprefix(f"define.{name}.")
-        options = ", ".join(f"--{_OPTIONS.get(key, key).replace('_', '-')}" for key in field.split(", "))
-        raise ParameterError(options, error.sentence, error.value, error.allowed) from None
+        options = ", ".join(option_of(key) for key in field.split(", "))
+        sentence = in_options(error.sentence)
+        if "height_map" in keys:
+            sentence = sentence.replace(str(Path(keys["height_map"]).absolute()), keys["height_map"])
+        raise ParameterError(options, sentence, error.value, error.allowed) from None
+    if outputs.store is not None:
+        import_samples.check_audit()
     if outputs.recipe is not None:
         folder = outputs.recipe.parent
         written = keys if job.path is None else {**keys, "height_map": path_from(folder, job.path)}
@@ -94,6 +101,7 @@ def run(keys: dict[str, Any], outputs: SimulationOutputs, *, json: bool = False)
         write_file(outputs.recipe, text.encode(), folder)
     document: dict[str, Any] = {"material": name}
     record = None
+    changes: list[str] = []
     tables: list[import_samples.ImportedTable] = []
     report = None
     if outputs.out is not None:
@@ -103,7 +111,9 @@ def run(keys: dict[str, Any], outputs: SimulationOutputs, *, json: bool = False)
         with _workers(outputs) as at, Bars() as bars:
             (built,) = build(recipe, outputs.store, at, bars, memory=None if outputs.scheduler else machine_memory())
         measured = Store(outputs.store).metadata(name).measured
-        record = None if measured is None else measured.simulation
+        if measured is not None:
+            record = measured.simulation
+            changes = [change.sentence for change in measured.changes]
         document |= {"state": built.state, "revision": built.revision}
         from brdfdb_pipelines import audit  # it takes half a second to load
 
@@ -118,18 +128,22 @@ def run(keys: dict[str, Any], outputs: SimulationOutputs, *, json: bool = False)
         print(_json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False))
         return report is None or not report.violations
     if record is not None:
-        print(terminal.plain("\n".join([name, *(f"  {line}" for line in [*record.in_words(), f"{seconds:.0f} s"])])))
-    if outputs.out is not None:
-        print(f"  written: {outputs.out}")
+        lines = [in_options(line) for line in [*record.in_words(), *changes]]
+        print(terminal.plain("\n".join([name, *(f"  {line}" for line in lines)])))
+    for file in (outputs.out, outputs.recipe):
+        if file is not None:
+            print(f"  written: {file}")
+    if record is not None:
+        print(f"  finished in {seconds:.0f} s")
     if report is not None:
-        import_samples.show_tables(tables, report, outputs.tolerance)
+        import_samples.show_tables(tables, report, outputs.tolerance, origin="simulated")
     return report is None or not report.violations
 
 
 def _workers(outputs: SimulationOutputs) -> AbstractContextManager[Workers]:
     if outputs.scheduler is not None:
         return workers.cluster(outputs.scheduler)
-    return workers.processes(outputs.jobs) if outputs.jobs > 1 else workers.threads(1)
+    return workers.interruptible(outputs.jobs)
 
 
 def _write_samples(job: SimulatedJob, out: Path, jobs: int) -> SimulationRecord:
@@ -137,9 +151,8 @@ def _write_samples(job: SimulatedJob, out: Path, jobs: int) -> SimulationRecord:
     with tempfile.TemporaryDirectory() as scratch, Bars() as bars:
         folder = estimates_path(Path(scratch), job.name, job.estimates_request)
         folder.mkdir(parents=True)
-        at = workers.processes(jobs) if jobs > 1 else workers.threads(1)
         bars({"event": "simulating", "material": job.name})
-        with at as opened:
+        with workers.interruptible(jobs) as opened:
             count = estimates_needed(job, folder, lambda numbers: _computed(job, folder, numbers, opened, bars), bars)
         assert count is not None
         samples = simulated_samples(job, combined(folder, job, count))
@@ -148,9 +161,7 @@ def _write_samples(job: SimulatedJob, out: Path, jobs: int) -> SimulationRecord:
 
 
 def _computed(job: SimulatedJob, folder: Path, numbers: range, at: Workers, bars: Bars) -> bool:
-    executor: Executor = at.executor
-    futures = [executor.submit(estimate_simulated, str(folder), job, number) for number in numbers]
-    for number, future in zip(numbers, futures, strict=True):
-        future.result()
+    estimates = at.executor.map(functools.partial(estimate_simulated, str(folder), job), numbers)
+    for number, _ in zip(numbers, estimates, strict=True):
         bars({"event": "estimate", "material": job.name, "number": number, "of": numbers.stop, "kept": False})
     return True

@@ -20,15 +20,15 @@ from brdfdb.measurements.interpolation import Base
 from brdfdb.measurements.record import SimulationRecord
 from brdfdb.measurements.samples import Instrument
 from brdfdb.microgeometry.directions import goniometer_directions
-from brdfdb.microgeometry.goniometer import Bounces
+from brdfdb.microgeometry.facets import Bounces
 from brdfdb.microgeometry.height_map import HeightMap
 from brdfdb.microgeometry.isotropy import SlopeHarmonics, slope_harmonics
 from brdfdb.microgeometry.levelling import Levelled
 from brdfdb.microgeometry.mirrors import one_bounce_is_smoothed
 from brdfdb.microgeometry.simulation import SimulatedBrdf, Simulation
 from brdfdb.microgeometry.surfaces import MadeSurface
-from brdfdb.models import beckmann
-from brdfdb.parameters import Floats
+from brdfdb.models import MODELS
+from brdfdb.parameters import Floats, ModelSpec, SurfaceRelation
 from brdfdb.place import path_of
 from brdfdb.store.estimates import read_estimate, write_estimate
 from brdfdb.store.lock import Lock
@@ -46,18 +46,16 @@ from brdfdb_pipelines.simulated_table import (
     spectral_facets,
 )
 
-SIMULATED_VERSION = 1  # of the way from a surface to the values of its table
+SIMULATED_VERSION = 2  # of the way from a surface to the values of its table
 # Keys that decide the table, and not the estimates
-_OF_TABLE = ("standard_error", "realisations", "reciprocal", "conserving", "title", "source")
+_OF_TABLE = ("standard_error", "realisations", "conserving", "noise_um", "title", "source")
 # Memory of a task [byte]: rays that are traced at once, and the facets of a map; 2048 x 2048 nodes take 2 GB
 _RAYS_BYTES = 200_000_000
 _NODE_BYTES = 500
 # Parameters of surfaces and simulations, and their keys in a recipe
 _KEYS = {"slope": "slope_deg", "slope_y": "slope_y_deg", "most": "realisations", "heights_um": "height_map"}
-_FEWEST = 8  # estimates of a round of a made surface, at least
+_KEYS |= {"wavelength_nm": "wavelengths_nm"}
 _DRAWN = 8  # made maps whose slopes are recorded
-_JUDGED_DEG = 83.0  # polar angle up to which the standard error is judged: the 145 patches, without the lowest ring
-_DIM = 0.01  # of the peak: relative errors are those of f_r above it
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,6 +86,7 @@ class SimulatedJob:
         return {
             **{key: value for key, value in table.items() if value is not None and key != "wavelengths_nm"},
             "simulated_version": SIMULATED_VERSION,
+            "height_map": "" if self.path is None else self.path.name,
             "file_sha256": self.sha256,
             "rho": np.asarray(facets.rho).tolist(),
             "mirror": facets.mirror,
@@ -109,7 +108,7 @@ class SimulatedJob:
         }
 
     @property
-    def levelled(self) -> _LevelledMap | None:
+    def levelled(self) -> LevelledMap | None:
         """The levelled height map; None for a made surface. FileFormatError, ParameterError or OSError if it is bad."""
         return None if self.path is None else _levelled(self.path, self.sha256, self.table.model_dump_json())
 
@@ -152,40 +151,6 @@ class SimulatedJob:
         return {key: value for key, value in self.__dict__.items() if key != "simulation"}
 
 
-class StandardErrors(NamedTuple):
-    """Largest relative standard errors [1] of f_r where it exceeds a hundredth of its peak.
-
-    Attributes
-    ----------
-    judged : float [1]
-        Of the rays, for lights and viewers on the 145 patches, up to 82.5 degrees. The stop rule judges it.
-    lowest : float [1]
-        The same with the lights and viewers at 87 degrees.
-    of_map : float [1]
-        Of a single finite map, from its blocks, up to 82.5 degrees; of made surfaces the same as `judged`.
-    """
-
-    judged: float
-    lowest: float
-    of_map: float
-
-
-def standard_errors(result: SimulatedBrdf) -> StandardErrors:
-    """Return the largest relative standard errors of a simulation."""
-    total = result.total
-    lights = result.simulation.lights[:, 2]
-    viewers = np.broadcast_to(result.simulation.viewers, (*total.mean.shape[:2], 3))[..., 2]
-    high = np.minimum(lights[:, np.newaxis], viewers) > np.cos(np.radians(_JUDGED_DEG))
-    bright = total.mean > _DIM * total.mean.max(axis=(0, 1), where=high[..., np.newaxis], initial=0.0)
-    inside = bright & high[..., np.newaxis]
-    relative = [error / np.where(bright, total.mean, 1.0) for error in (total.noise, total.error)]
-    return StandardErrors(
-        float(np.max(relative[0], where=inside, initial=0.0)),
-        float(np.max(relative[0], where=bright, initial=0.0)),
-        float(np.max(relative[1], where=inside, initial=0.0)),
-    )
-
-
 class PrincipalSlopes(NamedTuple):
     """Slopes of facets along the principal axes of their ellipse.
 
@@ -222,30 +187,31 @@ def _lobe(surface: MadeSurface | HeightMap, *, turned: bool) -> PrincipalSlopes:
     return PrincipalSlopes(both, both, 0.0)
 
 
-class _LevelledMap(NamedTuple):
+class LevelledMap(NamedTuple):
     """A levelled height map, and what was done to it; the map is the same object each time: its tracer is shared."""
 
     levelling: Levelled
     surface: HeightMap
     harmonics: SlopeHarmonics
+    noise: str
 
 
 @functools.lru_cache(maxsize=1)
-def _levelled(path: Path, sha256: str, table: str) -> _LevelledMap:
+def _levelled(path: Path, sha256: str, table: str) -> LevelledMap:
     """Return the levelled height map in a file; the cache serves a worker that gets many estimates of it.
 
     The file must have the digest of the request, under which estimates are written: it may be replaced during a build.
     """
     before = path.stat()
     try:
-        levelling = SimulatedTable.model_validate_json(table).levelled(path)
+        filtered = SimulatedTable.model_validate_json(table).filtered(path)
     finally:
         after = path.stat()
         same = (before.st_ino, before.st_ctime_ns) == (after.st_ino, after.st_ctime_ns)  # while it was read
         if not same or sha256_of(path) != sha256:
             raise FileFormatError(f"{path}: the file changed since the recipe was read; build again")
-    surface = levelling.height_map()
-    return _LevelledMap(levelling, surface, slope_harmonics(surface))
+    surface = filtered.levelled.height_map()
+    return LevelledMap(filtered.levelled, surface, slope_harmonics(surface), filtered.sentence)
 
 
 # Estimates
@@ -260,14 +226,15 @@ def estimate_simulated(folder: str, job: SimulatedJob, number: int) -> bool:
 
 
 def combined(folder: Path, job: SimulatedJob, count: int) -> SimulatedBrdf:
-    """Return the mean of the first estimates; StoreError if one of them is missing."""
+    """Return the mean of the first estimates.
+
+    Those that are damaged are computed again, and so are those that another build of the material has removed.
+    """
 
     def estimates() -> Iterator[Bounces]:
         for number in range(count):
             arrays = read_estimate(folder, number)
-            if arrays is None:
-                raise StoreError(f"{job.name}: estimate {number} in {folder} was removed or damaged; build again")
-            yield Bounces(**arrays)
+            yield job.simulation.estimate(number) if arrays is None else Bounces(**arrays)
 
     return job.simulation.combined(estimates())
 
@@ -278,23 +245,19 @@ def estimates_needed(
     """Compute estimates in rounds until their error is below the target; return their number, or None if a task failed.
 
     `compute` writes estimates of some numbers, and returns False if one failed. Estimates are judged in the order of
-    their numbers: the result depends neither on workers nor on interruptions. The error falls with the square root of
-    the count; the count at most doubles from round to round, since a few estimates tell their error roughly.
+    their numbers: the result depends neither on workers nor on interruptions.
     """
     simulation = job.simulation
-    most = simulation.most // simulation.round * simulation.round
     count = 0
     following = simulation.minimum
     while True:
         if not compute(range(count, following)):
             return None
         count = following
-        error = standard_errors(combined(folder, job, count)).judged
-        if error > simulation.target and count < most:
-            wanted = math.ceil(count * min((error / simulation.target) ** 2, 2.0) / simulation.round)
-            following = min(max(wanted * simulation.round, count + max(simulation.round, _FEWEST)), most)
+        error = combined(folder, job, count).standard_errors.judged
+        following = simulation.following(count, error)
         errors = {"standard_error": error, "target": simulation.target}
-        report({"event": "judged", "material": job.name, "estimates": count, **errors, "next": following})
+        report({"event": "judged", "material": job.name, "realisations": count, **errors, "next": following})
         if following == count:
             return count
 
@@ -315,20 +278,22 @@ def simulated_samples(job: SimulatedJob, result: SimulatedBrdf) -> Samples:
 
 
 def simulated_source(job: SimulatedJob, result: SimulatedBrdf) -> MeasuredSource:
-    """Return f_r of a simulation as a source, unchanged.
+    """Return f_r of a simulation as a reciprocal source: light on facets follows geometric optics.
 
-    Of mirror-like facets, the samples are interpolated over two bases, Lambert with one lobe and Beckmann with the
-    slopes of the surface: the base with the smaller error at samples that were held out is taken.
+    Of mirror-like facets, and of Lambertian grooves in one direction, the samples are interpolated over two bases,
+    Lambert with one lobe and that of a model of the surface, of which f_r has the lobe and the edges. The base with the
+    smaller error at samples that were held out is taken.
     """
     samples = simulated_samples(job, result)
     title = job.table.title or f"{surface_words(job)}, {facet_words(job)}"
     provenance = "; ".join([*_origin(job), samples.instrument.name])
-    made = functools.partial(MeasuredSource.of_samples, samples, name=job.name, title=title, provenance=provenance)
+    made = functools.partial(
+        MeasuredSource.of_samples, samples, name=job.name, title=title, provenance=provenance, reciprocal=True
+    )
     source = made()
-    if result.simulation.facets.mirror > 0.0:
-        other = made(base=_beckmann_base(result.simulation))
-        if _held_out(other) < _held_out(source):
-            source = other
+    base = _base(result)
+    if base is not None:
+        source = min(source, made(base=base), key=_held_out)
     record = SimulationRecord.model_validate(samples.record["simulation"])
     file = {} if job.path is None else {"file": job.path.name, "file_sha256": job.sha256}
     return source.recorded(simulation=record, **file)
@@ -341,29 +306,34 @@ def _origin(job: SimulatedJob) -> list[str]:
 def simulation_record(job: SimulatedJob, result: SimulatedBrdf) -> SimulationRecord:
     """Return the record of a simulation."""
     simulation = result.simulation
-    errors = standard_errors(result)
+    errors = result.standard_errors
     notes = job.levelled.levelling.measured.notes if job.levelled is not None else ()
     made = not isinstance(simulation.surface, HeightMap)
     if isinstance(simulation.surface, HeightMap):
         slopes = principal_slopes(simulation.surface)[:2]
     else:
         drawn = [simulation.drawn(number).realised() for number in range(min(_DRAWN, result.count))]
-        slopes = (_mean_square([one.slope_x for one in drawn]), _mean_square([one.slope_y for one in drawn]))
+        slopes = (_mean_square([map_.slope_x for map_ in drawn]), _mean_square([map_.slope_y for map_ in drawn]))
+        if job.table.all_azimuths:  # each map has grooves along y, and is turned
+            slopes = (_mean_square(slopes), _mean_square(slopes))
     along_x = np.flatnonzero(np.abs(simulation.lights[:, 1]) + np.minimum(simulation.lights[:, 0], 0.0) <= 1e-9)
     along_x = along_x[np.argsort(-simulation.lights[along_x, 2])]
     lights = simulation.lights[along_x]
     one, two, further = (_digits(share) for share in result.escaped.mean[along_x].mean(axis=2).T)
     return SimulationRecord(
         surface="; ".join([surface_words(job) + _azimuth_words(job), *notes]),
+        noise="" if job.levelled is None else job.levelled.noise,
         facets=facet_words(job),
         slopes=_digits(slopes),
-        estimates=result.count,
+        realisations=result.count,
         rays=simulation.rays,
         target=simulation.target,
         standard_error=float(f"{errors.judged:.3g}"),
         standard_error_lowest=float(f"{errors.lowest:.3g}"),
+        standard_error_median=float(f"{errors.median:.3g}"),
         standard_error_of_map=None if made else float(f"{errors.of_map:.3g}"),
         lights_deg=_digits(np.degrees(np.arccos(np.clip(lights[:, 2], 0.0, 1.0))), 6),
+        spectral=job.reflecting.wavelength_nm is not None,
         one=one,
         two=two,
         further=further,
@@ -383,20 +353,54 @@ def _mean_square(values: Sequence[float]) -> float:
 
 def _held_out(source: MeasuredSource) -> float:
     held_out = source.measured.held_out
-    return math.inf if held_out is None else held_out.median
+    return math.inf if held_out is None else held_out.l1
 
 
-def _beckmann_base(simulation: Simulation) -> Base:
-    """Return f_r [1/sr] of one bounce of facets with Gaussian slopes, and of an even Lambertian surface."""
+def _base(result: SimulatedBrdf) -> Base | None:
+    """Return f_r [1/sr] of a model of the surface, which its samples are interpolated over; None without a model."""
+    simulation = result.simulation
+    if simulation.facets.mirror > 0.0:
+        return _lobe_base(simulation)
+    surface = simulation.surface
+    if isinstance(surface, MadeSurface) and surface.kind == "grooves" and not simulation.turned:
+        return _groove_base(surface.slope, np.asarray(simulation.facets.rho), result.further.mean.mean(axis=(0, 1)))
+    return None
+
+
+def _model_of(suits: Callable[[SurfaceRelation], bool]) -> tuple[ModelSpec, SurfaceRelation]:
+    """Return the first model with a relation to surfaces that suits, and the relation."""
+    return next((spec, relation) for spec in MODELS.values() for relation in spec.surfaces if suits(relation))
+
+
+def _groove_base(slope: float, rho: Floats, further: Floats) -> Base:
+    """Return f_r [1/sr] of Lambertian V-grooves along y: two bounces by a model of their facets, and a mean of more."""
+    model, relation = _model_of(lambda relation: relation.grooves)
+    arguments = {**relation.arguments, relation.parameters[0]: float(np.arctan(slope)), "rho": rho}
+
+    def base(wi: Floats, wr: Floats) -> Floats:
+        angles = [angle[:, np.newaxis] for w in (wi, wr) for angle in spherical_angles(w)]
+        both = model.evaluate(*angles, **arguments) + model.evaluate(*angles[2:], *angles[:2], **arguments)
+        return np.asarray(0.5 * both + further)
+
+    return base
+
+
+def _lobe_base(simulation: Simulation) -> Base:
+    """Return f_r [1/sr] of one bounce of facets with Gaussian slopes, and of an even Lambertian surface.
+
+    It is the first model of mirror-like facets whose widths are multiples of the slopes.
+    """
+    model, relation = _model_of(lambda relation: relation.facets == "mirror" and relation.per_slope is not None)
     lobe = _lobe(simulation.surface, turned=simulation.turned)
     facets = simulation.facets
     index, extinction = (100.0, 1e4) if facets.n is None else (facets.n, facets.k)  # or else all light is reflected
-    widths = {"alpha_x": np.sqrt(2.0) * lobe.steepest, "alpha_y": np.sqrt(2.0) * lobe.across}
-    widths = {name: float(np.clip(width, 1e-3, 2.0)) for name, width in widths.items()}
+    alphas = (relation.per_slope or 1.0) * np.array([lobe.steepest, lobe.across])
+    widths = dict(zip(relation.parameters, np.clip(alphas, 1e-3, 2.0), strict=True))
 
     def base(wi: Floats, wr: Floats) -> Floats:
         theta_i, phi_i, theta_r, phi_r = (a[:, np.newaxis] for w in (wi, wr) for a in spherical_angles(w))
-        f_r = beckmann(theta_i, phi_i - lobe.azimuth, theta_r, phi_r - lobe.azimuth, **widths, n=index, k=extinction)
+        angles = theta_i, phi_i - lobe.azimuth, theta_r, phi_r - lobe.azimuth
+        f_r = model.evaluate(*angles, **widths, n=index, k=extinction)
         return np.asarray(facets.mirror * f_r + np.asarray(facets.rho) / np.pi)
 
     return base
@@ -427,8 +431,8 @@ def _azimuth_words(job: SimulatedJob) -> str:
     """Return why a height map was turned to all azimuths, or was not, in words; empty of a made surface."""
     if job.levelled is None:
         return ""
-    asked = "as was asked for; " if job.table.isotropic is not None else ""
-    return f" ({asked}{job.levelled.harmonics.sentence})"
+    chosen = "as was asked for; " if job.table.isotropic is not None else ""
+    return f" ({chosen}{job.levelled.harmonics.sentence})"
 
 
 def facet_words(job: SimulatedJob) -> str:
@@ -457,15 +461,8 @@ def build_simulated(root: str, folder: str, job: SimulatedJob, count: int) -> Me
     if status.state != "missing":
         return found(store, job.name, status)
     try:
-        result = combined(Path(folder), job, count)
-    except StoreError:
-        status = standing(store, job.name, request)
-        if status.state == "missing":
-            raise
-        return found(store, job.name, status)  # another build has published the table, and removed its estimates
-    try:
-        source = simulated_source(job, result)
-        tabulate = functools.partial(tabulated_lawfully, source, job.tolerance, reciprocal=job.table.reciprocal)
+        source = simulated_source(job, combined(Path(folder), job, count))
+        tabulate = functools.partial(tabulated_lawfully, source, job.tolerance, reciprocal=False)
         layout, values = tabulate(conserving=False)
         if job.table.conserving and largest_albedo(Table.of(layout, values), source).above_1:
             layout, values = tabulate(conserving=True)

@@ -72,8 +72,12 @@ def test_an_albedo_that_the_error_of_the_table_does_not_tell_from_1_is_not_judge
     assert run("import", write_csv(tmp_path / "white.csv", white), "--store", tmp_path / "store", *ONE_JOB) == 0
     printed = capsys.readouterr().out
     (line,) = [line for line in printed.splitlines() if line.startswith("white ")]
-    assert re.search(r"(0\.9|1\.0)\d? ± 0\.0\d at .* not judged", line)
-    assert printed.endswith("1 table audited: passes 0, not judged 1\n")
+    assert re.search(r"(0\.9|1\.0)\d? ± 0\.0\d at .* passes", line)
+    assert printed.endswith("1 table audited: passes 1; conservation of energy not judged: 1 (white)\n")
+    assert run("audit", "white", "--store", tmp_path / "store", "--jobs", 1) == 0
+    printed = capsys.readouterr().out
+    assert "cannot be judged: albedo " in printed
+    assert "passes 1, known published excess 0, violates 0" in printed
 
 
 def test_an_archive_is_audited_whole_and_audits_of_earlier_imports_stay(

@@ -156,7 +156,7 @@ def _print_materials(store: Store, root: Path, names: Sequence[str]) -> list[str
                 head["revision"],
             )
         )
-    errors = ("table error (p99)", "formula error (p99)", "surface error")
+    errors = ("table error (p99)", "formula error (p99)", "surface error (median)")
     columns: tuple[str, ...] = ("material", "title", "model", "colours", *errors, *COLUMNS, "revision")
     at = columns.index(errors[2])
     mapped = any(row[at] for row in rows)

@@ -8,7 +8,7 @@ import sys
 from typing import Any
 
 from brdfdb_pipelines.commands import INTERRUPTED, VIOLATED
-from brdfdb_pipelines.commands._arguments import add_jobs, place, share_cores, whole_number
+from brdfdb_pipelines.commands._arguments import add_jobs, numbers, place, share_cores, whole_number
 from brdfdb_pipelines.commands.topography import add_reading
 
 HELP = (
@@ -16,28 +16,10 @@ HELP = (
     "map in a file."
 )
 _KINDS = ("gaussian", "exponential", "band", "grooves", "gaussian-grooves")  # those of MadeSurface
-# Options that are keys of a recipe, and None if they are not given
-_KEYS: tuple[str, ...] = (
-    "surface",
-    "slope_deg",
-    "slope_y_deg",
-    "nodes",
-    "isotropic",
-    "facets",
-    "rho",
-    "mirror",
-    "n",
-    "k",
-)
-_KEYS += ("refractive_index", "wavelengths_nm", "standard_error", "realisations", "rays", "seed")
-_KEYS += ("conserving", "title", "source")
-# Options of a height map, and their defaults
-_MAP: dict[str, Any] = {"pixel_um": [], "height_um": None, "unit": None, "channel": None}
-_MAP |= {"level": "plane", "outliers": "refuse", "steps": "refuse", "holes": "leave-out"}
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the surface, its facets, when to stop, and the outputs."""
+def _add_surface(parser: argparse.ArgumentParser) -> None:
+    """Add the made surface, or the height map, how it is read, and its filter."""
     surface = parser.add_argument_group("surface")
     surface.add_argument("--surface", choices=_KINDS, help="kind of a made surface")
     surface.add_argument(
@@ -57,26 +39,40 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--isotropic",
         action="store_const",
         const=True,
-        help="the map stands for a surface without a direction (default: if its slopes are)",
+        help="the map stands for a surface without a direction (default: decided by its slopes)",
     )
     turned.add_argument(
         "--anisotropic", action="store_const", const=False, dest="isotropic", help="the surface has a direction"
     )
-    add_reading(parser)
+    add_reading(parser, holes=("refuse", "fill"))
+    surface.add_argument(
+        "--s-filter-um",
+        type=float,
+        metavar="UM",
+        help="cutoff of a Gaussian filter, which takes shorter waves and noise out of the height map; 0 is no filter "
+        "(default: no filter, and a noisy map is refused)",
+    )
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the surface, its facets, when to stop, and the outputs."""
+    _add_surface(parser)
     facets = parser.add_argument_group("facets")
     facets.add_argument("--facets", choices=("lambert", "mirror", "mixture"), help="reflection (default: lambert)")
     facets.add_argument(
-        "--rho", type=_numbers, metavar="RHO", help="albedo of Lambertian facets, or one for each wavelength"
+        "--rho", type=numbers, metavar="RHO", help="albedo of Lambertian facets, or one for each wavelength"
     )
     facets.add_argument("--mirror", type=float, metavar="WEIGHT", help="weight of the mirror-like part of a mixture")
     facets.add_argument(
-        "--n", type=_numbers, metavar="N", help="refractive index of mirrors (default: they reflect all)"
+        "--n", type=numbers, metavar="N", help="refractive index of mirrors (default: they reflect all)"
     )
-    facets.add_argument("--k", type=_numbers, metavar="K", help="extinction coefficient of mirrors (default: 0)")
+    facets.add_argument("--k", type=numbers, metavar="K", help="extinction coefficient of mirrors (default: 0)")
     facets.add_argument(
-        "--refractive-index", metavar="ENTRY", help="SHELF/BOOK/PAGE of refractiveindex.info, in place of N and K"
+        "--refractive-index",
+        metavar="ENTRY",
+        help="in place of N and K: a substance such as Cu, SHELF/BOOK/PAGE of refractiveindex.info, or constant/N/K",
     )
-    facets.add_argument("--wavelengths-nm", type=_numbers, metavar="NM,NM,...", help="wavelengths of spectra")
+    facets.add_argument("--wavelengths-nm", type=numbers, metavar="NM,NM,...", help="wavelengths of spectra")
     effort = parser.add_argument_group("effort")
     effort.add_argument(
         "--standard-error",
@@ -84,8 +80,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="E",
         help="relative standard error at which to stop, where f_r exceeds a hundredth of its peak (default: 0.02)",
     )
-    effort.add_argument("--realisations", type=whole_number(), metavar="N", help="most realisations (default: 256)")
-    effort.add_argument("--rays", type=whole_number(), metavar="N", help="light paths of a realisation (default: 4096)")
+    effort.add_argument(
+        "--realisations",
+        type=whole_number(),
+        metavar="N",
+        help="most realisations: maps of a made surface, or repetitions of a part of a height map (default: 256)",
+    )
+    effort.add_argument(
+        "--rays", type=whole_number(), metavar="N", help="rays for each light in a realisation (default: 4096)"
+    )
     effort.add_argument("--seed", type=int, metavar="N", help="seed (default: 0)")
     add_jobs(parser, "number of processes")
     effort.add_argument(
@@ -104,7 +107,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="E",
         help="largest relative error of 95 %% of the values of the table, 0.0001 to 0.5 (default: 0.05)",
     )
-    outputs.add_argument("--reciprocal", action="store_true", help="change the values to the nearest reciprocal ones")
     outputs.add_argument(
         "--not-conserving",
         action="store_const",
@@ -132,7 +134,7 @@ def run(options: argparse.Namespace) -> int:
         name = slug(f"{options.height_map.stem} {options.facets or 'lambert'}")
     else:
         if options.surface is None:
-            raise ParameterError("--surface, --height-map", "give exactly one of them")
+            raise ParameterError("--surface, --height-map", "neither is given; give one of them")
         angle = "" if options.slope_deg is None else f"{options.slope_deg:g}"
         name = slug(f"{options.surface} {angle} {options.facets or 'lambert'}")
     try:
@@ -158,23 +160,13 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _keys(options: argparse.Namespace) -> dict[str, Any]:
-    """Return the keys of a recipe that the options stand for."""
-    keys = {name: value for name in _KEYS if (value := getattr(options, name)) is not None}
-    keys |= {name: value for name, default in _MAP.items() if (value := getattr(options, name)) != default}
-    if options.hole_value is not None:
-        keys["hole"] = options.hole_value
+    """Return the keys of a recipe that the options stand for, without those of the default value."""
+    from brdfdb_pipelines.simulated_table import SimulatedTable
+
+    values = {**vars(options), "hole": options.hole_value, "height_map": options.height_map and str(options.height_map)}
+    fields = SimulatedTable.model_fields.items()
+    keys = {name: values[name] for name, field in fields if values.get(name) not in (None, [], field.default)}
     for name in ("rho", "n", "k", "pixel_um"):
         if len(keys.get(name, [])) == 1:
             (keys[name],) = keys[name]
-    keys |= {name: True for name in ("all_azimuths", "reciprocal") if getattr(options, name)}
-    if options.height_map is not None:
-        keys["height_map"] = str(options.height_map.absolute())
     return keys
-
-
-def _numbers(text: str) -> list[float]:
-    """Return numbers with commas between them."""
-    try:
-        return [float(part) for part in text.split(",")]
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r} is no number, or numbers with commas between them") from None
