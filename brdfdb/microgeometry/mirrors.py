@@ -69,26 +69,13 @@ def mirror_bounces(
 
     Parameters
     ----------
-    tracer : Tracer
-        The surface.
-    facets : Facets
-        Their reflectance. With rho > 0, light that is reflected by Lambert and by mirrors is counted, too.
-    lights : array (I, 3) [1]
-        Unit vectors to the lights, above the horizon.
-    viewers : array (V, 3) or (I, V, 3) [1]
-        Unit vectors to the viewers, above the horizon: the same for all lights, or those of each light.
     rays : int
         Number of paths of each light. Rays connect at most a sixteenth of them to the viewers after each bounce. A 64th
         of the number is that of the points which tell how much of the facets light and viewer see, at least 16 for
         each azimuth.
-    seed : int
-        The same seed gives the same numbers.
-    turned : bool
-        True for isotropic surfaces: light and viewer are turned about the normal together.
-    gaussian_slopes : tuple (along x, along y) [1], optional
-        Standard deviations of slopes that are known to be Gaussian. By default their density is estimated.
-    region : tuple (x_low, x_high, y_low, y_high) [um], optional
-        Rectangle in which the light first meets the surface, by default all of the map.
+    others
+        As those of `goniometer.bounces`, checked. With rho > 0, light that is reflected by Lambert and by mirrors is
+        counted, too.
 
     Returns
     -------

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
@@ -209,23 +209,31 @@ def revision_bytes(root: Path, name: str, revision: str) -> int:
 
 def build_measured(root: str, job: MeasuredJob) -> MeasuredResult:
     """Build the table of a job unless the store has it: a task for a worker."""
-    store = Path(root)
-    request = job.request
-    status = standing(store, job.name, request)
+
+    def table() -> MeasuredLayout:
+        laws = {"reciprocal": job.table.reciprocal, "conserving": job.table.conserving}
+        return tabulated_lawfully(job.source(), job.tolerance, **laws)
+
+    return build_of_data(Path(root), job.name, job.request, table, f"{job.files}: ")
+
+
+def build_of_data(
+    root: Path, name: str, request: Mapping[str, Any], table: Callable[[], MeasuredLayout], where: str = ""
+) -> MeasuredResult:
+    """Publish the table of data unless the store has it; ParameterError names the material and `where` its data are."""
+    status = standing(root, name, request)
     if status.state != "missing":
-        return found(store, job.name, status)
+        return _found(root, name, status)
     try:
-        layout, values = tabulated_lawfully(
-            job.source(), job.tolerance, reciprocal=job.table.reciprocal, conserving=job.table.conserving
-        )
-        return published(store, job.name, layout, request, values, status.why)
+        layout, values = table()
+        return _published(root, name, layout, request, values, status.why)
     except StoreError:
         raise
     except BrdfdbError as error:
-        raise ParameterError(job.name, f"{job.files}: {error}") from None
+        raise ParameterError(name, f"{where}{error}") from None
 
 
-def found(root: Path, name: str, status: Standing) -> MeasuredResult:
+def _found(root: Path, name: str, status: Standing) -> MeasuredResult:
     """Return the result of a job whose table the store has, and make that revision the current one."""
     if status.state == "adoptable":
         with Lock(root, name), writing(root, name):
@@ -234,7 +242,7 @@ def found(root: Path, name: str, status: Standing) -> MeasuredResult:
     return MeasuredResult(state, status.revision, revision_bytes(root, name, status.revision), status.why)
 
 
-def published(
+def _published(
     root: Path, name: str, layout: Layout, request: Mapping[str, Any], values: NDArray[np.float32], why: str
 ) -> MeasuredResult:
     """Publish a new table, unless another build did; return the result of the job. `why` says why the table is new."""
@@ -245,7 +253,7 @@ def published(
         if status.state == "missing":
             new = publish_files(root, name, staged.files)
     if status.state != "missing":
-        return found(root, name, status)
+        return _found(root, name, status)
     wavelengths = 0 if layout.wavelength_nm is None else layout.wavelength_nm.size
     return MeasuredResult("published", new.revision, new.bytes, why, tuple(layout.shape), wavelengths)
 

@@ -6,7 +6,6 @@ import functools
 import json as _json
 import tempfile
 import time
-from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -108,8 +107,12 @@ def run(keys: dict[str, Any], outputs: SimulationOutputs, *, json: bool = False)
         record = _write_samples(job, outputs.out, outputs.jobs)
         document["file"] = str(outputs.out)
     elif outputs.store is not None:
-        with _workers(outputs) as at, Bars() as bars:
-            (built,) = build(recipe, outputs.store, at, bars, memory=None if outputs.scheduler else machine_memory())
+        address = outputs.scheduler
+        at = workers.cluster(address) if address else workers.interruptible(outputs.jobs)
+        with at as opened, Bars() as bars:
+            (built,) = build(
+                recipe, outputs.store, opened, bars, memory=None if outputs.scheduler else machine_memory()
+            )
         measured = Store(outputs.store).metadata(name).measured
         if measured is not None:
             record = measured.simulation
@@ -138,12 +141,6 @@ def run(keys: dict[str, Any], outputs: SimulationOutputs, *, json: bool = False)
     if report is not None:
         import_samples.show_tables(tables, report, outputs.tolerance, origin="simulated")
     return report is None or not report.violations
-
-
-def _workers(outputs: SimulationOutputs) -> AbstractContextManager[Workers]:
-    if outputs.scheduler is not None:
-        return workers.cluster(outputs.scheduler)
-    return workers.interruptible(outputs.jobs)
 
 
 def _write_samples(job: SimulatedJob, out: Path, jobs: int) -> SimulationRecord:

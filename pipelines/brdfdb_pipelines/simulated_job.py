@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from brdfdb.errors import BrdfdbError, FileFormatError, ParameterError, StoreError, counted, import_extra
+from brdfdb.errors import FileFormatError, ParameterError, counted, import_extra
 from brdfdb.geometry import spherical_angles
 from brdfdb.measurements import MeasuredSource, Samples
 from brdfdb.measurements.interpolation import Base
@@ -32,11 +32,11 @@ from brdfdb.parameters import Floats, ModelSpec, SurfaceRelation
 from brdfdb.place import path_of
 from brdfdb.store.estimates import read_estimate, write_estimate
 from brdfdb.store.lock import Lock
-from brdfdb.store.revisions import standing
 from brdfdb.tables.albedo import largest_albedo
 from brdfdb.tables.layout import TABLE_VERSION
+from brdfdb.tables.measured_layout import MeasuredLayout
 from brdfdb.tables.table import Table
-from brdfdb_pipelines.measured_job import MeasuredResult, found, published, sha256_of, tabulated_lawfully
+from brdfdb_pipelines.measured_job import MeasuredResult, build_of_data, sha256_of, tabulated_lawfully
 from brdfdb_pipelines.recipe_grids import RecipeError
 from brdfdb_pipelines.simulated_table import (
     SINGLE_DIRECTIONS,
@@ -455,23 +455,17 @@ def _span(values: ArrayLike) -> str:
 
 def build_simulated(root: str, folder: str, job: SimulatedJob, count: int) -> MeasuredResult:
     """Tabulate the first estimates of a job and publish the table: a task for a worker."""
-    store = Path(root)
-    request = job.request
-    status = standing(store, job.name, request)
-    if status.state != "missing":
-        return found(store, job.name, status)
-    try:
+
+    def table() -> MeasuredLayout:
         source = simulated_source(job, combined(Path(folder), job, count))
         tabulate = functools.partial(tabulated_lawfully, source, job.tolerance, reciprocal=False)
-        layout, values = tabulate(conserving=False)
-        if job.table.conserving and largest_albedo(Table.of(layout, values), source).above_1:
-            layout, values = tabulate(conserving=True)
-        made = published(store, job.name, layout, request, values, status.why)
-    except StoreError:
-        raise
-    except BrdfdbError as error:
-        raise ParameterError(job.name, str(error)) from None
-    with Lock(store, job.name):  # which leaves no empty folder
+        made = tabulate(conserving=False)
+        if job.table.conserving and largest_albedo(Table.of(*made), source).above_1:
+            made = tabulate(conserving=True)
+        return made
+
+    made = build_of_data(Path(root), job.name, job.request, table)
+    with Lock(Path(root), job.name):  # which leaves no empty folder
         shutil.rmtree(Path(folder).parent, ignore_errors=True)
     return made
 
