@@ -263,3 +263,10 @@ def near_90(theta_deg: float) -> str:
 def counted(number: int, noun: str) -> str:
     """Return a number with its noun, which takes an s unless the number is 1."""
     return f"{number} {noun}{'' if number == 1 else 's'}"
+
+
+def percent(share: float | None) -> str:
+    """Return a share as text in percent, without decimals from 10 % on, with two digits below; empty if None."""
+    if share is None:
+        return ""
+    return f"{100.0 * share:.2g} %" if abs(share) < 0.0995 else f"{100.0 * share:.0f} %"

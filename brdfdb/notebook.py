@@ -77,11 +77,6 @@ def error_in_words(error: float | None) -> str:
     return f"{100.0 * error:.0f} %" if error >= 0.995 else f"{100.0 * error:#.2g}".rstrip(".") + " %"
 
 
-def percent(share: float | None) -> str:
-    """Return a stated error as text in percent; empty if none is known."""
-    return "" if share is None else f"{100.0 * share:.2g} %"
-
-
 def spectrum(wavelength_nm: Sequence[float] | None) -> str:
     """Return wavelengths as text: their range and number, or that there are none."""
     if wavelength_nm is None:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from brdfdb.geometry import common_solid_angle, versine
 from brdfdb.materials.source import Evaluate
-from brdfdb.measurements.samples import Instrument
+from brdfdb.measurements.instrument import Instrument
 from brdfdb.parameters import Floats
 
 WIDE = 20.0  # half angles of the aperture, from which on the width of a lobe is not changed by it

@@ -19,7 +19,8 @@ from brdfdb.errors import ParameterError
 from brdfdb.geometry import degrees, radians, spherical_angles, unit_vector
 from brdfdb.materials.source import Evaluate
 from brdfdb.measurements.aperture import cone, disk
-from brdfdb.measurements.samples import Instrument, Samples
+from brdfdb.measurements.instrument import Instrument
+from brdfdb.measurements.samples import Samples
 from brdfdb.parameters import Array
 
 Frames = NDArray[np.float32]
@@ -272,7 +273,8 @@ def reduced(picture: CameraPicture, thin: bool = True) -> Samples:
     the solid angle of the receiver. The blur is round in the picture, and the lens makes it an ellipse in directions:
     at 60 degrees it is 4 / 3 as wide along theta as across. f_r is taken back to a round one by its second derivatives.
     What this leaves is no noise, and no uncertainty states it: 0.1 % of f_r in lobes whose width is seven pixels, and
-    0.01 % of the widths that are fitted.
+    0.01 % of the widths that are fitted. In lobes of alpha 0.02, three pixels, 0.1 % of the widths and 0.2 % of rho_s:
+    `brdfdb.fitting.judgement` widens the intervals of such lobes by more than that.
     """
     settings = picture.settings
     surface, noise = _unsaturated(picture.sample, picture.background, settings, 1)

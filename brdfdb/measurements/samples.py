@@ -14,53 +14,29 @@ from numpy.typing import NDArray
 from brdfdb.arrays import check_rows, plain
 from brdfdb.errors import ParameterError, counted
 from brdfdb.geometry import check_phi, degrees, radians, unit_vector
+from brdfdb.measurements.conventions import ANGLES, NM_PER, PER_SR, QUANTITIES
+from brdfdb.measurements.instrument import Instrument
 from brdfdb.parameters import Floats, check_nanometres
 
 if TYPE_CHECKING:
     import xarray as xr
 
-RELATIVE = "relative to the light"  # entry "azimuths" of a record: the azimuth on the surface is not known
-NODES = "nodes"  # entry of a record that is true if the samples are all nodes of a grid
-ANGLES = ("theta_i", "phi_i", "theta_r", "phi_r")
 _OPTIONAL = ("uncertainty", "wavelength_nm", "bandwidth_nm")
-PER_SR = ("", "sr-1", "1/sr", "sr^-1", "sr**-1")
-NM_PER = {  # by the unit that a file states
-    **dict.fromkeys(("", "nm", "nanometer", "nanometre", "nanometers", "nanometres"), 1.0),
-    **dict.fromkeys(("um", "\u00b5m", "\u03bcm", "micron", "microns", "micrometer", "micrometre"), 1e3),
-    **dict.fromkeys(("micrometers", "micrometres"), 1e3),
-    **dict.fromkeys(("m", "meter", "metre", "meters", "metres"), 1e9),
-}
 _HORIZON = 0.5 * np.pi * (1.0 + 1e-9)  # largest polar angle [rad], with rounding
 _SAME_DEG = 1e-4  # directions closer than this are the same
 _READ_DEG = 0.25  # cells of directions that encoders read
 _SPREAD_DEG = 1.0  # width of the readings of one direction of the light, at most
 _REGULAR = 8  # viewers of an incidence, and more, make a scan
-_QUANTITIES = {
-    "reflectance_factor": "reflectance factors",
+_HELD = {name: words for name, words in QUANTITIES.items() if name != "f_r"} | {
     "f_r_cos": "values with the cosine of the viewer",
     "f_r_cos_i": "values with the cosine of the light",
 }
-
-
-@dataclass(frozen=True)
-class Instrument:
-    """The instrument of a measurement; None, or an empty text, where something is not known.
-
-    Solid angles [sr] of light and receiver are those that the sample sees. `spot_mm` is the diameter of the spot that
-    is measured, `polarisation` that of light and receiver in words.
-    """
-
-    name: str = ""
-    source_solid_angle_sr: float | None = None
-    receiver_solid_angle_sr: float | None = None
-    spot_mm: float | None = None
-    polarisation: str = ""
-
-    def __post_init__(self) -> None:
-        for quantity in ("source_solid_angle_sr", "receiver_solid_angle_sr", "spot_mm"):
-            value = getattr(self, quantity)
-            if value is not None and not 0.0 < value < np.inf:
-                raise ParameterError(quantity, f"{value:g} is not a positive number", value, (0.0, np.inf))
+_AZIMUTHS = {
+    "forward": "Azimuths count from the forward direction, as was stated: 180 degrees were added.",
+    "mirror": "Azimuths of viewers count from the mirror direction, as was stated: 180 degrees were added.",
+    "light": "Azimuths of viewers count from the light, as was stated.",
+    "absolute": "Azimuths of viewers count from a direction of the surface, as was stated.",
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,8 +64,11 @@ class Samples:
     uncertainty: Floats | None = field(default=None, repr=False)
     #: full width of each band at half of its height; None if it is not known, (C,) [nm]
     bandwidth_nm: NDArray[np.float64] | None = None
-    instrument: Instrument = Instrument()  #: the instrument
+    instrument: Instrument = field(default_factory=Instrument)  #: the instrument
     provenance: str = ""  #: where the samples come from, in words
+    #: Mueller matrices over their first element, between bases of the surface as in `brdfdb.tables.stokes`; elements
+    #: that are not measured are nan. None if the polarisation is not measured, (N, C, 4, 4) [1]
+    mueller: Floats | None = field(default=None, repr=False)
     #: what the file says beside its values: its header, or the record of an export
     record: Mapping[str, Any] = field(default_factory=dict, repr=False)
 
@@ -100,7 +79,7 @@ class Samples:
         count = self.theta_i.size
         expected = {**dict.fromkeys(ANGLES, (count,)), "values": (count, len(self.channels))}
         expected |= {"uncertainty": expected["values"], "wavelength_nm": (len(self.channels),)}
-        expected |= {"bandwidth_nm": expected["wavelength_nm"]}
+        expected |= {"bandwidth_nm": expected["wavelength_nm"], "mueller": (*expected["values"], 4, 4)}
         for name, shape in expected.items():
             array = getattr(self, name)
             if array is not None and array.shape != shape:
@@ -193,7 +172,8 @@ class Samples:
         """Return some of the samples: those of a mask (N,), or of indices."""
         parts = {name: getattr(self, name)[rows] for name in (*ANGLES, "values")}
         uncertainty = None if self.uncertainty is None else self.uncertainty[rows]
-        return replace(self, **parts, uncertainty=uncertainty)
+        mueller = None if self.mueller is None else self.mueller[rows]
+        return replace(self, **parts, uncertainty=uncertainty, mueller=mueller)
 
     def to_xarray(self) -> xr.Dataset:
         """Return the samples as a Dataset over ``sample`` and ``channel``, with angles in degrees.
@@ -208,7 +188,11 @@ class Samples:
             if of is not None:
                 of_channels[name] = ("channel", of, {"units": "nm"})
         values = {"brdf": self.values, "uncertainty": self.uncertainty}
-        known = {name: (("sample", "channel"), v, {"units": "sr-1"}) for name, v in values.items() if v is not None}
+        known: dict[str, Any] = {
+            name: (("sample", "channel"), v, {"units": "sr-1"}) for name, v in values.items() if v is not None
+        }
+        if self.mueller is not None:
+            known["mueller"] = (("sample", "channel", "row", "column"), self.mueller, {"units": "1"})
         instrument = {
             f"instrument_{part.name}": getattr(self.instrument, part.name)
             for part in fields(Instrument)
@@ -243,6 +227,9 @@ class Samples:
         uncertainty = None
         if "uncertainty" in dataset.variables:
             uncertainty = np.asarray(dataset["uncertainty"].transpose("sample", ...)).reshape(values.shape)
+        mueller = None
+        if "mueller" in dataset.variables:
+            mueller = np.asarray(dataset["mueller"].transpose("sample", "channel", "row", "column"))
         attributes = dataset.attrs
         instrument = {
             part.name: attributes[f"instrument_{part.name}"]
@@ -256,6 +243,7 @@ class Samples:
             wavelength_nm=wavelength,
             values=values,
             uncertainty=uncertainty,
+            mueller=mueller,
             bandwidth_nm=_length_nm(dataset, "bandwidth"),
             instrument=Instrument(**instrument),
             provenance=str(attributes.get("provenance", "")),
@@ -328,10 +316,16 @@ def percent(share: float) -> str:
 def notes_of(record: Mapping[str, Any]) -> tuple[str, ...]:
     """Return what a reader noted in a record, in sentences."""
     notes = [str(note) for note in record.get("notes", ())]
-    if text := _QUANTITIES.get(record.get("quantity", "")):
+    if "plane" in record:
+        notes += _plane(record)
+    if text := _HELD.get(record.get("quantity", "")):
         notes.append(f"The file holds {text}: f_r was made of them.")
-    if record.get("azimuth") == "forward":
-        notes.append("Azimuths count from the forward direction, as was stated: 180 degrees were added.")
+    if text := record.get("angles_stated"):
+        notes.append(f"Angles were read as stated: {text}.")
+    if k := record.get("coverage_factor"):
+        notes.append(f"Uncertainties were divided by the coverage factor {k:g}, as was stated.")
+    if text := _AZIMUTHS.get(record.get("azimuth", "")):
+        notes.append(text)
     elif title := record.get("forward_title"):
         notes.append(
             f"Azimuths? A title says {title!r}. If 0 is the direction into which the light travels, import the file "
@@ -354,3 +348,30 @@ def notes_of(record: Mapping[str, Any]) -> tuple[str, ...]:
     if network := record.get("network"):
         notes.append(f"{network}.")
     return tuple(notes)
+
+
+def _plane(record: Mapping[str, Any]) -> list[str]:
+    """Return on which side of the plane of incidence a reader took viewers to be, and whether the lobe agrees."""
+    lobe = record.get("lobe")
+    forward = record.get("azimuth") == "forward"
+    other = "light" if forward else "forward"
+    sides = ("side of the light", "mirror side") if forward else ("mirror side", "side of the light")
+    if record["plane"] == "signs":
+        text = f"those of the sign of theta_i on the {sides[1]}"
+    elif record["plane"] == "one side":
+        text = f"all on the {sides[0]} (delta_phi {0 if forward else 180}), as no theta_r is negative"
+    else:
+        text = f"positive theta_r on the {sides[0]}"
+    if forward and lobe in ("mirror", "light"):  # lobes were looked for before the sides were exchanged
+        lobe = "light" if lobe == "mirror" else "mirror"
+    if record["plane"] == "one azimuth":
+        return (
+            ["The azimuth is the same in all rows: negative theta_r is on its other side."] if lobe == "light" else []
+        )
+    text += "; the lobe is on the mirror side, too" if lobe == "mirror" else ""
+    start = "No column is an azimuth: viewers were taken to be in the plane of incidence"
+    notes = [f"{start}, {text}. --azimuth {other} exchanges the sides."]
+    if lobe == "normal":
+        text = "if theta_r counts from the specular direction, --column from_specular=NAME reads it"
+        notes.append(f"Specular? The lobe stays at theta_r 0 at all incidences: {text}.")
+    return notes

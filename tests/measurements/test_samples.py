@@ -170,6 +170,18 @@ def test_joined_files_that_contradict_say_so() -> None:
         assert "contradiction" not in joined([first, other]).record
 
 
+def test_joined_files_that_differ_in_their_lobe_alone_say_so() -> None:
+    """Two paints of other gloss agree but for a sixth of the directions; 5 % of noise do not differ."""
+    rng = np.random.default_rng(1)
+    angles = {name: rng.uniform(0.0, 1.5, 200) for name in ("theta_i", "phi_i", "theta_r", "phi_r")}
+    flat = Samples("flat", **angles, channels=("grey",), wavelength_nm=None, values=np.full((200, 1), 0.1))
+    lobe = np.where(np.arange(200) < 30, 2.0, 1.01)[:, np.newaxis]
+    said = joined([flat, replace(flat, values=flat.values * lobe)]).record["contradiction"]
+    assert said.endswith("f_r differs by 1 % in the median, and by more than 100 % at a tenth.")
+    noisy = replace(flat, values=flat.values * np.exp(rng.normal(0.0, 0.05, (200, 1))))
+    assert "contradiction" not in joined([flat, noisy]).record
+
+
 def test_joined_files_that_differ_beyond_their_uncertainties_say_so() -> None:
     first = samples(uncertainty=np.full((4, 2), 0.001))
     sentence = joined([first, replace(first, values=1.1 * first.values)]).record["contradiction"]
@@ -195,3 +207,24 @@ def test_joined_files_have_the_name_notes_and_counts_of_all() -> None:
     assert left_out in statement(both).sentences
     assert joined([samples(name="oak"), samples(name="elm")]).name == "oak and elm"
     assert joined([samples(name="sheet1"), samples(name="sheet2")]).name == "sheet"
+
+
+def test_files_of_other_wavelengths_are_joined_as_channels_and_the_same_ones_as_repeats() -> None:
+    first = samples(bandwidth_nm=None)
+    at_550 = replace(
+        first, channels=("550nm",), wavelength_nm=np.array([550.0]), values=first.values[:, :1] + 1.0, uncertainty=None
+    )
+    again = replace(at_550.selected(np.array([0, 2])), values=np.array([[1.11], [1.52]]), name="again")
+    both = joined([first, at_550, again])
+    assert both.channels == ("450nm", "550nm", "650nm")
+    order = np.lexsort((both.values[:, 1], both.theta_r, both.theta_i))
+    expected = [[0.1, 1.1, 0.2], [np.nan, 1.11, np.nan], [0.3, 1.3, np.nan]]
+    expected += [[0.5, 1.5, 0.6], [np.nan, 1.52, np.nan], [0.7, 1.7, 0.8]]
+    np.testing.assert_allclose(both.values[order], expected)
+    assert np.degrees(both.theta_r[order]) == pytest.approx([0.0, 0.0, 20.0, 0.0, 0.0, 20.0])
+    assert "joined to channels of 450, 550, 650 nm; where several" in " ".join(both.record["notes"])
+    assert both.uncertainty is None
+    same = joined([first, replace(first, uncertainty=0.5 * np.ones((4, 2)))])
+    assert len(same) == 8
+    with pytest.raises(ParameterError, match="has the channels grey"):
+        joined([first, replace(at_550, channels=("grey",), wavelength_nm=None)])
