@@ -7,12 +7,15 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from brdfdb.errors import counted
 from brdfdb.geometry import degrees
-from brdfdb.measurements.incidences import BAND_DEG, PEAK, Incidence, bands, incidences_of, lights
-from brdfdb.measurements.samples import NODES, Samples, notes_of, percent
+from brdfdb.measurements.conventions import NODES, numbers_of, remedy
+from brdfdb.measurements.exchanges import exchanged_rows
+from brdfdb.measurements.hypotheses import doubts
+from brdfdb.measurements.incidences import BAND_DEG, PEAK, Incidence, incidences_of
+from brdfdb.measurements.mueller import frame_doubt, polarised_sentences
+from brdfdb.measurements.samples import Samples, notes_of, percent
 from brdfdb.measurements.symmetry import are_bright, asymmetries
 from brdfdb.parameters import Floats
 
@@ -21,17 +24,12 @@ _ALL_COVERED = 0.999  # share of the disk from which on the rest is not spoken o
 _CLAIM = 0.05  # relative difference of a header from its own values that is stated
 _JUDGED = 1.0 - _CLAIM  # share of the disk from which on viewers tell an albedo well enough for it
 _SHOWN = 6  # incidences in sentences
-_EXCESS = 1.02  # albedo above which the unit is doubted
-_BLACK = 2e-4  # albedo below which the unit is doubted: the blackest coatings reflect more
 _MISSING = np.array([-1.0, -99.0, -999.0, -9999.0])  # numbers that files write for values that are missing
 _FILLED = np.array([9.99, 99.99, 999.99, 99999.0, 1e20, 9.96921e36])  # the same above 0; the last two are of netCDF
+_MANY = 3  # equal values that may be marks
+_ABOVE_FLOOR = 5.0  # of the smallest value that is none of many marks to them
 _FAR = 10.0  # times the largest other value is where a number is a mark
-# f_r of a lobe over the median from which on there is one, and below which there is none
-_LOBE = 2.0
-_LEVEL = 1.25
-_ABOUT_DEG = 15.0  # angles to the mirror direction and to the light within which lobes are looked for
-_TILTED_DEG = (20.0, 75.0)  # polar angles of lights that tell the sides apart
-_FEWEST = 5  # viewers of a light
+_FEWEST = 5  # values of a channel
 
 
 @dataclass(frozen=True)
@@ -82,7 +80,8 @@ class SampleStatement:
     reciprocity: ExchangedPairs | None  #: None if no sample is the swap of another
     claims: tuple[Claim, ...]  #: claims of the header that can be compared
     notes: tuple[str, ...]  #: sentences on what the reader did to the file
-    hints: tuple[str, ...]  #: sentences on what looks wrong
+    hints: tuple[str, ...]  #: sentences on what looks wrong, with the option that mends it
+    untold: tuple[str, ...]  #: a sentence on what the file may mean and its samples cannot tell
 
     @property
     def sentences(self) -> tuple[str, ...]:
@@ -94,6 +93,7 @@ class SampleStatement:
             *self._on_pairs(),
             *self._on_claims(),
             *self.notes,
+            *self.untold,
             *self.hints,
         )
 
@@ -120,7 +120,7 @@ class SampleStatement:
         lines = [f"{counts}; the largest value is {self.largest:.4g} /sr at {where}."]
         if self.wavelength_nm is not None:
             low, high = self.wavelength_nm
-            lines.append(f"Wavelengths: {low:.4g} to {high:.4g} nm." if high > low else f"Wavelength: {low:.4g} nm.")
+            lines.append(f"Wavelengths: {low:.9g} to {high:.9g} nm." if high > low else f"Wavelength: {low:.9g} nm.")
         elif self.channels == ("grey",):
             lines.append("No wavelength is stated; --wavelength-nm states one.")
         if self.uncertainty is not None:
@@ -165,20 +165,20 @@ class SampleStatement:
             f"median {100.0 * pairs.median:.3g} %, largest {100.0 * pairs.largest:.3g} %."
         ]
 
+    @property
+    def wrong_claims(self) -> tuple[Claim, ...]:
+        """The claims of the header that its own values contradict."""
+        return tuple(claim for claim in self.claims if claim.known and abs(claim.relative) > _CLAIM)
+
     def _on_claims(self) -> list[str]:
         lines = []
-        agree = 0
-        for claim in self.claims:
-            if claim.known and abs(claim.relative) > _CLAIM:
-                size = f"{percent(abs(claim.relative))} {'low' if claim.relative < 0.0 else 'high'}"
-                of_channel = f" ({claim.channel})" if len(self.channels) > 1 else ""
-                text = f"The header claims {claim.claimed:.4g} at theta_i {claim.theta_i_deg:.4g}{of_channel}"
-                least = "at least " if claim.at_least else ""
-                lines.append(
-                    f"{text}, and its own values integrate to {least}{claim.integrated:.4g}: the claim is {size}."
-                )
-            agree += claim.known and abs(claim.relative) <= _CLAIM
-        if agree:
+        for claim in self.wrong_claims:
+            size = f"{percent(abs(claim.relative))} {'low' if claim.relative < 0.0 else 'high'}"
+            of_channel = f" ({claim.channel})" if len(self.channels) > 1 else ""
+            text = f"The header claims {claim.claimed:.4g} at theta_i {claim.theta_i_deg:.4g}{of_channel}"
+            least = "at least " if claim.at_least else ""
+            lines.append(f"{text}, and its own values integrate to {least}{claim.integrated:.4g}: the claim is {size}.")
+        if agree := sum(claim.known for claim in self.claims) - len(self.wrong_claims):
             lines.append(
                 f"{counted(agree, 'claim')} of the header {'agrees' if agree == 1 else 'agree'} with its values."
             )
@@ -211,6 +211,7 @@ def statement(samples: Samples, progress: Callable[[float], None] | None = None)
     zeros = zeros if 0 < zeros.sum() < 0.5 * zeros.size else np.zeros_like(zeros)
     full = replace(samples, values=np.where(zeros, np.nan, samples.values)) if zeros.any() else samples
     integrated, in_bands = incidences_of(full, delta, progress, one_side=one_side)
+    judged = doubts(samples, integrated, one_side=one_side)
     at = samples.wavelength_nm
     uncertainty = None
     if samples.uncertainty is not None:
@@ -224,8 +225,8 @@ def statement(samples: Samples, progress: Callable[[float], None] | None = None)
         samples=len(samples),
         nodes=bool(samples.record.get(NODES)),
         lights=int(samples.incidence.max()) + 1,
-        theta_i_deg=(float(theta_i.min()), float(theta_i.max())),
-        theta_r_deg=(float(theta_r.min()), float(theta_r.max())),
+        theta_i_deg=_ends(theta_i),
+        theta_r_deg=_ends(theta_r),
         turned=samples.turned,
         one_side=one_side,
         holes=int(np.sum(~known)),
@@ -235,14 +236,20 @@ def statement(samples: Samples, progress: Callable[[float], None] | None = None)
         largest=float(np.nanmax(samples.values)) if known.any() else np.nan,
         largest_at_deg=(float(theta_i[peak]), float(theta_r[peak]), float(delta[peak])),
         uncertainty=uncertainty,
-        wavelength_nm=None if at is None else (float(at.min()), float(at.max())),
+        wavelength_nm=None if at is None else _ends(at),
         in_bands=in_bands,
         incidences=integrated,
         reciprocity=reciprocity_of(full, one_side),
         claims=_claims(samples, integrated),
-        notes=notes_of(samples.record),
-        hints=(*missing(samples), *azimuths(samples, delta), *units(samples, integrated)),
+        notes=(*notes_of(samples.record), *polarised_sentences(samples)),
+        hints=(*frame_doubt(samples), *missing(samples), *judged.hints),
+        untold=judged.untold,
     )
+
+
+def _ends(numbers: Floats) -> tuple[float, float]:
+    """Return the smallest and the largest of numbers."""
+    return float(numbers.min()), float(numbers.max())
 
 
 def _claims(samples: Samples, incidences: Sequence[Incidence]) -> tuple[Claim, ...]:
@@ -291,25 +298,9 @@ class ExchangedPairs:
 
 def reciprocity_of(samples: Samples, one_side: bool) -> ExchangedPairs | None:
     """Return the asymmetry of samples that are each other's swap; None without any."""
-    angles = [degrees(angle) for angle in (samples.theta_i, samples.phi_i, samples.theta_r, samples.phi_r)]
-    theta_i, phi_i, theta_r, phi_r = (np.rint(angle / _SAME_DEG).astype(np.int64) for angle in angles)
-    turn = round(360.0 / _SAME_DEG)
-    if samples.turned:
-        coordinates = theta_i, np.where(theta_i == 0, 0, phi_i % turn), theta_r, np.where(theta_r == 0, 0, phi_r % turn)
-        swapped = coordinates[2], coordinates[3], coordinates[0], coordinates[1]
-    else:
-        delta = np.where((theta_i == 0) | (theta_r == 0), 0, (phi_r - phi_i) % turn)
-        other = np.where(delta == 0, 0, turn - delta)
-        delta, other = (np.minimum(delta, other),) * 2 if one_side else (delta, other)
-        coordinates = (theta_i, theta_r, delta, 0 * delta)
-        swapped = (theta_r, theta_i, other, 0 * delta)
-    code, code_swapped = (((a * turn + b) * turn + c) * turn + d for a, b, c, d in (_wide(coordinates), _wide(swapped)))
-    order = np.argsort(code, kind="stable")
-    place = np.clip(np.searchsorted(code[order], code_swapped), 0, len(order) - 1)
-    partner = order[place]
-    first = np.flatnonzero((code[partner] == code_swapped) & (code < code_swapped))
+    first, second = exchanged_rows(samples, one_side)
     a = samples.values[first]
-    b = samples.values[partner[first]]
+    b = samples.values[second]
     level = float(np.nanmedian(np.abs(samples.values))) if samples.known.any() else 0.0
     pairs = int(np.sum(are_bright(a, b, level).any(axis=1)))
     if not pairs:
@@ -318,43 +309,13 @@ def reciprocity_of(samples: Samples, one_side: bool) -> ExchangedPairs | None:
     return ExchangedPairs(pairs, float(np.median(asymmetry)), float(asymmetry.max()))
 
 
-def _wide(parts: Sequence[NDArray[np.int64]]) -> list[NDArray[np.uint64]]:
-    """Return four whole numbers of 16 bits as unsigned numbers of 64, whose products do not overflow together."""
-    return [part.astype(np.uint64) for part in parts]
-
-
-def units(samples: Samples, incidences: Sequence[Incidence]) -> tuple[str, ...]:
-    """Return what looks wrong with the unit of the values, in sentences."""
-    if not samples.known.any():
-        return ("The samples have no values.",)
-    sound = [max(some.albedo) for some in incidences if some.peak <= PEAK]
-    if sound:
-        albedo = float(np.median(sound))
-        how = "the values integrate to"
-    else:
-        albedo = float(np.pi * np.nanmedian(samples.values))
-        how = "pi times the median of f_r is"
-    if albedo > _EXCESS:
-        reasons = [f"reflectance factors, which make {albedo / np.pi:.3g} when they are divided by pi"]
-        if albedo / 100.0 > _BLACK and albedo > 10.0:
-            reasons = [
-                f"percent, which make {albedo / 100.0:.3g}",
-                f"reflectance factors in percent ({albedo / 314.16:.3g})",
-            ]
-        return (f"Units? An albedo above 1: {how} {albedo:.4g}. The values may be {', or '.join(reasons)}.",)
-    if 0.0 <= albedo < _BLACK:
-        text = f"Units? Too dark: {how} {albedo:.2g}, and the blackest coatings reflect more."
-        return (f"{text} A thousand times is {1e3 * albedo:.2g}.",)
-    return ()
-
-
 def missing(samples: Samples) -> tuple[str, ...]:
     """Return whether negative values, or the largest, look like marks of missing ones, in a sentence."""
     known = samples.values[samples.known]
     scale = np.pi if samples.record.get("quantity") == "reflectance_factor" else 1.0
     low = float(known.min(initial=0.0))
     if low >= 0.0:
-        return _missing_above(known, scale)
+        return _missing_above(known, scale) or _floor(samples)
     if not np.any(known > 0.0):
         return ("Sign? No value is above 0, but f_r is never negative: these values cannot be tabulated or fitted.",)
     number = low * scale
@@ -364,10 +325,13 @@ def missing(samples: Samples) -> tuple[str, ...]:
     if not others.size or (count == 1 and not np.isclose(number, _MISSING).any()):
         return ()
     far = low < -float(np.abs(others).max()) and low < 10.0 * min(float(others.min()), 0.0)
-    if far or np.isclose(number, _MISSING).any():
-        verb, they = ("is", "does it") if count == 1 else ("are", "do they")
-        return (f"{counted(count, 'value')} {verb} {number:.4g}: {they} mean missing?",)
-    return ()
+    return (_marks(count, number),) if far or np.isclose(number, _MISSING).any() else ()
+
+
+def _marks(count: int, number: float) -> str:
+    """Return a sentence on values that look like marks of missing ones."""
+    verb, they = ("is", "does it") if count == 1 else ("are", "do they")
+    return f"{counted(count, 'value')} {verb} {number:.4g}: {they} mean missing?"
 
 
 def _missing_above(known: Floats, scale: float) -> tuple[str, ...]:
@@ -379,8 +343,22 @@ def _missing_above(known: Floats, scale: float) -> tuple[str, ...]:
     nines = np.isclose(high * scale, -_MISSING).any() or np.isclose(high * scale, _FILLED, rtol=1e-6).any()
     if not others.size or not nines or high <= _FAR * float(others.max()):
         return ()
-    verb, they = ("is", "does it") if count == 1 else ("are", "do they")
-    return (f"{counted(count, 'value')} {verb} {high * scale:.4g}: {they} mean missing?",)
+    return (_marks(count, high * scale),)
+
+
+def _floor(samples: Samples) -> tuple[str, ...]:
+    """Return whether the smallest values look like marks of missing ones: one number many times, far below others."""
+    quantity = str(samples.record.get("quantity", "f_r"))
+    numbers = numbers_of(quantity, samples.values, samples.theta_i, samples.theta_r)[samples.known]
+    numbers = numbers[np.isfinite(numbers) & (numbers > 0.0)]
+    marks = np.isclose(numbers, numbers.min(initial=np.inf), rtol=1e-6, atol=0.0)
+    others = numbers[~marks]
+    if not _MANY <= marks.sum() < numbers.size / 2 or others.min() < _ABOVE_FLOOR * numbers.min():
+        return ()
+    number = f"{numbers.min():.6g}"
+    text = f"{marks.sum()} values are {number}, and no other is below {others.min():.4g}"
+    how = remedy(samples.record, f"--missing {number} reads them as holes")
+    return (f"Holes? {text}: if they mean missing, {how}.",)
 
 
 def is_constant(samples: Samples) -> bool:
@@ -388,29 +366,3 @@ def is_constant(samples: Samples) -> bool:
     seen = samples.known.sum(axis=0) >= _FEWEST
     values = np.where(samples.known, samples.values, np.nan)[:, seen]
     return bool(seen.any() and np.all(np.nanmin(values, axis=0) == np.nanmax(values, axis=0)))
-
-
-def azimuths(samples: Samples, delta_deg: Floats) -> tuple[str, ...]:
-    """Return whether a lobe lies at the light and none in the mirror direction, in a sentence.
-
-    `delta_deg` (N,) are azimuths [degree] from the light to the viewer, in [0, 360).
-    """
-    known = samples.known
-    theta_i = np.degrees(samples.theta_i)
-    f_r = np.where(known, samples.values, 0.0).sum(axis=1) / np.maximum(known.sum(axis=1), 1)
-    low, high = _TILTED_DEG
-    seen = known.any(axis=1) & (theta_i >= low) & (theta_i <= high)
-    level = np.abs(np.degrees(samples.theta_r) - theta_i) <= _ABOUT_DEG
-    back = seen & level & (np.abs((delta_deg + 180.0) % 360.0 - 180.0) <= _ABOUT_DEG)
-    mirror = seen & level & (np.abs(delta_deg - 180.0) <= _ABOUT_DEG)
-    votes = []
-    for rows in lights(samples, _FEWEST) or bands(samples):
-        if back[rows].any():
-            middle = float(np.median(f_r[rows][seen[rows]]))
-            lobe, mirrored = (f_r[rows].max(where=side[rows], initial=0.0) for side in (back, mirror))
-            votes.append(lobe > _LOBE * max(middle, mirrored) and mirrored <= _LEVEL * max(middle, 0.0))
-    if 2 * sum(votes) <= len(votes):
-        return ()
-    other, direction = ("light", "light") if samples.record.get("azimuth") else ("forward", "forward direction")
-    text = "Azimuths? The lobe lies at delta_phi = 0, towards the light, and none lies in the mirror direction."
-    return (f"{text} If the file counts azimuths from the {direction}, import it with --azimuth {other}.",)

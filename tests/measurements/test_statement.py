@@ -84,8 +84,8 @@ def test_a_claim_of_the_header_is_compared_with_its_values() -> None:
 @pytest.mark.parametrize(
     ("value", "words"),
     [
-        (0.9, "reflectance factors, which make 0.9 when they are divided by pi"),
-        (28.0, "percent, which make 0.88"),
+        (0.9, "reflectance factors, which make 0.9 (--quantity reflectance_factor)"),
+        (28.0, "f_r in percent, which make 0.88 (--quantity percent)"),
         (2e-5, "A thousand times is 0.063"),
         (0.3, ""),
         (1e-3, ""),
@@ -192,13 +192,16 @@ def test_a_claim_is_judged_only_where_viewers_surround_enough(claimed: float, wo
     assert any(words in sentence for sentence in known.sentences)
 
 
-def _lobe(at_deg: float, back: float = 0.0) -> Any:
-    """Return f_r with a lobe at an azimuth, and one at the light with a part of its height."""
+def _lobe(at_deg: float, back: float = 0.0, grows: float = 1.0) -> Any:
+    """Return f_r with a lobe at an azimuth, and one at the light with a part of its height.
+
+    Mirror lobes grow as 1/cos^2 and narrow in azimuth to grazing lights; with `grows` of 0 lobes are round.
+    """
 
     def f_r(theta_i: Any, theta_r: Any, delta: Any) -> Any:
         def peak(turn: float) -> Any:
             cos = np.cos(theta_i) * np.cos(theta_r) + np.sin(theta_i) * np.sin(theta_r) * np.cos(delta - turn)
-            return np.exp(40.0 * (cos - 1.0))
+            return np.exp(40.0 * (cos - 1.0)) * (np.cos(theta_i) * np.cos(theta_r)) ** -grows
 
         return 0.1 + peak(np.radians(at_deg)) + back * peak(0.0)
 
@@ -207,7 +210,13 @@ def _lobe(at_deg: float, back: float = 0.0) -> Any:
 
 @pytest.mark.parametrize(
     ("values", "doubted"),
-    [(_lobe(0.0), True), (_lobe(180.0), False), (_lobe(180.0, 1.0), False), (_lobe(90.0), False), (0.1, False)],
+    [
+        (_lobe(0.0), True),
+        (_lobe(0.0, grows=0.0), False),
+        (_lobe(180.0), False),
+        (_lobe(180.0, 1.0), False),
+        (0.1, False),
+    ],
 )
 def test_a_lobe_at_the_light_is_doubted(values: Any, doubted: bool) -> None:
     sheet = samples(values, lights=(0.0, 30.0, 60.0))
