@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any, NamedTuple, Self
 
 import numpy as np
@@ -18,12 +19,16 @@ from brdfdb.materials.source import Evaluate
 from brdfdb.measurements import symmetry
 from brdfdb.measurements.colours import rgb_of, spectra_of_colours
 from brdfdb.measurements.extent import Extent
-from brdfdb.measurements.interpolation import Base, fit, floor_of
+from brdfdb.measurements.glints import Glints
+from brdfdb.measurements.interpolation import fit
+from brdfdb.measurements.lobe_base import Base
 from brdfdb.measurements.record import Change, Measured, Noise
 from brdfdb.measurements.samples import Samples
+from brdfdb.measurements.usable_values import without_filled
 from brdfdb.parameters import Floats
 from brdfdb.spectra import PICTURE_NM
 
+_NORMAL_99 = 2.6  # standard deviations within which 99 of 100 values of normal noise lie
 _COLOURS = (("R", "G", "B"), ("X", "Y", "Z"))
 _LOBE_LIGHTS_DEG = (10.0, 20.0, 30.0)  # lights at which the width of a lobe is measured
 _HALF_DEG = np.append(0.0, np.geomspace(0.02, 60.0, 160))  # half vectors of these lights, dense at narrow lobes
@@ -38,6 +43,7 @@ _AZIMUTHS = 16  # azimuths of the lights of an anisotropic surface
 _RINGS = 64
 _SPOKES = 96
 _CROWDED = 8.0  # rings next to the normal are so many e-folds closer than those at the horizon
+_DARKEST = 0.99  # largest part of the light that glints and margin leave no room for
 _ROUNDS = 40  # iterations of the factors of a reciprocal f_r, each of which counts for light and viewer
 
 
@@ -76,11 +82,22 @@ class MeasuredSource(FunctionSource):
 
     _measured: Measured = PrivateAttr()
     _channels_at: Evaluate = PrivateAttr()
+    _samples: Samples | None = PrivateAttr(default=None)
 
     @property
     def measured(self) -> Measured:
         """Return the record of the data."""
         return self._measured
+
+    @property
+    def glints(self) -> Glints | None:
+        """Return the peaks of f_r that its lookups leave out, at the wavelengths of the source; None without any."""
+        return self._measured.glints
+
+    @property
+    def samples(self) -> Samples | None:
+        """Return the samples that f_r is interpolated between, or the nodes of a file; None if f_r is a function."""
+        return self._samples
 
     @classmethod
     def of_samples(
@@ -91,27 +108,24 @@ class MeasuredSource(FunctionSource):
         title: str = "",
         provenance: str = "",
         base: Base | None = None,
-        reciprocal: bool = False,
+        reciprocal: bool | None = None,
     ) -> Self:
         """Return ten samples or more as a source, by the fit of `brdfdb.measurements.interpolation`.
 
         f_r is anisotropic if the samples have several azimuths of the light. Name, title and provenance are by default
         those of the samples. `base` is f_r [1/sr] (N, C) at unit vectors, such as `Source.brdf_at` of a fit, to which
-        the ratio is interpolated; by default Lambert and one lobe. Of data known to be `reciprocal`, each sample counts
-        with light and viewer exchanged, too. ParameterError if there are too few samples, no value is above 0, numbers
+        the ratio is interpolated; by default Lambert and one lobe. Of `reciprocal` data each sample counts with light
+        and viewer exchanged, too; by default they are reciprocal if samples that were held out follow better then.
+        ParameterError if there are too few samples, no value is above 0, numbers
         far below 0 stand for holes, or the name has no letters or digits.
         """
+        samples, filled = without_filled(samples)
         fitted = fit(samples, base, reciprocal=reciprocal)
-        noise = None
-        uncertainty = samples.uncertainty
-        if uncertainty is not None:
-            relative = (uncertainty / np.maximum(np.abs(samples.values), floor_of(samples)))[samples.known]
-            median, p95 = (float(f"{value:.3g}") for value in np.nanpercentile(relative, [50.0, 95.0]))
-            noise = Noise(median=median, p95=p95)
         some = samples.known.any(axis=1)
         extent = Extent.of(samples, turned=samples.turned)
         known = samples.values[samples.known]
         noise_p99 = fitted.held_out.p99
+        noise = None if fitted.noise is None else _NORMAL_99 * fitted.noise.p95
         measured = Measured(
             by=samples.instrument.name,
             channels=list(samples.channels),
@@ -120,16 +134,35 @@ class MeasuredSource(FunctionSource):
             holes=int(np.count_nonzero(~samples.known)),
             negative=float(f"{np.mean(known < 0.0):.3g}"),
             interpolation=f"asinh of f_r over noise, less that of {fitted.base}, by radial functions of directions",
-            reciprocity=symmetry.RECIPROCAL if reciprocal else symmetry.reciprocity(fitted.f_r, extent, noise_p99),
+            reciprocity=symmetry.RECIPROCAL
+            if fitted.f_r.reciprocal
+            else symmetry.reciprocity(fitted.f_r, extent, noise),
             mirror=None if samples.turned else _mirror_of(samples, noise_p99),
             extrapolated=_extrapolated(extent),
             extent=extent,
             held_out=fitted.held_out,
-            noise=noise,
+            noise=fitted.noise,
+            outliers=filled + fitted.outliers,
+            doubts=list(samples.record.get("doubts", ())),
         )
         origin = provenance or samples.provenance or "a file of samples"
         label = _Label(name or samples.name, title or samples.name, origin)
-        return cls._of(fitted.f_r, samples.wavelength_nm, measured, label, turned=samples.turned)
+        source = cls._of(fitted.f_r, samples.wavelength_nm, measured, label, turned=samples.turned)
+        source._samples = samples
+        return source._with_glints(fitted.glints)
+
+    def _with_glints(self, glints: Glints | None) -> Self:
+        """Return the source with glints whose powers are those of its channels."""
+        if glints is None:
+            return self
+        known_nm = None if self.wavelengths_nm is None else np.array(self.wavelengths_nm)
+        samples = self._samples
+        assert samples is not None
+        if known_nm is not None and samples.channels in _COLOURS:
+            glints = glints.mixed(rgb_of(samples.channels, np.eye(3)) @ spectra_of_colours())
+        elif known_nm is not None and samples.wavelength_nm is not None:
+            glints = glints.mixed(np.eye(known_nm.size)[:, np.argsort(samples.wavelength_nm)])
+        return self.recorded(glints=glints)
 
     @classmethod
     def of_function(
@@ -183,7 +216,11 @@ class MeasuredSource(FunctionSource):
         )
         if seen is not None and seen.assumed and seen.asymmetry is not None and seen.asymmetry.max > 0.0:
             f_r = _mirrored(f_r)
-        return cls._of(f_r, wavelength_nm, measured, _Label(name, title, provenance), turned=turned)
+        source = cls._of(f_r, wavelength_nm, measured, _Label(name, title, provenance), turned=turned)
+        if nodes is not None:
+            source._samples, filled = without_filled(nodes)
+            return source.recorded(outliers=filled)
+        return source
 
     @classmethod
     def _of(
@@ -203,7 +240,11 @@ class MeasuredSource(FunctionSource):
             order = np.argsort(wavelength_nm)
             wavelength_nm = wavelength_nm[order]
             f_r = _ordered(f_r, order)
-        width = _width(_mirrored(f_r) if measured.chiral else f_r) if measured.chiral or not turned else None
+        chiral = measured.chiral
+        # half vectors across the plane of incidence show the width along x of a light from y
+        azimuths = (0.5 * np.pi, 0.0) if turned else (0.0,)
+        widths = [_width(_mirrored(f_r) if chiral else f_r, phi) for phi in azimuths]
+        known = [width for width in widths if width is not None]
         source = cls(
             brdf=_brdf_of(f_r, channels, wavelength_nm),
             name=slug(label.name),
@@ -212,7 +253,7 @@ class MeasuredSource(FunctionSource):
             wavelengths_nm=None if wavelength_nm is None else tuple(wavelength_nm.tolist()),
             anisotropic=turned,
             reciprocal=measured.reciprocity.assumed,
-            alpha=None if width is None else (width, width),
+            alpha=(known[0], known[-1]) if len(known) == len(azimuths) else None,
         )
         source._measured = measured
         source._channels_at = f_r
@@ -223,6 +264,23 @@ class MeasuredSource(FunctionSource):
         extent = self._measured.extent
         return np.zeros(len(wi), dtype=bool) if extent is None else extent.outside(wi, wr)
 
+    def samples_at(self, wavelength_nm: NDArray[np.float64] | None) -> Samples | None:
+        """Return the samples with values (N, L) at wavelengths [nm] of a table, or grey; None without samples."""
+        samples = self._samples
+        if samples is None or wavelength_nm is None:
+            return samples
+        values = samples.values
+        known_nm = np.array(self.wavelengths_nm)
+        if samples.channels not in _COLOURS:
+            assert samples.wavelength_nm is not None
+            values = values[:, np.argsort(samples.wavelength_nm)]
+        holes = _spectra(np.isnan(values).astype(np.float64), samples.channels, known_nm, wavelength_nm) != 0.0
+        values = np.where(holes, np.nan, _spectra(np.nan_to_num(values), samples.channels, known_nm, wavelength_nm))
+        names = tuple(f"{nm:g}nm" for nm in wavelength_nm)
+        return replace(
+            samples, values=values, channels=names, wavelength_nm=wavelength_nm, uncertainty=None, bandwidth_nm=None
+        )
+
     def recorded(self, **changes: Any) -> Self:
         """Return the source with some entries of its record changed."""
         changed = self.model_copy()
@@ -232,10 +290,11 @@ class MeasuredSource(FunctionSource):
     def made(self, law: str, margin: float | Floats = MARGIN) -> Self:
         """Return the nearest source that keeps a law; its record says what was changed.
 
-        "reciprocal" is the mean of f_r and f_r with light and viewer exchanged. "conserving" is f_r times one number
-        for each light, the largest up to 1 that keeps the albedo at most 1 - `margin`; times that of the viewer, too,
-        if f_r is reciprocal. The margin [1] is room for the error of a table: a number, or one for each of the polar
-        angles `LIGHTS_DEG` of the light.
+        "reciprocal" is the mean of f_r and f_r with light and viewer exchanged; glints stay as they are. "conserving"
+        is f_r times one number for each light, the largest up to 1 that keeps the albedo at most 1 - `margin`; times
+        that of the viewer, too, if f_r is reciprocal. Glints then keep to what is left of 1: one that is not resolved
+        becomes narrower, which leaves its f_r at the sample, and others lose power. The margin [1] is room for the
+        error of a table: a number, or one for each of the polar angles `LIGHTS_DEG` of the light.
         """
         if law not in ("reciprocal", "conserving"):
             text = f"{law!r} is neither reciprocal nor conserving"
@@ -259,10 +318,35 @@ class MeasuredSource(FunctionSource):
         measured = self._measured.model_copy(update={"changes": changes, "reciprocity": reciprocity})
         wavelength_nm = None if self.wavelengths_nm is None else np.array(self.wavelengths_nm)
         label = _Label(self.name, self.title, self.provenance)
-        return self._of(after, wavelength_nm, measured, label, turned=self.anisotropic)
+        source = self._of(after, wavelength_nm, measured, label, turned=self.anisotropic)
+        source._samples = self._samples
+        if law == "conserving" and self.glints is not None:
+            glints = self.glints.limited(source._room(self.glints, margin))
+            darker = np.minimum(margin + _largest_power(glints), _DARKEST)
+            return self.recorded(glints=None).made(law, darker).recorded(glints=glints)
+        return source
+
+    def _room(self, glints: Glints, margin: float | Floats) -> Floats:
+        """Return what glints may reflect [1] of their lights, (glints, wavelengths): 1 less margin and albedo."""
+        f_r = self.brdf_at(None if self.wavelengths_nm is None else np.array(self.wavelengths_nm))
+        theta_i_deg = [glint.theta_i_deg for glint in glints.glints]
+        lights = unit_vector(radians(theta_i_deg), radians([glint.phi_i_deg for glint in glints.glints]))
+        albedos = []
+        for light in lights:
+            viewers, weight = _viewers(light, whole=self.anisotropic)
+            albedos.append(weight @ f_r(np.broadcast_to(light, viewers.shape), viewers))
+        margins = np.interp(theta_i_deg, LIGHTS_DEG, np.broadcast_to(margin, LIGHTS_DEG.shape))
+        return np.asarray(np.maximum(1.0 - margins[:, np.newaxis] - np.array(albedos), 0.0))
 
     def _check_function(self) -> None:
         """Take the data as they are."""
+
+
+def _largest_power(glints: Glints) -> Floats:
+    """Return the largest power [1] of glints over wavelengths and azimuths of the light, for `LIGHTS_DEG`."""
+    azimuths = np.arange(_AZIMUTHS) * (2.0 * np.pi / _AZIMUTHS) if glints.turned else np.zeros(1)
+    wi = unit_vector(radians(LIGHTS_DEG)[:, np.newaxis], azimuths)
+    return np.asarray(glints.power(wi.reshape(-1, 3)).reshape(LIGHTS_DEG.size, -1).max(axis=1))
 
 
 def slug(name: str) -> str:
@@ -291,15 +375,22 @@ def _brdf_of(f_r: Evaluate, channels: tuple[str, ...], wavelength_nm: NDArray[np
         return values
 
     def brdf(wi: Floats, wr: Floats, at: NDArray[np.float64] | None) -> Floats:
-        values = evaluated(wi, wr)
-        if at is None or wavelength_nm is None:
-            return values
-        stored = spectra_of_colours() if channels in _COLOURS else np.eye(wavelength_nm.size)
-        weights = np.stack([np.interp(at, wavelength_nm, row) for row in stored])
-        values = rgb_of(channels, values) if channels in _COLOURS else values
-        return np.asarray(np.maximum(np.einsum("nc,cl->nl", values, weights), 0.0))
+        values = _spectra(evaluated(wi, wr), channels, wavelength_nm, at)
+        return values if at is None or wavelength_nm is None else np.maximum(values, 0.0)
 
     return brdf
+
+
+def _spectra(
+    values: Floats, channels: tuple[str, ...], wavelength_nm: NDArray[np.float64] | None, at: NDArray[np.float64] | None
+) -> Floats:
+    """Return values (N, C) of channels at other wavelengths [nm], by straight lines, or colours as spectra."""
+    if at is None or wavelength_nm is None:
+        return values
+    stored = spectra_of_colours() if channels in _COLOURS else np.eye(wavelength_nm.size)
+    weights = np.stack([np.interp(at, wavelength_nm, row) for row in stored])
+    values = rgb_of(channels, values) if channels in _COLOURS else values
+    return np.asarray(np.einsum("nc,cl->nl", values, weights))
 
 
 def _ordered(f_r: Evaluate, order: NDArray[np.intp]) -> Evaluate:
@@ -324,15 +415,15 @@ def _mirror_of(samples: Samples, noise: float) -> Any:
     return symmetry.mirror_of_samples(samples.values[rows[left[a]]], samples.values[rows[right[b]]], noise)
 
 
-def _width(f_r: Evaluate) -> float | None:
-    """Return the width [1] of the lobe around the mirror direction, or None if there is none that is clear."""
+def _width(f_r: Evaluate, phi: float) -> float | None:
+    """Return the width [1] of the lobe across the plane of incidence at an azimuth [rad]; None: no lobe is clear."""
     slopes = []
     for light in _LOBE_LIGHTS_DEG:
-        wi = np.broadcast_to(unit_vector(radians(light), 0.0), (_HALF_DEG.size, 3))
+        wi = np.broadcast_to(unit_vector(radians(light), phi), (_HALF_DEG.size, 3))
         # half vectors across the plane of incidence: the viewer stays above the horizon longest
         theta = radians(_HALF_DEG)
-        along = unit_vector(radians(0.0), 0.0)
-        across = np.array([0.0, 1.0, 0.0])
+        along = np.array([0.0, 0.0, 1.0])
+        across = np.array([-np.sin(phi), np.cos(phi), 0.0])
         half = np.cos(theta)[:, np.newaxis] * along + np.sin(theta)[:, np.newaxis] * across
         wr = 2.0 * np.sum(wi * half, axis=1, keepdims=True) * half - wi
         above = wr[:, 2] > 0.05

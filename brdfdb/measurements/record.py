@@ -6,14 +6,13 @@ from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from brdfdb.errors import counted, percent
 from brdfdb.measurements.extent import Extent
+from brdfdb.measurements.glints import Glints
+from brdfdb.measurements.regions import Regions
 
-# Where errors at held-out samples are told apart: f_r in floors of the errors, and the cosine of a polar angle
-_LEVELS = (1.0, 10.0, 100.0, 1000.0)
-_LOW = 0.342  # of 70 degrees
-_FEWEST = 20  # samples that tell an error apart
 _NORMAL_99 = 2.6  # standard deviations within which 99 of 100 values of normal noise lie
 _FEW = 1e-3  # smallest share of directions that is shown: it is counted with a few thousand directions
 _SHOWN = 12  # digits of a digest
@@ -62,43 +61,83 @@ class HeldOut(BaseModel):
     p95: float
     p99: float
     max: float
-    p99_of_levels: list[list[float]] | None = Field(
-        default=None,
-        description="the same for f below 1, 10, 100 and 1000 times the mean floor, and above, each for light and "
-        "viewer up to 70 degrees, and for others; null: not known",
+    regions: Regions | None = Field(default=None, description="errors by region, noise included; null: not known")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _of_older_tables(cls, fields: Any) -> Any:
+        """Leave out the errors by levels of f_r, which tables of older programs have in place of regions."""
+        older = isinstance(fields, dict) and "p99_of_levels" in fields
+        return {key: value for key, value in fields.items() if key != "p99_of_levels"} if older else fields
+
+
+class WorstSample(BaseModel):
+    """The sample from which the table at the same directions differs most."""
+
+    model_config = _STRICT
+
+    theta_i_deg: float
+    phi_i_deg: float
+    theta_r_deg: float
+    phi_r_deg: float
+    channel: str
+    sample: float = Field(description="1/sr")
+    table: float = Field(description="1/sr")
+    error: float = Field(description="abs(table - sample) over the sample, or the floor of the errors")
+
+    @property
+    def sentence(self) -> str:
+        """Return where and how much the table differs, in words."""
+        light = f"theta_i {self.theta_i_deg:g}°, phi_i {self.phi_i_deg:g}°"
+        viewer = f"theta_r {self.theta_r_deg:g}°, phi_r {self.phi_r_deg:g}°"
+        return f"{percent(self.error)} at {light}, {viewer} ({self.sample:.4g} /sr; table {self.table:.4g} /sr)"
+
+
+class IncidenceEnergy(BaseModel):
+    """Trapezoid sums of f_r cos(theta_r) over the viewers of one incidence, in the channel that differs most.
+
+    They are integrals over theta_r [rad] of viewers in a plane, and otherwise over the projected solid angle [sr].
+    """
+
+    model_config = _STRICT
+
+    theta_i_deg: float
+    phi_i_deg: float
+    channel: str
+    samples: float = Field(description="sum of the samples")
+    table: float = Field(description="sum of the table at the directions of the samples")
+    error: float = Field(description="abs(table - samples) over the samples")
+
+
+class AtSamples(BaseModel):
+    """The table, with its glints, at the samples' own directions."""
+
+    model_config = _STRICT
+
+    p95: float = Field(description="95th percentile of the relative differences from the samples, noise included")
+    within: float = Field(default=0.0, description="share of the samples from which the table differs by at most 5 %")
+    worst: WorstSample
+    energies: list[IncidenceEnergy] = Field(
+        description="for each incidence with viewers enough, those with the largest differences if there are many"
     )
 
-    def level(self, f_r: NDArray[np.floating[Any]]) -> NDArray[np.int64]:
-        """Return the number of the level of each f_r [1/sr] in `p99_of_levels`."""
-        return np.asarray(np.digitize(f_r, np.multiply(np.mean(self.floor), _LEVELS)))
-
-    def with_levels(
-        self, errors: NDArray[np.float64], f_r: NDArray[np.float64], lowest: NDArray[np.float64]
-    ) -> HeldOut:
-        """Return the record with the percentiles of relative errors (N, C) of f_r [1/sr] of levels.
-
-        `lowest` (N,) are cosines of the lower of light and viewer. Where few samples tell, the error is that of the
-        next dimmer level, or else of all samples. Unknown errors are nan.
-        """
-        known = np.isfinite(errors)
-        level = self.level(f_r)
-        low = np.broadcast_to(lowest[:, np.newaxis] < _LOW, errors.shape)
-        of_levels = []
-        chosen = [known, known]
-        for number in range(len(_LEVELS) + 1):
-            parts = [known & (level == number) & zone for zone in (~low, low)]
-            chosen = [part if part.sum() >= _FEWEST else last for part, last in zip(parts, chosen, strict=True)]
-            of_levels.append([float(f"{np.percentile(errors[part], 99.0):.3g}") for part in chosen])
-        return self.model_copy(update={"p99_of_levels": of_levels})
+    @property
+    def worst_energy(self) -> IncidenceEnergy | None:
+        """The incidence whose energy the table changes most; None without any."""
+        return max(self.energies, key=lambda one: one.error, default=None)
 
 
 class Noise(BaseModel):
-    """Standard uncertainty of the samples as their file states it, relative to f_r or the floor."""
+    """Standard uncertainty of the samples, relative to f_r or the floor."""
 
     model_config = _STRICT
 
     median: float
     p95: float
+    origin: Literal["stated", "repeats", "reciprocal pairs", "neighbours"] = Field(
+        default="stated",
+        description="stated by the file, or shown by samples that should be the same, or by neighbours",
+    )
 
 
 class Change(BaseModel):
@@ -228,6 +267,16 @@ class Measured(BaseModel):
         default=None, description="directions that were measured, without holes; null: f_r is known everywhere"
     )
     held_out: HeldOut | None = Field(default=None, description="null: f_r is known everywhere")
+    at_samples: AtSamples | None = Field(
+        default=None, description="the table at the samples' own directions; null: f_r is known everywhere"
+    )
+    outliers: list[str] = Field(
+        default_factory=list, description="samples that f_r does not pass through, as their neighbours deny them"
+    )
+    doubts: list[str] = Field(default_factory=list, description="what looks wrong in the file, as its statement says")
+    glints: Glints | None = Field(
+        default=None, description="peaks that the values of the table leave out, and lookups add; null: there are none"
+    )
     noise: Noise | None = Field(default=None, description="null: not known")
     changes: list[Change] = Field(default_factory=list)
     simulation: SimulationRecord | None = Field(default=None, description="null: an instrument measured, or a renderer")
@@ -251,30 +300,54 @@ class Measured(BaseModel):
         return None if self.noise is None else _NORMAL_99 * self.noise.p95
 
     def error_of(
-        self, f_r: NDArray[np.floating[Any]], lowest: NDArray[np.float64], floor: NDArray[np.float64]
+        self,
+        f_r: NDArray[np.floating[Any]],
+        wi: NDArray[np.float64],
+        wr: NDArray[np.float64],
+        floor: NDArray[np.float64],
     ) -> NDArray[np.float64]:
-        """Return the uncertainty [1/sr] of f_r (..., L) that 99 of 100 values keep to; 0 if nothing is known of it.
+        """Return the uncertainty [1/sr] of f_r (N, L) that 99 of 100 values keep to; 0 if nothing is known of it.
 
-        `lowest` (..., 1) are cosines of the lower of light and viewer. Errors are relative to the `floor` (L,) [1/sr]
-        at least, or that of the samples that were held out. All samples of a simulation share their rays: those that
-        were held out do not show their common noise, which is added.
+        It is that of the region of unit vectors (N, 3) of light and viewer. Errors are relative to the `floor` (L,)
+        [1/sr] at least. All samples of a simulation share their rays: those that were held out do not show their common
+        noise, which is added.
         """
         held = self.held_out
-        if held is None or held.p99_of_levels is None:
+        if held is None or held.regions is None:
             return np.asarray((self.uncertainty or 0.0) * np.maximum(f_r, floor), np.float64)
-        relative = np.asarray(held.p99_of_levels)[held.level(f_r), (lowest < _LOW).astype(np.int64)]
+        relative = held.regions.p99(wi, wr)[:, np.newaxis]
         common = 0.0 if self.simulation is None else _NORMAL_99 * self.simulation.standard_error_median
-        return np.asarray(np.hypot(relative, common) * np.maximum(f_r, np.mean(held.floor)), np.float64)
+        floor = np.maximum(floor, min(held.floor))
+        return np.asarray(np.hypot(relative, common) * np.maximum(f_r, floor), np.float64)
+
+    @property
+    def origin(self) -> str:
+        """The word for data of this kind: measured or simulated."""
+        return "measured" if self.simulation is None else "simulated"
+
+    @property
+    def share(self) -> str:
+        """The share of all pairs of directions that were measured, in words; empty: f_r is known everywhere."""
+        if not self.extrapolated:
+            return ""
+        share = 1.0 - self.extrapolated
+        return f"{100.0 * share:.2g} %" if share >= _FEW else f"less than {100.0 * _FEW:g} %"
+
+    @property
+    def where(self) -> str:
+        """What a verdict rests on, such as "where measured, 1.4 %"; empty: f_r is known everywhere."""
+        return f"where {self.origin}, {self.share}" if self.share else ""
 
     def in_words(self) -> list[str]:
         """Return sentences on origin, errors, symmetries and changes."""
         known = "f_r of a file, between its values" if self.extent else "f_r of a file, everywhere"
-        of = f"{self.samples} samples of {self.incidences} incidences" if self.samples else known
+        of = f"{counted(self.samples, 'sample')} of {counted(self.incidences, 'incidence')}" if self.samples else known
         lines = [f"{of}, channels {', '.join(self.channels)}{f'; {self.by}' if self.by else ''}"]
         if self.simulation is not None:
             lines += self.simulation.in_words()
         if self.file:
             lines.append(f"file {self.file}, sha256 {self.file_sha256[:_SHOWN]}...")
+        lines += [f"doubt: {sentence}" for sentence in self.doubts]
         if self.held_out is not None:
             held = self.held_out
             left = "one incidence" if held.scheme == "incidences" else f"one of {held.rounds} parts"
@@ -282,13 +355,24 @@ class Measured(BaseModel):
                 f"error at samples held out, {left} at a time: median {held.median:.2g}, 95 of 100 within "
                 f"{held.p95:.2g}, 99 within {held.p99:.2g}, of f_r"
             )
-            if held.p99_of_levels is not None:
-                lines[-1] += (
-                    f"; between a tenth of the mean and the mean f_r, 99 within {held.p99_of_levels[3][0]:.2g} up to "
-                    f"70 degrees, and {held.p99_of_levels[3][1]:.2g} beyond"
+            if held.regions is not None:
+                lines.append(held.regions.sentence)
+        if self.at_samples is not None:
+            lines.append(
+                f"table at the samples: 95 of 100 within {self.at_samples.p95:.2g}; largest difference "
+                f"{self.at_samples.worst.sentence}"
+            )
+            energy = self.at_samples.worst_energy
+            if energy is not None:
+                lines.append(
+                    f"energy of each incidence, summed over its samples: within {percent(energy.error)} (at "
+                    f"{energy.theta_i_deg:g} degrees: {energy.samples:.4g}; table {energy.table:.4g})"
                 )
+        lines += [self.glints.sentence] if self.glints is not None and self.glints.lit else []
+        lines += self.outliers
         noise = "not stated" if self.noise is None else f"median {self.noise.median:.2g}, p95 {self.noise.p95:.2g}"
-        lines.append(f"noise of the {'samples' if self.samples else 'file'}: {noise}")
+        shown = "" if self.noise is None or self.noise.origin == "stated" else f", from {self.noise.origin}"
+        lines.append(f"noise of the {'samples' if self.samples else 'file'}: {noise}{shown}")
         for name, symmetry in (("reciprocity", self.reciprocity), ("mirror symmetry", self.mirror)):
             if symmetry is not None:
                 seen = symmetry.asymmetry
@@ -301,13 +385,8 @@ class Measured(BaseModel):
                 )
                 lines.append(f"{name} {'assumed' if symmetry.assumed else 'not assumed'}: {how}")
         if self.extrapolated is not None:
-            share = 1.0 - self.extrapolated
-            words = f"{100.0 * share:.3g} %" if share >= _FEW else f"less than {100.0 * _FEW:g} %"
-            how = "measured" if self.simulation is None else "simulated"
-            lines.append(
-                f"{words} of all pairs of directions were {how}; elsewhere f_r is extrapolated, and its error is "
-                "unknown"
-            )
+            known = f"{self.share or '100 %'} of all pairs of directions were {self.origin}"
+            lines.append(f"{known}; elsewhere f_r is extrapolated, and its error is unknown")
         if self.negative > 0.0:
             lines.append(f"{100.0 * self.negative:.3g} % of the values are below 0: f_r is 0 there")
         return lines + [change.sentence for change in self.changes]

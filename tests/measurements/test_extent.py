@@ -16,7 +16,8 @@ from brdfdb.materials.source import Evaluate
 from brdfdb.measurements import MeasuredSource, Samples
 from brdfdb.measurements.coordinates import beyond, places
 from brdfdb.measurements.extent import Extent
-from brdfdb.measurements.interpolation import fit, floor_of
+from brdfdb.measurements.interpolation import fit
+from brdfdb.measurements.usable_values import floor_of
 from brdfdb.parameters import Floats
 from tests.measurements.made_up import scans, scattered
 

@@ -12,8 +12,9 @@ from brdfdb.errors import ParameterError
 from brdfdb.geometry import radians, unit_vector
 from brdfdb.materials import presets
 from brdfdb.measurements import Samples
-from brdfdb.measurements.interpolation import fit, floor_of
+from brdfdb.measurements.interpolation import fit
 from brdfdb.measurements.record import HeldOut
+from brdfdb.measurements.usable_values import floor_of
 from brdfdb.parameters import Floats
 from tests.measurements.made_up import scans, scattered
 
