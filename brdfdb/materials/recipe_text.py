@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
+_BARE = re.compile(r"[A-Za-z0-9_-]+")  # keys that TOML takes without quotation marks
 DIGITS = 6  # significant digits of parameters that were searched
 _ZERO = 1e-12  # parameters that are not larger are 0
 
@@ -23,7 +25,8 @@ def _value(value: Any) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, dict):
-        return "{ " + ", ".join(f"{key} = {_value(one)}" for key, one in value.items()) + " }"
+        keys = {key: key if _BARE.fullmatch(key) else _value(key) for key in value}
+        return "{ " + ", ".join(f"{keys[key]} = {_value(one)}" for key, one in value.items()) + " }"
     if isinstance(value, list | tuple):
         return "[" + ", ".join(map(_value, value)) + "]"
     if isinstance(value, str):

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel, Field
 
-from brdfdb.geometry import degrees, radians
+from brdfdb.geometry import degrees, radians, unit_vector
 from brdfdb.integrals.quadrature import MOST_PANELS, Albedo, reflected_share
 from brdfdb.lobes import narrowest
 from brdfdb.materials import FunctionRecord, Source
@@ -48,21 +48,29 @@ class TableAlbedo(NamedTuple):
     """The directional albedo [1] of a table, (theta_i, phi_i, wavelengths), without the specular part, and its lights.
 
     `error` (theta_i,) estimates the largest absolute error over phi_i and wavelengths; 0 where the integral is exact.
-    Isotropic tables have one phi_i, 0, and grey ones one wavelength.
+    `glints`, shaped as `albedo`, is the part of it that glints reflect, and `guessed` what may be missing of this part:
+    the power of a glint that is not resolved is an upper bound, and one between measured lights is a guess. Such power
+    counts up to an albedo of 1. Isotropic tables have one phi_i, 0, and grey ones one wavelength.
     """
 
     theta_i_deg: Axis
     phi_i_deg: Axis
     albedo: Floats
     error: Floats
+    glints: Floats | None = None
+    guessed: Floats | None = None
 
     @property
     def mean(self) -> Floats:
         """The mean over phi_i, of shape (theta_i, wavelengths)."""
+        return self.mean_of(self.albedo)
+
+    def mean_of(self, shares: Floats) -> Floats:
+        """Return the mean over phi_i of numbers shaped as `albedo`, (theta_i, wavelengths)."""
         if self.phi_i_deg.size == 1:
-            return self.albedo[:, 0]
+            return shares[:, 0]
         weights = _trapezoid_weights(self.phi_i_deg) / self.phi_i_deg[-1]
-        return np.asarray(np.einsum("tpw,p->tw", self.albedo, weights))
+        return np.asarray(np.einsum("tpw,p->tw", shares, weights))
 
 
 def directional_albedo(
@@ -87,8 +95,19 @@ def directional_albedo(
     -----
     Exact for what `Table.lookup` returns where that is linear in each angle, so that the integral is a sum of the
     stored values with the integrals of the hat functions of their axes as weights. Other tables are looked up, by the
-    quadrature of `brdfdb.integrals.quadrature`, to the tolerance.
+    quadrature of `brdfdb.integrals.quadrature`, to the tolerance. The power of glints is added, as
+    `TableAlbedo` says.
     """
+    if table.glints is not None:
+        lights = theta_i_deg
+        if lights is None:
+            lights = np.union1d(THETA_I_DEG, np.array([glint.theta_i_deg for glint in table.glints.glints]))
+        smooth = directional_albedo(table.without_glints(), lights, tolerance, source)
+        wi = unit_vector(radians(smooth.theta_i_deg)[:, np.newaxis], radians(smooth.phi_i_deg)).reshape(-1, 3)
+        power, guessed = (table.glints.power(wi, guessed=part).reshape(smooth.albedo.shape) for part in (False, True))
+        least = smooth.albedo + power - guessed
+        counted = np.clip(1.0 - least, 0.0, guessed)
+        return smooth._replace(albedo=least + counted, glints=power - guessed + counted, guessed=counted)
     if not linear_in_angles(table):
         within = tolerance_of(table) if tolerance is None else tolerance
         of_lobe = table.source if source is None else source
@@ -135,13 +154,15 @@ def hemispherical_albedo(theta_i_deg: Axis, albedo: Floats) -> Floats:
 class Reflected(NamedTuple):
     """Share of light reflected, averaged over phi_i: arrays (theta_i, wavelengths) [1], one wavelength if grey.
 
-    `albedo` is without the `specular` part, `hemispherical` (wavelengths,) of light from everywhere with it. `error` is
-    the largest estimate of the error of the integration.
+    `albedo` is without the `specular` part, `hemispherical` (wavelengths,) of light from everywhere with it. `glints`
+    is the part of `albedo` that glints reflect, None without any. `error` is the largest estimate of the error of the
+    integration, and of what glints may lack.
     """
 
     theta_i_deg: Axis
     albedo: Floats
     specular: Floats
+    glints: Floats | None
     hemispherical: Floats
     error: float
 
@@ -152,6 +173,7 @@ class Reflected(NamedTuple):
             "theta_i": np.ascontiguousarray(self.theta_i_deg),
             "albedo": np.ascontiguousarray(self.albedo),
             "specular_reflectance": np.ascontiguousarray(self.specular),
+            "glints": None if self.glints is None else np.ascontiguousarray(self.glints),
             "hemispherical": self.hemispherical,
             "error": self.error,
         }
@@ -164,8 +186,13 @@ class AlbedoDocument(BaseModel):
     theta_i: list[float] = Field(description="degrees")
     albedo: list[list[float]] = Field(description="[theta_i][wavelength], without the specular part")
     specular_reflectance: list[list[float]] = Field(description="[theta_i][wavelength], the specular part")
+    glints: list[list[float]] | None = Field(
+        description="[theta_i][wavelength], the part of albedo that glints reflect at most; null: there are none"
+    )
     hemispherical: list[float] = Field(description="[wavelength], of light that is the same from everywhere, both")
-    error: float = Field(description="of albedo, the largest estimate of the integration")
+    error: float = Field(
+        description="of albedo, the largest estimate: of the integration, and of glints whose power is an upper bound"
+    )
 
 
 def reflected(table: Table) -> Reflected:
@@ -198,7 +225,9 @@ def _reflected(albedo: TableAlbedo, surface: Table | Source, wavelength_nm: Axis
     specular = np.asarray(surface.specular_reflectance(radians(theta_i_deg), wavelength_nm))
     specular = np.broadcast_to(specular.reshape(diffuse.shape[0], -1), diffuse.shape)
     hemispherical = hemispherical_albedo(theta_i_deg, diffuse + specular)
-    return Reflected(theta_i_deg, diffuse, specular, hemispherical, float(albedo.error.max()))
+    of_glints, guessed = (None if part is None else albedo.mean_of(part) for part in (albedo.glints, albedo.guessed))
+    error = albedo.error if guessed is None else albedo.error + guessed.max(axis=1)
+    return Reflected(theta_i_deg, diffuse, specular, of_glints, hemispherical, float(error.max()))
 
 
 def source_albedo(

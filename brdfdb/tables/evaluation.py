@@ -14,6 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field, PlainValidator, ValidationInf
 from brdfdb.errors import ParameterError
 from brdfdb.geometry import check_azimuth_deg, directions_from_half_difference, radians
 from brdfdb.materials import Material
+from brdfdb.measurements.glints import Glints
 from brdfdb.parameters import Array, check_nanometres
 from brdfdb.spectra import ILLUMINANT, colour_weights
 from brdfdb.tables import stokes
@@ -355,8 +356,10 @@ class LobeDirections(NamedTuple):
     angles: Angles
 
 
-def view_directions(view: ViewName, theta_i_deg: float, phi_i_deg: float) -> LobeDirections:
-    """Return the directions of a view of a lobe, closer together around the mirror direction.
+def view_directions(
+    view: ViewName, theta_i_deg: float, phi_i_deg: float, glints: Glints | None = None
+) -> LobeDirections:
+    """Return the directions of a view of a lobe, closer together around the mirror direction, and in glints.
 
     Parameters
     ----------
@@ -371,8 +374,9 @@ def view_directions(view: ViewName, theta_i_deg: float, phi_i_deg: float) -> Lob
     if view == "half-difference":
         points = directions_from_half_difference(radians(_HALF)[:, np.newaxis], turned, radians(_HALF), radians(90.0))
         return LobeDirections({"theta_h": _HALF, "theta_d": _HALF}, points)
+    lit = np.empty(0) if glints is None else glints.viewers_deg(theta_i_deg, phi_i_deg)
     if view == "cut":
-        signed = np.unique(np.clip(np.concatenate([_CUT, theta_i_deg + _NEAR]), -90.0, 90.0))
+        signed = np.unique(np.clip(np.concatenate([_CUT, theta_i_deg + _NEAR, lit]), -90.0, 90.0))
         beyond = turned + np.where(signed > 0.0, np.pi, 0.0)
         return LobeDirections({"theta_r": signed}, (light, turned, radians(np.abs(signed)), beyond))
     theta_r = np.unique(np.clip(np.concatenate([_OVER, theta_i_deg + _NEAR]), 0.0, 90.0))
@@ -416,13 +420,13 @@ def read_stokes(text: str) -> tuple[float, ...]:
 def stokes_document(table: Table, points: LookupPoints, incident: Sequence[float]) -> dict[str, Any]:
     """Return the fields of `StokesDocument`, with numpy arrays; ParameterError as by `Table.mueller`."""
     record = table.metadata.polarisation
-    light = np.array(incident)
-    specular = table.specular_mueller(points.angles[0], points.wavelength_nm) @ light
+    specular = stokes.reflected(table.specular_mueller(points.angles[0], points.wavelength_nm), incident)
+    matrix = table.mueller(*points.angles, points.wavelength_nm)
     return {
         "incident": list(incident),
-        "reflected": np.ascontiguousarray(table.mueller(*points.angles, points.wavelength_nm) @ light),
+        "reflected": np.ascontiguousarray(stokes.reflected(matrix, incident)),
         "specular": np.ascontiguousarray(specular),
         "convention": stokes.CONVENTION,
         "basis": stokes.SURFACE_BASIS,
-        "element_error": None if record is None or record.error is None else record.error.worst_p99,
+        "element_error": None if record is None else record.p99,
     }

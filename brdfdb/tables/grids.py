@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -210,3 +210,26 @@ def check_wavelengths(nodes: Any) -> Axis:
     if axis.ndim != 1 or axis.size == 0 or not (axis[0] > 0.0 and np.all(np.diff(axis) > 0.0)):
         raise ParameterError("wavelengths_nm", "must be positive and increase strictly")
     return check_nanometres("wavelengths_nm", axis)
+
+
+class Located(NamedTuple):
+    """Wavelengths that are asked for, M of them, on the axis of a table.
+
+    `nodes` (M, 4) are the numbers of the wavelengths of the table that count, `weight` (M, 4) their weights, as by
+    `weights_of_nodes`. `column` (M,) is the column of `Error.limits` for each. `tail` is the shape that the wavelengths
+    add to that of the directions.
+    """
+
+    nodes: NDArray[np.int64]
+    weight: NDArray[np.float64]
+    column: NDArray[np.int64]
+    tail: tuple[int, ...]
+
+    @property
+    def size(self) -> int:
+        """Number of wavelengths."""
+        return self.column.size
+
+    def mixed(self, values: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
+        """Return values (N, L) at the wavelengths of the table at those asked for (N, M), at least 0."""
+        return np.asarray(np.maximum(np.einsum("nmk,mk->nm", values[:, self.nodes], self.weight), 0.0))

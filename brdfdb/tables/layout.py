@@ -8,7 +8,7 @@ import json
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,9 @@ from brdfdb.materials import Material, Source, source_of
 from brdfdb.materials.polarised import polarised_source
 from brdfdb.parameters import Floats
 from brdfdb.tables.grids import Grid, check_wavelengths
+
+if TYPE_CHECKING:
+    from brdfdb.tables.mueller_field import MuellerField
 
 TABLE_VERSION = 6  # of the variables, dimensions and attributes of a table
 
@@ -121,6 +124,8 @@ class Layout:
     #: half angles between light and viewer, from 0 to 90, at which a polarised table stores its Mueller matrix; see
     #: `brdfdb.tables.polarisation`, (T,) [degree]
     facet_theta_d_deg: NDArray[np.float64] | None = None
+    #: measured Mueller matrices of a polarised table
+    field: MuellerField | None = None
 
     def __post_init__(self) -> None:
         source = self.source
@@ -226,7 +231,7 @@ class Layout:
                 f"{source.name}: is a function, which no other process can read from a file; tabulate it in this one, "
                 "with brdfdb.store.publication.publish"
             )
-        arrays = {
+        arrays: dict[str, Any] = {
             name: None if document.get(name) is None else np.array(document[name])
             for name in ("wavelength_nm", "spectra", "part_nm", "facet_theta_d_deg")
         }

@@ -11,10 +11,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from brdfdb.errors import ParameterError, import_extra
-from brdfdb.geometry import check_azimuth_deg, radians
+from brdfdb.geometry import check_azimuth_deg, radians, unit_vector
 from brdfdb.integrals.quadrature import reflected_share
 from brdfdb.lobes import around_mirror, narrowest
 from brdfdb.materials import FunctionRecord, Material
+from brdfdb.measurements.glints import Glints
 from brdfdb.parameters import Array, Floats
 from brdfdb.tables.shared_axes import (
     COLOURS,
@@ -77,6 +78,13 @@ class Plotted(Sliced, Protocol):
 
     def specular_reflectance(self, theta_i: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats: ...
 
+    def smooth_vectors(self, wi: ArrayLike, wr: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats: ...
+
+    def glint_power(self, wi: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats: ...
+
+    @property
+    def glints(self) -> Glints | None: ...
+
 
 @dataclass(frozen=True)
 class Plot:
@@ -132,7 +140,7 @@ class Plot:
 
     def cuts(
         self,
-        theta_i_deg: float | Sequence[float] = (0.0, 20.0, 40.0, 60.0),
+        theta_i_deg: float | Sequence[float] | None = None,
         phi_i_deg: float | Sequence[float] | None = 0.0,
         wavelength_nm: float | Sequence[float] | None = None,
         *,
@@ -141,10 +149,14 @@ class Plot:
     ) -> Axes:
         """Draw f_r [1/sr] in the plane of incidence over theta_r, which is positive on the mirror side.
 
-        Parameters and errors are those of `lobe`. `log` chooses a logarithmic axis. The default is one where the
-        largest value is more than 50 times the median.
+        Parameters and errors are those of `lobe`; lights are 0, 20, 40 and 60 degrees by default, and that of the
+        strongest glint. `log` chooses a logarithmic axis. The default is one where the largest value is more than 50
+        times the median.
         """
         wavelengths = self._wavelengths(wavelength_nm)
+        if theta_i_deg is None:
+            lit = [] if self.table.glints is None else [self.table.glints.strongest.theta_i_deg]
+            theta_i_deg = sorted({0.0, 20.0, 40.0, 60.0, *lit})
         curves = self._curves(theta_i_deg, phi_i_deg, wavelengths)
         axes = axes_for("cuts", ax, (6.4, 3.9))
         was_log = bool(drawn_on(axes)) and axes.get_yscale() == "log"
@@ -166,7 +178,7 @@ class Plot:
         return axes
 
     def albedo(self, phi_i_deg: float = 0.0, wavelength_nm: float | None = None, *, ax: Axes | None = None) -> Axes:
-        """Draw the directional albedo [1] over theta_i: the shares of uniform part, lobe and specular part, and 1.
+        """Draw the directional albedo [1] over theta_i: shares of uniform part, lobe, specular part and glints, and 1.
 
         The shares are stacked. The uniform part is shown where the source of the table names it. The azimuth of the
         light matters for anisotropic tables only; `wavelength_nm`, `ax` and errors are those of `lobe`.
@@ -273,6 +285,8 @@ class Plot:
                 and (lobe := self.table.source.lobe(np.cos(radians(theta)), at)) is not None
             ):
                 signed = np.union1d(signed, around_mirror(theta, lobe))
+            if self.table.glints is not None:
+                signed = np.union1d(signed, self.table.glints.viewers_deg(theta, phi))
             phi_r = phi + np.where(signed > 0.0, 180.0, 0.0)
             light = radians(theta), radians(phi)
             brdf = np.asarray(
@@ -313,15 +327,16 @@ class Plot:
 
 
 def albedo_shares(table: Plotted, phi_i: float, wavelength_nm: float | None) -> dict[str, Array]:
-    """Return shares [1] of reflected light at `ALBEDO_DEG`: uniform part, rest of f_r, specular part, by their labels.
+    """Return shares [1] of reflected light at `ALBEDO_DEG`: uniform part, rest of f_r, glints, specular part.
 
     Lookups are integrated to 1e-3, for lights at the azimuth `phi_i` [rad]; `wavelength_nm` is None for a grey table.
+    Power of glints that is an upper bound counts up to an albedo of 1.
     """
     source = table.source
     theta_i = radians(ALBEDO_DEG)
 
     def brdf(wi: Floats, wr: Floats) -> Floats:
-        return np.asarray(table.lookup_vectors(wi, wr, wavelength_nm))[..., np.newaxis]
+        return np.asarray(table.smooth_vectors(wi, wr, wavelength_nm))[..., np.newaxis]
 
     at = None if wavelength_nm is None else np.array([wavelength_nm])
     total = reflected_share(
@@ -337,7 +352,17 @@ def albedo_shares(table: Plotted, phi_i: float, wavelength_nm: float | None) -> 
     uniform = np.minimum(np.full(theta_i.size, 0.0 if known is None else np.pi * float(known[0])), total)
     rest = "lobe" if isinstance(source, Material) and source.has_lobe else "reflected"
     specular = np.asarray(table.specular_reflectance(theta_i, wavelength_nm), dtype=np.float64)
-    return {"uniform part": uniform, rest: total - uniform, "specular part": specular}
+    wi = unit_vector(theta_i, phi_i)
+    power = table.glint_power(wi, wavelength_nm)
+    guessed = np.zeros(theta_i.size)
+    if table.glints is not None:
+        every = table.glints.power(wi).sum(axis=1)
+        guessed = power * np.divide(
+            table.glints.power(wi, guessed=True).sum(axis=1), every, out=guessed, where=every > 0.0
+        )
+    most = np.clip(1.0 - (total + specular + power - guessed), 0.0, guessed)
+    label = "glints, at most" if guessed.any() else "glints"
+    return {"uniform part": uniform, rest: total - uniform, "specular part": specular, label: power - guessed + most}
 
 
 def _numbers(name: str, given: float | Sequence[float]) -> list[float]:

@@ -29,9 +29,9 @@ from brdfdb.materials.polarised import polarised_source
 from brdfdb.parameters import Floats
 from brdfdb.tables import stokes
 from brdfdb.tables._interpolation import weights_of_nodes
+from brdfdb.tables.grids import Located
 from brdfdb.tables.layout import Layout
 from brdfdb.tables.stokes import ELEMENTS
-from brdfdb.tables.table_base import Located
 
 GRID_TOLERANCE = 1e-3  # of the elements, where a recipe gives grids and no tolerance
 _SHARE = 0.5  # of the tolerance is for the elements of the facet: the share of light that is depolarised takes the rest
@@ -82,9 +82,9 @@ class MuellerFacets:
         share = np.divide(self.depolarised_at(located), f_r, out=np.zeros(np.shape(f_r)), where=f_r > 0.0)
         return np.asarray(1.0 - np.clip(share, 0.0, 1.0))
 
-    def in_plane(self, theta_d: Floats, f_r: Floats, located: Located) -> NDArray[np.float64]:
-        """Return m_ij / m_00 between bases of the plane, (..., M, 4, 4), at theta_d (...) [rad] and f_r (..., M)."""
-        return self._with_share(self.facet(theta_d, located), f_r, located)
+    def in_plane(self, w_i: Floats, w_r: Floats, f_r: Floats, located: Located) -> NDArray[np.float64]:
+        """Return m_ij / m_00 between bases of the plane, (..., M, 4, 4), at unit vectors (..., 3) and f_r (..., M)."""
+        return self._with_share(self.facet(stokes.half_angle(w_i, w_r), located), f_r, located)
 
     def of_surface(self, angles: tuple[ArrayLike, ...], f_r: Floats, located: Located) -> NDArray[np.float64]:
         """Return m_ij / m_00 between bases of the surface, (..., M, 4, 4), at four angles [rad] and f_r (..., M)."""

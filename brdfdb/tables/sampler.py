@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.geometry import radians, unit_vector
+from brdfdb.measurements.glints import Glints
 from brdfdb.parameters import Array
 
 # f_r [1/sr] for unit vectors of lights and viewers, in their broadcast shape
@@ -39,6 +40,7 @@ class Cells(NamedTuple):
     #: edges of cells in 1 - cos(theta_h), from 0 to 1. Edges in phi_h are even from 0 to 2 pi, (T + 1,) [1]
     edges: Array
     probability: Array  #: probability of each cell, lights with their azimuths one after another, (K * turns, T, P) [1]
+    albedo: Array  #: share of the light that the cells reflect, (K * turns,) [1]
 
     @property
     def rings(self) -> Array:
@@ -81,7 +83,8 @@ def cells_of(evaluate: Evaluate, *, anisotropic: bool) -> Cells:
     probability = mean * np.diff(edges)[:, np.newaxis]
     total = probability.sum(axis=(1, 2), keepdims=True)
     even = np.broadcast_to(np.diff(edges)[:, np.newaxis] / PHI_CELLS, probability.shape).copy()
-    return Cells(theta_i, turns, edges, np.divide(probability, total, out=even, where=total > 0.0))
+    shares = np.divide(probability, total, out=even, where=total > 0.0)
+    return Cells(theta_i, turns, edges, shares, total[:, 0, 0] * (2.0 * np.pi / PHI_CELLS))
 
 
 def _edges(evaluate: Evaluate, lights: Array) -> Array:
@@ -127,16 +130,49 @@ class _CellPlace(NamedTuple):
 
 
 class Sampler:
-    """Directions of viewers drawn from cells and from the cosine, with their density."""
+    """Directions of viewers drawn from cells, from the cosine and from glints, with their density.
 
-    def __init__(self, cells: Cells) -> None:
+    The share of the glints of a light is that of their power in all reflected light.
+    """
+
+    def __init__(self, cells: Cells, glints: Glints | None = None) -> None:
         self.cells = cells
+        self.glints = glints
         self._theta = _summed(cells.rings)
         self._phi = _summed(cells.probability)
         self._density = cells.density
 
     def draw(self, u1: Array, u2: Array, wi: Array) -> Array:
         """Return directions (..., 3) for random numbers and unit vectors (..., 3). Some are below the horizon."""
+        if self.glints is None:
+            return self._smooth(u1, u2, wi)
+        share = self._glint_share(wi)
+        shape = np.broadcast_shapes(np.shape(u1), np.shape(u2), share.shape)
+        u1, u2, share = (np.broadcast_to(values, shape) for values in (u1, u2, share))
+        wi = np.broadcast_to(wi, (*shape, 3))
+        first = np.clip(np.divide(u1, share, out=np.zeros(shape), where=share > 0.0), 0.0, 1.0)
+        of_glints = self.glints.draw(first.ravel(), u2.ravel(), wi.reshape(-1, 3)).reshape(*shape, 3)
+        rest = np.clip(np.divide(u1 - share, 1.0 - share, out=np.zeros(shape), where=share < 1.0), 0.0, 1.0)
+        return np.where((u1 < share)[..., np.newaxis], of_glints, self._smooth(rest, u2, wi))
+
+    def density(self, wi: Array, wr: Array) -> Array:
+        """Return the density [1/sr] of `draw` over the sphere, for unit vectors (..., 3)."""
+        smooth = self._smooth_density(wi, wr)
+        if self.glints is None:
+            return smooth
+        share = self._glint_share(wi)
+        pairs = [np.broadcast_to(w, (*smooth.shape, 3)).reshape(-1, 3) for w in (wi, wr)]
+        return np.asarray(share * self.glints.density(*pairs).reshape(smooth.shape) + (1.0 - share) * smooth)
+
+    def _glint_share(self, wi: Array) -> Array:
+        """Return the share of directions (...,) that glints draw."""
+        assert self.glints is not None
+        power = self.glints.power(wi.reshape(-1, 3)).mean(axis=1).reshape(wi.shape[:-1])
+        smooth = sum(weight * self.cells.albedo[row] for weight, row in self._lights(wi))
+        return np.asarray(np.divide(power, power + smooth, out=np.zeros(power.shape), where=power > 0.0))
+
+    def _smooth(self, u1: Array, u2: Array, wi: Array) -> Array:
+        """Return directions as of `draw`, without glints."""
         in_lobe = u1 < LOBE_SHARE
         # The first number is used again, in the component and in the cell that it has chosen
         first = np.clip(np.where(in_lobe, u1 / LOBE_SHARE, (u1 - LOBE_SHARE) / (1.0 - LOBE_SHARE)), 0.0, 1.0)
@@ -155,8 +191,8 @@ class Sampler:
         mirrored = 2.0 * np.sum(h * wi, axis=-1, keepdims=True) * h - wi
         return np.asarray(np.where(in_lobe[..., np.newaxis], mirrored, cosine + 0.0 * mirrored))
 
-    def density(self, wi: Array, wr: Array) -> Array:
-        """Return the density [1/sr] of `draw` over the sphere, for unit vectors (..., 3)."""
+    def _smooth_density(self, wi: Array, wr: Array) -> Array:
+        """Return the density [1/sr] of `_smooth`."""
         cells = self.cells
         h = wi + wr
         length = np.sqrt(np.sum(h * h, axis=-1))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,7 +21,7 @@ from brdfdb.tables.metadata import TableMetadata
 from brdfdb.tables.stated_error import FormulaError, Overall
 from brdfdb.tables.stokes import ElementError, record
 from brdfdb.tables.table import Table
-from brdfdb.tables.tabulation import metadata_of
+from brdfdb.tables.tabulation import glints_of, metadata_of
 
 DIRECTIONS = 1000  # directions of a band of theta_i for the error of a formula, as in charts
 SEED = 1992  # seed of these directions
@@ -48,7 +49,7 @@ def first_numbers(layout: Layout, read: Read) -> dict[str, Any]:
     numbers: dict[str, Any] = {"formula_error": formula_error_of(layout.source, layout.wavelength_nm)}
     polarised = layout.facet_theta_d_deg is not None
     if layout.size <= LARGE or polarised:
-        table = Table.of(layout, read(slice(0, layout.shape[0])))
+        table = replace(Table.of(layout, read(slice(0, layout.shape[0]))), glints=glints_of(layout))
         if layout.size <= LARGE:
             numbers["largest_albedo"] = largest_albedo(table, layout.source)
         if polarised:

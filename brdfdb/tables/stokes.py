@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
 from brdfdb.geometry import unit_vector
+from brdfdb.parameters import Floats
 
 _NO_PLANE = 1e-12  # sine of the angle between light and viewer below which any plane through both serves
 
@@ -29,6 +30,7 @@ CONVENTION = (
 SURFACE_BASIS = "s = z x w / |z x w|, horizontal, for light and viewer"
 PLANE_BASIS = "s = w_i x w_r / |w_i x w_r|, normal to the plane of light and viewer, for both"
 POLARISATION_VERSION = 1  # of the arrays, and of the record, of a polarised table
+MEASURED_POLARISATION_VERSION = 2  # of those of measured data
 ELEMENTS = ("m01", "m22", "m23")
 
 Matrix = list[list[float]]
@@ -72,7 +74,7 @@ def plane(theta_i: ArrayLike, phi_i: ArrayLike, theta_r: ArrayLike, phi_r: Array
     return Plane(half_angle(w_i, w_r), _to(s, s_i, -w_i), np.swapaxes(_to(s, s_r, w_r), -1, -2))
 
 
-def half_angle(w_i: NDArray[np.float64], w_r: NDArray[np.float64]) -> NDArray[np.float64]:
+def half_angle(w_i: Floats, w_r: Floats) -> NDArray[np.float64]:
     """Return theta_d [rad], half the angle between unit vectors (..., 3)."""
     return np.asarray(np.arctan2(np.linalg.norm(w_i - w_r, axis=-1), np.linalg.norm(w_i + w_r, axis=-1)))
 
@@ -125,18 +127,71 @@ class ElementError(BaseModel):
         return float(np.max(self.p99))
 
 
+class MeasuredElements(BaseModel):
+    """Measured Mueller matrices of a table: which elements, how near the table is to them, and how physical they are.
+
+    Errors are abs(table - measured) of the normalised elements m_ij / m_00, of the worst element.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    rows: int = Field(ge=2, le=4, description="number of rows I, Q, U, V that were measured")
+    columns: int = Field(ge=2, le=4, description="number of columns I, Q, U, V that were measured")
+    samples: int = Field(description="number of directions with Mueller matrices")
+    table_p99: float = Field(description="99 of 100 elements at the measured directions are this near to the table")
+    held_out_p99: float | None = Field(
+        description="99 of 100 elements are this near to the interpolation of the samples of other lights; the lowest "
+        "and the highest light are not left out; null: there are fewer than three lights"
+    )
+    noise: float = Field(
+        description="what 99 of 100 values of normal noise with the median error of samples that were left out at "
+        "random are within, which outliers do not widen: eigenvalues may be below 0 by it"
+    )
+    physical: float = Field(
+        description="share [0, 1] of the matrices without negative eigenvalue of the coherency matrix; of fewer than "
+        "sixteen elements that of the Stokes criterion"
+    )
+    stokes: float = Field(description="share [0, 1] of the matrices that make no light more than fully polarised")
+    statement: list[str] = Field(description="the shares in words: the criterion, its tolerance, and where it fails")
+
+    @property
+    def p99(self) -> float:
+        """Return the larger of the errors: that of elements of the table."""
+        return max(self.table_p99, self.held_out_p99 or 0.0)
+
+
 class Polarisation(BaseModel):
     """The record of a polarised table: convention, the stored elements, and their error."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    version: int = Field(description="version of the arrays mueller, mueller_theta_d and depolarised")
+    version: int = Field(
+        description="version of the arrays: 1 of a model, mueller over mueller_theta_d, and depolarised; 2 of "
+        "measured data, mueller over mueller_theta_h, mueller_theta_d and mueller_phi_d"
+    )
     convention: str = Field(description="meaning of Stokes vectors, in words")
     surface_basis: str = Field(description="basis of lookups and of the error, in words")
     plane_basis: str = Field(description="basis of the stored elements, in words")
-    elements: list[str] = Field(description="stored elements, m_ij over m_00, of light that is not depolarised")
+    elements: list[str] = Field(
+        description="stored elements, m_ij over m_00; of a model, of the light that is not depolarised"
+    )
     reconstruction: str = Field(description="the way from the arrays to the Mueller matrix, in words")
     error: ElementError | None = Field(default=None, description="the stated error of the elements; null: not measured")
+    measured: MeasuredElements | None = Field(
+        default=None, description="what was measured of the elements; null: they are a model's"
+    )
+
+    @property
+    def p99(self) -> float | None:
+        """Return the 99th percentile of the error of the worst element; None if it was not measured."""
+        stated = self.measured.p99 if self.measured is not None else None
+        return stated if self.error is None else self.error.worst_p99
+
+    @property
+    def in_words(self) -> str:
+        """The stored elements and their error, in a sentence."""
+        error = "error not stated" if self.p99 is None else f"99 of 100 elements are within {self.p99:.2g}"
+        return f"Mueller matrices; stored are {', '.join(self.elements)}, over m_00; {error}"
 
 
 def record(error: ElementError | None = None) -> Polarisation:
@@ -154,3 +209,31 @@ def record(error: ElementError | None = None) -> Polarisation:
         ),
         error=error,
     )
+
+
+def measured_record(elements: tuple[str, ...], measured: MeasuredElements) -> Polarisation:
+    """Return the record of a polarised table of measured data."""
+    basis = "surface" if (measured.rows, measured.columns) == (2, 2) else "plane"
+    return Polarisation(
+        version=MEASURED_POLARISATION_VERSION,
+        convention=CONVENTION,
+        surface_basis=SURFACE_BASIS,
+        plane_basis=PLANE_BASIS,
+        elements=list(elements),
+        reconstruction=(
+            "f_r times the matrix of m00 = 1 and the elements, linear over theta_h, theta_d, phi_d and wavelength, "
+            f"between bases of the {basis}; where mueller_phi_d ends at 180, that of the mirror image has the opposite "
+            "sign where one of row and column is U or V; elements that are not stored were not measured"
+        ),
+        measured=measured,
+    )
+
+
+def reflected(matrix: ArrayLike, incident: ArrayLike) -> NDArray[np.float64]:
+    """Return Stokes vectors (..., 4) of the light that matrices (..., 4, 4) reflect of incident light (4,).
+
+    An element that was not measured, nan, makes a component unknown only where the incident light has the one that it
+    is multiplied by.
+    """
+    light = np.asarray(incident, np.float64)
+    return np.asarray(np.where(light != 0.0, np.asarray(matrix, np.float64), 0.0) @ light)

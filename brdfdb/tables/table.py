@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,6 +15,7 @@ from brdfdb.arrays import FLOAT_TYPES, PLAIN_TYPES, array_lookup
 from brdfdb.errors import ParameterError
 from brdfdb.geometry import (
     HALF_PI,
+    Directions,
     asked_for,
     checked_angles,
     checked_vectors,
@@ -25,15 +26,17 @@ from brdfdb.geometry import (
 )
 from brdfdb.materials import FunctionRecord, FunctionSource, Material, Source
 from brdfdb.materials.source import FourAngles
+from brdfdb.measurements.glints import Glints
 from brdfdb.measurements.record import Measured
 from brdfdb.models.large_calls import array_for_result, filled
 from brdfdb.notebook import polar_sketch
 from brdfdb.parameters import Floats
-from brdfdb.tables import _coordinates, _kernels, stokes
+from brdfdb.tables import _coordinates, _kernels
 from brdfdb.tables._interpolation import Axes, prepared
-from brdfdb.tables.grids import Axis, Grid, axes_among, check_wavelengths
+from brdfdb.tables.grids import Axis, Grid, Located, axes_among, check_wavelengths
 from brdfdb.tables.layout import PLAIN, Interpolation, Layout, rebuilt
 from brdfdb.tables.metadata import TableMetadata
+from brdfdb.tables.mueller_field import MuellerField, checked_field
 from brdfdb.tables.polarisation import MuellerFacets, checked_facets, facets_of
 from brdfdb.tables.sampler import Sampler
 from brdfdb.tables.table_base import BaseTable
@@ -103,11 +106,14 @@ class Table(BaseTable):
     #: read them, (L,) [1]
     n: Axis | None = field(default=None, repr=False)
     k: Axis | None = field(default=None, repr=False)
-    facets: MuellerFacets | None = field(default=None, repr=False)  #: the polarisation; None of an unpolarised table
+    #: the polarisation, of a model or as it was measured; None of an unpolarised table
+    facets: MuellerFacets | MuellerField | None = field(default=None, repr=False)
+    #: peaks of f_r that are not in `values`, and that lookups add; None without any
+    glints: Glints | None = field(default=None, repr=False)
 
     @classmethod
     def of(cls, layout: Layout, values: NDArray[np.float32], grid: Grid | None = None) -> Table:
-        """Make the table of a layout, or of a part of its grid, before it is stored: without the specular part."""
+        """Make the table of a layout, or part of its grid, before it is stored: without specular part and glints."""
         return cls(
             name=layout.source.name,
             revision="",
@@ -120,7 +126,7 @@ class Table(BaseTable):
             spectra=layout.spectra,
             uniform=layout.uniform,
             part_nm=layout.part_nm,
-            facets=facets_of(layout),
+            facets=layout.field or facets_of(layout),
         )
 
     def laid_out(self, source: Source) -> Layout:
@@ -134,7 +140,8 @@ class Table(BaseTable):
             self.metadata.bits,
             self.metadata.reason,
             self.part_nm,
-            None if self.facets is None else self.facets.theta_d_deg,
+            self.facets.theta_d_deg if isinstance(self.facets, MuellerFacets) else None,
+            self.facets if isinstance(self.facets, MuellerField) else None,
         )
 
     @property
@@ -259,6 +266,8 @@ class Table(BaseTable):
         values = filled(write, array_for_result(out, shape + located.tail, dtype, arguments), located.size, threads)
         if unusual:
             checked_angles(*angles)  # raises an error or warns
+        if self.glints is not None:
+            self._add_glints(values, checked_angles(*angles), located)
         return values[()] if out is None else values
 
     @array_lookup
@@ -286,7 +295,25 @@ class Table(BaseTable):
 
         result = array_for_result(out, shape[:-1] + located.tail, vectors.dtype, {"wi": wi, "wr": wr})
         values = filled(write, result, located.size, threads)
+        if self.glints is not None:
+            self._add_glints(values, vectors, located)
         return values[()] if out is None else values
+
+    @array_lookup
+    def smooth_vectors(self, wi: ArrayLike, wr: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:
+        return self.without_glints().lookup_vectors(wi, wr, wavelength_nm)
+
+    def without_glints(self) -> Table:
+        """Return the table whose lookups leave out the glints, the part of f_r that grids and quadratures can hold."""
+        return self if self.glints is None else self._smooth
+
+    @functools.cached_property
+    def _smooth(self) -> Table:
+        return replace(self, glints=None)
+
+    def _add_glints(self, values: Floats, directions: Directions, located: Located) -> None:
+        f_r = self.glint_values(directions, located)
+        values += f_r if located.tail else f_r[..., 0]
 
     @functools.cached_property
     def _kernel(self) -> _Arrays:
@@ -354,8 +381,8 @@ class Table(BaseTable):
         vectors = checked_vectors(wi, wr)
         f_r = np.asarray(self.lookup_vectors(wi, wr, wavelength_nm))
         values = f_r if located.tail else f_r[..., np.newaxis]
-        theta_d = stokes.half_angle(*(w.astype(np.float64) for w in (vectors.w_i, vectors.w_r)))
-        matrix = values[..., np.newaxis, np.newaxis] * facets.in_plane(theta_d, values, located)
+        w_i, w_r = np.broadcast_arrays(*(w.astype(np.float64) for w in (vectors.w_i, vectors.w_r)))
+        matrix = values[..., np.newaxis, np.newaxis] * facets.in_plane(w_i, w_r, values, located)
         return np.asarray(matrix if located.tail else matrix[..., 0, :, :], dtype=vectors.dtype)
 
     @array_lookup
@@ -364,7 +391,7 @@ class Table(BaseTable):
 
         `theta_d` [rad] is half the angle between light and viewer, in [0, pi/2]. Shaped as by `lookup`, and (4, 4).
         """
-        facets = self._polarised
+        facets = self._of_model
         located = self._wavelengths(wavelength_nm)
         matrix = facets.facet(np.asarray(theta_d, np.float64), located)
         return matrix if located.tail else matrix[..., 0, :, :]
@@ -372,7 +399,7 @@ class Table(BaseTable):
     def depolarised(self, wavelength_nm: ArrayLike | None = None) -> Floats:
         """Interpolate the depolarised part of f_r [1/sr], which is uniform, shape (M,); () for one wavelength."""
         located = self._wavelengths(wavelength_nm)
-        return self._polarised.depolarised_at(located).reshape(located.tail)
+        return self._of_model.depolarised_at(located).reshape(located.tail)
 
     @array_lookup
     def specular_mueller(self, theta_i: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:
@@ -382,11 +409,20 @@ class Table(BaseTable):
         surface, which are those of the plane. ParameterError, too, if the table is unpolarised.
         """
         specular = np.asarray(self.specular_reflectance(theta_i, wavelength_nm))
+        if self.specular is None and isinstance(self._polarised, MuellerField):
+            return np.zeros((*specular.shape, 4, 4), specular.dtype)
         matrix = specular[..., np.newaxis, np.newaxis] * self.facet_mueller(theta_i, wavelength_nm)
         return np.asarray(matrix, dtype=specular.dtype)
 
     @property
-    def _polarised(self) -> MuellerFacets:
+    def _of_model(self) -> MuellerFacets:
+        if isinstance(self._polarised, MuellerField):
+            text = f"the matrices of {self.name} are measured, and depend on all angles: they have no facet"
+            raise ParameterError("polarised", text)
+        return self._polarised
+
+    @property
+    def _polarised(self) -> MuellerFacets | MuellerField:
         if self.facets is None:
             raise ParameterError(
                 "polarised", f"the table of {self.name} is unpolarised; build it with polarised = true in its recipe"
@@ -431,7 +467,7 @@ def table_from(name: str, revision: str, arrays: Mapping[str, NDArray[Any]], att
     """Return the table that the arrays and attributes of a stored group describe; ValueError if they do not fit."""
     metadata = TableMetadata.read(attrs)
     interpolation = metadata.known_interpolation()
-    metadata.known_measured()
+    measured = metadata.known_measured()
     variable = "brdf" if "brdf" in arrays else "parts"
     if variable not in arrays:
         raise ParameterError("brdf", f"neither it nor parts is among the arrays {', '.join(arrays) or 'none'}")
@@ -454,6 +490,9 @@ def table_from(name: str, revision: str, arrays: Mapping[str, NDArray[Any]], att
         raise ParameterError("brdf", "the attributes say that f_r is rebuilt from parts; rename the array to parts")
     if uniform is not None and uniform.size not in (1, *spectrum):
         raise ParameterError("uniform", f"{uniform.size} values are neither one nor one for each wavelength")
+    glints = None if measured is None else measured.glints
+    if glints is not None and glints.channels != (1 if wavelength_nm is None else wavelength_nm.size):
+        raise ParameterError("glints", f"they have {glints.channels} wavelengths, and the table others")
     return Table(
         name=name,
         revision=revision,
@@ -469,12 +508,14 @@ def table_from(name: str, revision: str, arrays: Mapping[str, NDArray[Any]], att
         part_nm=part_nm,
         n=arrays.get("n"),
         k=arrays.get("k"),
-        facets=checked_facets(arrays, 1 if wavelength_nm is None else wavelength_nm.size),
+        facets=checked_field(arrays, wavelength_nm, metadata.polarisation)
+        or checked_facets(arrays, 1 if wavelength_nm is None else wavelength_nm.size),
+        glints=glints,
     )
 
 
 class TableSource(FunctionSource):
-    """A table as a source: the values of its lookups are its f_r.
+    """A table as a source: the values of its lookups are its f_r, without glints.
 
     With `known_nm` (L,) [nm], increasing, the source is known at these wavelengths, too: beyond the range of a table of
     two or more wavelengths f_r is that of its first or last one. By default the source has the range of the table.
@@ -483,6 +524,7 @@ class TableSource(FunctionSource):
     _table: Table = PrivateAttr()
 
     def __init__(self, table: Table, known_nm: NDArray[np.float64] | None = None) -> None:
+        table = table.without_glints()
         recorded = table.source
         wavelength_nm = table.wavelength_nm
         metadata = table.metadata
@@ -510,6 +552,11 @@ class TableSource(FunctionSource):
     def measured(self) -> Measured | None:
         """Return the record of the data if the table is measured, or None."""
         return self._table.metadata.measured
+
+    @property
+    def glints(self) -> Glints | None:
+        """Return the peaks of f_r that the source leaves out; None if there are none."""
+        return None if self.measured is None else self.measured.glints
 
     @functools.cached_property
     def sampler(self) -> Sampler | None:

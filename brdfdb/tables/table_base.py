@@ -11,14 +11,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from brdfdb.arrays import array_lookup
-from brdfdb.errors import BrdfdbError, ParameterError
+from brdfdb.errors import BrdfdbError, ParameterError, percent
 from brdfdb.geometry import Directions, checked_angles, checked_vectors, common_shape
 from brdfdb.materials import FunctionRecord, Material, source_of
 from brdfdb.materials.source import FourAngles, Lookups
-from brdfdb.notebook import card, listed, percent, spectrum
+from brdfdb.measurements.glints import Glints
+from brdfdb.notebook import card, listed, spectrum
 from brdfdb.parameters import Floats, check_nanometres
 from brdfdb.tables._interpolation import weights_of_nodes
-from brdfdb.tables.grids import Axis
+from brdfdb.tables.grids import Axis, Located
 from brdfdb.tables.metadata import TableMetadata
 from brdfdb.tables.plot import Plot
 from brdfdb.tables.sampler import Sampler, cells_of
@@ -28,26 +29,25 @@ if TYPE_CHECKING:
     from brdfdb.integrals.sampling import Sample
 
 _MOST_KNOWN = 64  # largest number of single wavelengths whose places are cached
+_NORMAL_99 = 2.6  # standard deviations within which 99 of 100 values of normal noise lie
 _SAMPLED = 5  # number of wavelengths whose mean decides how directions are drawn
 
 
-class Located(NamedTuple):
-    """Wavelengths that are asked for, M of them, on the axis of a table.
+class _UnitPairs(NamedTuple):
+    """Unit vectors of lights and viewers, (N, 3) each, and the shape that their angles broadcast to."""
 
-    `nodes` (M, 4) are the numbers of the wavelengths of the table that count, `weight` (M, 4) their weights, as by
-    `weights_of_nodes`. `column` (M,) is the column of `Error.limits` for each. `tail` is the shape that the wavelengths
-    add to that of the directions.
-    """
+    w_i: NDArray[np.float64]
+    w_r: NDArray[np.float64]
+    shape: tuple[int, ...]
 
-    nodes: NDArray[np.int64]
-    weight: NDArray[np.float64]
-    column: NDArray[np.int64]
-    tail: tuple[int, ...]
 
-    @property
-    def size(self) -> int:
-        """Number of wavelengths."""
-        return self.column.size
+def _pairs(directions: Directions) -> _UnitPairs:
+    shape = np.broadcast_shapes(*(given.shape for given in directions.given))
+    columns = [
+        np.broadcast_to(getattr(directions, name), shape).ravel()
+        for name in ("x_i", "y_i", "cos_i", "x_r", "y_r", "cos_r")
+    ]
+    return _UnitPairs(np.stack(columns[:3], axis=1), np.stack(columns[3:], axis=1), shape)
 
 
 class Stated(NamedTuple):
@@ -56,7 +56,8 @@ class Stated(NamedTuple):
     brdf: Floats  #: values as by `Table.lookup`, [1/sr]
     #: in the same shape. At a wavelength of the table 99 of 100 values in this band of theta_i are within that of the
     #: source, or of what was measured if it is a measurement, whose uncertainty is added; nan outside of the directions
-    #: that were measured, where nothing is known. Between wavelengths, and in the places of
+    #: that were measured, where nothing is known. In a glint that one sample shows, next to this sample, it covers all
+    #: from 0 to the peak. Between wavelengths, and in the places of
     #: `brdfdb.tables.stated_error.Places`, 98 of 100 are, [1/sr]
     error: Floats
 
@@ -73,6 +74,9 @@ class BaseTable(Lookups):
     revision: str
     attrs: Mapping[str, Any]
     wavelength_nm: Axis | None
+
+    #: peaks of f_r that lookups add to the values of the grid; None without any
+    glints: Glints | None
 
     @property
     @abstractmethod
@@ -118,7 +122,8 @@ class BaseTable(Lookups):
         Half vectors are drawn from cells of constant density in (theta_h, phi_h), by marginal and conditional
         distributions. Cells hold the reflected light for 17 lights from the normal to the horizon. In between, the
         distributions of the two next lights are mixed. A fifth of the directions follows the cosine, so that no weight
-        is above 5 pi f_r. The specular part is not drawn: add `specular_reflectance` in the mirror direction.
+        is above 5 pi f_r. A light with glints draws from them in proportion to their power. The specular part is not
+        drawn: add `specular_reflectance` in the mirror direction.
         """
         from brdfdb.integrals.sampling import Sample, check_uniform
 
@@ -150,10 +155,10 @@ class BaseTable(Lookups):
             wavelength_nm = wavelength_nm[np.unique(np.linspace(0, last, _SAMPLED).astype(np.int64))]
 
         def mean(wi: NDArray[np.float64], wr: NDArray[np.float64]) -> NDArray[np.float64]:
-            values = np.asarray(self.lookup_vectors(wi, wr, wavelength_nm), dtype=np.float64)
+            values = np.asarray(self.smooth_vectors(wi, wr, wavelength_nm), dtype=np.float64)
             return values if wavelength_nm is None else np.asarray(values.mean(axis=-1))
 
-        return Sampler(cells_of(mean, anisotropic=self.anisotropic))
+        return Sampler(cells_of(mean, anisotropic=self.anisotropic), self.glints)
 
     @abstractmethod
     def specular_reflectance(self, theta_i: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:
@@ -219,16 +224,56 @@ class BaseTable(Lookups):
         return self._extrapolated(checked_angles(theta_i, phi_i, theta_r, phi_r))
 
     def _extrapolated(self, directions: Directions) -> NDArray[np.bool_]:
-        shape = np.broadcast_shapes(*(given.shape for given in directions.given))
+        pairs = _pairs(directions)
+        outside = np.zeros(pairs.shape, dtype=bool)
         measured = self.metadata.known_measured()
-        if measured is None or measured.extent is None:
-            return np.zeros(shape, dtype=bool)
-        x_i, y_i, z_i, x_r, y_r, z_r = (
-            np.broadcast_to(getattr(directions, name), shape).ravel()
-            for name in ("x_i", "y_i", "cos_i", "x_r", "y_r", "cos_r")
-        )
-        outside = measured.extent.outside(np.stack([x_i, y_i, z_i], axis=1), np.stack([x_r, y_r, z_r], axis=1))
-        return outside.reshape(shape) & ~directions.below
+        if measured is not None and measured.extent is not None:
+            outside = measured.extent.outside(pairs.w_i, pairs.w_r).reshape(pairs.shape)
+        if self.glints is not None:
+            outside = outside | self.glints.near(pairs.w_i, pairs.w_r, extrapolated=True).reshape(pairs.shape)
+        return outside & ~directions.below
+
+    @array_lookup
+    def in_glint(self, theta_i: ArrayLike, phi_i: ArrayLike, theta_r: ArrayLike, phi_r: ArrayLike) -> NDArray[np.bool_]:
+        """Return for which pairs of directions a lookup has a glint in it; angles and shape as of `extrapolated`."""
+        directions = checked_angles(theta_i, phi_i, theta_r, phi_r)
+        pairs = _pairs(directions)
+        if self.glints is None:
+            return np.zeros(pairs.shape, dtype=bool)
+        return self.glints.near(pairs.w_i, pairs.w_r).reshape(pairs.shape) & ~directions.below
+
+    @array_lookup
+    def smooth_vectors(self, wi: ArrayLike, wr: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:
+        """Interpolate f_r [1/sr] without glints, for quadratures and pictures that would miss them or make them noise.
+
+        Arguments, result and errors are those of `lookup_vectors`.
+        """
+        values = self.lookup_vectors(wi, wr, wavelength_nm)
+        if self.glints is None:
+            return values
+        located = self._wavelengths(wavelength_nm)
+        of_glints = self.glint_values(checked_vectors(wi, wr), located)
+        return np.asarray(np.maximum(values - (of_glints if located.tail else of_glints[..., 0]), 0.0))
+
+    @array_lookup
+    def glint_power(self, wi: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:
+        """Interpolate the share of light [1] that glints reflect, for unit vectors (..., 3); 0 without glints.
+
+        Wavelengths are those of `lookup`, which add an axis as they do there.
+        """
+        w_i = checked_vectors(wi, wi).w_i.astype(np.float64)
+        located = self._wavelengths(wavelength_nm)
+        power: Floats = np.zeros((w_i[..., 0].size, located.size))
+        if self.glints is not None:
+            power = located.mixed(self.glints.power(w_i.reshape(-1, 3)))
+        return np.asarray(power.reshape(w_i.shape[:-1] + located.tail))[()]
+
+    def glint_values(self, directions: Directions, located: Located) -> Floats:
+        """Return f_r [1/sr] of the glints alone, shaped as the directions and (M,), the wavelengths."""
+        pairs = _pairs(directions)
+        assert self.glints is not None
+        f_r = located.mixed(self.glints.f_r(pairs.w_i, pairs.w_r)).reshape(*pairs.shape, located.size)
+        return np.asarray(np.where(directions.below[..., np.newaxis], 0.0, f_r))
 
     @functools.cached_property
     def metadata(self) -> TableMetadata:
@@ -271,6 +316,7 @@ class BaseTable(Lookups):
             ("wavelengths", spectrum(wavelengths)),
             ("grid", axes),
             ("interpolation", known.interpolation.method + (" of logarithms" if known.interpolation.logarithm else "")),
+            *([] if self.glints is None else [("glints", self.glints.sentence)]),
             ("stated error", "" if error is None else f"{percent(error.overall.p99)} (99 of 100 values)"),
             ("revision", self.revision),
         ]
@@ -301,12 +347,23 @@ class BaseTable(Lookups):
                 f"the error of {self.name} was not measured between its wavelengths of "
                 f"{self.wavelength_nm[below]:g} and {self.wavelength_nm[below + 1]:g} nm; build it anew",
             )
-        values = brdf if located.tail else np.asarray(brdf)[..., np.newaxis]
+        values = np.asarray(brdf if located.tail else np.asarray(brdf)[..., np.newaxis])
+        if self.glints is not None:  # whose error is their own
+            values = np.maximum(values - self.glint_values(directions, located), 0.0)
         errors = stated(error.limits[:, located.column], error.floors[located.column], directions, values)
         measured = self.metadata.known_measured()
         if measured is not None:
-            lowest = np.minimum(directions.cos_i, directions.cos_r)[..., np.newaxis]
-            errors = errors + measured.error_of(values, lowest, error.floors[located.column])
+            pairs = _pairs(directions)
+            flat = np.broadcast_to(values, errors.shape).reshape(len(pairs.w_i), -1)
+            of_data = measured.error_of(flat, pairs.w_i, pairs.w_r, error.floors[located.column])
+            errors = errors + of_data.reshape(errors.shape)
+        if self.glints is not None:
+            assert measured is not None
+            pairs = _pairs(directions)
+            noise = measured.uncertainty if measured.noise is None else _NORMAL_99 * measured.noise.median
+            smooth = np.broadcast_to(values, errors.shape).reshape(len(pairs.w_i), -1).mean(axis=1)
+            of_glints = self.glints.error(pairs.w_i, pairs.w_r, smooth, noise or 0.0)
+            errors = errors + located.mixed(of_glints).reshape(errors.shape)
         if measured is not None and measured.extent is not None:
             errors = np.where(self._extrapolated(directions)[..., np.newaxis], np.nan, errors)
         return np.asarray(errors if located.tail else errors[..., 0])[()]

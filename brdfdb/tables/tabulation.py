@@ -12,12 +12,14 @@ from brdfdb._elementary import COS_HORIZON
 from brdfdb.geometry import HALF_PI, radians, unit_vector, vectors_from_half_difference
 from brdfdb.materials import Source
 from brdfdb.measurements import MeasuredSource
+from brdfdb.measurements.glints import Glints
 from brdfdb.parameters import Floats
 from brdfdb.tables.grids import RECIPROCITY, Axis, Grid
 from brdfdb.tables.layout import TABLE_VERSION, Layout
 from brdfdb.tables.metadata import TableMetadata
+from brdfdb.tables.mueller_field import AXES as MUELLER_AXES
 from brdfdb.tables.polarisation import facets_of
-from brdfdb.tables.stokes import record
+from brdfdb.tables.stokes import Polarisation, record
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -278,7 +280,13 @@ def frame(layout: Layout) -> Frame:
         )
     if isinstance(source, MeasuredSource) and source.measured.extent is not None:
         variables["extrapolated"] = StoredArray(grid.names, extrapolated(source, grid), VARIABLES["extrapolated"])
-    if (facets := facets_of(layout)) is not None:
+    if (field := layout.field) is not None:
+        for name, nodes in zip(MUELLER_AXES, field.axes_deg, strict=True):
+            coordinates[name] = _coordinate(name, nodes)
+        elements = field.elements if wavelength_nm is not None else field.elements[..., 0, :]
+        named = (*MUELLER_AXES, *spectral, "element")
+        variables["mueller"] = StoredArray(named, elements, VARIABLES["mueller"])
+    elif (facets := facets_of(layout)) is not None:
         coordinates["mueller_theta_d"] = _coordinate("mueller_theta_d", facets.theta_d_deg)
         named = ("mueller_theta_d", "wavelength", "element")
         variables["mueller"] = StoredArray(named, facets.elements, VARIABLES["mueller"])
@@ -309,8 +317,9 @@ def _reconstruction(layout: Layout) -> str:
     """Return the formula for f_r from the arrays of a table, in one line."""
     over = "brdf is linear" if layout.interpolation.straight else "cubic"
     spectrum = "" if layout.wavelength_nm is None else f"; over wavelengths {over}"
+    glints = "; lookups add the glints of the attribute measured" if glints_of(layout) is not None else ""
     if layout.plain:
-        return f"brdf is f_r; between nodes {layout.interpolation.method}{spectrum}"
+        return f"brdf is f_r; between nodes {layout.interpolation.method}{spectrum}{glints}"
     how = layout.interpolation
     mixed = layout.part_nm is not None
     number = "parts @ spectra" if layout.spectra is not None and not mixed else "parts"
@@ -320,18 +329,21 @@ def _reconstruction(layout: Layout) -> str:
         value = f"{value} / (cos(theta_i) * cos(theta_r))**{how.power:g}"
     value = f"uniform + {value}" if layout.uniform is not None else value
     beyond = "; nodes below the horizon hold a continuation" if layout.grid.half_difference else ""
-    return f"brdf = {value}; between nodes, parts are interpolated, {how.method}{spectrum}{beyond}"
+    return f"brdf = {value}; between nodes, parts are interpolated, {how.method}{spectrum}{beyond}{glints}"
 
 
 def metadata_of(layout: Layout) -> TableMetadata:
     """Return the metadata of a table that is known before its values are: without request and stated error."""
     source = layout.source
     wavelength_nm = layout.wavelength_nm
+    measured = source.measured if isinstance(source, MeasuredSource) else None
+    if measured is not None and measured.glints is not None:
+        measured = measured.model_copy(update={"glints": glints_of(layout)})
     return TableMetadata(
         table_version=TABLE_VERSION,
         **source.attributes(),
         source_record=source.document(),
-        measured=source.measured if isinstance(source, MeasuredSource) else None,
+        measured=measured,
         conventions=(
             "directions point away from the surface; delta_phi = phi_r - phi_i, 0 is back towards the light, "
             "180 degrees the mirror half plane; f_r without cosine; isotropic tables are even in delta_phi"
@@ -344,8 +356,27 @@ def metadata_of(layout: Layout) -> TableMetadata:
         bits=layout.bits,
         reconstruction=_reconstruction(layout),
         reason=layout.reason,
-        polarisation=None if layout.facet_theta_d_deg is None else record(),
+        polarisation=_polarisation(layout),
     )
+
+
+def _polarisation(layout: Layout) -> Polarisation | None:
+    """Return the record of the polarisation of a layout, without the error that is measured; None without it."""
+    if layout.field is not None:
+        return layout.field.record
+    return None if layout.facet_theta_d_deg is None else record()
+
+
+def glints_of(layout: Layout) -> Glints | None:
+    """Return the glints of a source at the wavelengths of a layout; None if it has none that reflects light."""
+    source = layout.source
+    glints: Glints | None = getattr(source, "glints", None)
+    if glints is None or not glints.lit:
+        return None
+    if layout.wavelength_nm is None or source.wavelengths_nm is None:
+        return glints
+    weights = [np.interp(layout.wavelength_nm, source.wavelengths_nm, row) for row in np.eye(glints.channels)]
+    return glints.mixed(np.stack(weights))
 
 
 _LONG_NAMES = {
@@ -359,7 +390,9 @@ _LONG_NAMES = {
     "phi_h": "azimuth of the half vector",
     "theta_d": "angle between light and half vector",
     "phi_d": "azimuth of the light about the half vector",
+    "mueller_theta_h": "polar angle of the half vector, of the Mueller matrix",
     "mueller_theta_d": "half the angle between light and viewer, of the Mueller matrix",
+    "mueller_phi_d": "azimuth of the light about the half vector, of the Mueller matrix",
 }
 
 VARIABLES = {

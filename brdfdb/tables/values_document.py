@@ -35,6 +35,11 @@ class Evaluated(BaseModel):
         description="shape of the broadcast angles; true: outside of the directions that were measured; null: error "
         "was not asked for"
     )
+    glint: bool | list[Any] | None = Field(
+        default=None,
+        description="shape of the broadcast angles; true: brdf has a glint in it, a peak beside the grid; missing: "
+        "the table has none",
+    )
     specular_reflectance: float | list[Any] | None = Field(
         description="specular part, a reflectance without unit that is not in brdf: shape of theta_i, then as brdf"
     )
@@ -121,6 +126,7 @@ def values_document(values: Values) -> dict[str, Any]:
     surface = values.surface
     points = values.points
     known = values.error is not None and values.surface.kind == "table"
+    lit = surface.kind == "table" and surface.source.glints is not None
     return {
         "source": surface.kind,
         "unit": "1/sr",
@@ -130,6 +136,7 @@ def values_document(values: Values) -> dict[str, Any]:
         "brdf": plain(values.brdf),
         "error": plain(values.error),
         "extrapolated": plain(surface.source.extrapolated(*points.angles)) if known else None,
+        **({"glint": plain(surface.source.in_glint(*points.angles))} if lit else {}),
         "specular_reflectance": plain(values.specular_reflectance),
         **({} if values.stokes is None else {"stokes": values.stokes}),
     }

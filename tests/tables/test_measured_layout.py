@@ -152,27 +152,13 @@ def test_published_table_has_the_record_and_its_errors_the_uncertainty(tmp_path:
     outside = source.extrapolated(WI, WR)
     assert 0 < np.count_nonzero(outside) < len(outside)
     np.testing.assert_array_equal(np.isnan(both.error), outside)  # nothing is known there
-    assert np.all(both.error[~outside] >= measured.held_out.p99 * both.brdf[~outside])
-    fresh = scattered(presets()["clay-vase"].brdf_at(None), 400, 0.05, seed=11)
+    regions = measured.held_out.regions
+    assert regions is not None
+    assert np.all(both.error[~outside] >= (regions.p99(WI, WR) * both.brdf)[~outside])
+    fresh = scattered(presets()["clay-vase"].brdf_at(None), 400, 0.05, seed=11)  # noise is included in the errors
     looked_up = table.lookup_vectors_with_error(fresh.w_i, fresh.w_r)
     inside = ~source.extrapolated(fresh.w_i, fresh.w_r)
     assert np.mean((np.abs(looked_up.brdf - fresh.values[:, 0]) <= looked_up.error)[inside]) > 0.97
-
-
-def test_errors_of_reciprocal_samples_are_those_of_their_level(tmp_path: Path) -> None:
-    samples = scattered(presets()["clay-vase"].brdf_at(None), 300, 0.05)
-    publish(tmp_path, MeasuredSource.of_samples(samples, name="clay", reciprocal=True), tolerance=0.05)
-    table = brdfdb.open(tmp_path)["clay"]
-    measured = table.metadata.measured
-    assert measured is not None
-    assert measured.held_out is not None
-    assert measured.held_out.p99_of_levels is not None
-    both = table.lookup_vectors_with_error(WI, WR)
-    known = np.isfinite(both.error)
-    level = np.where(both.brdf >= 1000.0 * measured.held_out.floor[0], 4, 3)  # none is below 100 floors
-    low = np.minimum(WI[..., 2], WR[..., 2]) < np.cos(np.radians(70.0))
-    share = np.array(measured.held_out.p99_of_levels)[level, low.astype(int)]
-    assert np.all((both.error >= share * both.brdf)[known])
 
 
 def test_colours_take_three_parts(tmp_path: Path) -> None:
@@ -219,3 +205,45 @@ def test_table_of_samples_in_one_plane_is_measured_there(tmp_path: Path) -> None
     stated = table.lookup_with_error(*at)
     assert np.isnan(stated.error).all(axis=1).tolist() == [False, False, True]
     assert stated.brdf[0] == pytest.approx([0.1 + 0.1 * np.cos(at[0, 0]), 0.2 + 0.1 * np.cos(at[2, 0])], rel=0.03)
+
+
+def _scans_of(f_r: Any, *, turned: bool) -> Samples:
+    """Return samples of scans that are 10 degrees apart in every angle."""
+    azimuths = (0.0, 90.0) if turned else (0.0,)
+    viewers = [(0.0, 0.0), *((a, b) for a in np.arange(10.0, 81.0, 10.0) for b in np.arange(0.0, 360.0, 20.0))]
+    rows = [(a, b, *viewer) for a in (10.0, 30.0, 50.0, 70.0) for b in azimuths for viewer in viewers]
+    angles = radians(np.array(rows)).T
+    values = f_r(unit_vector(angles[0], angles[1]), unit_vector(angles[2], angles[3]))
+    return Samples("scans", *angles, ("grey",), None, values)
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_a_table_of_scans_has_nodes_at_their_angles_and_keeps_each_sample(turned: bool) -> None:
+    def f_r(wi: Floats, wr: Floats) -> Floats:
+        stripes = np.cos(9.0 * wi[:, 2]) * np.cos(9.0 * wr[:, 2])
+        return np.asarray((0.2 + 0.1 * stripes + (0.05 * (wi + wr)[:, 0] ** 2 if turned else 0.0))[:, np.newaxis])
+
+    samples = _scans_of(f_r, turned=turned)
+    layout, values = tabulated(MeasuredSource.of_samples(samples), None, 0.2)
+    names = ("theta_i", "phi_i", "theta_r", "phi_r") if turned else ("theta_i", "theta_r", "delta_phi")
+    assert layout.grid.names == names
+    assert {10.0, 30.0, 50.0, 70.0} <= set(layout.grid.axes["theta_i"])
+    looked_up = Table.of(layout, values).lookup_vectors(samples.w_i, samples.w_r)
+    assert np.max(np.abs(looked_up / samples.values[:, 0] - 1.0)) < 0.05
+
+
+def test_a_narrow_anisotropic_lobe_has_its_widths_along_both_axes() -> None:
+    def f_r(wi: Floats, wr: Floats) -> Floats:
+        half = (wi + wr) / (wi + wr)[:, 2:]
+        return np.asarray((0.1 + 20.0 * np.exp(-((half[:, 0] / 0.05) ** 2) - (half[:, 1] / 0.2) ** 2))[:, np.newaxis])
+
+    alpha = grey(f_r).alpha
+    assert alpha == pytest.approx((0.05, 0.2), rel=0.1)
+
+
+def test_exchanged_pairs_that_contradict_each_other_deny_reciprocity() -> None:
+    samples = _scans_of(lambda wi, _: 0.1 + 0.2 * wi[:, 2:], turned=False)
+    assert not MeasuredSource.of_samples(samples).reciprocal
+    assert MeasuredSource.of_samples(
+        _scans_of(lambda wi, wr: 0.1 + 0.2 * wi[:, 2:] * wr[:, 2:], turned=False)
+    ).reciprocal
