@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,7 @@ import pytest
 from brdfdb import formats
 from brdfdb.errors import ParameterError
 from brdfdb.formats.text._columns import role_of, wavelength_of
-from brdfdb.measurements.samples import RELATIVE
+from brdfdb.measurements.conventions import RELATIVE
 from brdfdb.measurements.statement import statement
 from tests.formats.a_file import notes_of, samples_of
 
@@ -208,6 +209,8 @@ def test_wavelengths_in_micrometres_are_channels_in_nm(name: str, shown: str, tm
     assert sheet.values.tolist() == [[0.1, 0.2]]
     assert shown in notes_of(sheet)
     assert "Wavelengths: 450 to 550 nm." in statement(sheet).sentences
+    infrared = replace(statement(sheet), wavelength_nm=(632.8, 10600.0))
+    assert "Wavelengths: 632.8 to 10600 nm." in infrared.sentences
 
 
 def test_names_of_a_csv_may_be_in_micrometres(tmp_path: Path) -> None:
@@ -229,6 +232,9 @@ NOTES: list[tuple[str, dict[str, Any], str]] = [
     ("sza,vza,raa,brdf,unc (%)\n10,20,180,0.5,3\n", {}, "percent of the values of their rows"),
     ("sza,vza,raa,brdf,unc\n10,20,180,0.5,0.01\n", {}, "Standard uncertainties were read from the column unc."),
     (f"# at 532 nm\n{SR}", {}, "The wavelength 532 nm was read from the titles of the file."),
+    (f"# Wellenl\u00e4nge 632,8 nm\n{SR}", {}, "The wavelength 632.8 nm was read from the titles of the file."),
+    (f"# longueur d'onde : 0,532 \u00b5m\n{SR}", {}, "The wavelength 532 nm was read from the titles of the file."),
+    (f"# wavenumber 943 cm-1\n{SR}", {}, "The wavelength 10604.5 nm was read from the titles of the file."),
     (SR, {"wavelength_nm": 550.0}, "The wavelength 550 nm was stated; the file has none."),
     (
         "theta_i [deg],theta_r [deg],Phi [deg],brdf\n10,20,150,0.5\n",
@@ -239,6 +245,12 @@ NOTES: list[tuple[str, dict[str, Any], str]] = [
         "theta_i,theta_r,delta_phi,brdf\n10,20,180,0.5\n10,20,180,0.5\n10,20,180,0.6\n",
         {},
         "1 row repeats the directions and values of another and was left out.",
+    ),
+    (
+        "theta_i,theta_r,delta_phi,wavelength_nm,brdf\n"
+        + "".join(f"10,0,{turn},{nm},{1e-3 * nm}\n" for turn in (0, 30) for nm in (450, 550)),
+        {},
+        "2 rows repeat the directions and values of others and were left out.",
     ),
     ("# title\n,theta_i,theta_r,delta_phi,brdf\n0,10,20,180,0.5\n", {}, "Columns left out: index."),  # of pandas
 ]
@@ -264,9 +276,13 @@ def test_units_below_the_names_are_no_damaged_row(tmp_path: Path) -> None:
     ("keywords", "sentence"),
     [
         ({"theta_i": "src"}, r"theta_i: 'src' is not a column of .* which has sza, vza, raa, brdf"),
-        ({"quantity": "percent"}, "quantity: 'percent' is not one of auto, f_r"),
+        ({"quantity": "brf"}, "quantity: 'brf' is not one of f_r, reflectance_factor, percent"),
+        ({"angles": "gon"}, "angles: 'gon' is not one of deg, rad, mrad, elevation"),
+        ({"angles": "deg,rad"}, "angles: deg and rad exclude each other"),
+        ({"coverage_factor": 0.0}, "coverage_factor: 0 is not a positive number"),
+        ({"wavelength_unit": "um"}, "wavelength_unit: .* has no column of wavelengths"),
         ({"wavelength_nm": 0.55}, r"wavelength_nm: 0\.55 is outside \[10, 1e\+06\] nm"),
-        ({"azimuth": "back"}, "azimuth: 'back' is not one of light, forward"),
+        ({"azimuth": "back"}, "azimuth: 'back' is not one of light, forward, mirror"),
     ],
 )
 def test_keywords_that_are_wrong_are_refused(keywords: Any, sentence: str, tmp_path: Path) -> None:

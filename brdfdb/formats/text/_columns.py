@@ -1,85 +1,128 @@
-"""Columns of texts: what the names of other programs mean, and the layout of a text."""
+"""Columns of texts: what the names of other programs and laboratories mean, and the units in them."""
 
 from __future__ import annotations
 
-import csv
-import itertools
 import math
 import re
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+import unicodedata
+from collections.abc import Mapping, Sequence
+from functools import lru_cache
+from itertools import product
+from typing import NamedTuple
 
-ANGLES = ("theta_i", "phi_i", "theta_r", "phi_r", "delta_phi")
-_LIGHT = (
-    "i",
-    "in",
-    "inc",
-    "incident",
-    "incoming",
-    "source",
-    "src",
-    "light",
-    "solar",
-    "sun",
-    "ill",
-    "illumination",
-    "s",
+from brdfdb.measurements.conventions import ANGLE_UNITS, NM_PER
+
+ANGLES = ("theta_i", "phi_i", "theta_r", "phi_r", "delta_phi", "from_specular", "rotation")
+UNKNOWN_COSINE = "?"  # quantity of f_r times the cosine of an angle that is not known
+_CACHED = 4096  # names whose meaning is kept: those above rows are looked at for each line
+
+
+def _table(text: str) -> dict[str, list[str]]:
+    """Return the words behind each key of a table, a key a line."""
+    return {key: words.split() for key, _, words in (line.partition(":") for line in text.strip().splitlines())}
+
+
+def _keys(table: Mapping[str, Sequence[str]]) -> dict[str, str]:
+    """Return the key of each word of a table."""
+    return {word: key for key, words in table.items() for word in words}
+
+
+# Parts of names; those of an angle are one of polar or azimuth and one of light or viewer
+_PARTS = _table("""
+light: i in inc incident incoming incidence source src light lamp laser einfall solar sun ill illumination s
+viewer: r o out outgoing refl reflected reflection scat scatter scattered scattering sc sca v view viewing viewer det \
+detector detection rec receiver receiving obs observer observation collection exit emission emergence emergent streu \
+detektor
+polar: theta zenith z za polar th angle winkel
+azimuth: phi azimuth a az aa azi ph azimut
+uncertainty: uncertainty u unc std stdev stddev std_dev standard_deviation sigma error err standard_uncertainty \
+std_error unsicherheit messunsicherheit incertitude ecart_type ubrdf dbrdf delta_brdf
+""")
+# Plain names, as of `plain_name`, by what a column is
+_NAMES = _table("""
+theta_i: aoi angle_of_incidence incidence_angle incidence aoi_theta_i grazing_angle glancing_angle einfallswinkel \
+angle_d_incidence angle_incidence incident
+theta_r: streuwinkel ausfallswinkel beobachtungswinkel detektorwinkel messwinkel reflexionswinkel angle_de_diffusion \
+angle_d_observation angle_de_vue angle_de_reflexion angle_of_reflection angle_of_scatter aos detector_position \
+detektorposition
+rotation: rotation sample_rotation sample_azimuth sample_rot sample_phi rot rotation_of_sample sample_orientation \
+rotation_angle sample_rotation_angle azimuth_of_sample probenrotation probendrehung drehwinkel turntable
+delta_phi: delta_phi dphi deltaphi phi_d phid raa relaz relative_azimuth rel_azimuth phi_rel delta_azimuth delta_az \
+dazimuth azimuth_difference relative_phi rel_phi phi_r_phi_i relativazimut azimut_relatif
+wavelength: wavelength lambda wl wvl wave wave_length laser_wavelength wellenlange wellenlaenge wellenl_nge \
+longueur_d_onde
+""")
+# Plain names of values by their quantity
+_QUANTITIES = _table("""
+f_r: brdf f_r fr bsdf value values mean_brdf brdf_mean average_brdf avg_brdf brdf_avg brdf_average brdf_value \
+mittelwert_brdf brdf_mittelwert brdf_moyenne
+reflectance_factor: brf rf hcrf bcrf reflectance_factor r_factor reflexionsfaktor
+f_r_cos: dsf ccbrdf ccbsdf cc_brdf cc_bsdf brdf_cos f_r_cos fr_cos brdfcos ars cosine_corrected_brdf \
+cosine_corrected_bsdf cos_corrected_brdf cos_corrected_bsdf brdf_cosine_corrected bsdf_cosine_corrected \
+angle_resolved_scatter angle_resolved_scattering
+f_r_cos_i: f_r_cos_i
+""")
+_QUANTITY_OF = _keys(_QUANTITIES)
+_REFLECTANCES = ("r", "reflectance", "refl", "reflectivity", "reflexionsgrad", "reflectance_percent")
+AZIMUTHS = (
+    "phi",
+    "azimuth",
+    "azimut",
+    "azi",
+    "az",
+    "azimuth_angle",
+)  # of a viewer relative to the light, if there is no other
+BARE_POLAR = ("theta", "angle", "zenith", "polar", "polar_angle", "winkel", "elevation", "altitude")  # of a viewer
+_OF_S = ("theta_s", "thetas", "th_s", "polar_s", "zenith_s")  # of the sun, or of scattered light
+
+
+def _roles_of_names() -> dict[str, str]:
+    """Return the role of each plain name: of angles with their two parts in any order, and of `_NAMES`."""
+    roles: dict[str, str] = {}
+    for side, of_side in (("i", "light"), ("r", "viewer")):
+        for kind, of_kind in (("theta", "polar"), ("phi", "azimuth")):
+            for angle, word in product(_PARTS[of_kind], _PARTS[of_side]):
+                for name in (f"{angle}_{word}", f"{angle}{word}", f"{word}_{angle}", f"{word}{angle}"):
+                    roles.setdefault(name, f"{kind}_{side}")
+    return roles | _keys(_NAMES) | dict.fromkeys(AZIMUTHS, "")  # "phi" is not "ph" and "i"
+
+
+_ROLE_OF = _roles_of_names()
+
+_OF_SPECULAR = re.compile(
+    r"(?:angle|theta|scatter\w*|delta|degrees?)_(?:from|off|to|about|relative_to|rel_to|rel|wrt)_(?:the_)?spec(?:ular)?"
+    r"|(?:from|off)_spec(?:ular)?(?:_angle)?|aspecular(?:_angle)?|(?:theta|angle)_(?:spec|aspec)(?:ular)?"
+    r"|theta_(?:s|r|o)_(?:minus_)?theta_i|spec(?:ular)?_offset"
 )
-_VIEWER = (
-    *("r", "o", "out", "outgoing", "refl", "reflected", "scat", "scatter", "scattered"),
-    *("v", "view", "viewing", "viewer", "det", "detector", "rec", "receiver", "obs", "observer"),
+_SURFACE = re.compile(r"(?:^|_)(?:elevation|elev|altitude|grazing|glancing)(?=_|$)")  # angles that count from it
+_WITH_UNCERTAINTY = "|".join(("brdf", "bsdf", "f_r", "fr", *_QUANTITIES["reflectance_factor"]))
+_OF_UNCERTAINTY = re.compile(
+    rf"(?:rel(?:ative)?_|expanded_|combined_|\d_?(?=sigma))?"
+    rf"(?:(?:{'|'.join(_PARTS['uncertainty'])})(?:_(?:of_|in_)?(?:the_)?(?:{_WITH_UNCERTAINTY}))?"
+    rf"|(?:{_WITH_UNCERTAINTY})_(?:rel(?:ative)?_)?(?:{'|'.join(_PARTS['uncertainty'])}))(?:_rel(?:ative)?)?"
 )
-_POLAR = ("theta", "zenith", "z", "za", "polar", "th")
-_AZIMUTH = ("phi", "azimuth", "a", "az", "aa", "azi", "ph")
-_RELATIVE = ("delta_phi", "dphi", "deltaphi", "phi_d", "phid", "raa", "relaz", "relative_azimuth", "rel_azimuth")
-_OTHERS = {"aoi": "theta_i", "angle_of_incidence": "theta_i", "incidence_angle": "theta_i", "incidence": "theta_i"}
-_QUANTITIES = {
-    "f_r": ("brdf", "f_r", "fr", "bsdf", "value", "values"),
-    "reflectance_factor": ("brf", "rf", "hcrf", "bcrf", "reflectance_factor", "r_factor"),
-    "f_r_cos": ("dsf", "ccbrdf", "brdf_cos", "f_r_cos", "fr_cos", "brdfcos"),
-    "f_r_cos_i": ("f_r_cos_i",),
-}
-QUANTITIES = tuple(_QUANTITIES)
-_UNCERTAINTY = (
-    "uncertainty",
-    "u",
-    "unc",
-    "ubrdf",
-    "u_brdf",
-    "brdf_unc",
-    "std",
-    "stdev",
-    "brdf_std",
-    "standard_deviation",
-)
-_WAVELENGTH = ("wavelength", "lambda", "wl", "wvl", "wave")
-_LENGTHS = {"nm": 1.0, "nanomet": 1.0, "um": 1e3, "µm": 1e3, "μm": 1e3, "micro": 1e3, "m": 1e9}  # in nm
 _LENGTH = re.compile(r"(?:^|[\W_\d])(nm|um|µm|μm|m|(?:nano|micro)met(?:er|re)s?|microns?)(?=$|[\W_])", re.IGNORECASE)
-ANGLE_UNITS = {"deg": math.pi / 180.0, "rad": 1.0, "mrad": 1e-3}  # in rad
-_ANGLE_WORDS = {
-    "deg": ("deg", "degs", "degree", "degrees", "°", "º", "\ufffd"),  # the last is ° of other encodings
-    "rad": ("rad", "rads", "radian", "radians"),
-    "mrad": ("mrad", "mrads", "milliradian", "milliradians"),
-}
-_OTHER_ANGLES = ("gon", "grad", "arcmin", "arcsec", "turn")  # units of angles that are refused
-AZIMUTHS = ("phi", "azimuth", "azi", "az", "azimuth_angle")  # of a viewer relative to the light, if there is no other
-_COLOURS = (("R", "G", "B"), ("r", "g", "b"), ("X", "Y", "Z"))  # x, y, z are positions
-_OF_FACTORS = re.compile(r"\b(?:BRF|HCRF|reflectance factors?)\b", re.IGNORECASE)
-_OF_PERCENT = re.compile(
-    r"\b(?:BRDF|BRF|HCRF|BCRF|DSF|f_r|reflectance factors?|values)\b[\s,:;=(\[]*(?:(?:is|are|given|in) )*"
-    r"(?:%|(?:percent|pct)\b)",
+_SPECTRAL = re.compile(
+    r"(?:(?:photon|laser|optical)[\W_]*)?(?:wave[\W_]?number|energy|frequency|wellenzahl|energie|frequenz)s?"
+    r"[\W_]*(?:(?P<cm>cm ?(?:\^? ?-1|\u207b\u00b9)|1 ?/ ?cm)|(?P<ev>eV)|(?P<thz>THz))\W*",
     re.IGNORECASE,
 )
-_OF_UNCERTAINTY = re.compile(r"uncertaint|error|deviation|\bstd\b", re.IGNORECASE)
+_NM_TIMES = {"cm": 1e7, "ev": 1239.841984, "thz": 299792.458}  # wavelengths [nm] times numbers in cm^-1, eV and THz
+ANGLE_WORDS = _keys(
+    {
+        "deg": ("deg", "degs", "degree", "degrees", "°", "º", "\ufffd", "degré", "degrés"),  # \ufffd: ° of others
+        "rad": ("rad", "rads", "radian", "radians"),
+        "mrad": ("mrad", "mrads", "milliradian", "milliradians"),
+    }
+)
+OTHER_ANGLES = ("gon", "grad", "arcmin", "arcsec", "turn")  # units of angles that are refused
+_COLOURS = (("R", "G", "B"), ("r", "g", "b"), ("X", "Y", "Z"))  # x, y, z are positions
 _NUMBER_NM = re.compile(r"(?P<word>[a-z_]*?)[_@]?(?P<number>\d+(?:\.\d+)?)_?(?P<unit>nm|um|µm|μm)?$")
+_ELEMENT = re.compile(r"(?:m|mm|mueller|muller)_?([0-4])_?([0-4])")  # of a Mueller matrix
 BRACKETS = re.compile(r"[\[(](.*?)[\])]")
 _OF_NO_COSINE = re.compile(r"(?<!cos)(?<!cos )(?<!cosine)(?<!cosine )[\[(].*?[\])]", re.IGNORECASE)
 _NM_IN_BRACKETS = re.compile(r"[\[(]\s*(\d+(?:\.\d+)? ?(?:nm|um|µm|μm))\s*[\])]")
 _OF_COSINE = re.compile(r"(?P<word>.+?)_?cos(?:ine)?(?:_(?P<angle>.+))?")
-INDEX = "index"  # name of a first column whose header is empty
-UNKNOWN_COSINE = "?"  # quantity of f_r times the cosine of an angle that is not known
-_FEWEST_NAMES = 3  # fields of a line of names that are no numbers: those of the angles
-_COMMENT = re.compile(r"^\s*(?:#|%|//|!)+\s?")
 PERCENT = re.compile(r"%|(?:^|[\W_])(?:percent|pct)(?:$|[\W_])", re.IGNORECASE)
 _DIGITS = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻⁺−", "0123456789-+-")
 _PREFIX = {"": 1.0, "m": 1e3, "u": 1e6, "µ": 1e6, "μ": 1e6}  # of 1/sr: 1 per msr is 1000 per sr
@@ -90,250 +133,161 @@ _UNIT = re.compile(
     r"(?:(?:1 ?)?/ ?(?P<over>[muµμ]?)(?i:sr)|(?i:per) (?P<per>[muµμ]?)(?i:sr)"
     r"|(?P<raised>[muµμ]?)(?i:sr) ?(?:\^|\*\*)? ?\{?\(?-1\)?\}?)?"
 )
-_LOGARITHM = re.compile(r"\bd[bB]\b|(?:^|[\W_])(?:log|ln|lg)(?:10|2)?(?=$|[\W_])", re.IGNORECASE)
+_STATE = re.compile(  # of polarisation
+    r"(?:(?P<base>.+?)[\s_-]*(?:[\s_-]|(?=[\[(]))[\[(]?(?P<state>ss|sp|ps|pp|s|p|TE|TM)(?:[\s_-]*pol(?:ari[sz](?:ed|ation))?\.?)?[\])]?"
+    r"|(?P<before>ss|sp|ps|pp|s|p|TE|TM)(?:[\s_-]*pol(?:ari[sz](?:ed|ation))?\.?)?[\s_-]+(?P<after>[^\[(]+?))"
+    r"(?P<unit>\s*[\[(][^\])]*[\])])?",
+    re.IGNORECASE,
+)
+_PAIR = re.compile(r"(?<![A-Za-z])([sp])\s*(?:[-_>/→]|to)+\s*([sp])(?![A-Za-z])", re.IGNORECASE)  # s-p is sp
+_LOGARITHM_OF = re.compile(
+    r"(?:log_?10|log_?2|log|lg|ln)(?:[ _]*\((?P<inner>[^()]*(?:\([^()]*\))?[^()]*)\)(?:\W.*)?|[ _]+(?P<bare>.+))"
+    r"|(?P<before>.+?)[ _]+dB",
+    re.IGNORECASE,
+)
+_LOGARITHM = re.compile(r"(?:\b|_)d[bB]\b|(?:^|[\W_])(?:log|ln|lg)_?(?:10|2)?(?=$|[\W_])", re.IGNORECASE)
+OF_SAMPLES = re.compile(
+    r"(?:sample|samples|specimen|material|surface|coating|probe|probenname|muster|echantillon|materiau|filter|target|"
+    r"sample_(?:name|id|no|number|nr)|material_(?:name|id)|specimen_id|name)"
+)
+_FACTOR = re.compile(  # of all numbers, such as BRDF/1000, BRDF x 100 and 1000*BRDF
+    r"(?P<before>\d[\d.eE^+-]*\s*[*\u00d7\u00b7])?\s*(?P<base>.*?[\w)\]])[\s_]*"
+    r"(?P<after>(?:[*\u00d7\u00b7/]|(?<=[\s_])[xX])\s*\d[\d.]*(?:[eE^]?[-+]?\d+)?)?"
+)
 _WAVELENGTH_TEXT = re.compile(r"\d+(?:\.\d+)? ?(?:nm|um|µm|μm)|nm|um|µm|μm")
 
 
-@dataclass(frozen=True)
-class TextLayout:
-    """The layout of a text.
-
-    Attributes
-    ----------
-    delimiter : str or None
-        The character between fields; None: any white space.
-    line : int
-        Line of the names of the columns; that of the first row if it has none.
-    names : tuple of str
-        Names of the columns; their numbers, from 1, if it has none.
-    titles : tuple of str
-        Lines before the numbers that are not the names.
-    first : int
-        Line of the first row.
-    units : tuple of str
-        Units in a line of their own below the names, one a column; () if there is none.
-    damaged : str
-        A sentence on an earlier line that looks like a row but has fields that are not numbers; else empty.
-    """
-
-    delimiter: str | None
-    line: int
-    names: tuple[str, ...]
-    titles: tuple[str, ...]
-    first: int
-    units: tuple[str, ...] = ()
-    damaged: str = ""
-
-    @property
-    def described(self) -> tuple[str, ...]:
-        """Names of the columns with the units of the line below them in brackets."""
-        pairs = itertools.zip_longest(self.names, self.units, fillvalue="")
-        return tuple(f"{name} [{unit.strip('[]()')}]" if unit else name for name, unit in pairs)
-
-    @property
-    def names_percent(self) -> bool:
-        """True if a line before the numbers says that values are percent."""
-        return any(_OF_PERCENT.search(line) and not _OF_UNCERTAINTY.search(line) for line in self.titles)
-
-    @property
-    def names_factors(self) -> bool:
-        """True if a line before the numbers speaks of reflectance factors."""
-        return any(_OF_FACTORS.search(line) for line in self.titles)
-
-
-def fields_of(line: str, delimiter: str | None) -> list[str]:
-    """Return the fields of a line; those in quotation marks may hold the delimiter."""
-    line = line.strip("\r\n")
-    if delimiter is not None and '"' in line:
-        try:
-            return [field.strip() for field in next(csv.reader([line], delimiter=delimiter, skipinitialspace=True))]
-        except csv.Error:  # a field is too long
-            pass
-    return [field.strip().strip('"') for field in line.split(delimiter)]
-
-
-def number_of(text: str) -> float | None:
-    """Return the number in a field, with a decimal point or comma, nan of an empty one; None if it is neither."""
-    if not text or text.lower() in ("na", "n/a", "null", "none", "-", "--"):
-        return float("nan")
-    try:
-        return float(text.replace(",", "."))
-    except ValueError:
-        return None
-
-
-def layout_of(lines: Iterable[tuple[int, str]]) -> TextLayout | None:
-    """Return the layout of a text by its first lines, with their numbers; None if there is no row.
-
-    The first line of numbers alone is the first row: four at least, or three below the names of two polar angles. The
-    last line before it with as many fields, three of them no numbers, has the names, also behind a sign of a comment.
-    """
-    before: list[_Line] = []
-    for number, line in lines:
-        delimiter = next((sign for sign in _delimiters(line) if _is_row(fields_of(line, sign), sign, before)), "")
-        if delimiter == "":
-            text = comment_of(line)
-            before.append(_Line(number, text, comment=text != line.rstrip("\r\n")))
-            continue
-        count = len(fields_of(line, delimiter))
-        at, names = _names(before, delimiter, count)
-        rows_of_units = [above for above in before if above.number > at and _are_units(above.text, delimiter, count)]
-        units = _split(rows_of_units[-1].text, delimiter, count) if rows_of_units else ()
-        before = [above for above in before if above not in rows_of_units]
-        titles = tuple(above.text for above in before if above.number != at and above.text.strip())
-        between = [above for above in before if above.number > at and not above.comment]
-        between = (
-            between if at else [earlier for earlier in between[-1:] if len(fields_of(earlier.text, delimiter)) == count]
-        )
-        damaged = next((fault for earlier in between if (fault := _fault(earlier, delimiter, names))), "")
-        return TextLayout(delimiter, at or number, names, titles, number, units, damaged)
-    return None
-
-
-def comment_of(line: str) -> str:
-    """Return a line without the sign of a comment and its end."""
-    return _COMMENT.sub("", line.rstrip("\r\n"))
-
-
-def header_of(text: str, layout: TextLayout) -> tuple[str, ...]:
-    """Return the names of columns in a line with as many as a layout has, three of them known; else none."""
-    names = _split(text, layout.delimiter, len(layout.names))
-    known = sum(name in layout.names or bool(role_of(name)) for name in names if number_of(name) is None)
-    return names if known >= _FEWEST_NAMES else ()
-
-
-@dataclass(frozen=True)
-class _Line:
-    """A line before the first row, without the sign of a comment."""
-
-    number: int
-    text: str
-    comment: bool
-
-
-def _delimiters(line: str) -> list[str | None]:
-    """Return the delimiters that a line may have, the likely ones first: a comma may be that of decimals."""
-    signs: list[str | None] = [sign for sign in "\t;," if sign in line]
-    return signs if signs and "," not in signs else [*signs, None]
-
-
-def _is_row(fields: Sequence[str], delimiter: str | None, before: Sequence[_Line]) -> bool:
-    """Return True if fields are the numbers of a row, and not all empty."""
-    numbers = [number_of(field) for field in fields]
-    if len(numbers) < 3 or None in numbers or not any(value == value for value in numbers):
-        return False
-    return len(numbers) > 3 or {"theta_i", "theta_r"} <= set(roles_of(_names(before, delimiter, 3)[1]))
-
-
-def _names(before: Sequence[_Line], delimiter: str | None, count: int) -> tuple[int, tuple[str, ...]]:
-    """Return the line and the names of columns; without names, line 0 and numbers from 1.
-
-    They are in the last line with as many names, one of which is known, or else in the last line that is no row.
-    """
-    numbered = tuple(str(1 + column) for column in range(count))
-    for line in reversed(before):
-        names = _split(line.text, delimiter, count)
-        words = [name for name in names if number_of(name) is None]
-        if len(words) >= _FEWEST_NAMES and any(role_of(name) for name in words):
-            return line.number, names
-    for line in reversed(before):
-        names = () if _are_units(line.text, delimiter, count) else _split(line.text, delimiter, count)
-        if sum(number_of(name) is None for name in names) >= _FEWEST_NAMES:
-            return line.number, names
-        if line.text.strip() and (line.comment or not _fault(line, delimiter, numbered)):
-            break
-    return 0, numbered
-
-
-def _are_units(text: str, delimiter: str | None, count: int) -> bool:
-    """Return True if a line has as many fields as there are columns, and two of them or more are units of angles."""
-    units = [unit.strip("[]()").lower() for unit in _split(text, delimiter, count)]
-    return sum(any(unit in words for words in _ANGLE_WORDS.values()) or unit in _OTHER_ANGLES for unit in units) >= 2
-
-
-def _split(text: str, delimiter: str | None, count: int) -> tuple[str, ...]:
-    """Return the names in a line if it has as many as there are columns, with the delimiter of rows or another one.
-
-    The first may be empty: pandas writes the numbers of rows into such a column.
-    """
-    for sign in dict.fromkeys((delimiter, None, ",", ";", "\t")):
-        first, *others = fields_of(text, sign)
-        if len(others) == count - 1 and all(others) and (first or len(others) >= _FEWEST_NAMES):
-            return (first or INDEX, *others)
-    return ()
-
-
-def _fault(line: _Line, delimiter: str | None, names: Sequence[str]) -> str:
-    """Return a sentence on a line that is a row of numbers except for some fields; empty for other lines."""
-    fields = fields_of(line.text, delimiter)
-    numbers = [number_of(field) for field in fields]
-    known = sum(value is not None and value == value for value in numbers)
-    if len(fields) == len(names) and known >= 2:
-        for field, name, value in zip(fields, names, numbers, strict=True):
-            if value is None:
-                return f"line {line.number}, field {name}: {field[:40]!r} is not a number"
-    if len(fields) != len(names) and len(fields) >= 3 and None not in numbers and known:
-        return f"line {line.number} has {len(fields)} fields, but the first valid row has {len(names)}"
-    return ""
-
-
+@lru_cache(maxsize=_CACHED)
 def role_of(name: str) -> str:
     """Return what a column is by its name: one of `ANGLES`, "values", "uncertainty", "wavelength"; "" if unknown."""
+    name = _bracketed(name)
     plain = plain_name(name)
-    if plain in AZIMUTHS:  # "phi" is not "ph" and "i"
-        return ""
-    if plain in _RELATIVE:
-        return "delta_phi"
-    if plain in _OTHERS:
-        return _OTHERS[plain]
-    if plain in _UNCERTAINTY:
-        return "uncertainty"
-    if plain in _WAVELENGTH or (plain.rpartition("_")[0] in _WAVELENGTH and length_unit(name) is not None):
+    if spectral_unit(name) is not None:
         return "wavelength"
-    if wavelength_of(name) is not None or _is_quantity(plain):
+    if plain in _ROLE_OF:
+        return _ROLE_OF[plain]
+    if _OF_SPECULAR.fullmatch(plain):
+        return "from_specular"
+    if _OF_UNCERTAINTY.fullmatch(plain):
+        return "uncertainty"
+    if plain.rpartition("_")[0] in _NAMES["wavelength"] and length_unit(name) is not None:
+        return "wavelength"
+    if wavelength_of(name) is not None or _is_quantity(plain) or state_of(name)[1]:
         return "values"
-    for side, words in (("i", _LIGHT), ("r", _VIEWER)):
-        for kind, angles in (("theta", _POLAR), ("phi", _AZIMUTH)):
-            if any(plain in (f"{a}_{w}", f"{a}{w}", f"{w}_{a}", f"{w}{a}") for a in angles for w in words):
-                return f"{kind}_{side}"
-    return ""
+    if _is_quantity(plain_name(without_logarithm(name))):
+        return "values"
+    if of_surface(name):
+        return role_of(_SURFACE.sub("_zenith", plain).strip("_")) or role_of(_SURFACE.sub("", plain).strip("_"))
+    if angle_unit(name) in ANGLE_UNITS and len(plain) > 3 and plain in (*_PARTS["light"], *_PARTS["viewer"]):
+        return "theta_i" if plain in _PARTS["light"] else "theta_r"
+    shorter = re.sub(
+        r"^(?:polar|zenith)_(?=angle_)|_(?:angle|winkel)s?$|_(?:theta|phi|th)_?[a-z]{0,3}$|_of(?:_the)?(?=_)", "", plain
+    )
+    return role_of(shorter) if shorter != plain and shorter not in AZIMUTHS else ""
 
 
-def roles_of(names: Sequence[str]) -> dict[str, list[int]]:
-    """Return the columns of each role, by the names of all columns."""
+def state_of(name: str) -> tuple[str, str]:
+    """Return the name of a quantity without its polarisation, and that: s, p, ss, sp, ps, pp or "" if it has none.
+
+    A name of two letters alone, such as sp or s-p, is f_r.
+    """
+    name = _PAIR.sub(r"\1\2", name.strip())
+    if name.lower() in ("ss", "sp", "ps", "pp"):
+        return "brdf", name.lower()
+    if name in ("TE", "TM", "Rs", "Rp"):
+        return ("brdf" if name[0] == "T" else "reflectance_factor"), {"TE": "s", "TM": "p"}.get(name, name[-1])
+    match = _STATE.fullmatch(name)
+    if match is None:
+        return name, ""
+    base, state = (match["base"] or match["after"] or "").strip(), (match["state"] or match["before"]).lower()
+    if plain_name(base) not in _QUANTITY_OF:
+        return name, ""
+    unit = (match["unit"] or "").strip()
+    return f"{base} {unit}".strip(), {"te": "s", "tm": "p"}.get(state, state)
+
+
+def of_surface(name: str) -> bool:
+    """Return True if a name is that of an angle from the surface: an elevation, altitude or grazing angle."""
+    return _SURFACE.search(plain_name(name)) is not None
+
+
+def roles_of(names: Sequence[str], given: Mapping[str, Sequence[int]] | None = None) -> dict[str, list[int]]:
+    """Return the columns of each role, by the names of all columns; columns that the caller gives have no other."""
+    given = given or {}
+    taken = {column for columns in given.values() for column in columns}
     roles: dict[str, list[int]] = {}
     for number, name in enumerate(names):
-        roles.setdefault(role_of(name), []).append(number)
+        if number not in taken:
+            roles.setdefault(role_of(name), []).append(number)
     plain = [plain_name(name) for name in names]
-    if {"theta_i", "theta_s"} <= set(plain):  # theta_s is of the scattered light then, else of the sun
-        for angle in ("theta", "phi"):
-            if f"{angle}_s" in plain:
-                at = plain.index(f"{angle}_s")
-                roles[f"{angle}_i"] = [column for column in roles.get(f"{angle}_i", []) if column != at]
-                roles[f"{angle}_r"] = [at]
     bare = [BRACKETS.sub("", name).strip() for name in names]
     for colour in _COLOURS:
         if "values" not in roles and set(colour) <= set(bare):
             roles["values"] = [bare.index(channel) for channel in colour]
-    azimuths = [column for column, text in enumerate(plain) if text in AZIMUTHS]
-    if len(azimuths) == 1 and not {"phi_i", "phi_r", "delta_phi"} & set(roles):
-        roles["delta_phi"] = azimuths
-    return {role: columns for role, columns in roles.items() if role and columns}
+    if "values" not in roles and "values" not in given:
+        first = element_columns(plain).get((0, 0))
+        reflectances = [n for n, text in enumerate(plain) if text in _REFLECTANCES and n not in taken]
+        roles["values"] = reflectances if first is None else [first]
+    of_s = any(plain[n] in _OF_S for n in roles.get("theta_i", ()))
+    if of_s and not {"theta_r", "from_specular"} & {*given, *roles}:
+        for angle in ("theta", "phi"):  # theta_s is of the scattered light then, else of the sun
+            columns = roles.get(f"{angle}_i", [])
+            moved = [n for n in columns if re.fullmatch(r"[a-z]+_s|(?:theta|phi)s", plain[n])]
+            roles[f"{angle}_i"] = [n for n in columns if n not in moved]
+            roles[f"{angle}_r"] = roles.get(f"{angle}_r", []) + moved
+    known = {role: columns for role, columns in roles.items() if role and columns}
+    free = set(range(len(names))) - taken - {column for columns in known.values() for column in columns}
+    polar = [n for n in sorted(free) if plain[n] in BARE_POLAR]
+    if len(polar) == 1 and "theta_r" not in known and "theta_r" not in given:
+        known["theta_r"] = polar
+    azimuths = [n for n in sorted(free) if plain[n] in AZIMUTHS]
+    if len(azimuths) == 1 and not {"phi_i", "phi_r", "delta_phi"} & set(known):
+        known["delta_phi"] = azimuths
+    return known
 
 
+def element_columns(plain: Sequence[str]) -> dict[tuple[int, int], int]:
+    """Return the columns of Mueller elements, such as m00 or M11, by row and column from 0; {} without two of them."""
+    matches = [(number, match) for number, name in enumerate(plain) if (match := _ELEMENT.fullmatch(name))]
+    columns = {(int(match[1]), int(match[2])): number for number, match in matches}
+    first = 0 if any(0 in place for place in columns) else 1
+    shifted = {(row - first, column - first): number for (row, column), number in columns.items()}
+    return shifted if len(shifted) > 1 and max(map(max, shifted)) < 4 else {}
+
+
+def without_logarithm(name: str) -> str:
+    """Return the name of the quantity in that of its logarithm, such as BRDF of log10(BRDF)."""
+    match = _LOGARITHM_OF.fullmatch(name.strip())
+    return name if match is None else match["inner"] or match["bare"] or match["before"]
+
+
+@lru_cache(maxsize=_CACHED)
 def plain_name(name: str) -> str:
-    """Return a name in lower case, without units in brackets and with _ for all other signs."""
+    """Return a name in lower case, without accents and units in brackets, and with _ for all other signs."""
     text = name.strip().lower().replace("θ", "theta").replace("φ", "phi").replace("ϕ", "phi").replace("δ", "delta_")
+    text = text.replace("λ", "lambda").replace("σ", "sigma").replace("ß", "ss").replace("ϑ", "theta")
+    text = "".join(sign for sign in unicodedata.normalize("NFKD", text) if not unicodedata.combining(sign))
     text = re.sub(r"[\[(].*?[\])]", "", text)
-    text = re.sub(r"[^a-z0-9.µμ]+", "_", text).strip("_")
-    return re.sub(r"_(?:deg|degrees?|m?rad|radians?|percent|pct)$", "", text)
+    text = re.sub(r"[^a-z0-9.µμ]+|\.(?!\d)", "_", text).strip("_")
+    text = re.sub(r"__+", "_", text)
+    return re.sub(r"_(?:in_)?(?:deg|degrees?|grad|m?rad|radians?|percent|pct|1_sr|per_sr|sr_?1|sr)$", "", text)
+
+
+@lru_cache(maxsize=_CACHED)
+def _bracketed(name: str) -> str:
+    """Return the name of a quantity with its factor in brackets, BRDF [/1000]; other names with decimal points."""
+    name = re.sub(r"(?<=\d),(?=\d)", ".", name)
+    match = _FACTOR.fullmatch(name.strip())
+    if match is None or not (match["before"] or match["after"]) or not _is_quantity(plain_name(match["base"])):
+        return name
+    return f"{match['base']} [{match['before'] or match['after']}]"
 
 
 def angle_unit(name: str) -> str:
     """Return the unit of angles that a name gives: one of `ANGLE_UNITS`, the text in its brackets, or "" if none."""
     for unit in (text.strip() for text in BRACKETS.findall(name)):
         if unit:
-            return next((key for key, words in _ANGLE_WORDS.items() if unit.lower().rstrip(".") in words), unit)
+            return "deg" if unit == "Grad" else ANGLE_WORDS.get(unit.lower().rstrip("."), unit)  # "grad" is a gon
     if match := re.search(r"[\W_](m?rad)", name.lower()):
         return match[1]
     return "deg" if "deg" in name.lower() or "°" in name else ""
@@ -342,7 +296,13 @@ def angle_unit(name: str) -> str:
 def length_unit(name: str) -> float | None:
     """Return the unit [nm] of wavelengths that a name gives, such as 1000 of lambda_um; None if it gives none."""
     match = _LENGTH.search(name)
-    return None if match is None else next(nm for unit, nm in _LENGTHS.items() if match[1].lower().startswith(unit))
+    return None if match is None else NM_PER[match[1].lower()]
+
+
+def spectral_unit(name: str) -> float | None:
+    """Return the product of the wavelength [nm] and the number of wavenumbers, photon energies or frequencies."""
+    match = _SPECTRAL.fullmatch(name.strip())
+    return None if match is None else next(nm for unit, nm in _NM_TIMES.items() if match[unit])
 
 
 def wavelength_of(name: str) -> float | None:
@@ -350,23 +310,22 @@ def wavelength_of(name: str) -> float | None:
 
     A quantity may have it in brackets, with its unit: BRF (550 nm).
     """
+    name = _bracketed(name)
     match = _NUMBER_NM.fullmatch(plain_name(name))
     if match is None:
         inner = _NM_IN_BRACKETS.search(name)
         return wavelength_of(inner[1]) if inner and _is_quantity(plain_name(name)) else None
-    word = match["word"]
+    word = match["word"].rstrip("_")
     number = float(match["number"])
-    unit = match["unit"]
-    if word and not (_is_quantity(word.rstrip("_")) or word.rstrip("_") in ("r", "reflectance")):
+    unknown = match["word"] and not (_is_quantity(word) or word in ("r", "reflectance"))
+    if unknown or (match["unit"] is None and number < 100.0):
         return None
-    if unit is None:
-        return number if number >= 100.0 else None
-    return number if unit == "nm" else 1e3 * number
+    return number * NM_PER[match["unit"] or "nm"]
 
 
 def _is_quantity(plain: str) -> bool:
     """Return True if a plain name is that of a quantity, also times a cosine."""
-    return any(plain in words for words in _QUANTITIES.values()) or _cosine_in(plain) is not None
+    return plain in _QUANTITY_OF or _cosine_in(plain) is not None
 
 
 def _cosine_in(plain: str) -> str | None:
@@ -376,11 +335,12 @@ def _cosine_in(plain: str) -> str | None:
 
 
 def quantity_of(name: str, columns: Sequence[str]) -> str:
-    """Return the quantity that the name of a column of values gives: one of `QUANTITIES`, or "" if it gives none.
+    """Return the quantity that the name of a column of values gives, such as f_r_cos, or "" if it gives none.
 
     It is `UNKNOWN_COSINE` if f_r is multiplied by the cosine of an angle that is neither that of the light nor that of
     the viewer. The names of all columns tell whether theta_s is the one or the other.
     """
+    name = without_logarithm(state_of(_bracketed(name))[0])
     plain = plain_name(name)
     match = _NUMBER_NM.fullmatch(plain)
     word = match["word"].rstrip("_") if match else plain
@@ -392,20 +352,24 @@ def quantity_of(name: str, columns: Sequence[str]) -> str:
                 return quantity
         if angle in ("s", "theta_s"):
             return UNKNOWN_COSINE
-        of_viewer = role_of(angle) == "theta_r" or angle in _VIEWER
-        of_light = role_of(angle) == "theta_i"
-        return "f_r_cos" if of_viewer else "f_r_cos_i" if of_light or angle in _LIGHT else UNKNOWN_COSINE
-    return next((quantity for quantity, words in _QUANTITIES.items() if word in words), "")
+        of_viewer = role_of(angle) == "theta_r" or angle in _PARTS["viewer"]
+        of_light = role_of(angle) == "theta_i" or angle in _PARTS["light"]
+        return "f_r_cos" if of_viewer else "f_r_cos_i" if of_light else UNKNOWN_COSINE
+    bare = {BRACKETS.sub("", column).strip() for column in columns}
+    if word in _REFLECTANCES and not any(set(colour) <= bare for colour in _COLOURS):
+        return "reflectance_factor"
+    return _QUANTITY_OF.get(word, "")
 
 
 def units_in(name: str) -> list[str]:
     """Return the texts in brackets in a name of values, without those that are quantities, angles or wavelengths."""
     units = []
+    name = _bracketed(name)
     for match in BRACKETS.finditer(name):
         unit = match[1].strip()
         of_cosine = re.search(r"cos(?:ine)?\W*$", name[: match.start()], re.IGNORECASE)
         of_wavelength = _WAVELENGTH_TEXT.fullmatch(unit) and wavelength_of(name) is not None
-        if unit and not (of_cosine or of_wavelength or role_of(unit)):
+        if unit and not (of_cosine or of_wavelength or (role_of(unit) and unit.strip("*/\u00d7\u00b7") == unit)):
             units.append(unit)
     return units
 
@@ -433,15 +397,32 @@ def scale_of(name: str) -> tuple[float, str]:
     scale = 0.01 if PERCENT.search(BRACKETS.sub(" ", name)) else 1.0
     unknown = ""
     for unit in units_in(name):
-        factor = factor_of(unit)
-        if factor is None and PERCENT.search(unit):
-            factor = 0.01
-        if factor is None:
-            unknown = unknown or unit
+        factor = factor_of(unit) or (0.01 if PERCENT.search(unit) else None)
+        unknown = unknown or ("" if factor else unit)
         scale *= factor or 1.0
     return scale, unknown
 
 
-def is_logarithm(name: str) -> bool:
-    """Return True if a name says that its numbers are decibels or other logarithms."""
-    return _LOGARITHM.search(name) is not None
+class ValueName(NamedTuple):
+    """What the name of a column of values says.
+
+    `quantity` is as of `quantity_of`. `logarithm` is log10, ln, decibel, "log" of others, or "" if numbers are none:
+    else `factor` makes 1/sr of them, and `unit` is the first that is not known, or "".
+    """
+
+    quantity: str
+    logarithm: str
+    factor: float
+    unit: str
+    wavelength_nm: float | None
+
+
+def value_name(name: str, columns: Sequence[str]) -> ValueName:
+    """Return what the name of a column of values says, among the names of all columns."""
+    match = _LOGARITHM.search(name)
+    word = match[0].strip(" _([.-*").lower() if match else ""
+    logarithm = word and {"db": "decibel", "ln": "ln", "log_10": "log10", "lg": "log10"}.get(word, word)
+    if logarithm not in ("", "decibel", "ln", "log10"):
+        logarithm = "log"
+    factor, unit = (1.0, "") if logarithm else scale_of(state_of(name)[0])
+    return ValueName(quantity_of(name, columns), logarithm, factor, unit, wavelength_of(name))
