@@ -32,21 +32,11 @@ class LightAndViewer(NamedTuple):
 
 @dataclass(frozen=True)
 class System(ABC):
-    """A system of angles [rad] of a pair of directions: a polar angle and an azimuth, twice.
+    """A system of angles [rad] of a pair of directions: a polar angle and an azimuth, twice."""
 
-    Attributes
-    ----------
-    anisotropic : bool
-        False: without the first azimuth; the second one counts from it.
-    mirrored : bool
-        f_r is the same for the negative second azimuth, so that it ends at pi.
-    steepest : float [rad]
-        Largest polar angle of directions of nodes.
-    """
-
-    anisotropic: bool
-    mirrored: bool = True
-    steepest: float = field(default=STEEPEST, kw_only=True)
+    anisotropic: bool  #: false: without the first azimuth; the second one counts from it
+    mirrored: bool = True  #: f_r is the same for the negative second azimuth, so that it ends at pi
+    steepest: float = field(default=STEEPEST, kw_only=True)  #: largest polar angle of directions of nodes, [rad]
 
     names: ClassVar[tuple[str, ...]]
 

@@ -76,21 +76,12 @@ class _Counter:
 
 @dataclass(frozen=True, eq=False)
 class AngularGrid:
-    """Values on a grid of angles, interpolated linearly over each.
+    """Values on a grid of angles, interpolated linearly over each."""
 
-    Attributes
-    ----------
-    system : System
-        The angles.
-    nodes : tuple of array (n,) [rad]
-        Nodes of each angle, strictly increasing. One node means that the value does not depend on the angle.
-    values : float32 array (n, ..., C) [1/sr]
-        f_r at the nodes: an axis for each angle, and last the channels.
-    """
-
-    system: System
+    system: System  #: the angles
+    #: Nodes of each angle, strictly increasing, (n,) [rad]. One node means that the value does not depend on the angle.
     nodes: tuple[Floats, ...]
-    values: NDArray[np.float32]
+    values: NDArray[np.float32]  #: f_r at the nodes: an axis for each angle, and last the channels, (n, ..., C) [1/sr]
 
     @property
     def count(self) -> int:

@@ -11,7 +11,7 @@ from typing import Any
 from xml.sax.saxutils import escape
 
 from brdfdb.errors import FileFormatError
-from brdfdb.formats._input import check_size
+from brdfdb.formats._input import head_of, opened_text
 from brdfdb.formats._record import lines, of_lines, one_line
 from brdfdb.place import path_of
 
@@ -19,8 +19,7 @@ from brdfdb.place import path_of
 FRONT_OF_RADIANCE = "Reflection Back"
 SIDES = {"back": FRONT_OF_RADIANCE, "front": "Reflection Front"}
 VISIBLE = "Visible"
-_MOST_BYTES, _PIECE = 1 << 29, 1 << 20  # size of a file that is read, and of what is parsed at a time [byte]
-_HEAD_BYTES = 4096  # in which the first element stands
+_MOST_BYTES, _PIECE = 1 << 29, 1 << 20  # size of a file that is read [byte], and of what is parsed at a time
 _NAMESPACE = "http://windows.lbl.gov"
 _HEAD = f"""<?xml version="1.0" encoding="UTF-8"?>
 <WindowElement xmlns="{_NAMESPACE}" xmlns:xsi="http://www.w3.org/2001/XMLSchema-instance">
@@ -34,55 +33,25 @@ _TAIL = "</Layer>\n</Optical>\n</WindowElement>\n"
 
 @dataclass(frozen=True)
 class BsdfBlock:
-    """Numbers of one channel and one side.
+    """Numbers of one channel and one side."""
 
-    Attributes
-    ----------
-    wavelength : str
-        "Visible", "Solar", or a channel of a colour, such as "CIE-X".
-    side : str
-        "Reflection Back", and so on.
-    basis : str
-        Name of the angle basis: of the columns, in a matrix.
-    row_basis : str
-        Name of the basis of the rows; empty of a tree.
-    numbers : str
-        The numbers as text.
-    kind : str
-        Type of the data; the schema of WINDOW knows BTDF alone, for reflection, too.
-    """
-
-    wavelength: str
-    side: str
-    basis: str
-    row_basis: str
-    numbers: str
-    kind: str = "BTDF"
+    wavelength: str  #: "Visible", "Solar", or a channel of a colour, such as "CIE-X"
+    side: str  #: "Reflection Back", and so on
+    basis: str  #: name of the angle basis: of the columns, in a matrix
+    row_basis: str  #: name of the basis of the rows; empty of a tree
+    numbers: str  #: the numbers as text
+    kind: str = "BTDF"  #: type of the data; the schema of WINDOW knows BTDF alone, for reflection, too
 
 
 @dataclass(frozen=True)
 class BsdfFile:
-    """Content of a BSDF file.
+    """Content of a BSDF file."""
 
-    Attributes
-    ----------
-    name : str
-        Name of the material.
-    structure : str
-        "TensorTree3", "TensorTree4", "Columns" or "Rows".
-    definition : Element
-        Definition of the data, with the angle bases.
-    record : mapping
-        Our record; empty of files of other programs.
-    blocks : mapping
-        Blocks of the side, by wavelength.
-    """
-
-    name: str
-    structure: str
-    definition: ElementTree.Element
-    record: Mapping[str, Any]
-    blocks: Mapping[str, BsdfBlock]
+    name: str  #: name of the material
+    structure: str  #: "TensorTree3", "TensorTree4", "Columns" or "Rows"
+    definition: ElementTree.Element  #: definition of the data, with the angle bases
+    record: Mapping[str, Any]  #: our record; empty of files of other programs
+    blocks: Mapping[str, BsdfBlock]  #: blocks of the side, by wavelength
 
 
 def text_of(
@@ -170,12 +139,22 @@ def read(path: str | os.PathLike[str], side: str = FRONT_OF_RADIANCE) -> BsdfFil
         for part in entry.findall("{*}WavelengthDataBlock"):
             if _text(part, "WavelengthDataDirection").lower() == side.lower():
                 wavelength = _text(entry, "Wavelength")
+                if wavelength.lower() in blocks:
+                    text = f"the block {wavelength} of {side} stands twice; write a file for each measurement"
+                    raise FileFormatError(f"{path}: field WavelengthData: {text}")
                 basis = _text(part, "AngleBasis") or _text(part, "ColumnAngleBasis")
                 numbers = _text(part, "ScatteringData")
                 blocks[wavelength.lower()] = BsdfBlock(wavelength, side, basis, _text(part, "RowAngleBasis"), numbers)
     if VISIBLE.lower() not in blocks:
         of_radiance = ", which is Radiance's front" if side == FRONT_OF_RADIANCE else ""
-        raise FileFormatError(f"{path}: it has no {VISIBLE} block of {side}{of_radiance}")
+        known = {
+            (_text(entry, "Wavelength").lower(), _text(part, "WavelengthDataDirection").lower())
+            for entry in layer.findall("{*}WavelengthData")
+            for part in entry.findall("{*}WavelengthDataBlock")
+        }
+        other = [name for name, words in SIDES.items() if (VISIBLE.lower(), words.lower()) in known]
+        hint = f"; --side {other[0]} reads {SIDES[other[0]]}" if other else ""
+        raise FileFormatError(f"{path}: field WavelengthData: it has no {VISIBLE} block of {side}{of_radiance}{hint}")
     return BsdfFile(
         _text(layer, "Material/{*}Name") or path.stem,
         _text(definition, "IncidentDataStructure"),
@@ -187,19 +166,17 @@ def read(path: str | os.PathLike[str], side: str = FRONT_OF_RADIANCE) -> BsdfFil
 
 def _root(path: Path) -> ElementTree.Element:
     """Return the root of a document, which is parsed in pieces: the first one that is no XML ends it."""
-    check_size(path, _MOST_BYTES)
     parser = ElementTree.XMLParser()
-    end = b""
-    with path.open("rb") as file:
-        if not is_window_element(file.read(_HEAD_BYTES)):
+    end = ""
+    with opened_text(path, _MOST_BYTES) as file:
+        if not is_window_element(head_of(path)):
             raise FileFormatError(f"{path}: line 1: it does not begin with a WindowElement")
-        file.seek(0)
         while piece := file.read(_PIECE):
-            seen = end + piece
-            if b"<!DOCTYPE" in seen or b"<!ENTITY" in seen:  # entities may grow without limit
+            seen = end + (piece if end else piece.lstrip())
+            if "<!DOCTYPE" in seen or "<!ENTITY" in seen:  # entities may grow without limit
                 raise FileFormatError(f"{path}: it declares a document type, which these files do not have")
-            parser.feed(piece)
-            end = piece[-len(b"<!DOCTYPE") :]
+            parser.feed(seen[len(end) :])
+            end = piece[-len("<!DOCTYPE") :]
     root: ElementTree.Element = parser.close()
     return root
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -19,32 +20,22 @@ RGB = ("R", "G", "B")
 XYZ = ("X", "Y", "Z")
 LUMINOUS = ("Y",)
 GREY = ("grey",)
+FILE_RANGE_NM = (10.0, 1e6)  # wavelengths of files: others are in another unit
 _AT_ONCE = 1 << 22  # values of a table that are looked up at a time
 
 
 @dataclass(frozen=True, eq=False)
 class Channels:
-    """The channels of a file.
+    """The channels of a file."""
 
-    Attributes
-    ----------
-    names : tuple of str
-        ("R", "G", "B"), ("X", "Y", "Z"), ("Y",), ("grey",), or a wavelength each, such as "550nm".
-    wavelength_nm : array (L,) [nm] or None
-        Wavelengths at which the table is looked up; None of a grey one.
-    weights : array (L, C) or None
-        Weights that take the wavelengths to the channels; None where they are the channels.
-    meaning : str
-        The channels in words.
-    remarks : tuple of str
-        A sentence for the record if the channels are others than those of the table.
-    """
-
+    #: ("R", "G", "B"), ("X", "Y", "Z"), ("Y",), ("grey",), or a wavelength each, such as "550nm"
     names: tuple[str, ...]
+    #: wavelengths at which the table is looked up; None of a grey one, (L,) [nm]
     wavelength_nm: NDArray[np.float64] | None
+    #: weights that take the wavelengths to the channels; None where they are the channels, (L, C)
     weights: NDArray[np.float64] | None
-    meaning: str
-    remarks: tuple[str, ...] = ()
+    meaning: str  #: the channels in words
+    remarks: tuple[str, ...] = ()  #: a sentence for the record if the channels are others than those of the table
 
     def values(self, table: Table, wi: Floats, wr: Floats) -> Floats:
         """Return f_r [1/sr] of a table in the channels, shape (..., C), at unit vectors (..., 3)."""
@@ -72,6 +63,27 @@ class Channels:
 def names_of(wavelength_nm: NDArray[np.float64] | None) -> tuple[str, ...]:
     """Return the names of channels at wavelengths [nm], such as 550nm; "grey" without wavelengths."""
     return GREY if wavelength_nm is None else tuple(f"{nm:g}nm" for nm in wavelength_nm)
+
+
+def check_file_wavelengths(wavelength_nm: NDArray[np.float64], taken: str, refused: Collection[str]) -> None:
+    """Raise ParameterError if wavelengths [nm] of a file are outside [10, 1e6] nm, with the unit that they may have.
+
+    Numbers were taken to be in the unit `taken`. The unit is not named if the file refuses to be told of it.
+    """
+    from brdfdb.measurements.conventions import NM_PER, WAVELENGTH_UNITS
+
+    low, high = FILE_RANGE_NM
+    inside = (wavelength_nm >= low) & (wavelength_nm <= high)
+    if np.all(inside):
+        return
+    wrong = float(wavelength_nm[~inside][0])
+    text = f"{wrong:g} nm is outside [{low:g}, {high:g}] nm"
+    for unit in WAVELENGTH_UNITS:
+        other_nm = wavelength_nm * (NM_PER[unit] / NM_PER[taken])
+        if np.all((other_nm >= low) & (other_nm <= high)) and "--wavelength-unit" not in refused:
+            text += f"; if the numbers are {unit}, state --wavelength-unit {unit}"
+            break
+    raise ParameterError("wavelength_nm", text, wrong, FILE_RANGE_NM)
 
 
 def has_spectrum(table: Table) -> bool:
@@ -132,10 +144,7 @@ def channels_of(table: Table, colour: str = "") -> Channels:
 def at_wavelength(table: Table, wavelength_nm: float) -> Channels:
     """Return the one channel of a format that holds a single wavelength: that of a grey table, or a wavelength.
 
-    Raises
-    ------
-    ParameterError
-        If the wavelength [nm] is outside those of the table; a table of one wavelength has that one.
+    ParameterError if the wavelength [nm] is outside those of the table; a table of one wavelength has that one.
     """
     at = table.wavelength_nm
     if at is None or at.size == 1:

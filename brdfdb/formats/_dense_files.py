@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 
 from brdfdb.errors import FileFormatError, ParameterError, import_extra
 from brdfdb.formats._channels import names_of
-from brdfdb.formats._input import check_text
+from brdfdb.formats._input import opened_text
 from brdfdb.formats._interface import TOLERANCE, FormatOption
-from brdfdb.formats._nodes import samples_at_angles
 from brdfdb.formats._record import CONVENTION, history_of, record, specular_remark
+from brdfdb.measurements.conventions import ANGLE_WORDS, AZIMUTHS, RELATIVE, ListedRows
 from brdfdb.place import path_of
 
 if TYPE_CHECKING:
@@ -74,6 +74,7 @@ _TURNED = {
 _MOST_VALUES = 1 << 27  # of a file that is read
 _MOST_NODES = 1 << 22  # of an axis that is read
 _DEGREES = ("", "degree", "degrees", "deg", "°")
+_RIGHT_ANGLE = 1.58  # polar angles without a unit, none of which is larger, may be radians
 _RADIANS = ("rad", "radian", "radians")
 MOST_BYTES = 40_000_000  # size of a file that is written, about
 _MOST_READ = 1 << 29  # of a file that is read
@@ -144,7 +145,7 @@ def record_of_attributes(attributes: Mapping[str, Any]) -> dict[str, Any]:
     return document
 
 
-def read_dataset(path: Path, opened: xr.Dataset) -> FileTable | Samples:
+def read_dataset(path: Path, opened: xr.Dataset) -> FileTable | ListedRows | Samples:
     """Return f_r of a dataset that a file holds, or its samples; FileFormatError if it is neither."""
     from brdfdb.measurements.samples import Samples
     from brdfdb.tables.grids import axes_among
@@ -175,13 +176,17 @@ def read_dataset(path: Path, opened: xr.Dataset) -> FileTable | Samples:
             f"{path}: the dimensions of brdf, {', '.join(map(str, brdf.dims))}, are not those of a table"
         )
     check_sizes(path, {name: opened[name].shape for name in ("brdf", *brdf.dims)})
-    from brdfdb.measurements.samples import PER_SR
+    from brdfdb.measurements.conventions import PER_SR
 
     if _unit(brdf) not in PER_SR:
         raise FileFormatError(f"{path}: brdf has the units {_unit(brdf)!r}; allowed is sr-1")
     values = brdf.transpose(*names, *spectral).values
     at = _in_nm(path, opened["wavelength"]) if spectral else None
     axes = {name: _in_degrees(path, opened[name]) for name in names}
+    for name in axes:
+        if name.startswith("theta") and not _unit(opened[name]) and max(axes[name], default=0.0) < _RIGHT_ANGLE:
+            text = "it has no units, and no angle above 1.6; state the attribute units as degree or rad"
+            raise FileFormatError(f"{path}: field {name}: {text}")
     return file_table(path, axes, values, at, record_of_attributes(opened.attrs))
 
 
@@ -199,7 +204,7 @@ def _unit(variable: xr.DataArray) -> str:
 
 def _in_nm(path: Path, variable: xr.DataArray) -> NDArray[Any]:
     """Return wavelengths [nm], in the unit that a file names."""
-    from brdfdb.measurements.samples import NM_PER
+    from brdfdb.measurements.conventions import NM_PER
 
     if _unit(variable) not in NM_PER:
         raise FileFormatError(f"{path}: {variable.name} has the units {_unit(variable)!r}; allowed are nm, um and m")
@@ -222,8 +227,8 @@ def file_table(
     values: NDArray[Any],
     wavelength_nm: NDArray[Any] | None,
     known: Mapping[str, Any],
-) -> FileTable | Samples:
-    """Return f_r that is interpolated linearly on the grid of a file; its samples if it has holes, or negative values.
+) -> FileTable | ListedRows:
+    """Return f_r that is interpolated linearly on the grid of a file; its rows if it has holes, or negative values.
 
     Raises
     ------
@@ -251,14 +256,17 @@ def file_table(
     channels = names_of(at)
     name = str(known.get("name") or path_of(path).stem)
 
-    def nodes() -> Samples:
+    def rows() -> ListedRows:
         angles = np.stack(np.broadcast_arrays(*grid.directions()), axis=-1).reshape(-1, 4)
         flat = values.reshape(-1, len(channels)).astype(np.float64)
-        return samples_at_angles(angles, flat, name, channels, at, known)
+        refused = [f"--azimuth {word}" for word in AZIMUTHS if word != "forward"]
+        refused += [f"--angles {word}" for word in ANGLE_WORDS]
+        own = tuple(refused) if grid.half_difference else ()
+        return ListedRows(angles, flat, name, channels, at, known, refused=own)
 
     continued = grid.half_difference  # below the horizon, where a negative number serves the interpolation
     if np.any(np.isnan(values)) or (np.any(values < 0.0) and not continued):
-        return nodes()
+        return rows()
     table = interpolated(grid, stored, at)
     return FileTable(
         name=name,
@@ -266,7 +274,7 @@ def file_table(
         wavelength_nm=at,
         evaluate=lambda wi, wr: np.asarray(table.lookup_vectors(wi, wr)).reshape(len(wi), len(channels)),
         record=known,
-        nodes=nodes,
+        rows=rows,
     )
 
 
@@ -276,12 +284,15 @@ def reading_of_rows(
     values: NDArray[np.float64],
     wavelength_nm: NDArray[np.float64] | None,
     known: Mapping[str, Any],
-    nodes: Callable[[], Samples] | None = None,
-) -> FileTable | Samples:
-    """Return f_r of rows of angles [degree]: interpolated linearly if they are a grid without holes, else as samples.
+    rows: Callable[[], ListedRows] | None = None,
+    *,
+    stated: bool = False,
+) -> FileTable | ListedRows:
+    """Return f_r of rows of angles [degree]: interpolated linearly if they are a grid without holes, else as rows.
 
     There is a column of angles (N,) for each axis, and one of values (N, C) [1/sr] for each wavelength, or a single
-    one. `known` is the record of the file. `nodes` gives its samples (default: `samples_of_rows`).
+    one. `known` is the record of the file. `rows` gives its rows (default: `listed_rows`). With `stated` the user says
+    what angles or wavelengths are: the numbers may be none of a grid.
 
     Raises
     ------
@@ -297,43 +308,41 @@ def reading_of_rows(
     of_axes = {name: np.unique(column) for name, column in angles.items()}
     shape = tuple(column.size for column in of_axes.values())
     of_vectors = {"theta_i", "theta_r"} <= set(angles)
-    if of_vectors and nodes is None:
-        nodes = functools.partial(samples_of_rows, path, angles, values, wavelength_nm, known)
-    if nodes is not None and not np.all(values >= 0.0):  # holes, and what no interpolation can tell from them
-        return nodes()
+    if of_vectors and rows is None:
+        rows = functools.partial(listed_rows, path, angles, values, wavelength_nm, known)
+    holes = not np.all(values >= 0.0)  # and what no interpolation can tell from them
+    if rows is not None and (stated or holes):
+        return rows()
     if np.prod(shape, dtype=object) == len(values) and _is_grid(angles, of_axes):
         ordered = values.reshape(*shape, -1)
         table = file_table(path, of_axes, ordered[..., 0] if wavelength_nm is None else ordered, wavelength_nm, known)
-        return replace(table, nodes=nodes) if isinstance(table, FileTable) and nodes is not None else table
-    if nodes is None:
+        return replace(table, rows=rows) if isinstance(table, FileTable) and rows is not None else table
+    if rows is None:
         raise FileFormatError(f"{path}: the rows over {', '.join(angles)} do not form a grid")
-    return nodes()
+    return rows()
 
 
-def samples_of_rows(
+def listed_rows(
     path: Path,
     angles: Mapping[str, NDArray[np.float64]],
     values: NDArray[np.float64],
     wavelength_nm: NDArray[np.float64] | None,
     known: Mapping[str, Any],
     **keywords: Any,
-) -> Samples:
-    """Return the samples of rows of theta_i, theta_r and their azimuths, or delta_phi [degree], as `reading_of_rows`.
+) -> ListedRows:
+    """Return the rows of theta_i, theta_r and their azimuths, or delta_phi [degree], as `reading_of_rows`.
 
-    Keywords are those of `samples_at_angles`.
+    Keywords are those of `ListedRows`.
     """
-    from brdfdb.measurements.samples import RELATIVE
-
     zero = np.zeros(len(values))
     phi_i = angles.get("phi_i", zero)
-    if "delta_phi" in angles and "phi_i" not in angles:
-        known = {**known, "azimuths": RELATIVE}
+    relative = "delta_phi" in angles and "phi_i" not in angles
+    known = {**known, "azimuths": RELATIVE} if relative else known
     phi_r = phi_i + angles["delta_phi"] if "delta_phi" in angles else angles.get("phi_r", zero)
     rows = np.deg2rad(np.stack([angles["theta_i"], phi_i, angles["theta_r"], phi_r], axis=1))
+    name = str(known.get("name") or path.stem)
     channels = names_of(wavelength_nm)
-    return samples_at_angles(
-        rows, values, str(known.get("name") or path.stem), channels, wavelength_nm, known, **keywords
-    )
+    return ListedRows(rows, values, name, channels, wavelength_nm, known, relative=relative, **keywords)
 
 
 def _is_grid(angles: Mapping[str, NDArray[np.float64]], nodes: Mapping[str, NDArray[np.float64]]) -> bool:
@@ -348,13 +357,25 @@ def _is_grid(angles: Mapping[str, NDArray[np.float64]], nodes: Mapping[str, NDAr
 
 def parsed(path: Path) -> dict[str, Any]:
     """Return the object in a JSON file; FileFormatError if it holds none, or more than 512 MiB."""
-    check_text(path, _MOST_READ)
     try:
-        document = json.loads(path.read_bytes())
+        with opened_text(path, _MOST_READ) as file:
+            document = json.load(file, object_pairs_hook=_once)
+    except FileFormatError:
+        raise
     except (ValueError, RecursionError) as error:
         raise FileFormatError(f"{path}: it is not JSON, or is damaged ({error})") from error
     if not isinstance(document, dict):
         raise FileFormatError(f"{path}: it is not a JSON object")
+    return document
+
+
+def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """Return an object of JSON; ValueError if it has a name twice, of which parsers take the last."""
+    document = dict(pairs)
+    if len(document) != len(pairs):
+        names = [name for name, _ in pairs]
+        twice = next(name for name in names if names.count(name) > 1)
+        raise ValueError(f"an object has the field {twice!r:.80} twice; write a file for each")
     return document
 
 
@@ -365,7 +386,7 @@ def column(path: Path, name: str, values: Any, *, holes: bool = False) -> NDArra
     except (ValueError, TypeError, OverflowError):
         numbers = np.empty((0, 0))
     if numbers.ndim != 1 or not numbers.size or np.any(np.isinf(numbers) | (np.isnan(numbers) & ~holes)):
-        raise FileFormatError(f"{path}: {name} is not a list of numbers")
+        raise FileFormatError(f"{path}: field {name}: it is not a list of numbers")
     return numbers
 
 

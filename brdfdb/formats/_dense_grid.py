@@ -55,28 +55,15 @@ _STRAIGHT = 7.5  # steps of such an angle that a straight line continues f_r by 
 
 @dataclass(frozen=True, eq=False)
 class DenseTable:
-    """f_r on a grid of angles.
+    """f_r on a grid of angles."""
 
-    Attributes
-    ----------
-    grid : Grid
-        Nodes of the axes [degree].
-    channels : Channels
-        Wavelengths, or "grey".
-    values : float32 array (*axes, C) [1/sr]
-        f_r at the nodes. On axes of half and difference vectors it is continued in a straight line where light or
-        viewer is below the horizon, so that cells at the horizon can be interpolated.
-    error : FileError
-        Error against the table, with linear interpolation.
-    tolerance : float or None [1]
-        Largest p99 that was asked for; None of a regular grid.
-    """
-
-    grid: Grid
-    channels: Channels
+    grid: Grid  #: nodes of the axes [degree]
+    channels: Channels  #: wavelengths, or "grey"
+    #: f_r at the nodes, (*axes, C) [1/sr]. On axes of half and difference vectors it is continued in a straight line
+    #: where light or viewer is below the horizon, so that cells at the horizon can be interpolated.
     values: NDArray[np.float32]
-    error: FileError
-    tolerance: float | None = None
+    error: FileError  #: error against the table, with linear interpolation
+    tolerance: float | None = None  #: largest p99 that was asked for; None of a regular grid, [1]
 
 
 def dense_table(

@@ -12,35 +12,23 @@ from brdfdb.errors import ParameterError
 if TYPE_CHECKING:
     from brdfdb.formats._readings import FileTable
     from brdfdb.formats._written import Written
+    from brdfdb.measurements.conventions import ListedRows
     from brdfdb.measurements.samples import Samples
 
 
 @dataclass(frozen=True)
 class FormatOption:
-    """An option of a format.
+    """An option of a format."""
 
-    Attributes
-    ----------
-    name : str
-        Name of the keyword argument.
-    default : bool, int, float or str
-        Value that is used if none is given, also where it is outside of the range; its type is that of the option.
-    help : str
-        A few words for people, with the unit.
-    low, high : float
-        Range of a number, both ends included.
-    choices : tuple of str
-        Values of a text.
-    most_served : float
-        Largest number for which a service makes a file: larger ones take gigabytes or minutes.
-    """
-
-    name: str
+    name: str  #: name of the keyword argument
+    #: value that is used if none is given, also where it is outside of the range; its type is that of the option
     default: bool | int | float | str
-    help: str
+    help: str  #: a few words for people, with the unit
+    #: range of a number, both ends included
     low: float = -math.inf
     high: float = math.inf
-    choices: tuple[str, ...] = ()
+    choices: tuple[str, ...] = ()  #: values of a text
+    #: largest number for which a service makes a file: larger ones take gigabytes or minutes
     most_served: float = math.inf
 
     @property
@@ -138,60 +126,44 @@ class Exporter(Protocol):
     """A format that tables are written to: a module or folder of `brdfdb.formats`, or another object with these names.
 
     It imports packages other than NumPy, and the tables, only when it writes.
-
-    Attributes
-    ----------
-    suffix : str
-        End of the names of its files, with the dot.
-    media_type : str
-        Media type over HTTP.
-    summary : str
-        A few words on what is written.
-    tools : str
-        Programs that read such files.
-    kinds : tuple of str
-        Kinds of files, one file each, that are made of one table: values of the keyword argument `kind`. Empty if one
-        file holds the table.
-    options : tuple of FormatOption
-        All other keyword arguments.
-    write : callable
-        ``write(table, path, verdict=None, **options)`` writes the file, and those beside it, completely or not at all;
-        files that exist are replaced. Its options are `options` and `kind`, whose `help` says what they mean. `verdict`
-        is that of the audit of this revision, or None if the caller does not know it. It raises CannotHoldError for a
-        table that the format has no place for (anisotropic, or of wavelengths that give no colour), ParameterError if
-        an option cannot be met (no file is so small, no such wavelength), and WriteError if a file cannot be written.
-        A module without `read` may have `recognises`, as importers do: files with its suffix are then of this format
-        only if it recognises them.
     """
 
-    suffix: str
-    media_type: str
-    summary: str
-    tools: str
+    suffix: str  #: end of the names of its files, with the dot
+    media_type: str  #: media type over HTTP
+    summary: str  #: a few words on what is written
+    tools: str  #: programs that read such files
+    #: Kinds of files, one file each, that are made of one table: values of the keyword argument `kind`. Empty if one
+    #: file holds the table.
     kinds: tuple[str, ...]
-    options: tuple[FormatOption, ...]
+    options: tuple[FormatOption, ...]  #: all other keyword arguments
+    #: ``write(table, path, verdict=None, **options)`` writes the file, and those beside it, completely or not at all;
+    #: files that exist are replaced. Its options are `options` and `kind`, whose `help` says what they mean. `verdict`
+    #: is that of the audit of this revision, or None if the caller does not know it. It raises CannotHoldError for a
+    #: table that the format has no place for (anisotropic, or of wavelengths that give no colour), ParameterError if an
+    #: option cannot be met (no file is so small, no such wavelength), and WriteError if a file cannot be written. A
+    #: module without `read` may have `recognises`, as importers do: files with its suffix are then of this format only
+    #: if it recognises them.
     write: Callable[..., Written]
 
 
 class Importer(Protocol):
-    """A format that is read: a module or folder of `brdfdb.formats`, or another object with these names.
+    """A format that is read: a module or folder of `brdfdb.formats`, or another object with these names."""
 
-    Attributes
-    ----------
-    suffix : str
-        End of the names of its files, with the dot.
-    recognises : callable
-        ``recognises(head)`` is true if the first bytes of a file, 4096 of them or all, are those of this format.
-    read : callable
-        ``read(path)`` gives f_r as the tools of the format see it, or the samples that the file lists. It raises
-        FileFormatError if the file is damaged or of another format, and OSError if it cannot be read. A module whose
-        `read` takes more has a tuple ``keywords`` with their names. A module whose files may hold several materials has
-        ``members(path)``, which gives the names that its keyword ``member`` takes, none of a file with one material.
-    """
-
-    suffix: str
+    suffix: str  #: end of the names of its files, with the dot
+    #: ``recognises(head)`` is true if the first bytes of a file, 4096 of them or all, are those of this format. Texts
+    #: of any encoding come as UTF-8 with LF, without space before the first line. A module may have ``signs``, a
+    #: regular expression of bytes: a file with a match that no format recognises is read by this one, which says what
+    #: is missing.
     recognises: Callable[[bytes], bool]
-    read: Callable[..., FileTable | Samples]
+    #: ``read(path)`` gives f_r as the tools of the format see it, or the rows that the file lists. It raises
+    #: FileFormatError if the file is damaged or of another format, and OSError if it cannot be read. A module whose
+    #: `read` takes more has a tuple ``keywords`` with their names. A module whose files may hold several materials has
+    #: ``members(path)``, which gives the names that its keyword ``member`` takes, none of a file with one material. A
+    #: module whose files list polar angles and azimuths of light and viewer has ``angle_unit``: deg, rad, or "stated"
+    #: where each file states it. ``wavelength_unit`` is that of its numbers, by default nm. What a user states on them
+    #: is applied to the rows, of which `brdfdb.formats.read` makes samples; a reader has words of it in ``keywords``
+    #: only if it cannot read without them.
+    read: Callable[..., FileTable | ListedRows | Samples]
 
 
 def options_of(exporter: Exporter) -> dict[str, FormatOption]:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from brdfdb.formats._stated_error import FileError
-    from brdfdb.measurements.samples import Instrument
+    from brdfdb.measurements.instrument import Instrument
     from brdfdb.tables.table import Table
 
 NOT_STATED = "not stated"
@@ -59,7 +59,7 @@ def record(
         "error_of_file": None if error is None else {"against": "the table", **error.document()},
         "tolerance": tolerance,
         "error": None if statement is None else statement.model_dump(mode="json"),
-        "remarks": [*remarks, *extrapolated_remark(table)],
+        "remarks": [*remarks, *extrapolated_remark(table), *glint_remark(table)],
         "licence": f"{licence}; {_MEASURED}" if known.refractive_index else licence,
         "program": f"brdfdb {version('brdfdb')}",
     }
@@ -90,6 +90,15 @@ def extrapolated_remark(table: Table) -> tuple[str, ...]:
         return ()
     share = f"{100.0 * known.extrapolated:.3g} % of all pairs of directions"
     return (f"{share} were not measured: f_r is extrapolated there, and its error is not known",)
+
+
+def glint_remark(table: Table) -> tuple[str, ...]:
+    """Return a sentence on the glints of a table that an export leaves out; none if there are none.
+
+    The record of a file lists them under measured, so that its reader can add them.
+    """
+    measured = table.metadata.measured
+    return () if measured is None or measured.glints is None else (measured.glints.left_out("the values of the file"),)
 
 
 def lines(document: dict[str, Any]) -> list[str]:
@@ -139,16 +148,23 @@ def of_lines(texts: list[str]) -> dict[str, Any]:
 
 def note(document: dict[str, Any], sentence: str) -> None:
     """Add a sentence to the notes of a record, which statements on samples repeat."""
-    document["notes"] = [*document.get("notes", ()), sentence]
+    if sentence not in (notes := document.get("notes", ())):
+        document["notes"] = [*notes, sentence]
 
 
-_LENGTH = r"(?P<number>\d+(?:\.\d+)?) ?(?P<unit>nm|um|\u00b5m|\u03bcm|microns?)\b"
+_UM = r"um|\u00b5m|\u03bcm|microns?"
+_LENGTH = (  # a comma before three digits of nm may part thousands
+    rf"(?P<number>\d+(?:\.\d+|,\d\d?(?!\d)|,\d+(?= ?(?:{_UM})))?) ?"
+    rf"(?P<unit>nm|{_UM}|cm ?(?:\^? ?-1|\u207b\u00b9)|1 ?/ ?cm)(?!\w)"
+)
 _WAVELENGTHS = tuple(  # of light, not of a layer or a band; the first that a text has are taken
     re.compile(pattern, re.IGNORECASE)
     for pattern in (
-        rf"(?:wavelengths?|laser|lambda|\u03bb)(?:[\s:=,(]|\b(?:is|was|are|of|at|lambda|light|source)\b)*{_LENGTH}",
+        r"(?:wavelengths?|wave ?numbers?|laser|lambda|\u03bb|wellenl\w{0,2}\W?ngen?|wellenzahl|longueurs? d.onde"
+        r"|nombres? d.onde)"
+        rf"(?:[\s:=,(]|\b(?:is|was|are|of|at|lambda|light|source|ist|des|lasers?|lichts|du|de|est)\b)*{_LENGTH}",
         rf"{_LENGTH} (?:wavelength|laser|light)",
-        rf"(?:\bat|@)\s*{_LENGTH}",
+        rf"(?:\b(?:at|bei|\u00e0)|@)\s*{_LENGTH}",
     )
 )
 _SPOT = re.compile(r"(\d+(?:\.\d+)?) ?mm spot")
@@ -165,13 +181,19 @@ def of_comments(document: Mapping[str, Any]) -> tuple[Instrument, float | None]:
     """
     text = "\n".join(f"{key}: {value}" for key, value in document.items() if isinstance(value, str))
     matches = next((matches for one in _WAVELENGTHS if (matches := list(one.finditer(text)))), [])
-    lengths = {round(float(at["number"]) * (1.0 if at["unit"].lower() == "nm" else 1e3), 6) for at in matches}
+    numbers = ((float(at["number"].replace(",", ".")), at["unit"].lower()) for at in matches)
+    lengths = {_in_nm(number, unit) for number, unit in numbers if number}
     spots = set(_SPOT.findall(text))
     name = next((str(document[key]) for key in _INSTRUMENTS if key in document), "")
     spot = float(spots.pop()) if len(spots) == 1 else None
-    from brdfdb.measurements.samples import Instrument
+    from brdfdb.measurements.instrument import Instrument
 
     return Instrument(name, spot_mm=spot or None), lengths.pop() if len(lengths) == 1 else None
+
+
+def _in_nm(number: float, unit: str) -> float:
+    """Return the wavelength [nm] of a length, or of a wavenumber in cm^-1."""
+    return round(number if unit == "nm" else 1e7 / number if "cm" in unit else 1e3 * number, 6)
 
 
 def beside(path: Path) -> Path:

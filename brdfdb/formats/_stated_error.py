@@ -42,26 +42,15 @@ class FileError:
 
     Light and viewer are drawn cosine-weighted over the hemisphere. In a second draw the viewers are in the lobe, and
     each pair is weighted by the cosine of its viewer. Each number is that of the channel where it is largest.
-
-    Attributes
-    ----------
-    p99 : float [1]
-        Limit of 99 of 100 values, with a confidence of 99.9 %: the larger one of the two draws.
-    p99_hemisphere, p99_lobe : float [1]
-        The limit of each draw. They are equal if the source has no lobe.
-    l1 : float [1]
-        Mean of abs(file - table) over that of the table, cosine-weighted.
-    largest : float [1]
-        Largest error of all pairs.
-    measure : callable or None
-        Gives `statement`.
     """
 
-    p99: float
+    p99: float  #: limit of 99 of 100 values, with a confidence of 99.9 %: the larger one of the two draws, [1]
+    #: The limit of each draw, [1]. They are equal if the source has no lobe.
     p99_hemisphere: float
     p99_lobe: float
-    l1: float
-    largest: float
+    l1: float  #: mean of abs(file - table) over that of the table, cosine-weighted, [1]
+    largest: float  #: largest error of all pairs, [1]
+    #: gives `statement`
     measure: Callable[[], FileStatement | None] | None = field(default=None, repr=False, compare=False)
 
     def document(self) -> dict[str, float]:

@@ -23,24 +23,13 @@ _OF_ZARR = re.compile(r"(?:.+/)?(?:zarr\.json|c(?:/[0-9]+)*)")  # files of a zar
 
 @dataclass(frozen=True)
 class Written:
-    """The files of one table in another format, and what they state.
+    """The files of one table in another format, and what they state."""
 
-    Attributes
-    ----------
-    paths : tuple of Path
-        The file itself, then the files next to it. A format may write a directory.
-    error : FileError or None
-        Error of the values in the file against those of the table; None of pictures and source code.
-    tolerance : float or None [1]
-        Largest p99 that was asked for; None where nothing was.
-    remarks : tuple of str
-        Sentences on what the format cannot hold of this table.
-    """
-
-    paths: tuple[Path, ...]
+    paths: tuple[Path, ...]  #: The file itself, then the files next to it. A format may write a directory.
+    #: error of the values in the file against those of the table; None of pictures and source code
     error: FileError | None = None
-    tolerance: float | None = None
-    remarks: tuple[str, ...] = field(default=())
+    tolerance: float | None = None  #: largest p99 that was asked for; None where nothing was, [1]
+    remarks: tuple[str, ...] = field(default=())  #: sentences on what the format cannot hold of this table
 
     @property
     def within(self) -> bool:

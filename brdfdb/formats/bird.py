@@ -13,6 +13,7 @@ from __future__ import annotations
 import functools
 import json
 import os
+import re
 import uuid
 from datetime import UTC, datetime
 from pathlib import Path
@@ -28,22 +29,26 @@ from brdfdb.formats._dense_files import (
     column,
     degrees_of,
     dense_record,
+    listed_rows,
     parsed,
     reading_of_rows,
-    samples_of_rows,
     title_of,
 )
+from brdfdb.formats._doubts import doubt_comments
 from brdfdb.formats._interface import TOLERANCE
 from brdfdb.formats._record import specular_remark
 from brdfdb.formats._written import Written, whole
+from brdfdb.measurements.conventions import NM_PER
 from brdfdb.place import path_of
 
 if TYPE_CHECKING:
     from brdfdb.formats._readings import FileTable
-    from brdfdb.measurements.samples import Samples
+    from brdfdb.measurements.conventions import ListedRows
     from brdfdb.tables.table import Table
 
 suffix = ".json"
+angle_unit = "stated"
+keywords = ("angles", "wavelength_unit")
 media_type = "application/json"
 summary = "universal BRDF JSON of the project BiRD"
 tools = "BiRD view and other programs of the universal BRDF format"
@@ -57,9 +62,12 @@ _MICRONS = ("um", "µm", "μm")
 _UNITS = {
     "angle": ("deg", "degree", "degrees", "°", "rad", ""),
     "BRDF": ("1/sr", "sr-1", "sr^-1", ""),
-    "wavelength": ("nm", *_MICRONS, ""),
+    "wavelength": ("nm", *_MICRONS, "m", ""),
 }
 _NOT_STATED = "not stated"
+_TYPE = re.compile(rb'"type"\s*:\s*"BRDF"')
+signs = re.compile(rb'"(?:BRDF|theta_i)"\s*:\s*\{')
+_RIGHT_ANGLE = 1.58  # polar angles without a unit, none of which is larger, may be radians
 
 
 def write(
@@ -111,17 +119,32 @@ def write(
 
 def recognises(head: bytes) -> bool:
     """Return True for the first bytes of a file that names the schema, or the section ``metadata`` and its type."""
-    return head.lstrip().startswith(b"{") and (b"brdf_json_schema" in head or b'"type":"BRDF"' in head)
+    return head.startswith(b"{") and (b"brdf_json_schema" in head or bool(_TYPE.search(head)))
 
 
-def read(path: str | os.PathLike[str]) -> FileTable | Samples:
+def read(path: str | os.PathLike[str], **stated: str) -> FileTable | ListedRows:
     """Return f_r of a universal BRDF file: interpolated linearly on a grid of light and viewer, else its samples."""
     path = path_of(path)
     document = parsed(path)
     data = document.get("data")
     metadata = document.get("metadata")
-    lists = _lists(path, data if isinstance(data, dict) else {})
-    known = metadata.get("adhoc_section", {}) if isinstance(metadata, dict) else {}
+    data = data if isinstance(data, dict) else {}
+    metadata = metadata if isinstance(metadata, dict) else {}
+    if metadata.get("type", "BRDF") != "BRDF":
+        raise FileFormatError(f"{path}: field metadata.type: {metadata['type']!r:.40} is not read; allowed is BRDF")
+    comments = [text for name in ("description", "method") if isinstance(text := metadata.get(name), str)]
+    for name in ("polarization_i", "polarization_r"):
+        entry = data.get(name)
+        given = entry.get("values") if isinstance(entry, dict) else None
+        states = {json.dumps(state) for state in (given if isinstance(given, list) else [given]) if state is not None}
+        if len(states) > 1:
+            text = f"rows have the states {', '.join(sorted(states))[:80]}; write a file for each"
+            raise FileFormatError(f"{path}: field data.{name}: {text}")
+        comments += [f"{name}: {state.strip(chr(34))}" for state in states]
+    lists = _lists(path, data)
+    known = metadata.get("adhoc_section", {})
+    known = {**known} if isinstance(known, dict) else {}
+    doubt_comments([part for text in comments for part in re.split(r"[;\n]", text)], known)
     values = lists.pop("BRDF")[:, np.newaxis]
     at = lists.pop("wavelength_i", None)
     uncertainty = lists["uBRDF"][:, np.newaxis] if "uBRDF" in lists else None
@@ -129,18 +152,18 @@ def read(path: str | os.PathLike[str]) -> FileTable | Samples:
     if at is not None:
         nodes = np.unique(at)
         if len(values) % nodes.size or not np.array_equal(at, np.tile(nodes, len(values) // nodes.size)):
-            raise FileFormatError(f"{path}: the directions do not all have the same wavelengths in the same order")
+            text = "the directions do not all have the same wavelengths in the same order"
+            raise FileFormatError(f"{path}: field data.wavelength_i: {text}")
         values = values.reshape(-1, nodes.size)
         at = nodes
         uncertainty = None if uncertainty is None else uncertainty.reshape(values.shape)
         lists = {name: angle[:: nodes.size] for name, angle in lists.items()}
-    known = known if isinstance(known, dict) else {}
-    listed = functools.partial(samples_of_rows, path, lists, values, at, known, uncertainty=uncertainty)
+    listed = functools.partial(listed_rows, path, lists, values, at, known, uncertainty=uncertainty)
     if not np.any(lists["phi_i"]) and np.max(lists["phi_r"]) <= 180.0:
         lists = {"theta_i": lists["theta_i"], "theta_r": lists["theta_r"], "delta_phi": lists["phi_r"]}
     else:
         lists, values = _closed(lists, values)
-    return reading_of_rows(path, lists, values, at, known, listed)
+    return reading_of_rows(path, lists, values, at, known, listed, stated=bool(stated))
 
 
 def _lists(path: Path, data: dict[str, Any]) -> dict[str, NDArray[np.float64]]:
@@ -154,15 +177,32 @@ def _lists(path: Path, data: dict[str, Any]) -> dict[str, NDArray[np.float64]]:
             units = _UNITS["angle" if name in _ANGLES else "BRDF" if name == "uBRDF" else name.partition("_")[0]]
             if unit not in units:
                 allowed = ", ".join(word for word in units if word)
-                raise FileFormatError(f"{path}: {name} has the unit {unit!r:.40}; allowed are {allowed}")
-            lists[name] = degrees_of(numbers, unit) if name in _ANGLES else numbers * (1e3 if unit in _MICRONS else 1.0)
+                raise FileFormatError(f"{path}: field data.{name}: it has the unit {unit!r:.40}; allowed are {allowed}")
+            lists[name] = (
+                degrees_of(numbers, unit)
+                if name in _ANGLES
+                else np.round(numbers * NM_PER[unit], 9)
+                if name.startswith("wavelength")
+                else numbers
+            )
         elif name in (*_ANGLES, "BRDF"):
-            raise FileFormatError(f"{path}: data has no object {name}")
+            raise FileFormatError(f"{path}: field data.{name}: it is missing, or no object with a unit and values")
+    for name in ("theta_i", "theta_r"):
+        if not str(data[name].get("unit", "")) and lists["theta_i"].max() < _RIGHT_ANGLE > lists["theta_r"].max():
+            text = "it has no unit, and no polar angle is above 1.6; state the unit deg or rad"
+            raise FileFormatError(f"{path}: field data.{name}: {text}")
+    if len({values.size for values in lists.values()}) != 1:
+        sizes = ", ".join(f"{name} {values.size}" for name, values in lists.items())
+        raise FileFormatError(f"{path}: field data: the lists differ in length: {sizes}")
+    if "wavelength_r" in lists and not np.array_equal(
+        lists["wavelength_r"], lists.get("wavelength_i", lists["wavelength_r"])
+    ):
+        raise FileFormatError(
+            f"{path}: field data.wavelength_r: it differs from wavelength_i: fluorescence is not read"
+        )
     if "wavelength_r" in lists:
         lists.setdefault("wavelength_i", lists["wavelength_r"])
         del lists["wavelength_r"]
-    if len({values.size for values in lists.values()}) != 1:
-        raise FileFormatError(f"{path}: the lists {', '.join(lists)} differ in length")
     return lists
 
 

@@ -14,7 +14,7 @@ import itertools
 import os
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Unpack
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,23 +22,25 @@ from numpy.typing import NDArray
 from brdfdb.errors import FileFormatError
 from brdfdb.formats import text
 from brdfdb.formats._dense_files import OPTIONS, DenseOptions, dense_record, reading_of_rows
-from brdfdb.formats._input import lines_of
+from brdfdb.formats._input import fault_of_row, lines_of
+from brdfdb.formats._nodes import fill_values
 from brdfdb.formats._record import lines, of_lines, specular_remark
 from brdfdb.formats._written import Written, whole
-from brdfdb.formats.text._columns import number_of
+from brdfdb.measurements.conventions import ListedRows
 from brdfdb.place import path_of
 
 if TYPE_CHECKING:
     from brdfdb.formats._readings import FileTable
-    from brdfdb.measurements.samples import Samples
     from brdfdb.tables.table import Table
 
 suffix = ".csv"
+angle_unit = "deg"
 media_type = "text/csv"
 summary = "f_r on a plain grid of angles as text"
 tools = "every spreadsheet, pandas, R, MATLAB"
 kinds = ()
 options = OPTIONS
+keywords = ("quantity", "angles", "wavelength_unit", "missing")
 _DIGITS = 5
 _LEAST_NM = 10.0  # of wavelengths in names without a unit
 _ANGLE_BYTES, _VALUE_BYTES, _MOST_BYTES = 8, 10, 40_000_000  # of a number in a row, and of a file, about
@@ -92,29 +94,27 @@ def recognises(head: bytes) -> bool:
     return f"# {_COLUMNS}" in start or (alone and len(of_values) < len(names))
 
 
-def read(path: str | os.PathLike[str]) -> FileTable | Samples:
+def read(path: str | os.PathLike[str], **stated: Any) -> FileTable | ListedRows:
     """Return f_r of a text, interpolated linearly if its rows are those of a grid; else the samples that it lists.
 
     A text without the line on columns that `write` puts into the record is read by `brdfdb.formats.text` if its columns
-    are angles of light and viewer.
+    are angles of light and viewer, with the keywords `stated`.
     """
-    from brdfdb.measurements.samples import Samples
-
     path = path_of(path)
     comments: list[str] = []
     numbered = lines_of(path)
     first = 0
     line = ""
     for number, line in numbered:
-        if not line.startswith("#"):
+        if line.strip() and not line.startswith("#"):
             first = number
             break
         comments.append(line[1:].strip())
     names = tuple(name.strip() for name in line.split(","))
-    if not line or line.startswith("#"):
+    if not line.strip() or line.startswith("#"):
         raise FileFormatError(f"{path}: it has no line with the names of columns")
     if _COLUMNS not in comments and set(names) >= _ENOUGH:
-        return text.read(path)
+        return text.read(path, **stated)
     numbers = _numbers(path, first, names, numbered)
     angles = tuple(name for name in names if name in _ANGLES)
     if not angles or names[: len(angles)] != angles or len(names) == len(angles):
@@ -128,8 +128,11 @@ def read(path: str | os.PathLike[str]) -> FileTable | Samples:
         raise FileFormatError(f"{path}: line {first}: a wavelength is listed twice")
     columns = {name: numbers[:, index] for index, name in enumerate(angles)}
     values = numbers[:, len(angles) :]
-    reading = reading_of_rows(path, columns, values, at, known)
-    if isinstance(reading, Samples) and _COLUMNS in comments and np.all(values >= 0.0):
+    if (missing := stated.get("missing")) is not None:
+        values = np.where(fill_values(values, known, missing), np.nan, values)
+    of_rows = bool(stated.get("angles") or stated.get("wavelength_unit"))
+    reading = reading_of_rows(path, columns, values, at, known, stated=of_rows)
+    if not of_rows and isinstance(reading, ListedRows) and _COLUMNS in comments and np.all(values >= 0.0):
         raise FileFormatError(f"{path}: rows of the grid are missing")
     return reading
 
@@ -147,25 +150,15 @@ def _numbers(
     except FileFormatError:
         raise
     except ValueError:
-        wrong = _wrong_row(names, itertools.islice(lines_of(path), first, None))
-        raise FileFormatError(f"{path}: {wrong}") from None
+        for number, line in itertools.islice(lines_of(path), first, None):
+            if fault := fault_of_row(line, names):
+                raise FileFormatError(f"{path}: line {number}{fault}") from None
+        raise FileFormatError(f"{path}: it is no table of numbers") from None
     if numbers.shape[1] != len(names):
         raise FileFormatError(
             f"{path}: line {start[0]} has {numbers.shape[1]} fields, but there are {len(names)} names of columns"
         )
     return numbers
-
-
-def _wrong_row(names: tuple[str, ...], rows: Iterator[tuple[int, str]]) -> str:
-    """Return what is wrong with the first row that cannot be read."""
-    for number, line in rows:
-        fields = [field.strip() for field in line.partition("#")[0].split(",")]
-        if len(fields) != len(names) and any(fields):
-            return f"line {number} has {len(fields)} fields, but there are {len(names)} names of columns"
-        for field, name in zip(fields, names, strict=False):
-            if number_of(field or "empty") is None and any(fields):
-                return f"line {number}, field {name}: {field[:40]!r} is not a number"
-    return "it is no table of numbers"
 
 
 def _wavelengths(names: tuple[str, ...]) -> NDArray[np.float64] | None:

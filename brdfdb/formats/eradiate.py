@@ -26,9 +26,10 @@ from brdfdb.errors import CannotHoldError, FileFormatError, import_extra
 from brdfdb.formats._channels import at_wavelength, names_of
 from brdfdb.formats._dense_files import opened_netcdf, record_of_attributes
 from brdfdb.formats._interface import TOLERANCE, WAVELENGTH, FormatOption
-from brdfdb.formats._nodes import samples_at_angles, weighted, without_holes
+from brdfdb.formats._nodes import weighted, without_holes
 from brdfdb.formats._record import history_of, record, specular_remark
 from brdfdb.formats._written import Written, whole
+from brdfdb.measurements.conventions import ListedRows
 from brdfdb.parameters import Floats
 from brdfdb.place import path_of
 
@@ -38,7 +39,6 @@ if TYPE_CHECKING:
     from brdfdb.formats._channels import Channels
     from brdfdb.formats._readings import FileTable
     from brdfdb.formats._stated_error import Comparison
-    from brdfdb.measurements.samples import Samples
     from brdfdb.tables.table import Table
 
 suffix = ".nc"
@@ -123,14 +123,14 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     nm = known.get("wavelength_nm")
     at = np.array([float(nm)]) if isinstance(nm, int | float) else None
 
-    def nodes() -> Samples:
+    def rows() -> ListedRows:
         axes = (axis for _, axis, _ in _coordinates(values.shape).values())
         viewer, turn, light = (grid.reshape(-1) for grid in np.meshgrid(*axes, indexing="ij"))
         zero = np.zeros(values.size)
         angles = np.stack([np.arccos(light), zero, np.arccos(viewer), -turn % (2.0 * np.pi)], axis=1)
-        return samples_at_angles(angles, values.reshape(-1, 1).astype(np.float64), name, names_of(at), at, known)
+        return ListedRows(angles, values.reshape(-1, 1).astype(np.float64), name, names_of(at), at, known)
 
-    return FileTable(name, names_of(at), at, functools.partial(_evaluated, values), known, nodes)
+    return FileTable(name, names_of(at), at, functools.partial(_evaluated, values), known, rows)
 
 
 def _smallest(table: Table, comparison: Comparison, tolerance: float) -> tuple[int, int, int]:

@@ -7,9 +7,9 @@ Bases are those of the plane of light and viewer, x along its normal for both, y
 Q > 0 is s-polarised, as here. U > 0 is linear along x + y, which is s - p: U and V of the file have the opposite sign.
 Both signs together leave the matrix between bases of the plane as it is.
 
-A file can hold polarised isotropic tables, at no more than five wavelengths in whole nanometres, because Mitsuba reads
-five. The specular part is left out. A reader of files gets f_r of unpolarised light, the first element of the matrix;
-values that were not measured are nan.
+Polarised isotropic tables are written at no more than five wavelengths in whole nanometres, because Mitsuba reads
+five. The specular part is left out. Files of any number of wavelengths are read: f_r of unpolarised light, the first
+element of the matrix, and the matrices. A nan was not measured.
 """
 
 from __future__ import annotations
@@ -17,18 +17,20 @@ from __future__ import annotations
 import json
 import math
 import os
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.errors import CannotHoldError, FileFormatError, ParameterError
-from brdfdb.formats._angles import HalfDifference
+from brdfdb.formats._angles import HALF_PI, HalfDifference
 from brdfdb.formats._channels import Channels, names_of
 from brdfdb.formats._interface import MEGABYTES, TOLERANCE
-from brdfdb.formats._nodes import samples_of_grid
-from brdfdb.formats._record import document_of, record, specular_remark
+from brdfdb.formats._nodes import rows_of_grid, samples_of
+from brdfdb.formats._record import document_of, note, record, specular_remark
 from brdfdb.formats._written import Written, whole
 from brdfdb.formats.rgl._tensors import MAGIC, read_tensors, write_tensors
 from brdfdb.parameters import Floats
@@ -65,6 +67,13 @@ _COPIES = 4  # of phi_d, of which symmetry leaves a quarter
 _SPLIT = 0.5  # share of the tolerance up to which a cell of theta_d may change the elements of a facet
 _FIRST_DEG = np.linspace(0.0, 90.0, 10)
 _LEAST_DEG = 0.1
+_ROUNDING = 1e-5  # of angles [rad] of 32 bits
+_MOST_READ = 400_000  # values of f_r that are read of a file, as samples of fewer directions
+_FEWEST_READ = 20_000  # directions that are read whatever the number of wavelengths
+_THINNED = (1.0, 1.0, 0.25)  # what a node of phi_d, theta_d and theta_h counts
+_MOST_JUDGED = 500_000  # matrices of a file whose eigenvalues are computed
+_AT_ONCE = 1 << 14
+_SEED = 2020
 
 
 def write(
@@ -82,6 +91,12 @@ def write(
     """
     if table.facets is None:
         raise CannotHoldError(f"{table.name}: the table is unpolarised, and the format holds Mueller matrices")
+    from brdfdb.tables.mueller_field import MuellerField
+
+    if isinstance(table.facets, MuellerField):
+        raise CannotHoldError(
+            f"{table.name}: its Mueller matrices are measured; files are written of models, whose matrices are facets'"
+        )
     channels = _channels(table)
     made = mueller_grid(table, channels, tolerance, 1e6 * megabytes - _BESIDE)
     remarks = (*specular_remark(table), *channels.remarks)
@@ -134,12 +149,62 @@ def recognises(head: bytes) -> bool:
 
 
 def read(path: str | os.PathLike[str]) -> Samples:
-    """Return f_r of a file at its own directions above the horizon.
+    """Return f_r and Mueller matrices of a file at its own directions above the horizon.
 
     Names, shapes and directions as in Mitsuba's ``measured_polarized``: the axes of M are phi_d, theta_d, theta_h, the
-    wavelength, and those of the Mueller matrix.
+    wavelength, and those of the Mueller matrix. Files of more values than samples may have are thinned, and are never
+    read as a whole. The record has sentences on the share of all matrices that is physical, in the entry "physical".
     """
+    from brdfdb.measurements.conventions import Convention, FormatConventions
+    from brdfdb.measurements.mueller import mirrored
+    from brdfdb.tables.mueller_field import to_surface
+
     path = path_of(path)
+    file = _tensor_file(path)
+    counts = [axis.size for axis in file.axes]
+    nodes = [_thinned(count, step) for count, step in zip(counts, _steps(counts, file.wavelength_nm.size), strict=True)]
+    matrix = file.matrix[np.ix_(*nodes)].astype(np.float64)
+    matrix[~np.isfinite(matrix)] = np.nan
+    matrix = matrix.transpose(2, 1, 0, 3, 4, 5)
+    values = matrix[..., 0, 0]
+    if np.all(np.isnan(values)):
+        raise FileFormatError(f"{path}: field 'M' has no number at the nodes that are read: all of M[0, 0] are nan")
+    with np.errstate(invalid="ignore", divide="ignore"):
+        mueller = matrix / np.where(values > 0.0, values, np.nan)[..., np.newaxis, np.newaxis]
+    mueller[np.isnan(mueller).any(axis=(-1, -2))] = np.nan
+    record = {**file.known, "element": "M[0, 0]", "physical": _physical(file), "mueller_frame": "s"}
+    note(record, "Bases of Mueller matrices were turned to those of the surface; U and V change their sign.")
+    if math.prod(axis.size for axis in nodes) < math.prod(counts):
+        shape = " x ".join(str(count) for count in counts)
+        every = ", ".join(str(axis.size) for axis in nodes)
+        note(record, f"Of {shape} nodes of phi_d, theta_d and theta_h, {every} were read, evenly spread.")
+    axes = [axis[some] for axis, some in zip(file.axes, nodes, strict=True)]
+    rows = rows_of_grid(
+        _SYSTEM,
+        axes[::-1],
+        values,
+        file.name,
+        names_of(file.wavelength_nm),
+        file.wavelength_nm,
+        record,
+        mueller=mirrored(mueller).reshape(-1, file.wavelength_nm.size, 4, 4),  # U and V have the opposite sign
+    )
+    samples = samples_of(rows, Convention(), FormatConventions())
+    return to_surface(samples.selected(np.any(samples.known, axis=1)))
+
+
+class TensorFile(NamedTuple):
+    """A checked file: phi_d, theta_d and theta_h [rad], wavelengths (L,) [nm], M [1/sr] as it lies in the file."""
+
+    name: str
+    axes: list[NDArray[np.float64]]
+    wavelength_nm: NDArray[np.float64]
+    matrix: NDArray[Any]
+    known: dict[str, Any]
+
+
+def _tensor_file(path: Path) -> TensorFile:
+    """Return the fields of a file; FileFormatError if one is missing or is not what it must be."""
     tensors = read_tensors(path)
     for name in (*_AXES, "wvls", "M"):
         if name not in tensors:
@@ -148,42 +213,80 @@ def read(path: str | os.PathLike[str]) -> Samples:
     at = tensors["wvls"].reshape(-1).astype(np.float64)
     shape = (*(axis.size for axis in axes), at.size, 4, 4)
     matrix = tensors["M"]
-    if matrix.shape != shape or matrix.dtype != np.float32:
+    if matrix.shape != shape or matrix.dtype.kind != "f":
         raise FileFormatError(f"{path}: field 'M' is {matrix.dtype} of shape {matrix.shape}; its axes give {shape}")
     for name, axis in zip((*_AXES, "wvls"), (*axes, at), strict=True):
         if not axis.size or not np.all(np.isfinite(axis)) or np.any(np.diff(axis) <= 0.0):
             raise FileFormatError(f"{path}: field {name!r} does not increase")
-    values = np.ascontiguousarray(matrix[..., 0, 0].transpose(2, 1, 0, 3)).astype(np.float64)
-    values[np.isinf(values)] = np.nan
+    for name, axis, most in zip(_AXES, axes, (2.0 * np.pi, HALF_PI, HALF_PI), strict=True):
+        low = -np.pi if name == "phi_d" else 0.0
+        if axis[0] < low - _ROUNDING or axis[-1] > most + _ROUNDING:
+            span = f"{axis[0]:g} to {axis[-1]:g}"
+            raise FileFormatError(
+                f"{path}: field {name!r} has angles of {span}; allowed are {low:.4g} to {most:.4g} rad"
+            )
     description = tensors.get("description")
-    known = {} if description is None else document_of(description.tobytes())
-    name = str(known.get("name") or path.stem)
-    samples = samples_of_grid(_SYSTEM, axes[::-1], values, name, names_of(at), at, {**known, "element": "M[0, 0]"})
-    return samples.selected(np.any(samples.known, axis=1))
+    known = {} if description is None else dict(document_of(description.tobytes()))
+    return TensorFile(str(known.get("name") or path.stem), axes, at, matrix, known)
+
+
+def _steps(counts: Sequence[int], wavelengths: int) -> list[int]:
+    """Return the steps of nodes of phi_d, theta_d and theta_h that leave as many samples as are read at most.
+
+    theta_h, across which lobes lie, keeps its nodes longest.
+    """
+    most = max(_FEWEST_READ, _MOST_READ // wavelengths)
+    steps = [1, 1, 1]
+    while math.prod(_thinned(count, step).size for count, step in zip(counts, steps, strict=True)) > most:
+        left = [share * count / step for share, count, step in zip(_THINNED, counts, steps, strict=True)]
+        steps[left.index(max(left))] += 1
+    return steps
+
+
+def _thinned(count: int, step: int) -> NDArray[np.int64]:
+    """Return every so many nodes of an axis, and the last."""
+    return np.unique(np.append(np.arange(0, count, step), count - 1))
+
+
+def _physical(file: TensorFile) -> list[str]:
+    """Return sentences on the share of the matrices of a file that is physical: all, or some drawn at random."""
+    from brdfdb.measurements.mueller import HalfDifferenceAngles, PhysicalShare
+
+    counts = [axis.size for axis in file.axes]
+    directions = math.prod(counts)
+    wavelengths = file.wavelength_nm.size
+    most = max(1, _MOST_JUDGED // wavelengths)
+    drawn = np.arange(directions)
+    if directions > most:
+        drawn = np.sort(np.random.default_rng(_SEED).choice(directions, most, replace=False, shuffle=False))
+    share = PhysicalShare(file.wavelength_nm)
+    step = max(1, _AT_ONCE // wavelengths)
+    for start in range(0, len(drawn), step):
+        index = np.unravel_index(drawn[start : start + step], counts)
+        phi_d, theta_d, theta_h = (axis[at] for axis, at in zip(file.axes, index, strict=True))
+        wi, wr = _SYSTEM.vectors(np.stack([theta_h, theta_d, phi_d], axis=1))
+        above = (wi[:, 2] > -_ROUNDING) & (wr[:, 2] > -_ROUNDING)
+        matrix = file.matrix[tuple(at[above] for at in index)].astype(np.float64)
+        matrix[~np.isfinite(matrix).all(axis=(-1, -2))] = np.nan
+        share.add(matrix, HalfDifferenceAngles(theta_h[above], theta_d[above], _within_half_turn(phi_d[above])))
+    return share.sentences(share.count * directions // len(drawn))
+
+
+def _within_half_turn(phi: Floats) -> Floats:
+    return np.asarray((phi + np.pi) % (2.0 * np.pi) - np.pi)
 
 
 @dataclass(frozen=True, eq=False)
 class MuellerGrid:
-    """Mueller matrices at nodes of theta_h, theta_d and phi_d.
+    """Mueller matrices at nodes of theta_h, theta_d and phi_d."""
 
-    Attributes
-    ----------
-    grid : Grid
-        Nodes [degree]; phi_d ends at 90.
-    channels : Channels
-        Wavelengths.
-    values : float32 array (theta_h, theta_d, phi_d, L, 4, 4) [1/sr]
-        Matrices between bases of the plane of light and viewer, continued below the horizon.
-    error : FileError
-        Error of f_r against the table.
-    element_p99 : float [1]
-        Limit of 99 of 100 errors of the normalised elements, of the worst element and wavelength.
-    """
-
-    grid: Grid
-    channels: Channels
+    grid: Grid  #: nodes [degree]; phi_d ends at 90
+    channels: Channels  #: wavelengths
+    #: matrices between bases of the plane of light and viewer, continued below the horizon, (theta_h, theta_d, phi_d,
+    #: L, 4, 4) [1/sr]
     values: NDArray[np.float32]
-    error: FileError
+    error: FileError  #: error of f_r against the table
+    #: limit of 99 of 100 errors of the normalised elements, of the worst element and wavelength, [1]
     element_p99: float
 
 

@@ -24,7 +24,7 @@ from brdfdb.formats import _bsdf_xml
 from brdfdb.formats._bsdf_xml import FRONT_OF_RADIANCE, VISIBLE, BsdfBlock, BsdfFile
 from brdfdb.formats._channels import LUMINOUS, XYZ, channels_of
 from brdfdb.formats._interface import FIXED, FormatOption
-from brdfdb.formats._nodes import samples_at_vectors
+from brdfdb.formats._nodes import rows_at_vectors
 from brdfdb.formats._written import Written, whole
 from brdfdb.integrals.patches import BASES, Basis, Index
 from brdfdb.parameters import Floats
@@ -32,7 +32,7 @@ from brdfdb.place import path_of
 
 if TYPE_CHECKING:
     from brdfdb.formats._readings import FileTable
-    from brdfdb.measurements.samples import Samples
+    from brdfdb.measurements.conventions import ListedRows
     from brdfdb.tables.table import Table
 
 suffix = ".xml"
@@ -182,6 +182,8 @@ def _text(matrix: Floats) -> str:
 
 
 def _numbers(text: str) -> Floats:
+    if "_" in text:
+        raise ValueError("could not convert string to float: a number has the sign _")
     return np.array(text.replace(",", " ").split(), dtype=np.float64)
 
 
@@ -226,11 +228,17 @@ def read(path: str | os.PathLike[str], side: str = "back") -> FileTable:
         raise ParameterError("side", f"{side!r} is not one of {', '.join(_bsdf_xml.SIDES)}", side, (*_bsdf_xml.SIDES,))
     file = _bsdf_xml.read(path, _bsdf_xml.SIDES[side])
     if file.structure.lower() not in ("columns", "rows"):
-        raise FileFormatError(f"{path}: its structure {file.structure!r} is not Columns or Rows")
+        raise FileFormatError(
+            f"{path}: field IncidentDataStructure: its structure {file.structure!r} is not Columns or Rows"
+        )
     bases = {basis.name.lower(): basis for basis in BASES.values()}
     for element in file.definition.findall("{*}AngleBasis"):
         basis = _defined(path, element)
-        bases.setdefault(basis.name.lower(), basis)  # names that are known keep their meaning, as in Radiance
+        known = bases.setdefault(basis.name.lower(), basis)  # names that are known keep their meaning, as in Radiance
+        if (known.counts, known.bounds_deg) != (basis.counts, basis.bounds_deg):
+            wrong = f"patches {basis.counts} between {basis.bounds_deg} degrees"
+            right = f"this name means patches {known.counts} between {known.bounds_deg}; rename it, or correct it"
+            raise FileFormatError(f"{path}: field AngleBasis {basis.name!r}: {wrong}; {right}")
     names = [CIE_X, VISIBLE, CIE_Z] if {CIE_X.lower(), CIE_Z.lower()} <= set(file.blocks) else [VISIBLE]
     visible = file.blocks[VISIBLE.lower()]
     for name in (visible.basis, visible.row_basis):
@@ -240,11 +248,11 @@ def read(path: str | os.PathLike[str], side: str = "back") -> FileTable:
     matrix = np.stack([_matrix(path, file, name, viewers, lights) for name in names], axis=-1)
     of_colour = XYZ if len(names) > 1 else LUMINOUS
     evaluate = functools.partial(evaluated, np.maximum(matrix, 0.0), viewers, lights)
-    nodes = functools.partial(_samples, path, file, viewers, lights)
-    return FileTable(file.name, of_colour, None, evaluate, file.record, nodes)
+    rows = functools.partial(_rows, path, file, viewers, lights)
+    return FileTable(file.name, of_colour, None, evaluate, file.record, rows)
 
 
-def _samples(path: str | os.PathLike[str], file: BsdfFile, viewers: Basis, lights: Basis) -> Samples:
+def _rows(path: str | os.PathLike[str], file: BsdfFile, viewers: Basis, lights: Basis) -> ListedRows:
     """Return all blocks of the front in these bases at the middles of patches; a channel is a block."""
     names = [
         block.wavelength
@@ -254,7 +262,7 @@ def _samples(path: str | os.PathLike[str], file: BsdfFile, viewers: Basis, light
     matrix = np.stack([_matrix(path, file, name, viewers, lights) for name in names], axis=-1)
     viewer, light = np.divmod(np.arange(len(viewers) * len(lights)), len(lights))
     channels = [LUMINOUS[0] if name == VISIBLE else name for name in names]
-    return samples_at_vectors(
+    return rows_at_vectors(
         lights.middles[light] * FLIPPED,
         viewers.middles[viewer],
         matrix.reshape(len(viewer), -1),
@@ -273,10 +281,12 @@ def _matrix(path: str | os.PathLike[str], file: BsdfFile, name: str, viewers: Ba
     try:
         numbers = _numbers(block.numbers)
     except ValueError as error:
-        raise FileFormatError(f"{path}: block {name}: {error}") from None
+        raise FileFormatError(f"{path}: field ScatteringData of block {name}: {error}") from None
     if numbers.size != len(viewers) * len(lights) or not np.all(np.isfinite(numbers)):
         wanted = f"{len(viewers)} x {len(lights)}"
-        raise FileFormatError(f"{path}: block {name} has {numbers.size} numbers instead of {wanted} finite numbers")
+        raise FileFormatError(
+            f"{path}: field ScatteringData: block {name} has {numbers.size} numbers instead of {wanted} finite numbers"
+        )
     if file.structure.lower() == "rows":
         return numbers.reshape(len(lights), len(viewers)).T
     return numbers.reshape(len(viewers), len(lights))
@@ -289,13 +299,21 @@ def _defined(path: str | os.PathLike[str], element: ElementTree.Element) -> Basi
     counts = []
     try:
         for ring in element.findall("{*}AngleBasisBlock"):
+            lower = float(ring.findtext("{*}ThetaBounds/{*}LowerTheta") or bounds[-1])
+            if lower != bounds[-1]:
+                text = f"a ring begins at {lower:g} degrees, but the one before it ends at {bounds[-1]:g}"
+                raise FileFormatError(f"{path}: field LowerTheta of angle basis {name!r}: {text}")
             bounds.append(float(ring.findtext("{*}ThetaBounds/{*}UpperTheta") or "nan"))
             counts.append(int(ring.findtext("{*}nPhis") or "0"))
+    except FileFormatError:
+        raise
     except ValueError as error:
         raise FileFormatError(f"{path}: angle basis {name!r}: {error}") from None
     rising = all(low < high for low, high in itertools.pairwise(bounds)) and bounds[-1] == 90.0
     if not (rising and all(count > 0 for count in counts) and len(counts) <= _MOST_RINGS):
-        raise FileFormatError(f"{path}: angle basis {name!r} has no rings of patches up to 90 degrees")
+        raise FileFormatError(
+            f"{path}: field AngleBasis: angle basis {name!r} has no rings of patches up to 90 degrees"
+        )
     if sum(counts) > _MOST_PATCHES:
         raise FileFormatError(f"{path}: angle basis {name!r} has {sum(counts)} patches, more than {_MOST_PATCHES}")
     return Basis(name, tuple(bounds), tuple(counts))

@@ -8,6 +8,7 @@ degrees (libbsdf, ``LightToolsBsdfReader.cpp``). Blocks of the front with the ty
 from __future__ import annotations
 
 import os
+import re
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,17 +16,21 @@ from numpy.typing import NDArray
 
 from brdfdb.errors import FileFormatError
 from brdfdb.formats._channels import XYZ, names_of
+from brdfdb.formats._doubts import doubt_comments
 from brdfdb.formats._input import Words
-from brdfdb.formats._nodes import samples_of_grid
+from brdfdb.formats._nodes import rows_of_grid
 from brdfdb.formats._record import of_lines
 from brdfdb.place import path_of
 
 if TYPE_CHECKING:
-    from brdfdb.measurements.samples import Samples
+    from brdfdb.measurements.conventions import ListedRows
 
 suffix = ".bsdf"
+angle_unit = "stated"
+keywords = ("wavelength_unit",)
 _SYMMETRY = "Asymmetric"
 _LIGHT_DEG = 90.0
+signs = re.compile(rb"^(?:TristimulusValue|POI)\b|^AOI[ \t]+[-\d.]+[ \t]*$", re.MULTILINE)
 _ENTRIES = ("AOI", "POI", "Side", "Wavelength", "ScatterType", "TristimulusValue")
 _TRISTIMULUS = ("TrisX", "TrisY", "TrisZ")
 
@@ -36,8 +41,8 @@ def recognises(head: bytes) -> bool:
     return any(words[:2] == [b"Symmetry", _SYMMETRY.encode()] for words in lines)
 
 
-def read(path: str | os.PathLike[str]) -> Samples:
-    """Return the samples of the front of a LightTools file.
+def read(path: str | os.PathLike[str], *, wavelength_unit: str = "") -> ListedRows:
+    """Return the rows of the front of a LightTools file; the user states the unit of its wavelengths.
 
     The record has the total integrated scatter as "tis", with its angles of incidence as "theta_i_deg". Planes of
     incidence that differ are refused: what POI counts from is not published.
@@ -51,7 +56,7 @@ def read(path: str | os.PathLike[str]) -> Samples:
     kept = [block for block in blocks if block["Side"] == "Front" and block["ScatterType"] == "BRDF"]
     if not kept or len({block["POI"] for block in kept}) > 1:
         raise FileFormatError(
-            f"{path}: it has no block with Side Front and ScatterType BRDF, or these blocks differ in POI"
+            f"{path}: field Side: it has no block with Side Front and ScatterType BRDF, or these blocks differ in POI"
         )
     incidences = sorted({float(block["AOI"]) for block in kept})
     keys = [key for key in _TRISTIMULUS if any(block["TristimulusValue"] == key for block in kept)]
@@ -65,16 +70,17 @@ def read(path: str | os.PathLike[str]) -> Samples:
             )
         grid[key] = block
     if len(grid) != len(incidences) * len(keys):
-        raise FileFormatError(f"{path}: an angle of incidence lacks a block of {', '.join(keys)}")
+        raise FileFormatError(f"{path}: field AOI: an angle of incidence lacks a block of {', '.join(keys)}")
     shape = (lists["ScatterAzimuth"].size, lists["ScatterRadial"].size)
     values = np.stack([[grid[aoi, key]["values"].reshape(shape) for key in keys] for aoi in incidences])
-    at, channels = _channels(keys)
+    at, channels = _channels(words, keys, wavelength_unit)
     record = of_lines(words.comments) | {
         "theta_i_deg": incidences,
         "tis": [[[grid[aoi, key]["tis"] for key in keys] for aoi in incidences]],
     }
+    doubt_comments(words.comments, record)
     nodes = (np.array(incidences), np.zeros(1), lists["ScatterRadial"], lists["ScatterAzimuth"] - _LIGHT_DEG)
-    return samples_of_grid(
+    return rows_of_grid(
         Spherical(anisotropic=True, mirrored=False),
         [np.deg2rad(axis) for axis in nodes],
         values.transpose(0, 3, 2, 1)[:, np.newaxis],
@@ -88,11 +94,23 @@ def read(path: str | os.PathLike[str]) -> Samples:
 def _lists(words: Words) -> dict[str, NDArray[np.float64]]:
     """Return the lists of angles [degree] in the header."""
     lists: dict[str, NDArray[np.float64]] = {}
+    name = ""
+    line = 0  # of the last entry, whose value may have several words
     for word in words:
         if word in ("ScatterAzimuth", "ScatterRadial"):
+            if word in lists:
+                raise words.error(word, "it is stated twice; write a file for each header")
             lists[word] = words.numbers(words.count(word), word)
+            if np.any(np.diff(lists[word]) <= 0.0):
+                raise words.error(word, "its angles do not increase")
+            name = word
         elif word == "DataBegin":
             break
+        elif word[:1] in "+-.0123456789" and name in lists:
+            raise words.error(name, f"{word[:40]!r} is one number more than are stated")
+        elif words.line != line:
+            name = word[:40]
+            line = words.line
     for name in ("ScatterAzimuth", "ScatterRadial"):
         if name not in lists or not lists[name].size:
             raise words.error(name, "it is missing before DataBegin")
@@ -118,16 +136,28 @@ def _blocks(words: Words, count: int) -> list[dict[str, Any]]:
             blocks.append(block)
             block = dict(empty)
         elif word == "DataEnd":
+            words.end(word, "the last block")
             return blocks
+        else:
+            text = f"{word[:40]!r} is no entry of a block; ScatterAzimuth and ScatterRadial state {count} values"
+            raise words.error(f"block {len(blocks) + 1}", text)
     raise words.error("DataEnd", f"the file ends without it, after {len(blocks)} blocks")
 
 
-def _channels(keys: list[str]) -> tuple[NDArray[np.float64] | None, tuple[str, ...]]:
-    """Return wavelengths [nm], and names of channels, of the blocks of an angle of incidence."""
+def _channels(words: Words, keys: list[str], stated_unit: str) -> tuple[NDArray[np.float64] | None, tuple[str, ...]]:
+    """Return wavelengths [nm], and names of channels, of the blocks of an angle of incidence.
+
+    Numbers from 100 on are nm, from 0.1 to 100 um, and below 1e-3 m, unless the user states their unit.
+    """
     if keys[0] in _TRISTIMULUS:
         return None, tuple(XYZ[_TRISTIMULUS.index(key)] for key in keys)
     lengths = np.array([float(key) for key in keys])
     if np.any(lengths <= 0.0):
         return None, ("grey",)
-    lengths = lengths * (1e3 if lengths.max() < 100.0 else 1.0)
+    if not stated_unit:
+        scales = np.select([lengths >= 100.0, lengths >= 0.1, lengths < 1e-3], [1.0, 1e3, 1e9], np.nan)
+        if np.unique(scales).size > 1 or np.isnan(scales[0]):
+            text = f"{', '.join(keys)[:80]} have no unit in common; state --wavelength-unit nm, um or m"
+            raise words.error("Wavelength", text)
+        lengths = np.round(lengths * scales, 9)
     return lengths, names_of(lengths)

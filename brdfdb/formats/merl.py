@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,15 +22,16 @@ from brdfdb.formats._angles import HALF_PI, HalfDifference
 from brdfdb.formats._angular_grid import AngularGrid, reciprocal
 from brdfdb.formats._channels import RGB, channels_of
 from brdfdb.formats._interface import FIXED, FormatOption
-from brdfdb.formats._nodes import samples_of_grid, without_holes
-from brdfdb.formats._record import beside, record, record_beside, specular_remark
+from brdfdb.formats._nodes import rows_of_grid, without_holes
+from brdfdb.formats._planes import read_planes
+from brdfdb.formats._record import beside, note, record, record_beside, specular_remark
 from brdfdb.formats._written import Written, whole
 from brdfdb.parameters import Floats
 from brdfdb.place import path_of
 
 if TYPE_CHECKING:
     from brdfdb.formats._readings import FileTable
-    from brdfdb.measurements.samples import Samples
+    from brdfdb.measurements.conventions import ListedRows
     from brdfdb.tables.table import Table
 
 suffix = ".binary"
@@ -52,6 +54,7 @@ SHAPE = (90, 90, 180)  # theta_h, theta_d, phi_d
 SCALE = np.array([1.0, 1.15, 1.66]) / 1500.0  # f_r [1/sr] of a number in R, G, B
 INVALID = -1.0  # readers take a negative number for a direction that was not measured
 _HEADER = np.array(SHAPE, "<i4").tobytes()
+_SWAPPED = np.array(SHAPE, ">i4").tobytes()
 _BYTES = len(_HEADER) + 3 * 8 * SHAPE[0] * SHAPE[1] * SHAPE[2]
 _SYSTEM = HalfDifference(anisotropic=False, mirrored=False)
 _HOLDS = "f_r [1/sr], the BRDF without the cosine, is number * (1, 1.15, 1.66) / 1500 in R, G, B; numbers lie at the "
@@ -98,38 +101,48 @@ def write(
     return Written(paths, error, tolerance, remarks)
 
 
+signs = re.compile(rb"\A(?:[\x01-\xff][\0-\x03]\0\0){3}|\A(?:\0\0[\0-\x03][\x01-\xff]){3}", re.DOTALL)  # three numbers
+
+
 def recognises(head: bytes) -> bool:
-    """Return True for the first bytes of a MERL file."""
-    return head.startswith(_HEADER)
+    """Return True for the first bytes of a MERL file, of either byte order."""
+    return head.startswith((_HEADER, _SWAPPED))
 
 
 def read(path: str | os.PathLike[str]) -> FileTable:
     """Return f_r of a MERL file as its readers see it: one bin looked up, or interpolated if its record says edges.
 
-    A negative number is a hole: f_r is nan there.
+    A negative number, or nan, is a hole: f_r is nan there. Big-endian and interleaved files are recognised, and a note
+    of the record says so.
     """
     from brdfdb.formats._readings import FileTable
 
     path = path_of(path)
     with path.open("rb") as file:
         size = os.fstat(file.fileno()).st_size
-        if file.read(len(_HEADER)) != _HEADER or size != _BYTES:
-            raise FileFormatError(f"{path}: it is not a MERL file of {_BYTES} bytes with the dimensions {SHAPE}")
-        planes = np.fromfile(file, "<f8").reshape(3, *SHAPE)
-    if not np.all(np.isfinite(planes)):
-        raise FileFormatError(f"{path}: a number is not finite")
+        head = file.read(len(_HEADER))
+    if head not in (_HEADER, _SWAPPED) or size != _BYTES:
+        dimensions = np.frombuffer(head.ljust(len(_HEADER), b"\0"), ">i4" if head[:1] == b"\0" else "<i4").tolist()
+        text = f"its header states {' x '.join(map(str, dimensions))} bins, and it has {size} bytes"
+        text += "; 32-bit floats are not read" if size == len(_HEADER) + (_BYTES - len(_HEADER)) // 2 else ""
+        wanted = f"a MERL file of {_BYTES} bytes with the dimensions {SHAPE}"
+        raise FileFormatError(f"{path}: it is not {wanted}: {text}")
+    content = read_planes(path, len(_HEADER), SHAPE)
+    planes = content.numbers
     known = record_beside(path)
+    for sentence in content.notes:
+        note(known, sentence)
     samples = "edges" if known.get("samples") == "edges" else "centres"
     name = str(known.get("name") or path.stem)
 
-    def nodes() -> Samples:
+    def rows() -> ListedRows:
         offset = 0.5 if samples == "centres" else 0.0
         at = [np.arange(count) + offset for count in SHAPE]
         axes = [np.deg2rad(axis) for axis in (_degrees_h(at[0]), at[1], at[2])]
         values = np.moveaxis(without_holes(planes), 0, -1) * SCALE
-        return samples_of_grid(_SYSTEM, axes, values, name, RGB, None, known)
+        return rows_of_grid(_SYSTEM, axes, values, name, RGB, None, known)
 
-    return FileTable(name, RGB, None, MerlReader(planes, samples), known, nodes)
+    return FileTable(name, RGB, None, MerlReader(planes, samples), known, rows)
 
 
 def _nodes(samples: str) -> tuple[NDArray[np.bool_], Floats]:

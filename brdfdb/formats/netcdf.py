@@ -19,10 +19,12 @@ from brdfdb.place import path_of
 
 if TYPE_CHECKING:
     from brdfdb.formats._readings import FileTable
+    from brdfdb.measurements.conventions import ListedRows
     from brdfdb.measurements.samples import Samples
     from brdfdb.tables.table import Table
 
 suffix = ".nc"
+angle_unit = "stated"
 media_type = "application/netcdf"
 summary = "f_r on a plain grid of angles as netCDF"
 tools = "xarray, MATLAB, Panoply, every program with netCDF"
@@ -59,7 +61,7 @@ def recognises(head: bytes) -> bool:
     return head.startswith(_MAGIC) and any(name in head for name in (b"theta_r", b"theta_h", b"\0\0\0\x06sample"))
 
 
-def read(path: str | os.PathLike[str]) -> FileTable | Samples:
+def read(path: str | os.PathLike[str]) -> FileTable | ListedRows | Samples:
     """Return f_r of a netCDF file with ``brdf`` over angles [degree], interpolated linearly; or samples."""
     path = path_of(path)
     with opened_netcdf(path) as opened:

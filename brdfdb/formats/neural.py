@@ -22,13 +22,13 @@ import numpy as np
 from brdfdb.errors import FileFormatError, ParameterError, import_extra
 from brdfdb.formats._angles import HalfDifference, Spherical
 from brdfdb.formats._channels import RGB
-from brdfdb.formats._nodes import samples_of_grid
+from brdfdb.formats._nodes import rows_of_grid
 from brdfdb.parameters import Floats
 from brdfdb.place import path_of
 
 if TYPE_CHECKING:
     from brdfdb.formats._readings import FileTable
-    from brdfdb.measurements.samples import Samples
+    from brdfdb.measurements.conventions import ListedRows
 
 suffix = ".h5"
 keywords = ("member",)
@@ -72,16 +72,16 @@ def read(path: str | os.PathLike[str], member: str = "") -> FileTable:
     name, content = _content(path, member)
     layers = _layers(f"{path}: {name}" if name != path.stem else f"{path}", content)
     evaluate = functools.partial(_evaluated, layers)
-    return FileTable(name, RGB, None, evaluate, {"network": _NETWORK}, functools.partial(_samples, name, evaluate))
+    return FileTable(name, RGB, None, evaluate, {"network": _NETWORK}, functools.partial(_rows, name, evaluate))
 
 
-def _samples(name: str, evaluate: Any) -> Samples:
+def _rows(name: str, evaluate: Any) -> ListedRows:
     """Return values of a network on a grid."""
     system = Spherical(anisotropic=False, mirrored=True)
     nodes = [np.deg2rad(axis) for axis in _NODES_DEG]
     angles = np.stack([grid.reshape(-1) for grid in np.meshgrid(*nodes, indexing="ij")], axis=1)
     values = evaluate(*system.vectors(angles))
-    return samples_of_grid(system, nodes, values, name, RGB, None, {"network": _NETWORK})
+    return rows_of_grid(system, nodes, values, name, RGB, None, {"network": _NETWORK})
 
 
 def _content(path: Path, member: str) -> tuple[str, bytes]:
@@ -167,6 +167,9 @@ def _layers(path: str, content: bytes) -> list[tuple[Floats, Floats]]:
     except FileFormatError:
         raise
     except Exception as error:  # h5py raises what its parser comes to
+        if b"_NCProperties" in content or path.endswith(".nc"):
+            text = "netCDF 4 is not read; write netCDF 3, for example with nccopy -k classic"
+            raise FileFormatError(f"{path}: {text}") from error
         wanted = ", ".join(_LAYERS)
         raise FileFormatError(f"{path}: it is not a network of Keras with the layers {wanted} ({error})") from error
     if not all(np.all(np.isfinite(part)) for layer in layers for part in layer):

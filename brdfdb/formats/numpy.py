@@ -26,10 +26,11 @@ from brdfdb.place import path_of
 
 if TYPE_CHECKING:
     from brdfdb.formats._readings import FileTable
-    from brdfdb.measurements.samples import Samples
+    from brdfdb.measurements.conventions import ListedRows
     from brdfdb.tables.table import Table
 
 suffix = ".npz"
+angle_unit = "deg"
 media_type = "application/x-npz"
 summary = "f_r on a plain grid of angles as NumPy arrays"
 tools = "NumPy"
@@ -70,10 +71,10 @@ def recognises(head: bytes) -> bool:
     return head.startswith(b"PK\x03\x04") and head[30:].startswith((b"theta_i.npy", b"theta_h.npy"))
 
 
-def read(path: str | os.PathLike[str]) -> FileTable | Samples:
+def read(path: str | os.PathLike[str]) -> FileTable | ListedRows:
     """Return f_r of an .npz archive with ``brdf`` and the axes that it lists, interpolated linearly.
 
-    A grid with holes, nan, gives samples. The values take 512 MiB at most.
+    A grid with holes, nan, gives rows. The values take 512 MiB at most.
     """
     path = path_of(path)
     try:

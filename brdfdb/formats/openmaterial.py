@@ -10,12 +10,12 @@ part is left out. A file has about 40 MB at most: a table that needs more is wri
 
 from __future__ import annotations
 
-import functools
 import json
 import math
 import os
 import re
 import uuid
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -27,22 +27,26 @@ from brdfdb.formats._dense_files import (
     RESOLUTION,
     degrees_of,
     dense_record,
+    listed_rows,
     parsed,
     reading_of_rows,
-    samples_of_rows,
     title_of,
 )
 from brdfdb.formats._interface import TOLERANCE
+from brdfdb.formats._nodes import wrong_radians
 from brdfdb.formats._record import specular_remark
 from brdfdb.formats._written import Written, whole
 from brdfdb.place import path_of
 
 if TYPE_CHECKING:
     from brdfdb.formats._readings import FileTable
-    from brdfdb.measurements.samples import Samples
+    from brdfdb.measurements.conventions import ListedRows
     from brdfdb.tables.table import Table
 
 suffix = ".xompt"
+angle_unit = "rad"
+keywords = ("angles", "wavelength_unit")
+wavelength_unit = "m"
 media_type = "application/json"
 summary = "BRDF lookup tables of ASAM OpenMATERIAL 3D"
 tools = "simulators of ASAM OpenMATERIAL 3D"
@@ -110,47 +114,96 @@ def write(
     return Written((path_of(path),), dense.error, dense.tolerance, remarks)
 
 
+signs = re.compile(rb'"lookupTable"|openMaterial3dVersion')
+
+
 def recognises(head: bytes) -> bool:
     """Return True for the first bytes of a file that names the schema of BRDF tables."""
     return b"material_brdf_schema" in head
 
 
-def read(path: str | os.PathLike[str]) -> FileTable | Samples:
+def read(path: str | os.PathLike[str], **stated: str) -> FileTable | ListedRows:
     """Return f_r of a lookup table: interpolated linearly if it covers the hemisphere, else its samples."""
-    from brdfdb.measurements.samples import Instrument
+    from brdfdb.measurements.instrument import Instrument
 
     path = path_of(path)
     document = parsed(path)
     brdf, metadata = document.get("brdf"), document.get("metadata")
+    brdf = brdf if isinstance(brdf, dict) else {}
     metadata = metadata if isinstance(metadata, dict) else {}
-    try:
-        rows = np.array(brdf["lookupTable"] if isinstance(brdf, dict) else None, dtype=np.float64)
-    except (KeyError, ValueError, TypeError, OverflowError):
-        rows = np.empty(0)
-    if rows.ndim != 2 or rows.shape[1] != 5 or not len(rows) or not np.all(np.isfinite(rows)):
-        raise FileFormatError(f"{path}: brdf.lookupTable is not a list of rows of five numbers")
-    at, first = np.unique(np.round(rows[:, 0] * 1e9, 6), return_index=True)
-    if len(rows) % at.size or not np.array_equal(first, np.arange(at.size) * (len(rows) // at.size)):
-        raise FileFormatError(f"{path}: the rows are not sorted, or the wavelengths have different numbers of rows")
+    rows = _rows(path, brdf.get("lookupTable"))
+    at, first, counts = np.unique(np.round(rows[:, 0] * 1e9, 6), return_index=True, return_counts=True)
+    _check_wavelengths(path, brdf, at)
+    if len(set(counts.tolist())) != 1:
+        fewest, most = (f"{at[index]:g} nm has {counts[index]} rows" for index in (counts.argmin(), counts.argmax()))
+        raise FileFormatError(f"{path}: field brdf.lookupTable: {fewest}, {most}: rows are missing or listed twice")
+    if not np.array_equal(first, np.arange(at.size) * (len(rows) // at.size)):
+        text = "its rows are not sorted by their wavelength"
+        raise FileFormatError(f"{path}: field brdf.lookupTable: {text}; sort them, and then by their angles")
     blocks = rows.reshape(at.size, -1, 5)
-    if not np.array_equal(np.broadcast_to(blocks[0, :, 1:4], blocks[:, :, 1:4].shape), blocks[:, :, 1:4]):
-        raise FileFormatError(f"{path}: the wavelengths have different directions")
-    names = ("theta_i", "theta_r", "delta_phi")
-    angles = {name: degrees_of(blocks[0, :, 1 + index], "rad") for index, name in enumerate(names)}
+    if np.any(differs := np.any(blocks[:, :, 1:4] != blocks[:1, :, 1:4], axis=(0, 2))):
+        row = int(np.argmax(differs))
+        text = f"row {row + 1} of the wavelengths has different directions; each needs the same ones in the same order"
+        raise FileFormatError(f"{path}: field brdf.lookupTable: {text}")
     known = metadata.get("brdfdb")
     known = known if isinstance(known, dict) else {**metadata, "name": metadata.get("name", "")}
-    nodes = functools.partial(
-        samples_of_rows,
-        path,
-        angles,
-        blocks[:, :, 4].T,
-        at,
-        known,
-        instrument=Instrument(receiver_solid_angle_sr=_solid_angle(brdf)),
-        provenance=str(metadata.get("sources", "")),
-    )
-    angles, values = _folded(angles, blocks[:, :, 4].T)
-    return reading_of_rows(path, angles, values, at, known, nodes)
+    names = ("theta_i", "theta_r", "delta_phi")
+    angles = {name: degrees_of(blocks[0, :, 1 + index], "rad") for index, name in enumerate(names)}
+    instrument = Instrument(receiver_solid_angle_sr=_solid_angle(brdf))
+    provenance = str(metadata.get("sources", ""))
+    values = blocks[:, :, 4].T
+
+    def wrong_angle(row: int, column: int) -> str:
+        index = (1 + column) // 2
+        where = f"{path}: field brdf.lookupTable, row {row + 1}, {names[index]}"
+        return f"{where}: {wrong_radians(blocks[0, row, 1 + index], column)}"
+
+    def listed() -> ListedRows:
+        of_file: dict[str, Any] = {"instrument": instrument, "provenance": provenance, "wrong_angle": wrong_angle}
+        return listed_rows(path, angles, values, at, known, **of_file)
+
+    limits = {"theta_i": (0.0, 180.0), "theta_r": (0.0, 180.0), "delta_phi": (-720.0, 720.0)}
+    if any(np.any((angles[name] < low) | (angles[name] > high)) for name, (low, high) in limits.items()):
+        return listed()
+    angles_of_half, half = _folded(angles, values)
+    return reading_of_rows(path, angles_of_half, half, at, known, listed, stated=bool(stated))
+
+
+def _rows(path: Path, listed: Any) -> NDArray[np.float64]:
+    """Return the rows of a lookup table, shape (N, 5); FileFormatError with the first row that is none."""
+    field = f"{path}: field brdf.lookupTable"
+    if not isinstance(listed, list) or not listed:
+        raise FileFormatError(f"{field}: it is missing, or not a list of rows of five numbers")
+    try:
+        rows = np.array(listed, dtype=np.float64)
+    except (ValueError, TypeError, OverflowError):
+        rows = np.empty(0)
+    if rows.ndim == 2 and rows.shape[1] == 5 and np.all(np.isfinite(rows)):
+        return rows
+    for number, row in enumerate(listed, 1):
+        numbers = isinstance(row, list) and all(isinstance(v, int | float) and math.isfinite(v) for v in row)
+        if not numbers or len(row) != 5:
+            text = "is not five finite numbers: wavelength [m], theta_i, theta_r, phi_r [rad], f_r [1/sr]"
+            raise FileFormatError(f"{field}: row {number}, {json.dumps(row)[:60]}, {text}")
+    raise FileFormatError(f"{field}: it is not a list of rows of five numbers")
+
+
+def _check_wavelengths(path: Path, brdf: dict[str, Any], at: NDArray[np.float64]) -> None:
+    """Raise FileFormatError if the lists of wavelengths [m] of a file are not those of its rows, `at` [nm]."""
+    entries = brdf.get("receiverSolidAngles")
+    of_entries = [entry.get("wavelength") if isinstance(entry, dict) else None for entry in entries or ()]
+    for name, stated in (("wavelengths", brdf.get("wavelengths")), ("receiverSolidAngles", of_entries or None)):
+        if stated is None:
+            continue
+        try:
+            listed = np.unique(np.round(np.array(stated, dtype=np.float64).reshape(-1) * 1e9, 6))
+        except (ValueError, TypeError, OverflowError):
+            listed = np.empty(0)
+        if listed.size != at.size or not np.allclose(listed, at, rtol=1e-6, atol=0.0):
+            shown = ", ".join(f"{1e-9 * nm:g}" for nm in listed[:3])
+            rows = ", ".join(f"{1e-9 * nm:g}" for nm in at[:3])
+            text = f"it lists {listed.size} wavelengths from {shown} m, but the rows have {at.size} from {rows} m"
+            raise FileFormatError(f"{path}: field brdf.{name}: {text}")
 
 
 def _solid_angle(brdf: Any) -> float | None:

@@ -13,6 +13,7 @@ import functools
 import math
 import mmap
 import os
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
@@ -26,10 +27,11 @@ from brdfdb.errors import FileFormatError
 from brdfdb.formats._angles import HalfDifference, Specular, Spherical, System
 from brdfdb.formats._angular_grid import SIZE, AngularGrid, Sink, chosen, mirrored, reciprocal
 from brdfdb.formats._channels import names_of
-from brdfdb.formats._input import MOST_TEXT, check_size
+from brdfdb.formats._doubts import OPEN_END, has_open_end
+from brdfdb.formats._input import HEAD, MOST_TEXT, check_size, encoding_of, opened_text, plain_number
 from brdfdb.formats._interface import TOLERANCE, FormatOption
-from brdfdb.formats._nodes import samples_of_grid, without_holes
-from brdfdb.formats._record import lines, of_lines, record
+from brdfdb.formats._nodes import rows_of_grid, without_holes
+from brdfdb.formats._record import lines, note, of_lines, record
 from brdfdb.formats._written import Written, whole
 from brdfdb.parameters import Floats
 from brdfdb.place import path_of
@@ -63,6 +65,9 @@ _ROUNDING_DEG = 1e-3
 _TYPES = ("brdf", "btdf", "specular_reflectance", "specular_transmittance")
 _CHANNELS = {"monochrome": 1, "rgb": 3, "xyz": 3}
 _LONGEST = 1 << 24  # bytes of a line of a header: a list of angles or wavelengths
+_ENTRY = re.compile(r"[A-Z][A-Z0-9_]*")
+signs = re.compile(rb"^(?:DATA_TYPE|COLOR_MODEL|PARAM_TYPE|PARAM[0-4]_LIST)\b", re.MULTILINE)
+_NUMBER = re.compile(rb"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 _SPACES = b" \t\n\v\f\r"
 
 
@@ -116,11 +121,16 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     path = path_of(path)
     comments, blocks = parsed(path)
     by_type = {block.entries["DATA_TYPE"]: block for block in blocks}
+    if len(by_type) < len(blocks):
+        types = ", ".join(block.entries["DATA_TYPE"] for block in blocks)
+        raise FileFormatError(f"{path}: field DATA_TYPE: {types}: a type stands twice; write a file for each")
     if "brdf" not in by_type:
-        raise FileFormatError(f"{path}: it is not an SSDD file with a block of DATA_TYPE brdf")
+        raise FileFormatError(f"{path}: field DATA_TYPE: it is not an SSDD file with a block of DATA_TYPE brdf")
     block = by_type["brdf"]
     grid = _grid(path, block)
     document = of_lines(comments)
+    if blocks[-1].entries["DATA"] == "ascii" and has_open_end(path):
+        note(document, OPEN_END)
     if "specular_reflectance" in by_type:
         dirac = by_type["specular_reflectance"]
         document["specular_theta_i_deg"] = dirac.angles[0].tolist()
@@ -129,8 +139,8 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     names = _COLOURS[block.entries["COLOR_MODEL"]] if at is None else names_of(at)
     name = str(document.get("name") or block.entries.get("NAME") or path.stem)
     angles = [np.deg2rad(axis) for axis in block.angles]
-    nodes = functools.partial(samples_of_grid, grid.system, angles, block.values, name, names, at, document)
-    return FileTable(name, names, at, grid.evaluate, document, nodes, listed=True)
+    rows = functools.partial(rows_of_grid, grid.system, angles, block.values, name, names, at, document)
+    return FileTable(name, names, at, grid.evaluate, document, rows, listed=True)
 
 
 def _systems(comparison: Comparison) -> list[System]:
@@ -196,7 +206,9 @@ def _grid(path: Path, block: SsddBlock) -> AngularGrid:
         _NAMES[Spherical]: Spherical(anisotropic, both_sides),
     }
     if kind not in systems or "PARAM4_LIST" in block.entries:
-        raise FileFormatError(f"{path}: PARAM_TYPE is {kind}; {', '.join(systems)} are read, and no PARAM4_LIST")
+        raise FileFormatError(
+            f"{path}: field PARAM_TYPE: it is {kind}; {', '.join(systems)} are read, and no PARAM4_LIST"
+        )
     nodes = tuple(np.deg2rad(axis) for axis in block.angles)
     values = without_holes(block.values)
     if not anisotropic:
@@ -207,23 +219,13 @@ def _grid(path: Path, block: SsddBlock) -> AngularGrid:
 
 @dataclass(frozen=True, eq=False)
 class SsddBlock:
-    """A block of data.
+    """A block of data."""
 
-    Attributes
-    ----------
-    entries : mapping of str
-        The entries before the values, by name.
-    angles : tuple of array [degree]
-        The lists of angles that are there, from PARAM0_LIST on; (0,) for one that is left out.
-    values : float32 array (n0, n1, ..., C)
-        Values over the lists, and last the channels.
-    wavelength_nm : array (C,) [nm] or None
-        Wavelengths of the channels; None if the channels are not wavelengths.
-    """
-
-    entries: Mapping[str, str]
+    entries: Mapping[str, str]  #: the entries before the values, by name
+    #: the lists of angles that are there, from PARAM0_LIST on; (0,) for one that is left out, [degree]
     angles: tuple[NDArray[np.float64], ...]
-    values: NDArray[np.float32]
+    values: NDArray[np.float32]  #: values over the lists, and last the channels, (n0, n1, ..., C)
+    #: wavelengths of the channels; None if the channels are not wavelengths, (C,) [nm]
     wavelength_nm: NDArray[np.float64] | None
 
 
@@ -254,9 +256,14 @@ def parsed(path: Path) -> tuple[list[str], list[SsddBlock]]:
     """Return the comments and the blocks of a file; FileFormatError if it is no SSDD file, or damaged."""
     check_size(path, MOST_TEXT)
     with path.open("rb") as file:
-        if not file.read(1):
+        head = file.read(HEAD)
+        if not head:
             return [], []
-        data = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
+        data: mmap.mmap | bytes = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
+    encoding = encoding_of(head)
+    if encoding not in (None, "utf-8") or (b"\r" in head and b"\n" not in head):  # then its values are text, too
+        with opened_text(path) as text_file:
+            data = text_file.read().encode()
     comments: list[str] = []
     blocks: list[SsddBlock] = []
     entries: dict[str, str] = {}
@@ -273,9 +280,15 @@ def parsed(path: Path) -> tuple[list[str], list[SsddBlock]]:
         if line.startswith("#"):
             comments.append(line[1:].strip())
             continue
-        name, _, text = line.partition(" ")
+        name, text = (*line.split(None, 1), "", "")[:2]
         if name == "DATA_TYPE":
             entries = {}
+        if name and not _ENTRY.fullmatch(name):
+            before = "behind the values that its lists state" if blocks else "in its header"
+            raise FileFormatError(f"{path}: byte {at - 1}: {line[:40]!r} is no entry, and stands {before}")
+        if name in entries:
+            text = f"{entries[name]!r:.40} and {text!r:.40}; write a file for each"
+            raise FileFormatError(f"{path}: byte {at - 1}, field {name}: it stands twice: {text}")
         if name:
             entries[name] = text.strip()
         if name == "DATA":
@@ -284,50 +297,67 @@ def parsed(path: Path) -> tuple[list[str], list[SsddBlock]]:
     return comments, blocks
 
 
-def _values(path: Path, data: mmap.mmap, at: int, entries: Mapping[str, str]) -> tuple[SsddBlock, int]:
+def _values(path: Path, data: mmap.mmap | bytes, at: int, entries: Mapping[str, str]) -> tuple[SsddBlock, int]:
     """Return the block whose values begin at a byte, and the byte behind it."""
     if entries.get("DATA_TYPE") not in _TYPES or "PARAM0_LIST" not in entries:
-        raise FileFormatError(f"{path}: a block of data has no DATA_TYPE of {', '.join(_TYPES)}, or no PARAM0_LIST")
-    try:
-        lists = {name: np.array([float(text) for text in entries.get(name, "0").split()]) for name in _LISTS}
-        model = entries.get("COLOR_MODEL", "")
-        spectral = model == "spectrum"
-        nm = np.array([float(text) for text in entries["WAVELENGTH_LIST"].split()]) if spectral else None
-        channels = _CHANNELS[model] if nm is None else nm.size
-    except (KeyError, ValueError):
-        raise FileFormatError(f"{path}: COLOR_MODEL, or a list of angles or wavelengths, cannot be read") from None
+        text = f"a block of data has none of {', '.join(_TYPES)}, or no PARAM0_LIST"
+        raise FileFormatError(f"{path}: field DATA_TYPE: {text}")
+    lists = {name: _numbers(path, name, entries.get(name, "0")) for name in _LISTS}
+    model = entries.get("COLOR_MODEL", "")
+    if model not in (*_CHANNELS, "spectrum"):
+        known = ", ".join((*_CHANNELS, "spectrum"))
+        raise FileFormatError(f"{path}: field COLOR_MODEL: {model!r:.40} is not one of {known}")
+    nm = _numbers(path, "WAVELENGTH_LIST", entries.get("WAVELENGTH_LIST", "")) if model == "spectrum" else None
+    channels = _CHANNELS[model] if nm is None else nm.size
     angles = tuple(lists.values())
-    if not channels or not all(nodes.size and np.all(np.diff(nodes) > 0.0) for nodes in angles):
-        raise FileFormatError(f"{path}: a list of angles is empty or does not increase")
-    if nm is not None and not (channels and nm[0] > 0.0 and nm[-1] < np.inf and np.all(np.diff(nm) > 0.0)):
-        raise FileFormatError(f"{path}: WAVELENGTH_LIST is not a list of positive, increasing numbers [nm]")
+    if nm is not None and nm[0] <= 0.0:
+        raise FileFormatError(f"{path}: field WAVELENGTH_LIST: {nm[0]:g} is not a wavelength in nm")
     for (name, nodes), (low, high) in zip(lists.items(), _RANGES_DEG, strict=True):
         if not low <= nodes[0] <= nodes[-1] <= high + _ROUNDING_DEG:
-            raise FileFormatError(
-                f"{path}: {name} is from {nodes[0]:g} to {nodes[-1]:g} degrees; allowed is [{low:g}, {high:g}]"
-            )
+            text = f"it is from {nodes[0]:g} to {nodes[-1]:g} degrees; allowed is [{low:g}, {high:g}]"
+            raise FileFormatError(f"{path}: field {name}: {text}")
     if entries["DATA"] not in ("binary", "ascii"):
-        raise FileFormatError(f"{path}: DATA is {entries['DATA']!r:.40}; allowed are binary and ascii")
+        raise FileFormatError(f"{path}: field DATA: {entries['DATA']!r:.40} is not one of binary and ascii")
     count = channels * math.prod(nodes.size for nodes in angles)
     if entries["DATA"] == "binary":
         end = at + 4 * count
         if end > len(data):
             raise FileFormatError(
-                f"{path}: it has {len(data) - at} bytes of values; its lists of angles need {4 * count}"
+                f"{path}: field DATA: it has {len(data) - at} bytes of values; its lists of angles need {4 * count}"
             )
         flat = np.frombuffer(data, "<f4", count, at)
     else:
         end = data.find(b"\nDATA_TYPE", at)
         end = len(data) if end < 0 else end
         lines = (line for line in data[at:end].split(b"\n") if not line.lstrip().startswith(b"#"))
+        words = b" ".join(lines).split()
         try:
-            flat = np.array(b" ".join(lines).split(), np.float32)
+            if any(b"_" in word for word in words):
+                raise ValueError
+            flat = np.array(words, np.float32)
         except ValueError:
-            raise FileFormatError(f"{path}: a value is not a number") from None
+            wrong = next((word.decode("utf-8", "replace") for word in words if not _NUMBER.fullmatch(word)), "")
+            raise FileFormatError(f"{path}: field DATA: {wrong[:40]!r} is not a number") from None
         if flat.size != count:
-            raise FileFormatError(f"{path}: it has {flat.size} values; its lists of angles need {count}")
+            text = f"it has {flat.size} values; its lists of angles need {count}: the file was cut, or a list is wrong"
+            raise FileFormatError(f"{path}: field DATA: {text}")
     if not np.all(np.isfinite(flat)):
-        raise FileFormatError(f"{path}: a value is not finite")
+        raise FileFormatError(f"{path}: field DATA: value {int(np.argmin(np.isfinite(flat))) + 1} is not finite")
     shape = tuple(nodes.size for nodes in reversed(angles))
     values = np.moveaxis(flat.reshape(*shape, channels), -1, 0).T
     return SsddBlock(dict(entries), angles, np.ascontiguousarray(values), nm), end
+
+
+def _numbers(path: Path, name: str, text: str) -> NDArray[np.float64]:
+    """Return a list of increasing numbers in an entry of a header."""
+    numbers = []
+    for word in text.split():
+        try:
+            numbers.append(plain_number(word))
+        except ValueError:
+            numbers.append(math.nan)
+        if not math.isfinite(numbers[-1]):
+            raise FileFormatError(f"{path}: field {name}: {word[:40]!r} is not a finite number")
+    if not numbers or np.any(np.diff(numbers) <= 0.0):
+        raise FileFormatError(f"{path}: field {name}: its numbers are missing or do not increase")
+    return np.array(numbers)

@@ -19,16 +19,18 @@ from brdfdb.errors import FileFormatError
 from brdfdb.formats._angles import Spherical
 from brdfdb.formats._angular_grid import AngularGrid, filled
 from brdfdb.formats._channels import RGB, channels_of
+from brdfdb.formats._input import encoding_of
 from brdfdb.formats._interface import FIXED, FormatOption
-from brdfdb.formats._nodes import samples_of_grid, without_holes
-from brdfdb.formats._record import beside, record, record_beside, specular_remark
+from brdfdb.formats._nodes import rows_of_grid, without_holes
+from brdfdb.formats._planes import read_planes
+from brdfdb.formats._record import beside, note, record, record_beside, specular_remark
 from brdfdb.formats._written import Written, whole
 from brdfdb.parameters import Floats
 from brdfdb.place import path_of
 
 if TYPE_CHECKING:
     from brdfdb.formats._readings import FileTable
-    from brdfdb.measurements.samples import Samples
+    from brdfdb.measurements.conventions import ListedRows
     from brdfdb.tables.table import Table
 
 suffix = ".bin"
@@ -91,35 +93,47 @@ def write(
 
 def recognises(head: bytes) -> bool:
     """Return True for the first bytes of a UTIA file, which has no header: all of them are likely values of f_r."""
-    numbers = np.frombuffer(head[: len(head) // 8 * 8], "<f8")
+    return encoding_of(head) is None and (_are_likely(head, "<f8") or _are_likely(head, ">f8"))
+
+
+def _are_likely(head: bytes, kind: str) -> bool:
+    """Return True if all numbers of a type in some bytes are likely values of f_r, or nan."""
+    numbers = np.frombuffer(head[: len(head) // 8 * 8], kind)
     if numbers.size < 512:
         return False
     with np.errstate(invalid="ignore"):
         size = np.abs(numbers)
-        return bool(np.any(numbers)) and bool(np.all((numbers == 0.0) | ((size > _LIKELY[0]) & (size < _LIKELY[1]))))
+        likely = (size > _LIKELY[0]) & (size < _LIKELY[1])
+        return bool(np.any(likely) and np.all(likely | (numbers == 0.0) | np.isnan(numbers)))
 
 
 def read(path: str | os.PathLike[str]) -> FileTable:
-    """Return f_r of a UTIA file as UTIA's own reader sees it, or dj_brdf if its record says so."""
+    """Return f_r of a UTIA file as UTIA's own reader sees it, or dj_brdf if its record says so.
+
+    A negative number, or nan, is a hole. Big-endian and interleaved files are recognised, and a note of the record says
+    so.
+    """
     from brdfdb.formats._readings import FileTable
 
     path = path_of(path)
     size = path.stat().st_size
     if size != _BYTES:
-        raise FileFormatError(f"{path}: it has {size} bytes; a UTIA file has {_BYTES}")
-    planes = np.fromfile(path, "<f8").reshape(3, *SHAPE)
-    if not np.all(np.isfinite(planes)):
-        raise FileFormatError(f"{path}: a number is not finite")
+        text = "; 32-bit floats are not read" if 2 * size == _BYTES else ""
+        raise FileFormatError(f"{path}: it has {size} bytes; a UTIA file has {_BYTES}{text}")
+    content = read_planes(path, 0, SHAPE)
+    planes = content.numbers
     known = record_beside(path)
+    for sentence in content.notes:
+        note(known, sentence)
     numbers = np.pad(np.moveaxis(planes, 0, -1), [(0, 0), (0, 1), (0, 0), (0, 1), (0, 0)], mode="wrap")
     encoding = "dj_brdf" if known.get("encoding") == "dj_brdf" else "linear"
     name = str(known.get("name") or path.stem)
 
-    def nodes() -> Samples:
+    def rows() -> ListedRows:
         axes = [np.deg2rad(step * np.arange(count)) for step, count in zip(STEPS_DEG, SHAPE, strict=True)]
-        return samples_of_grid(_SYSTEM, axes, _decoded(np.moveaxis(planes, 0, -1), encoding), name, RGB, None, known)
+        return rows_of_grid(_SYSTEM, axes, _decoded(np.moveaxis(planes, 0, -1), encoding), name, RGB, None, known)
 
-    return FileTable(name, RGB, None, UtiaReader(without_holes(numbers), encoding), known, nodes, listed=True)
+    return FileTable(name, RGB, None, UtiaReader(without_holes(numbers), encoding), known, rows, listed=True)
 
 
 def _encoded(f_r: Floats, encoding: str) -> Floats:

@@ -19,10 +19,12 @@ from brdfdb.place import path_of
 
 if TYPE_CHECKING:
     from brdfdb.formats._readings import FileTable
+    from brdfdb.measurements.conventions import ListedRows
     from brdfdb.measurements.samples import Samples
     from brdfdb.tables.table import Table
 
 suffix = ".zarr"
+angle_unit = "stated"
 media_type = "application/zip"  # of the directory over HTTP
 summary = "f_r on a plain grid of angles as zarr 3"
 tools = "xarray, zarr"
@@ -50,7 +52,7 @@ def recognises(head: bytes) -> bool:
     return b'"zarr_format"' in head and b'"group"' in head
 
 
-def read(path: str | os.PathLike[str]) -> FileTable | Samples:
+def read(path: str | os.PathLike[str]) -> FileTable | ListedRows | Samples:
     """Return f_r of a zarr group with ``brdf`` over angles [degree], interpolated linearly; or samples."""
     import xarray as xr
     import zarr

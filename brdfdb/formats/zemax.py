@@ -10,11 +10,11 @@ XYZ, or its Y alone (``--colour``). The specular part is left out.
 
 from __future__ import annotations
 
-import functools
 import os
+import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,9 +23,10 @@ from brdfdb.errors import FileFormatError
 from brdfdb.formats._angles import Specular
 from brdfdb.formats._angular_grid import SIZE, AngularGrid, Sink, chosen
 from brdfdb.formats._channels import LUMINOUS, XYZ, channels_of
+from brdfdb.formats._doubts import doubt_comments
 from brdfdb.formats._input import Words
 from brdfdb.formats._interface import TOLERANCE, FormatOption
-from brdfdb.formats._nodes import samples_of_grid, without_holes
+from brdfdb.formats._nodes import rows_of_grid, without_holes
 from brdfdb.formats._record import CONVENTION, lines, note, of_comments, of_lines, record, specular_remark
 from brdfdb.formats._written import Written, whole
 from brdfdb.parameters import Floats
@@ -35,7 +36,7 @@ if TYPE_CHECKING:
     from brdfdb.formats._channels import Channels
     from brdfdb.formats._readings import FileTable
     from brdfdb.formats._stated_error import FileError
-    from brdfdb.measurements.samples import Samples
+    from brdfdb.measurements.conventions import ListedRows
     from brdfdb.tables.albedo import TableAlbedo
     from brdfdb.tables.table import Table
 
@@ -58,6 +59,14 @@ _LISTS = ("SampleRotation", "AngleOfIncidence", "ScatterAzimuth", "ScatterRadial
 _TITLE = "BSDF Data Interchange file"
 _SYMMETRIES = ("PlaneSymmetrical", "Asymmetrical", "ASymmetrical", "ASymmetrical4D", "Asymmetrical4D")
 _PARTS = {"Monochrome": ("Monochrome",), "XYZ": ("TristimulusX", "TristimulusY", "TristimulusZ")}
+
+_RANGES_DEG = {  # of the lists
+    "SampleRotation": (-360.0, 360.0),
+    "AngleOfIncidence": (0.0, 90.0),
+    "ScatterAzimuth": (-360.0, 360.0),
+    "ScatterRadial": (0.0, 180.0),
+}
+signs = re.compile(rb"^(?:AngleOfIncidence|ScatterAzimuth|ScatterRadial|SpectralContent|ScatterType)\b", re.MULTILINE)
 
 _LARGEST = float(np.finfo(np.float32).max)
 
@@ -137,7 +146,7 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     path = path_of(path)
     text = parsed(path)
     if text.scatter != "BRDF":
-        raise FileFormatError(f"{path}: its ScatterType is {text.scatter!r}; only BRDF is read")
+        raise FileFormatError(f"{path}: field ScatterType: {text.scatter!r:.40} is not read; allowed is BRDF")
     turns, incidences, azimuths, radials = (np.deg2rad(axis) for axis in text.angles)
     values = without_holes(text.values.transpose(2, 1, 4, 3, 0)).astype(np.float32)
     both_sides = text.symmetry == "PlaneSymmetrical"
@@ -149,32 +158,25 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     grid = AngularGrid(Specular(anisotropic, both_sides), nodes, values if anisotropic else values[:, 0])
     document = of_lines(list(text.comments))
     document |= {"theta_i_deg": text.angles[1].tolist(), "tis": np.moveaxis(text.tis, 0, -1).tolist()}
+    if "program" not in document:
+        doubt_comments(text.comments, document)
     luminous = document.get("channels") == list(LUMINOUS)
     names = XYZ if text.content == "XYZ" else LUMINOUS if luminous else ("grey",)
     name = str(document.get("name") or path.name.partition(".")[0])
-    listed = functools.partial(_samples, name, names, text, document)
-    return FileTable(name, names, None, grid.evaluate, document, listed, listed=True)
-
-
-def _samples(name: str, names: tuple[str, ...], text: ZemaxText, document: dict[str, Any]) -> Samples:
-    """Return the values of a file at their own angles."""
-    nodes = [np.deg2rad(text.angles[axis]) for axis in (1, 0, 3, 2)]
     instrument, wavelength_nm = of_comments(document)
-    known = wavelength_nm is not None and names == ("grey",)
-    if known:
-        document = dict(document)
+    at = None
+    if wavelength_nm is not None and names == ("grey",):
+        names, at = (f"{wavelength_nm:g}nm",), np.array([wavelength_nm])
         note(document, f"The wavelength {wavelength_nm:g} nm was read from the comments of the file.")
-    return samples_of_grid(
-        Specular(anisotropic=True, mirrored=False),
-        nodes,
-        text.values.transpose(2, 1, 4, 3, 0),
-        name,
-        (f"{wavelength_nm:g}nm",) if known else names,
-        np.array([wavelength_nm]) if known else None,
-        document,
-        instrument=instrument,
-        provenance=str(document.get("Sample", "")),
-    )
+
+    def rows() -> ListedRows:
+        angles = [np.deg2rad(text.angles[axis]) for axis in (1, 0, 3, 2)]
+        f_r = text.values.transpose(2, 1, 4, 3, 0)
+        system = Specular(anisotropic=True, mirrored=False)
+        sample = str(document.get("Sample", ""))
+        return rows_of_grid(system, angles, f_r, name, names, at, document, instrument=instrument, provenance=sample)
+
+    return FileTable(name, names, at, grid.evaluate, document, rows, listed=True)
 
 
 def _albedo(
@@ -212,29 +214,17 @@ def _albedo(
 
 @dataclass(frozen=True, eq=False)
 class ZemaxText:
-    """Content of a Zemax file.
+    """Content of a Zemax file."""
 
-    Attributes
-    ----------
-    comments : tuple of str
-        The comments.
-    symmetry, content, scatter : str
-        Values of the entries Symmetry, SpectralContent and ScatterType.
-    angles : tuple of array [degree]
-        The four lists: rotations of the sample, angles of incidence, azimuths and radial angles.
-    tis : array (C, rotations, incidences)
-        Total integrated scatter.
-    values : array (C, rotations, incidences, azimuths, radials) [1/sr]
-        f_r.
-    """
-
-    comments: tuple[str, ...]
+    comments: tuple[str, ...]  #: the comments
+    #: values of the entries Symmetry, SpectralContent and ScatterType
     symmetry: str
     content: str
     scatter: str
+    #: the four lists: rotations of the sample, angles of incidence, azimuths and radial angles, [degree]
     angles: tuple[NDArray[np.float64], ...]
-    tis: NDArray[np.float64]
-    values: Floats
+    tis: NDArray[np.float64]  #: total integrated scatter, (C, rotations, incidences)
+    values: Floats  #: f_r, (C, rotations, incidences, azimuths, radials) [1/sr]
 
 
 def write_text(stream: Sink, text: ZemaxText) -> None:
@@ -257,24 +247,16 @@ def write_text(stream: Sink, text: ZemaxText) -> None:
 def parsed(path: Path) -> ZemaxText:
     """Return the content of a file; FileFormatError if it is no Zemax BSDF file, or damaged."""
     words = Words(path)
-    entries = {"Source": "", "Symmetry": "", "SpectralContent": "", "ScatterType": ""}
-    angles: dict[str, NDArray[np.float64]] = {}
-    for word in words:
-        if word in entries:
-            entries[word] = words.next(word)
-        elif word in _LISTS:
-            angles[word] = words.numbers(words.count(word), word)
-            if not angles[word].size or np.any(np.diff(angles[word]) <= 0.0):
-                raise words.error(word, "there are no angles, or they do not increase")
-        elif any(word in parts for parts in _PARTS.values()):
-            break
+    entries, angles, first = _header(words)
     content = entries["SpectralContent"]
     if entries["Symmetry"] not in _SYMMETRIES or content not in _PARTS:
-        raise FileFormatError(f"{path}: its Symmetry or SpectralContent is not that of a Zemax BSDF file")
+        text = f"{entries['Symmetry']!r:.40} and {content!r:.40} are not those of a Zemax BSDF file"
+        allowed = f"{', '.join(_SYMMETRIES)}, and {', '.join(_PARTS)}"
+        raise FileFormatError(f"{path}: fields Symmetry and SpectralContent: {text}; allowed are {allowed}")
     angles.setdefault("SampleRotation", np.zeros(1))
     missing = [name for name in _LISTS if name not in angles]
     if missing:
-        raise FileFormatError(f"{path}: {', '.join(missing)} is missing")
+        raise FileFormatError(f"{path}: field {', '.join(missing)}: the list is missing in the header")
     lists = tuple(angles[name] for name in _LISTS)
     parts = len(_PARTS[content])
     blocks = parts * lists[0].size * lists[1].size
@@ -282,14 +264,25 @@ def parsed(path: Path) -> ZemaxText:
         raise FileFormatError(f"{path}: its lists of angles need {blocks} blocks of values, more than the file has")
     rows = []
     tis = np.empty(blocks)
+    size = f"ScatterAzimuth and ScatterRadial state {lists[2].size} x {lists[3].size} values"
     for number in range(blocks):
-        for word in words:
-            if word == "TIS":
-                break
+        where = f"block {number + 1} of {blocks}"
+        at = number % (blocks // parts)
+        if at == 0:
+            part = _PARTS[content][number * parts // blocks]
+            if number:
+                words.expect("DataEnd", f"{where}: {size}")
+                words.expect(part, where)
+            elif first != part:
+                raise words.error(where, f"{first!r:.40} stands where {part} is expected")
+            words.expect("DataBegin", where)
+        words.expect("TIS", f"{where}: {size}")
         tis[number] = words.numbers(1, "TIS")[0]
-        rows.append(words.numbers(lists[2].size * lists[3].size, f"block {number + 1} of {blocks}"))
+        rows.append(words.numbers(lists[2].size * lists[3].size, f"{where}: {size}"))
         if np.any(np.abs(rows[-1]) > _LARGEST):
             raise words.error("TIS", f"a value exceeds {_LARGEST:g}, the largest 32-bit float")
+    words.expect("DataEnd", f"block {blocks} of {blocks}: {size}")
+    words.end("DataEnd", "the last block")
     shape = (parts, *(nodes.size for nodes in lists))
     values = np.concatenate(rows, dtype=np.float32, casting="same_kind").reshape(shape)
     return ZemaxText(
@@ -301,3 +294,35 @@ def parsed(path: Path) -> ZemaxText:
         tis.reshape(shape[:3]),
         values,
     )
+
+
+def _header(words: Words) -> tuple[dict[str, str], dict[str, NDArray[np.float64]], str]:
+    """Return the entries and the lists of angles [degree] of a header, and the first word below it."""
+    entries = {"Source": "", "Symmetry": "", "SpectralContent": "", "ScatterType": ""}
+    angles: dict[str, NDArray[np.float64]] = {}
+    name = ""
+    line = 0  # of the last entry, whose value may have several words
+    for word in words:
+        if word in angles or entries.get(word):
+            raise words.error(word, "it is stated twice; write a file for each header")
+        if word in entries:
+            name = word
+            entries[word] = words.next(word)
+            line = words.line
+        elif word in _LISTS:
+            name = word
+            angles[word] = words.numbers(words.count(word), word)
+            if not angles[word].size or np.any(np.diff(angles[word]) <= 0.0):
+                raise words.error(word, "there are no angles, or they do not increase")
+            low, high = _RANGES_DEG[word]
+            if angles[word][0] < low or angles[word][-1] > high:
+                text = f"{angles[word][0]:g} to {angles[word][-1]:g} degrees; allowed are {low:g} to {high:g}"
+                raise words.error(word, text)
+        elif any(word in parts for parts in _PARTS.values()):
+            return entries, angles, word
+        elif words.line != line and word[:1] in "+-.0123456789":
+            raise words.error(name or "header", f"{word[:40]!r} is one number more than are stated")
+        elif words.line != line:
+            known = ", ".join((*entries, *_LISTS))
+            raise words.error(word[:40], f"it is not an entry of a Zemax BSDF file, which are {known}")
+    raise words.error(name or "header", f"the file ends before {' or '.join(parts[0] for parts in _PARTS.values())}")

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,11 +14,13 @@ import pytest
 import xarray as xr
 
 from brdfdb import formats
+from brdfdb.errors import FileFormatError
 from brdfdb.formats._nodes import FILL_VALUES
 from brdfdb.formats._readings import FileTable
 from brdfdb.formats.rgl._tensors import read_tensors, write_tensors
 from brdfdb.measurements.samples import Samples
-from tests.formats.a_file import exported, read_table, samples_of
+from tests.formats import made_files as made
+from tests.formats.a_file import exported, notes_of, read_table, samples_of
 from tests.formats.round_trip import ROUND_TRIPPED
 
 GREEN = 1
@@ -191,3 +194,50 @@ def test_a_direction_that_is_nan_is_nan_from_a_file(tmp_path: Path) -> None:
     reading = read_table(exported(tmp_path, "numpy"))
     assert np.isnan(reading.lookup([0.2, np.nan], 0.0, 0.3, 1.0)).tolist() == [False, True]
     assert reading.lookup(2.0, 0.0, 0.3, 1.0) == 0.0
+
+
+MARKED = {
+    "a.csv": made.sheet(),
+    "a.txt": made.sheet("theta_i,theta_r,delta_phi,BRDF_percent"),
+    "a.astm": made.astm("BRF"),
+    "a.fred.txt": made.fred().replace("scale=1", "scale=0.1"),
+    "a.dat": made.pabopto("DSF"),
+    "a.ssdd": made.ssdd(),
+    "zemax.bsdf": made.zemax(),
+    "lighttools.bsdf": made.lighttools(),
+    "a.json": made.bird(),
+}
+
+
+def _marked(content: str, words: Sequence[str]) -> str:
+    """Return a text with words instead of some numbers."""
+    numbers = itertools.count()
+    cycle = itertools.cycle(words)
+    return re.sub(r"\b0\.\d{6}\b", lambda match: match[0] if (next(numbers) + 3) % 37 else next(cycle), content)
+
+
+@pytest.mark.parametrize("name", MARKED)
+def test_marks_of_saturation_are_told_and_left_out_if_they_are_stated(name: str, tmp_path: Path) -> None:
+    text = _marked(MARKED[name], ["65535"])
+    notes = notes_of(samples_of(tmp_path, text, name))
+    count = re.search(r"Saturated\? (\d) values of 65535 .*: --missing 65535 leaves them out\.", notes)
+    assert count, notes
+    mended = samples_of(tmp_path, text, name, missing=65535.0)
+    assert (~mended.known).sum() == int(count[1])
+    assert f"Holes, as was stated: {count[1]} values of 65535." in notes_of(mended)
+    assert "Saturated" not in notes_of(mended)
+    assert np.nanmax(mended.values) < 1.0
+
+
+def test_words_that_stand_for_no_value_are_counted(tmp_path: Path) -> None:
+    samples = samples_of(tmp_path, _marked(made.sheet(), ["overflow", "#N/A", "sat", "overflow"]))
+    assert (~samples.known).sum() == 4
+    assert "Words read as holes: 2 of 'overflow', 1 of '#N/A', 1 of 'sat'." in notes_of(samples)
+    for name, content in (("a.astm", made.astm()), ("a.csv", "theta_h,theta_d,brdf\n1,2,3\n1,2,0.300000\n")):
+        with pytest.raises(FileFormatError, match=r"line \d+, field (550nm|brdf): 'overflow' is not a number"):
+            samples_of(tmp_path, re.sub(r"0\.\d{6}\n", "overflow\n", content), name)
+
+
+def test_a_fill_value_of_logarithms_is_a_hole(tmp_path: Path) -> None:
+    samples = samples_of(tmp_path, _marked(made.astm("log10_BRDF"), ["-999"]), "a.astm")
+    assert (~samples.known).sum() == 4

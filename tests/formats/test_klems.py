@@ -136,7 +136,8 @@ def test_damaged_files_are_refused_with_a_sentence(tmp_path: Path, files: dict[t
         ("<ScatteringData>\n", "<ScatteringData>\none,", "could not convert string to float"),
         ("<nPhis>12</nPhis>", "<nPhis>many</nPhis>", r"invalid literal for int\(\)"),
         ("<nPhis>12</nPhis>", "<nPhis>1000000000000</nPhis>", "more than 100000"),
-        ("<UpperTheta>45", "<UpperTheta>5", "no rings of patches up to 90 degrees"),
+        ("<nPhis>12</nPhis>", "<nPhis>11</nPhis>", r"this name means patches \(1, 8, 12, 12, 8\)"),
+        ("<UpperTheta>45", "<UpperTheta>5", "ring begins at 45 degrees, but the one before it ends at 5"),
     ]
     check_changes_refused(tmp_path / "a.xml", files[GREY, "quarter"].read_text(), changes, "klems")
 

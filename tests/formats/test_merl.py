@@ -19,7 +19,7 @@ from tests.formats.small_tables import ISOTROPIC, SMOOTH, SPECULAR, small_table
 HEADER = 12  # byte
 PLANE = 90 * 90 * 180
 SCALES = (1.0 / 1500.0, 1.15 / 1500.0, 1.66 / 1500.0)
-NAN = np.array([np.nan]).tobytes()
+INFINITE = np.array([np.inf]).tobytes()
 FLOAT32_RTOL = 1e-7  # values are 32 bit numbers here: worst measured 3.9e-8
 
 
@@ -102,6 +102,6 @@ def test_the_record_is_beside_the_file_and_says_what_is_left_out(exported: tuple
 def test_damaged_files(tmp_path: Path) -> None:
     path = tmp_path / "a.binary"
     head, rest = np.array([90, 90, 180], "<i4").tobytes(), bytes(3 * 8 * PLANE)
-    for data in (head + rest[:-1], head + rest + b"0", b"\x5b" + head[1:] + rest, head + NAN + rest[8:]):
+    for data in (head + rest[:-1], head + rest + b"0", b"\x5b" + head[1:] + rest, head + INFINITE + rest[8:]):
         path.write_bytes(data)
         check_refused(path, "", "merl")

@@ -10,11 +10,11 @@ import pytest
 from brdfdb.errors import FileFormatError
 from tests.formats.a_file import check_texts_refused, samples_of
 
-DEGREES = {"angles": "deg"}
+DEGREES = {"angles": "deg", "file_format": "text"}
 ROLES = {"theta_i": "sun", "theta_r": "view", "delta_phi": "turn", "values": "number"}
 PLANE = "theta_i,theta_r,delta_phi,brdf"
 ROWS = "10,20,180,0.5\n40,20,180,0.25\n"
-# Texts, keywords and sentences; with keywords a file is read as text by any name
+# Texts, keywords and sentences
 REFUSED: list[tuple[str, dict[str, str], str]] = [
     ("theta_i,theta_r,raa,brdf\n1,2,3,4\n1,2,3\n", DEGREES, "line 3 has 3 fields, but the first row has 4"),
     ("theta_i,theta_r,raa,brdf\n1,2,3,4\n1,2,x,4\n", DEGREES, "line 3, field raa: 'x' is not a number"),
@@ -22,7 +22,6 @@ REFUSED: list[tuple[str, dict[str, str], str]] = [
     ("theta_i,theta_r,raa,brdf\n1,2,3,4\n1,,3,4\n", DEGREES, "line 3, field theta_r: an angle is missing"),
     ("theta_i,theta_r,raa,brdf\n1,200,3,4\n", DEGREES, "line 2: theta_r of 200 degrees is not a polar angle"),
     ("theta_i,theta_r,raa,brdf\n1,100,3,4\n", DEGREES, "none of its 1 values is above the horizon"),
-    ("theta_i,theta_r,raa,550nm,550nm\n1,2,3,4,5\n", DEGREES, "line 1: a wavelength is listed twice"),
     ("theta_i,sza,theta_r,raa,brdf\n1,2,3,4,5\n", DEGREES, "line 1: theta_i and sza are both theta_i; name the column"),
     ("a,b,c,d\n1,2,3,4\n", DEGREES, "no column is theta_i, theta_r, values, among a, b, c, d"),
     ("no numbers at all\n", DEGREES, "line 1: none of the first 1000 lines is a row of numbers"),
@@ -45,8 +44,11 @@ REFUSED: list[tuple[str, dict[str, str], str]] = [
     ),
     (f"{PLANE}\ngon,gon,gon,1/sr\n{ROWS}", {}, "the unit 'gon' is not a unit of angles"),
     ("theta_i,theta_r,phi_i,Phi,brdf\n10,20,0,150,0.5\n", {}, "no column is the azimuth of the viewer"),
-    ("theta_i,theta_r,brdf\n30,0,0.2\n30,40,0.3\n", {}, "no column is the azimuth .* --column delta_phi=NAME"),
-    ("theta_i,theta_r,brdf\n30,0,0.2\n30,40,0.3\n", DEGREES, "no column is the azimuth .* --column delta_phi=NAME"),
+    (
+        "theta_i,theta_r,rel_azimuth_2,brdf\n30,0,0,0.2\n30,40,0,0.3\n",
+        {},
+        "unless rel_azimuth_2 is; .* --column delta_phi=NAME",
+    ),
     ("sza,vza,raa,brf,brdf\n1,2,3,4,5\n", {}, "line 1: brdf and brf are different quantities; name the columns"),
     ("sza,vza,raa,brdf,brf\n1,2,3,4,5\n", {}, "line 1: brdf and brf are different quantities; name the columns"),
     ("sza,vza,raa,lambda,brdf\n1,2,3,0.45,4\n1,2,3,550,4\n", {}, "field lambda: 0.45 and 550 have no unit in common"),
@@ -67,8 +69,8 @@ REFUSED: list[tuple[str, dict[str, str], str]] = [
     ("theta_h,theta_d,brdf\n1,2\n", {}, "line 2 has 2 fields, but there are 3 names"),
     ("theta_h,theta_d,brdf\n", {}, "line 1 has the names of columns, but no row follows"),
     ("theta_h,theta_d,550nm,550nm\n1,2,3,4\n", {}, "line 1: a wavelength is listed twice"),
-    (f"{PLANE[:-4]}550nm,550nm\n1,2,3,4,5\n", {}, "line 1: a wavelength is listed twice"),
     (f"{PLANE}\n1,2,3,4\n1,2,3,abc\n", {}, "line 3, field brdf: 'abc' is not a number"),
+    (f"{PLANE}\n# 10,20,180,0.5\n", {}, "line 2: all rows begin with the sign of a comment; remove it"),
     (f"{PLANE}\n", {}, "line 1 has the names of columns, but no row of numbers follows"),
     (f"{PLANE[:-4]}nannm\n10,10,0,1\n10,20,0,1\n", {}, "no column is values, among"),
     (f"{PLANE[:-4]}-5nm\n10,10,0,1\n10,20,0,1\n", {}, "-5nm: a wavelength is less than 10 nm"),
@@ -88,8 +90,7 @@ def test_a_text_is_refused_with_line_and_field(text: str, keywords: Any, sentenc
 @pytest.mark.parametrize(
     ("title", "comment", "sentence"),
     [
-        ("wavelength 450 nm", "wavelength 650 nm", "gives a wavelength of 650 nm, but rows above it have 450 nm"),
-        ("of paint", "wavelength 650 nm", "gives a wavelength of 650 nm, but rows above it have none"),
+        ("of paint", "wavelength 650 nm", "gives a wavelength to rows below it, but no line gives one to line 3"),
         ("of paint", "theta_r,theta_i,delta_phi,brdf", "names other columns than line 2: theta_r, theta_i, delta_phi"),
         ("of paint", "theta_i,theta_r,delta_phi,BRF", "names other columns than line 2: theta_i, theta_r, delta_phi"),
         ("of paint", "theta in radians", "gives angles another unit: 'theta in radians'"),
@@ -122,9 +123,14 @@ def test_the_cosine_of_another_angle_is_asked_for(tmp_path: Path) -> None:
     assert samples_of(tmp_path, text, quantity="f_r").values == pytest.approx(0.1)
 
 
-@pytest.mark.parametrize("name", ["BRDF [dB]", "log10(BRDF)", "ln BRDF"])
-def test_logarithms_are_refused(name: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("name", "quantity"),
+    [("BRDF [dB]", "f_r"), ("log2(BRDF)", ""), ("ln BRDF", "percent"), ("log_BRDF", ""), ("log BRDF", "")],
+)
+def test_logarithms_that_are_not_known_are_refused(name: str, quantity: str, tmp_path: Path) -> None:
     text = f"theta_i,theta_r,delta_phi,{name}\n60,20,180,-3\n"
-    columns = {role: role for role in ("theta_i", "theta_r", "delta_phi")}
-    sentence = "values are logarithms; write f_r itself"
-    check_texts_refused(tmp_path / "sheet.csv", {text: sentence}, quantity="f_r", values=name, **columns)
+    sentence = "values are logarithms; --quantity log10, ln, decibel says which, or write f_r itself"
+    if not quantity:
+        sentence = "the base of the logarithms of '.*' is not known; state --quantity log10 or --quantity ln"
+        assert samples_of(tmp_path, text, quantity="log10").values == pytest.approx(1e-3)
+    check_texts_refused(tmp_path / "sheet.csv", {text: sentence}, **({"quantity": quantity} if quantity else {}))

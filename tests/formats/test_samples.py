@@ -185,7 +185,8 @@ def test_the_cosine_of_a_pab_opto_file_is_divided_out_and_its_back_turned(tmp_pa
     damages = {
         PABOPTO + "120 30\n": "line 4 has 2 fields; expected are 3: theta, phi and values",
         PABOPTO + "120 30 much\n": "line 4: 'much' is not a finite number",
-        PABOPTO.replace("DSF", "radiance") + "1 2 3\n": "field #format: 'radiance' is not one of dsf",
+        PABOPTO.replace("DSF", "radiance")
+        + "1 2 3\n": "field #format: 'theta phi radiance' is not theta phi and one of dsf",
         PABOPTO.replace("150 20", "150") + "1 2 3\n": "field #incident_angle",
     }
     check_texts_refused(tmp_path / "shade.dat", damages)

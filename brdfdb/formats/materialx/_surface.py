@@ -42,34 +42,22 @@ _ALBEDO = np.array(
 
 @dataclass(frozen=True)
 class MaterialXSurface:
-    """A surface without coat, fuzz, transmission and subsurface. Names are those of OpenPBR, all numbers are [1].
+    """A surface without coat, fuzz, transmission and subsurface. Names are those of OpenPBR, all numbers are [1]."""
 
-    Attributes
-    ----------
-    kind : str
-        "open_pbr_surface" or "standard_surface".
-    base_color, specular_color : tuple of float
-        Linear sRGB, or one number of a grey surface.
-    base_weight, base_diffuse_roughness, base_metalness, specular_weight, specular_roughness, specular_ior : float
-        As in the specifications. A standard surface calls them base, diffuse_roughness, metalness, specular,
-        specular_roughness and specular_IOR.
-    specular_anisotropy : float
-        The slopes are wider, and the highlight longer, along the tangent.
-    quarter_turn : bool
-        True if the tangent is y instead of x.
-    """
-
-    kind: str
+    kind: str  #: "open_pbr_surface" or "standard_surface"
+    #: linear sRGB, or one number of a grey surface
     base_color: tuple[float, ...]
     specular_color: tuple[float, ...] = (1.0,)
+    #: As in the specifications. A standard surface calls them base, diffuse_roughness, metalness, specular,
+    #: specular_roughness and specular_IOR.
     base_weight: float = 1.0
     base_diffuse_roughness: float = 0.0
     base_metalness: float = 0.0
     specular_weight: float = 1.0
     specular_roughness: float = 0.3
     specular_ior: float = 1.5
-    specular_anisotropy: float = 0.0
-    quarter_turn: bool = False
+    specular_anisotropy: float = 0.0  #: the slopes are wider, and the highlight longer, along the tangent
+    quarter_turn: bool = False  #: true if the tangent is y instead of x
 
     @property
     def alphas(self) -> tuple[float, float]:

@@ -22,7 +22,7 @@ from brdfdb.formats import _bsdf_xml
 from brdfdb.formats._bsdf_xml import FRONT_OF_RADIANCE, VISIBLE, BsdfBlock
 from brdfdb.formats._channels import LUMINOUS, XYZ, channels_of
 from brdfdb.formats._interface import TOLERANCE, FormatOption
-from brdfdb.formats._nodes import samples_at_vectors
+from brdfdb.formats._nodes import rows_at_vectors
 from brdfdb.formats._record import lines
 from brdfdb.formats._written import Written, whole
 from brdfdb.formats.radiance._growth import Growth
@@ -44,7 +44,7 @@ if TYPE_CHECKING:
     from brdfdb.formats._channels import Channels
     from brdfdb.formats._readings import FileTable
     from brdfdb.formats._stated_error import Comparison, FileError
-    from brdfdb.measurements.samples import Samples
+    from brdfdb.measurements.conventions import ListedRows
     from brdfdb.tables.table import Table
 
 suffix = ".xml"
@@ -214,15 +214,15 @@ def read(path: str | os.PathLike[str]) -> FileTable:
             raise FileFormatError(f"{path}: block {name} is not a tensor tree: {error}") from None
     of_colour = XYZ if len(trees) > 1 else LUMINOUS
 
-    def nodes() -> Samples:
+    def rows() -> ListedRows:
         """Return the values at the middles of the cells of the first tree."""
         place = trees[0].middles()
         used = slice(None) if rank == ANISOTROPIC else place[:, 0] < 0.5
         wi, wr = lights(place[used, : rank - 2]), viewers(place[used, -2:])
         values = trees[0].values[used, np.newaxis] if len(trees) == 1 else evaluated(tuple(trees), wi, wr)
-        return samples_at_vectors(wi, wr, values, file.name, of_colour, None, file.record)
+        return rows_at_vectors(wi, wr, values, file.name, of_colour, None, file.record)
 
-    return FileTable(file.name, of_colour, None, functools.partial(evaluated, tuple(trees)), file.record, nodes)
+    return FileTable(file.name, of_colour, None, functools.partial(evaluated, tuple(trees)), file.record, rows)
 
 
 def material_text(table: Table, xml: str, record: dict[str, Any]) -> str:

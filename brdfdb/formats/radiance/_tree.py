@@ -28,26 +28,15 @@ class Tree:
     """A tree of cells: each divides into 2^rank children, or is a leaf with a grid of values.
 
     Bit j of the number of a child is the half of dimension j. In a grid dimension 0 varies slowest.
-
-    Attributes
-    ----------
-    rank : int
-        Dimensions of the cube.
-    children : int array (inner, 2^rank)
-        Inner nodes: the number of an inner node, or ``-1 - leaf``. The root is node 0, or leaf 0 if there is no node.
-    start : int array (leaves,)
-        Place of the first value of each leaf.
-    halvings : int array (leaves,)
-        Each axis of the grid of a leaf has 2^halvings cells.
-    values : array (N,)
-        Values of all leaves; negative ones stand for 0.
     """
 
-    rank: int
+    rank: int  #: dimensions of the cube
+    #: Inner nodes: the number of an inner node, or ``-1 - leaf``, (inner, 2^rank). The root is node 0, or leaf 0 if
+    #: there is no node.
     children: Index
-    start: Index
-    halvings: Index
-    values: Floats
+    start: Index  #: place of the first value of each leaf, (leaves,)
+    halvings: Index  #: each axis of the grid of a leaf has 2^halvings cells, (leaves,)
+    values: Floats  #: values of all leaves; negative ones stand for 0, (N,)
 
     def at(self, place: Floats) -> Floats:
         """Return the values (N,) at positions (N, rank) in the unit cube; negative ones are 0, as for Radiance."""
@@ -175,6 +164,8 @@ def parsed(text: str, rank: int) -> Tree:
     values: list[float] = []
     nodes: list[list[int]] = []  # children before their parents
     path: list[list[int]] = [[]]  # the children, so far, of all open nodes; the first list is that of the root
+    if "_" in text:
+        raise ValueError("a number has the sign _")
     for match in _TOKEN.finditer(text):
         grid, brace = match.groups()
         if grid is not None:

@@ -23,7 +23,7 @@ from brdfdb.place import path_of
 if TYPE_CHECKING:
     from brdfdb.formats._readings import FileTable
     from brdfdb.formats._written import Written
-    from brdfdb.measurements.samples import Samples
+    from brdfdb.measurements.conventions import ListedRows
     from brdfdb.tables.table import Table
 
 suffix = ".bsdf"
@@ -98,7 +98,7 @@ def recognises(head: bytes) -> bool:
 def read(path: str | os.PathLike[str]) -> FileTable:
     """Return f_r of a tensor file as Mitsuba's `measured` evaluates it."""
     from brdfdb.formats._channels import GREY, RGB, names_of
-    from brdfdb.formats._nodes import samples_at_vectors
+    from brdfdb.formats._nodes import rows_at_vectors
     from brdfdb.formats._readings import FileTable
     from brdfdb.formats._record import document_of
     from brdfdb.formats.rgl._fields import fields_of
@@ -114,7 +114,7 @@ def read(path: str | os.PathLike[str]) -> FileTable:
         channels = GREY
         at = None
 
-    def nodes() -> Samples:
-        return samples_at_vectors(*fields.at_nodes(), name, channels, at, document)
+    def rows() -> ListedRows:
+        return rows_at_vectors(*fields.at_nodes(), name, channels, at, document)
 
-    return FileTable(name, channels, at, fields.evaluate, document, nodes)
+    return FileTable(name, channels, at, fields.evaluate, document, rows)

@@ -24,42 +24,19 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Fields:
-    """The fields of a file.
+    """The fields of a file."""
 
-    Attributes
-    ----------
-    theta_i : array (N,) [rad]
-        Polar angles of the light.
-    phi_i : array (P,) [rad]
-        Azimuths of the light: one of isotropic materials.
-    ndf : array (h, w)
-        A factor over the half vector.
-    sigma : array (h, w)
-        A divisor, four times, over the light.
-    vndf : array (P, N, h, w)
-        The density over the half vector whose warp the next two are stored by.
-    luminance : array (P, N, S, S)
-        The density over the uniform numbers of that warp that samples are drawn from.
-    spectra : array (P, N, W, S, S)
-        Values: with the factors above f_r cos(theta_r) [1/sr]. Channels are wavelengths, or R, G, B.
-    wavelength_nm : array (W,) [nm] or None
-        Wavelengths; None where the channels are R, G, B.
-    jacobian : bool
-        True if the factors count.
-    description : str
-        Text of the file.
-    """
-
-    theta_i: Floats32
-    phi_i: Floats32
-    ndf: Floats32
-    sigma: Floats32
-    vndf: Floats32
-    luminance: Floats32
+    theta_i: Floats32  #: polar angles of the light, (N,) [rad]
+    phi_i: Floats32  #: azimuths of the light: one of isotropic materials, (P,) [rad]
+    ndf: Floats32  #: a factor over the half vector, (h, w)
+    sigma: Floats32  #: a divisor, four times, over the light, (h, w)
+    vndf: Floats32  #: the density over the half vector whose warp the next two are stored by, (P, N, h, w)
+    luminance: Floats32  #: the density over the uniform numbers of that warp that samples are drawn from, (P, N, S, S)
+    #: Values: with the factors above f_r cos(theta_r) [1/sr], (P, N, W, S, S). Channels are wavelengths, or R, G, B.
     spectra: Floats32
-    wavelength_nm: Floats32 | None
-    jacobian: bool = True
-    description: str = ""
+    wavelength_nm: Floats32 | None  #: wavelengths; None where the channels are R, G, B, (W,) [nm]
+    jacobian: bool = True  #: true if the factors count
+    description: str = ""  #: text of the file
 
     @property
     def isotropic(self) -> bool:
@@ -124,11 +101,14 @@ class Fields:
         wi = np.stack([np.sin(theta_i) * np.cos(phi_i), np.sin(theta_i) * np.sin(phi_i), np.cos(theta_i)], axis=-1)
         size = self.spectra.shape[-1]
         u_x, u_y = self.warp.forward(size)
+        undefined = np.isnan(u_x) | np.isnan(u_y)  # where the density is 0
+        u_x, u_y = np.where(undefined, 0.0, u_x), np.where(undefined, 0.0, u_y)
         turn = of_azimuth(phi_i.reshape(-1, 1, 1)) - 0.5 if self.isotropic else 0.0
         m = directions(u_x, u_y + turn)
         wi = np.broadcast_to(wi.reshape(-1, 1, 1, 3), m.shape).reshape(-1, 3)
         m = m.reshape(-1, 3)
         wr = 2.0 * np.sum(wi * m, axis=-1, keepdims=True) * m - wi
+        wr = np.where(undefined.reshape(-1, 1), [0.0, 0.0, -1.0], wr)
         values = self._last_channels.reshape(len(m), -1)
         if self.jacobian:
             u_i = of_polar_angle(theta_i), of_azimuth(phi_i)
@@ -153,23 +133,15 @@ class Fields:
 
 @dataclass(frozen=True, eq=False)
 class SquarePlaces:
-    """Pairs of directions in the coordinates of a file.
+    """Pairs of directions in the coordinates of a file."""
 
-    Attributes
-    ----------
-    theta_i, phi_i : array (M,) [rad]
-        Light, its azimuth in the part of the circle that the file holds.
-    u_i, u_m : array (2, M)
-        Light and half vector in the unit square: first of the polar angle, then of the azimuth.
-    cosine : array (M,) [1]
-        Cosine of theta_r.
-    """
-
+    #: light, its azimuth in the part of the circle that the file holds, (M,) [rad]
     theta_i: Array
     phi_i: Array
+    #: light and half vector in the unit square: first of the polar angle, then of the azimuth, (2, M)
     u_i: Array
     u_m: Array
-    cosine: Array
+    cosine: Array  #: cosine of theta_r, (M,) [1]
 
     @classmethod
     def of(cls, wi: Floats, wr: Floats, isotropic: bool, reduction: int = 1) -> SquarePlaces:

@@ -241,28 +241,15 @@ def _lines(at: Floats, nodes: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class RglPlan:
-    """Numbers of nodes of a file.
+    """Numbers of nodes of a file."""
 
-    Attributes
-    ----------
-    size : int
-        Rows and columns of `spectra` and `luminance`.
-    lights : int
-        Nodes of theta_i.
-    azimuths : int
-        Nodes of phi_i over the part of the circle that the file holds; isotropic tables have one.
-    rows, columns : int
-        Those of `vndf`.
-    horizon : float
-        Share of each row above the horizon, as in `densities`.
-    """
-
-    size: int
-    lights: int
-    azimuths: int = 1
+    size: int  #: rows and columns of `spectra` and `luminance`
+    lights: int  #: nodes of theta_i
+    azimuths: int = 1  #: nodes of phi_i over the part of the circle that the file holds; isotropic tables have one
+    #: those of `vndf`
     rows: int = 2
     columns: int = 2
-    horizon: float = 0.0
+    horizon: float = 0.0  #: share of each row above the horizon, as in `densities`
 
 
 def build(surface: HalfVectorSurface, plan: RglPlan, wavelength_nm: Floats32 | None) -> Fields:

@@ -39,21 +39,11 @@ _CENTRE = 0.15  # place up to which densities grow from 0 along rows: theta_m th
 
 @dataclass(frozen=True, eq=False)
 class HalfVectorValues:
-    """Values at half vectors: f_r cos(theta_r), and what belongs to it.
+    """Values at half vectors: f_r cos(theta_r), and what belongs to it."""
 
-    Attributes
-    ----------
-    brdf : array (..., C) [1/sr]
-        f_r cos(theta_r), continued below the horizon, where it is negative.
-    cosine : array (...) [1]
-        Cosine of theta_r.
-    solid_angle : array (...) [sr]
-        Solid angle of the viewer for each area of the unit square of half vectors.
-    """
-
-    brdf: Array
-    cosine: Array
-    solid_angle: Array
+    brdf: Array  #: f_r cos(theta_r), continued below the horizon, where it is negative, (..., C) [1/sr]
+    cosine: Array  #: cosine of theta_r, (...) [1]
+    solid_angle: Array  #: solid angle of the viewer for each area of the unit square of half vectors, (...) [sr]
 
 
 class Factors(NamedTuple):

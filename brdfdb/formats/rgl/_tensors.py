@@ -60,7 +60,13 @@ def read_tensors(path: str | os.PathLike[str]) -> dict[str, NDArray[Any]]:
     (count,) = header.unpack("<I")
     if count > _MOST_FIELDS:
         raise FileFormatError(f"{path}: damaged: {count} fields")
-    return dict(header.field() for _ in range(count))
+    fields = [header.field() for _ in range(count)]
+    arrays = dict(fields)
+    if len(arrays) < len(fields):
+        raise FileFormatError(
+            f"{path}: damaged: of its fields {', '.join(name for name, _ in fields)} one stands twice"
+        )
+    return arrays
 
 
 class _Header:
