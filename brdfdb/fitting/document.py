@@ -9,10 +9,14 @@ from numpy.typing import ArrayLike
 from pydantic import Field
 
 from brdfdb.figure import DocumentPart
+from brdfdb.fitting.nuisance import NuisanceKind
+from brdfdb.fitting.residuals import Kind
 from brdfdb.materials import Material
 
 ALBEDO_ANGLES_DEG = (0.0, 30.0, 60.0, 75.0, 85.0)  # theta_i at which the albedo of every fit is computed
 ALBEDO_TOLERANCE = 1e-3  # absolute tolerance of these albedos
+
+Method = Literal["covariance", "profile", "end of range", "incidences", "several fits"]
 
 
 class Estimate(DocumentPart):
@@ -25,10 +29,13 @@ class Estimate(DocumentPart):
     standard_error: float | None = Field(description="null: at an end of its range, or not determined by the samples")
     low: float = Field(description="lower end of the 95 % interval, within the range of the model")
     high: float
-    method: Literal["covariance", "profile", "end of range"] = Field(
+    method: Method = Field(
         description="covariance: from the derivatives at the best point. profile: where the cost of the best fit with "
         "this number fixed rises by 3.84 times its noise. end of range: the best value is an end of the range of the "
-        "model, and no profile was computed"
+        "model, and no profile was computed. incidences: from fits with incidences left out in turn, as residuals are "
+        "correlated. several fits: over fits with proposed nuisance numbers, or with other residuals. Fits "
+        "other than the best have the first and the third method only: intervals are too narrow where residuals form a "
+        "pattern"
     )
 
 
@@ -63,15 +70,10 @@ class FitAlbedo(DocumentPart):
     @classmethod
     def largest(cls, theta_i_deg: ArrayLike, albedo: ArrayLike, error: ArrayLike) -> FitAlbedo:
         """Return the largest of some albedos [1], with its angle and the error of its quadrature."""
-        index = int(np.argmax(albedo))
-        value = float(np.asarray(albedo)[index])
-        uncertainty = float(np.asarray(error)[index])
-        return cls(
-            theta_i_deg=float(np.asarray(theta_i_deg)[index]),
-            value=value,
-            error=uncertainty,
-            conserves=value <= 1.0 + uncertainty + ALBEDO_TOLERANCE,
-        )
+        largest = np.argmax(albedo)
+        angle, value, wrong = (float(np.asarray(array)[largest]) for array in (theta_i_deg, albedo, error))
+        conserves = value <= 1.0 + wrong + ALBEDO_TOLERANCE
+        return cls(theta_i_deg=angle, value=value, error=wrong, conserves=conserves)
 
 
 class Outlier(DocumentPart):
@@ -96,6 +98,15 @@ class Fit(DocumentPart):
         description="root mean square of ln(model / sample) over positive samples, less the outliers of every fit"
     )
     median_ln: float | None = Field(description="median of its absolute value")
+    nuisance: list[Estimate] = Field(default=[], description="nuisance numbers of the measurement that were fitted")
+    proposed: list[NuisanceKind] = Field(
+        default=[], description="nuisance numbers whose pattern the residuals show; of the best fit only"
+    )
+    noise_floor: float | None = Field(
+        default=None,
+        description="f_r, in 1/sr, at which the floor of the noise is as large as its part in proportion; null: the "
+        "samples show none, or the residual has none",
+    )
     sigma: float = Field(description="robust standard deviation of the residuals: 1.4826 times their median size")
     held_out: HeldOutIncidences | None = Field(description="null: the light has one direction only")
     numbers: int = Field(description="numbers that were searched")
@@ -138,8 +149,9 @@ class Fits(DocumentPart):
     channels: list[str]
     wavelengths_nm: list[float] | None
     assumed_wavelength_nm: float | None = Field(description="for models with n and k, where the samples state none")
-    residual: Literal["log", "relative", "cosine", "uncertainty"]
+    residual: Kind
     refractive_index: str | None
+    nuisance: list[NuisanceKind] = Field(default=[], description="kinds of fitted nuisance numbers")
     source_solid_angle_sr: float | None = Field(description="solid angle of the light; null: not known")
     receiver_solid_angle_sr: float | None = Field(description="solid angle of the receiver; null: not known")
     left_out: UnusedSamples

@@ -7,11 +7,10 @@ from numpy.typing import NDArray
 
 from brdfdb.figure import Figure, Map, Panel, curve_of, rows
 from brdfdb.fitting.document import Fits
-from brdfdb.fitting.fitted import FittedSurface
+from brdfdb.fitting.search import FittedSurface
 from brdfdb.geometry import degrees, radians, unit_vector
 from brdfdb.measurements.aperture import InstrumentView
-
-Array = NDArray[np.float64]
+from brdfdb.parameters import Floats
 
 _MOST = 6  # incidences that are shown
 _PLANE_DEG = 2.5  # distance from the plane of incidence of samples that a cut shows
@@ -50,7 +49,7 @@ def figure_of(document: Fits, fitted: FittedSurface) -> Figure:
     )
 
 
-def _turned(fitted: FittedSurface, chosen: NDArray[np.int64]) -> Array:
+def _turned(fitted: FittedSurface, chosen: NDArray[np.int64]) -> Floats:
     """Return the azimuths [degree] of viewers from that of the light, in [0, 360)."""
     return np.asarray(degrees(fitted.samples.phi_r[chosen] - fitted.samples.phi_i[chosen]) % 360.0)
 

@@ -90,19 +90,13 @@ def read_published(path: str | os.PathLike[str]) -> PublishedFits:
     except UnicodeDecodeError:
         raise FileFormatError(f"{path}: it is not UTF-8 text") from None
     comments = [line.lstrip("# ") for line in lines if line.startswith("#")]
-    fits = [
-        _fit(path, number, line)
-        for number, line in enumerate(lines, 1)
-        if line.strip() and not line.lstrip().startswith("#")
-    ]
+    numbered = [(number, line) for number, line in enumerate(lines, 1) if line.strip()]
+    fits = [_fit(path, number, line) for number, line in numbered if not line.lstrip().startswith("#")]
     if not fits:
         raise FileFormatError(f"{path}: it has no line of the form NAME = LOBE(NUMBER = ...)")
-    names = {term.name for one in fits for term in one.terms} - {_FLAT}
-    sentences = [
-        f"{name}: no model of the registry is used for it, because {_named()[name]['unsure']}."
-        for name in sorted(names)
-        if "unsure" in _named().get(name, {})
-    ]
+    names = {term.name for fit in fits for term in fit.terms} - {_FLAT}
+    unsure = {name: _named()[name]["unsure"] for name in sorted(names) if "unsure" in _named().get(name, {})}
+    sentences = [f"{name}: no model of the registry is used for it, because {why}." for name, why in unsure.items()]
     sentences += [f"{name}: its formula is not known." for name in sorted(names - set(_named()))]
     return PublishedFits(name=path.stem, comment=" ".join(comments)[:_MOST_LINE], fits=fits, sentences=sentences)
 
@@ -153,15 +147,12 @@ def _fit(path: Path, number: int, line: str) -> PublishedFit:
         raise FileFormatError(f"{path}: line {number} is not NAME = LOBE(NUMBER = ...): {line[:60]!r}")
     try:
         terms = _terms(ast.parse(text.strip(), mode="eval").body)
-    except FileFormatError as error:
-        raise FileFormatError(f"{path}: line {number} ({name.strip()[:60]}): {error}") from None
-    except (SyntaxError, ValueError, RecursionError, MemoryError):
-        reason = "it is not LOBE(NUMBER = ...)"
+    except (FileFormatError, SyntaxError, ValueError, RecursionError, MemoryError) as error:
+        reason = error if isinstance(error, FileFormatError) else "it is not LOBE(NUMBER = ...)"
         raise FileFormatError(f"{path}: line {number} ({name.strip()[:60]}): {reason}") from None
-    model = _model(terms)
-    flags = _flags(terms)
-    albedo = None
-    if model is not None and not _out_of_range(model, terms):
+    model, flags, albedo = _model(terms), _flags(terms), None
+    outside = [] if model is None else _out_of_range(model, terms)
+    if model is not None and not outside:
         # in the channel whose reflectances add up to most
         given = [_parameters(terms, channel) for channel in range(len(CHANNELS))]
         sums = [sum(v for name, v in one.items() if MODELS[model].parameter(name).reflectance) for one in given]
@@ -171,9 +162,9 @@ def _fit(path: Path, number: int, line: str) -> PublishedFit:
         albedo = FitAlbedo.largest(ALBEDO_ANGLES_DEG, computed.albedo, computed.error)
         if not albedo.conserves:
             flags.append(f"it reflects {albedo.value:.3g} of the light from {albedo.theta_i_deg:g} degrees")
-    elif model is not None:
-        flags += _out_of_range(model, terms)
-    return PublishedFit(name=name.strip(), line=number, terms=terms, model=model, albedo=albedo, flags=flags)
+    return PublishedFit(
+        name=name.strip(), line=number, terms=terms, model=model, albedo=albedo, flags=[*flags, *outside]
+    )
 
 
 def _terms(node: ast.expr) -> list[PublishedLobe]:
@@ -215,20 +206,14 @@ def _parameters(terms: list[PublishedLobe], channel: int) -> dict[str, float]:
     """Return the parameters of the model of the terms in a channel, as recipes write them."""
     model = _model(terms)
     assert model is not None
-
-    def in_channel(numbers: list[float]) -> float:
-        return numbers[min(channel, len(numbers) - 1)]
-
-    values: dict[str, float] = {}
-    spec = MODELS[model]
-    uniform = spec.uniform or spec.parameters[0].name
+    uniform = MODELS[model].uniform or MODELS[model].parameters[0].name
+    values = {uniform: 0.0}
     for term in terms:
-        if term.name == _FLAT:
-            values[uniform] = in_channel(term.numbers["albedo"])
-            continue
-        for name, theirs in _named()[term.name]["parameters"].items():
-            values[name] = in_channel(term.numbers[theirs])
-    return {uniform: 0.0} | values
+        names = {uniform: "albedo"} if term.name == _FLAT else _named()[term.name]["parameters"]
+        for name, theirs in names.items():
+            numbers = term.numbers[theirs]
+            values[name] = numbers[min(channel, len(numbers) - 1)]
+    return values
 
 
 def _flags(terms: list[PublishedLobe]) -> list[str]:
@@ -246,11 +231,11 @@ def _flags(terms: list[PublishedLobe]) -> list[str]:
 
 def _out_of_range(model: str, terms: list[PublishedLobe]) -> list[str]:
     """Return sentences on numbers outside the ranges of a model."""
-    flags: list[str] = []
+    flags: dict[str, None] = {}
     for channel in range(len(CHANNELS)):
         for name, value in _parameters(terms, channel).items():
             try:
                 MODELS[model].parameter(name).check(value)
             except ParameterError as error:
-                flags.append(f"{name}: {error.sentence}")
-    return list(dict.fromkeys(flags))
+                flags[f"{name}: {error.sentence}"] = None
+    return list(flags)

@@ -4,23 +4,20 @@ from __future__ import annotations
 
 import itertools
 import re
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from functools import cache, cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from brdfdb.errors import ParameterError
-from brdfdb.fitting.variables import EDGE, NORMAL, index_of, index_variables, spread, switches, variable
+from brdfdb.fitting.variables import EDGE, NORMAL, index_of, index_slopes, index_variables, spread, switches, variable
 from brdfdb.geometry import unit_vector
 from brdfdb.measurements.aperture import InstrumentView
 from brdfdb.models import MODELS
 from brdfdb.parameters import Floats, ModelSpec, Parameter, closest
 from brdfdb.refractive_indices import refractive_index
 
-Array = NDArray[np.float64]
 Numbers = Mapping[str, Any]
 
 ASSUMED_NM = 550.0  # wavelength of samples that state none, for models with n and k
@@ -41,16 +38,9 @@ def unit_of(parameter: Parameter) -> float:
     return min(parameter.high, 1.0)
 
 
-class LinearParameters(NamedTuple):
-    """The parameters in which f_r is a polynomial, and its degree."""
-
-    names: tuple[str, ...]
-    degree: int
-
-
 @cache
-def coefficients(spec: ModelSpec) -> LinearParameters:
-    """Return the parameters in which f_r is a polynomial, and its degree.
+def linear_parameters(spec: ModelSpec) -> tuple[str, ...]:
+    """Return the parameters in which f_r is a polynomial, of degree 1 if the model states none.
 
     Notes
     -----
@@ -59,12 +49,11 @@ def coefficients(spec: ModelSpec) -> LinearParameters:
     """
     names = [p.name for p in spec.parameters if _is_amplitude(p)]
     if spec.degree is not None:
-        return LinearParameters(tuple(name for name in names if spec.parameter(name).reflectance), spec.degree)
+        return tuple(name for name in names if spec.parameter(name).reflectance)
     linear: list[str] = []
     for name in names:
-        if _is_linear(spec, [*linear, name]):
-            linear.append(name)
-    return LinearParameters(tuple(linear), 1)
+        linear += [name] if _is_linear(spec, [*linear, name]) else []
+    return tuple(linear)
 
 
 def _is_amplitude(parameter: Parameter) -> bool:
@@ -95,7 +84,8 @@ class Polynomial:
     """The M monomials of K coefficients up to a degree.
 
     `exponents` (M, K) are the powers of the coefficients, `nodes` (M, K) the coefficients, in their units, at which the
-    model is evaluated. Without `constant`, the polynomial is 0 where its coefficients are.
+    model is evaluated. `inverse` (M, M) turns its values there (..., M, N) into the factors of the monomials. Without
+    `constant`, the polynomial is 0 where its coefficients are.
     """
 
     def __init__(self, count: int, degree: int, *, constant: bool) -> None:
@@ -117,10 +107,6 @@ class Polynomial:
         factors = self.exponents.T.reshape(*self.exponents.T.shape, *further)
         powers = self.lowered.reshape(*self.lowered.shape, *further)
         return np.asarray(factors * np.prod(values[np.newaxis, np.newaxis] ** powers, axis=2))
-
-    def parts(self, values: Floats) -> Floats:
-        """Return the factors (..., M, N) of the monomials from the values (..., M, N) of a model at the nodes."""
-        return np.asarray(self.inverse @ values)
 
 
 class NotDescribedError(ParameterError):
@@ -152,16 +138,17 @@ class Term:
     def __init__(self, spec: ModelSpec, label: str, *, alone: bool, beside_flat: bool, turned: bool) -> None:
         self.spec, self.label = spec, label
         self.fixed: dict[str, float] = switches(spec)
-        names, degree = coefficients(spec)
+        names = linear_parameters(spec)
         if beside_flat and spec.uniform is not None and spec.lobe is not None:
             self.fixed[spec.uniform] = 0.0
             names = tuple(name for name in names if name != spec.uniform)
         bright = not names or self._is_bright(names)
         self.scaled = bright and not alone
         self.linear = () if self.scaled else names
-        self.polynomial = (
-            Polynomial(1, 1, constant=False) if self.scaled else Polynomial(len(names), degree, constant=bright)
-        )
+        degree = 1 if self.scaled or spec.degree is None else spec.degree
+        count, constant = (1, False) if self.scaled else (len(names), bright)
+        self.polynomial = Polynomial(count, degree, constant=constant)
+        self.own = self.monomials = slice(0)  # its coefficients and monomials among those of all terms
         self.memory: tuple[InstrumentView, dict[Any, Floats]] | None = None
         self.tied = None if turned else spec.lobe_axes
         out = {*self.fixed, *self.linear, *(self.tied or ())[1:]}
@@ -229,8 +216,7 @@ class Term:
             same = np.flatnonzero(spread == count)
             for some in np.array_split(same, -(-same.size * count * len(view) // _VALUES)):
                 seen[some] = self._seen(view, float(of_rows[some[0]]), [rows[row] for row in some.tolist()])
-        values = seen.reshape(len(points), len(nodes), -1)
-        return values if self.scaled else self.polynomial.parts(values)
+        return np.asarray(self.polynomial.inverse @ seen.reshape(len(points), len(nodes), -1))
 
     def _seen(self, view: InstrumentView, width: float, points: Sequence[Numbers]) -> Floats:
         """Return f_r (B, N) [1/sr] as an instrument sees it, with the specular part that falls into its aperture."""
@@ -241,6 +227,23 @@ class Term:
         if self.spec.specular is None:
             return f_r
         return f_r + view.mirror * self.reflected(view, given)
+
+    def slopes(self, view: InstrumentView, given: Mapping[str, float], names: set[str]) -> dict[str, Floats]:
+        """Return the derivatives (M, N) [1/sr] of the factors of the monomials by some parameters of the model."""
+        gradient = self.spec.gradient
+        assert gradient is not None
+        arguments = columns([{**given, **node} for node in self.nodes])
+        count, ordered = len(self.nodes), sorted(names)
+        width = self.widths([given]) if view.half_angle else None
+
+        def derivatives(wi: Floats, wr: Floats) -> Floats:
+            by = gradient(wi, wr, **arguments).derivatives
+            return np.concatenate([np.broadcast_to(by[name], (count, len(wi))) for name in ordered]).T
+
+        with np.errstate(all="ignore"):  # extreme parameters may raise flags
+            seen = view.mean(derivatives, None if width is None else float(width[0])).T
+        factors = self.polynomial.inverse @ seen.reshape(len(ordered), count, len(view))
+        return dict(zip(ordered, factors, strict=True))
 
     def reflected(self, view: InstrumentView, given: Mapping[str, Any]) -> Floats:
         """Return the specular reflectance (N,) [1] for each direction of the light; 0 for models without one."""
@@ -279,22 +282,16 @@ class SearchedSurface:
     """
 
     def __init__(
-        self, name: str, wavelength_nm: Array | None, channels: int, *, turned: bool, entry: str | None = None
+        self, name: str, wavelength_nm: Floats | None, channels: int, *, turned: bool, entry: str | None = None
     ) -> None:
         names = _parsed(name)
-        alone = len(names) == 1
-        flat = flat_model()
-        repeated = Counter(names)
-        seen = Counter[str]()
+        alone, beside_flat = len(names) == 1, len(names) > 1 and flat_model() in names
         self.name, self.channels, self.entry = name, channels, entry
         self.terms: list[Term] = []
-        for model in names:
-            seen[model] += 1
-            number = f" {seen[model]}" if repeated[model] > 1 else ""
-            label = "" if alone else f"{model}{number} "
-            spec = MODELS[model]
-            beside = not alone and flat in names
-            self.terms.append(Term(spec, label, alone=alone, beside_flat=beside, turned=turned))
+        for at, model in enumerate(names):
+            ordinal = f" {names[: at + 1].count(model)}" if names.count(model) > 1 else ""
+            label = "" if alone else f"{model}{ordinal} "
+            self.terms.append(Term(MODELS[model], label, alone=alone, beside_flat=beside_flat, turned=turned))
         self.indexed = any(term.spec.spectral for term in self.terms)
         self.searched_index = self.indexed and entry is None
         self._refuse(turned)
@@ -303,25 +300,27 @@ class SearchedSurface:
         if self.searched_index:
             self.shape += index_variables()
             self.owners += [None, None]
-        self.coefficients = [one for number, term in enumerate(self.terms) for one in term.coefficients(number)]
+        self.coefficients: list[Coefficient] = []
+        self.monomial_count = 0
+        for number, term in enumerate(self.terms):
+            own, size = term.coefficients(number), len(term.polynomial.exponents)
+            term.own = slice(len(self.coefficients), len(self.coefficients) + len(own))
+            term.monomials = slice(self.monomial_count, self.monomial_count + size)
+            self.coefficients += own
+            self.monomial_count += size
         self.units = np.array([one.unit for one in self.coefficients]).reshape(-1, 1)
         self.wavelength_nm = np.full(channels, ASSUMED_NM) if wavelength_nm is None else wavelength_nm
         self.indices = refractive_index(entry, self.wavelength_nm) if self.indexed and entry else None
 
     def _refuse(self, turned: bool) -> None:
         for term in self.terms:
-            spec = term.spec
-            if spec.anisotropic is not None and not turned:
-                raise NotDescribedError(
-                    "model",
-                    f"{spec.name} changes when the surface is turned, and the light comes from one azimuth only",
-                )
+            name = term.spec.name
+            if term.spec.anisotropic is not None and not turned:
+                text = f"{name} changes when the surface is turned, and the light comes from one azimuth only"
+                raise NotDescribedError("model", text)
             if self.channels > 1 and len(self.terms) == 1 and any(p.reflectance for p in term.free):
-                raise NotDescribedError(
-                    "model",
-                    f"{spec.name}: f_r is not a polynomial in its reflectances, so spectra of them cannot be fitted; "
-                    "choose one channel",
-                )
+                text = f"{name}: f_r is not a polynomial in its reflectances, so spectra of them cannot be fitted; "
+                raise NotDescribedError("model", f"{text}choose one channel")
         if self.searched_index and self.channels > 1:
             raise NotDescribedError(
                 "model",
@@ -337,7 +336,7 @@ class SearchedSurface:
             for one, owner in zip(self.shape, self.owners, strict=True)
         ]
 
-    def numbers(self, x: Array) -> list[dict[str, float]]:
+    def numbers(self, x: Floats) -> list[dict[str, float]]:
         """Return the shared parameters of each term at a point of the unit cube, with n and k if they are searched."""
         numbers: list[dict[str, float]] = [dict(term.fixed) for term in self.terms]
         index: dict[str, float] = {}
@@ -363,19 +362,19 @@ class SearchedSurface:
             of_channel |= {"n": float(n[channel]), "k": float(k[channel])}
         return {**given, **of_channel}
 
-    def in_channel(self, x: Array, values: Array, number: int, channel: int) -> tuple[dict[str, float], float]:
+    def in_channel(self, x: Floats, values: Floats, number: int, channel: int) -> tuple[dict[str, float], float]:
         """Return all arguments of a term in a channel, and its scale."""
         given = self.arguments(number, self.numbers(x)[number], channel)
-        rows = [row for row, one in enumerate(self.coefficients) if one.term == number]
-        linear = {self.coefficients[row].name: float(values[row, channel]) for row in rows}
-        scale = linear.pop(SCALE, 1.0)
-        return given | linear, scale
+        own = self.terms[number].own
+        names = [one.name for one in self.coefficients[own]]
+        given |= dict(zip(names, values[own, channel].tolist(), strict=True))
+        return given, given.pop(SCALE, 1.0)
 
-    def basis(self, x: Array, view: InstrumentView) -> Floats:
+    def basis(self, x: Floats, view: InstrumentView) -> Floats:
         """Return the factors (M, N, C) [1/sr] of all monomials; (M, N, 1) if they are the same in each channel."""
         return np.asarray(self.bases(x[np.newaxis], view)[0])
 
-    def bases(self, points: Array, view: InstrumentView) -> Floats:
+    def bases(self, points: Floats, view: InstrumentView) -> Floats:
         """Return the factors (B, M, N, C) or (B, M, N, 1) [1/sr] at points (B, S), which models take together.
 
         The terms of a point that was evaluated alone are remembered until the next: its neighbours share some of them.
@@ -395,33 +394,70 @@ class SearchedSurface:
 
     def monomials(self, values: Floats) -> Floats:
         """Return the monomials (M, C) of coefficients (K, C)."""
-        parts = []
-        at = 0
-        for term in self.terms:
-            count = term.polynomial.exponents.shape[1]
-            parts.append(term.polynomial.monomials(self._in_units(values, at, count)))
-            at += count
-        return np.concatenate(parts)
+        in_units = values / self.units
+        return np.concatenate([term.polynomial.monomials(in_units[term.own]) for term in self.terms])
 
     def slopes(self, values: Floats) -> Floats:
         """Return the derivatives (K, M, C) of the monomials by each coefficient."""
-        sizes = [term.polynomial.exponents.shape for term in self.terms]
-        slopes = np.zeros((sum(k for _, k in sizes), sum(m for m, _ in sizes), values.shape[1]))
-        row = column = 0
-        for term, (m, k) in zip(self.terms, sizes, strict=True):
-            of_term = term.polynomial.slopes(self._in_units(values, row, k))
-            slopes[row : row + k, column : column + m] = of_term / self.units[row : row + k, :, np.newaxis]
-            row, column = row + k, column + m
-        return slopes
+        in_units = values / self.units
+        slopes = np.zeros((len(values), self.monomial_count, values.shape[1]))
+        for term in self.terms:
+            slopes[term.own, term.monomials] = term.polynomial.slopes(in_units[term.own])
+        return np.asarray(slopes / self.units[:, np.newaxis])
 
-    def _in_units(self, values: Floats, at: int, count: int) -> Floats:
-        return np.asarray(values[at : at + count] / self.units[at : at + count])
+    def f_r_slopes(self, basis: Floats, values: Floats) -> Floats:
+        """Return the derivatives (K, N, C) [1/sr] of f_r by each coefficient (K, C)."""
+        slopes = self.slopes(values)
+        if basis.shape[2] == 1:
+            return np.asarray(np.einsum("mn,kmc->knc", basis[:, :, 0], slopes))
+        return np.asarray(np.einsum("mnc,kmc->knc", basis, slopes))
 
-    def f_r(self, x: Array, values: Floats, view: InstrumentView) -> Floats:
+    def basis_slopes(self, x: Floats, view: InstrumentView) -> dict[int, Floats]:
+        """Return the derivatives (M, N, C) or (M, N, 1) [1/sr] of `basis` by shape variables, by their index.
+
+        Only models with a gradient have them. A specular part inside an aperture has none, nor have n and k where k is
+        0, the end of its range: it begins there like a square root.
+        """
+        numbers = self.numbers(x)
+        by_variable = {index: moves for index in range(len(self.shape)) if (moves := self._moves(index, x, numbers))}
+        by_term: list[list[dict[str, Floats]]] = []  # derivatives of the factors of each term in each channel, by name
+        for number, term in enumerate(self.terms):
+            names = {name for moves in by_variable.values() for name in moves.get(number, ())}
+            known = bool(names) and term.spec.gradient is not None
+            if view.half_angle and term.spec.specular is not None:
+                known = False
+            count = (self.channels if term.spec.spectral else 1) if known else 0
+            arguments = [self.arguments(number, numbers[number], channel) for channel in range(count)]
+            by_term.append([term.slopes(view, given, names) for given in arguments])
+        several = self.channels if self.indexed else 1
+        slopes: dict[int, Floats] = {}
+        for index, moves in by_variable.items():
+            if not all(by_term[number] for number in moves):
+                continue
+            slopes[index] = np.zeros((self.monomial_count, len(view), several))
+            for number, by_name in moves.items():
+                of_channels = [sum(move * one[name] for name, move in by_name.items()) for one in by_term[number]]
+                slopes[index][self.terms[number].monomials] = np.stack(of_channels, axis=-1)
+        return {index: np.nan_to_num(of_index, nan=0.0, posinf=0.0, neginf=0.0) for index, of_index in slopes.items()}
+
+    def _moves(self, index: int, x: Floats, numbers: list[dict[str, float]]) -> dict[int, dict[str, float]]:
+        """Return the derivatives of parameters by a shape variable: by the number of their term, then by name."""
+        variable, owner = self.shape[index], self.owners[index]
+        if owner is not None:
+            tied = self.terms[owner].tied
+            names = tied if tied and variable.name == tied[0] else (variable.name,)
+            return {owner: dict.fromkeys(names, variable.slope(float(x[index])))}
+        ends = [one.value(float(u)) for one, u in zip(self.shape[-2:], x[-2:], strict=True)]  # n and k are last
+        slopes = index_slopes(*ends)[variable.name]
+        moves = {"n": slopes.n * variable.slope(0.5), "k": slopes.k * variable.slope(0.5)}
+        spectral = [number for number, term in enumerate(self.terms) if term.spec.spectral]
+        return {number: moves for number in spectral if numbers[number]["k"] > 0.0}
+
+    def f_r(self, x: Floats, values: Floats, view: InstrumentView) -> Floats:
         """Return f_r (N, C) [1/sr] as an instrument sees it, with coefficients (K, C)."""
         return total(self.basis(x, view), self.monomials(values))
 
-    def reflected(self, x: Array, values: Array, view: InstrumentView) -> Floats:
+    def reflected(self, x: Floats, values: Floats, view: InstrumentView) -> Floats:
         """Return the specular reflectance (N, C) [1] for each direction of the light."""
         sums = np.zeros((len(view), self.channels))
         for number, term in enumerate(self.terms):
@@ -430,7 +466,7 @@ class SearchedSurface:
                 sums[:, channel] += scale * term.reflected(view, given)
         return sums
 
-    def widths(self, points: Array) -> Floats:
+    def widths(self, points: Floats) -> Floats:
         """Return the widths (B, L) of the L lobes at points (B, S) of the unit cube, in slopes."""
         numbers = [self.numbers(x) for x in points]
         widths = [
@@ -444,9 +480,8 @@ def columns(points: Sequence[Numbers]) -> dict[str, Any]:
     """Return the arguments of points as columns (B, 1), or as one number where all have the same."""
     columns: dict[str, Any] = {}
     for name, first in points[0].items():
-        values = [one[name] for one in points]
-        same = all(value == first for value in values)
-        columns[name] = first if same else np.array(values)[:, np.newaxis]
+        values = [point[name] for point in points]
+        columns[name] = first if values.count(first) == len(values) else np.array(values)[:, np.newaxis]
     return columns
 
 
@@ -472,9 +507,8 @@ def _parsed(name: str) -> list[str]:
     for part in name.split("+"):
         match = re.fullmatch(r"\s*(?:(\d+)\s+)?([\w-]+)\s*", part)
         if match is None:
-            raise ParameterError(
-                "model", f"{name!r} is neither a model nor a sum of models such as 'A + 2 B'", name, tuple(MODELS)
-            )
+            text = f"{name!r} is neither a model nor a sum of models such as 'A + 2 B'"
+            raise ParameterError("model", text, name, tuple(MODELS))
         model = match[2]
         if model not in MODELS:
             hint = closest(model, MODELS) or f"; the models are {', '.join(MODELS)}"

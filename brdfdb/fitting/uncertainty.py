@@ -1,8 +1,8 @@
-"""The uncertainty of a fit: covariance, correlations, and profiles where the covariance misleads."""
+"""The uncertainty of a fit: covariance, resampled incidences, and profiles where the covariance misleads."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -10,8 +10,6 @@ from numpy.typing import NDArray
 
 from brdfdb.fitting.problem import Point, Problem
 from brdfdb.parameters import Floats
-
-Array = NDArray[np.float64]
 
 NORMAL_95 = 1.959963984540054  # standard errors to each side of a 95 % interval
 _RIDGE = 1e-13  # added to the normalised matrix, so that a direction without any information has a finite variance
@@ -21,67 +19,178 @@ _STEPS = 14  # of the search of an end of an interval
 _FIRST = 0.02  # first step of a profile, of the range, for a number without a standard error
 _EVALUATIONS = 25
 _LEAST_NOISE = 1e-18  # variance of noise-free samples: residuals of 1e-9 are rounding
+_DETERMINED = 1e-6  # share of the squares of a column that the other columns leave; less is not determined
 
 
 class Covariance(NamedTuple):
     """Covariance of the numbers of a fit; nan for those at an end of their range."""
 
-    shape: Array  # (S, S), of all shape variables, in the unit cube
-    coefficients: Array  # (K, C), variances
-    both: Array  # (S + K, S + K), of shape and the coefficients of the first channel
+    place: Floats  # (S + Q, S + Q), of shape variables and nuisance numbers, in the unit cube
+    channels: Floats  # (C, S + K, S + K), of shape variables and the coefficients of each channel
     noise: float  # factor between cost and deviance: twice the rise of the cost over it is chi-squared of one freedom
-    searched: int  # numbers that were searched and are not at an end
 
 
 def noise_of(problem: Problem, residuals: Floats, searched: int) -> tuple[float, float]:
     """Return two factors, above 0: of the covariance of a robust fit, and between cost and deviance."""
     r = residuals[problem.residual.used]
-    z = (r / problem.scale) ** 2
-    squares = max(float(np.sum(r * r / (1.0 + z))) / max(r.size - searched, 1), _LEAST_NOISE)
-    slope = float(np.mean((1.0 + z) ** -1.5))
+    weights = 1.0 / np.hypot(1.0, r / problem.scale)
+    squares = max(float(np.sum((r * weights) ** 2)) / max(r.size - searched, 1), _LEAST_NOISE)
+    slope = float(np.mean(weights**3))
     return squares / slope**2, squares / slope
+
+
+class FreeColumns(NamedTuple):
+    """Derivatives of residuals by the numbers that are searched and not at an end of their range.
+
+    `outer` (T, N, C) by shape variables and nuisance numbers, whose `indices` are those of `Point.place`; `inner`
+    (K, N, C) by coefficients, of which `free` (K, C) are not at an end. `searched` is the number of all.
+    """
+
+    outer: Floats
+    indices: NDArray[np.int64]
+    inner: Floats
+    free: NDArray[np.bool_]
+    searched: int
+
+
+def _free_columns(problem: Problem, point: Point) -> FreeColumns:
+    inner, free = problem.coefficient_jacobian(point)
+    places = point.place[problem.searched]
+    inside = (places > _END) & (places < 1.0 - _END)
+    indices = np.array(problem.searched, dtype=np.int64)[inside]
+    return FreeColumns(problem.shape_jacobian(point)[inside], indices, inner, free, int(inside.sum() + free.sum()))
 
 
 def covariance(problem: Problem, point: Point) -> Covariance:
     """Return the covariance of the numbers of a fit, from the derivatives of residuals at its best point."""
-    inner, free = problem.coefficient_jacobian(point)
-    columns = problem.shape_jacobian(point)
-    inside = np.array([_END < point.x[j] < 1.0 - _END for j in problem.free], dtype=bool)
-    searched = int(inside.sum() + free.sum())
+    outer, indices, inner, free, searched = _free_columns(problem, point)
     factor, noise = noise_of(problem, point.residuals, searched)
-    some = columns[inside]
-    count = len(inner)
-    shapes = len(problem.surface.shape)
+    reduced = np.zeros((len(outer), len(outer)))
     of_channels = []
-    for c in range(point.f_r.shape[1]):
-        outer = some[:, :, c]
-        of_inner = inner[free[:, c], :, c]
-        of_channels.append((outer @ outer.T, outer @ of_inner.T, of_inner @ of_inner.T))
-    reduced = np.zeros((len(some), len(some)))
-    for a, b, d in of_channels:
-        reduced += a - b @ _inverse(d) @ b.T
-    of_shape = _inverse(reduced)
-    variances = np.full((count, point.f_r.shape[1]), np.nan)
-    for c, (_, b, d) in enumerate(of_channels):
-        inverse = _inverse(d)
-        gain = inverse @ b.T
-        variances[free[:, c], c] = factor * np.diag(inverse + gain @ of_shape @ gain.T)
-    indices = np.array(problem.free, dtype=np.int64)[inside]
-    shape = np.full((shapes, shapes), np.nan)
-    shape[np.ix_(indices, indices)] = factor * of_shape
-    both = np.full((shapes + count,) * 2, np.nan)
-    _, b, d = of_channels[0]
-    inverse = _inverse(d)
-    gain = inverse @ b.T
-    first = shapes + np.flatnonzero(free[:, 0])
-    both[np.ix_(indices, indices)] = factor * of_shape
-    both[np.ix_(first, first)] = factor * (inverse + gain @ of_shape @ gain.T)
-    both[np.ix_(first, indices)] = -factor * gain @ of_shape
-    both[np.ix_(indices, first)] = both[np.ix_(first, indices)].T
-    return Covariance(shape, variances, both, noise, searched)
+    for c in range(inner.shape[2]):
+        x, y = outer[:, :, c], inner[free[:, c], :, c]
+        across, of_inner = x @ y.T, inverse(y @ y.T)
+        reduced += x @ x.T - across @ of_inner @ across.T
+        of_channels.append((of_inner, of_inner @ across.T))
+    of_place = inverse(reduced)
+    place = np.full((len(point.place),) * 2, np.nan)
+    place[np.ix_(indices, indices)] = factor * of_place
+    shapes = len(problem.surface.shape)
+    channels = np.full((inner.shape[2], *(shapes + len(inner),) * 2), np.nan)
+    channels[:, :shapes, :shapes] = place[:shapes, :shapes]
+    of_shape = indices < shapes
+    for c, (of_inner, gain) in enumerate(of_channels):
+        own = shapes + np.flatnonzero(free[:, c])
+        across = -factor * (gain @ of_place)[:, of_shape]
+        channels[c][np.ix_(own, own)] = factor * (of_inner + gain @ of_place @ gain.T)
+        channels[c][np.ix_(own, indices[of_shape])] = across
+        channels[c][np.ix_(indices[of_shape], own)] = across.T
+    return Covariance(place, channels, noise)
 
 
-def _inverse(matrix: Array) -> Array:
+class GroupSpread(NamedTuple):
+    """A step of Gauss and Newton from a point, and its spread with each group of samples left out in turn.
+
+    `step` (S + Q,) is that of `Point.place`, `covariance` (S + Q, S + Q) that of independent residuals, `resampled`
+    (S + Q, S + Q) that of the groups (delete-a-group jackknife); nan for numbers that do not move. `determined` are
+    numbers that the others cannot replace. `coefficients` (K, C) are resampled variances, nan at a bound.
+    """
+
+    step: Floats
+    covariance: Floats
+    resampled: Floats
+    coefficients: Floats
+    determined: NDArray[np.bool_]
+    groups: int
+
+    @property
+    def quantile(self) -> float:
+        """Standard errors to each side of a 95 % interval: Student's t."""
+        from scipy.stats import t
+
+        return float(t.ppf(0.975, max(self.groups - 1, 1)))
+
+    @property
+    def inflation(self) -> float:
+        """How many times the square of a typical interval is that of independent residuals, at least 1."""
+        alone, several = np.diag(self.covariance), np.diag(self.resampled)
+        known = (alone > 0.0) & np.isfinite(several)
+        ratio = float(np.median(several[known] / alone[known])) if known.any() else 1.0
+        return max(ratio * (self.quantile / NORMAL_95) ** 2, 1.0)
+
+    def ratio(self, index: int) -> float:
+        """Return the size of the step of a number over its resampled standard error."""
+        return float(np.abs(self.step[index]) / np.sqrt(max(self.resampled[index, index], 1e-300)))
+
+
+def sums_by(groups: NDArray[np.int64]) -> Callable[[Floats], Floats]:
+    """Return a function that sums the rows (N, ...) of each group (K, ...)."""
+    order = np.argsort(groups, kind="stable")
+    starts = np.concatenate([[0], np.cumsum(np.bincount(groups))[:-1]])
+    return lambda rows: np.add.reduceat(rows[order], starts, axis=0)
+
+
+def spread_of(problem: Problem, point: Point, groups: NDArray[np.int64], leave: Sequence[int] = ()) -> GroupSpread:
+    """Return the step from a point to the least cost, its covariance, and that of the groups left out in turn.
+
+    The steps are linear: what each group adds to the normal equations is taken from them. With K groups, the
+    covariance is (K - 1) / K times the sum of the squared changes (the jackknife, CR3 of Bell and McCaffrey 2002).
+    Numbers whose indices in `Point.place` are in `leave` do not move.
+    """
+    outer, indices, inner, free, searched = _free_columns(problem, point)
+    moves = ~np.isin(indices, leave)
+    outer, indices = outer[moves], indices[moves]
+    weights = 1.0 / np.hypot(1.0, point.residuals / problem.scale)
+    first = point.residuals * weights
+    second = weights**3 * problem.residual.used
+    sums = sums_by(groups)
+
+    def without_each(rows: Floats) -> Floats:  # the sum over all, then less each group
+        parts = sums(rows)
+        return np.concatenate([[parts.sum(axis=0)], parts.sum(axis=0) - parts])
+
+    shared, count = len(outer), int(groups.max()) + 1
+    reduced = np.zeros((count + 1, shared, shared))
+    gradient = np.zeros((count + 1, shared))
+    squares = np.zeros(shared)
+    of_channels = []
+    for c in range(inner.shape[2]):
+        x = np.concatenate([outer[:, :, c], inner[free[:, c], :, c]])
+        normals = without_each((x[:, np.newaxis] * x * second[:, c]).transpose(2, 0, 1))
+        slopes = without_each((x * first[:, c]).T)
+        squares += np.diag(normals[0])[:shared]
+        of_inner = np.array([inverse(matrix) for matrix in normals[:, shared:, shared:]])
+        across = normals[:, :shared, shared:]
+        reduced += normals[:, :shared, :shared] - across @ of_inner @ across.transpose(0, 2, 1)
+        gradient += slopes[:, :shared] - np.einsum("kab,kbc,kc->ka", across, of_inner, slopes[:, shared:])
+        of_channels.append((of_inner, across, slopes[:, shared:]))
+    inverses = np.array([inverse(matrix) for matrix in reduced])
+    steps = -np.einsum("kab,kb->ka", inverses, gradient)
+    factor = (count - 1.0) / count
+    coefficients = np.full(free.shape, np.nan)
+    for c, (of_inner, across, slopes) in enumerate(of_channels):
+        solved = -np.einsum("kab,kb->ka", of_inner, slopes + np.einsum("kab,ka->kb", across, steps))
+        coefficients[free[:, c], c] = factor * np.sum((solved[1:] - solved[0]) ** 2, axis=0)
+    moved = steps[1:] - steps[0]
+    noise, _ = noise_of(problem, point.residuals, searched)
+    mean = float(np.mean(second[problem.residual.used]))
+    spread = GroupSpread(
+        step=np.full(len(point.place), np.nan),
+        covariance=np.full((len(point.place),) * 2, np.nan),
+        resampled=np.full((len(point.place),) * 2, np.nan),
+        coefficients=coefficients,
+        determined=np.zeros(len(point.place), dtype=np.bool_),
+        groups=count,
+    )
+    block = np.ix_(indices, indices)
+    spread.step[indices] = steps[0]
+    spread.covariance[block] = inverses[0] * noise * mean  # the normal matrix has the mean slope of the robust cost
+    spread.resampled[block] = factor * moved.T @ moved
+    spread.determined[indices] = np.diag(reduced[0]) > _DETERMINED * squares
+    return spread
+
+
+def inverse(matrix: Floats) -> Floats:
     """Return the inverse of a normal matrix, scaled before: units of its rows differ by powers of ten."""
     if not len(matrix):
         return matrix
@@ -93,35 +202,20 @@ def _inverse(matrix: Array) -> Array:
 class Profile:
     """The deviance of a fit as a function of one number, with all others searched.
 
-    The number is a shape variable or, where the problem has one channel, a coefficient.
+    `index` is that of `Covariance.channels`: a shape variable or, where the problem has one channel, a coefficient.
     """
 
-    def __init__(
-        self,
-        problem: Problem,
-        point: Point,
-        known: Covariance,
-        *,
-        shape: int | None = None,
-        coefficient: int | None = None,
-    ) -> None:
-        self.problem = problem
-        self.point = point
-        self.noise = known.noise
-        self.shape, self.coefficient = shape, coefficient
-        if shape is not None:
-            self.low = 0.0
-            self.high = 1.0
-            self.best = float(point.x[shape])
-        else:
-            assert coefficient is not None
-            one = problem.surface.coefficients[coefficient]
-            self.low = one.low
-            self.high = one.high
-            self.best = float(point.values[coefficient, 0])
+    def __init__(self, problem: Problem, point: Point, known: Covariance, index: int) -> None:
         shapes = len(problem.surface.shape)
-        index = shape if shape is not None else shapes + int(coefficient or 0)
-        along = np.nan_to_num(known.both[:shapes, index] / known.both[index, index])
+        self.problem, self.point, self.noise = problem, point, known.noise
+        self.shape = index if index < shapes else None
+        self.coefficient = None if index < shapes else index - shapes
+        self.low, self.high = 0.0, 1.0
+        if self.coefficient is not None:
+            coefficient = problem.surface.coefficients[self.coefficient]
+            self.low, self.high = coefficient.low, coefficient.high
+        self.best = float(point.x[index] if index < shapes else point.values[index - shapes, 0])
+        along = np.nan_to_num(known.channels[0, :shapes, index] / known.channels[0, index, index])
         self.along = np.where(np.isfinite(along), along, 0.0)  # changes of the others with the fixed number
 
     def deviation(self, at: float) -> float:
@@ -129,10 +223,10 @@ class Profile:
         p = self.problem
         fixed = p.fixed if self.shape is None else {**p.fixed, self.shape: at}
         fixed_coefficients = None if self.coefficient is None else {self.coefficient: at}
-        one = Problem(p.surface, p.view, p.residual, fixed, fixed_coefficients)
-        one.scale = p.scale
-        begin = np.clip(self.point.x + self.along * (at - self.best), 0.0, 1.0)
-        cost = one.descend(begin[one.free], _EVALUATIONS).cost
+        one = Problem(p.surface, p.view, p.residual, fixed, fixed_coefficients, p.nuisance, p.scale)
+        begin = self.point.place
+        begin[: len(self.along)] = np.clip(self.point.x + self.along * (at - self.best), 0.0, 1.0)
+        cost = one.descend(begin[one.searched], _EVALUATIONS).cost
         return float(np.sqrt(max(2.0 * (cost - self.point.cost) / self.noise, 0.0)))
 
     def agrees(self, error: float) -> bool:
@@ -156,8 +250,7 @@ class Profile:
 
     def _end(self, step: float) -> float:
         bound = self.low if step < 0.0 else self.high
-        inner = self.best
-        inner_deviation = 0.0
+        inner, inner_deviation = self.best, 0.0
         while True:
             outer = self.best + step
             if (outer - bound) * step >= 0.0:
@@ -167,9 +260,7 @@ class Profile:
                 return _root(self.deviation, inner, inner_deviation, outer, deviation)
             if outer == bound:
                 return bound
-            inner = outer
-            inner_deviation = deviation
-            step = 2.0 * step
+            inner, inner_deviation, step = outer, deviation, 2.0 * step
 
 
 def _root(function: Callable[[float], float], inner: float, below: float, outer: float, above: float) -> float:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brdfdb.parameters import ModelSpec, Parameter
+from brdfdb.parameters import Floats, ModelSpec, Parameter
 
 Array = NDArray[np.float64]
 
@@ -71,13 +71,6 @@ class Index(NamedTuple):
     k: float
 
 
-class IndexSlopes(NamedTuple):
-    """The derivatives of n and k by the two variables in their place."""
-
-    by_normal: Index
-    by_edge: Index
-
-
 def index_of(normal: float, edge: float) -> Index:
     """Return n and k [1] of facets with a reflectance at normal incidence, and their place between the two ends of n.
 
@@ -90,8 +83,8 @@ def index_of(normal: float, edge: float) -> Index:
     return Index(n, math.sqrt(max(k2, 0.0)))
 
 
-def index_slopes(normal: float, edge: float) -> IndexSlopes:
-    """Return the derivatives of n and k of `index_of`; those of k are 0 where k is."""
+def index_slopes(normal: float, edge: float) -> dict[str, Index]:
+    """Return the derivatives of n and k of `index_of` by NORMAL and EDGE; those of k are 0 where k is."""
     root = math.sqrt(normal)
     most = (1.0 + root) / (1.0 - root)
     n, k = index_of(normal, edge)
@@ -101,9 +94,10 @@ def index_slopes(normal: float, edge: float) -> IndexSlopes:
     half = 0.5 / k if k > 0.0 else 0.0  # k is a square root
     k2_by_n = (2.0 * normal * (n + 1.0) - 2.0 * (n - 1.0)) / (1.0 - normal)
     k2_by_normal = 4.0 * n / (1.0 - normal) ** 2
-    return IndexSlopes(
-        Index(by_normal, half * (k2_by_n * by_normal + k2_by_normal)), Index(by_edge, half * k2_by_n * by_edge)
-    )
+    return {
+        NORMAL: Index(by_normal, half * (k2_by_n * by_normal + k2_by_normal)),
+        EDGE: Index(by_edge, half * k2_by_n * by_edge),
+    }
 
 
 def switches(spec: ModelSpec) -> dict[str, float]:
@@ -119,9 +113,9 @@ def spread(count: int, variables: int) -> Array:
     return np.asarray(halton.random(count))
 
 
-def best_apart(points: Array, values: Array, count: int) -> Array:
+def best_apart(points: Floats, values: Floats, count: int) -> Floats:
     """Return the points with the least values, of which no two are near each other."""
-    chosen: list[Array] = []
+    chosen: list[Floats] = []
     for index in np.argsort(values, kind="stable"):
         if all(np.max(np.abs(points[index] - other)) > _NEAR for other in chosen):
             chosen.append(points[index])

@@ -1,4 +1,4 @@
-"""Fits of synthetic samples: ``python tests/benchmarks/fitting.py``, ten minutes.
+"""Fits of synthetic samples: ``python tests/benchmarks/fitting.py``, three minutes.
 
 Twelve materials of the papers are sampled at four incidences, with 3 % of noise and gaps. The share of parameters that
 lie in their 95 % intervals, the same where noise is not in proportion to f_r, and the processor time of one fit of 7000

@@ -93,7 +93,7 @@ def test_a_narrow_lobe_has_its_true_width_where_the_aperture_is_known() -> None:
     assert true.low < 0.03 < true.high
     assert biased.low > 0.0303
     assert with_it.rms_ln == pytest.approx(NOISE, rel=0.15)
-    assert with_it.remarks == []
+    assert not any("widened" in sentence for sentence in with_it.remarks)
     assert any("has widened it" in sentence for sentence in without.remarks)
 
 

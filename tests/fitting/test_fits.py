@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 
 from brdfdb.errors import ParameterError
 from brdfdb.fitting.estimates import estimates_of
-from brdfdb.fitting.fit import fit, fits
+from brdfdb.fitting.fit import ONE_AZIMUTH, fit, fits
 from brdfdb.fitting.problem import Problem
-from brdfdb.fitting.remarks import ONE_AZIMUTH
 from brdfdb.fitting.residuals import Residual
 from brdfdb.fitting.surface import NotDescribedError, SearchedSurface, fitted_by_default
 from brdfdb.fitting.uncertainty import NORMAL_95, _root
