@@ -9,6 +9,7 @@ from importlib.metadata import version
 import numpy as np
 
 from brdfdb.audit.finding import DECISIVE, Finding, NotJudged, Sentence, Subject, TableVerdict
+from brdfdb.audit.glints import resting_on
 from brdfdb.audit.registry import FINDINGS
 from brdfdb.audit.report import AuditReport, MaterialAudit, as_published, conserves_energy, explanations
 from brdfdb.errors import ParameterError
@@ -55,6 +56,7 @@ def audit(table: Table, *, source: Source | None = None, accept_excess: bool = F
                 sentences.append(kind.sentence("not judged", finding.reason))
             else:
                 sentences += finding.sentences()
+    measured = table.metadata.measured
     words = {finding.verdict for finding in subject.findings.values()}
     otherwise: TableVerdict = "not judged" if subject.unrecorded else "passes"
     verdict: TableVerdict = next((word for word in DECISIVE if word in words), otherwise)
@@ -65,9 +67,10 @@ def audit(table: Table, *, source: Source | None = None, accept_excess: bool = F
         model=source.model if isinstance(source, Material) else "",
         findings=subject.findings,
         sentences=sentences,
-        as_published=as_published(subject.findings, origin=subject.origin),
-        conserves_energy=conserves_energy(subject.findings),
+        as_published=as_published(subject.findings, measured=measured),
+        conserves_energy=conserves_energy(subject.findings, measured=measured),
         verdict=verdict,
+        verdict_in_words=f"{verdict} {resting_on(measured)}".strip(),
     )
 
 

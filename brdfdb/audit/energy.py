@@ -90,7 +90,7 @@ class Energy(Finding):
         if model is None:
             return [
                 self.sentence("not judged", "no model of this table can be evaluated", title="Energy of the model"),
-                self.sentence(table.verdict, of_table, title="Energy of the table"),
+                self.sentence(table.word, of_table, title="Energy of the table"),
             ]
         of_table = "as the model" if table.reason and table.reason == model.reason else of_table
         if len(model.hemispherical) == 1:
@@ -126,11 +126,11 @@ class Energy(Finding):
     def cells(self) -> list[Cell]:
         """Return the largest albedos, and the albedo of the lossless surface in uniform light."""
         model, table = self.model, self.table
-        of_table = _largest(table.verdict, table.max_albedo, table.max_at_theta_i_deg)
         if model is None:
             nothing = Cell("not judged", "–", LAST)
-            return [nothing, of_table, nothing]
+            return [nothing, _largest(table.word, table.max_albedo, table.max_at_theta_i_deg), nothing]
         of_model = _largest(model.verdict, model.max_albedo, model.max_at_theta_i_deg)
+        of_table = _largest(table.verdict, table.max_albedo, table.max_at_theta_i_deg)
         return [of_model, of_table, furnace_cell(model.furnace)]
 
     def figures(self) -> list[Panel | Map]:

@@ -186,10 +186,15 @@ class Subject:
     accept_excess: bool = False
     findings: dict[str, Finding] = field(default_factory=dict)
 
+    @property
+    def smooth(self) -> Table:
+        """Return the table without its glints, which the findings on interpolation and on errors judge."""
+        return self.table.without_glints()
+
     @cached_property
     def pairs(self) -> ComparedPairs:
         """Return f_r [1/sr] of table and source at the directions that several findings share."""
-        return pairs_of(self.table, self.source)
+        return pairs_of(self.smooth, self.source)
 
     @cached_property
     def restated(self) -> TableMetadata | None:
@@ -219,7 +224,7 @@ class Subject:
     def origin(self) -> str:
         """Return whether the data of a table were measured or simulated."""
         measured = self.table.metadata.measured
-        return "measured" if measured is None or measured.simulation is None else "simulated"
+        return "measured" if measured is None else measured.origin
 
     @property
     def without(self) -> str:

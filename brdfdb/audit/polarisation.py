@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from brdfdb.audit.finding import LAST, Cell, Finding, NumberTable, Sentence, Subject, Verdict
 from brdfdb.figure import number
-from brdfdb.parameters import Floats
+from brdfdb.geometry import spherical_angles
+from brdfdb.measurements.mueller import OF_TRACE, TOLERANCE, PhysicalShare, half_difference_angles
 from brdfdb.tables import error_measurement
 from brdfdb.tables.statements import element_error
 
@@ -20,10 +20,6 @@ _SEED = 1986
 _OF_STATED = 1.5
 _ROUNDING = 1e-6  # of elements, which are float32, of 24 bits
 
-# sigma_i x conj(sigma_j), which sum, weighted by the elements of a Mueller matrix, to its coherency matrix
-_PAULI = np.array([[[1, 0], [0, 1]], [[1, 0], [0, -1]], [[0, 1], [1, 0]], [[0, -1j], [1j, 0]]])
-_BASIS = np.array([[np.kron(a, b.conj()) for b in _PAULI] for a in _PAULI])
-
 
 class PolarisationFinding(Finding):
     """Cloude's eigenvalues of the Mueller matrices of a table, and the error of their normalised elements."""
@@ -34,15 +30,29 @@ class PolarisationFinding(Finding):
         "A Mueller matrix is physically realisable if no eigenvalue of its coherency matrix is negative (Cloude 1986): "
         "it is then a sum of Jones matrices. Eigenvalues are divided by the trace. Negative values up to the stated "
         "error of the stored matrix elements are allowed, because interpolated matrices may break the condition even "
-        "if those at the nodes obey it. Unpolarised tables have no such matrices."
+        "if those at the nodes obey it; of measured data, up to their noise, or 0.001. Tables of measured data are "
+        "judged where they were measured, and the share of the matrices that are physical to 0.001 is given, with the "
+        "Stokes criterion: no light leaves more than fully polarised. It alone judges tables with fewer than sixteen "
+        "elements, by I less sqrt(Q^2 + U^2 + V^2) in place of the smallest eigenvalue. Unpolarised tables have no "
+        "such matrices."
     )
 
     lookups: int = Field(description="directions and wavelengths at which the table was looked up; 0: unpolarised")
     smallest_eigenvalue: float = Field(description="smallest eigenvalue of the coherency matrix over its trace")
     eigenvalue_tolerance: float = Field(description="largest amount by which it may be negative")
+    physical: float = Field(
+        default=1.0, description="share [0, 1] of the lookups whose eigenvalues are at least -0.001 of the trace"
+    )
+    stokes: float = Field(
+        default=1.0, description="share [0, 1] of the lookups that make no light more polarised than 1.004"
+    )
+    measured_physical: float | None = Field(
+        default=None, description="share [0, 1] of the measured matrices that are physical; null: a model's"
+    )
+    where: list[str] = Field(default=[], description="the shares of the lookups in words, and where they are lowest")
     error_p99: float | None = Field(
         description="99th percentile of the error of the worst normalised element, at other directions than those of "
-        "the stated error; null: the source is not known"
+        "the stated error; null: the source is not known, or measured"
     )
     stated_p99: float | None = Field(description="the same, as the table states it; null: it states none")
     verdict: Verdict
@@ -61,25 +71,43 @@ class PolarisationFinding(Finding):
                 stated_p99=None,
                 verdict="passes",
             )
-        stated = None if record is None else record.error
         drawn = error_measurement.draw(subject.source, table.wavelength_nm, _DIRECTIONS, _SEED)
-        mueller = table.mueller_vectors(drawn.wi[drawn.above], drawn.wr[drawn.above])
-        eigenvalues = coherency_eigenvalues(mueller[mueller[..., 0, 0] > 0.0])
-        allowed = _ROUNDING + (0.0 if stated is None else stated.facet)
-        measured = None if subject.source is None else element_error(table, subject.source, _SEED).worst_p99
-        within = measured is None or stated is None or measured <= _OF_STATED * stated.worst_p99 + _ROUNDING
-        smallest = float(eigenvalues.min(initial=0.0))
+        wi = drawn.wi[drawn.above]
+        wr = drawn.wr[drawn.above]
+        measured = None if record is None else record.measured
+        error = None if record is None else record.error
+        if measured is not None:
+            known = ~table.extrapolated(*spherical_angles(wi), *spherical_angles(wr))
+            wi = wi[known]
+            wr = wr[known]
+        mueller = table.mueller_vectors(wi, wr)
+        mueller = mueller if table.wavelength_nm is not None else mueller[:, np.newaxis]
+        share = PhysicalShare(table.wavelength_nm)
+        share.add(mueller, half_difference_angles(wi, wr))
+        allowed = _ROUNDING + (0.0 if error is None else error.facet)
+        if measured is not None:
+            allowed = max(TOLERANCE, measured.noise) * (1.0 if share.whole else OF_TRACE)
+        stated = None if record is None else record.p99
+        of_model = None
+        if measured is None and subject.source is not None:
+            of_model = element_error(table, subject.source, _SEED).worst_p99
+        within = of_model is None or stated is None or of_model <= _OF_STATED * stated + _ROUNDING
+        smallest = share.smallest if share.whole else min(0.0, -share.most_excess)
         return cls(
-            lookups=len(eigenvalues),
+            lookups=share.count,
             smallest_eigenvalue=smallest,
             eigenvalue_tolerance=allowed,
-            error_p99=measured,
-            stated_p99=None if stated is None else stated.worst_p99,
+            physical=share.share,
+            stokes=share.stokes_share,
+            measured_physical=None if measured is None else measured.physical,
+            where=share.sentences(),
+            error_p99=of_model,
+            stated_p99=stated,
             verdict="passes" if smallest >= -allowed and within else "violates",
         )
 
     def sentences(self) -> list[Sentence]:
-        """Return a sentence on the smallest eigenvalue and the error of the elements."""
+        """Return sentences on the smallest eigenvalue and the error of the elements, and where they are unphysical."""
         if not self.lookups:
             return [self.sentence(self.verdict, "the table is unpolarised")]
         allowed = number(-self.eigenvalue_tolerance, 2)
@@ -88,7 +116,15 @@ class PolarisationFinding(Finding):
             text = f"not physically realisable: {text}"
         if self.error_p99 is not None and self.stated_p99 is not None:
             text += f"; error of the elements {number(self.error_p99, 2)}, stated {number(self.stated_p99, 2)}"
-        return [self.sentence(self.verdict, text)]
+        if self.measured_physical is not None:
+            text += f"; {100.0 * self.physical:.4g} % of the lookups are physical to 0.001, and "
+            text += f"{100.0 * self.measured_physical:.4g} % of the measured matrices"
+            if self.stated_p99 is not None:
+                text += f"; error of the elements {number(self.stated_p99, 2)} (p99)"
+        sentences = [self.sentence(self.verdict, text)]
+        if self.physical < 1.0:
+            sentences += [self.sentence(self.verdict, text) for text in self.where[1:]]
+        return sentences
 
     def cells(self) -> list[Cell]:
         """Return the smallest eigenvalue, or a dash for an unpolarised table."""
@@ -103,14 +139,9 @@ class PolarisationFinding(Finding):
         row = (
             str(self.lookups),
             *(number(value, 2) for value in (self.smallest_eigenvalue, -self.eigenvalue_tolerance)),
+            *(number(value, 4) for value in (self.physical, self.stokes)),
             *("-" if value is None else number(value, 2) for value in (self.error_p99, self.stated_p99)),
         )
-        headings = ("lookups", "smallest eigenvalue", "allowed", "error of elements (p99)", "stated")
+        shares = ("lookups", "smallest eigenvalue", "allowed", "physical", "Stokes criterion")
+        headings = (*shares, "error of elements (p99)", "stated")
         return [NumberTable("Mueller matrices", headings, [row])]
-
-
-def coherency_eigenvalues(mueller: Floats) -> NDArray[np.float64]:
-    """Return Cloude's eigenvalues [1] of Mueller matrices (N, 4, 4), over the trace of the coherency matrix: (N, 4)."""
-    coherency = np.einsum("nij,ijab->nab", np.asarray(mueller, np.float64), _BASIS) / 4.0
-    trace = np.trace(coherency, axis1=1, axis2=2).real
-    return np.asarray(np.linalg.eigvalsh(coherency) / trace[:, np.newaxis])

@@ -81,7 +81,7 @@ class Reciprocity(Finding):
     @classmethod
     def judge(cls, subject: Subject) -> Reciprocity:
         """Judge a table and its source; without a source the table alone."""
-        both = reciprocity_of(subject.table, subject.pairs)
+        both = reciprocity_of(subject.smooth, subject.pairs)
         if subject.source is not None and subject.table.metadata.measured is None:
             return both
         return both.model_copy(update={"model_random": None, "model_lobe": None}).judged()

@@ -11,16 +11,21 @@ from pydantic_core import CoreSchema, core_schema
 
 from brdfdb.audit.energy import Energy
 from brdfdb.audit.finding import STRICT, F, Finding, NotJudged, Sentence, TableVerdict, Verdict, Word
+from brdfdb.audit.glints import resting_on
 from brdfdb.audit.model_energy import LOSS_UP_TO_DEG, ModelEnergy
 from brdfdb.audit.reciprocity import Reciprocity
 from brdfdb.audit.record import Difference
 from brdfdb.audit.registry import FINDINGS
 from brdfdb.audit.table_error import TableError
-from brdfdb.errors import ParameterError
+from brdfdb.errors import ParameterError, percent
 from brdfdb.figure import Figure
+from brdfdb.measurements.record import Measured
 
 AS_PUBLISHED = "is it what the paper says?"
 CONSERVES_ENERGY = "does the published model conserve energy?"
+QUESTIONS = (AS_PUBLISHED, CONSERVES_ENERGY)
+OF_DATA = ("is it what the data say?", "do the data conserve energy?")  # of measured and simulated tables
+_OF_BOTH = ("as published, or as the data say?", "conserves energy?")  # of a list with tables of both kinds
 NO_PAPER = "where no paper states a material, its model, or its function, takes the place of the paper"
 
 
@@ -34,16 +39,18 @@ class Answer(BaseModel):
     reason: str = Field(description="the answer in a sentence, with its angle and its wavelength")
 
 
-def as_published(findings: Mapping[str, Finding], *, origin: str = "measured") -> Answer:
+def as_published(findings: Mapping[str, Finding], *, measured: Measured | None = None) -> Answer:
     """Return the answer to `AS_PUBLISHED`: every finding on the table, its excess over that of the model included.
 
-    `origin` is the word for a table of data: measured or simulated.
+    `measured` is the record of a table of data.
     """
     energy = findings[Energy.key]
     failing = [
-        FINDINGS[key].title.lower()
+        title.lower()
         for key, finding in findings.items()
         if key != Energy.key and finding.verdict == "violates"
+        for title in dict.fromkeys(said.title for said in finding.sentences() if said.word == "violates")
+        or (FINDINGS[key].title,)
     ]
     model_violates = isinstance(energy, Energy) and energy.model is not None and energy.model.verdict == "violates"
     if isinstance(energy, Energy) and energy.table.verdict == "violates" and not model_violates:
@@ -51,18 +58,19 @@ def as_published(findings: Mapping[str, Finding], *, origin: str = "measured") -
     if failing:
         named = ", ".join(failing)
         if _is_measured(findings):
-            text = f"the data break a law by more than their uncertainty: {named}"
+            text = f"the data break a law by more than their uncertainty, or the table misses them: {named}"
             return Answer(word="violates", text=f"no: {named}", reason=text)
         return Answer(word="violates", text=f"no: {named}", reason=f"the table differs from its source in: {named}")
     error = findings[TableError.key]
     if isinstance(error, NotJudged):
-        text = origin if _is_measured(findings) else "not judged"
+        resting = resting_on(measured)
+        text = f"passes {resting}" if resting else "not judged" if measured is None else measured.origin
         return Answer(word="not judged", text=text, reason=error.reason)
     reason = "the table keeps to the formulas of its source within the error that it states"
     return Answer(word="passes", text="yes", reason=reason)
 
 
-def conserves_energy(findings: Mapping[str, Finding]) -> Answer:
+def conserves_energy(findings: Mapping[str, Finding], *, measured: Measured | None = None) -> Answer:
     """Return the answer to `CONSERVES_ENERGY`, which the table has no part in, unless it is measured."""
     energy = findings[Energy.key]
     if isinstance(energy, Energy) and _is_measured(findings):  # data have no model
@@ -71,8 +79,12 @@ def conserves_energy(findings: Mapping[str, Finding]) -> Answer:
         where = f"{most} at {table.max_at_theta_i_deg:.3g}°"
         if table.verdict != "violates" and not table.is_certain:
             text = f"cannot be judged: {where}, and 1 is within the error of the table and its data"
+            if table.max_albedo is not None and table.is_extrapolated:
+                share = percent(table.extrapolated / table.max_albedo)
+                text = f"cannot be judged: {share} of the albedo lies in directions that were not measured"
             return Answer(word="not judged", text=text, reason=table.reason or text)
-        text = f"the data {'do not' if table.verdict == 'violates' else 'do'}: {where}"
+        resting = f" {measured.where}" if measured is not None and measured.where else ""
+        text = f"the data {'do not' if table.verdict == 'violates' else 'do'}{resting}: {where}"
         return Answer(word=table.verdict, text=text, reason=table.reason or text)
     if not isinstance(energy, Energy) or energy.model is None:
         return Answer(word="not judged", text="not judged", reason="no model of this table can be evaluated")
@@ -100,21 +112,17 @@ def _short(model: ModelEnergy) -> str:
         judged = zip(model.furnace.theta_i_deg, model.furnace.albedo, strict=True)
         least = [(min(value for value in row if value is not None), at) for at, row in judged if at <= LOSS_UP_TO_DEG]
         albedo, at = min(least)
-        loss = f"{_percent(1.0 - albedo)} at {at:.3g}°"
+        loss = f"{percent(1.0 - albedo)} at {at:.3g}°"
         return f"conserves energy up to a loss of {loss}" if bounded else f"conserves energy{up_to}; loses up to {loss}"
     if model.verdict == "gains":
         largest = None if model.furnace is None else model.furnace.largest
         gain = 0.0 if largest is None else largest - 1.0
-        return f"conserves energy{up_to}; would create {_percent(gain)} if nothing were absorbed"
+        return f"conserves energy{up_to}; would create {percent(gain)} if nothing were absorbed"
     return {
         "known published excess": f"no, as published: {where}",
         "accepted excess": f"no, as accepted: {where}",
         "violates": f"no: {where}",
     }[model.verdict]
-
-
-def _percent(share: float) -> str:
-    return f"{100.0 * share:.2g} %" if share < 0.995 else "100 %"
 
 
 def _read(findings: Any) -> Any:
@@ -172,6 +180,13 @@ class MaterialAudit(BaseModel):
         "nothing says what the values of the table are of"
     )
 
+    verdict_in_words: str = Field(
+        default="",
+        description="the verdict, the share of the directions that it rests on if a part of them was measured, and "
+        "that of the samples that the table misses: passes where measured, 1.4 %; empty: of a report of an older "
+        "program",
+    )
+
     def of(self, kind: type[F]) -> F:
         """Return the finding of one kind; LookupError if it is not judged."""
         finding = self.findings[kind.key]
@@ -182,6 +197,11 @@ class MaterialAudit(BaseModel):
     def problems(self) -> list[str]:
         """Return sentences on the findings that are not a plain pass."""
         return [sentence for finding in self.findings.values() for sentence in finding.problems()]
+
+    @property
+    def questions(self) -> tuple[str, str]:
+        """The questions that `as_published` and `conserves_energy` answer."""
+        return OF_DATA if _is_measured(self.findings) else QUESTIONS
 
     @property
     def not_judged(self) -> list[str]:
@@ -256,6 +276,12 @@ class AuditReport(BaseModel):
     page_subjects: list[str] = Field(default=[], description="keys of the materials and figures on the page")
     page_sha256: str = Field(default="", description="of the page; empty: not recorded")
     sha256: str = Field(default="", description="of this document, one line, with this last field empty")
+
+    @property
+    def questions(self) -> tuple[str, str]:
+        """The two questions on all materials, as headings."""
+        kinds = {audited.questions for audited in self.materials} or {QUESTIONS}
+        return kinds.pop() if len(kinds) == 1 else _OF_BOTH
 
     @property
     def families_wrong(self) -> list[str]:

@@ -97,7 +97,7 @@ class Smoothness(Finding):
     @classmethod
     def judge(cls, subject: Subject) -> Smoothness:
         """Judge a table and its source; without a source the table alone."""
-        return smoothness_of(subject.table, subject.source, subject.pairs)
+        return smoothness_of(subject.smooth, subject.source, subject.pairs)
 
     def sentences(self) -> list[Sentence]:
         """Return a sentence on the largest jump, or on the largest of those that are too large."""

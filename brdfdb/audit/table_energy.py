@@ -11,7 +11,7 @@ from pydantic import BaseModel, Field
 from brdfdb.audit.finding import STRICT, Verdict
 from brdfdb.audit.model_energy import DIGITS, crossing, limit_of, place
 from brdfdb.figure import Numbers, numbers, rows
-from brdfdb.geometry import radians
+from brdfdb.geometry import radians, unit_vector
 from brdfdb.materials.provenance import KnownExcess
 from brdfdb.parameters import Floats
 from brdfdb.tables.albedo import directional_albedo, hemispherical_albedo, tolerance_of
@@ -24,6 +24,8 @@ MOST_ERROR = 0.5
 _BAND_POINTS = 100  # number of points of the mean over a band of theta_i
 _NOT_FINITE = 1e30  # value in place of an albedo that is not finite
 _FINITE = 1e20  # smallest mean that includes such a value
+_RINGS = 40  # of viewers that tell which share of an albedo was measured; each has twice as many viewers
+_MOST_UNMEASURED = 0.5  # share of the albedo of a light that is judged, beside which others do not count
 
 
 class Bands(BaseModel):
@@ -71,6 +73,15 @@ class TableEnergy(BaseModel):
     )
     bands: Bands | None = Field(description="null: the table states no error, and no excess is explained")
     max_albedo: float | None = Field(description="null: not finite")
+    guessed: float = Field(
+        default=0.0,
+        description="part of it by glints that one sample shows, or at lights that were not measured: an upper bound",
+    )
+    extrapolated: float = Field(
+        default=0.0,
+        description="part of it in directions that were not measured; lights for which it is more than half do not "
+        "count, unless it is so for all",
+    )
     max_at_theta_i_deg: float
     max_at_wavelength_nm: float | None
     exceeds_1_from_theta_i_deg: float | None = Field(description="to 0.001 degrees")
@@ -87,18 +98,35 @@ class TableEnergy(BaseModel):
     def uncertainty(self) -> float | None:
         """Return the part of the largest albedo [1] that the errors of its band may make; None if none is stated.
 
-        It is that of the worst wavelength, with the error of measured data.
+        It is that of the worst wavelength, with the error of measured data, what glints may lack, and what was not
+        measured.
         """
+        unknown = self.guessed + self.extrapolated
         if self.bands is None or self.max_albedo is None:
-            return None
+            return unknown or None
         edges = np.array(self.bands.theta_i_deg)
         band = int(np.clip(np.searchsorted(edges, self.max_at_theta_i_deg, side="right") - 1, 0, edges.size - 2))
-        return self.max_albedo * (max(self.bands.stated_error[band]) + self.bands.held_out_error)
+        return self.max_albedo * (max(self.bands.stated_error[band]) + self.bands.held_out_error) + unknown
+
+    @property
+    def is_extrapolated(self) -> bool:
+        """True if most of the largest albedo lies in directions that were not measured: it is unknown."""
+        return self.max_albedo is not None and self.extrapolated > _MOST_UNMEASURED * self.max_albedo
 
     @property
     def is_certain(self) -> bool:
-        """True if the largest albedo is at most 1, its uncertainty included."""
-        return self.max_albedo is None or self.max_albedo + (self.uncertainty or 0.0) <= 1.0
+        """True if the largest albedo is at most 1, its uncertainty included; glints count as they may be at most."""
+        if self.max_albedo is None:
+            return True
+        if self.is_extrapolated:
+            return False
+        most = self.max_albedo + (self.uncertainty or self.guessed) - self.guessed
+        return most < 1.0 if self.guessed else most <= 1.0
+
+    @property
+    def word(self) -> Verdict | Literal["not judged"]:
+        """The verdict on a table without a model; "not judged" if 1 is within the error of its largest albedo."""
+        return "not judged" if self.verdict == "passes" and not self.is_certain else self.verdict
 
 
 class _Judge(NamedTuple):
@@ -141,11 +169,18 @@ def table_energy_of(
     diffuse = integrated.albedo.max(axis=1)
     specular = _specular(table, theta_i, diffuse.shape)
     albedo = diffuse + specular
-    finite = np.where(np.isfinite(albedo), albedo, np.inf)
+    unmeasured = _unmeasured(table, theta_i, integrated.phi_i_deg)
+    counts = unmeasured.max(axis=1) <= max(_MOST_UNMEASURED, unmeasured.max(axis=1).min())
+    finite = np.where(counts[:, np.newaxis], np.where(np.isfinite(albedo), albedo, np.inf), 0.0)
     worst_theta, worst_wavelength = np.unravel_index(np.argmax(finite), finite.shape)
     largest = float(finite[worst_theta, worst_wavelength])
     judge = _judge(table, theta_i, _known(diffuse))
-    certain = _known(albedo - np.minimum(integration, tolerance_of(table))[:, np.newaxis])
+    guessed = np.zeros(diffuse.shape) if integrated.guessed is None else integrated.guessed.max(axis=1)
+    bounded = float(f"{guessed[worst_theta, worst_wavelength]:.4g}")
+    smooth = diffuse if integrated.glints is None else (integrated.albedo - integrated.glints).max(axis=1)
+    extrapolated = np.where(unmeasured > 0.0, unmeasured * _known(smooth), 0.0)
+    known_part = _known(albedo - np.minimum(integration, tolerance_of(table))[:, np.newaxis] - guessed - extrapolated)
+    certain = np.where(counts[:, np.newaxis], known_part, 0.0)
     one = limit_of(None, theta_i)
     first = _first_above_1(table, theta_i, np.max(finite, axis=1) - one)
     unexplained = theta_i[judge.unexplained(certain, one)]
@@ -166,11 +201,17 @@ def table_energy_of(
     worst_nm = None if table.wavelength_nm is None else float(table.wavelength_nm[worst_wavelength])
     digits = 4 if abs(largest - 1.0) > 5e-4 else 7  # 1.0003 is not 1
     share = f"{largest:.{digits}g}" if np.isfinite(largest) else "no finite share"
-    reason = f"reflects {share} of the incident light at {place(theta_i[worst_theta], worst_nm)}"
+    most = "at most " if bounded else ""
+    reason = f"reflects {most}{share} of the incident light at {place(theta_i[worst_theta], worst_nm)}"
     if unexplained.size == 0:
         verdict = "passes"
-        cause = "its integration has" if bands is None else "the table states"
-        reason = f"{reason}, within the error that {cause}" if first is not None else ""
+        cause = f"within the error that {'its integration has' if bands is None else 'the table states'}"
+        unknown = float(extrapolated[worst_theta, worst_wavelength])
+        if unknown > _MOST_UNMEASURED * largest:
+            cause = f"{unknown:.3g} of it in directions that were not measured"
+        elif bounded:
+            cause = f"{bounded:.3g} of it by glints whose power is known as an upper bound alone"
+        reason = f"{reason}, {cause}" if first is not None or (bounded and largest >= 1.0) else ""
     elif (
         known is not None and np.isfinite(largest) and not np.any(judge.unexplained(certain, limit_of(known, theta_i)))
     ):
@@ -189,6 +230,8 @@ def table_energy_of(
         hemispherical=numbers(hemispherical_albedo(theta_i, integrated.mean + specular), 4),
         bands=bands,
         max_albedo=largest if np.isfinite(largest) else None,
+        guessed=bounded,
+        extrapolated=float(f"{extrapolated[worst_theta, worst_wavelength]:.4g}"),
         max_at_theta_i_deg=float(theta_i[worst_theta]),
         max_at_wavelength_nm=worst_nm,
         exceeds_1_from_theta_i_deg=first,
@@ -196,6 +239,30 @@ def table_energy_of(
         verdict=verdict,
         reason=reason,
     )
+
+
+def _unmeasured(table: Table, theta_i_deg: Axis, phi_i_deg: Axis) -> Floats:
+    """Return the share [1] of the albedo in directions that were not measured, (theta_i, 1 or wavelengths).
+
+    It is 0 of a table that was made to conserve energy, and the largest of the azimuths of the light.
+    """
+    measured = table.metadata.measured
+    if measured is None or measured.extent is None or any(change.law == "conserving" for change in measured.changes):
+        return np.zeros((theta_i_deg.size, 1))
+    smooth = table.without_glints()
+    theta = np.arcsin(np.sqrt((np.arange(_RINGS) + 0.5) / _RINGS))  # rings of the same projected solid angle
+    phi = 2.0 * np.pi * (np.arange(2 * _RINGS) + 0.5) / (2 * _RINGS)
+    viewers = unit_vector(theta[:, np.newaxis], phi).reshape(-1, 3)
+    shares = []
+    for light in unit_vector(radians(theta_i_deg)[:, np.newaxis], radians(phi_i_deg)):
+        of_light = []
+        for w in light:
+            lights = np.broadcast_to(w, viewers.shape)
+            f_r = np.nan_to_num(smooth.lookup_vectors(lights, viewers).reshape(len(viewers), -1))
+            outside = f_r[measured.extent.outside(lights, viewers)].sum(axis=0)
+            of_light.append(outside / np.maximum(f_r.sum(axis=0), 1e-300))
+        shares.append(np.max(of_light, axis=0))
+    return np.array(shares)
 
 
 def _first_above_1(table: Table, theta_i_deg: Axis, excess: Axis) -> float | None:

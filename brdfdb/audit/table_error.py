@@ -77,7 +77,7 @@ class TableError(Finding):
                 errors = "; ".join(measured.simulation.errors_in_words())
                 return NotJudged(reason=f"{needs}; {subject.without}; {errors}")
             return subject.not_judged(needs)
-        return table_error_of(subject.table, subject.source, subject.pairs, subject.findings[Nodes.key].verdict)
+        return table_error_of(subject.smooth, subject.source, subject.pairs, subject.findings[Nodes.key].verdict)
 
     def sentences(self) -> list[Sentence]:
         """Return a sentence on the error, and on each fault of the stated error."""

@@ -37,7 +37,7 @@ class ValueCounts(Finding):
         # A linear interpolant is never below its nodes
         pairs = subject.pairs
         linear = linear_in_angles(subject.table)
-        return values_of(subject.table, None if linear else pairs.table[pairs.drawn.above])
+        return values_of(subject.smooth, None if linear else pairs.table[pairs.drawn.above])
 
     def sentences(self) -> list[Sentence]:
         """Return a sentence on the sign of the values, and one on those that are not finite."""

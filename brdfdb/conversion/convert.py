@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from brdfdb.conversion.document import Conversion, Peak, WorstView, percent
+from brdfdb.conversion.document import Conversion, Peak, WorstView
 from brdfdb.conversion.nodes import (
     COARSE,
     FINER,
@@ -25,7 +25,7 @@ from brdfdb.conversion.nodes import (
 )
 from brdfdb.conversion.search import REFUSED, Distance, Result, Target, search
 from brdfdb.conversion.search import STEPS as _SEARCH_STEPS
-from brdfdb.errors import ParameterError
+from brdfdb.errors import ParameterError, percent
 from brdfdb.geometry import degrees, radians, unit_vector
 from brdfdb.integrals.pairs import Counts, Symmetry, view_of
 from brdfdb.lobes import Lobe

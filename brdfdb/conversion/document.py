@@ -73,8 +73,3 @@ class Conversion(DocumentPart):
     def name(self) -> str:
         """The name of the material."""
         return self.material.name
-
-
-def percent(share: float) -> str:
-    """Return a share as text in percent: without decimals from 10 % on, with two digits below."""
-    return f"{100.0 * share:.0f} %" if share >= 0.0995 else f"{100.0 * share:.2g} %"

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from brdfdb.conversion.document import Conversion, percent
+from brdfdb.conversion.document import Conversion
+from brdfdb.errors import percent
 from brdfdb.figure import Curve, Figure, Panel, curve_of
 from brdfdb.geometry import radians, unit_vector
 from brdfdb.lobes import around_mirror

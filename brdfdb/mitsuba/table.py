@@ -17,6 +17,7 @@ from brdfdb.mitsuba._surface import DIFFUSE, GLOSSY, SPECULAR, Facet, Formula, V
 from brdfdb.mitsuba._wavelengths import Columns, projection
 from brdfdb.store import open as open_store
 from brdfdb.tables._interpolation import prepared, weights_of_nodes
+from brdfdb.tables.mueller_field import MuellerField
 from brdfdb.tables.polarisation import MuellerFacets
 from brdfdb.tables.sampler import LOBE_SHARE, Cells
 from brdfdb.tables.table import Table, table_from
@@ -57,6 +58,9 @@ class TableFormula(Formula):
         if "material" not in props:
             raise ParameterError("material", "the name of a material in the store is missing")
         table = loaded(props["material"], props.get("store", None))
+        if table.glints is not None:
+            mi.Log(mi.LogLevel.Warn, f"{table.name}: {table.glints.left_out('the values of the plugin')}")
+            table = table.without_glints()
         self.name, self.anisotropic = table.name, table.anisotropic
         self._grid, self._how = table.grid, table.interpolation
         self._mixed = table.part_nm is not None or table.straight  # f_r is interpolated between wavelengths
@@ -80,7 +84,12 @@ class TableFormula(Formula):
         self._whole = not mi.is_spectral and not self._mixed and self._spectrum is None
         self._values = GridValues(axes, np.asarray(numbers @ mixing, np.float32) if self._whole else numbers)
         self._rows = Buffer(mixing)
-        self._facets = _TableFacets(table.facets, table, self._columns) if mi.is_polarized and table.facets else None
+        if mi.is_polarized and isinstance(table.facets, MuellerField):
+            text = f"the Mueller matrices of {table.name} are measured, and the plugin reads those of models alone"
+            raise ParameterError("polarised", f"{text}; use an unpolarised variant, or look the table up")
+        self._facets = None
+        if mi.is_polarized and isinstance(table.facets, MuellerFacets):
+            self._facets = _TableFacets(table.facets, table, self._columns)
         self._lobe = CellsLobe(table.sampler.cells)
         self.components = (GLOSSY,)
         if table.uniform is not None and np.any(table.uniform > 0.0):

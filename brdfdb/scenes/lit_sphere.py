@@ -295,8 +295,9 @@ class _Shown(NamedTuple):
         return full[: phis // 4 + 1] if self.elliptical else full
 
     def brdf(self, wi: Array, wr: Array) -> Array:
-        """Return f_r [1/sr] in linear sRGB (..., 3)."""
-        return self._coloured(self.surface.lookup_vectors(wi, wr, self.wavelength_nm))
+        """Return f_r [1/sr] in linear sRGB (..., 3), of a table without its glints, which would be noise."""
+        f_r = self.surface.smooth_vectors if isinstance(self.surface, BaseTable) else self.surface.lookup_vectors
+        return self._coloured(f_r(wi, wr, self.wavelength_nm))
 
     def specular(self, theta: Array) -> Array:
         """Return the specular reflectance [1] in linear sRGB (..., 3)."""

@@ -42,6 +42,12 @@ SpectrumKind = Annotated[
 # The last audit
 
 
+_IN_WORDS = (
+    "the verdict, and the share of the directions that it rests on if a part of them was measured: passes where "
+    "measured, 1.4 %; empty or null: not recorded"
+)
+
+
 class ShownAnswer(BaseModel):
     """The answer of an audit to one of its two questions."""
 
@@ -67,9 +73,10 @@ class AuditSummary(BaseModel):
     revision: str = Field(description="revision that was audited")
     model: str
     verdict: str
+    verdict_in_words: str = Field(default="", description=_IN_WORDS)
     sentences: list[ShownSentence]
-    as_published: ShownAnswer = Field(description="of the table: is it what the paper says?")
-    conserves_energy: ShownAnswer = Field(description="of the model: does the published model conserve energy?")
+    as_published: ShownAnswer = Field(description="of the table: is it what the paper says, or the data?")
+    conserves_energy: ShownAnswer = Field(description="of the model or the data: do they conserve energy?")
 
 
 class AuditedMaterial(AuditSummary):
@@ -165,8 +172,11 @@ class Line(BaseModel):
     largest_albedo: LargestAlbedo | None = Field(default=None, description="with the specular part; null: not measured")
     spectrum: SpectrumKind | None = None
     verdict: str | None = Field(default=None, description="of the audit of this revision; null: it has none")
-    as_published: ShownAnswer | None = Field(default=None, description="is the table what the paper says?")
-    conserves_energy: ShownAnswer | None = Field(default=None, description="does the published model conserve energy?")
+    verdict_in_words: str | None = Field(default=None, description=_IN_WORDS)
+    as_published: ShownAnswer | None = Field(default=None, description="is the table what the paper says, or the data?")
+    conserves_energy: ShownAnswer | None = Field(
+        default=None, description="does the published model conserve energy, or do the data?"
+    )
     revision: str = ""
     created: str | None = None
     bytes: int | None = None

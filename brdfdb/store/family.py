@@ -18,11 +18,11 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from brdfdb.arrays import array_lookup
-from brdfdb.errors import ParameterError, StoreError, sentence_of
+from brdfdb.errors import ParameterError, StoreError, percent, sentence_of
 from brdfdb.geometry import checked_angles, checked_vectors, degrees, radians
 from brdfdb.materials import written_name
 from brdfdb.models import MODELS
-from brdfdb.notebook import card, percent
+from brdfdb.notebook import card
 from brdfdb.parameters import Floats, Parameter
 from brdfdb.store.files import read_sealed
 from brdfdb.tables.evaluation import LookupSubject

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import http.client
 import io
@@ -33,6 +34,7 @@ from brdfdb.geometry import (
     spherical_angles,
 )
 from brdfdb.materials.source import FourAngles
+from brdfdb.measurements.glints import Glints
 from brdfdb.parameters import Floats
 from brdfdb.store.paths import NAME, pinned
 from brdfdb.tables.grids import Axis
@@ -257,6 +259,12 @@ class RemoteTable(BaseTable):
     def anisotropic(self) -> bool:
         """True if the table has an axis for the azimuth of the surface."""
         return self._anisotropic
+
+    @functools.cached_property
+    def glints(self) -> Glints | None:  # type: ignore[override]
+        """The peaks of f_r that the values of the service have in them; None without any."""
+        measured = self.metadata.known_measured()
+        return None if measured is None else measured.glints
 
     def _at_angles(self, angles: FourAngles, wavelength_nm: ArrayLike | None) -> Floats:
         self._wavelengths(wavelength_nm)  # checked first, as by a table, before anything is sent

@@ -23,8 +23,8 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from brdfdb.errors import StoreError, UnknownFamilyError, UnknownMaterialError, UnknownRevisionError
-from brdfdb.notebook import listing, percent
+from brdfdb.errors import StoreError, UnknownFamilyError, UnknownMaterialError, UnknownRevisionError, percent
+from brdfdb.notebook import listing
 from brdfdb.place import path_of
 from brdfdb.store.files import read_sealed, regular_bytes
 from brdfdb.store.paths import (

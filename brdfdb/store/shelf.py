@@ -111,7 +111,10 @@ class Shelf:
             return {"name": name, "damaged": str(error)}
         verdict = self.verdict(name)
         audited = verdict.finding.model_dump() if verdict and verdict.current else {}
-        return {**known[1], **{key: audited.get(key) for key in ("verdict", "as_published", "conserves_energy")}}
+        return {
+            **known[1],
+            **{key: audited.get(key) for key in ("verdict", "verdict_in_words", "as_published", "conserves_energy")},
+        }
 
     def warm(self) -> None:
         """Load the kernels of lookups."""

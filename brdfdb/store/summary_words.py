@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from brdfdb.errors import near_90
+from brdfdb.errors import counted, near_90, percent
 from brdfdb.microgeometry.model_errors import has_map, surface_error_of
 from brdfdb.store.files import read_json, sha256_of
 from brdfdb.store.paths import METADATA, NAME, manifest_path, number_of, revision_path
@@ -20,17 +20,21 @@ ERRORS_EXPLAINED = (
     "formula relative to the exact form of the same model; 0, exact form: the formula is exact"
 )
 SURFACE_EXPLAINED = "surface error: of the formula relative to rays on surfaces that suit the material"
-COLUMNS = ("what the paper says?", "model conserves energy?")  # headings of the two answers
+COLUMNS = ("as published or measured?", "conserves energy?")  # headings of the two answers
 
 REPORT_OF_ALL = "audit.json"  # in a store: the report on all its materials
 REPORT_OF_SOME = "audit-part.json"  # on those that were named or imported
 
 
 class Audited(NamedTuple):
-    """The answers of an audit in a few words: does the table agree with the paper, does its model conserve energy."""
+    """The answers of an audit in a few words: does the table agree with the paper, does its model conserve energy.
+
+    `samples` are the errors of a table of measured data at its samples, and its glints; empty of other tables.
+    """
 
     as_published: str
     conserves_energy: str
+    samples: str = ""
 
 
 def last_audit(root: Path) -> dict[tuple[str, str], Audited]:
@@ -43,8 +47,18 @@ def last_audit(root: Path) -> dict[tuple[str, str], Audited]:
         audited = Audited(str(entry["verdict"]), "")
         if "as_published" in entry:
             audited = Audited(str(entry["as_published"]["text"]), str(entry["conserves_energy"]["text"]))
+            audited = audited._replace(samples=_samples((entry.get("findings") or {}).get("glints") or {}))
         answers[entry["material"], entry["revision"]] = audited
     return answers
+
+
+def _samples(finding: Mapping[str, Any]) -> str:
+    worst = finding.get("worst") or {}
+    shares = {"held out (p95)": finding.get("held_out_p95"), "worst sample": worst.get("error")}
+    parts = [f"{name} {percent(share)}" for name, share in shares.items() if share is not None]
+    if glints := finding.get("glints"):
+        parts.append(counted(len(glints), "glint"))
+    return ", ".join(parts)
 
 
 def audited_materials(root: Path) -> list[dict[str, Any]]:

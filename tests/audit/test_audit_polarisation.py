@@ -10,7 +10,8 @@ import pytest
 import brdfdb
 from brdfdb import models
 from brdfdb.audit.finding import Subject
-from brdfdb.audit.polarisation import PolarisationFinding, coherency_eigenvalues
+from brdfdb.audit.polarisation import PolarisationFinding
+from brdfdb.measurements.mueller import coherency_eigenvalues
 from brdfdb.store.publication import publish_layout
 from brdfdb.tables.table import Table
 from tests.tables.test_polarisation import directions, polarised, rough

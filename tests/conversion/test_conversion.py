@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from brdfdb import models
 from brdfdb.conversion.convert import compare, convert
-from brdfdb.conversion.document import Conversion, percent
+from brdfdb.conversion.document import Conversion
 from brdfdb.conversion.figure import figure_of
-from brdfdb.errors import ParameterError
+from brdfdb.errors import ParameterError, percent
 from brdfdb.figure import Panel
 from brdfdb.fitting.variables import index_of, spread
 from brdfdb.fresnel import unpolarised

@@ -26,6 +26,7 @@ from tests.mitsuba.surfaces import (
     vectors,
 )
 from tests.store.a_store import lambert
+from tests.tables import glinting
 from tests.tables.made_up import WAVELENGTHS, made_up
 from tests.tables.test_mixture import NM, PAINTED
 from tests.tables.test_wavelengths import TABLES as STRAIGHT
@@ -184,3 +185,19 @@ def test_two_tables_in_a_scene_have_derivatives(monkeypatch: pytest.MonkeyPatch)
         gradient = np.array(drjit.grad(parameters[key]))
         assert np.all(np.isfinite(gradient))
         assert np.sum(gradient) > 0.0  # a brighter table, a brighter picture
+
+
+def test_the_plugin_leaves_glints_out_and_says_so(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    mitsuba = variant("llvm_ad_spectral")
+    table = glinting.stored(tmp_path)
+    mitsuba.set_log_level(mitsuba.LogLevel.Warn)
+    surface = surface_of(mitsuba, monkeypatch, table)
+    out, err = capfd.readouterr()
+    assert "glinting: not in the values of the plugin: the glints of the table, up to 75.4 %" in out + err
+    wi, wr = (np.array([[np.sin(t), 0.0, np.cos(t)]], np.float32) for t in np.deg2rad([60.0, -60.5]))
+    place = interaction(mitsuba, wi)
+    place.wavelengths = [550.0] * 4
+    value, _ = surface.eval_pdf(smooth(mitsuba), place, vectors(mitsuba, wr))
+    assert np.array(value).ravel()[0] / wr[0, 2] == pytest.approx(glinting.GROUND, rel=1e-2)

@@ -9,8 +9,7 @@ from typing import Any
 
 import pytest
 
-from brdfdb.errors import StoreError
-from brdfdb.notebook import percent
+from brdfdb.errors import StoreError, percent
 from brdfdb.store.reader import Store
 from brdfdb.store.records import Summary, fields_of, record_of
 from brdfdb.store.summary_words import Audited, colours, energy, formula_error, last_audit
@@ -82,6 +81,14 @@ def test_a_pointer_of_an_older_program_is_read_and_a_wrong_one_is_not(root: Path
     wrong = older | {"formula_error": 0.1}
     with pytest.raises(StoreError, match=r"HEAD\.json has no valid 'formula_error'"):
         record_of(wrong, Summary, "white", "HEAD.json")
+
+
+def test_errors_at_the_samples_are_plain_numbers(tmp_path: Path) -> None:
+    finding = {"held_out_p95": 1.13, "worst": {"error": 0.0312}, "glints": [{}]}
+    entry = {"material": "a", "revision": "r1", "verdict": "x", **{key: {"text": "yes"} for key in ANSWERS}}
+    document = {"materials": [{**entry, "findings": {"glints": finding}}]}
+    (tmp_path / "audit.json").write_text(json.dumps(document), encoding="utf-8")
+    assert last_audit(tmp_path)["a", "r1"].samples == "held out (p95) 113 %, worst sample 3.1 %, 1 glint"
 
 
 def test_the_newer_of_two_audits_answers_for_the_materials_in_both(tmp_path: Path) -> None:
