@@ -23,7 +23,7 @@ import brdfdb_pipelines
 from brdfdb._numba import is_cached
 from brdfdb.audit import FINDINGS, AuditReport, MaterialAudit, audit, report
 from brdfdb.audit.record import differences, leaves
-from brdfdb.audit.report import NO_PAPER, FamilyAudit
+from brdfdb.audit.report import NO_PAPER, QUESTIONS, FamilyAudit
 from brdfdb.errors import BrdfdbError, ParameterError, StoreError, UnknownMaterialError
 from brdfdb.figure import Figure
 from brdfdb.materials import presets
@@ -370,7 +370,7 @@ def _print(root: Path, audit_report: AuditReport, report_path: Path) -> None:
     columns = audit_page.columns()
     terminal.print_table(
         f"Audit of {root}, the tables as interpolated",
-        ("material", *audit_page.QUESTIONS, *columns),
+        ("material", *audit_report.questions, *columns),
         [
             (
                 a.material,
@@ -410,7 +410,7 @@ def _print(root: Path, audit_report: AuditReport, report_path: Path) -> None:
     without = f"not judged {unjudged}, " if unjudged else ""
     remarks = audit_page.remarked(audit_report)
     remarked = f", {remarks} of them with a remark on the model" if remarks else ""
-    if any(a.material not in presets() for a in audits):
+    if any(a.questions == QUESTIONS and a.material not in presets() for a in audits):
         print(NO_PAPER)
     page_path = report_path.with_suffix(".html")
     print(

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from brdfdb.audit import FINDINGS, AuditReport, MaterialAudit
 from brdfdb.audit.energy import Energy
 from brdfdb.audit.finding import LAST, LEVELS, RANKS, Cell, NotJudged, NumberTable, Word
-from brdfdb.audit.report import AS_PUBLISHED, CONSERVES_ENERGY, NO_PAPER, Answer
+from brdfdb.audit.report import NO_PAPER, OF_DATA, QUESTIONS, Answer
 from brdfdb.audit.validity import Validity
 from brdfdb.figure import Figure
 from brdfdb_pipelines import figure_svg, html_page
@@ -35,10 +35,15 @@ _MARKS: dict[Word, str] = {
     "accepted excess": "!",
     "violates": "✕",
 }
-_COUNTED: tuple[Word, ...] = ("conserves", "loses", "gains", "known published excess", "accepted excess", "violates")
-
-
-QUESTIONS = (AS_PUBLISHED, CONSERVES_ENERGY)  # headings of the first two columns of terminal and page
+_COUNTED: tuple[Word, ...] = (
+    "conserves",
+    "not judged",
+    "loses",
+    "gains",
+    "known published excess",
+    "accepted excess",
+    "violates",
+)
 
 
 class DrawnPlot(NamedTuple):
@@ -80,7 +85,10 @@ def render(report: AuditReport, plots: Mapping[str, list[DrawnPlot]] | None = No
     environment = html_page.environment()
     environment.filters |= {"level": LEVELS.__getitem__, "mark": _MARKS.__getitem__, "sentence": _sentence}
     environment.globals |= {"anchor": anchor, "key_of": key_of, "rank": RANKS.__getitem__}
-    energy = {a.material: a.findings[Energy.key].verdict for a in report.materials}
+    energy: dict[str, Word] = {a.material: a.findings[Energy.key].verdict for a in report.materials}
+    for a in report.materials:  # the albedo of data may be above 1 within their error
+        if energy[a.material] == "conserves" and a.conserves_energy.word == "not judged":
+            energy[a.material] = "not judged"
     tables = {
         a.material: [table for finding in a.findings.values() for table in finding.tables() if table.rows]
         for a in report.materials
@@ -98,6 +106,7 @@ def render(report: AuditReport, plots: Mapping[str, list[DrawnPlot]] | None = No
         plots=plots,
         rows=rows,
         questions=QUESTIONS,
+        of_data=OF_DATA,
         no_paper=NO_PAPER,
         remarked=remarked(report),
         columns=columns(),
@@ -123,7 +132,7 @@ def columns() -> tuple[str, ...]:
 
 
 def answers_of(a: MaterialAudit) -> list[Answer]:
-    """Return the answers to `QUESTIONS` on a material."""
+    """Return the answers to the two questions on a material."""
     return [a.as_published, a.conserves_energy]
 
 

@@ -151,6 +151,7 @@ def _of_table(table: Table) -> _Subject:
     source = source_of_table(table)
     measured = table.metadata.measured
     subject = _Subject(source, table.wavelength_nm)
+    terminal.say_without_glints("the chart", source)
     if measured is not None:
         print(
             f"{table.name}: measured data, which the store does not contain. Errors are relative to the stored table; "

@@ -133,6 +133,7 @@ def _run(
         bar.add_task("tracing rays", total=None)
         view = gather(scene, width)
     materials = reflectors(scene)
+    terminal.say_without_glints("the picture", *scene.materials.values())
     with terminal.progress(counted=False) as bar:
         task = bar.add_task("tabulating, timing", total=2 * len(materials))
         offered, prices = {}, {}

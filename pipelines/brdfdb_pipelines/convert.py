@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from brdfdb.conversion.convert import STEPS, convert
-from brdfdb.conversion.document import Conversion, percent
+from brdfdb.conversion.document import Conversion
 from brdfdb.conversion.figure import figure_of
 from brdfdb.conversion.nodes import Weigh
-from brdfdb.errors import ParameterError
+from brdfdb.errors import ParameterError, percent
 from brdfdb.figure import Figure, Panel
 from brdfdb.geometry import radians
 from brdfdb.materials import written_name
@@ -102,6 +102,7 @@ def run(
     The store need not exist, and the recipe needs only to define materials. The picture shows both models.
     """
     named = named_source(name, store, recipe_path)
+    terminal.say_without_glints("the conversion", named.source)
     wavelength_nm = named.wavelength_nm
     if request.wavelength_nm is not None:
         wavelength_nm = np.array(request.wavelength_nm, dtype=np.float64)

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import brdfdb
 from brdfdb.errors import CannotHoldError, ParameterError, WriteError, counted
-from brdfdb.formats import EXPORTERS
+from brdfdb.formats import EXPORTERS, written_by
 from brdfdb.formats._record import extrapolated_remark
 from brdfdb.formats._written import Written
 from brdfdb.place import path_of
@@ -96,7 +96,7 @@ def _write(
     files: list[Written] = []
     try:
         for path, kind in paths or [(directory / f"{name}{exporter.suffix}", {})]:
-            written = exporter.write(table, path, verdict=verdict, **{**options, **kind})
+            written = written_by(exporter, table, path, verdict=verdict, **{**options, **kind})
             files.append(replace(written, remarks=(*written.remarks, *extrapolated_remark(table))))
     except (CannotHoldError, ParameterError) as error:  # also for an option that the table does not allow
         return _Export(name, files, str(error) if name in str(error) else f"{name}: {error}")
@@ -108,7 +108,9 @@ def _verdicts(root: Path, audit: Path | None, revisions: Mapping[str, str]) -> d
     try:
         materials = audited_materials(root) if audit is None else json.loads(audit.read_bytes())["materials"]
         ours = [entry for entry in materials if is_of_store(root, entry)]
-        given = {(entry["material"], entry["revision"]): entry["verdict"] for entry in ours}
+        given = {
+            (entry["material"], entry["revision"]): entry.get("verdict_in_words") or entry["verdict"] for entry in ours
+        }
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         reason = error.strerror if isinstance(error, OSError) else "it is not a report of `brdfdb audit`"
         raise ParameterError("audit", f"{audit} cannot be read: {reason}", str(audit)) from None
@@ -130,11 +132,14 @@ def _report(exports: list[_Export], directory: Path, file_format: str) -> bool:
     if statements := [(statement, name) for statement, name in known if statement is not None]:
         whole, file = max(statements, key=lambda item: item[0].p98)
         rows = whole.places
-        light = max(rows.alongside)
-        horizon = max(rows.one_grazing + rows.both_grazing)
+        of_places = {"near the light": rows.alongside, "next to the horizon": rows.one_grazing + rows.both_grazing}
+        shown = [  # the error is 0 where there are no data
+            f"{place} {_share(max(errors)) if any(errors) or whole.against == 'the model' else 'there are no data'}"
+            for place, errors in of_places.items()
+        ]
         print(
             f"error relative to {whole.against}, with that of the table: 98 % of the values within {_share(whole.p98)} "
-            f"({file}), near the light {_share(light)}, next to the horizon {_share(horizon)}"
+            f"({file}), {', '.join(shown)}"
         )
     beyond = [files for _, files in written if not files.within]
     for files in beyond:

@@ -16,6 +16,7 @@ from brdfdb.fitting import published
 from brdfdb.fitting.document import Estimate, Fits
 from brdfdb.fitting.figure import figure_of
 from brdfdb.fitting.fit import INTERRUPTED, fits
+from brdfdb.fitting.nuisance import kinds_of
 from brdfdb.fitting.published import PublishedFits
 from brdfdb.fitting.residuals import Kind
 from brdfdb.fitting.surface import fitted_by_default
@@ -52,9 +53,10 @@ class FitSettings:
 
     models: Sequence[str] | None = None
     reading: Mapping[str, Any] = field(default_factory=dict)
-    residual: Kind = "log"
+    residual: Kind = "noise"
     channel: str | None = None
     refractive_index: str | None = None
+    nuisance: Sequence[str] = ()
     receiver_deg: float | None = None
     source_deg: float | None = None
 
@@ -62,8 +64,9 @@ class FitSettings:
 def run(data: Sequence[Path], settings: FitSettings, outputs: FitOutputs) -> Fits:
     """Fit models to the samples of a file, or of several files of one surface, and print the result.
 
-    The notes of the reader, and what looks wrong with the samples, are printed before the search. Ctrl-C ends the
-    search: finished models are ranked and written, and `Fits.interrupted` is true.
+    The notes of the reader, and what looks wrong with the samples, are printed before the search, and what the samples
+    cannot tell below the ranking. Ctrl-C ends the search: finished models are ranked and written, and
+    `Fits.interrupted` is true.
 
     Raises
     ------
@@ -74,6 +77,7 @@ def run(data: Sequence[Path], settings: FitSettings, outputs: FitOutputs) -> Fit
     BrdfdbError
         If a recipe is asked for and no fit is a single model of the registry.
     """
+    kinds_of(settings.nuisance)  # refused before a file is read
     table = MeasuredTable(samples=[str(file) for file in data], **settings.reading)
     samples = joined(
         [_of_channel(formats.samples(file, table.format, **table.keywords), settings.channel) for file in data]
@@ -95,6 +99,7 @@ def run(data: Sequence[Path], settings: FitSettings, outputs: FitOutputs) -> Fit
             settings.models,
             residual=settings.residual,
             refractive_index=settings.refractive_index,
+            nuisance=kinds_of(settings.nuisance),
             tick=tick,
             keep_finished=True,
         )
@@ -102,7 +107,7 @@ def run(data: Sequence[Path], settings: FitSettings, outputs: FitOutputs) -> Fit
         _write(outputs.json, document.model_dump_json(indent=1) + "\n")
     if outputs.page is not None:
         _write(outputs.page, _page(document, figure_of(document, fitted[0])))
-    print(terminal.plain("\n".join(lines(document))))
+    print(terminal.plain("\n".join([*lines(document), *stated.untold])))
     if outputs.recipe is not None:
         _write(outputs.recipe, recipe_of(document))
     return document
@@ -174,14 +179,18 @@ def recipe_of(document: Fits) -> str:
 def lines(document: Fits) -> list[str]:
     """Return the lines that the command prints: the ranking, then the best fit."""
     left = document.left_out
-    text = [f"{document.name}: {document.samples} values at {document.incidences} incidences, {document.residual}"]
+    values = f"{counted(document.samples, 'value')} at {counted(document.incidences, 'incidence')}"
+    text = [f"{document.name}: {values}, residuals: {document.residual}"]
     reasons = [
         f"{count} {reason}"
         for count, reason in (
             (left.below_horizon, "below the horizon"),
             (left.holes, "holes"),
             (left.at_horizon, "at the horizon"),
-            (left.unusable, "not positive" if document.residual in ("log", "relative") else "without uncertainty"),
+            (
+                left.unusable,
+                "not positive" if document.residual in ("noise", "log", "relative") else "without uncertainty",
+            ),
         )
         if count
     ]
@@ -217,7 +226,9 @@ def lines(document: Fits) -> list[str]:
         missing = list(document.skipped.values()).count(INTERRUPTED)
         text.append(f"  interrupted: {counted(missing, 'model')} not fitted, and intervals come from the covariance")
     best = document.fits[0]
-    text += ["", f"best: {best.model}", *_numbers(best.estimates)]
+    text += ["", f"best: {best.model}", *_numbers(best.estimates), *_numbers(best.nuisance)]
+    if best.noise_floor is not None:
+        text.append(f"  the noise has a floor: below {best.noise_floor:.3g} /sr it is no longer in proportion to f_r")
     text += [f"  note  {sentence}" for sentence in best.remarks]
     if document.outlier_count:
         farthest = document.outliers[0]
@@ -249,9 +260,11 @@ def _numbers(estimates: Sequence[Estimate]) -> list[str]:
     text = []
     for one in estimates[:_SHOWN]:
         name = one.name if one.channel is None else f"{one.name} ({one.channel})"
-        error = "" if one.standard_error is None else f" ± {one.standard_error:.2g}"
+        several = one.method == "several fits"  # the standard error is that of one of them
+        error = "" if several or one.standard_error is None else f" ± {one.standard_error:.2g}"
         unit = "" if one.unit == "1" else f" {one.unit}"
-        text.append(f"  {name:<34}{one.value:.5g}{error}{unit}  95 %: {one.low:.5g} to {one.high:.5g} ({one.method})")
+        method = f"{one.method}, as the notes say" if several else one.method
+        text.append(f"  {name:<34}{one.value:.5g}{error}{unit}  95 %: {one.low:.5g} to {one.high:.5g} ({method})")
     if len(estimates) > _SHOWN:
         text.append(f"  and {len(estimates) - _SHOWN} more; --json has them")
     return text

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json as _json
 import math
+import re
 import threading
 import time
 from collections.abc import Sequence
@@ -15,7 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from brdfdb import formats
-from brdfdb.errors import BrdfdbError, MissingExtraError, ParameterError, StoreError, counted, import_extra
+from brdfdb.errors import BrdfdbError, MissingExtraError, ParameterError, StoreError, counted, import_extra, percent
 from brdfdb.formats.netcdf import write_samples
 from brdfdb.materials import presets
 from brdfdb.materials.recipe_text import toml_of
@@ -43,6 +44,8 @@ PATIENCE_S = 2.0  # time [s] after which the progress bar appears
 TOLERANCE = 0.05  # default tolerance of tables
 NOT_JUDGED = "not judged"
 _LISTED = 12  # materials that a sentence names
+_DOUBT = re.compile(r"(?P<word>[A-Z][\w ]*\?)|(?P<differs>At \d+ directions? .* differs)")  # starts of sentences
+_UNTOLD = re.compile(r"(whether [^;()]*) \([^()]*--")  # what an option decides
 
 
 @dataclass(frozen=True)
@@ -109,17 +112,26 @@ class Imported:
 class ImportedTable:
     """Figures of one imported table; a row of the summary.
 
-    `error_p95` [1] is the relative error of the table against the data that a tolerance bounds. `measured` [1] is the
-    share of all pairs of directions that were measured. The asymmetry [1] is abs(f - f') / (abs(f) + abs(f')) of the
-    interpolated f_r, with light and viewer exchanged in f'; None: unknown. `uncertainty` [1] holds for 99 % of the
-    values; the table is `asymmetric` if that does not explain its asymmetry. `albedo` is the largest directional
-    albedo; None: not finite. Its error includes that at samples that were held out. `verdict` is that of the audit;
-    `energy` is "not judged" where the error of the albedo does not tell whether it is above 1.
+    `error_p99` [1] is the relative error of the table against the interpolated data, as lists show it; the table
+    `keeps_tolerance` if that of 95 % of the values does. Three numbers tell whether the samples are kept:
+    `held_out_p95` [1], the error of the interpolation at samples that it did not get; `worst_sample` [1], the largest
+    difference of the table from a sample at its own direction; `incidence_energy` [1], the largest relative change of
+    the energy of an incidence, summed over its samples. None: unknown. `measured` [1] is the share of all pairs of
+    directions that were measured. The asymmetry [1] is abs(f - f') / (abs(f) + abs(f')) of the interpolated f_r, with
+    light and viewer exchanged in f'; None: unknown. `uncertainty` [1] holds for 99 % of the values; the table is
+    `asymmetric` if that does not explain its asymmetry. `albedo` is the largest directional albedo; None: not finite.
+    Its error includes that at samples that were held out. `verdict` is that of the audit, also in words; `energy` is
+    "not judged" where the error of the albedo does not tell whether it is above 1.
     """
 
     material: str
     revision: str
-    error_p95: float
+    error_p99: float
+    keeps_tolerance: bool
+    held_out_p95: float | None
+    worst_sample: float | None
+    incidence_energy: float | None
+    glints: int
     measured: float
     asymmetry_median: float | None
     asymmetry_p99: float | None
@@ -130,6 +142,7 @@ class ImportedTable:
     at_theta_i_deg: float
     above_1: bool
     verdict: str
+    verdict_in_words: str
     energy: str
 
 
@@ -139,12 +152,14 @@ def run(
     *,
     join: bool = False,
     json: bool = False,
+    full: bool = False,
     out: Path | None = None,
     tables: Tables | None = None,
 ) -> Imported:
     """Read files, print a statement on each, and build and audit tables of them if that is asked for.
 
-    A file that is refused is one sentence on stderr; the others are imported. `keys` are those of `MeasuredTable`,
+    A folder stands for the files in it. Of several materials each has a line, with `full` the whole statement. A file
+    that is refused is one sentence on stderr; the others are imported. `keys` are those of `MeasuredTable`,
     without `samples`. All materials of an archive are imported unless a `member` is named. The samples of a single file
     are written to `out`, as netCDF. With `join`, all files are one set of samples.
 
@@ -160,7 +175,7 @@ def run(
     if tables is not None and tables.store is not None:
         check_audit()
     result = Imported()
-    targets = _targets(files, keys, join, result)
+    targets = _targets(files_of(files), keys, join, result)
     count = len(targets) + len(result.refused)
     if out is not None and count != 1:
         raise ParameterError("--out", f"writes the samples of a single file, and there are {count}", count, 1)
@@ -177,11 +192,15 @@ def run(
             _refuse(result, target, error)
             continue
         result.statements.append((target, read.statement))
-        if not json:
-            stated = read.statement
+        stated = read.statement
+        if not json and count > 1 and not full:
+            print(terminal.plain(f"{target.label}: {in_a_line(stated)}"), flush=True)
+        elif not json:
             lines = [f"{target.label}: {stated.name}", *(f"  {sentence}" for sentence in stated.sentences)]
             lines += [f"  written: {out}"] if out is not None else []
             print(terminal.plain("\n".join(lines)), flush=True)
+    if not json and count > 1 and not full and result.statements:
+        print("Statement on a file: `brdfdb import FILE`; on all files: --full")
     if count > 1 and (lost := count - len(result.statements)):
         terminal.say(f"{lost} of {count} materials {'was' if lost == 1 else 'were'} not imported")
     audited: list[ImportedTable] = []
@@ -223,6 +242,41 @@ def _targets(files: Sequence[Path], keys: dict[str, Any], join: bool, result: Im
             continue
         targets += [replace(one, keys={**keys, "member": member}) for member in members] or [one]
     return targets
+
+
+def files_of(paths: Sequence[Path]) -> list[Path]:
+    """Return files, with those in a folder, in the order of their names, instead of the folder; a zarr group is a file.
+
+    Hidden files, and folders in a folder, are left out. ParameterError if a folder has no file.
+    """
+    files: list[Path] = []
+    for path in paths:
+        if not path.is_dir() or (path / "zarr.json").exists():
+            files.append(path)
+            continue
+        parts = [part for part in sorted(path.iterdir()) if not part.name.startswith(".")]
+        inside = [part for part in parts if not part.is_dir() or (part / "zarr.json").exists()]
+        if not inside:
+            raise ParameterError("FILE", f"the folder {path} has no files", str(path))
+        files += inside
+    return files
+
+
+def in_a_line(stated: SampleStatement) -> str:
+    """Return the name, samples, lights and wavelengths of a statement, and the first words of each doubt."""
+    low, high = stated.wavelength_nm or (0.0, 0.0)
+    of_light = f"{low:.9g} to {high:.9g} nm" if high > low else f"{low:.9g} nm" if high else ", ".join(stated.channels)
+    of_light = "no wavelength" if of_light == "grey" else of_light
+    doubts = []
+    for sentence in (*stated.hints, *stated.notes):
+        if match := _DOUBT.match(sentence):
+            doubts.append("contradictions" if match["differs"] else match["word"])
+    doubts += [sentence.partition(":")[0] for sentence in stated.hints if not _DOUBT.match(sentence)]
+    if wrong := [abs(claim.relative) for claim in stated.wrong_claims]:
+        doubts.append(f"claims of the header off by up to {percent(max(wrong))}")
+    doubts += [f"cannot tell {match}" for match in _UNTOLD.findall(" ".join(stated.untold))]
+    counts = f"{counted(stated.samples, 'sample')}, {counted(stated.lights, 'light')}, {of_light}"
+    return f"{stated.name}; {counts}; {'; '.join(dict.fromkeys(doubts)) or 'no doubt'}"
 
 
 def _refuse(result: Imported, target: ImportTarget, error: BrdfdbError | OSError) -> None:
@@ -270,9 +324,10 @@ def _named(targets: Sequence[ImportTarget], tables: Tables, count: int, result: 
     for target in targets:
         stems = [file.stem for file in target.files]
         of_files = common_name(stems) or ("" if len(stems) > 1 else stems[0])
-        if not (tables.name or of_files):
+        if tables.name is None and not of_files:
             raise ParameterError("--name", f"{target.label} have no word in common; give a name", None)
-        name = tables.name or slug(target.keys.get("member", "").removesuffix(".h5") or of_files)
+        of_files = target.keys.get("member", "").removesuffix(".h5") or of_files
+        name = slug(of_files) if tables.name is None else tables.name
         if not NAME.fullmatch(name):
             raise ParameterError(
                 "--name", f"{name!r} is not made of lower-case letters, digits and single hyphens, 128 at most", name
@@ -358,16 +413,23 @@ def figures_of(root: Path, report: AuditReport) -> list[ImportedTable]:
     store = Store(root)
     tables = []
     for audited in report.materials:
-        measured = store.metadata(audited.material).measured
+        metadata = store.metadata(audited.material)
+        measured = metadata.measured
         error = store[audited.material].error
         assert measured is not None
         seen = measured.reciprocity.asymmetry
+        samples = measured.at_samples
         energy = audited.of(Energy).table
         tables.append(
             ImportedTable(
                 audited.material,
                 audited.revision,
-                math.nan if error is None else error.overall.p95,
+                math.nan if error is None else error.overall.p99,
+                error is not None and error.overall.p95 <= metadata.whole_request["tolerance"],
+                None if measured.held_out is None else measured.held_out.p95,
+                None if samples is None else samples.worst.error,
+                None if samples is None or samples.worst_energy is None else samples.worst_energy.error,
+                0 if measured.glints is None else len(measured.glints.lit),
                 1.0 if measured.extrapolated is None else 1.0 - measured.extrapolated,
                 None if seen is None else seen.median,
                 None if seen is None else seen.p99,
@@ -378,6 +440,7 @@ def figures_of(root: Path, report: AuditReport) -> list[ImportedTable]:
                 energy.max_at_theta_i_deg,
                 energy.exceeds_1_from_theta_i_deg is not None,
                 audited.verdict,
+                audited.verdict_in_words,
                 audited.conserves_energy.word,
             )
         )
@@ -407,8 +470,17 @@ def show_tables(
 ) -> None:
     """Print a row for each table, the problems of tables, and the summary; `origin` is measured or simulated."""
     print()
-    shares = ("error_p95", "measured", "asymmetry_median", "asymmetry_p99", "uncertainty")
-    numbers = ("table error", origin, "asymmetry, median", "asymmetry, 99 %", "uncertainty", "albedo up to")
+    shares = {
+        "error_p99": "table error (p99)",
+        "held_out_p95": "held out (p95)",
+        "worst_sample": "worst sample",
+        "incidence_energy": "energy of incidences",
+        "measured": origin,
+        "asymmetry_median": "asymmetry (median)",
+        "asymmetry_p99": "asymmetry (p99)",
+        "uncertainty": "uncertainty (p99)",
+    }
+    numbers = (*shares.values(), "albedo up to")
     terminal.print_table(
         f"{origin.capitalize()} tables in {report.store}",
         ("material", *numbers, "audit"),
@@ -417,17 +489,21 @@ def show_tables(
                 table.material,
                 *(_percent(getattr(table, field)) for field in shares),
                 _albedo(table),
-                table.verdict,
+                table.verdict_in_words,
             )
             for table in tables
         ],
         numbers=numbers,
+        less=("asymmetry (p99)", "uncertainty (p99)", "asymmetry (median)", origin, "held out (p95)"),
     )
-    print(f"table error: 95 % of the values differ by at most this from the interpolated data, where f_r was {origin}")
+    print(f"table error (p99): 99 % of the values are this near to the interpolated data, where f_r was {origin}")
+    print("held out (p95): 95 % of the samples that were left out are this near to f_r interpolated between the others")
+    print("worst sample: largest difference of the table, with its glints, from a sample at its own direction")
+    print("energy of incidences: largest change of the sum of f_r cos theta_r over the samples of an incidence")
     print(f"{origin}: share of all pairs of directions; elsewhere f_r is extrapolated, and its error is unknown")
     print("asymmetry: |f - f'| / (|f| + |f'|) of the interpolated f_r, for directions up to 80 degrees; f' is f with")
     print("light and viewer exchanged; the faintest pairs are left out")
-    print("uncertainty: 99 % of the samples that were held out are this near to the interpolated f_r")
+    print("uncertainty (p99): 99 % of the samples that were held out are this near to the interpolated f_r")
     print("albedo: largest value of the table, ± its uncertainty; energy is not judged if that reaches above 1")
     for audited in report.materials:
         for problem in audited.problems():
@@ -436,6 +512,8 @@ def show_tables(
         print(sentence)
     verdicts = dict.fromkeys(["passes", *sorted(table.verdict for table in tables)])
     counts = ", ".join(f"{word} {sum(table.verdict == word for table in tables)}" for word in verdicts)
+    if len(tables) == 1:
+        counts = tables[0].verdict_in_words
     unsure = [table.material for table in tables if table.energy == NOT_JUDGED]
     energy = f"; conservation of energy not judged: {_counted(unsure)}" if unsure else ""
     print(f"{counted(len(tables), 'table')} audited: {counts}{energy}")
@@ -443,8 +521,11 @@ def show_tables(
 
 def sentences(tables: Sequence[ImportedTable], tolerance: float) -> list[str]:
     """Return the summary of errors, asymmetries and albedos in sentences."""
-    far = [f"{table.material}: {_percent(table.error_p95)}" for table in tables if not table.error_p95 <= tolerance]
-    missed = f"table error above the tolerance of {_percent(tolerance)}, even on the finest grid: {_counted(far)}"
+    far = [table.material for table in tables if not table.keeps_tolerance]
+    share = f"the tolerance of {_percent(tolerance)} for 95 % of the values"
+    missed = f"{'all tables keep' if len(tables) > 1 else 'the table keeps'} to {share}"
+    if far:
+        missed = f"beyond {share}, even on the finest grid: {_counted(far)}"
     medians = [table.asymmetry_median for table in tables if table.asymmetry_median is not None]
     asymmetry = "reciprocity asymmetry: cannot be computed from these data"
     if medians:

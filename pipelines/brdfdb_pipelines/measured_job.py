@@ -4,20 +4,22 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, BeforeValidator, Field, ValidationError
+from pydantic import AfterValidator, BaseModel, BeforeValidator, Field, ValidationError
 
 from brdfdb import formats
 from brdfdb.errors import BrdfdbError, FileFormatError, ParameterError, StoreError, sentence_of
 from brdfdb.formats._input import check_file
 from brdfdb.materials.provenance import Text
 from brdfdb.measurements import MeasuredSource, Samples, joined
+from brdfdb.measurements.conventions import ANGLE_WORDS, CONVENTION_KEYS, Convention
 from brdfdb.measurements.measured_source import LIGHTS_DEG, MARGIN
+from brdfdb.measurements.statement import statement
 from brdfdb.place import path_of
 from brdfdb.store.lock import Lock, writing
 from brdfdb.store.paths import material_path, revision_path
@@ -27,16 +29,37 @@ from brdfdb.store.revisions import Standing, standing
 from brdfdb.tables.albedo import directional_albedo, largest_albedo
 from brdfdb.tables.layout import TABLE_VERSION, Layout
 from brdfdb.tables.measured_layout import MeasuredLayout, tabulated
+from brdfdb.tables.mueller_field import check_polarised, field_of
 from brdfdb.tables.table import Table
+from brdfdb.tables.tabulation import glints_of
 from brdfdb_pipelines.recipe_grids import STRICT, RecipeError
 
 if TYPE_CHECKING:
     from brdfdb.formats._readings import FileTable
 
-MEASURED_VERSION = 9  # of the way from a file to the values of its table
-# Keys of a request that are left out where they are empty.
-_ADDED = {"columns", "quantity", "angles", "azimuth", "wavelength_nm", "side"}
+MEASURED_VERSION = 10  # of the way from a file to the values of its table
+# Keys of a request that are left out where they have their default.
+_ADDED = {
+    "columns",
+    "where",
+    "missing",
+    "quantity",
+    "angles",
+    "azimuth",
+    "wavelength_unit",
+    "coverage_factor",
+    "wavelength_nm",
+    "side",
+    "mueller_frame",
+    "polarised",
+}
+_MOST_MARGIN = 0.9  # of a light whose table is above 1 by far, such as one with glints between its lights
 _MARGINS = 3  # tables of data that are made to conserve, each a little darker, until none is above 1
+
+
+def _checked_angles(words: str) -> str:
+    """Return words on angles; ValueError if one is not known, or two exclude each other."""
+    return Convention(angles=words).angles
 
 
 Texts = Annotated[
@@ -59,20 +82,51 @@ class MeasuredTable(BaseModel):
     columns: dict[str, Texts] = Field(
         default={}, description="headers of the columns of a text, by role, such as theta_i; by default by their names"
     )
-    quantity: Literal["", "f_r", "reflectance_factor", "f_r_cos", "f_r_cos_i"] = Field(
-        default="", description="quantity of the values of a text; by default by names and titles"
+    where: dict[str, Texts] = Field(
+        default={}, description="values of columns of a text, by header: only rows that have one of them are read"
     )
-    angles: Literal["", "deg", "rad"] = Field(
-        default="", description="unit of the angles of a text; by default by names"
+    missing: float | None = Field(
+        default=None, allow_inf_nan=False, description="number of the file that marks values that were not measured"
     )
-    azimuth: Literal["", "light", "forward"] = Field(
+    quantity: Literal[
+        "",
+        "f_r",
+        "reflectance_factor",
+        "percent",
+        "reflectance_factor_percent",
+        "log10",
+        "ln",
+        "decibel",
+        "f_r_cos",
+        "f_r_cos_i",
+    ] = Field(
+        default="", description="what the values of the file are; by default what the format, names and titles say"
+    )
+    angles: Annotated[str, AfterValidator(_checked_angles)] = Field(
         default="",
-        description="direction from which azimuths count: light, the default, or forward, into which it travels",
+        description=f"what the angles of the file are: {', '.join(ANGLE_WORDS)}, or several with commas",
+    )
+    azimuth: Literal["", "light", "forward", "mirror", "absolute"] = Field(
+        default="",
+        description="from where azimuths of viewers count: light, mirror, absolute; or forward, where those of lights "
+        "are those into which it travels; by default as the format says",
+    )
+    wavelength_unit: Literal["", "nm", "um", "m"] = Field(
+        default="", description="unit of the wavelengths of the file; by default that of the format"
+    )
+    coverage_factor: float | None = Field(
+        default=None, gt=0.0, allow_inf_nan=False, description="factor k of expanded uncertainties"
     )
     wavelength_nm: float | None = Field(
         default=None, ge=10.0, le=1e6, description="wavelength [nm] of a file of one channel that states none"
     )
     side: Literal["", "back", "front"] = Field(default="", description="side of a Klems matrix; by default back")
+    mueller_frame: Literal["", "s", "p"] = Field(
+        default="",
+        description="polarisation that Q > 0 means in the Mueller matrices of a file: s, the default, or p, with the "
+        "signs of Q and V that ellipsometers write",
+    )
+    polarised: bool = Field(default=False, description="tabulate the Mueller matrices of the file, too")
     title: Text | None = Field(default=None, description="a line for people; by default the name in the file")
     source: Text | None = Field(default=None, description="who measured, where it is published; by default the file's")
     reciprocal: bool = Field(default=False, description="tabulate the nearest values that are reciprocal")
@@ -81,9 +135,10 @@ class MeasuredTable(BaseModel):
     @property
     def keywords(self) -> dict[str, Any]:
         """Return the keywords of `brdfdb.formats.read`."""
-        names = ("member", "quantity", "angles", "azimuth", "wavelength_nm", "side")
+        names = ("member", "where", *CONVENTION_KEYS, "wavelength_nm", "side", "mueller_frame")
         others = {name: getattr(self, name) for name in names}
-        return {**self.columns, **{name: value for name, value in others.items() if value}}
+        given = {name: value for name, value in others.items() if value}
+        return {**self.columns, **given, **({} if self.missing is None else {"missing": self.missing})}
 
     def read(self, paths: Sequence[Path]) -> FileTable | Samples:
         """Return f_r of the one file, or the samples of several that are joined; errors as by `joined`."""
@@ -91,7 +146,10 @@ class MeasuredTable(BaseModel):
 
     def joined(self, paths: Sequence[Path]) -> Samples:
         """Return the joined samples of files; FileFormatError, ParameterError or OSError for a bad file."""
-        return joined([formats.samples(path, self.format, **self.keywords) for path in paths])
+        samples = joined([formats.samples(path, self.format, **self.keywords) for path in paths])
+        if self.polarised:
+            check_polarised(samples)
+        return samples
 
 
 @dataclass(frozen=True)
@@ -114,14 +172,16 @@ class MeasuredJob:
     @property
     def request(self) -> dict[str, Any]:
         """Everything that decides the table, ready for JSON: the same request makes the same table."""
-        table = self.table.model_dump(mode="json", exclude={"samples"})
+        table = self.table.model_dump(mode="json", exclude={"samples", *_ADDED})
+        added = self.table.model_dump(mode="json", include=_ADDED, exclude_defaults=True)
         return {
             "table_version": TABLE_VERSION,
             "measured_version": MEASURED_VERSION,
             "measured_name": self.name,
             "file_sha256": self.sha256,
             "tolerance": self.tolerance,
-            **{key: value for key, value in table.items() if value or key not in _ADDED},
+            **table,
+            **added,
         }
 
     def source(self) -> MeasuredSource:
@@ -131,6 +191,7 @@ class MeasuredJob:
         file = f"the file {self.files}" if len(self.paths) == 1 else f"the files {self.files}"
         if isinstance(read, Samples):
             provenance = self.table.source or read.provenance or file
+            read = replace(read, record={**read.record, "doubts": statement(read).hints})
             source = MeasuredSource.of_samples(read, name=self.name, title=title, provenance=provenance)
         else:
             source = MeasuredSource.of_function(
@@ -212,7 +273,13 @@ def build_measured(root: str, job: MeasuredJob) -> MeasuredResult:
 
     def table() -> MeasuredLayout:
         laws = {"reciprocal": job.table.reciprocal, "conserving": job.table.conserving}
-        return tabulated_lawfully(job.source(), job.tolerance, **laws)
+        polarised = job.table.joined(job.paths) if job.table.polarised else None
+        made = tabulated_lawfully(job.source(), job.tolerance, **laws)
+        if polarised is None:
+            return made
+        source = made.layout.source
+        field = field_of(polarised, chiral=isinstance(source, MeasuredSource) and source.measured.chiral)
+        return made._replace(layout=replace(made.layout, field=field))
 
     return build_of_data(Path(root), job.name, job.request, table, f"{job.files}: ")
 
@@ -275,7 +342,7 @@ def tabulated_lawfully(
     for _ in range(_MARGINS):
         made = source.made("conserving", margin)
         table = tabulated(made, wavelength_nm, tolerance)
-        read = Table.of(*table)
+        read = replace(Table.of(*table), glints=glints_of(table.layout))
         largest = largest_albedo(read, made)
         if not largest.above_1:
             break
@@ -285,5 +352,5 @@ def tabulated_lawfully(
         order = np.argsort(theta_i_deg, kind="stable")
         padded = np.pad(np.maximum(excess, 0.0)[order], 1)
         highest = np.lib.stride_tricks.sliding_window_view(padded, 3).max(axis=1)  # lights between two have the larger
-        margin += 1.1 * np.interp(LIGHTS_DEG, theta_i_deg[order], highest)
+        margin = np.minimum(margin + 1.1 * np.interp(LIGHTS_DEG, theta_i_deg[order], highest), _MOST_MARGIN)
     return table

@@ -194,7 +194,8 @@ class Recipe(BaseModel):
     )
     polarised: bool = Field(
         default=False,
-        description="true: tabulate Mueller matrices, too, to the tolerance; for models of polarised light",
+        description="true: tabulate Mueller matrices, too, to the tolerance; for models of polarised light. Measured "
+        "materials have a key of their own",
     )
     define: dict[str, dict[str, Any]] = Field(
         default={},
@@ -249,7 +250,10 @@ class Recipe(BaseModel):
         selected = self._selected(wavelengths)
         for kind, others in (("measured", self._measured), ("simulated", self._simulated)):
             if self.polarised and others:
-                raise RecipeError("polarised", f"{others[0].name} is {kind}, and its polarisation is unknown")
+                name = others[0].name
+                text = f"{name} is measured: give polarised = true in define.{name}"
+                text = f"{name} is simulated, and its polarisation is unknown" if kind == "simulated" else text
+                raise RecipeError("polarised", text)
             if self.hot_spot_tolerance is not None and others:
                 raise RecipeError("hot_spot_tolerance", f"is only for models, and {others[0].name} is {kind}")
         for named, family in selected:

@@ -16,9 +16,9 @@ from numpy.typing import ArrayLike
 from brdfdb.errors import FileFormatError, ParameterError, counted, import_extra
 from brdfdb.geometry import spherical_angles
 from brdfdb.measurements import MeasuredSource, Samples
-from brdfdb.measurements.interpolation import Base
+from brdfdb.measurements.instrument import Instrument
+from brdfdb.measurements.lobe_base import Base
 from brdfdb.measurements.record import SimulationRecord
-from brdfdb.measurements.samples import Instrument
 from brdfdb.microgeometry.directions import goniometer_directions
 from brdfdb.microgeometry.facets import Bounces
 from brdfdb.microgeometry.height_map import HeightMap

@@ -7,6 +7,7 @@ import platform
 import sys
 import unicodedata
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from rich.cells import cell_len
 from rich.console import Console
@@ -14,6 +15,9 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 
 from brdfdb.notebook import error_in_words
+
+if TYPE_CHECKING:
+    from brdfdb.materials import Source
 
 _LONGEST = 1000  # characters of a sentence: what a recipe gives may be a megabyte
 _FOLDED = 8  # width of a column of text below which a table is wider than the terminal instead
@@ -35,6 +39,14 @@ def say(sentence: str) -> None:
     if len(line) > _LONGEST:  # its middle is what the user gave
         line = f"{line[: _LONGEST // 2]} ... {line[-_LONGEST // 2 :]}"
     print(f"brdfdb: {line}", file=sys.stderr)
+
+
+def say_without_glints(where: str, *sources: Source) -> None:
+    """Print a line for each source with glints that an output leaves out; `where` names it, such as "the picture"."""
+    for source in {id(source): source for source in sources}.values():
+        glints = getattr(source, "glints", None)
+        if glints is not None:
+            say(f"{source.name}: {glints.left_out(where)}")
 
 
 def progress(counted: bool = True, text: str = "", transient: bool = False) -> Progress:

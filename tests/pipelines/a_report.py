@@ -9,6 +9,7 @@ import numpy as np
 
 from brdfdb.audit.energy import Energy
 from brdfdb.audit.finding import Finding, Verdict
+from brdfdb.audit.glints import GlintsFinding
 from brdfdb.audit.model_energy import EnergyVerdict, Furnace, ModelEnergy, UniformBound
 from brdfdb.audit.nodes import Nodes
 from brdfdb.audit.polarisation import PolarisationFinding
@@ -187,6 +188,9 @@ def others() -> tuple[Finding, ...]:
             verdict="passes",
         ),
         table_error(),
+        GlintsFinding(
+            glints=[], held_out_p95=None, p95=None, worst=None, energies=[], worst_energy=None, verdict="passes"
+        ),
         PolarisationFinding(
             lookups=5000,
             smallest_eigenvalue=-0.001,

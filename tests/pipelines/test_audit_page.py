@@ -10,7 +10,7 @@ import pytest
 
 from brdfdb.audit.energy import Energy, furnace_cell
 from brdfdb.audit.finding import LEVELS
-from brdfdb.audit.report import AuditReport
+from brdfdb.audit.report import Answer, AuditReport
 from brdfdb.audit.table_error import TableError
 from brdfdb.figure import number
 from brdfdb_pipelines import audit_page, figure_look
@@ -115,6 +115,15 @@ def test_one_material_violates_and_a_remark_on_a_model_that_passes_is_said() -> 
     assert " 1 passes with a remark on the model: it would create light" in words
     assert audit_page.remarked(report_of([good, bad], ["bad"])) == 1
     assert audit_page.remarked(report_of([bad], ["bad"])) == 0
+
+
+def test_an_albedo_that_may_be_above_1_is_not_counted_as_one_that_conserves_energy() -> None:
+    good = material("good", "conserves")
+    unclear = Answer(word="not judged", text="cannot be judged", reason="1 is within the error of the table")
+    found = report_of([good.model_copy(update={"conserves_energy": unclear})], [])
+    page = audit_page.render(found)
+    assert "<dt>conserves</dt><dd>0</dd>" in page
+    assert "<dt>not judged</dt><dd>1</dd>" in page
 
 
 def test_violations_come_first_then_known_excess_then_losses(html: str) -> None:

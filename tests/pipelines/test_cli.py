@@ -300,6 +300,7 @@ def test_lookup_as_json(
         "brdf": np.atleast_1d(table.lookup(*angles, wavelengths)).tolist(),
         "specular_reflectance": np.atleast_1d(table.specular_reflectance(angles[0], wavelengths)).tolist(),
         "extrapolated": False,
+        "glint": False,
     }
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import signal
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -88,6 +89,23 @@ def test_all_leaves_out_what_the_format_cannot_hold(store: Path, tmp_path: Path,
     assert "dark: a specular part is not in the file\n" in text
     assert text.endswith("strange: this format holds nothing strange; left out\n")
     assert sorted(path.name for path in out.iterdir()) == ["dark.list", "grey.list"]
+
+
+def test_places_without_data_are_named(
+    store: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Captured
+) -> None:
+    def of_data(table: Any, path: Path, **options: Any) -> Written:
+        written = write(table, path, **options)
+        assert written.error is not None
+        known = written.error.statement
+        assert known is not None
+        nowhere = known.places.model_copy(update={"one_grazing": [0.0] * 3, "both_grazing": [0.0] * 3})
+        statement = known.model_copy(update={"against": "the data", "places": nowhere})
+        return replace(written, error=replace(written.error, measure=lambda: statement))
+
+    monkeypatch.setattr(LIST, "write", of_data)
+    assert run("export", "list", "grey", "--store", store, "--out", tmp_path / "out") == 0
+    assert "near the light 20%, next to the horizon there are no data\n" in capsys.readouterr().out
 
 
 def test_a_material_that_is_named_is_refused_and_others_are_written(

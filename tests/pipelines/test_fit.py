@@ -68,7 +68,7 @@ KINDS = {"fit.json": "json", "new/fit.html": "page", "fit.toml": "recipe"}
 
 def test_the_ranking_is_printed(answer: Answer) -> None:
     first, note, heading, *others = answer.printed.splitlines()
-    assert first.startswith("tile: 108 values at 3 incidences, log")
+    assert first.startswith("tile: 108 values at 3 incidences, residuals: noise")
     assert note.startswith("  note  The light comes from one azimuth of the surface")
     assert heading.split() == ["model", "held", "out", "all", "numbers", "BIC", "albedo"]
     ranked = [
@@ -79,6 +79,7 @@ def test_the_ranking_is_printed(answer: Answer) -> None:
     held = [float(line[2]) for line in ranked if line]
     assert 0.02 < held[0] < 0.045 < held[1] < held[2]
     assert "best: ward" in others
+    assert others[-1].startswith("The samples cannot tell: ")
     numbers = {line.split()[0]: line for line in others if "95 %:" in line}
     assert numbers.keys() == {"alpha_x", "rho_d", "rho_s"}
     for name, line in numbers.items():
@@ -278,7 +279,7 @@ def test_files_without_a_usable_sample_are_refused(tmp_path: Path, capsys: Captu
     noise = tmp_path / "noise.csv"
     noise.write_bytes(np.random.default_rng(0).bytes(4096))
     for file, words in (
-        (dark, "dark has no value that the residual log can use"),
+        (dark, "dark has no value that the residual noise can use"),
         (holes, "no value"),
         (noise, "no format recognises it"),
         (tmp_path / "missing.csv", "No such file or directory"),
@@ -324,3 +325,41 @@ def test_published_fits_are_listed_and_become_a_recipe(tmp_path: Path, capsys: C
     assert "  note  the recipe has channel G " in capsys.readouterr().out
     assert run("fit", data, "--model", "ward") == 2
     assert "--model: " in capsys.readouterr().err
+
+
+def test_nuisance_numbers_are_proposed_fitted_and_printed(tmp_path: Path, capsys: Captured) -> None:
+    lines = np.array(rows())
+    lines[:, 3] *= 1.0 - 0.2 * np.linspace(0.0, 1.0, len(lines))
+    data, out, recipe = written(tmp_path / "lamp.csv", lines.tolist()), tmp_path / "fit.json", tmp_path / "fit.toml"
+    assert run("fit", data, "--model", "ward", "--json", out) == 0
+    assert "--nuisance drift fits it" in capsys.readouterr().out
+    (plain,) = json.loads(out.read_text(encoding="utf-8"))["fits"]
+    assert plain["proposed"] == ["drift"]
+    assert run("fit", data, "--model", "ward", "--nuisance", "drift", "--json", out, "--recipe", recipe) == 0
+    printed = capsys.readouterr().out
+    assert re.search(r"\n  drift +-0\.\d+ ± [\d.]+  95 %: -0\.\d+ to -0\.\d+ ", printed)
+    document = json.loads(out.read_text(encoding="utf-8"))
+    jsonschema.validate(document, json.loads(schema("fits")))
+    assert document["nuisance"] == ["drift"]
+    (fitted,) = document["fits"]
+    assert [one["name"] for one in fitted["nuisance"]] == ["drift", "curvature of the drift"]
+    (job,) = recipe_file.load(recipe).jobs()
+    for one in fitted["estimates"]:
+        interval = f"{one['name']} {one['low']:.4g} to {one['high']:.4g}"
+        assert interval in job.material.note
+        assert one["low"] < TRUTH[one["name"]] < one["high"]
+    assert "nuisance: 'lamp' is not one of tilt, drift, dark" in refused(
+        capsys, "fit", data, "--nuisance", "drift,lamp", "--model", "ward"
+    )
+
+
+def test_a_fit_at_an_assumed_wavelength_says_so(tile: Path, tmp_path: Path, capsys: Captured) -> None:
+    out, recipe = tmp_path / "fit.json", tmp_path / "fit.toml"
+    assert run("fit", tile, "--model", "beckmann", "--json", out, "--recipe", recipe) == 0
+    assert "fitted at an assumed wavelength of 550 nm" in capsys.readouterr().out
+    assert "fitted at an assumed wavelength of 550 nm" in recipe.read_text(encoding="utf-8")
+    document = json.loads(out.read_text(encoding="utf-8"))
+    assert document["assumed_wavelength_nm"] == 550.0
+    assert any("assumed wavelength of 550 nm" in one for one in document["fits"][0]["remarks"])
+    assert run("fit", tile, "--model", "beckmann", "--wavelength-nm", "650", "--json", out) == 0
+    assert "assumed wavelength" not in capsys.readouterr().out

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import json
+import tomllib
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from brdfdb import formats, models
-from brdfdb_pipelines.import_samples import _percent
+from brdfdb.measurements.statement import Claim, statement
+from brdfdb_pipelines.import_samples import _percent, in_a_line
 from tests.pipelines.command import Captured, refused, run
 
 
@@ -74,6 +77,12 @@ def test_mistakes_are_one_sentence(options: list[str], sentence: str, tile: Path
     assert sentence in refused(capsys, "import", tile, *options)
 
 
+def test_empty_words_are_refused(tile: Path, tmp_path: Path, capsys: Captured) -> None:
+    assert refused(capsys, "import", tile, *OPTIONS, "--angles", "").startswith("--angles: it is empty")
+    store = ("--store", tmp_path / "store")
+    assert refused(capsys, "import", tile, *OPTIONS, *store, "--name", "").startswith("--name: '' is not made of")
+
+
 FITS = "# published fits\nbrass = Ward(a = 0.1)\n"
 
 
@@ -110,6 +119,64 @@ def test_materials_that_are_lost_are_counted(tile: Path, tmp_path: Path, capsys:
     *sentences, count = capsys.readouterr().err.splitlines()
     assert [file.name in sentence for file, sentence in zip(files[1:], sentences, strict=True)] == [True, True]
     assert count == "brdfdb: 2 of 3 materials were not imported"
+
+
+SHEET = "AOI (deg),Scatter angle (deg),BRDF (1/sr)\n"
+
+
+def test_a_folder_is_a_line_for_each_file_or_the_whole_statements(tmp_path: Path, capsys: Captured) -> None:
+    folder = tmp_path / "day 1"
+    folder.mkdir()
+    rows = [
+        f"{light},{viewer},{0.1 + 0.1 * np.exp(-(((viewer - light) / 9.0) ** 2)):.6f}\n"
+        for light in (20, 40)
+        for viewer in range(-80, 81, 5)
+    ]
+    (folder / "b.csv").write_text("# wavelength 532 nm\n" + SHEET + "".join(rows))
+    (folder / "a.csv").write_text(
+        SHEET + "".join(row.replace(",", ",-").replace("--", "").replace(",-0", ",0") for row in rows)
+    )
+    (folder / ".hidden").write_text("nothing")
+    assert run("import", folder) == 0
+    first, second, hint = capsys.readouterr().out.splitlines()
+    assert first.startswith(f"{folder / 'a.csv'}: a; 66 samples, 2 lights, no wavelength; ")
+    assert second == f"{folder / 'b.csv'}: b; 66 samples, 2 lights, 532 nm; no doubt"
+    assert hint == "Statement on a file: `brdfdb import FILE`; on all files: --full"
+    assert run("import", folder, "--full") == 0
+    assert capsys.readouterr().out.count("No column is an azimuth") == 2
+    (folder / "c.csv").write_text("no numbers")
+    assert run("import", folder) == 2
+    captured = capsys.readouterr()
+    assert len(captured.out.splitlines()) == 3
+    assert "c.csv" in captured.err
+    (tmp_path / "empty").mkdir()
+    assert "has no files" in refused(capsys, "import", tmp_path / "empty")
+
+
+def test_a_claim_of_the_header_that_its_values_contradict_is_in_the_line(tile: Path) -> None:
+    keys = dict(option.split("=") for option in COLUMNS)
+    known = statement(formats.samples(tile, **keys))
+    claims = tuple(Claim(10.0, "grey", claimed, 0.1, at_least=False, known=True) for claimed in (0.07, 0.081, 0.099))
+    assert in_a_line(replace(known, claims=claims)).endswith("; Units?; claims of the header off by up to 30 %")
+    assert in_a_line(replace(known, claims=claims[2:])).endswith(", no wavelength; Units?")
+
+
+def test_rows_are_selected_and_the_recipe_says_so(tmp_path: Path, capsys: Captured) -> None:
+    path, recipe = tmp_path / "tiles.csv", tmp_path / "tile.toml"
+    rows = [f"{name},{angle},{factor}\n" for name, factor in (("A 1", 0.1), ("B", 0.2)) for angle in ("20,10", "40,5")]
+    path.write_text("Sample name,AOI,theta_s,BRDF\n" + "".join(rows) + "B,40,9,1e-6\n")
+    sentence = refused(capsys, "import", path)
+    assert sentence.endswith("rows have different values, A 1, B; --where 'Sample name'=A 1 reads one value")
+    options = ("--where", "Sample name=B", "--missing", "1e-6")
+    assert run("import", path, *options, "--recipe", recipe, "--name", "tile") == 0
+    printed = capsys.readouterr().out
+    assert "3 samples of 1 channel" in printed
+    assert "1 hole" in printed
+    keys = tomllib.loads(recipe.read_text())["define"]["tile"]
+    assert keys == {"samples": "tiles.csv", "where": {"Sample name": ["B"]}, "missing": 1e-6}
+    assert refused(capsys, "import", path, "--where", "Sample name").startswith(
+        "--where: 'Sample name' is not HEADER=V"
+    )
 
 
 def test_percentages_of_summaries_are_plain_numbers() -> None:

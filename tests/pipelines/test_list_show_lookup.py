@@ -44,7 +44,7 @@ def test_list_has_a_column_with_the_stated_error(planned: Path, capsys: Captured
     assert explained.startswith("table error: ")
     columns = re.split(r"  +", head)
     assert columns[3:8] == [
-        *("colours", "table error (p99)", "formula error (p99)", "what the paper says?", "model conserves energy?")
+        *("colours", "table error (p99)", "formula error (p99)", "as published or measured?", "conserves energy?")
     ]
     store = brdfdb.open(planned)
     assert len(lines) == 2

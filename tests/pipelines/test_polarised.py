@@ -71,3 +71,48 @@ def test_what_has_no_mueller_matrices_is_refused(tmp_path: Path, name: str, sent
     mine = '[define.mine]\nsamples = "mine.csv"\n' if name == "mine" else ""
     with pytest.raises(RecipeError, match=sentence):
         load(written(tmp_path, RECIPE.replace("magnesium-oxide-ceramic", name) + mine)).jobs()
+
+
+def sheet(tmp_path: Path) -> Path:
+    """Polarisers before light and viewer, in the plane of incidence: m01 of 0.25, m10 of 0.15, m11 of 0.6."""
+    lines = ["AOI,theta_r,delta_phi,ss,sp,ps,pp"]
+    for aoi in (10, 30, 50, 70):
+        for viewer in range(0, 81, 10):
+            f_r = 0.1 + 0.2 * np.exp(-(((viewer - aoi) / 25.0) ** 2))
+            lines.append(f"{aoi},{viewer},180," + ",".join(f"{f_r * share:.6g}" for share in (1.0, 0.25, 0.15, 0.6)))
+    path = tmp_path / "plate.csv"
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+def test_polarisers_are_imported_looked_up_and_built_again(tmp_path: Path, capsys: Captured) -> None:
+    store, again, recipe = tmp_path / "store", tmp_path / "again", tmp_path / "plate.toml"
+    imported = ("import", sheet(tmp_path), "--tolerance", 0.3, "--store", store, "--polarised")
+    assert run(*imported, "--recipe", recipe) == 0
+    assert "Polarised: 2 rows and 2 columns" in capsys.readouterr().out
+    assert "polarised = true" in recipe.read_text()
+    lookup = ("lookup", "plate", 50, 0, 40, 180, "--store", store, "--stokes")
+    assert run(*lookup, "1,-1,0,0", "--json") == 0
+    answer = json.loads(capsys.readouterr().out)
+    light = answer["stokes"]["reflected"]
+    assert light[:2] == pytest.approx([0.75 * answer["brdf"][0], -0.45 * answer["brdf"][0]], rel=1e-5)
+    assert light[2:] == [None, None]
+    assert run(*lookup, "1,-1,0,0") == 0
+    assert "not measured, not measured /sr" in capsys.readouterr().out
+    assert run(*lookup, "1,-1,0,0", "--with-error") == 0
+    stated = f"99 of 100 are within {answer['stokes']['element_error']:.2g}\n"
+    assert f"error of the elements m_ij / m_00 of the Mueller matrix: {stated}" in capsys.readouterr().out
+    assert run("show", "plate", "--store", store) == 0
+    assert "  polarised   Mueller matrices; stored are m01, m10, m11, over m_00; " in capsys.readouterr().out
+    assert run("build", recipe, "--store", again) == 0
+    angles = np.radians([50.0, 0.0, 40.0, 180.0])
+    first, second = (brdfdb.open(root)["plate"].mueller(*angles) for root in (store, again))
+    np.testing.assert_array_equal(first, second)
+
+
+def test_a_file_without_polarisation_makes_no_polarised_table(tmp_path: Path, capsys: Captured) -> None:
+    path = sheet(tmp_path)
+    path.write_text(path.read_text().replace("ss,sp,ps,pp", "brdf,a,b,c"))
+    sentence = refused(capsys, "import", path, "--store", tmp_path / "store", "--polarised")
+    assert "plate.csv: polarised: plate has no polarised values; known are the columns ss, sp, ps and pp" in sentence
+    assert "--polarised: is allowed only together with --store" in refused(capsys, "import", path, "--polarised")

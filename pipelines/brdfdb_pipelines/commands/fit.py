@@ -12,7 +12,7 @@ from brdfdb_pipelines.commands._reading import OPTIONS, add_reading, reading_key
 HELP = "Fit models to measured samples; rank them by their error at incidences left out of the fit."
 
 # Options that only a fit to samples has
-_OF_SAMPLES = (*OPTIONS, "model", "refractive_index", "receiver_deg", "source_deg", "page")
+_OF_SAMPLES = (*OPTIONS, "model", "refractive_index", "nuisance", "receiver_deg", "source_deg", "page")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -35,9 +35,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--residual",
-        choices=("log", "relative", "cosine", "uncertainty"),
-        default="log",
-        help="difference to minimise (default: log, the difference of logarithms)",
+        choices=("noise", "log", "relative", "cosine", "uncertainty"),
+        default="noise",
+        help="difference to minimise (default: noise, that of logarithms, with a floor if samples show one)",
+    )
+    parser.add_argument(
+        "--nuisance",
+        type=lambda text: tuple(part.strip() for part in text.split(",")),
+        default=(),
+        metavar="KIND,KIND",
+        help="errors of the measurement to fit as well: tilt (of the sample), drift (of the lamp, over the rows), dark "
+        "(a signal without light)",
     )
     parser.add_argument("--channel", metavar="NAME", help="fit one channel (default: all channels together)")
     parser.add_argument(
@@ -88,6 +96,7 @@ def run(options: argparse.Namespace) -> int:
         residual=options.residual,
         channel=options.channel,
         refractive_index=options.refractive_index,
+        nuisance=options.nuisance,
         receiver_deg=options.receiver_deg,
         source_deg=options.source_deg,
     )

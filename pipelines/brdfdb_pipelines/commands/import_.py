@@ -13,10 +13,19 @@ HELP = "Import measurements: state their coverage, albedos and metadata, and mak
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the files, the meaning of their columns, and the outputs."""
-    parser.add_argument("files", nargs="+", type=place, metavar="FILE", help="a file of measurements, or a zarr group")
+    parser.add_argument(
+        "files",
+        nargs="+",
+        type=place,
+        metavar="FILE",
+        help="a file of measurements, a folder of such files, or a zarr group",
+    )
     add_reading(parser)
     parser.add_argument(
         "--join", action="store_true", help="join all files into one set of samples of the same surface"
+    )
+    parser.add_argument(
+        "--full", action="store_true", help="print the whole statement on each of several files, not a line"
     )
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     parser.add_argument("--out", type=place, metavar="FILE.nc", help="write the samples of a single file as netCDF")
@@ -35,6 +44,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=float,
         metavar="E",
         help="largest relative error of 95 %% of the values of a table, 0.0001 to 0.5 (default: 0.05)",
+    )
+    tables.add_argument(
+        "--polarised", action="store_true", help="tabulate the Mueller matrices of the file, too (default: f_r alone)"
     )
     tables.add_argument("--reciprocal", action="store_true", help="change the values to the nearest reciprocal ones")
     tables.add_argument(
@@ -59,7 +71,7 @@ def run(options: argparse.Namespace) -> int:
     from brdfdb_pipelines import import_samples
 
     keys = reading_keys(options)
-    of_table = ("tolerance", "reciprocal", "conserving", "name", "title", "source")
+    of_table = ("tolerance", "polarised", "reciprocal", "conserving", "name", "title", "source")
     tables = None
     if options.store is not None or options.recipe is not None:
         tables = import_samples.Tables(
@@ -76,13 +88,14 @@ def run(options: argparse.Namespace) -> int:
                 raise ParameterError(
                     f"--{name}", "is allowed only together with --store or --recipe", getattr(options, name)
                 )
-    made = {name: True for name in ("reciprocal", "conserving") if getattr(options, name)}
+    made = {name: True for name in ("polarised", "reciprocal", "conserving") if getattr(options, name)}
     source = {} if options.source is None else {"source": options.source}
     result = import_samples.run(
         options.files,
         {**keys, **made, **source},
         join=options.join,
         json=options.json,
+        full=options.full,
         out=options.out,
         tables=tables,
     )

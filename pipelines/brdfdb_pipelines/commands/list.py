@@ -152,17 +152,18 @@ def _print_materials(store: Store, root: Path, names: Sequence[str]) -> list[str
             (
                 *(name, head["title"], kind(head), colours(head)),
                 *(terminal.error(head.get("error_p99")), formula_error(head, terminal.error), surface),
+                "" if audited is None else audited.samples,
                 *(NOT_AUDITED if audited is None else audited.as_published, energy(head, audited)),
                 head["revision"],
             )
         )
     errors = ("table error (p99)", "formula error (p99)", "surface error (median)")
-    columns: tuple[str, ...] = ("material", "title", "model", "colours", *errors, *COLUMNS, "revision")
-    at = columns.index(errors[2])
-    mapped = any(row[at] for row in rows)
-    if not mapped:
-        columns = (*columns[:at], *columns[at + 1 :])
-        rows = [(*row[:at], *row[at + 1 :]) for row in rows]
+    every = ("material", "title", "model", "colours", *errors, "at the samples", *COLUMNS, "revision")
+    optional = (errors[2], "at the samples")
+    shown = [at for at, name in enumerate(every) if name not in optional or any(row[at] for row in rows)]
+    columns = tuple(every[at] for at in shown)
+    rows = [tuple(row[at] for at in shown) for row in rows]
+    mapped = errors[2] in columns
     terminal.print_table(
         f"{counted(len(rows), 'material')} in {root}",
         columns,

@@ -59,20 +59,10 @@ def run(options: argparse.Namespace) -> int:
     """Print f_r [1/sr] at the directions [degree], and the specular reflectance [1] where there is a specular part."""
     import numpy as np
 
-    from brdfdb.geometry import check_azimuth_deg, radians
+    from brdfdb.geometry import radians
     from brdfdb.tables.table import Table
 
-    angles_deg = [getattr(options, angle) for angle in _ANGLES]
-    for angle, value in zip(_ANGLES, angles_deg, strict=True):
-        if not math.isfinite(value):
-            raise ParameterError(angle, f"{value} is not a number of degrees", value)
-        if angle.startswith("theta") and not 0.0 <= value <= 180.0:
-            raise ParameterError(angle, f"{value:g} is outside [0, 180] degrees", value, (0.0, 180.0))
-        if angle.startswith("phi"):
-            check_azimuth_deg(angle, value)
-    if all(abs(value) < _LIKE_RADIANS for value in angles_deg) and not all(map(float.is_integer, angles_deg)):
-        shown = " ".join(f"{value:g}" for value in angles_deg)
-        print(f"brdfdb: angles are in degrees, but these look like radians: {shown}", file=sys.stderr)
+    angles_deg = _checked_angles(options)
     root: Path = options.store
     store = brdfdb.open(root, snapshot=options.snapshot)
     source: Table | Family
@@ -95,6 +85,7 @@ def run(options: argparse.Namespace) -> int:
     light = _reflected(source, angles_deg, options)
     error = None
     outside = isinstance(source, Table) and bool(source.extrapolated(theta_i, phi_i, theta_r, phi_r))
+    glint = isinstance(source, Table) and bool(source.in_glint(theta_i, phi_i, theta_r, phi_r))
     if options.with_error:
         stated = source.lookup_with_error(theta_i, phi_i, theta_r, phi_r, options.wavelength_nm, **point)
         brdf, error = (np.atleast_1d(values) for values in stated)
@@ -109,9 +100,9 @@ def run(options: argparse.Namespace) -> int:
             "wavelength_nm": None if wavelengths is None else list(wavelengths),
             "brdf": brdf.tolist(),
             **({} if error is None else {"error": [None if math.isnan(one) else one for one in error.tolist()]}),
-            **({"extrapolated": outside} if isinstance(source, Table) else {}),
+            **({"extrapolated": outside, "glint": glint} if isinstance(source, Table) else {}),
             "specular_reflectance": specular.tolist(),
-            **({} if light is None else {"stokes": light}),
+            **({} if light is None else {"stokes": {**light, **{key: _known(light[key]) for key in _STOKES}}}),
         }
         print(json.dumps(answer))
         return 0
@@ -121,13 +112,47 @@ def run(options: argparse.Namespace) -> int:
         within = "" if error is None or outside else f" +- {error[index]:.2g}"
         print(f"{at}{value:.6g}{within} /sr{mirrored}")
         if light is not None:
-            numbers = ", ".join(f"{number:.6g}" for number in light["reflected"][index])
+            reflected = np.atleast_2d(light["reflected"])[index]
+            numbers = ", ".join("not measured" if math.isnan(number) else f"{number:.6g}" for number in reflected)
             print(f"{at}I, Q, U, V: {numbers} /sr")
     if light is not None:
         print(f"{light['convention']}. {light['basis']}")
+        if error is not None:
+            stated = light["element_error"]
+            within = "not stated" if stated is None else f"99 of 100 are within {stated:.2g}"
+            print(f"error of the elements m_ij / m_00 of the Mueller matrix: {within}")
+    if glint:
+        print("a glint is in it: a peak that the grid cannot hold, kept beside it")
+        if error is not None and np.any(error > 0.5 * brdf):
+            print("its shape is not known well between samples: the error is more than half of f_r")
     if outside:
         print("extrapolated: these directions were not measured, and the error is unknown")
     return 0
+
+
+def _checked_angles(options: argparse.Namespace) -> list[float]:
+    """Return the angles [degree]; ParameterError if one is outside its range, and a warning if they may be radians."""
+    from brdfdb.geometry import check_azimuth_deg
+
+    angles_deg = [getattr(options, angle) for angle in _ANGLES]
+    for angle, value in zip(_ANGLES, angles_deg, strict=True):
+        if not math.isfinite(value):
+            raise ParameterError(angle, f"{value} is not a number of degrees", value)
+        if angle.startswith("theta") and not 0.0 <= value <= 180.0:
+            raise ParameterError(angle, f"{value:g} is outside [0, 180] degrees", value, (0.0, 180.0))
+        if angle.startswith("phi"):
+            check_azimuth_deg(angle, value)
+    if all(abs(value) < _LIKE_RADIANS for value in angles_deg) and not all(map(float.is_integer, angles_deg)):
+        shown = " ".join(f"{value:g}" for value in angles_deg)
+        print(f"brdfdb: angles are in degrees, but these look like radians: {shown}", file=sys.stderr)
+    return angles_deg
+
+
+def _known(numbers: Any) -> Any:
+    """Return nested lists of numbers with null for what was not measured."""
+    if isinstance(numbers, list):
+        return [_known(number) for number in numbers]
+    return None if math.isnan(numbers) else numbers
 
 
 def _reflected(source: Table | Family, angles_deg: list[float], options: argparse.Namespace) -> dict[str, Any] | None:

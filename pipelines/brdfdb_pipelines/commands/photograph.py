@@ -63,6 +63,7 @@ def run(options: argparse.Namespace) -> int:
 
     name = options.name
     source = named_source(name, options.store, options.recipe).source
+    terminal.say_without_glints("the pictures", source)
     instrument = instrument_of(options.set)
     wavelength_nm = check_nanometres("--wavelength-nm", [options.wavelength_nm])
     brdf = source.brdf_at(wavelength_nm if source.spectral else None)

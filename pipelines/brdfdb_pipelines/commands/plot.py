@@ -40,10 +40,16 @@ def run(options: argparse.Namespace) -> int:
     store = brdfdb.open(options.store)
     revisions = {name: store.head(name) for name in options.names}  # refuses an unknown name before anything is drawn
     options.out.mkdir(parents=True, exist_ok=True)
+    known: list[str] = []
     with terminal.progress() as bar:
         task = bar.add_task("plotting", total=len(revisions) * len(kinds))
         for name in revisions:
             table = store[name]
+            measured = table.metadata.measured
+            if measured is not None and measured.share:
+                known.append(f"{name}: {measured.share} of all pairs of directions {measured.origin}, the rest made up")
+            if table.glints is not None:
+                known.append(f"{name}: {table.glints.sentence}")
             for kind in kinds:
                 # a fixed salt and no date: the same table gives the same bytes
                 with mpl.rc_context({"svg.hashsalt": f"{name}-{kind}"}):
@@ -54,5 +60,7 @@ def run(options: argparse.Namespace) -> int:
                     figure.savefig(drawn, format=options.format, dpi=_DPI, metadata=undated)
                     write_file(options.out / f"{name}-{kind}.{options.format}", drawn.getvalue(), options.out)
                 bar.advance(task)
+    for sentence in known:
+        print(terminal.plain(sentence))
     print(f"{counted(len(revisions) * len(kinds), f'{options.format.upper()} file')} in {options.out}")
     return 0

@@ -48,6 +48,7 @@ def run(options: argparse.Namespace) -> int:
             bar.add_task("tracing rays", total=None)
             view = gather(scene, options.width or WIDTH, across=options.across or 1)
             materials = reflectors(scene)
+            terminal.say_without_glints("the picture", *scene.materials.values())
     except ParameterError as error:
         raise scene_file.SceneError(name, error.parameter, error.sentence) from None
     with terminal.progress() as bar:

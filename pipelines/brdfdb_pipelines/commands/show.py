@@ -59,6 +59,8 @@ def _print_material(table: Table, path: Path, audited: Audited | None) -> None:
         print(terminal.plain(f"  incomplete  the table {metadata.gaps}"))
     _print_grid(table)
     truth = "its formula" if metadata.model is not None else "its source" if metadata.measured is None else "the data"
+    if metadata.polarisation is not None:
+        print(f"  polarised   {metadata.polarisation.in_words}")
     _print_error(table.error, truth, measured=metadata.measured is not None)
     if metadata.measured is None:
         _print_formula_error(metadata.formula_error)
@@ -258,13 +260,13 @@ def _print_answers(audited: Audited | None, metadata: TableMetadata) -> None:
     from brdfdb.store.summary_words import NOT_AUDITED
 
     of_paper = metadata.material in presets() and metadata.source_record
-    says = "the paper" if of_paper else "its model"
+    says = "the paper says" if of_paper else "its model says"
     whose = "does the published model"
     if metadata.measured is not None:
-        says = "its source"
+        says = "the data say"
         whose = "do the data"
     both = (NOT_AUDITED, NOT_AUDITED) if audited is None else audited
-    print(f"  audit       is it what {says} says? {both[0]}")
+    print(f"  audit       is it what {says}? {both[0]}")
     print(f"              {whose} conserve energy? {both[1]}")
 
 
@@ -302,11 +304,13 @@ def _print_albedo(table: Table, material: Material | None) -> None:
     albedo = directional_albedo(table, np.array(ALBEDO_ANGLES_DEG), source=material)
     diffuse = albedo.mean
     wavelength = table.wavelength_nm
+    guessed = np.zeros(diffuse.shape) if albedo.guessed is None else albedo.mean_of(albedo.guessed)
+    width = 16 if guessed.any() else 9
     columns = sorted({0, diffuse.shape[1] // 2, diffuse.shape[1] - 1})
     print(
         "  albedo, as tabulated "
-        + "".join(f"{f'{angle:g}°':>9}" for angle in ALBEDO_ANGLES_DEG)
-        + "  (theta_i; with the specular part)"
+        + "".join(f"{f'{angle:g}°':>{width}}" for angle in ALBEDO_ANGLES_DEG)
+        + f"  (theta_i; with the specular part{'' if table.glints is None else ' and the glints'})"
     )
     largest = table.metadata.largest_albedo
     if largest is not None:
@@ -317,5 +321,10 @@ def _print_albedo(table: Table, material: Material | None) -> None:
     for w in columns:
         at = None if wavelength is None else float(wavelength[w])
         specular = table.specular_reflectance(radians(ALBEDO_ANGLES_DEG), at)
-        values = diffuse[:, w] + specular
-        print(f"    {'grey' if at is None else f'{at:g} nm':<10}" + "".join(f"{value:9.4f}" for value in values))
+        cells = [
+            f"{'at most ' if most else ''}{value:.4f}"
+            for value, most in zip(diffuse[:, w] + specular, guessed[:, w] > 0.0, strict=True)
+        ]
+        print(f"    {'grey' if at is None else f'{at:g} nm':<10}" + "".join(f"{cell:>{width}}" for cell in cells))
+    if guessed.any():
+        print("    at most: the power of a glint that one sample shows, or between measured lights, is an upper bound")
