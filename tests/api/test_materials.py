@@ -55,6 +55,7 @@ def test_catalogue(client: Client, store: Store) -> None:
         "incomplete": None,
         "verdict": None,
         "as_published": None,
+        "verdict_in_words": None,
         "conserves_energy": None,
         "revision": "r000001",
         "href": FOIL,

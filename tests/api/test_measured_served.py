@@ -32,7 +32,7 @@ def test_documents_say_by_whom_and_how_well_a_table_was_measured(client: Client,
     record = Store(measured).metadata("my-clay").measured
     assert record is not None
     assert (known["by"], known["file"]) == ("a made-up goniophotometer", "clay.csv")
-    assert known["held_out"] == record.model_dump()["held_out"]
+    assert known["held_out"] == record.model_dump(mode="json")["held_out"]
     assert client.get("/v1/materials/clay-vase").json()["measured"] is None
     lines = client.get("/v1/materials").json()["materials"]
     assert {line["name"]: line["measured"] for line in lines} == {"clay-vase": False, "my-clay": True}

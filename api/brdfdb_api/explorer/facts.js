@@ -1,15 +1,15 @@
 // Facts about a material, next to the picture: the verdict in a sentence, and folded details.
 
-import { byId, chip, element, isGood, percent, short } from "./dom.js";
+import { byId, chip, element, isGood, isWrong, percent, short } from "./dom.js";
 import { nearest } from "./series.js";
 
 /** @typedef {[string | Node, string | Node, ...(string | undefined)[]]} Row a term, its value, and small lines below */
 
-/** @type {Record<string, string>} */
 const QUESTIONS = {
   as_published: "is it what the paper says?",
   conserves_energy: "does the published model conserve energy?",
 };
+const OF_DATA = { as_published: "is it what the data say?", conserves_energy: "do the data conserve energy?" };
 const aside = byId("facts", HTMLElement);
 
 /** Show the facts about a material, or about a model with other parameters.
@@ -88,7 +88,7 @@ export function show({ info, source }) {
       "Audit",
       pairs(above(info.largest_albedo)),
       ...(audit
-        ? audited(audit)
+        ? audited(audit, info.measured ? OF_DATA : QUESTIONS)
         : [element("p", {}, "not audited; run ", element("code", {}, "brdfdb audit"))]),
     ),
     folded("Data", element("p", { className: "links" }, ...links(info))),
@@ -106,15 +106,24 @@ function verdict({ audit, error, measured, formula_error: of }) {
   if (!audit?.current || !audit.as_published) return [`Not audited at this revision; ${table}.`];
   const { as_published: published, conserves_energy: energy } = audit;
   const form = of?.against === "highest rung" ? ", which is the exact form" : "";
-  const first = isGood(published.word)
-    ? `It is what the paper says: ${table}${measured ? "" : form}.`
-    : `It is not what the paper says (${published.text}): ${table}.`;
-  const words = isGood(energy.word)
-    ? "It conserves energy."
-    : energy.text.startsWith("no")
-      ? `It does not conserve energy${energy.text.slice(2)}.`
-      : `On energy: it ${energy.text}.`;
-  return [chip(isGood(published.word) ? audit.verdict : published.word), ` ${first} ${words}`];
+  const wrong = isWrong(published.word) ? `; ${published.reason}` : "";
+  const first = measured
+    ? `${measured.simulation ? "Simulated" : "Measured"} data: ${table}${wrong}.`
+    : isGood(published.word)
+      ? `It is what the paper says: ${table}${form}.`
+      : `It is not what the paper says (${published.text}): ${table}.`;
+  const words = measured
+    ? `Do the data conserve energy? ${energy.text[0].toUpperCase()}${energy.text.slice(1)}.`
+    : isGood(energy.word)
+      ? "It conserves energy."
+      : energy.text.startsWith("no")
+        ? `It does not conserve energy${energy.text.slice(2)}.`
+        : `On energy: it ${energy.text}.`;
+  const mark =
+    measured || isGood(published.word)
+      ? chip(audit.verdict, audit.verdict_in_words || audit.verdict)
+      : chip(published.word);
+  return [mark, ` ${first} ${words}`];
 }
 
 /** Details behind their title.
@@ -140,15 +149,28 @@ const origin = ({ by, file, samples, incidences, extrapolated }) =>
     .filter(Boolean)
     .join("; ");
 
+const largest = (/** @type {{ error: number }[]} */ energies) => Math.max(...energies.map(({ error }) => error));
+
 /** The accuracy of measured data, and the measured share of all directions.
  * @param {any} measured
  * @returns {Row[]} */
-const data = ({ held_out: left, noise, extrapolated, negative, changes }) => [
+const data = ({ held_out: left, at_samples: at, glints, noise, extrapolated, negative, changes }) => [
   [
     "held out",
     left ? `95 of 100 samples within ${percent(left.p95)}` : "no samples",
     left ? `99 within ${percent(left.p99)}` : "",
   ],
+  ...(at
+    ? [
+        /** @type {Row} */ ([
+          "worst sample",
+          `${percent(at.worst.error)} off`,
+          `light ${at.worst.theta_i_deg}°, viewer ${at.worst.theta_r_deg}°`,
+        ]),
+        ...optional("energy", at.energies.length && `each incidence within ${percent(largest(at.energies))}`),
+      ]
+    : []),
+  ...optional("glints", glints && "beside the grid: lookups add them, spheres in studio light leave them out"),
   ["noise", noise ? `95 of 100 below ${percent(noise.p95)}` : "not stated"],
   ...optional("measured", extrapolated === null ? "" : `${percent(1 - extrapolated)} of all directions`),
   ...optional("below 0", negative && `${percent(negative)} of the values, which were set to 0`),
@@ -222,16 +244,17 @@ export function band({ error, wavelength_nm: wavelengths }, { theta_i, nm }) {
 }
 
 /** All findings of the audit, with a sentence unless they pass; the report also quotes the papers.
- * @param {any} audit */
-function audited(audit) {
+ * @param {any} audit
+ * @param {Record<string, string>} questions */
+function audited(audit, questions) {
   const findings = audit.sentences.filter((/** @type {any} */ { quote }) => !quote);
   return [
     answers([
       ...(audit.as_published && audit.conserves_energy
-        ? Object.entries(QUESTIONS).map(
+        ? Object.entries(questions).map(
             ([key, question]) => /** @type {Row} */ ([question, chip(audit[key].word, audit[key].text)]),
           )
-        : [["verdict", chip(audit.verdict)]]),
+        : [["verdict", chip(audit.verdict, audit.verdict_in_words || audit.verdict)]]),
       ...findings.map((/** @type {any} */ { title, word, text }) => [
         title.toLowerCase(),
         chip(word),

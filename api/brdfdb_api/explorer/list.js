@@ -151,8 +151,12 @@ function marks(each) {
   /** @type {[string, string, string][]} */
   const wrong = [];
   if (each.damaged) wrong.push(["damaged", "damaged", each.damaged]);
-  if (published && !isGood(published.word))
-    wrong.push([published.word, `not as published: ${published.text}`, published.reason]);
+  if (published && (each.measured ? isWrong(published.word) : !isGood(published.word)))
+    wrong.push([
+      published.word,
+      `not as ${each.measured ? "the data say" : "published"}: ${published.text}`,
+      published.reason,
+    ]);
   if (energy && isWrong(energy.word) && energy.word !== "gains")
     wrong.push([energy.word, `energy: ${energy.text}`, energy.reason]);
   if (!wrong.length && isWrong(words(each))) wrong.push([words(each), words(each), ""]);

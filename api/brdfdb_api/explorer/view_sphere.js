@@ -24,6 +24,7 @@ const WORDS =
   "The viewer is far above the page. The light is θᵢ away from the viewer, to the right (+x) at φᵢ = 0 and to the " +
   "top (+y) at 90°, and so bright that a white matt surface appears white. Drag the light to move it. " +
   "The x axis of the surface runs around the vertical axis of the sphere.";
+const STUDIO = "The viewer is far above the page. The light is that of a studio; the specular part reflects it, too.";
 const SKY = " The surroundings are bright above and black below.";
 const SPECULAR = " The specular part reflects them and the light, a disk of 5°.";
 
@@ -129,7 +130,7 @@ function spheres(into, series, answers, state) {
     around?.specular?.flat().some((/** @type {number} */ part) => part > 0),
   );
   if (state.surround === "studio")
-    return "The viewer is far above the page. The light is that of a studio; the specular part reflects it, too.";
+    return STUDIO + (series.some(({ info }) => info.measured?.glints) ? " Glints are left out." : "");
   return WORDS + (state.surround === "sky" ? SKY : "") + (specular ? SPECULAR : "") + unseenWords(series[0], state);
 }
 

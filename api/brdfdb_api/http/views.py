@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import hashlib
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -84,7 +85,8 @@ def lobe_answer(
 ) -> Response:
     """Return the answer with the lobe of a surface; `about` begins the document."""
     kind = query.kind(accept_of(request))
-    axes, angles = view_directions(query.view, query.theta_i, query.phi_i)
+    glints = surface.source.glints if surface.kind == "table" else None
+    axes, angles = view_directions(query.view, query.theta_i, query.phi_i, glints)
     points = LookupPoints.of(angles, listed(query.wavelength_nm))
     # The view fixes the points; the client chooses only the wavelengths. Arrays have the limit of JSON, too
     checked_size(max(request.app.state.settings.max_points, MOST_POINTS), points, query, surface, "json")
@@ -120,9 +122,11 @@ async def export(
         options = {option: allowed[option].parse(text) for option, text in query.items()}
     shelf = shelf_of(request)
     table, known = await run_in_threadpool(lambda: (shelf.table(name, revision), shelf.verdict(name)))
-    verdict = known.finding.verdict if known and known.finding.is_of(table.revision, table.digest) else None
+    verdict = None
+    if known and known.finding.is_of(table.revision, table.digest):
+        verdict = known.finding.verdict_in_words or known.finding.verdict
     # The file states the program and the verdict, which a later audit may change. The tag is weak: some state the time
-    headers = cache_headers(tag_of(table, verdict), file_format)
+    headers = cache_headers(tag_of(table, hashlib.sha256(str(verdict).encode()).hexdigest()[:16]), file_format)
     headers["ETag"] = f"W/{headers['ETag']}"
     if request.headers.get("if-none-match") == headers["ETag"]:  # before the file is made, which takes seconds
         return Response(status_code=304, headers=headers)
@@ -153,7 +157,7 @@ def audit(request: Request, name: str, revision: Revision = None) -> Response:
 def sphere(
     request: Request, name: str, query: Annotated[SphereQuery, InQuery()], revision: Revision = None
 ) -> Response:
-    """Return a draft picture of a sphere of the material in studio light."""
+    """Return a draft picture of a sphere of the material in studio light, without the glints of measured data."""
     table = shelf_of(request).table(name, revision)
     return sphere_answer(table, query, cache_headers(tag_of(table, query.size), query.format))
 
