@@ -44,3 +44,9 @@ def test_no_retired_word_is_used() -> None:
     lines = (*((path, _prose(path)) for path in SOURCES), *pages)
     text = ((path, number, line) for path, prose in lines for number, line in prose)
     assert [f"{path}:{number}: {hit.group()}" for path, number, line in text if (hit := words.search(line))] == []
+
+
+def test_no_line_of_a_page_is_read_as_a_comment() -> None:
+    # MyST leaves out lines that begin with a percent sign; those of code cells are in fences
+    outside = {path: re.sub(r"^```.*?^```$", "", path.read_text(encoding="utf-8"), flags=re.M | re.S) for path in PAGES}
+    assert [str(path) for path, text in outside.items() if re.search(r"^\s*%", text, flags=re.M)] == []

@@ -81,7 +81,7 @@ def test_an_address_of_a_service_is_no_path() -> None:
 TEXTS = {
     *("name", "names", "model", "library", "snapshot", "member", "column", "title", "source", "channel", "set"),
     *("revision", "to", "fix", "refractive_index", "stokes", "words", "paper", "sort", "allow", "scheduler", "host"),
-    *("kind", "scene", "format", "range", "unit", "models"),
+    *("kind", "scene", "format", "range", "unit", "models", "where", "nuisance", "angles"),
 }
 PLACES = {"place", "picture_file", "sheet_file"}
 

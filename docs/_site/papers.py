@@ -10,7 +10,18 @@ from typing import NamedTuple
 from _site.markup import plain, write_page
 
 _BIBLIOGRAPHY = Path(__file__).parents[2] / "references.bib"
-_LETTERS = {r"{\"u}": "ü", r"{\c{c}}": "ç", r"{\'a}": "á", r"{\'o}": "ó", r"\&": "&", "--": "–"}
+_LETTERS = {
+    r"{\"u}": "ü",
+    r"{\"a}": "ä",
+    r"{\c{c}}": "ç",
+    r"{\'a}": "á",
+    r"{\'e}": "é",
+    r"{\'i}": "í",
+    r"{\'o}": "ó",
+    r"{\v{r}}": "ř",
+    r"\&": "&",
+    "--": "–",
+}
 
 
 class Paper(NamedTuple):
