@@ -1,4 +1,4 @@
-"""Whether rows of a text are missing, or belong to another light: ends of files, and numbers of rows."""
+"""Doubts about texts: rows that are missing or belong to another light, and comments on what the values are."""
 
 from __future__ import annotations
 

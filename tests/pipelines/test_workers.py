@@ -82,8 +82,12 @@ def test_an_interrupt_does_not_wait_for_estimates_of_rays(jobs: int, tmp_path: P
         if event["event"] == "simulating":
             threading.Timer(2.5, interrupt).start()
 
-    with pytest.raises(KeyboardInterrupt), workers.interruptible(jobs) as at:
-        build(load(recipe), tmp_path / "store", at, report)
+    handler = signal.signal(signal.SIGINT, signal.default_int_handler)  # shells in the background ignore it
+    try:
+        with pytest.raises(KeyboardInterrupt), workers.interruptible(jobs) as at:
+            build(load(recipe), tmp_path / "store", at, report)
+    finally:
+        signal.signal(signal.SIGINT, handler)
     assert time.monotonic() - interrupted[0] < 10.0
 
 
