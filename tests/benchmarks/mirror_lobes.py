@@ -57,8 +57,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             truth = f_r(wi, wr, slope_x, slope_y, azimuth)
             value = source.lookup_vectors(wi, wr)
             lowest = np.minimum(wi[:, 2], wr[:, 2])
-            columns = value[:, np.newaxis], lowest[:, np.newaxis]
-            stated = source.measured.error_of(*columns, np.zeros(1))[:, 0]
+            stated = source.measured.error_of(value[:, np.newaxis], wi, wr, np.zeros(1))[:, 0]
             off = np.abs(value - truth)
             for low, high in ((0.0, HIGH_DEG), (HIGH_DEG, LOWEST_DEG)):
                 some = (lowest <= np.cos(np.radians(low))) & (lowest > np.cos(np.radians(high)))
