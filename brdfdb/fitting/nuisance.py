@@ -50,7 +50,7 @@ def keeps_order(samples: Samples) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class Nuisance:
-    """What disturbs the readings of samples: reading = gain f_r + dark, at the directions of a tilted sample.
+    """Disturbances of the readings of samples: reading = gain f_r + dark, at the directions of a tilted sample.
 
     The tilt [degree] turns the sample about its x and y axis. The gain is 1 + drift t + curvature t (t - 1), t from 0
     at the first sample to 1 at the last, over its value at `reference`. The dark level [1/sr] is divided by powers of

@@ -76,7 +76,7 @@ class FittedSurface:
 
     @cached_property
     def readings(self) -> Floats:
-        """What the instrument reads of the fit at all samples (N, C) [1/sr], with its nuisance numbers."""
+        """Readings of the fit by the instrument at all samples (N, C) [1/sr], with its nuisance numbers."""
         return self.readings_of(self.point, np.arange(len(self.samples)))
 
     def readings_of(self, point: Point, rows: NDArray[np.int64]) -> Floats:

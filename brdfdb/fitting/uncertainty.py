@@ -112,7 +112,7 @@ class GroupSpread(NamedTuple):
 
     @property
     def inflation(self) -> float:
-        """How many times the square of a typical interval is that of independent residuals, at least 1."""
+        """Square of a typical interval over that of independent residuals, at least 1."""
         alone, several = np.diag(self.covariance), np.diag(self.resampled)
         known = (alone > 0.0) & np.isfinite(several)
         ratio = float(np.median(several[known] / alone[known])) if known.any() else 1.0

@@ -1,4 +1,4 @@
-"""What the numbers of a file mean: the quantity of its values, how its angles and wavelengths count, and its k.
+"""Meaning of the numbers of a file: the quantity of its values, how its angles and wavelengths count, and its k.
 
 A `Convention` is what a user states with ``--quantity``, ``--angles``, ``--azimuth``, ``--wavelength-unit`` and
 ``--coverage-factor``. It is applied to rows of any format at one place.
@@ -67,7 +67,7 @@ class FormatConventions(NamedTuple):
 
 @dataclass(frozen=True)
 class Convention:
-    """What a user states on the numbers of a file. Empty: as the reader takes them.
+    """Statements of a user on the numbers of a file. Empty: as the reader takes them.
 
     Attributes
     ----------

@@ -471,7 +471,7 @@ def _grows(peaks: Sequence[_AtLight], *, narrows: bool) -> bool:
 
 
 class _AtLight(NamedTuple):
-    """What a light [degree] shows: viewers near it, a lobe there alone, its height [1/sr], a lobe that is mirrored."""
+    """Lobes of a light [degree]: viewers near it, a lobe there alone, its height [1/sr], a lobe that is mirrored."""
 
     theta_i: float
     seen: bool

@@ -465,7 +465,7 @@ def _wrong(how: SampleInterpolation, problem: _Problem, told: NDArray[np.int64],
 
 
 class _Noise(NamedTuple):
-    """How far f_r may pass from each sample (N,), and the record of the noise."""
+    """Distance from each sample (N,) at which f_r may pass, and the record of the noise."""
 
     allowed: Floats
     record: Noise | None

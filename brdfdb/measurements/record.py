@@ -335,7 +335,7 @@ class Measured(BaseModel):
 
     @property
     def where(self) -> str:
-        """What a verdict rests on, such as "where measured, 1.4 %"; empty: f_r is known everywhere."""
+        """Basis of a verdict, such as "where measured, 1.4 %"; empty: f_r is known everywhere."""
         return f"where {self.origin}, {self.share}" if self.share else ""
 
     def in_words(self) -> list[str]:

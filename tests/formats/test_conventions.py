@@ -1,4 +1,4 @@
-"""What a user states on the numbers of a file of any format: quantity, angles, azimuths, wavelengths and k."""
+"""Statements of a user on the numbers of a file of any format: quantity, angles, azimuths, wavelengths and k."""
 
 from __future__ import annotations
 

@@ -404,7 +404,7 @@ def scale_of(name: str) -> tuple[float, str]:
 
 
 class ValueName(NamedTuple):
-    """What the name of a column of values says.
+    """Meaning of the name of a column of values.
 
     `quantity` is as of `quantity_of`. `logarithm` is log10, ln, decibel, "log" of others, or "" if numbers are none:
     else `factor` makes 1/sr of them, and `unit` is the first that is not known, or "".
