@@ -216,7 +216,8 @@ class Vectors:
     @property
     def given(self) -> tuple[Floats, ...]:
         """The arrays whose shapes broadcast to that of the result, nan where a vector is nan."""
-        return self.w_i.sum(axis=-1), self.w_r.sum(axis=-1)
+        i, r = (w[..., 0] + w[..., 1] + w[..., 2] for w in (self.w_i, self.w_r))  # in a third of the time of `sum`
+        return i, r
 
     x_i = functools.cached_property(lambda self: self.w_i[..., 0].astype(np.float64))
     y_i = functools.cached_property(lambda self: self.w_i[..., 1].astype(np.float64))
@@ -299,7 +300,7 @@ def _unit_vectors(name: str, w: ArrayLike) -> Floats:
         array = array.astype(np.float64)
     count = array.size // 3
     some = array.reshape(-1, 3)[:: max(1, count // 1000)].astype(np.float64)  # a view of contiguous arrays
-    length = np.sqrt(np.sum(some * some, axis=-1))
+    length = np.sqrt(np.einsum("ij,ij->i", some, some))
     bad = np.abs(length - 1.0) > UNIT_LENGTH
     if np.any(bad):
         x, y, z = some[bad][0]

@@ -63,16 +63,16 @@ _FEWEST = 64
 
 
 def rectangles(first: Floats, second: Floats) -> Array:
-    """Return panels between edges as rows: the centre, then half the width, in the first and second variable."""
-    centres = [(edges[:-1] + edges[1:]) / 2.0 for edges in (first, second)]
-    halves = [np.diff(edges) / 2.0 for edges in (first, second)]
-    return np.stack(
-        [
-            *(grid.ravel() for grid in np.meshgrid(centres[0], centres[1], indexing="ij")),
-            *(grid.ravel() for grid in np.meshgrid(halves[0], halves[1], indexing="ij")),
-        ],
-        axis=-1,
-    )
+    """Return panels between edges (..., edges) of many integrals, shape (..., panels, 4).
+
+    A row has the centre, then half the width, in the first and second variable.
+    """
+    first = first[..., :, np.newaxis]
+    second = second[..., np.newaxis, :]
+    parts: list[Floats] = [(first[..., :-1, :] + first[..., 1:, :]) / 2.0, (second[..., :-1] + second[..., 1:]) / 2.0]
+    parts += [np.diff(first, axis=-2) / 2.0, np.diff(second) / 2.0]
+    panels = np.stack(np.broadcast_arrays(*parts), axis=-1)
+    return panels.reshape(*panels.shape[:-3], -1, 4)
 
 
 class Integrals(NamedTuple):
@@ -83,7 +83,7 @@ class Integrals(NamedTuple):
 
 
 def integrated(
-    integrand: Integrand, panels: Array, of: Indices, tolerance: float, most_panels: int, width: int = 1
+    integrand: Integrand, panels: Array, of: Indices, tolerance: Floats, most_panels: int, width: int = 1
 ) -> Integrals:
     """Return integrals over panels, shape (integrals, width), and estimates of their errors (integrals,).
 
@@ -97,8 +97,8 @@ def integrated(
         and the variables at its nodes, (P, 15, 1) and (P, 1, 15).
     panels, of : array (P, 4), array (P,)
         Rectangles, as from `rectangles`, and the index of the integral of each. Each integral has a panel at least.
-    tolerance : float
-        Absolute error to stay below, for the worst of the `width` values of an integral.
+    tolerance : array (integrals,)
+        Absolute error of each to stay below, for the worst of its `width` values.
     most_panels : int
         Number of new panels at which an integral stops.
     """
@@ -130,7 +130,7 @@ def _sums(of: Indices, terms: Array, count: int) -> Array:
     return np.asarray(np.bincount(of, weights=terms, minlength=count), dtype=np.float64)
 
 
-def _chosen(total: Array, of: Indices, wanting: NDArray[np.bool_], tolerance: float) -> NDArray[np.bool_]:
+def _chosen(total: Array, of: Indices, wanting: NDArray[np.bool_], tolerance: Floats) -> NDArray[np.bool_]:
     """Return which panels are halved: of each integral that wants it, all but those that add up to half the tolerance.
 
     These are the panels with the smallest errors.
@@ -143,7 +143,7 @@ def _chosen(total: Array, of: Indices, wanting: NDArray[np.bool_], tolerance: fl
     table = np.zeros((int(integral.max()) + 1, int(place.max()) + 1))
     table[integral, place] = total[rows]
     chosen = np.zeros(total.size, dtype=bool)
-    chosen[rows] = np.cumsum(table, axis=1)[integral, place] > 0.5 * tolerance
+    chosen[rows] = np.cumsum(table, axis=1)[integral, place] > 0.5 * tolerance[of[rows]]
     return chosen
 
 

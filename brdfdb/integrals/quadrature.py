@@ -145,31 +145,68 @@ def reflected_share(
 ) -> Albedo:
     """Return the directional albedo [1] of a function of unit vectors that gives several values of f_r at once.
 
+    ``brdf(wi, wr)`` gives f_r [1/sr] of shape (N, width) for unit vectors (N, 3). All else is as in `reflected_shares`.
+    """
+
+    def of_any_light(_: Indices, wi: Array, wr: Array) -> Floats:
+        return brdf(wi.reshape(-1, 3), wr.reshape(-1, 3))
+
+    return reflected_shares(
+        of_any_light,
+        theta_i,
+        phi_i,
+        lobe,
+        tolerance=tolerance,
+        most_panels=most_panels,
+        width=width,
+        mirrored=mirrored,
+    )
+
+
+def reflected_shares(
+    brdf: Callable[[Indices, Array, Array], Floats],
+    theta_i: ArrayLike,
+    phi_i: ArrayLike,
+    lobe: Lobe | None,
+    *,
+    tolerance: ArrayLike,
+    most_panels: int,
+    width: int = 1,
+    mirrored: ArrayLike = False,
+) -> Albedo:
+    """Return the directional albedo [1] of functions of unit vectors, which may be another for each light.
+
     All lights are integrated together, each on panels of its own. The albedo has the shape (..., width), the error is
     one for each light; it is above the tolerance where the quadrature stopped early.
 
     Parameters
     ----------
     brdf : callable
-        ``brdf(wi, wr)`` for unit vectors (N, 3): f_r [1/sr] of shape (N, width).
+        ``brdf(of, wi, wr)`` for the indices of lights (P,) and unit vectors (P, N, 3): f_r [1/sr] of P * N * width
+        values.
     theta_i, phi_i : array_like [rad]
         Directions of the lights, theta up to pi/2. They broadcast.
     lobe : Lobe or None
         Lobe that all values of a light share, with widths that are numbers or broadcast with the lights.
-    tolerance, most_panels : float, int
-        Absolute error to stay below, for the worst of the values of a light; number of panels at which it stops.
+    tolerance : array_like
+        Absolute error to stay below, for the worst of the values of a light. It broadcasts.
+    most_panels : int
+        Number of panels at which a light stops.
     mirrored : array_like of bool
         True if f_r is the same on both sides of the plane of incidence, so that one side is integrated. It broadcasts.
     """
-    theta, phi, one_side = np.broadcast_arrays(np.asarray(theta_i, dtype=np.float64), phi_i, mirrored)
+    theta, phi, within, one_side = np.broadcast_arrays(
+        np.asarray(theta_i, dtype=np.float64), phi_i, tolerance, mirrored
+    )
     if theta.size == 0:
         return Albedo(np.empty((*theta.shape, width)), np.empty(theta.shape))
     lights = unit_vector(theta.ravel(), phi.ravel())
     sides = np.where(one_side.ravel(), 2.0, 1.0)
 
     def reflected(of: Indices, wr: Array, measure: Array) -> Array:
-        wi = np.broadcast_to(lights[of][:, np.newaxis, np.newaxis], wr.shape)
-        values = np.asarray(brdf(wi.reshape(-1, 3), wr.reshape(-1, 3)), dtype=np.float64)
+        vectors = wr.reshape(len(of), -1, 3)
+        wi = np.broadcast_to(lights[of][:, np.newaxis], vectors.shape)
+        values = np.asarray(brdf(of, wi, vectors), dtype=np.float64)
         values = values.reshape(*wr.shape[:-1], width) * np.maximum(wr[..., 2:], 0.0)
         values *= (measure * sides[of][:, np.newaxis, np.newaxis])[..., np.newaxis]
         return values
@@ -179,7 +216,7 @@ def reflected_share(
     else:
         widths = [np.broadcast_to(alpha, theta.shape).ravel() for alpha in (lobe.alpha_x, lobe.alpha_y)]
         integrals = _over_the_slopes(reflected, lights, np.clip(widths, 1e-9, 10.0), one_side.ravel())
-    albedo, error = integrated(*integrals, tolerance, most_panels, width)
+    albedo, error = integrated(*integrals, within.ravel(), most_panels, width)
     return Albedo(albedo.reshape(*theta.shape, width), error.reshape(theta.shape)[()])
 
 
@@ -240,9 +277,8 @@ def _over_the_hemisphere(
         return reflected(of, unit_vector(theta, phi), np.sin(theta))
 
     edges = np.where((theta_i > 0.0) & (theta_i < HALF_PI), theta_i, HALF_PI / 2.0)
-    panels = [
-        rectangles(np.array([0.0, edge, HALF_PI]), phi + _QUARTERS) for edge, phi in zip(edges, phi_i, strict=True)
-    ]
+    ends = np.stack([np.zeros(edges.size), edges, np.full(edges.size, HALF_PI)], axis=-1)
+    panels = rectangles(ends, phi_i[:, np.newaxis] + _QUARTERS)
     return _panel_integrals(integrand, panels, phi_i, one_side)
 
 
@@ -262,19 +298,17 @@ def _over_the_slopes(
     # At grazing the horizon leaps a quarter turn away from the light, so panels end there
     x_i, y_i = lights[:, 0], lights[:, 1]
     across = np.where(x_i**2 + y_i**2 > 0.0, np.arctan2(widths[0] * x_i, -widths[1] * y_i), HALF_PI)  # p = 0
-    panels = [rectangles(np.linspace(0.0, 1.0, 5), begin + _QUARTERS) for begin in across]
+    panels = rectangles(np.linspace(0.0, 1.0, 5), across[:, np.newaxis] + _QUARTERS)
     return _panel_integrals(integrand, panels, across + HALF_PI, one_side)
 
 
-def _panel_integrals(
-    integrand: Integrand, panels: list[Array], begin: Array, one_side: NDArray[np.bool_]
-) -> _PanelIntegrals:
-    """Return the integrals of all lights over their panels.
+def _panel_integrals(integrand: Integrand, panels: Array, begin: Array, one_side: NDArray[np.bool_]) -> _PanelIntegrals:
+    """Return the integrals of all lights over their panels (lights, panels, 4).
 
     Where `one_side` says so, panels cover one side of the plane of incidence, which begins at the azimuth `begin`.
     """
-    of = np.repeat(np.arange(len(panels)), [len(some) for some in panels])
-    rows = np.concatenate(panels)
+    of = np.repeat(np.arange(len(panels)), panels.shape[1])
+    rows = panels.reshape(-1, 4)
     kept = ~one_side[of] | ((rows[:, 1] > begin[of]) & (rows[:, 1] < begin[of] + np.pi))
     return _PanelIntegrals(integrand, rows[kept], of[kept])
 

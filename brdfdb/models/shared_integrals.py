@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-_KEPT_BYTES = 16 << 20
+_KEPT_BYTES = 64 << 20  # of 400 materials that differ in their sigma
 _Arrays = tuple[NDArray[np.float64], ...]
 
 _sharing: ContextVar[bool] = ContextVar("sharing", default=False)
@@ -45,7 +45,9 @@ def shared(features: NDArray[np.float64], others: tuple[Any, ...], integrate: Ca
     """
     if not _sharing.get():
         return integrate()
-    key = hashlib.sha256(repr((others, features.shape)).encode() + features.tobytes()).digest()
+    content = hashlib.sha256(repr((others, features.shape)).encode())
+    content.update(np.ascontiguousarray(features).data)
+    key = content.digest()
     with _lock:
         if key in _kept:
             _kept.move_to_end(key)

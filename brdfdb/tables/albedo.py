@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, NamedTuple
+from collections.abc import Callable, Generator, Sequence
+from typing import Any, Literal, NamedTuple, TypeVar, cast
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -11,9 +11,10 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel, Field
 
 from brdfdb.geometry import degrees, radians, unit_vector
-from brdfdb.integrals.quadrature import MOST_PANELS, Albedo, reflected_share
+from brdfdb.integrals.panels import Indices
+from brdfdb.integrals.quadrature import MOST_PANELS, Albedo, reflected_share, reflected_shares
 from brdfdb.lobes import narrowest
-from brdfdb.materials import FunctionRecord, Source
+from brdfdb.materials import FunctionRecord, Material, Source
 from brdfdb.measurements import MeasuredSource
 from brdfdb.parameters import Floats
 from brdfdb.tables.grids import Axis
@@ -42,6 +43,17 @@ _FLAT = 1e-4  # largest rise from light to light, relative to the albedo, of a b
 
 # From lights [degree] and a tolerance to albedos (theta_i, wavelengths) [1]
 AlbedoAt = Callable[[Axis, float], Floats]
+
+
+class _Request(NamedTuple):
+    """Lights [degree] at which a search needs albedos (theta_i, wavelengths), and their absolute tolerance [1]."""
+
+    theta_i_deg: Axis
+    tolerance: float
+
+
+_Result = TypeVar("_Result")
+_Search = Generator[_Request, Floats, _Result]  # those of many materials go on together, each with its answers
 
 
 class TableAlbedo(NamedTuple):
@@ -332,17 +344,41 @@ def largest_albedo(table: Table, source: Source | None) -> LargestAlbedo:
     lookups, for the lights of `directional_albedo`.
     """
     wavelength_nm = table.wavelength_nm
-    albedo_at = albedo_of(table, source)
-    power = None
-    of_source = source is not None and not _looked_up(source)
-    if source is None or not of_source:
-        integrated = directional_albedo(table, tolerance=LARGEST_TOLERANCE)
-        lights = integrated.theta_i_deg
-        albedos = _with_specular(table, lights, wavelength_nm, integrated.albedo)
-    else:
-        power = source.grazing_power(wavelength_nm)
-        lights = np.append(THETA_I_DEG, np.unique([LAST_LIGHT_DEG, last_light(source)]))
-        lights, albedos = _searched(albedo_at, lights)
+    if source is not None and not _looked_up(source):
+        return _answered(_largest_of_source(source, wavelength_nm), _of_source(source, wavelength_nm))
+    integrated = directional_albedo(table, tolerance=LARGEST_TOLERANCE)
+    lights = integrated.theta_i_deg
+    results = _Albedos(lights, _with_specular(table, lights, wavelength_nm, integrated.albedo))
+    return _answered(_stated(results, None, "table", wavelength_nm), _of_table(table))
+
+
+def largest_albedos(materials: Sequence[Material]) -> list[LargestAlbedo]:
+    """Return `largest_albedo` of grey materials of one model, whose integrals are computed together."""
+    searches = [_largest_of_source(material, None) for material in materials]
+    requests = {number: next(search) for number, search in enumerate(searches)}
+    results: dict[int, LargestAlbedo] = {}
+    while requests:
+        answers = _albedos_of([materials[number] for number in requests], [*requests.values()])
+        before, requests = requests, {}
+        for number, answer in zip(before, answers, strict=True):
+            try:
+                requests[number] = searches[number].send(answer)
+            except StopIteration as finished:
+                results[number] = finished.value
+    return [results[number] for number in range(len(materials))]
+
+
+def _largest_of_source(source: Source, wavelength_nm: Axis | None) -> _Search[LargestAlbedo]:
+    lights = np.append(THETA_I_DEG, np.unique([LAST_LIGHT_DEG, last_light(source)]))
+    results = yield from _searched(lights)
+    return (yield from _stated(results, source.grazing_power(wavelength_nm), "source", wavelength_nm))
+
+
+def _stated(
+    results: _Albedos, power: float | None, of: Literal["source", "table"], wavelength_nm: Axis | None
+) -> _Search[LargestAlbedo]:
+    """Return the largest of the albedos that were found, and the growth beyond the last light."""
+    lights, albedos = results
     row, column = np.unravel_index(int(np.argmax(np.where(np.isfinite(albedos), albedos, np.inf))), albedos.shape)
     largest = float(albedos[row, column])
     return LargestAlbedo(
@@ -350,10 +386,20 @@ def largest_albedo(table: Table, source: Source | None) -> LargestAlbedo:
         theta_i_deg=float(f"{lights[row]:.6g}"),
         wavelength_nm=None if wavelength_nm is None else float(wavelength_nm[column]),
         tolerance=LARGEST_TOLERANCE,
-        of="source" if of_source else "table",
+        of=of,
         up_to_theta_i_deg=float(lights[-1]),
-        grazing=_grazing(albedo_at, power, largest, float(lights[-1])),
+        grazing=(yield from _grazing(power, largest, float(lights[-1]))),
     )
+
+
+def _answered(search: _Search[_Result], albedo_at: AlbedoAt) -> _Result:
+    """Return what a search finds, with the albedos of one surface."""
+    try:
+        request = next(search)
+        while True:
+            request = search.send(albedo_at(*request))
+    except StopIteration as finished:
+        return cast(_Result, finished.value)
 
 
 def albedo_of(table: Table, source: Source | None) -> AlbedoAt:
@@ -378,12 +424,12 @@ def grazing_of_source(source: Source, wavelength_nm: Axis | None, largest: float
     `largest` is the largest albedo [1] for lights up to there.
     """
     power = source.grazing_power(wavelength_nm)
-    return _grazing(_of_source(source, wavelength_nm), power, largest, last_light(source))
+    return _answered(_grazing(power, largest, last_light(source)), _of_source(source, wavelength_nm))
 
 
 def grazing_of_table(table: Table, largest: float, up_to_theta_i_deg: float) -> Grazing | None:
     """Return the albedo of the lookups of a table for lights beyond an angle [degree], whose growth is measured."""
-    return _grazing(_of_table(table), None, largest, up_to_theta_i_deg)
+    return _answered(_grazing(None, largest, up_to_theta_i_deg), _of_table(table))
 
 
 def _of_source(source: Source, wavelength_nm: Axis | None) -> AlbedoAt:
@@ -396,6 +442,42 @@ def _of_source(source: Source, wavelength_nm: Axis | None) -> AlbedoAt:
         return _with_specular(source, theta_i_deg, wavelength_nm, albedo)
 
     return albedo_at
+
+
+def _albedos_of(materials: Sequence[Material], requests: Sequence[_Request]) -> list[Floats]:
+    """Return the albedos of grey materials of one model, each at lights and to a tolerance of its own."""
+    grids = [
+        np.broadcast_arrays(radians(lights)[:, np.newaxis], radians(azimuths_deg(m)))
+        for m, (lights, _) in zip(materials, requests, strict=True)
+    ]
+    of_light = np.repeat(np.arange(len(materials)), [theta.size for theta, _ in grids])
+    theta_i, phi_i = (np.concatenate([angles[axis].ravel() for angles in grids]) for axis in (0, 1))
+    spec = materials[0].spec
+    given = [material.arguments() for material in materials]
+    parameters = {name: np.array([one[name] for one in given])[:, np.newaxis] for name in given[0]}
+
+    def brdf(of: Indices, wi: Floats, wr: Floats) -> Floats:
+        with np.errstate(all="ignore"):  # as in `source_albedo`
+            return spec.vectors(wi, wr, **{name: values[of_light[of]] for name, values in parameters.items()})
+
+    cos_i = np.cos(theta_i)[:, np.newaxis]
+    lobe = None if spec.lobe is None else spec.lobe(cos_i, **{name: v[of_light] for name, v in parameters.items()})
+    integrals = reflected_shares(
+        brdf,
+        theta_i,
+        phi_i,
+        narrowest(lobe),
+        tolerance=np.array([tolerance for _, tolerance in requests])[of_light],
+        most_panels=_MOST_PANELS,
+        mirrored=np.array([not material.anisotropic for material in materials])[of_light],
+    )
+    ends = np.cumsum([theta.size for theta, _ in grids])[:-1]
+    return [
+        _with_specular(material, lights, None, albedo.reshape(*theta.shape, 1))
+        for material, (lights, _), (theta, _), albedo in zip(
+            materials, requests, grids, np.split(integrals.albedo, ends), strict=True
+        )
+    ]
 
 
 def _of_table(table: Table) -> AlbedoAt:
@@ -418,9 +500,9 @@ class _Albedos(NamedTuple):
     albedo: Floats
 
 
-def _searched(albedo_at: AlbedoAt, lights: Axis) -> _Albedos:
+def _searched(lights: Axis) -> _Search[_Albedos]:
     """Return the albedos of lights, and of more lights around each maximum that may be the largest albedo."""
-    albedos = albedo_at(lights, LARGEST_TOLERANCE)
+    albedos = yield _Request(lights, LARGEST_TOLERANCE)
     for _ in range(_ROUNDS):
         of_lights = albedos.max(axis=1)
         between: set[float] = set()
@@ -434,23 +516,23 @@ def _searched(albedo_at: AlbedoAt, lights: Axis) -> _Albedos:
             break
         added = np.array(sorted(between))
         order = np.argsort(np.append(lights, added))
-        albedos = np.concatenate([albedos, albedo_at(added, LARGEST_TOLERANCE)])[order]
+        albedos = np.concatenate([albedos, (yield _Request(added, LARGEST_TOLERANCE))])[order]
         lights = np.append(lights, added)[order]
     return _Albedos(lights, albedos)
 
 
-def _grazing(albedo_at: AlbedoAt, declared: float | None, largest: float, up_to_theta_i_deg: float) -> Grazing | None:
+def _grazing(declared: float | None, largest: float, up_to_theta_i_deg: float) -> _Search[Grazing | None]:
     """Return the growth of an albedo beyond an angle, by quadrature next to 90 degrees; None if it is not finite."""
 
-    def at(cos_i: float, before: float) -> float:
+    def at(cos_i: float, before: float) -> _Search[float]:
         theta_i_deg = np.array([90.0 - float(degrees(np.arcsin(cos_i)))])
-        return float(np.max(albedo_at(theta_i_deg, min(_GRAZING_TOLERANCE * max(before, 1.0), 1.0))))
+        return float(np.max((yield _Request(theta_i_deg, min(_GRAZING_TOLERANCE * max(before, 1.0), 1.0)))))
 
     if not np.isfinite(largest):
         return None
-    near = at(_NEAR, largest)
-    nearer = at(_NEARER, near)
-    nearest = at(_NEAREST, nearer)
+    near = yield from at(_NEAR, largest)
+    nearer = yield from at(_NEARER, near)
+    nearest = yield from at(_NEAREST, nearer)
     if not np.isfinite([near, nearer, nearest]).all():
         return None
     power = declared
@@ -466,7 +548,7 @@ def _grazing(albedo_at: AlbedoAt, declared: float | None, largest: float, up_to_
     most = max(largest, near, nearer, nearest)
     passes = None
     if largest <= 1.0 and (power > 0.0 or most > 1.0 + LARGEST_TOLERANCE):
-        tried = {_NEAR: near, _NEARER: nearer, _NEAREST: nearest, _LEAST: at(_LEAST, nearest)}
+        tried = {_NEAR: near, _NEARER: nearer, _NEAREST: nearest, _LEAST: (yield from at(_LEAST, nearest))}
         above = next((cos_i for cos_i, albedo in tried.items() if albedo > 1.0), None)
         if above is not None:
             below = float(np.cos(radians(min(up_to_theta_i_deg, LAST_LIGHT_DEG))))
@@ -474,10 +556,12 @@ def _grazing(albedo_at: AlbedoAt, declared: float | None, largest: float, up_to_
                 guess = (factor / (1.0 - rest)) ** (1.0 / power)
                 for tried_cos in (guess * (1.0 + _PASSING), guess * (1.0 - _PASSING)):
                     if above < tried_cos < below:
-                        below, above = (below, tried_cos) if at(tried_cos, 1.0) > 1.0 else (tried_cos, above)
+                        below, above = (
+                            (below, tried_cos) if (yield from at(tried_cos, 1.0)) > 1.0 else (tried_cos, above)
+                        )
             while below > above * (1.0 + _PASSING):
                 between = float(np.sqrt(below * above))
-                below, above = (below, between) if at(between, 1.0) > 1.0 else (between, above)
+                below, above = (below, between) if (yield from at(between, 1.0)) > 1.0 else (between, above)
         elif factor > 0.0 and rest < 1.0:  # closer than quadrature reaches, by the formula
             above = (factor / (1.0 - rest)) ** (1.0 / power)
         if above is not None:

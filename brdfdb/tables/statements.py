@@ -18,7 +18,7 @@ from brdfdb.tables.albedo import largest_albedo
 from brdfdb.tables.error_measurement import Read, measure
 from brdfdb.tables.layout import Layout, digest
 from brdfdb.tables.metadata import TableMetadata
-from brdfdb.tables.stated_error import FormulaError, Overall
+from brdfdb.tables.stated_error import FormulaError, LargestAlbedo, Overall
 from brdfdb.tables.stokes import ElementError, record
 from brdfdb.tables.table import Table
 from brdfdb.tables.tabulation import glints_of, metadata_of
@@ -40,17 +40,19 @@ _WAVELENGTHS_AT_ONCE = 8  # wavelengths that are evaluated together
 MEASURED = ("error", "formula_error", "largest_albedo", "polarisation")  # attributes that hold measured numbers
 
 
-def first_numbers(layout: Layout, read: Read) -> dict[str, Any]:
+def first_numbers(layout: Layout, read: Read, largest: LargestAlbedo | None = None) -> dict[str, Any]:
     """Return the attributes of a table that lists show next to its stated error.
 
-    They are `formula_error`; `largest_albedo` unless the table has more than `LARGE` values; `polarisation` of a
-    polarised table. `read` gives some rows of the first axis of the stored array.
+    They are `formula_error`; `largest_albedo`, unless it is given, or the table has more than `LARGE` values;
+    `polarisation` of a polarised table. `read` gives some rows of the first axis of the stored array.
     """
     numbers: dict[str, Any] = {"formula_error": formula_error_of(layout.source, layout.wavelength_nm)}
     polarised = layout.facet_theta_d_deg is not None
-    if layout.size <= LARGE or polarised:
+    if largest is not None:
+        numbers["largest_albedo"] = largest
+    if (layout.size <= LARGE and largest is None) or polarised:
         table = replace(Table.of(layout, read(slice(0, layout.shape[0]))), glints=glints_of(layout))
-        if layout.size <= LARGE:
+        if layout.size <= LARGE and largest is None:
             numbers["largest_albedo"] = largest_albedo(table, layout.source)
         if polarised:
             numbers["polarisation"] = record(element_error(table, layout.source))
@@ -168,12 +170,15 @@ def _up(values: Floats) -> list[list[float]]:
     return [[float(f"{1.00501 * value:.3g}") for value in row] for row in values.tolist()]
 
 
-def stated_metadata(layout: Layout, read: Read, request: Mapping[str, Any] | None = None) -> TableMetadata:
+def stated_metadata(
+    layout: Layout, read: Read, request: Mapping[str, Any] | None = None, largest: LargestAlbedo | None = None
+) -> TableMetadata:
     """Return the metadata of a table with its stated error, its first numbers and the request that it was made for.
 
     `read` gives some rows of the first axis of the stored array: large tables are read piece by piece. The metadata is
-    the same whenever it is measured, but for rounding: directions are drawn with seeds of their own.
+    the same whenever it is measured, but for rounding: directions are drawn with seeds of their own. The largest albedo
+    is computed unless it is given.
     """
     known = metadata_of(layout)
     made_for = {} if request is None else {"request": known.without_source(request), "request_sha256": digest(request)}
-    return known.model_copy(update={**made_for, "error": measure(layout, read), **first_numbers(layout, read)})
+    return known.model_copy(update={**made_for, "error": measure(layout, read), **first_numbers(layout, read, largest)})
