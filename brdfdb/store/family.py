@@ -8,9 +8,10 @@ from __future__ import annotations
 import functools
 import itertools
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from types import EllipsisType
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -19,11 +20,11 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from brdfdb.arrays import array_lookup
 from brdfdb.errors import ParameterError, StoreError, percent, sentence_of
-from brdfdb.geometry import checked_angles, checked_vectors, degrees, radians
+from brdfdb.geometry import asked_for, checked_angles, checked_vectors, common_shape, degrees, radians
 from brdfdb.materials import written_name
 from brdfdb.models import MODELS
 from brdfdb.notebook import card
-from brdfdb.parameters import Floats, Parameter
+from brdfdb.parameters import Floats, Gradient, Parameter
 from brdfdb.store.files import read_sealed
 from brdfdb.tables.evaluation import LookupSubject
 from brdfdb.tables.grids import Axis
@@ -35,6 +36,7 @@ FORMAT = "brdfdb-family"
 FORMAT_VERSION: Literal[2] = 2  # 1: without an error near the light and at the horizon
 _STRICT = ConfigDict(frozen=True, extra="forbid")
 _SAME = 1e-12  # relative tolerance for treating a parameter as equal to a member's value
+_SAME_SINGLE = 1.2e-7  # the same for float32
 
 
 class FamilyLine(BaseModel):
@@ -188,47 +190,124 @@ def stale(family: str, member: str) -> str:
 
 
 class Stencil(NamedTuple):
-    """The nodes around a value of a parameter: the number of the first, and the weight of each."""
+    """The nodes around values of a parameter: numbers of the first ones (...), and weights (..., nodes).
 
-    first: int
+    `slopes` are the derivatives of the weights by the parameter; 0 unless they are wanted.
+    """
+
+    first: NDArray[np.int64]
     weights: Floats
+    slopes: Floats
 
 
-def stencil(nodes: Axis, value: float, power: int, *, cubic: bool) -> Stencil:
-    """Return the nodes around a value of a parameter, with their weights.
+def stencil(nodes: Axis, value: ArrayLike, power: int, *, cubic: bool, derive: bool = False) -> Stencil:
+    """Return the nodes around values (...) of a parameter, with their weights, and with `derive` their derivatives.
 
     Lagrange's polynomial through 2 nodes, or 4 (3 if there are no more), in a power of the parameter or its logarithm
     (power 0). At a node its weight is exactly 1, that of others 0.
     """
     width = min(4 if cubic else 2, nodes.size)
-    cell = int(np.searchsorted(nodes, value, side="right")) - 1
-    first = min(max(cell - (width - 2) // 2, 0), nodes.size - width)
-    near = nodes[first : first + width]
-    x = np.log(near) if power == 0 else near ** float(power)
-    at = np.log(value) if power == 0 else value ** float(power)
-    others = ~np.eye(width, dtype=bool)
-    factors = np.divide(at - x, x[:, np.newaxis] - x, out=np.ones((width, width)), where=others)
-    return Stencil(first, np.prod(factors, axis=1))
+    at = np.asarray(value, dtype=np.float64)
+    cell = np.searchsorted(nodes, at, side="right") - 1
+    first = np.clip(cell - (width - 2) // 2, 0, nodes.size - width)
+    x = np.log(nodes) if power == 0 else nodes ** float(power)
+    scaled = np.where(at == nodes[cell], x[cell], np.log(at) if power == 0 else at ** float(power))
+    near = [x[first + k] for k in range(width)]
+    pairs = list(itertools.permutations(range(width), 2))
+    factors = {(j, k): (scaled - near[k]) / (near[j] - near[k]) for j, k in pairs}
+    weights = np.ones((*at.shape, width))
+    slopes = np.zeros((*at.shape, width))
+    for j, k in pairs:
+        weights[..., j] *= factors[j, k]
+    if not derive:
+        return Stencil(first, weights, slopes)
+    for j, k in pairs:
+        rest = [factors[j, m] for m in range(width) if m not in (j, k)]
+        slopes[..., j] += math.prod(rest, start=1.0 / (near[j] - near[k]))
+    by_x = 1.0 / at if power == 0 else power * at ** float(power - 1)  # derivative of the power
+    return Stencil(first, weights, slopes * np.asarray(by_x)[..., np.newaxis])
+
+
+class _Mean:
+    """The weighted mean of values (...), or of logarithms of values plus `offset`, with its derivatives.
+
+    Points that are `single` have one value, of weight 1, and get it unchanged.
+    """
+
+    def __init__(
+        self, shape: tuple[int, ...], offset: float | None, single: ArrayLike = False, slopes: int = 0
+    ) -> None:
+        self._offset = offset
+        self._single = np.broadcast_to(single, shape)
+        self._total = np.zeros(shape)
+        self._slopes = [np.zeros(shape) for _ in range(slopes)]
+        self._black = np.ones(shape, dtype=bool)  # where values that have a weight are 0
+        self._flat = np.ones(shape, dtype=bool)  # where all values are
+
+    def add(self, rows: Any, value: Floats, weight: ArrayLike, slopes: Sequence[ArrayLike] = ()) -> None:
+        """Add the values of some points, with their weight and its derivatives."""
+        value = np.asarray(value, dtype=np.float64)
+        summand = value if self._offset is None else np.log(np.maximum(value, 0.0) + self._offset)
+        black = np.equal(value, 0.0)
+        self._black[rows] &= black | np.equal(weight, 0.0)
+        self._total[rows] += np.multiply(weight, np.where(self._single[rows], value, summand))
+        if self._slopes:
+            self._flat[rows] &= black
+        for total, slope in zip(self._slopes, slopes, strict=True):
+            total[rows] += np.multiply(slope, summand)
+
+    def result(self) -> tuple[Floats, list[Floats]]:
+        """Return the mean, 0 where all values are and at least 0 elsewhere, and its derivatives, 0 where it is cut."""
+        mean, factor = self._total, np.ones(())
+        if self._offset is not None:
+            mean = np.where(self._single, mean, np.exp(np.where(self._single, 0.0, mean)) - self._offset)
+            factor = mean + self._offset
+        cut = self._flat | (mean < 0.0)
+        return (
+            np.where(self._black, 0.0, np.maximum(mean, 0.0)),
+            [np.where(cut, 0.0, factor * slope) for slope in self._slopes],
+        )
 
 
 def blended(values: Sequence[Floats], weights: Sequence[ArrayLike], offset: float | None) -> Floats:
     """Return the weighted mean of values, or of the logarithms of values plus `offset`; 0 where all values are."""
-    if offset is None:
-        mean = sum(np.asarray(weight) * value for weight, value in zip(weights, values, strict=True))
-        return np.maximum(mean, 0.0)
-    logarithms = sum(
-        np.asarray(weight) * np.log(np.maximum(value, 0.0) + offset)
-        for weight, value in zip(weights, values, strict=True)
-    )
-    black = np.logical_and.reduce([np.equal(value, 0.0) for value in values])
-    return np.where(black, 0.0, np.maximum(np.exp(logarithms) - offset, 0.0))
+    mean = _Mean(np.broadcast_shapes(*map(np.shape, [*values, *weights])), offset)
+    for value, weight in zip(values, weights, strict=True):
+        mean.add(..., value, weight)
+    return mean.result()[0]
 
 
-class _Part(NamedTuple):
-    """A member and its weight."""
+class _Use(NamedTuple):
+    """A member, its points among those of a call, its weight there, and the derivatives of this weight."""
 
     table: Table
-    weight: float
+    rows: Any  # an array, or all
+    weight: Any
+    slopes: list[Any]
+
+
+class _Query(NamedTuple):
+    """Points of one call: angles or vectors, and the members around their parameters.
+
+    Parameters and directions that broadcast to `shape` have a row for each point, in the `order` of the cells between
+    members, which keeps close together what a member needs. Of a single set of parameters `shape` is None, and the
+    directions are as they were given.
+    """
+
+    given: tuple[Any, ...]
+    stencils: list[Stencil]
+    derive: bool
+    shape: tuple[int, ...] | None = None
+    order: NDArray[np.int64] = np.zeros(1, dtype=np.int64)
+
+    @property
+    def single(self) -> NDArray[np.bool_]:
+        """True at points that are members."""
+        return np.asarray(np.all([np.count_nonzero(along.weights, axis=-1) == 1 for along in self.stencils], axis=0))
+
+    def at(self, rows: Any) -> tuple[Any, ...]:
+        """Return the angles or vectors of rows."""
+        return self.given if self.shape is None else tuple(array[rows] for array in self.given)
 
 
 class _AtParameters:
@@ -301,7 +380,7 @@ class Family:
         theta_r: ArrayLike,
         phi_r: ArrayLike,
         wavelength_nm: ArrayLike | None = None,
-        **parameters: float,
+        **parameters: ArrayLike,
     ) -> Floats:
         """Interpolate f_r [1/sr] over directions, wavelengths and parameters.
 
@@ -309,8 +388,8 @@ class Family:
         ----------
         theta_i, phi_i, theta_r, phi_r, wavelength_nm
             As in `Table.lookup`: angles in radians.
-        **parameters : float
-            One number for each swept parameter, in the unit of the model: angles in radians.
+        **parameters : array_like
+            Each swept parameter, in the unit of the model: angles in radians. They broadcast with the angles.
 
         Returns
         -------
@@ -320,20 +399,63 @@ class Family:
         Raises
         ------
         ParameterError
-            If a parameter is missing, not swept, not one number or outside its swept range, or an angle or wavelength
-            is outside its range.
+            If a parameter is missing, not swept or outside its swept range, or an angle or wavelength is outside its
+            range.
         StoreError
             If a member was built anew since the family was recorded.
+
+        Notes
+        -----
+        Each member is read once in a call, at all the points that need it: one call with a million sets of parameters
+        is a thousand times faster than a million calls.
         """
-        given = (theta_i, phi_i, theta_r, phi_r, wavelength_nm)
-        return self._blended(self._parts(parameters), lambda table: table.lookup(*given))
+        query = self._query(parameters, (theta_i, phi_i, theta_r, phi_r))
+        return self._interpolated(query, Table.lookup, wavelength_nm).f_r
 
     @array_lookup
     def lookup_vectors(
-        self, wi: ArrayLike, wr: ArrayLike, wavelength_nm: ArrayLike | None = None, **parameters: float
+        self, wi: ArrayLike, wr: ArrayLike, wavelength_nm: ArrayLike | None = None, **parameters: ArrayLike
     ) -> Floats:
         """Interpolate f_r [1/sr] for unit vectors `wi` of the light and `wr` of the viewer, each of shape (..., 3)."""
-        return self._blended(self._parts(parameters), lambda table: table.lookup_vectors(wi, wr, wavelength_nm))
+        query = self._query(parameters, (wi, wr), 1)
+        return self._interpolated(query, Table.lookup_vectors, wavelength_nm).f_r
+
+    @array_lookup
+    def gradient(
+        self,
+        theta_i: ArrayLike,
+        phi_i: ArrayLike,
+        theta_r: ArrayLike,
+        phi_r: ArrayLike,
+        wavelength_nm: ArrayLike | None = None,
+        **parameters: ArrayLike,
+    ) -> Gradient:
+        """Return f_r [1/sr] and its derivatives by the swept parameters, as `brdfdb.derivatives.gradient` does.
+
+        Arguments and errors are those of `lookup`.
+
+        Returns
+        -------
+        Gradient
+            `f_r` [1/sr], the same as by `lookup`, and `derivatives`, a dict from the names of the swept parameters to
+            arrays of the same shape, each in 1/sr over the unit of its parameter.
+
+        Notes
+        -----
+        The derivatives are those of the interpolation polynomials, without differences, and not those of the model. At
+        the parameters of a member, where two polynomials meet, they are those of the polynomial above, at the upper end
+        of a range that below. Where f_r is held at 0, they are 0.
+        """
+        query = self._query(parameters, (theta_i, phi_i, theta_r, phi_r), derive=True)
+        return self._interpolated(query, Table.lookup, wavelength_nm)
+
+    @array_lookup
+    def gradient_vectors(
+        self, wi: ArrayLike, wr: ArrayLike, wavelength_nm: ArrayLike | None = None, **parameters: ArrayLike
+    ) -> Gradient:
+        """Return `gradient` for unit vectors `wi` (light) and `wr` (viewer) of shape (..., 3)."""
+        query = self._query(parameters, (wi, wr), 1, derive=True)
+        return self._interpolated(query, Table.lookup_vectors, wavelength_nm)
 
     @array_lookup
     def lookup_with_error(
@@ -343,95 +465,214 @@ class Family:
         theta_r: ArrayLike,
         phi_r: ArrayLike,
         wavelength_nm: ArrayLike | None = None,
-        **parameters: float,
+        **parameters: ArrayLike,
     ) -> Stated:
         """Interpolate f_r [1/sr], and give the stated error [1/sr] of each value.
 
         Parameters and errors are those of `lookup`. At the parameters of a member the error is what its table states,
         elsewhere what was measured of the family.
         """
-        parts = self._parts(parameters)
-        given = (theta_i, phi_i, theta_r, phi_r, wavelength_nm)
-        if len(parts) == 1:
-            return parts[0].table.lookup_with_error(*given)
-        brdf = self._blended(parts, lambda table: table.lookup(*given))
-        directions = checked_angles(theta_i, phi_i, theta_r, phi_r)
-        return Stated(brdf, parts[0].table.stated_by(self.error, directions, brdf, wavelength_nm))
+        given = (theta_i, phi_i, theta_r, phi_r)
+        return self._with_error(
+            self._query(parameters, given),
+            Table.lookup,
+            Table.lookup_with_error,
+            wavelength_nm,
+            lambda table, brdf: table.stated_by(self.error, checked_angles(*given), brdf, wavelength_nm),
+        )
 
     @array_lookup
     def lookup_vectors_with_error(
-        self, wi: ArrayLike, wr: ArrayLike, wavelength_nm: ArrayLike | None = None, **parameters: float
+        self, wi: ArrayLike, wr: ArrayLike, wavelength_nm: ArrayLike | None = None, **parameters: ArrayLike
     ) -> Stated:
         """Interpolate f_r [1/sr] for unit vectors, and give the stated error [1/sr]; as `lookup_with_error`."""
-        parts = self._parts(parameters)
-        if len(parts) == 1:
-            return parts[0].table.lookup_vectors_with_error(wi, wr, wavelength_nm)
-        brdf = self._blended(parts, lambda table: table.lookup_vectors(wi, wr, wavelength_nm))
-        return Stated(brdf, parts[0].table.stated_by(self.error, checked_vectors(wi, wr), brdf, wavelength_nm))
+        return self._with_error(
+            self._query(parameters, (wi, wr), 1),
+            Table.lookup_vectors,
+            Table.lookup_vectors_with_error,
+            wavelength_nm,
+            lambda table, brdf: table.stated_by(self.error, checked_vectors(wi, wr), brdf, wavelength_nm),
+        )
 
     @array_lookup
     def specular_reflectance(
-        self, theta_i: ArrayLike, wavelength_nm: ArrayLike | None = None, **parameters: float
+        self, theta_i: ArrayLike, wavelength_nm: ArrayLike | None = None, **parameters: ArrayLike
     ) -> Floats:
         """Interpolate the reflectance [1] of the specular part; 0 for models that have none.
 
         Arguments, shape and errors are those of `Table.specular_reflectance` and `lookup`. The error is at most
         `record.specular_error`.
         """
-        parts = self._parts(parameters)
-        values = [part.table.specular_reflectance(theta_i, wavelength_nm) for part in parts]
-        if len(parts) == 1:
-            return values[0]
-        return blended(values, [part.weight for part in parts], self.record.interpolation.specular_offset)[()]
+        query = self._query(parameters, (theta_i,))
+        return self._interpolated(
+            query,
+            Table.specular_reflectance,
+            wavelength_nm,
+            offset=self.record.interpolation.specular_offset,
+        ).f_r
 
-    def around(self, **parameters: float) -> list[Table]:
+    def around(self, **parameters: ArrayLike) -> list[Table]:
         """Return the members that a lookup at these parameters interpolates; errors as by `lookup`."""
-        return [part.table for part in self._parts(parameters)]
+        return [use.table for use in self._uses(self._query(parameters, ()))]
 
-    def _blended(self, parts: Sequence[_Part], look: Callable[[Table], Floats]) -> Floats:
-        """Return the weighted mean of the values that `look` finds in members, or those of a single member."""
-        values = [look(part.table) for part in parts]
-        if len(parts) == 1:
-            return values[0]
-        mean = blended(
-            [np.asarray(value, dtype=np.float64) for value in values],
-            [part.weight for part in parts],
-            self.record.interpolation.offset,
+    def _query(
+        self, parameters: Mapping[str, Any], given: tuple[Any, ...], own: int = 0, *, derive: bool = False
+    ) -> _Query:
+        """Return the points of a call; the last `own` axes of what is given do not broadcast."""
+        stencils = self._stencils(parameters, derive=derive)
+        if (swept := stencils[0].first.shape) == ():
+            return _Query(given, stencils, derive)
+        arrays = [np.asarray(array) for array in given]
+        try:
+            shape = np.broadcast_shapes(swept, *(array.shape[: array.ndim - own] for array in arrays))
+        except ValueError:
+            shapes = ", ".join(str(array.shape[: array.ndim - own]) for array in arrays)
+            raise ParameterError(
+                next(iter(self.axes)), f"the shapes of parameters, {swept}, and directions, {shapes}, do not broadcast"
+            ) from None
+        dtype = asked_for(*given)
+        first = [np.broadcast_to(along.first, shape).reshape(-1) for along in stencils]
+        order = np.argsort(self._number(first), kind="stable")
+
+        def rows(array: NDArray[Any], last: tuple[int, ...]) -> NDArray[Any]:
+            return np.broadcast_to(array, (*shape, *last)).reshape(-1, *last)[order]
+
+        numbers = [array.astype(dtype) if array.dtype.kind in "iuf" else array for array in arrays]
+        return _Query(
+            tuple(rows(array, array.shape[array.ndim - own :]) for array in numbers),
+            [Stencil(*(rows(part, part.shape[stencils[0].first.ndim :]) for part in along)) for along in stencils],
+            derive,
+            shape,
+            order,
         )
-        return mean.astype(np.asarray(values[0]).dtype)[()]
 
-    def _parts(self, parameters: Mapping[str, Any]) -> list[_Part]:
-        """Return the members around a point, with weights that add up to 1."""
+    def _number(self, corner: Iterable[NDArray[np.int64]]) -> NDArray[np.int64]:
+        """Return the numbers of members from their places along the parameters."""
+        return np.asarray(np.ravel_multi_index(tuple(corner), tuple(nodes.size for nodes in self.axes.values())))
+
+    def _uses_of_one(self, query: _Query) -> Iterator[_Use]:
+        """Yield the members around a single set of parameters, with all directions; numbers of Python are faster."""
+        near = [
+            [(int(first) + k, *both) for k, both in enumerate(zip(weights.tolist(), slopes.tolist(), strict=True))]
+            for first, weights, slopes in query.stencils
+        ]
+        for corner in itertools.product(*([part for part in along if part[1] or part[2]] for along in near)):
+            number = 0
+            for nodes, part in zip(self.axes.values(), corner, strict=True):
+                number = number * nodes.size + part[0]
+            weights = [weight for _, weight, _ in corner]
+            by = [math.prod([*weights[:k], part[2], *weights[k + 1 :]]) for k, part in enumerate(corner)]
+            if (weight := math.prod(weights)) or any(by):
+                yield _Use(self._member(number), ..., np.float64(weight), [np.float64(slope) for slope in by])
+
+    def _uses(self, query: _Query) -> Iterator[_Use]:
+        """Yield each member that has a weight, once, with its points; points of a cell have the same members."""
+        if query.shape is None:
+            yield from self._uses_of_one(query)
+            return
+        first, weights, slopes = zip(*query.stencils, strict=True)
+        cells, starts = np.unique(self._number(first), return_index=True)
+        corners = np.indices([along.shape[-1] for along in weights]).reshape(len(first), -1)
+        beyond = self._number(corners).tolist()
+        points: dict[int, list[NDArray[np.int64]]] = {}
+        groups = np.split(np.arange(first[0].size), starts[1:])
+        for lowest, rows in zip(cells.tolist(), groups, strict=False):  # no cell of no points
+            for number in beyond:
+                points.setdefault(lowest + number, []).append(rows)
+        for number in sorted(points) or [0]:
+            rows = np.concatenate(points.get(number, [np.arange(0)]))
+            place = np.unravel_index([number], tuple(nodes.size for nodes in self.axes.values()))
+            within = [i - f[rows] for i, f in zip(place, first, strict=True)]
+            along = [w[rows, k] for w, k in zip(weights, within, strict=True)]
+            weight = np.asarray(math.prod(along))
+            by = [
+                np.asarray(math.prod([*along[:axis], slope[rows, within[axis]], *along[axis + 1 :]]))
+                for axis, slope in enumerate(slopes)
+                if query.derive
+            ]
+            used = np.logical_or.reduce([np.not_equal(w, 0.0) for w in (weight, *by)])
+            if used.any() or not used.size:
+                yield _Use(self._member(number), rows[used], weight[used], [w[used] for w in by])
+
+    def _interpolated(
+        self,
+        query: _Query,
+        look: Callable[..., Floats],
+        wavelength_nm: ArrayLike | None,
+        *,
+        offset: float | EllipsisType | None = ...,
+    ) -> Gradient:
+        """Return the mean over members of the values that `look` finds, and its derivatives."""
+        blend = self.record.interpolation.offset if offset is ... else offset
+        mean = None
+        for use in self._uses(query):
+            value = np.asarray(look(use.table, *query.at(use.rows), wavelength_nm))
+            if mean is None:
+                dtype = value.dtype
+                tail = value.shape if query.shape is None else value.shape[1:]
+                spread = (..., *(np.newaxis,) * len(tail))
+                points = () if query.shape is None else (math.prod(query.shape),)
+                mean = _Mean((*points, *tail), blend, query.single[spread], len(self.axes) if query.derive else 0)
+            mean.add(use.rows, value, use.weight[spread], [slope[spread] for slope in use.slopes if query.derive])
+        assert mean is not None
+        brdf, slopes = mean.result()
+        arrays = [array.astype(dtype) for array in (brdf, *slopes)]
+        if query.shape is not None:
+            back = np.argsort(query.order)
+            arrays = [array[back].reshape((*query.shape, *tail)) for array in arrays]
+        shaped = [array[()] for array in arrays]
+        return Gradient(shaped[0], dict(zip(self.axes, shaped[1:], strict=query.derive)))
+
+    def _with_error(
+        self,
+        query: _Query,
+        look: Callable[..., Floats],
+        of_member: Callable[..., Stated],
+        wavelength_nm: ArrayLike | None,
+        stated: Callable[[Table, Floats], Floats],
+    ) -> Stated:
+        """Return f_r and its error: what members state at their parameters, what the family states elsewhere."""
+        single = query.single
+        if query.shape is None and single:
+            return of_member(next(self._uses(query)).table, *query.given, wavelength_nm)
+        brdf = self._interpolated(query, look, wavelength_nm).f_r
+        error = np.asarray(stated(self._member(0), brdf))
+        if single.any():
+            rows = error.reshape(single.size, -1).copy()
+            for use in self._uses(query):
+                exact = use.rows[single[use.rows]]
+                if exact.size:
+                    own = of_member(use.table, *query.at(exact), wavelength_nm).error
+                    rows[query.order[exact]] = own.reshape(exact.size, -1)
+            error = rows.reshape(error.shape)
+        return Stated(brdf, error[()])
+
+    def _stencils(self, parameters: Mapping[str, Any], *, derive: bool) -> list[Stencil]:
+        """Return the members around points, along each parameter; all broadcast to the same shape."""
         names = list(self.axes)
         for name in parameters:
             if name not in names:
                 known = f"the parameters of the family {self.name} are {', '.join(names)}"
                 raise ParameterError(name, f"{parameters[name]!r} given, but {known}", parameters[name], tuple(names))
-        around = []
-        cubic = self.record.interpolation.method == "cubic"
-        for limits, nodes, power in zip(self._limits, self.axes.values(), self._powers, strict=True):
+        values = []
+        for limits, nodes in zip(self._limits, self.axes.values(), strict=True):
             if limits.name not in parameters:
                 needed = f"missing, {self.name} needs a value in {limits.interval}"
                 raise ParameterError(limits.name, needed, None, (limits.low, limits.high))
-            near = stencil(nodes, _checked(limits, nodes, parameters[limits.name]), power, cubic=cubic)
-            around.append([(near.first + k, weight) for k, weight in enumerate(near.weights) if weight != 0.0])
-        shape = [nodes.size for nodes in self.axes.values()]
-        parts = []
-        for corner in itertools.product(*around):
-            number = int(np.ravel_multi_index([at for at, _ in corner], shape))
-            parts.append(_Part(self._member(number), float(np.prod([weight for _, weight in corner]))))
-        return parts
+            values.append(_checked(limits, nodes, parameters[limits.name]))
+        common_shape(", ".join(names), *values)
+        cubic = self.record.interpolation.method == "cubic"
+        return [
+            stencil(nodes, value, power, cubic=cubic, derive=derive)
+            for nodes, value, power in zip(self.axes.values(), np.broadcast_arrays(*values), self._powers, strict=True)
+        ]
 
 
-def _checked(limits: Parameter, nodes: Axis, value: Any) -> float:
-    """Return a number within limits; a number that differs from a node by rounding is that of the node."""
-    if np.ndim(value) != 0:
-        raise ParameterError(
-            limits.name, f"{value!r} is not one number in {limits.interval}", value, (limits.low, limits.high)
-        )
+def _checked(limits: Parameter, nodes: Axis, value: Any) -> Floats:
+    """Return numbers within limits; a number that differs from a node by rounding is that of the node."""
     given: NDArray[Any] = np.asarray(value)
-    if given.dtype.kind in "iuf":
-        nearest = nodes[np.argmin(np.abs(nodes - given))]
-        if abs(nearest - given) <= _SAME * np.abs(nodes).max():
-            return float(nearest)
-    return float(limits.check(value))
+    if given.dtype.kind not in "iuf":
+        return limits.check(value)
+    nearest = nodes[np.searchsorted((nodes[1:] + nodes[:-1]) / 2.0, given)]
+    same = _SAME_SINGLE if given.dtype == np.float32 else _SAME
+    return limits.check(np.where(np.abs(nearest - given) <= same * np.abs(nodes).max(), nearest, given))

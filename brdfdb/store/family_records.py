@@ -27,7 +27,7 @@ from brdfdb.store.family import (
     stale,
     stencil,
 )
-from brdfdb.store.files import sync_directory, write_sealed
+from brdfdb.store.files import sync_path, write_sealed
 from brdfdb.store.lock import Lock, writing
 from brdfdb.store.paths import family_path
 from brdfdb.store.reader import Store
@@ -325,7 +325,8 @@ def _interpolated(sweep: Sweep, measured: _Measured, corners: Floats, way: _Way)
     weights = np.array(rows)
     members = np.flatnonzero(np.any(weights != 0.0, axis=0))
     spread = (slice(None), *(np.newaxis,) * (corners.ndim - 2))
-    return blended([corners[:, c] for c in members], [weights[:, c][spread] for c in members], way.offset)
+    with np.errstate(over="ignore"):  # between few members a cubic of logarithms may overflow: its error is infinite
+        return blended([corners[:, c] for c in members], [weights[:, c][spread] for c in members], way.offset)
 
 
 def recorded(root: Path, sweep: Sweep) -> FamilyRecord | None:
@@ -352,8 +353,8 @@ def write_family(root: str, sweep: Sweep) -> FamilyRecord:
         with writing(store, sweep.name):
             path.parent.mkdir(exist_ok=True)
             write_sealed(path, record.model_dump(mode="json"), lock.path.parent)
-            sync_directory(path.parent)
-            sync_directory(store)
+            sync_path(path.parent)
+            sync_path(store)
     return record
 
 

@@ -176,7 +176,7 @@ class Killed(BaseException):
     """What ends a process."""
 
 
-@pytest.mark.parametrize("last", ["measure", "write_sealed", "sync_directory"])
+@pytest.mark.parametrize("last", ["measure", "write_sealed", "sync_path"])
 def test_a_build_that_was_killed_before_the_record_goes_on_there(
     last: str, first: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -190,7 +190,7 @@ def test_a_build_that_was_killed_before_the_record_goes_on_there(
             built(root, GREY)
     members = tree(root / "materials")
     events = built(root, GREY)
-    assert of_family(events) == (["unchanged"] if last == "sync_directory" else ["measuring", "published"])
+    assert of_family(events) == (["unchanged"] if last == "sync_path" else ["measuring", "published"])
     assert events[-1]["unchanged"] == 5
     assert tree(root / "materials") == members
     assert brdfdb.open(root).family("grey").record == brdfdb.open(first).family("grey").record
