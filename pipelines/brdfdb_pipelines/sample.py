@@ -1,14 +1,16 @@
-"""The sample job: a training set of materials times directions, written chunk by chunk into one zarr group."""
+"""The sample job: a training set of materials times directions, written shard by shard into one zarr group."""
 
 from __future__ import annotations
 
+import collections
 import contextlib
 import fcntl
 import functools
 import importlib.metadata
+import itertools
 import json
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,7 +25,7 @@ from brdfdb.materials.hypercube import Axis, axes_of, in_units, materials, pairs
 from brdfdb.models import MODELS
 from brdfdb.parameters import Floats, ModelSpec
 from brdfdb.place import path_of
-from brdfdb.store.codec import array_files, chunk_bytes, group_files
+from brdfdb.store.codec import array_files, chunk_bytes, group_files, shard_bytes
 from brdfdb.store.files import write_file
 from brdfdb.store.paths import METADATA
 from brdfdb.tables.tabulation import StoredArray
@@ -31,9 +33,12 @@ from brdfdb_pipelines import terminal
 
 Array = NDArray[np.float64]
 
-_CHUNK_VALUES = 1 << 20  # values of a chunk, 4 MB
+_CHUNK_VALUES = 1 << 18  # usual values of a chunk, 1 MB: what is read for a single value
+_MOST_VALUES = 1 << 27  # of a chunk, 512 MB
+_SHARD_VALUES = 1 << 23  # usual values of a shard, 32 MB: a file, which an interruption loses
 _DIMENSIONS = ("material", "direction")
-_LAST = "last.json"  # the metadata of the group until all chunks are there: nothing opens the directory before
+_LAST = "last.json"  # the metadata of the group until all shards are there: nothing opens the directory before
+_SUFFIXES = ("", ".zarr")
 
 
 class SampleError(BrdfdbError):
@@ -45,7 +50,8 @@ class TrainingSet:
     """A training set before its values: the drawn materials and directions.
 
     `written` has the drawn parameters (M,) as files write them, `angles` those (D,) [degree] of light and viewer. With
-    `gradients`, derivatives by the drawn parameters are written, too.
+    `gradients`, derivatives by the drawn parameters are written, too. A chunk has `chunk` materials, and a shard
+    `shard`; None: the usual size. The last `test` materials are those of the test.
     """
 
     spec: ModelSpec
@@ -53,6 +59,9 @@ class TrainingSet:
     written: dict[str, Array]
     angles: dict[str, Array]
     gradients: bool
+    chunk: int | None = None
+    shard: int | None = None
+    test: int = 0
 
     @functools.cached_property
     def shape(self) -> tuple[int, int]:
@@ -62,7 +71,18 @@ class TrainingSet:
     @functools.cached_property
     def rows(self) -> int:
         """Materials of a chunk."""
-        return min(max(1, _CHUNK_VALUES // self.shape[1]), self.shape[0])
+        return min(self.chunk or max(1, _CHUNK_VALUES // self.shape[1]), self.shape[0])
+
+    @functools.cached_property
+    def chunks(self) -> int:
+        """Number of chunks."""
+        return -(-self.shape[0] // self.rows)
+
+    @functools.cached_property
+    def chunks_of_shard(self) -> int:
+        """Chunks of a shard."""
+        fitting = (self.shard or _SHARD_VALUES // self.shape[1]) // self.rows
+        return min(max(1, fitting), self.chunks)
 
     @functools.cached_property
     def arguments(self) -> Mapping[str, Array]:
@@ -117,17 +137,21 @@ def run(
     ranges: Mapping[str, tuple[float, float]] | None = None,
     seed: int = 0,
     gradients: bool = False,
+    chunk: int | None = None,
+    shard: int | None = None,
+    test: float = 0.0,
     jobs: int = 1,
 ) -> None:
     """Write a training set, or resume one that was interrupted.
 
     Until the zarr group is complete its name ends in ``.partial``. Ranges of parameters have the names and units of
-    recipes. The same seed draws the same set.
+    recipes. The same seed draws the same set. `chunk` and `shard` are numbers of materials, `test` is the share of the
+    materials that are for tests: the last ones, which are as random as the others.
 
     Raises
     ------
     ParameterError
-        If the model is unknown or has no derivatives, or a range is refused.
+        If the model is unknown or has no derivatives, or a range, a size or a share is refused.
     SampleError
         If the group exists already, another process writes it, or part of another set has its name.
     """
@@ -139,16 +163,38 @@ def run(
         known = [one.name for one in MODELS.values() if one.gradient is not None]
         text = f"{model} has no derivatives; models with derivatives: {', '.join(known)}"
         raise ParameterError("--gradients", text, model, known)
+    if out.suffix not in _SUFFIXES:
+        raise SampleError(f"{out} is no name of a training set, a folder that zarr reads; let it end in .zarr")
     if os.path.lexists(out):
         raise SampleError(f"{out} exists already; remove it, or give another name")
+    _check_sizes(count, directions, chunk, shard)
+    tests = round(test * count) if 0.0 <= test < 1.0 else -1
+    if test and not 0 < tests < count:
+        text = f"{test:g} of {count} materials are none or all; give a share such as 0.1"
+        raise ParameterError("--test", text, test)
     axes = axes_of(spec, ranges or {})
-    made = TrainingSet(spec, axes, materials(spec, axes, count, seed), pairs(directions, seed), gradients)
+    drawn = materials(spec, axes, count, seed)
+    if tests and not any(np.unique(values).size == count for values in drawn.values()):
+        raise ParameterError("--test", "the ranges are so narrow that a material may be on both sides", test)
+    made = TrainingSet(spec, axes, drawn, pairs(directions, seed), gradients, chunk, shard, tests)
     partial = out.with_name(f"{out.name}.partial")
     with _alone(partial, out):
         _write(made, seed, partial, jobs)
         os.replace(partial, out)
     size = terminal.size(sum(file.stat().st_size for file in out.rglob("*") if file.is_file()))
-    print(f"{out}: {count} materials of {model} times {directions} directions, {size}")
+    parts = f", the last {tests} for tests" if tests else ""
+    print(f"{out}: {count} materials of {model} times {directions} directions{parts}, {size}")
+    print(f"{made.rows} materials a chunk, {made.rows * made.chunks_of_shard} a file")
+
+
+def _check_sizes(count: int, directions: int, chunk: int | None, shard: int | None) -> None:
+    """Raise a ParameterError for a chunk that is too large, or a shard that is not made of chunks."""
+    if chunk is not None and (values := min(chunk, count) * directions) > _MOST_VALUES:
+        text = f"{chunk} materials take {terminal.size(4 * values)}; at most {_MOST_VALUES // directions} are allowed"
+        raise ParameterError("--chunk", text, chunk)
+    if shard is not None and (chunk is None or shard % chunk):
+        wrong = "needs --chunk" if chunk is None else f"{shard} is not a multiple of {chunk}, the materials of a chunk"
+        raise ParameterError("--shard", wrong, shard)
 
 
 @contextlib.contextmanager
@@ -171,9 +217,11 @@ def _alone(partial: Path, out: Path) -> Iterator[None]:
 
 def _write(made: TrainingSet, seed: int, partial: Path, jobs: int) -> None:
     """Write all files of a set that are missing. Its metadata come first, under another name, and last."""
-    shapes = (made.shape, (made.rows, made.shape[1]))
-    arrays = {  # whose chunks are written one by one
-        f"{name}/{METADATA}": array_files(_DIMENSIONS, *shapes, "<f4", json.dumps(attributes), None)[METADATA]
+    chunk, shard = ((rows, made.shape[1]) for rows in (made.rows, made.rows * made.chunks_of_shard))
+    arrays = {  # whose shards are written one by one
+        f"{name}/{METADATA}": array_files(_DIMENSIONS, made.shape, chunk, "<f4", json.dumps(attributes), None, shard)[
+            METADATA
+        ]
         for name, attributes in made.variables.items()
     }
     files = group_files(_coordinates(made), _attributes(made, seed), arrays)
@@ -186,33 +234,52 @@ def _write(made: TrainingSet, seed: int, partial: Path, jobs: int) -> None:
     write_file(partial / _LAST, last, partial)
     for name, data in files.items():
         write_file(partial / name, data, partial)
-    _write_chunks(made, partial, jobs)
+    _write_shards(made, partial, jobs)
     os.replace(partial / _LAST, partial / METADATA)
 
 
-def _write_chunks(made: TrainingSet, partial: Path, jobs: int) -> None:
-    """Write the missing chunks. An interrupted write leaves no part of a chunk."""
-    chunks = range(-(-made.shape[0] // made.rows))
+def _write_shards(made: TrainingSet, partial: Path, jobs: int) -> None:
+    """Write the missing shards. An interrupted write leaves no part of a shard."""
 
-    def chunk_file(name: str, chunk: int) -> Path:
-        return partial / name / "c" / str(chunk) / "0"
+    def shard_file(name: str, shard: int) -> Path:
+        return partial / name / "c" / str(shard) / "0"
 
-    def write(chunk: int) -> None:
-        for name, values in zip(made.variables, made.values(chunk), strict=True):
-            write_file(chunk_file(name, chunk), chunk_bytes(values, made.rows), partial)
+    def encoded(chunk: int) -> list[bytes]:
+        return [chunk_bytes(values, made.rows) for values in made.values(chunk)]
 
-    last = next(reversed(made.variables))  # the array whose chunks are written last
-    missing = [chunk for chunk in chunks if not chunk_file(last, chunk).exists()]
+    every = range(made.chunks)
+    parts = [every[start : start + made.chunks_of_shard] for start in every[:: made.chunks_of_shard]]
+    last = next(reversed(made.variables))  # the array whose shards are written last
+    missing = {shard: part for shard, part in enumerate(parts) if not shard_file(last, shard).exists()}
     for half in partial.glob(".*"):  # files of a killed process
         half.unlink()
     with terminal.progress() as bar, ThreadPoolExecutor(jobs) as executor:
-        task = bar.add_task(made.spec.name, total=len(chunks), completed=len(chunks) - len(missing))
+        done = made.chunks - sum(map(len, missing.values()))
+        task = bar.add_task(made.spec.name, total=made.chunks, completed=done)
         try:
-            for _ in executor.map(write, missing):
-                bar.advance(task)
+            chunks = _in_order(executor, encoded, [chunk for part in missing.values() for chunk in part], 2 * jobs)
+            for shard, part in missing.items():
+                columns = []
+                for _ in part:
+                    columns.append(next(chunks))
+                    bar.advance(task)
+                for name, column in zip(made.variables, zip(*columns, strict=True), strict=True):
+                    write_file(shard_file(name, shard), shard_bytes(column, made.chunks_of_shard), partial)
         except BaseException:
             executor.shutdown(cancel_futures=True)
             raise
+
+
+def _in_order(
+    executor: ThreadPoolExecutor, task: Callable[[int], list[bytes]], numbers: Sequence[int], ahead: int
+) -> Iterator[list[bytes]]:
+    """Yield the results of a task for each number; `ahead` of them are computed before they are asked for."""
+    waiting = iter(numbers)
+    running = collections.deque(executor.submit(task, number) for number in itertools.islice(waiting, ahead))
+    while running:
+        result = running.popleft().result()
+        running.extend(executor.submit(task, number) for number in itertools.islice(waiting, 1))
+        yield result
 
 
 def _coordinates(made: TrainingSet) -> dict[str, StoredArray]:
@@ -229,6 +296,11 @@ def _coordinates(made: TrainingSet) -> dict[str, StoredArray]:
 def _attributes(made: TrainingSet, seed: int) -> dict[str, Any]:
     """Return the attributes of the group."""
     spec = made.spec
+    first = made.shape[0] - made.test
+    rule = (
+        "rows of train and test, from the first to before the last: no material is in both; the seed draws their order"
+    )
+    split = {"split": {"train": [0, first], "test": [first, made.shape[0]]}, "split_rule": rule} if made.test else {}
     fixed = {one.name: one.default for one in spec.parameters if isinstance(one.default, bool)}
     return {
         "coordinates": " ".join([*made.written, *made.angles]),
@@ -244,5 +316,6 @@ def _attributes(made: TrainingSet, seed: int) -> dict[str, Any]:
         "fixed": fixed,
         "materials": "Latin hypercube over the ranges",
         "directions": "Latin hypercube, even in solid angle; every material has all of them",
+        **split,
         "versions": {name: importlib.metadata.version(name) for name in ("brdfdb", "numpy", "scipy")},
     }

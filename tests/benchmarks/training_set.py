@@ -36,13 +36,12 @@ def once(count: int, directions: int, folder: Path | None) -> dict[str, tuple[fl
     spec = MODELS["ward"]
     axes = axes_of(spec, {})
     made = sample.TrainingSet(spec, axes, materials(spec, axes, count, 0), pairs(directions, 0), gradients=False)
-    chunks = -(-count // made.rows)
     spent = {"kernel": np.zeros(2), "codec": np.zeros(2), "brdfdb sample": np.zeros(2)}
 
     def clock() -> np.ndarray:
         return np.array([time.perf_counter(), time.process_time()])
 
-    for chunk in range(chunks):
+    for chunk in range(made.chunks):
         begin = clock()
         (values,) = made.values(chunk)
         computed = clock()

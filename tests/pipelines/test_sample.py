@@ -13,9 +13,11 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
+import zarr
 from scipy.stats import kstest
 
 from brdfdb.derivatives import gradient
+from brdfdb.errors import ParameterError
 from brdfdb.models import MODELS
 from brdfdb_pipelines import sample
 from tests.pipelines.command import Captured, refused, run
@@ -90,7 +92,8 @@ sys.exit(cli.main(sys.argv[1:]))
 
 def test_a_killed_set_does_not_look_complete_and_goes_on(tmp_path: Path) -> None:
     whole, out = tmp_path / "whole.zarr", tmp_path / "set.zarr"
-    arguments = ("sample", "ward", "--count", "12000", "--directions", "2000", "--jobs", "1")
+    sizes = ("--chunk", "500", "--shard", "500")
+    arguments = ("sample", "ward", "--count", "12000", "--directions", "2000", *sizes, "--jobs", "1")
     command = [sys.executable, "-c", SLOW, *arguments, "--out", str(out)]
     partial = tmp_path / "set.zarr.partial"
     process = subprocess.Popen(command, stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
@@ -102,7 +105,7 @@ def test_a_killed_set_does_not_look_complete_and_goes_on(tmp_path: Path) -> None
     with pytest.raises((FileNotFoundError, ValueError)):
         xr.open_zarr(partial, consolidated=False)
     kept = {path: path.stat().st_mtime_ns for path in partial.glob("f_r/c/*/0")}
-    assert 2 <= len(kept) < 23
+    assert 2 <= len(kept) < 24
     assert run(*arguments[:-2], "--seed", 1, "--out", out) == 2  # another set
     assert run(*arguments, "--out", out) == 0
     assert not partial.exists()
@@ -124,6 +127,13 @@ def test_a_killed_set_does_not_look_complete_and_goes_on(tmp_path: Path) -> None
         (("ward", "--range", "rho_d=0.9:1", "--range", "rho_s=0.9:1"), "--range: 0 of 4000 materials keep rho_d + "),
         (("ward", "--range", "rho_d=0:1", "--range", "rho_d=0:0.5"), "--range rho_d: "),
         (("ward", "--seed", "-1"), "--seed: -1 "),
+        (("ward", "--shard", "100"), "--shard: needs --chunk"),
+        (("ward", "--shard", "100", "--chunk", "30"), "--shard: 100 is not a multiple of 30, the materials of a chunk"),
+        (("ward", "--test", "1"), "--test: 1 of 40 materials are none or all; give a share such as 0.1"),
+        (("ward", "--test", "0.01"), "--test: 0.01 of 40 materials are none or all; "),
+        (("ward", "--test", "nan"), "--test: nan of 40 materials "),
+        (("ward", "--test", "-0.1"), "--test: -0.1 of 40 materials "),
+        (("lambert", "--test", "0.1", "--range", "rho=0.5:0.5"), "--test: the ranges are so narrow that a material "),
     ],
 )
 def test_what_is_refused(arguments: tuple[str, ...], sentence: str, tmp_path: Path, capsys: Captured) -> None:
@@ -132,14 +142,14 @@ def test_what_is_refused(arguments: tuple[str, ...], sentence: str, tmp_path: Pa
 
 
 def test_one_process_writes_a_set(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Captured) -> None:
-    out, chunks = tmp_path / "set.zarr", sample._write_chunks
+    out, shards = tmp_path / "set.zarr", sample._write_shards
 
     def beside(*made: Any) -> None:
         said = refused(capsys, "sample", "ward", *SMALL, "--seed", 3, "--out", out)
         assert f"another process is writing {out}.partial" in said
-        chunks(*made)
+        shards(*made)
 
-    monkeypatch.setattr(sample, "_write_chunks", beside)
+    monkeypatch.setattr(sample, "_write_shards", beside)
     assert run("sample", "ward", *SMALL, "--out", out) == 0
     assert xr.open_zarr(out).attrs["seed"] == 0
     assert not list(tmp_path.glob("*.partial"))
@@ -186,5 +196,55 @@ def test_memory_is_that_of_a_chunk(tmp_path: Path, monkeypatch: pytest.MonkeyPat
 
     monkeypatch.setattr(sample.TrainingSet, "values", noted)
     sample.run("ward", tmp_path / "set.zarr", count=3000, directions=1000)
-    assert max(sizes) <= 2**20
-    assert len(sizes) == 3
+    assert max(sizes) <= 2**18
+    assert len(sizes) == 12
+
+
+def test_chunks_lie_in_shards_that_zarr_reads(tmp_path: Path, capsys: Captured) -> None:
+    out, usual = tmp_path / "set.zarr", tmp_path / "usual.zarr"
+    arguments = ("sample", "ward", "--count", 1000, "--directions", 20, "--gradients")
+    assert run(*arguments, "--chunk", 48, "--shard", 144, "--out", out) == 0
+    assert "48 materials a chunk, 144 a file" in capsys.readouterr().out
+    assert run(*arguments, "--out", usual) == 0
+    array = zarr.open_array(out / "f_r")
+    assert (array.chunks, array.shards) == ((48, 20), (144, 20))
+    assert len([*out.glob("f_r/c/*/0")]) == 7
+    xr.testing.assert_identical(xr.open_zarr(out).load(), xr.open_zarr(usual).load())
+    data = bytearray((out / "f_r/c/3/0").read_bytes())
+    data[1000] ^= 1
+    (out / "f_r/c/3/0").write_bytes(data)
+    assert np.isfinite(array[:432]).all()
+    with pytest.raises(ValueError, match="checksum"):
+        array[432:576]
+
+
+def test_usual_chunks_are_a_megabyte_in_files_of_32(tmp_path: Path) -> None:
+    for directions, rows, shards in ((1000, 262, 32), (3, 87_381, 32), (1_000_000, 1, 8)):
+        angles = {"theta_i": np.zeros(directions)}
+        made = sample.TrainingSet(MODELS["ward"], [], {"rho_d": np.zeros(20_000_000)}, angles, gradients=False)
+        assert (made.rows, made.chunks_of_shard) == (rows, shards)
+    with pytest.raises(ParameterError, match=r"^--chunk: 300 materials take 1\.2 GB; at most 134 are allowed$"):
+        sample.run("ward", tmp_path / "set.zarr", count=300, directions=1_000_000, chunk=300)
+
+
+def test_no_material_is_in_train_and_test(tmp_path: Path) -> None:
+    out, other = tmp_path / "set.zarr", tmp_path / "other.zarr"
+    arguments = ("sample", "oren_nayar", "--count", 2000, "--directions", 5)
+    assert run(*arguments, "--test", 0.15, "--out", out) == 0
+    assert run(*arguments, "--out", other) == 0
+    made, whole = xr.open_zarr(out), xr.open_zarr(other)
+    assert made.attrs["split"] == {"train": [0, 1700], "test": [1700, 2000]}
+    assert "no material is in both" in made.attrs["split_rule"]
+    assert "split" not in whole.attrs
+    np.testing.assert_array_equal(made["f_r"], whole["f_r"])
+    train, test = (made.isel(material=slice(*made.attrs["split"][part])) for part in ("train", "test"))
+    for name in ("rho", "sigma_deg"):
+        assert not set(train[name].values) & set(test[name].values)
+        assert kstest(test[name], train[name]).pvalue > 0.01
+
+
+@pytest.mark.parametrize("name", ["set.npz", "set.nc", "set.h5"])
+def test_names_of_files_are_refused(name: str, tmp_path: Path, capsys: Captured) -> None:
+    said = refused(capsys, "sample", "ward", *SMALL, "--out", tmp_path / name)
+    assert said.endswith(f"{name} is no name of a training set, a folder that zarr reads; let it end in .zarr")
+    assert [*tmp_path.iterdir()] == []

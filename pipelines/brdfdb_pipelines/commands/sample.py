@@ -45,6 +45,25 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--gradients", action="store_true", help="also write the derivatives with respect to the parameters"
     )
+    parser.add_argument(
+        "--chunk",
+        type=whole_number(_MATERIALS),
+        metavar="N",
+        help="materials of a chunk, the least part that is read and decoded (default: 1 MB)",
+    )
+    parser.add_argument(
+        "--shard",
+        type=whole_number(),
+        metavar="N",
+        help="materials of a shard, the part of an array in a file: a multiple of --chunk (default: 32 MB)",
+    )
+    parser.add_argument(
+        "--test",
+        type=float,
+        default=0.0,
+        metavar="SHARE",
+        help="share of the materials for tests, such as 0.1: the last ones; no material is on both sides",
+    )
     add_jobs(parser, "number of threads")
 
 
@@ -60,6 +79,9 @@ def run(options: argparse.Namespace) -> int:
         ranges=_ranges(options.range),
         seed=options.seed,
         gradients=options.gradients,
+        chunk=options.chunk,
+        shard=options.shard,
+        test=options.test,
         jobs=options.jobs,
     )
     return 0
