@@ -97,6 +97,14 @@ class StoreError(BrdfdbError):
     """A store that is missing, damaged, of another version, or cannot be written."""
 
 
+class NoEditionError(StoreError):
+    """A place without an edition."""
+
+
+class NoServiceError(StoreError):
+    """An address where something else than a service of brdfdb answers."""
+
+
 _COMPARED = 2000  # names that a wrong one is compared with: those next to it in the alphabet. Each takes 20 us
 
 
@@ -162,9 +170,11 @@ EXTRAS = {
     "scenes": ("colour", "matplotlib", "OpenEXR", "scipy"),
     "report": ("jinja2", "matplotlib", "mpmath", "colour"),
     "dask": ("distributed",),
+    "editions": ("obstore", "pyarrow"),
     "http": ("fsspec", "aiohttp"),
     "measurements": ("scipy", "h5py"),
     "microgeometry": ("embreex", "scipy", "SurfaceTopography", "tifffile", "PIL"),
+    "release": ("hatchling", "sphinx", "myst_nb"),
 }
 
 
@@ -192,10 +202,31 @@ def missing_extra(module: str) -> MissingExtraError | None:
         Full name of the module that is not installed, as `ModuleNotFoundError.name` has it.
     """
     package = module.partition(".")[0]
-    commands = [f"pip install 'brdfdb[{extra}]'" for extra, modules in EXTRAS.items() if package in modules]
+    commands = [install_command(extra) for extra, modules in EXTRAS.items() if package in modules]
     if not commands:
         return None
     return MissingExtraError(f"{package} is not installed; it comes with {' or '.join(commands)}")
+
+
+def install_command(extra: str) -> str:
+    """Return the command that adds an extra to this installation, from the clone, wheel or index that it came from."""
+    import importlib.metadata  # these imports take longer than those of a short command
+    import json
+    from urllib.parse import unquote, urlsplit
+
+    try:
+        origin = importlib.metadata.distribution("brdfdb").read_text("direct_url.json")
+    except importlib.metadata.PackageNotFoundError:  # on a path of modules, without pip
+        return f"pip install -e '.[{extra}]' in a clone"
+    if origin is None:  # pip found it by its name
+        return f"pip install 'brdfdb[{extra}]'"
+    known = json.loads(origin)
+    url = urlsplit(known["url"])
+    if url.scheme == "file":
+        editable = "-e " if known.get("dir_info", {}).get("editable") else ""
+        return f"pip install {editable}'{unquote(url.path)}[{extra}]'"
+    system = f"{known['vcs_info']['vcs']}+" if "vcs_info" in known else ""
+    return f"pip install 'brdfdb[{extra}] @ {system}{known['url']}'"
 
 
 # What is not of the type that a field has, by the types of pydantic's errors

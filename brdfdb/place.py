@@ -13,11 +13,17 @@ from brdfdb.errors import ParameterError
 
 _SCHEME = re.compile(r"\s*([A-Za-z][A-Za-z0-9+.-]+):(?=[/:])")  # two letters or more: C:/ is a drive
 _SERVICES = ("http", "https")
+_BUCKETS = ("s3", "gs", "az")
 
 
 def is_service(place: object) -> TypeGuard[str]:
     """Return True if a place is the address of a service, such as ``http://127.0.0.1:8000``."""
     return isinstance(place, str) and _scheme(place) in _SERVICES
+
+
+def is_bucket(place: object) -> TypeGuard[str]:
+    """Return True if a place is the address of objects in a bucket, such as ``s3://bucket/prefix``."""
+    return isinstance(place, str) and _scheme(place) in _BUCKETS
 
 
 def path_of(place: str | os.PathLike[str], parameter: str = "path") -> Path:
@@ -59,6 +65,11 @@ def path_of(place: str | os.PathLike[str], parameter: str = "path") -> Path:
         raise ParameterError(parameter, sentence, place)
     path = Path(text).expanduser() if text.startswith(("~/", "~\\")) else Path(text)
     return path.absolute() if _scheme(str(path)) else path  # ./s3:/a, which Path writes s3:/a
+
+
+def tables_place(place: str | os.PathLike[str], parameter: str = "store") -> Path | str:
+    """Return the path of a store or of an edition, or an address ``https://``, ``s3://``, ``gs://`` or ``az://``."""
+    return place if is_service(place) or is_bucket(place) else path_of(place, parameter)
 
 
 def _scheme(text: str) -> str:

@@ -41,6 +41,7 @@ _JUDGES = (
     "api/test_lowest_versions.py",
     "api/test_server.py",
     "pipelines/test_workers.py",
+    "store/edition/test_judges.py",
 )
 _FIXTURES_OF_JUDGES = {"chromium"}
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import difflib
+import importlib.metadata
 import math
 import pickle
 import sys
@@ -11,6 +12,7 @@ from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Literal
+from unittest.mock import Mock
 
 import pytest
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
@@ -29,6 +31,7 @@ from brdfdb.errors import (
     WriteError,
     counted,
     import_extra,
+    install_command,
     sentence_of,
 )
 from brdfdb.parameters import Parameter
@@ -106,10 +109,34 @@ def test_sentences_name_what_is_wrong() -> None:
 def test_a_module_of_an_extra_is_imported_or_named(monkeypatch: pytest.MonkeyPatch) -> None:
     assert import_extra("jinja2").__name__ == "jinja2"
     monkeypatch.setitem(sys.modules, "distributed", None)
-    with pytest.raises(MissingExtraError, match=r"^distributed is not installed; .* 'brdfdb\[dask\]'$"):
+    with pytest.raises(MissingExtraError, match=r"^distributed is not installed; .*\[dask\]'$"):
         import_extra("distributed")
     with pytest.raises(ModuleNotFoundError):
         import_extra("brdfdb.nowhere")
+
+
+@pytest.mark.parametrize(
+    ("origin", "command"),
+    [
+        ('{"url": "file:///my%20clone", "dir_info": {"editable": true}}', "pip install -e '/my clone[report]'"),
+        ('{"url": "file:///a/brdfdb-1-py3-none-any.whl"}', "pip install '/a/brdfdb-1-py3-none-any.whl[report]'"),
+        ('{"url": "https://a.org/b.whl", "archive_info": {}}', "pip install 'brdfdb[report] @ https://a.org/b.whl'"),
+        (
+            '{"url": "https://a.org/b", "vcs_info": {"vcs": "git"}}',
+            "pip install 'brdfdb[report] @ git+https://a.org/b'",
+        ),
+        (None, "pip install 'brdfdb[report]'"),
+        (importlib.metadata.PackageNotFoundError(), "pip install -e '.[report]' in a clone"),
+    ],
+)
+def test_an_extra_is_installed_from_where_the_program_came(
+    origin: str | Exception | None, command: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    distribution = Mock()
+    distribution.return_value.read_text.return_value = origin
+    distribution.side_effect = origin if isinstance(origin, Exception) else None
+    monkeypatch.setattr(importlib.metadata, "distribution", distribution)
+    assert install_command("report") == command
 
 
 class Fields(BaseModel):

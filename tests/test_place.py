@@ -18,11 +18,12 @@ import brdfdb
 from brdfdb import formats
 from brdfdb.errors import BrdfdbError, ParameterError
 from brdfdb.materials import presets
-from brdfdb.place import is_service, path_of
+from brdfdb.place import is_bucket, is_service, path_of
 from brdfdb.store.publication import publish_dataset
 from brdfdb.tables.table import Table
 from brdfdb_api.settings import Settings
 from brdfdb_pipelines import cli, sample, scene_file
+from brdfdb_pipelines.commands._arguments import tables
 from brdfdb_pipelines.recipe_file import load
 from tests.measurements.made_up import scattered
 from tests.pipelines.command import Captured
@@ -83,7 +84,7 @@ TEXTS = {
     *("revision", "to", "fix", "refractive_index", "stokes", "words", "paper", "sort", "allow", "scheduler", "host"),
     *("kind", "scene", "format", "range", "unit", "models", "where", "nuisance", "angles"),
 }
-PLACES = {"place", "picture_file", "sheet_file"}
+PLACES = {"place", "picture_file", "sheet_file", "tables"}
 
 
 def _actions(parser: argparse.ArgumentParser, names: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Any]]:
@@ -123,6 +124,8 @@ def test_each_place_of_the_command_line_refuses_other_schemes_and_creates_nothin
             continue
         flag = [_flag(action)] if _flag(action) else []
         for text in (*FOREIGN, "http://127.0.0.1:9/a", ""):
+            if action.type is tables and (is_service(text) or is_bucket(text)):
+                continue
             with pytest.raises(SystemExit) as ended:
                 cli.main([*names, *flag, text])
             assert ended.value.code == 2
@@ -136,14 +139,14 @@ def test_a_store_of_the_environment_is_read_alike(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Captured
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("BRDFDB_STORE", "s3://bucket/db")
+    monkeypatch.setenv("BRDFDB_STORE", "ftp://bucket/db")
     for command in ("list", "build", "serve"):
         with pytest.raises(SystemExit) as ended:
             cli.main([command])
         assert ended.value.code == 2
-        assert "'s3://bucket/db' is neither a path nor" in capsys.readouterr().err
+        assert "'ftp://bucket/db' is neither a path nor" in capsys.readouterr().err
     for read in (brdfdb.open, Settings.from_environment):
-        with pytest.raises(ParameterError, match=r"^BRDFDB_STORE: 's3://bucket/db' is neither"):
+        with pytest.raises(ParameterError, match=r"^BRDFDB_STORE: 'ftp://bucket/db' is neither"):
             read()
     monkeypatch.setenv("BRDFDB_STORE", f"file://{tmp_path}/a%20b")
     assert Settings.from_environment().store == tmp_path / "a b"
@@ -224,7 +227,7 @@ def test_each_function_that_takes_a_path_refuses_other_schemes(
             for name, one in inspect.signature(function).parameters.items()
             if one.default is one.empty and one.kind is not one.VAR_KEYWORD and name != parameter
         }
-        for place in ("s3://bucket/x.csv", Path("memory://x")):
+        for place in ("ftp://bucket/x.csv", Path("memory://x")):
             with pytest.raises(BrdfdbError) as raised:
                 function(**required, **{parameter: place})
             holds = "holds" in str(raised.value) or type(raised.value).__name__ == "CannotHoldError"
@@ -239,11 +242,11 @@ def test_stores_are_made_nowhere_else(tmp_path: Path, monkeypatch: pytest.Monkey
     monkeypatch.chdir(tmp_path)
     for make in (
         lambda: sample.run("lambert", Path("s3://b/c"), count=1, directions=1),
-        lambda: xr.open_dataset("s3://b/c", engine="brdfdb"),
-        lambda: xr.open_dataset("s3://b/c", engine="brdfdb", material="white"),
+        lambda: xr.open_dataset("ftp://b/c", engine="brdfdb"),
+        lambda: xr.open_dataset("ftp://b/c", engine="brdfdb", material="white"),
         lambda: brdfdb.models.MODELS.add_files(["s3://b/models.py"]),
     ):
-        with pytest.raises(ParameterError, match=r"'s3:/"):
+        with pytest.raises(ParameterError, match=r"'(s3|ftp):/"):
             make()
     assert [*tmp_path.iterdir()] == []
 

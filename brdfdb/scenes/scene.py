@@ -18,7 +18,7 @@ from brdfdb.place import path_of
 from brdfdb.scenes.environment import Environment
 from brdfdb.scenes.shapes import STRICT, AnyShape, Array, Recorded, Vector, check_direction, unit
 from brdfdb.spectra import ILLUMINANT, OBSERVER, check_illuminant, check_observer, covers_visible
-from brdfdb.store.reader import Store
+from brdfdb.store import open_tables
 from brdfdb.tables.table import TableSource, source_of_table
 
 STORED = "store:"  # prefix of the name of a material that is read from the store of the scene
@@ -275,7 +275,7 @@ def _stored(root: str, name: str, held_to: tuple[float, ...] | None) -> Source:
     """Return a material of a store. It stays in memory, because a scene needs it at every list of points."""
     try:
         return source_of_table(
-            Store(root)[name.removeprefix(STORED)], known_nm=None if held_to is None else np.array(held_to)
+            open_tables(root)[name.removeprefix(STORED)], known_nm=None if held_to is None else np.array(held_to)
         )
     except BrdfdbError as error:
         raise ParameterError(f"material {name}", str(error)) from None

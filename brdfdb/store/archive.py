@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import tempfile
 import zipfile
 from collections.abc import Iterable, Iterator
@@ -11,10 +12,9 @@ from typing import Any
 from pydantic import BaseModel
 
 from brdfdb.errors import StoreError, UnknownMaterialError
-from brdfdb.store.files import read_json
+from brdfdb.store.edition.reader import Edition
 from brdfdb.store.paths import METADATA, pinned
 from brdfdb.store.reader import Store
-from brdfdb.store.records import check_manifest
 
 ZIP = "application/zip"
 
@@ -41,16 +41,15 @@ def zipped(contents: Iterable[tuple[str, bytes]], compression: int = zipfile.ZIP
             yield piece
 
 
-def root_group(store: Store) -> dict[str, Any]:
+def root_group(store: Store | Edition) -> dict[str, Any]:
     """Return the fields of `Group`: all current revisions as materials/NAME/REVISION-DIGEST, without damaged ones."""
     metadata: dict[str, Any] = {"materials": _group()}
     for name in store:
         with contextlib.suppress(StoreError, UnknownMaterialError):
-            group, digest = store.location(name)
-            check_manifest(group, digest, contents=False)
-            metadata_of_group = read_json(group / METADATA)
+            stored = store.revision(name)
+            metadata_of_group = json.loads(stored.read(METADATA))
             arrays = metadata_of_group.pop("consolidated_metadata", {}).get("metadata", {})
-            revision = pinned(group.name, digest)
+            revision = pinned(stored.number, stored.digest)
             place = f"materials/{name}/{revision}"
             metadata |= {f"materials/{name}": _group(revision=revision), place: metadata_of_group}
             metadata |= {f"{place}/{key}": array for key, array in arrays.items()}

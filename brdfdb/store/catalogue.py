@@ -22,7 +22,7 @@ from brdfdb.materials.spectrum import Spectrum
 from brdfdb.measurements.record import Measured
 from brdfdb.microgeometry.model_errors import SurfaceError, surface_error_of
 from brdfdb.models import MODELS
-from brdfdb.store.records import read_metadata
+from brdfdb.store.records import summary_of
 from brdfdb.store.summary_words import NOT_AUDITED
 from brdfdb.tables.metadata import TableMetadata
 from brdfdb.tables.stated_error import Error, FormulaError, FormulaRung, LargestAlbedo
@@ -184,25 +184,29 @@ class Line(BaseModel):
     damaged: str | None = Field(default=None, description="what is wrong with its files")
 
 
-def line_of(name: str, group: Path, head: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the line of a revision, but for its audit, from its metadata and the pointer of the material."""
-    metadata = read_metadata(group)
+def line_of(name: str, head: Mapping[str, Any], metadata: Callable[[], TableMetadata]) -> dict[str, Any]:
+    """Return the line of a revision, but for its audit, from what lists show of it.
+
+    The pointer of an older program says less: then `metadata` reads those of the revision.
+    """
+    facts: Any = head if "incomplete" in head else summary_of(metadata(), head["bytes"], head["created"])
+    model = facts["model"] or None
     return {
         "name": name,
-        "title": metadata.title or "",
-        "model": metadata.model,
-        "model_title": metadata.model_title or metadata.model or "",
-        "paper": metadata.model_reference or "",
-        "source": metadata.source or "",
-        "measured": metadata.measured is not None,
-        "anisotropic": metadata.anisotropic,
-        "wavelength_range_nm": metadata.wavelength_range_nm or None,
-        "spectrum": spectrum_of(metadata.wavelength_range_nm),
-        "incomplete": metadata.gaps or None,
-        "formula_error": None if metadata.formula_error is None else metadata.formula_error.in_lists(),
-        "surface_error": surface_error_of(metadata.model, metadata.parameters),
-        "largest_albedo": None if metadata.largest_albedo is None else metadata.largest_albedo.model_dump(mode="json"),
-        "revision": group.name,
+        "title": facts["title"],
+        "model": model,
+        "model_title": facts["model_title"],
+        "paper": facts["model_reference"],
+        "source": facts["source"],
+        "measured": facts["measured"],
+        "anisotropic": facts["anisotropic"],
+        "wavelength_range_nm": facts["wavelength_range_nm"] or None,
+        "spectrum": spectrum_of(facts["wavelength_range_nm"]),
+        "incomplete": facts["incomplete"] or None,
+        "formula_error": facts["formula_error"],
+        "surface_error": surface_error_of(model, facts["parameters"]),
+        "largest_albedo": facts["largest_albedo"],
+        "revision": head["revision"],
         **{key: head.get(key) for key in ("error_p99", "created", "bytes")},
     }
 

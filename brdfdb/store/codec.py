@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 _CHUNK_VALUES = 1 << 20  # values of a chunk of a dataset in memory: 4 MB
+_NO_CHUNK = (1 << 64) - 1  # in the index of a shard
 
 # crc32c last: without it nearly every flipped bit reads back as a plausible number
 COMPRESSORS = (BloscCodec(cname="zstd", clevel=1, shuffle="shuffle"), Crc32cCodec())
@@ -47,6 +48,16 @@ def chunk_bytes(values: NDArray[np.floating[Any]], rows: int) -> bytes:
     data: bytes = decoding.BLOSC.encode(np.ascontiguousarray(values, dtype="<f4"))
     checksum: int = google_crc32c.value(data)
     return data + checksum.to_bytes(4, "little")
+
+
+def shard_bytes(chunks: Sequence[bytes], places: int) -> bytes:
+    """Return the bytes of a shard with so many places, of which the first are filled by chunks."""
+    sizes = np.array([len(chunk) for chunk in chunks], dtype="<u8")
+    index = np.full((places, 2), _NO_CHUNK, dtype="<u8")
+    index[: len(chunks)] = np.stack([np.cumsum(sizes) - sizes, sizes], axis=1)
+    data = index.tobytes()
+    checksum: int = google_crc32c.value(data)
+    return b"".join([*chunks, data, checksum.to_bytes(4, "little")])
 
 
 def decoded(layout: Layout, number: int, data: bytes) -> NDArray[np.float32]:
@@ -76,6 +87,7 @@ def array_files(
     dtype: str,
     attributes: str,
     data: bytes | None,
+    shard: tuple[int, ...] | None = None,
 ) -> dict[str, bytes]:
     """Return the files of an array by their path inside it; cached, since tables share coordinates and zarr is slow."""
     files: dict[str, Buffer] = {}
@@ -83,6 +95,7 @@ def array_files(
         MemoryStore(files),
         shape=shape,
         chunks=chunk,
+        shards=shard,
         dtype=dtype,
         compressors=COMPRESSORS,
         fill_value=np.nan,  # zarr's own 0 reads as a plausible black material

@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import itertools
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -23,6 +24,8 @@ from brdfdb.store.paths import METADATA
 from brdfdb.store.records import check_file
 
 if TYPE_CHECKING:
+    from zarr.abc.store import Store as ZarrStore
+
     from brdfdb.tables.table import Table
 
 BLOSC = Blosc(cname="zstd", clevel=1, shuffle=Blosc.SHUFFLE)
@@ -40,17 +43,33 @@ class StoredArrays(NamedTuple):
 
 
 def decode(name: str, path: Path, files: Mapping[str, FileEntry], digest: str) -> Table:
-    """Return the table of a revision; StoreError if it is damaged, or no table that this program can look up."""
+    """Return the table of a revision in a directory; errors as of `decoded_table`."""
+
+    def as_zarr() -> ZarrStore:
+        from brdfdb.store.zarr_store import CheckedRevision
+
+        return CheckedRevision(path, files)
+
+    return decoded_table(name, path.name, digest, partial(checked_bytes, path, files=files), as_zarr)
+
+
+def decoded_table(
+    name: str, revision: str, digest: str, read: Callable[[str], bytes], as_zarr: Callable[[], ZarrStore]
+) -> Table:
+    """Return the table of a revision; StoreError if it is damaged, or no table that this program can look up.
+
+    `read` returns the content of a file, checked; `as_zarr` the revision as zarr reads it, in any encoding.
+    """
     try:
-        stored = read_group(path, files) or read_by_zarr(path, files)
+        stored = read_group(read) or read_by_zarr(as_zarr())
     except StoreError:
         raise
     except Exception as error:  # codecs raise many kinds; each means that the bytes are damaged
-        raise StoreError(f"{name} {path.name} is damaged: its values cannot be decoded") from error
+        raise StoreError(f"{name} {revision} is damaged: its values cannot be decoded") from error
     try:
-        return replace(table_of(name, path.name, *stored), digest=digest)
+        return replace(table_of(name, revision, *stored), digest=digest)
     except ValueError as error:  # written by another program
-        raise StoreError(f"{name} {path.name} cannot be looked up: {error}") from error
+        raise StoreError(f"{name} {revision} cannot be looked up: {error}") from error
 
 
 def table_of(
@@ -71,33 +90,31 @@ def table_of(
     return table
 
 
-def read_group(group: Path, files: Mapping[str, FileEntry]) -> StoredArrays | None:
-    """Return the arrays of a revision; None if their encoding is not that of `brdfdb.store.codec`.
+def read_group(read: Callable[[str], bytes]) -> StoredArrays | None:
+    """Return the arrays of a revision, whose files `read` returns; None if another program encoded them.
 
-    StoreError names a file that is missing or changed; files that hold no arrays raise errors of other kinds.
+    Errors of `read` are passed on; files that hold no arrays raise errors of many kinds.
     """
-    metadata = json.loads(checked_bytes(group, METADATA, files))
+    metadata = json.loads(read(METADATA))
     described = (metadata.get("consolidated_metadata") or {}).get("metadata")
-    if described is None or not all(map(_is_ours, described.values())):
+    if described is None or not all(map(is_ours, described.values())):
         return None
-    arrays = {name: _array(group, name, array, files) for name, array in described.items()}
+    arrays = {name: _array(read, name, array) for name, array in described.items()}
     dims = {name: tuple(array.get("dimension_names") or ()) for name, array in described.items()}
     return StoredArrays(arrays, dims, metadata.get("attributes", {}))
 
 
-def read_by_zarr(path: Path, files: Mapping[str, FileEntry]) -> StoredArrays:
+def read_by_zarr(store: ZarrStore) -> StoredArrays:
     """Return the arrays of a revision that another program wrote, in any encoding that zarr reads."""
     import zarr
 
-    from brdfdb.store.zarr_store import CheckedRevision
-
-    group = zarr.open_group(CheckedRevision(path, files), mode="r")
+    group = zarr.open_group(store, mode="r")
     stored = dict(group.arrays())
     dims = {key: array.metadata.dimension_names or () for key, array in stored.items()}  # type: ignore[union-attr]
     return StoredArrays({key: np.asarray(array[...]) for key, array in stored.items()}, dims, dict(group.attrs))
 
 
-def _is_ours(array: Mapping[str, Any]) -> bool:
+def is_ours(array: Mapping[str, Any]) -> bool:
     """Return True if the metadata of an array are those that `brdfdb.store.codec` writes."""
     return (
         array.get("node_type") == "array"
@@ -110,18 +127,17 @@ def _is_ours(array: Mapping[str, Any]) -> bool:
     )
 
 
-def _array(group: Path, name: str, array: Mapping[str, Any], files: Mapping[str, FileEntry]) -> NDArray[Any]:
+def _array(read: Callable[[str], bytes], name: str, array: Mapping[str, Any]) -> NDArray[Any]:
     """Return an array [native byte order] from the files of its chunks."""
-    checked_bytes(group, f"{name}/{METADATA}", files)  # not used here, but checked as every file of the revision
+    read(f"{name}/{METADATA}")  # not used here, but checked as every file of the revision
     shape = array["shape"]
     chunk = array["chunk_grid"]["configuration"]["chunk_shape"]
     dtype = np.dtype(array["data_type"])
     values = np.empty(shape, dtype=dtype)
     for number in itertools.product(*(range(-(-size // step)) for size, step in zip(shape, chunk, strict=True))):
-        data = decoded(checked_bytes(group, "/".join([name, "c", *map(str, number)]), files))
+        data = decoded(read("/".join([name, "c", *map(str, number)])))
         if data is None:
-            where = f"{group.parent.name} {group.name}"
-            raise StoreError(f"{where} is damaged: its values cannot be decoded")
+            raise ValueError(f"the checksum of a chunk of {name} is wrong")
         place = tuple(slice(n * step, (n + 1) * step) for n, step in zip(number, chunk, strict=True))
         piece = np.frombuffer(data, dtype=dtype.newbyteorder("<")).reshape(chunk)
         values[place] = piece[tuple(slice(size - at.start) for size, at in zip(shape, place, strict=True))]

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import ctypes
 import errno
+import functools
 import hashlib
 import json
 import os
+import platform
 import re
 import stat
 import uuid
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TypedDict, cast
 
@@ -19,7 +23,22 @@ from brdfdb.errors import StoreError
 NON_BLOCKING = getattr(os, "O_NONBLOCK", 0)  # without it the opening of a pipe waits for its writer; Windows has none
 
 _AT_ONCE = 16  # files that are synced at the same time: each waits for the disk
+# File systems, by the type that statfs gives, whose syncfs waits until files and directories are on the disk. That of
+# others, such as FUSE, may return at once
+_SYNCED_AT_ONCE = {
+    0xEF53: "ext4",
+    0x58465342: "xfs",
+    0x9123683E: "btrfs",
+    0xF2F52010: "f2fs",
+    0x2FC12FC1: "zfs",
+    0x6969: "nfs",
+    0x794C7630: "overlayfs",
+    0x01021994: "tmpfs",
+}
 _SEAL = re.compile(rb'\{"sha256": "([0-9a-f]{64})",\n')
+
+
+Sync = Callable[[Iterable[Path]], None]  # makes files and directories outlast a power cut
 
 
 class FileEntry(TypedDict):
@@ -78,20 +97,64 @@ def write_file(path: Path, data: bytes, temporary: Path, *, sync: bool = True) -
     return {"size": len(data), "sha256": hashlib.sha256(data).hexdigest()}
 
 
-def write_files(directory: Path, contents: Mapping[str, bytes], temporary: Path) -> dict[str, FileEntry]:
-    """Write files, by their paths inside a directory, as `write_file` does; a disk syncs many as fast as one."""
-    with ThreadPoolExecutor(_AT_ONCE) as pool:
-        entries = pool.map(lambda file: write_file(directory / file, contents[file], temporary), contents)
-        return dict(zip(contents, entries, strict=True))
+def write_files(
+    directory: Path, contents: Mapping[str, bytes], temporary: Path, *, sync: bool = True
+) -> dict[str, FileEntry]:
+    """Write files, by their paths inside a directory, as `write_file` does."""
+    with syncing(temporary) as sync_all:
+        entries = {name: write_file(directory / name, data, temporary, sync=False) for name, data in contents.items()}
+        if sync:
+            sync_all(directory / name for name in contents)
+    return entries
 
 
-def sync_directory(path: Path) -> None:
-    """Make new and removed names in a directory outlast a power cut."""
-    directory = os.open(path, os.O_RDONLY)
+@contextmanager
+def syncing(directory: Path) -> Iterator[Sync]:
+    """Provide a function that makes files and directories outlast a power cut, all of the file system of `directory`.
+
+    One call syncs the file system, where that is known to wait for the disk and to report what could not be written
+    since this context began; else it syncs each path.
+    """
+    handle = os.open(directory, os.O_RDONLY)
+
+    def sync(paths: Iterable[Path]) -> None:
+        if not _sync_file_system(handle):
+            with ThreadPoolExecutor(_AT_ONCE) as pool:  # a disk syncs many as fast as one
+                list(pool.map(sync_path, dict.fromkeys(paths)))
+
     try:
-        os.fsync(directory)
+        yield sync
     finally:
-        os.close(directory)
+        os.close(handle)
+
+
+@functools.cache
+def _linux() -> ctypes.CDLL | None:
+    """Return the C library of a Linux whose syncfs reports errors, as since version 5.8; None of other systems."""
+    version = re.match(r"(\d+)\.(\d+)", platform.release())
+    if platform.system() != "Linux" or version is None or tuple(map(int, version.groups())) < (5, 8):
+        return None
+    return ctypes.CDLL(None, use_errno=True)
+
+
+def _sync_file_system(handle: int) -> bool:
+    """Sync the file system of an open directory; return False where that is not known to be enough."""
+    library = _linux()
+    status = (ctypes.c_long * 32)()  # its first number is the type of the file system
+    if library is None or library.fstatfs(handle, status) != 0 or status[0] not in _SYNCED_AT_ONCE:
+        return False
+    if library.syncfs(handle) != 0:
+        raise OSError(ctypes.get_errno(), os.strerror(ctypes.get_errno()))
+    return True
+
+
+def sync_path(path: Path) -> None:
+    """Make the content of a file, or new and removed names in a directory, outlast a power cut."""
+    handle = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
 
 
 # Sealed JSON: the first line is the digest of the other lines
@@ -139,7 +202,7 @@ def write_sealed(path: Path, content: Mapping[str, Any], temporary: Path | None 
 def swap_sealed(path: Path, content: Mapping[str, Any]) -> None:
     """Write a sealed JSON file so that a reader sees the old content or the new, at any moment."""
     write_sealed(path, content)
-    sync_directory(path.parent)
+    sync_path(path.parent)
 
 
 def read_json(path: Path) -> dict[str, Any]:

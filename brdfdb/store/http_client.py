@@ -23,7 +23,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from brdfdb.arrays import array_lookup
-from brdfdb.errors import ParameterError, StoreError, UnknownMaterialError, UnknownRevisionError
+from brdfdb.errors import (
+    NoServiceError,
+    ParameterError,
+    StoreError,
+    UnknownMaterialError,
+    UnknownRevisionError,
+    install_command,
+)
 from brdfdb.geometry import (
     Directions,
     checked_angles,
@@ -71,6 +78,14 @@ class _Answer(NamedTuple):
 
     response: http.client.HTTPResponse
     content: bytes
+
+
+class Fetched(NamedTuple):
+    """The status of an answer, its bytes, and where it redirects to."""
+
+    status: int
+    content: bytes
+    location: str
 
 
 class Service:
@@ -136,9 +151,9 @@ class Service:
             raise self.stranger()
         return content
 
-    def stranger(self) -> StoreError:
+    def stranger(self) -> NoServiceError:
         """Return the error for an address where something else answers, such as the login page of a network."""
-        return StoreError(f"{self.url} is not a brdfdb service")
+        return NoServiceError(f"{self.url} is not a brdfdb service")
 
     def content(self, path: str, body: bytes | None, media: str) -> bytes:
         """Return the bytes of an answer.
@@ -148,8 +163,9 @@ class Service:
         raised them.
         """
         end = time.monotonic() + min(self.timeout_s, PATIENCE_S)
+        headers = {"Accept": media} if body is None else {"Accept": media, "Content-Type": media}
         while True:
-            response, answer = self._exchanged(path, body, media)
+            response, answer = self._exchanged(path, body, headers)
             wait = response.getheader("Retry-After", "") if response.status == 503 else ""
             if not wait.isdecimal() or time.monotonic() + int(wait) > end:
                 break
@@ -167,6 +183,8 @@ class Service:
         except (ValueError, TypeError, KeyError):  # the page of a proxy
             problem = {}
             detail = ""
+        if status == 404 and not problem:
+            raise self.stranger()
         if status == 404 and "closest" in problem:
             raise UnknownMaterialError(path.partition("/materials/")[2].partition("/")[0] or path, problem["closest"])
         if status == 404 and problem.get("parameter") == "revision":
@@ -179,8 +197,12 @@ class Service:
         sentence = f"{self.url} answered {status} {response.reason}".rstrip() + why
         raise TooLargeError(sentence) if status == 413 else StoreError(sentence)
 
-    def _exchanged(self, path: str, body: bytes | None, media: str) -> _Answer:
-        headers = {"Accept": media} if body is None else {"Accept": media, "Content-Type": media}
+    def fetched(self, path: str, headers: Mapping[str, str]) -> Fetched:
+        """Return the answer of a web server to the request of a file; StoreError that no server answers."""
+        response, answer = self._exchanged(path, None, headers)
+        return Fetched(response.status, answer, response.getheader("Location", ""))
+
+    def _exchanged(self, path: str, body: bytes | None, headers: Mapping[str, str]) -> _Answer:
         request = ("GET" if body is None else "POST", self._path + path, body, headers)
         own: _Connection | None = getattr(self._local, "connection", None)
         if own is None or own.process != os.getpid():  # a forked process does not share the connection of its parent
@@ -414,7 +436,7 @@ class RemoteStore(Mapping[str, RemoteTable]):
         """
         document = self._material(name, "" if revision is None else f"/revisions/{quote(revision, safe='')}")
         if find_spec("fsspec") is None or find_spec("aiohttp") is None:
-            raise StoreError("a dataset over HTTP needs fsspec and aiohttp: pip install 'brdfdb[http]'")
+            raise StoreError(f"a dataset over HTTP needs fsspec and aiohttp: {install_command('http')}")
         from brdfdb.store.zarr_store import CheckedRemoteRevision
         from brdfdb.tables.xarray_view import opened
 

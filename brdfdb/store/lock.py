@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import errno
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import TracebackType
 from typing import IO
@@ -16,6 +17,13 @@ try:
     import fcntl
 except ModuleNotFoundError:  # Windows
     fcntl = None  # type: ignore[assignment]
+
+
+_NO_LOCKS = (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP)  # of flock, from a file system that has none
+
+
+class NoLocksError(StoreError):
+    """A store on a system or a file system without locks."""
 
 
 @contextmanager
@@ -43,7 +51,7 @@ class Lock:
 
     def __enter__(self) -> Lock:
         if fcntl is None:
-            raise StoreError(
+            raise NoLocksError(
                 f"cannot write to the store at {self.root}: this system has no file locks; use Linux or macOS"
             )
         with writing(self.root, self.name):
@@ -70,23 +78,44 @@ class Lock:
             raise BusyError(f"another build is at work on {self.name}") from None
         except FileNotFoundError:
             pass
+        except OSError as error:
+            handle.close()
+            if error.errno in _NO_LOCKS:
+                self._tidy()
+                raise NoLocksError(
+                    f"cannot write to the store at {self.root}: its file system has no file locks (flock: "
+                    f"{error.strerror}); use another, or mount it with locks"
+                ) from error
+            raise
         except BaseException:
             handle.close()
             raise
         handle.close()
         return None
 
+    def _tidy(self) -> None:
+        """Remove the directory of the lock if nothing else is in it."""
+        with suppress(OSError):  # another build has come in: it is theirs
+            if os.listdir(self.path.parent) == ["lock"]:
+                self.path.unlink()
+                self.path.parent.rmdir()
+
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
         """Release the lock, and remove its directory if nothing else is in it."""
         assert self._handle is not None
-        try:
-            if os.listdir(self.path.parent) == ["lock"]:
-                self.path.unlink()
-                self.path.parent.rmdir()
-        except OSError:  # another build has come in: it is theirs
-            pass
+        self._tidy()
         fcntl.flock(self._handle, fcntl.LOCK_UN)  # closing is not enough where a child was forked meanwhile
         self._handle.close()
         self._handle = None
+
+
+def is_taken(path: Path) -> bool:
+    """Return True if somebody has the lock at a path; OSError if there is none, or it cannot be tried."""
+    with path.open("rb") as handle:
+        try:
+            fcntl.flock(handle, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        except BlockingIOError:
+            return True
+    return False

@@ -10,9 +10,15 @@ from pathlib import Path
 NAME = re.compile(r"(?!.{129})[a-z0-9]+(-[a-z0-9]+)*")
 
 HEAD = "HEAD.json"
+EDITION = "edition.json"  # the root of an edition
 METADATA = "zarr.json"  # of a zarr group or array
 _MANIFEST = ".MANIFEST.json"
 DIRECTORIES = ("materials", "families", "snapshots", ".staging")  # of a store
+
+
+def is_edition(place: Path) -> bool:
+    """Return True if a directory has an edition."""
+    return (place / EDITION).is_file()
 
 
 def marker_path(root: Path) -> Path:

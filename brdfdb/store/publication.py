@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -17,10 +17,10 @@ from brdfdb.materials import Source
 from brdfdb.measurements import MeasuredSource
 from brdfdb.place import path_of
 from brdfdb.store.decoding import table_of
-from brdfdb.store.files import FileEntry, sync_directory, write_files, write_sealed
+from brdfdb.store.files import FileEntry, Sync, sealed, syncing, write_file, write_files
 from brdfdb.store.lock import Lock, writing
 from brdfdb.store.paths import NAME, manifest_path, material_path, staged_path
-from brdfdb.store.records import Manifest, make_store, newest, point_to, read_metadata, summary_of
+from brdfdb.store.records import Manifest, make_store, newest, read_metadata, summary_of, swap_pointers
 from brdfdb.tables.grids import check_wavelengths
 from brdfdb.tables.layout import Layout
 from brdfdb.tables.measured_layout import tabulated
@@ -32,12 +32,22 @@ from brdfdb.tables.tabulation import tabulate
 if TYPE_CHECKING:
     import xarray as xr
 
+_MANIFEST = "manifest.json"  # of a staged table that is about to be published
+
 
 class NewRevision(NamedTuple):
     """The name of a new revision, and its size [byte]."""
 
     revision: str
     bytes: int
+
+
+class Staged(NamedTuple):
+    """A table in its staging directory, and the files of its group."""
+
+    name: str
+    staging: Path
+    files: Mapping[str, FileEntry]
 
 
 class Published(NamedTuple):
@@ -195,7 +205,9 @@ def publish_files(root: Path, name: str, files: Mapping[str, bytes]) -> NewRevis
         shutil.rmtree(staging, ignore_errors=True)
         try:
             staging.mkdir()
-            return publish_staged(root, name, staging, write_files(staging / "table", files, staging))
+            with syncing(root) as sync:
+                written = write_files(staging / "table", files, staging, sync=False)
+                return publish_staged(root, [Staged(name, staging, written)], sync)[0]
         finally:
             shutil.rmtree(staging, ignore_errors=True)
 
@@ -222,31 +234,47 @@ def checked_dataset(name: str, dataset: xr.Dataset) -> xr.Dataset:
     return dataset
 
 
-def publish_staged(root: Path, name: str, staging: Path, files: Mapping[str, FileEntry]) -> NewRevision:
-    """Make a staged table the current revision of its material; the caller holds the lock.
+def publish_staged(root: Path, tables: Sequence[Staged], sync: Sync) -> list[NewRevision]:
+    """Make staged tables the current revisions of their materials; the caller holds the locks.
 
-    The last step swaps the pointer; until then readers see the revision before. After a crash just before that step,
-    the revision is complete, and the next build of the request makes it current. Files of the group that `files` does
-    not name are removed. StoreError says that it cannot be written.
+    Three syncs serve all tables: of their files, of their names in the directories of materials, and of the pointers.
+    Each is complete before what names the synced ones is written. Until the pointers are swapped readers see the
+    revisions before. After a crash just before that, a revision is complete, and the next build of its request makes it
+    current. Files of a group that `files` does not name are removed. StoreError says that it cannot be written.
     """
+    made = []
+    groups = []
+    for table in tables:
+        with writing(root, table.name):
+            made.append(_numbered(root, table))
+            groups.append(material_path(root, table.name) / made[-1].revision)
+    with writing(root, tables[0].name if len(tables) == 1 else f"{len(tables)} tables"):
+        sync(
+            path
+            for _, staging, _ in tables
+            for path in (staging / _MANIFEST, staging / "table", *(staging / "table").rglob("*"))
+        )
+        for table, group in zip(tables, groups, strict=True):
+            os.replace(table.staging / _MANIFEST, manifest_path(group))
+            (table.staging / "table").rename(group)
+        swap_pointers(groups, sync)
+    for table in tables:
+        shutil.rmtree(table.staging, ignore_errors=True)
+    return made
+
+
+def _numbered(root: Path, table: Staged) -> NewRevision:
+    """Give a staged table the number of its revision and a manifest."""
+    name, staging, files = table
+    staged = staging / "table"
     material = material_path(root, name)
-    table = staging / "table"
-    with writing(root, name):
-        for path in table.rglob("*"):
-            if path.is_file() and path.relative_to(table).as_posix() not in files:
-                path.unlink()
-        metadata = read_metadata(table)
-        stored = sum(entry["size"] for entry in files.values())
-        summary = summary_of(metadata, stored, datetime.now(UTC).isoformat(timespec="seconds"))
-        for directory, _, _ in os.walk(table, topdown=False):
-            sync_directory(Path(directory))
-        material.mkdir(exist_ok=True)
-        sync_directory(material.parent)
-        revision = f"r{newest(material) + 1:06d}"
-        manifest: Manifest = {"material": name, "revision": revision, "summary": summary, "files": dict(files)}
-        write_sealed(manifest_path(material / revision), manifest, staging)
-        table.rename(material / revision)
-        sync_directory(material)
-        point_to(material, revision)
-        shutil.rmtree(staging, ignore_errors=True)
+    for path in staged.rglob("*"):
+        if path.is_file() and path.relative_to(staged).as_posix() not in files:
+            path.unlink()
+    stored = sum(entry["size"] for entry in files.values())
+    summary = summary_of(read_metadata(staged), stored, datetime.now(UTC).isoformat(timespec="seconds"))
+    material.mkdir(exist_ok=True)
+    revision = f"r{newest(material) + 1:06d}"
+    manifest: Manifest = {"material": name, "revision": revision, "summary": summary, "files": dict(files)}
+    write_file(staging / _MANIFEST, sealed(manifest), staging, sync=False)
     return NewRevision(revision, stored)

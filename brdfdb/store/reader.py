@@ -14,24 +14,23 @@ rewrite a shared root file, and stale metadata hides groups.
 
 from __future__ import annotations
 
-import itertools
 import os
-import threading
-import weakref
-from collections import OrderedDict
 from collections.abc import Iterator, Mapping
+from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from brdfdb.errors import StoreError, UnknownFamilyError, UnknownMaterialError, UnknownRevisionError, percent
 from brdfdb.notebook import listing
 from brdfdb.place import path_of
-from brdfdb.store.files import read_sealed, regular_bytes
+from brdfdb.store.files import read_json, read_sealed, regular_bytes
 from brdfdb.store.paths import (
     HEAD,
+    METADATA,
     NAME,
     families_path,
     family_path,
+    manifest_path,
     material_path,
     materials_path,
     number_of,
@@ -42,6 +41,7 @@ from brdfdb.store.paths import (
 )
 from brdfdb.store.records import (
     Head,
+    Manifest,
     Snapshot,
     check_manifest,
     check_marker,
@@ -52,6 +52,7 @@ from brdfdb.store.records import (
     whole_revisions,
 )
 from brdfdb.store.summary_words import COLUMNS, colours, energy, formula_error, kind, last_audit, surface_error
+from brdfdb.store.table_cache import CACHE_BYTES, TableCache
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -59,10 +60,6 @@ if TYPE_CHECKING:
     from brdfdb.store.family import Family
     from brdfdb.tables.metadata import TableMetadata
     from brdfdb.tables.table import Table
-
-
-CACHE_BYTES = 256 * 2**20  # largest size of the decoded tables in memory
-_OBJECTS_BYTES = 20_000  # size of a decoded table without its arrays: metadata and arguments of kernels
 
 
 class Store(Mapping[str, "Table"]):
@@ -92,12 +89,8 @@ class Store(Mapping[str, "Table"]):
         self.root = path_of(root, "root").absolute()
         check_marker(self.root)
         self.snapshot: Snapshot | None = None if snapshot is None else read_snapshot(self.root, snapshot)
-        self._cache_bytes = cache_bytes
-        self._decoded: OrderedDict[tuple[str, str], Table] = OrderedDict()
+        self._decoded: TableCache[Table] = TableCache(cache_bytes)
         self._pointers: dict[str, Pointer] = {}
-        self._lock = threading.Lock()
-        self._decoding = threading.Lock()
-        _OPEN[next(_NUMBERS)] = self
 
     def _repr_html_(self) -> str:
         """Return the store for notebooks: its materials, with their errors and the answers of its last audit."""
@@ -106,7 +99,7 @@ class Store(Mapping[str, "Table"]):
         for name in self:
             try:
                 head = self.summary(name)
-                surface = surface_error(head, self.path(name))
+                surface = surface_error(head, partial(self.attributes, name))
             except StoreError as error:
                 rows.append((name, str(error), *[""] * 7))
                 continue
@@ -191,6 +184,10 @@ class Store(Mapping[str, "Table"]):
             raise UnknownRevisionError(f"{name} has no revision {revision[:40]!r}; here it is {pinned(number, digest)}")
         return Location(group, digest)
 
+    def revision(self, name: str, revision: str | None = None) -> StoredRevision:
+        """Return a revision, by default the current one, for reading its files; errors as by `table`."""
+        return StoredRevision(self.location(name) if revision is None else self.located(name, revision))
+
     def revisions(self, name: str) -> list[str]:
         """Return the complete revisions of a material, oldest first; of a snapshot the one that it names."""
         current = self.path(name)
@@ -200,32 +197,16 @@ class Store(Mapping[str, "Table"]):
     def held(self, name: str) -> Table | None:
         """Return the current table of a material if it is decoded already, without waiting, else None."""
         pointer = self._read_pointer(name)
-        return None if pointer is None else self._used((name, pointer.location.digest))
+        return None if pointer is None else self._decoded.used((name, pointer.location.digest))
 
     def _table(self, name: str, location: Location) -> Table:
-        key = name, location.digest
-        if (decoded := self._used(key)) is not None:
-            return decoded
-        with self._decoding:  # a thread that asks for the same table waits for it
-            if (decoded := self._used(key)) is not None:
-                return decoded
+        def decoded() -> Table:
             files = check_manifest(*location, contents=False)["files"]
             from brdfdb.store.decoding import decode  # lists need no arrays
 
-            table = decode(name, location.group, files, location.digest)
-            with self._lock:
-                self._decoded[key] = table
-                size = sum(table.nbytes + _OBJECTS_BYTES for table in self._decoded.values())
-                while size > self._cache_bytes and len(self._decoded) > 1:
-                    size -= self._decoded.popitem(last=False)[1].nbytes + _OBJECTS_BYTES
-            return table
+            return decode(name, location.group, files, location.digest)
 
-    def _used(self, key: tuple[str, str]) -> Table | None:
-        """Return a decoded table, and count it as the one used last; None if it is not decoded."""
-        with self._lock:
-            if key in self._decoded:
-                self._decoded.move_to_end(key)
-            return self._decoded.get(key)
+        return self._decoded.get((name, location.digest), decoded)
 
     def head(self, name: str) -> str:
         """Return the current revision of a material, such as ``r000003``, at this moment; errors as by `summary`."""
@@ -235,12 +216,21 @@ class Store(Mapping[str, "Table"]):
         """Return the directory of the current revision: a zarr group that xarray opens."""
         return self.location(name).group
 
+    def place_of(self, name: str) -> str:
+        """Return where the current revision lies, for people."""
+        return str(self.path(name))
+
     def summary(self, name: str) -> Head:
         """Return the content of the pointer of a material: what lists show of the current revision.
 
         UnknownMaterialError says that the store has no such material; StoreError, that the pointer is damaged.
         """
         return self.current(name).head
+
+    def attributes(self, name: str) -> dict[str, Any]:
+        """Return the attributes of the current revision as JSON, for lists, which need no arrays."""
+        attributes: dict[str, Any] = read_json(self.path(name) / METADATA).get("attributes", {})
+        return attributes
 
     def metadata(self, name: str) -> TableMetadata:
         """Return the metadata of the current revision, without decoding its values; errors as by `summary`."""
@@ -356,6 +346,35 @@ class Store(Mapping[str, "Table"]):
         return self.current(name).location
 
 
+class StoredRevision:
+    """A revision of a material of a store: its files, each checked when it is read, and its manifest."""
+
+    def __init__(self, location: Location) -> None:
+        self.group, self.digest = location
+
+    @property
+    def number(self) -> str:
+        """Number of the revision, such as ``r000003``."""
+        return self.group.name
+
+    @cached_property
+    def manifest(self) -> Manifest:
+        """The manifest, after a check of the sizes of all files; StoreError names the first that differs."""
+        return check_manifest(self.group, self.digest, contents=False)
+
+    @property
+    def manifest_bytes(self) -> bytes:
+        """The content of the manifest, whose sha256 is `digest`; StoreError if it changed."""
+        read_manifest(self.group, self.digest)
+        return manifest_path(self.group).read_bytes()
+
+    def read(self, key: str) -> bytes:
+        """Return a file by its path inside the group; StoreError if it is missing or changed."""
+        from brdfdb.store.decoding import checked_bytes
+
+        return checked_bytes(self.group, key, self.manifest["files"])
+
+
 class Location(NamedTuple):
     """Location of a revision: its directory, and the digest of its manifest."""
 
@@ -376,22 +395,3 @@ class Pointer(NamedTuple):
         """Return the pointer with the content of its file."""
         revision = head["revision"]
         return cls(seen, path, head, Location(path.parent / revision, head["manifests"][revision]))
-
-
-_OPEN: weakref.WeakValueDictionary[int, Store] = weakref.WeakValueDictionary()
-_NUMBERS = itertools.count()
-
-
-def _after_fork() -> None:
-    """Give the stores of a child new locks, because a fork copies one thread, and locks of the others stay locked.
-
-    The state behind the locks is valid at any moment. Waiting for the threads before a fork fails: they may need locks
-    that the fork has taken already, such as that of thread pools.
-    """
-    for store in list(_OPEN.values()):
-        store._lock = threading.Lock()
-        store._decoding = threading.Lock()
-
-
-if hasattr(os, "register_at_fork"):  # Windows does not fork
-    os.register_at_fork(after_in_child=_after_fork)

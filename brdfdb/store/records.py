@@ -10,7 +10,8 @@ import functools
 import hashlib
 import json
 import os
-from collections.abc import Mapping
+import uuid
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from types import UnionType
@@ -32,13 +33,16 @@ from brdfdb.errors import StoreError
 from brdfdb.place import path_of
 from brdfdb.store.files import (
     FileEntry,
+    Sync,
     bytes_of,
     read_json,
     read_sealed,
     regular_bytes,
+    sealed,
     sha256_of,
     swap_sealed,
-    sync_directory,
+    sync_path,
+    syncing,
     unsealed,
 )
 from brdfdb.store.paths import (
@@ -46,6 +50,7 @@ from brdfdb.store.paths import (
     HEAD,
     METADATA,
     NAME,
+    is_edition,
     manifest_path,
     marker_path,
     materials_path,
@@ -81,6 +86,12 @@ class Summary(TypedDict):
     formula_error: NotRequired[dict[str, Any] | None]
     largest_albedo: NotRequired[dict[str, Any] | None]
     measured: NotRequired[bool]
+    model_title: NotRequired[str]  # this field and the next ones serve filters of lists; older pointers lack them
+    model_reference: NotRequired[str]
+    source: NotRequired[str]
+    anisotropic: NotRequired[bool | None]
+    parameters: NotRequired[dict[str, Any]]
+    incomplete: NotRequired[str]
 
 
 class Manifest(TypedDict):
@@ -191,7 +202,12 @@ def check_marker(root: Path) -> None:
     except (FileNotFoundError, NotADirectoryError):
         if (around := store_around(root)) is not None:
             raise StoreError(f"{root} lies in the store at {around}; name that directory") from None
-        raise StoreError(f"no store at {root}: brdfdb.json is missing there; `brdfdb build` makes one") from None
+        if is_edition(root):
+            raise StoreError(f"{root} is an edition, which is only read; name the directory of a store") from None
+        raise StoreError(
+            f"no store at {root}: brdfdb.json is missing there; `brdfdb build --store {root}` makes one of the papers' "
+            "materials. --store, $BRDFDB_STORE and brdfdb.open() take another directory, or the address of an edition"
+        ) from None
     except OSError as error:
         raise StoreError(f"cannot read {marker}: {error.strerror}") from error
     try:
@@ -201,9 +217,13 @@ def check_marker(root: Path) -> None:
         if data != json.dumps(content, indent=1).encode():  # as version 1 wrote it
             raise DamagedMarkerError(f"{damaged}; `brdfdb build` writes it anew") from None
     if (content.get("format"), content.get("version")) != (FORMAT, FORMAT_VERSION):
+        old = content.get("version") == 1
+        way = (
+            "`brdfdb build RECIPE --store DIR` builds its tables anew in another directory" if old else "update brdfdb"
+        )
         raise StoreError(
             f"{marker} says format {content.get('format')} version {content.get('version')}, this program reads "
-            f"{FORMAT} version {FORMAT_VERSION}; `brdfdb build --store DIR` builds its recipe in another directory"
+            f"{FORMAT} version {FORMAT_VERSION}; {way}"
         )
 
 
@@ -229,6 +249,8 @@ def make_store(root: Path) -> bool:
                     raise
                 made = True
         elif strangers and not _has_tables(root):
+            if is_edition(root):
+                raise StoreError(f"{root} is an edition; `brdfdb build RECIPE --to {root}` builds an edition")
             raise StoreError(f"{root} is not empty and not a store; name an empty or a new directory")
         else:
             made = True
@@ -237,7 +259,7 @@ def make_store(root: Path) -> bool:
         materials_path(root).mkdir(exist_ok=True)
         staging_path(root).mkdir(exist_ok=True)
         if made:
-            sync_directory(root)
+            sync_path(root)
     except OSError as error:
         raise StoreError(f"cannot write a store at {root}: {error.strerror or error}") from error
     return made and not strangers
@@ -277,6 +299,12 @@ def summary_of(metadata: TableMetadata, stored: int, created: str) -> Summary:
         "formula_error": None if metadata.formula_error is None else metadata.formula_error.in_lists(),
         "largest_albedo": None if largest is None else largest.model_dump(mode="json"),
         "measured": metadata.measured is not None,
+        "model_title": metadata.model_title or metadata.model or "",
+        "model_reference": metadata.model_reference or "",
+        "source": metadata.source or "",
+        "anisotropic": metadata.anisotropic,
+        "parameters": metadata.model_dump(mode="json", include={"parameters"})["parameters"],
+        "incomplete": metadata.gaps,
     }
 
 
@@ -368,7 +396,7 @@ def read_metadata(group: Path) -> TableMetadata:
 def _agrees(stated: Any, value: Any) -> bool:
     """Return True if every part of a statement is that of a value."""
     if isinstance(stated, dict) and isinstance(value, dict):
-        return all(_agrees(part, value.get(key)) for key, part in stated.items())
+        return all(key in value and _agrees(part, value[key]) for key, part in stated.items())
     return bool(stated == value)
 
 
@@ -406,24 +434,56 @@ def check_summary(head: Head, manifest: Manifest) -> None:
 
 
 def point_to(material: Path, revision: str) -> None:
-    """Swap the pointer of a material to one of its revisions; the caller holds the lock.
+    """Swap the pointer of a material to one of its revisions; the caller holds the lock. Errors as by `swap_pointers`.
 
-    StoreError says that the manifest of the revision is damaged, or has another digest than in the pointer before.
+    The build that made the revision may have been killed before it synced its files: they are synced first.
     """
+    group = material / revision
+    with syncing(material) as sync:
+        sync([*group.rglob("*"), group])
+        swap_pointers([group], sync)
+
+
+def swap_pointers(groups: Sequence[Path], sync: Sync) -> None:
+    """Swap the pointers of materials to revisions whose files are synced; the caller holds the locks.
+
+    Before the first swap, names and manifests of the revisions and the new pointers are synced, and after the last the
+    swaps. StoreError says that a manifest is damaged, or has another digest than in the pointer before.
+    """
+    new = {group: group.with_name(f".{HEAD}.{uuid.uuid4().hex}") for group in groups}
+    try:
+        for group, pointer in new.items():
+            pointer.write_bytes(sealed(_head_of(group)))
+        sync(
+            path
+            for group, pointer in new.items()
+            for path in (manifest_path(group), pointer, group.parent, group.parent.parent)
+        )
+        for group, pointer in new.items():
+            os.replace(pointer, pointer_path(group.parent))
+    except BaseException:
+        for pointer in new.values():
+            pointer.unlink(missing_ok=True)
+        raise
+    sync(group.parent for group in groups)
+
+
+def _head_of(group: Path) -> Head:
+    """Return the pointer of a material to one of its revisions."""
+    material = group.parent
     known = known_manifests(material)
-    manifest = read_manifest(material / revision, known.get(revision)).content
+    manifest = read_manifest(group, known.get(group.name)).content
     manifests = {}
-    for group in whole_revisions(material):
+    for other in whole_revisions(material):
         with suppress(StoreError):  # of another revision, whose damage `verify` names
-            manifests[group.name] = known.get(group.name) or read_manifest(group, None).digest
-    head: Head = {
+            manifests[other.name] = known.get(other.name) or read_manifest(other, None).digest
+    return {
         "material": material.name,
-        "revision": revision,
+        "revision": group.name,
         **manifest["summary"],
         "manifests": manifests,
         "last": newest(material),
     }
-    swap_sealed(pointer_path(material), head)
 
 
 def known_manifests(material: Path) -> dict[str, str]:

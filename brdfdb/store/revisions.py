@@ -223,7 +223,8 @@ def _collect(store: Store, keep: int, damaged: bool, collected: Collected) -> No
                 if material.is_dir():
                     _collect_material(store, material, keep, damaged, stay.get(material, set()), collected)
         except BusyError:
-            collected.busy.append(name)
+            if not name.startswith("."):  # else it is the presence of a build
+                collected.busy.append(name)
     for path in staged.iterdir():
         if path.is_file():
             _remove(store.root, path, collected)

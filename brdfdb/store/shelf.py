@@ -4,48 +4,55 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from brdfdb.errors import StoreError, UnknownMaterialError
+from brdfdb.store import open_tables
 from brdfdb.store.catalogue import AuditFile, Verdict, line_of
-from brdfdb.store.paths import manifest_path
-from brdfdb.store.reader import CACHE_BYTES, Location, Store
-from brdfdb.store.records import check_manifest
+from brdfdb.store.edition.records import Member
+from brdfdb.store.reader import Store, StoredRevision
+from brdfdb.store.table_cache import CACHE_BYTES
 
 if TYPE_CHECKING:
+    from brdfdb.store.edition.reader import Edition
+    from brdfdb.store.edition.records import Member
     from brdfdb.tables.table import Table
 
 
 class Shelf:
     """The materials of a store, for a program that runs while the store changes.
 
-    The store at `root`, or an open one, is opened when it is first needed: there may be none yet. `audit_files` are
-    what ``brdfdb audit`` wrote as JSON, such as the reports on all materials and on some; each may be missing.
+    The store or the edition at `root`, or an open one, is opened when it is first needed: there may be none yet.
+    `audit_files` are what ``brdfdb audit`` wrote as JSON, such as the reports on all materials and on some; each may be
+    missing.
     """
 
     def __init__(
         self,
-        root: Path,
+        root: Path | str,
         audit_files: Sequence[Path],
         cache_bytes: int = CACHE_BYTES,
         snapshot: str | None = None,
-        store: Store | None = None,
+        store: Store | Edition | None = None,
     ) -> None:
-        self._root = root.absolute()  # resolved now: the working directory may change
+        # resolved now: the working directory may change
+        self._root = root.absolute() if isinstance(root, Path) else root
         self._cache_bytes = cache_bytes
         self._snapshot = snapshot
         self._store = store
         self._seen: set[str] = set()
-        self._summaries: dict[str, tuple[str, dict[str, Any]]] = {}
+        self._lines: dict[str, tuple[str, dict[str, Any]]] = {}  # with the digest of the manifest
+        self._checked: dict[str, str] = {}  # digests of manifests
         self._audits = [AuditFile(path) for path in audit_files]
         self.warming = False  # kernels are being loaded, or compiled for half a minute
 
     @property
-    def store(self) -> Store:
-        """The open store; StoreError if it does not exist."""
+    def store(self) -> Store | Edition:
+        """The open store or edition; StoreError if it does not exist."""
         if self._store is None:
-            self._store = Store(self._root, self._cache_bytes, snapshot=self._snapshot)
+            self._store = open_tables(self._root, self._cache_bytes, snapshot=self._snapshot)
         return self._store
 
     def held(self, name: str) -> Table | None:
@@ -71,14 +78,13 @@ class Shelf:
         with self._named(name):
             return self.store.head(name)
 
-    def located(self, name: str, revision: str | None = None) -> Location:
-        """Return where a revision lies; errors as of `table`."""
+    def revision(self, name: str, revision: str | None = None) -> StoredRevision | Member:
+        """Return a revision, for reading its files; errors as of `table`."""
         with self._named(name):
-            location = self.store.location(name) if revision is None else self.store.located(name, revision)
-            if not manifest_path(location.group).is_file():
-                raise StoreError(f"{name} {location.group.name} is damaged: its manifest is missing")
+            stored = self.store.revision(name, revision)
+            stored.manifest  # noqa: B018  # a damaged one is named now
         self._seen.add(name)
-        return location
+        return stored
 
     @contextlib.contextmanager
     def _named(self, name: str) -> Iterator[None]:
@@ -99,14 +105,24 @@ class Shelf:
         return names
 
     def summary(self, name: str) -> dict[str, Any]:
-        """Return the line of a material in lists; for a damaged one its name and a sentence."""
+        """Return the line of a material after a look at its files; for a damaged one its name and a sentence."""
         try:
-            current = self.store.current(name)
-            group, digest = current.location
-            known = self._summaries.get(name)
+            stored = self.store.revision(name)
+            if self._checked.get(name) != stored.digest:
+                stored.manifest  # noqa: B018  # checks the sizes of all files
+                self._checked[name] = stored.digest
+        except (UnknownMaterialError, StoreError) as error:
+            return {"name": name, "damaged": str(error)}
+        return self.line(name)
+
+    def line(self, name: str) -> dict[str, Any]:
+        """Return the line of a material from its pointer alone, for filters; `summary` notices more damage."""
+        try:
+            digest = self.store.revision(name).digest
+            known = self._lines.get(name)
             if known is None or known[0] != digest:
-                check_manifest(group, digest, contents=False)
-                known = self._summaries[name] = digest, line_of(name, group, current.head)
+                line = line_of(name, self.store.summary(name), partial(self.store.metadata, name))
+                known = self._lines[name] = digest, line
         except (UnknownMaterialError, StoreError) as error:
             return {"name": name, "damaged": str(error)}
         verdict = self.verdict(name)
@@ -133,8 +149,8 @@ class Shelf:
         if not audits:
             return None
         with self._named(name):
-            group, digest = self.store.location(name)
-        verdicts = [Verdict(audited, when, audited.is_of(group.name, digest)) for audited, when in audits]
+            current = self.store.revision(name)
+        verdicts = [Verdict(audited, when, audited.is_of(current.number, current.digest)) for audited, when in audits]
         # leave out a report on another table with the number of the current revision, as of a store that was rebuilt
-        verdicts = [verdict for verdict in verdicts if verdict.current or verdict.finding.revision != group.name]
+        verdicts = [verdict for verdict in verdicts if verdict.current or verdict.finding.revision != current.number]
         return max(verdicts, key=lambda verdict: (verdict.current, verdict.when), default=None)

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from brdfdb.errors import ParameterError, StoreError
 from brdfdb.store.family import stale
-from brdfdb.store.files import seal_of, sync_directory, write_sealed
+from brdfdb.store.files import seal_of, sync_path, write_sealed
 from brdfdb.store.lock import Lock, writing
 from brdfdb.store.paths import NAME, snapshot_path
 from brdfdb.store.reader import Store
@@ -63,8 +63,8 @@ def create(root: Path, name: str, advance: Callable[[], None] = lambda: None) ->
         with writing(root, f"the snapshot {name}"):
             path.parent.mkdir(exist_ok=True)
             write_sealed(path, snapshot, lock.path.parent)
-            sync_directory(path.parent)
-            sync_directory(root)
+            sync_path(path.parent)
+            sync_path(root)
     return seal_of(path)
 
 
@@ -76,4 +76,4 @@ def remove(root: Path, name: str) -> None:
             read_snapshot(root, name)  # it raises an error that names the others
         with writing(root, f"the snapshot {name}"):
             path.unlink()
-            sync_directory(path.parent)
+            sync_path(path.parent)

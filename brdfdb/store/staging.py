@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.errors import BusyError, StoreError
-from brdfdb.store.files import FileEntry, read_sealed, sealed, sha256_of, write_file, write_files
+from brdfdb.store.files import FileEntry, read_sealed, sealed, sha256_of, sync_path, write_file, write_files
 from brdfdb.store.lock import Lock, writing
 from brdfdb.store.paths import marker_path, materials_path, request_path, staging_path, store_of_staged
 from brdfdb.tables import tabulation
@@ -100,11 +100,14 @@ def _layout(text: str) -> Layout:
     return layout
 
 
-def write_block(staging: str, layout: str, number: int, values: NDArray[np.float32] | None = None) -> Block:
+def write_block(
+    staging: str, layout: str, number: int, values: NDArray[np.float32] | None = None, *, sync: bool = True
+) -> Block:
     """Compute a block and write it, unless it is complete already: the task that a build gives to its workers.
 
     `staging` and `layout` are text: a directory that builder and worker share, and JSON. `values` are those of the
-    block, if they are known already. StoreError says that it cannot be written.
+    block, if they are known already. Without `sync` the caller syncs the file. StoreError says that it cannot be
+    written.
     """
     from brdfdb.store.codec import chunk_bytes, chunk_name
 
@@ -114,11 +117,13 @@ def write_block(staging: str, layout: str, number: int, values: NDArray[np.float
     path = directory / "table" / name
     marker = directory / "blocks" / f"{number:06d}.json"
     if (entry := _kept(marker, path, layout)) is not None:
+        if sync:  # the build that wrote it may have been killed before
+            sync_path(path)
         return {"name": name, "entry": entry, "kept": True}
     values = tabulation.block(table, table.blocks[number]) if values is None else values
     data = chunk_bytes(values, table.block_rows)
     with writing(store_of_staged(directory), table.source.name):
-        entry = write_file(path, data, directory)
+        entry = write_file(path, data, directory, sync=sync)
         record = {**entry, "layout": _short(layout)}
         # `_kept` compares the block with its marker, and notices a marker that a power cut damaged
         write_file(marker, json.dumps(record, indent=1).encode(), directory, sync=False)
@@ -144,8 +149,11 @@ def _kept(marker: Path, path: Path, layout: str) -> FileEntry | None:
     return entry if agrees else None
 
 
-def write_frame(staging: str, layout: str) -> dict[str, FileEntry]:
-    """Write all of a table but its blocks, which exist, as the last task of a table; return the written files."""
+def write_frame(staging: str, layout: str, *, sync: bool = True) -> dict[str, FileEntry]:
+    """Write all of a table but its blocks, which exist, as the last task of a table; return the written files.
+
+    Without `sync` the caller syncs them.
+    """
     from brdfdb.store.codec import frame_files
     from brdfdb.tables.statements import stated_metadata
 
@@ -157,7 +165,7 @@ def write_frame(staging: str, layout: str) -> dict[str, FileEntry]:
     attributes = {**frame.attrs, **metadata.attributes()}
     with writing(store_of_staged(directory), table.source.name):
         files = frame_files(table, frame._replace(attrs=attributes))
-        return write_files(directory / "table", files, directory)
+        return write_files(directory / "table", files, directory, sync=sync)
 
 
 def _reader(layout: Layout, table: Path) -> Callable[[slice], NDArray[np.float32]]:

@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 
 from brdfdb.errors import counted, near_90, percent
 from brdfdb.microgeometry.model_errors import has_map, surface_error_of
-from brdfdb.store.files import read_json, sha256_of
-from brdfdb.store.paths import METADATA, NAME, manifest_path, number_of, revision_path
+from brdfdb.store.files import sha256_of
+from brdfdb.store.paths import NAME, manifest_path, number_of, revision_path
 
 NOT_MEASURED = "not measured"
 NOT_AUDITED = "not audited"
@@ -37,12 +37,12 @@ class Audited(NamedTuple):
     samples: str = ""
 
 
-def last_audit(root: Path) -> dict[tuple[str, str], Audited]:
+def last_audit(root: Path | str) -> dict[tuple[str, str], Audited]:
     """Return the answers of the last audit by material and revision; none where there is no readable report.
 
     Audits of older programs have one verdict, which stands for the first answer.
     """
-    answers = {}
+    answers: dict[tuple[str, str], Audited] = {}
     for entry in audited_materials(root):
         audited = Audited(str(entry["verdict"]), "")
         if "as_published" in entry:
@@ -61,12 +61,14 @@ def _samples(finding: Mapping[str, Any]) -> str:
     return ", ".join(parts)
 
 
-def audited_materials(root: Path) -> list[dict[str, Any]]:
+def audited_materials(root: Path | str) -> list[dict[str, Any]]:
     """Return the entries of the reports in a store, on all materials and on a part of them, the newer report last.
 
     Entries of other tables are left out, as of a store that was built anew: see `is_of_store`.
     """
     entries: list[dict[str, Any]] = []
+    if isinstance(root, str):  # an address has no reports
+        return entries
     paths = [path for name in (REPORT_OF_ALL, REPORT_OF_SOME) if (path := root / name).exists()]
     for path in sorted(paths, key=lambda path: path.stat().st_mtime_ns):
         try:
@@ -78,11 +80,11 @@ def audited_materials(root: Path) -> list[dict[str, Any]]:
     return entries
 
 
-def is_of_store(root: Path, entry: Mapping[str, Any]) -> bool:
+def is_of_store(root: Path | str, entry: Mapping[str, Any]) -> bool:
     """Return True if the entry of a report is of a table of this store; by its revision alone if it has no digest."""
     if not entry.get("manifest_sha256"):
         return True
-    if not (NAME.fullmatch(entry["material"]) and number_of(entry["revision"])):
+    if isinstance(root, str) or not (NAME.fullmatch(entry["material"]) and number_of(entry["revision"])):
         return False
     try:
         manifest = manifest_path(revision_path(root, entry["material"], entry["revision"]))
@@ -118,16 +120,16 @@ def formula_error(head: Mapping[str, Any], percent: Callable[[float], str]) -> s
     return "0, exact form" if stated["against"] == "highest rung" else "no exact form"
 
 
-def surface_error(head: Mapping[str, Any], group: Path) -> str:
+def surface_error(head: Mapping[str, Any], attributes: Callable[[], Mapping[str, Any]]) -> str:
     """Return the error of a formula against rays on the surface that suits a material, in words; empty without a map.
 
-    It is computed from the parameters of the table in the directory of a revision, of which the pointer has none, and
-    never stored: a newer map is shown at once. StoreError if the table cannot be read.
+    It is computed from the parameters in the pointer, or in the `attributes` of the table if the pointer is older, and
+    never stored: a newer map is shown at once.
     """
     if not has_map(head["model"]):
         return ""
-    attributes = read_json(group / METADATA).get("attributes", {})
-    error = surface_error_of(head["model"], attributes.get("parameters", {}))
+    parameters = head["parameters"] if "parameters" in head else attributes().get("parameters", {})
+    error = surface_error_of(head["model"], parameters)
     return "" if error is None else error.in_lists
 
 

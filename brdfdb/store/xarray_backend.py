@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -12,10 +12,10 @@ import xarray as xr
 from xarray.backends import BackendEntrypoint
 
 from brdfdb.errors import ParameterError, StoreError
-from brdfdb.place import is_service, path_of
+from brdfdb.place import is_bucket, is_service, path_of
 from brdfdb.store import open as open_store
 from brdfdb.store.http_client import RemoteStore
-from brdfdb.store.paths import METADATA, marker_path, number_of, store_of
+from brdfdb.store.paths import METADATA, is_edition, marker_path, number_of, store_of
 from brdfdb.store.reader import Store
 from brdfdb.tables.xarray_view import opened
 
@@ -24,7 +24,9 @@ class BrdfdbBackend(BackendEntrypoint):
     """Read tables of brdfdb lazily, with ``brdf`` [1/sr] over all axes."""
 
     description = "Tables of brdfdb: f_r over all axes, computed when it is read"
-    open_dataset_parameters = ("filename_or_obj", "drop_variables", "material", "revision", "snapshot")
+    open_dataset_parameters = (
+        *("filename_or_obj", "drop_variables", "material", "revision", "snapshot", "storage_options"),
+    )
 
     def open_dataset(  # type: ignore[override]
         self,
@@ -34,14 +36,16 @@ class BrdfdbBackend(BackendEntrypoint):
         material: str | None = None,
         revision: str | None = None,
         snapshot: str | None = None,
+        storage_options: Mapping[str, Any] | None = None,
     ) -> xr.Dataset:
         """Open a table as a lazy Dataset, as `Store.dataset` gives it.
 
         Parameters
         ----------
         filename_or_obj : path or address
-            A store (``brdf-store``) or a service (``http://127.0.0.1:8000``), with the keyword `material`; or a
-            material (``brdf-store/materials/NAME``); or a revision (``brdf-store/materials/NAME/r000001``, of a service
+            A store (``brdf-store``), an edition (a directory, ``https://``, ``s3://`` or ``gs://``) or a service
+            (``http://127.0.0.1:8000``), with the keyword `material`; or a material (``brdf-store/materials/NAME``); or
+            a revision (``brdf-store/materials/NAME/r000001``, of a service
             ``http://127.0.0.1:8000/v1/store/materials/NAME/r000001``), be it a copy outside of a store.
         drop_variables : str or iterable of str, optional
             Variables to leave out, such as ``parts``.
@@ -51,6 +55,8 @@ class BrdfdbBackend(BackendEntrypoint):
             Its revision; by default the current one.
         snapshot : str, optional
             Name of a snapshot of the store, whose revision of the material is opened.
+        storage_options : mapping, optional
+            Options of obstore for an edition in a bucket, as of `brdfdb.open`.
 
         Raises
         ------
@@ -61,7 +67,9 @@ class BrdfdbBackend(BackendEntrypoint):
         """
         place = filename_or_obj
         if material is not None:
-            dataset = open_store(place, snapshot=snapshot).dataset(material, revision)
+            dataset = open_store(place, snapshot=snapshot, storage_options=storage_options).dataset(material, revision)
+        elif is_bucket(place):
+            raise ParameterError("material", f"{place} is an edition; name one of its materials")
         elif is_service(place):
             service, _, named = place.rstrip("/").partition("/v1/store/materials/")
             material, _, revision = named.partition("/")
@@ -74,17 +82,20 @@ class BrdfdbBackend(BackendEntrypoint):
         return dataset.drop_vars(dropped, errors="ignore")
 
     def guess_can_open(self, filename_or_obj: Any) -> bool:
-        """Return True for the directory of a store; revisions are zarr groups, which others read, too."""
+        """Return True for the directory of a store or an edition; revisions are zarr groups, which others read, too."""
         with contextlib.suppress(ParameterError):
-            return isinstance(filename_or_obj, str | os.PathLike) and marker_path(path_of(filename_or_obj)).is_file()
+            if isinstance(filename_or_obj, str | os.PathLike):
+                path = path_of(filename_or_obj)
+                return marker_path(path).is_file() or is_edition(path)
         return False
 
 
 def _local(path: Path, revision: str | None, snapshot: str | None) -> xr.Dataset:
     """Open the directory of a material or of a revision."""
-    if marker_path(path).is_file():
-        names = ", ".join(list(Store(path))[:5]) or "none"
-        raise ParameterError("material", f"{path} is a store; name one of its materials, such as {names}")
+    if marker_path(path).is_file() or is_edition(path):
+        names = ", ".join(list(open_store(path))[:5]) or "none"
+        kind = "an edition" if is_edition(path) else "a store"
+        raise ParameterError("material", f"{path} is {kind}; name one of its materials, such as {names}")
     if (root := store_of(path / "r000001")) is not None:
         return Store(root, snapshot=snapshot).dataset(path.name, revision)
     if (root := store_of(path)) is not None:

@@ -6,6 +6,7 @@ import re
 import shutil
 from dataclasses import replace
 from fnmatch import fnmatchcase
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,7 @@ from brdfdb.audit.record import UNCHECKED, Record, expected_of, record_of
 from brdfdb.audit.table_error import TableError
 from brdfdb.errors import BrdfdbError, StoreError
 from brdfdb.materials import Material, presets
-from brdfdb.store.decoding import read_group, table_of
+from brdfdb.store.decoding import checked_bytes, read_group, table_of
 from brdfdb.store.files import read_sealed
 from brdfdb.store.reader import Store
 from brdfdb.store.records import Summary, check_manifest, fields_of
@@ -67,7 +68,7 @@ def listed(where: str, leaf: str) -> bool:
 def forged(store: Path, name: str, attributes: dict[str, Any]) -> Table:
     group = Store(store).path(name)
     files = check_manifest(group, None, contents=False)["files"]
-    arrays, dims, _ = read_group(group, files) or pytest.fail("not read")
+    arrays, dims, _ = read_group(partial(checked_bytes, group, files=files)) or pytest.fail("not read")
     return table_of(name, group.name, arrays, dims, attributes)
 
 

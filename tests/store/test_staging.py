@@ -20,10 +20,10 @@ from zarr.codecs import BloscCodec, Crc32cCodec
 
 import brdfdb
 from brdfdb.errors import ParameterError, StoreError
-from brdfdb.store import codec, records
-from brdfdb.store.files import unsealed
+from brdfdb.store import codec, files, records
+from brdfdb.store.files import syncing, unsealed
 from brdfdb.store.lock import Lock
-from brdfdb.store.publication import publish_dataset, publish_staged
+from brdfdb.store.publication import Staged, publish_dataset, publish_staged
 from brdfdb.store.staging import planned, prepare, write_block, write_frame
 from brdfdb.tables import layout as layouts
 from brdfdb.tables.error_measurement import measure
@@ -104,14 +104,23 @@ def test_a_store_that_cannot_be_made_is_one_sentence(tmp_path: Path, monkeypatch
 # Writes that fail
 
 
-@pytest.mark.parametrize("call", ["replace", "rename", "fsync"])
+def no_syncfs(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let each file be synced by itself, as where syncfs is missing."""
+    monkeypatch.setattr(files, "_linux", lambda: None)
+
+
+@pytest.mark.parametrize("call", ["replace", "rename", "fsync", "syncfs"])
 @pytest.mark.parametrize("error", [OSError(errno.ENOSPC, "No space left on device"), OSError("the disk is gone")])
 def test_failed_writes_change_nothing(root: Path, monkeypatch: pytest.MonkeyPatch, call: str, error: OSError) -> None:
     def fail(*_: Any) -> None:
         raise error
 
     with monkeypatch.context() as patch:
-        patch.setattr(os, call, fail)
+        if call == "syncfs":
+            patch.setattr(files, "_sync_file_system", fail)
+        else:
+            no_syncfs(patch)
+            patch.setattr(os, call, fail)
         with pytest.raises(StoreError) as caught:
             publish_dataset(root, "white", lambert(0.75))
     assert str(caught.value) == f"cannot write white to the store at {root}: {error.strerror or error}"
@@ -124,28 +133,56 @@ def test_failed_writes_change_nothing(root: Path, monkeypatch: pytest.MonkeyPatc
     assert rho(root) == 0.75
 
 
-def test_revisions_are_synced_before_the_pointer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    synced: list[int] = []
+@pytest.mark.parametrize("at_once", [True, False])
+def test_revisions_are_synced_before_the_pointers(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, at_once: bool
+) -> None:
+    """No pointer is swapped before all that it names, and the next sync comes after the last swap."""
+    synced: set[tuple[int, int]] = set()  # inode and time of the last change of the content or of the names
     sync, replace = os.fsync, os.replace
-    before: list[set[int]] = []
+    swaps: list[Path] = []
+    after: list[Path] = []
+
+    def state(path: Path | int) -> tuple[int, int]:
+        return os.stat(path).st_ino, os.stat(path).st_mtime_ns
 
     def fsync(handle: int) -> None:
         sync(handle)
-        synced.append(os.fstat(handle).st_ino)
+        synced.add(state(handle))
+
+    def everything(_: int) -> bool:
+        after.extend(swaps)
+        if at_once:
+            synced.update(state(path) for path in (tmp_path, *tmp_path.rglob("*")))
+        return at_once
 
     def swap(source: Any, target: Any) -> None:
         if Path(target).name == "HEAD.json":
-            before.append(set(synced))
+            group = Path(target).parent / "r000001"
+            manifest = group.with_name("r000001.MANIFEST.json")
+            # a swap changes the time of its directory, which has one material
+            assert [p for p in (group, *group.rglob("*"), manifest, source) if state(p) not in synced] == []
+            assert swaps or state(group.parent) in synced
+            swaps.append(group)
         replace(source, target)
 
     monkeypatch.setattr(os, "fsync", fsync)
+    monkeypatch.setattr(files, "_sync_file_system", everything)
     monkeypatch.setattr(os, "replace", swap)
-    publish_dataset(tmp_path, "white", lambert(0.5))
-    (known,) = before
-    group = tmp_path / "materials" / "white" / "r000001"
-    paths = [group, *group.rglob("*"), *list(group.parents)[:3], group.with_name("r000001.MANIFEST.json")]
-    assert len(paths) > 20
-    assert [path for path in paths if path.stat().st_ino not in known] == []
+    records.make_store(tmp_path)
+    tables = []
+    with syncing(tmp_path) as sync_all:
+        for name in ("white", "grey"):
+            text = json.dumps(layout(0.5).document())
+            where = prepare(tmp_path, name, REQUEST, text)
+            block = write_block(str(where), text, 0, sync=False)
+            written = {block["name"]: block["entry"]} | write_frame(str(where), text, sync=False)
+            tables.append(Staged(name, where, written))
+        publish_staged(tmp_path, tables, sync_all)
+    assert [group.parent.name for group in swaps] == ["white", "grey"]
+    assert after == swaps
+    for group in swaps:
+        brdfdb.open(tmp_path).verify(group.parent.name)
 
 
 # Imports once, then forks a writer for each line: a fork is safe while there is one thread
@@ -157,8 +194,16 @@ import xarray as xr
 import zarr, zarr.codecs
 from brdfdb.store import codec, files, publication, records
 
-def die(*_):
+def die(*_, **__):
     os.kill(os.getpid(), signal.SIGKILL)
+
+def die_at_sync(number):
+    sync = files._sync_file_system
+    def counted(handle):
+        nonlocal number
+        number -= 1
+        return sync(handle) if number else die()
+    files._sync_file_system = counted
 
 places = {"files": files, "publication": publication, "records": records, "Path": Path}
 axes = {"theta_i": [0.0, 90.0], "theta_r": [0.0, 90.0], "delta_phi": [0.0, 180.0]}
@@ -167,7 +212,7 @@ dataset = xr.Dataset({"brdf": (tuple(axes), values)}, coords=axes)  # the first 
 for line in sys.stdin:
     root, place, step = line.rsplit(maxsplit=2)
     if (child := os.fork()) == 0:
-        setattr(places[place], step, die)
+        die_at_sync(int(step)) if place == "sync" else setattr(places[place], step, die)
         publication.publish_dataset(root, "white", dataset)
         os._exit(0)
     print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), flush=True)
@@ -190,14 +235,13 @@ def killed() -> Iterator[Callable[[Path, str], int]]:
 
 
 @pytest.mark.parametrize(
-    "step", ["files write_file", "publication publish_staged", "publication sync_directory",
-             "publication write_sealed", "Path rename", "publication point_to", "records swap_sealed",
-             "files sync_directory"],
+    "step", ["files write_file", "publication publish_staged", "publication write_file", "sync 1", "Path rename",
+             "publication swap_pointers", "records _head_of", "sync 2", "sync 3"],
 )  # fmt: skip
 def test_killed_writes_change_nothing(root: Path, step: str, killed: Callable[[Path, str], int]) -> None:
     assert killed(root, step) == -signal.SIGKILL
     store = brdfdb.open(root)
-    if step == "files sync_directory":  # the pointer is swapped; only that it outlasts a power cut is not certain
+    if step == "sync 3":  # the pointer is swapped; only that it outlasts a power cut is not certain
         assert store.head("white") == "r000002"
         store.verify("white")
         return
@@ -205,7 +249,7 @@ def test_killed_writes_change_nothing(root: Path, step: str, killed: Callable[[P
     assert (rho(root), store.head("white"), list(store)) == (0.25, "r000001", ["white"])
     before = contents(root / "materials")
     revision, _ = publish_dataset(root, "white", lambert(0.75))
-    taken = step in ("Path rename", "publication point_to", "records swap_sealed")
+    taken = step in ("Path rename", "publication swap_pointers", "records _head_of", "sync 2")
     assert revision == ("r000003" if taken else "r000002")
     assert staged(root) == []
     changed = dict(before.items() - contents(root / "materials").items())
@@ -234,13 +278,13 @@ def test_blocks_and_frame_make_the_table_of_tabulate(tmp_path: Path, four_blocks
     blocks = [write_block(str(where), four_blocks, number) for number in (2, 0, 3, 1)]
     assert [block["kept"] for block in blocks] == [False] * 4
     assert sorted(block["name"] for block in blocks) == [f"brdf/c/{number}/0/0" for number in range(4)]
-    files = {block["name"]: block["entry"] for block in blocks} | write_frame(str(where), four_blocks)
+    written = {block["name"]: block["entry"] for block in blocks} | write_frame(str(where), four_blocks)
     (where / "table" / "stray").write_text("left by an earlier attempt")
-    with Lock(tmp_path, "white"):
-        revision, stored = publish_staged(tmp_path, "white", where, files)
+    with Lock(tmp_path, "white"), syncing(tmp_path) as sync:
+        ((revision, stored),) = publish_staged(tmp_path, [Staged("white", where, written)], sync)
     store = brdfdb.open(tmp_path)
     store.verify("white")
-    assert sorted(contents(store.path("white"))) == sorted(files)
+    assert sorted(contents(store.path("white"))) == sorted(written)
     assert stored == sum(len(data) for data in contents(store.path("white")).values())
     error = store["white"].attrs["error"]
     with store.dataset("white") as found:
@@ -322,6 +366,7 @@ def test_a_layout_is_kept_for_the_next_build(tmp_path: Path, four_blocks: str) -
 def test_failed_blocks_are_one_sentence(tmp_path: Path, four_blocks: str, monkeypatch: pytest.MonkeyPatch) -> None:
     where = staged_table(tmp_path, four_blocks)
     other = staged_blocks(tmp_path / "other", four_blocks)
+    no_syncfs(monkeypatch)
     monkeypatch.setattr(os, "fsync", full)
     for root, task in (
         (tmp_path, lambda: write_block(str(where), four_blocks, 0)),
