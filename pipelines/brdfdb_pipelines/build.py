@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import contextlib
 import gc
+import os
 import threading
 import time
+import uuid
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass, field
 from functools import partial
@@ -24,19 +26,20 @@ from brdfdb.models import MODELS
 from brdfdb.store.estimates import begin_estimates, estimates_path
 from brdfdb.store.family import FamilyRecord, Sweep
 from brdfdb.store.family_records import recorded, write_family
-from brdfdb.store.files import FileEntry
-from brdfdb.store.lock import Lock, writing
-from brdfdb.store.paths import material_path, pointer_path
-from brdfdb.store.publication import NewRevision, publish_staged
-from brdfdb.store.records import make_store, point_to
+from brdfdb.store.files import FileEntry, syncing
+from brdfdb.store.lock import Lock, NoLocksError
+from brdfdb.store.paths import material_path, pointer_path, staging_path
+from brdfdb.store.publication import NewRevision, Staged, publish_staged
+from brdfdb.store.records import make_store
 from brdfdb.store.revisions import standing
-from brdfdb.store.staging import Block, discard, prepare, remove_begun, write_block, write_frame
+from brdfdb.store.staging import Block, prepare, remove_begun, write_block, write_frame
 from brdfdb.tables import _kernels
 from brdfdb.tables.layout import Layout
 from brdfdb.tables.planner import coarsest
 from brdfdb.tables.table import Table, points
 from brdfdb.tables.tabulation import block
 from brdfdb_pipelines import workers
+from brdfdb_pipelines.build_group import GROUP_S, GroupResult, build_group, group_size, resumed, survey_group
 from brdfdb_pipelines.build_progress import Event, Tally
 from brdfdb_pipelines.build_survey import (
     Survey,
@@ -44,11 +47,9 @@ from brdfdb_pipelines.build_survey import (
     check_memory,
     cost_of_plan,
     cost_of_table,
-    head_of,
     memory_of_plan,
-    survey,
 )
-from brdfdb_pipelines.measured_job import MeasuredJob, MeasuredResult, build_measured, revision_bytes
+from brdfdb_pipelines.measured_job import MeasuredJob, MeasuredResult, build_measured
 from brdfdb_pipelines.recipe_file import Job, Recipe
 from brdfdb_pipelines.workers import Workers, WorkersError
 
@@ -56,7 +57,7 @@ if TYPE_CHECKING:  # rays and their statistics take a second to load
     from brdfdb_pipelines.simulated_job import SimulatedJob
 
 _LOOK_S = 2.0  # interval [s] at which silent workers are checked
-_PUBLISHED = 16  # tables that are published at once: each waits for the disk several times
+_PUBLISHED = 16  # large tables that are published at once: each waits for the disk several times
 _POLL_S = 0.1  # interval [s] at which a lock of another build is tried again
 
 _Item = TypeVar("_Item")
@@ -86,6 +87,7 @@ class _Table:
     job: Job
     survey: Survey
     lock: Lock
+    again_at: float = 0.0  # time of a next try [s], after another build had the lock
     staging: Path = Path()
     blocks: deque[int] = field(default_factory=deque)  # not submitted yet
     files: dict[str, FileEntry] = field(default_factory=dict)
@@ -129,12 +131,15 @@ def build(
     try:
         at = at if isinstance(at, Workers) else Workers(at, lambda: 1)
         return _Builder(jobs, measured, simulated, sweeps, root, at, report, memory).run()
-    except ParameterError:
+    except (ParameterError, NoLocksError):
         if made:
             remove_begun(root)
             if existed:
                 root.mkdir(exist_ok=True)
         raise
+
+
+_Member = TypeVar("_Member", Job, _Table)
 
 
 @dataclass(eq=False)
@@ -153,7 +158,11 @@ class _Builder:
     running: dict[Future[Any], Callable[[Future[Any]], None]] = field(default_factory=dict)
     publisher: ThreadPoolExecutor = field(default_factory=lambda: ThreadPoolExecutor(_PUBLISHED))
     publishing: set[Future[Any]] = field(default_factory=set)  # the running tasks of this process itself
-    waiting: deque[_Table] = field(default_factory=deque)  # not begun
+    waiting: deque[_Table] = field(default_factory=deque)  # of several blocks, not begun
+    small: deque[_Table] = field(default_factory=deque)  # of one block, not begun
+    busy: deque[_Table] = field(default_factory=deque)  # of one block, which other builds are building
+    group_s: float = GROUP_S  # time of a member of the group that ended last [s]
+    token: str | None = None  # a locked file in the store, which workers on other machines must see
     open: list[_Table] = field(default_factory=list)
     ready: deque[_Table] = field(default_factory=deque)  # all blocks are there
     built: dict[str, Built] = field(default_factory=dict)
@@ -167,6 +176,28 @@ class _Builder:
         others: list[MeasuredJob | SimulatedJob] = [*self.measured, *self.simulated]
         names = [job.name for job in self.jobs] + [job.name for job in others]
         self.report({"event": "start", "tables": len(names), "store": str(self.root)})
+        presence = Lock(self.root, f".build-{uuid.uuid4().hex[:12]}", wait=False)
+        with contextlib.ExitStack() as locked:
+            if os.access(staging_path(self.root), os.W_OK):  # else nothing can be built, and maybe nothing is missing
+                locked.enter_context(presence)
+                self.token = str(presence.path) if self.at.apart else None
+            self._run()
+        if self.error is not None:
+            raise self.error
+        built = [self.built[name] for name in names]
+        states = [b.state for b in built]
+        self.report(
+            {
+                "event": "done",
+                "tables": len(built),
+                **{state: states.count(state) for state in ("published", "adopted", "unchanged")},
+                "bytes": sum(b.stored_bytes for b in built),
+                "seconds": round(time.perf_counter() - start, 3),
+            }
+        )
+        return built
+
+    def _run(self) -> None:
         try:
             self._survey()
             self._tabulate()
@@ -183,22 +214,10 @@ class _Builder:
             self.publisher.shutdown()
             for table in self.open:
                 table.lock.__exit__(None, None, None)
-        if self.error is not None:
-            raise self.error
-        built = [self.built[name] for name in names]
-        states = [b.state for b in built]
-        self.report(
-            {
-                "event": "done",
-                "tables": len(built),
-                **{state: states.count(state) for state in ("published", "adopted", "unchanged")},
-                "bytes": sum(b.stored_bytes for b in built),
-                "seconds": round(time.perf_counter() - start, 3),
-            }
-        )
-        return built
 
     def _submit(self, then: Callable[[Future[Any]], None], task: Callable[..., Any], *arguments: Any) -> None:
+        if self.token is not None:
+            task, arguments = workers.at_store, (self.token, task, *arguments)
         self.running[self.at.executor.submit(task, *arguments)] = then
 
     @property
@@ -234,22 +253,17 @@ class _Builder:
                 wavelengths = 1 if job.wavelength_nm is None else job.wavelength_nm.size
                 self._claim(f"planning {job.name}", memory_of_plan(wavelengths, job.tolerance))
 
-        def begin(job: Job) -> None:
-            def then(future: Future[Survey]) -> None:
-                if (result := self._result(job.name, future)) is None:
-                    return
-                status = result.standing
-                self.report({"event": "surveyed", "material": job.name, "state": status.state, "why": status.why})
-                if status.state == "current":
-                    self._is_current(job, status.revision)
-                else:
-                    self.waiting.append(_Table(job, result, Lock(self.root, job.name, wait=False)))
-
-            self._submit(then, survey, str(self.root), job)
-
-        self._each(sorted(self.jobs, key=cost_of_plan, reverse=True), begin)
-        missing = sorted(self.waiting, key=lambda table: cost_of_table(table.job, table.survey), reverse=True)
-        self.waiting = deque(missing)
+        pending = deque(sorted(self.jobs, key=cost_of_plan, reverse=True))
+        missing: list[_Table] = []
+        while pending or self.running:
+            while pending and self._room:
+                jobs = [pending.popleft() for _ in range(self._group_size(len(pending)))]
+                self._submit(partial(self._surveyed, jobs, missing), survey_group, str(self.root), jobs)
+            self._wait()
+        self.group_s = GROUP_S
+        missing.sort(key=lambda table: cost_of_table(table.job, table.survey), reverse=True)
+        self.waiting = deque(table for table in missing if len(table.survey.block_values) > 1)
+        self.small = deque(table for table in missing if len(table.survey.block_values) <= 1)
         self.task_bytes = 1
         for table in missing:
             self._claim(f"a block of {table.name}", table.survey.task_bytes)
@@ -262,19 +276,38 @@ class _Builder:
         self.task_bytes = max(self.task_bytes, need)
         check_memory(what, need, self.memory)
 
-    def _is_current(self, job: Job, revision: str) -> None:
-        self.built[job.name] = Built(job, "unchanged", revision, revision_bytes(self.root, job.name, revision))
-        self.report({"event": "unchanged", "material": job.name, "revision": revision})
+    def _surveyed(self, jobs: list[Job], missing: list[_Table], future: Future[GroupResult]) -> None:
+        for job, result in self._results(jobs, future):
+            status = result.standing
+            self.report({"event": "surveyed", "material": job.name, "state": status.state, "why": status.why})
+            if status.state == "current":
+                self._found(job, result)
+            else:
+                missing.append(_Table(job, result, Lock(self.root, job.name, wait=False)))
+
+    def _found(self, job: Job, survey: Survey) -> None:
+        """Note a table that the store has: its revision is the current one, or was made so."""
+        status = survey.standing
+        state = "adopted" if status.state == "adoptable" else "unchanged"
+        why = {"why": status.why} if state == "adopted" else {}
+        self.built[job.name] = Built(job, state, status.revision, survey.stored, status.why)
+        self.report({"event": state, "material": job.name, "revision": status.revision, **why})
+
+    def _published(self, table: _Table, revision: str, stored: int) -> None:
+        survey = table.survey
+        why = survey.standing.why
+        self.built[table.name] = Built(table.job, "published", revision, stored, why, survey.shape, survey.wavelengths)
+        self.report({"event": "published", "material": table.name, "revision": revision, "bytes": stored, "why": why})
 
     # Tables
 
     def _tabulate(self) -> None:
-        while self.waiting or self.open or self.running:
+        while self.waiting or self.small or self.busy or self.open or self.running:
             while self._room and self._next():
                 pass
             if self.running:
                 self._wait()
-            elif self.waiting:
+            elif self.waiting or self.busy:
                 time.sleep(_POLL_S)  # all remaining tables are being built by others
 
     def _next(self) -> bool:
@@ -294,7 +327,31 @@ class _Builder:
             if self._begin(table):
                 self._submit_block(table)
                 return True
-        return False
+        while self.busy and self.busy[0].again_at <= time.monotonic():
+            self.small.append(self.busy.popleft())
+        if not self.small:
+            return False
+        group = [self.small.popleft() for _ in range(self._group_size(len(self.small)))]
+        members = [(table.job, table.survey) for table in group]
+        self._submit(partial(self._grouped, group), build_group, str(self.root), members)
+        return True
+
+    def _group_size(self, remaining: int) -> int:
+        return group_size(self.group_s, remaining, self.at.slots(), apart=self.at.apart)
+
+    def _grouped(self, group: list[_Table], future: Future[GroupResult]) -> None:
+        for table, result in self._results(group, future):
+            table.survey = result.survey
+            if result.state == "busy":
+                self._waits(table)
+                table.again_at = time.monotonic() + _POLL_S
+                self.busy.append(table)
+            elif result.state == "published":
+                for number, kept in enumerate(result.kept):
+                    self._block(table, number, kept=kept)
+                self._published(table, result.revision, result.bytes)
+            else:
+                self._found(table.job, result.survey)
 
     def _submit_block(self, table: _Table) -> None:
         number = table.blocks.popleft()
@@ -307,34 +364,26 @@ class _Builder:
     def _begin(self, table: _Table) -> bool:
         """Lock a material and survey it again; return True if there are blocks to compute."""
         job = table.job
-        name = table.name
         try:
             table.lock.__enter__()
         except BusyError:
-            if not table.waiting_reported:
-                self.report({"event": "waiting", "material": name})
-                table.waiting_reported = True
+            self._waits(table)
             self.waiting.append(table)
             return False
         self.open.append(table)
-        if head_of(self.root, name) != table.survey.head:  # another build has published a revision since the survey
-            table.survey = survey(str(self.root), job)
-        standing = table.survey.standing
-        if standing.state == "missing":
-            table.staging = prepare(self.root, name, job.request, table.survey.layout)
+        table.survey = resumed(self.root, job, table.survey)
+        if table.survey.standing.state == "missing":
+            table.staging = prepare(self.root, table.name, job.request, table.survey.layout)
             table.blocks.extend(range(len(table.survey.block_values)))
             return True
-        if standing.state == "adoptable":
-            with writing(self.root, name):
-                point_to(material_path(self.root, name), standing.revision)
-            discard(self.root, name, job.request)  # the build that made this revision may have been killed
-            stored = revision_bytes(self.root, name, standing.revision)
-            self.built[name] = Built(job, "adopted", standing.revision, stored, standing.why)
-            self.report({"event": "adopted", "material": name, "revision": standing.revision, "why": standing.why})
-        else:
-            self._is_current(job, standing.revision)
+        self._found(job, table.survey)
         self._close(table)
         return False
+
+    def _waits(self, table: _Table) -> None:
+        if not table.waiting_reported:
+            self.report({"event": "waiting", "material": table.name})
+            table.waiting_reported = True
 
     def _close(self, table: _Table) -> None:
         if table in self.open:
@@ -347,37 +396,31 @@ class _Builder:
             self._close(table)
             return
         table.files[block["name"]] = block["entry"]
-        kept = block["kept"] and not table.survey.tabulated  # from an earlier build
-        values = table.survey.block_values
-        self.report(
-            {
-                "event": "block",
-                "material": table.name,
-                "block": number,
-                "blocks": len(values),
-                "kept": kept,
-                **self.tally.add(values[number], kept=kept),
-            }
-        )
-        if len(table.files) == len(values):
+        self._block(table, number, kept=block["kept"])
+        if len(table.files) == len(table.survey.block_values):
             self.ready.append(table)
+
+    def _block(self, table: _Table, number: int, *, kept: bool) -> None:
+        kept = kept and not table.survey.tabulated  # from an earlier build
+        values = table.survey.block_values
+        event = {"event": "block", "material": table.name, "block": number, "blocks": len(values), "kept": kept}
+        self.report({**event, **self.tally.add(values[number], kept=kept)})
 
     def _framed(self, table: _Table, future: Future[dict[str, FileEntry]]) -> None:
         if (files := self._result(table.name, future)) is None:
             self._close(table)
             return
-        staged = (self.root, table.name, table.staging, {**table.files, **files})
-        publication = self.publisher.submit(publish_staged, *staged)
+
+        def publish() -> NewRevision:
+            with syncing(self.root) as sync:
+                return publish_staged(self.root, [Staged(table.name, table.staging, {**table.files, **files})], sync)[0]
 
         def published(future: Future[NewRevision]) -> None:
             if (made := self._result(table.name, future)) is not None:
-                why = table.survey.standing.why
-                size = (table.survey.shape, table.survey.wavelengths)
-                self.built[table.name] = Built(table.job, "published", made.revision, made.bytes, why, *size)
-                event = {"event": "published", "material": table.name}
-                self.report({**event, "revision": made.revision, "bytes": made.bytes, "why": why})
+                self._published(table, *made)
             self._close(table)
 
+        publication = self.publisher.submit(publish)
         self.publishing.add(publication)
         self.running[publication] = published
 
@@ -492,9 +535,27 @@ class _Builder:
             raise error
         if workers.lost(error):
             raise WorkersError("the workers are gone, killed or out of memory; build again to resume") from error
+        self._failed(name, error)
+        return None
+
+    def _results(self, items: Sequence[_Member], future: Future[GroupResult]) -> Iterator[tuple[_Member, Any]]:
+        """Yield the members of a group with their results, without those that failed."""
+        group: GroupResult | None = self._result(items[0].name, future)
+        if group is None:
+            for item in items[1:]:
+                self._failed(item.name, future.exception())
+            return
+        self.group_s = group.seconds
+        for item, result in zip(items, group.results, strict=True):
+            if isinstance(result, Exception):
+                self._failed(item.name, result)
+            else:
+                yield item, result
+
+    def _failed(self, name: str, error: BaseException | None) -> None:
+        assert isinstance(error, Exception)
         self.error = self.error or error
         self.report({"event": "failed", "material": name, "error": str(error)})
-        return None
 
 
 _UP = np.array([[0.0, 0.0, 1.0], [0.6, 0.0, 0.8], [0.0, 0.6, 0.8]])  # three directions: any will do

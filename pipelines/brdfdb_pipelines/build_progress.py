@@ -78,6 +78,11 @@ class Bars:
                     self._progress.remove_task(self._kernels)
                 self._log(f"planning {counted(event['tables'], 'table')}")
                 self._overall = self._begun("planning", event["tables"], "tables")
+            case "shards":
+                self._log(f"tabulating {counted(event['tables'], 'table')}")
+                self._overall = self._begun("tabulating", event["tables"], "tables")
+            case "shard" if self._overall is not None:
+                self._advance(self._overall, event["tables"])
             case "surveyed" if self._overall is not None:
                 self._advance(self._overall)
             case "planned" if self._overall is not None:
@@ -171,8 +176,8 @@ class Bars:
     def _bar(self, task: TaskID) -> Task:
         return self._progress.tasks[self._progress.task_ids.index(task)]
 
-    def _advance(self, task: TaskID) -> None:
-        """Advance a bar by one of its units, and say how many of them are done."""
-        self._progress.advance(task)
+    def _advance(self, task: TaskID, units: int = 1) -> None:
+        """Advance a bar by some of its units, and say how many of them are done."""
+        self._progress.advance(task, units)
         bar = self._bar(task)
         self._progress.update(task, rate=f"{bar.completed:.0f}/{bar.total:.0f} {bar.fields['unit']}")

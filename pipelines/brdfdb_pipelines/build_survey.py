@@ -20,6 +20,7 @@ from brdfdb.store.revisions import Standing, standing
 from brdfdb.store.staging import planned, prepare, write_block
 from brdfdb.tables.layout import Layout, digest
 from brdfdb_pipelines import terminal
+from brdfdb_pipelines.measured_job import revision_bytes
 from brdfdb_pipelines.recipe_file import Job
 
 _THETA_DEG = (0.0, 30.0, 60.0, 85.0)  # polar angles at which a model is tried before it is planned
@@ -54,6 +55,7 @@ class Survey:
     task_bytes: int = 0  # memory of one task
     disk_bytes: int = 0  # disk space still to be written, at most
     tabulated: bool = False
+    stored: int = 0  # size of the revision that answers the job [byte]
 
     @property
     def size(self) -> int:
@@ -61,10 +63,11 @@ class Survey:
         return sum(self.block_values)
 
 
-def survey(root: str, job: Job) -> Survey:
+def survey(root: str, job: Job, *, sync: bool = True) -> Survey:
     """Return the survey of a job: a task for a worker, because it plans the layout of a missing table.
 
-    The values that a plan has computed are staged as the blocks of the table, if the disk has room for them.
+    The values that a plan has computed are staged as the blocks of the table, if the disk has room for them. Without
+    `sync` the caller syncs them.
     """
     store = Path(root)
     name = job.name
@@ -72,7 +75,7 @@ def survey(root: str, job: Job) -> Survey:
     head = head_of(store, name)
     status = standing(store, name, request)
     if status.state != "missing":
-        return Survey(status, head)
+        return Survey(status, head, stored=revision_bytes(store, name, status.revision))
     text = planned(store, name, request)
     tabulated = False
     if text is None:
@@ -84,7 +87,7 @@ def survey(root: str, job: Job) -> Survey:
                 staging = prepare(store, name, request, text)
                 if values is not None and size_on_disk(layout) <= free_bytes(store):
                     for number, rows in enumerate(layout.blocks):
-                        write_block(str(staging), text, number, values[rows])
+                        write_block(str(staging), text, number, values[rows], sync=sync)
                     tabulated = True
         except BusyError:
             pass  # another build has the lock and most likely builds this table
@@ -104,6 +107,11 @@ def survey(root: str, job: Job) -> Survey:
         disk_bytes=disk,
         tabulated=tabulated,
     )
+
+
+def staged_blocks(root: Path, job: Job) -> list[Path]:
+    """Return the files of the blocks of a table that is staged."""
+    return [path for path in (request_path(root, job.name, digest(job.request)) / "table").rglob("*") if path.is_file()]
 
 
 def cost_of_plan(job: Job) -> int:

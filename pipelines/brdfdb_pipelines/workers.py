@@ -6,6 +6,7 @@ import logging
 import multiprocessing
 import os
 import signal
+import socket
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -13,28 +14,33 @@ from concurrent.futures import CancelledError, Executor, Future, ProcessPoolExec
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
 from typing import Any
 
-from brdfdb.errors import BrdfdbError, ParameterError, import_extra
+from brdfdb.errors import BrdfdbError, ParameterError, StoreError, import_extra
+from brdfdb.store.lock import is_taken
 
 _CONNECT_S = 10  # time for the scheduler to answer [s]
 _ASK_S = 1.0  # interval [s] at which a cluster is asked for its size, which may grow
 
 
 class WorkersError(BrdfdbError):
-    """Workers or a scheduler that do not answer."""
+    """Workers that fail, or a scheduler that does not answer."""
 
 
 @dataclass(frozen=True)
 class Workers:
     """An executor, the number of tasks that it runs at a time, and what stops it at once, where that is possible.
 
-    The number may change; it is 0 while there are no workers.
+    The number may change; it is 0 while there are no workers. Workers `apart` are on machines that may not see the
+    store.
     """
 
     executor: Executor
     slots: Callable[[], int]
     stop: Callable[[], None] = lambda: None
+    apart: bool = False
 
 
 class _InTurn(Executor):
@@ -112,8 +118,9 @@ def cluster(address: str) -> Iterator[Workers]:
     if ":" not in address:  # dask would wait for half a minute, and then print a traceback
         raise ParameterError("--scheduler", f"{address!r} is not an address such as tcp://10.0.0.1:8786", address)
     distributed: Any = import_extra("distributed")
-    # a scheduler that ends is reported below in one sentence; dask sets the levels of its loggers itself
-    for name in ("distributed", "distributed.client", "distributed.core", "tornado", "asyncio"):
+    # a scheduler that ends is reported below in one sentence; dask sets the levels of its loggers itself, and when
+    # Ctrl-C meets one of its requests, tornado reports a NameError of its function `sync`
+    for name in ("distributed", "distributed.client", "distributed.core", "tornado", "tornado.application", "asyncio"):
         logging.getLogger(name).setLevel(logging.CRITICAL + 1)
     try:
         client = distributed.Client(address, timeout=_CONNECT_S, set_as_default=False)
@@ -133,7 +140,46 @@ def cluster(address: str) -> Iterator[Workers]:
         return size
 
     with client:
-        yield Workers(client.get_executor(pure=False), slots)
+        yield Workers(client.get_executor(pure=False), slots, apart=True)
+
+
+def at_store(token: str, task: Callable[..., Any], *arguments: Any) -> Any:
+    """Run a task on a worker, after a look for a file in the store that the builder has locked.
+
+    StoreError, naming the worker, says that it does not see this file, or that it does not see the lock.
+    """
+    _check_store(token)
+    return task(*arguments)
+
+
+@lru_cache(maxsize=8)  # a worker looks once for each build
+def _check_store(token: str) -> None:
+    root = Path(token).parents[2]
+    try:
+        if is_taken(Path(token)):
+            return
+        sees = f"sees the store at {root}, but not its locks: mount it with locks that all machines share"
+    except OSError:
+        sees = f"does not see the store at {root}: mount one file system there on all machines"
+    raise StoreError(f"{_this_worker()} {sees}")
+
+
+def at_place(token: Path | None, task: Callable[..., None], *arguments: Any) -> None:
+    """Run a task on a worker, after a look for a file that the builder has put into a directory.
+
+    WorkersError says that the worker does not see it, or that the task failed; it names the worker.
+    """
+    if token and not token.is_file():
+        raise WorkersError(f"{_this_worker()} does not see {token.parent}: mount one file system there on all machines")
+    try:
+        task(*arguments)
+    except BrdfdbError as error:
+        raise WorkersError(f"{_this_worker()}: {error}") from error
+
+
+def _this_worker() -> str:
+    distributed: Any = import_extra("distributed")
+    return f"the worker {distributed.get_worker().address} on the host {socket.gethostname()}"
 
 
 def lost(error: BaseException) -> bool:

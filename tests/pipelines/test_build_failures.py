@@ -136,7 +136,7 @@ def test_a_full_disk_is_one_sentence_and_what_was_written_is_kept(
     def fill(path: Path, data: bytes, temporary: Path, **options: bool) -> Any:
         nonlocal written
         written += len(data)
-        if written > 60_000:
+        if written > 30_000:
             raise OSError(errno.ENOSPC, "No space left on device", str(path))
         return write(path, data, temporary, **options)
 

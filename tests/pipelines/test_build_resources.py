@@ -83,9 +83,9 @@ def test_a_disk_too_small_for_planned_tables_leaves_nothing(
     monkeypatch.setattr(build_survey.shutil, "disk_usage", lambda _: SimpleNamespace(free=free))
     names: list[str] = []
 
-    def write_block(directory: str, *given: Any) -> staging.Block:
+    def write_block(directory: str, *given: Any, **options: bool) -> staging.Block:
         names.append(Path(directory).parent.name)
-        return staging.write_block(directory, *given)
+        return staging.write_block(directory, *given, **options)
 
     monkeypatch.setattr(build_survey, "write_block", write_block)
     root = tmp_path / "store"

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+import logging
 import os
 import re
 import signal
+import socket
 import subprocess
 import sys
 import threading
@@ -18,7 +20,7 @@ from typing import Any
 import pytest
 
 import brdfdb
-from brdfdb.errors import ParameterError
+from brdfdb.errors import ParameterError, install_command
 from brdfdb_pipelines import build as builds
 from brdfdb_pipelines import workers
 from brdfdb_pipelines.build import build
@@ -196,6 +198,59 @@ def test_a_cluster_builds_what_threads_build_and_a_worker_that_is_killed_does_no
     assert other.stored_bytes == done.stored_bytes
 
 
+def test_a_worker_of_a_cluster_that_does_not_see_the_store_is_named(
+    cluster: tuple[str, list[subprocess.Popen[str]]],
+    recipe: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: Captured,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    root = "/proc/self/cwd/store"  # of a worker this is another directory
+    if not Path(root).parent.is_dir():
+        pytest.skip("no /proc here")
+    said = refused(capsys, "build", recipe, "--store", root, "--scheduler", cluster[0])
+    where = (
+        rf"^the worker tcp://127\.0\.0\.1:[0-9]+ on the host {re.escape(socket.gethostname())} does not see the store"
+    )
+    assert re.match(f"{where} at {root}: mount one file system there on all machines$", said)
+    assert staged(tmp_path / "store") == []
+    root = "/proc/self/cwd/edition"
+    said = refused(capsys, "build", recipe, "--to", root, "--scheduler", cluster[0])
+    assert re.match(f"{where.removesuffix(' the store')} {root}: mount one file system there on all machines$", said)
+    assert [*(tmp_path / "edition").iterdir()] == []
+
+
+def test_an_error_of_a_shard_names_the_worker(
+    cluster: tuple[str, list[subprocess.Popen[str]]], recipe: Path, tmp_path: Path, capsys: Captured
+) -> None:
+    place = tmp_path / "edition"
+    place.mkdir()
+    (place / "groups").write_bytes(b"")
+    said = refused(capsys, "build", recipe, "--to", place, "--scheduler", cluster[0])
+    assert re.match(rf"the worker tcp://127\.0\.0\.1:[0-9]+ on the host .*: cannot write groups/.* to {place}: ", said)
+    assert sorted(path.name for path in place.iterdir()) == ["groups"]
+
+
+def test_an_interrupt_of_a_request_to_the_scheduler_prints_nothing(
+    cluster: tuple[str, list[subprocess.Popen[str]]], caplog: pytest.LogCaptureFixture
+) -> None:
+    handler = signal.signal(signal.SIGINT, signal.default_int_handler)
+    logger = logging.getLogger("tornado.application")
+    logger.addHandler(caplog.handler)
+    try:
+        with workers.cluster(cluster[0]) as at:
+            at.executor._client.loop.add_callback(time.sleep, 1.0)  # type: ignore[attr-defined]
+            threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT)).start()
+            with pytest.raises(KeyboardInterrupt):
+                at.slots()
+            time.sleep(1.5)  # until the loop has met the cancellation
+    finally:
+        logger.removeHandler(caplog.handler)
+        signal.signal(signal.SIGINT, handler)
+    assert "NameError" not in caplog.text
+
+
 def test_a_cluster_simulates_what_threads_simulate(
     cluster: tuple[str, list[subprocess.Popen[str]]], tmp_path: Path, capsys: Captured
 ) -> None:
@@ -214,7 +269,7 @@ def test_a_scheduler_that_is_not_there_is_one_sentence(
     command = ("build", recipe, "--store", tmp_path / "store", "--scheduler", "tcp://127.0.0.1:9")
     assert refused(capsys, *command) == "no dask scheduler answers at tcp://127.0.0.1:9"
     monkeypatch.setitem(sys.modules, "distributed", None)
-    assert refused(capsys, *command) == "distributed is not installed; it comes with pip install 'brdfdb[dask]'"
+    assert refused(capsys, *command) == f"distributed is not installed; it comes with {install_command('dask')}"
     assert not (tmp_path / "store").exists()
 
 
