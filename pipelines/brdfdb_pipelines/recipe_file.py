@@ -7,7 +7,8 @@ import functools
 import itertools
 import math
 import os
-from collections.abc import Iterable, Mapping, Sequence
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib import resources
 from importlib.resources.abc import Traversable
@@ -26,7 +27,8 @@ from pydantic import (
 )
 
 from brdfdb.errors import MaterialError, ParameterError, sentence_of
-from brdfdb.materials import PAPERS, Material, exact_material, libraries, presets, written_name
+from brdfdb.geometry import radians
+from brdfdb.materials import PAPERS, Material, exact_material, libraries, presets, source_of, written_name
 from brdfdb.materials.polarised import polarised_source
 from brdfdb.models import MODELS
 from brdfdb.parameters import closest
@@ -38,6 +40,7 @@ from brdfdb.tables.mixture import refined_wavelengths
 from brdfdb.tables.planner import PLAN_VERSION, coarsest, offset_of, planned
 from brdfdb.tables.polarisation import GRID_TOLERANCE, planned_theta_d
 from brdfdb.tables.stokes import POLARISATION_VERSION
+from brdfdb.tables.sweeps import SHARED_PLAN_VERSION
 from brdfdb_pipelines import toml_file
 from brdfdb_pipelines.measured_job import MeasuredJob, measured_job
 from brdfdb_pipelines.recipe_grids import LIST, STRICT, Grids, Nodes, Range, RecipeError, nodes_of
@@ -61,18 +64,12 @@ def _known_library(name: str) -> str:
     return name
 
 
-class _Selected(NamedTuple):
-    """A material that a recipe selects, and the family that it is a member of, with its parameters there."""
-
-    material: Material
-    family: Mapping[str, Any] | None = None
-
-
 @dataclass(frozen=True)
 class Job:
     """One table to build: on a grid, or to a tolerance, of which one is None; `family` says what it is a member of.
 
-    `planned_on` has the formula that the model of `material` is the exact form of. It plans the axes faster.
+    `planned_on` has the formula that the model of `material` is the exact form of. It plans the axes faster. With
+    `shared_plan` the table may take the plan of another member of its family.
     """
 
     material: Material
@@ -84,6 +81,27 @@ class Job:
     family: Mapping[str, Any] | None = None
     polarised: bool = False
     hot_spot_tolerance: float | None = None
+    shared_plan: bool = False
+
+    @classmethod
+    def from_request(cls, request: Mapping[str, Any]) -> Job:
+        """Return the job of a `request`; BrdfdbError if this program cannot read its material."""
+        alike = request.get("planned_on")
+        material, planned_on = (None if one is None else source_of(one) for one in (request, alike))
+        assert isinstance(material, Material)
+        assert planned_on is None or isinstance(planned_on, Material)
+        return cls(
+            material,
+            None if request["wavelength_nm"] is None else np.array(request["wavelength_nm"]),
+            None if request["grid"] is None else Grid(request["grid"]),
+            request["tolerance"],
+            request["interpolation"] or "linear",
+            planned_on,
+            request.get("family"),
+            "polarised" in request,
+            request.get("hot_spot_tolerance"),
+            "shared_plan" in request,
+        )
 
     def layout(self) -> Layout:
         """Return the layout of the table; to a tolerance, this takes the planner a second or more."""
@@ -146,11 +164,13 @@ class Job:
         alike = {} if self.planned_on is None else {"planned_on": self.planned_on.document()}
         polarised = {"polarised": POLARISATION_VERSION} if self.polarised else {}
         hot_spot = {} if self.hot_spot_tolerance is None else {"hot_spot_tolerance": self.hot_spot_tolerance}
+        shared = {"shared_plan": SHARED_PLAN_VERSION} if self.shared_plan else {}
         return {
             **member,
             **alike,
             **polarised,
             **hot_spot,
+            **shared,
             "table_version": TABLE_VERSION,
             **self.material.document(),
             "wavelength_nm": None if self.wavelength_nm is None else self.wavelength_nm.tolist(),
@@ -159,6 +179,74 @@ class Job:
             "tolerance": self.tolerance,
             "plan_version": None if self.tolerance is None else PLAN_VERSION,
         }
+
+
+MemberPoint = tuple[int, tuple[float, ...]]  # number of a member from 0, values of the swept parameters as in files
+
+
+class Members(NamedTuple):
+    """Members of a family that a recipe asks for; memory does not grow with their number.
+
+    `bases` has the job of a member, and that of another if some members are isotropic and some are not: only the grid
+    of their jobs differs. `axes` has the values of the swept parameters, and the last runs fastest.
+    """
+
+    name: str
+    title: str
+    width: int  # digits of the numbers in the names of members
+    axes: dict[str, list[float]]
+    bases: list[Job]
+    numbers: Sequence[int]
+
+    @property
+    def size(self) -> int:
+        """Number of members that the axes make."""
+        return math.prod(map(len, self.axes.values()))
+
+    def points(self) -> Iterator[MemberPoint]:
+        """Yield the members, in the order of their names."""
+        for number in self.numbers:
+            rest = number
+            values = []
+            for axis in reversed(self.axes.values()):
+                rest, place = divmod(rest, len(axis))
+                values.append(axis[place])
+            yield number, tuple(reversed(values))
+
+    def jobs(self, points: Iterable[MemberPoint] | None = None) -> Iterator[Job]:
+        """Yield the jobs of members, by default of all; the recipe has checked that their parameters are in range."""
+        kinds = {base.material.anisotropic: base for base in self.bases}
+        material = self.bases[0].material
+        in_model = {written_name(parameter): parameter for parameter in material.spec.parameters}
+        swept = [in_model[x] for x in self.axes]
+        for number, values in self.points() if points is None else points:
+            parameters = dict(material.parameters)
+            for parameter, value in zip(swept, values, strict=True):
+                parameters[parameter.name] = float(radians(value)) if parameter.unit == "rad" else value
+            at = dict(zip(self.axes, values, strict=True))
+            names = {"name": self.member(number), "title": _title(self.title, at)}
+            member = material.model_copy(update={**names, "parameters": parameters})
+            base = kinds.get(member.anisotropic, self.bases[0])
+            yield replace(base, material=member, family={"name": self.name, "parameters": at})
+
+    def member(self, number: int) -> str:
+        """Return the name of a member."""
+        return f"{self.name}-{number + 1:0{self.width}d}"
+
+    def has(self, name: str) -> bool:
+        """Return True if a member of the family has this name."""
+        family, _, number = name.rpartition("-")
+        right = family == self.name and len(number) == self.width and number.isdecimal()
+        return right and 1 <= int(number) <= self.size
+
+    def matching(self, pattern: str) -> Sequence[int]:
+        """Return the numbers of the members whose names match a pattern: all if the name of the family does."""
+        if fnmatch.filter([self.name], pattern):
+            return range(self.size)
+        literal = re.split(r"[*?[]", pattern, maxsplit=1)[0]
+        if not f"{self.name}-".startswith(literal[: len(self.name) + 1]):
+            return []
+        return [number for number in range(self.size) if fnmatch.fnmatch(self.member(number), pattern)]
 
 
 class Recipe(BaseModel):
@@ -209,25 +297,29 @@ class Recipe(BaseModel):
     _folder: Path | None = PrivateAttr(default=None)  # that relative paths of CSV files begin at
     _measured: list[MeasuredJob] = PrivateAttr(default=[])
     _simulated: list[SimulatedJob] = PrivateAttr(default=[])
-    _checked: list[Job] | None = PrivateAttr(default=None)  # jobs of this recipe, which does not change once it is read
+    _checked: list[Job | Members] | None = PrivateAttr(default=None)  # a recipe does not change once it is read
+
+    def orders(self) -> list[Job | Members]:
+        """Return a job for each table of a model alone, and the members of families; RecipeError if it is wrong."""
+        if self._checked is None:
+            self._checked = self._orders()
+        return [*self._checked]
 
     def jobs(self) -> list[Job]:
         """Return a job for each table of a model that the recipe asks for; RecipeError if the recipe is wrong."""
-        if self._checked is None:
-            self._checked = self._jobs()
-        return [*self._checked]
+        return [job for one in self.orders() for job in (one.jobs() if isinstance(one, Members) else [one])]
 
     def measured_jobs(self) -> list[MeasuredJob]:
         """Return a job for each table of measured data that the recipe asks for; errors as by `jobs`."""
-        self.jobs()
+        self.orders()
         return [*self._measured]
 
     def simulated_jobs(self) -> list[SimulatedJob]:
         """Return a job for each table of a simulated surface that the recipe asks for; errors as by `jobs`."""
-        self.jobs()
+        self.orders()
         return [*self._simulated]
 
-    def _jobs(self) -> list[Job]:
+    def _orders(self) -> list[Job | Members]:
         if (self.tolerance is None) == (self.grids is None):
             raise RecipeError("tolerance, grids", "give exactly one of them")
         if self.interpolation is not None and self.grids is None:
@@ -246,7 +338,6 @@ class Recipe(BaseModel):
                 wavelengths = check_wavelengths(nodes_of("wavelengths_nm", self.wavelengths_nm))
             except ParameterError as error:
                 raise RecipeError(error.parameter, error.sentence) from None
-        jobs = []
         selected = self._selected(wavelengths)
         for kind, others in (("measured", self._measured), ("simulated", self._simulated)):
             if self.polarised and others:
@@ -256,34 +347,49 @@ class Recipe(BaseModel):
                 raise RecipeError("polarised", text)
             if self.hot_spot_tolerance is not None and others:
                 raise RecipeError("hot_spot_tolerance", f"is only for models, and {others[0].name} is {kind}")
-        for named, family in selected:
-            material = exact_material(named) if self.forms == "exact" and family is None else named
-            wavelength_nm = None
-            if material.spectral:
-                stated = material.wavelengths_nm
-                wavelength_nm = wavelengths if stated is None else np.array(stated)
-                if wavelength_nm is None:
-                    raise RecipeError(
-                        "wavelengths_nm", f"is missing; {material.name} is spectral and states no wavelengths"
-                    )
-            several = wavelength_nm is not None and wavelength_nm.size > 1
-            kind = "anisotropic" if material.anisotropic else "spectral" if several else "isotropic"
-            if self.grids is not None and kind not in grids:
-                raise RecipeError(f"grids.{kind}", f"is missing; {material.name} needs it")
-            job = Job(
-                *(material, wavelength_nm, grids.get(kind), self.tolerance, self.interpolation or "linear"),
-                planned_on=None if material is named or self.tolerance is None else named,
-                family=family,
-                polarised=self.polarised,
-                hot_spot_tolerance=self.hot_spot_tolerance,
-            )
-            try:
-                job.check()
-            except ParameterError as error:
-                where = "" if job.grid is None else f" on grids.{kind}"
-                raise RecipeError(f"{material.name}{where}", str(error)) from None
-            jobs.append(job)
-        return jobs
+        orders: list[Job | Members] = []
+        for one in selected:
+            if isinstance(one, Material):
+                orders.append(self._job(one, None, grids, wavelengths))
+            else:
+                bases = [self._job(job.material, job.family, grids, wavelengths) for job in one.bases]
+                orders.append(one._replace(bases=bases))
+        return orders
+
+    def _job(
+        self,
+        named: Material,
+        family: Mapping[str, Any] | None,
+        grids: Mapping[str, Grid],
+        wavelengths: NDArray[np.float64] | None,
+    ) -> Job:
+        """Return the job of a material, checked."""
+        material = exact_material(named) if self.forms == "exact" and family is None else named
+        wavelength_nm = None
+        if material.spectral:
+            stated = material.wavelengths_nm
+            wavelength_nm = wavelengths if stated is None else np.array(stated)
+            if wavelength_nm is None:
+                raise RecipeError(
+                    "wavelengths_nm", f"is missing; {material.name} is spectral and states no wavelengths"
+                )
+        several = wavelength_nm is not None and wavelength_nm.size > 1
+        kind = "anisotropic" if material.anisotropic else "spectral" if several else "isotropic"
+        if self.grids is not None and kind not in grids:
+            raise RecipeError(f"grids.{kind}", f"is missing; {material.name} needs it")
+        job = Job(
+            *(material, wavelength_nm, grids.get(kind), self.tolerance, self.interpolation or "linear"),
+            planned_on=None if material is named or self.tolerance is None else named,
+            family=family,
+            polarised=self.polarised,
+            hot_spot_tolerance=self.hot_spot_tolerance,
+        )
+        try:
+            job.check()
+        except ParameterError as error:
+            where = "" if job.grid is None else f" on grids.{kind}"
+            raise RecipeError(f"{material.name}{where}", str(error)) from None
+        return job
 
     def _grid(self, grid: BaseModel, name: str) -> Grid:
         parts: dict[str, list[float | Range]] = dict(grid)
@@ -315,8 +421,8 @@ class Recipe(BaseModel):
                 )
         return sweeps
 
-    def _selected(self, wavelengths: NDArray[np.float64] | None) -> list[_Selected]:
-        known = {name: _Selected(material) for name, material in presets(self.library).items()}
+    def _selected(self, wavelengths: NDArray[np.float64] | None) -> list[Material | Members]:
+        known = dict(presets(self.library))
         for name, table in self.define.items():
             if name in known:
                 raise RecipeError(f"define.{name}", "is the name of a preset; choose another name")
@@ -325,10 +431,10 @@ class Recipe(BaseModel):
                     raise RecipeError(f"define.{name}", "is not made of lower-case letters, digits and single hyphens")
                 continue
             try:
-                known[name] = _Selected(Material.from_table(name, table, self._folder))
+                known[name] = Material.from_table(name, table, self._folder)
             except MaterialError as error:
                 raise RecipeError(f"define.{name}", f"{error.parameter}: {error.sentence}") from None
-        families: dict[str, list[str]] = {}
+        families: dict[str, Members] = {}
         count = 0
         for name, table in self.sweep.items():  # before the first member of the first family is made
             count += math.prod(map(len, _swept(name, table).values()))
@@ -338,13 +444,13 @@ class Recipe(BaseModel):
                     f"the lists make {count} members; the families of a recipe have at most {_MOST_MEMBERS} in total",
                 )
         for name, table in self.sweep.items():
-            members = {member.material.name: member for member in _members(name, table, self._folder)}
-            for taken in (name, *members):
-                if taken in known or taken in families:
-                    raise RecipeError(f"sweep.{name}", f"{taken!r} is the name of another material or family")
-            known |= members
-            families[name] = list(members)
-        chosen: dict[str, _Selected] = {}
+            members = _members(name, table, self._folder)
+            others = [*known, *families]
+            taken = name if name in others or any(m.has(name) for m in families.values()) else None
+            if (taken := taken or next(filter(members.has, others), None)) is not None:
+                raise RecipeError(f"sweep.{name}", f"{taken!r} is the name of another material or family")
+            families[name] = members
+        chosen: dict[str, Material | Members] = {}
         measured = {name: table for name, table in self.define.items() if "samples" in table}
         simulated = {n: t for n, t in self.define.items() if n not in measured and not _SIMULATED.isdisjoint(t)}
         files: dict[str, MeasuredJob] = {}
@@ -355,15 +461,21 @@ class Recipe(BaseModel):
             files |= {x: measured_job(x, measured[x], self._folder, self.tolerance) for x in named if x not in files}
             of_rays = fnmatch.filter(simulated, pattern)
             surfaces |= {x: self._of_rays(x, wavelengths) for x in of_rays if x not in surfaces}
-            for family in fnmatch.filter(families, pattern):
-                matches += families[family]
-            if not matches and not named and not of_rays:
-                names = [*known, *measured, *simulated, *families]
-                raise RecipeError("materials", _no_match(pattern, names, self.library))
+            among = {name: numbers for name, whole in families.items() if (numbers := whole.matching(pattern))}
+            if not matches and not named and not of_rays and not among:
+                apart = [whole.member(number) for whole in families.values() for number in whole.numbers]
+                raise RecipeError(
+                    "materials", _no_match(pattern, [*known, *apart, *measured, *simulated, *families], self.library)
+                )
             chosen |= {name: known[name] for name in matches}
+            for name, numbers in among.items():
+                before = chosen.get(name)
+                if isinstance(before, Members):
+                    numbers = sorted({*numbers, *before.numbers})
+                chosen[name] = families[name]._replace(numbers=numbers)
         self._measured = list(files.values())
         self._simulated = list(surfaces.values())
-        return list(chosen.values())
+        return [one if isinstance(one, Material) else one._replace(bases=_kinds(one)) for one in chosen.values()]
 
     def _of_rays(self, name: str, wavelengths: NDArray[np.float64] | None) -> SimulatedJob:
         """Return the job of a simulated material; RecipeError if it cannot be built."""
@@ -404,25 +516,53 @@ def _swept(name: str, table: Mapping[str, Any]) -> dict[str, list[float]]:
     return axes
 
 
-def _members(name: str, table: Mapping[str, Any], folder: Path | None) -> list[_Selected]:
-    """Return the materials of a sweep, the last parameter varying fastest."""
+def _title(title: str, at: Mapping[str, float]) -> str:
+    """Return the title of a member."""
+    return ", ".join([title, *(f"{x} {value:.12g}" for x, value in at.items())])
+
+
+def _members(name: str, table: Mapping[str, Any], folder: Path | None) -> Members:
+    """Return the members of a sweep; RecipeError if the parameters of any are out of range."""
     axes = _swept(name, table)
-    width = max(3, len(str(math.prod(map(len, axes.values())))))
-    members = []
-    for number, values in enumerate(itertools.product(*axes.values()), start=1):
-        member = f"{name}-{number:0{width}d}"
+    count = math.prod(map(len, axes.values()))
+    title = table.get("title")
+    family = Members(name, title if isinstance(title, str) else "", max(3, len(str(count))), axes, [], range(count))
+
+    def checked(number: int) -> Material:
+        ((_, values),) = family._replace(numbers=[number]).points()
         at = dict(zip(axes, values, strict=True))
         fields = {**table, "parameters": {**table["parameters"], **at}}
-        if isinstance(title := table.get("title"), str) and title:
-            fields["title"] = ", ".join([title, *(f"{x} {value:.12g}" for x, value in at.items())])
+        if family.title:
+            fields["title"] = _title(family.title, at)
         try:
-            material = Material.from_table(member, fields, folder)
+            return Material.from_table(family.member(number), fields, folder)
         except MaterialError as error:
             if error.parameter in (*table["parameters"], *_parameters_of(table.get("model"))):
                 raise RecipeError(f"sweep.{name}.parameters.{error.parameter}", error.sentence) from None
             raise RecipeError(f"sweep.{name}", f"{error.parameter}: {error.sentence}") from None
-        members.append(_Selected(material, {"name": name, "parameters": at}))
-    return members
+
+    first = checked(0)
+    try:
+        checked(count - 1)  # values increase, and ranges are intervals: all members between are in range, too
+    except RecipeError:
+        step = 1
+        for axis in reversed(axes.values()):  # the first member that is wrong has the first value of all axes but one
+            for place in range(len(axis)):
+                checked(place * step)
+            step *= len(axis)
+        raise
+    return family._replace(bases=[Job(first, None, None, None, family={"name": name})])
+
+
+def _kinds(members: Members) -> list[Job]:
+    """Return the job of the first isotropic and of the first anisotropic of some members, as far as there are such."""
+    spec = members.bases[0].material.spec
+    kinds: dict[bool, Job] = {}
+    for job in members.jobs():
+        kinds.setdefault(job.material.anisotropic, job)
+        if len(kinds) == 2 or (spec.anisotropic is None and spec.lobe_axes is None):
+            break
+    return [*kinds.values()]
 
 
 def path_from(folder: Path, file: Path) -> str:
@@ -449,7 +589,7 @@ def load(path: Path | None = None, library: str = PAPERS, *, to_build: bool = Tr
         recipe = Recipe.model_validate(content)
         if path is not None:
             recipe._folder = path.parent
-        recipe.jobs()
+        recipe.orders()
     except OSError as error:
         refusal = RecipeError("", error.strerror or str(error))
     except toml_file.TomlError as error:

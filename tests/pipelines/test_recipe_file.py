@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+import tracemalloc
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from brdfdb.materials import presets
+from brdfdb.materials import Material, presets
 from brdfdb.tables.grids import HALF_DIFFERENCE_AXES
 from brdfdb.tables.layout import digest
 from brdfdb.tables.planner import PLAN_VERSION
-from brdfdb_pipelines.recipe_file import Job, load
-from brdfdb_pipelines.recipe_grids import Range
+from brdfdb_pipelines.recipe_file import Job, Members, load
+from brdfdb_pipelines.recipe_grids import Range, RecipeError
 from tests.pipelines.recipes import DEFINED, GOOD, HALF, SWEPT, TO_TOLERANCE, isotropic, recipe_file_of
 
 
@@ -179,6 +180,49 @@ def test_angles_of_a_sweep_are_degrees_and_numbers_are_what_was_meant(tmp_path: 
     assert recipe.sweeps(jobs)[0].axes == {
         "rho": [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7], "sigma_deg": [0.0, 20.0]
     }  # fmt: skip
+
+
+def test_members_are_the_materials_that_would_be_written_alone(tmp_path: Path) -> None:
+    text = SWEPT[: SWEPT.index("[sweep.mine.parameters]")].replace("ward", "oren_nayar") + (
+        "[sweep.mine.parameters]\nrho = [0.1, 0.7]\nsigma_deg = [0, 20, 60]\n"
+    )
+    for job in jobs_of(tmp_path, text):
+        assert job.family is not None
+        table = {"title": job.material.title, "model": "oren_nayar", "source": "me"}
+        alone = Material.from_table(job.name, {**table, "parameters": job.family["parameters"]})
+        assert alone == job.material
+
+
+@pytest.mark.parametrize(
+    ("parameters", "named", "value"),
+    [
+        ("rho = [0.1, 0.7]\nsigma_deg = [0, 100, 200]", "sigma_deg", "100 "),
+        ("rho = [0.1, 1.5, 2.5]\nsigma_deg = [0, 20]", "rho", "1.5 "),
+        ("rho = [0.1, 1.5]\nsigma_deg = [-10, 20]", "sigma_deg", "-10 "),
+    ],
+)
+def test_the_first_member_outside_of_the_range_is_named(
+    parameters: str, named: str, value: str, tmp_path: Path
+) -> None:
+    text = SWEPT[: SWEPT.index("[sweep.mine.parameters]")].replace("ward", "oren_nayar")
+    with pytest.raises(RecipeError, match=f"parameters.{named}: {value}is outside"):
+        jobs_of(tmp_path, f"{text}[sweep.mine.parameters]\n{parameters}\n")
+
+
+def test_members_take_no_memory_until_they_are_built(tmp_path: Path) -> None:
+    text = SWEPT[: SWEPT.index("[sweep.mine.parameters]")].replace("ward", "oren_nayar") + (
+        "[sweep.mine.parameters]\nrho = [{ start = 0.1, stop = 0.9, step = 0.01 }]\n"
+        "sigma_deg = [{ start = 1, stop = 80, step = 0.1 }]\n"
+    )
+    path = recipe_file_of(tmp_path, text)
+    load(path)  # loads the presets and the model
+    tracemalloc.start()
+    (members,) = load(path).orders()
+    used = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert isinstance(members, Members)
+    assert len(members.numbers) == 64_071
+    assert used < 10_000_000  # reading any file takes 4 MB
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from brdfdb_pipelines.commands import INTERRUPTED
-from brdfdb_pipelines.commands._arguments import add_store, add_workers, byte_count, place, share_cores
+from brdfdb_pipelines.commands._arguments import add_store, add_workers, byte_count, place, share_cores, tables
 
 if TYPE_CHECKING:
     from brdfdb_pipelines.build import Built
@@ -29,8 +29,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--library", metavar="NAME", help="build a library of presets, such as metals, instead of a recipe file"
     )
-    add_store(parser)
-    add_workers(parser, "DIR")
+    where = parser.add_mutually_exclusive_group()
+    add_store(where)
+    where.add_argument(
+        "--to",
+        type=tables,
+        metavar="DEST",
+        help="build an edition of the recipe, without a store, in a directory or s3://bucket/prefix, gs:// or az://; "
+        "workers share nothing but DEST",
+    )
+    parser.add_argument(
+        "--rewrite",
+        action="store_true",
+        help="with --to, also write tables that DEST has already, to repair what `brdfdb verify --store DEST` finds",
+    )
+    add_workers(parser, "DIR, or the directory DEST,")
     parser.add_argument(
         "--memory",
         type=byte_count,
@@ -46,9 +59,9 @@ def run(options: argparse.Namespace) -> int:
     try:
         _build(options)
     except KeyboardInterrupt:
+        kept = "complete shards" if options.to else "published tables, complete blocks and realisations"
         print(
-            "brdfdb: interrupted; published tables, complete blocks and realisations are preserved; "
-            f"to resume: {shlex.join(['brdfdb', *options.arguments])}",
+            f"brdfdb: interrupted; {kept} are preserved; to resume: {shlex.join(['brdfdb', *options.arguments])}",
             file=sys.stderr,
         )
         return INTERRUPTED
@@ -57,17 +70,22 @@ def run(options: argparse.Namespace) -> int:
 
 def _build(options: argparse.Namespace) -> None:
     from brdfdb._numba import when_compiling
-    from brdfdb.errors import ParameterError
+    from brdfdb.errors import ParameterError, counted
     from brdfdb.materials import PAPERS
-    from brdfdb_pipelines import recipe_file, workers
+    from brdfdb_pipelines import recipe_file, terminal, workers
     from brdfdb_pipelines.build import build, compile_kernels
     from brdfdb_pipelines.build_progress import Bars, print_json
     from brdfdb_pipelines.build_survey import machine_memory
+    from brdfdb_pipelines.edition_build import build_edition
 
     if options.recipe is not None and options.library is not None:
         raise ParameterError(
             "--library", f"cannot be combined with a recipe file, and {options.recipe} is given", options.library
         )
+    if options.rewrite and not options.to:
+        raise ParameterError("--rewrite", "is for editions, and --to is missing; a store repairs itself")
+    if options.to and options.memory is not None:
+        raise ParameterError("--memory", "cannot be combined with --to: a shard takes little memory", options.memory)
     recipe = recipe_file.load(options.recipe, options.library or PAPERS)
     start = time.perf_counter()
     memory: int | None = options.memory
@@ -81,6 +99,15 @@ def _build(options: argparse.Namespace) -> None:
         else:
             at = (workers.processes if options.processes else workers.threads)(options.jobs)
     with at as opened, nullcontext(print_json) if options.json else Bars() as report:
+        if options.to:
+            edition = build_edition(recipe, options.to, opened, report, rewrite=options.rewrite)
+            if not options.json:
+                print(
+                    f"{counted(edition.materials, 'table')} in {counted(edition.objects, 'object')}, "
+                    f"{terminal.size(edition.bytes)}, at {options.to}, in {time.perf_counter() - start:.1f} s; sha256 "
+                    f"{edition.digest}" + (edition.replaced and f"; it replaces {edition.replaced}")
+                )
+            return
         if not options.scheduler:
             compile_kernels(recipe, options.store, options.jobs, report)
         with when_compiling(lambda: report({"event": "compiling", "kernels": 0})):
