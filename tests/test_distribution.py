@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import os
+import shutil
 import subprocess
 import sys
 import tarfile
+import venv
 import zipfile
 from pathlib import Path
 
@@ -64,3 +67,42 @@ def test_the_wheel_runs_away_from_the_repository(built: Path, tmp_path: Path) ->
     done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=True)
     assert done.stdout.startswith(str(built / "wheel"))
     assert "rolled-brass" in done.stdout
+
+
+SCENE = """
+store = "edition"
+lights = [{ direction = [0, -1, 0] }]
+camera = { position = [0, -5, 0], target = [0, 0, 0], height = 2.2 }
+tolerance = { ciede2000 = 1.0 }
+[[objects]]
+name = "ball"
+material = "store:rolled-brass"
+[objects.shape]
+kind = "sphere"
+radius = 1
+"""
+
+
+@pytest.mark.judge
+def test_a_new_user_needs_the_wheel_and_an_edition_alone(built: Path, tmp_path: Path) -> None:
+    kept = ROOT / "tests" / "store" / "kept"
+    shutil.unpack_archive(kept / "edition-1.zip", tmp_path / "edition")
+    (tmp_path / "scene.toml").write_text(SCENE, encoding="utf-8")
+    venv.create(tmp_path / "venv", with_pip=True)
+    (wheel,) = built.glob("*.whl")
+    environment = {name: text for name, text in os.environ.items() if not name.startswith(("BRDFDB_", "PYTHON"))}
+
+    def run(program: str, *arguments: str) -> str:
+        command = [str(tmp_path / "venv" / "bin" / program), *arguments]
+        done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr
+        return done.stdout
+
+    run("pip", "install", "--quiet", "--no-compile", f"{wheel}[scenes]")
+    number = json.loads((kept / "numbers.json").read_text(encoding="utf-8"))["materials"]["rolled-brass"]["lookups"][0]
+    looked_up = run("brdfdb", "lookup", "rolled-brass", "30", "0", "30", "180", "--store", "edition")
+    assert looked_up == f"{number['f_r'][0]:.6g} /sr\n"
+    run("brdfdb", "plot", "rolled-brass", "--kind", "lobe", "--store", "edition", "--out", "plots")
+    run("brdfdb", "render", "scene.toml", "--width", "32", "--out", "pictures")
+    assert [path.suffix for path in (tmp_path / "plots").iterdir()] == [".png"]
+    assert {path.suffix for path in (tmp_path / "pictures").iterdir()} >= {".png", ".exr"}

@@ -19,7 +19,7 @@ from brdfdb.errors import FileFormatError, ParameterError, import_extra
 from brdfdb.formats._channels import names_of
 from brdfdb.formats._input import opened_text
 from brdfdb.formats._interface import TOLERANCE, FormatOption
-from brdfdb.formats._record import CONVENTION, history_of, record, specular_remark
+from brdfdb.formats._record import CONVENTION, discovery, history_of, record, specular_remark
 from brdfdb.measurements.conventions import ANGLE_WORDS, AZIMUTHS, RELATIVE, ListedRows
 from brdfdb.place import path_of
 
@@ -120,15 +120,16 @@ def dataset(table: Table, dense: DenseTable, verdict: str | None) -> xr.Dataset:
         names = {"standard_name": "radiation_wavelength", "long_name": "wavelength", "units": "nm"}
         coordinates["wavelength"] = ("wavelength", at, names)
     values = dense.values if spectral else dense.values[..., 0]
-    quantity = {"long_name": "bidirectional reflectance distribution function", "units": "sr-1"}
+    origin = {"coverage_content_type": "modelResult" if table.metadata.measured is None else "physicalMeasurement"}
+    quantity = {"long_name": "bidirectional reflectance distribution function", "units": "sr-1", **origin}
     variables: dict[str, Any] = {"brdf": ((*dense.grid.names, *spectral), values, quantity)}
     if specular_remark(table) and table.specular is not None:
         nodes = table.axes_deg["theta_i"] if table.specular_theta_deg is None else table.specular_theta_deg
         coordinates["specular_theta_i"] = ("specular_theta_i", nodes, {"units": "degree", "long_name": "theta_i"})
-        share = {"long_name": "reflectance of the specular part, in the exact mirror direction", "units": "1"}
+        share = {"long_name": "reflectance of the specular part, in the exact mirror direction", "units": "1", **origin}
         variables["specular_reflectance"] = (("specular_theta_i", *spectral), table.specular, share)
     known = dense_record(table, dense, verdict, specular=True)
-    attributes = plain_attributes({**known, "history": history_of(known)})
+    attributes = plain_attributes({**known, **discovery(known), "history": history_of(known)})
     return without_missing_coordinates(xr.Dataset(variables, coordinates, attributes))
 
 

@@ -9,6 +9,8 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from brdfdb.distribution import NO_LICENCE, distribution
+
 if TYPE_CHECKING:
     from brdfdb.formats._stated_error import FileError
     from brdfdb.measurements.instrument import Instrument
@@ -76,6 +78,38 @@ def specular_remark(table: Table) -> tuple[str, ...]:
 def history_of(document: Mapping[str, Any]) -> str:
     """Return the history of a file with a record, which netCDF files have by the CF conventions."""
     return f"{document['program']}: exported from revision {document['revision']}"
+
+
+def discovery(document: Mapping[str, Any]) -> dict[str, str]:
+    """Return the attributes that ACDD, the conventions for the discovery of data, adds to a record and to those of CF.
+
+    What the record does not have is left out: a table that no store holds has no digest. ACDD also lists attributes for
+    places on Earth and for times, which no table has.
+    """
+    from brdfdb.tables.xarray_view import CF_VERSION
+
+    stated = distribution()
+    creator = ", ".join(stated.authors)
+    title = document["title"] or document["name"]
+    found = {
+        "Conventions": f"{CF_VERSION}, ACDD-1.3",
+        "title": title,
+        "summary": f"BRDF of the material {document['name']} ({title}) over directions of light and viewer",
+        "keywords": ", ".join(stated.keywords),
+        "id": document["digest"] or "",
+        "naming_authority": "SHA-256 of the manifest of the revision" if document["digest"] else "",
+        "comment": "; ".join([document["holds"], *document["remarks"]]),
+        "processing_level": "measured" if document["measured"] else "computed from a model",
+        "standard_name_vocabulary": "CF Standard Name Table",
+        "license": stated.licence or NO_LICENCE,
+        "project": "brdfdb",
+        "product_version": document["revision"] or "",
+        "creator_name": creator,
+        "creator_url": stated.address,
+        "publisher_name": creator,
+        "publisher_url": stated.address,
+    }
+    return {key: value for key, value in found.items() if value}
 
 
 def frame_remark(table: Table, x_axis: str) -> tuple[str, ...]:

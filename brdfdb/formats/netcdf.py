@@ -39,8 +39,8 @@ def write(
     """Write f_r on a plain grid of angles as netCDF 3 (64-bit offset).
 
     ``brdf`` [1/sr] is float32 over the angles [degree] and, last, the wavelengths [nm]. ``specular_reflectance`` is the
-    specular part. Units and names follow the CF conventions. The record is in the attributes. The values take 100 MB at
-    most.
+    specular part. Units and names follow the CF conventions, attributes for discovery those of ACDD. The record is in
+    the attributes. The values take 100 MB at most.
 
     Raises
     ------
