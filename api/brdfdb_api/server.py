@@ -19,9 +19,9 @@ from typing import Any
 
 import uvicorn
 
-import brdfdb
 from brdfdb._numba import when_compiling
 from brdfdb.errors import BrdfdbError, ParameterError
+from brdfdb.store import open_tables
 from brdfdb_api import log
 from brdfdb_api.settings import Settings
 
@@ -43,13 +43,13 @@ class ServerError(BrdfdbError):
     """A service that cannot listen, or whose worker failed."""
 
 
-def serve(store_dir: Path, host: str, port: int, workers: int = 1, snapshot: str | None = None) -> None:
-    """Serve a store, or a snapshot of it, over HTTP until interrupted; port 0 is any free port.
+def serve(store: Path | str, host: str, port: int, workers: int = 1, snapshot: str | None = None) -> None:
+    """Serve a store, a snapshot of it, or an edition, over HTTP until interrupted; port 0 is any free port.
 
     Raises
     ------
     brdfdb.errors.StoreError
-        If there is no store at `store_dir`, or no such snapshot in it.
+        If there is no store or edition at `store`, or no such snapshot in it.
     ParameterError
         If the port is out of range, or a variable ``BRDFDB_*`` has a value that is not allowed.
     ServerError
@@ -57,15 +57,15 @@ def serve(store_dir: Path, host: str, port: int, workers: int = 1, snapshot: str
     """
     if not 0 <= port <= 65535:
         raise ParameterError("port", f"{port} is outside [0, 65535]", port, (0, 65535))
-    os.environ["BRDFDB_STORE"] = str(store_dir)  # for the workers
+    os.environ["BRDFDB_STORE"] = str(store)  # for the workers
     if snapshot is not None:
         os.environ["BRDFDB_SNAPSHOT"] = snapshot
     settings = Settings.from_environment()
-    brdfdb.open(store_dir, snapshot=settings.snapshot)
+    open_tables(store, snapshot=settings.snapshot)
     with contextlib.ExitStack() as stack:
         listener = stack.enter_context(_listening(host, port))
         address, port = listener.getsockname()[:2]
-        print(f"serving {store_dir} at http://{f'[{host}]' if ':' in host else host}:{port}/", flush=True)
+        print(f"serving {store} at http://{f'[{host}]' if ':' in host else host}:{port}/", flush=True)
         if not ipaddress.ip_address(address).is_loopback:
             print(OPEN_ADDRESS, flush=True)
         stack.enter_context(_ended_by_signals())

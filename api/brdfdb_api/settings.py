@@ -9,7 +9,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, ValidationError
 from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
 from brdfdb.errors import ParameterError, sentence_of
-from brdfdb.place import path_of
+from brdfdb.place import path_of, tables_place
 from brdfdb.store.summary_words import REPORT_OF_ALL, REPORT_OF_SOME
 
 LogLevel = Literal["info", "warning", "error"]
@@ -20,6 +20,7 @@ def _separated(value: Any) -> Any:
 
 
 Place = Annotated[Path, BeforeValidator(path_of)]
+TablesPlace = Annotated[Path | str, BeforeValidator(tables_place)]
 Positive = Annotated[int, Field(gt=0)]
 Origin = Annotated[str, Field(pattern=r"^(\*|https?://[^/]+)$")]
 
@@ -29,7 +30,10 @@ class Settings(BaseSettings):
 
     model_config = SettingsConfigDict(env_prefix="BRDFDB_", frozen=True)
 
-    store: Place = Field(default=Path("brdf-store"), description="directory that ``brdfdb build --store`` wrote")
+    store: TablesPlace = Field(
+        default=Path("brdf-store"),
+        description="directory that ``brdfdb build --store`` or ``brdfdb publish`` wrote, or the address of an edition",
+    )
     audit: Place | None = Field(default=None, description="file that ``brdfdb audit`` wrote; None: that in the store")
     max_points: Positive = Field(
         default=10_000, description="points in one JSON answer; .npy may have 100 times as many"
@@ -49,8 +53,9 @@ class Settings(BaseSettings):
     @property
     def audit_files(self) -> tuple[Path, ...]:
         """Paths of the audit reports: the given one, or those in the store on all and on some materials."""
-        in_store = (self.store / REPORT_OF_ALL, self.store / REPORT_OF_SOME)
-        return in_store if self.audit is None else (self.audit,)
+        if self.audit is not None:
+            return (self.audit,)
+        return () if isinstance(self.store, str) else (self.store / REPORT_OF_ALL, self.store / REPORT_OF_SOME)
 
     @classmethod
     def from_environment(cls) -> Self:

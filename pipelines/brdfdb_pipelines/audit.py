@@ -109,7 +109,7 @@ def run(
     OSError, ValueError
         If the report cannot be written there.
     """
-    store = brdfdb.open(root)
+    store = Store(root)
     materials = list(dict.fromkeys(names)) or list(store)
     for name in (*names, *allow):
         store.head(name)
@@ -163,7 +163,7 @@ def _done(
     if not fresh and tuple(audit_page.key_of(known[name]) for name in order) == before.page:
         return {name: Section(known[name], None) for name in order}
     # The longest tasks come first, so that no process works alone at the end
-    groups = _groups(brdfdb.open(root), [name for name in materials if name not in known])
+    groups = _groups(Store(root), [name for name in materials if name not in known])
     tasks: dict[tuple[str, ...], Task] = {group: partial(_audited, root, group, allow) for group in groups.long}
     tasks |= {(f"figure {key}",): partial(_drawn, key) for key in figures if f"figure {key}" not in known}
     tasks |= {group: partial(_audited, root, group, allow) for group in groups.short}
@@ -285,7 +285,7 @@ def _outcomes(tasks: dict[tuple[str, ...], Task], jobs: int) -> Iterator[tuple[t
 
 def _audited(root: Path, names: Sequence[str], allow: Sequence[str]) -> list[Section | StoreError]:
     """Audit materials; a damaged material has its error as the result, and the others are audited."""
-    store = brdfdb.open(root)
+    store = Store(root)
     outcomes: list[Section | StoreError] = []
     for name in names:
         try:
@@ -301,10 +301,10 @@ def _audited(root: Path, names: Sequence[str], allow: Sequence[str]) -> list[Sec
 
 def _families(root: Path, before: Former, jobs: int) -> list[FamilyAudit]:
     """Return the audits of the families of a store and of its snapshots, of which those of the same record are one."""
-    store = brdfdb.open(root)
+    store = Store(root)
     subjects = {("", name): store for name in store.families()}
     for snapshot in snapshot_names(root):
-        pinned = brdfdb.open(root, snapshot=snapshot)
+        pinned = Store(root, snapshot=snapshot)
         subjects |= {(snapshot, name): pinned for name in pinned.families()}
     known = {audited.subject_sha256: audited for audited in before.families}
     tasks: dict[tuple[str, ...], Task] = {}
@@ -326,7 +326,7 @@ def _families(root: Path, before: Former, jobs: int) -> list[FamilyAudit]:
 
 def _family_audited(root: Path, name: str, snapshot: str, sha256: str) -> list[FamilyAudit]:
     """Measure a family anew, and compare its record."""
-    store = brdfdb.open(root, snapshot=snapshot or None)
+    store = Store(root, snapshot=snapshot or None)
     about = {"family": name, "snapshot": snapshot, "subject_sha256": sha256}
     try:
         if not snapshot:

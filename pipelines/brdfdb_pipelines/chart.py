@@ -13,7 +13,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-import brdfdb
 from brdfdb.errors import BrdfdbError, ParameterError
 from brdfdb.forms.catalogue import Form, of_table
 from brdfdb.forms.tradeoff import STEPS, TIMED, Chart, Charts, FamilyChart, chart, chart_family
@@ -26,6 +25,7 @@ from brdfdb.tables.planner import check_tolerance
 from brdfdb.tables.table import Table, source_of_table
 from brdfdb_pipelines import chart_picture, recipe_file, terminal
 from brdfdb_pipelines.chart_picture import CLOSE, percent
+from brdfdb_pipelines.named_source import tables_at
 
 
 class _Subject(NamedTuple):
@@ -49,7 +49,7 @@ def run(
     names: Sequence[str],
     out: Path,
     *,
-    store: Path | None = None,
+    store: Path | str | None = None,
     recipe_path: Path | None = None,
     tolerances: Sequence[float] | None = None,
 ) -> Charts:
@@ -102,14 +102,14 @@ def _write(stem: Path, document: Charts, drawn: Chart | FamilyChart) -> None:
     stem.with_suffix(".png").write_bytes(chart_picture.png(drawn))
 
 
-def _subjects(names: Sequence[str], root: Path | None, recipe_path: Path | None) -> list[_Subject | _Family]:
+def _subjects(names: Sequence[str], root: Path | str | None, recipe_path: Path | None) -> list[_Subject | _Family]:
     """Return the subject of each name; names in the recipe precede those in the store."""
     recipe = recipe_file.load(recipe_path, to_build=False)
     listed = recipe.jobs()
     jobs = {job.material.name: job for job in listed}
     sweeps = {sweep.name: sweep for sweep in recipe.sweeps(listed)}
     measured = {job.name: job for job in recipe.measured_jobs()}
-    store: Store | None = brdfdb.open(root) if root is not None and root.exists() else None
+    store = tables_at(root)
     subjects: list[_Subject | _Family] = []
     for name in dict.fromkeys(names):
         table = store[name] if store is not None and name in store else None
@@ -125,7 +125,7 @@ def _subjects(names: Sequence[str], root: Path | None, recipe_path: Path | None)
         elif name in sweeps:
             members = [jobs[member] for member in sweeps[name].members]
             materials = [job.material for job in members]
-            same = store is not None and recorded(store.root, sweeps[name]) is not None
+            same = isinstance(store, Store) and recorded(store.root, sweeps[name]) is not None
             stored = store.family(name) if store is not None and same else None
             subjects.append(_Family(sweeps[name], materials, members[0].wavelength_nm, stored))
             continue

@@ -30,7 +30,7 @@ _MACHINE = {
     *(errno.ENOMEM, errno.EAGAIN, errno.EMFILE, errno.ENFILE),
 }
 # Commands that evaluate no model, or a single value: compiled kernels would take longer to load
-_WITHOUT_KERNELS = {"gc", "history", "list", "lookup", "rollback", "snapshot", "verify"}
+_WITHOUT_KERNELS = {"gc", "history", "list", "lookup", "publish", "rollback", "snapshot", "verify"}
 _TELL = {"audit", "build", "serve"}  # commands with their own message on the compilation of kernels
 # Allocations between two garbage collections. A command allocates modules and tables that live until its end; with
 # Python's 700, collections take up to a tenth of its time

@@ -50,7 +50,7 @@ CAPTION = (
 )
 
 
-def run(root: str, names: Sequence[str], out: Path, jobs: int) -> None:
+def run(root: Path | str, names: Sequence[str], out: Path, jobs: int) -> None:
     """Write the contact sheet of materials of a store, by default of all, as PNG or EXR, and print its size.
 
     An EXR is in linear light, and light brighter than white is not clipped. WriteError if the file cannot be written.

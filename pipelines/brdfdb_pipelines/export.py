@@ -9,12 +9,12 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import brdfdb
 from brdfdb.errors import CannotHoldError, ParameterError, WriteError, counted
 from brdfdb.formats import EXPORTERS, written_by
 from brdfdb.formats._record import extrapolated_remark
 from brdfdb.formats._written import Written
 from brdfdb.place import path_of
+from brdfdb.store import open_tables
 from brdfdb.store.summary_words import NOT_AUDITED, audited_materials, is_of_store
 from brdfdb_pipelines import terminal, workers
 
@@ -31,7 +31,7 @@ class _Export(NamedTuple):
 
 
 def run(
-    root: Path,
+    root: Path | str,
     names: list[str],
     directory: Path,
     file_format: str,
@@ -55,7 +55,7 @@ def run(
         If a file cannot be written.
     """
     directory = path_of(directory, "directory")
-    store = brdfdb.open(root)
+    store = open_tables(root)
     revisions = {name: store.head(name) for name in names or store}
     verdicts = _verdicts(root, audit, revisions)
     try:
@@ -85,11 +85,16 @@ def run(
 
 
 def _write(
-    root: Path, directory: Path, file_format: str, options: Mapping[str, Any], verdicts: Mapping[str, str], name: str
+    root: Path | str,
+    directory: Path,
+    file_format: str,
+    options: Mapping[str, Any],
+    verdicts: Mapping[str, str],
+    name: str,
 ) -> _Export:
     """Write the files of one material."""
     exporter = EXPORTERS[file_format]
-    table = brdfdb.open(root)[name]
+    table = open_tables(root)[name]
     verdict = verdicts.get(name, NOT_AUDITED)
     kinds = (options["kind"],) if "kind" in options else exporter.kinds
     paths = [(directory / f"{name}_{kind}{exporter.suffix}", {"kind": kind}) for kind in kinds]
@@ -103,7 +108,7 @@ def _write(
     return _Export(name, files)
 
 
-def _verdicts(root: Path, audit: Path | None, revisions: Mapping[str, str]) -> dict[str, str]:
+def _verdicts(root: Path | str, audit: Path | None, revisions: Mapping[str, str]) -> dict[str, str]:
     """Return the verdicts of an audit report on these revisions by name; none if the store has no report."""
     try:
         materials = audited_materials(root) if audit is None else json.loads(audit.read_bytes())["materials"]

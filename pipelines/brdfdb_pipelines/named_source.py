@@ -8,10 +8,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-import brdfdb
 from brdfdb.errors import ParameterError
 from brdfdb.materials import Source
 from brdfdb.parameters import closest
+from brdfdb.store import open_tables
+from brdfdb.store.edition.reader import Edition
+from brdfdb.store.reader import Store
 from brdfdb.tables.table import source_of_table
 from brdfdb_pipelines import recipe_file
 
@@ -23,7 +25,12 @@ class NamedSource(NamedTuple):
     wavelength_nm: NDArray[np.float64] | None
 
 
-def named_source(name: str, root: Path | None, recipe_path: Path | None) -> NamedSource:
+def tables_at(place: Path | str | None) -> Store | Edition | None:
+    """Return the store or the edition at a place; None where there is no place, or no directory."""
+    return None if place is None or (isinstance(place, Path) and not place.exists()) else open_tables(place)
+
+
+def named_source(name: str, root: Path | str | None, recipe_path: Path | None) -> NamedSource:
     """Return a material of the recipe (by default all presets) or of the store; ParameterError for an unknown name."""
     recipe = recipe_file.load(recipe_path, to_build=False)
     jobs = {job.material.name: job for job in recipe.jobs()}
@@ -33,7 +40,7 @@ def named_source(name: str, root: Path | None, recipe_path: Path | None) -> Name
     if name in measured:
         source = measured[name].lawful_source()
         return NamedSource(source, None if source.wavelengths_nm is None else np.array(source.wavelengths_nm))
-    store = brdfdb.open(root) if root is not None and root.exists() else None
+    store = tables_at(root)
     if store is not None and name in store:
         return NamedSource(source_of_table(store[name]), store[name].wavelength_nm)
     if name in (job.name for job in recipe.simulated_jobs()):

@@ -119,7 +119,7 @@ def test_a_bad_page_names_the_parameter(client: Client) -> None:
 def test_the_catalogue_is_sorted_and_what_is_unknown_comes_last(own: Path) -> None:
     publish(own, "half-tile", "lambert", rho=0.5, error=True)
     client = client_of(own)
-    (own / "materials" / "grey-felt" / "r000001" / "zarr.json").write_bytes(b"{}")
+    (own / "materials" / "grey-felt" / "HEAD.json").write_bytes(b"{}")
     for sort in ["error_p99", "-error_p99", "created", "-created", "bytes", "-bytes"]:
         lines = client.get(f"/v1/materials?sort={sort}").json()["materials"]
         assert len(lines) == 5

@@ -58,7 +58,7 @@ def test_help_of_commands_with_a_store_names_it(capsys: Captured) -> None:
     for command in COMMANDS:
         out = help_of(capsys, *command.split())
         assert out.startswith(f"usage: brdfdb {command} ")
-        assert "--store DIR" in out, command
+        assert "--store DIR" in out or "--store PLACE" in out, command
         assert f"\n    {command.split()[0]} " in listed
     exit_codes = listed.partition("exit codes:")[2].split("\n")
     assert [line.split()[0] for line in exit_codes if line] == ["0", "1", "2", "70", "130", "143"]

@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 
 import brdfdb
-from brdfdb.errors import ParameterError
+from brdfdb.errors import ParameterError, install_command
 from brdfdb_pipelines.commands import BUG, REFUSED
 from tests.pipelines.command import Captured, refused, run
 from tests.pipelines.recipes import isotropic
@@ -68,11 +68,11 @@ def test_what_the_user_can_act_on_is_one_sentence(monkeypatch: pytest.MonkeyPatc
         (MemoryError("Unable to allocate 8. TiB"), "Unable to allocate 8. TiB"),
         (
             ModuleNotFoundError("No module named 'jinja2'", name="jinja2"),
-            "jinja2 is not installed; it comes with pip install 'brdfdb[report]'",
+            f"jinja2 is not installed; it comes with {install_command('report')}",
         ),
         (
             ModuleNotFoundError("No module named 'matplotlib.figure'", name="matplotlib.figure"),
-            "matplotlib is not installed; it comes with pip install 'brdfdb[scenes]' or pip install 'brdfdb[report]'",
+            f"matplotlib is not installed; it comes with {install_command('scenes')} or {install_command('report')}",
         ),
     ):
         raising(monkeypatch, error)
@@ -232,7 +232,7 @@ def test_a_missing_server_is_one_sentence_that_names_the_extra(
 ) -> None:
     monkeypatch.delitem(sys.modules, "brdfdb_api.server", raising=False)
     monkeypatch.setitem(sys.modules, "uvicorn", None)
-    said = "uvicorn is not installed; it comes with pip install 'brdfdb[serve]'"
+    said = f"uvicorn is not installed; it comes with {install_command('serve')}"
     assert refused(capsys, "serve", "--store", built) == said
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -127,7 +128,7 @@ def test_no_paper_is_cited_for_a_table_without_a_record_of_its_source(tmp_path: 
         exported = "".join(path.read_text(encoding="utf-8") for path in (tmp_path / name).iterdir() if path.is_file())
         store = brdfdb.open(tmp_path)
         document = json.dumps(material_document(store[name], None), default=str)
-        line = json.dumps(line_of(name, store.path(name), store.summary(name)))
+        line = json.dumps(line_of(name, store.summary(name), partial(store.metadata, name)))
         said[name] = [
             any(word in text for word in ("He et al.", "he1991")) for text in (shown, exported, document, line)
         ]

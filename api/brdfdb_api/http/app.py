@@ -31,6 +31,7 @@ from brdfdb_api.http.views import EXPORTS_AT_ONCE, views
 from brdfdb_api.settings import Settings
 
 if TYPE_CHECKING:
+    from brdfdb.store.edition.reader import Edition
     from brdfdb.store.reader import Store
 
 DESCRIPTION = """\
@@ -65,7 +66,7 @@ class Application(FastAPI):
         return super().openapi()
 
 
-def create_app(settings: Settings | None = None, store: Store | None = None) -> FastAPI:
+def create_app(settings: Settings | None = None, store: Store | Edition | None = None) -> FastAPI:
     """Make the application.
 
     Parameters
@@ -92,7 +93,9 @@ def create_app(settings: Settings | None = None, store: Store | None = None) -> 
         openapi_url=None,  # `pages` has it
     )
     given = app.state.settings = settings or Settings.from_environment()
-    app.state.failed = functools.partial(problem_of, root=given.store.absolute())
+    app.state.failed = functools.partial(
+        problem_of, root=None if isinstance(given.store, str) else given.store.absolute()
+    )
     app.state.shelf = Shelf(given.store, given.audit_files, given.cache_bytes, given.snapshot, store)
     app.state.large = asyncio.Semaphore(LARGE_AT_ONCE)
     app.state.exports = asyncio.Semaphore(EXPORTS_AT_ONCE)

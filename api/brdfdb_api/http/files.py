@@ -11,9 +11,7 @@ from starlette.responses import Response, StreamingResponse
 
 from brdfdb import __version__
 from brdfdb.store.archive import ZIP, Group, root_group, zipped
-from brdfdb.store.decoding import checked_bytes
-from brdfdb.store.paths import manifest_path, pinned
-from brdfdb.store.records import check_manifest, read_manifest
+from brdfdb.store.paths import pinned
 from brdfdb_api.http.addresses import Revision, addresses, answers, both, is_pinned, shelf_of
 from brdfdb_api.http.errors import RequestError
 from brdfdb_api.http.queries import shortened
@@ -38,11 +36,11 @@ files = addresses()
 )
 def download(request: Request, name: str, revision: Revision = None) -> Response:
     """Return a revision as an uncompressed zip file for xarray.open_zarr(zarr.storage.ZipStore(path, mode="r"))."""
-    group, digest = shelf_of(request).located(name, revision)
-    headers = cache_headers(f"{name}-{pinned(group.name, digest)}-{__version__}", "zip", immutable=is_pinned(revision))
-    headers["Content-Disposition"] = f'attachment; filename="{name}-{group.name}.zarr.zip"'
-    listed = check_manifest(group, digest, contents=False)["files"]
-    contents = ((name, checked_bytes(group, name, listed)) for name in sorted(listed))
+    stored = shelf_of(request).revision(name, revision)
+    tag = f"{name}-{pinned(stored.number, stored.digest)}-{__version__}"
+    headers = cache_headers(tag, "zip", immutable=is_pinned(revision))
+    headers["Content-Disposition"] = f'attachment; filename="{name}-{stored.number}.zarr.zip"'
+    contents = ((key, stored.read(key)) for key in sorted(stored.manifest["files"]))
     pieces = zipped(contents, zipfile.ZIP_STORED)
     pieces = itertools.chain([next(pieces)], pieces)  # the first piece reads and checks every file
     return StreamingResponse(pieces, media_type=ZIP, headers=headers)
@@ -58,13 +56,13 @@ def stored_file(request: Request, name: str, revision: str, file: str) -> Respon
 
     Take REVISION with its digest from ``links.store`` of the material: all files then belong to the same table.
     """
-    group, digest = shelf_of(request).located(name, revision)
-    listed = check_manifest(group, digest, contents=False)["files"]
+    stored = shelf_of(request).revision(name, revision)
+    listed = stored.manifest["files"]
     if file not in listed:
         raise RequestError(404, f"{name} {revision} has no file {shortened(file)!r}")
-    content = checked_bytes(group, file, listed)  # a cache would never replace a damaged file
+    content = stored.read(file)  # a cache would never replace a damaged file
     is_json = file.endswith(".json")  # JSON may be compressed
-    tag = f"{name}-{group.name}-{listed[file]['sha256'][:16]}"
+    tag = f"{name}-{stored.number}-{listed[file]['sha256'][:16]}"
     headers = cache_headers(tag, "json" if is_json else "file", immutable=is_pinned(revision))
     return Document(content, headers) if is_json else _ranged(request, content, headers)
 
@@ -76,10 +74,9 @@ def stored_file(request: Request, name: str, revision: str, file: str) -> Respon
 )
 def manifest(request: Request, name: str, revision: str) -> Response:
     """Return the manifest of a revision: the size and the SHA-256 of each file."""
-    group, digest = shelf_of(request).located(name, revision)
-    read_manifest(group, digest)
-    headers = cache_headers(f"{name}-{pinned(group.name, digest)}", immutable=is_pinned(revision))
-    return Document(manifest_path(group).read_bytes(), headers)
+    stored = shelf_of(request).revision(name, revision)
+    headers = cache_headers(f"{name}-{pinned(stored.number, stored.digest)}", immutable=is_pinned(revision))
+    return Document(stored.manifest_bytes, headers)
 
 
 def _ranged(request: Request, content: bytes, headers: dict[str, str]) -> Response:

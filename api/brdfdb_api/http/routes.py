@@ -93,7 +93,7 @@ def catalogue(request: Request, query: Annotated[CatalogueQuery, InQuery()]) -> 
         members = shelf.store.family_content(query.family)["members"]
         names = [name for name in names if name in members]
     with refused():
-        places = query.chosen(names, shelf.summary)
+        places = query.chosen(names, shelf.line)
     after = query.after
     page = [place for place in places if place > after][: query.limit]
     lines = [shelf.summary(name) for _, _, name in page]

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from brdfdb.errors import ParameterError
-from brdfdb.place import path_of
+from brdfdb.place import path_of, tables_place
 from brdfdb.store import default_root
 
 MOST_JOBS = 1024  # threads or processes
@@ -25,6 +25,14 @@ def place(text: str) -> Path:
         raise argparse.ArgumentTypeError(error.sentence) from None
 
 
+def tables(text: str) -> Path | str:
+    """Return the place of a store or of an edition that an option names."""
+    try:
+        return tables_place(text)
+    except ParameterError as error:
+        raise argparse.ArgumentTypeError(error.sentence) from None
+
+
 def numbers(text: str) -> list[float]:
     """Return numbers with commas between them."""
     try:
@@ -33,7 +41,7 @@ def numbers(text: str) -> list[float]:
         raise argparse.ArgumentTypeError(f"{text!r} is no number, or numbers with commas between them") from None
 
 
-def add_store(parser: argparse.ArgumentParser) -> None:
+def add_store(parser: argparse._ActionsContainer) -> None:
     """Add the option --store DIR."""
     parser.add_argument(
         "--store",
@@ -41,6 +49,18 @@ def add_store(parser: argparse.ArgumentParser) -> None:
         default=default_root(),
         metavar="DIR",
         help="directory of the store (default: $BRDFDB_STORE, or %(default)s)",
+    )
+
+
+def add_tables(parser: argparse.ArgumentParser) -> None:
+    """Add the option --store PLACE of commands that read tables."""
+    parser.add_argument(
+        "--store",
+        type=tables,
+        default=default_root(),
+        metavar="PLACE",
+        help="directory of a store or of an edition, or the address of an edition: https://, s3:// or gs:// "
+        "(default: $BRDFDB_STORE, or %(default)s)",
     )
 
 

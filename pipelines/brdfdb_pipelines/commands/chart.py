@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from brdfdb_pipelines.commands._arguments import add_out, add_store, place
+from brdfdb_pipelines.commands._arguments import add_out, add_tables, place
 
 HELP = "Chart error against cost for all forms of materials or families; write pictures and JSON."
 
@@ -17,7 +17,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="NAME",
         help="presets, or materials and families of the recipe or the store",
     )
-    add_store(parser)
+    add_tables(parser)
     add_out(parser, "brdf-chart")
     parser.add_argument(
         "--recipe", type=place, metavar="FILE", help="a TOML file that defines materials, families and wavelengths"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from brdfdb_pipelines.commands._arguments import add_store, picture_file, place, share_cores
+from brdfdb_pipelines.commands._arguments import add_tables, picture_file, place, share_cores
 
 HELP = "Convert a material to another model: find the closest parameters, and state the remaining error."
 
@@ -13,7 +13,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the material, the model, fixed parameters, and the outputs."""
     parser.add_argument("name", metavar="NAME", help="a preset, or a material of the recipe or the store")
     parser.add_argument("--to", required=True, metavar="MODEL", help="the model to convert to")
-    add_store(parser)
+    add_tables(parser)
     parser.add_argument(
         "--recipe", type=place, metavar="FILE", help="a TOML file that defines materials and their wavelengths"
     )

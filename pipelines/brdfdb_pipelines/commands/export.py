@@ -6,7 +6,7 @@ import argparse
 
 from brdfdb.errors import ParameterError
 from brdfdb_pipelines.commands import VIOLATED
-from brdfdb_pipelines.commands._arguments import add_jobs, add_out, add_store, place
+from brdfdb_pipelines.commands._arguments import add_jobs, add_out, add_tables, place
 
 HELP = "Write tables as files of other formats."
 
@@ -24,7 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         sentence = f"Write {exporter.summary}.".replace("%", "%%")
         command = formats.add_parser(name, help=sentence, description=sentence)
         command.add_argument("names", nargs="*", metavar="NAME", help="materials")
-        add_store(command)
+        add_tables(command)
         command.add_argument("--all", action="store_true", help="export all materials of the store")
         add_out(command, f"brdf-{name}")
         command.add_argument(

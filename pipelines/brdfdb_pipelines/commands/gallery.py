@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from brdfdb_pipelines.commands._arguments import add_jobs, add_store, sheet_file
+from brdfdb_pipelines.commands._arguments import add_jobs, add_tables, sheet_file
 
 HELP = "Draw a contact sheet with a lit sphere of each material, as PNG or EXR."
 
@@ -12,7 +12,7 @@ HELP = "Draw a contact sheet with a lit sphere of each material, as PNG or EXR."
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the store, the materials and the file."""
     parser.add_argument("names", nargs="*", metavar="NAME", help="materials (default: all of the store)")
-    add_store(parser)
+    add_tables(parser)
     add_jobs(parser, "number of threads")
     parser.add_argument(
         "--out",

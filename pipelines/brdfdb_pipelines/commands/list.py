@@ -5,16 +5,18 @@ from __future__ import annotations
 import argparse
 import contextlib
 import itertools
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import brdfdb
 from brdfdb.errors import ParameterError, StoreError, counted, sentence_of
-from brdfdb_pipelines.commands._arguments import add_snapshot, add_store
+from brdfdb.store import open_tables
+from brdfdb_pipelines.commands._arguments import add_snapshot, add_tables
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from brdfdb.store.edition.reader import Edition
     from brdfdb.store.reader import Store
 
 HELP = "List the materials and families of the store, or the presets."
@@ -29,7 +31,7 @@ _WORDS = 5  # number of words that all sources must share to be printed once
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the store and the choice of presets."""
-    add_store(parser)
+    add_tables(parser)
     parser.add_argument("--presets", action="store_true", help="list the presets that recipes can name")
     parser.add_argument(
         "--library", metavar="NAME", help="with --presets: library to list, such as metals (default: papers)"
@@ -54,8 +56,8 @@ def run(options: argparse.Namespace) -> int:
         return 0
     if options.library is not None:
         raise ParameterError("--library", "is allowed only together with --presets", options.library)
-    root: Path = options.store
-    store = brdfdb.open(root, snapshot=options.snapshot)
+    root: Path | str = options.store
+    store = open_tables(root, snapshot=options.snapshot)
     names = _chosen(store, options)
     damaged = _print_materials(store, root, names) + ([] if given else _print_families(store))
     if damaged:
@@ -97,7 +99,7 @@ def _shared(sources: Sequence[str]) -> str:
     return f"{' '.join(start)} " if len(sources) > 1 and len(start) >= _WORDS else ""
 
 
-def _chosen(store: Store, options: argparse.Namespace) -> list[str]:
+def _chosen(store: Store | Edition, options: argparse.Namespace) -> list[str]:
     """Return the names of the materials that the options let through, in order; a damaged one has no line."""
     if options.sort == "name" and not any(getattr(options, flag) for flag in _FILTERS):
         return sorted(store)
@@ -107,7 +109,7 @@ def _chosen(store: Store, options: argparse.Namespace) -> list[str]:
 
     def line(name: str) -> dict[str, Any]:
         with contextlib.suppress(StoreError):
-            return line_of(name, store.path(name), store.summary(name))
+            return line_of(name, store.summary(name), partial(store.metadata, name))
         return {"name": name}
 
     try:
@@ -117,7 +119,7 @@ def _chosen(store: Store, options: argparse.Namespace) -> list[str]:
     return [name for _, _, name in choice.chosen(list(store), line)]
 
 
-def _print_materials(store: Store, root: Path, names: Sequence[str]) -> list[str]:
+def _print_materials(store: Store | Edition, root: Path | str, names: Sequence[str]) -> list[str]:
     """Print a line for each material from its pointer and the last audit; return a sentence for each damaged one."""
     from brdfdb.store.summary_words import (
         COLUMNS,
@@ -141,9 +143,9 @@ def _print_materials(store: Store, root: Path, names: Sequence[str]) -> list[str
         try:
             head = store.summary(name)
             if not (head["title"] and head["model"]):  # the pointer of a whole table has both
-                gaps = store.metadata(name).gaps
+                gaps = head["incomplete"] if "incomplete" in head else store.metadata(name).gaps
                 incomplete += [f"{name} {head['revision']} {gaps}"] if gaps else []  # a function has no model
-            surface = surface_error(head, store.path(name))
+            surface = surface_error(head, partial(store.attributes, name))
         except StoreError as error:
             damaged.append(str(error))
             continue
@@ -178,7 +180,7 @@ def _print_materials(store: Store, root: Path, names: Sequence[str]) -> list[str
     return damaged
 
 
-def _print_families(store: Store) -> list[str]:
+def _print_families(store: Store | Edition) -> list[str]:
     """Print a line for each family from its record alone; return a sentence for each damaged one."""
     from brdfdb_pipelines import terminal
 

@@ -7,12 +7,11 @@ import json
 import math
 import sys
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import brdfdb
 from brdfdb.errors import ParameterError
-from brdfdb_pipelines.commands._arguments import add_snapshot, add_store
+from brdfdb.store import open_tables
+from brdfdb_pipelines.commands._arguments import add_snapshot, add_tables
 
 if TYPE_CHECKING:
     from brdfdb.store.family import Family
@@ -30,7 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("name", metavar="NAME", help="material or family")
     for angle in _ANGLES:
         parser.add_argument(angle, type=float, metavar=angle.upper(), help="degrees")
-    add_store(parser)
+    add_tables(parser)
     parser.add_argument(
         "--wavelength-nm",
         type=float,
@@ -63,8 +62,7 @@ def run(options: argparse.Namespace) -> int:
     from brdfdb.tables.table import Table
 
     angles_deg = _checked_angles(options)
-    root: Path = options.store
-    store = brdfdb.open(root, snapshot=options.snapshot)
+    store = open_tables(options.store, snapshot=options.snapshot)
     source: Table | Family
     point: dict[str, Any] = {}
     if options.name not in store and options.name in store.families():

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
-from brdfdb_pipelines.commands._arguments import add_out, add_store, place, whole_number
+from brdfdb_pipelines.commands._arguments import add_out, add_tables, place, whole_number
 
 if TYPE_CHECKING:
     from brdfdb.measurements.gonioreflectometer import Gonioreflectometer
@@ -21,7 +21,7 @@ LIGHTS = ((15.0, 0.0), (30.0, 45.0), (45.0, 90.0), (60.0, 20.0))
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the material, the lights, and the instrument."""
     parser.add_argument("name", metavar="NAME", help="a preset, or a material of the recipe or the store")
-    add_store(parser)
+    add_tables(parser)
     parser.add_argument("--recipe", type=place, metavar="FILE", help="a TOML file that defines materials")
     parser.add_argument(
         "--light",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import io
 
-from brdfdb_pipelines.commands._arguments import add_out, add_store
+from brdfdb_pipelines.commands._arguments import add_out, add_tables
 
 HELP = "Plot lobe, cuts, albedo and slices of materials as PNG or SVG."
 
@@ -17,7 +17,7 @@ _DPI = 150
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the materials, the kind of plot and the format."""
     parser.add_argument("names", nargs="+", metavar="NAME", help="materials")
-    add_store(parser)
+    add_tables(parser)
     parser.add_argument("--kind", choices=KINDS, metavar="KIND", help=f"{', '.join(KINDS)} (default: all)")
     parser.add_argument("--format", choices=("png", "svg"), default="png", help="format of the files (default: png)")
     parser.add_argument("--wavelength", type=float, metavar="NM", help="wavelength in nanometres (default: 550)")
@@ -32,12 +32,12 @@ def run(options: argparse.Namespace) -> int:
     import matplotlib as mpl
     from matplotlib.figure import Figure
 
-    import brdfdb
+    from brdfdb.store import open_tables
     from brdfdb.store.files import write_file
     from brdfdb_pipelines import terminal
 
     kinds = KINDS if options.kind is None else (options.kind,)
-    store = brdfdb.open(options.store)
+    store = open_tables(options.store)
     revisions = {name: store.head(name) for name in options.names}  # refuses an unknown name before anything is drawn
     options.out.mkdir(parents=True, exist_ok=True)
     known: list[str] = []

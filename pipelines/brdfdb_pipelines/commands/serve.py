@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import argparse
 
-from brdfdb_pipelines.commands._arguments import MOST_JOBS, add_snapshot, add_store, whole_number
+from brdfdb_pipelines.commands._arguments import MOST_JOBS, add_snapshot, add_tables, whole_number
 
 HELP = "Serve lookups over HTTP."
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the store, the address and the number of processes."""
-    add_store(parser)
+    add_tables(parser)
     parser.add_argument("--host", default="127.0.0.1", help="address to listen on (default: %(default)s)")
     parser.add_argument(
         "--port", type=int, default=8000, help="port to listen on; 0: any free port (default: %(default)s)"

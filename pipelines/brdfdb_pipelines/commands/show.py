@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import brdfdb
-from brdfdb_pipelines.commands._arguments import add_snapshot, add_store
+from brdfdb.store import open_tables
+from brdfdb_pipelines.commands._arguments import add_snapshot, add_tables
 
 if TYPE_CHECKING:
     from brdfdb.materials import Material
@@ -30,7 +30,7 @@ ALBEDO_ANGLES_DEG = (0.0, 30.0, 60.0, 80.0)
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the material and the store."""
     parser.add_argument("name", metavar="NAME")
-    add_store(parser)
+    add_tables(parser)
     add_snapshot(parser)
 
 
@@ -38,18 +38,18 @@ def run(options: argparse.Namespace) -> int:
     """Print what the store, or a snapshot of it, states about a material or a family."""
     from brdfdb.store.summary_words import last_audit
 
-    root: Path = options.store
-    store = brdfdb.open(root, snapshot=options.snapshot)
+    root: Path | str = options.store
+    store = open_tables(root, snapshot=options.snapshot)
     if options.name not in store and options.name in store.families():
         _print_family(store.family(options.name))
     else:
         table = store[options.name]
         audited = last_audit(root).get((table.name, table.revision))
-        _print_material(table, store.path(options.name), audited)
+        _print_material(table, store.place_of(options.name), store.summary(options.name)["bytes"], audited)
     return 0
 
 
-def _print_material(table: Table, path: Path, audited: Audited | None) -> None:
+def _print_material(table: Table, place: str, stored: int, audited: Audited | None) -> None:
     from brdfdb.microgeometry.model_errors import NO_MAP, surface_error_of
     from brdfdb_pipelines import terminal
 
@@ -70,8 +70,7 @@ def _print_material(table: Table, path: Path, audited: Audited | None) -> None:
     source = _source_of(table)
     _print_validity(source, table.wavelength_nm)
     _print_albedo(table, source)
-    stored = sum(file.stat().st_size for file in path.rglob("*") if file.is_file())
-    print(f"  files       {path} (zarr v3, {terminal.size(stored)})")
+    print(f"  files       {place} (zarr v3, {terminal.size(stored)})")
 
 
 def _print_family(family: Family) -> None:
