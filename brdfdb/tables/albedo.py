@@ -45,7 +45,7 @@ _FLAT = 1e-4  # largest rise from light to light, relative to the albedo, of a b
 AlbedoAt = Callable[[Axis, float], Floats]
 
 
-class _Request(NamedTuple):
+class _AlbedoRequest(NamedTuple):
     """Lights [degree] at which a search needs albedos (theta_i, wavelengths), and their absolute tolerance [1]."""
 
     theta_i_deg: Axis
@@ -53,7 +53,7 @@ class _Request(NamedTuple):
 
 
 _Result = TypeVar("_Result")
-_Search = Generator[_Request, Floats, _Result]  # those of many materials go on together, each with its answers
+_Search = Generator[_AlbedoRequest, Floats, _Result]  # those of many materials go on together, each with its answers
 
 
 class TableAlbedo(NamedTuple):
@@ -444,7 +444,7 @@ def _of_source(source: Source, wavelength_nm: Axis | None) -> AlbedoAt:
     return albedo_at
 
 
-def _albedos_of(materials: Sequence[Material], requests: Sequence[_Request]) -> list[Floats]:
+def _albedos_of(materials: Sequence[Material], requests: Sequence[_AlbedoRequest]) -> list[Floats]:
     """Return the albedos of grey materials of one model, each at lights and to a tolerance of its own."""
     grids = [
         np.broadcast_arrays(radians(lights)[:, np.newaxis], radians(azimuths_deg(m)))
@@ -502,7 +502,7 @@ class _Albedos(NamedTuple):
 
 def _searched(lights: Axis) -> _Search[_Albedos]:
     """Return the albedos of lights, and of more lights around each maximum that may be the largest albedo."""
-    albedos = yield _Request(lights, LARGEST_TOLERANCE)
+    albedos = yield _AlbedoRequest(lights, LARGEST_TOLERANCE)
     for _ in range(_ROUNDS):
         of_lights = albedos.max(axis=1)
         between: set[float] = set()
@@ -516,7 +516,7 @@ def _searched(lights: Axis) -> _Search[_Albedos]:
             break
         added = np.array(sorted(between))
         order = np.argsort(np.append(lights, added))
-        albedos = np.concatenate([albedos, (yield _Request(added, LARGEST_TOLERANCE))])[order]
+        albedos = np.concatenate([albedos, (yield _AlbedoRequest(added, LARGEST_TOLERANCE))])[order]
         lights = np.append(lights, added)[order]
     return _Albedos(lights, albedos)
 
@@ -526,7 +526,7 @@ def _grazing(declared: float | None, largest: float, up_to_theta_i_deg: float) -
 
     def at(cos_i: float, before: float) -> _Search[float]:
         theta_i_deg = np.array([90.0 - float(degrees(np.arcsin(cos_i)))])
-        return float(np.max((yield _Request(theta_i_deg, min(_GRAZING_TOLERANCE * max(before, 1.0), 1.0)))))
+        return float(np.max((yield _AlbedoRequest(theta_i_deg, min(_GRAZING_TOLERANCE * max(before, 1.0), 1.0)))))
 
     if not np.isfinite(largest):
         return None
