@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from brdfdb.errors import import_extra
-from brdfdb.store.edition.groups import Group
+from brdfdb.store.edition.groups import EditionGroup
 from brdfdb.store.edition.records import RevisionFiles, sha256
 from brdfdb.tables.metadata import TableMetadata
 
@@ -39,7 +39,7 @@ COLUMNS = {
 }
 
 
-def rows_of(group: Group) -> list[dict[str, Any]]:
+def rows_of(group: EditionGroup) -> list[dict[str, Any]]:
     """Return the rows of the members of a group."""
     digest = group.digest
     return [{**_row(member), "group": digest, "place": place} for place, member in enumerate(group.members)]

@@ -29,7 +29,7 @@ _MOST_BYTES = 64 * 2**20  # largest size of the members of a group: a reader of 
 _MOST_WAITING_BYTES = 256 * 2**20  # largest size of the revisions that wait for others of their kind
 
 
-class Group(NamedTuple):
+class EditionGroup(NamedTuple):
     """A group, ready to be written: its files, its records, and its members in their order."""
 
     files: dict[str, bytes]
@@ -63,7 +63,7 @@ class Group(NamedTuple):
         }
 
 
-def grouped(revisions: Iterable[RevisionFiles], *, plain: bool = False) -> Iterator[Group]:
+def grouped(revisions: Iterable[RevisionFiles], *, plain: bool = False) -> Iterator[EditionGroup]:
     """Yield the groups of revisions, whose names are different and sorted.
 
     Revisions whose arrays have the same axes, shapes and attributes share groups of at most `MOST_MEMBERS`. With
@@ -119,7 +119,7 @@ def _main_chunks(revision: RevisionFiles) -> list[str]:
     return ["/".join([variable, "c", str(row), *rest]) for row in range(rows)]
 
 
-def group_of(members: Sequence[RevisionFiles], *, plain: bool = False) -> Group:
+def group_of(members: Sequence[RevisionFiles], *, plain: bool = False) -> EditionGroup:
     """Return the group of revisions of one kind."""
     if len(members) == 1:
         return _single(members[0], plain=plain)
@@ -142,10 +142,10 @@ def group_of(members: Sequence[RevisionFiles], *, plain: bool = False) -> Group:
     files = group_files(stacks, attributes, others)
     files[METADATA] = _with_note(files[METADATA], variable)
     records = encoded_records(members, shard, [{chunk: place} for place in places], files)
-    return Group(files, records, members)
+    return EditionGroup(files, records, members)
 
 
-def _single(member: RevisionFiles, *, plain: bool) -> Group:
+def _single(member: RevisionFiles, *, plain: bool) -> EditionGroup:
     """Return the group of a single revision: its files, with the chunks of the main variable in one shard."""
     files = dict(member.files)
     places: dict[str, Chunk] = {}
@@ -170,7 +170,7 @@ def _single(member: RevisionFiles, *, plain: bool) -> Group:
         if plain and variable == "parts":
             files |= _plain([member])
         files[METADATA] = _consolidated(member.metadata, files, described)
-    return Group(files, encoded_records([member], shard, [places], files), [member])
+    return EditionGroup(files, encoded_records([member], shard, [places], files), [member])
 
 
 def _consolidated(metadata: Mapping[str, Any], files: Mapping[str, bytes], described: Mapping[str, Any]) -> bytes:

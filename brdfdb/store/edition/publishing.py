@@ -9,13 +9,13 @@ from typing import Any, NamedTuple
 
 from brdfdb.errors import ParameterError, StoreError, counted, import_extra
 from brdfdb.store.edition.catalogue import encoded_rows, rows_of
-from brdfdb.store.edition.groups import Group, grouped
+from brdfdb.store.edition.groups import EditionGroup, grouped
 from brdfdb.store.edition.objects import ChangedRootError, Objects, Versioned, objects_at
 from brdfdb.store.edition.records import (
     FORMAT,
     FORMAT_VERSION,
+    EditionIndex,
     GroupEntry,
-    Index,
     RevisionFiles,
     catalogue_key,
     encoded_root,
@@ -137,7 +137,7 @@ def replaced(objects: Objects, before: Versioned, edition: PublishedEdition) -> 
         return "an edition that cannot be read"
 
 
-def write_group(objects: Objects, group: Group, *, rewrite: bool = False) -> None:
+def write_group(objects: Objects, group: EditionGroup, *, rewrite: bool = False) -> None:
     """Write a group, and last its records; unless the place has it, or with `rewrite`."""
     digest = group.digest
     if rewrite or not objects.has(records_key(digest)):
@@ -165,7 +165,7 @@ def finish_edition(
     objects.put({family_key(digests[name]): content for name, content in families.items()})
     objects.put({catalogue_key(sha256(catalogue)): catalogue})
     size = sum(entry["bytes"] for entry in entries) + len(catalogue) + sum(map(len, families.values()))
-    index: Index = {
+    index: EditionIndex = {
         "format": f"{FORMAT}-index",
         "version": FORMAT_VERSION,
         "materials": materials,

@@ -270,7 +270,7 @@ class Member:
         return content
 
 
-# Index and root
+# The index and the root
 
 
 class GroupEntry(TypedDict):
@@ -285,7 +285,7 @@ class GroupEntry(TypedDict):
     names: NotRequired[list[str]]
 
 
-class Index(TypedDict):
+class EditionIndex(TypedDict):
     """All that an edition has; its digest is that of the edition."""
 
     format: str
@@ -347,7 +347,7 @@ def records_key(digest: str) -> str:
     return f"groups/{digest}.records"
 
 
-def read_index(objects: Objects, digest: str) -> Index:
+def read_index(objects: Objects, digest: str) -> EditionIndex:
     """Return an index, checked; StoreError if it is missing or damaged."""
     key = index_key(digest)
     try:
@@ -355,4 +355,4 @@ def read_index(objects: Objects, digest: str) -> Index:
     except ValueError as error:
         raise StoreError(f"{objects.name} is damaged: {key} is not JSON") from error
     check_format(index, f"{FORMAT}-index", f"{objects.name}: {key}")
-    return record_of(index, Index, objects.name, key)
+    return record_of(index, EditionIndex, objects.name, key)
