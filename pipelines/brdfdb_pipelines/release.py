@@ -34,7 +34,7 @@ class ReleaseError(BrdfdbError):
     """A release that cannot be made."""
 
 
-def run(out: Path) -> documents.Edition:
+def run(out: Path) -> documents.EditionFacts:
     """Make a release in a new directory, and return what it says of its edition.
 
     Raises
@@ -67,7 +67,7 @@ def run(out: Path) -> documents.Edition:
     return edition
 
 
-def _made(clone: Path, work: Path, part: Path) -> documents.Edition:
+def _made(clone: Path, work: Path, part: Path) -> documents.EditionFacts:
     """Make all parts of a release; the site, which runs page by page, beside the tables that it does not show."""
     command = partial(_run, clone, work)
     program = partial(command, "brdfdb_pipelines.cli")
@@ -160,7 +160,7 @@ def _running(
             process.wait()
 
 
-def _publish(clone: Path, store: Path, part: Path) -> documents.Edition:
+def _publish(clone: Path, store: Path, part: Path) -> documents.EditionFacts:
     """Publish the store as an edition and return its facts."""
     of_library = {title: set(presets(name)) for name, title in libraries().items()}
     names = set(brdfdb.open(store))
@@ -171,7 +171,7 @@ def _publish(clone: Path, store: Path, part: Path) -> documents.Edition:
         lock.unlink()
     (catalogue,) = (part / "edition" / "catalogue").iterdir()
     columns = import_extra("pyarrow.parquet").read_schema(catalogue)
-    return documents.Edition(
+    return documents.EditionFacts(
         digest=published.digest,
         date=git(clone, "show", "-s", "--format=%cs").strip(),
         libraries={title: len(members & names) for title, members in of_library.items()},
@@ -183,7 +183,7 @@ def _publish(clone: Path, store: Path, part: Path) -> documents.Edition:
     )
 
 
-def _describe(clone: Path, part: Path, edition: documents.Edition) -> None:
+def _describe(clone: Path, part: Path, edition: documents.EditionFacts) -> None:
     """Write the documents of an edition, and the checksums of all files."""
     citation = (clone / "CITATION.cff").read_text(encoding="utf-8")
     page = part / "site" / "index.html"

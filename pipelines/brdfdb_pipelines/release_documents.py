@@ -38,7 +38,7 @@ _CONTEXT: Json = {
 _TYPES = {"string": "sc:Text", "int64": "sc:Integer", "double": "sc:Float", "bool": "sc:Boolean"}  # by those of Parquet
 
 
-class Edition(NamedTuple):
+class EditionFacts(NamedTuple):
     """Facts of an edition that the documents state."""
 
     digest: str
@@ -67,7 +67,7 @@ class Edition(NamedTuple):
         return f"{distribution().summary}. Each table states its error. {contents}."
 
 
-def citation(text: str, edition: Edition) -> str:
+def citation(text: str, edition: EditionFacts) -> str:
     """Return the text of CITATION.cff with the date of the release and a reference to the edition."""
     value = f'value: "sha256:{edition.digest}"'
     said = 'description: "digest of the edition"'
@@ -84,7 +84,7 @@ def citation(text: str, edition: Edition) -> str:
     return f"{text}\n{reference}"
 
 
-def datacite(text: str, edition: Edition) -> Json:
+def datacite(text: str, edition: EditionFacts) -> Json:
     """Return the record of the edition for DataCite; `text` is CITATION.cff, whose DOIs it is derived from."""
     stated = distribution()
     rights = {"rights": stated.licence, "rightsIdentifier": stated.licence, "rightsIdentifierScheme": "SPDX"}
@@ -111,7 +111,7 @@ def datacite(text: str, edition: Edition) -> Json:
     }
 
 
-def schema_org(edition: Edition) -> Json:
+def schema_org(edition: EditionFacts) -> Json:
     """Return the edition as a Dataset of schema.org, for the front page of the site, which lies beside the edition."""
     return {
         "@context": "https://schema.org/",
@@ -134,7 +134,7 @@ def schema_org(edition: Edition) -> Json:
     }
 
 
-def croissant(edition: Edition) -> Json:
+def croissant(edition: EditionFacts) -> Json:
     """Return the edition as Croissant 1.0: the catalogue as a file and a set of records, a row a material."""
     name = "materials"
     return {
@@ -182,7 +182,7 @@ def front_page(text: str, dataset: Json) -> str:
     return text.replace("</head>", f'<script type="application/ld+json">{script}</script>\n</head>', 1)
 
 
-def _dataset(edition: Edition) -> Json:
+def _dataset(edition: EditionFacts) -> Json:
     """Return the fields of schema.org that its Dataset and that of Croissant share."""
     stated = distribution()
     creators = [{"@type": "Organization", "name": name} for name in stated.authors]

@@ -48,7 +48,7 @@ def kept(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def made(kept: Path, tmp_path: Path) -> tuple[Path, documents.Edition]:
+def made(kept: Path, tmp_path: Path) -> tuple[Path, documents.EditionFacts]:
     """A release of the kept store, without the program, and the facts that it states."""
     (tmp_path / "site").mkdir()
     (tmp_path / "site" / "index.html").write_text(FRONT)
@@ -160,7 +160,7 @@ def test_a_store_with_other_materials_is_not_released(
 # What the documents say
 
 
-def test_the_numbers_are_those_of_the_edition(made: tuple[Path, documents.Edition]) -> None:
+def test_the_numbers_are_those_of_the_edition(made: tuple[Path, documents.EditionFacts]) -> None:
     out, edition = made
     opened = Edition(out / "edition")
     assert edition.digest == opened.digest
@@ -184,7 +184,7 @@ def test_the_numbers_are_those_of_the_edition(made: tuple[Path, documents.Editio
 
 
 def test_what_the_owner_must_state_is_marked_and_what_he_stated_is_taken(
-    made: tuple[Path, documents.Edition], monkeypatch: pytest.MonkeyPatch
+    made: tuple[Path, documents.EditionFacts], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     out, edition = made
     for name in ("CITATION.cff", "datacite.json", "croissant.json"):
@@ -201,7 +201,7 @@ def test_what_the_owner_must_state_is_marked_and_what_he_stated_is_taken(
     assert UNSTATED not in cited + json.dumps([record, documents.croissant(edition), documents.schema_org(edition)])
 
 
-def test_the_checksums_are_those_of_all_files(made: tuple[Path, documents.Edition]) -> None:
+def test_the_checksums_are_those_of_all_files(made: tuple[Path, documents.EditionFacts]) -> None:
     out, _ = made
     listed = dict(line.split("  ")[::-1] for line in (out / release.CHECKSUMS).read_text().splitlines())
     files = {path.relative_to(out).as_posix(): path for path in out.rglob("*") if path.is_file()}
@@ -221,7 +221,7 @@ print(json.dumps([row["materials/name"].decode() for row in dataset.records("mat
 
 @pytest.mark.judge
 @pytest.mark.skipif(Path() == JUDGES, reason="BRDFDB_CF names no folder of judges")
-def test_judges_of_documents_find_no_fault(made: tuple[Path, documents.Edition]) -> None:
+def test_judges_of_documents_find_no_fault(made: tuple[Path, documents.EditionFacts]) -> None:
     out, _ = made
     subprocess.run([JUDGES / "cffconvert", "--validate"], cwd=out, check=True)
     done = subprocess.run([JUDGES / "python", "-c", READ_ALL], cwd=out, capture_output=True, text=True, check=True)
