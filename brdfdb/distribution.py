@@ -1,4 +1,4 @@
-"""What ``pyproject.toml`` states of this distribution, with marks where its owner has not stated something yet."""
+"""The statements of ``pyproject.toml`` on this distribution, with marks where its owner has yet to state something."""
 
 from __future__ import annotations
 

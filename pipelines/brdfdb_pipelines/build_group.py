@@ -31,7 +31,7 @@ class GroupResult(NamedTuple):
 
 
 class GroupTable(NamedTuple):
-    """What became of a table in a group: its survey, revision and size [byte], and which blocks existed already.
+    """The result for a table of a group: its survey, revision and size [byte], and the blocks that existed already.
 
     A table is "busy" while another build has its lock.
     """

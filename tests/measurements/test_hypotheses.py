@@ -66,7 +66,7 @@ def test_right_files_are_not_doubted(directions: dict[str, Any], noise: float) -
 
 
 def test_pairs_state_both_numbers_and_the_option() -> None:
-    """Of f_r = 0.019 cos theta_i, pairs differ by the cosines, and agree exactly once they are divided."""
+    """Pairs of f_r = 0.019 cos theta_i differ by the cosines, and agree exactly once they are divided."""
     known = statement(sheet(lambda at: 0.019 * np.cos(at.theta_i), polar=LIGHTS, turns=(0.0, 180.0), noise=0.0))
     a, b = np.cos(np.radians(np.array(LIGHTS)))[np.array(np.triu_indices(4, 1))]
     expected = 100.0 * np.median(np.abs(a - b) / (a + b))
@@ -188,7 +188,7 @@ def test_rings_with_two_lobes_or_a_hole_do_not_tell_elevations(full: bool) -> No
 
 
 def test_lobes_in_the_plane_that_fade_may_be_of_elevations() -> None:
-    """Of scans in the plane the heights of lobes tell, which the surface may have, too: it is said, and not doubted."""
+    """Heights of lobes in scans in the plane may be those of the surface: they are stated, and raise no doubt."""
     plane = {"lights": np.arange(10.0, 81.0, 10.0), "polar": np.arange(5.0, 86.0, 5.0), "turns": (0.0, 180.0)}
     right = sheet("glossy paint", **plane)
     wrong = replace(right, theta_i=0.5 * np.pi - right.theta_i, theta_r=0.5 * np.pi - right.theta_r)

@@ -6,18 +6,18 @@ together. Any reader of zarr v3 opens a group.
 
 from __future__ import annotations
 
+import itertools
 import json
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
-import google_crc32c
 import numpy as np
 import zarr
 from numpy.typing import NDArray
 from zarr.storage import MemoryStore
 
-from brdfdb.store.codec import chunk_bytes, group_files
+from brdfdb.store.codec import chunk_bytes, group_files, shard_bytes
 from brdfdb.store.decoding import is_ours, read_group
 from brdfdb.store.edition.records import Chunk, GroupEntry, RevisionFiles, encoded_records, sha256
 from brdfdb.store.paths import METADATA
@@ -138,7 +138,8 @@ def group_of(members: Sequence[RevisionFiles], *, plain: bool = False) -> Editio
     others |= shared
     if plain and variable == "parts":
         others |= _plain(members)
-    attributes = _common_attributes(members)
+    known, *more = [member.metadata["attributes"] for member in members]
+    attributes = {key: value for key, value in known.items() if all(each.get(key) == value for each in more)}
     files = group_files(stacks, attributes, others)
     files[METADATA] = _with_note(files[METADATA], variable)
     records = encoded_records(members, shard, [{chunk: place} for place in places], files)
@@ -192,15 +193,10 @@ def _dims(array: Mapping[str, Any]) -> list[str]:
 
 
 def _shard(chunks: Sequence[bytes]) -> tuple[list[Chunk], bytes]:
-    """Return the places of chunks in a shard, and the shard as the codec `sharding_indexed` of zarr v3 reads it."""
-    places = []
-    start = 0
-    for chunk in chunks:
-        places.append(Chunk(start, len(chunk)))
-        start += len(chunk)
-    index = np.array(places, dtype="<u8").tobytes()
-    checksum: int = google_crc32c.value(index)
-    return places, b"".join([*chunks, index, checksum.to_bytes(4, "little")])
+    """Return the places of chunks in a shard, and the shard."""
+    starts = itertools.accumulate(map(len, chunks), initial=0)
+    places = [Chunk(start, len(chunk)) for start, chunk in zip(starts, chunks, strict=False)]  # the last start: the end
+    return places, shard_bytes(chunks, len(chunks))
 
 
 def _sharded(array: Mapping[str, Any], count: int, *, stacked: bool) -> bytes:
@@ -274,12 +270,6 @@ def _values(member: RevisionFiles, name: str, array: Mapping[str, Any]) -> NDArr
     stored = read_group(lambda key: json.dumps(document).encode() if key == METADATA else member.files[key])
     assert stored is not None
     return stored.arrays[name]
-
-
-def _common_attributes(members: Sequence[RevisionFiles]) -> dict[str, Any]:
-    """Return the attributes that all members have alike."""
-    first, *others = [member.metadata["attributes"] for member in members]
-    return {key: value for key, value in first.items() if all(other.get(key) == value for other in others)}
 
 
 def _with_note(metadata: bytes, variable: str) -> bytes:
